@@ -1,0 +1,21 @@
+//! FMLGS: train 3D Gaussians from posed photos while you watch, and look around in them.
+//!
+//! The data flow, one module per arrow (a module uses only those above it):
+//!
+//! * [`math`]: spherical harmonics, rotations, stable scalar functions, statistics, colour maps;
+//! * [`scene`]: what a scene is made of: cameras, photos, Gaussians, masks; no I/O;
+//! * [`io`]: one file per format, and one `open(path)` that sniffs;
+//! * [`render`]: the splat renderer, forward and backward, on the CPU and on the GPU;
+//! * [`pipeline`]: training, evaluation, synthetic data; reports to an `Observer` only;
+//! * [`worker`]: the background thread that runs the pipeline for the window;
+//! * [`cli`]: one file per subcommand;
+//! * [`ui`]: the window.
+
+pub mod cli;
+pub mod io;
+pub mod math;
+pub mod pipeline;
+pub mod render;
+pub mod scene;
+pub mod ui;
+pub mod worker;

@@ -1,0 +1,8 @@
+//! Plain mathematics with no knowledge of scenes: everything here is pure and total.
+
+pub mod real;
+pub mod rotation;
+pub mod sh;
+pub mod stats;
+
+pub use real::Real;

@@ -1,0 +1,71 @@
+//! Quaternions and rotation matrices, with the degenerate cases defined.
+
+use glam::DMat3;
+
+use super::Real;
+
+/// The rotation matrix (rows) of the unit quaternion along `q = [w, x, y, z]`, or `None` if `q`
+/// is zero, not finite, or has no usable length (its squares under- or overflow even after scaling).
+pub fn matrix_from_quaternion<R: Real>(q: [R; 4]) -> Option<[[R; 3]; 3]> {
+    let u = unit_quaternion(q)?;
+    let [w, x, y, z] = u;
+    let (one, two) = (R::ONE, R::of(2.0));
+    Some([
+        [one - two * (y * y + z * z), two * (x * y - w * z), two * (x * z + w * y)],
+        [two * (x * y + w * z), one - two * (x * x + z * z), two * (y * z - w * x)],
+        [two * (x * z - w * y), two * (y * z + w * x), one - two * (x * x + y * y)],
+    ])
+}
+
+/// `q` scaled to unit length. Scales by the largest component first, so neither tiny nor huge
+/// quaternions lose their direction.
+pub fn unit_quaternion<R: Real>(q: [R; 4]) -> Option<[R; 4]> {
+    let largest = q.iter().fold(R::ZERO, |m, c| m.max(c.abs()));
+    if !(largest > R::ZERO) || q.iter().any(|c| !c.is_finite()) {
+        return None;
+    }
+    let s = q.map(|c| c / largest);
+    let length = (s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + s[3] * s[3]).sqrt();
+    let u = s.map(|c| c / length);
+    u.iter().all(|c| c.is_finite()).then_some(u)
+}
+
+/// How far `m` is from a proper rotation: the largest entry of `|m mᵀ - I|`, or infinity if its
+/// determinant is not positive or an entry is not finite.
+pub fn rotation_error(m: &DMat3) -> f64 {
+    if !m.is_finite() || m.determinant() <= 0.0 {
+        return f64::INFINITY;
+    }
+    let d = *m * m.transpose() - DMat3::IDENTITY;
+    d.to_cols_array().iter().fold(0.0, |w, e| w.max(e.abs()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scale_of_a_quaternion_does_not_matter() {
+        let q = [0.3_f32, -0.2, 0.7, 0.1];
+        let a = matrix_from_quaternion(q).expect("valid");
+        for s in [1e-30_f32, 1e-3, 1e30] {
+            let b = matrix_from_quaternion(q.map(|c| c * s)).expect("valid");
+            for (x, y) in a.iter().flatten().zip(b.iter().flatten()) {
+                assert!((x - y).abs() < 1e-5, "{x} {y}");
+            }
+        }
+    }
+
+    #[test]
+    fn degenerate_quaternions_are_refused() {
+        assert!(matrix_from_quaternion([0.0_f32; 4]).is_none());
+        assert!(matrix_from_quaternion([f32::NAN, 0.0, 0.0, 1.0]).is_none());
+        assert!(matrix_from_quaternion([f32::INFINITY, 0.0, 0.0, 1.0]).is_none());
+    }
+
+    #[test]
+    fn a_reflection_is_no_rotation() {
+        assert!(rotation_error(&DMat3::IDENTITY) < 1e-15);
+        assert!(rotation_error(&-DMat3::IDENTITY).is_infinite());
+    }
+}

@@ -1,0 +1,1 @@
+//! The CPU renderer (generic over `f32` and `f64`).

@@ -1,0 +1,126 @@
+//! Splatting: clouds of Gaussians to pictures, and gradients of pictures back to Gaussians.
+//!
+//! EWA splatting as in 3D Gaussian Splatting, with three rules that both backends share:
+//!
+//! * a Gaussian touches a pixel where `alpha = min(ALPHA_MAX, opacity * exp(-q / 2)) >= ALPHA_MIN`,
+//!   `q` the squared Mahalanobis distance of the pixel's centre in the picture plane;
+//! * it reaches a tile if the smallest `q` over the tile's pixel centres allows that;
+//! * a pixel is closed before the splat that would bring its transmittance under
+//!   `TRANSMITTANCE_MIN`.
+
+pub mod cpu;
+
+use crate::math::Real;
+
+/// Side of a tile in px, on every backend.
+pub const TILE_PX: usize = 16;
+/// Smallest alpha that counts.
+pub const ALPHA_MIN: f64 = 1.0 / 255.0;
+/// Largest alpha of one splat.
+pub const ALPHA_MAX: f64 = 0.999;
+/// A pixel stops before its transmittance falls under this.
+pub const TRANSMITTANCE_MIN: f64 = 1e-4;
+/// Variance in px² added along both picture axes (3DGS's low-pass filter).
+pub const BLUR_PX2: f64 = 0.3;
+/// Tangents of the viewing angle are clamped to this multiple of the picture's half extent before
+/// the projection is linearised, so that splats far outside do not blow up.
+pub const TANGENT_CLAMP: f64 = 1.3;
+
+/// How to draw.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderSettings {
+    /// Highest spherical-harmonics degree used; the cloud's own if lower.
+    pub sh_degree: u8,
+    /// Colour behind the Gaussians. Extra channels have 0 behind them.
+    pub background: [f32; 3],
+    /// Distance of the near plane in scene units: Gaussians whose centre is nearer are left out.
+    pub near: f64,
+    /// Scale opacities so that [`BLUR_PX2`] keeps a splat's energy (Mip-Splatting's 2-D filter).
+    pub antialias: bool,
+    /// Also return expected depth `sum(w z)` and median depth.
+    pub depth: bool,
+}
+
+impl Default for RenderSettings {
+    fn default() -> Self {
+        Self { sh_degree: 3, background: [0.0; 3], near: 0.01, antialias: false, depth: false }
+    }
+}
+
+/// Values per Gaussian that are composited like colours, in the same pass.
+#[derive(Clone, Copy, Debug)]
+pub struct Features<'a, R> {
+    /// Channels per Gaussian.
+    pub channels: usize,
+    /// `[n * channels]`, those of one Gaussian together.
+    pub values: &'a [R],
+}
+
+impl<R> Features<'_, R> {
+    /// No extra channels.
+    pub const NONE: Self = Self { channels: 0, values: &[] };
+}
+
+/// A rendered picture, channel planes of `width_px * height_px` values each, row-major.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Frame<R> {
+    /// Width in px.
+    pub width_px: usize,
+    /// Height in px.
+    pub height_px: usize,
+    /// Red, green, blue over the background.
+    pub color: [Vec<R>; 3],
+    /// The extra channels (not divided by alpha).
+    pub features: Vec<Vec<R>>,
+    /// Accumulated opacity, 0 to 1.
+    pub alpha: Vec<R>,
+    /// `sum(w z)` in scene units, not divided by alpha; empty unless asked for.
+    pub depth: Vec<R>,
+    /// Depth at which transmittance first falls to one half, 0 where it never does; empty unless
+    /// asked for. Carries no gradient.
+    pub median_depth: Vec<R>,
+}
+
+impl<R: Real> Frame<R> {
+    /// Interleaved 8-bit RGB, clamped and rounded.
+    pub fn to_rgb8(&self) -> Vec<[u8; 3]> {
+        let byte = |v: R| (v.f32().clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
+        let [r, g, b] = &self.color;
+        r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [byte(r), byte(g), byte(b)]).collect()
+    }
+}
+
+/// Gradient of a loss with respect to a [`Frame`]; empty vectors mean zero.
+#[derive(Clone, Debug, Default)]
+pub struct FrameGradient<R> {
+    /// With respect to `Frame::color`.
+    pub color: [Vec<R>; 3],
+    /// With respect to `Frame::features`.
+    pub features: Vec<Vec<R>>,
+    /// With respect to `Frame::alpha`.
+    pub alpha: Vec<R>,
+    /// With respect to `Frame::depth`.
+    pub depth: Vec<R>,
+}
+
+/// Gradient with respect to every parameter of a cloud, laid out like the cloud.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CloudGradient<R> {
+    /// With respect to `positions`.
+    pub positions: Vec<[R; 3]>,
+    /// With respect to `log_scales`.
+    pub log_scales: Vec<[R; 3]>,
+    /// With respect to the raw `quaternions`.
+    pub quaternions: Vec<[R; 4]>,
+    /// With respect to `opacity_logits`.
+    pub opacity_logits: Vec<R>,
+    /// With respect to `sh`.
+    pub sh: Vec<[R; 3]>,
+    /// With respect to the features' values.
+    pub features: Vec<R>,
+    /// Length of the gradient with respect to the centre's position in the picture, in loss per
+    /// half picture side (normalised device coordinates, as 3DGS thresholds it); 0 where unseen.
+    pub screen: Vec<R>,
+    /// Radius in px at which each Gaussian was drawn (3 sigma along its longer axis); 0 = not drawn.
+    pub radius_px: Vec<f32>,
+}

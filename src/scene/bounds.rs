@@ -1,0 +1,70 @@
+//! Axis-aligned boxes and robust extents of point sets.
+
+use glam::DVec3;
+
+/// An axis-aligned box in world space, in scene units.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Bounds {
+    /// Smallest corner.
+    pub min: DVec3,
+    /// Largest corner.
+    pub max: DVec3,
+}
+
+impl Bounds {
+    /// The box of the finite points, or `None` if there are none.
+    pub fn of(points: impl IntoIterator<Item = DVec3>) -> Option<Self> {
+        let mut finite = points.into_iter().filter(|p| p.is_finite());
+        let first = finite.next()?;
+        let start = Self { min: first, max: first };
+        Some(finite.fold(start, |b, p| Self { min: b.min.min(p), max: b.max.max(p) }))
+    }
+
+    /// The box from the 2nd to the 98th percentile on each axis: what a person would call the
+    /// scene, without its stray points.
+    pub fn robust(points: impl IntoIterator<Item = DVec3>) -> Option<Self> {
+        let points: Vec<DVec3> = points.into_iter().filter(|p| p.is_finite()).collect();
+        if points.is_empty() {
+            return None;
+        }
+        let (mut min, mut max) = (DVec3::ZERO, DVec3::ZERO);
+        for axis in 0..3 {
+            let mut v: Vec<f64> = points.iter().map(|p| p[axis]).collect();
+            let last = v.len() - 1;
+            let (lo, hi) = ((last as f64 * 0.02) as usize, (last as f64 * 0.98).ceil() as usize);
+            min[axis] = *v.select_nth_unstable_by(lo, f64::total_cmp).1;
+            max[axis] = *v.select_nth_unstable_by(hi, f64::total_cmp).1;
+        }
+        Some(Self { min, max })
+    }
+
+    /// The middle.
+    pub fn center(&self) -> DVec3 {
+        (self.min + self.max) * 0.5
+    }
+
+    /// Edge lengths.
+    pub fn size(&self) -> DVec3 {
+        self.max - self.min
+    }
+
+    /// Half the diagonal.
+    pub fn radius(&self) -> f64 {
+        self.size().length() * 0.5
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn robust_bounds_ignore_strays() {
+        let mut points: Vec<DVec3> = (0..1000).map(|i| DVec3::splat(f64::from(i) / 1000.0)).collect();
+        points.push(DVec3::splat(1e9));
+        points.push(DVec3::NAN);
+        let b = Bounds::robust(points).expect("not empty");
+        assert!(b.max.x < 1.0 && b.min.x < 0.03);
+        assert!(Bounds::of([DVec3::NAN]).is_none());
+    }
+}

@@ -1,0 +1,187 @@
+//! A calibrated pinhole camera.
+//!
+//! Camera axes: x right, y down, z forward (COLMAP's). Pixel `(i, j)` covers
+//! `[i, i+1) x [j, j+1)`, so its centre is at `(i + 0.5, j + 0.5)` px.
+
+use glam::{DMat3, DVec2, DVec3};
+use serde::{Deserialize, Serialize};
+
+use crate::math::rotation::rotation_error;
+
+/// A pinhole camera: size, intrinsics (px) and pose.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Camera {
+    /// Width of the picture in px, at least 1.
+    pub width_px: u32,
+    /// Height of the picture in px, at least 1.
+    pub height_px: u32,
+    /// Focal lengths in px along x and y, both positive.
+    pub focal_px: DVec2,
+    /// Principal point in px from the top-left corner of the top-left pixel.
+    pub principal_px: DVec2,
+    /// Rotation of the pose: columns are the camera's right, down and forward axes in the world.
+    pub world_from_camera: DMat3,
+    /// Camera centre in the world, in scene units.
+    pub center: DVec3,
+}
+
+/// What is wrong with a camera.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CameraError {
+    /// Zero pixels, or more than [`Camera::MAX_SIDE_PX`] along a side.
+    #[error("picture size {0} x {1} px is not between 1 and {max} px a side", max = Camera::MAX_SIDE_PX)]
+    Size(u32, u32),
+    /// A focal length that is not positive and finite.
+    #[error("focal length ({0}, {1}) px is not positive and finite")]
+    Focal(f64, f64),
+    /// A principal point that is not finite.
+    #[error("principal point ({0}, {1}) px is not finite")]
+    Principal(f64, f64),
+    /// A pose whose 3x3 part is no rotation.
+    #[error("the pose's 3x3 part is not a rotation (deviation {0:.2e}; scale, shear, reflection or NaN)")]
+    Rotation(f64),
+    /// A camera centre that is not finite.
+    #[error("the camera centre ({0}, {1}, {2}) is not finite")]
+    Center(f64, f64, f64),
+}
+
+impl Camera {
+    /// Largest side of a picture that any part of the program accepts.
+    pub const MAX_SIDE_PX: u32 = 16_384;
+
+    /// Checks every field; see [`CameraError`].
+    pub fn validate(&self) -> Result<(), CameraError> {
+        let (w, h) = (self.width_px, self.height_px);
+        if w == 0 || h == 0 || w > Self::MAX_SIDE_PX || h > Self::MAX_SIDE_PX {
+            return Err(CameraError::Size(w, h));
+        }
+        let f = self.focal_px;
+        if !(f.is_finite() && f.x > 0.0 && f.y > 0.0) {
+            return Err(CameraError::Focal(f.x, f.y));
+        }
+        let c = self.principal_px;
+        if !c.is_finite() {
+            return Err(CameraError::Principal(c.x, c.y));
+        }
+        let error = rotation_error(&self.world_from_camera);
+        if error.is_nan() || error > 1e-3 {
+            return Err(CameraError::Rotation(error));
+        }
+        if !self.center.is_finite() {
+            return Err(CameraError::Center(self.center.x, self.center.y, self.center.z));
+        }
+        Ok(())
+    }
+
+    /// A camera at `eye` that looks at `target`, with `up` upwards in the picture, a vertical
+    /// field of view of `fov_y_rad` and the principal point in the middle. `None` where the
+    /// viewing direction is zero or along `up`.
+    pub fn look_at(eye: DVec3, target: DVec3, up: DVec3, fov_y_rad: f64, width_px: u32, height_px: u32) -> Option<Self> {
+        let forward = (target - eye).try_normalize()?;
+        let right = forward.cross(up).try_normalize()?;
+        let down = forward.cross(right);
+        let focal = 0.5 * f64::from(height_px) / (0.5 * fov_y_rad).tan();
+        Some(Self {
+            width_px,
+            height_px,
+            focal_px: DVec2::splat(focal),
+            principal_px: DVec2::new(f64::from(width_px), f64::from(height_px)) * 0.5,
+            world_from_camera: DMat3::from_cols(right, down, forward),
+            center: eye,
+        })
+    }
+
+    /// The same camera with a picture of another size: intrinsics scaled per axis.
+    pub fn resized(&self, width_px: u32, height_px: u32) -> Self {
+        let scale = DVec2::new(
+            f64::from(width_px) / f64::from(self.width_px),
+            f64::from(height_px) / f64::from(self.height_px),
+        );
+        Self {
+            width_px,
+            height_px,
+            focal_px: self.focal_px * scale,
+            principal_px: self.principal_px * scale,
+            ..self.clone()
+        }
+    }
+
+    /// The same camera at most `max_side_px` along its longer side, never enlarged.
+    pub fn limited_to(&self, max_side_px: u32) -> Self {
+        let longer = self.width_px.max(self.height_px);
+        if longer <= max_side_px {
+            return self.clone();
+        }
+        let scale = f64::from(max_side_px) / f64::from(longer);
+        let side = |s: u32| ((f64::from(s) * scale).round() as u32).max(1);
+        self.resized(side(self.width_px), side(self.height_px))
+    }
+
+    /// Unit vector of the viewing direction in the world.
+    pub fn forward(&self) -> DVec3 {
+        self.world_from_camera.z_axis
+    }
+
+    /// The world point in camera axes (x right, y down, z forward).
+    pub fn camera_from_world(&self, p: DVec3) -> DVec3 {
+        self.world_from_camera.transpose() * (p - self.center)
+    }
+
+    /// Pixel coordinates of a world point in front of the camera, or `None` behind it.
+    pub fn project(&self, p: DVec3) -> Option<DVec2> {
+        let q = self.camera_from_world(p);
+        (q.z > 0.0).then(|| DVec2::new(q.x, q.y) / q.z * self.focal_px + self.principal_px)
+    }
+
+    /// Direction in the world (not normalised, camera-space depth 1) of the ray through the
+    /// pixel position.
+    pub fn ray(&self, pixel: DVec2) -> DVec3 {
+        let q = (pixel - self.principal_px) / self.focal_px;
+        self.world_from_camera * DVec3::new(q.x, q.y, 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera() -> Camera {
+        Camera::look_at(DVec3::new(0.0, -3.0, 1.0), DVec3::ZERO, DVec3::Z, 0.8, 640, 480).expect("valid")
+    }
+
+    #[test]
+    fn looks_at_its_target_with_up_upwards() {
+        let c = camera();
+        c.validate().expect("valid");
+        let middle = c.project(DVec3::ZERO).expect("in front");
+        assert!((middle - DVec2::new(320.0, 240.0)).length() < 1e-9);
+        let above = c.project(DVec3::new(0.0, 0.0, 0.5)).expect("in front");
+        assert!(above.y < 240.0);
+        let right = c.project(DVec3::new(0.5, 0.0, 0.0)).expect("in front");
+        assert!(right.x > 320.0);
+    }
+
+    #[test]
+    fn ray_inverts_projection() {
+        let c = camera();
+        let p = c.center + c.ray(DVec2::new(12.25, 400.5)) * 2.5;
+        let back = c.project(p).expect("in front");
+        assert!((back - DVec2::new(12.25, 400.5)).length() < 1e-9);
+    }
+
+    #[test]
+    fn bad_cameras_are_named() {
+        let mut c = camera();
+        c.width_px = 0;
+        assert!(matches!(c.validate(), Err(CameraError::Size(0, 480))));
+        let mut c = camera();
+        c.world_from_camera *= 2.0;
+        assert!(matches!(c.validate(), Err(CameraError::Rotation(_))));
+        let mut c = camera();
+        c.center.x = f64::NAN;
+        assert!(matches!(c.validate(), Err(CameraError::Center(..))));
+        let mut c = camera();
+        c.focal_px.y = -1.0;
+        assert!(matches!(c.validate(), Err(CameraError::Focal(..))));
+    }
+}

@@ -1,0 +1,199 @@
+//! The Gaussians, as a structure of arrays with raw (unactivated) parameters.
+
+use glam::DVec3;
+
+use crate::math::{Real, rotation, sh};
+
+/// `n` Gaussians. Parameters are stored raw: the renderer applies `exp` to log-scales, the
+/// sigmoid to opacity logits, and normalises quaternions.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GaussianCloud<R = f32> {
+    /// World position of the local origin, in scene units: `world = origin + positions[i]`, added
+    /// in f64. Keeps scenes far from zero exact.
+    pub origin: DVec3,
+    /// Centres relative to `origin`, `[n]`.
+    pub positions: Vec<[R; 3]>,
+    /// Natural logarithms of the standard deviations along the local axes, `[n]`.
+    pub log_scales: Vec<[R; 3]>,
+    /// Rotations world_from_local as quaternions `[w, x, y, z]` of any length, `[n]`.
+    pub quaternions: Vec<[R; 4]>,
+    /// Opacities before the sigmoid, `[n]`.
+    pub opacity_logits: Vec<R>,
+    /// Degree of the spherical harmonics, 0 to 3.
+    pub sh_degree: u8,
+    /// RGB coefficients, `[n * (sh_degree + 1)²]`, those of one Gaussian together.
+    pub sh: Vec<[R; 3]>,
+    /// Per-Gaussian properties that the program does not interpret but keeps from a `.ply`.
+    pub extras: Vec<ExtraProperty>,
+}
+
+/// A named per-Gaussian scalar that came with a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExtraProperty {
+    /// The property's name in the file.
+    pub name: String,
+    /// One value per Gaussian.
+    pub values: Vec<f32>,
+}
+
+/// What is wrong with a cloud.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CloudError {
+    /// Arrays of different lengths.
+    #[error("array '{0}' holds {1} entries, expected {2}")]
+    Length(&'static str, usize, usize),
+    /// A value that is NaN or infinite.
+    #[error("Gaussian {index}: {field} is not finite")]
+    NotFinite {
+        /// Which Gaussian.
+        index: usize,
+        /// Which of its parameters.
+        field: &'static str,
+    },
+    /// A spherical-harmonics degree over 3.
+    #[error("spherical-harmonics degree {0} is over 3")]
+    Degree(u8),
+}
+
+impl<R: Real> GaussianCloud<R> {
+    /// Number of Gaussians.
+    pub fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.positions.is_empty()
+    }
+
+    /// Coefficients per Gaussian, `(sh_degree + 1)²`.
+    pub fn sh_stride(&self) -> usize {
+        sh::coefficients(self.sh_degree)
+    }
+
+    /// World position of Gaussian `i`.
+    pub fn world_position(&self, i: usize) -> DVec3 {
+        self.origin + DVec3::from_array(self.positions[i].map(Real::f64))
+    }
+
+    /// Checks lengths and finiteness; the error names the first offender.
+    pub fn validate(&self) -> Result<(), CloudError> {
+        let n = self.len();
+        if self.sh_degree > 3 {
+            return Err(CloudError::Degree(self.sh_degree));
+        }
+        let lengths = [
+            ("log_scales", self.log_scales.len(), n),
+            ("quaternions", self.quaternions.len(), n),
+            ("opacity_logits", self.opacity_logits.len(), n),
+            ("sh", self.sh.len(), n * self.sh_stride()),
+        ];
+        for (name, have, want) in lengths {
+            if have != want {
+                return Err(CloudError::Length(name, have, want));
+            }
+        }
+        if let Some(e) = self.extras.iter().find(|e| e.values.len() != n) {
+            return Err(CloudError::Length("extras", e.values.len(), n));
+        }
+        let bad = |index, field| Err(CloudError::NotFinite { index, field });
+        if !self.origin.is_finite() {
+            return bad(0, "origin");
+        }
+        let stride = self.sh_stride();
+        for i in 0..n {
+            if !self.positions[i].iter().all(|v| v.is_finite()) {
+                return bad(i, "position");
+            }
+            if !self.log_scales[i].iter().all(|v| v.is_finite()) {
+                return bad(i, "scale");
+            }
+            if !self.quaternions[i].iter().all(|v| v.is_finite()) {
+                return bad(i, "rotation");
+            }
+            if !self.opacity_logits[i].is_finite() {
+                return bad(i, "opacity");
+            }
+            if !self.sh[i * stride..(i + 1) * stride].iter().flatten().all(|v| v.is_finite()) {
+                return bad(i, "spherical harmonics");
+            }
+        }
+        Ok(())
+    }
+
+    /// The same cloud in another precision (extras are kept as they are).
+    pub fn cast<S: Real>(&self) -> GaussianCloud<S> {
+        let three = |v: &Vec<[R; 3]>| v.iter().map(|a| a.map(|x| S::of(x.f64()))).collect();
+        GaussianCloud {
+            origin: self.origin,
+            positions: three(&self.positions),
+            log_scales: three(&self.log_scales),
+            quaternions: self.quaternions.iter().map(|q| q.map(|x| S::of(x.f64()))).collect(),
+            opacity_logits: self.opacity_logits.iter().map(|x| S::of(x.f64())).collect(),
+            sh_degree: self.sh_degree,
+            sh: three(&self.sh),
+            extras: self.extras.clone(),
+        }
+    }
+
+    /// Gaussian `i`'s rotation matrix, or `None` where its quaternion is degenerate.
+    pub fn rotation(&self, i: usize) -> Option<[[R; 3]; 3]> {
+        rotation::matrix_from_quaternion(self.quaternions[i])
+    }
+
+    /// A copy of the Gaussians at `indices`, in that order.
+    pub fn select(&self, indices: &[usize]) -> Self {
+        let stride = self.sh_stride();
+        Self {
+            origin: self.origin,
+            positions: indices.iter().map(|&i| self.positions[i]).collect(),
+            log_scales: indices.iter().map(|&i| self.log_scales[i]).collect(),
+            quaternions: indices.iter().map(|&i| self.quaternions[i]).collect(),
+            opacity_logits: indices.iter().map(|&i| self.opacity_logits[i]).collect(),
+            sh_degree: self.sh_degree,
+            sh: indices.iter().flat_map(|&i| self.sh[i * stride..(i + 1) * stride].iter().copied()).collect(),
+            extras: self
+                .extras
+                .iter()
+                .map(|e| ExtraProperty { name: e.name.clone(), values: indices.iter().map(|&i| e.values[i]).collect() })
+                .collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn one() -> GaussianCloud {
+        GaussianCloud {
+            positions: vec![[0.0; 3]; 2],
+            log_scales: vec![[0.0; 3]; 2],
+            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 2],
+            opacity_logits: vec![0.0; 2],
+            sh: vec![[0.0; 3]; 2],
+            ..GaussianCloud::default()
+        }
+    }
+
+    #[test]
+    fn validation_names_the_offender() {
+        one().validate().expect("valid");
+        let mut c = one();
+        c.log_scales[1][2] = f32::NAN;
+        assert_eq!(c.validate(), Err(CloudError::NotFinite { index: 1, field: "scale" }));
+        let mut c = one();
+        c.sh.pop();
+        assert_eq!(c.validate(), Err(CloudError::Length("sh", 1, 2)));
+    }
+
+    #[test]
+    fn selection_keeps_order() {
+        let mut c = one();
+        c.positions[1] = [1.0, 2.0, 3.0];
+        let s = c.select(&[1, 0, 1]);
+        assert_eq!(s.len(), 3);
+        assert_eq!(s.positions[0], [1.0, 2.0, 3.0]);
+        s.validate().expect("valid");
+    }
+}

@@ -1,0 +1,125 @@
+//! A set of posed photos with whatever sparse geometry came with it.
+
+use std::path::PathBuf;
+
+use glam::DVec3;
+
+use super::{Bounds, Photo};
+
+/// Posed photos, as read from any of the supported layouts.
+#[derive(Clone, Debug, Default)]
+pub struct Dataset {
+    /// Short name for titles: the folder's.
+    pub name: String,
+    /// The folder.
+    pub root: PathBuf,
+    /// Which layout it was read from, for people: "COLMAP binary", "transforms.json", ...
+    pub format: String,
+    /// The photos that exist, sorted by name.
+    pub photos: Vec<Photo>,
+    /// Sparse points, possibly none.
+    pub points: Vec<SparsePoint>,
+    /// The colour behind everything (Blender's renders are composited over it); `None` = unknown.
+    pub background: Option<[f32; 3]>,
+    /// Things a person should know: photos that are listed but missing, and so on.
+    pub warnings: Vec<String>,
+}
+
+/// A point of a structure-from-motion reconstruction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SparsePoint {
+    /// World position, scene units.
+    pub position: DVec3,
+    /// sRGB colour.
+    pub rgb: [u8; 3],
+}
+
+impl Dataset {
+    /// Indices of the photos to train on and of those held out. Photos that the dataset marks as
+    /// test are held out; without such marks it is every `every`-th of the sorted list, starting
+    /// with the first (the convention of the 3DGS literature). `every == 0` holds none out.
+    pub fn split(&self, every: usize) -> (Vec<usize>, Vec<usize>) {
+        let marked = self.photos.iter().any(|p| p.test_split);
+        (0..self.photos.len()).partition(|&i| {
+            let held = if marked { self.photos[i].test_split } else { every > 0 && i % every == 0 };
+            !held
+        })
+    }
+
+    /// Mean camera centre, and 1.1 times the largest distance from it: the `extent` that
+    /// position learning rates and densification thresholds scale with (3DGS `getNerfppNorm`).
+    pub fn camera_extent(&self) -> (DVec3, f64) {
+        let n = self.photos.len().max(1) as f64;
+        let mean = self.photos.iter().map(|p| p.camera.center).sum::<DVec3>() / n;
+        let far = self.photos.iter().map(|p| p.camera.center.distance(mean)).fold(0.0, f64::max);
+        (mean, if far > 0.0 { far * 1.1 } else { 1.0 })
+    }
+
+    /// Upwards in the world: against the mean of the cameras' down axes, or `+z` if they cancel.
+    pub fn up(&self) -> DVec3 {
+        let sum: DVec3 = self.photos.iter().map(|p| -p.camera.world_from_camera.y_axis).sum();
+        if sum.length() > 0.1 * self.photos.len() as f64 { sum.try_normalize().unwrap_or(DVec3::Z) } else { DVec3::Z }
+    }
+
+    /// The point nearest to all viewing axes: what the photos look at. Falls back to the mean of
+    /// the sparse points where the axes are parallel.
+    pub fn focus(&self) -> DVec3 {
+        let mut a = glam::DMat3::ZERO;
+        let mut b = DVec3::ZERO;
+        for p in &self.photos {
+            let d = p.camera.forward();
+            let outer = glam::DMat3::from_cols(d * d.x, d * d.y, d * d.z);
+            let m = glam::DMat3::IDENTITY - outer;
+            a += m;
+            b += m * p.camera.center;
+        }
+        let n = self.photos.len() as f64;
+        if n > 1.0 && a.determinant() > 1e-4 * n.powi(3) {
+            return a.inverse() * b;
+        }
+        Bounds::robust(self.points.iter().map(|p| p.position)).map_or_else(
+            || self.photos.first().map_or(DVec3::ZERO, |p| p.camera.center + p.camera.forward()),
+            |b| b.center(),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Camera;
+
+    fn ring(n: usize) -> Dataset {
+        let photos = (0..n)
+            .map(|i| {
+                let a = i as f64 / n as f64 * std::f64::consts::TAU;
+                let eye = DVec3::new(3.0 * a.cos(), 3.0 * a.sin(), 1.0);
+                Photo {
+                    name: format!("{i:03}.png"),
+                    path: PathBuf::new(),
+                    camera: Camera::look_at(eye, DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid"),
+                    distortion: None,
+                    test_split: false,
+                }
+            })
+            .collect();
+        Dataset { photos, ..Dataset::default() }
+    }
+
+    #[test]
+    fn every_eighth_is_held_out() {
+        let (train, test) = ring(17).split(8);
+        assert_eq!(test, vec![0, 8, 16]);
+        assert_eq!(train.len(), 14);
+        assert!(ring(5).split(0).1.is_empty());
+    }
+
+    #[test]
+    fn a_ring_of_cameras_has_its_focus_and_up() {
+        let d = ring(12);
+        assert!(d.focus().length() < 1e-9);
+        assert!(d.up().dot(DVec3::Z) > 0.999);
+        let (mean, extent) = d.camera_extent();
+        assert!((mean - DVec3::Z).length() < 1e-9 && (extent - 3.3).abs() < 1e-9);
+    }
+}

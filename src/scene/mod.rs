@@ -1,0 +1,13 @@
+//! What a scene is made of. Pure data: nothing here reads or writes files.
+
+pub mod bounds;
+pub mod camera;
+pub mod cloud;
+pub mod dataset;
+pub mod photo;
+
+pub use bounds::Bounds;
+pub use camera::{Camera, CameraError};
+pub use cloud::{CloudError, ExtraProperty, GaussianCloud};
+pub use dataset::{Dataset, SparsePoint};
+pub use photo::{Distortion, Photo, PhotoPixels};

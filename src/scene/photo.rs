@@ -1,0 +1,62 @@
+//! Photos: where they are, how their lens bends, and their pixels once loaded.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use super::Camera;
+
+/// A posed photo of a dataset. Its pixels are loaded by `io`, undistorted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Photo {
+    /// File name as the dataset writes it, for example `images/0001.jpg`.
+    pub name: String,
+    /// Where the file is.
+    pub path: PathBuf,
+    /// The pinhole camera of the undistorted photo at full resolution.
+    pub camera: Camera,
+    /// How the file on disk deviates from that pinhole; `None` for none.
+    pub distortion: Option<Distortion>,
+    /// Whether the dataset itself says that this photo is for testing (Blender's `test` split).
+    pub test_split: bool,
+}
+
+/// OpenCV's radial-tangential lens model: `x' = x (1 + k1 r² + k2 r⁴) + 2 p1 x y + p2 (r² + 2 x²)`,
+/// `y' = y (1 + k1 r² + k2 r⁴) + p1 (r² + 2 y²) + 2 p2 x y`. `k3` is zero in every model we read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Distortion {
+    /// Quadratic radial coefficient.
+    pub k1: f64,
+    /// Quartic radial coefficient.
+    pub k2: f64,
+    /// First tangential coefficient.
+    pub p1: f64,
+    /// Second tangential coefficient.
+    pub p2: f64,
+}
+
+/// A loaded, undistorted photo.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhotoPixels {
+    /// Width in px.
+    pub width_px: u32,
+    /// Height in px.
+    pub height_px: u32,
+    /// Row-major sRGB, as displayed; black where `coverage` is 0.
+    pub rgb: Vec<[u8; 3]>,
+    /// Row-major weight of each pixel, 0 where the photo shows nothing (outside the lens after
+    /// undistortion, transparent); `None` means all of it counts.
+    pub coverage: Option<Vec<u8>>,
+}
+
+impl PhotoPixels {
+    /// Number of pixels.
+    pub fn len(&self) -> usize {
+        self.rgb.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.rgb.is_empty()
+    }
+}
