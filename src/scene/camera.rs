@@ -76,7 +76,14 @@ impl Camera {
     /// A camera at `eye` that looks at `target`, with `up` upwards in the picture, a vertical
     /// field of view of `fov_y_rad` and the principal point in the middle. `None` where the
     /// viewing direction is zero or along `up`.
-    pub fn look_at(eye: DVec3, target: DVec3, up: DVec3, fov_y_rad: f64, width_px: u32, height_px: u32) -> Option<Self> {
+    pub fn look_at(
+        eye: DVec3,
+        target: DVec3,
+        up: DVec3,
+        fov_y_rad: f64,
+        width_px: u32,
+        height_px: u32,
+    ) -> Option<Self> {
         let forward = (target - eye).try_normalize()?;
         let right = forward.cross(up).try_normalize()?;
         let down = forward.cross(right);

@@ -1,0 +1,130 @@
+//! Holds the layout that ARCHITECTURE.md describes: which module may use which, how long a file
+//! may be, that every file says what it is for, and that every GPU kernel has its three files.
+//!
+//! Each rule is a pure function from files to complaints. The tests at the end feed each of them
+//! an offender, so a rule that has gone blind fails here.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+#[path = "architecture/rules.rs"]
+mod rules;
+#[path = "architecture/source.rs"]
+mod source;
+
+use std::path::Path;
+
+use rules::{Complaint, headers, kernels, module_order, printing, size_caps};
+use source::{SourceFile, read_tree};
+
+fn tree() -> Vec<SourceFile> {
+    let files = read_tree(Path::new(env!("CARGO_MANIFEST_DIR")));
+    assert!(files.iter().any(|f| f.path == "src/lib.rs"), "the source tree was not found");
+    files
+}
+
+fn check(complaints: Vec<Complaint>) {
+    assert!(complaints.is_empty(), "{} complaint(s):\n{}", complaints.len(), complaints.join("\n"));
+}
+
+#[test]
+fn modules_use_only_what_stands_above_them() {
+    check(module_order(&tree()));
+}
+
+#[test]
+fn files_stay_under_their_size_caps() {
+    check(size_caps(&tree()));
+}
+
+#[test]
+fn every_file_says_what_it_is_for() {
+    check(headers(&tree()));
+}
+
+#[test]
+fn every_kernel_has_its_launcher_and_its_cpu_counterpart() {
+    check(kernels(&tree()));
+}
+
+#[test]
+fn only_the_command_line_prints() {
+    check(printing(&tree()));
+}
+
+/// One made-up file.
+fn file(path: &str, text: &str) -> SourceFile {
+    SourceFile { path: path.to_owned(), text: text.to_owned() }
+}
+
+/// Complaints of `rule` about one made-up file.
+fn complaints(rule: fn(&[SourceFile]) -> Vec<Complaint>, path: &str, text: &str) -> usize {
+    rule(&[file(path, text)]).len()
+}
+
+#[test]
+fn module_order_catches_violations() {
+    let n = |path, text| complaints(module_order, path, text);
+    assert_eq!(n("src/io/ply.rs", "use crate::scene::Camera;"), 0);
+    assert_eq!(n("src/io/ply.rs", "use crate::render::Frame;"), 1);
+    assert_eq!(n("src/io/ply.rs", "fn f() { crate::ui::run(); crate::worker::go() }"), 2);
+    assert_eq!(n("src/io/ply.rs", "use crate::{math::Real, scene::{Camera, cli}, pipeline};"), 1);
+    assert_eq!(n("src/io/ply.rs", "use crate::{\n    math::Real,\n    ui::App,\n};"), 1);
+    assert_eq!(n("src/io/ply.rs", "use super::super::render::Frame;"), 1);
+    assert_eq!(n("src/io/mod.rs", "use super::render::Frame;"), 1);
+    assert_eq!(n("src/io/ply/mod.rs", "use super::render::Frame;"), 0);
+    assert_eq!(n("src/io/ply.rs", "use super::render::Frame;"), 0);
+    assert_eq!(n("src/cli/train.rs", "use crate::ui::run;"), 1);
+    assert_eq!(n("src/ui/app.rs", "use crate::cli::train;"), 1);
+    assert_eq!(n("src/shiny/mod.rs", "//! A module that the table lacks."), 1);
+}
+
+#[test]
+fn module_order_looks_past_comments_strings_and_tests() {
+    let n = |path, text| complaints(module_order, path, text);
+    assert_eq!(n("src/io/ply.rs", "// see crate::render\n/* crate::ui */ const A: &str = \"crate::ui::x\";"), 0);
+    assert_eq!(n("src/io/ply.rs", "#[cfg(test)]\nmod tests {\n    use crate::render::Frame;\n}\n"), 0);
+    assert_eq!(n("src/io/ply.rs", "#[cfg(test)]\nmod tests {\n    fn a() {}\n}\nuse crate::ui::App;\n"), 1);
+    assert_eq!(n("src/io/ply.rs", "const A: char = '\"'; use crate::ui::App; const B: char = '\"';"), 1);
+    let test_file = [
+        file("src/io/mod.rs", "//! x\n#[cfg(test)]\nmod checks;\n"),
+        file("src/io/checks.rs", "//! x\nuse crate::render::Frame;\n"),
+    ];
+    assert!(module_order(&test_file).is_empty());
+}
+
+#[test]
+fn size_caps_catch_long_files() {
+    assert_eq!(complaints(size_caps, "src/a.rs", &"x\n".repeat(600)), 0);
+    assert_eq!(complaints(size_caps, "src/a.rs", &"x\n".repeat(601)), 1);
+    assert_eq!(complaints(size_caps, "shaders/a.wgsl", &"x\n".repeat(250)), 0);
+    assert_eq!(complaints(size_caps, "shaders/a.wgsl", &"x\n".repeat(251)), 1);
+}
+
+#[test]
+fn headers_catch_files_without_one() {
+    assert_eq!(complaints(headers, "src/a.rs", "//! What it is for.\n"), 0);
+    assert_eq!(complaints(headers, "src/a.rs", "use std::fmt;\n//! late\n"), 1);
+    assert_eq!(complaints(headers, "src/a.rs", "//!\nuse std::fmt;\n"), 1);
+    assert_eq!(complaints(headers, "tests/a.rs", ""), 1);
+    assert_eq!(complaints(headers, "shaders/a.wgsl", "// What it is for.\n"), 0);
+    assert_eq!(complaints(headers, "shaders/a.wgsl", "@compute fn main() {}\n"), 1);
+}
+
+#[test]
+fn kernels_catch_missing_counterparts() {
+    let kernel = file("shaders/blend.wgsl", "// x");
+    let launcher = file("src/render/gpu/blend.rs", "//! x");
+    let counterpart = file("src/render/cpu/blend.rs", "//! x");
+    let all = [kernel, launcher, counterpart];
+    assert!(kernels(&all).is_empty());
+    assert_eq!(kernels(&all[..1]).len(), 2);
+    assert_eq!(kernels(&all[..2]).len(), 1);
+    assert!(kernels(&[file("shaders/shared/sh.wgsl", "// x")]).is_empty());
+}
+
+#[test]
+fn printing_catches_a_library_that_talks() {
+    assert_eq!(complaints(printing, "src/io/ply.rs", "fn f() { println!(\"x\"); }"), 1);
+    assert_eq!(complaints(printing, "src/io/ply.rs", "fn f() { eprint!(\"x\"); }"), 1);
+    assert_eq!(complaints(printing, "src/cli/info.rs", "fn f() { println!(\"x\"); }"), 0);
+    assert_eq!(complaints(printing, "src/io/ply.rs", "#[cfg(test)]\nmod t {\n    fn f() { println!(); }\n}\n"), 0);
+}

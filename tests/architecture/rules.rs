@@ -1,0 +1,172 @@
+//! The rules: each takes the tree and returns what is wrong with it.
+
+use super::source::{SourceFile, library_code, test_module_files};
+
+/// One sentence that names the file and the rule.
+pub type Complaint = String;
+
+/// Each module of the library and the other modules it may use, in the order of the data flow.
+const MODULES: [(&str, &[&str]); 11] = [
+    ("math", &[]),
+    ("scene", &["math"]),
+    ("io", &["math", "scene"]),
+    ("models", &["math", "scene", "io"]),
+    ("render", &["math", "scene"]),
+    ("pipeline", &["math", "scene", "io", "models", "render"]),
+    ("navigate", &["math", "scene", "render"]),
+    ("worker", &["math", "scene", "io", "models", "render", "pipeline", "navigate"]),
+    ("agent", &["math", "scene", "navigate", "worker"]),
+    ("cli", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "worker", "agent"]),
+    ("ui", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "worker", "agent"]),
+];
+
+/// Longest Rust file in lines.
+const RUST_LINES: usize = 600;
+/// Longest WGSL file in lines.
+const WGSL_LINES: usize = 250;
+
+/// Modules of the library use only what [`MODULES`] allows; test code is exempt.
+pub fn module_order(files: &[SourceFile]) -> Vec<Complaint> {
+    let mut complaints = Vec::new();
+    for file in library_files(files) {
+        let Some(module) = top_module(&file.path) else { continue };
+        let Some((_, allowed)) = MODULES.iter().find(|(name, _)| *name == module) else {
+            complaints.push(format!("{}: module '{module}' is not in the table of modules", file.path));
+            continue;
+        };
+        for used in used_modules(&library_code(&file.text), depth(&file.path)) {
+            let known = MODULES.iter().any(|(name, _)| *name == used);
+            if known && used != module && !allowed.contains(&used.as_str()) {
+                complaints.push(format!("{}: '{module}' may not use '{used}'", file.path));
+            }
+        }
+    }
+    complaints
+}
+
+/// No file is longer than its cap.
+pub fn size_caps(files: &[SourceFile]) -> Vec<Complaint> {
+    let cap = |path: &str| if path.ends_with(".wgsl") { WGSL_LINES } else { RUST_LINES };
+    let too_long = |f: &SourceFile| {
+        let (lines, cap) = (f.text.lines().count(), cap(&f.path));
+        (lines > cap).then(|| format!("{}: {lines} lines, the cap is {cap}: split it by concern", f.path))
+    };
+    files.iter().filter_map(too_long).collect()
+}
+
+/// Every Rust file starts with `//! text`, every shader with `// text`.
+pub fn headers(files: &[SourceFile]) -> Vec<Complaint> {
+    let mark = |path: &str| if path.ends_with(".wgsl") { "//" } else { "//!" };
+    let headless = |f: &SourceFile| {
+        let mark = mark(&f.path);
+        let first = f.text.lines().next().unwrap_or_default();
+        let said = first.strip_prefix(mark).is_some_and(|rest| !rest.trim().is_empty());
+        (!said).then(|| format!("{}: the first line must be '{mark} what this file is for'", f.path))
+    };
+    files.iter().filter_map(headless).collect()
+}
+
+/// `shaders/<kernel>.wgsl` comes with `src/render/gpu/<kernel>.rs` and `src/render/cpu/<kernel>.rs`.
+pub fn kernels(files: &[SourceFile]) -> Vec<Complaint> {
+    let kernel = |f: &SourceFile| {
+        let name = f.path.strip_prefix("shaders/")?.strip_suffix(".wgsl")?;
+        (!name.contains('/')).then(|| name.to_owned())
+    };
+    let mut complaints = Vec::new();
+    for name in files.iter().filter_map(kernel) {
+        for (side, role) in [("gpu", "its launcher"), ("cpu", "its CPU counterpart")] {
+            let wanted = format!("src/render/{side}/{name}.rs");
+            if !files.iter().any(|f| f.path == wanted) {
+                complaints.push(format!("shaders/{name}.wgsl: {role} {wanted} is missing"));
+            }
+        }
+    }
+    complaints
+}
+
+/// The library reports through `Observer` and return values; only the command line prints.
+pub fn printing(files: &[SourceFile]) -> Vec<Complaint> {
+    let mut complaints = Vec::new();
+    for file in library_files(files).filter(|f| top_module(&f.path) != Some("cli")) {
+        let code = library_code(&file.text);
+        for call in ["print!", "println!", "eprint!", "eprintln!"] {
+            if words_ending_in_bang(&code).any(|word| word == call) {
+                complaints.push(format!("{}: {call} outside src/cli", file.path));
+            }
+        }
+    }
+    complaints
+}
+
+/// The files of the library, without those declared as `#[cfg(test)] mod name;` and what is
+/// below them.
+fn library_files(files: &[SourceFile]) -> impl Iterator<Item = &SourceFile> {
+    let mut test_modules = Vec::new();
+    for file in files.iter().filter(|f| f.path.starts_with("src/")) {
+        let folder = file.path.strip_suffix("/mod.rs").or(file.path.strip_suffix(".rs")).unwrap_or(&file.path);
+        test_modules.extend(test_module_files(&file.text).iter().map(|name| format!("{folder}/{name}")));
+    }
+    files.iter().filter(move |f| {
+        let is_test = test_modules.iter().any(|m| f.path == format!("{m}.rs") || f.path.starts_with(&format!("{m}/")));
+        f.path.starts_with("src/") && !is_test
+    })
+}
+
+/// `io` for `src/io/ply.rs`; `None` for the crate's own roots.
+fn top_module(path: &str) -> Option<&str> {
+    let inside = path.strip_prefix("src/")?;
+    match inside.split_once('/') {
+        Some((module, _)) => Some(module),
+        None => inside.strip_suffix(".rs").filter(|name| !["lib", "main"].contains(name)),
+    }
+}
+
+/// How many `super::` lead from the file to the crate's root.
+fn depth(path: &str) -> usize {
+    let inside = path.strip_prefix("src/").unwrap_or(path);
+    inside.split('/').filter(|part| *part != "mod.rs").count()
+}
+
+/// The crate's own modules that `code` names by `crate::`, by a group `crate::{..}`, or by as
+/// many `super::` as lead to the root.
+fn used_modules(code: &str, depth: usize) -> Vec<String> {
+    let flat: String = code.split_whitespace().collect::<Vec<_>>().join(" ");
+    let flat = flat.replace(" ::", "::").replace(":: ", "::");
+    let mut used = Vec::new();
+    for start in ["crate::".to_owned(), "super::".repeat(depth)] {
+        for (at, _) in flat.match_indices(&start) {
+            // A longer chain of `super::`, or a name such as `my_crate::`, is something else.
+            if flat[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ':') {
+                continue;
+            }
+            used.extend(first_names(&flat[at + start.len()..]));
+        }
+    }
+    used
+}
+
+/// The first path segment of what follows, or of each member of a `{..}` group.
+fn first_names(rest: &str) -> Vec<String> {
+    let name = |s: &str| s.trim().chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>();
+    let Some(group) = rest.strip_prefix('{') else { return vec![name(rest)] };
+    let (mut level, mut start, mut names) = (0_usize, 0, Vec::new());
+    for (i, c) in group.char_indices() {
+        match c {
+            '{' => level += 1,
+            '}' if level > 0 => level -= 1,
+            ',' | '}' if level == 0 => {
+                names.push(name(&group[start..i]));
+                start = i + 1;
+                if c == '}' {
+                    break;
+                }
+            }
+            _ => {}
+        }
+    }
+    names
+}
+
+fn words_ending_in_bang(code: &str) -> impl Iterator<Item = &str> {
+    code.split(|c: char| !(c.is_alphanumeric() || c == '_' || c == '!')).filter(|w| w.ends_with('!'))
+}
