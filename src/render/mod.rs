@@ -11,6 +11,7 @@
 pub mod cpu;
 
 use crate::math::Real;
+use crate::scene::CameraError;
 
 /// Side of a tile in px, on every backend.
 pub const TILE_PX: usize = 16;
@@ -25,6 +26,28 @@ pub const BLUR_PX2: f64 = 0.3;
 /// Tangents of the viewing angle are clamped to this multiple of the picture's half extent before
 /// the projection is linearised, so that splats far outside do not blow up.
 pub const TANGENT_CLAMP: f64 = 1.3;
+
+/// Most channels that one pass composites, colour and depth included.
+pub const MAX_CHANNELS: usize = 32;
+
+/// Why a picture could not be drawn.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RenderError {
+    /// The camera is not usable.
+    #[error("camera: {0}")]
+    Camera(#[from] CameraError),
+    /// More extra channels than one pass composites.
+    #[error("{0} extra channels are too many for one pass (at most {max}); render them in groups", max = MAX_CHANNELS - 4)]
+    Channels(usize),
+    /// A feature array of the wrong length.
+    #[error("the feature array holds {have} values, expected {want}")]
+    FeatureLength {
+        /// Values given.
+        have: usize,
+        /// Gaussians times channels.
+        want: usize,
+    },
+}
 
 /// How to draw.
 #[derive(Clone, Debug, PartialEq)]

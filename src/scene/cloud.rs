@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::math::{Real, rotation, sh};
+use crate::math::{Real, sh};
 
 /// `n` Gaussians. Parameters are stored raw: the renderer applies `exp` to log-scales, the
 /// sigmoid to opacity logits, and normalises quaternions.
@@ -34,6 +34,21 @@ pub struct ExtraProperty {
     pub name: String,
     /// One value per Gaussian.
     pub values: Vec<f32>,
+}
+
+/// The raw parameters of one Gaussian; see [`GaussianCloud`] for the units.
+#[derive(Clone, Copy, Debug)]
+pub struct Gaussian<'a, R = f32> {
+    /// Centre relative to the cloud's origin.
+    pub position: [R; 3],
+    /// Logarithms of the standard deviations.
+    pub log_scale: [R; 3],
+    /// Rotation `[w, x, y, z]`.
+    pub quaternion: [R; 4],
+    /// Opacity before the sigmoid.
+    pub opacity_logit: R,
+    /// Its coefficients.
+    pub sh: &'a [[R; 3]],
 }
 
 /// What is wrong with a cloud.
@@ -69,6 +84,19 @@ impl<R: Real> GaussianCloud<R> {
     /// Coefficients per Gaussian, `(sh_degree + 1)²`.
     pub fn sh_stride(&self) -> usize {
         sh::coefficients(self.sh_degree)
+    }
+
+    /// The parameters of Gaussian `i`.
+    #[inline(always)]
+    pub fn gaussian(&self, i: usize) -> Gaussian<'_, R> {
+        let stride = self.sh_stride();
+        Gaussian {
+            position: self.positions[i],
+            log_scale: self.log_scales[i],
+            quaternion: self.quaternions[i],
+            opacity_logit: self.opacity_logits[i],
+            sh: &self.sh[i * stride..(i + 1) * stride],
+        }
     }
 
     /// World position of Gaussian `i`.
@@ -134,11 +162,6 @@ impl<R: Real> GaussianCloud<R> {
             sh: three(&self.sh),
             extras: self.extras.clone(),
         }
-    }
-
-    /// Gaussian `i`'s rotation matrix, or `None` where its quaternion is degenerate.
-    pub fn rotation(&self, i: usize) -> Option<[[R; 3]; 3]> {
-        rotation::matrix_from_quaternion(self.quaternions[i])
     }
 
     /// A copy of the Gaussians at `indices`, in that order.

@@ -8,6 +8,6 @@ pub mod photo;
 
 pub use bounds::Bounds;
 pub use camera::{Camera, CameraError};
-pub use cloud::{CloudError, ExtraProperty, GaussianCloud};
+pub use cloud::{CloudError, ExtraProperty, Gaussian, GaussianCloud};
 pub use dataset::{Dataset, SparsePoint};
 pub use photo::{Distortion, Photo, PhotoPixels};

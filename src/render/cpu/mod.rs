@@ -1,1 +1,341 @@
-//! The CPU renderer (generic over `f32` and `f64`).
+//! The CPU renderer: at `f64` the oracle that every kernel and gradient is held against, at `f32`
+//! (tile-parallel, eight pixels a register) the fast path where there is no GPU.
+//!
+//! Stages, one file each: [`project`], [`sort`], [`bin`], [`blend`]; backward: [`blend_backward`],
+//! [`project_backward`]. Results do not depend on the number of threads.
+
+pub mod bin;
+pub mod blend;
+pub mod blend_backward;
+pub mod lanes;
+pub mod project;
+pub mod project_backward;
+pub mod sort;
+
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use self::bin::Tiles;
+use self::blend::{RowOut, blend_row};
+use self::blend_backward::{MOMENTS, RowIn, blend_row_backward};
+use self::project::{NONE, Projected, View};
+use self::project_backward::{GaussianGradient, project_backward};
+use super::{CloudGradient, Features, Frame, FrameGradient, MAX_CHANNELS, RenderError, RenderSettings, TILE_PX};
+use crate::math::Real;
+use crate::scene::{Camera, Gaussian, GaussianCloud};
+
+/// Runs `$body` with the constant `$c` set to the number of channels `$n` is padded to.
+macro_rules! with_channels {
+    ($n:expr, $c:ident => $body:expr) => {
+        match $n {
+            3 => {
+                const $c: usize = 3;
+                $body
+            }
+            4 => {
+                const $c: usize = 4;
+                $body
+            }
+            10 => {
+                const $c: usize = 10;
+                $body
+            }
+            _ => {
+                const $c: usize = MAX_CHANNELS;
+                $body
+            }
+        }
+    };
+}
+
+/// Channels that the kernels are compiled for: colour; with depth; with six codes and depth; any.
+fn padded(channels: usize) -> usize {
+    [3, 4, 10].into_iter().find(|&c| channels <= c).unwrap_or(MAX_CHANNELS)
+}
+
+/// What the last frame cost.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RenderStats {
+    /// Gaussians that reach at least one pixel.
+    pub visible: usize,
+    /// Gaussians left out because their shape is degenerate.
+    pub degenerate: usize,
+    /// Tile list entries.
+    pub entries: usize,
+    /// Splat-pixel products evaluated by the forward pass.
+    pub products: u64,
+    /// Seconds per stage: project, sort, bin, blend.
+    pub stage_secs: [f64; 4],
+    /// Seconds of the backward pass over the tiles.
+    pub backward_secs: f64,
+}
+
+/// A renderer with its buffers, to be kept from frame to frame.
+#[derive(Debug, Default)]
+pub struct Renderer<R> {
+    projected: Projected<R>,
+    order: Vec<u64>,
+    tiles: Tiles,
+    transmittance: Vec<R>,
+    last: Vec<u32>,
+    records: Vec<R>,
+    frame: Option<FrameInfo<R>>,
+    stats: RenderStats,
+}
+
+/// What the backward pass must know of the forward pass.
+#[derive(Debug, Clone)]
+struct FrameInfo<R> {
+    view: View<R>,
+    settings: RenderSettings,
+    /// Channels in use and as padded.
+    channels: [usize; 2],
+    depth_channel: Option<usize>,
+}
+
+impl<R: Real> Renderer<R> {
+    /// A renderer with empty buffers.
+    pub fn new() -> Self {
+        Self { ..Self::default() }
+    }
+
+    /// What the last frame cost.
+    pub fn stats(&self) -> RenderStats {
+        self.stats
+    }
+
+    /// Draws `cloud` as `camera` sees it.
+    pub fn render(
+        &mut self,
+        cloud: &GaussianCloud<R>,
+        features: Features<'_, R>,
+        camera: &Camera,
+        settings: &RenderSettings,
+    ) -> Result<Frame<R>, RenderError> {
+        camera.validate()?;
+        let extra = features.channels;
+        let used = 3 + extra + usize::from(settings.depth);
+        if used > MAX_CHANNELS {
+            return Err(RenderError::Channels(extra));
+        }
+        if features.values.len() != cloud.len() * extra {
+            return Err(RenderError::FeatureLength { have: features.values.len(), want: cloud.len() * extra });
+        }
+        let view = View::new(camera, cloud.origin, settings.near);
+        let size = view.size;
+        let channels = padded(used);
+        let mut clock = Clock::start();
+        project::project(&mut self.projected, cloud, features, &view, settings, channels);
+        let project_secs = clock.lap();
+        sort::sort(&self.projected.splats, &mut self.order);
+        let sort_secs = clock.lap();
+        bin::bin(&mut self.tiles, &self.projected.splats, &self.order, size);
+        let bin_secs = clock.lap();
+
+        let pixels = size[0] * size[1];
+        self.transmittance.resize(pixels, R::ONE);
+        self.last.resize(pixels, 0);
+        let mut frame = empty_frame(size, extra, settings.depth);
+        let products = self.blend(&mut frame, channels, size);
+        finish(&mut frame, &self.transmittance, settings.background);
+        self.stats = RenderStats {
+            visible: self.projected.splats.len(),
+            degenerate: self.projected.degenerate,
+            entries: self.tiles.entries.len(),
+            products,
+            stage_secs: [project_secs, sort_secs, bin_secs, clock.lap()],
+            backward_secs: 0.0,
+        };
+        self.frame = Some(FrameInfo {
+            view,
+            settings: settings.clone(),
+            channels: [used, channels],
+            depth_channel: settings.depth.then_some(used - 1),
+        });
+        Ok(frame)
+    }
+
+    fn blend(&mut self, frame: &mut Frame<R>, channels: usize, size: [usize; 2]) -> u64 {
+        let strip = size[0] * TILE_PX;
+        let mut rows: Vec<RowOut<'_, R>> = self
+            .transmittance
+            .chunks_mut(strip)
+            .zip(self.last.chunks_mut(strip))
+            .map(|(transmittance, last)| RowOut { planes: Vec::new(), transmittance, last, median: &mut [] })
+            .collect();
+        let planes = frame.color.iter_mut().chain(&mut frame.features).chain(std::iter::once(&mut frame.depth));
+        for plane in planes {
+            for (row, part) in rows.iter_mut().zip(plane.chunks_mut(strip)) {
+                row.planes.push(part);
+            }
+        }
+        for (row, part) in rows.iter_mut().zip(frame.median_depth.chunks_mut(strip)) {
+            row.median = part;
+        }
+        let (splats, values, tiles) = (&self.projected.splats, &self.projected.values, &self.tiles);
+        rows.par_iter_mut()
+            .enumerate()
+            .map(|(ty, out)| with_channels!(channels, C => blend_row::<R, C>(splats, values, tiles, size, ty, out)))
+            .sum()
+    }
+
+    /// Backward pass over the tiles of the last frame. Afterwards [`Self::gaussian_gradient`]
+    /// answers for each Gaussian. Does nothing before the first frame.
+    pub fn backward_tiles(&mut self, gradient: &FrameGradient<R>) {
+        let Some(info) = &self.frame else { return };
+        let clock = Instant::now();
+        let size = info.view.size;
+        let pixels = size[0] * size[1];
+        let background = info.settings.background;
+        let mut d_transmittance = vec![R::ZERO; pixels];
+        for (plane, level) in gradient.color.iter().zip(background) {
+            let level = R::of(f64::from(level));
+            d_transmittance.iter_mut().zip(plane).for_each(|(t, g)| *t += *g * level);
+        }
+        d_transmittance.iter_mut().zip(&gradient.alpha).for_each(|(t, g)| *t -= *g);
+
+        let stride = MOMENTS + info.channels[1];
+        self.records.resize(self.tiles.entries.len() * stride, R::ZERO);
+        let strip = size[0] * TILE_PX;
+        let mut rest = self.records.as_mut_slice();
+        let mut tasks = Vec::with_capacity(self.tiles.grid[1]);
+        for ty in 0..self.tiles.grid[1] {
+            let span = ty * strip..((ty + 1) * strip).min(pixels);
+            let planes: [&Vec<R>; 3] = [&gradient.color[0], &gradient.color[1], &gradient.color[2]];
+            let planes = planes.into_iter().chain(&gradient.features);
+            let mut planes: Vec<&[R]> = planes.map(|p| p.get(span.clone()).unwrap_or(&[])).collect();
+            if let Some(channel) = info.depth_channel {
+                planes.resize(channel, &[]);
+                planes.push(gradient.depth.get(span.clone()).unwrap_or(&[]));
+            }
+            let input = RowIn {
+                planes,
+                transmittance_gradient: &d_transmittance[span.clone()],
+                transmittance: &self.transmittance[span.clone()],
+                last: &self.last[span],
+            };
+            let [from, to] = [ty * self.tiles.grid[0], (ty + 1) * self.tiles.grid[0]];
+            let entries = (self.tiles.first[to] - self.tiles.first[from]) as usize;
+            let (own, others) = rest.split_at_mut(entries * stride);
+            rest = others;
+            tasks.push((ty, input, own));
+        }
+        let (splats, values, tiles) = (&self.projected.splats, &self.projected.values, &self.tiles);
+        tasks.into_par_iter().for_each(|(ty, input, own)| {
+            with_channels!(info.channels[1], C =>
+                blend_row_backward::<R, C>(splats, values, tiles, size, ty, &input, own));
+        });
+        self.stats.backward_secs = clock.elapsed().as_secs_f64();
+    }
+
+    /// Sum of Gaussian `i`'s tile records, or `None` if it was not drawn.
+    fn record(&self, i: usize, stride: usize) -> Option<(usize, [R; MOMENTS + MAX_CHANNELS])> {
+        let s = *self.projected.splat_of.get(i)?;
+        if s == NONE {
+            return None;
+        }
+        let (from, to) = self.tiles.span[s as usize];
+        let mut sum = [R::ZERO; MOMENTS + MAX_CHANNELS];
+        for &place in &self.tiles.places[from as usize..to as usize] {
+            let at = place as usize * stride;
+            for (total, v) in sum.iter_mut().zip(&self.records[at..at + stride]) {
+                *total += *v;
+            }
+        }
+        Some((s as usize, sum))
+    }
+
+    /// Gradient of Gaussian `i`, whose parameters are still those that were drawn, after
+    /// [`Self::backward_tiles`]; `None` if it was not drawn.
+    #[inline(always)]
+    pub fn gaussian_gradient(&self, gaussian: &Gaussian<'_, R>, i: usize) -> Option<GaussianGradient<R>> {
+        let info = self.frame.as_ref()?;
+        let (s, record) = self.record(i, MOMENTS + info.channels[1])?;
+        let splat = &self.projected.splats[s];
+        project_backward(gaussian, splat, &info.view, &info.settings, &record, info.depth_channel)
+    }
+
+    /// Gradient with respect to the whole cloud for the last rendered frame, which must have been
+    /// of this cloud.
+    pub fn backward(
+        &mut self,
+        cloud: &GaussianCloud<R>,
+        features: Features<'_, R>,
+        gradient: &FrameGradient<R>,
+    ) -> CloudGradient<R> {
+        self.backward_tiles(gradient);
+        let n = cloud.len();
+        let stride = cloud.sh_stride();
+        let mut out = CloudGradient {
+            positions: vec![[R::ZERO; 3]; n],
+            log_scales: vec![[R::ZERO; 3]; n],
+            quaternions: vec![[R::ZERO; 4]; n],
+            opacity_logits: vec![R::ZERO; n],
+            sh: vec![[R::ZERO; 3]; n * stride],
+            features: vec![R::ZERO; n * features.channels],
+            screen: vec![R::ZERO; n],
+            radius_px: vec![0.0; n],
+        };
+        let Some(record_stride) = self.frame.as_ref().map(|f| MOMENTS + f.channels[1]) else { return out };
+        for i in 0..n {
+            let Some(g) = self.gaussian_gradient(&cloud.gaussian(i), i) else { continue };
+            out.positions[i] = g.position;
+            out.log_scales[i] = g.log_scale;
+            out.quaternions[i] = g.quaternion;
+            out.opacity_logits[i] = g.opacity_logit;
+            out.screen[i] = g.screen;
+            out.radius_px[i] = g.radius_px.f32();
+            for (k, sh) in out.sh[i * stride..(i + 1) * stride].iter_mut().enumerate() {
+                *sh = g.color.map(|c| c * g.basis[k]);
+            }
+            if let Some((_, record)) = self.record(i, record_stride) {
+                let own = &record[MOMENTS + 3..MOMENTS + 3 + features.channels];
+                out.features[i * features.channels..(i + 1) * features.channels].copy_from_slice(own);
+            }
+        }
+        out
+    }
+}
+
+/// Seconds between laps.
+struct Clock(Instant);
+
+impl Clock {
+    fn start() -> Self {
+        Self(Instant::now())
+    }
+
+    fn lap(&mut self) -> f64 {
+        let now = Instant::now();
+        let secs = now.duration_since(self.0).as_secs_f64();
+        self.0 = now;
+        secs
+    }
+}
+
+fn empty_frame<R: Real>(size: [usize; 2], extra: usize, depth: bool) -> Frame<R> {
+    let pixels = size[0] * size[1];
+    let plane = || vec![R::ZERO; pixels];
+    let optional = || if depth { vec![R::ZERO; pixels] } else { Vec::new() };
+    Frame {
+        width_px: size[0],
+        height_px: size[1],
+        color: std::array::from_fn(|_| plane()),
+        features: (0..extra).map(|_| plane()).collect(),
+        alpha: plane(),
+        depth: optional(),
+        median_depth: optional(),
+    }
+}
+
+/// Adds the background and turns transmittance into alpha.
+fn finish<R: Real>(frame: &mut Frame<R>, transmittance: &[R], background: [f32; 3]) {
+    for (plane, level) in frame.color.iter_mut().zip(background) {
+        if level != 0.0 {
+            let level = R::of(f64::from(level));
+            plane.iter_mut().zip(transmittance).for_each(|(p, t)| *p += *t * level);
+        }
+    }
+    frame.alpha.iter_mut().zip(transmittance).for_each(|(a, t)| *a = R::ONE - *t);
+}

@@ -1,0 +1,178 @@
+//! Tile binning: which splats reach which tile, each tile's list in depth order.
+
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+use rayon::prelude::*;
+
+use super::project::Splat;
+use super::sort::splat_of;
+use crate::math::Real;
+use crate::render::TILE_PX;
+
+/// Tile lists and, for the backward pass, the way back from a splat to its entries.
+#[derive(Debug, Default)]
+pub struct Tiles {
+    /// Tiles per row and per column.
+    pub grid: [usize; 2],
+    /// Tile `t` owns `entries[first[t]..first[t + 1]]`.
+    pub first: Vec<u32>,
+    /// Splats of all tiles, tile after tile, each tile's front to back. Written once from several
+    /// threads to disjoint places, hence atomics (relaxed ones cost nothing).
+    pub entries: Vec<AtomicU32>,
+    /// Splat `s` has its places in `entries` at `places[span[s].0..span[s].1]`.
+    pub span: Vec<(u32, u32)>,
+    /// Places in `entries`, splat after splat.
+    pub places: Vec<u32>,
+}
+
+/// Inclusive tile rectangle `[x0, y0, x1, y1]` of the tiles with a pixel centre inside the splat's
+/// bounding box; `None` if there is none.
+#[inline(always)]
+fn rectangle<R: Real>(s: &Splat<R>, size: [usize; 2]) -> Option<[usize; 4]> {
+    let mut r = [0; 4];
+    for axis in 0..2 {
+        let lo = (s.mean[axis] - s.half[axis]).f64() - 0.5;
+        let hi = (s.mean[axis] + s.half[axis]).f64() - 0.5;
+        let lo = lo.ceil().max(0.0);
+        let hi = hi.floor().min(size[axis] as f64 - 1.0);
+        if !(lo <= hi) {
+            return None;
+        }
+        r[axis] = lo as usize / TILE_PX;
+        r[axis + 2] = hi as usize / TILE_PX;
+    }
+    Some(r)
+}
+
+/// Smallest squared Mahalanobis distance over the rectangle of pixel centres `[lo, hi]`.
+#[inline(always)]
+pub fn nearest<R: Real>(s: &Splat<R>, lo: [R; 2], hi: [R; 2]) -> R {
+    let [a, b, c] = s.conic;
+    // Offsets of the rectangle from the centre; the minimum lies on the edges that face it.
+    let (x0, x1) = (lo[0] - s.mean[0], hi[0] - s.mean[0]);
+    let (y0, y1) = (lo[1] - s.mean[1], hi[1] - s.mean[1]);
+    let inside_x = x0 <= R::ZERO && x1 >= R::ZERO;
+    let inside_y = y0 <= R::ZERO && y1 >= R::ZERO;
+    if inside_x && inside_y {
+        return R::ZERO;
+    }
+    let two = R::of(2.0);
+    let q = |x: R, y: R| a * x * x + two * b * x * y + c * y * y;
+    let mut best = None;
+    if !inside_x {
+        let x = if x0 > R::ZERO { x0 } else { x1 };
+        let y = (-b * x / c).max(y0).min(y1);
+        best = Some(q(x, y));
+    }
+    if !inside_y {
+        let y = if y0 > R::ZERO { y0 } else { y1 };
+        let x = (-b * y / a).max(x0).min(x1);
+        let other = q(x, y);
+        best = Some(best.map_or(other, |q: R| q.min(other)));
+    }
+    best.unwrap_or(R::ZERO)
+}
+
+/// Calls `found` for every tile that the splat reaches.
+#[inline(always)]
+fn each_tile<R: Real>(s: &Splat<R>, size: [usize; 2], columns: usize, mut found: impl FnMut(u32)) {
+    let Some([x0, y0, x1, y1]) = rectangle(s, size) else { return };
+    let single = x0 == x1 && y0 == y1;
+    for ty in y0..=y1 {
+        for tx in x0..=x1 {
+            let lo = [tx * TILE_PX, ty * TILE_PX];
+            let corner = |axis: usize, p: usize| R::of((p.min(size[axis] - 1)) as f64 + 0.5);
+            let reaches = single
+                || nearest(
+                    s,
+                    [corner(0, lo[0]), corner(1, lo[1])],
+                    [corner(0, lo[0] + TILE_PX - 1), corner(1, lo[1] + TILE_PX - 1)],
+                ) <= s.reach;
+            if reaches {
+                found((ty * columns + tx) as u32);
+            }
+        }
+    }
+}
+
+/// One task's share of the depth-ordered splats.
+struct Share {
+    tiles: Vec<u32>,
+    lengths: Vec<u32>,
+    counts: Vec<u32>,
+}
+
+/// Builds the lists. `order` is the sorted keys of [`super::sort::sort`].
+pub fn bin<R: Real>(out: &mut Tiles, splats: &[Splat<R>], order: &[u64], size: [usize; 2]) {
+    let grid = [size[0].div_ceil(TILE_PX), size[1].div_ceil(TILE_PX)];
+    let tiles = grid[0] * grid[1];
+    // A fixed number of shares: the lists do not depend on the number of threads anyway, but the
+    // counters of a share cost `tiles` words each.
+    let share = order.len().div_ceil(2 * rayon::current_num_threads()).max(1_024);
+    let mut shares: Vec<Share> = order
+        .par_chunks(share)
+        .map(|keys| {
+            let mut s = Share {
+                tiles: Vec::with_capacity(keys.len() * 2),
+                lengths: Vec::with_capacity(keys.len()),
+                counts: vec![0; tiles],
+            };
+            for &key in keys {
+                let before = s.tiles.len();
+                let (list, counts) = (&mut s.tiles, &mut s.counts);
+                each_tile(&splats[splat_of(key) as usize], size, grid[0], |t| {
+                    list.push(t);
+                    counts[t as usize] += 1;
+                });
+                s.lengths.push((s.tiles.len() - before) as u32);
+            }
+            s
+        })
+        .collect();
+
+    // Counts become first places: tile-major, and within a tile share after share.
+    out.grid = grid;
+    out.first.clear();
+    out.first.reserve(tiles + 1);
+    let mut at = 0;
+    for t in 0..tiles {
+        out.first.push(at);
+        for s in &mut shares {
+            at += std::mem::replace(&mut s.counts[t], at);
+        }
+    }
+    out.first.push(at);
+
+    out.span.clear();
+    out.span.resize(splats.len(), (0, 0));
+    let mut entry = 0;
+    for (keys, s) in order.chunks(share).zip(&shares) {
+        for (&key, &length) in keys.iter().zip(&s.lengths) {
+            out.span[splat_of(key) as usize] = (entry, entry + length);
+            entry += length;
+        }
+    }
+
+    out.entries.resize_with(at as usize, AtomicU32::default);
+    out.places.resize(at as usize, 0);
+    let mut rest = out.places.as_mut_slice();
+    let mut slices = Vec::with_capacity(shares.len());
+    for s in &shares {
+        let (head, tail) = rest.split_at_mut(s.tiles.len());
+        slices.push(head);
+        rest = tail;
+    }
+    let entries = &out.entries;
+    shares.par_iter_mut().zip(slices).zip(order.par_chunks(share)).for_each(|((s, places), keys)| {
+        let mut e = 0;
+        for (&key, &length) in keys.iter().zip(&s.lengths) {
+            for _ in 0..length {
+                let next = &mut s.counts[s.tiles[e] as usize];
+                entries[*next as usize].store(splat_of(key), Relaxed);
+                places[e] = *next;
+                *next += 1;
+                e += 1;
+            }
+        }
+    });
+}

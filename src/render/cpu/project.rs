@@ -1,0 +1,316 @@
+//! Projection: Gaussians to splats (mean, conic, reach, colour) in the picture of one camera.
+
+use rayon::prelude::*;
+
+use crate::math::{Real, rotation, sh};
+use crate::render::{ALPHA_MIN, BLUR_PX2, Features, RenderSettings, TANGENT_CLAMP};
+use crate::scene::{Camera, Gaussian, GaussianCloud};
+
+/// Gaussians that one task projects.
+const CHUNK: usize = 2_048;
+
+/// A camera in the renderer's precision, relative to a cloud's origin.
+#[derive(Clone, Debug)]
+pub struct View<R> {
+    /// Rows of camera_from_world.
+    pub rows: [[R; 3]; 3],
+    /// Cloud origin minus camera centre in world axes; kept in f64 so that far-off scenes stay exact.
+    pub offset: [f64; 3],
+    /// Focal lengths, px.
+    pub focal: [R; 2],
+    /// Principal point, px.
+    pub principal: [R; 2],
+    /// Largest tangent of the viewing angle at which the projection is linearised, per axis.
+    pub clamp: [R; 2],
+    /// Near plane.
+    pub near: R,
+    /// Picture size in px.
+    pub size: [usize; 2],
+}
+
+impl<R: Real> View<R> {
+    /// The view of `camera` on a cloud with this origin.
+    pub fn new(camera: &Camera, origin: glam::DVec3, near: f64) -> Self {
+        let m = camera.world_from_camera;
+        let row = |a: glam::DVec3| [R::of(a.x), R::of(a.y), R::of(a.z)];
+        let half = [f64::from(camera.width_px) * 0.5, f64::from(camera.height_px) * 0.5];
+        Self {
+            rows: [row(m.x_axis), row(m.y_axis), row(m.z_axis)],
+            offset: (origin - camera.center).to_array(),
+            focal: [R::of(camera.focal_px.x), R::of(camera.focal_px.y)],
+            principal: [R::of(camera.principal_px.x), R::of(camera.principal_px.y)],
+            clamp: [
+                R::of(TANGENT_CLAMP * half[0] / camera.focal_px.x),
+                R::of(TANGENT_CLAMP * half[1] / camera.focal_px.y),
+            ],
+            near: R::of(near),
+            size: [camera.width_px as usize, camera.height_px as usize],
+        }
+    }
+
+    /// A position relative to the camera centre, in world axes.
+    #[inline(always)]
+    pub fn relative(&self, p: [R; 3]) -> [R; 3] {
+        [
+            R::of(p[0].f64() + self.offset[0]),
+            R::of(p[1].f64() + self.offset[1]),
+            R::of(p[2].f64() + self.offset[2]),
+        ]
+    }
+}
+
+/// A Gaussian as it appears in the picture.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Splat<R> {
+    /// Centre, px.
+    pub mean: [R; 2],
+    /// Inverse covariance `[xx, xy, yy]`, 1/px².
+    pub conic: [R; 3],
+    /// Opacity after the sigmoid and the anti-aliasing compensation.
+    pub opacity: R,
+    /// Squared Mahalanobis distance up to which alpha is at least `ALPHA_MIN`.
+    pub reach: R,
+    /// Half width and half height of the ellipse at `reach`, px.
+    pub half: [R; 2],
+    /// Camera-space depth.
+    pub depth: R,
+    /// Index in the cloud.
+    pub gaussian: u32,
+}
+
+/// Everything between a Gaussian's raw parameters and its splat that the backward pass needs too.
+pub struct Geometry<R> {
+    /// Centre relative to the camera, world axes.
+    pub relative: [R; 3],
+    /// Centre in camera axes.
+    pub local: [R; 3],
+    /// Tangents `x/z`, `y/z` after clamping, and whether they were clamped.
+    pub tangent: [R; 2],
+    /// Whether each tangent was clamped.
+    pub clamped: [bool; 2],
+    /// Rows of the linearised projection in world axes, `J W`.
+    pub jacobian: [[R; 3]; 2],
+    /// Rotation world_from_local.
+    pub rotation: [[R; 3]; 3],
+    /// Standard deviations.
+    pub scale: [R; 3],
+    /// Rows of `J W R S`.
+    pub factor: [[R; 3]; 2],
+    /// Blurred covariance `[xx, xy, yy]`, px².
+    pub covariance: [R; 3],
+    /// Determinant of the unblurred and of the blurred covariance.
+    pub determinants: [R; 2],
+}
+
+#[inline(always)]
+fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Projects the ellipsoid; `None` behind the near plane, for a degenerate quaternion, or where the
+/// covariance over- or underflows.
+#[inline(always)]
+pub fn geometry<R: Real>(gaussian: &Gaussian<'_, R>, view: &View<R>) -> Option<Geometry<R>> {
+    let relative = view.relative(gaussian.position);
+    let local = [dot(view.rows[0], relative), dot(view.rows[1], relative), dot(view.rows[2], relative)];
+    let z = local[2];
+    if !(z > view.near) {
+        return None;
+    }
+    let mut tangent = [local[0] / z, local[1] / z];
+    let mut clamped = [false; 2];
+    for axis in 0..2 {
+        let limit = view.clamp[axis];
+        if tangent[axis] > limit || tangent[axis] < -limit {
+            clamped[axis] = true;
+            tangent[axis] = if tangent[axis] > limit { limit } else { -limit };
+        }
+    }
+    let mut jacobian = [[R::ZERO; 3]; 2];
+    for axis in 0..2 {
+        let s = view.focal[axis] / z;
+        for k in 0..3 {
+            jacobian[axis][k] = s * (view.rows[axis][k] - tangent[axis] * view.rows[2][k]);
+        }
+    }
+    let rotation = rotation::matrix_from_quaternion(gaussian.quaternion)?;
+    let scale = gaussian.log_scale.map(Real::exp);
+    let mut factor = [[R::ZERO; 3]; 2];
+    for axis in 0..2 {
+        for k in 0..3 {
+            let column = [rotation[0][k], rotation[1][k], rotation[2][k]];
+            factor[axis][k] = dot(jacobian[axis], column) * scale[k];
+        }
+    }
+    let [u, v] = factor;
+    let blur = R::of(BLUR_PX2);
+    let (uu, uv, vv) = (dot(u, u), dot(u, v), dot(v, v));
+    // Lagrange's identity keeps the determinant positive where `uu vv - uv²` would cancel.
+    let cross = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    let sharp = dot(cross, cross);
+    let blurred = sharp + blur * (uu + vv) + blur * blur;
+    if !blurred.is_finite() {
+        return None;
+    }
+    Some(Geometry {
+        relative,
+        local,
+        tangent,
+        clamped,
+        jacobian,
+        rotation,
+        scale,
+        factor,
+        covariance: [uu + blur, uv, vv + blur],
+        determinants: [sharp, blurred],
+    })
+}
+
+/// Unit viewing direction of a centre relative to the camera; forward if they coincide.
+#[inline(always)]
+pub fn direction<R: Real>(relative: [R; 3]) -> [R; 3] {
+    let length = dot(relative, relative).sqrt();
+    if length > R::ZERO { relative.map(|c| c / length) } else { [R::ZERO, R::ZERO, R::ONE] }
+}
+
+/// Colour before the clamp at zero: `0.5 + sum(basis * sh)`.
+#[inline(always)]
+pub fn raw_color<R: Real>(coefficients: &[[R; 3]], basis: &[R; 16], degree: u8) -> [R; 3] {
+    let mut c = [R::HALF; 3];
+    for (b, k) in basis.iter().zip(&coefficients[..sh::coefficients(degree)]) {
+        for channel in 0..3 {
+            c[channel] += *b * k[channel];
+        }
+    }
+    c
+}
+
+/// Factor on the opacity that keeps a splat's energy under the blur, `sqrt(det / det_blurred)`.
+#[inline(always)]
+pub fn compensation<R: Real>(g: &Geometry<R>) -> R {
+    (g.determinants[0] / g.determinants[1]).sqrt()
+}
+
+/// Splats of one frame with their composited values.
+#[derive(Debug, Default)]
+pub struct Projected<R> {
+    /// The Gaussians that reach at least one pixel centre, in the cloud's order.
+    pub splats: Vec<Splat<R>>,
+    /// `[splats * channels]`: colour, extra channels, depth if asked for, padding zeros.
+    pub values: Vec<R>,
+    /// For each Gaussian its splat, or `NONE`.
+    pub splat_of: Vec<u32>,
+    /// Gaussians left out because their covariance or rotation is degenerate.
+    pub degenerate: usize,
+}
+
+/// No splat.
+pub const NONE: u32 = u32::MAX;
+
+struct Part<R> {
+    splats: Vec<Splat<R>>,
+    values: Vec<R>,
+    degenerate: usize,
+}
+
+/// Projects the whole cloud. `channels` is the padded number of values per splat.
+pub fn project<R: Real>(
+    out: &mut Projected<R>,
+    cloud: &GaussianCloud<R>,
+    features: Features<'_, R>,
+    view: &View<R>,
+    settings: &RenderSettings,
+    channels: usize,
+) {
+    let n = cloud.len();
+    let parts: Vec<Part<R>> = (0..n.div_ceil(CHUNK))
+        .into_par_iter()
+        .map(|c| project_chunk(cloud, features, view, settings, channels, c * CHUNK..((c + 1) * CHUNK).min(n)))
+        .collect();
+    out.splats.clear();
+    out.values.clear();
+    out.degenerate = 0;
+    for part in &parts {
+        out.splats.extend_from_slice(&part.splats);
+        out.values.extend_from_slice(&part.values);
+        out.degenerate += part.degenerate;
+    }
+    out.splat_of.clear();
+    out.splat_of.resize(n, NONE);
+    for (s, splat) in out.splats.iter().enumerate() {
+        out.splat_of[splat.gaussian as usize] = s as u32;
+    }
+}
+
+#[multiversion::multiversion(targets("x86_64+avx2+fma"))]
+fn project_chunk<R: Real>(
+    cloud: &GaussianCloud<R>,
+    features: Features<'_, R>,
+    view: &View<R>,
+    settings: &RenderSettings,
+    channels: usize,
+    range: std::ops::Range<usize>,
+) -> Part<R> {
+    let mut part = Part {
+        splats: Vec::with_capacity(range.len()),
+        values: Vec::with_capacity(range.len() * channels),
+        degenerate: 0,
+    };
+    let degree = settings.sh_degree.min(cloud.sh_degree);
+    let alpha_min = R::of(ALPHA_MIN);
+    for i in range {
+        // Cheap tests first: most Gaussians of a scene are outside the picture.
+        let relative = view.relative(cloud.positions[i]);
+        if !(dot(view.rows[2], relative) > view.near) {
+            continue;
+        }
+        let mut opacity = cloud.opacity_logits[i].sigmoid();
+        if opacity < alpha_min {
+            continue;
+        }
+        let gaussian = cloud.gaussian(i);
+        let Some(g) = geometry(&gaussian, view) else {
+            part.degenerate += 1;
+            continue;
+        };
+        if settings.antialias {
+            opacity *= compensation(&g);
+            if !(opacity >= alpha_min) {
+                continue;
+            }
+        }
+        let z = g.local[2];
+        let mean = [
+            view.focal[0] * (g.local[0] / z) + view.principal[0],
+            view.focal[1] * (g.local[1] / z) + view.principal[1],
+        ];
+        let reach = R::of(2.0) * (opacity / alpha_min).ln();
+        let [xx, xy, yy] = g.covariance;
+        let half = [(reach * xx).sqrt(), (reach * yy).sqrt()];
+        let inside = |axis: usize| {
+            let last = R::of(view.size[axis] as f64) - R::HALF;
+            mean[axis] + half[axis] >= R::HALF && mean[axis] - half[axis] <= last
+        };
+        if !(inside(0) && inside(1)) {
+            continue;
+        }
+        let det = g.determinants[1];
+        let conic = [yy / det, -xy / det, xx / det];
+        // A covariance so wide that its inverse underflows has no usable shape.
+        if !(conic[0] > R::ZERO && conic[2] > R::ZERO && half[0].is_finite() && half[1].is_finite()) {
+            part.degenerate += 1;
+            continue;
+        }
+        let basis = sh::basis(degree, direction(g.relative));
+        let color = raw_color(gaussian.sh, &basis, degree).map(|c| c.max(R::ZERO));
+        let first = part.values.len();
+        part.values.extend_from_slice(&color);
+        part.values.extend_from_slice(&features.values[i * features.channels..(i + 1) * features.channels]);
+        if settings.depth {
+            part.values.push(z);
+        }
+        part.values.resize(first + channels, R::ZERO);
+        part.splats.push(Splat { mean, conic, opacity, reach, half, depth: z, gaussian: i as u32 });
+    }
+    part
+}

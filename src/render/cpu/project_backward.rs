@@ -1,0 +1,210 @@
+//! From the moments of a splat back to the raw parameters of its Gaussian.
+
+use super::blend_backward::MOMENTS;
+use super::project::{Geometry, Splat, View, direction, geometry, raw_color};
+use crate::math::{Real, rotation::unit_quaternion, sh};
+use crate::render::RenderSettings;
+use crate::scene::Gaussian;
+
+/// Gradient with respect to the raw parameters of one Gaussian.
+#[derive(Clone, Copy, Debug)]
+pub struct GaussianGradient<R> {
+    /// With respect to its position.
+    pub position: [R; 3],
+    /// With respect to its log-scales.
+    pub log_scale: [R; 3],
+    /// With respect to its raw quaternion.
+    pub quaternion: [R; 4],
+    /// With respect to its opacity logit.
+    pub opacity_logit: R,
+    /// With respect to its colour before the clamp; the gradient of SH coefficient `k` is
+    /// `basis[k]` times this.
+    pub color: [R; 3],
+    /// SH basis in the viewing direction.
+    pub basis: [R; 16],
+    /// Length of the gradient with respect to the projected centre, per half picture side.
+    pub screen: R,
+    /// Three standard deviations along the splat's longer axis, px.
+    pub radius_px: R,
+}
+
+/// Backward of the projection. `record` is the sum of the splat's tile records: moments, colour,
+/// features, depth. `depth_channel` is the channel that carries depth, if any does.
+#[inline(always)]
+pub fn project_backward<R: Real>(
+    gaussian: &Gaussian<'_, R>,
+    splat: &Splat<R>,
+    view: &View<R>,
+    settings: &RenderSettings,
+    record: &[R],
+    depth_channel: Option<usize>,
+) -> Option<GaussianGradient<R>> {
+    let g = geometry(gaussian, view)?;
+    let [m0, mx, my, mxx, mxy, myy] = [record[0], record[1], record[2], record[3], record[4], record[5]];
+    let [a, b, c] = splat.conic;
+    let d_mean = [a * mx + b * my, b * mx + c * my];
+    let d_factor = factor_gradient(&g, splat.conic, [mxx, mxy, myy], settings.antialias.then_some(m0));
+
+    let mut log_scale = [R::ZERO; 3];
+    let mut d_rotation = [[R::ZERO; 3]; 3];
+    let mut d_jacobian = [[R::ZERO; 3]; 2];
+    for k in 0..3 {
+        log_scale[k] = g.factor[0][k] * d_factor[0][k] + g.factor[1][k] * d_factor[1][k];
+        for r in 0..3 {
+            d_rotation[r][k] = g.scale[k] * (g.jacobian[0][r] * d_factor[0][k] + g.jacobian[1][r] * d_factor[1][k]);
+            for axis in 0..2 {
+                d_jacobian[axis][r] += g.rotation[r][k] * g.scale[k] * d_factor[axis][k];
+            }
+        }
+    }
+
+    let z = g.local[2];
+    let mut d_local = [R::ZERO; 3];
+    for axis in 0..2 {
+        let s = view.focal[axis] / z;
+        let d_tangent = -s * dot(view.rows[2], d_jacobian[axis]);
+        d_local[2] -= dot(g.jacobian[axis], d_jacobian[axis]) / z;
+        if !g.clamped[axis] {
+            d_local[axis] += d_tangent / z;
+            d_local[2] -= d_tangent * g.tangent[axis] / z;
+        }
+        d_local[axis] += s * d_mean[axis];
+        d_local[2] -= s * (g.local[axis] / z) * d_mean[axis];
+    }
+    if let Some(channel) = depth_channel {
+        d_local[2] += record[MOMENTS + channel];
+    }
+    let mut position = [R::ZERO; 3];
+    for k in 0..3 {
+        position[k] = view.rows[0][k] * d_local[0] + view.rows[1][k] * d_local[1] + view.rows[2][k] * d_local[2];
+    }
+
+    let degree = settings.sh_degree.min(stored_degree(gaussian.sh.len()));
+    let toward = direction(g.relative);
+    let basis = sh::basis(degree, toward);
+    let raw = raw_color(gaussian.sh, &basis, degree);
+    let mut color = [record[MOMENTS], record[MOMENTS + 1], record[MOMENTS + 2]];
+    for (d, r) in color.iter_mut().zip(raw) {
+        if r < R::ZERO {
+            *d = R::ZERO;
+        }
+    }
+    if degree > 0 {
+        let d_toward = direction_gradient(gaussian.sh, degree, toward, color);
+        let length = dot(g.relative, g.relative).sqrt();
+        let radial = dot(toward, d_toward);
+        if length > R::ZERO {
+            for k in 0..3 {
+                position[k] += (d_toward[k] - toward[k] * radial) / length;
+            }
+        }
+    }
+
+    // m0 is dL/dopacity times opacity; through the sigmoid that leaves 1 - sigmoid.
+    let opacity_logit = m0 * (-gaussian.opacity_logit).sigmoid();
+    let half = [R::of(view.size[0] as f64 * 0.5), R::of(view.size[1] as f64 * 0.5)];
+    let on_screen = [d_mean[0] * half[0], d_mean[1] * half[1]];
+    let [xx, xy, yy] = g.covariance;
+    let middle = R::HALF * (xx + yy);
+    let spread = (R::of(0.25) * (xx - yy) * (xx - yy) + xy * xy).sqrt();
+    Some(GaussianGradient {
+        position,
+        log_scale,
+        quaternion: quaternion_gradient(gaussian.quaternion, &d_rotation)?,
+        opacity_logit,
+        color,
+        basis,
+        screen: (on_screen[0] * on_screen[0] + on_screen[1] * on_screen[1]).sqrt(),
+        radius_px: R::of(3.0) * (middle + spread).sqrt(),
+    })
+}
+
+/// Degree of a Gaussian that stores this many coefficients.
+#[inline(always)]
+fn stored_degree(coefficients: usize) -> u8 {
+    match coefficients {
+        16.. => 3,
+        9.. => 2,
+        4.. => 1,
+        _ => 0,
+    }
+}
+
+#[inline(always)]
+fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Gradient with respect to the rows `u, v` of `J W R S`, from the second moments through the
+/// inverse of the covariance, `dK = -K dC K`, and from the compensation where it is on (`m0`).
+#[inline(always)]
+fn factor_gradient<R: Real>(
+    g: &Geometry<R>,
+    [a, b, c]: [R; 3],
+    [mxx, mxy, myy]: [R; 3],
+    compensated: Option<R>,
+) -> [[R; 3]; 2] {
+    // dL/dK as a symmetric matrix [[ga, gb], [gb, gc]].
+    let (ga, gb, gc) = (-R::HALF * mxx, -R::HALF * mxy, -R::HALF * myy);
+    let (p00, p01) = (ga * a + gb * b, ga * b + gb * c);
+    let (p10, p11) = (gb * a + gc * b, gb * b + gc * c);
+    let two = R::of(2.0);
+    let xx = -(a * p00 + b * p10);
+    let xy = -two * (a * p01 + b * p11);
+    let yy = -(b * p01 + c * p11);
+    let [u, v] = g.factor;
+    let mut d = [[R::ZERO; 3]; 2];
+    for k in 0..3 {
+        d[0][k] = two * xx * u[k] + xy * v[k];
+        d[1][k] = two * yy * v[k] + xy * u[k];
+    }
+    if let Some(m0) = compensated {
+        let [sharp, blurred] = g.determinants;
+        let (uu, uv, vv) = (dot(u, u), g.covariance[1], dot(v, v));
+        let d_sharp = if sharp > R::ZERO { m0 / (two * sharp) } else { R::ZERO };
+        let d_blurred = -m0 / (two * blurred);
+        for k in 0..3 {
+            d[0][k] += two * (d_sharp * (u[k] * vv - uv * v[k]) + d_blurred * (u[k] * g.covariance[2] - uv * v[k]));
+            d[1][k] += two * (d_sharp * (v[k] * uu - uv * u[k]) + d_blurred * (v[k] * g.covariance[0] - uv * u[k]));
+        }
+    }
+    d
+}
+
+/// Gradient of the colour along the viewing direction.
+#[inline(always)]
+fn direction_gradient<R: Real>(coefficients: &[[R; 3]], degree: u8, toward: [R; 3], color: [R; 3]) -> [R; 3] {
+    let slopes = sh::basis_gradient(degree, toward);
+    let mut d = [R::ZERO; 3];
+    for (slope, k) in slopes.iter().zip(&coefficients[..sh::coefficients(degree)]) {
+        let along = dot(*k, color);
+        for axis in 0..3 {
+            d[axis] += slope[axis] * along;
+        }
+    }
+    d
+}
+
+/// Chain rule through `R(q / |q|)`.
+#[inline(always)]
+fn quaternion_gradient<R: Real>(q: [R; 4], g: &[[R; 3]; 3]) -> Option<[R; 4]> {
+    let [w, x, y, z] = unit_quaternion(q)?;
+    let two = R::of(2.0);
+    let d = [
+        two * (x * (g[2][1] - g[1][2]) + y * (g[0][2] - g[2][0]) + z * (g[1][0] - g[0][1])),
+        two * (y * (g[0][1] + g[1][0]) + z * (g[0][2] + g[2][0]) + w * (g[2][1] - g[1][2])
+            - two * x * (g[1][1] + g[2][2])),
+        two * (x * (g[0][1] + g[1][0]) + z * (g[1][2] + g[2][1]) + w * (g[0][2] - g[2][0])
+            - two * y * (g[0][0] + g[2][2])),
+        two * (x * (g[0][2] + g[2][0]) + y * (g[1][2] + g[2][1]) + w * (g[1][0] - g[0][1])
+            - two * z * (g[0][0] + g[1][1])),
+    ];
+    let length = (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt();
+    let u = [w, x, y, z];
+    let radial = u.iter().zip(&d).fold(R::ZERO, |s, (u, d)| s + *u * *d);
+    let mut out = [R::ZERO; 4];
+    for k in 0..4 {
+        out[k] = (d[k] - u[k] * radial) / length;
+    }
+    Some(out)
+}
