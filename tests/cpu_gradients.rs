@@ -31,7 +31,8 @@ impl Problem {
             alpha: plane(),
             depth: plane(),
         };
-        let settings = RenderSettings { background: [0.3, 0.1, 0.8], antialias, depth: true, ..RenderSettings::default() };
+        let settings =
+            RenderSettings { background: [0.3, 0.1, 0.8], antialias, depth: true, ..RenderSettings::default() };
         Self { cloud, features, camera, settings, weights }
     }
 

@@ -145,12 +145,7 @@ fn tile_backward<R: Real, const C: usize>(
 /// Takes one splat off each pixel: restores the transmittance in front of it and returns its
 /// weight and `dL/dpower`. `along` is the gradient of the picture along the splat's value.
 #[inline(always)]
-fn unwind<R: Real>(
-    alpha: &Lane<R>,
-    along: &Lane<R>,
-    left: &mut Lane<R>,
-    behind: &mut Lane<R>,
-) -> (Lane<R>, Lane<R>) {
+fn unwind<R: Real>(alpha: &Lane<R>, along: &Lane<R>, left: &mut Lane<R>, behind: &mut Lane<R>) -> (Lane<R>, Lane<R>) {
     let mut weight = [R::ZERO; LANES];
     let mut power = [R::ZERO; LANES];
     for l in 0..LANES {

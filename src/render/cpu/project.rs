@@ -51,11 +51,7 @@ impl<R: Real> View<R> {
     /// A position relative to the camera centre, in world axes.
     #[inline(always)]
     pub fn relative(&self, p: [R; 3]) -> [R; 3] {
-        [
-            R::of(p[0].f64() + self.offset[0]),
-            R::of(p[1].f64() + self.offset[1]),
-            R::of(p[2].f64() + self.offset[2]),
-        ]
+        [R::of(p[0].f64() + self.offset[0]), R::of(p[1].f64() + self.offset[1]), R::of(p[2].f64() + self.offset[2])]
     }
 }
 

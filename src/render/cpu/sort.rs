@@ -10,9 +10,7 @@ use crate::math::Real;
 /// makes an unstable sort deterministic.
 pub fn sort<R: Real>(splats: &[Splat<R>], keys: &mut Vec<u64>) {
     keys.clear();
-    keys.par_extend(
-        splats.par_iter().enumerate().map(|(i, s)| (u64::from(s.depth.f32().to_bits()) << 32) | i as u64),
-    );
+    keys.par_extend(splats.par_iter().enumerate().map(|(i, s)| (u64::from(s.depth.f32().to_bits()) << 32) | i as u64));
     keys.par_sort_unstable();
 }
 
