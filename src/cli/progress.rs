@@ -1,0 +1,150 @@
+//! The observer of the command line: a progress bar on a terminal, a line now and then elsewhere.
+//! Everything goes to standard error, so that standard output holds results alone.
+
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+use indicatif::{HumanCount, HumanDuration, ProgressBar, ProgressStyle};
+
+use super::interrupt;
+use crate::pipeline::observer::{Evaluation, Level, Observer, Progress, Signal, StepMetrics};
+
+/// Time between lines where standard error is no terminal.
+const LINE_INTERVAL: Duration = Duration::from_secs(5);
+
+/// Shows work to a person at a terminal or reading a log.
+pub struct Console {
+    quiet: bool,
+    terminal: bool,
+    bar: Option<(String, ProgressBar)>,
+    metrics: String,
+    last_line: Option<Instant>,
+}
+
+impl Console {
+    /// `quiet` shows warnings only.
+    pub fn new(quiet: bool) -> Self {
+        let terminal = std::io::stderr().is_terminal();
+        Self { quiet, terminal, bar: None, metrics: String::new(), last_line: None }
+    }
+
+    /// Prints a line without disturbing the bar.
+    fn line(&self, text: &str) {
+        match &self.bar {
+            Some((_, bar)) => bar.suspend(|| eprintln!("{text}")),
+            None => eprintln!("{text}"),
+        }
+    }
+
+    /// The bar of `stage`, a new one if the stage has changed.
+    fn bar(&mut self, stage: &str) -> &ProgressBar {
+        if self.bar.as_ref().is_none_or(|(current, _)| current != stage) {
+            if let Some((_, old)) = self.bar.take() {
+                old.finish_and_clear();
+            }
+            self.metrics.clear();
+            let bar = ProgressBar::new(0);
+            let style = ProgressStyle::with_template("{prefix} [{bar:28}] {human_pos}/{human_len} {msg}");
+            if let Ok(style) = style {
+                bar.set_style(style.progress_chars("=> "));
+            }
+            bar.set_prefix(stage.to_owned());
+            return &self.bar.insert((stage.to_owned(), bar)).1;
+        }
+        &self.bar.get_or_insert_with(|| (stage.to_owned(), ProgressBar::hidden())).1
+    }
+}
+
+impl Observer for Console {
+    fn signal(&self) -> Signal {
+        if interrupt::asked_to_stop() { Signal::Cancel } else { Signal::Continue }
+    }
+
+    fn progress(&mut self, progress: Progress) {
+        if self.quiet {
+            return;
+        }
+        if self.terminal {
+            let message = format!("{} {}", rate_and_times(&progress), self.metrics);
+            let bar = self.bar(&progress.stage);
+            bar.set_length(progress.total);
+            bar.set_position(progress.done);
+            bar.set_message(message);
+            if progress.done >= progress.total {
+                bar.finish_and_clear();
+            }
+            return;
+        }
+        let due = self.last_line.is_none_or(|at| at.elapsed() >= LINE_INTERVAL);
+        if due {
+            self.last_line = Some(Instant::now());
+            let (done, total) = (HumanCount(progress.done), HumanCount(progress.total));
+            eprintln!("{} {done}/{total} {} {}", progress.stage, rate_and_times(&progress), self.metrics);
+        }
+    }
+
+    fn step(&mut self, m: StepMetrics) {
+        let gaussians = HumanCount(m.gaussians as u64);
+        self.metrics = format!("| loss {:.4} PSNR {:.2} dB, {gaussians} Gaussians", m.loss, m.train_psnr);
+    }
+
+    fn evaluation(&mut self, e: Evaluation) {
+        if !self.quiet {
+            self.line(&evaluation_line(&e));
+        }
+    }
+
+    fn note(&mut self, level: Level, text: String) {
+        match level {
+            Level::Warning => self.line(&format!("warning: {text}")),
+            Level::Info if !self.quiet => self.line(&text),
+            Level::Info => {}
+        }
+    }
+}
+
+impl Drop for Console {
+    fn drop(&mut self) {
+        if let Some((_, bar)) = self.bar.take() {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// `step 500, 12.3 s: held-out PSNR 21.34 dB, SSIM 0.712, 23,121 Gaussians`.
+pub fn evaluation_line(e: &Evaluation) -> String {
+    let gaussians = HumanCount(e.gaussians as u64);
+    format!(
+        "step {}, {:.1} s: held-out PSNR {:.2} dB, SSIM {:.3} over {} views, {gaussians} Gaussians",
+        e.step,
+        e.secs,
+        e.psnr,
+        e.ssim,
+        e.views.len()
+    )
+}
+
+fn rate_and_times(p: &Progress) -> String {
+    // `max` also turns NaN into 0; a century is as good as infinity here.
+    let duration = |secs: f64| HumanDuration(Duration::from_secs_f64(secs.max(0.0).min(3e9)));
+    let elapsed = duration(p.elapsed_secs);
+    match p.eta_secs() {
+        Some(eta) if p.done < p.total => format!("{:.1}/s, {elapsed:#}, ETA {:#}", p.rate, duration(eta)),
+        _ => format!("{elapsed:#}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rate_gives_an_eta() {
+        let mut p = Progress { stage: "Training".into(), done: 50, total: 200, elapsed_secs: 10.0, rate: 5.0 };
+        assert_eq!(rate_and_times(&p), "5.0/s, 10s, ETA 30s");
+        p.rate = 0.0;
+        assert_eq!(rate_and_times(&p), "10s");
+        p.elapsed_secs = f64::NAN;
+        assert!(!rate_and_times(&p).is_empty());
+    }
+}
