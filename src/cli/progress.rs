@@ -125,8 +125,7 @@ pub fn evaluation_line(e: &Evaluation) -> String {
 }
 
 fn rate_and_times(p: &Progress) -> String {
-    // `max` also turns NaN into 0; a century is as good as infinity here.
-    let duration = |secs: f64| HumanDuration(Duration::from_secs_f64(secs.max(0.0).min(3e9)));
+    let duration = |secs: f64| HumanDuration(Duration::try_from_secs_f64(secs).unwrap_or_default());
     let elapsed = duration(p.elapsed_secs);
     match p.eta_secs() {
         Some(eta) if p.done < p.total => format!("{:.1}/s, {elapsed:#}, ETA {:#}", p.rate, duration(eta)),

@@ -21,7 +21,7 @@ pub fn matrix_from_quaternion<R: Real>(q: [R; 4]) -> Option<[[R; 3]; 3]> {
 /// quaternions lose their direction.
 pub fn unit_quaternion<R: Real>(q: [R; 4]) -> Option<[R; 4]> {
     let largest = q.iter().fold(R::ZERO, |m, c| m.max(c.abs()));
-    if !(largest > R::ZERO) || q.iter().any(|c| !c.is_finite()) {
+    if largest <= R::ZERO || q.iter().any(|c| !c.is_finite()) {
         return None;
     }
     let s = q.map(|c| c / largest);
