@@ -12,7 +12,7 @@ mod source;
 
 use std::path::Path;
 
-use rules::{Complaint, headers, kernels, module_order, printing, size_caps};
+use rules::{Complaint, dependencies, headers, kernels, module_order, printing, size_caps};
 use source::{SourceFile, read_tree};
 
 fn tree() -> Vec<SourceFile> {
@@ -48,6 +48,11 @@ fn every_kernel_has_its_launcher_and_its_cpu_counterpart() {
 #[test]
 fn only_the_command_line_prints() {
     check(printing(&tree()));
+}
+
+#[test]
+fn every_dependency_has_its_reason() {
+    check(dependencies(include_str!("../Cargo.toml"), include_str!("../ARCHITECTURE.md")));
 }
 
 /// One made-up file.
@@ -127,4 +132,15 @@ fn printing_catches_a_library_that_talks() {
     assert_eq!(complaints(printing, "src/io/ply.rs", "fn f() { eprint!(\"x\"); }"), 1);
     assert_eq!(complaints(printing, "src/cli/info.rs", "fn f() { println!(\"x\"); }"), 0);
     assert_eq!(complaints(printing, "src/io/ply.rs", "#[cfg(test)]\nmod t {\n    fn f() { println!(); }\n}\n"), 0);
+}
+
+#[test]
+fn dependencies_catch_missing_and_stale_rows() {
+    let manifest =
+        "[package]\nname = \"x\"\n[dependencies]\na = \"1\"\nb = { version = \"2\" }\n[profile.dev]\nc = 1\n";
+    let document = |rows: &str| format!("# A\n## Why each dependency\n| crate | why |\n|---|---|\n{rows}");
+    assert!(dependencies(manifest, &document("| `a`, `b` | both |\n")).is_empty());
+    assert_eq!(dependencies(manifest, &document("| `a` | uses `b` |\n")).len(), 1);
+    assert_eq!(dependencies(manifest, &document("| `a`, `b` | x |\n| `old` | x |\n")).len(), 1);
+    assert_eq!(dependencies(manifest, "").len(), 2);
 }

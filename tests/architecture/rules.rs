@@ -98,6 +98,35 @@ pub fn printing(files: &[SourceFile]) -> Vec<Complaint> {
     complaints
 }
 
+/// Every dependency in `manifest` (Cargo.toml) is named in a table row of `document`, and every
+/// crate named in that table is a dependency.
+pub fn dependencies(manifest: &str, document: &str) -> Vec<Complaint> {
+    let wanted = dependency_names(manifest);
+    let table = document.split("## Why each dependency").nth(1).unwrap_or_default();
+    let first_cells = table.lines().filter_map(|l| l.strip_prefix("| ")?.split(" | ").next());
+    let named: Vec<&str> = first_cells.flat_map(|cell| cell.split('`').skip(1).step_by(2)).collect();
+    let missing = wanted.iter().filter(|w| !named.contains(&w.as_str()));
+    let stale = named.iter().filter(|n| !wanted.iter().any(|w| w == *n));
+    missing
+        .map(|w| format!("ARCHITECTURE.md: dependency '{w}' is not in the table 'Why each dependency'"))
+        .chain(stale.map(|n| format!("ARCHITECTURE.md: '{n}' is in the table of dependencies but not in Cargo.toml")))
+        .collect()
+}
+
+/// Names in the sections `[dependencies]` and `[dev-dependencies]` (and those of targets).
+fn dependency_names(manifest: &str) -> Vec<String> {
+    let mut inside = false;
+    let mut names = Vec::new();
+    for line in manifest.lines().map(str::trim) {
+        if line.starts_with('[') {
+            inside = line.ends_with("dependencies]");
+        } else if inside && !line.starts_with('#') {
+            names.extend(line.split_once('=').map(|(name, _)| name.trim().to_owned()));
+        }
+    }
+    names
+}
+
 /// The files of the library, without those declared as `#[cfg(test)] mod name;` and what is
 /// below them.
 fn library_files(files: &[SourceFile]) -> impl Iterator<Item = &SourceFile> {
