@@ -1,1 +1,28 @@
-//! (see lib.rs)
+//! Files: one per format, and one [`open`] that sniffs.
+//!
+//! Readers never trust a length field: what a file claims is held against the file's real size
+//! before memory is set aside for it, and paths inside a dataset may not leave its folder. Every
+//! error names the file and the place in it.
+
+pub mod atomic;
+pub mod colmap;
+mod compressed_ply;
+mod error;
+pub mod files;
+mod listing;
+pub mod llff;
+mod open;
+pub mod photo;
+mod ply;
+pub mod points_ply;
+mod quantised;
+mod reader;
+
+mod resample;
+pub mod splat_ply;
+pub mod trained;
+pub mod transforms;
+
+pub use error::{IoError, OpenError};
+pub use open::{Opened, open};
+pub use trained::TrainedScene;

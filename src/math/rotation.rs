@@ -40,6 +40,13 @@ pub fn rotation_error(m: &DMat3) -> f64 {
     d.to_cols_array().iter().fold(0.0, |w, e| w.max(e.abs()))
 }
 
+/// The rotation nearest to `m` (the orthogonal factor of its polar decomposition), for an `m` that
+/// is one up to rounding.
+pub fn nearest_rotation(m: &DMat3) -> DMat3 {
+    // Newton's iteration (Higham 1986); its error squares at every step.
+    (0..8).fold(*m, |r, _| (r + r.inverse().transpose()) * 0.5)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -67,5 +74,15 @@ mod tests {
     fn a_reflection_is_no_rotation() {
         assert!(rotation_error(&DMat3::IDENTITY) < 1e-15);
         assert!(rotation_error(&-DMat3::IDENTITY).is_infinite());
+    }
+
+    #[test]
+    fn the_nearest_rotation_is_one_and_leaves_rotations_alone() {
+        let r = DMat3::from_rotation_y(0.7) * DMat3::from_rotation_x(-2.0);
+        let skew = DMat3::from_cols_array(&[1.0, 2e-4, 0.0, -1e-4, 1.0, 3e-4, 0.0, 0.0, 1.0002]);
+        let fixed = nearest_rotation(&(r * skew));
+        assert!(rotation_error(&fixed) < 1e-14);
+        assert!((fixed - r).to_cols_array().iter().all(|e| e.abs() < 3e-4));
+        assert!((nearest_rotation(&r) - r).to_cols_array().iter().all(|e| e.abs() < 1e-15));
     }
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use crate::scene::GaussianCloud;
+pub use crate::scene::{Evaluation, StepMetrics, ViewScore};
 
 /// What the work should do next; asked at every step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,49 +38,6 @@ impl Progress {
     pub fn eta_secs(&self) -> Option<f64> {
         (self.rate > 0.0).then(|| self.total.saturating_sub(self.done) as f64 / self.rate)
     }
-}
-
-/// Measurements of one training step (reported every few steps).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct StepMetrics {
-    /// Steps done.
-    pub step: u64,
-    /// Seconds of training so far.
-    pub secs: f64,
-    /// L1 + 0.2 D-SSIM, mean over the steps since the last report.
-    pub loss: f64,
-    /// PSNR in dB of the training photos of those steps, mean.
-    pub train_psnr: f64,
-    /// Gaussians now.
-    pub gaussians: usize,
-}
-
-/// Quality on one held-out photo.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ViewScore {
-    /// The photo's name.
-    pub name: String,
-    /// PSNR in dB.
-    pub psnr: f64,
-    /// SSIM.
-    pub ssim: f64,
-}
-
-/// Quality on the held-out photos.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Evaluation {
-    /// Steps done.
-    pub step: u64,
-    /// Seconds of training so far (evaluation itself not counted).
-    pub secs: f64,
-    /// Mean PSNR in dB over the views.
-    pub psnr: f64,
-    /// Mean SSIM over the views.
-    pub ssim: f64,
-    /// Gaussians at that step.
-    pub gaussians: usize,
-    /// Each view.
-    pub views: Vec<ViewScore>,
 }
 
 /// Something a person should see in a log.

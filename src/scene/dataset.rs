@@ -100,6 +100,7 @@ mod tests {
                     camera: Camera::look_at(eye, DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid"),
                     distortion: None,
                     test_split: false,
+                    background: None,
                 }
             })
             .collect();

@@ -4,10 +4,12 @@ pub mod bounds;
 pub mod camera;
 pub mod cloud;
 pub mod dataset;
+pub mod history;
 pub mod photo;
 
 pub use bounds::Bounds;
 pub use camera::{Camera, CameraError};
 pub use cloud::{CloudError, ExtraProperty, Gaussian, GaussianCloud};
 pub use dataset::{Dataset, SparsePoint};
+pub use history::{Evaluation, StepMetrics, ViewScore};
 pub use photo::{Distortion, Photo, PhotoPixels};

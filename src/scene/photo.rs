@@ -19,6 +19,9 @@ pub struct Photo {
     pub distortion: Option<Distortion>,
     /// Whether the dataset itself says that this photo is for testing (Blender's `test` split).
     pub test_split: bool,
+    /// Colour that the file's transparent pixels are composited over; `None` = they count for
+    /// nothing (coverage 0).
+    pub background: Option<[f32; 3]>,
 }
 
 /// OpenCV's radial-tangential lens model: `x' = x (1 + k1 r² + k2 r⁴) + 2 p1 x y + p2 (r² + 2 x²)`,

@@ -1,0 +1,133 @@
+//! Files that are either the old one or the new one, whatever happens in between.
+
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+use super::IoError;
+
+/// Replaces `path` by what `fill` writes: a temporary file in the same folder is filled, synced
+/// and renamed over it, and the folder is synced. On any failure the temporary file is removed
+/// and what was at `path` before stays as it was.
+///
+/// # Errors
+/// [`IoError::Write`] with the system's reason and a remedy; errors of `fill` arrive the same way.
+pub fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), IoError> {
+    replace(path, fill).map_err(|cause| IoError::Write { path: path.into(), remedy: remedy(cause.kind()), cause })
+}
+
+fn replace(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    let name = path.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "not a file name"))?;
+    let folder = match path.parent() {
+        Some(p) if !p.as_os_str().is_empty() => p,
+        _ => Path::new("."),
+    };
+    if path.is_dir() {
+        return Err(io::Error::new(io::ErrorKind::IsADirectory, "a folder of that name exists"));
+    }
+    let mut prefix = std::ffi::OsString::from(".");
+    prefix.push(name);
+    prefix.push(".");
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(&prefix).suffix(".tmp");
+    // Temporary files are private by default; the finished one has the usual permissions.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut file = builder.tempfile_in(folder)?;
+    let mut out = BufWriter::with_capacity(1 << 20, file.as_file_mut());
+    fill(&mut out)?;
+    out.flush()?;
+    drop(out);
+    file.as_file().sync_all()?;
+    file.persist(path).map_err(|e| e.error)?;
+    sync_folder(folder)
+}
+
+/// Makes a rename in `folder` survive a power cut, on systems where folders can be synced.
+fn sync_folder(folder: &Path) -> io::Result<()> {
+    if cfg!(unix) { std::fs::File::open(folder)?.sync_all() } else { Ok(()) }
+}
+
+/// What a person can do about a failed write.
+fn remedy(kind: io::ErrorKind) -> &'static str {
+    use io::ErrorKind as K;
+    match kind {
+        K::StorageFull | K::QuotaExceeded => "the disk is full: free some space or choose another folder",
+        K::FileTooLarge => "the disk does not hold files of this size: choose another folder",
+        K::PermissionDenied | K::ReadOnlyFilesystem => "the folder cannot be written to: choose another folder",
+        K::NotFound | K::NotADirectory => "the folder does not exist: create it or choose another one",
+        _ => "what was there before is unchanged",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn entries(folder: &Path) -> Vec<String> {
+        let mut names: Vec<String> = fs::read_dir(folder)
+            .expect("list")
+            .map(|e| e.expect("entry").file_name().to_string_lossy().into_owned())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn replaces_and_leaves_nothing_behind() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("a.bin");
+        write(&path, |w| w.write_all(b"one")).expect("first");
+        write(&path, |w| w.write_all(b"two")).expect("second");
+        assert_eq!(fs::read(&path).expect("read"), b"two");
+        assert_eq!(entries(folder.path()), ["a.bin"]);
+    }
+
+    #[test]
+    fn a_full_disk_keeps_the_old_file() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("a.bin");
+        write(&path, |w| w.write_all(b"old")).expect("first");
+        let e = write(&path, |w| {
+            w.write_all(&[0; 1000])?;
+            Err(io::Error::from(io::ErrorKind::StorageFull))
+        })
+        .expect_err("full");
+        let text = e.to_string();
+        assert!(matches!(&e, IoError::Write { cause, .. } if cause.kind() == io::ErrorKind::StorageFull));
+        assert!(text.contains("a.bin") && text.contains("free some space"), "{text}");
+        assert_eq!(fs::read(&path).expect("read"), b"old");
+        assert_eq!(entries(folder.path()), ["a.bin"]);
+    }
+
+    #[test]
+    fn a_missing_folder_or_a_folder_in_the_way_is_named() {
+        let folder = tempfile::tempdir().expect("folder");
+        let e = write(&folder.path().join("no/a.bin"), |w| w.write_all(b"x")).expect_err("missing");
+        assert!(e.to_string().contains("does not exist"), "{e}");
+        fs::create_dir(folder.path().join("b.bin")).expect("create");
+        let e = write(&folder.path().join("b.bin"), |w| w.write_all(b"x")).expect_err("in the way");
+        assert!(matches!(&e, IoError::Write { cause, .. } if cause.kind() == io::ErrorKind::IsADirectory));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_read_only_folder_is_named() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("a.bin");
+        write(&path, |w| w.write_all(b"old")).expect("first");
+        fs::set_permissions(folder.path(), PermissionsExt::from_mode(0o555)).expect("permissions");
+        let result = write(&path, |w| w.write_all(b"new"));
+        fs::set_permissions(folder.path(), PermissionsExt::from_mode(0o755)).expect("permissions");
+        match result {
+            Err(e) => {
+                assert!(matches!(&e, IoError::Write { cause, .. } if cause.kind() == io::ErrorKind::PermissionDenied));
+                assert!(e.to_string().contains("choose another folder"), "{e}");
+                assert_eq!(fs::read(&path).expect("read"), b"old");
+            }
+            // The superuser may write anywhere.
+            Ok(()) => assert_eq!(fs::read(&path).expect("read"), b"new"),
+        }
+    }
+}

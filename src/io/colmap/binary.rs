@@ -1,0 +1,102 @@
+//! COLMAP's binary files.
+
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::{Cameras, Image, lens, point};
+use crate::io::IoError;
+use crate::io::reader::Reader;
+use crate::scene::SparsePoint;
+
+/// Least bytes of a camera: id, model, size, three parameters.
+const CAMERA_BYTES: usize = 4 + 4 + 16 + 24;
+/// Least bytes of an image: id, pose, camera, empty name, number of 2-D points.
+const IMAGE_BYTES: usize = 4 + 56 + 4 + 1 + 8;
+/// Bytes of an image's 2-D point.
+const OBSERVATION_BYTES: usize = 24;
+/// Least bytes of a point: id, position, colour, error, length of its track.
+const POINT_BYTES: usize = 8 + 24 + 3 + 8 + 8;
+/// Bytes of an entry of a point's track.
+const TRACK_BYTES: usize = 8;
+
+/// `cameras.bin`.
+pub(super) fn cameras(bytes: &[u8], path: &Path) -> Result<Cameras, IoError> {
+    let mut r = Reader::new(bytes, path);
+    let n = r.count("cameras", CAMERA_BYTES)?;
+    let mut cameras = Cameras::new();
+    for i in 0..n {
+        let place = format!("camera {i}");
+        let id = r.u32(&place)?;
+        let number = r.u32(&place)?;
+        let size = (r.u64(&place)?, r.u64(&place)?);
+        let Some((model, count)) = lens::by_number(number) else {
+            return Err(IoError::Unsupported {
+                path: path.into(),
+                what: format!("the camera model number {number}"),
+                remedy: "undistort the photos with COLMAP's image_undistorter first",
+            });
+        };
+        let params = (0..count).map(|_| r.f64(&place)).collect::<Result<Vec<_>, _>>()?;
+        cameras.insert(id, lens::lens(model, size, &params, id, path)?);
+    }
+    Ok(cameras)
+}
+
+/// `images.bin`.
+pub(super) fn images(bytes: &[u8], path: &Path) -> Result<Vec<Image>, IoError> {
+    let mut r = Reader::new(bytes, path);
+    let n = r.count("images", IMAGE_BYTES)?;
+    let mut images = Vec::new();
+    for i in 0..n {
+        let place = format!("image {i}");
+        r.u32(&place)?;
+        let mut q = [0.0; 4];
+        for v in &mut q {
+            *v = r.f64(&place)?;
+        }
+        let translation = DVec3::new(r.f64(&place)?, r.f64(&place)?, r.f64(&place)?);
+        let camera = r.u32(&place)?;
+        let name = std::str::from_utf8(r.c_string(&place)?).map_err(|_| IoError::Syntax {
+            path: path.into(),
+            place: place.clone(),
+            reason: "its name is not UTF-8 text".into(),
+        })?;
+        let observations = r.count(&format!("2-D points of {place}"), OBSERVATION_BYTES)?;
+        r.take(observations * OBSERVATION_BYTES, &place)?;
+        images.push(Image { name: name.into(), camera, quaternion: q, translation });
+    }
+    Ok(images)
+}
+
+/// `points3D.bin`.
+pub(super) fn points(bytes: &[u8], path: &Path) -> Result<Vec<SparsePoint>, IoError> {
+    let mut r = Reader::new(bytes, path);
+    let n = r.count("points", POINT_BYTES)?;
+    let mut points = Vec::with_capacity(n);
+    for i in 0..n {
+        r.u64("a point")?;
+        let position = DVec3::new(r.f64("a point")?, r.f64("a point")?, r.f64("a point")?);
+        let rgb = r.array("a point")?;
+        r.f64("a point")?;
+        let track = r.count("track entries of a point", TRACK_BYTES)?;
+        r.take(track * TRACK_BYTES, "a point's track")?;
+        points.push(point(position, rgb, i, path)?);
+    }
+    Ok(points)
+}
+
+/// Number of cameras in the bytes of a `cameras.bin`.
+pub fn check_cameras(bytes: &[u8], path: &Path) -> Result<usize, IoError> {
+    cameras(bytes, path).map(|c| c.len())
+}
+
+/// Number of photos in the bytes of an `images.bin`.
+pub fn check_images(bytes: &[u8], path: &Path) -> Result<usize, IoError> {
+    images(bytes, path).map(|i| i.len())
+}
+
+/// Number of points in the bytes of a `points3D.bin`.
+pub fn check_points(bytes: &[u8], path: &Path) -> Result<usize, IoError> {
+    points(bytes, path).map(|p| p.len())
+}

@@ -1,0 +1,253 @@
+//! Tests of COLMAP reconstructions.
+
+use std::fs;
+
+use glam::{DQuat, DVec2};
+use image::RgbImage;
+
+use super::*;
+use crate::scene::Distortion;
+
+/// A camera at (1, 2, 3) that looks along +y with +z up.
+fn world_from_camera() -> DMat3 {
+    DMat3::from_cols(DVec3::X, -DVec3::Z, DVec3::Y)
+}
+
+fn pose() -> ([f64; 4], DVec3) {
+    let r = world_from_camera().transpose();
+    let q = DQuat::from_mat3(&r);
+    ([q.w, q.x, q.y, q.z], -(r * DVec3::new(1.0, 2.0, 3.0)))
+}
+
+struct Bin(Vec<u8>);
+
+impl Bin {
+    fn u32(mut self, v: u32) -> Self {
+        self.0.extend(v.to_le_bytes());
+        self
+    }
+    fn u64(mut self, v: u64) -> Self {
+        self.0.extend(v.to_le_bytes());
+        self
+    }
+    fn f64(mut self, values: &[f64]) -> Self {
+        values.iter().for_each(|v| self.0.extend(v.to_le_bytes()));
+        self
+    }
+    fn bytes(mut self, b: &[u8]) -> Self {
+        self.0.extend(b);
+        self
+    }
+}
+
+/// Camera 7 of model `number`.
+fn cameras_bin(number: u32, params: &[f64]) -> Vec<u8> {
+    Bin(vec![]).u64(1).u32(7).u32(number).u64(64).u64(48).f64(params).0
+}
+
+fn images_bin(names: &[&str]) -> Vec<u8> {
+    let (q, t) = pose();
+    names
+        .iter()
+        .fold(Bin(vec![]).u64(names.len() as u64), |b, name| {
+            let b = b.u32(1).f64(&q).f64(&t.to_array()).u32(7).bytes(name.as_bytes()).bytes(&[0]);
+            // Two observations, which are skipped.
+            b.u64(2).f64(&[1.0; 3]).f64(&[2.0; 3])
+        })
+        .0
+}
+
+fn points_bin(position: [f64; 3]) -> Vec<u8> {
+    let b = Bin(vec![]).u64(1).u64(99).f64(&position).bytes(&[10, 20, 30]).f64(&[0.5]);
+    b.u64(2).u32(1).u32(0).u32(2).u32(5).0
+}
+
+const OPENCV: [f64; 8] = [50.0, 51.0, 30.0, 25.0, 0.1, -0.02, 0.003, -0.004];
+
+/// A dataset with photos `b.png` and `sub/a.png`.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("folder");
+    let images = folder.path().join("images/sub");
+    fs::create_dir_all(&images).expect("create");
+    RgbImage::new(64, 48).save(images.join("a.png")).expect("save");
+    RgbImage::new(64, 48).save(folder.path().join("images/b.png")).expect("save");
+    folder
+}
+
+fn write(folder: &Path, at: &str, files: &[(&str, &[u8])]) {
+    let at = folder.join(at);
+    fs::create_dir_all(&at).expect("create");
+    for (name, bytes) in files {
+        fs::write(at.join(name), bytes).expect("write");
+    }
+}
+
+fn binary(at: &str) -> tempfile::TempDir {
+    let f = folder();
+    let images = images_bin(&["sub/a.png", "b.png", "gone.png"]);
+    let files: [(&str, &[u8]); 3] = [
+        ("cameras.bin", &cameras_bin(4, &OPENCV)),
+        ("images.bin", &images),
+        ("points3D.bin", &points_bin([1.0, 2.0, 3.5])),
+    ];
+    write(f.path(), at, &files);
+    f
+}
+
+fn text() -> tempfile::TempDir {
+    let f = folder();
+    let (q, t) = pose();
+    let numbers = |v: &[f64]| v.iter().map(|v| format!("{v:?}")).collect::<Vec<_>>().join(" ");
+    let cameras = format!("# comment\n7 OPENCV 64 48 {}\n", numbers(&OPENCV));
+    let image = |id: u32, name: &str, points: &str| {
+        format!("{id} {} {} 7 {name}\n{points}\n", numbers(&q), numbers(&t.to_array()))
+    };
+    // The line of observations may be empty, and may look like a comment's opposite: numbers.
+    let images =
+        ["# comment\n".into(), image(1, "sub/a.png", ""), image(2, "b.png", "1 2 3 4 5 6"), image(3, "gone.png", "")];
+    let files: [(&str, &[u8]); 3] = [
+        ("cameras.txt", cameras.as_bytes()),
+        ("images.txt", &images.concat().into_bytes()),
+        ("points3D.txt", b"# comment\n99 1 2 3.5 10 20 30 0.5 1 0 2 5\n"),
+    ];
+    write(f.path(), "sparse", &files);
+    f
+}
+
+#[test]
+fn binary_and_text_agree_wherever_they_lie() {
+    let t = text();
+    let reference = read(t.path()).expect("text");
+    assert_eq!(reference.format, "COLMAP text");
+    assert_eq!(reference.warnings, ["1 of 3 listed photos are missing and were skipped (first: images/gone.png)"]);
+    for at in ["sparse/0", "sparse", "."] {
+        let b = binary(at);
+        let d = read(b.path()).expect(at);
+        assert_eq!(d.format, "COLMAP binary");
+        assert_eq!(d.points, reference.points);
+        assert_eq!(d.photos.len(), 2);
+        for (p, r) in d.photos.iter().zip(&reference.photos) {
+            assert_eq!((&p.name, &p.camera, p.distortion), (&r.name, &r.camera, r.distortion));
+        }
+    }
+}
+
+#[test]
+fn a_known_point_projects_where_it_should() {
+    let b = binary("sparse/0");
+    let d = read(b.path()).expect("read");
+    let photo = &d.photos[1];
+    assert_eq!((photo.name.as_str(), d.photos[0].name.as_str()), ("sub/a.png", "b.png"));
+    assert!((photo.camera.center - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-12);
+    // Ten ahead (+y), two to the right (+x), one up (+z).
+    let p = photo.camera.project(DVec3::new(3.0, 12.0, 4.0)).expect("in front");
+    assert!((p - DVec2::new(30.0 + 50.0 * 0.2, 25.0 - 51.0 * 0.1)).length() < 1e-9, "{p}");
+    assert_eq!(photo.distortion, Some(Distortion { k1: 0.1, k2: -0.02, p1: 0.003, p2: -0.004 }));
+    assert_eq!(d.points, [SparsePoint { position: DVec3::new(1.0, 2.0, 3.5), rgb: [10, 20, 30] }]);
+}
+
+#[test]
+fn every_model_up_to_opencv_is_read_and_others_are_named() {
+    let path = Path::new("cameras.bin");
+    let models: [(u32, &[f64], [f64; 4]); 5] = [
+        (0, &[50.0, 30.0, 25.0], [0.0; 4]),
+        (1, &[50.0, 50.0, 30.0, 25.0], [0.0; 4]),
+        (2, &[50.0, 30.0, 25.0, 0.1], [0.1, 0.0, 0.0, 0.0]),
+        (3, &[50.0, 30.0, 25.0, 0.1, 0.2], [0.1, 0.2, 0.0, 0.0]),
+        (4, &[50.0, 50.0, 30.0, 25.0, 0.1, 0.2, 0.3, 0.4], [0.1, 0.2, 0.3, 0.4]),
+    ];
+    for (number, params, [k1, k2, p1, p2]) in models {
+        let lens = &binary::cameras(&cameras_bin(number, params), path).expect("read")[&7];
+        assert!(matches!(lens.focal, listing::Focal::Px(f) if f == DVec2::splat(50.0)), "{number}");
+        assert_eq!(lens.principal_px, Some(DVec2::new(30.0, 25.0)));
+        assert_eq!(lens.distortion, Distortion { k1, k2, p1, p2 });
+    }
+    let e = check_cameras(&cameras_bin(5, &OPENCV), path).expect_err("fisheye");
+    assert!(matches!(&e, IoError::Unsupported { what, .. } if what.contains("OPENCV_FISHEYE")), "{e}");
+    let e = check_cameras(&cameras_bin(77, &OPENCV), path).expect_err("unknown");
+    assert!(matches!(&e, IoError::Unsupported { what, .. } if what.contains("77")), "{e}");
+    let e = check_text_cameras("1 FOV 64 48 1 2 3 4 5", path).expect_err("FOV");
+    assert!(matches!(&e, IoError::Unsupported { what, .. } if what.contains("FOV")), "{e}");
+    assert!(matches!(check_text_cameras("1 PINHOLE 64 48 1 2 3", path), Err(IoError::Syntax { .. })));
+}
+
+#[test]
+fn counts_of_two_to_the_sixty_are_refused() {
+    let path = Path::new("x.bin");
+    let huge = (1_u64 << 60).to_le_bytes();
+    let with = |mut bytes: Vec<u8>, at: usize| {
+        bytes[at..at + 8].copy_from_slice(&huge);
+        bytes
+    };
+    let is_huge = |e: &IoError| matches!(e, IoError::Count { claimed, .. } if *claimed == 1 << 60);
+    assert!(is_huge(&check_cameras(&with(cameras_bin(4, &OPENCV), 0), path).expect_err("cameras")));
+    let images = images_bin(&["a.png"]);
+    assert!(is_huge(&check_images(&with(images.clone(), 0), path).expect_err("images")));
+    let observations = images.len() - 48 - 8;
+    assert!(is_huge(&check_images(&with(images, observations), path).expect_err("observations")));
+    let points = points_bin([0.0; 3]);
+    assert!(is_huge(&check_points(&with(points.clone(), 0), path).expect_err("points")));
+    let track = points.len() - 16 - 8;
+    assert!(is_huge(&check_points(&with(points, track), path).expect_err("track")));
+}
+
+#[test]
+fn truncated_files_are_named_at_every_length() {
+    let path = Path::new("x.bin");
+    let ok = |e: &IoError| matches!(e, IoError::Truncated { .. } | IoError::Count { .. });
+    for n in 0..cameras_bin(4, &OPENCV).len() {
+        assert!(ok(&check_cameras(&cameras_bin(4, &OPENCV)[..n], path).expect_err("cut")), "{n}");
+    }
+    for n in 0..images_bin(&["a.png"]).len() {
+        assert!(ok(&check_images(&images_bin(&["a.png"])[..n], path).expect_err("cut")), "{n}");
+    }
+    for n in 0..points_bin([0.0; 3]).len() {
+        assert!(ok(&check_points(&points_bin([0.0; 3])[..n], path).expect_err("cut")), "{n}");
+    }
+}
+
+#[test]
+fn hostile_values_are_named() {
+    let e = check_points(&points_bin([0.0, f64::NAN, 0.0]), Path::new("p")).expect_err("NaN");
+    assert!(matches!(&e, IoError::NotFinite { element: "point", index: 0, property, .. } if property == "y"), "{e}");
+    let replaced = |images: &[u8], cameras: &[u8]| {
+        let b = binary("sparse/0");
+        write(b.path(), "sparse/0", &[("images.bin", images), ("cameras.bin", cameras)]);
+        read(b.path()).expect_err("hostile")
+    };
+    let cameras = cameras_bin(4, &OPENCV);
+    let outside = replaced(&images_bin(&["../a.png"]), &cameras);
+    assert!(matches!(outside, IoError::Outside { .. }), "{outside}");
+    let twice = replaced(&images_bin(&["b.png", "b.png"]), &cameras);
+    assert!(matches!(twice, IoError::Duplicate { .. }), "{twice}");
+    for quaternion in [[0.0; 4], [f64::NAN, 0.0, 0.0, 1.0]] {
+        let mut images = images_bin(&["b.png"]);
+        images[12..44].copy_from_slice(&quaternion.map(f64::to_le_bytes).concat());
+        let e = replaced(&images, &cameras);
+        assert!(matches!(e, IoError::Camera { cause: CameraError::Rotation(_), .. }), "{e}");
+    }
+    let mut images = images_bin(&["b.png"]);
+    images[44..52].copy_from_slice(&f64::INFINITY.to_le_bytes());
+    let e = replaced(&images, &cameras);
+    assert!(matches!(e, IoError::Camera { cause: CameraError::Center(..), .. }), "{e}");
+    let mut other = cameras.clone();
+    other[8] = 6;
+    let e = replaced(&images_bin(&["b.png"]), &other);
+    assert!(matches!(&e, IoError::Syntax { reason, .. } if reason.contains("no camera 7")), "{e}");
+    let mut empty = cameras.clone();
+    empty[16..24].copy_from_slice(&0_u64.to_le_bytes());
+    assert!(matches!(replaced(&images_bin(&["b.png"]), &empty), IoError::Syntax { .. }));
+    let mut nan = cameras;
+    nan[32 + 32..32 + 40].copy_from_slice(&f64::NAN.to_le_bytes());
+    let e = replaced(&images_bin(&["b.png"]), &nan);
+    assert!(matches!(&e, IoError::Syntax { reason, .. } if reason.contains("k1")), "{e}");
+}
+
+#[test]
+fn a_camera_without_photos_folder_is_named() {
+    let b = binary("sparse/0");
+    fs::rename(b.path().join("images"), b.path().join("pictures")).expect("rename");
+    assert!(matches!(read(b.path()), Err(IoError::Syntax { reason, .. }) if reason.contains("images_<factor>")));
+    fs::rename(b.path().join("pictures"), b.path().join("images_2")).expect("rename");
+    assert_eq!(read(b.path()).expect("reduced folder").photos.len(), 2);
+}

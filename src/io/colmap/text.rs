@@ -1,0 +1,120 @@
+//! COLMAP's text files: `#` starts a comment, one thing a line (images: two lines each).
+
+use std::path::Path;
+use std::str::{FromStr, SplitAsciiWhitespace};
+
+use glam::DVec3;
+
+use super::{Cameras, Image, lens, point};
+use crate::io::IoError;
+use crate::scene::SparsePoint;
+
+/// The words of a line.
+struct Line<'a> {
+    words: SplitAsciiWhitespace<'a>,
+    number: usize,
+    path: &'a Path,
+}
+
+impl<'a> Line<'a> {
+    fn new(text: &'a str, number: usize, path: &'a Path) -> Self {
+        Self { words: text.split_ascii_whitespace(), number, path }
+    }
+
+    fn bad(&self, reason: String) -> IoError {
+        IoError::Syntax { path: self.path.into(), place: format!("line {}", self.number), reason }
+    }
+
+    fn word(&mut self, what: &str) -> Result<&'a str, IoError> {
+        self.words.next().ok_or_else(|| self.bad(format!("{what} is missing")))
+    }
+
+    fn next<T: FromStr>(&mut self, what: &str) -> Result<T, IoError> {
+        let word = self.word(what)?;
+        word.parse().map_err(|_| {
+            let shown: String = word.chars().take(30).collect();
+            self.bad(format!("{what} = '{shown}' is no such number"))
+        })
+    }
+
+    fn vector(&mut self, what: &str) -> Result<DVec3, IoError> {
+        Ok(DVec3::new(self.next(what)?, self.next(what)?, self.next(what)?))
+    }
+}
+
+/// The lines that are neither empty nor comments.
+fn lines<'a>(text: &'a str, path: &'a Path) -> impl Iterator<Item = Line<'a>> {
+    let full = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'));
+    full.map(move |(i, l)| Line::new(l, i + 1, path))
+}
+
+/// `cameras.txt`: `id model width height params...`.
+pub(super) fn cameras(text: &str, path: &Path) -> Result<Cameras, IoError> {
+    let mut cameras = Cameras::new();
+    for mut l in lines(text, path) {
+        let id = l.next("camera id")?;
+        let model = l.word("model")?;
+        let size = (l.next("width")?, l.next("height")?);
+        let mut params = Vec::new();
+        for word in l.words.by_ref() {
+            match word.parse() {
+                Ok(v) => params.push(v),
+                Err(_) => return Err(l.bad("a parameter is not a number".into())),
+            }
+        }
+        cameras.insert(id, lens::lens(model, size, &params, id, path)?);
+    }
+    Ok(cameras)
+}
+
+/// `images.txt`: `id qw qx qy qz tx ty tz camera name`, then a line of 2-D points, maybe empty.
+pub(super) fn images(text: &str, path: &Path) -> Result<Vec<Image>, IoError> {
+    let mut images = Vec::new();
+    let mut rest = text.lines().enumerate();
+    while let Some((i, line)) = rest.next() {
+        if line.trim().is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let mut l = Line::new(line, i + 1, path);
+        l.next::<u32>("image id")?;
+        let mut quaternion = [0.0; 4];
+        for v in &mut quaternion {
+            *v = l.next("rotation")?;
+        }
+        let translation = l.vector("translation")?;
+        let camera = l.next("camera id")?;
+        // A name may hold blanks: it is what is left of the line.
+        let first = l.word("name")?;
+        let name = line.get(first.as_ptr() as usize - line.as_ptr() as usize..).unwrap_or(first).trim_end();
+        images.push(Image { name: name.into(), camera, quaternion, translation });
+        rest.next();
+    }
+    Ok(images)
+}
+
+/// `points3D.txt`: `id x y z r g b error track...`.
+pub(super) fn points(text: &str, path: &Path) -> Result<Vec<SparsePoint>, IoError> {
+    let mut points = Vec::new();
+    for mut l in lines(text, path) {
+        l.next::<u64>("point id")?;
+        let position = l.vector("position")?;
+        let rgb = [l.next("red")?, l.next("green")?, l.next("blue")?];
+        points.push(point(position, rgb, points.len(), path)?);
+    }
+    Ok(points)
+}
+
+/// Number of cameras in the text of a `cameras.txt`.
+pub fn check_text_cameras(text: &str, path: &Path) -> Result<usize, IoError> {
+    cameras(text, path).map(|c| c.len())
+}
+
+/// Number of photos in the text of an `images.txt`.
+pub fn check_text_images(text: &str, path: &Path) -> Result<usize, IoError> {
+    images(text, path).map(|i| i.len())
+}
+
+/// Number of points in the text of a `points3D.txt`.
+pub fn check_text_points(text: &str, path: &Path) -> Result<usize, IoError> {
+    points(text, path).map(|p| p.len())
+}

@@ -1,0 +1,215 @@
+//! What can go wrong with files: every error names the file, the place in it and, where there is
+//! one, the remedy.
+
+use std::io;
+use std::path::PathBuf;
+
+use crate::scene::{CameraError, CloudError};
+
+/// A file that could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum IoError {
+    /// The operating system refused to read.
+    #[error("cannot read {path}: {cause}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        cause: io::Error,
+    },
+    /// The operating system refused to write. What was there before is untouched.
+    #[error("cannot write {path}: {cause}; {remedy}")]
+    Write {
+        /// The file that was to be written.
+        path: PathBuf,
+        /// What the person can do.
+        remedy: &'static str,
+        /// What the system says.
+        cause: io::Error,
+    },
+    /// A folder, pipe or device where a file is expected.
+    #[error("{path} is not a regular file")]
+    NotAFile {
+        /// The path.
+        path: PathBuf,
+    },
+    /// More memory than the reader may use.
+    #[error("{path}: {what} needs {bytes} bytes, over the limit of {limit} bytes; {remedy}")]
+    OverBudget {
+        /// The file.
+        path: PathBuf,
+        /// What needs it.
+        what: &'static str,
+        /// How much it needs.
+        bytes: u64,
+        /// How much it may have.
+        limit: u64,
+        /// What the person can do.
+        remedy: &'static str,
+    },
+    /// The file ends too early.
+    #[error("{path} ends early: {place} needs {need} more bytes, {have} are left")]
+    Truncated {
+        /// The file.
+        path: PathBuf,
+        /// What was being read.
+        place: String,
+        /// Bytes it needs.
+        need: u64,
+        /// Bytes left.
+        have: u64,
+    },
+    /// A count that the rest of the file cannot hold.
+    #[error("{path} claims {claimed} {what}, but what follows holds {possible} at most")]
+    Count {
+        /// The file.
+        path: PathBuf,
+        /// Of what.
+        what: String,
+        /// What the file says.
+        claimed: u64,
+        /// What it can hold.
+        possible: u64,
+    },
+    /// Something that does not follow the format.
+    #[error("{path}, {place}: {reason}")]
+    Syntax {
+        /// The file.
+        path: PathBuf,
+        /// Where: a line, an element, a key.
+        place: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A number that is NaN or infinite.
+    #[error("{path}: {property} of {element} {index} is not finite")]
+    NotFinite {
+        /// The file.
+        path: PathBuf,
+        /// Kind of thing: "vertex", "point", "pose".
+        element: &'static str,
+        /// Which, from 0.
+        index: usize,
+        /// Which of its properties.
+        property: String,
+    },
+    /// A camera that is none.
+    #[error("{path}, photo '{photo}': {cause}")]
+    Camera {
+        /// The file that describes it.
+        path: PathBuf,
+        /// The photo.
+        photo: String,
+        /// What is wrong.
+        cause: CameraError,
+    },
+    /// A lens or file variant that the program does not handle.
+    #[error("{path} uses {what}, which is not supported; {remedy}")]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// The variant.
+        what: String,
+        /// What the person can do.
+        remedy: &'static str,
+    },
+    /// A path in a dataset that leads out of the dataset's folder.
+    #[error("{path} refers to '{entry}', which lies outside the folder {folder}; copy the file into it")]
+    Outside {
+        /// The file with the reference.
+        path: PathBuf,
+        /// The reference.
+        entry: String,
+        /// The dataset's folder.
+        folder: PathBuf,
+    },
+    /// The same photo listed twice.
+    #[error("{path} lists the photo '{photo}' twice")]
+    Duplicate {
+        /// The file.
+        path: PathBuf,
+        /// The photo.
+        photo: String,
+    },
+    /// A photo whose size is no scaled version of what its camera says.
+    #[error("{path} is {} x {} px, but its camera is for {} x {} px and no scaled version of that",
+        found.0, found.1, expected.0, expected.1)]
+    PhotoSize {
+        /// The picture file.
+        path: PathBuf,
+        /// Its size.
+        found: (u32, u32),
+        /// The camera's size.
+        expected: (u32, u32),
+    },
+    /// A picture with no pixels.
+    #[error("{path} is a picture of {width_px} x {height_px} px")]
+    EmptyPicture {
+        /// The picture file.
+        path: PathBuf,
+        /// Its width.
+        width_px: u32,
+        /// Its height.
+        height_px: u32,
+    },
+    /// A picture that does not decode.
+    #[error("{path} cannot be decoded: {reason}")]
+    Picture {
+        /// The picture file.
+        path: PathBuf,
+        /// What the decoder says.
+        reason: String,
+    },
+    /// A dataset without a single photo.
+    #[error("{path} lists {listed} photos and none of them exists (first: '{first}')")]
+    NoPhotos {
+        /// The file that lists them.
+        path: PathBuf,
+        /// How many it lists.
+        listed: usize,
+        /// The first of them.
+        first: String,
+    },
+    /// A cloud that violates its own invariants.
+    #[error("{path}: {cause}")]
+    Cloud {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        cause: CloudError,
+    },
+    /// A scene folder of another version of the program.
+    #[error("{path} has format version {found}; this program reads versions up to {supported}; update the program")]
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        found: u64,
+        /// The highest version understood.
+        supported: u64,
+    },
+}
+
+/// Why a path could not be opened.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    /// Nothing is there.
+    #[error("{path} does not exist")]
+    NotFound {
+        /// The path.
+        path: PathBuf,
+    },
+    /// Nothing that the program knows.
+    #[error("{path} is nothing that can be opened. Looked for: {looked_for}. Found: {found}.")]
+    Unrecognised {
+        /// The path.
+        path: PathBuf,
+        /// Every layout or format tried.
+        looked_for: String,
+        /// What is there instead.
+        found: String,
+    },
+    /// Recognised, but broken.
+    #[error(transparent)]
+    Io(#[from] IoError),
+}

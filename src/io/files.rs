@@ -1,0 +1,178 @@
+//! Bounded reading, and paths that stay inside their folder.
+
+use std::fs::{self, File};
+use std::io::Read;
+use std::path::{Component, Path, PathBuf};
+use std::sync::OnceLock;
+
+use super::IoError;
+
+/// Largest text file (JSON, COLMAP text) in bytes.
+pub const MAX_TEXT_BYTES: u64 = 512 << 20;
+/// Largest picture file in bytes.
+pub const MAX_PICTURE_BYTES: u64 = 256 << 20;
+
+/// Bytes that one reader may use: half of the memory that is free when the program first asks.
+pub fn memory_budget() -> u64 {
+    static BUDGET: OnceLock<u64> = OnceLock::new();
+    *BUDGET.get_or_init(|| {
+        // Systems that do not say get what any of them can spare.
+        const UNKNOWN: u64 = 1 << 30;
+        let Ok(mut system) = sysinfo::System::new() else { return UNKNOWN };
+        system.refresh_memory();
+        let group = system.cgroup_limits().map_or(u64::MAX, |g| g.free_memory);
+        match system.available_memory().min(group) {
+            0 => UNKNOWN,
+            free => free / 2,
+        }
+    })
+}
+
+/// The whole file, if it is a regular file of at most `limit` bytes.
+pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
+    let failed = |cause| IoError::Read { path: path.into(), cause };
+    let meta = fs::metadata(path).map_err(failed)?;
+    if !meta.is_file() {
+        return Err(IoError::NotAFile { path: path.into() });
+    }
+    let limit = limit.min(memory_budget());
+    let over = |bytes| IoError::OverBudget {
+        path: path.into(),
+        what: "the file",
+        bytes,
+        limit,
+        remedy: "free some memory or use a smaller file",
+    };
+    if meta.len() > limit {
+        return Err(over(meta.len()));
+    }
+    let mut bytes = Vec::with_capacity(meta.len() as usize);
+    // The file may grow between the check and the read.
+    File::open(path).map_err(failed)?.take(limit + 1).read_to_end(&mut bytes).map_err(failed)?;
+    if bytes.len() as u64 > limit {
+        return Err(over(bytes.len() as u64));
+    }
+    Ok(bytes)
+}
+
+/// The first `limit` bytes of a file, or all of it if it is shorter.
+pub fn read_start(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
+    let failed = |cause| IoError::Read { path: path.into(), cause };
+    if !fs::metadata(path).map_err(failed)?.is_file() {
+        return Err(IoError::NotAFile { path: path.into() });
+    }
+    let mut bytes = Vec::new();
+    File::open(path).map_err(failed)?.take(limit).read_to_end(&mut bytes).map_err(failed)?;
+    Ok(bytes)
+}
+
+/// The text of a UTF-8 file of at most [`MAX_TEXT_BYTES`].
+pub fn read_text(path: &Path) -> Result<String, IoError> {
+    String::from_utf8(read(path, MAX_TEXT_BYTES)?).map_err(|e| IoError::Syntax {
+        path: path.into(),
+        place: format!("byte {}", e.utf8_error().valid_up_to()),
+        reason: "not UTF-8 text".into(),
+    })
+}
+
+/// A JSON file as `T`.
+pub fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, IoError> {
+    let bytes = read(path, MAX_TEXT_BYTES)?;
+    serde_json::from_slice(&bytes).map_err(|e| json_error(path, &e))
+}
+
+/// A JSON error with its place taken apart.
+pub fn json_error(path: &Path, e: &serde_json::Error) -> IoError {
+    let text = e.to_string();
+    let reason = text.rsplit_once(" at line ").map_or(text.as_str(), |(reason, _)| reason);
+    IoError::Syntax {
+        path: path.into(),
+        place: format!("line {} column {}", e.line(), e.column()),
+        reason: reason.into(),
+    }
+}
+
+/// A path that a dataset's file `source` refers to, relative to the dataset's folder `root`:
+/// normalised, with `/` between its parts. Absolute paths and `..` are refused.
+pub fn relative(root: &Path, entry: &str, source: &Path) -> Result<String, IoError> {
+    let outside = || IoError::Outside { path: source.into(), entry: entry.into(), folder: root.into() };
+    // A backslash parts names on Windows only; refused everywhere, so that a dataset means the
+    // same on every system.
+    if entry.contains(['\\', '\0']) {
+        return Err(outside());
+    }
+    let mut parts = Vec::new();
+    for component in Path::new(entry).components() {
+        match component {
+            Component::Normal(name) => parts.push(name.to_str().ok_or_else(outside)?),
+            Component::CurDir => {}
+            Component::ParentDir | Component::RootDir | Component::Prefix(_) => return Err(outside()),
+        }
+    }
+    if parts.is_empty() {
+        return Err(outside());
+    }
+    Ok(parts.join("/"))
+}
+
+/// The existing file `root/entry` once its symbolic links are followed, which must stay inside
+/// `root`; `None` if it does not exist. `entry` comes from [`relative`].
+pub fn inside(root: &Path, entry: &str, source: &Path) -> Result<Option<PathBuf>, IoError> {
+    let path = root.join(entry);
+    let Ok(real) = fs::canonicalize(&path) else { return Ok(None) };
+    let real_root = fs::canonicalize(root).map_err(|cause| IoError::Read { path: root.into(), cause })?;
+    if !real.starts_with(&real_root) {
+        return Err(IoError::Outside { path: source.into(), entry: entry.into(), folder: root.into() });
+    }
+    Ok(Some(path))
+}
+
+/// The name of a folder for people, also where its path ends in `.` or `..`.
+pub fn folder_name(folder: &Path) -> String {
+    let real = fs::canonicalize(folder).unwrap_or_else(|_| folder.into());
+    real.file_name().map_or_else(|| real.display().to_string(), |n| n.to_string_lossy().into_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_that_leave_the_folder_are_refused() {
+        let root = Path::new("/data/scene");
+        let source = Path::new("transforms.json");
+        for entry in ["../a.png", "images/../../a.png", "/etc/passwd", "", ".", "..\\a.png", "a\0b"] {
+            let e = relative(root, entry, source).expect_err(entry);
+            assert!(matches!(e, IoError::Outside { .. }), "{entry}: {e}");
+        }
+        assert_eq!(relative(root, "./images//a.png", source).expect("inside"), "images/a.png");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn symbolic_links_out_of_the_folder_are_refused() {
+        let folder = tempfile::tempdir().expect("folder");
+        let root = folder.path().join("scene");
+        fs::create_dir(&root).expect("create");
+        fs::write(folder.path().join("secret.png"), b"x").expect("write");
+        fs::write(root.join("inner.png"), b"x").expect("write");
+        std::os::unix::fs::symlink("../secret.png", root.join("out.png")).expect("link");
+        std::os::unix::fs::symlink("inner.png", root.join("in.png")).expect("link");
+        let source = Path::new("transforms.json");
+        assert!(matches!(inside(&root, "out.png", source), Err(IoError::Outside { .. })));
+        assert!(matches!(inside(&root, "in.png", source), Ok(Some(_))));
+        assert!(matches!(inside(&root, "none.png", source), Ok(None)));
+    }
+
+    #[test]
+    fn only_regular_files_of_bounded_size_are_read() {
+        let folder = tempfile::tempdir().expect("folder");
+        let file = folder.path().join("a");
+        fs::write(&file, [0; 100]).expect("write");
+        assert!(matches!(read(&file, 99), Err(IoError::OverBudget { bytes: 100, limit: 99, .. })));
+        assert_eq!(read(&file, 100).expect("fits").len(), 100);
+        assert!(matches!(read(folder.path(), 100), Err(IoError::NotAFile { .. })));
+        #[cfg(unix)]
+        assert!(matches!(read(Path::new("/dev/zero"), 100), Err(IoError::NotAFile { .. })));
+    }
+}

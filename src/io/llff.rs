@@ -1,0 +1,221 @@
+//! LLFF: `poses_bounds.npy` beside a folder of photos.
+//!
+//! Each row holds a 3 x 5 block `[R | t | (height, width, focal)]`, row by row, with camera axes
+//! down, right, back, then the nearest and farthest depth. Rows belong to the photos in the order
+//! of their names.
+
+use std::fs;
+use std::path::Path;
+
+use glam::{DMat3, DVec2, DVec3};
+use npyz::NpyFile;
+
+use super::listing::{self, Focal, Lens, Listed, photos};
+use super::{IoError, files};
+use crate::scene::{Camera, Dataset, Distortion};
+
+/// The file with the poses.
+pub const POSES_FILE: &str = "poses_bounds.npy";
+/// Numbers per photo.
+const ROW: usize = 17;
+/// Largest header of an `.npy` file in bytes.
+const MAX_HEADER_BYTES: usize = 64 << 10;
+/// Endings of photos.
+const ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
+
+/// Reads the dataset in `root`.
+pub fn read(root: &Path) -> Result<Dataset, IoError> {
+    let file = root.join(POSES_FILE);
+    let rows = poses(&files::read(&file, u64::MAX)?, &file)?;
+    let folder = listing::photo_folder(root, &file)?;
+    let names = names(&root.join(&folder))?;
+    if names.len() != rows.len() {
+        return Err(IoError::Count {
+            path: file,
+            what: format!("photos (the folder {folder} holds another number)"),
+            claimed: rows.len() as u64,
+            possible: names.len() as u64,
+        });
+    }
+    let listed =
+        rows.iter().zip(&names).map(|(row, name)| listed(row, name, &folder, &file)).collect::<Result<_, _>>()?;
+    let mut warnings = Vec::new();
+    Ok(Dataset {
+        name: files::folder_name(root),
+        root: root.into(),
+        format: "LLFF".into(),
+        photos: photos(listed, root, &file, &mut warnings)?,
+        points: Vec::new(),
+        background: None,
+        warnings,
+    })
+}
+
+/// The rows in the bytes of a `poses_bounds.npy`.
+pub fn poses(bytes: &[u8], path: &Path) -> Result<Vec<[f64; ROW]>, IoError> {
+    let bad = |reason: String| IoError::Syntax { path: path.into(), place: "npy".into(), reason };
+    let header = header_len(bytes).ok_or_else(|| bad("not an .npy file, or its header is cut off".into()))?;
+    // npyz reads the header from its own length field, so it sees no more than that much.
+    let npy = NpyFile::new(bytes).map_err(|e| bad(e.to_string()))?;
+    let &[n, ROW_U64] = npy.shape() else {
+        return Err(bad(format!("the array's shape is {:?}, expected [photos, {ROW}]", npy.shape())));
+    };
+    if npy.order() != npyz::Order::C {
+        return Err(bad("the array is stored column by column; save it with order='C'".into()));
+    }
+    let item = npy.dtype().num_bytes().filter(|b| *b > 0).ok_or_else(|| bad("the array holds no numbers".into()))?;
+    let possible = ((bytes.len() - header) / (ROW * item)) as u64;
+    if n > possible {
+        return Err(IoError::Count { path: path.into(), what: "photos".into(), claimed: n, possible });
+    }
+    let values: Vec<f64> = match item {
+        4 => npy.into_vec::<f32>().map_err(|e| bad(e.to_string()))?.into_iter().map(f64::from).collect(),
+        _ => npy.into_vec::<f64>().map_err(|e| bad(e.to_string()))?,
+    };
+    if let Some(at) = values.iter().position(|v| !v.is_finite()) {
+        return Err(IoError::NotFinite {
+            path: path.into(),
+            element: "pose",
+            index: at / ROW,
+            property: format!("column {}", at % ROW),
+        });
+    }
+    Ok(values.as_chunks::<ROW>().0.to_vec())
+}
+
+const ROW_U64: u64 = ROW as u64;
+
+/// Bytes before the data of an `.npy` file.
+fn header_len(bytes: &[u8]) -> Option<usize> {
+    let [0x93, b'N', b'U', b'M', b'P', b'Y', major, _, rest @ ..] = bytes else { return None };
+    let (start, length) = match major {
+        1 => (10, usize::from(u16::from_le_bytes(*rest.first_chunk()?))),
+        _ => (12, u32::from_le_bytes(*rest.first_chunk()?) as usize),
+    };
+    let end = start + length;
+    (length <= MAX_HEADER_BYTES && end <= bytes.len()).then_some(end)
+}
+
+/// The photos in a folder, sorted; SPIn-NeRF's helper pictures are left out.
+fn names(folder: &Path) -> Result<Vec<String>, IoError> {
+    let failed = |cause| IoError::Read { path: folder.into(), cause };
+    let mut names = Vec::new();
+    for entry in fs::read_dir(folder).map_err(failed)? {
+        let name = entry.map_err(failed)?.file_name().to_string_lossy().into_owned();
+        let ending = name.rsplit_once('.').map_or(String::new(), |(_, e)| e.to_lowercase());
+        if ENDINGS.contains(&ending.as_str()) && !name.contains("cutout") && !name.contains("pseudo") {
+            names.push(name);
+        }
+    }
+    names.sort();
+    Ok(names)
+}
+
+fn listed(row: &[f64; ROW], name: &str, folder: &str, source: &Path) -> Result<Listed, IoError> {
+    let column = |c: usize| DVec3::new(row[c], row[5 + c], row[10 + c]);
+    let DVec3 { x: height, y: width, z: focal } = column(4);
+    let side = |v: f64| (v >= 1.0 && v <= f64::from(Camera::MAX_SIDE_PX)).then_some(v.round() as u32);
+    let (Some(w), Some(h)) = (side(width), side(height)) else {
+        return Err(IoError::Syntax {
+            path: source.into(),
+            place: format!("photo '{name}'"),
+            reason: format!("size {width} x {height} px is not between 1 and {} px a side", Camera::MAX_SIDE_PX),
+        });
+    };
+    Ok(Listed {
+        name: name.into(),
+        entry: format!("{folder}/{name}"),
+        lens: Lens {
+            size_px: Some((w, h)),
+            focal: Focal::Px(DVec2::splat(focal)),
+            principal_px: None,
+            distortion: Distortion::default(),
+        },
+        // Down, right, back to right, down, forward.
+        world_from_camera: DMat3::from_cols(column(1), column(0), -column(2)),
+        center: column(3),
+        test_split: false,
+        background: None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use image::RgbImage;
+    use npyz::WriterBuilder;
+
+    use super::*;
+    use crate::scene::CameraError;
+
+    /// A camera at (1, 2, 3) that looks along +y with +z up: down is -z, right x, back -y.
+    const POSE: [f64; ROW] = [0.0, 1.0, 0.0, 1.0, 48.0, 0.0, 0.0, -1.0, 2.0, 64.0, -1.0, 0.0, 0.0, 3.0, 50.0, 0.5, 9.0];
+
+    fn npy(values: &[f64], shape: &[u64]) -> Vec<u8> {
+        let mut out = Vec::new();
+        let mut w = npyz::WriteOptions::new().default_dtype().shape(shape).writer(&mut out).begin_nd().expect("begin");
+        w.extend(values.iter().copied()).expect("write");
+        w.finish().expect("finish");
+        out
+    }
+
+    fn folder(rows: usize) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().expect("folder");
+        fs::write(folder.path().join(POSES_FILE), npy(&POSE.repeat(rows), &[rows as u64, 17])).expect("write");
+        fs::create_dir(folder.path().join("images_2")).expect("create");
+        for name in ["b.png", "a.png", "a_cutout.png", "pseudo_b.png"] {
+            RgbImage::new(32, 24).save(folder.path().join("images_2").join(name)).expect("save");
+        }
+        folder
+    }
+
+    #[test]
+    fn a_known_point_projects_where_it_should() {
+        let d = read(folder(2).path()).expect("read");
+        assert_eq!(d.photos.iter().map(|p| p.name.as_str()).collect::<Vec<_>>(), ["a.png", "b.png"]);
+        let c = &d.photos[0].camera;
+        assert_eq!((c.width_px, c.height_px, c.focal_px), (32, 24, DVec2::splat(25.0)));
+        // Ten ahead (+y), two to the right (+x), one up (+z), at half size.
+        let p = c.project(DVec3::new(3.0, 12.0, 4.0)).expect("in front");
+        assert!((p - DVec2::new(16.0 + 25.0 * 0.2, 12.0 - 25.0 * 0.1)).length() < 1e-12, "{p}");
+        assert_eq!(c.project(DVec3::new(1.0, -5.0, 3.0)), None, "behind");
+    }
+
+    #[test]
+    fn the_number_of_photos_must_match() {
+        assert!(matches!(read(folder(3).path()), Err(IoError::Count { claimed: 3, possible: 2, .. })));
+    }
+
+    #[test]
+    fn hostile_arrays_are_named() {
+        let path = Path::new(POSES_FILE);
+        let good = npy(&POSE, &[1, 17]);
+        assert_eq!(poses(&good, path).expect("good"), [POSE]);
+        for n in [0, 5, 9, 60] {
+            assert!(matches!(poses(&good[..n], path), Err(IoError::Syntax { .. })), "{n}");
+        }
+        assert!(matches!(poses(&good[..good.len() - 1], path), Err(IoError::Count { claimed: 1, possible: 0, .. })));
+        let text = String::from_utf8_lossy(&good).into_owned();
+        let at = text.find("(1, 17)").map_or(0, |_| good.windows(7).position(|w| w == b"(1, 17)").expect("shape"));
+        let with_shape = |shape: &str| {
+            let mut bytes = good.clone();
+            let pad = bytes[at + 7..].iter().position(|b| *b == b'\n').expect("end");
+            let tail: Vec<u8> = format!("{shape}, }}").into_bytes();
+            bytes[at..at + 7 + pad].fill(b' ');
+            bytes[at..at + tail.len()].copy_from_slice(&tail);
+            poses(&bytes, path)
+        };
+        assert!(
+            matches!(with_shape("(1152921504606846976, 17)"), Err(IoError::Count { claimed, .. }) if claimed == 1 << 60)
+        );
+        assert!(matches!(with_shape("(17, 1)"), Err(IoError::Syntax { .. })));
+        assert!(matches!(with_shape("(17,)"), Err(IoError::Syntax { .. })));
+        let mut bad = POSE;
+        bad[7] = f64::NAN;
+        assert!(matches!(poses(&npy(&bad, &[1, 17]), path), Err(IoError::NotFinite { element: "pose", index: 0, .. })));
+        let f = folder(2);
+        let mut mirrored = POSE;
+        mirrored[7] = 1.0;
+        fs::write(f.path().join(POSES_FILE), npy(&mirrored.repeat(2), &[2, 17])).expect("write");
+        assert!(matches!(read(f.path()), Err(IoError::Camera { cause: CameraError::Rotation(_), .. })));
+    }
+}

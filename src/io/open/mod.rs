@@ -1,0 +1,139 @@
+//! One `open` for everything: looks at what is there and calls the reader for it.
+
+use std::fs;
+use std::path::Path;
+
+use super::trained::{self, TrainedScene};
+use super::{IoError, OpenError, colmap, files, llff, splat_ply, transforms};
+use crate::scene::{Dataset, GaussianCloud};
+
+/// What a path turned out to be.
+#[derive(Debug)]
+pub enum Opened {
+    /// Posed photos.
+    Dataset(Dataset),
+    /// A finished splat.
+    Cloud(GaussianCloud),
+    /// A folder that this program trained.
+    Trained(TrainedScene),
+}
+
+type Result<T> = std::result::Result<T, OpenError>;
+
+/// What is looked for in a folder, in this order, and the reader of each.
+const FOLDERS: [Layout; 5] = [
+    Layout {
+        name: "a trained scene (scene.json)",
+        is: trained::is_scene,
+        open: |p| Ok(Opened::Trained(trained::load(p)?)),
+    },
+    Layout {
+        name: "nerfstudio or instant-ngp photos (transforms.json)",
+        is: |p| p.join("transforms.json").is_file(),
+        open: |p| Ok(Opened::Dataset(transforms::read(&p.join("transforms.json"))?)),
+    },
+    Layout {
+        name: "Blender photos (transforms_train.json)",
+        is: |p| p.join("transforms_train.json").is_file(),
+        open: |p| Ok(Opened::Dataset(transforms::read_blender(p)?)),
+    },
+    Layout {
+        name: "a COLMAP reconstruction ({cameras,images}.{bin,txt} in sparse/0, sparse or the folder)",
+        is: colmap::is_colmap,
+        open: |p| Ok(Opened::Dataset(colmap::read(p)?)),
+    },
+    Layout {
+        name: "LLFF photos (poses_bounds.npy)",
+        is: |p| p.join(llff::POSES_FILE).is_file(),
+        open: |p| Ok(Opened::Dataset(llff::read(p)?)),
+    },
+];
+
+/// A way to keep a scene in a folder.
+struct Layout {
+    name: &'static str,
+    is: fn(&Path) -> bool,
+    open: fn(&Path) -> std::result::Result<Opened, IoError>,
+}
+
+/// What is looked for in a file.
+const FILES: &str = "splats (.ply, .compressed.ply), transforms.json, scene.json, poses_bounds.npy";
+
+/// Bytes that tell file formats apart.
+const MAGIC_BYTES: u64 = 4;
+
+/// Opens a dataset's folder or its `transforms.json`, a splat file, or a trained scene.
+///
+/// # Errors
+/// [`OpenError::Unrecognised`] says what was looked for and what was found instead; what is
+/// recognised but broken arrives as [`OpenError::Io`] from its reader.
+pub fn open(path: &Path) -> Result<Opened> {
+    let meta = fs::metadata(path).map_err(|cause| match cause.kind() {
+        std::io::ErrorKind::NotFound => OpenError::NotFound { path: path.into() },
+        _ => IoError::Read { path: path.into(), cause }.into(),
+    })?;
+    if meta.is_dir() { open_folder(path) } else { open_file(path) }
+}
+
+fn open_folder(path: &Path) -> Result<Opened> {
+    if let Some(layout) = FOLDERS.iter().find(|l| (l.is)(path)) {
+        return Ok((layout.open)(path)?);
+    }
+    Err(OpenError::Unrecognised {
+        path: path.into(),
+        looked_for: FOLDERS.map(|l| l.name).join("; "),
+        found: contents(path)?,
+    })
+}
+
+fn open_file(path: &Path) -> Result<Opened> {
+    let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().to_lowercase());
+    let folder = match path.parent() {
+        Some(p) if !p.as_os_str().is_empty() => p,
+        _ => Path::new("."),
+    };
+    match name.as_str() {
+        trained::SCENE_FILE => return Ok(Opened::Trained(trained::load(folder)?)),
+        "transforms_train.json" | "transforms_test.json" | "transforms_val.json"
+            if folder.join("transforms_train.json").is_file() =>
+        {
+            return Ok(Opened::Dataset(transforms::read_blender(folder)?));
+        }
+        llff::POSES_FILE => return Ok(Opened::Dataset(llff::read(folder)?)),
+        n if n.starts_with("transforms") && n.ends_with(".json") => {
+            return Ok(Opened::Dataset(transforms::read(path)?));
+        }
+        _ => {}
+    }
+    match files::read_start(path, MAGIC_BYTES)?.as_slice() {
+        [b'p', b'l', b'y', b'\n' | b'\r'] => Ok(Opened::Cloud(splat_ply::read(path)?)),
+        start => Err(OpenError::Unrecognised {
+            path: path.into(),
+            looked_for: FILES.into(),
+            found: format!("a file that starts with '{}'", start.escape_ascii()),
+        }),
+    }
+}
+
+/// The first few names in a folder, for people.
+fn contents(folder: &Path) -> Result<String> {
+    const SHOWN: usize = 8;
+    let failed = |cause| IoError::Read { path: folder.into(), cause };
+    let mut names = Vec::new();
+    for entry in fs::read_dir(folder).map_err(failed)? {
+        let entry = entry.map_err(failed)?;
+        let slash = if entry.path().is_dir() { "/" } else { "" };
+        names.push(entry.file_name().to_string_lossy().into_owned() + slash);
+    }
+    names.sort();
+    let more = names.len().saturating_sub(SHOWN);
+    names.truncate(SHOWN);
+    Ok(match (names.is_empty(), more) {
+        (true, _) => "an empty folder".into(),
+        (false, 0) => names.join(", "),
+        (false, more) => format!("{} and {more} more", names.join(", ")),
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,56 @@
+//! Tests of sniffing.
+
+use std::path::PathBuf;
+
+use super::*;
+
+fn folder() -> (tempfile::TempDir, PathBuf) {
+    let guard = tempfile::tempdir().expect("folder");
+    let path = guard.path().to_path_buf();
+    (guard, path)
+}
+
+#[test]
+fn what_is_not_recognised_says_what_was_looked_for_and_found() {
+    let (_guard, path) = folder();
+    let e = open(&path).expect_err("empty");
+    assert!(matches!(&e, OpenError::Unrecognised { found, .. } if found == "an empty folder"), "{e}");
+    for i in 0..10 {
+        fs::write(path.join(format!("note{i}.txt")), "hello").expect("write");
+    }
+    fs::create_dir(path.join("a_folder")).expect("create");
+    let text = open(&path).expect_err("notes").to_string();
+    for part in ["transforms.json", "scene.json", "a_folder/", "note0.txt", "and 3 more"] {
+        assert!(text.contains(part), "'{part}' is missing in: {text}");
+    }
+    let text = open(&path.join("note0.txt")).expect_err("a note").to_string();
+    for part in [".ply", "note0.txt", "'hell'"] {
+        assert!(text.contains(part), "'{part}' is missing in: {text}");
+    }
+    assert!(matches!(open(&path.join("nothing")), Err(OpenError::NotFound { .. })));
+}
+
+#[test]
+fn splats_and_scenes_are_told_apart() {
+    let (_guard, path) = folder();
+    let cloud = GaussianCloud {
+        positions: vec![[1.0; 3]],
+        log_scales: vec![[0.0; 3]],
+        quaternions: vec![[1.0, 0.0, 0.0, 0.0]],
+        opacity_logits: vec![0.0],
+        sh: vec![[0.0; 3]],
+        ..GaussianCloud::default()
+    };
+    splat_ply::write(&path.join("any.name"), &cloud).expect("write");
+    assert!(matches!(open(&path.join("any.name")), Ok(Opened::Cloud(c)) if c == cloud));
+    let scene = path.join("scene");
+    trained::save(&scene, &trained::SceneInfo::default(), &cloud).expect("save");
+    assert!(matches!(open(&scene), Ok(Opened::Trained(t)) if t.cloud == cloud));
+    assert!(matches!(open(&scene.join("scene.json")), Ok(Opened::Trained(_))));
+}
+
+#[cfg(unix)]
+#[test]
+fn devices_are_refused() {
+    assert!(matches!(open(Path::new("/dev/zero")), Err(OpenError::Io(IoError::NotAFile { .. }))));
+}

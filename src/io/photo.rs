@@ -1,0 +1,135 @@
+//! Photos: decoded within bounds, undistorted, and reduced to the size that is wanted.
+//!
+//! Orientation tags are left alone: poses and intrinsics refer to the pixels as stored.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use image::{DynamicImage, ImageDecoder, ImageError, ImageReader, Limits};
+
+use super::resample::{Pixels, resample};
+use super::{IoError, files};
+use crate::scene::{Camera, Photo, PhotoPixels};
+
+/// Bytes at the start of a picture file that hold its size in all but rare cases.
+const HEADER_BYTES: u64 = 256 << 10;
+
+/// The photo's pixels: undistorted to its pinhole camera and averaged down to at most
+/// `max_side_px` along the longer side. `photo.camera.limited_to(max_side_px)` is the camera that
+/// goes with them.
+///
+/// # Errors
+/// If the file is missing, too large, not of the camera's size, or does not decode.
+pub fn load(photo: &Photo, max_side_px: u32) -> Result<PhotoPixels, IoError> {
+    let expected = (photo.camera.width_px, photo.camera.height_px);
+    let mut pixels = decode(&photo.path, expected)?;
+    if let Some(background) = photo.background {
+        pixels = over(pixels, background);
+    }
+    Ok(resample(&pixels, &photo.camera, photo.distortion.as_ref(), &photo.camera.limited_to(max_side_px)))
+}
+
+/// Width and height in px of a picture file, from its header.
+pub fn size(path: &Path) -> Result<(u32, u32), IoError> {
+    let start = files::read_start(path, HEADER_BYTES)?;
+    let complete = (start.len() as u64) < HEADER_BYTES;
+    match decoder(&start, path) {
+        Ok(d) => Ok(d.dimensions()),
+        Err(e) if complete => Err(e),
+        // A large colour profile or preview can push the size past the start.
+        Err(_) => Ok(decoder(&files::read(path, files::MAX_PICTURE_BYTES)?, path)?.dimensions()),
+    }
+}
+
+/// Decodes a picture that must be of `expected` size, as 8-bit RGB or RGBA.
+fn decode(path: &Path, expected: (u32, u32)) -> Result<Pixels, IoError> {
+    let bytes = files::read(path, files::MAX_PICTURE_BYTES)?;
+    if is_cut_jpeg(&bytes) {
+        return Err(IoError::Picture {
+            path: path.into(),
+            reason: "the JPEG data has no end; the file is cut off".into(),
+        });
+    }
+    let decoder = decoder(&bytes, path)?;
+    let found = decoder.dimensions();
+    if found != expected {
+        return Err(IoError::PhotoSize { path: path.into(), found, expected });
+    }
+    let picture = DynamicImage::from_decoder(decoder).map_err(|e| failed(path, &e))?;
+    let (width, height) = (found.0 as usize, found.1 as usize);
+    Ok(if picture.color().has_alpha() {
+        Pixels { width, height, channels: 4, data: picture.into_rgba8().into_raw() }
+    } else {
+        Pixels { width, height, channels: 3, data: picture.into_rgb8().into_raw() }
+    })
+}
+
+/// A decoder that has read the header, with its memory bounded.
+fn decoder<'a>(bytes: &'a [u8], path: &Path) -> Result<impl ImageDecoder + 'a, IoError> {
+    let mut reader = ImageReader::new(Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|cause| IoError::Read { path: path.into(), cause })?;
+    if reader.format().is_none() {
+        return Err(IoError::Picture { path: path.into(), reason: "not a JPEG, PNG or WebP picture".into() });
+    }
+    let mut limits = Limits::default();
+    limits.max_image_width = Some(Camera::MAX_SIDE_PX);
+    limits.max_image_height = Some(Camera::MAX_SIDE_PX);
+    limits.max_alloc = Some(files::memory_budget());
+    reader.limits(limits);
+    let decoder = reader.into_decoder().map_err(|e| failed(path, &e))?;
+    let (width_px, height_px) = decoder.dimensions();
+    if width_px == 0 || height_px == 0 {
+        return Err(IoError::EmptyPicture { path: path.into(), width_px, height_px });
+    }
+    Ok(decoder)
+}
+
+fn failed(path: &Path, e: &ImageError) -> IoError {
+    IoError::Picture { path: path.into(), reason: e.to_string() }
+}
+
+/// Whether this is a JPEG without its end marker. The decoder fills what is missing with grey.
+fn is_cut_jpeg(bytes: &[u8]) -> bool {
+    // Inside the coded data every 0xFF is followed by 0 or a restart marker, so the end marker
+    // cannot occur by chance; a preview embedded before the coded data can contain one, which is
+    // why the search starts at the main picture's scan.
+    bytes.starts_with(&[0xFF, 0xD8, 0xFF])
+        && !jpeg_scan(bytes).is_some_and(|scan| scan.windows(2).any(|w| w == [0xFF, 0xD9]))
+}
+
+/// What follows the first start-of-scan marker.
+fn jpeg_scan(bytes: &[u8]) -> Option<&[u8]> {
+    let mut rest = bytes.get(2..)?;
+    loop {
+        let [0xFF, marker, tail @ ..] = rest else { return None };
+        match *marker {
+            0xDA => return Some(tail),
+            // Padding before a marker.
+            0xFF => rest = &rest[1..],
+            // Markers without a segment.
+            0x01 | 0xD0..=0xD8 => rest = tail,
+            _ => {
+                let length = usize::from(u16::from_be_bytes(*tail.first_chunk()?));
+                rest = tail.get(length..)?;
+            }
+        }
+    }
+}
+
+/// Transparent pixels over a colour.
+fn over(mut pixels: Pixels, background: [f32; 3]) -> Pixels {
+    if pixels.channels == 3 {
+        return pixels;
+    }
+    let data = pixels.data.chunks_exact(4).flat_map(|p| {
+        let a = f32::from(p[3]) / 255.0;
+        [0, 1, 2].map(|c| (f32::from(p[c]) * a + 255.0 * background[c] * (1.0 - a)).round() as u8)
+    });
+    pixels.data = data.collect();
+    pixels.channels = 3;
+    pixels
+}
+
+#[cfg(test)]
+mod tests;

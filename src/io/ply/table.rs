@@ -1,0 +1,70 @@
+//! The rows of an element as columns of numbers.
+
+use std::borrow::Cow;
+
+use super::Scalar;
+
+/// A column of a [`Table`].
+#[derive(Clone, Debug)]
+pub struct Column {
+    /// The property's name.
+    pub name: String,
+    /// The property's type.
+    pub scalar: Scalar,
+    /// Where it starts in a row, in bytes.
+    pub offset: usize,
+}
+
+impl Column {
+    /// The value in `row`.
+    #[inline]
+    pub fn f64(&self, row: &[u8]) -> f64 {
+        self.scalar.read(&row[self.offset..])
+    }
+
+    /// The value in `row`, in single precision.
+    #[inline]
+    pub fn f32(&self, row: &[u8]) -> f32 {
+        self.f64(row) as f32
+    }
+
+    /// The value in `row` of an integer column that fits 32 bits.
+    #[inline]
+    pub fn u32(&self, row: &[u8]) -> u32 {
+        self.f64(row) as u32
+    }
+}
+
+/// Rows of fixed size, little-endian.
+pub struct Table<'a> {
+    /// Number of rows.
+    pub rows: usize,
+    /// Bytes per row.
+    pub stride: usize,
+    /// The columns in file order.
+    pub columns: Vec<Column>,
+    /// `rows * stride` bytes.
+    pub data: Cow<'a, [u8]>,
+}
+
+impl Table<'_> {
+    /// The bytes of row `i`.
+    #[inline]
+    pub fn row(&self, i: usize) -> &[u8] {
+        &self.data[i * self.stride..(i + 1) * self.stride]
+    }
+
+    /// The column of that name.
+    pub fn column(&self, name: &str) -> Option<&Column> {
+        self.columns.iter().find(|c| c.name == name)
+    }
+
+    /// The columns of those names, or the first name that is missing.
+    pub fn all<const N: usize>(&self, names: [&'static str; N]) -> Result<[&Column; N], &'static str> {
+        if let Some(missing) = names.iter().find(|n| self.column(n).is_none()) {
+            return Err(missing);
+        }
+        // Every name was found above, so the fallback is never reached.
+        Ok(names.map(|n| self.column(n).unwrap_or(&self.columns[0])))
+    }
+}

@@ -1,0 +1,142 @@
+//! Sparse points as `.ply`: `x y z` and, where present, `red green blue`.
+
+use std::path::Path;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::ply::{Ply, Scalar, Table};
+use super::{IoError, files};
+use crate::scene::SparsePoint;
+
+/// Colour of points that have none.
+const GREY: u8 = 128;
+
+/// Reads the points of a `.ply`.
+pub fn read(path: &Path) -> Result<Vec<SparsePoint>, IoError> {
+    parse(&files::read(path, u64::MAX)?, path)
+}
+
+/// The points of a `.ply`'s bytes; `path` is for errors.
+pub fn parse(bytes: &[u8], path: &Path) -> Result<Vec<SparsePoint>, IoError> {
+    let ply = Ply::parse(bytes, path)?;
+    let Some(table) = ply.table("vertex")? else {
+        return Err(ply.syntax("vertex", "missing".into()));
+    };
+    let xyz =
+        table.all(["x", "y", "z"]).map_err(|name| ply.syntax("vertex", format!("property '{name}' is missing")))?;
+    let rgb = table.all(["red", "green", "blue"]).ok();
+    let points: Vec<SparsePoint> = (0..table.rows)
+        .into_par_iter()
+        .map(|i| {
+            let row = table.row(i);
+            SparsePoint {
+                position: DVec3::from_array(xyz.map(|c| c.f64(row))),
+                rgb: rgb.map_or([GREY; 3], |c| c.map(|c| byte(c.scalar, c.f64(row)))),
+            }
+        })
+        .collect();
+    first_bad(&points, &table, path)?;
+    Ok(points)
+}
+
+/// A colour channel as 8 bits: floating-point colours are 0 to 1, 16-bit ones fill their range.
+fn byte(scalar: Scalar, value: f64) -> u8 {
+    let scaled = match scalar {
+        Scalar::F32 | Scalar::F64 => value * 255.0,
+        Scalar::U16 => value / 257.0,
+        _ => value,
+    };
+    scaled.round().clamp(0.0, 255.0) as u8
+}
+
+fn first_bad(points: &[SparsePoint], table: &Table<'_>, path: &Path) -> Result<(), IoError> {
+    debug_assert_eq!(points.len(), table.rows);
+    match points.par_iter().position_first(|p| !p.position.is_finite()) {
+        None => Ok(()),
+        Some(index) => {
+            let axis = points[index].position.to_array().iter().position(|v| !v.is_finite()).unwrap_or(0);
+            let property = ["x", "y", "z"][axis].into();
+            Err(IoError::NotFinite { path: path.into(), element: "vertex", index, property })
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse_bytes(bytes: &[u8]) -> Result<Vec<SparsePoint>, IoError> {
+        parse(bytes, Path::new("points.ply"))
+    }
+
+    const ASCII: &str = "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int i\nelement vertex 2\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nproperty double x\nproperty double y\nproperty double z\nend_header\n3 7 8 9\n255 0 9 1.5 -2 3e2\n1 2 3 0 0 0.1\n";
+
+    fn binary(big: bool) -> Vec<u8> {
+        let mut out = ASCII.split_inclusive("end_header\n").next().unwrap_or_default().to_owned();
+        out = out.replace("ascii", if big { "binary_big_endian" } else { "binary_little_endian" });
+        let mut out = out.into_bytes();
+        let int = |v: i32| if big { v.to_be_bytes() } else { v.to_le_bytes() };
+        let double = |v: f64| if big { v.to_be_bytes() } else { v.to_le_bytes() };
+        out.push(3);
+        for v in [7, 8, 9] {
+            out.extend(int(v));
+        }
+        for (rgb, xyz) in [([255, 0, 9], [1.5, -2.0, 300.0]), ([1, 2, 3], [0.0, 0.0, 0.1])] {
+            out.extend(rgb);
+            xyz.into_iter().for_each(|v| out.extend(double(v)));
+        }
+        out
+    }
+
+    #[test]
+    fn all_encodings_agree() {
+        let ascii = parse_bytes(ASCII.as_bytes()).expect("ascii");
+        assert_eq!(ascii.len(), 2);
+        assert_eq!(ascii[0], SparsePoint { position: DVec3::new(1.5, -2.0, 300.0), rgb: [255, 0, 9] });
+        assert_eq!(ascii, parse_bytes(&binary(false)).expect("little endian"));
+        assert_eq!(ascii, parse_bytes(&binary(true)).expect("big endian"));
+    }
+
+    #[test]
+    fn truncated_files_are_named_at_every_length() {
+        for full in [ASCII.as_bytes().to_vec(), binary(false), binary(true)] {
+            // The last digits of the last number and its line end are no loss of structure.
+            for n in 0..full.len() - 4 {
+                let e = parse_bytes(&full[..n]).expect_err("truncated");
+                assert!(
+                    matches!(e, IoError::Syntax { .. } | IoError::Truncated { .. } | IoError::Count { .. }),
+                    "{n}: {e}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn absurd_counts_are_refused_without_allocating() {
+        for format in ["ascii", "binary_little_endian", "binary_big_endian"] {
+            let text = format!(
+                "ply\nformat {format} 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n",
+                1_u64 << 60
+            );
+            let e = parse_bytes(text.as_bytes()).expect_err("too many");
+            assert!(matches!(e, IoError::Count { claimed, .. } if claimed == 1 << 60), "{e}");
+        }
+    }
+
+    #[test]
+    fn non_finite_points_name_vertex_and_property() {
+        let text = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n1 NaN 3\n";
+        let e = parse_bytes(text.as_bytes()).expect_err("NaN");
+        assert!(matches!(&e, IoError::NotFinite { index: 1, property, .. } if property == "y"), "{e}");
+        assert_eq!(parse_bytes(text.replace("NaN", "2").as_bytes()).expect("finite")[1].rgb, [GREY; 3]);
+    }
+
+    #[test]
+    fn a_negative_list_length_is_refused() {
+        let mut bytes = b"ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list int int i\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n".to_vec();
+        bytes.extend((-1_i32).to_le_bytes());
+        bytes.extend([0; 64]);
+        assert!(matches!(parse_bytes(&bytes), Err(IoError::Truncated { .. })));
+    }
+}

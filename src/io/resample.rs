@@ -1,0 +1,199 @@
+//! Undistortion and reduction of a picture in one pass.
+//!
+//! Every output pixel is the mean of what its square covers in the full-size pinhole picture.
+//! Without distortion that mean is exact. With distortion it is taken over a grid of samples at
+//! least as dense as the full-size pixels, each a bilinear look-up in the picture on disk.
+
+use glam::Vec2;
+use rayon::prelude::*;
+
+use crate::scene::{Camera, Distortion, PhotoPixels};
+
+/// A decoded picture.
+pub(super) struct Pixels {
+    /// Width in px.
+    pub width: usize,
+    /// Height in px.
+    pub height: usize,
+    /// 3 (RGB) or 4 (RGBA).
+    pub channels: usize,
+    /// Row-major, channels interleaved.
+    pub data: Vec<u8>,
+}
+
+/// Colour times weight, and weight.
+type Sum = [f32; 4];
+
+/// `pixels`, taken through a lens of `distortion` with `camera`'s intrinsics, as `target` (the
+/// same camera, possibly smaller) would see it.
+pub(super) fn resample(
+    pixels: &Pixels,
+    camera: &Camera,
+    distortion: Option<&Distortion>,
+    target: &Camera,
+) -> PhotoPixels {
+    let (width_px, height_px) = (target.width_px, target.height_px);
+    let (w, h) = (width_px as usize, height_px as usize);
+    let mut rgb = vec![[0_u8; 3]; w * h];
+    let mut coverage = vec![0_u8; w * h];
+    let lens = distortion.map(|d| Lens::new(camera, d));
+    rgb.par_chunks_exact_mut(w).zip(coverage.par_chunks_exact_mut(w)).enumerate().for_each(|(y, (rgb, coverage))| {
+        let sums = match (&lens, pixels.channels) {
+            (None, 3) => area_row::<3>(pixels, w, h, y),
+            (None, _) => area_row::<4>(pixels, w, h, y),
+            (Some(lens), 3) => lens.row::<3>(pixels, w, h, y),
+            (Some(lens), _) => lens.row::<4>(pixels, w, h, y),
+        };
+        for ((rgb, coverage), [r, g, b, weight]) in rgb.iter_mut().zip(coverage).zip(sums) {
+            *coverage = (weight * 255.0 + 0.5) as u8;
+            if *coverage > 0 {
+                *rgb = [r, g, b].map(|c| (c / weight + 0.5) as u8);
+            }
+        }
+    });
+    let partial = coverage.iter().any(|&c| c != u8::MAX);
+    PhotoPixels { width_px, height_px, rgb, coverage: partial.then_some(coverage) }
+}
+
+/// Colour (0 to 255) times alpha, and alpha, of the pixel at `index`.
+#[inline(always)]
+fn texel<const C: usize>(data: &[u8], index: usize) -> Sum {
+    let p = &data[index * C..index * C + C];
+    let a = if C == 4 { f32::from(p[C - 1]) / 255.0 } else { 1.0 };
+    [f32::from(p[0]) * a, f32::from(p[1]) * a, f32::from(p[2]) * a, a]
+}
+
+#[inline(always)]
+fn add(sum: &mut Sum, value: Sum, weight: f32) {
+    for (s, v) in sum.iter_mut().zip(value) {
+        *s += v * weight;
+    }
+}
+
+/// Row `y` of the `w x h` picture of exact area means, each divided by the area.
+fn area_row<const C: usize>(pixels: &Pixels, w: usize, h: usize, y: usize) -> Vec<Sum> {
+    let mut column = vec![[0.0; 4]; pixels.width];
+    for (source_y, weight) in overlaps(pixels.height, h, y) {
+        for (x, sum) in column.iter_mut().enumerate() {
+            add(sum, texel::<C>(&pixels.data, source_y * pixels.width + x), weight);
+        }
+    }
+    let mean = |x| {
+        let mut sum = [0.0; 4];
+        overlaps(pixels.width, w, x).for_each(|(source_x, weight)| add(&mut sum, column[source_x], weight));
+        sum
+    };
+    (0..w).map(mean).collect()
+}
+
+/// The cells out of `from` that cell `i` out of `to` overlaps when both span the same length, and
+/// the fractions of the latter that they make up.
+fn overlaps(from: usize, to: usize, i: usize) -> impl Iterator<Item = (usize, f32)> {
+    // In units of 1 / (from * to) of the span, all bounds are integers.
+    let (start, end) = (i * from, (i + 1) * from);
+    (start / to..end.div_ceil(to)).map(move |j| {
+        let overlap = end.min((j + 1) * to) - start.max(j * to);
+        (j, overlap as f32 / from as f32)
+    })
+}
+
+/// A distorting lens in single precision (a few 1e-4 px at 10,000 px).
+struct Lens {
+    focal: Vec2,
+    principal: Vec2,
+    k: [f32; 2],
+    p: [f32; 2],
+    /// Squared distance from the axis beyond which the model folds back on itself.
+    fold: f32,
+}
+
+impl Lens {
+    fn new(camera: &Camera, d: &Distortion) -> Self {
+        Self {
+            focal: camera.focal_px.as_vec2(),
+            principal: camera.principal_px.as_vec2(),
+            k: [d.k1 as f32, d.k2 as f32],
+            p: [d.p1 as f32, d.p2 as f32],
+            fold: fold(d.k1, d.k2) as f32,
+        }
+    }
+
+    /// Row `y` of the undistorted `w x h` picture.
+    fn row<const C: usize>(&self, pixels: &Pixels, w: usize, h: usize, y: usize) -> Vec<Sum> {
+        let (across, down) = (pixels.width.div_ceil(w), pixels.height.div_ceil(h));
+        let n = w * across;
+        let mut sums = vec![[0.0; 4]; w];
+        let mut at = vec![Vec2::ZERO; n];
+        let step = Vec2::new(pixels.width as f32 / n as f32, pixels.height as f32 / (h * down) as f32);
+        let weight = 1.0 / (across * down) as f32;
+        for sub in 0..down {
+            let v = ((y * down + sub) as f32 + 0.5) * step.y;
+            self.source_row(v, step.x, &mut at);
+            for (sum, samples) in sums.iter_mut().zip(at.chunks_exact(across)) {
+                for &p in samples {
+                    if let Some(value) = bilinear::<C>(pixels, p) {
+                        add(sum, value, weight);
+                    }
+                }
+            }
+        }
+        sums
+    }
+
+    /// Where the row of pinhole positions `((i + 0.5) * step, v)` lies in the picture on disk;
+    /// NaN beyond the fold. No branches, so that the loop vectorises.
+    fn source_row(&self, v: f32, step: f32, out: &mut [Vec2]) {
+        let y = (v - self.principal.y) / self.focal.y;
+        let yy = y * y;
+        let ([k1, k2], [p1, p2]) = (self.k, self.p);
+        for (i, out) in out.iter_mut().enumerate() {
+            let x = ((i as f32 + 0.5) * step - self.principal.x) / self.focal.x;
+            let r2 = x * x + yy;
+            let radial = 1.0 + r2 * (k1 + r2 * k2);
+            let xd = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x);
+            let yd = y * radial + p1 * (r2 + 2.0 * yy) + 2.0 * p2 * x * y;
+            let sx = xd * self.focal.x + self.principal.x;
+            *out = Vec2::new(if r2 < self.fold { sx } else { f32::NAN }, yd * self.focal.y + self.principal.y);
+        }
+    }
+}
+
+/// The smallest `r²` at which `r (1 + k1 r² + k2 r⁴)` stops growing; infinite if it never does.
+fn fold(k1: f64, k2: f64) -> f64 {
+    // Derivative: 1 + 3 k1 t + 5 k2 t² with t = r².
+    let (a, b) = (5.0 * k2, 3.0 * k1);
+    let discriminant = b * b - 4.0 * a;
+    if discriminant < 0.0 {
+        return f64::INFINITY;
+    }
+    // Both roots in the form that does not cancel: q / a and 1 / q.
+    let q = -0.5 * (b + discriminant.sqrt().copysign(b));
+    [q / a, 1.0 / q].into_iter().filter(|t| *t > 0.0).fold(f64::INFINITY, f64::min)
+}
+
+/// The picture at pixel position `p` between its four nearest pixels; `None` outside of it.
+#[inline(always)]
+fn bilinear<const C: usize>(pixels: &Pixels, p: Vec2) -> Option<Sum> {
+    let (w, h) = (pixels.width as f32, pixels.height as f32);
+    // Written so that NaN is outside.
+    if !(p.x >= 0.0 && p.x <= w && p.y >= 0.0 && p.y <= h) {
+        return None;
+    }
+    // Pixel centres are at halves; the outermost half pixel repeats the border.
+    let x = (p.x - 0.5).clamp(0.0, w - 1.0);
+    let y = (p.y - 0.5).clamp(0.0, h - 1.0);
+    let (x0, y0) = (x as usize, y as usize);
+    let (fx, fy) = (x - x0 as f32, y - y0 as f32);
+    let x1 = (x0 + 1).min(pixels.width - 1);
+    let y1 = (y0 + 1).min(pixels.height - 1);
+    let (top, bottom) = (y0 * pixels.width, y1 * pixels.width);
+    let mut sum = [0.0; 4];
+    add(&mut sum, texel::<C>(&pixels.data, top + x0), (1.0 - fx) * (1.0 - fy));
+    add(&mut sum, texel::<C>(&pixels.data, top + x1), fx * (1.0 - fy));
+    add(&mut sum, texel::<C>(&pixels.data, bottom + x0), (1.0 - fx) * fy);
+    add(&mut sum, texel::<C>(&pixels.data, bottom + x1), fx * fy);
+    Some(sum)
+}
+
+#[cfg(test)]
+mod tests;

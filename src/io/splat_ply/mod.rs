@@ -1,0 +1,51 @@
+//! Finished splats as `.ply`, as the 3D Gaussian Splatting reference code writes them.
+//!
+//! One `vertex` per Gaussian: `x y z`, `nx ny nz` (unused, 0), `f_dc_0..2`, `f_rest_0..` (all red
+//! coefficients, then green, then blue), `opacity` (before the sigmoid), `scale_0..2`
+//! (logarithms), `rot_0..3` (w x y z). Properties may come in any order; further ones are kept in
+//! [`GaussianCloud::extras`](crate::scene::GaussianCloud) and written back.
+//!
+//! A cloud whose origin is not zero keeps its full precision in a way that other programs ignore:
+//! a comment `fmlgs origin X Y Z` and properties `x_residual y_residual z_residual`, so that
+//! `world = x + x_residual` in double precision.
+
+mod read;
+mod write;
+
+pub use read::{parse, read};
+pub use write::{encode, write};
+
+/// Properties that carry Gaussians, besides `f_rest_*`.
+const STANDARD: [&str; 20] = [
+    "x",
+    "y",
+    "z",
+    "nx",
+    "ny",
+    "nz",
+    "f_dc_0",
+    "f_dc_1",
+    "f_dc_2",
+    "opacity",
+    "scale_0",
+    "scale_1",
+    "scale_2",
+    "rot_0",
+    "rot_1",
+    "rot_2",
+    "rot_3",
+    "x_residual",
+    "y_residual",
+    "z_residual",
+];
+
+/// Start of the comment that holds the cloud's origin.
+const ORIGIN: &str = "fmlgs origin ";
+
+/// Whether a property is one that this module writes itself.
+fn is_standard(name: &str) -> bool {
+    STANDARD.contains(&name) || name.strip_prefix("f_rest_").is_some_and(|k| k.bytes().all(|b| b.is_ascii_digit()))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,158 @@
+//! Reading splats from `.ply`.
+
+use std::path::Path;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::{ORIGIN, is_standard};
+use crate::io::ply::{Column, Ply, Scalar, Table};
+use crate::io::{IoError, compressed_ply, files};
+use crate::math::sh::coefficients;
+use crate::scene::{ExtraProperty, GaussianCloud};
+
+/// Reads a splat `.ply`, plain or compressed (PlayCanvas's `.compressed.ply`).
+pub fn read(path: &Path) -> Result<GaussianCloud, IoError> {
+    parse(&files::read(path, u64::MAX)?, path)
+}
+
+/// The Gaussians of a splat `.ply`'s bytes; `path` is for errors.
+pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
+    let ply = Ply::parse(bytes, path)?;
+    if ply.element("chunk").is_some() {
+        return compressed_ply::decode(&ply);
+    }
+    let Some(table) = ply.table("vertex")? else {
+        return Err(ply.syntax("vertex", "missing".into()));
+    };
+    Reading { ply: &ply, table: &table }.cloud()
+}
+
+struct Reading<'a> {
+    ply: &'a Ply<'a>,
+    table: &'a Table<'a>,
+}
+
+impl Reading<'_> {
+    fn cloud(&self) -> Result<GaussianCloud, IoError> {
+        let dc = self.columns(["f_dc_0", "f_dc_1", "f_dc_2"])?;
+        let (degree, rest) = self.rest_columns()?;
+        let (origin, positions) = self.positions()?;
+        Ok(GaussianCloud {
+            origin,
+            positions,
+            log_scales: self.values(self.columns(["scale_0", "scale_1", "scale_2"])?)?,
+            quaternions: self.values(self.columns(["rot_0", "rot_1", "rot_2", "rot_3"])?)?,
+            opacity_logits: self.values(self.columns(["opacity"])?)?.into_iter().map(|[v]| v).collect(),
+            sh_degree: degree,
+            sh: self.harmonics(degree, dc, &rest)?,
+            extras: self.extras(),
+        })
+    }
+
+    fn columns<const N: usize>(&self, names: [&'static str; N]) -> Result<[&Column; N], IoError> {
+        self.table.all(names).map_err(|missing| IoError::Unsupported {
+            path: self.ply.path.into(),
+            what: format!("vertices without the property '{missing}' (points or a mesh, not Gaussians)"),
+            remedy: "open a splat .ply, or the folder of posed photos that these points belong to",
+        })
+    }
+
+    /// One array from `N` columns, every value checked.
+    fn values<const N: usize>(&self, columns: [&Column; N]) -> Result<Vec<[f32; N]>, IoError> {
+        let row = |i: usize| self.table.row(i);
+        let values: Vec<[f32; N]> =
+            (0..self.table.rows).into_par_iter().map(|i| columns.map(|c| c.f32(row(i)))).collect();
+        self.check(&values, |k| &columns[k].name)?;
+        Ok(values)
+    }
+
+    fn check<'n, const N: usize>(&self, values: &[[f32; N]], name: impl Fn(usize) -> &'n str) -> Result<(), IoError> {
+        let Some(index) = values.par_iter().position_first(|v| v.iter().any(|x| !x.is_finite())) else { return Ok(()) };
+        let k = values[index].iter().position(|x| !x.is_finite()).unwrap_or(0);
+        Err(self.not_finite(index, name(k)))
+    }
+
+    fn not_finite(&self, index: usize, property: &str) -> IoError {
+        IoError::NotFinite { path: self.ply.path.into(), element: "vertex", index, property: property.into() }
+    }
+
+    /// Positions relative to an origin: the one that the file states, the middle of the scene
+    /// where the file stores doubles, else zero (single precision loses nothing there).
+    fn positions(&self) -> Result<(DVec3, Vec<[f32; 3]>), IoError> {
+        let xyz = self.columns(["x", "y", "z"])?;
+        let residual = self.table.all(["x_residual", "y_residual", "z_residual"]).ok();
+        let doubles = xyz.iter().any(|c| c.scalar == Scalar::F64);
+        let stated = self.stated_origin()?;
+        if !doubles && (residual.is_none() || stated.is_none()) {
+            return Ok((DVec3::ZERO, self.values(xyz)?));
+        }
+        let world: Vec<DVec3> = (0..self.table.rows)
+            .into_par_iter()
+            .map(|i| {
+                let row = self.table.row(i);
+                let fine = residual.map_or(DVec3::ZERO, |c| DVec3::from_array(c.map(|c| c.f64(row))));
+                DVec3::from_array(xyz.map(|c| c.f64(row))) + fine
+            })
+            .collect();
+        let origin = stated
+            .unwrap_or_else(|| crate::scene::Bounds::of(world.iter().copied()).map_or(DVec3::ZERO, |b| b.center()));
+        let positions: Vec<[f32; 3]> = world.par_iter().map(|p| (*p - origin).as_vec3().to_array()).collect();
+        self.check(&positions, |k| &xyz[k].name)?;
+        Ok((origin, positions))
+    }
+
+    fn stated_origin(&self) -> Result<Option<DVec3>, IoError> {
+        let Some(text) = self.ply.comments.iter().find_map(|c| c.strip_prefix(ORIGIN)) else { return Ok(None) };
+        let numbers: Vec<f64> = text.split_ascii_whitespace().filter_map(|w| w.parse().ok()).collect();
+        match numbers[..] {
+            [x, y, z] if numbers.iter().all(|v| v.is_finite()) => Ok(Some(DVec3::new(x, y, z))),
+            _ => Err(self.ply.syntax("vertex", format!("the comment '{ORIGIN}' does not hold three numbers"))),
+        }
+    }
+
+    /// Degree and columns of the higher harmonics, in file order.
+    fn rest_columns(&self) -> Result<(u8, Vec<&Column>), IoError> {
+        let columns: Vec<&Column> = (0..).map_while(|k| self.table.column(&format!("f_rest_{k}"))).collect();
+        let named = self.table.columns.iter().filter(|c| c.name.starts_with("f_rest_")).count();
+        let degree = (0..=3_u8).find(|&d| 3 * (coefficients(d) - 1) == columns.len());
+        match degree {
+            Some(d) if named == columns.len() => Ok((d, columns)),
+            _ => {
+                Err(self.ply.syntax("vertex", format!("{named} properties f_rest_*, expected 0, 9, 24 or 45 in a row")))
+            }
+        }
+    }
+
+    fn harmonics(&self, degree: u8, dc: [&Column; 3], rest: &[&Column]) -> Result<Vec<[f32; 3]>, IoError> {
+        let stride = coefficients(degree);
+        let per_channel = stride - 1;
+        let mut sh = vec![[0.0_f32; 3]; self.table.rows * stride];
+        sh.par_chunks_exact_mut(stride).enumerate().for_each(|(i, out)| {
+            let row = self.table.row(i);
+            out[0] = dc.map(|c| c.f32(row));
+            for (k, rgb) in out[1..].iter_mut().enumerate() {
+                *rgb = [0, 1, 2].map(|channel| rest[channel * per_channel + k].f32(row));
+            }
+        });
+        if let Some(at) = sh.par_iter().position_first(|v| v.iter().any(|x| !x.is_finite())) {
+            let channel = sh[at].iter().position(|x| !x.is_finite()).unwrap_or(0);
+            let name = match at % stride {
+                0 => &dc[channel].name,
+                k => &rest[channel * per_channel + k - 1].name,
+            };
+            return Err(self.not_finite(at / stride, name));
+        }
+        Ok(sh)
+    }
+
+    fn extras(&self) -> Vec<ExtraProperty> {
+        let others = self.table.columns.iter().filter(|c| !is_standard(&c.name));
+        others
+            .map(|c| ExtraProperty {
+                name: c.name.clone(),
+                values: (0..self.table.rows).into_par_iter().map(|i| c.f32(self.table.row(i))).collect(),
+            })
+            .collect()
+    }
+}

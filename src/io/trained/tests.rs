@@ -1,0 +1,121 @@
+//! Tests of trained scenes.
+
+use glam::{DMat3, DVec2, DVec3};
+
+use super::*;
+use crate::scene::{ExtraProperty, Photo, ViewScore};
+
+fn camera() -> Camera {
+    Camera {
+        width_px: 640,
+        height_px: 480,
+        focal_px: DVec2::new(500.1, 501.0 / 3.0),
+        principal_px: DVec2::new(320.5, 239.5),
+        world_from_camera: DMat3::from_rotation_x(0.3) * DMat3::from_rotation_z(1.0 / 3.0),
+        center: DVec3::new(0.1, 0.2, 0.3),
+    }
+}
+
+fn cloud(n: usize) -> GaussianCloud {
+    GaussianCloud {
+        positions: (0..n).map(|i| [i as f32, 0.5, -1.0]).collect(),
+        log_scales: vec![[-1.0; 3]; n],
+        quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
+        opacity_logits: vec![0.25; n],
+        sh: vec![[0.1, 0.2, 0.3]; n],
+        extras: vec![ExtraProperty { name: "label".into(), values: vec![2.0; n] }],
+        ..GaussianCloud::default()
+    }
+}
+
+fn info() -> SceneInfo {
+    SceneInfo {
+        version: VERSION,
+        name: "plush".into(),
+        dataset: Some(DatasetReference { path: "../plush".into(), format: "transforms.json".into() }),
+        cameras: vec![SceneCamera { name: "a.jpg".into(), camera: camera(), held_out: true }],
+        background: Some([1.0, 0.5, 0.25]),
+        config: serde_json::json!({ "steps": 7000 }),
+        plan: serde_json::json!({ "sh_bands": 2 }),
+        history: History {
+            steps: vec![StepMetrics { step: 10, secs: 0.1, loss: 0.3, train_psnr: 12.0, gaussians: 5 }],
+            evaluations: vec![Evaluation {
+                step: 10,
+                secs: 0.1,
+                psnr: f64::INFINITY,
+                ssim: 1.0,
+                gaussians: 5,
+                views: vec![ViewScore { name: "a.jpg".into(), psnr: f64::INFINITY, ssim: 1.0 }],
+            }],
+        },
+    }
+}
+
+#[test]
+fn a_scene_survives_a_round_trip_and_a_second_save() {
+    let folder = tempfile::tempdir().expect("folder");
+    let folder = folder.path().join("new/scene");
+    save(&folder, &info(), &cloud(5)).expect("save");
+    assert!(is_scene(&folder));
+    let back = load(&folder).expect("load");
+    assert_eq!(back, TrainedScene { folder: folder.clone(), info: info(), cloud: cloud(5) });
+    save(&folder, &info(), &cloud(9)).expect("save again");
+    assert_eq!(load(&folder).expect("load").cloud.len(), 9);
+    assert_eq!(fs::read_dir(&folder).expect("list").count(), 2, "temporary files are left");
+}
+
+#[test]
+fn a_failed_save_keeps_the_scene_that_was_there() {
+    let folder = tempfile::tempdir().expect("folder");
+    save(folder.path(), &info(), &cloud(5)).expect("save");
+    let mut broken = cloud(6);
+    broken.positions[3][1] = f32::NAN;
+    assert!(matches!(save(folder.path(), &info(), &broken), Err(IoError::Cloud { .. })));
+    assert_eq!(load(folder.path()).expect("load").cloud.len(), 5);
+}
+
+#[test]
+fn datasets_are_referred_to_relatively() {
+    let folder = tempfile::tempdir().expect("folder");
+    let root = folder.path().join("data/plush");
+    fs::create_dir_all(&root).expect("create");
+    let photo = |name: &str| Photo {
+        name: name.into(),
+        path: root.join(name),
+        camera: camera(),
+        distortion: None,
+        test_split: false,
+        background: None,
+    };
+    let dataset = Dataset { root: root.clone(), photos: vec![photo("a"), photo("b")], ..Dataset::default() };
+    let scene = folder.path().join("out/scene");
+    fs::create_dir_all(&scene).expect("create");
+    let info = SceneInfo::of(&dataset, &[1], &scene);
+    assert_eq!(info.dataset.as_ref().expect("known").path, Path::new("../../data/plush"));
+    assert_eq!(info.cameras.iter().map(|c| c.held_out).collect::<Vec<_>>(), [false, true]);
+    let trained = TrainedScene { folder: scene, info, cloud: cloud(1) };
+    let found = trained.dataset_path().expect("exists");
+    assert_eq!(fs::canonicalize(found).expect("real"), fs::canonicalize(&root).expect("real"));
+    fs::remove_dir(&root).expect("remove");
+    assert_eq!(trained.dataset_path(), None);
+}
+
+#[test]
+fn other_versions_and_broken_files_are_named() {
+    let folder = tempfile::tempdir().expect("folder");
+    save(folder.path(), &info(), &cloud(1)).expect("save");
+    let path = folder.path().join(SCENE_FILE);
+    let text = fs::read_to_string(&path).expect("read");
+    let load_with = |from: &str, to: &str| {
+        assert!(text.contains(from), "{from}");
+        fs::write(&path, text.replacen(from, to, 1)).expect("write");
+        load(folder.path())
+    };
+    assert!(matches!(load_with("\"version\": 1", "\"version\": 2"), Err(IoError::Version { found: 2, .. })));
+    assert!(matches!(load_with("\"version\": 1", "\"version\": -1"), Err(IoError::Syntax { .. })));
+    assert!(matches!(load_with("\"width_px\": 640", "\"width_px\": 0"), Err(IoError::Camera { .. })));
+    assert!(matches!(load_with("{", "["), Err(IoError::Syntax { .. })));
+    fs::write(&path, &text).expect("write");
+    fs::remove_file(folder.path().join(CLOUD_FILE)).expect("remove");
+    assert!(matches!(load(folder.path()), Err(IoError::Read { .. })));
+}

@@ -1,0 +1,108 @@
+//! What a training run has measured so far; kept with the trained scene.
+
+use serde::{Deserialize, Serialize};
+
+/// Measurements of one training step (reported every few steps).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StepMetrics {
+    /// Steps done.
+    pub step: u64,
+    /// Seconds of training so far.
+    pub secs: f64,
+    /// L1 + 0.2 D-SSIM, mean over the steps since the last report.
+    #[serde(with = "or_null")]
+    pub loss: f64,
+    /// PSNR in dB of the training photos of those steps, mean.
+    #[serde(with = "or_null")]
+    pub train_psnr: f64,
+    /// Gaussians now.
+    pub gaussians: usize,
+}
+
+/// Quality on one held-out photo.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ViewScore {
+    /// The photo's name.
+    pub name: String,
+    /// PSNR in dB.
+    #[serde(with = "or_null")]
+    pub psnr: f64,
+    /// SSIM.
+    #[serde(with = "or_null")]
+    pub ssim: f64,
+}
+
+/// Quality on the held-out photos.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Evaluation {
+    /// Steps done.
+    pub step: u64,
+    /// Seconds of training so far (evaluation itself not counted).
+    pub secs: f64,
+    /// Mean PSNR in dB over the views.
+    #[serde(with = "or_null")]
+    pub psnr: f64,
+    /// Mean SSIM over the views.
+    #[serde(with = "or_null")]
+    pub ssim: f64,
+    /// Gaussians at that step.
+    pub gaussians: usize,
+    /// Each view.
+    pub views: Vec<ViewScore>,
+}
+
+/// JSON has no infinity (the PSNR of identical pictures) and no NaN: infinity is written as text,
+/// NaN as `null`.
+mod or_null {
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Value {
+        Number(f64),
+        Text(Infinity),
+    }
+
+    #[derive(Deserialize)]
+    enum Infinity {
+        #[serde(rename = "inf")]
+        Positive,
+        #[serde(rename = "-inf")]
+        Negative,
+    }
+
+    pub fn serialize<S: Serializer>(v: &f64, s: S) -> Result<S::Ok, S::Error> {
+        match *v {
+            f64::INFINITY => s.serialize_str("inf"),
+            f64::NEG_INFINITY => s.serialize_str("-inf"),
+            v if v.is_nan() => s.serialize_none(),
+            v => s.serialize_f64(v),
+        }
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
+        Ok(match Option::<Value>::deserialize(d)? {
+            None => f64::NAN,
+            Some(Value::Number(v)) => v,
+            Some(Value::Text(Infinity::Positive)) => f64::INFINITY,
+            Some(Value::Text(Infinity::Negative)) => f64::NEG_INFINITY,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn measurements_survive_json_even_when_not_finite() {
+        for v in [12.25, 0.1 + 0.2, f64::INFINITY, f64::NEG_INFINITY] {
+            let m = StepMetrics { step: 3, secs: 1.5, loss: v, train_psnr: -v, gaussians: 7 };
+            let text = serde_json::to_string(&m).expect("write");
+            assert_eq!(serde_json::from_str::<StepMetrics>(&text).expect("read"), m, "{text}");
+        }
+        let m = StepMetrics { loss: f64::NAN, ..StepMetrics::default() };
+        let text = serde_json::to_string(&m).expect("write");
+        assert!(serde_json::from_str::<StepMetrics>(&text).expect("read").loss.is_nan());
+    }
+}

@@ -1,0 +1,147 @@
+//! Readers against real files: counts, geometry and speed. Skipped where the files are absent.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use std::path::Path;
+use std::time::Instant;
+
+use common::data;
+use fmlgs::io::{self, Opened};
+use fmlgs::scene::{Dataset, GaussianCloud};
+
+fn dataset(path: &Path) -> Dataset {
+    match io::open(path).expect("open") {
+        Opened::Dataset(d) => d,
+        other => panic!("{} is {other:?}", path.display()),
+    }
+}
+
+fn cloud(path: &Path) -> GaussianCloud {
+    match io::open(path).expect("open") {
+        Opened::Cloud(c) => c,
+        other => panic!("{} is {other:?}", path.display()),
+    }
+}
+
+/// Share of the sparse points that the first photo sees.
+fn visible(d: &Dataset) -> f64 {
+    let c = &d.photos[0].camera;
+    let inside = |p: glam::DVec2| p.x > 0.0 && p.y > 0.0 && p.x < f64::from(c.width_px) && p.y < f64::from(c.height_px);
+    let seen = d.points.iter().filter(|p| c.project(p.position).is_some_and(inside)).count();
+    seen as f64 / d.points.len() as f64
+}
+
+#[test]
+fn plush() {
+    let Some(path) = data("plush") else { return };
+    let d = dataset(&path);
+    assert_eq!((d.photos.len(), d.points.len(), d.warnings.len()), (97, 18_231, 0));
+    assert_eq!((d.name.as_str(), d.format.as_str()), ("plush", "transforms.json"));
+    assert!(d.photos.iter().all(|p| p.distortion.is_some_and(|l| l.k1 > 0.03)));
+    // With flipped axes no point would be in front of the camera.
+    assert!(visible(&d) > 0.3, "{}", visible(&d));
+    let start = Instant::now();
+    let photo = io::photo::load(&d.photos[0], 504).expect("load");
+    println!("plush photo at 504 px: {:.1} ms", start.elapsed().as_secs_f64() * 1e3);
+    assert_eq!((photo.width_px, photo.height_px), (504, 378));
+    let same = dataset(&path.join("transforms.json"));
+    assert_eq!(same.photos, d.photos);
+}
+
+/// The quarter-size set was undistorted and reduced by other software: an independent check of
+/// our own undistortion.
+#[test]
+fn plush_undistorted_elsewhere_looks_the_same() {
+    let (Some(full), Some(quarter)) = (data("plush"), data("plush_quarter")) else { return };
+    let (full, quarter) = (dataset(&full), dataset(&quarter));
+    assert_eq!((quarter.photos.len(), quarter.points.len()), (97, 18_231));
+    let difference = |a: &fmlgs::scene::PhotoPixels, b: &fmlgs::scene::PhotoPixels| {
+        let (mut sum, mut n) = (0.0, 0.0);
+        for (i, (a, b)) in a.rgb.iter().zip(&b.rgb).enumerate() {
+            if a_covers(i) {
+                sum += a.iter().zip(b).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2)).sum::<f64>();
+                n += 3.0;
+            }
+        }
+        10.0 * (255.0_f64.powi(2) / (sum / n)).log10()
+    };
+    fn a_covers(i: usize) -> bool {
+        let (x, y) = (i % 252, i / 252);
+        (4..248).contains(&x) && (4..185).contains(&y)
+    }
+    let ours = io::photo::load(&full.photos[0], 252).expect("load");
+    let theirs = io::photo::load(&quarter.photos[0], 252).expect("load");
+    let psnr = difference(&ours, &theirs);
+    let mut bent = full.photos[0].clone();
+    bent.distortion = None;
+    let control = difference(&io::photo::load(&bent, 252).expect("load"), &theirs);
+    println!("undistorted here against elsewhere: {psnr:.1} dB; not undistorted: {control:.1} dB");
+    assert!(psnr > 30.0 && psnr > control + 5.0, "{psnr} {control}");
+}
+
+#[test]
+fn fox_lists_67_photos_and_has_50() {
+    let Some(path) = data("fox") else { return };
+    let d = dataset(&path);
+    assert_eq!((d.photos.len(), d.points.len()), (50, 0));
+    assert_eq!(d.warnings.len(), 1);
+    assert!(d.warnings[0].starts_with("17 of 67 listed photos are missing"), "{}", d.warnings[0]);
+    let start = Instant::now();
+    let photo = io::photo::load(&d.photos[0], 960).expect("load");
+    println!("fox photo at 960 px: {:.1} ms", start.elapsed().as_secs_f64() * 1e3);
+    assert_eq!((photo.width_px, photo.height_px), (540, 960));
+}
+
+#[test]
+fn splats() {
+    for (name, n, degree) in [
+        ("guitar_sh0_90854.ply", 90_854, 0),
+        ("statue_narcissus_sh0_101275.ply", 101_275, 0),
+        ("playbot_lod3_sh2_31000.ply", 31_000, 2),
+    ] {
+        let Some(path) = data("splats").map(|p| p.join(name)) else { return };
+        let start = Instant::now();
+        let c = cloud(&path);
+        println!("{name}: {:.1} ms", start.elapsed().as_secs_f64() * 1e3);
+        assert_eq!((c.len(), c.sh_degree, c.extras.len()), (n, degree, 0));
+        c.validate().expect("valid");
+        let folder = tempfile::tempdir().expect("folder");
+        let copy = folder.path().join("copy.ply");
+        io::splat_ply::write(&copy, &c).expect("write");
+        assert_eq!(std::fs::read(&copy).expect("copy").len(), std::fs::read(&path).expect("original").len());
+        assert!(cloud(&copy) == c, "{name} changed on the way");
+    }
+}
+
+/// The plain file was made from the compressed one by other software.
+#[test]
+fn compressed_guitar_is_the_plain_guitar() {
+    let Some(path) = data("splats") else { return };
+    let start = Instant::now();
+    let compressed = cloud(&path.join("guitar.compressed.ply"));
+    println!("compressed guitar: {:.1} ms", start.elapsed().as_secs_f64() * 1e3);
+    assert_same(&compressed, &cloud(&path.join("guitar_sh0_90854.ply")));
+}
+
+/// Equal up to the rounding of two decoders.
+fn assert_same(a: &GaussianCloud, b: &GaussianCloud) {
+    assert_eq!((a.len(), a.sh_degree), (b.len(), b.sh_degree));
+    for i in 0..a.len() {
+        let near = |x: &[f32], y: &[f32], what: &str| {
+            for (x, y) in x.iter().zip(y) {
+                assert!((x - y).abs() < 2e-4 * (1.0 + x.abs()), "Gaussian {i}: {what} {x} against {y}");
+            }
+        };
+        near(&a.positions[i], &b.positions[i], "position");
+        near(&a.log_scales[i], &b.log_scales[i], "scale");
+        let unit = |q: [f32; 4]| fmlgs::math::rotation::unit_quaternion(q).expect("valid");
+        let (p, q) = (unit(a.quaternions[i]), unit(b.quaternions[i]));
+        let dot: f32 = p.iter().zip(q).map(|(p, q)| p * q).sum();
+        near(&p.map(|v| v * dot.signum()), &q, "rotation");
+        let opacity = |l: f32| 1.0 / (1.0 + (-l).exp());
+        near(&[opacity(a.opacity_logits[i])], &[opacity(b.opacity_logits[i])], "opacity");
+        let stride = a.sh_stride();
+        near(a.sh[i * stride..(i + 1) * stride].as_flattened(), b.sh[i * stride..(i + 1) * stride].as_flattened(), "colour");
+    }
+}
