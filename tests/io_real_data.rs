@@ -142,6 +142,10 @@ fn assert_same(a: &GaussianCloud, b: &GaussianCloud) {
         let opacity = |l: f32| 1.0 / (1.0 + (-l).exp());
         near(&[opacity(a.opacity_logits[i])], &[opacity(b.opacity_logits[i])], "opacity");
         let stride = a.sh_stride();
-        near(a.sh[i * stride..(i + 1) * stride].as_flattened(), b.sh[i * stride..(i + 1) * stride].as_flattened(), "colour");
+        near(
+            a.sh[i * stride..(i + 1) * stride].as_flattened(),
+            b.sh[i * stride..(i + 1) * stride].as_flattened(),
+            "colour",
+        );
     }
 }

@@ -8,6 +8,8 @@ use super::{IoError, OpenError, colmap, files, llff, splat_ply, transforms};
 use crate::scene::{Dataset, GaussianCloud};
 
 /// What a path turned out to be.
+// One value exists per opening; a box would only be in the reader's way.
+#[allow(clippy::large_enum_variant)]
 #[derive(Debug)]
 pub enum Opened {
     /// Posed photos.
