@@ -1,5 +1,29 @@
 //! Training Gaussians from posed photos.
+//!
+//! [`run`] is the whole job; [`trainer`] the state and its step; [`init`], [`schedule`] and
+//! [`density`] what the step consults; [`checkpoint`] what survives a kill.
 
+pub mod budget;
+pub mod checkpoint;
 pub mod config;
+pub mod density;
+pub mod init;
+mod run;
+pub mod schedule;
+pub mod trainer;
 
 pub use config::{BackendChoice, TrainConfig};
+pub use run::{TrainEnd, TrainError, TrainOutcome, run};
+
+use crate::scene::{Camera, PhotoPixels};
+
+/// A photo ready for comparison: undistorted, scaled, with its camera.
+#[derive(Clone, Debug)]
+pub struct TrainView {
+    /// The photo's name.
+    pub name: String,
+    /// Camera of the scaled picture.
+    pub camera: Camera,
+    /// Its pixels, of the camera's size.
+    pub pixels: PhotoPixels,
+}

@@ -4,6 +4,7 @@
 //! Stages, one file each: [`project`], [`sort`], [`bin`], [`blend`]; backward: [`blend_backward`],
 //! [`project_backward`]. Results do not depend on the number of threads.
 
+pub mod adam;
 pub mod bin;
 pub mod blend;
 pub mod blend_backward;
@@ -11,6 +12,7 @@ pub mod lanes;
 pub mod project;
 pub mod project_backward;
 pub mod sort;
+pub mod ssim;
 
 use std::time::Instant;
 

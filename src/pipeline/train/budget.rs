@@ -1,0 +1,30 @@
+//! How many Gaussians this machine can train.
+
+/// Bytes that one trained Gaussian takes: parameters, two moments, a snapshot and a copy to roll
+/// back to (59 floats each), its statistics, and the renderer's records of about four tiles.
+pub const BYTES_PER_GAUSSIAN: u64 = 59 * 4 * 5 + 12 + 64 + 4 * 60;
+
+/// Share of the memory that is free now which the Gaussians may take.
+const SHARE: f64 = 0.4;
+
+/// Most Gaussians that fit, between ten thousand and ten million.
+pub fn gaussians() -> usize {
+    let system = sysinfo::System::new_with_specifics(
+        sysinfo::RefreshKind::nothing().with_memory(sysinfo::MemoryRefreshKind::nothing().with_ram()),
+    );
+    fitting(system.available_memory())
+}
+
+fn fitting(bytes: u64) -> usize {
+    ((bytes as f64 * SHARE) as u64 / BYTES_PER_GAUSSIAN).clamp(10_000, 10_000_000) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn budget_follows_memory() {
+        assert!(super::fitting(1 << 30) > 200_000);
+        assert!(super::fitting(1 << 30) < super::fitting(2 << 30));
+        assert_eq!(super::fitting(0), 10_000);
+    }
+}

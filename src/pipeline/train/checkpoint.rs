@@ -1,0 +1,173 @@
+//! A run's whole state in one file, so that a killed run goes on along the same trajectory.
+//!
+//! Layout: the magic bytes, the header's length (u64), a JSON header, then little-endian f32
+//! arrays: the cloud, both moments (positions, log-scales, quaternions, opacity logits, SH each)
+//! and the density statistics.
+
+use std::io::Write;
+use std::path::Path;
+
+use bytemuck::cast_slice;
+use glam::DVec3;
+use rand_pcg::Pcg64Mcg;
+use serde::{Deserialize, Serialize};
+
+use super::TrainConfig;
+use super::density::DensityStats;
+use super::trainer::Trainer;
+use crate::io::IoError;
+use crate::io::trained::History;
+use crate::math::sh::coefficients;
+use crate::scene::GaussianCloud;
+
+/// The file's name in a trained scene's folder.
+pub const FILE: &str = "checkpoint.bin";
+const MAGIC: &[u8; 8] = b"FMLGSCP1";
+
+/// Everything about a run but its arrays.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Header {
+    /// Settings of the run.
+    pub config: TrainConfig,
+    /// Names of the photos trained on.
+    pub photos: Vec<String>,
+    /// Steps done.
+    pub step: u64,
+    /// Seconds of training so far.
+    pub secs: f64,
+    /// Gaussians.
+    pub count: usize,
+    /// Their SH degree.
+    pub sh_degree: u8,
+    /// Their origin.
+    pub origin: DVec3,
+    /// State of the random generator.
+    pub rng: Pcg64Mcg,
+    /// Photos left in the round.
+    pub round: Vec<u32>,
+    /// Most Gaussians allowed.
+    pub budget: usize,
+    /// Factor on the learning rates.
+    pub damping: f64,
+    /// What was measured so far.
+    pub history: History,
+}
+
+/// Why a checkpoint cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum CheckpointError {
+    /// It cannot be read or written.
+    #[error(transparent)]
+    Io(#[from] IoError),
+    /// It is not a checkpoint, or a damaged one.
+    #[error("{path} is damaged or no checkpoint ({reason}); move it away to start the training anew")]
+    Damaged {
+        /// The file.
+        path: std::path::PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// It belongs to another run.
+    #[error(
+        "{path} belongs to a run with other {what}; choose another folder for the result, or move the file away to \
+         start anew"
+    )]
+    OtherRun {
+        /// The file.
+        path: std::path::PathBuf,
+        /// What differs.
+        what: &'static str,
+    },
+}
+
+/// Writes the state atomically.
+pub fn save(path: &Path, trainer: &Trainer, header: &Header) -> Result<(), IoError> {
+    crate::io::atomic::write(path, |w| {
+        let text = serde_json::to_vec(header)?;
+        w.write_all(MAGIC)?;
+        w.write_all(&(text.len() as u64).to_le_bytes())?;
+        w.write_all(&text)?;
+        for cloud in [&trainer.cloud, &trainer.moments[0], &trainer.moments[1]] {
+            write_cloud(w, cloud)?;
+        }
+        w.write_all(cast_slice(&trainer.stats.gradient))?;
+        w.write_all(cast_slice(&trainer.stats.seen))?;
+        w.write_all(cast_slice(&trainer.stats.radius))
+    })
+}
+
+fn write_cloud(w: &mut dyn Write, c: &GaussianCloud) -> std::io::Result<()> {
+    w.write_all(cast_slice(&c.positions))?;
+    w.write_all(cast_slice(&c.log_scales))?;
+    w.write_all(cast_slice(&c.quaternions))?;
+    w.write_all(cast_slice(&c.opacity_logits))?;
+    w.write_all(cast_slice(&c.sh))
+}
+
+/// A checkpoint as read.
+pub struct Checkpoint {
+    /// The run.
+    pub header: Header,
+    /// The Gaussians.
+    pub cloud: GaussianCloud,
+    /// Adam's moments.
+    pub moments: [GaussianCloud; 2],
+    /// Density statistics.
+    pub stats: DensityStats,
+}
+
+/// Reads a checkpoint, or `None` if there is no such file.
+pub fn load(path: &Path) -> Result<Option<Checkpoint>, CheckpointError> {
+    let damaged = |reason: &str| CheckpointError::Damaged { path: path.into(), reason: reason.into() };
+    let bytes = match std::fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(cause) => return Err(IoError::Read { path: path.into(), cause }.into()),
+    };
+    let rest = bytes.strip_prefix(MAGIC).ok_or_else(|| damaged("it does not begin like one"))?;
+    let (length, rest) = rest.split_first_chunk::<8>().ok_or_else(|| damaged("it ends in the header"))?;
+    let length = usize::try_from(u64::from_le_bytes(*length)).ok().filter(|&l| l <= rest.len());
+    let (text, data) = rest.split_at(length.ok_or_else(|| damaged("it ends in the header"))?);
+    let header: Header = serde_json::from_slice(text).map_err(|e| damaged(&e.to_string()))?;
+    let (n, degree) = (header.count, header.sh_degree);
+    let per_gaussian = (3 * (3 + 3 + 4 + 1 + 3 * coefficients(degree.min(3))) + 3) * 4;
+    if degree > 3 || n.checked_mul(per_gaussian) != Some(data.len()) {
+        return Err(damaged("its arrays do not have the length that its header says"));
+    }
+    let mut at = Floats(data);
+    let mut cloud = || at.cloud(n, degree, header.origin);
+    let (cloud, moments) = (cloud(), [cloud(), cloud()]);
+    cloud.validate().map_err(|e| damaged(&e.to_string()))?;
+    let gradient = at.take(n);
+    let seen = at.take(n).iter().map(|v| v.to_bits()).collect();
+    let radius = at.take(n);
+    Ok(Some(Checkpoint { header, cloud, moments, stats: DensityStats { gradient, seen, radius } }))
+}
+
+/// Takes arrays off a buffer whose length has been checked.
+struct Floats<'a>(&'a [u8]);
+
+impl Floats<'_> {
+    fn take(&mut self, n: usize) -> Vec<f32> {
+        let (own, rest) = self.0.split_at(n * 4);
+        self.0 = rest;
+        own.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect()
+    }
+
+    fn arrays<const K: usize>(&mut self, n: usize) -> Vec<[f32; K]> {
+        self.take(n * K).as_chunks::<K>().0.to_vec()
+    }
+
+    fn cloud(&mut self, n: usize, sh_degree: u8, origin: DVec3) -> GaussianCloud {
+        GaussianCloud {
+            origin,
+            positions: self.arrays(n),
+            log_scales: self.arrays(n),
+            quaternions: self.arrays(n),
+            opacity_logits: self.take(n),
+            sh_degree,
+            sh: self.arrays(n * coefficients(sh_degree)),
+            extras: Vec::new(),
+        }
+    }
+}

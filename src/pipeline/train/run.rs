@@ -1,0 +1,432 @@
+//! The whole job: photos in, a trained scene out, with progress, checkpoints and held-out scores.
+
+use std::collections::VecDeque;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
+use rayon::prelude::*;
+
+use super::checkpoint::{self, CheckpointError, Header};
+use super::trainer::Trainer;
+use super::{TrainConfig, TrainView, init};
+use crate::io::IoError;
+use crate::io::trained::{self, History, SceneInfo};
+use crate::math::stats::{mean, median};
+use crate::pipeline::evaluate::evaluate;
+use crate::pipeline::observer::{Evaluation, Level, Observer, Progress, Signal, StepMetrics};
+use crate::render::RenderError;
+use crate::scene::{Dataset, GaussianCloud};
+
+/// Steps between measurements that are reported.
+const REPORT_STEPS: u64 = 10;
+/// Steps between copies of the cloud to roll back to.
+const SAFE_STEPS: u64 = 500;
+/// A loss this many times its running median means that the run diverges.
+const DIVERGED: f64 = 10.0;
+/// How often a run may diverge before it gives up.
+const MAX_ROLLBACKS: u32 = 4;
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TrainEnd {
+    /// All steps were done.
+    Finished,
+    /// The observer asked to stop; the state is saved.
+    Cancelled,
+}
+
+/// What a run leaves behind.
+#[derive(Clone, Debug)]
+pub struct TrainOutcome {
+    /// The Gaussians.
+    pub cloud: Arc<GaussianCloud>,
+    /// Held-out evaluations, the last one of the final state.
+    pub evaluations: Vec<Evaluation>,
+    /// How it ended.
+    pub end: TrainEnd,
+    /// Steps done.
+    pub steps: u64,
+    /// Seconds of training.
+    pub secs: f64,
+}
+
+/// Why a run failed.
+#[derive(Debug, thiserror::Error)]
+pub enum TrainError {
+    /// No photo to train on.
+    #[error("{0} has no photo to train on: {1} photos, all held out; lower --holdout or add photos")]
+    NoPhotos(String, usize),
+    /// A photo could not be read.
+    #[error(transparent)]
+    Photo(IoError),
+    /// A view could not be drawn.
+    #[error("photo {0}: {1}")]
+    Render(String, RenderError),
+    /// The checkpoint in the result's folder cannot be used.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// The result could not be saved.
+    #[error(transparent)]
+    Save(IoError),
+    /// The loss kept growing.
+    #[error("the training diverged {0} times even with lowered rates; the photos' poses may be wrong")]
+    Diverged(u32),
+    /// Settings that make no sense.
+    #[error("{0}")]
+    Config(String),
+}
+
+/// Trains on `dataset` and saves into the folder `out`, if given. A checkpoint of the same run in
+/// that folder is continued. Blocks until done; all contact is through `observer`.
+pub fn run(
+    dataset: &Dataset,
+    config: &TrainConfig,
+    out: Option<&Path>,
+    observer: &mut dyn Observer,
+) -> Result<TrainOutcome, TrainError> {
+    check(config)?;
+    let (train, held) = dataset.split(config.holdout_every);
+    if train.is_empty() {
+        return Err(TrainError::NoPhotos(dataset.name.clone(), dataset.photos.len()));
+    }
+    let saved = match out {
+        Some(folder) => resumable(folder, dataset, config, &train)?,
+        None => None,
+    };
+    let Some(mut views) = load_views(dataset, &train, config, "Loading photos", observer)? else {
+        return Ok(stopped_early());
+    };
+    let Some(tests) = load_views(dataset, &held, config, "Loading held-out photos", observer)? else {
+        return Ok(stopped_early());
+    };
+    views.shrink_to_fit();
+    let mut job = Job::start(dataset, config, out, &held, views, tests, saved);
+    let end = job.train(observer)?;
+    job.finish(end, observer)
+}
+
+fn check(config: &TrainConfig) -> Result<(), TrainError> {
+    let bad = |text: &str| Err(TrainError::Config(text.into()));
+    if config.steps == 0 {
+        return bad("the number of steps must be at least 1");
+    }
+    if config.max_side_px < 16 {
+        return bad("the longest side of the training pictures must be at least 16 px");
+    }
+    if config.sh_degree > 3 {
+        return bad("the spherical-harmonics degree must be 0 to 3");
+    }
+    Ok(())
+}
+
+fn stopped_early() -> TrainOutcome {
+    TrainOutcome { cloud: Arc::default(), evaluations: Vec::new(), end: TrainEnd::Cancelled, steps: 0, secs: 0.0 }
+}
+
+fn photo_names(dataset: &Dataset, indices: &[usize]) -> Vec<String> {
+    indices.iter().map(|&i| dataset.photos[i].name.clone()).collect()
+}
+
+/// The checkpoint in `folder`, if there is one and it is of this run.
+fn resumable(
+    folder: &Path,
+    dataset: &Dataset,
+    config: &TrainConfig,
+    train: &[usize],
+) -> Result<Option<checkpoint::Checkpoint>, CheckpointError> {
+    let path = folder.join(checkpoint::FILE);
+    let Some(saved) = checkpoint::load(&path)? else { return Ok(None) };
+    let h = &saved.header;
+    // How often to look and save does not change the trajectory.
+    let theirs = TrainConfig { eval_every: config.eval_every, checkpoint_secs: config.checkpoint_secs, ..h.config.clone() };
+    if theirs != *config {
+        return Err(CheckpointError::OtherRun { path, what: "settings" });
+    }
+    if h.photos != photo_names(dataset, train) {
+        return Err(CheckpointError::OtherRun { path, what: "photos" });
+    }
+    Ok(Some(saved))
+}
+
+/// Loads and scales photos, several at a time; `None` if the observer cancels.
+pub fn load_views(
+    dataset: &Dataset,
+    indices: &[usize],
+    config: &TrainConfig,
+    stage: &str,
+    observer: &mut dyn Observer,
+) -> Result<Option<Vec<TrainView>>, TrainError> {
+    let start = Instant::now();
+    let mut views = Vec::with_capacity(indices.len());
+    for batch in indices.chunks(8) {
+        if wait(observer) == Signal::Cancel {
+            return Ok(None);
+        }
+        let loaded: Result<Vec<TrainView>, IoError> = batch
+            .par_iter()
+            .map(|&i| {
+                let photo = &dataset.photos[i];
+                let pixels = crate::io::photo::load(photo, config.max_side_px)?;
+                let camera = photo.camera.resized(pixels.width_px, pixels.height_px);
+                Ok(TrainView { name: photo.name.clone(), camera, pixels })
+            })
+            .collect();
+        views.extend(loaded.map_err(TrainError::Photo)?);
+        let secs = start.elapsed().as_secs_f64();
+        observer.progress(Progress {
+            stage: stage.into(),
+            done: views.len() as u64,
+            total: indices.len() as u64,
+            elapsed_secs: secs,
+            rate: views.len() as f64 / secs.max(1e-9),
+        });
+    }
+    Ok(Some(views))
+}
+
+/// Waits out a pause.
+fn wait(observer: &mut dyn Observer) -> Signal {
+    loop {
+        match observer.signal() {
+            Signal::Pause => std::thread::sleep(Duration::from_millis(20)),
+            other => return other,
+        }
+    }
+}
+
+/// A running job.
+struct Job<'a> {
+    config: &'a TrainConfig,
+    out: Option<&'a Path>,
+    info: SceneInfo,
+    photos: Vec<String>,
+    views: Vec<TrainView>,
+    tests: Vec<TrainView>,
+    trainer: Trainer,
+    secs: f64,
+    history: History,
+    safe: GaussianCloud,
+    rollbacks: u32,
+    recent: VecDeque<f64>,
+}
+
+impl<'a> Job<'a> {
+    fn start(
+        dataset: &Dataset,
+        config: &'a TrainConfig,
+        out: Option<&'a Path>,
+        held: &[usize],
+        views: Vec<TrainView>,
+        tests: Vec<TrainView>,
+        saved: Option<checkpoint::Checkpoint>,
+    ) -> Self {
+        let (_, extent) = dataset.camera_extent();
+        let background = dataset.background.unwrap_or([0.0; 3]);
+        let mut rng = Pcg64Mcg::seed_from_u64(config.seed);
+        let (mut secs, mut history) = (0.0, History::default());
+        let trainer = match saved {
+            Some(s) => {
+                let mut t = Trainer::new(s.cloud, config, background, extent, s.header.rng);
+                t.moments = s.moments;
+                t.stats = s.stats;
+                t.step = s.header.step;
+                t.round = s.header.round;
+                t.budget = s.header.budget;
+                t.schedule.damping = s.header.damping;
+                (secs, history) = (s.header.secs, s.header.history);
+                t
+            }
+            None => {
+                let cloud = init::initial_cloud(dataset, &views, config.sh_degree, config.random_points, &mut rng);
+                Trainer::new(cloud, config, background, extent, rng)
+            }
+        };
+        let mut info = SceneInfo::of(dataset, held, out.unwrap_or(Path::new(".")));
+        info.config = serde_json::to_value(config).unwrap_or_default();
+        let photos = views.iter().map(|v| v.name.clone()).collect();
+        let safe = trainer.cloud.clone();
+        Self { config, out, info, photos, views, tests, trainer, secs, history, safe, rollbacks: 0, recent: VecDeque::new() }
+    }
+
+    fn train(&mut self, observer: &mut dyn Observer) -> Result<TrainEnd, TrainError> {
+        if self.trainer.step > 0 {
+            observer.note(Level::Info, format!("Continuing at step {} of {}", self.trainer.step, self.config.steps));
+        }
+        if self.trainer.cloud.len() > self.trainer.budget {
+            let (have, may) = (self.trainer.cloud.len(), self.trainer.budget);
+            observer.note(Level::Warning, format!("{have} Gaussians to start from are over the budget of {may}; none will be added"));
+        }
+        let mut meter = Meter::default();
+        let mut window = Window::default();
+        let mut saved_at = Instant::now();
+        while self.trainer.step < self.config.steps {
+            if wait(observer) == Signal::Cancel {
+                return Ok(TrainEnd::Cancelled);
+            }
+            let start = Instant::now();
+            let result = self.step(observer)?;
+            self.secs += start.elapsed().as_secs_f64();
+            window.add(result.loss, result.psnr);
+            let step = self.trainer.step;
+            if step % REPORT_STEPS == 0 || step == self.config.steps {
+                let metrics = StepMetrics {
+                    step,
+                    secs: self.secs,
+                    loss: mean(&window.losses),
+                    train_psnr: mean(&window.psnrs),
+                    gaussians: self.trainer.cloud.len(),
+                };
+                window = Window::default();
+                self.history.steps.push(metrics);
+                observer.step(metrics);
+            }
+            observer.progress(Progress {
+                stage: "Training".into(),
+                done: step,
+                total: self.config.steps,
+                elapsed_secs: self.secs,
+                rate: meter.rate(step, self.secs),
+            });
+            if observer.wants_cloud() {
+                observer.cloud(Arc::new(self.trainer.cloud.clone()), step);
+            }
+            if self.config.eval_every > 0 && step % self.config.eval_every == 0 && step < self.config.steps {
+                self.evaluate(observer)?;
+            }
+            let due = self.config.checkpoint_secs;
+            if due > 0.0 && saved_at.elapsed().as_secs_f64() >= due {
+                self.checkpoint()?;
+                saved_at = Instant::now();
+            }
+        }
+        Ok(TrainEnd::Finished)
+    }
+
+    /// One step with its guard against divergence, and density control.
+    fn step(&mut self, observer: &mut dyn Observer) -> Result<super::trainer::StepResult, TrainError> {
+        let name = || self.photos.first().cloned().unwrap_or_default();
+        let result = self.trainer.advance(&self.views).map_err(|e| TrainError::Render(name(), e))?;
+        if result.skipped > 0 && self.trainer.step % 100 == 0 {
+            observer.note(Level::Warning, format!("{} Gaussians had a gradient that is not finite", result.skipped));
+        }
+        self.recent.push_back(result.loss);
+        if self.recent.len() > 200 {
+            self.recent.pop_front();
+        }
+        let usual = if self.recent.len() >= 100 && self.trainer.step % 20 == 0 {
+            median(&self.recent.iter().copied().collect::<Vec<_>>())
+        } else {
+            f64::INFINITY
+        };
+        if !result.loss.is_finite() || result.loss > DIVERGED * usual {
+            self.rollbacks += 1;
+            if self.rollbacks > MAX_ROLLBACKS {
+                return Err(TrainError::Diverged(self.rollbacks));
+            }
+            observer.note(
+                Level::Warning,
+                format!("Step {}: the loss is {:.3}, far above what it was; back to the last good state with halved rates", self.trainer.step, result.loss),
+            );
+            self.trainer.roll_back(self.safe.clone());
+            self.recent.clear();
+            return Ok(result);
+        }
+        if let Some(report) = self.trainer.control_density() {
+            if report.refused > 0 {
+                observer.note(Level::Info, format!("The budget of {} Gaussians is reached", self.trainer.budget));
+            }
+            self.recent.clear();
+        }
+        if self.trainer.step % SAFE_STEPS == 0 {
+            self.safe = self.trainer.cloud.clone();
+        }
+        Ok(result)
+    }
+
+    fn evaluate(&mut self, observer: &mut dyn Observer) -> Result<(), TrainError> {
+        if self.tests.is_empty() {
+            return Ok(());
+        }
+        let settings = self.trainer.render_settings();
+        let e = evaluate(&self.trainer.cloud, &self.tests, &settings, self.trainer.step, self.secs)
+            .map_err(|e| TrainError::Render("held-out".into(), e))?;
+        self.history.evaluations.push(e.clone());
+        observer.evaluation(e);
+        Ok(())
+    }
+
+    fn checkpoint(&self) -> Result<(), TrainError> {
+        let Some(folder) = self.out else { return Ok(()) };
+        let t = &self.trainer;
+        let header = Header {
+            config: self.config.clone(),
+            photos: self.photos.clone(),
+            step: t.step,
+            secs: self.secs,
+            count: t.cloud.len(),
+            sh_degree: t.cloud.sh_degree,
+            origin: t.cloud.origin,
+            rng: t.rng.clone(),
+            round: t.round.clone(),
+            budget: t.budget,
+            damping: t.schedule.damping,
+            history: self.history.clone(),
+        };
+        std::fs::create_dir_all(folder).map_err(|cause| {
+            TrainError::Save(IoError::Write { path: folder.into(), remedy: "choose another folder for the result", cause })
+        })?;
+        checkpoint::save(&folder.join(checkpoint::FILE), t, &header).map_err(TrainError::Save)
+    }
+
+    /// Scores and saves the final state.
+    fn finish(mut self, end: TrainEnd, observer: &mut dyn Observer) -> Result<TrainOutcome, TrainError> {
+        self.checkpoint()?;
+        let scored = self.history.evaluations.last().is_some_and(|e| e.step == self.trainer.step);
+        if end == TrainEnd::Finished && !scored {
+            self.evaluate(observer)?;
+        }
+        if let Some(folder) = self.out {
+            self.info.history = self.history.clone();
+            trained::save(folder, &self.info, &self.trainer.cloud).map_err(TrainError::Save)?;
+        }
+        let cloud = Arc::new(self.trainer.cloud);
+        observer.cloud(Arc::clone(&cloud), self.trainer.step);
+        Ok(TrainOutcome { cloud, evaluations: self.history.evaluations, end, steps: self.trainer.step, secs: self.secs })
+    }
+}
+
+/// Losses and PSNRs since the last report.
+#[derive(Default)]
+struct Window {
+    losses: Vec<f64>,
+    psnrs: Vec<f64>,
+}
+
+impl Window {
+    fn add(&mut self, loss: f64, psnr: f64) {
+        self.losses.push(loss);
+        if psnr.is_finite() {
+            self.psnrs.push(psnr);
+        }
+    }
+}
+
+/// Steps per second over the last few seconds.
+#[derive(Default)]
+struct Meter {
+    marks: VecDeque<(u64, f64)>,
+}
+
+impl Meter {
+    fn rate(&mut self, step: u64, secs: f64) -> f64 {
+        self.marks.push_back((step, secs));
+        while self.marks.len() > 2 && self.marks[1].1 < secs - 3.0 {
+            self.marks.pop_front();
+        }
+        let (first, since) = self.marks[0];
+        if secs > since { (step - first) as f64 / (secs - since) } else { 0.0 }
+    }
+}

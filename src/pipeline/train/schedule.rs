@@ -1,0 +1,131 @@
+//! Learning rates and milestones of a run, scaled to its number of steps.
+//!
+//! 3DGS's values are made for 30,000 steps; a run of `n` steps goes through the same phases.
+
+use super::TrainConfig;
+use crate::render::cpu::adam::AdamStep;
+
+/// Steps that 3DGS's milestones are written for.
+const REFERENCE_STEPS: f64 = 30_000.0;
+
+/// Learning rates of one step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rates {
+    /// Positions, scene units.
+    pub position: f32,
+    /// Log-scales.
+    pub log_scale: f32,
+    /// Quaternions.
+    pub quaternion: f32,
+    /// Opacity logits.
+    pub opacity_logit: f32,
+    /// Constant colour.
+    pub sh_constant: f32,
+    /// Other SH coefficients.
+    pub sh_rest: f32,
+}
+
+/// When what happens.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Schedule {
+    steps: u64,
+    sh_degree: u8,
+    extent: f64,
+    /// Factor on every rate, lowered after a divergence.
+    pub damping: f64,
+    /// Steps between openings of SH bands.
+    pub sh_interval: u64,
+    /// First step at which Gaussians may be added.
+    pub densify_from: u64,
+    /// Last step at which Gaussians may be added.
+    pub densify_until: u64,
+    /// Steps between density control.
+    pub densify_interval: u64,
+    /// Steps between opacity resets.
+    pub reset_interval: u64,
+}
+
+impl Schedule {
+    /// The schedule of a run in a scene of this extent (see `Dataset::camera_extent`).
+    pub fn new(config: &TrainConfig, extent: f64) -> Self {
+        let n = config.steps as f64;
+        let scaled = |reference: f64| (reference * n / REFERENCE_STEPS).round() as u64;
+        Self {
+            steps: config.steps,
+            sh_degree: config.sh_degree,
+            extent,
+            damping: 1.0,
+            sh_interval: scaled(2_000.0).clamp(1, 1_000),
+            densify_from: scaled(1_000.0).clamp(50, 500),
+            densify_until: scaled(17_000.0),
+            densify_interval: scaled(400.0).clamp(20, 100),
+            // A short run has no time to recover from more than a few resets.
+            reset_interval: scaled(6_000.0).clamp(1_000, 3_000),
+        }
+    }
+
+    /// Rates at `step`, counted from 0: exponential decay by 100 for positions, constant otherwise.
+    pub fn rates(&self, step: u64) -> Rates {
+        let t = step as f64 / self.steps.max(1) as f64;
+        let position = 1.6e-4 * self.extent * 0.01_f64.powf(t);
+        let rate = |r: f64| (r * self.damping) as f32;
+        Rates {
+            position: rate(position),
+            log_scale: rate(5e-3),
+            quaternion: rate(1e-3),
+            opacity_logit: rate(5e-2),
+            sh_constant: rate(2.5e-3),
+            sh_rest: rate(2.5e-3 / 20.0),
+        }
+    }
+
+    /// SH degree in use at `step`.
+    pub fn sh_degree(&self, step: u64) -> u8 {
+        (step / self.sh_interval).min(u64::from(self.sh_degree)) as u8
+    }
+
+    /// Whether Gaussians are added and removed after `done` steps.
+    pub fn densifies(&self, done: u64) -> bool {
+        done >= self.densify_from && done <= self.densify_until && done % self.densify_interval == 0
+    }
+
+    /// Whether opacities are reset after `done` steps. Never near the end of density control, so
+    /// that what the reset hides can come back or be removed.
+    pub fn resets(&self, done: u64) -> bool {
+        done > 0 && done % self.reset_interval == 0 && done + self.densify_interval * 5 <= self.densify_until
+    }
+
+    /// Adam's constants for the step after `step`.
+    pub fn adam(&self, step: u64) -> AdamStep {
+        AdamStep::new(step + 1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn schedule(steps: u64) -> Schedule {
+        Schedule::new(&TrainConfig { steps, ..TrainConfig::default() }, 2.0)
+    }
+
+    #[test]
+    fn rates_decay_to_a_hundredth() {
+        let s = schedule(1_000);
+        let (a, b) = (s.rates(0).position, s.rates(1_000).position);
+        assert!((a - 3.2e-4).abs() < 1e-9 && (a / b - 100.0).abs() < 1e-2);
+        assert_eq!(s.rates(0).opacity_logit, s.rates(999).opacity_logit);
+    }
+
+    #[test]
+    fn every_length_goes_through_all_phases() {
+        for steps in [300, 2_000, 7_000, 30_000] {
+            let s = schedule(steps);
+            assert_eq!(s.sh_degree(0), 0);
+            assert_eq!(s.sh_degree(steps), 3, "{steps}");
+            let rounds = (1..=steps).filter(|&d| s.densifies(d)).count();
+            assert!(rounds >= 4, "{steps}: {rounds}");
+            assert!((1..=steps).rev().take(steps as usize / 3).all(|d| !s.densifies(d) && !s.resets(d)));
+        }
+    }
+}

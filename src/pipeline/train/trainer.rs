@@ -1,0 +1,312 @@
+//! The state of a run on the CPU and its single step: draw, compare, go back, move.
+
+use rand::seq::SliceRandom;
+use rand_pcg::Pcg64Mcg;
+use rayon::prelude::*;
+
+use super::density::{self, DensityReport, DensityStats};
+use super::schedule::{Rates, Schedule};
+use super::{TrainConfig, TrainView};
+use crate::math::sh;
+use crate::pipeline::metrics;
+use crate::render::cpu::Renderer;
+use crate::render::cpu::adam::AdamStep;
+use crate::render::cpu::ssim::{LossParts, PhotoLoss};
+use crate::render::{Features, FrameGradient, RenderError, RenderSettings};
+use crate::scene::{Gaussian, GaussianCloud};
+
+/// Weight of D-SSIM in the loss.
+pub const LAMBDA: f64 = 0.2;
+/// Gaussians that one task updates.
+const BLOCK: usize = 512;
+/// Gradients are clipped to this before they are squared, far from overflow.
+const CLIP: f32 = 1e15;
+
+/// What one step measured.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StepResult {
+    /// Loss of the photo before the step.
+    pub loss: f64,
+    /// PSNR of the photo before the step, dB.
+    pub psnr: f64,
+    /// Gaussians whose gradient was not finite and that were left as they are.
+    pub skipped: usize,
+}
+
+/// Everything that a step reads and writes. Deterministic: the same state and photos give the same
+/// next state, whatever the number of threads.
+pub struct Trainer {
+    /// The Gaussians.
+    pub cloud: GaussianCloud,
+    /// Adam's first and second moments, laid out like the cloud.
+    pub moments: [GaussianCloud; 2],
+    /// Input of density control.
+    pub stats: DensityStats,
+    /// Rates and milestones.
+    pub schedule: Schedule,
+    /// Source of all randomness.
+    pub rng: Pcg64Mcg,
+    /// Photos left in this round, in reverse order.
+    pub round: Vec<u32>,
+    /// Steps done.
+    pub step: u64,
+    /// Size of the scene that thresholds scale with.
+    pub extent: f64,
+    /// Most Gaussians allowed.
+    pub budget: usize,
+    settings: RenderSettings,
+    densify: bool,
+    renderer: Renderer<f32>,
+    losses: [PhotoLoss<f32>; 3],
+    gradient: FrameGradient<f32>,
+}
+
+impl Trainer {
+    /// A run's first state.
+    pub fn new(cloud: GaussianCloud, config: &TrainConfig, background: [f32; 3], extent: f64, rng: Pcg64Mcg) -> Self {
+        let zero = zeros_like(&cloud);
+        Self {
+            stats: DensityStats::new(cloud.len()),
+            moments: [zero.clone(), zero],
+            schedule: Schedule::new(config, extent),
+            rng,
+            round: Vec::new(),
+            step: 0,
+            extent,
+            budget: config.max_gaussians.unwrap_or_else(super::budget::gaussians),
+            settings: RenderSettings { background, antialias: config.antialias, ..RenderSettings::default() },
+            densify: config.densify,
+            renderer: Renderer::new(),
+            losses: Default::default(),
+            gradient: FrameGradient::default(),
+            cloud,
+        }
+    }
+
+    /// How the cloud is meant to be drawn.
+    pub fn render_settings(&self) -> RenderSettings {
+        RenderSettings { sh_degree: self.cloud.sh_degree, ..self.settings.clone() }
+    }
+
+    /// One step on the next photo of the round.
+    pub fn advance(&mut self, views: &[TrainView]) -> Result<StepResult, RenderError> {
+        if self.round.is_empty() {
+            self.round = (0..views.len() as u32).collect();
+            self.round.shuffle(&mut self.rng);
+        }
+        let Some(view) = self.round.pop().and_then(|i| views.get(i as usize)) else { return Ok(StepResult::default()) };
+        self.settings.sh_degree = self.schedule.sh_degree(self.step);
+        let frame = self.renderer.render(&self.cloud, Features::NONE, &view.camera, &self.settings)?;
+        let parts = self.compare(frame.color, view);
+        self.renderer.backward_tiles(&self.gradient);
+        let longer = view.camera.width_px.max(view.camera.height_px) as f32;
+        let skipped = self.descend(1.0 / longer);
+        self.step += 1;
+        Ok(StepResult { loss: parts.total(LAMBDA), psnr: metrics::psnr_of(parts.mse), skipped })
+    }
+
+    /// Density control and opacity reset where they are due. Returns what was done.
+    pub fn control_density(&mut self) -> Option<DensityReport> {
+        if !self.densify {
+            return None;
+        }
+        let mut report = None;
+        if self.schedule.densifies(self.step) {
+            let large = self.step > self.schedule.reset_interval;
+            report = Some(density::control(
+                &mut self.cloud,
+                &mut self.moments,
+                &self.stats,
+                self.extent,
+                self.budget,
+                large,
+                &mut self.rng,
+            ));
+            self.stats = DensityStats::new(self.cloud.len());
+        }
+        if self.schedule.resets(self.step) {
+            density::reset_opacity(&mut self.cloud, &mut self.moments);
+        }
+        report
+    }
+
+    /// Replaces the cloud by an earlier one and forgets the moments; rates are halved.
+    pub fn roll_back(&mut self, cloud: GaussianCloud) {
+        let zero = zeros_like(&cloud);
+        self.stats = DensityStats::new(cloud.len());
+        self.moments = [zero.clone(), zero];
+        self.cloud = cloud;
+        self.schedule.damping *= 0.5;
+    }
+
+    /// Fills the picture gradient and returns the loss.
+    fn compare(&mut self, mut rendered: [Vec<f32>; 3], view: &TrainView) -> LossParts {
+        let target = metrics::planes::<f32>(&view.pixels);
+        let coverage = view.pixels.coverage.as_deref();
+        if let Some(coverage) = coverage {
+            for (plane, want) in rendered.iter_mut().zip(&target) {
+                for ((r, t), c) in plane.iter_mut().zip(want).zip(coverage) {
+                    let share = f32::from(*c) / 255.0;
+                    *r = *t + share * (*r - *t);
+                }
+            }
+        }
+        let width = view.camera.width_px as usize;
+        let mut sum = LossParts::default();
+        for c in 0..3 {
+            let gradient = &mut self.gradient.color[c];
+            gradient.resize(rendered[c].len(), 0.0);
+            let parts = self.losses[c].channel(&rendered[c], &target[c], width, LAMBDA, 3, gradient);
+            sum.l1 += parts.l1 / 3.0;
+            sum.ssim += parts.ssim / 3.0;
+            sum.mse += parts.mse / 3.0;
+            if let Some(coverage) = coverage {
+                gradient.iter_mut().zip(coverage).for_each(|(g, c)| *g *= f32::from(*c) / 255.0);
+            }
+        }
+        sum
+    }
+
+    /// Backward of the projection and Adam, fused per Gaussian: gradients never reach memory, and
+    /// Gaussians that were not drawn cost nothing.
+    fn descend(&mut self, radius_scale: f32) -> usize {
+        let update = Update {
+            rates: self.schedule.rates(self.step),
+            adam: self.schedule.adam(self.step),
+            stride: self.cloud.sh_stride(),
+            active: sh::coefficients(self.settings.sh_degree),
+            radius_scale,
+        };
+        let renderer = &self.renderer;
+        let [first, second] = &mut self.moments;
+        let blocks: Vec<Block<'_>> = blocks(&mut self.cloud)
+            .zip(blocks(first))
+            .zip(blocks(second))
+            .zip(self.stats.gradient.chunks_mut(BLOCK))
+            .zip(self.stats.seen.chunks_mut(BLOCK))
+            .zip(self.stats.radius.chunks_mut(BLOCK))
+            .enumerate()
+            .map(|(b, (((((p, m), v), gradient), seen), radius))| Block {
+                first: b * BLOCK,
+                p,
+                m,
+                v,
+                gradient,
+                seen,
+                radius,
+            })
+            .collect();
+        blocks.into_par_iter().map(|mut block| descend_block(renderer, &mut block, &update)).sum()
+    }
+}
+
+/// Constants of a step's update.
+struct Update {
+    rates: Rates,
+    adam: AdamStep,
+    stride: usize,
+    active: usize,
+    radius_scale: f32,
+}
+
+/// The arrays of some consecutive Gaussians.
+struct Slices<'a> {
+    positions: &'a mut [[f32; 3]],
+    log_scales: &'a mut [[f32; 3]],
+    quaternions: &'a mut [[f32; 4]],
+    opacity_logits: &'a mut [f32],
+    sh: &'a mut [[f32; 3]],
+}
+
+/// Everything that the update of some consecutive Gaussians touches.
+struct Block<'a> {
+    first: usize,
+    p: Slices<'a>,
+    m: Slices<'a>,
+    v: Slices<'a>,
+    gradient: &'a mut [f32],
+    seen: &'a mut [u32],
+    radius: &'a mut [f32],
+}
+
+fn blocks(cloud: &mut GaussianCloud) -> impl Iterator<Item = Slices<'_>> {
+    let stride = cloud.sh_stride();
+    cloud
+        .positions
+        .chunks_mut(BLOCK)
+        .zip(cloud.log_scales.chunks_mut(BLOCK))
+        .zip(cloud.quaternions.chunks_mut(BLOCK))
+        .zip(cloud.opacity_logits.chunks_mut(BLOCK))
+        .zip(cloud.sh.chunks_mut(BLOCK * stride))
+        .map(|((((positions, log_scales), quaternions), opacity_logits), sh)| Slices {
+            positions,
+            log_scales,
+            quaternions,
+            opacity_logits,
+            sh,
+        })
+}
+
+/// A cloud of the same shape with every parameter zero.
+fn zeros_like(cloud: &GaussianCloud) -> GaussianCloud {
+    GaussianCloud {
+        origin: cloud.origin,
+        positions: vec![[0.0; 3]; cloud.len()],
+        log_scales: vec![[0.0; 3]; cloud.len()],
+        quaternions: vec![[0.0; 4]; cloud.len()],
+        opacity_logits: vec![0.0; cloud.len()],
+        sh_degree: cloud.sh_degree,
+        sh: vec![[0.0; 3]; cloud.sh.len()],
+        extras: Vec::new(),
+    }
+}
+
+/// Updates a block and returns how many of its Gaussians had to be skipped.
+#[multiversion::multiversion(targets("x86_64+avx2+fma"))]
+fn descend_block(renderer: &Renderer<f32>, block: &mut Block<'_>, update: &Update) -> usize {
+    let Update { rates, adam, stride, active, radius_scale } = update;
+    let Block { first, p, m, v, gradient, seen, radius } = block;
+    let mut skipped = 0;
+    for i in 0..p.positions.len() {
+        let own = i * stride..(i + 1) * stride;
+        let gaussian = Gaussian {
+            position: p.positions[i],
+            log_scale: p.log_scales[i],
+            quaternion: p.quaternions[i],
+            opacity_logit: p.opacity_logits[i],
+            sh: &p.sh[own.clone()],
+        };
+        let Some(g) = renderer.gaussian_gradient(&gaussian, *first + i) else { continue };
+        let finite = g.position.iter().chain(&g.log_scale).chain(&g.quaternion).chain(&g.color).all(|x| x.is_finite())
+            && g.opacity_logit.is_finite();
+        if !finite {
+            skipped += 1;
+            continue;
+        }
+        gradient[i] += g.screen;
+        seen[i] += 1;
+        radius[i] = radius[i].max(g.radius_px * radius_scale);
+        let step = |p: &mut [f32], m: &mut [f32], v: &mut [f32], g: &[f32], rate: f32| {
+            for k in 0..g.len() {
+                adam.update(&mut p[k], g[k].clamp(-CLIP, CLIP), &mut m[k], &mut v[k], rate);
+            }
+        };
+        step(&mut p.positions[i], &mut m.positions[i], &mut v.positions[i], &g.position, rates.position);
+        step(&mut p.log_scales[i], &mut m.log_scales[i], &mut v.log_scales[i], &g.log_scale, rates.log_scale);
+        step(&mut p.quaternions[i], &mut m.quaternions[i], &mut v.quaternions[i], &g.quaternion, rates.quaternion);
+        let o = i..i + 1;
+        step(
+            &mut p.opacity_logits[o.clone()],
+            &mut m.opacity_logits[o.clone()],
+            &mut v.opacity_logits[o],
+            &[g.opacity_logit],
+            rates.opacity_logit,
+        );
+        for k in 0..*active {
+            let at = own.start + k;
+            let rate = if k == 0 { rates.sh_constant } else { rates.sh_rest };
+            step(&mut p.sh[at], &mut m.sh[at], &mut v.sh[at], &g.color.map(|c| c * g.basis[k]), rate);
+        }
+    }
+    skipped
+}
