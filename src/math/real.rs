@@ -1,5 +1,6 @@
 //! The scalar that the CPU renderer is generic over: `f32` is the fast path, `f64` the oracle.
 
+use super::lanes::{LaneOp, Plain};
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
@@ -30,6 +31,8 @@ pub trait Real:
     const ONE: Self;
     /// One half.
     const HALF: Self;
+    /// Distance from 1 to the next larger value.
+    const EPSILON: Self;
     /// The nearest value to `x`.
     fn of(x: f64) -> Self;
     /// This value in double precision.
@@ -56,6 +59,12 @@ pub trait Real:
     /// Neither infinite nor NaN.
     fn is_finite(self) -> bool;
 
+    /// Runs a vector computation with the best vectors that this machine has for this type.
+    #[inline(always)]
+    fn vectorize<O: LaneOp<Self>>(op: O) -> O::Output {
+        op.run(Plain)
+    }
+
     /// `1 / (1 + exp(-x))` without overflow for any `x`.
     fn sigmoid(self) -> Self {
         if self >= Self::ZERO {
@@ -71,6 +80,7 @@ impl Real for f64 {
     const ZERO: Self = 0.0;
     const ONE: Self = 1.0;
     const HALF: Self = 0.5;
+    const EPSILON: Self = f64::EPSILON;
     fn of(x: f64) -> Self {
         x
     }
@@ -109,10 +119,27 @@ impl Real for f64 {
     }
 }
 
+/// Constants of the fast `f32` exponential: `exp(x) = 2^n exp(r)` with `n = round(x / ln 2)`,
+/// `|r| <= ln(2) / 2`, a minimax polynomial for `exp(r)`, and `n` added to the exponent field.
+pub(super) mod fast_exp {
+    /// Smaller arguments give the result of this one.
+    pub const SMALLEST: f32 = -87.0;
+    /// Adding 1.5 * 2^23 rounds to the nearest integer and leaves it in the low mantissa bits.
+    pub const ROUND: f32 = 12_582_912.0;
+    /// Upper part of ln 2, short enough for exact products with n.
+    pub const LN2_HI: f32 = 0.693_359_4;
+    /// Lower part of ln 2.
+    pub const LN2_LO: f32 = -2.121_944_4e-4;
+    /// Coefficients from the highest power down.
+    pub const POLYNOMIAL: [f32; 8] =
+        [1.987_569_1e-4, 1.398_199_9e-3, 8.333_452e-3, 4.166_579_6e-2, 1.666_666_5e-1, 5.000_000_3e-1, 1.0, 1.0];
+}
+
 impl Real for f32 {
     const ZERO: Self = 0.0;
     const ONE: Self = 1.0;
     const HALF: Self = 0.5;
+    const EPSILON: Self = f32::EPSILON;
     #[inline(always)]
     fn of(x: f64) -> Self {
         x as f32
@@ -135,27 +162,14 @@ impl Real for f32 {
     }
     #[inline(always)]
     fn exp_neg(self) -> Self {
-        // exp(x) = 2^n * exp(r): n = round(x / ln 2), |r| <= ln(2) / 2, minimax polynomial for
-        // exp(r), exponent field set by integer addition.
-        const LOG2_E: f32 = std::f32::consts::LOG2_E;
-        // ln 2 in two parts, so that n * ln 2 is exact to twice the precision.
-        const LN2_HI: f32 = 0.693_359_4;
-        const LN2_LO: f32 = -2.121_944_4e-4;
-        // Adding 1.5 * 2^23 rounds to the nearest integer and leaves it in the low mantissa bits.
-        const ROUND: f32 = 12_582_912.0;
-        let x = if self < -87.0 { -87.0 } else { self };
-        let shifted = x * LOG2_E + ROUND;
+        use fast_exp::{LN2_HI, LN2_LO, POLYNOMIAL, ROUND, SMALLEST};
+        let x = if self < SMALLEST { SMALLEST } else { self };
+        let shifted = x * std::f32::consts::LOG2_E + ROUND;
         let n = shifted - ROUND;
         let r = (x - n * LN2_HI) - n * LN2_LO;
-        let p = 1.987_569_1e-4_f32;
-        let p = p * r + 1.398_199_9e-3;
-        let p = p * r + 8.333_452e-3;
-        let p = p * r + 4.166_579_6e-2;
-        let p = p * r + 1.666_666_5e-1;
-        let p = p * r + 5.000_000_3e-1;
-        let y = (p * r) * r + r + 1.0;
-        let exponent = (shifted.to_bits().wrapping_sub(ROUND.to_bits())) << 23;
-        f32::from_bits(y.to_bits().wrapping_add(exponent))
+        let y = POLYNOMIAL[1..].iter().fold(POLYNOMIAL[0], |p, c| p * r + c);
+        // Only the low bits of `shifted` differ from those of ROUND, and those are n.
+        f32::from_bits(y.to_bits().wrapping_add(shifted.to_bits() << 23))
     }
     #[inline(always)]
     fn ln(self) -> Self {
@@ -176,6 +190,15 @@ impl Real for f32 {
     #[inline(always)]
     fn mul_add(self, a: Self, b: Self) -> Self {
         self * a + b
+    }
+    #[inline(always)]
+    fn vectorize<O: LaneOp<Self>>(op: O) -> O::Output {
+        #[cfg(target_arch = "x86_64")]
+        let op = match super::lanes::run_avx2(op) {
+            Ok(output) => return output,
+            Err(op) => op,
+        };
+        op.run(Plain)
     }
     #[inline(always)]
     fn is_finite(self) -> bool {

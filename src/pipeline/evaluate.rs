@@ -24,12 +24,5 @@ pub fn evaluate(
         scores.push(ViewScore { name: view.name.clone(), psnr, ssim });
     }
     let of = |f: fn(&ViewScore) -> f64| mean(&scores.iter().map(f).collect::<Vec<_>>());
-    Ok(Evaluation {
-        step,
-        secs,
-        psnr: of(|s| s.psnr),
-        ssim: of(|s| s.ssim),
-        gaussians: cloud.len(),
-        views: scores,
-    })
+    Ok(Evaluation { step, secs, psnr: of(|s| s.psnr), ssim: of(|s| s.ssim), gaussians: cloud.len(), views: scores })
 }

@@ -36,7 +36,8 @@ pub fn from_points(points: &[SparsePoint], degree: u8) -> GaussianCloud {
         .par_iter()
         .map(|p| {
             // The first neighbour is the point itself.
-            let near: Vec<f64> = tree.nearest_neighbor_iter_with_distance_2(p).skip(1).take(3).map(|(_, d)| d).collect();
+            let near: Vec<f64> =
+                tree.nearest_neighbor_iter_with_distance_2(*p).skip(1).take(3).map(|(_, d)| d).collect();
             (near.iter().sum::<f64>() / near.len().max(1) as f64).sqrt()
         })
         .collect();

@@ -141,7 +141,8 @@ fn resumable(
     let Some(saved) = checkpoint::load(&path)? else { return Ok(None) };
     let h = &saved.header;
     // How often to look and save does not change the trajectory.
-    let theirs = TrainConfig { eval_every: config.eval_every, checkpoint_secs: config.checkpoint_secs, ..h.config.clone() };
+    let theirs =
+        TrainConfig { eval_every: config.eval_every, checkpoint_secs: config.checkpoint_secs, ..h.config.clone() };
     if theirs != *config {
         return Err(CheckpointError::OtherRun { path, what: "settings" });
     }
@@ -248,7 +249,20 @@ impl<'a> Job<'a> {
         info.config = serde_json::to_value(config).unwrap_or_default();
         let photos = views.iter().map(|v| v.name.clone()).collect();
         let safe = trainer.cloud.clone();
-        Self { config, out, info, photos, views, tests, trainer, secs, history, safe, rollbacks: 0, recent: VecDeque::new() }
+        Self {
+            config,
+            out,
+            info,
+            photos,
+            views,
+            tests,
+            trainer,
+            secs,
+            history,
+            safe,
+            rollbacks: 0,
+            recent: VecDeque::new(),
+        }
     }
 
     fn train(&mut self, observer: &mut dyn Observer) -> Result<TrainEnd, TrainError> {
@@ -257,7 +271,10 @@ impl<'a> Job<'a> {
         }
         if self.trainer.cloud.len() > self.trainer.budget {
             let (have, may) = (self.trainer.cloud.len(), self.trainer.budget);
-            observer.note(Level::Warning, format!("{have} Gaussians to start from are over the budget of {may}; none will be added"));
+            observer.note(
+                Level::Warning,
+                format!("{have} Gaussians to start from are over the budget of {may}; none will be added"),
+            );
         }
         let mut meter = Meter::default();
         let mut window = Window::default();
@@ -328,7 +345,10 @@ impl<'a> Job<'a> {
             }
             observer.note(
                 Level::Warning,
-                format!("Step {}: the loss is {:.3}, far above what it was; back to the last good state with halved rates", self.trainer.step, result.loss),
+                format!(
+                    "Step {}: the loss is {:.3}, far above what it was; back to the last good state with halved rates",
+                    self.trainer.step, result.loss
+                ),
             );
             self.trainer.roll_back(self.safe.clone());
             self.recent.clear();
@@ -376,7 +396,11 @@ impl<'a> Job<'a> {
             history: self.history.clone(),
         };
         std::fs::create_dir_all(folder).map_err(|cause| {
-            TrainError::Save(IoError::Write { path: folder.into(), remedy: "choose another folder for the result", cause })
+            TrainError::Save(IoError::Write {
+                path: folder.into(),
+                remedy: "choose another folder for the result",
+                cause,
+            })
         })?;
         checkpoint::save(&folder.join(checkpoint::FILE), t, &header).map_err(TrainError::Save)
     }
@@ -394,7 +418,13 @@ impl<'a> Job<'a> {
         }
         let cloud = Arc::new(self.trainer.cloud);
         observer.cloud(Arc::clone(&cloud), self.trainer.step);
-        Ok(TrainOutcome { cloud, evaluations: self.history.evaluations, end, steps: self.trainer.step, secs: self.secs })
+        Ok(TrainOutcome {
+            cloud,
+            evaluations: self.history.evaluations,
+            end,
+            steps: self.trainer.step,
+            secs: self.secs,
+        })
     }
 }
 

@@ -3,9 +3,10 @@
 use std::sync::atomic::Ordering::Relaxed;
 
 use super::bin::Tiles;
-use super::lanes::{GROUPS, LANES, Lane, SLOTS, Walk, alphas, row_terms};
+use super::lanes::{GROUPS, SLOTS, SplatLanes, Walk, row_terms};
 use super::project::Splat;
 use crate::math::Real;
+use crate::math::lanes::{LANES, LaneOp, Lanes};
 use crate::render::{TILE_PX, TRANSMITTANCE_MIN};
 
 /// Splats between two looks at which pixels are still open.
@@ -23,129 +24,121 @@ pub struct RowOut<'a, R> {
     pub median: &'a mut [R],
 }
 
-/// Blends the tiles of row `ty`. Returns the number of splat-pixel products evaluated.
-#[multiversion::multiversion(targets("x86_64+avx2+fma"))]
-pub fn blend_row<R: Real, const C: usize>(
-    splats: &[Splat<R>],
-    values: &[R],
-    tiles: &Tiles,
-    size: [usize; 2],
-    ty: usize,
-    out: &mut RowOut<'_, R>,
-) -> u64 {
-    let (values, _) = values.as_chunks::<C>();
-    let mut products = 0;
-    for tx in 0..tiles.grid[0] {
-        products += if out.median.is_empty() {
-            blend_tile::<R, C, false>(splats, values, tiles, size, [tx, ty], out)
-        } else {
-            blend_tile::<R, C, true>(splats, values, tiles, size, [tx, ty], out)
-        };
-    }
-    products
+/// Compositing of the tiles of row `ty`; returns the number of splat-pixel products evaluated.
+pub struct BlendRow<'a, 'b, R, const C: usize> {
+    /// The frame's splats.
+    pub splats: &'a [Splat<R>],
+    /// `C` values per splat.
+    pub values: &'a [R],
+    /// Their tile lists.
+    pub tiles: &'a Tiles,
+    /// Picture size in px.
+    pub size: [usize; 2],
+    /// Which row of tiles.
+    pub ty: usize,
+    /// Where to write.
+    pub out: &'a mut RowOut<'b, R>,
 }
 
-#[inline(always)]
-fn blend_tile<R: Real, const C: usize, const MEDIAN: bool>(
-    splats: &[Splat<R>],
-    values: &[[R; C]],
-    tiles: &Tiles,
-    size: [usize; 2],
-    tile: [usize; 2],
-    out: &mut RowOut<'_, R>,
-) -> u64 {
-    let corner = [tile[0] * TILE_PX, tile[1] * TILE_PX];
-    let height = TILE_PX.min(size[1] - corner[1]);
-    let width = TILE_PX.min(size[0] - corner[0]);
-    let index = tile[1] * tiles.grid[0] + tile[0];
-    let (first, end) = (tiles.first[index] as usize, tiles.first[index + 1] as usize);
+impl<R: Real, const C: usize> LaneOp<R> for BlendRow<'_, '_, R, C> {
+    type Output = u64;
+    #[inline(always)]
+    fn run<L: Lanes<R>>(mut self, l: L) -> u64 {
+        let median = !self.out.median.is_empty();
+        let mut groups = 0;
+        for tx in 0..self.tiles.grid[0] {
+            groups += if median { self.tile::<L, true>(l, tx) } else { self.tile::<L, false>(l, tx) };
+        }
+        groups * LANES as u64
+    }
+}
 
-    let mut sums = [[[R::ZERO; LANES]; SLOTS]; C];
-    let mut left = [[R::ONE; LANES]; SLOTS];
-    let mut open = [[R::ONE; LANES]; SLOTS];
-    let mut last = [[0_u32; LANES]; SLOTS];
-    let mut median = [[R::ZERO; LANES]; SLOTS];
-    let mut closed = [false; SLOTS];
-    let mut groups_done = 0_u64;
+impl<R: Real, const C: usize> BlendRow<'_, '_, R, C> {
+    /// Composites one tile and returns the number of lane groups evaluated.
+    #[inline(always)]
+    fn tile<L: Lanes<R>, const MEDIAN: bool>(&mut self, l: L, tx: usize) -> u64 {
+        let (values, _) = self.values.as_chunks::<C>();
+        let corner = [tx * TILE_PX, self.ty * TILE_PX];
+        let height = TILE_PX.min(self.size[1] - corner[1]);
+        let index = self.ty * self.tiles.grid[0] + tx;
+        let (first, end) = (self.tiles.first[index] as usize, self.tiles.first[index + 1] as usize);
 
-    for (k, entry) in tiles.entries[first..end].iter().enumerate() {
-        let id = entry.load(Relaxed) as usize;
-        let s = splats[id];
-        let value = &values[id];
-        let walk = Walk::new(&s, corner, height);
-        for row in walk.rows.clone() {
-            let dy = walk.dy(row);
-            let terms = row_terms(&s, dy);
-            for g in walk.groups(dy) {
+        let (zero, one) = (l.splat(R::ZERO), l.splat(R::ONE));
+        let (half, least) = (l.splat(R::HALF), l.splat(R::of(TRANSMITTANCE_MIN)));
+        let mut sums = [[zero; C]; SLOTS];
+        let mut left = [one; SLOTS];
+        let mut open = [one; SLOTS];
+        let mut last = [zero; SLOTS];
+        let mut median = [zero; SLOTS];
+        let mut closed = [false; SLOTS];
+        let mut groups = 0_u64;
+
+        for (k, entry) in self.tiles.entries[first..end].iter().enumerate() {
+            let id = entry.load(Relaxed) as usize;
+            let s = &self.splats[id];
+            let walk = Walk::new(s, corner, height);
+            let lanes = SplatLanes::new(l, s);
+            let value = values[id].map(|v| l.splat(v));
+            let place = l.splat(R::of((k + 1) as f64));
+            let dx = [l.load(&walk.dx[0]), l.load(&walk.dx[1])];
+            for row in walk.rows.clone() {
+                let dy = walk.dy(row);
+                let terms = row_terms(l, s, dy);
+                for g in walk.groups(dy) {
+                    let slot = row * GROUPS + g;
+                    if closed[slot] {
+                        continue;
+                    }
+                    groups += 1;
+                    let alpha = lanes.alphas(l, dx[g], terms);
+                    let before = left[slot];
+                    let after = l.mul(before, l.sub(one, alpha));
+                    // A pixel stays open while the next splat leaves it enough light.
+                    let still = l.both(l.ge(open[slot], one), l.ge(after, least));
+                    let weight = l.keep(still, l.mul(alpha, before));
+                    open[slot] = l.keep(still, one);
+                    left[slot] = l.select(still, after, before);
+                    if MEDIAN {
+                        let crossed = l.both(l.ge(before, l.add(half, l.splat(R::EPSILON))), l.ge(half, left[slot]));
+                        median[slot] = l.select(crossed, l.splat(s.depth), median[slot]);
+                    }
+                    last[slot] = l.select(l.ge(zero, weight), last[slot], place);
+                    for c in 0..C {
+                        sums[slot][c] = l.mul_add(weight, value[c], sums[slot][c]);
+                    }
+                }
+            }
+            if k % CLOSED_CHECK == CLOSED_CHECK - 1 {
+                let mut all = true;
+                for slot in 0..height * GROUPS {
+                    closed[slot] = closed[slot] || l.sum(open[slot]) == R::ZERO;
+                    all &= closed[slot];
+                }
+                if all {
+                    break;
+                }
+            }
+        }
+
+        let width = TILE_PX.min(self.size[0] - corner[0]);
+        let out = &mut *self.out;
+        for row in 0..height {
+            for g in 0..width.div_ceil(LANES) {
                 let slot = row * GROUPS + g;
-                if closed[slot] {
-                    continue;
+                let count = LANES.min(width - g * LANES);
+                let at = row * self.size[0] + corner[0] + g * LANES;
+                for (c, plane) in out.planes.iter_mut().enumerate() {
+                    plane[at..at + count].copy_from_slice(&l.store(sums[slot][c])[..count]);
                 }
-                groups_done += 1;
-                let alpha = alphas(&s, &walk.dx[g], terms);
-                let weight = attenuate(&alpha, &mut left[slot], &mut open[slot], |l, before, after| {
-                    if MEDIAN && before > R::HALF && after <= R::HALF {
-                        median[slot][l] = s.depth;
-                    }
-                });
-                for l in 0..LANES {
-                    last[slot][l] = if weight[l] > R::ZERO { k as u32 + 1 } else { last[slot][l] };
+                out.transmittance[at..at + count].copy_from_slice(&l.store(left[slot])[..count]);
+                for (o, v) in out.last[at..at + count].iter_mut().zip(l.store(last[slot])) {
+                    *o = v.f32() as u32;
                 }
-                for c in 0..C {
-                    for l in 0..LANES {
-                        sums[c][slot][l] += weight[l] * value[c];
-                    }
+                if MEDIAN {
+                    out.median[at..at + count].copy_from_slice(&l.store(median[slot])[..count]);
                 }
             }
         }
-        if k % CLOSED_CHECK == CLOSED_CHECK - 1 {
-            let mut all = true;
-            for slot in 0..height * GROUPS {
-                closed[slot] = open[slot].iter().fold(R::ZERO, |m, &o| m + o) == R::ZERO;
-                all &= closed[slot];
-            }
-            if all {
-                break;
-            }
-        }
+        groups
     }
-
-    for row in 0..height {
-        for g in 0..width.div_ceil(LANES) {
-            let slot = row * GROUPS + g;
-            let lanes = LANES.min(width - g * LANES);
-            let at = row * size[0] + corner[0] + g * LANES;
-            for (c, plane) in out.planes.iter_mut().enumerate() {
-                plane[at..at + lanes].copy_from_slice(&sums[c][slot][..lanes]);
-            }
-            out.transmittance[at..at + lanes].copy_from_slice(&left[slot][..lanes]);
-            out.last[at..at + lanes].copy_from_slice(&last[slot][..lanes]);
-            if MEDIAN {
-                out.median[at..at + lanes].copy_from_slice(&median[slot][..lanes]);
-            }
-        }
-    }
-    groups_done * LANES as u64
-}
-
-/// Lets a splat of the given alphas take its share of each open pixel's light. Returns the weights
-/// `alpha * transmittance`; `seen` is told the transmittance before and after.
-#[inline(always)]
-fn attenuate<R: Real>(
-    alpha: &Lane<R>,
-    left: &mut Lane<R>,
-    open: &mut Lane<R>,
-    mut seen: impl FnMut(usize, R, R),
-) -> Lane<R> {
-    let mut weight = [R::ZERO; LANES];
-    for l in 0..LANES {
-        let before = left[l];
-        let after = before * (R::ONE - alpha[l]);
-        let still = if after >= R::of(TRANSMITTANCE_MIN) { open[l] } else { R::ZERO };
-        open[l] = still;
-        weight[l] = if still > R::ZERO { alpha[l] * before } else { R::ZERO };
-        left[l] = if still > R::ZERO { after } else { before };
-        seen(l, before, left[l]);
-    }
-    weight
 }

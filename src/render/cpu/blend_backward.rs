@@ -7,9 +7,10 @@
 use std::sync::atomic::Ordering::Relaxed;
 
 use super::bin::Tiles;
-use super::lanes::{GROUPS, LANES, Lane, SLOTS, Walk, alphas, row_terms};
+use super::lanes::{GROUPS, SLOTS, SplatLanes, Walk, row_terms};
 use super::project::Splat;
 use crate::math::Real;
+use crate::math::lanes::{LANES, LaneOp, Lanes};
 use crate::render::{ALPHA_MAX, TILE_PX};
 
 /// Moments in front of the channels in a tile entry's record.
@@ -27,142 +28,134 @@ pub struct RowIn<'a, R> {
     pub last: &'a [u32],
 }
 
-/// Fills `records` (`MOMENTS + C` values per entry of the tile row, in the order of the lists).
-#[multiversion::multiversion(targets("x86_64+avx2+fma"))]
-pub fn blend_row_backward<R: Real, const C: usize>(
-    splats: &[Splat<R>],
-    values: &[R],
-    tiles: &Tiles,
-    size: [usize; 2],
-    ty: usize,
-    input: &RowIn<'_, R>,
-    records: &mut [R],
-) {
-    let (values, _) = values.as_chunks::<C>();
-    let base = tiles.first[ty * tiles.grid[0]] as usize;
-    for tx in 0..tiles.grid[0] {
-        let t = ty * tiles.grid[0] + tx;
-        let (first, end) = (tiles.first[t] as usize, tiles.first[t + 1] as usize);
+/// Backward pass of the tiles of row `ty`: fills `records` with `MOMENTS + C` values per entry of
+/// the tile row, in the order of the lists.
+pub struct BlendRowBackward<'a, 'b, R, const C: usize> {
+    /// The frame's splats.
+    pub splats: &'a [Splat<R>],
+    /// `C` values per splat.
+    pub values: &'a [R],
+    /// Their tile lists.
+    pub tiles: &'a Tiles,
+    /// Picture size in px.
+    pub size: [usize; 2],
+    /// Which row of tiles.
+    pub ty: usize,
+    /// What to read.
+    pub input: &'a RowIn<'b, R>,
+    /// Where to write.
+    pub records: &'a mut [R],
+}
+
+impl<R: Real, const C: usize> LaneOp<R> for BlendRowBackward<'_, '_, R, C> {
+    type Output = ();
+    #[inline(always)]
+    fn run<L: Lanes<R>>(mut self, l: L) {
+        for tx in 0..self.tiles.grid[0] {
+            self.tile(l, tx);
+        }
+    }
+}
+
+impl<R: Real, const C: usize> BlendRowBackward<'_, '_, R, C> {
+    #[inline(always)]
+    fn tile<L: Lanes<R>>(&mut self, l: L, tx: usize) {
+        let (values, _) = self.values.as_chunks::<C>();
+        let corner = [tx * TILE_PX, self.ty * TILE_PX];
+        let height = TILE_PX.min(self.size[1] - corner[1]);
+        let width = TILE_PX.min(self.size[0] - corner[0]);
+        let index = self.ty * self.tiles.grid[0] + tx;
+        let (first, end) = (self.tiles.first[index] as usize, self.tiles.first[index + 1] as usize);
+        let base = self.tiles.first[self.ty * self.tiles.grid[0]] as usize;
         let stride = MOMENTS + C;
-        let own = &mut records[(first - base) * stride..(end - base) * stride];
-        tile_backward::<R, C>(splats, values, tiles, size, [tx, ty], input, own);
-    }
-}
 
-#[inline(always)]
-fn tile_backward<R: Real, const C: usize>(
-    splats: &[Splat<R>],
-    values: &[[R; C]],
-    tiles: &Tiles,
-    size: [usize; 2],
-    tile: [usize; 2],
-    input: &RowIn<'_, R>,
-    records: &mut [R],
-) {
-    let corner = [tile[0] * TILE_PX, tile[1] * TILE_PX];
-    let height = TILE_PX.min(size[1] - corner[1]);
-    let width = TILE_PX.min(size[0] - corner[0]);
-    let index = tile[1] * tiles.grid[0] + tile[0];
-    let first = tiles.first[index] as usize;
-
-    let mut gradient = [[[R::ZERO; LANES]; SLOTS]; C];
-    let mut left = [[R::ONE; LANES]; SLOTS];
-    // Light that arrives from behind the current splat, times its gradient.
-    let mut behind = [[R::ZERO; LANES]; SLOTS];
-    let mut last = [[0_u32; LANES]; SLOTS];
-    let mut furthest = [0_u32; SLOTS];
-    for row in 0..height {
-        for g in 0..width.div_ceil(LANES) {
-            let slot = row * GROUPS + g;
-            let lanes = LANES.min(width - g * LANES);
-            let at = row * size[0] + corner[0] + g * LANES;
-            for (c, plane) in input.planes.iter().enumerate().filter(|(_, p)| !p.is_empty()) {
-                gradient[c][slot][..lanes].copy_from_slice(&plane[at..at + lanes]);
-            }
-            left[slot][..lanes].copy_from_slice(&input.transmittance[at..at + lanes]);
-            last[slot][..lanes].copy_from_slice(&input.last[at..at + lanes]);
-            for l in 0..lanes {
-                behind[slot][l] = left[slot][l] * input.transmittance_gradient[at + l];
-            }
-            furthest[slot] = last[slot].iter().fold(0, |m, &v| m.max(v));
-        }
-    }
-    let deepest = furthest.iter().fold(0, |m, &v| m.max(v)) as usize;
-
-    let stride = MOMENTS + C;
-    records[deepest * stride..].fill(R::ZERO);
-    for k in (0..deepest).rev() {
-        let id = tiles.entries[first + k].load(Relaxed) as usize;
-        let s = splats[id];
-        let value = &values[id];
-        let walk = Walk::new(&s, corner, height);
-        let mut moments = [[R::ZERO; LANES]; MOMENTS];
-        let mut value_sums = [[R::ZERO; LANES]; C];
-        for row in walk.rows.clone() {
-            let dy = walk.dy(row);
-            let terms = row_terms(&s, dy);
-            for g in walk.groups(dy) {
+        let (zero, one) = (l.splat(R::ZERO), l.splat(R::ONE));
+        let mut gradient = [[zero; C]; SLOTS];
+        let mut left = [one; SLOTS];
+        // Light that arrives from behind the current splat, times its gradient.
+        let mut behind = [zero; SLOTS];
+        let mut last = [zero; SLOTS];
+        let mut furthest = [0_u32; SLOTS];
+        let input = self.input;
+        let part = |plane: &[R], at: usize, count: usize| {
+            let mut lane = [R::ZERO; LANES];
+            lane[..count].copy_from_slice(&plane[at..at + count]);
+            l.load(&lane)
+        };
+        for row in 0..height {
+            for g in 0..width.div_ceil(LANES) {
                 let slot = row * GROUPS + g;
-                if (k as u32) >= furthest[slot] {
-                    continue;
+                let count = LANES.min(width - g * LANES);
+                let at = row * self.size[0] + corner[0] + g * LANES;
+                for (c, plane) in input.planes.iter().enumerate().filter(|(_, p)| !p.is_empty()) {
+                    gradient[slot][c] = part(plane, at, count);
                 }
-                let dx = &walk.dx[g];
-                let mut alpha = alphas(&s, dx, terms);
-                for l in 0..LANES {
-                    alpha[l] = if (k as u32) < last[slot][l] { alpha[l] } else { R::ZERO };
+                left[slot] = part(input.transmittance, at, count);
+                behind[slot] = l.mul(left[slot], part(input.transmittance_gradient, at, count));
+                let mut places = [R::ZERO; LANES];
+                for (p, v) in places.iter_mut().zip(&input.last[at..at + count]) {
+                    *p = R::of(f64::from(*v));
+                    furthest[slot] = furthest[slot].max(*v);
                 }
-                let mut along = [R::ZERO; LANES];
-                for c in 0..C {
-                    for l in 0..LANES {
-                        along[l] += gradient[c][slot][l] * value[c];
-                    }
-                }
-                let (weight, power) = unwind(&alpha, &along, &mut left[slot], &mut behind[slot]);
-                for c in 0..C {
-                    for l in 0..LANES {
-                        value_sums[c][l] += weight[l] * gradient[c][slot][l];
-                    }
-                }
-                for l in 0..LANES {
-                    let px = power[l] * dx[l];
-                    let py = power[l] * dy;
-                    moments[0][l] += power[l];
-                    moments[1][l] += px;
-                    moments[2][l] += py;
-                    moments[3][l] += px * dx[l];
-                    moments[4][l] += px * dy;
-                    moments[5][l] += py * dy;
-                }
+                last[slot] = l.load(&places);
             }
         }
-        let record = &mut records[k * stride..(k + 1) * stride];
-        for (r, lanes) in record.iter_mut().zip(moments.iter().chain(&value_sums)) {
-            *r = sum(lanes);
+        let deepest = furthest.iter().fold(0, |m, &v| m.max(v)) as usize;
+
+        let records = &mut self.records[(first - base) * stride..(end - base) * stride];
+        records[deepest * stride..].fill(R::ZERO);
+        let capped = l.splat(R::of(ALPHA_MAX));
+        for k in (0..deepest).rev() {
+            let id = self.tiles.entries[first + k].load(Relaxed) as usize;
+            let s = &self.splats[id];
+            let walk = Walk::new(s, corner, height);
+            let lanes = SplatLanes::new(l, s);
+            let value = values[id].map(|v| l.splat(v));
+            let place = l.splat(R::of((k + 1) as f64));
+            let mut moments = [zero; MOMENTS];
+            let mut value_sums = [zero; C];
+            let dx = [l.load(&walk.dx[0]), l.load(&walk.dx[1])];
+            for row in walk.rows.clone() {
+                let offset = walk.dy(row);
+                let terms = row_terms(l, s, offset);
+                let dy = l.splat(offset);
+                for g in walk.groups(offset) {
+                    let slot = row * GROUPS + g;
+                    if (k as u32) >= furthest[slot] {
+                        continue;
+                    }
+                    let alpha = lanes.alphas(l, dx[g], terms);
+                    let alpha = l.keep(l.ge(last[slot], place), alpha);
+                    let mut along = zero;
+                    for c in 0..C {
+                        along = l.mul_add(gradient[slot][c], value[c], along);
+                    }
+                    // Take the splat off: transmittance in front of it, its weight, and dL/dalpha.
+                    let inverse = l.div(one, l.sub(one, alpha));
+                    let before = l.mul(left[slot], inverse);
+                    let weight = l.mul(alpha, before);
+                    let d_alpha = l.sub(l.mul(before, along), l.mul(behind[slot], inverse));
+                    // A capped alpha does not depend on the splat's opacity or shape.
+                    let power = l.select(l.ge(alpha, capped), zero, l.mul(alpha, d_alpha));
+                    behind[slot] = l.mul_add(weight, along, behind[slot]);
+                    left[slot] = before;
+                    for c in 0..C {
+                        value_sums[c] = l.mul_add(weight, gradient[slot][c], value_sums[c]);
+                    }
+                    let px = l.mul(power, dx[g]);
+                    let py = l.mul(power, dy);
+                    moments[0] = l.add(moments[0], power);
+                    moments[1] = l.add(moments[1], px);
+                    moments[2] = l.add(moments[2], py);
+                    moments[3] = l.mul_add(px, dx[g], moments[3]);
+                    moments[4] = l.mul_add(px, dy, moments[4]);
+                    moments[5] = l.mul_add(py, dy, moments[5]);
+                }
+            }
+            let record = &mut records[k * stride..(k + 1) * stride];
+            for (r, v) in record.iter_mut().zip(moments.iter().chain(&value_sums)) {
+                *r = l.sum(*v);
+            }
         }
     }
-}
-
-/// Takes one splat off each pixel: restores the transmittance in front of it and returns its
-/// weight and `dL/dpower`. `along` is the gradient of the picture along the splat's value.
-#[inline(always)]
-fn unwind<R: Real>(alpha: &Lane<R>, along: &Lane<R>, left: &mut Lane<R>, behind: &mut Lane<R>) -> (Lane<R>, Lane<R>) {
-    let mut weight = [R::ZERO; LANES];
-    let mut power = [R::ZERO; LANES];
-    for l in 0..LANES {
-        let inverse = R::ONE / (R::ONE - alpha[l]);
-        let before = left[l] * inverse;
-        weight[l] = alpha[l] * before;
-        let d_alpha = before * along[l] - behind[l] * inverse;
-        // A capped alpha does not depend on the splat's opacity or shape.
-        power[l] = if alpha[l] < R::of(ALPHA_MAX) { alpha[l] * d_alpha } else { R::ZERO };
-        behind[l] += weight[l] * along[l];
-        left[l] = before;
-    }
-    (weight, power)
-}
-
-/// Sum over lanes in a fixed order.
-#[inline(always)]
-fn sum<R: Real>(v: &Lane<R>) -> R {
-    ((v[0] + v[4]) + (v[2] + v[6])) + ((v[1] + v[5]) + (v[3] + v[7]))
 }

@@ -3,17 +3,13 @@
 
 use super::project::Splat;
 use crate::math::Real;
+use crate::math::lanes::{LANES, Lane, Lanes};
 use crate::render::{ALPHA_MAX, ALPHA_MIN, TILE_PX};
 
-/// Pixels that are computed together: one AVX register of `f32`.
-pub const LANES: usize = 8;
 /// Lane groups per tile row.
 pub const GROUPS: usize = TILE_PX / LANES;
 /// Lane groups per tile.
 pub const SLOTS: usize = TILE_PX * GROUPS;
-
-/// One value per pixel of a lane group.
-pub type Lane<R> = [R; LANES];
 
 /// A splat prepared for walking the rows of one tile.
 pub struct Walk<R> {
@@ -77,22 +73,41 @@ impl<R: Real> Walk<R> {
     }
 }
 
-/// Alpha of each pixel of a lane group, 0 where it does not count. `row` holds the part of the
-/// quadratic form that is constant along a row: `2 b dy` and `c dy²`.
-#[inline(always)]
-pub fn alphas<R: Real>(s: &Splat<R>, dx: &Lane<R>, row: [R; 2]) -> Lane<R> {
-    let mut alpha = [R::ZERO; LANES];
-    for l in 0..LANES {
-        let q = (s.conic[0] * dx[l] + row[0]) * dx[l] + row[1];
-        let raw = s.opacity * (-R::HALF * q).exp_neg();
-        let capped = if raw < R::of(ALPHA_MAX) { raw } else { R::of(ALPHA_MAX) };
-        alpha[l] = if capped >= R::of(ALPHA_MIN) { capped } else { R::ZERO };
-    }
-    alpha
+/// A splat's constants in vector registers.
+pub struct SplatLanes<R: Real, L: Lanes<R>> {
+    a: L::V,
+    opacity: L::V,
+    minus_half: L::V,
+    largest: L::V,
+    smallest: L::V,
 }
 
-/// The constants of [`alphas`] for the row at `dy`.
+impl<R: Real, L: Lanes<R>> SplatLanes<R, L> {
+    /// The constants of `s`.
+    #[inline(always)]
+    pub fn new(l: L, s: &Splat<R>) -> Self {
+        Self {
+            a: l.splat(s.conic[0]),
+            opacity: l.splat(s.opacity),
+            minus_half: l.splat(-R::HALF),
+            largest: l.splat(R::of(ALPHA_MAX)),
+            smallest: l.splat(R::of(ALPHA_MIN)),
+        }
+    }
+
+    /// Alpha of each pixel of a lane group at horizontal offsets `dx`, 0 where it does not count.
+    /// `row` holds the part of the quadratic form that is constant along a row: `2 b dy`, `c dy²`.
+    #[inline(always)]
+    pub fn alphas(&self, l: L, dx: L::V, row: [L::V; 2]) -> L::V {
+        let q = l.mul_add(l.mul_add(self.a, dx, row[0]), dx, row[1]);
+        let raw = l.mul(self.opacity, l.exp_neg(l.mul(self.minus_half, q)));
+        let alpha = l.min(raw, self.largest);
+        l.keep(l.ge(alpha, self.smallest), alpha)
+    }
+}
+
+/// The row constants of [`SplatLanes::alphas`] at `dy`.
 #[inline(always)]
-pub fn row_terms<R: Real>(s: &Splat<R>, dy: R) -> [R; 2] {
-    [R::of(2.0) * s.conic[1] * dy, s.conic[2] * dy * dy]
+pub fn row_terms<R: Real, L: Lanes<R>>(l: L, s: &Splat<R>, dy: R) -> [L::V; 2] {
+    [l.splat(R::of(2.0) * s.conic[1] * dy), l.splat(s.conic[2] * dy * dy)]
 }

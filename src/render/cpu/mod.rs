@@ -19,8 +19,8 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use self::bin::Tiles;
-use self::blend::{RowOut, blend_row};
-use self::blend_backward::{MOMENTS, RowIn, blend_row_backward};
+use self::blend::{BlendRow, RowOut};
+use self::blend_backward::{BlendRowBackward, MOMENTS, RowIn};
 use self::project::{NONE, Projected, View};
 use self::project_backward::{GaussianGradient, project_backward};
 use super::{CloudGradient, Features, Frame, FrameGradient, MAX_CHANNELS, RenderError, RenderSettings, TILE_PX};
@@ -178,7 +178,9 @@ impl<R: Real> Renderer<R> {
         let (splats, values, tiles) = (&self.projected.splats, &self.projected.values, &self.tiles);
         rows.par_iter_mut()
             .enumerate()
-            .map(|(ty, out)| with_channels!(channels, C => blend_row::<R, C>(splats, values, tiles, size, ty, out)))
+            .map(|(ty, out)| {
+                with_channels!(channels, C => R::vectorize(BlendRow::<R, C> { splats, values, tiles, size, ty, out }))
+            })
             .sum()
     }
 
@@ -225,8 +227,10 @@ impl<R: Real> Renderer<R> {
         }
         let (splats, values, tiles) = (&self.projected.splats, &self.projected.values, &self.tiles);
         tasks.into_par_iter().for_each(|(ty, input, own)| {
-            with_channels!(info.channels[1], C =>
-                blend_row_backward::<R, C>(splats, values, tiles, size, ty, &input, own));
+            with_channels!(info.channels[1], C => {
+                let input = &input;
+                R::vectorize(BlendRowBackward::<R, C> { splats, values, tiles, size, ty, input, records: own });
+            });
         });
         self.stats.backward_secs = clock.elapsed().as_secs_f64();
     }

@@ -72,9 +72,11 @@ impl<R: Real> PhotoLoss<R> {
         let wanted = !gradient.is_empty();
         self.rows.resize(pixels * MAPS, R::ZERO);
         self.partials.resize(if wanted { pixels * PARTIALS } else { height }, R::ZERO);
-        self.rows.par_chunks_mut(width * MAPS).zip(x.par_chunks(width)).zip(y.par_chunks(width)).for_each(
-            |((out, x), y)| filter_products(out, x, y, &taps),
-        );
+        self.rows
+            .par_chunks_mut(width * MAPS)
+            .zip(x.par_chunks(width))
+            .zip(y.par_chunks(width))
+            .for_each(|((out, x), y)| filter_products(out, x, y, &taps));
         let per_row = if wanted { width * PARTIALS } else { 1 };
         let sums: Vec<[f64; 3]> = self
             .partials
@@ -106,14 +108,13 @@ impl<R: Real> PhotoLoss<R> {
     fn gradient(&mut self, x: &[R], y: &[R], width: usize, weights: [f64; 2], taps: &[R; TAPS], out: &mut [R]) {
         let height = x.len() / width;
         self.filtered.resize(self.partials.len(), R::ZERO);
-        self.filtered
-            .par_chunks_mut(width * PARTIALS)
-            .zip(self.partials.par_chunks(width * PARTIALS))
-            .for_each(|(out, partials)| {
+        self.filtered.par_chunks_mut(width * PARTIALS).zip(self.partials.par_chunks(width * PARTIALS)).for_each(
+            |(out, partials)| {
                 for k in 0..PARTIALS {
                     filter_row(&mut out[k * width..(k + 1) * width], &partials[k * width..(k + 1) * width], taps);
                 }
-            });
+            },
+        );
         let filtered = &self.filtered;
         out.par_chunks_mut(width)
             .zip(x.par_chunks(width))
@@ -140,13 +141,11 @@ fn filter_row<R: Real>(out: &mut [R], row: &[R], taps: &[R; TAPS]) {
 
 #[inline(always)]
 fn accumulate<R: Real>(out: &mut [R], wide: &[R], taps: &[R; TAPS]) {
-    for (i, o) in out.iter_mut().enumerate() {
-        let near = &wide[i..i + TAPS];
-        let mut sum = R::ZERO;
-        for t in 0..TAPS {
-            sum += near[t] * taps[t];
+    out.fill(R::ZERO);
+    for (t, weight) in taps.iter().enumerate() {
+        for (o, v) in out.iter_mut().zip(&wide[t..]) {
+            *o += *v * *weight;
         }
-        *o = sum;
     }
 }
 
@@ -172,13 +171,7 @@ fn filter_products<R: Real>(out: &mut [R], x: &[R], y: &[R], taps: &[R; TAPS]) {
 
 /// Column filter at `row` of the `k`-th of `maps` interleaved row-filtered planes.
 #[inline(always)]
-fn column<R: Real>(
-    out: &mut [R],
-    planes: &[R],
-    [k, maps]: [usize; 2],
-    [row, height]: [usize; 2],
-    taps: &[R; TAPS],
-) {
+fn column<R: Real>(out: &mut [R], planes: &[R], [k, maps]: [usize; 2], [row, height]: [usize; 2], taps: &[R; TAPS]) {
     let width = out.len();
     out.fill(R::ZERO);
     for t in 0..TAPS {
@@ -193,39 +186,39 @@ fn column<R: Real>(
 
 /// SSIM summed over a row; its partial derivatives into `out` unless that is empty.
 #[multiversion::multiversion(targets("x86_64+avx2+fma"))]
-fn similarity<R: Real>(
-    planes: &[R],
-    row: usize,
-    height: usize,
-    width: usize,
-    taps: &[R; TAPS],
-    out: &mut [R],
-) -> f64 {
+fn similarity<R: Real>(planes: &[R], row: usize, height: usize, width: usize, taps: &[R; TAPS], out: &mut [R]) -> f64 {
     let mut maps = vec![R::ZERO; width * MAPS];
     for (k, map) in maps.chunks_mut(width).enumerate() {
         column(map, planes, [k, MAPS], [row, height], taps);
     }
     let (c1, c2, two) = (R::of(C1), R::of(C2), R::of(2.0));
-    let mut sum = 0.0;
-    for i in 0..width {
-        let (mx, my) = (maps[i], maps[width + i]);
-        let (vx, vy) = (maps[2 * width + i] - mx * mx, maps[3 * width + i] - my * my);
-        let cov = maps[4 * width + i] - mx * my;
-        let (a1, a2) = (two * mx * my + c1, two * cov + c2);
-        let (b1, b2) = (mx * mx + my * my + c1, vx + vy + c2);
-        let inverse = R::ONE / (b1 * b2);
-        let s = a1 * a2 * inverse;
-        sum += s.f64();
-        if !out.is_empty() {
+    let mut values = vec![R::ZERO; width];
+    let mut partials = vec![R::ZERO; width * PARTIALS];
+    {
+        let [mx, my, xx, yy, xy]: [&[R]; MAPS] = std::array::from_fn(|k| &maps[k * width..(k + 1) * width]);
+        let (by_mean, rest) = partials.split_at_mut(width);
+        let (by_square, by_product) = rest.split_at_mut(width);
+        let by_product = &mut by_product[..width];
+        for i in 0..width {
+            let (mx, my) = (mx[i], my[i]);
+            let (vx, vy) = (xx[i] - mx * mx, yy[i] - my * my);
+            let cov = xy[i] - mx * my;
+            let (a1, a2) = (two * mx * my + c1, two * cov + c2);
+            let (b1, b2) = (mx * mx + my * my + c1, vx + vy + c2);
+            let inverse = R::ONE / (b1 * b2);
+            let s = a1 * a2 * inverse;
+            values[i] = s;
             let d_cov = two * a1 * inverse;
-            let d_var = -s / b2;
-            let d_mean = two * my * a2 * inverse - two * mx * s / b1;
-            out[i] = d_mean - two * mx * d_var - my * d_cov;
-            out[width + i] = d_var;
-            out[2 * width + i] = d_cov;
+            let d_var = -s * inverse * b1;
+            by_mean[i] = two * my * a2 * inverse - two * mx * s * inverse * b2 - two * mx * d_var - my * d_cov;
+            by_square[i] = d_var;
+            by_product[i] = d_cov;
         }
     }
-    sum
+    if !out.is_empty() {
+        out.copy_from_slice(&partials);
+    }
+    values.iter().map(|s| s.f64()).sum()
 }
 
 /// Gradient of a row from the row-filtered partials, plus that of L1.

@@ -1,0 +1,274 @@
+//! Eight numbers at a time: explicit vectors where the machine has AVX2 and FMA (found out at run
+//! time), plain arrays elsewhere and for `f64`.
+//!
+//! A kernel is a [`LaneOp`]; [`Real::vectorize`] runs it with the best [`Lanes`] for its type.
+
+use super::Real;
+
+/// Numbers per vector.
+pub const LANES: usize = 8;
+
+/// Eight numbers in memory.
+pub type Lane<R> = [R; LANES];
+
+/// A computation that can run on any vectors. Implementations must be `#[inline(always)]` down to
+/// the arithmetic, so that all of it is compiled for the instructions of `L`.
+pub trait LaneOp<R: Real> {
+    /// What it returns.
+    type Output;
+    /// Does it.
+    fn run<L: Lanes<R>>(self, lanes: L) -> Self::Output;
+}
+
+/// Arithmetic on vectors of [`LANES`] numbers.
+pub trait Lanes<R: Real>: Copy + Send + Sync {
+    /// A vector.
+    type V: Copy;
+    /// A truth value per lane.
+    type M: Copy;
+    /// The same number in every lane.
+    fn splat(self, x: R) -> Self::V;
+    /// From memory.
+    fn load(self, x: &Lane<R>) -> Self::V;
+    /// To memory.
+    fn store(self, v: Self::V) -> Lane<R>;
+    /// `a + b`.
+    fn add(self, a: Self::V, b: Self::V) -> Self::V;
+    /// `a - b`.
+    fn sub(self, a: Self::V, b: Self::V) -> Self::V;
+    /// `a b`.
+    fn mul(self, a: Self::V, b: Self::V) -> Self::V;
+    /// `a / b`.
+    fn div(self, a: Self::V, b: Self::V) -> Self::V;
+    /// `a b + c`.
+    fn mul_add(self, a: Self::V, b: Self::V, c: Self::V) -> Self::V;
+    /// The smaller.
+    fn min(self, a: Self::V, b: Self::V) -> Self::V;
+    /// `a >= b`.
+    fn ge(self, a: Self::V, b: Self::V) -> Self::M;
+    /// Both.
+    fn both(self, a: Self::M, b: Self::M) -> Self::M;
+    /// `a` where the mask holds, else `b`.
+    fn select(self, mask: Self::M, a: Self::V, b: Self::V) -> Self::V;
+    /// [`Real::exp_neg`].
+    fn exp_neg(self, v: Self::V) -> Self::V;
+
+    /// `a` where the mask holds, else 0.
+    #[inline(always)]
+    fn keep(self, mask: Self::M, a: Self::V) -> Self::V {
+        self.select(mask, a, self.splat(R::ZERO))
+    }
+
+    /// Sum over the lanes, in a fixed order.
+    #[inline(always)]
+    fn sum(self, v: Self::V) -> R {
+        let v = self.store(v);
+        ((v[0] + v[4]) + (v[2] + v[6])) + ((v[1] + v[5]) + (v[3] + v[7]))
+    }
+}
+
+/// Arrays: the definition of what every other implementation does.
+#[derive(Clone, Copy, Debug)]
+pub struct Plain;
+
+#[inline(always)]
+fn each<R: Real>(f: impl Fn(usize) -> R) -> Lane<R> {
+    std::array::from_fn(f)
+}
+
+impl<R: Real> Lanes<R> for Plain {
+    type V = Lane<R>;
+    type M = [bool; LANES];
+    #[inline(always)]
+    fn splat(self, x: R) -> Lane<R> {
+        [x; LANES]
+    }
+    #[inline(always)]
+    fn load(self, x: &Lane<R>) -> Lane<R> {
+        *x
+    }
+    #[inline(always)]
+    fn store(self, v: Lane<R>) -> Lane<R> {
+        v
+    }
+    #[inline(always)]
+    fn add(self, a: Lane<R>, b: Lane<R>) -> Lane<R> {
+        each(|l| a[l] + b[l])
+    }
+    #[inline(always)]
+    fn sub(self, a: Lane<R>, b: Lane<R>) -> Lane<R> {
+        each(|l| a[l] - b[l])
+    }
+    #[inline(always)]
+    fn mul(self, a: Lane<R>, b: Lane<R>) -> Lane<R> {
+        each(|l| a[l] * b[l])
+    }
+    #[inline(always)]
+    fn div(self, a: Lane<R>, b: Lane<R>) -> Lane<R> {
+        each(|l| a[l] / b[l])
+    }
+    #[inline(always)]
+    fn mul_add(self, a: Lane<R>, b: Lane<R>, c: Lane<R>) -> Lane<R> {
+        each(|l| a[l] * b[l] + c[l])
+    }
+    #[inline(always)]
+    fn min(self, a: Lane<R>, b: Lane<R>) -> Lane<R> {
+        each(|l| if a[l] < b[l] { a[l] } else { b[l] })
+    }
+    #[inline(always)]
+    fn ge(self, a: Lane<R>, b: Lane<R>) -> [bool; LANES] {
+        std::array::from_fn(|l| a[l] >= b[l])
+    }
+    #[inline(always)]
+    fn both(self, a: [bool; LANES], b: [bool; LANES]) -> [bool; LANES] {
+        std::array::from_fn(|l| a[l] & b[l])
+    }
+    #[inline(always)]
+    fn select(self, mask: [bool; LANES], a: Lane<R>, b: Lane<R>) -> Lane<R> {
+        each(|l| if mask[l] { a[l] } else { b[l] })
+    }
+    #[inline(always)]
+    fn exp_neg(self, v: Lane<R>) -> Lane<R> {
+        each(|l| v[l].exp_neg())
+    }
+}
+
+/// `f32` through AVX2 and FMA.
+#[cfg(target_arch = "x86_64")]
+mod avx2 {
+    use pulp::x86::V3;
+    use pulp::{f32x8, m32x8, u32x8};
+
+    use super::{Lane, LaneOp, Lanes};
+
+    impl Lanes<f32> for V3 {
+        type V = f32x8;
+        type M = m32x8;
+        #[inline(always)]
+        fn splat(self, x: f32) -> f32x8 {
+            self.splat_f32x8(x)
+        }
+        #[inline(always)]
+        fn load(self, x: &Lane<f32>) -> f32x8 {
+            bytemuck::cast(*x)
+        }
+        #[inline(always)]
+        fn store(self, v: f32x8) -> Lane<f32> {
+            bytemuck::cast(v)
+        }
+        #[inline(always)]
+        fn add(self, a: f32x8, b: f32x8) -> f32x8 {
+            self.add_f32x8(a, b)
+        }
+        #[inline(always)]
+        fn sub(self, a: f32x8, b: f32x8) -> f32x8 {
+            self.sub_f32x8(a, b)
+        }
+        #[inline(always)]
+        fn mul(self, a: f32x8, b: f32x8) -> f32x8 {
+            self.mul_f32x8(a, b)
+        }
+        #[inline(always)]
+        fn div(self, a: f32x8, b: f32x8) -> f32x8 {
+            self.div_f32x8(a, b)
+        }
+        #[inline(always)]
+        fn mul_add(self, a: f32x8, b: f32x8, c: f32x8) -> f32x8 {
+            self.mul_add_f32x8(a, b, c)
+        }
+        #[inline(always)]
+        fn min(self, a: f32x8, b: f32x8) -> f32x8 {
+            self.min_f32x8(a, b)
+        }
+        #[inline(always)]
+        fn ge(self, a: f32x8, b: f32x8) -> m32x8 {
+            self.cmp_ge_f32x8(a, b)
+        }
+        #[inline(always)]
+        fn both(self, a: m32x8, b: m32x8) -> m32x8 {
+            self.and_m32x8(a, b)
+        }
+        #[inline(always)]
+        fn select(self, mask: m32x8, a: f32x8, b: f32x8) -> f32x8 {
+            self.select_f32x8(mask, a, b)
+        }
+        #[inline(always)]
+        fn exp_neg(self, v: f32x8) -> f32x8 {
+            // The polynomial of `Real::exp_neg` for f32; see there.
+            use crate::math::real::fast_exp::{LN2_HI, LN2_LO, POLYNOMIAL, ROUND, SMALLEST};
+            let x = self.max_f32x8(v, self.splat_f32x8(SMALLEST));
+            let round = self.splat_f32x8(ROUND);
+            let shifted = self.mul_add_f32x8(x, self.splat_f32x8(std::f32::consts::LOG2_E), round);
+            let n = self.sub_f32x8(shifted, round);
+            let r = self.negate_mul_add_f32x8(n, self.splat_f32x8(LN2_HI), x);
+            let r = self.negate_mul_add_f32x8(n, self.splat_f32x8(LN2_LO), r);
+            let mut p = self.splat_f32x8(POLYNOMIAL[0]);
+            for c in &POLYNOMIAL[1..] {
+                p = self.mul_add_f32x8(p, r, self.splat_f32x8(*c));
+            }
+            let bits: u32x8 = bytemuck::cast(shifted);
+            let exponent = self.shl_const_u32x8::<23>(bits);
+            bytemuck::cast(self.wrapping_add_u32x8(bytemuck::cast(p), exponent))
+        }
+    }
+
+    struct Simd<O>(V3, O);
+
+    impl<O: LaneOp<f32>> pulp::NullaryFnOnce for Simd<O> {
+        type Output = O::Output;
+        #[inline(always)]
+        fn call(self) -> O::Output {
+            self.1.run(self.0)
+        }
+    }
+
+    /// Runs `op` compiled for AVX2 and FMA, or gives it back where the machine lacks them.
+    #[inline(always)]
+    pub fn run<O: LaneOp<f32>>(op: O) -> Result<O::Output, O> {
+        match V3::try_new() {
+            Some(v3) => Ok(v3.vectorize(Simd(v3, op))),
+            None => Err(op),
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+pub(super) use avx2::run as run_avx2;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Evaluates a chain of every operation.
+    struct Chain(Lane<f32>, Lane<f32>);
+
+    impl LaneOp<f32> for Chain {
+        type Output = (Lane<f32>, f32);
+        #[inline(always)]
+        fn run<L: Lanes<f32>>(self, l: L) -> Self::Output {
+            let (a, b) = (l.load(&self.0), l.load(&self.1));
+            let e = l.exp_neg(a);
+            let m = l.both(l.ge(a, b), l.ge(b, l.splat(-40.0)));
+            let v = l.select(m, l.mul_add(a, b, e), l.div(l.sub(a, l.min(a, b)), l.splat(3.0)));
+            let v = l.add(v, l.keep(m, l.mul(e, e)));
+            (l.store(v), l.sum(v))
+        }
+    }
+
+    #[test]
+    fn vectors_do_what_arrays_do() {
+        let mut state = 1_u32;
+        let mut next = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            -((state >> 8) as f32) / (1 << 24) as f32 * 60.0
+        };
+        for _ in 0..1_000 {
+            let (a, b) = (std::array::from_fn(|_| next()), std::array::from_fn(|_| next()));
+            let (plain, _) = Chain(a, b).run(Plain);
+            let (fast, _) = f32::vectorize(Chain(a, b));
+            for (x, y) in plain.iter().zip(&fast) {
+                assert!((x - y).abs() <= 1e-5 * x.abs().max(1e-6), "{x} {y}");
+            }
+        }
+    }
+}
