@@ -44,12 +44,16 @@ pub trait Lanes<R: Real>: Copy + Send + Sync {
     fn mul_add(self, a: Self::V, b: Self::V, c: Self::V) -> Self::V;
     /// The smaller.
     fn min(self, a: Self::V, b: Self::V) -> Self::V;
-    /// `a >= b`.
+    /// Square root; NaN below 0.
+    fn sqrt(self, v: Self::V) -> Self::V;
+    /// `a >= b`, false for NaN.
     fn ge(self, a: Self::V, b: Self::V) -> Self::M;
     /// Both.
     fn both(self, a: Self::M, b: Self::M) -> Self::M;
     /// `a` where the mask holds, else `b`.
     fn select(self, mask: Self::M, a: Self::V, b: Self::V) -> Self::V;
+    /// One bit per lane, lane 0 lowest.
+    fn bits(self, mask: Self::M) -> u32;
     /// [`Real::exp_neg`].
     fn exp_neg(self, v: Self::V) -> Self::V;
 
@@ -128,6 +132,14 @@ impl<R: Real> Lanes<R> for Plain {
         each(|l| if mask[l] { a[l] } else { b[l] })
     }
     #[inline(always)]
+    fn sqrt(self, v: Lane<R>) -> Lane<R> {
+        each(|l| v[l].sqrt())
+    }
+    #[inline(always)]
+    fn bits(self, mask: [bool; LANES]) -> u32 {
+        mask.iter().enumerate().map(|(l, &m)| u32::from(m) << l).sum()
+    }
+    #[inline(always)]
     fn exp_neg(self, v: Lane<R>) -> Lane<R> {
         each(|l| v[l].exp_neg())
     }
@@ -193,6 +205,15 @@ mod avx2 {
             self.select_f32x8(mask, a, b)
         }
         #[inline(always)]
+        fn sqrt(self, v: f32x8) -> f32x8 {
+            self.sqrt_f32x8(v)
+        }
+        #[inline(always)]
+        fn bits(self, mask: m32x8) -> u32 {
+            let all: u32x8 = self.select_u32x8(mask, self.splat_u32x8(!0), self.splat_u32x8(0));
+            self.avx._mm256_movemask_ps(bytemuck::cast(all)) as u32
+        }
+        #[inline(always)]
         fn exp_neg(self, v: f32x8) -> f32x8 {
             // The polynomial of `Real::exp_neg` for f32; see there.
             use crate::math::real::fast_exp::{LN2_HI, LN2_LO, POLYNOMIAL, ROUND, SMALLEST};
@@ -202,10 +223,13 @@ mod avx2 {
             let n = self.sub_f32x8(shifted, round);
             let r = self.negate_mul_add_f32x8(n, self.splat_f32x8(LN2_HI), x);
             let r = self.negate_mul_add_f32x8(n, self.splat_f32x8(LN2_LO), r);
-            let mut p = self.splat_f32x8(POLYNOMIAL[0]);
-            for c in &POLYNOMIAL[1..] {
-                p = self.mul_add_f32x8(p, r, self.splat_f32x8(*c));
-            }
+            // Estrin's scheme: the same polynomial with half the latency.
+            let pair =
+                |k: usize| self.mul_add_f32x8(self.splat_f32x8(POLYNOMIAL[k]), r, self.splat_f32x8(POLYNOMIAL[k + 1]));
+            let r2 = self.mul_f32x8(r, r);
+            let high = self.mul_add_f32x8(pair(0), r2, pair(2));
+            let low = self.mul_add_f32x8(pair(4), r2, pair(6));
+            let p = self.mul_add_f32x8(high, self.mul_f32x8(r2, r2), low);
             let bits: u32x8 = bytemuck::cast(shifted);
             let exponent = self.shl_const_u32x8::<23>(bits);
             bytemuck::cast(self.wrapping_add_u32x8(bytemuck::cast(p), exponent))
@@ -250,7 +274,12 @@ mod tests {
             let e = l.exp_neg(a);
             let m = l.both(l.ge(a, b), l.ge(b, l.splat(-40.0)));
             let v = l.select(m, l.mul_add(a, b, e), l.div(l.sub(a, l.min(a, b)), l.splat(3.0)));
-            let v = l.add(v, l.keep(m, l.mul(e, e)));
+            let root = l.sqrt(l.mul(a, l.splat(-1.0)));
+            let v = l.add(v, l.keep(m, l.mul(e, root)));
+            assert_eq!(
+                l.bits(l.ge(a, b)).count_ones() as usize,
+                (0..LANES).filter(|&i| self.0[i] >= self.1[i]).count()
+            );
             (l.store(v), l.sum(v))
         }
     }

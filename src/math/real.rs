@@ -31,8 +31,6 @@ pub trait Real:
     const ONE: Self;
     /// One half.
     const HALF: Self;
-    /// Distance from 1 to the next larger value.
-    const EPSILON: Self;
     /// The nearest value to `x`.
     fn of(x: f64) -> Self;
     /// This value in double precision.
@@ -80,7 +78,6 @@ impl Real for f64 {
     const ZERO: Self = 0.0;
     const ONE: Self = 1.0;
     const HALF: Self = 0.5;
-    const EPSILON: Self = f64::EPSILON;
     fn of(x: f64) -> Self {
         x
     }
@@ -139,7 +136,6 @@ impl Real for f32 {
     const ZERO: Self = 0.0;
     const ONE: Self = 1.0;
     const HALF: Self = 0.5;
-    const EPSILON: Self = f32::EPSILON;
     #[inline(always)]
     fn of(x: f64) -> Self {
         x as f32

@@ -6,6 +6,7 @@ use super::Real;
 
 /// The rotation matrix (rows) of the unit quaternion along `q = [w, x, y, z]`, or `None` if `q`
 /// is zero, not finite, or has no usable length (its squares under- or overflow even after scaling).
+#[inline(always)]
 pub fn matrix_from_quaternion<R: Real>(q: [R; 4]) -> Option<[[R; 3]; 3]> {
     let u = unit_quaternion(q)?;
     let [w, x, y, z] = u;
@@ -19,6 +20,7 @@ pub fn matrix_from_quaternion<R: Real>(q: [R; 4]) -> Option<[[R; 3]; 3]> {
 
 /// `q` scaled to unit length. Scales by the largest component first, so neither tiny nor huge
 /// quaternions lose their direction.
+#[inline(always)]
 pub fn unit_quaternion<R: Real>(q: [R; 4]) -> Option<[R; 4]> {
     let largest = q.iter().fold(R::ZERO, |m, c| m.max(c.abs()));
     if largest <= R::ZERO || q.iter().any(|c| !c.is_finite()) {

@@ -102,6 +102,26 @@ struct Share {
     counts: Vec<u32>,
 }
 
+/// Finds the tiles of the splats in `keys`.
+#[multiversion::multiversion(targets("x86_64+avx2+fma"))]
+fn share_of<R: Real>(splats: &[Splat<R>], keys: &[u64], size: [usize; 2], grid: [usize; 2]) -> Share {
+    let mut s = Share {
+        tiles: Vec::with_capacity(keys.len() * 4),
+        lengths: Vec::with_capacity(keys.len()),
+        counts: vec![0; grid[0] * grid[1]],
+    };
+    for &key in keys {
+        let before = s.tiles.len();
+        let (list, counts) = (&mut s.tiles, &mut s.counts);
+        each_tile(&splats[splat_of(key) as usize], size, grid[0], |t| {
+            list.push(t);
+            counts[t as usize] += 1;
+        });
+        s.lengths.push((s.tiles.len() - before) as u32);
+    }
+    s
+}
+
 /// Builds the lists. `order` is the sorted keys of [`super::sort::sort`].
 pub fn bin<R: Real>(out: &mut Tiles, splats: &[Splat<R>], order: &[u64], size: [usize; 2]) {
     let grid = [size[0].div_ceil(TILE_PX), size[1].div_ceil(TILE_PX)];
@@ -109,26 +129,7 @@ pub fn bin<R: Real>(out: &mut Tiles, splats: &[Splat<R>], order: &[u64], size: [
     // A fixed number of shares: the lists do not depend on the number of threads anyway, but the
     // counters of a share cost `tiles` words each.
     let share = order.len().div_ceil(2 * rayon::current_num_threads()).max(1_024);
-    let mut shares: Vec<Share> = order
-        .par_chunks(share)
-        .map(|keys| {
-            let mut s = Share {
-                tiles: Vec::with_capacity(keys.len() * 2),
-                lengths: Vec::with_capacity(keys.len()),
-                counts: vec![0; tiles],
-            };
-            for &key in keys {
-                let before = s.tiles.len();
-                let (list, counts) = (&mut s.tiles, &mut s.counts);
-                each_tile(&splats[splat_of(key) as usize], size, grid[0], |t| {
-                    list.push(t);
-                    counts[t as usize] += 1;
-                });
-                s.lengths.push((s.tiles.len() - before) as u32);
-            }
-            s
-        })
-        .collect();
+    let mut shares: Vec<Share> = order.par_chunks(share).map(|keys| share_of(splats, keys, size, grid)).collect();
 
     // Counts become first places: tile-major, and within a tile share after share.
     out.grid = grid;

@@ -3,7 +3,7 @@
 use std::sync::atomic::Ordering::Relaxed;
 
 use super::bin::Tiles;
-use super::lanes::{GROUPS, SLOTS, SplatLanes, Walk, row_terms};
+use super::lanes::{SLOTS, SplatLanes, Walk, ramp, slots_of_rows};
 use super::project::Splat;
 use crate::math::Real;
 use crate::math::lanes::{LANES, LaneOp, Lanes};
@@ -70,51 +70,49 @@ impl<R: Real, const C: usize> BlendRow<'_, '_, R, C> {
         let mut open = [one; SLOTS];
         let mut last = [zero; SLOTS];
         let mut median = [zero; SLOTS];
-        let mut closed = [false; SLOTS];
+        let ramp = ramp(l);
+        let all = slots_of_rows(height);
+        let mut alive = all;
         let mut groups = 0_u64;
 
         for (k, entry) in self.tiles.entries[first..end].iter().enumerate() {
             let id = entry.load(Relaxed) as usize;
             let s = &self.splats[id];
-            let walk = Walk::new(s, corner, height);
+            let walk = Walk::new(l, s, corner, ramp);
+            let mut slots = walk.slots & alive;
+            if slots == 0 {
+                continue;
+            }
+            groups += u64::from(slots.count_ones());
             let lanes = SplatLanes::new(l, s);
             let value = values[id].map(|v| l.splat(v));
             let place = l.splat(R::of((k + 1) as f64));
-            let dx = [l.load(&walk.dx[0]), l.load(&walk.dx[1])];
-            for row in walk.rows.clone() {
-                let dy = walk.dy(row);
-                let terms = row_terms(l, s, dy);
-                for g in walk.groups(dy) {
-                    let slot = row * GROUPS + g;
-                    if closed[slot] {
-                        continue;
-                    }
-                    groups += 1;
-                    let alpha = lanes.alphas(l, dx[g], terms);
-                    let before = left[slot];
-                    let after = l.mul(before, l.sub(one, alpha));
-                    // A pixel stays open while the next splat leaves it enough light.
-                    let still = l.both(l.ge(open[slot], one), l.ge(after, least));
-                    let weight = l.keep(still, l.mul(alpha, before));
-                    open[slot] = l.keep(still, one);
-                    left[slot] = l.select(still, after, before);
-                    if MEDIAN {
-                        let crossed = l.both(l.ge(before, l.add(half, l.splat(R::EPSILON))), l.ge(half, left[slot]));
-                        median[slot] = l.select(crossed, l.splat(s.depth), median[slot]);
-                    }
-                    last[slot] = l.select(l.ge(zero, weight), last[slot], place);
-                    for c in 0..C {
-                        sums[slot][c] = l.mul_add(weight, value[c], sums[slot][c]);
-                    }
+            let dx = walk.dx(l, ramp);
+            while slots != 0 {
+                let slot = slots.trailing_zeros() as usize;
+                slots &= slots - 1;
+                let alpha = lanes.alphas(l, dx[slot / TILE_PX], walk.row(l, slot % TILE_PX));
+                let before = left[slot];
+                let after = l.mul(before, l.sub(one, alpha));
+                // A pixel stays open while the next splat leaves it enough light.
+                let still = l.both(l.ge(open[slot], one), l.ge(after, least));
+                let weight = l.keep(still, l.mul(alpha, before));
+                open[slot] = l.keep(still, one);
+                left[slot] = l.select(still, after, before);
+                if MEDIAN {
+                    let arrived = l.select(l.ge(half, left[slot]), l.splat(s.depth), median[slot]);
+                    median[slot] = l.select(l.ge(half, before), median[slot], arrived);
+                }
+                last[slot] = l.select(l.ge(zero, weight), last[slot], place);
+                for c in 0..C {
+                    sums[slot][c] = l.mul_add(weight, value[c], sums[slot][c]);
                 }
             }
             if k % CLOSED_CHECK == CLOSED_CHECK - 1 {
-                let mut all = true;
-                for slot in 0..height * GROUPS {
-                    closed[slot] = closed[slot] || l.sum(open[slot]) == R::ZERO;
-                    all &= closed[slot];
-                }
-                if all {
+                alive = (0..SLOTS as u32)
+                    .filter(|&slot| all >> slot & 1 == 1 && l.bits(l.ge(open[slot as usize], one)) != 0)
+                    .fold(0, |m, slot| m | 1 << slot);
+                if alive == 0 {
                     break;
                 }
             }
@@ -124,7 +122,7 @@ impl<R: Real, const C: usize> BlendRow<'_, '_, R, C> {
         let out = &mut *self.out;
         for row in 0..height {
             for g in 0..width.div_ceil(LANES) {
-                let slot = row * GROUPS + g;
+                let slot = g * TILE_PX + row;
                 let count = LANES.min(width - g * LANES);
                 let at = row * self.size[0] + corner[0] + g * LANES;
                 for (c, plane) in out.planes.iter_mut().enumerate() {

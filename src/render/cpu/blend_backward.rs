@@ -7,7 +7,7 @@
 use std::sync::atomic::Ordering::Relaxed;
 
 use super::bin::Tiles;
-use super::lanes::{GROUPS, SLOTS, SplatLanes, Walk, row_terms};
+use super::lanes::{SLOTS, SplatLanes, Walk, ramp, slots_of_rows};
 use super::project::Splat;
 use crate::math::Real;
 use crate::math::lanes::{LANES, LaneOp, Lanes};
@@ -84,7 +84,7 @@ impl<R: Real, const C: usize> BlendRowBackward<'_, '_, R, C> {
         };
         for row in 0..height {
             for g in 0..width.div_ceil(LANES) {
-                let slot = row * GROUPS + g;
+                let slot = g * TILE_PX + row;
                 let count = LANES.min(width - g * LANES);
                 let at = row * self.size[0] + corner[0] + g * LANES;
                 for (c, plane) in input.planes.iter().enumerate().filter(|(_, p)| !p.is_empty()) {
@@ -105,52 +105,51 @@ impl<R: Real, const C: usize> BlendRowBackward<'_, '_, R, C> {
         let records = &mut self.records[(first - base) * stride..(end - base) * stride];
         records[deepest * stride..].fill(R::ZERO);
         let capped = l.splat(R::of(ALPHA_MAX));
+        let (ramp, all) = (ramp(l), slots_of_rows(height));
         for k in (0..deepest).rev() {
             let id = self.tiles.entries[first + k].load(Relaxed) as usize;
             let s = &self.splats[id];
-            let walk = Walk::new(s, corner, height);
+            let walk = Walk::new(l, s, corner, ramp);
+            let mut slots = walk.slots & all;
             let lanes = SplatLanes::new(l, s);
             let value = values[id].map(|v| l.splat(v));
             let place = l.splat(R::of((k + 1) as f64));
             let mut moments = [zero; MOMENTS];
             let mut value_sums = [zero; C];
-            let dx = [l.load(&walk.dx[0]), l.load(&walk.dx[1])];
-            for row in walk.rows.clone() {
-                let offset = walk.dy(row);
-                let terms = row_terms(l, s, offset);
-                let dy = l.splat(offset);
-                for g in walk.groups(offset) {
-                    let slot = row * GROUPS + g;
-                    if (k as u32) >= furthest[slot] {
-                        continue;
-                    }
-                    let alpha = lanes.alphas(l, dx[g], terms);
-                    let alpha = l.keep(l.ge(last[slot], place), alpha);
-                    let mut along = zero;
-                    for c in 0..C {
-                        along = l.mul_add(gradient[slot][c], value[c], along);
-                    }
-                    // Take the splat off: transmittance in front of it, its weight, and dL/dalpha.
-                    let inverse = l.div(one, l.sub(one, alpha));
-                    let before = l.mul(left[slot], inverse);
-                    let weight = l.mul(alpha, before);
-                    let d_alpha = l.sub(l.mul(before, along), l.mul(behind[slot], inverse));
-                    // A capped alpha does not depend on the splat's opacity or shape.
-                    let power = l.select(l.ge(alpha, capped), zero, l.mul(alpha, d_alpha));
-                    behind[slot] = l.mul_add(weight, along, behind[slot]);
-                    left[slot] = before;
-                    for c in 0..C {
-                        value_sums[c] = l.mul_add(weight, gradient[slot][c], value_sums[c]);
-                    }
-                    let px = l.mul(power, dx[g]);
-                    let py = l.mul(power, dy);
-                    moments[0] = l.add(moments[0], power);
-                    moments[1] = l.add(moments[1], px);
-                    moments[2] = l.add(moments[2], py);
-                    moments[3] = l.mul_add(px, dx[g], moments[3]);
-                    moments[4] = l.mul_add(px, dy, moments[4]);
-                    moments[5] = l.mul_add(py, dy, moments[5]);
+            let dx = walk.dx(l, ramp);
+            while slots != 0 {
+                let slot = slots.trailing_zeros() as usize;
+                slots &= slots - 1;
+                if (k as u32) >= furthest[slot] {
+                    continue;
                 }
+                let (dx, dy) = (dx[slot / TILE_PX], l.splat(walk.dy[slot % TILE_PX]));
+                let alpha = lanes.alphas(l, dx, walk.row(l, slot % TILE_PX));
+                let alpha = l.keep(l.ge(last[slot], place), alpha);
+                let mut along = zero;
+                for c in 0..C {
+                    along = l.mul_add(gradient[slot][c], value[c], along);
+                }
+                // Take the splat off: transmittance in front of it, its weight, and dL/dalpha.
+                let inverse = l.div(one, l.sub(one, alpha));
+                let before = l.mul(left[slot], inverse);
+                let weight = l.mul(alpha, before);
+                let d_alpha = l.sub(l.mul(before, along), l.mul(behind[slot], inverse));
+                // A capped alpha does not depend on the splat's opacity or shape.
+                let power = l.select(l.ge(alpha, capped), zero, l.mul(alpha, d_alpha));
+                behind[slot] = l.mul_add(weight, along, behind[slot]);
+                left[slot] = before;
+                for c in 0..C {
+                    value_sums[c] = l.mul_add(weight, gradient[slot][c], value_sums[c]);
+                }
+                let px = l.mul(power, dx);
+                let py = l.mul(power, dy);
+                moments[0] = l.add(moments[0], power);
+                moments[1] = l.add(moments[1], px);
+                moments[2] = l.add(moments[2], py);
+                moments[3] = l.mul_add(px, dx, moments[3]);
+                moments[4] = l.mul_add(px, dy, moments[4]);
+                moments[5] = l.mul_add(py, dy, moments[5]);
             }
             let record = &mut records[k * stride..(k + 1) * stride];
             for (r, v) in record.iter_mut().zip(moments.iter().chain(&value_sums)) {

@@ -11,66 +11,83 @@ pub const GROUPS: usize = TILE_PX / LANES;
 /// Lane groups per tile.
 pub const SLOTS: usize = TILE_PX * GROUPS;
 
-/// A splat prepared for walking the rows of one tile.
+/// The lane groups of one tile that a splat can touch, and the row constants of its quadratic form.
+///
+/// Group `g` of row `row` is slot `g * TILE_PX + row`.
 pub struct Walk<R> {
-    /// Rows of the tile to visit, first and one past the last.
-    pub rows: std::ops::Range<usize>,
-    /// Horizontal offsets of the tile's pixel centres from the splat's centre.
-    pub dx: [Lane<R>; GROUPS],
-    /// Vertical offset of the tile's first row of pixel centres.
-    pub dy0: R,
-    // The ellipse's horizontal middle in tile pixels at dy = 0, its slope with dy, and its shape.
-    middle: R,
-    slope: R,
-    inverse_a: R,
-    curve: R,
-    reach: R,
+    /// One bit per slot.
+    pub slots: u32,
+    /// Vertical offsets of the rows of pixel centres from the splat's centre.
+    pub dy: [R; TILE_PX],
+    /// `2 b dy` per row.
+    linear: [R; TILE_PX],
+    /// `c dy²` per row.
+    constant: [R; TILE_PX],
+    /// Horizontal offset of the first pixel centre from the splat's centre.
+    left: R,
+}
+
+/// Slots of the rows `0..height`.
+#[inline(always)]
+pub fn slots_of_rows(height: usize) -> u32 {
+    let rows = (1_u32 << height) - 1;
+    rows | rows << TILE_PX
 }
 
 impl<R: Real> Walk<R> {
-    /// The walk of `s` over the tile whose first pixel is `corner` and that has `height` rows.
+    /// The walk of `s` over the tile whose first pixel is `corner`. `ramp` is 0, 1, ... 7.
     #[inline(always)]
-    pub fn new(s: &Splat<R>, corner: [usize; 2], height: usize) -> Self {
+    pub fn new<L: Lanes<R>>(l: L, s: &Splat<R>, corner: [usize; 2], ramp: L::V) -> Self {
         let [a, b, c] = s.conic;
         let left = R::of(corner[0] as f64 + 0.5) - s.mean[0];
-        let dy0 = R::of(corner[1] as f64 + 0.5) - s.mean[1];
-        let mut dx = [[R::ZERO; LANES]; GROUPS];
-        for (g, lane) in dx.iter_mut().enumerate() {
-            for (l, x) in lane.iter_mut().enumerate() {
-                *x = left + R::of((g * LANES + l) as f64);
+        let top = R::of(corner[1] as f64 + 0.5) - s.mean[1];
+        let slope = -b / a;
+        // A row at dy meets the ellipse for pixels within `half` of `middle`; see `alphas` for the
+        // form. A hundredth of a pixel of slack covers rounding: the alpha rule decides anyway.
+        let (curve, inverse_a) = (l.splat(c + b * slope), l.splat(R::ONE / a));
+        let slack = R::of(0.01);
+        let mut walk =
+            Self { slots: 0, dy: [R::ZERO; TILE_PX], linear: [R::ZERO; TILE_PX], constant: [R::ZERO; TILE_PX], left };
+        for part in 0..GROUPS {
+            let dy = l.add(l.splat(top + R::of((part * LANES) as f64)), ramp);
+            let square = l.mul(dy, dy);
+            let rest = l.sub(l.splat(s.reach), l.mul(curve, square));
+            // Outside the ellipse the root is NaN and every comparison false.
+            let half = l.add(l.sqrt(l.mul(rest, inverse_a)), l.splat(slack));
+            let middle = l.mul_add(l.splat(slope), dy, l.splat(-left));
+            let (from, to) = (l.sub(middle, half), l.add(middle, half));
+            for g in 0..GROUPS {
+                let first = l.splat(R::of((g * LANES) as f64));
+                let last = l.splat(R::of((g * LANES + LANES - 1) as f64));
+                let touched = l.both(l.ge(last, from), l.ge(to, first));
+                walk.slots |= l.bits(touched) << (g * TILE_PX + part * LANES);
             }
+            let rows = part * LANES..(part + 1) * LANES;
+            walk.dy[rows.clone()].copy_from_slice(&l.store(dy));
+            walk.linear[rows.clone()].copy_from_slice(&l.store(l.mul(l.splat(R::of(2.0) * b), dy)));
+            walk.constant[rows].copy_from_slice(&l.store(l.mul(l.splat(c), square)));
         }
-        // Row r is at dy0 + r; rows with |dy| <= half height can hold something.
-        let lo = (-dy0 - s.half[1]).f32().ceil().max(0.0);
-        let hi = (-dy0 + s.half[1]).f32().floor().min(height as f32 - 1.0);
-        let rows = if lo <= hi { lo as usize..hi as usize + 1 } else { 0..0 };
-        let inverse_a = R::ONE / a;
-        let slope = -b * inverse_a;
-        Self { rows, dx, dy0, middle: -left, slope, inverse_a, curve: c + b * slope, reach: s.reach }
+        walk
     }
 
-    /// Vertical offset of a row's pixel centres from the splat's centre.
+    /// Horizontal offsets of each group's pixel centres from the splat's centre.
     #[inline(always)]
-    pub fn dy(&self, row: usize) -> R {
-        self.dy0 + R::of(row as f64)
+    pub fn dx<L: Lanes<R>>(&self, l: L, ramp: L::V) -> [L::V; GROUPS] {
+        std::array::from_fn(|g| l.add(ramp, l.splat(self.left + R::of((g * LANES) as f64))))
     }
 
-    /// The lane groups of the row at `dy` that the ellipse can touch.
+    /// The row constants that [`SplatLanes::alphas`] wants.
     #[inline(always)]
-    pub fn groups(&self, dy: R) -> std::ops::Range<usize> {
-        let rest = self.reach - self.curve * dy * dy;
-        if rest < R::ZERO {
-            return 0..0;
-        }
-        // A hundredth of a pixel of slack covers the rounding of this estimate; the alpha rule
-        // decides about each pixel anyway.
-        let half = (rest * self.inverse_a).sqrt().f32() + 0.01;
-        let middle = (self.middle + self.slope * dy).f32();
-        let split = LANES as f32;
-        let first = usize::from(middle - half > split - 1.0);
-        let last = usize::from(middle + half >= split);
-        if middle + half < 0.0 || middle - half > TILE_PX as f32 - 1.0 { 0..0 } else { first..last + 1 }
+    pub fn row<L: Lanes<R>>(&self, l: L, row: usize) -> [L::V; 2] {
+        [l.splat(self.linear[row]), l.splat(self.constant[row])]
     }
+}
+
+/// 0, 1, ... 7.
+#[inline(always)]
+pub fn ramp<R: Real, L: Lanes<R>>(l: L) -> L::V {
+    let lane: Lane<R> = std::array::from_fn(|i| R::of(i as f64));
+    l.load(&lane)
 }
 
 /// A splat's constants in vector registers.
@@ -104,10 +121,4 @@ impl<R: Real, L: Lanes<R>> SplatLanes<R, L> {
         let alpha = l.min(raw, self.largest);
         l.keep(l.ge(alpha, self.smallest), alpha)
     }
-}
-
-/// The row constants of [`SplatLanes::alphas`] at `dy`.
-#[inline(always)]
-pub fn row_terms<R: Real, L: Lanes<R>>(l: L, s: &Splat<R>, dy: R) -> [L::V; 2] {
-    [l.splat(R::of(2.0) * s.conic[1] * dy), l.splat(s.conic[2] * dy * dy)]
 }
