@@ -2,26 +2,32 @@
 //! not wait for that.
 
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, LazyLock};
 
-static ASKED_TO_STOP: AtomicBool = AtomicBool::new(false);
+use signal_hook::{consts::TERM_SIGNALS, flag};
 
-/// Starts listening. Without a handler (none could be set), Ctrl-C ends the process at once, which
-/// loses at most the time since the last checkpoint.
+static ASKED_TO_STOP: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
+static TOLD: AtomicBool = AtomicBool::new(false);
+
+/// Starts listening. Where that is not possible, Ctrl-C ends the process at once, which loses at
+/// most the time since the last checkpoint.
 pub fn listen() {
-    let handler = || {
-        if ASKED_TO_STOP.swap(true, Ordering::SeqCst) {
-            // Files are written under a temporary name and renamed, so none is left half-written.
-            #[allow(clippy::disallowed_methods)]
-            std::process::exit(130);
+    for &signal in TERM_SIGNALS {
+        // The shutdown is looked at first, so it only acts on a signal after the first. Files are
+        // written under a temporary name and renamed, so it leaves none half-written.
+        let listening = flag::register_conditional_shutdown(signal, 130, Arc::clone(&ASKED_TO_STOP))
+            .and_then(|_| flag::register(signal, Arc::clone(&ASKED_TO_STOP)));
+        if let Err(error) = listening {
+            eprintln!("warning: signal {signal} will end the program at once: {error}");
         }
-        eprintln!("\nStopping at the next safe point (press Ctrl-C again to stop at once) ...");
-    };
-    if let Err(error) = ctrlc::set_handler(handler) {
-        eprintln!("warning: Ctrl-C will end the program at once: {error}");
     }
 }
 
-/// Whether the work should stop.
+/// Whether the work should stop. Says so the first time that it should.
 pub fn asked_to_stop() -> bool {
-    ASKED_TO_STOP.load(Ordering::SeqCst)
+    let asked = ASKED_TO_STOP.load(Ordering::SeqCst);
+    if asked && !TOLD.swap(true, Ordering::SeqCst) {
+        eprintln!("\nStopping at the next safe point (press Ctrl-C again to stop at once) ...");
+    }
+    asked
 }
