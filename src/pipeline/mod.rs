@@ -1,6 +1,7 @@
 //! What the program does with scenes: training, evaluation, synthetic data, measurements.
 //! Everything here talks to the outside through an [`observer::Observer`] and nothing else.
 
+pub mod bench;
 pub mod evaluate;
 pub mod metrics;
 pub mod observer;
