@@ -2,7 +2,9 @@
 //! Everything here talks to the outside through an [`observer::Observer`] and nothing else.
 
 pub mod bench;
+pub mod demo_scene;
 pub mod evaluate;
 pub mod metrics;
 pub mod observer;
+pub mod synth;
 pub mod train;

@@ -1,0 +1,167 @@
+//! Typed reads from buffers, every range checked.
+
+use gltf::json::accessor::{Accessor, ComponentType, Type};
+use gltf::json::{Index, buffer::View, validation::Checked};
+
+use super::{File, GltfError};
+
+/// Values of an accessor as `f32`, those of one element together.
+pub struct Values {
+    /// Components per element.
+    pub width: usize,
+    /// `[count * width]`, finite.
+    pub data: Vec<f32>,
+}
+
+impl Values {
+    /// Elements as arrays, filled up with `fill` where the accessor has fewer components.
+    pub fn arrays<const N: usize>(&self, fill: f32) -> impl Iterator<Item = [f32; N]> + '_ {
+        self.data.chunks_exact(self.width).map(move |c| std::array::from_fn(|i| c.get(i).copied().unwrap_or(fill)))
+    }
+}
+
+impl File<'_> {
+    /// Reads a numeric accessor; integers are scaled to 0..1 or -1..1 where it says `normalized`.
+    pub(super) fn values(&mut self, index: usize, place: &str) -> Result<Values, GltfError> {
+        let root = self.root;
+        let accessor = self.item(&root.accessors, index, "accessors", place)?;
+        let place = format!("accessors[{index}]");
+        let width = match accessor.type_ {
+            Checked::Valid(Type::Scalar) => 1,
+            Checked::Valid(Type::Vec2) => 2,
+            Checked::Valid(Type::Vec3) => 3,
+            Checked::Valid(Type::Vec4) => 4,
+            _ => return Err(self.content(place, "its type is not SCALAR, VEC2, VEC3 or VEC4")),
+        };
+        let component = self.component(accessor, &place)?;
+        let count = accessor.count.0;
+        self.spend(count.saturating_mul(width as u64))?;
+        let count = count as usize;
+        let normalized = accessor.normalized;
+        let mut data = match accessor.buffer_view {
+            Some(view) => {
+                let offset = accessor.byte_offset.map_or(0, |o| o.0);
+                let mut out = Vec::with_capacity(count * width);
+                for element in self.elements(view, offset, count, component, width, &place)? {
+                    out.extend(element.chunks_exact(component.size()).map(|b| number(b, component, normalized)));
+                }
+                out
+            }
+            None => vec![0.0; count * width],
+        };
+        if let Some(sparse) = &accessor.sparse {
+            let n = sparse.count.0;
+            self.spend(n.saturating_mul(width as u64 + 1))?;
+            let n = n as usize;
+            let Checked::Valid(kind) = &sparse.indices.component_type else {
+                return Err(self.content(place, "its sparse indices have an unknown component type"));
+            };
+            let indices =
+                self.elements(sparse.indices.buffer_view, sparse.indices.byte_offset.0, n, kind.0, 1, &place)?;
+            let rows =
+                self.elements(sparse.values.buffer_view, sparse.values.byte_offset.0, n, component, width, &place)?;
+            for (i, row) in indices.zip(rows) {
+                let at = integer(i, kind.0) as usize;
+                let Some(target) = data.get_mut(at.saturating_mul(width)..at.saturating_add(1).saturating_mul(width))
+                else {
+                    return Err(self.content(place, format!("a sparse index {at} is not below its count {count}")));
+                };
+                for (t, b) in target.iter_mut().zip(row.chunks_exact(component.size())) {
+                    *t = number(b, component, normalized);
+                }
+            }
+        }
+        if let Some(i) = data.iter().position(|v| !v.is_finite()) {
+            return Err(self.content(place, format!("element {} is not finite", i / width)));
+        }
+        Ok(Values { width, data })
+    }
+
+    /// Reads an index accessor.
+    pub(super) fn indices(&mut self, index: usize, place: &str) -> Result<Vec<u32>, GltfError> {
+        let root = self.root;
+        let accessor = self.item(&root.accessors, index, "accessors", place)?;
+        let place = format!("accessors[{index}]");
+        let component = self.component(accessor, &place)?;
+        let whole = matches!(component, ComponentType::U8 | ComponentType::U16 | ComponentType::U32);
+        if !whole || !matches!(accessor.type_, Checked::Valid(Type::Scalar)) || accessor.sparse.is_some() {
+            return Err(self.content(place, "is no list of unsigned integers, but is used as indices"));
+        }
+        let view = accessor.buffer_view.ok_or_else(|| self.content(&place, "has no bufferView"))?;
+        self.spend(accessor.count.0)?;
+        let (offset, count) = (accessor.byte_offset.map_or(0, |o| o.0), accessor.count.0 as usize);
+        Ok(self.elements(view, offset, count, component, 1, &place)?.map(|b| integer(b, component)).collect())
+    }
+
+    fn component(&self, accessor: &Accessor, place: &str) -> Result<ComponentType, GltfError> {
+        match &accessor.component_type {
+            Checked::Valid(c) => Ok(c.0),
+            Checked::Invalid => Err(self.content(place, "its componentType is unknown")),
+        }
+    }
+
+    /// The bytes of each of `count` elements of `width` components.
+    fn elements<'s>(
+        &'s self,
+        view: Index<View>,
+        offset: u64,
+        count: usize,
+        component: ComponentType,
+        width: usize,
+        place: &str,
+    ) -> Result<impl Iterator<Item = &'s [u8]> + use<'s>, GltfError> {
+        let bytes = self.view_bytes(view.value(), place)?;
+        let size = component.size() * width;
+        let stride = self.root.buffer_views[view.value()].byte_stride.map_or(size, |s| s.0);
+        let reach = || {
+            let last = (count as u64).checked_sub(1)?.checked_mul(stride as u64)?;
+            last.checked_add(offset)?.checked_add(size as u64)
+        };
+        let needed = if count == 0 { Some(0) } else { reach() };
+        if stride < size || needed.is_none_or(|n| n > bytes.len() as u64) {
+            let problem =
+                format!("{count} elements of {size} bytes do not fit its buffer view of {} bytes", bytes.len());
+            return Err(self.content(place, problem));
+        }
+        let offset = offset as usize;
+        Ok((0..count).map(move |i| &bytes[offset + i * stride..][..size]))
+    }
+
+    /// The bytes of a buffer view.
+    pub(super) fn view_bytes(&self, index: usize, place: &str) -> Result<&[u8], GltfError> {
+        let view = self.item(&self.root.buffer_views, index, "bufferViews", place)?;
+        let buffer = self.item(&self.buffers, view.buffer.value(), "buffers", &format!("bufferViews[{index}]"))?;
+        let start = view.byte_offset.map_or(0, |o| o.0);
+        let range = start
+            .checked_add(view.byte_length.0)
+            .and_then(|end| Some(usize::try_from(start).ok()?..usize::try_from(end).ok()?));
+        range.and_then(|r| buffer.get(r)).ok_or_else(|| {
+            let problem =
+                format!("{} bytes from {start} lie outside its buffer of {}", view.byte_length.0, buffer.len());
+            self.content(format!("bufferViews[{index}]"), problem)
+        })
+    }
+}
+
+/// One little-endian component; 0 where `b` is not as long as the type (never so here).
+fn number(b: &[u8], component: ComponentType, normalized: bool) -> f32 {
+    let (value, largest) = match (component, b) {
+        (ComponentType::I8, [a, ..]) => (f32::from(*a as i8), 127.0),
+        (ComponentType::U8, [a, ..]) => (f32::from(*a), 255.0),
+        (ComponentType::I16, [a, b, ..]) => (f32::from(i16::from_le_bytes([*a, *b])), 32_767.0),
+        (ComponentType::U16, [a, b, ..]) => (f32::from(u16::from_le_bytes([*a, *b])), 65_535.0),
+        (ComponentType::U32, [a, b, c, d, ..]) => (u32::from_le_bytes([*a, *b, *c, *d]) as f32, 4_294_967_295.0),
+        (ComponentType::F32, [a, b, c, d, ..]) => return f32::from_le_bytes([*a, *b, *c, *d]),
+        _ => (0.0, 1.0),
+    };
+    if normalized { (value / largest).max(-1.0) } else { value }
+}
+
+fn integer(b: &[u8], component: ComponentType) -> u32 {
+    match (component, b) {
+        (ComponentType::U8, [a, ..]) => u32::from(*a),
+        (ComponentType::U16, [a, b, ..]) => u32::from(u16::from_le_bytes([*a, *b])),
+        (ComponentType::U32, [a, b, c, d, ..]) => u32::from_le_bytes([*a, *b, *c, *d]),
+        _ => 0,
+    }
+}

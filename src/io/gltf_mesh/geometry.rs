@@ -1,0 +1,115 @@
+//! Primitives: vertices and triangles.
+
+use glam::{Vec2, Vec3, Vec4};
+use gltf::json::mesh::{Mode, Primitive as JsonPrimitive, Semantic};
+use gltf::json::validation::Checked;
+
+use super::{File, GltfError, MAX_ITEMS, Material, Mesh, MeshNode, Primitive};
+
+/// Highest texture coordinate set that is read.
+const MAX_UV_SETS: u32 = 8;
+
+impl File<'_> {
+    /// The meshes that `nodes` use; the others stay empty.
+    pub(super) fn meshes(&mut self, nodes: &[MeshNode], materials: &[Material]) -> Result<Vec<Mesh>, GltfError> {
+        let root = self.root;
+        let mut used = vec![false; root.meshes.len()];
+        for m in nodes.iter().filter_map(|n| n.mesh) {
+            used[m] = true;
+        }
+        if root.meshes.iter().map(|m| m.primitives.len()).sum::<usize>() > MAX_ITEMS {
+            let limit = format!("{MAX_ITEMS}");
+            let what = "the number of primitives".into();
+            return Err(GltfError::TooLarge { path: self.path.to_owned(), what, limit });
+        }
+        let mut meshes = Vec::with_capacity(root.meshes.len());
+        for (m, mesh) in root.meshes.iter().enumerate() {
+            let mut out = Mesh { name: mesh.name.clone(), primitives: Vec::new() };
+            for (p, primitive) in mesh.primitives.iter().enumerate().filter(|_| used[m]) {
+                let place = format!("meshes[{m}].primitives[{p}]");
+                out.primitives.extend(self.primitive(primitive, &place, materials)?);
+            }
+            meshes.push(out);
+        }
+        Ok(meshes)
+    }
+
+    fn primitive(
+        &mut self,
+        primitive: &JsonPrimitive,
+        place: &str,
+        materials: &[Material],
+    ) -> Result<Option<Primitive>, GltfError> {
+        let mode = match primitive.mode {
+            Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) => mode,
+            Checked::Valid(_) => {
+                self.warnings.push(format!("{place}: points and lines are not drawn"));
+                return Ok(None);
+            }
+            Checked::Invalid => return Err(self.content(place, "its mode is unknown")),
+        };
+        let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).map(|i| i.value());
+        let Some(positions) = attribute(Semantic::Positions) else {
+            self.warnings.push(format!("{place}: has no positions, left out"));
+            return Ok(None);
+        };
+        let values = self.values(positions, place)?;
+        if values.width != 3 {
+            return Err(self.content(place, "its POSITION is not VEC3"));
+        }
+        let positions: Vec<Vec3> = values.arrays(0.0).map(Vec3::from_array).collect();
+        let count = positions.len();
+        let normals = match attribute(Semantic::Normals) {
+            Some(i) => self.values(i, place)?.arrays(0.0).map(Vec3::from_array).collect(),
+            None => Vec::new(),
+        };
+        let colors = match attribute(Semantic::Colors(0)) {
+            Some(i) => self.values(i, place)?.arrays(1.0).map(Vec4::from_array).collect(),
+            None => Vec::new(),
+        };
+        let mut uv_sets: Vec<Vec<Vec2>> = Vec::new();
+        for set in 0..MAX_UV_SETS {
+            if let Some(i) = attribute(Semantic::TexCoords(set)) {
+                uv_sets.resize(set as usize + 1, Vec::new());
+                uv_sets[set as usize] = self.values(i, place)?.arrays(0.0).map(Vec2::from_array).collect();
+            }
+        }
+        let lengths = [normals.len(), colors.len()].into_iter().chain(uv_sets.iter().map(Vec::len));
+        if let Some(length) = lengths.into_iter().find(|&l| l != 0 && l != count) {
+            return Err(self.content(place, format!("one attribute has {length} elements, POSITION has {count}")));
+        }
+        let order: Vec<u32> = match primitive.indices {
+            Some(i) => self.indices(i.value(), place)?,
+            None => (0..u32::try_from(count).unwrap_or(u32::MAX)).collect(),
+        };
+        if let Some(i) = order.iter().find(|&&i| i as usize >= count) {
+            return Err(self.content(place, format!("an index {i} is not below its {count} vertices")));
+        }
+        let material = match primitive.material {
+            // The last material is the default one, which no file can name.
+            Some(i) => {
+                self.item(&materials[..materials.len() - 1], i.value(), "materials", place)?;
+                i.value()
+            }
+            None => materials.len() - 1,
+        };
+        let triangles = triangles(&order, mode);
+        Ok(Some(Primitive { positions, normals, uv_sets, colors, triangles, material }))
+    }
+}
+
+/// Triangles of a list, strip or fan; incomplete ones at the end are dropped.
+pub fn triangles(order: &[u32], mode: Mode) -> Vec<[u32; 3]> {
+    match mode {
+        Mode::TriangleStrip => order
+            .windows(3)
+            .enumerate()
+            .map(|(i, w)| if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[0], w[2], w[1]] })
+            .collect(),
+        Mode::TriangleFan => {
+            let Some((&first, rest)) = order.split_first() else { return Vec::new() };
+            rest.windows(2).map(|w| [first, w[0], w[1]]).collect()
+        }
+        _ => order.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),
+    }
+}

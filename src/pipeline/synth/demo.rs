@@ -1,0 +1,51 @@
+//! The scene that ships with the program.
+
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::options::{Rig, SynthOptions};
+use super::write::{SETTINGS, TRANSFORMS};
+use super::{SynthError, SynthReport, render_scene};
+use crate::io::gltf_mesh;
+use crate::pipeline::observer::Observer;
+
+/// The demo scene: a table-top of things with parts, written by [`crate::pipeline::demo_scene`].
+pub fn demo_glb() -> &'static [u8] {
+    include_bytes!("../../../assets/demo.glb")
+}
+
+/// Settings for the demo's photos: small enough that two cores train on them live.
+pub fn demo_options() -> SynthOptions {
+    SynthOptions {
+        views: 64,
+        held_out: 8,
+        width_px: 400,
+        height_px: 300,
+        samples: 3,
+        rig: Rig::Survey,
+        focus: Some(DVec3::new(0.0, 0.84, 0.0)),
+        radius: Some(0.62),
+        points: 12_000,
+        ..SynthOptions::default()
+    }
+}
+
+/// Whether `out` already holds the photos that [`write_demo`] would write.
+pub fn demo_is_written(out: &Path) -> bool {
+    let expected = serde_json::json!({ "version": 1, "scene": fingerprint(), "options": demo_options() });
+    let settings = std::fs::read(out.join(SETTINGS)).ok();
+    let found: Option<serde_json::Value> = settings.and_then(|bytes| serde_json::from_slice(&bytes).ok());
+    found == Some(expected) && out.join(TRANSFORMS).is_file()
+}
+
+/// Renders the demo's photos into the folder `out`.
+pub fn write_demo(out: &Path, observer: &mut dyn Observer) -> Result<SynthReport, SynthError> {
+    let scene = gltf_mesh::read_slice(demo_glb(), "demo.glb")?;
+    render_scene(&scene, "demo", Some(fingerprint()), &demo_options(), out, observer)
+}
+
+/// FNV-1a of the scene's bytes.
+fn fingerprint() -> u64 {
+    demo_glb().iter().fold(0xcbf2_9ce4_8422_2325, |h, &b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3))
+}

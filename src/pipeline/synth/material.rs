@@ -1,0 +1,87 @@
+//! Colour of the surface at a point.
+
+use glam::{Vec2, Vec3, Vec3A, Vec4};
+
+use super::surface::{Surface, Triangle, blend};
+use super::texture::Texture;
+use crate::io::gltf_mesh::{AlphaMode, Material, MeshScene, TextureUse};
+
+/// The look of a point, linear.
+#[derive(Clone, Copy, Debug)]
+pub struct Look {
+    /// Diffuse colour.
+    pub albedo: Vec3A,
+    /// Emitted light.
+    pub emission: Vec3A,
+    /// How much of what is behind it the point covers.
+    pub alpha: f32,
+}
+
+/// Materials with their textures.
+pub struct Materials {
+    list: Vec<Material>,
+    textures: Vec<Texture>,
+    /// Whether light always stops at a surface.
+    opaque: bool,
+}
+
+impl Materials {
+    /// Of a scene.
+    pub fn of(scene: &MeshScene) -> Self {
+        Self {
+            list: scene.materials.clone(),
+            textures: scene.images.iter().map(Texture::new).collect(),
+            opaque: scene.materials.iter().all(|m| m.alpha == AlphaMode::Opaque),
+        }
+    }
+
+    /// One of them.
+    pub fn get(&self, index: u32) -> &Material {
+        &self.list[index as usize]
+    }
+
+    /// Mean base colour of a material.
+    pub fn mean(&self, index: usize) -> Vec4 {
+        let m = &self.list[index];
+        m.base_color * m.base_texture.as_ref().map_or(Vec4::ONE, |t| self.textures[t.image].mean())
+    }
+
+    /// The look of a point of a triangle where one sample covers `width` of the frame's units.
+    pub fn look(&self, surface: &Surface, triangle: &Triangle, weights: Vec3, width: f32) -> Look {
+        let m = self.get(triangle.material);
+        let corners = triangle.vertices.map(|v| &surface.vertices[v as usize]);
+        let sampled = |usage: &Option<TextureUse>, set: usize| {
+            let Some(usage) = usage else { return Vec4::ONE };
+            let texture = &self.textures[usage.image];
+            let uv = corners.map(|c| c.uv[set]);
+            let texels = uv_area(uv) * texture.texels();
+            let area = 0.5
+                * (corners[1].position - corners[0].position).cross(corners[2].position - corners[0].position).length();
+            let footprint = if area > 0.0 { width * (texels / area).sqrt() } else { 1.0 };
+            texture.sample(usage, blend(uv, weights), footprint)
+        };
+        let base = m.base_color * sampled(&m.base_texture, 0) * blend(corners.map(|c| c.color), weights);
+        let emission = if m.emission == Vec3::ZERO {
+            Vec3A::ZERO
+        } else {
+            Vec3A::from(m.emission) * Vec3A::from_vec4(sampled(&m.emission_texture, 1))
+        };
+        let alpha = match m.alpha {
+            AlphaMode::Opaque => 1.0,
+            AlphaMode::Mask(cutoff) => f32::from(u8::from(base.w >= cutoff)),
+            AlphaMode::Blend => base.w.clamp(0.0, 1.0),
+        };
+        Look { albedo: Vec3A::from_vec4(base).max(Vec3A::ZERO), emission, alpha }
+    }
+
+    /// Whether light goes through the point: masked out, or covering less than half.
+    pub fn passes(&self, surface: &Surface, triangle: &Triangle, weights: Vec3) -> bool {
+        !self.opaque
+            && self.get(triangle.material).alpha != AlphaMode::Opaque
+            && self.look(surface, triangle, weights, 0.0).alpha < 0.5
+    }
+}
+
+fn uv_area([a, b, c]: [Vec2; 3]) -> f32 {
+    0.5 * (b - a).perp_dot(c - a).abs()
+}

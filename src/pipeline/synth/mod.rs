@@ -1,0 +1,227 @@
+//! Posed photos of any glTF scene, with ground truth.
+//!
+//! A scene of triangles is rendered by ray casting, which shares nothing with the splat renderer:
+//! what training makes of the photos can be checked against what was really there. [`run`] writes a
+//! folder that opens as a data set:
+//!
+//! | file | content |
+//! |---|---|
+//! | `transforms.json` | nerfstudio layout, OpenGL camera axes, world axes of the glTF (y up); `train_filenames` and `test_filenames` list the split |
+//! | `images/NNNN.png` | photos, sRGB |
+//! | `object_ids/NNNN.png`, `part_ids/NNNN.png` | 16-bit ids at the pixels' centres, 0 = background (or, for parts, none) |
+//! | `identities.json` | what each id is: name, level, parent, path in the node tree, colour, pixels, views |
+//! | `depth/NNNN.npy` | f32 depth along the camera's axis at the pixels' centres, scene units, 0 = background |
+//! | `points3D.ply` | sparse points on surfaces that training photos see, with a reconstruction's noise |
+//! | `synth.json` | the settings, and a fingerprint of the scene |
+//!
+//! Modules: [`levels`] finds objects and parts, `surface` flattens the node tree, `trace` casts rays,
+//! `material` and `texture` colour them, `light` lights them, `rig` places cameras, `view` renders
+//! one photo, `points` and `write` put it all on disk, [`demo`] is the scene that ships with the
+//! program.
+
+pub mod demo;
+pub mod levels;
+mod light;
+mod material;
+pub mod options;
+mod points;
+mod rig;
+mod surface;
+#[cfg(test)]
+mod tests;
+mod texture;
+mod trace;
+mod view;
+mod write;
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg32;
+use rayon::prelude::*;
+
+pub use demo::demo_glb;
+pub use levels::{Identity, Level};
+pub use options::{Levels, Rig, SynthOptions};
+
+use crate::io::gltf_mesh::{self, GltfError, MeshScene};
+use crate::pipeline::observer::{self, Observer, Progress, Signal};
+use crate::scene::Camera;
+
+/// Why no data set was made.
+#[derive(Debug, thiserror::Error)]
+pub enum SynthError {
+    /// The scene could not be read.
+    #[error(transparent)]
+    Scene(#[from] GltfError),
+    /// A setting is out of its range.
+    #[error("{0}")]
+    Options(String),
+    /// The scene shows nothing.
+    #[error("the scene has no triangles with any area; a scene of meshes is needed")]
+    Empty,
+    /// More geometry than is drawn.
+    #[error("the scene has {count} triangles; at most {limit} are drawn. Simplify it first")]
+    TooManyTriangles {
+        /// Triangles, instances counted.
+        count: usize,
+        /// The limit.
+        limit: usize,
+    },
+    /// More identities than a 16-bit id map holds.
+    #[error("the scene has more than 65535 objects and parts; name fewer nodes")]
+    TooManyIdentities,
+    /// A file could not be written.
+    #[error("{path}: {source}; is there space, and may the folder be written to?", path = path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The observer asked to stop.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+/// What was made.
+#[derive(Clone, Debug)]
+pub struct SynthReport {
+    /// The folder.
+    pub out: PathBuf,
+    /// Photos for training.
+    pub train_views: usize,
+    /// Photos held out.
+    pub held_out_views: usize,
+    /// Objects and parts, pixels counted.
+    pub identities: Vec<Identity>,
+    /// Sparse points.
+    pub points: usize,
+    /// Triangles of the scene after splitting for light.
+    pub triangles: usize,
+    /// Seconds in all.
+    pub secs: f64,
+    /// What was left out of the scene.
+    pub warnings: Vec<String>,
+}
+
+/// Renders the scene in `glb` (any glTF file) into a data set in the folder `out`, which is made.
+/// Files of an earlier run are overwritten, others left alone.
+pub fn run(
+    glb: &Path,
+    options: &SynthOptions,
+    out: &Path,
+    observer: &mut dyn Observer,
+) -> Result<SynthReport, SynthError> {
+    options.validate()?;
+    let scene = gltf_mesh::read(glb)?;
+    let name = glb.file_stem().map_or_else(|| "scene".into(), |s| s.to_string_lossy().into_owned());
+    render_scene(&scene, &name, None, options, out, observer)
+}
+
+/// The same for a scene in memory; `fingerprint` goes into `synth.json`.
+fn render_scene(
+    scene: &MeshScene,
+    name: &str,
+    fingerprint: Option<u64>,
+    options: &SynthOptions,
+    out: &Path,
+    observer: &mut dyn Observer,
+) -> Result<SynthReport, SynthError> {
+    let start = Instant::now();
+    for warning in &scene.warnings {
+        observer.note(observer::Level::Warning, warning.clone());
+    }
+    let progress = |done: usize, stage: &str, observer: &mut dyn Observer| {
+        let elapsed_secs = start.elapsed().as_secs_f64();
+        let rate = if done > 0 { done as f64 / elapsed_secs.max(1e-9) } else { 0.0 };
+        let (done, total) = (done as u64, options.views as u64);
+        observer.progress(Progress { stage: stage.into(), done, total, elapsed_secs, rate });
+    };
+    progress(0, "Building the scene", observer);
+    let mut identities = levels::identities(scene, options.levels, name)?;
+    let stage = stage(scene, &identities)?;
+    let cameras = rig::cameras(&stage.surface, &stage.tracer, options);
+    let test = held_out(options);
+    let writer = write::Writer::new(out, cameras.len())?;
+    let per_view = options.points.div_ceil((options.views - options.held_out).max(1));
+    let mut cloud = Vec::new();
+    // A few photos at once, so that encoding one overlaps with tracing the next.
+    let batch = 2 * rayon::current_num_threads();
+    for first in (0..cameras.len()).step_by(batch) {
+        wait_or_cancel(observer)?;
+        let last = (first + batch).min(cameras.len());
+        let results: Vec<_> = (first..last)
+            .into_par_iter()
+            .map(|i| {
+                let camera = &cameras[i];
+                let view = stage.render(camera, i, options);
+                let points = if test[i] { Vec::new() } else { points::sample(&view, camera, i, per_view, options) };
+                writer.photo(i, camera, &view).map(|()| (levels::counts(&view.object, &view.part), points))
+            })
+            .collect::<Result<_, SynthError>>()?;
+        for (counts, points) in results {
+            cloud.extend(points);
+            for (id, pixels) in counts {
+                if let Some(identity) = identities.list.get_mut(usize::from(id) - 1) {
+                    identity.pixels += pixels;
+                    identity.views += 1;
+                }
+            }
+        }
+        progress(last, "Rendering photos", observer);
+    }
+    cloud.truncate(options.points);
+    let points = cloud.len();
+    writer.finish(name, fingerprint, options, &cameras, &test, &identities.list, &cloud)?;
+    let held = test.iter().filter(|t| **t).count();
+    Ok(SynthReport {
+        out: out.to_owned(),
+        train_views: cameras.len() - held,
+        held_out_views: held,
+        identities: identities.list,
+        points,
+        triangles: stage.surface.triangles.len(),
+        secs: start.elapsed().as_secs_f64(),
+        warnings: scene.warnings.clone(),
+    })
+}
+
+/// Makes a scene ready for rendering.
+fn stage(scene: &MeshScene, identities: &levels::Identities) -> Result<view::Stage, SynthError> {
+    let surface = surface::Surface::of(scene, identities)?;
+    let tracer = trace::Tracer::new(&surface);
+    let materials = material::Materials::of(scene);
+    let light = light::Light::new(&surface, &materials);
+    Ok(view::Stage { surface, tracer, materials, light })
+}
+
+/// Which photos are held out: one at random from each of as many equal stretches of the list.
+fn held_out(options: &SynthOptions) -> Vec<bool> {
+    let mut rng = Pcg32::seed_from_u64(options.seed ^ 0x7e57);
+    let (views, held) = (options.views, options.held_out);
+    let mut test = vec![false; views];
+    for k in 0..held {
+        let (from, to) = (k * views / held, (k + 1) * views / held);
+        test[rng.random_range(from..to)] = true;
+    }
+    test
+}
+
+fn wait_or_cancel(observer: &mut dyn Observer) -> Result<(), SynthError> {
+    loop {
+        match observer.signal() {
+            Signal::Continue => return Ok(()),
+            Signal::Cancel => return Err(SynthError::Cancelled),
+            Signal::Pause => std::thread::sleep(Duration::from_millis(20)),
+        }
+    }
+}
+
+/// nerfstudio's camera: 4x4 rows of world_from_camera with x right, y up, z back.
+fn opengl_pose(camera: &Camera) -> [[f64; 4]; 4] {
+    let m = camera.world_from_camera;
+    let (x, y, z, c) = (m.x_axis, -m.y_axis, -m.z_axis, camera.center);
+    [[x.x, y.x, z.x, c.x], [x.y, y.y, z.y, c.y], [x.z, y.z, z.z, c.z], [0.0, 0.0, 0.0, 1.0]]
+}

@@ -1,0 +1,467 @@
+//! Photos, ids and depth against exact geometry.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+
+use glam::{DVec2, DVec3, Vec3};
+use serde_json::{Value, json};
+
+use super::*;
+use crate::io::gltf_mesh::tests::{cubes, glb, real_scenes};
+use crate::pipeline::observer::Silent;
+
+/// Two cubes: a small one in front of a larger one, as two objects.
+fn two_cubes() -> MeshScene {
+    let nodes = json!([
+        { "name": "large", "mesh": 0, "translation": [0.3, 0.2, -0.4] },
+        { "name": "small", "mesh": 0, "scale": [0.4, 0.4, 0.4], "translation": [-0.2, 0.1, 0.9] },
+    ]);
+    let (root, bin) = cubes(nodes, json!([0, 1]), json!([]));
+    gltf_mesh::read_slice(&glb(&root, &bin), "two.glb").unwrap()
+}
+
+const BOXES: [(DVec3, f64); 2] = [(DVec3::new(0.3, 0.2, -0.4), 0.5), (DVec3::new(-0.2, 0.1, 0.9), 0.2)];
+
+fn stage_of(scene: &MeshScene) -> view::Stage {
+    stage(scene, &levels::identities(scene, Levels::Nodes, "test").unwrap()).unwrap()
+}
+
+fn small() -> SynthOptions {
+    SynthOptions { views: 6, held_out: 2, width_px: 64, height_px: 48, samples: 2, points: 300, ..Default::default() }
+}
+
+/// Id and depth of the nearest box along a ray of unit depth, by slabs, and how far the ray stays
+/// from any edge of an outline.
+fn exact(camera: &Camera, direction: DVec3, shift: DVec3) -> (u16, f64, f64) {
+    let (mut best, mut margin) = ((0, f64::INFINITY), f64::INFINITY);
+    for (i, (middle, half)) in BOXES.iter().enumerate() {
+        let a = (*middle + shift - camera.center - DVec3::splat(*half)) / direction;
+        let b = (*middle + shift - camera.center + DVec3::splat(*half)) / direction;
+        let (enter, leave) = (a.min(b).max_element(), a.max(b).min_element());
+        margin = margin.min((leave - enter).abs());
+        if leave > enter && enter < best.1 {
+            best = (i as u16 + 1, enter);
+        }
+    }
+    if best.0 == 0 { (0, 0.0, margin) } else { (best.0, best.1, margin) }
+}
+
+/// Pixels whose id or depth is not that of the exact scene shifted by `shift`, and pixels compared.
+fn mismatches(shift: DVec3) -> (usize, usize) {
+    let stage = stage_of(&two_cubes());
+    let (mut wrong, mut compared) = (0, 0);
+    for eye in [DVec3::new(0.5, 1.0, 4.0), DVec3::new(-3.0, 2.0, 2.0), DVec3::new(0.1, 3.5, 0.7)] {
+        let camera = Camera::look_at(eye, DVec3::new(0.1, 0.1, 0.1), DVec3::Y, 0.7, 160, 120).unwrap();
+        let view = stage.render(&camera, 0, &SynthOptions { samples: 1, ..small() });
+        for (i, (&id, &depth)) in view.object.iter().zip(&view.depth).enumerate() {
+            let at = DVec2::new((i % 160) as f64 + 0.5, (i / 160) as f64 + 0.5);
+            let (expected, exact_depth, margin) = exact(&camera, camera.ray(at), shift);
+            if margin > 1e-3 {
+                compared += 1;
+                wrong += usize::from(id != expected || (f64::from(depth) - exact_depth).abs() > 2e-5);
+            }
+        }
+    }
+    (wrong, compared)
+}
+
+#[test]
+fn ids_and_depth_of_boxes_are_exact() {
+    let (wrong, compared) = mismatches(DVec3::ZERO);
+    assert!(compared > 57_000, "{compared}");
+    assert_eq!(wrong, 0, "of {compared}");
+    // Negative control: the same check sees a shift of a thousandth of the scene.
+    let (wrong, _) = mismatches(DVec3::new(0.001, 0.0, 0.0));
+    assert!(wrong > 500, "{wrong}");
+}
+
+#[test]
+fn anti_aliasing_covers_edges_by_area() {
+    // An unlit black cube on white: a pixel's value tells how much of it the cube covers.
+    let black = json!([{ "pbrMetallicRoughness": { "baseColorFactor": [0, 0, 0, 1] }, "extensions": { "KHR_materials_unlit": {} } }]);
+    let (root, bin) = cubes(json!([{ "mesh": 0 }]), json!([0]), black);
+    let scene = gltf_mesh::read_slice(&glb(&root, &bin), "t.glb").unwrap();
+    let stage = stage_of(&scene);
+    let camera = Camera::look_at(DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, DVec3::Y, 0.5, 41, 41).unwrap();
+    let options = SynthOptions { samples: 8, background: [255; 3], ..small() };
+    let covered = |stage: &view::Stage| -> f64 {
+        let view = stage.render(&camera, 0, &options);
+        view.rgb.iter().map(|p| 1.0 - f64::from(texture::linear(f32::from(p[0]) / 255.0))).sum()
+    };
+    let side = camera.focal_px.x / 3.5;
+    let (found, exact) = (covered(&stage), side * side);
+    assert!((found / exact - 1.0).abs() < 0.003, "{found} of {exact} px");
+}
+
+/// A square from (0, 0) to (1, 1) at z = 0 facing +z with a 2 x 2 texture, unlit.
+fn textured_square(info: Value, sampler: Value) -> MeshScene {
+    let mut bin = Vec::new();
+    for (x, y) in [(0.0_f32, 0.0_f32), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)] {
+        bin.extend([x, y, 0.0].iter().flat_map(|v| v.to_le_bytes()));
+    }
+    for (u, v) in [(0.0_f32, 1.0_f32), (1.0, 1.0), (1.0, 0.0), (0.0, 0.0)] {
+        bin.extend([u, v].iter().flat_map(|v| v.to_le_bytes()));
+    }
+    bin.extend([0_u8, 1, 2, 0, 2, 3, 0, 0]);
+    let mut png = std::io::Cursor::new(Vec::new());
+    let texels = [[250, 10, 20, 255], [30, 200, 40, 255], [50, 60, 180, 255], [128, 128, 128, 0]];
+    let image = image::RgbaImage::from_raw(2, 2, texels.concat()).unwrap();
+    image.write_to(&mut png, image::ImageFormat::Png).unwrap();
+    let (at, length) = (bin.len(), png.get_ref().len());
+    bin.extend(png.into_inner());
+    let root = json!({
+        "asset": { "version": "2.0" }, "scenes": [{ "nodes": [0] }], "nodes": [{ "name": "square", "mesh": 0 }],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0, "TEXCOORD_1": 1 }, "indices": 2, "material": 0 }] }],
+        "materials": [{ "alphaMode": "MASK", "pbrMetallicRoughness": { "baseColorTexture": info },
+            "extensions": { "KHR_materials_unlit": {} } }],
+        "textures": [{ "source": 0, "sampler": 0 }], "samplers": [sampler],
+        "images": [{ "bufferView": 3, "mimeType": "image/png" }],
+        "accessors": [
+            { "bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3" },
+            { "bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC2" },
+            { "bufferView": 2, "componentType": 5121, "count": 6, "type": "SCALAR" },
+        ],
+        "bufferViews": [
+            { "buffer": 0, "byteLength": 48 }, { "buffer": 0, "byteOffset": 48, "byteLength": 32 },
+            { "buffer": 0, "byteOffset": 80, "byteLength": 6 }, { "buffer": 0, "byteOffset": at, "byteLength": length },
+        ],
+        "buffers": [{ "byteLength": bin.len() }],
+    });
+    gltf_mesh::read_slice(&glb(&root, &bin), "square.glb").unwrap()
+}
+
+/// Colours in the middle of the square's quarters: top left, top right, bottom left, bottom right.
+fn quarters(scene: &MeshScene) -> [[u8; 3]; 4] {
+    let stage = stage_of(scene);
+    let camera = Camera::look_at(DVec3::new(0.5, 0.5, 2.0), DVec3::new(0.5, 0.5, 0.0), DVec3::Y, 0.6, 80, 80).unwrap();
+    let view = stage.render(&camera, 0, &SynthOptions { background: [9, 9, 9], ..small() });
+    [(0.25, 0.75), (0.75, 0.75), (0.25, 0.25), (0.75, 0.25)].map(|(x, y)| {
+        let p = camera.project(DVec3::new(x, y, 0.0)).unwrap();
+        view.rgb[p.y as usize * 80 + p.x as usize]
+    })
+}
+
+#[test]
+fn textures_keep_their_srgb_values_and_transform() {
+    let (red, green, blue, hole) = ([250, 10, 20], [30, 200, 40], [50, 60, 180], [9, 9, 9]);
+    let nearest = json!({ "magFilter": 9728 });
+    let plain = textured_square(json!({ "index": 0, "texCoord": 1 }), nearest.clone());
+    // The last texel has no alpha, so the background shows through the mask.
+    assert_eq!(quarters(&plain), [red, green, blue, hole]);
+    let shifted = |transform: Value, sampler: &Value| {
+        let info = json!({ "index": 0, "texCoord": 1, "extensions": { "KHR_texture_transform": transform } });
+        quarters(&textured_square(info, sampler.clone()))
+    };
+    assert_eq!(shifted(json!({ "offset": [0.5, 0.0] }), &nearest), [green, red, hole, blue]);
+    assert_eq!(shifted(json!({ "scale": [-1.0, 1.0] }), &nearest), [green, red, hole, blue]);
+    // The set that the transform names wins: set 0 is absent, so everything is one texel.
+    let [a, b, c, d] = shifted(json!({ "texCoord": 0 }), &nearest);
+    assert!(a == b && b == c && c == d);
+    let clamp = json!({ "magFilter": 9728, "wrapS": 33071, "wrapT": 33071 });
+    assert_eq!(shifted(json!({ "offset": [0.5, 0.0] }), &clamp), [green, green, hole, hole]);
+    let mirror = json!({ "magFilter": 9728, "wrapS": 33648, "wrapT": 33648 });
+    assert_eq!(shifted(json!({ "offset": [1.0, 0.0] }), &mirror), [green, red, hole, blue]);
+}
+
+#[test]
+fn srgb_and_linear_are_inverse() {
+    for byte in 0..=255_u8 {
+        assert_eq!(texture::srgb_byte(texture::linear(f32::from(byte) / 255.0)), byte);
+    }
+    assert_eq!((texture::srgb_byte(-1.0), texture::srgb_byte(7.0)), (0, 255));
+}
+
+#[test]
+fn light_is_brightest_from_above_and_shadows_fall() {
+    // A plate with a cube over its middle: below the cube it is darker than at its corners.
+    let nodes = json!([
+        { "name": "plate", "mesh": 0, "scale": [4, 0.1, 4], "translation": [0, -1.0, 0] },
+        { "name": "cube", "mesh": 0 },
+    ]);
+    let (root, bin) = cubes(nodes, json!([0, 1]), json!([]));
+    let stage = stage_of(&gltf_mesh::read_slice(&glb(&root, &bin), "t.glb").unwrap());
+    let light = |p: DVec3, normal: Vec3| {
+        let from = stage.surface.local(p + normal.as_dvec3() * 0.02);
+        let hit = stage.tracer.nearest(from, -normal.to_vec3a(), 0.0).unwrap();
+        let triangle = &stage.surface.triangles[hit.triangle];
+        stage.light.at(stage.lit(), triangle, hit.weights, true).0.element_sum()
+    };
+    let corner = light(DVec3::new(1.8, -0.95, 1.8), Vec3::Y);
+    let below = light(DVec3::new(0.0, -0.95, 0.0), Vec3::Y);
+    let underside = light(DVec3::new(0.0, -0.5, 0.0), Vec3::NEG_Y);
+    assert!(below < 0.6 * corner && underside < 0.6 * corner, "{below} {underside} {corner}");
+    assert!(below > 0.05 && (1.5..=3.3).contains(&corner), "{below} {corner}");
+}
+
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    for entry in fs::read_dir(folder).unwrap().flatten() {
+        let name = entry.file_name().into_string().unwrap();
+        if entry.path().is_dir() {
+            found.extend(files(&entry.path()).into_iter().map(|(k, v)| (format!("{name}/{k}"), v)));
+        } else {
+            found.insert(name, fs::read(entry.path()).unwrap());
+        }
+    }
+    found
+}
+
+fn write(options: &SynthOptions) -> (tempfile::TempDir, SynthReport) {
+    let out = tempfile::tempdir().unwrap();
+    let report = render_scene(&two_cubes(), "two", None, options, out.path(), &mut Silent).unwrap();
+    (out, report)
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes() {
+    let (a, _) = write(&small());
+    let (b, _) = write(&small());
+    assert!(files(a.path()) == files(b.path()));
+    let (c, _) = write(&SynthOptions { seed: 1, ..small() });
+    let changed = files(c.path());
+    let same = files(a.path()).iter().filter(|(k, v)| changed.get(*k) == Some(v)).count();
+    assert!(same <= 1, "{same} files are the same for another seed");
+}
+
+#[test]
+fn a_data_set_agrees_with_itself() {
+    for rig in [Rig::Dome, Rig::Orbit, Rig::Handheld, Rig::Survey] {
+        let options = SynthOptions { rig, views: 9, held_out: 3, ..small() };
+        let (out, report) = write(&options);
+        let json = |name: &str| -> Value { serde_json::from_slice(&fs::read(out.path().join(name)).unwrap()).unwrap() };
+        let transforms = json("transforms.json");
+        let list = |key: &str| -> BTreeSet<String> {
+            transforms[key].as_array().unwrap().iter().map(|v| v.as_str().unwrap().to_owned()).collect()
+        };
+        let (train, test) = (list("train_filenames"), list("test_filenames"));
+        assert!(train.is_disjoint(&test));
+        assert_eq!((train.len(), test.len()), (6, 3));
+        assert_eq!((report.train_views, report.held_out_views), (6, 3));
+        let frames = transforms["frames"].as_array().unwrap();
+        let named: BTreeSet<String> = frames.iter().map(|f| f["file_path"].as_str().unwrap().to_owned()).collect();
+        assert_eq!(named, train.union(&test).cloned().collect());
+        let mut counted: BTreeMap<u64, u64> = BTreeMap::new();
+        for name in &named {
+            let photo = image::open(out.path().join(name)).unwrap();
+            assert_eq!((photo.width(), photo.height()), (64, 48));
+            let stem = Path::new(name).file_stem().unwrap().to_str().unwrap();
+            for level in ["object_ids", "part_ids"] {
+                let ids = image::open(out.path().join(level).join(format!("{stem}.png"))).unwrap().into_luma16();
+                for id in ids.into_raw().into_iter().filter(|id| *id != 0) {
+                    *counted.entry(u64::from(id)).or_default() += 1;
+                }
+            }
+        }
+        let identities = json("identities.json");
+        let listed = identities["identities"].as_array().unwrap();
+        let pixels = |i: &Value| (i["id"].as_u64().unwrap(), i["pixels"].as_u64().unwrap());
+        let listed: BTreeMap<u64, u64> = listed.iter().map(pixels).filter(|(_, n)| *n > 0).collect();
+        assert_eq!(listed, counted, "{rig:?}");
+        assert!(counted.len() == 2, "{rig:?}: both cubes are seen");
+    }
+}
+
+#[test]
+fn poses_and_points_fit_the_photos() {
+    let (out, report) = write(&SynthOptions { point_noise_px: 0.0, ..small() });
+    assert_eq!(report.points, 300);
+    let bytes = fs::read(out.path().join("points3D.ply")).unwrap();
+    let end = b"end_header\n";
+    let start = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
+    let body = &bytes[start..];
+    assert_eq!(body.len(), 300 * 15);
+    for point in body.chunks(15) {
+        let c: Vec<f64> = point[..12].chunks(4).map(|b| f64::from(f32::from_le_bytes(b.try_into().unwrap()))).collect();
+        let p = DVec3::new(c[0], c[1], c[2]);
+        let nearest = BOXES.iter().map(|(m, h)| ((p - *m).abs().max_element() - h).abs()).fold(f64::INFINITY, f64::min);
+        assert!(nearest < 1e-5, "{p} is {nearest} off");
+    }
+    // A pose written in OpenGL axes looks along its own -z at the scene.
+    let transforms: Value = serde_json::from_slice(&fs::read(out.path().join("transforms.json")).unwrap()).unwrap();
+    for frame in transforms["frames"].as_array().unwrap() {
+        let m = |r: usize, c: usize| frame["transform_matrix"][r][c].as_f64().unwrap();
+        let (eye, back) = (DVec3::new(m(0, 3), m(1, 3), m(2, 3)), DVec3::new(m(0, 2), m(1, 2), m(2, 2)));
+        let towards = (DVec3::new(0.15, 0.15, 0.1) - eye).normalize_or_zero();
+        assert!(towards.dot(-back) > 0.98, "{towards} {back}");
+        assert!(m(1, 1) > 0.2, "up is up");
+    }
+}
+
+#[test]
+fn noise_moves_points_by_its_size() {
+    let stage = stage_of(&two_cubes());
+    let camera = Camera::look_at(DVec3::new(0.5, 1.0, 4.0), DVec3::ZERO, DVec3::Y, 0.7, 64, 48).unwrap();
+    let options = |noise| SynthOptions { point_noise_px: noise, ..small() };
+    let view = stage.render(&camera, 0, &options(0.0));
+    let exact = points::sample(&view, &camera, 0, 400, &options(0.0));
+    let noisy = points::sample(&view, &camera, 0, 400, &options(1.5));
+    let offsets = exact.iter().zip(&noisy).map(|(a, b)| {
+        let d = camera.camera_from_world(a.position).z;
+        (b.position - a.position).x / d * camera.focal_px.y
+    });
+    let sigma = (offsets.map(|o| o * o).sum::<f64>() / 400.0).sqrt();
+    assert!((1.3..1.7).contains(&sigma), "{sigma} px");
+}
+
+#[test]
+fn wrong_settings_are_named() {
+    let changes: [fn(&mut SynthOptions); 7] = [
+        |o| o.views = 0,
+        |o| o.held_out = o.views,
+        |o| o.width_px = 0,
+        |o| o.samples = 99,
+        |o| o.fov_y_deg = f64::NAN,
+        |o| o.radius = Some(-1.0),
+        |o| o.specular = f32::NAN,
+    ];
+    for change in changes {
+        let mut options = small();
+        change(&mut options);
+        let result = run(Path::new("absent.glb"), &options, Path::new("nowhere"), &mut Silent);
+        assert!(matches!(result, Err(SynthError::Options(_))), "{result:?}");
+    }
+}
+
+#[test]
+fn cancelling_leaves_no_data_set() {
+    struct Stop;
+    impl Observer for Stop {
+        fn signal(&self) -> Signal {
+            Signal::Cancel
+        }
+    }
+    let (out, _) = write(&small());
+    assert!(out.path().join("transforms.json").is_file());
+    let result = render_scene(&two_cubes(), "two", None, &small(), out.path(), &mut Stop);
+    assert!(matches!(result, Err(SynthError::Cancelled)));
+    assert!(!out.path().join("transforms.json").exists());
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("file");
+    fs::write(&file, b"in the way").unwrap();
+    let error = render_scene(&two_cubes(), "two", None, &small(), &file, &mut Silent).unwrap_err();
+    assert!(matches!(&error, SynthError::Write { path, .. } if path.starts_with(&file)), "{error}");
+}
+
+#[test]
+fn a_scene_without_area_is_refused() {
+    let (root, bin) = cubes(json!([{ "mesh": 0, "scale": [0, 0, 0] }]), json!([0]), json!([]));
+    let scene = gltf_mesh::read_slice(&glb(&root, &bin), "t.glb").unwrap();
+    let identities = levels::identities(&scene, Levels::Nodes, "t").unwrap();
+    assert!(matches!(stage(&scene, &identities), Err(SynthError::Empty)));
+}
+
+#[test]
+fn scenes_far_away_and_tiny_are_as_exact() {
+    let nodes = json!([{ "mesh": 0, "translation": [1e6, 0, 0], "scale": [0.001, 0.001, 0.001] }]);
+    let (root, bin) = cubes(nodes, json!([0]), json!([]));
+    let stage = stage_of(&gltf_mesh::read_slice(&glb(&root, &bin), "t.glb").unwrap());
+    let middle = DVec3::new(1e6, 0.0, 0.0);
+    let camera = Camera::look_at(middle + DVec3::new(0.0, 0.0, 0.004), middle, DVec3::Y, 0.5, 33, 33).unwrap();
+    let view = stage.render(&camera, 0, &small());
+    assert!((f64::from(view.depth[16 * 33 + 16]) / 0.0035 - 1.0).abs() < 1e-5);
+    assert_eq!(view.object[0], 0);
+}
+
+/// Names of objects and, in brackets, of their parts.
+fn named(scene: &MeshScene, levels: Levels) -> Vec<(String, Vec<String>)> {
+    let list = levels::identities(scene, levels, "file").unwrap().list;
+    assert!(list.iter().enumerate().all(|(i, identity)| usize::from(identity.id) == i + 1));
+    let parts = |id| list.iter().filter(|p| p.parent == Some(id)).map(|p| p.name.clone()).collect();
+    list.iter().filter(|i| i.level == Level::Object).map(|i| (i.name.clone(), parts(i.id))).collect()
+}
+
+fn expect(found: &[(String, Vec<String>)], expected: &[(&str, &[&str])]) {
+    let expected: Vec<(String, Vec<String>)> =
+        expected.iter().map(|(o, p)| ((*o).to_owned(), p.iter().map(|p| (*p).to_owned()).collect())).collect();
+    assert_eq!(found, expected);
+}
+
+#[test]
+fn levels_of_node_trees() {
+    let tree = |nodes: Value, roots: Value| {
+        let (root, bin) = cubes(nodes, roots, json!([]));
+        gltf_mesh::read_slice(&glb(&root, &bin), "t.glb").unwrap()
+    };
+    // Wrappers are skipped, a group without a name hands its meshes up, a lone mesh is a whole object.
+    let scene = tree(
+        json!([
+            { "name": "Scene", "children": [1] },
+            { "name": "RootNode", "children": [2, 6, 8] },
+            { "name": "mug", "children": [3, 4] },
+            { "name": "body", "mesh": 0 },
+            { "name": "handle", "children": [5] },
+            { "mesh": 0 },
+            { "name": "ball", "children": [7] },
+            { "name": "Object_1", "mesh": 0 },
+            { "name": "empty" },
+        ]),
+        json!([0]),
+    );
+    expect(&named(&scene, Levels::Nodes), &[("mug", &["body", "handle"]), ("ball", &[])]);
+    expect(&named(&scene, Levels::File), &[("file", &["body", "handle", "Object_1"])]);
+    // A lone group of plain meshes is an object; parts may lie below parts; own meshes are no part.
+    let scene = tree(
+        json!([
+            { "name": "bike", "children": [1, 2] },
+            { "name": "wheel", "mesh": 0 },
+            { "name": "frame", "mesh": 0, "children": [3] },
+            { "name": "fork", "mesh": 0 },
+        ]),
+        json!([0]),
+    );
+    expect(&named(&scene, Levels::Nodes), &[("bike", &["wheel", "frame", "fork"])]);
+    let scene = tree(json!([{ "mesh": 0, "children": [1] }, { "name": "lid", "mesh": 0 }]), json!([0]));
+    expect(&named(&scene, Levels::Nodes), &[("node 0", &["lid"])]);
+    let ids = levels::identities(&scene, Levels::Nodes, "t").unwrap().of_node;
+    assert_eq!((ids[0].object, ids[0].part, ids[1].object, ids[1].part), (1, 0, 1, 2));
+}
+
+#[test]
+fn levels_of_real_scenes() {
+    let Some(folder) = real_scenes() else { return };
+    let of = |file: &str| named(&gltf_mesh::read(&folder.join(file)).unwrap(), Levels::Nodes);
+    expect(&of("CesiumMilkTruck/CesiumMilkTruck.glb"), &[("Cesium_Milk_Truck", &["Wheels", "Wheels.001"])]);
+    expect(
+        &of("kenney_vehicles/vehicle-motorcycle.glb"),
+        &[("motorcycle", &["wheel-back", "wheel-front", "body", "fork"])],
+    );
+    expect(&of("ToyCar/ToyCar.gltf"), &[("ToyCar", &[]), ("Fabric", &[]), ("Glass", &[])]);
+    assert_eq!(of("sunglasses/sunglasses.glb").len(), 8);
+    assert_eq!(of("kenney_vehicles/vehicle-truck-red.glb").len(), 6);
+    let truck = gltf_mesh::read(&folder.join("kenney_vehicles/vehicle-truck-red.glb")).unwrap();
+    assert_eq!(named(&truck, Levels::File)[0].1.len(), 6);
+}
+
+#[test]
+fn real_scenes_are_rendered() {
+    let Some(folder) = real_scenes() else { return };
+    let options = SynthOptions { views: 3, held_out: 1, ..small() };
+    for file in
+        ["CesiumMilkTruck/CesiumMilkTruck.glb", "SheenChair/SheenChair.gltf", "kenney_vehicles/vehicle-truck-red.glb"]
+    {
+        let out = tempfile::tempdir().unwrap();
+        let report = run(&folder.join(file), &options, out.path(), &mut Silent).unwrap();
+        let seen: u64 = report.identities.iter().filter(|i| i.level == Level::Object).map(|i| i.pixels).sum();
+        let share = seen as f64 / (3.0 * 64.0 * 48.0);
+        assert!((0.12..0.8).contains(&share), "{file}: {share} of the pictures show the scene");
+    }
+}
+
+#[test]
+fn the_demo_shows_every_thing_and_part() {
+    let out = tempfile::tempdir().unwrap();
+    let options = SynthOptions { width_px: 160, height_px: 120, samples: 1, points: 500, ..demo::demo_options() };
+    let scene = gltf_mesh::read_slice(demo_glb(), "demo.glb").unwrap();
+    let report = render_scene(&scene, "demo", None, &options, out.path(), &mut Silent).unwrap();
+    assert!(report.warnings.is_empty());
+    for identity in &report.identities {
+        let enough = if identity.level == Level::Object { 40 } else { 4 };
+        assert!(identity.views >= enough, "{} is seen in {} of 64 photos", identity.path, identity.views);
+    }
+    assert!(!demo::demo_is_written(out.path()), "other settings than the demo's");
+}

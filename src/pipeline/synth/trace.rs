@@ -1,0 +1,78 @@
+//! Rays against the triangles, through a bounding volume hierarchy.
+
+use std::time::Duration;
+
+use glam::{Vec3, Vec3A};
+use obvhs::BvhBuildParams;
+use obvhs::cwbvh::CwBvh;
+use obvhs::cwbvh::builder::build_cwbvh_from_tris;
+use obvhs::ray::{Ray, RayHit};
+use obvhs::rt_triangle::RtTriangle;
+
+use super::surface::Surface;
+
+/// Where a ray meets the surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Hit {
+    /// Distance in lengths of the ray's direction.
+    pub t: f32,
+    /// Index of the triangle.
+    pub triangle: usize,
+    /// Weights of the triangle's corners, which sum to one.
+    pub weights: Vec3,
+}
+
+/// The hierarchy over a surface.
+pub struct Tracer {
+    bvh: CwBvh,
+    /// In the order of the hierarchy's leaves.
+    triangles: Vec<RtTriangle>,
+    /// Index in the surface of each.
+    original: Vec<u32>,
+}
+
+impl Tracer {
+    /// Builds it.
+    pub fn new(surface: &Surface) -> Self {
+        let triangles: Vec<obvhs::triangle::Triangle> = surface
+            .triangles
+            .iter()
+            .map(|t| surface.corners(t))
+            .map(|[v0, v1, v2]| obvhs::triangle::Triangle { v0, v1, v2 })
+            .collect();
+        let bvh = build_cwbvh_from_tris(&triangles, BvhBuildParams::fast_build(), &mut Duration::default());
+        let original = bvh.primitive_indices.clone();
+        let triangles = original.iter().map(|&i| RtTriangle::from(&triangles[i as usize])).collect();
+        Self { bvh, triangles, original }
+    }
+
+    /// The nearest surface from `origin` along `direction`, from `t_min` on.
+    pub fn nearest(&self, origin: Vec3A, direction: Vec3A, t_min: f32) -> Option<Hit> {
+        let ray = Ray::new(origin, direction, t_min, f32::INFINITY);
+        let mut hit = RayHit::none();
+        if !self.bvh.ray_traverse(ray, &mut hit, |ray, i| self.triangles[i].intersect(ray)) {
+            return None;
+        }
+        let i = hit.primitive_id as usize;
+        let w = self.triangles[i].compute_barycentric(&ray);
+        let weights = Vec3::new(1.0 - w.x - w.y, w.x, w.y);
+        Some(Hit { t: hit.t, triangle: self.original[i] as usize, weights })
+    }
+
+    /// Whether the way from `origin` to `origin + direction` is free of surfaces, those left out
+    /// for which `passes` holds.
+    pub fn free(&self, origin: Vec3A, direction: Vec3A, passes: impl Fn(usize, Vec3) -> bool) -> bool {
+        let ray = Ray::new(origin, direction, 0.0, 1.0);
+        self.bvh.ray_traverse_miss(ray, |ray, i| {
+            let triangle = &self.triangles[i];
+            let t = triangle.intersect(ray);
+            if t.is_finite() {
+                let w = triangle.compute_barycentric(ray);
+                if passes(self.original[i] as usize, Vec3::new(1.0 - w.x - w.y, w.x, w.y)) {
+                    return f32::INFINITY;
+                }
+            }
+            t
+        })
+    }
+}

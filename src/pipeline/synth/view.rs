@@ -1,0 +1,200 @@
+//! One photo: colours, depth and ids.
+
+use glam::{DVec2, Vec3A};
+use rayon::prelude::*;
+
+use super::levels::NodeIds;
+use super::light::{Light, Lit, highlight};
+use super::material::Materials;
+use super::options::SynthOptions;
+use super::surface::Surface;
+use super::texture::{linear, srgb_byte};
+use super::trace::{Hit, Tracer};
+use crate::scene::Camera;
+
+/// Surfaces that one sample looks through at most.
+const MAX_LAYERS: usize = 16;
+/// A sample stops when less than this of it is left uncovered.
+const MIN_TRANSMITTANCE: f32 = 1.0 / 512.0;
+/// Samples of a pixel that differ by more than this in linear light call for more samples.
+const MAX_DIFFERENCE: f32 = 0.02;
+
+/// A rendered photo; all lists are row-major.
+pub struct View {
+    /// sRGB.
+    pub rgb: Vec<[u8; 3]>,
+    /// Depth along the camera's axis at the pixel's centre in scene units; 0 = nothing there.
+    pub depth: Vec<f32>,
+    /// Object at the pixel's centre; 0 = none.
+    pub object: Vec<u16>,
+    /// Part at the pixel's centre; 0 = none.
+    pub part: Vec<u16>,
+}
+
+/// Everything that rendering needs.
+pub struct Stage {
+    /// Triangles.
+    pub surface: Surface,
+    /// Their hierarchy.
+    pub tracer: Tracer,
+    /// Their look.
+    pub materials: Materials,
+    /// The light on them.
+    pub light: Light,
+}
+
+impl Stage {
+    /// Renders the scene from `camera`; `view` is the photo's number, for its random numbers.
+    pub fn render(&self, camera: &Camera, view: usize, options: &SynthOptions) -> View {
+        let (w, h) = (camera.width_px as usize, camera.height_px as usize);
+        let rows: Vec<Vec<Pixel>> =
+            (0..h).into_par_iter().map(|y| (0..w).map(|x| self.pixel(camera, x, y, view, options)).collect()).collect();
+        let pixels = || rows.iter().flatten();
+        View {
+            rgb: pixels().map(|p| p.rgb).collect(),
+            depth: pixels().map(|p| p.depth).collect(),
+            object: pixels().map(|p| p.object).collect(),
+            part: pixels().map(|p| p.part).collect(),
+        }
+    }
+
+    /// The scene as the light needs it.
+    pub fn lit(&self) -> Lit<'_> {
+        Lit { surface: &self.surface, tracer: &self.tracer, materials: &self.materials }
+    }
+
+    /// Ids and depth at the centre; colour as the mean of `samples` x `samples` stratified samples,
+    /// of five where those are alike.
+    fn pixel(&self, camera: &Camera, x: usize, y: usize, view: usize, options: &SynthOptions) -> Pixel {
+        let origin = self.surface.local(camera.center);
+        let (px, py) = (x as f64, y as f64);
+        let along = |dx: f64, dy: f64| camera.ray(DVec2::new(px + dx, py + dy)).as_vec3a();
+        let n = options.samples;
+        // Tangent of the angle between two samples.
+        let step = 1.0 / (camera.focal_px.y as f32 * n as f32);
+        let background = Vec3A::from_array(options.background.map(|c| linear(f32::from(c) / 255.0)));
+        let look = |dx: f64, dy: f64| self.sample(origin, along(dx, dy), step, background, options.specular);
+        let stratum = |i: u32| {
+            let [jx, jy] = jitter(options.seed, view, y * camera.width_px as usize + x, i);
+            look((f64::from(i % n) + jx) / f64::from(n), (f64::from(i / n) + jy) / f64::from(n))
+        };
+        let center = look(0.5, 0.5);
+        let mean = if n <= 2 {
+            (0..n * n).map(|i| stratum(i).color).sum::<Vec3A>() / (n * n) as f32
+        } else {
+            let corners = [0, n - 1, n * (n - 1), n * n - 1];
+            let first = corners.map(stratum);
+            let sum: Vec3A = first.iter().map(|s| s.color).sum();
+            if first.iter().all(|s| s.is_like(&center)) {
+                (sum + center.color) / 5.0
+            } else {
+                let others = (0..n * n).filter(|i| !corners.contains(i));
+                (sum + others.map(|i| stratum(i).color).sum::<Vec3A>()) / (n * n) as f32
+            }
+        };
+        let rgb = [srgb_byte(mean.x), srgb_byte(mean.y), srgb_byte(mean.z)];
+        Pixel { rgb, depth: center.depth, object: center.ids.object, part: center.ids.part }
+    }
+
+    /// What arrives along a ray of unit depth: linear light, through whatever lets it through, and
+    /// the first surface that does not.
+    fn sample(&self, origin: Vec3A, direction: Vec3A, step: f32, background: Vec3A, specular: f32) -> Sample {
+        let (mut out, mut left, mut t_min) = (Sample::default(), 1.0_f32, 0.0_f32);
+        for _ in 0..MAX_LAYERS {
+            let Some(hit) = self.tracer.nearest(origin, direction, t_min) else { break };
+            let (color, alpha) = self.shade(&hit, direction, step, specular);
+            out.color += color * (alpha * left);
+            left *= 1.0 - alpha;
+            if alpha >= 0.5 && out.depth == 0.0 {
+                let triangle = &self.surface.triangles[hit.triangle];
+                // The direction has unit depth, so its multiple is the depth.
+                out.depth = (f64::from(hit.t) * self.surface.unit) as f32;
+                (out.ids, out.material) = (triangle.ids, triangle.material);
+            }
+            if left < MIN_TRANSMITTANCE {
+                left = 0.0;
+                break;
+            }
+            t_min = behind(hit.t);
+        }
+        out.color = (out.color + background * left).clamp(Vec3A::ZERO, Vec3A::ONE);
+        out
+    }
+
+    /// Colour and cover of a point.
+    fn shade(&self, hit: &Hit, direction: Vec3A, step: f32, specular: f32) -> (Vec3A, f32) {
+        let triangle = &self.surface.triangles[hit.triangle];
+        let material = self.materials.get(triangle.material);
+        let look = self.materials.look(&self.surface, triangle, hit.weights, hit.t * step);
+        if material.unlit || look.alpha <= 0.0 {
+            return (look.albedo, look.alpha);
+        }
+        let corners = triangle.vertices.map(|v| &self.surface.vertices[v as usize]);
+        let [a, b, c] = corners.map(|v| v.position);
+        let smooth = super::surface::blend(corners.map(|v| v.normal), hit.weights).normalize_or_zero();
+        let flat = (b - a).cross(c - a);
+        // Which face is seen is decided by the triangle, not by its interpolated normal, which may
+        // already look away at an outline.
+        let outward = if flat.dot(smooth) < 0.0 { -flat } else { flat };
+        let front = outward.dot(direction) <= 0.0;
+        let (diffuse, key) = self.light.at(self.lit(), triangle, hit.weights, front);
+        let mut color = look.albedo * diffuse + look.emission;
+        if specular > 0.0 && key > 0.0 {
+            let normal = if front { smooth } else { -smooth };
+            let reflectance = Vec3A::splat(0.04).lerp(look.albedo, material.metallic.clamp(0.0, 1.0));
+            let to_eye = -direction.normalize_or_zero();
+            color += highlight(normal, to_eye, material.roughness, reflectance) * (key * specular);
+        }
+        (color, look.alpha)
+    }
+}
+
+/// What one ray sees.
+#[derive(Clone, Copy, Default)]
+struct Sample {
+    /// Linear, 0 to 1.
+    color: Vec3A,
+    /// In scene units, 0 for none.
+    depth: f32,
+    ids: NodeIds,
+    material: u32,
+}
+
+impl Sample {
+    /// Whether two samples of a pixel lie on the same smooth piece of surface.
+    fn is_like(&self, other: &Self) -> bool {
+        let same = self.ids == other.ids && self.material == other.material;
+        let differs = (self.color - other.color).abs().max_element() > MAX_DIFFERENCE;
+        same && !differs && (self.depth - other.depth).abs() <= 0.02 * self.depth
+    }
+}
+
+/// What a pixel shows.
+#[derive(Clone, Copy, Default)]
+struct Pixel {
+    rgb: [u8; 3],
+    depth: f32,
+    object: u16,
+    part: u16,
+}
+
+/// The next start of a ray that goes on behind a surface at `t`.
+fn behind(t: f32) -> f32 {
+    t * (1.0 + 4.0 * f32::EPSILON) + 1e-6
+}
+
+/// Two numbers in 0..1 for one sample of one pixel of one view.
+fn jitter(seed: u64, view: usize, pixel: usize, sample: u32) -> [f64; 2] {
+    let mut h = mix(seed ^ mix(view as u64 ^ mix((pixel as u64) << 8 | u64::from(sample))));
+    let first = h >> 11;
+    h = mix(h);
+    [first, h >> 11].map(|v| v as f64 / (1_u64 << 53) as f64)
+}
+
+/// SplitMix64's finaliser: every bit of the input reaches every bit of the output.
+fn mix(x: u64) -> u64 {
+    let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}

@@ -1,0 +1,152 @@
+//! Files of a synthetic data set.
+
+use std::fs::{self, File};
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+use npyz::WriterBuilder;
+use serde_json::json;
+
+use super::levels::Identity;
+use super::options::SynthOptions;
+use super::view::View;
+use super::{SynthError, opengl_pose};
+use crate::scene::{Camera, SparsePoint};
+
+/// The file whose presence makes the folder a data set; written last.
+pub const TRANSFORMS: &str = "transforms.json";
+/// Settings and fingerprint.
+pub const SETTINGS: &str = "synth.json";
+
+/// Writes into one folder.
+pub struct Writer {
+    out: PathBuf,
+    /// Digits of a photo's number.
+    digits: usize,
+}
+
+impl Writer {
+    /// Makes the folders. Takes away what marks an earlier data set as complete.
+    pub fn new(out: &Path, views: usize) -> Result<Self, SynthError> {
+        for folder in ["images", "object_ids", "part_ids", "depth"] {
+            let path = out.join(folder);
+            fs::create_dir_all(&path).map_err(|source| SynthError::Write { path, source })?;
+        }
+        for marker in [TRANSFORMS, SETTINGS] {
+            let path = out.join(marker);
+            match fs::remove_file(&path) {
+                Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+                    return Err(SynthError::Write { path, source });
+                }
+                _ => {}
+            }
+        }
+        Ok(Self { out: out.to_owned(), digits: views.saturating_sub(1).to_string().len().max(4) })
+    }
+
+    /// Writes the files of photo `index`.
+    pub fn photo(&self, index: usize, camera: &Camera, view: &View) -> Result<(), SynthError> {
+        let (w, h) = (camera.width_px, camera.height_px);
+        let stem = self.stem(index);
+        self.file(&format!("images/{stem}.png"), |f| png(f, view.rgb.as_flattened(), w, h, ExtendedColorType::Rgb8))?;
+        for (folder, ids) in [("object_ids", &view.object), ("part_ids", &view.part)] {
+            let bytes = bytemuck::cast_slice(ids);
+            self.file(&format!("{folder}/{stem}.png"), |f| png(f, bytes, w, h, ExtendedColorType::L16))?;
+        }
+        self.file(&format!("depth/{stem}.npy"), |f| {
+            let shape = [u64::from(h), u64::from(w)];
+            let mut npy = npyz::WriteOptions::new().default_dtype().shape(&shape).writer(f).begin_nd()?;
+            npy.extend(view.depth.iter().copied())?;
+            npy.finish()
+        })
+    }
+
+    /// Writes what is about all photos.
+    #[expect(clippy::too_many_arguments, reason = "one call, each argument a file's content")]
+    pub fn finish(
+        &self,
+        scene: &str,
+        fingerprint: Option<u64>,
+        options: &SynthOptions,
+        cameras: &[Camera],
+        test: &[bool],
+        identities: &[Identity],
+        points: &[SparsePoint],
+    ) -> Result<(), SynthError> {
+        let identities = json!({ "version": 1, "scene": scene, "identities": identities });
+        self.json("identities.json", &identities)?;
+        if !points.is_empty() {
+            self.file("points3D.ply", |f| ply(f, points))?;
+        }
+        self.json(SETTINGS, &json!({ "version": 1, "scene": fingerprint, "options": options }))?;
+        self.json(TRANSFORMS, &self.transforms(options, cameras, test, !points.is_empty()))
+    }
+
+    fn transforms(&self, options: &SynthOptions, cameras: &[Camera], test: &[bool], ply: bool) -> serde_json::Value {
+        let name = |i: usize| format!("images/{}.png", self.stem(i));
+        let frames: Vec<_> = cameras
+            .iter()
+            .enumerate()
+            .map(|(i, c)| json!({ "file_path": name(i), "transform_matrix": opengl_pose(c) }))
+            .collect();
+        let listed = |held: bool| (0..cameras.len()).filter(|&i| test[i] == held).map(name).collect::<Vec<_>>();
+        // All photos of a run share one lens.
+        let c = &cameras[0];
+        let mut out = json!({
+            "camera_model": "OPENCV",
+            "w": c.width_px, "h": c.height_px,
+            "fl_x": c.focal_px.x, "fl_y": c.focal_px.y,
+            "cx": c.principal_px.x, "cy": c.principal_px.y,
+            "k1": 0.0, "k2": 0.0, "p1": 0.0, "p2": 0.0,
+            "background": options.background.map(|b| f32::from(b) / 255.0),
+            "train_filenames": listed(false),
+            "val_filenames": listed(true),
+            "test_filenames": listed(true),
+            "frames": frames,
+        });
+        if ply {
+            out["ply_file_path"] = "points3D.ply".into();
+        }
+        out
+    }
+
+    fn stem(&self, index: usize) -> String {
+        format!("{index:0digits$}", digits = self.digits)
+    }
+
+    fn json(&self, name: &str, value: &serde_json::Value) -> Result<(), SynthError> {
+        self.file(name, |f| serde_json::to_writer_pretty(f, value).map_err(Into::into))
+    }
+
+    fn file(
+        &self,
+        name: &str,
+        write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
+    ) -> Result<(), SynthError> {
+        let path = self.out.join(name);
+        let result = File::create(&path).map(BufWriter::new).and_then(|mut f| {
+            write(&mut f)?;
+            f.flush()
+        });
+        result.map_err(|source| SynthError::Write { path, source })
+    }
+}
+
+fn png(f: &mut BufWriter<File>, bytes: &[u8], w: u32, h: u32, color: ExtendedColorType) -> std::io::Result<()> {
+    PngEncoder::new(f).write_image(bytes, w, h, color).map_err(std::io::Error::other)
+}
+
+/// Binary PLY of coloured points.
+fn ply(f: &mut BufWriter<File>, points: &[SparsePoint]) -> std::io::Result<()> {
+    writeln!(f, "ply\nformat binary_little_endian 1.0\nelement vertex {}", points.len())?;
+    writeln!(f, "property float x\nproperty float y\nproperty float z")?;
+    writeln!(f, "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header")?;
+    for p in points {
+        for c in p.position.to_array() {
+            f.write_all(&(c as f32).to_le_bytes())?;
+        }
+        f.write_all(&p.rgb)?;
+    }
+    Ok(())
+}
