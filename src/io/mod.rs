@@ -9,6 +9,7 @@ pub mod colmap;
 mod compressed_ply;
 mod error;
 pub mod files;
+pub mod gltf_mesh;
 mod listing;
 pub mod llff;
 mod open;

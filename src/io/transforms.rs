@@ -25,6 +25,16 @@ struct File {
     ply_file_path: Option<String>,
     #[serde(default)]
     test_filenames: Vec<String>,
+    /// What this program's own data sets say beyond nerfstudio's keys.
+    #[serde(default)]
+    fmlgs: Own,
+}
+
+/// See [`File::fmlgs`].
+#[derive(Default, Deserialize)]
+struct Own {
+    /// sRGB colour behind everything, 0 to 1.
+    background: Option<[f32; 3]>,
 }
 
 #[derive(Deserialize)]
@@ -86,7 +96,7 @@ pub fn read(file: &Path) -> Result<Dataset, IoError> {
         format: "transforms.json".into(),
         photos,
         points,
-        background: None,
+        background: parsed.fmlgs.background.filter(|b| b.iter().all(|c| (0.0..=1.0).contains(c))),
         warnings,
     })
 }

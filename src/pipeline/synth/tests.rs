@@ -289,6 +289,25 @@ fn poses_and_points_fit_the_photos() {
 }
 
 #[test]
+fn the_reader_gets_back_what_was_rendered() {
+    let options = SynthOptions { background: [255, 51, 0], ..small() };
+    let (out, report) = write(&options);
+    let dataset = crate::io::transforms::read(&out.path().join("transforms.json")).unwrap();
+    assert!(dataset.warnings.is_empty(), "{:?}", dataset.warnings);
+    assert_eq!((dataset.photos.len(), dataset.points.len()), (6, report.points));
+    assert_eq!(dataset.background, Some([1.0, 0.2, 0.0]));
+    let (train, test) = dataset.split(8);
+    assert_eq!((train.len(), test.len()), (report.train_views, report.held_out_views));
+    let stage = stage_of(&two_cubes());
+    for (photo, camera) in dataset.photos.iter().zip(rig::cameras(&stage.surface, &stage.tracer, &options)) {
+        assert!(photo.distortion.is_none());
+        assert!(photo.camera.center.distance(camera.center) < 1e-9);
+        let p = DVec3::new(0.2, 0.3, 0.1);
+        assert!(photo.camera.project(p).unwrap().distance(camera.project(p).unwrap()) < 1e-6);
+    }
+}
+
+#[test]
 fn noise_moves_points_by_its_size() {
     let stage = stage_of(&two_cubes());
     let camera = Camera::look_at(DVec3::new(0.5, 1.0, 4.0), DVec3::ZERO, DVec3::Y, 0.7, 64, 48).unwrap();
