@@ -1,5 +1,6 @@
 //! Plain mathematics with no knowledge of scenes: everything here is pure and total.
 
+pub mod colormap;
 pub mod lanes;
 pub mod real;
 pub mod rotation;

@@ -6,6 +6,7 @@ pub mod cloud;
 pub mod dataset;
 pub mod history;
 pub mod photo;
+pub mod plan;
 
 pub use bounds::Bounds;
 pub use camera::{Camera, CameraError};
@@ -13,3 +14,4 @@ pub use cloud::{CloudError, ExtraProperty, Gaussian, GaussianCloud};
 pub use dataset::{Dataset, SparsePoint};
 pub use history::{Evaluation, StepMetrics, ViewScore};
 pub use photo::{Distortion, Photo, PhotoPixels};
+pub use plan::{Machine, PlanLine, ScenePlan};

@@ -1,1 +1,23 @@
-//! (see lib.rs)
+//! The background: long jobs, short jobs and the drawing of the viewport, each on its own thread.
+//!
+//! Control runs in three closed enums: [`Action`] (what a person wants), [`Command`] (what a job is
+//! to do), [`Event`] (what happened). Bulk data never queues: it is published in a [`Slot`].
+
+pub mod action;
+pub mod control;
+pub mod jobs;
+pub mod machine;
+pub mod observer;
+mod paint;
+pub mod places;
+pub mod preview;
+pub mod protocol;
+pub mod slot;
+pub mod thread;
+pub mod view;
+
+pub use action::{Action, Pane, Shortcut, ViewMode};
+pub use control::Control;
+pub use protocol::{Command, Event, Failure, HomeView, JobId, JobKind, Lane, OpenedScene, Outcome, Stop};
+pub use slot::Slot;
+pub use thread::{CloudSnapshot, Jobs, QueueFull, Repaint, Worker};

@@ -1,0 +1,279 @@
+//! What a person can want of the program: one closed enum from which menus, the command palette,
+//! the shortcut sheet and the key bindings are generated.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+/// What the viewport shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum ViewMode {
+    /// The rendered picture.
+    #[default]
+    Picture,
+    /// Expected depth, turbo colours from near to far.
+    Depth,
+    /// Accumulated opacity.
+    Alpha,
+    /// Absolute difference from the photo.
+    Difference,
+}
+
+impl ViewMode {
+    /// All of them, in the order of the toolbar.
+    pub const ALL: [Self; 4] = [Self::Picture, Self::Depth, Self::Alpha, Self::Difference];
+
+    /// Its name.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Picture => "Picture",
+            Self::Depth => "Depth",
+            Self::Alpha => "Alpha",
+            Self::Difference => "Difference",
+        }
+    }
+}
+
+/// A part of the window that can be hidden.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Pane {
+    /// Thumbnails and facts of the photos.
+    Dataset,
+    /// Settings, progress and plots of training.
+    Training,
+    /// What is left out for this scene, and why.
+    Plan,
+    /// Messages.
+    Log,
+}
+
+impl Pane {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Dataset, Self::Training, Self::Plan, Self::Log];
+
+    /// Its title.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Dataset => "Photos",
+            Self::Training => "Training",
+            Self::Plan => "Scene plan",
+            Self::Log => "Log",
+        }
+    }
+}
+
+/// A key with modifiers. Keys are named as on the keyboard: "F", "Home", "F1", "[".
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Shortcut {
+    /// Control (Command on a Mac).
+    pub ctrl: bool,
+    /// The key's name.
+    pub key: &'static str,
+}
+
+/// What a person wants.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Action {
+    /// Make the demo scene, open it and train it.
+    TryDemo,
+    /// Choose a folder of photos or a trained scene.
+    OpenFolder,
+    /// Choose a file.
+    OpenFile,
+    /// Open this file or folder.
+    Open(PathBuf),
+    /// Write the Gaussians as a `.ply`.
+    ExportPly,
+    /// Write what the viewport shows as a `.png`.
+    Screenshot,
+    /// Start training, or go on from the last checkpoint.
+    StartTraining,
+    /// Pause or resume training.
+    PauseTraining,
+    /// Cancel the running job.
+    Cancel,
+    /// Measure PSNR and SSIM on the held-out photos.
+    Evaluate,
+    /// Bring the scene into view.
+    FrameScene,
+    /// Go back to the first view.
+    ResetView,
+    /// Look through the previous photo's camera.
+    PreviousPhoto,
+    /// Look through the next photo's camera.
+    NextPhoto,
+    /// Look through the camera of the photo with this index.
+    GoToPhoto(usize),
+    /// Choose what the viewport shows.
+    Show(ViewMode),
+    /// Show or hide the photo beside the picture.
+    ToggleCompare,
+    /// Show or hide the cameras of the photos.
+    ToggleCameras,
+    /// Show or hide a pane.
+    TogglePane(Pane),
+    /// Search all actions.
+    Palette,
+    /// List all shortcuts.
+    Shortcuts,
+    /// Close the window.
+    Quit,
+}
+
+impl Action {
+    /// Every action that needs no further input, in the order of the palette.
+    pub const ALL: [Self; 25] = [
+        Self::TryDemo,
+        Self::OpenFolder,
+        Self::OpenFile,
+        Self::ExportPly,
+        Self::Screenshot,
+        Self::StartTraining,
+        Self::PauseTraining,
+        Self::Cancel,
+        Self::Evaluate,
+        Self::FrameScene,
+        Self::ResetView,
+        Self::PreviousPhoto,
+        Self::NextPhoto,
+        Self::Show(ViewMode::Picture),
+        Self::Show(ViewMode::Depth),
+        Self::Show(ViewMode::Alpha),
+        Self::Show(ViewMode::Difference),
+        Self::ToggleCompare,
+        Self::ToggleCameras,
+        Self::TogglePane(Pane::Dataset),
+        Self::TogglePane(Pane::Training),
+        Self::TogglePane(Pane::Plan),
+        Self::TogglePane(Pane::Log),
+        Self::Palette,
+        Self::Shortcuts,
+    ];
+
+    /// Its name in menus and in the palette.
+    pub fn text(&self) -> String {
+        match self {
+            Self::TryDemo => "Try the demo".into(),
+            Self::OpenFolder => "Open folder…".into(),
+            Self::OpenFile => "Open file…".into(),
+            Self::Open(path) => format!("Open {}", path.display()),
+            Self::ExportPly => "Export Gaussians as .ply…".into(),
+            Self::Screenshot => "Save the view as .png…".into(),
+            Self::StartTraining => "Start training".into(),
+            Self::PauseTraining => "Pause or resume training".into(),
+            Self::Cancel => "Cancel the running job".into(),
+            Self::Evaluate => "Measure held-out quality".into(),
+            Self::FrameScene => "Frame the scene".into(),
+            Self::ResetView => "Reset the view".into(),
+            Self::PreviousPhoto => "Previous photo".into(),
+            Self::NextPhoto => "Next photo".into(),
+            Self::GoToPhoto(index) => format!("Go to photo {}", index + 1),
+            Self::Show(mode) => format!("Show {}", mode.text().to_lowercase()),
+            Self::ToggleCompare => "Compare with the photo".into(),
+            Self::ToggleCameras => "Show or hide cameras".into(),
+            Self::TogglePane(pane) => format!("Show or hide the {} pane", pane.text().to_lowercase()),
+            Self::Palette => "Command palette".into(),
+            Self::Shortcuts => "Keyboard shortcuts".into(),
+            Self::Quit => "Quit".into(),
+        }
+    }
+
+    /// One sentence on what it does.
+    pub fn tooltip(&self) -> &'static str {
+        match self {
+            Self::TryDemo => {
+                "Render a table-top scene into posed photos, open them and train at once. Needs no download."
+            }
+            Self::OpenFolder => "COLMAP, transforms.json (nerfstudio, instant-ngp, Blender), LLFF, or a trained scene.",
+            Self::OpenFile => "A splat .ply, a transforms.json, or the scene.json of a trained scene.",
+            Self::Open(_) => "Open this path.",
+            Self::ExportPly => "Write the Gaussians in the format that 3DGS viewers read.",
+            Self::Screenshot => "Write the picture in the viewport, without the drawn cameras.",
+            Self::StartTraining => {
+                "Fit Gaussians to the photos. Continues from the last checkpoint if the settings are the same."
+            }
+            Self::PauseTraining => "Hold training without losing its state.",
+            Self::Cancel => "Stop the running job at its next step. What is trained so far stays.",
+            Self::Evaluate => "PSNR and SSIM on the photos that training does not see.",
+            Self::FrameScene => "Move back until all of the scene is in view.",
+            Self::ResetView => "Return to the view with which the scene opened.",
+            Self::PreviousPhoto | Self::NextPhoto | Self::GoToPhoto(_) => "Look through the camera of a photo.",
+            Self::Show(ViewMode::Picture) => "The rendered picture.",
+            Self::Show(ViewMode::Depth) => "Distance from the camera, near to far as blue to red.",
+            Self::Show(ViewMode::Alpha) => "Accumulated opacity, black to white.",
+            Self::Show(ViewMode::Difference) => {
+                "Absolute difference from the photo, four times amplified. Needs a photo's view."
+            }
+            Self::ToggleCompare => "Show the photo beside the picture with a slider between them.",
+            Self::ToggleCameras => "Draw the camera of every photo into the view.",
+            Self::TogglePane(_) => "Show or hide this part of the window.",
+            Self::Palette => "Find and run any action by name.",
+            Self::Shortcuts => "List every key and mouse gesture.",
+            Self::Quit => "Close the window. A running training keeps its last checkpoint.",
+        }
+    }
+
+    /// The key that runs it, if it has one.
+    pub fn shortcut(&self) -> Option<Shortcut> {
+        let plain = |key| Some(Shortcut { ctrl: false, key });
+        let ctrl = |key| Some(Shortcut { ctrl: true, key });
+        match self {
+            Self::OpenFolder => ctrl("O"),
+            Self::ExportPly => ctrl("E"),
+            Self::Screenshot => ctrl("S"),
+            Self::StartTraining => ctrl("T"),
+            Self::PauseTraining => plain("T"),
+            Self::Cancel => plain("Escape"),
+            Self::FrameScene => plain("F"),
+            Self::ResetView => plain("Home"),
+            Self::PreviousPhoto => plain("["),
+            Self::NextPhoto => plain("]"),
+            Self::Show(ViewMode::Picture) => plain("1"),
+            Self::Show(ViewMode::Depth) => plain("5"),
+            Self::Show(ViewMode::Difference) => plain("6"),
+            Self::Show(ViewMode::Alpha) => plain("7"),
+            Self::ToggleCompare => plain("C"),
+            Self::ToggleCameras => plain("V"),
+            Self::Palette => ctrl("P"),
+            Self::Shortcuts => plain("F1"),
+            Self::Quit => ctrl("Q"),
+            Self::TryDemo
+            | Self::OpenFile
+            | Self::Open(_)
+            | Self::Evaluate
+            | Self::GoToPhoto(_)
+            | Self::TogglePane(_) => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn no_two_actions_share_a_key_or_a_name() {
+        let all: Vec<Action> = Action::ALL.into_iter().chain([Action::Quit]).collect();
+        let keys: Vec<Shortcut> = all.iter().filter_map(Action::shortcut).collect();
+        assert_eq!(keys.iter().collect::<HashSet<_>>().len(), keys.len());
+        let names: HashSet<String> = all.iter().map(Action::text).collect();
+        assert_eq!(names.len(), all.len());
+    }
+
+    #[test]
+    fn no_action_takes_a_flying_key() {
+        for action in Action::ALL {
+            if let Some(Shortcut { ctrl: false, key }) = action.shortcut() {
+                assert!(!["W", "A", "S", "D", "Q", "E"].contains(&key), "{action:?} would stop flying");
+            }
+        }
+    }
+
+    #[test]
+    fn every_action_is_explained() {
+        for action in Action::ALL {
+            assert!(action.tooltip().ends_with('.'), "{action:?}");
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! What each command does: the only implementation of [`Jobs`] that ships.
+
+use std::path::Path;
+use std::sync::{Arc, OnceLock};
+
+use super::machine;
+use super::places::Places;
+use super::preview::{home_view, sparse_cloud};
+use super::protocol::{Command, Failure, OpenedScene, Outcome, Stop};
+use super::thread::Jobs;
+use crate::io::{self, IoError, OpenError, Opened, TrainedScene, trained};
+use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::train::TrainConfig;
+use crate::scene::{Dataset, GaussianCloud, Machine, PhotoPixels, ScenePlan};
+
+/// Runs commands on the pipeline.
+pub struct PipelineJobs {
+    places: Places,
+    machine: OnceLock<Machine>,
+}
+
+impl PipelineJobs {
+    /// Keeps what it makes in `places`.
+    pub fn new(places: Places) -> Self {
+        Self { places, machine: OnceLock::new() }
+    }
+
+    /// What the machine offers, looked up once.
+    fn machine(&self) -> &Machine {
+        self.machine.get_or_init(machine::look)
+    }
+
+    fn open(&self, path: &Path, observer: &mut dyn Observer) -> Result<OpenedScene, Stop> {
+        let path = &std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+        let mut scene = match io::open(path).map_err(|e| open_failure(&e))? {
+            Opened::Dataset(dataset) => self.dataset_scene(dataset, observer),
+            Opened::Cloud(cloud) => {
+                let name = path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+                OpenedScene { name, cloud: Some(Arc::new(cloud)), trained: true, ..OpenedScene::default() }
+            }
+            Opened::Trained(trained) => trained_scene(trained, observer),
+        };
+        scene.path.clone_from(path);
+        let (dataset, cloud) = (scene.dataset.as_deref(), scene.cloud.as_deref());
+        if scene.home.camera.is_none() {
+            scene.home = home_view(dataset, cloud);
+        }
+        scene.plan = self.plan(dataset, cloud.filter(|_| scene.trained), &TrainConfig::default());
+        Ok(scene)
+    }
+
+    fn plan(&self, dataset: Option<&Dataset>, cloud: Option<&GaussianCloud>, config: &TrainConfig) -> ScenePlan {
+        ScenePlan::of(dataset, cloud, self.machine(), config.max_side_px, config.sh_degree)
+    }
+
+    /// Photos, with the Gaussians that were trained on them before, if there are any.
+    fn dataset_scene(&self, dataset: Dataset, observer: &mut dyn Observer) -> OpenedScene {
+        let out = self.places.trained(&dataset.root);
+        let before = trained::is_scene(&out).then(|| trained::load(&out)).and_then(|loaded| match loaded {
+            Ok(scene) => Some(scene),
+            Err(e) => {
+                observer.note(Level::Warning, format!("Earlier training of these photos cannot be shown: {e}"));
+                None
+            }
+        });
+        let name = dataset.name.clone();
+        let dataset = Some(Arc::new(dataset));
+        match before {
+            Some(TrainedScene { info, cloud, .. }) => OpenedScene {
+                name,
+                dataset,
+                cloud: Some(Arc::new(cloud)),
+                trained: true,
+                out,
+                history: info.history,
+                ..OpenedScene::default()
+            },
+            None => {
+                let cloud = dataset.as_deref().and_then(sparse_cloud).map(Arc::new);
+                OpenedScene { name, dataset, cloud, out, ..OpenedScene::default() }
+            }
+        }
+    }
+}
+
+/// A trained scene, with its photos if they are still where they were.
+fn trained_scene(scene: TrainedScene, observer: &mut dyn Observer) -> OpenedScene {
+    let photos = scene.dataset_path().map(|p| (io::open(&p), p));
+    let dataset = match photos {
+        Some((Ok(Opened::Dataset(d)), _)) => Some(Arc::new(d)),
+        Some((Ok(_), p)) => {
+            observer.note(
+                Level::Warning,
+                format!("{} holds no photos any more; the scene opens without them", p.display()),
+            );
+            None
+        }
+        Some((Err(e), _)) => {
+            observer.note(Level::Warning, format!("The photos cannot be read, the scene opens without them: {e}"));
+            None
+        }
+        None => {
+            observer.note(Level::Warning, "The photos are not where they were; the scene opens without them".into());
+            None
+        }
+    };
+    let TrainedScene { folder, info, cloud } = scene;
+    let mut opened = OpenedScene {
+        name: info.name,
+        dataset,
+        trained: true,
+        out: folder,
+        history: info.history,
+        ..OpenedScene::default()
+    };
+    opened.home = home_view(opened.dataset.as_deref(), Some(&cloud));
+    if let Some(first) = info.cameras.into_iter().next() {
+        opened.home.camera = Some(first.camera);
+    }
+    opened.cloud = Some(Arc::new(cloud));
+    opened
+}
+
+impl Jobs for PipelineJobs {
+    fn run(&self, command: Command, observer: &mut dyn Observer) -> Result<Outcome, Stop> {
+        match command {
+            Command::Open { path } => Ok(Outcome::Opened(Box::new(self.open(&path, observer)?))),
+            Command::Demo | Command::Train { .. } | Command::Evaluate { .. } => {
+                Err(Stop::Failed(Failure { message: "This build has no trainer yet".into(), remedy: String::new() }))
+            }
+            Command::Export { cloud, path } => export(&cloud, &path),
+            Command::Photo { index, photo, max_side_px } => {
+                let pixels = io::photo::load(&photo, max_side_px).map_err(|e| io_failure(&e))?;
+                Ok(Outcome::Photo { index, max_side_px, pixels: Arc::new(pixels) })
+            }
+            Command::Picture { pixels, path } => save_picture(&pixels, &path),
+        }
+    }
+}
+
+fn export(cloud: &GaussianCloud, path: &Path) -> Result<Outcome, Stop> {
+    io::splat_ply::write(path, cloud).map_err(|e| io_failure(&e))?;
+    Ok(Outcome::Written(path.to_path_buf()))
+}
+
+fn save_picture(pixels: &PhotoPixels, path: &Path) -> Result<Outcome, Stop> {
+    let bytes: Vec<u8> = pixels.rgb.iter().flatten().copied().collect();
+    io::atomic::write(path, |w| {
+        use image::ImageEncoder;
+        let png = image::codecs::png::PngEncoder::new(w);
+        png.write_image(&bytes, pixels.width_px, pixels.height_px, image::ExtendedColorType::Rgb8)
+            .map_err(std::io::Error::other)
+    })
+    .map_err(|e| io_failure(&e))?;
+    Ok(Outcome::Written(path.to_path_buf()))
+}
+
+fn io_failure(error: &IoError) -> Stop {
+    // These errors name the file, the place and the remedy themselves.
+    Stop::Failed(Failure::of(error, ""))
+}
+
+fn open_failure(error: &OpenError) -> Stop {
+    let remedy = match error {
+        OpenError::NotFound { .. } => "Check the path: the file may have been moved or renamed.",
+        OpenError::Unrecognised { .. } => "Open the folder that holds the photos and their poses, or a splat .ply.",
+        OpenError::Io(_) => "",
+    };
+    Stop::Failed(Failure::of(error, remedy))
+}

@@ -1,0 +1,36 @@
+//! What this machine offers.
+
+use crate::scene::Machine;
+
+/// Looks at memory, cores and the graphics adapter. Takes some milliseconds: not for the window's
+/// thread.
+pub fn look() -> Machine {
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let free_memory_bytes = free_memory_bytes();
+    let max_gaussians = usize::try_from(free_memory_bytes / 4 / 1024).unwrap_or(usize::MAX).clamp(10_000, 10_000_000);
+    Machine { free_memory_bytes, max_gaussians, cores, gpu: real_gpu() }
+}
+
+/// Memory that programs may still use; 0 where the system does not say.
+fn free_memory_bytes() -> u64 {
+    sysinfo::System::new().map_or(0, |mut system| {
+        system.refresh_memory();
+        system.available_memory()
+    })
+}
+
+/// Name of the first adapter that is not emulated.
+fn real_gpu() -> Option<String> {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
+    adapters
+        .iter()
+        .map(wgpu::Adapter::get_info)
+        .find(|i| {
+            matches!(
+                i.device_type,
+                wgpu::DeviceType::DiscreteGpu | wgpu::DeviceType::IntegratedGpu | wgpu::DeviceType::VirtualGpu
+            )
+        })
+        .map(|i| i.name)
+}

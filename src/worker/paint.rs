@@ -1,0 +1,132 @@
+//! From a rendered frame to the pixels of a view mode.
+
+use super::action::ViewMode;
+use crate::math::colormap::turbo;
+use crate::math::stats::quantile;
+use crate::render::Frame;
+use crate::scene::PhotoPixels;
+
+/// How many times the difference from the photo is amplified, so that an error of 1/4 is white.
+pub const DIFFERENCE_GAIN: u16 = 4;
+
+/// A frame as pixels.
+#[derive(Debug, Default, PartialEq)]
+pub(super) struct Drawn {
+    pub(super) rgb: Vec<[u8; 3]>,
+    pub(super) depth_range: Option<(f32, f32)>,
+    pub(super) psnr: Option<f64>,
+}
+
+/// Turns a frame into pixels. A photo of another size than the frame is sampled at the pixels'
+/// centres.
+pub(super) fn paint(frame: &Frame<f32>, mode: ViewMode, photo: Option<&PhotoPixels>) -> Drawn {
+    let photo = photo.filter(|p| p.len() == p.width_px as usize * p.height_px as usize && !p.is_empty());
+    let rgb = || frame.to_rgb8();
+    let psnr = photo.and_then(|p| psnr(frame, p));
+    match (mode, photo) {
+        (ViewMode::Depth, _) => {
+            let (rgb, depth_range) = depth(frame);
+            Drawn { rgb, depth_range, psnr }
+        }
+        (ViewMode::Alpha, _) => {
+            let rgb = frame.alpha.iter().map(|a| [(a.clamp(0.0, 1.0) * 255.0 + 0.5) as u8; 3]).collect();
+            Drawn { rgb, depth_range: None, psnr }
+        }
+        (ViewMode::Difference, Some(p)) => Drawn { rgb: difference(frame, p), depth_range: None, psnr },
+        (ViewMode::Picture | ViewMode::Difference, _) => Drawn { rgb: rgb(), depth_range: None, psnr },
+    }
+}
+
+/// Expected depth, near blue to far red between its 2nd and 98th percentile; black where nothing is.
+fn depth(frame: &Frame<f32>) -> (Vec<[u8; 3]>, Option<(f32, f32)>) {
+    let depths: Vec<f32> =
+        frame.depth.iter().zip(&frame.alpha).map(|(d, a)| if *a > 0.1 { d / a } else { f32::NAN }).collect();
+    // A few thousand values place the percentiles closely enough.
+    let stride = (depths.len() / 4096).max(1);
+    let sample: Vec<f64> = depths.iter().step_by(stride).filter(|d| d.is_finite()).map(|d| f64::from(*d)).collect();
+    if sample.is_empty() {
+        return (vec![[0; 3]; frame.alpha.len()], None);
+    }
+    let (near, far) = (quantile(&sample, 0.02) as f32, quantile(&sample, 0.98) as f32);
+    let span = (far - near).max(f32::MIN_POSITIVE);
+    (depths.iter().map(|d| turbo((d - near) / span)).collect(), Some((near, far)))
+}
+
+/// Calls `each` with the drawn and the photographed colour of every pixel that the photo covers.
+fn pairs(frame: &Frame<f32>, photo: &PhotoPixels, mut each: impl FnMut(usize, [u8; 3], [u8; 3])) {
+    let drawn = frame.to_rgb8();
+    let (w, h) = (photo.width_px as usize, photo.height_px as usize);
+    for (i, d) in drawn.into_iter().enumerate() {
+        let (x, y) = (i % frame.width_px, i / frame.width_px);
+        let at = ((2 * y + 1) * h / (2 * frame.height_px)) * w + (2 * x + 1) * w / (2 * frame.width_px);
+        if photo.coverage.as_ref().is_none_or(|c| c.get(at).is_some_and(|c| *c > 127)) {
+            each(i, d, photo.rgb[at]);
+        }
+    }
+}
+
+fn difference(frame: &Frame<f32>, photo: &PhotoPixels) -> Vec<[u8; 3]> {
+    let mut out = vec![[0; 3]; frame.alpha.len()];
+    pairs(frame, photo, |i, drawn, real| {
+        for c in 0..3 {
+            out[i][c] = u8::try_from(u16::from(drawn[c].abs_diff(real[c])) * DIFFERENCE_GAIN).unwrap_or(u8::MAX);
+        }
+    });
+    out
+}
+
+fn psnr(frame: &Frame<f32>, photo: &PhotoPixels) -> Option<f64> {
+    let (mut sum, mut n) = (0.0_f64, 0.0_f64);
+    pairs(frame, photo, |_, drawn, real| {
+        sum += (0..3).map(|c| f64::from(drawn[c].abs_diff(real[c])).powi(2)).sum::<f64>();
+        n += 3.0;
+    });
+    // An exact match has no finite PSNR; none is shown for it.
+    (sum > 0.0).then(|| 10.0 * (255.0 * 255.0 * n / sum).log10())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(value: f32) -> Frame<f32> {
+        let plane = vec![value; 4];
+        Frame {
+            width_px: 2,
+            height_px: 2,
+            color: [plane.clone(), plane.clone(), plane],
+            alpha: vec![1.0, 1.0, 1.0, 0.0],
+            depth: vec![1.0, 2.0, 3.0, 0.0],
+            ..Frame::default()
+        }
+    }
+
+    fn photo(level: u8, coverage: Option<Vec<u8>>) -> PhotoPixels {
+        PhotoPixels { width_px: 2, height_px: 2, rgb: vec![[level; 3]; 4], coverage }
+    }
+
+    #[test]
+    fn difference_is_amplified_and_ignores_uncovered_pixels() {
+        let drawn = paint(&frame(0.0), ViewMode::Difference, Some(&photo(10, Some(vec![255, 255, 0, 255]))));
+        assert_eq!(drawn.rgb, vec![[40; 3], [40; 3], [0; 3], [40; 3]]);
+        let psnr = drawn.psnr.expect("they differ");
+        assert!((psnr - 20.0 * 25.5_f64.log10()).abs() < 1e-9, "{psnr}");
+        assert_eq!(paint(&frame(0.0), ViewMode::Picture, Some(&photo(0, None))).psnr, None);
+    }
+
+    #[test]
+    fn depth_runs_from_near_to_far_and_leaves_holes_black() {
+        let drawn = paint(&frame(0.5), ViewMode::Depth, None);
+        let (near, far) = drawn.depth_range.expect("something is there");
+        assert!((1.0..1.1).contains(&near) && (2.9..=3.0).contains(&far));
+        assert_eq!(drawn.rgb[3], [0; 3]);
+        assert!(drawn.rgb[0][2] > drawn.rgb[0][1] || drawn.rgb[0] != drawn.rgb[2]);
+    }
+
+    #[test]
+    fn a_photo_of_another_size_is_sampled_at_pixel_centres() {
+        let big = PhotoPixels { width_px: 4, height_px: 4, rgb: (0..16).map(|i| [i; 3]).collect(), coverage: None };
+        let drawn = paint(&frame(0.0), ViewMode::Difference, Some(&big));
+        assert_eq!(drawn.rgb.iter().map(|p| p[0] / 4).collect::<Vec<_>>(), vec![5, 7, 13, 15]);
+    }
+}

@@ -1,0 +1,292 @@
+//! What the worker is told ([`Command`]) and what it tells ([`Event`]).
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use crate::io::trained::History;
+use crate::pipeline::observer::{Evaluation, Level, Progress, StepMetrics};
+use crate::pipeline::train::TrainConfig;
+use crate::scene::{Bounds, Camera, Dataset, GaussianCloud, Photo, PhotoPixels, ScenePlan};
+
+/// Names one job of one worker.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct JobId(pub u64);
+
+/// What sort of job it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum JobKind {
+    /// Reads a file or folder.
+    Open,
+    /// Makes the demo scene and reads it.
+    Demo,
+    /// Trains Gaussians.
+    Train,
+    /// Measures held-out quality.
+    Evaluate,
+    /// Writes a file.
+    Export,
+    /// Loads a photo's pixels.
+    Photo,
+    /// Writes a picture.
+    Picture,
+}
+
+impl JobKind {
+    /// Which thread runs it.
+    pub fn lane(self) -> Lane {
+        match self {
+            Self::Open | Self::Demo | Self::Train | Self::Evaluate => Lane::Long,
+            Self::Export | Self::Photo | Self::Picture => Lane::Short,
+        }
+    }
+}
+
+/// Which thread a job runs on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lane {
+    /// One after another, minutes each.
+    Long,
+    /// Answered while a long job runs.
+    Short,
+}
+
+/// What a job is to do.
+#[derive(Clone, Debug)]
+pub enum Command {
+    /// Read a dataset, a splat or a trained scene.
+    Open {
+        /// File or folder.
+        path: PathBuf,
+    },
+    /// Render the demo scene into posed photos, unless that was done before, and read them.
+    Demo,
+    /// Fit Gaussians to photos.
+    Train {
+        /// The photos.
+        dataset: Arc<Dataset>,
+        /// How.
+        config: TrainConfig,
+        /// Folder of the trained scene and its checkpoints.
+        out: PathBuf,
+    },
+    /// Measure PSNR and SSIM on the held-out photos.
+    Evaluate {
+        /// The photos.
+        dataset: Arc<Dataset>,
+        /// The Gaussians.
+        cloud: Arc<GaussianCloud>,
+        /// Picture size and hold-out rule.
+        config: TrainConfig,
+    },
+    /// Write Gaussians as a `.ply`.
+    Export {
+        /// The Gaussians.
+        cloud: Arc<GaussianCloud>,
+        /// The file.
+        path: PathBuf,
+    },
+    /// Load a photo, undistorted and at most `max_side_px` along its longer side.
+    Photo {
+        /// Its index in the dataset.
+        index: usize,
+        /// The photo.
+        photo: Box<Photo>,
+        /// Size limit in px.
+        max_side_px: u32,
+    },
+    /// Write a picture as a `.png`.
+    Picture {
+        /// The picture.
+        pixels: Arc<PhotoPixels>,
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+impl Command {
+    /// What sort of job this is.
+    pub fn kind(&self) -> JobKind {
+        match self {
+            Self::Open { .. } => JobKind::Open,
+            Self::Demo => JobKind::Demo,
+            Self::Train { .. } => JobKind::Train,
+            Self::Evaluate { .. } => JobKind::Evaluate,
+            Self::Export { .. } => JobKind::Export,
+            Self::Photo { .. } => JobKind::Photo,
+            Self::Picture { .. } => JobKind::Picture,
+        }
+    }
+
+    /// What it does, as a title: "Opening fox".
+    pub fn title(&self) -> String {
+        let name =
+            |p: &PathBuf| p.file_name().map_or_else(|| p.display().to_string(), |n| n.to_string_lossy().into_owned());
+        match self {
+            Self::Open { path } => format!("Opening {}", name(path)),
+            Self::Demo => "Making the demo scene".into(),
+            Self::Train { dataset, .. } => format!("Training {}", dataset.name),
+            Self::Evaluate { dataset, .. } => format!("Measuring {}", dataset.name),
+            Self::Export { path, .. } | Self::Picture { path, .. } => format!("Writing {}", name(path)),
+            Self::Photo { photo, .. } => format!("Loading {}", photo.name),
+        }
+    }
+}
+
+/// How to look at a scene at first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HomeView {
+    /// What a person would call the scene.
+    pub bounds: Bounds,
+    /// Upwards in the world, unit length.
+    pub up: DVec3,
+    /// A camera to start from, where the scene has one.
+    pub camera: Option<Camera>,
+}
+
+impl Default for HomeView {
+    fn default() -> Self {
+        Self { bounds: Bounds { min: DVec3::NEG_ONE, max: DVec3::ONE }, up: DVec3::Z, camera: None }
+    }
+}
+
+/// A scene as the window needs it.
+#[derive(Clone, Debug, Default)]
+pub struct OpenedScene {
+    /// Where it was read from.
+    pub path: PathBuf,
+    /// Short name for titles.
+    pub name: String,
+    /// Posed photos, if it has any.
+    pub dataset: Option<Arc<Dataset>>,
+    /// What to draw: trained Gaussians, or the sparse points as small ones.
+    pub cloud: Option<Arc<GaussianCloud>>,
+    /// Whether `cloud` is a result, not just sparse points.
+    pub trained: bool,
+    /// Folder in which training keeps its results and checkpoints.
+    pub out: PathBuf,
+    /// Measurements of earlier training.
+    pub history: History,
+    /// How to look at it at first.
+    pub home: HomeView,
+    /// What is left out for it, and why.
+    pub plan: ScenePlan,
+}
+
+/// What a finished job brings.
+#[derive(Clone, Debug)]
+pub enum Outcome {
+    /// A scene was read.
+    Opened(Box<OpenedScene>),
+    /// Training is done; the Gaussians lie in the slot.
+    Trained {
+        /// Evaluations of the whole run, oldest first.
+        evaluations: Vec<Evaluation>,
+        /// Folder of the trained scene.
+        out: PathBuf,
+        /// What drawing the result can leave out.
+        plan: ScenePlan,
+    },
+    /// Held-out quality was measured.
+    Evaluated(Evaluation),
+    /// A file was written.
+    Written(PathBuf),
+    /// A photo was loaded.
+    Photo {
+        /// Its index in the dataset.
+        index: usize,
+        /// The size limit that was asked for.
+        max_side_px: u32,
+        /// Its pixels.
+        pixels: Arc<PhotoPixels>,
+    },
+}
+
+/// Why a job failed, for people: what went wrong where, and what to do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Failure {
+    /// What went wrong, with file and place.
+    pub message: String,
+    /// What a person can do about it; empty if the message already says so.
+    pub remedy: String,
+}
+
+impl Failure {
+    /// The failure of an error and all its causes.
+    pub fn of(error: &dyn std::error::Error, remedy: impl Into<String>) -> Self {
+        let mut message = error.to_string();
+        let mut cause = error.source();
+        while let Some(c) = cause {
+            let text = c.to_string();
+            // Many errors already print their cause.
+            if !message.contains(&text) {
+                message = format!("{message}: {text}");
+            }
+            cause = c.source();
+        }
+        Self { message, remedy: remedy.into() }
+    }
+}
+
+/// How a job ends short of its outcome.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Stop {
+    /// It was asked to.
+    Cancelled,
+    /// Something went wrong.
+    Failed(Failure),
+}
+
+/// What happened. For each job: first `Started`, then any of the middle ones, at last exactly one of
+/// `Finished`, `Cancelled`, `Failed`. Only `Progress` may be missing.
+#[derive(Clone, Debug)]
+pub enum Event {
+    /// The job has left the queue.
+    Started {
+        /// Which job.
+        job: JobId,
+        /// Its sort.
+        kind: JobKind,
+        /// What it does, for people.
+        title: String,
+    },
+    /// Where it stands. May be dropped when events are not taken fast enough.
+    Progress(JobId, Progress),
+    /// Training measurements.
+    Step(JobId, StepMetrics),
+    /// A held-out evaluation.
+    Evaluation(JobId, Evaluation),
+    /// A line for the log.
+    Note(JobId, Level, String),
+    /// The job now waits (`true`) or goes on (`false`).
+    Paused(JobId, bool),
+    /// It did what it was to do.
+    Finished(JobId, Outcome),
+    /// It ended because it was asked to.
+    Cancelled(JobId),
+    /// It could not go on.
+    Failed(JobId, Failure),
+}
+
+impl Event {
+    /// Which job it is about.
+    pub fn job(&self) -> JobId {
+        match self {
+            Self::Started { job, .. } => *job,
+            Self::Progress(job, _)
+            | Self::Step(job, _)
+            | Self::Evaluation(job, _)
+            | Self::Note(job, ..)
+            | Self::Paused(job, _)
+            | Self::Finished(job, _)
+            | Self::Cancelled(job)
+            | Self::Failed(job, _) => *job,
+        }
+    }
+
+    /// Whether the job is over.
+    pub fn is_end(&self) -> bool {
+        matches!(self, Self::Finished(..) | Self::Cancelled(_) | Self::Failed(..))
+    }
+}

@@ -1,0 +1,238 @@
+//! The drawing lane: a thread that renders what the eye sees, so that the window never waits for it.
+//!
+//! Only the latest request counts: one that was not begun yet is replaced.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use super::action::ViewMode;
+use super::protocol::Failure;
+use super::thread::{Repaint, panic_failure};
+use super::{Slot, paint};
+use crate::render::cpu::Renderer;
+use crate::render::{Features, Frame, RenderError, RenderSettings};
+use crate::scene::{Camera, GaussianCloud, PhotoPixels};
+
+/// How much time a picture may take; decides its resolution.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effort {
+    /// The eye moves: keep up with it.
+    Moving,
+    /// The eye rests while something else needs the processor.
+    Shared,
+    /// The eye rests: full resolution, and depth to pick from.
+    Full,
+}
+
+impl Effort {
+    /// Seconds a picture should take at most; `None` = as long as it takes.
+    fn budget_secs(self) -> Option<f64> {
+        match self {
+            Self::Moving => Some(0.030),
+            Self::Shared => Some(0.080),
+            Self::Full => None,
+        }
+    }
+}
+
+/// What to draw.
+#[derive(Clone, Debug)]
+pub struct ViewRequest {
+    /// The Gaussians.
+    pub cloud: Arc<GaussianCloud>,
+    /// From where, at full resolution.
+    pub camera: Camera,
+    /// What of it.
+    pub mode: ViewMode,
+    /// Highest spherical-harmonics degree to draw.
+    pub sh_degree: u8,
+    /// Colour behind everything.
+    pub background: [f32; 3],
+    /// How long it may take.
+    pub effort: Effort,
+    /// The photo taken from this camera, for the difference and for PSNR.
+    pub photo: Option<Arc<PhotoPixels>>,
+    /// Comes back with the picture.
+    pub ticket: u64,
+}
+
+/// A drawn view.
+#[derive(Clone, Debug)]
+pub struct ViewPicture {
+    /// The request's.
+    pub ticket: u64,
+    /// Whether this is the request's full resolution.
+    pub full: bool,
+    /// The camera at the size that was drawn.
+    pub camera: Camera,
+    /// Row-major sRGB.
+    pub rgb: Vec<[u8; 3]>,
+    /// Median depth in scene units, row-major, 0 where there is none; `None` if not drawn.
+    pub median_depth: Option<Vec<f32>>,
+    /// Depths at the two ends of the colour scale, in the depth mode.
+    pub depth_range: Option<(f32, f32)>,
+    /// PSNR in dB against the photo, if the request had one.
+    pub psnr: Option<f64>,
+    /// Seconds that rendering took.
+    pub secs: f64,
+}
+
+/// The result of a request.
+pub type ViewResult = Result<ViewPicture, Failure>;
+
+#[derive(Default)]
+struct Mailbox {
+    request: Option<ViewRequest>,
+    closed: bool,
+}
+
+/// Handle of the drawing thread. Dropping it ends the thread.
+pub struct ViewLane {
+    mailbox: Arc<(Mutex<Mailbox>, Condvar)>,
+    pictures: Arc<Slot<ViewResult>>,
+}
+
+impl ViewLane {
+    /// Starts the thread. Fails only if the system gives none.
+    pub fn start(repaint: Repaint) -> std::io::Result<Self> {
+        let mailbox = Arc::new((Mutex::new(Mailbox::default()), Condvar::new()));
+        let pictures = Arc::new(Slot::default());
+        let (box_, out) = (Arc::clone(&mailbox), Arc::clone(&pictures));
+        let work = move || {
+            let mut painter = Painter::default();
+            while let Some(request) = next(&box_) {
+                out.publish(painter.draw(&request));
+                repaint();
+            }
+        };
+        std::thread::Builder::new().name("viewport".into()).spawn(work)?;
+        Ok(Self { mailbox, pictures })
+    }
+
+    /// Asks for a view; replaces a request that was not begun yet.
+    pub fn request(&self, request: ViewRequest) {
+        let (mutex, wake) = &*self.mailbox;
+        let old = lock(mutex).request.replace(request);
+        wake.notify_one();
+        drop(old);
+    }
+
+    /// Where pictures are published.
+    pub fn pictures(&self) -> &Slot<ViewResult> {
+        &self.pictures
+    }
+}
+
+impl Drop for ViewLane {
+    fn drop(&mut self) {
+        let (mutex, wake) = &*self.mailbox;
+        lock(mutex).closed = true;
+        wake.notify_one();
+    }
+}
+
+// A request is replaced in one assignment, so a panicking holder leaves nothing half done.
+fn lock(mutex: &Mutex<Mailbox>) -> MutexGuard<'_, Mailbox> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Waits for a request; `None` once the handle is gone.
+fn next(mailbox: &(Mutex<Mailbox>, Condvar)) -> Option<ViewRequest> {
+    let (mutex, wake) = mailbox;
+    let mut guard = lock(mutex);
+    loop {
+        if guard.closed {
+            return None;
+        }
+        if let Some(r) = guard.request.take() {
+            return Some(r);
+        }
+        guard = wake.wait(guard).unwrap_or_else(PoisonError::into_inner);
+    }
+}
+
+/// Draws requests, and learns how fast it can.
+#[derive(Default)]
+struct Painter {
+    renderer: Renderer<f32>,
+    /// Seconds per pixel lately; `None` before the first picture.
+    secs_per_px: Option<f64>,
+}
+
+impl Painter {
+    fn draw(&mut self, request: &ViewRequest) -> ViewResult {
+        let camera = self.fitting_camera(&request.camera, request.effort);
+        let full = camera == request.camera;
+        let start = Instant::now();
+        let frame = match catch_unwind(AssertUnwindSafe(|| self.render(request, &camera))) {
+            Ok(Ok(frame)) => frame,
+            Ok(Err(e)) => return Err(Failure::of(&e, "Reset the view (Home), or open the scene again.")),
+            Err(payload) => {
+                // Its buffers may be in any state.
+                self.renderer = Renderer::new();
+                return Err(panic_failure(payload.as_ref()));
+            }
+        };
+        let secs = start.elapsed().as_secs_f64();
+        let now = secs / f64::from(camera.width_px * camera.height_px);
+        self.secs_per_px = Some(self.secs_per_px.map_or(now, |s| 0.7 * s + 0.3 * now));
+        let drawn = paint::paint(&frame, request.mode, request.photo.as_deref());
+        let median_depth = (!frame.median_depth.is_empty()).then_some(frame.median_depth);
+        Ok(ViewPicture {
+            ticket: request.ticket,
+            full,
+            camera,
+            rgb: drawn.rgb,
+            median_depth,
+            depth_range: drawn.depth_range,
+            psnr: drawn.psnr,
+            secs,
+        })
+    }
+
+    fn render(&mut self, request: &ViewRequest, camera: &Camera) -> Result<Frame<f32>, RenderError> {
+        let settings = RenderSettings {
+            sh_degree: request.sh_degree,
+            background: request.background,
+            depth: request.effort == Effort::Full || request.mode == ViewMode::Depth,
+            ..RenderSettings::default()
+        };
+        self.renderer.render(&request.cloud, Features::NONE, camera, &settings)
+    }
+
+    /// The camera at a resolution that is likely to keep to the budget.
+    fn fitting_camera(&self, camera: &Camera, effort: Effort) -> Camera {
+        let pixels = f64::from(camera.width_px) * f64::from(camera.height_px);
+        // The first picture says how fast this machine is with this scene; it must be quick itself.
+        let secs_per_px = self.secs_per_px.unwrap_or(4e-7);
+        let Some(budget) = effort.budget_secs() else { return camera.clone() };
+        let scale = (budget / (secs_per_px * pixels)).sqrt().clamp(0.2, 1.0);
+        // In quarter-octave steps, so that the picture does not change its grain all the time.
+        let scale = 2.0_f64.powf((scale.log2() * 4.0).floor() / 4.0);
+        if scale >= 1.0 {
+            return camera.clone();
+        }
+        let side = |s: u32| ((f64::from(s) * scale).round() as u32).max(1);
+        camera.resized(side(camera.width_px), side(camera.height_px))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    #[test]
+    fn a_slow_machine_draws_smaller_while_the_eye_moves() {
+        let camera = Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 1000, 600).expect("valid");
+        let slow = Painter { secs_per_px: Some(1e-6), ..Painter::default() };
+        let moving = slow.fitting_camera(&camera, Effort::Moving);
+        assert!(moving.width_px < 300, "{}", moving.width_px);
+        assert!((f64::from(moving.width_px) / f64::from(moving.height_px) - 5.0 / 3.0).abs() < 0.02);
+        assert!(slow.fitting_camera(&camera, Effort::Shared).width_px > moving.width_px);
+        assert_eq!(slow.fitting_camera(&camera, Effort::Full), camera);
+        let fast = Painter { secs_per_px: Some(1e-9), ..Painter::default() };
+        assert_eq!(fast.fitting_camera(&camera, Effort::Moving), camera);
+    }
+}
