@@ -1,1 +1,50 @@
-//! (see lib.rs)
+//! The window.
+//!
+//! [`state::AppState`] is what the window knows: a pure fold over the worker's events.
+//! [`app::App`] draws it and turns what a person does into [`crate::worker::Action`]s; an action
+//! changes the view or becomes a job. Nothing here computes for longer than a redraw may take.
+
+mod act;
+pub mod app;
+pub mod dialogs;
+pub mod format;
+pub mod keys;
+pub mod layout;
+pub mod palette;
+pub mod panes;
+pub mod state;
+pub mod theme;
+pub mod toasts;
+pub mod viewport;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use crate::worker::jobs::PipelineJobs;
+use crate::worker::places::Places;
+
+/// Opens the window, with a scene if `open` is given, and returns when it is closed.
+pub fn run(open: Option<PathBuf>) -> eframe::Result {
+    let viewport = egui::ViewportBuilder::default()
+        .with_title("FMLGS")
+        .with_app_id("fmlgs")
+        .with_inner_size([1480.0, 920.0])
+        .with_min_inner_size([860.0, 560.0])
+        .with_drag_and_drop(true);
+    let options = eframe::NativeOptions { viewport, ..eframe::NativeOptions::default() };
+    eframe::run_native(
+        "fmlgs",
+        options,
+        Box::new(|cc| {
+            let app = app::App::new(cc, PipelineJobs::new(Places::of_user()), open)?;
+            Ok(Box::new(app))
+        }),
+    )
+}
+
+/// Something that asks the window to look at what is new, from any thread.
+fn repainter(ctx: &egui::Context) -> crate::worker::Repaint {
+    let ctx = ctx.clone();
+    // Twenty redraws a second show all that jobs report; pictures come through the same call.
+    Arc::new(move || ctx.request_repaint_after(std::time::Duration::from_millis(33)))
+}

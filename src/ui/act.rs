@@ -1,0 +1,157 @@
+//! What each action does.
+
+use std::sync::Arc;
+
+use super::app::App;
+use super::dialogs::{Chosen, Purpose, Question};
+use super::state::Tone;
+use crate::worker::{Action, Command, Failure, JobKind};
+
+impl App {
+    /// Does what a person asked for.
+    pub(super) fn act(&mut self, action: Action, ctx: &egui::Context) {
+        match action {
+            Action::TryDemo => self.replace_scene(Action::TryDemo),
+            Action::Open(path) => self.replace_scene(Action::Open(path)),
+            Action::OpenFolder => self.choose(Purpose::OpenFolder),
+            Action::OpenFile => self.choose(Purpose::OpenFile),
+            Action::ExportPly => self.choose(Purpose::ExportPly),
+            Action::Screenshot => self.choose(Purpose::Screenshot),
+            Action::StartTraining => self.start_training(),
+            Action::PauseTraining => {
+                if let Some(job) = self.state.job.as_ref().filter(|j| j.kind == JobKind::Train) {
+                    self.worker.set_paused(job.id, !job.paused);
+                }
+            }
+            Action::Cancel => {
+                if let Some(job) = &self.state.job {
+                    self.worker.cancel(job.id);
+                }
+            }
+            Action::Evaluate => self.evaluate(),
+            Action::Show(mode) => self.layout.mode = mode,
+            Action::ToggleCompare => {
+                self.layout.compare = !self.layout.compare;
+                if self.layout.compare && self.viewport.photo_index().is_none() {
+                    self.view(&Action::NextPhoto, ctx);
+                }
+            }
+            Action::ToggleCameras => self.layout.cameras = !self.layout.cameras,
+            Action::TogglePane(pane) => self.layout.toggle(pane),
+            Action::Palette => self.palette.toggle(),
+            Action::Shortcuts => self.sheet = !self.sheet,
+            Action::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
+            Action::FrameScene
+            | Action::ResetView
+            | Action::PreviousPhoto
+            | Action::NextPhoto
+            | Action::GoToPhoto(_) => {
+                self.view(&action, ctx);
+            }
+        }
+    }
+
+    fn view(&mut self, action: &Action, ctx: &egui::Context) {
+        let now = ctx.input(|i| i.time);
+        self.viewport.act(action, &self.state, &self.worker, now);
+    }
+
+    /// Opens something else; asks first if that ends a running job.
+    fn replace_scene(&mut self, action: Action) {
+        match self.state.job.as_ref().map(|j| (j.kind, j.title.clone())) {
+            None => self.open(action),
+            Some((_, title)) => {
+                self.question = Some(Question {
+                    text: format!("{title} is still running. Cancel it and go on? What it has saved so far stays."),
+                    yes: "Cancel it and go on",
+                    no: "Keep it running",
+                    action,
+                });
+            }
+        }
+    }
+
+    /// Cancels what runs and does the action next.
+    pub(super) fn give_up_and(&mut self, action: Action) {
+        if let Some(job) = &self.state.job {
+            self.worker.cancel(job.id);
+        }
+        self.open(action);
+    }
+
+    fn open(&mut self, action: Action) {
+        let command = match action {
+            Action::Open(path) => Command::Open { path },
+            _ => Command::Demo,
+        };
+        self.submit(command);
+    }
+
+    fn submit(&mut self, command: Command) {
+        let title = command.title();
+        if let Err(e) = self.worker.submit(command) {
+            self.state.toast(Tone::Warning, format!("{title}: {e}"));
+        }
+    }
+
+    fn start_training(&mut self) {
+        let scene = self.state.scene.as_ref();
+        let Some((dataset, out)) = scene.and_then(|s| Some((s.dataset.clone()?, s.out.clone()))) else {
+            self.state.toast(Tone::Warning, "Open a folder of posed photos first: training needs them.");
+            return;
+        };
+        if let Some(job) = &self.state.job {
+            let text = format!("{} is still running; cancel it first (Esc).", job.title);
+            self.state.toast(Tone::Warning, text);
+            return;
+        }
+        self.submit(Command::Train { dataset, config: self.layout.config.clone(), out });
+    }
+
+    fn evaluate(&mut self) {
+        let dataset = self.state.scene.as_ref().and_then(|s| s.dataset.clone());
+        let trained = self.state.training_job.is_some() || self.state.scene.as_ref().is_some_and(|s| s.trained);
+        match (dataset, self.viewport.cloud().cloned()) {
+            (Some(dataset), Some(cloud)) if trained => {
+                self.submit(Command::Evaluate { dataset, cloud, config: self.layout.config.clone() });
+            }
+            _ => self
+                .state
+                .toast(Tone::Warning, "Train first: quality is measured on trained Gaussians and held-out photos."),
+        }
+    }
+
+    fn choose(&mut self, purpose: Purpose) {
+        let writes = matches!(purpose, Purpose::ExportPly | Purpose::Screenshot);
+        if writes && self.viewport.picture().is_none() {
+            self.state.toast(Tone::Warning, "There is nothing to write yet: open a scene first.");
+            return;
+        }
+        let name = self.state.scene.as_ref().map_or_else(|| "scene".to_owned(), |s| s.name.clone());
+        if let Err(e) = self.dialogs.ask(purpose, &name, Arc::clone(&self.repaint)) {
+            self.state.fail("Opening the file dialog", Failure::of(&e, "Close other programs and try again."));
+        }
+    }
+
+    /// Goes on with what the file dialog brought.
+    pub(super) fn chosen(&mut self, answer: Chosen) {
+        match answer {
+            Chosen::Path(Purpose::OpenFolder | Purpose::OpenFile, path) => self.ask(Action::Open(path)),
+            Chosen::Path(Purpose::ExportPly, path) => {
+                if let Some(cloud) = self.viewport.cloud().cloned() {
+                    self.submit(Command::Export { cloud, path });
+                }
+            }
+            Chosen::Path(Purpose::Screenshot, path) => {
+                if let Some(pixels) = self.viewport.pixels() {
+                    self.submit(Command::Picture { pixels: Arc::new(pixels), path });
+                }
+            }
+            Chosen::Nothing => {}
+            Chosen::NoDialog => self.state.toast(
+                Tone::Warning,
+                "No file dialog appeared on this system. Drop the file onto the window, or press Ctrl+P and type its path.",
+            ),
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! The application: takes events in, draws the window, sends commands out.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
+
+use super::dialogs::{self, FileDialogs, Question};
+use super::layout::Layout;
+use super::palette::{Palette, shortcut_sheet};
+use super::panes::{bars, dataset::Thumbnails, empty, log, plan, training};
+use super::state::AppState;
+use super::toasts::Toasts;
+use super::viewport::Viewport;
+use super::{keys, theme};
+use crate::worker::{Action, Jobs, Pane, Repaint, Worker};
+
+/// The window's application.
+pub struct App {
+    /// What it knows.
+    pub state: AppState,
+    /// Choices that are kept.
+    pub layout: Layout,
+    /// The view of the scene.
+    pub viewport: Viewport,
+    pub(super) worker: Worker,
+    pub(super) repaint: Repaint,
+    pub(super) dialogs: FileDialogs,
+    pub(super) question: Option<Question>,
+    pub(super) palette: Palette,
+    pub(super) sheet: bool,
+    pub(super) backend: String,
+    thumbnails: Thumbnails,
+    toasts: Toasts,
+    actions: Vec<Action>,
+}
+
+impl App {
+    /// Starts the worker and opens `open`, if given. `jobs` does the work. Fails only if
+    /// the system gives no threads.
+    pub fn new(cc: &eframe::CreationContext<'_>, jobs: impl Jobs, open: Option<PathBuf>) -> std::io::Result<Self> {
+        theme::install(&cc.egui_ctx);
+        let repaint = super::repainter(&cc.egui_ctx);
+        let layout = Layout::load(cc.storage);
+        let mut state = AppState::new(layout.recent.clone());
+        state.say(super::state::Tone::Info, format!("FMLGS {}", env!("CARGO_PKG_VERSION")));
+        Ok(Self {
+            worker: Worker::start(jobs, Arc::clone(&repaint))?,
+            viewport: Viewport::new(Arc::clone(&repaint))?,
+            state,
+            layout,
+            repaint,
+            dialogs: FileDialogs::default(),
+            question: None,
+            palette: Palette::default(),
+            sheet: false,
+            backend: "CPU".into(),
+            thumbnails: Thumbnails::default(),
+            toasts: Toasts::default(),
+            actions: open.map(Action::Open).into_iter().collect(),
+        })
+    }
+
+    /// Asks for an action, as a key or a button would.
+    pub fn ask(&mut self, action: Action) {
+        self.actions.push(action);
+    }
+
+    /// Takes in everything that happened since.
+    fn take_events(&mut self, ctx: &egui::Context) {
+        while let Some(event) = self.worker.next_event() {
+            self.state.apply(event);
+        }
+        self.viewport.update(&mut self.state, &self.worker);
+        self.thumbnails.update(ctx, &mut self.state);
+        if std::mem::take(&mut self.state.wants_training) {
+            self.actions.push(Action::StartTraining);
+        }
+        while let Some(answer) = self.dialogs.answer() {
+            self.chosen(answer);
+        }
+    }
+
+    fn keys_and_drops(&mut self, ctx: &egui::Context) {
+        if !self.palette.is_open() && self.state.error.is_none() && self.question.is_none() && !self.sheet {
+            self.actions.extend(keys::pressed(ctx));
+        }
+        let dropped = ctx.input(|i| i.raw.dropped_files.first().map(|f| f.path().to_path_buf()));
+        self.actions.extend(dropped.map(Action::Open));
+    }
+
+    fn panes(&mut self, ui: &mut Ui) {
+        let bar = Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(10, 6));
+        let pane = Frame::new().fill(theme::PANEL).inner_margin(Margin::same(12));
+        let Self { state, layout, actions, viewport, .. } = self;
+        Panel::top("menus").frame(bar).show(ui, |ui| bars::top(ui, state, layout, actions));
+        Panel::bottom("status").frame(bar).show(ui, |ui| bars::status(ui, state, layout, &self.backend, actions));
+        if layout.shows(Pane::Log) {
+            Panel::bottom("log")
+                .frame(pane)
+                .resizable(true)
+                .default_size(150.0)
+                .min_size(80.0)
+                .show(ui, |ui| log::show(ui, state));
+        }
+        let Some(scene) = state.scene.clone() else {
+            let canvas = Frame::new().fill(theme::CANVAS);
+            CentralPanel::no_frame().frame(canvas).show(ui, |ui| empty::show(ui, state, actions));
+            return;
+        };
+        if scene.dataset.is_some() && layout.shows(Pane::Dataset) {
+            Panel::left("photos").frame(pane).resizable(true).default_size(270.0).size_range(180.0..=600.0).show(
+                ui,
+                |ui| {
+                    self.thumbnails.show(ui, state, layout, viewport.photo_index(), &self.worker, actions);
+                },
+            );
+        }
+        if layout.shows(Pane::Training) || layout.shows(Pane::Plan) {
+            Panel::right("work").frame(pane).resizable(true).default_size(350.0).size_range(290.0..=640.0).show(
+                ui,
+                |ui| {
+                    ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+                        if layout.shows(Pane::Training) {
+                            ui.heading(Pane::Training.text());
+                            training::show(ui, state, layout, actions);
+                        }
+                        if layout.shows(Pane::Plan) {
+                            ui.add_space(10.0);
+                            egui::CollapsingHeader::new(Pane::Plan.text())
+                                .default_open(state.history.steps.is_empty())
+                                .show(ui, |ui| plan::show(ui, &state.plan));
+                        }
+                    });
+                },
+            );
+        }
+        CentralPanel::no_frame().show(ui, |ui| viewport.show(ui, state, layout, actions));
+    }
+
+    fn over_everything(&mut self, ctx: &egui::Context) {
+        if ctx.input(|i| !i.raw.hovered_files.is_empty()) {
+            drop_hint(ctx);
+        }
+        if let Some(action) = self.palette.show(ctx) {
+            self.actions.push(action);
+        }
+        shortcut_sheet(ctx, &mut self.sheet);
+        if let Some(question) = &self.question
+            && let Some(yes) = dialogs::show_question(ctx, question)
+            && let Some(question) = self.question.take()
+            && yes
+        {
+            self.give_up_and(question.action);
+        }
+        if self.state.error.as_ref().is_some_and(|e| dialogs::show_error(ctx, e)) {
+            self.state.error = None;
+        }
+        self.toasts.show(ctx, &mut self.state, ctx.content_rect().shrink2(egui::vec2(0.0, 44.0)));
+    }
+}
+
+impl eframe::App for App {
+    fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
+        self.take_events(ctx);
+    }
+
+    fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
+        let ctx = ui.ctx().clone();
+        self.keys_and_drops(&ctx);
+        self.panes(ui);
+        self.over_everything(&ctx);
+        for action in std::mem::take(&mut self.actions) {
+            self.act(action, &ctx);
+            ctx.request_repaint();
+        }
+    }
+
+    fn save(&mut self, storage: &mut dyn eframe::Storage) {
+        self.layout.recent = self.state.recent.clone();
+        self.layout.save(storage);
+    }
+
+    fn clear_color(&self, _visuals: &egui::Visuals) -> [f32; 4] {
+        theme::CANVAS.to_normalized_gamma_f32()
+    }
+}
+
+fn drop_hint(ctx: &egui::Context) {
+    let painter = ctx.layer_painter(egui::LayerId::new(egui::Order::Foreground, egui::Id::unique("drop")));
+    let rect = ctx.content_rect();
+    painter.rect_filled(rect, 0.0, egui::Color32::from_black_alpha(170));
+    painter.rect_stroke(rect.shrink(24.0), 12.0, egui::Stroke::new(2.0, theme::ACCENT), egui::StrokeKind::Inside);
+    let font = egui::FontId::proportional(24.0);
+    painter.text(rect.center(), egui::Align2::CENTER_CENTER, "Drop to open", font, theme::TEXT);
+}

@@ -1,0 +1,128 @@
+//! What the window remembers from one run to the next.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use crate::pipeline::train::TrainConfig;
+use crate::worker::{Pane, ViewMode};
+
+/// Key of the layout in the storage.
+const KEY: &str = "layout";
+
+/// What the plots run over.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum PlotAxis {
+    /// Seconds of training.
+    #[default]
+    Seconds,
+    /// Optimiser steps.
+    Steps,
+}
+
+/// Choices of a person about the window, and the settings of the next training.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Layout {
+    /// Panes that are hidden.
+    pub hidden: Vec<Pane>,
+    /// Whether cameras are drawn into the view.
+    pub cameras: bool,
+    /// Whether the photo is shown beside the picture.
+    pub compare: bool,
+    /// Where the split between picture and photo is, 0 to 1.
+    pub split: f32,
+    /// What the viewport shows.
+    pub mode: ViewMode,
+    /// What the plots run over.
+    pub plot_axis: PlotAxis,
+    /// Settings of the next training.
+    pub config: TrainConfig,
+    /// Files and folders opened lately.
+    pub recent: Vec<PathBuf>,
+}
+
+impl Default for Layout {
+    fn default() -> Self {
+        Self {
+            hidden: vec![Pane::Log],
+            cameras: true,
+            compare: false,
+            split: 0.5,
+            mode: ViewMode::Picture,
+            plot_axis: PlotAxis::default(),
+            config: TrainConfig { steps: 3_000, eval_every: 250, ..TrainConfig::default() },
+            recent: Vec::new(),
+        }
+    }
+}
+
+impl Layout {
+    /// The stored layout, or the default one.
+    pub fn load(storage: Option<&dyn eframe::Storage>) -> Self {
+        let mut layout: Self = storage.and_then(|s| eframe::get_value(s, KEY)).unwrap_or_default();
+        layout.split = if layout.split.is_finite() { layout.split.clamp(0.02, 0.98) } else { 0.5 };
+        layout
+    }
+
+    /// Stores the layout.
+    pub fn save(&self, storage: &mut dyn eframe::Storage) {
+        eframe::set_value(storage, KEY, self);
+    }
+
+    /// Whether a pane is shown.
+    pub fn shows(&self, pane: Pane) -> bool {
+        !self.hidden.contains(&pane)
+    }
+
+    /// Shows a hidden pane or hides a shown one.
+    pub fn toggle(&mut self, pane: Pane) {
+        if self.shows(pane) {
+            self.hidden.push(pane);
+        } else {
+            self.hidden.retain(|p| *p != pane);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashMap;
+
+    #[derive(Default)]
+    struct Memory(HashMap<String, String>);
+
+    impl eframe::Storage for Memory {
+        fn get_string(&self, key: &str) -> Option<String> {
+            self.0.get(key).cloned()
+        }
+        fn set_string(&mut self, key: &str, value: String) {
+            self.0.insert(key.to_owned(), value);
+        }
+        fn remove_string(&mut self, key: &str) {
+            self.0.remove(key);
+        }
+        fn flush(&mut self) {}
+    }
+
+    #[test]
+    fn a_layout_comes_back_as_it_was_saved() {
+        let mut layout = Layout { split: 0.25, recent: vec!["a/b".into()], ..Layout::default() };
+        layout.toggle(Pane::Dataset);
+        let mut storage = Memory::default();
+        layout.save(&mut storage);
+        assert_eq!(Layout::load(Some(&storage)), layout);
+        assert!(!layout.shows(Pane::Dataset));
+        layout.toggle(Pane::Dataset);
+        assert!(layout.shows(Pane::Dataset));
+    }
+
+    #[test]
+    fn a_broken_store_gives_the_default() {
+        let mut storage = Memory::default();
+        eframe::Storage::set_string(&mut storage, KEY, "(split: NaN, nonsense".into());
+        assert_eq!(Layout::load(Some(&storage)), Layout::default());
+        assert_eq!(Layout::load(None), Layout::default());
+    }
+}

@@ -1,0 +1,173 @@
+//! The command palette and the shortcut sheet: two loops over the actions.
+
+use egui::{Align2, Key, Modifiers, RichText, ScrollArea, TextEdit};
+
+use super::keys;
+use super::theme;
+use crate::worker::Action;
+
+/// The command palette.
+#[derive(Default)]
+pub struct Palette {
+    open: bool,
+    query: String,
+    selected: usize,
+}
+
+impl Palette {
+    /// Opens it with an empty query, or closes it.
+    pub fn toggle(&mut self) {
+        *self = Self { open: !self.open, ..Self::default() };
+    }
+
+    /// Whether it is on screen.
+    pub fn is_open(&self) -> bool {
+        self.open
+    }
+
+    /// Closes it.
+    pub fn close(&mut self) {
+        self.open = false;
+    }
+
+    /// Draws it, and returns the action that was chosen.
+    pub fn show(&mut self, ctx: &egui::Context) -> Option<Action> {
+        if !self.open {
+            return None;
+        }
+        let found = matches(&self.query);
+        let last = found.len().saturating_sub(1);
+        let step = |key| ctx.input_mut(|i| i.consume_key(Modifiers::NONE, key));
+        if step(Key::ArrowDown) {
+            self.selected += 1;
+        }
+        if step(Key::ArrowUp) {
+            self.selected = self.selected.saturating_sub(1);
+        }
+        self.selected = self.selected.min(last);
+        let entered = step(Key::Enter);
+        let mut chosen = if entered { found.get(self.selected).cloned() } else { None };
+        let area = egui::Modal::default_area(egui::Id::unique("palette")).anchor(Align2::CENTER_TOP, [0.0, 90.0]);
+        let response = egui::Modal::new(egui::Id::unique("palette"))
+            .frame(theme::dialog().inner_margin(12))
+            .area(area)
+            .show(ctx, |ui| {
+                ui.set_width(520.0);
+                let edit = TextEdit::singleline(&mut self.query)
+                    .hint_text("Type an action, or a path to open")
+                    .desired_width(f32::INFINITY);
+                let edit = ui.add(edit).accessible_name("Search actions");
+                edit.request_focus();
+                if edit.changed() {
+                    self.selected = 0;
+                }
+                ui.add_space(4.0);
+                ScrollArea::vertical().max_height(380.0).auto_shrink([false, true]).show(ui, |ui| {
+                    if found.is_empty() {
+                        ui.weak("No action of that name.");
+                    }
+                    for (i, action) in found.iter().enumerate() {
+                        let row = egui::Button::selectable(i == self.selected, action.text())
+                            .shortcut_text(keys::label(ui.ctx(), action))
+                            .min_size(egui::vec2(ui.available_width(), 28.0));
+                        let row = ui.add(row).on_hover_text(action.tooltip());
+                        if i == self.selected && (entered || edit.changed() || step_keys(ui)) {
+                            row.scroll_to_me(None);
+                        }
+                        if row.clicked() {
+                            chosen = Some(action.clone());
+                        }
+                    }
+                });
+            });
+        if chosen.is_some() || response.should_close() {
+            self.open = false;
+        }
+        chosen
+    }
+}
+
+fn step_keys(ui: &egui::Ui) -> bool {
+    ui.input(|i| i.key_down(Key::ArrowDown) || i.key_down(Key::ArrowUp))
+}
+
+/// Actions whose names hold every word of the query, those that begin with it first. A query that
+/// looks like a path can also be opened.
+fn matches(query: &str) -> Vec<Action> {
+    let path = query.trim();
+    if path.starts_with(['/', '.', '~']) || path.contains(":\\") {
+        let home = path.strip_prefix("~/").and_then(|rest| Some(std::env::home_dir()?.join(rest)));
+        return vec![Action::Open(home.unwrap_or_else(|| path.into()))];
+    }
+    let query = path.to_lowercase();
+    let words: Vec<&str> = query.split_whitespace().collect();
+    let mut found: Vec<Action> =
+        Action::ALL.into_iter().filter(|a| words.iter().all(|w| a.text().to_lowercase().contains(w))).collect();
+    found.sort_by_key(|a| !a.text().to_lowercase().starts_with(&query));
+    found
+}
+
+/// Draws the shortcut sheet while `open`.
+pub fn shortcut_sheet(ctx: &egui::Context, open: &mut bool) {
+    if !*open {
+        return;
+    }
+    let response = egui::Modal::new(egui::Id::unique("shortcuts")).frame(theme::dialog()).show(ctx, |ui| {
+        ui.set_width(640.0);
+        ui.heading("Keyboard and mouse");
+        ui.add_space(8.0);
+        ui.columns_const(|[left, right]| {
+            let bound: Vec<(String, String)> = Action::ALL
+                .into_iter()
+                .chain([Action::Quit])
+                .filter(|a| a.shortcut().is_some())
+                .map(|a| (keys::label(left.ctx(), &a), a.text()))
+                .collect();
+            let gestures = keys::GESTURES.map(|(k, t)| (k.to_owned(), t.to_owned()));
+            sheet_grid(left, "Actions", &bound);
+            sheet_grid(right, "In the viewport", &gestures);
+        });
+        ui.add_space(8.0);
+        ui.horizontal(|ui| {
+            ui.weak("While a text field has the focus, it owns the plain keys.");
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| ui.button("Close").clicked()).inner
+        })
+        .inner
+    });
+    if response.inner || response.should_close() {
+        *open = false;
+    }
+}
+
+fn sheet_grid(ui: &mut egui::Ui, title: &str, rows: &[(String, String)]) {
+    theme::section(ui, title);
+    egui::Grid::new(title).num_columns(2).spacing([16.0, 5.0]).min_col_width(70.0).show(ui, |ui| {
+        for (key, text) in rows {
+            ui.label(RichText::new(key).monospace().color(theme::ACCENT));
+            ui.label(text);
+            ui.end_row();
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_empty_query_lists_everything() {
+        assert_eq!(matches("").len(), Action::ALL.len());
+    }
+
+    #[test]
+    fn every_word_counts_and_a_beginning_wins() {
+        assert_eq!(matches("train start"), vec![Action::StartTraining]);
+        assert_eq!(matches("open").first(), Some(&Action::OpenFolder));
+        assert!(matches("no such thing").is_empty());
+    }
+
+    #[test]
+    fn a_path_can_be_opened() {
+        assert_eq!(matches(" /data/My Fox "), vec![Action::Open("/data/My Fox".into())]);
+    }
+}

@@ -1,0 +1,143 @@
+//! The bar at the top (menus, name of the scene) and the bar at the bottom (the running job).
+
+use egui::{Align, Button, RichText, Ui};
+
+use super::super::layout::Layout;
+use super::super::state::AppState;
+use super::super::{format, keys, theme};
+use crate::pipeline::observer::Progress;
+use crate::worker::{Action, Pane, ViewMode};
+
+/// Draws the bar at the top.
+pub fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut Vec<Action>) {
+    ui.horizontal(|ui| {
+        let has_scene = state.scene.is_some();
+        let has_photos = state.scene.as_ref().is_some_and(|s| s.dataset.is_some());
+        ui.menu_button("File", |ui| {
+            ui.set_min_width(260.0);
+            for action in [Action::TryDemo, Action::OpenFolder, Action::OpenFile] {
+                item(ui, true, None, action, actions);
+            }
+            ui.menu_button("Open recent", |ui| {
+                if state.recent.is_empty() {
+                    ui.weak("Nothing yet");
+                }
+                for path in &state.recent {
+                    let text = format::shortened(&path.display().to_string(), 60);
+                    if ui.button(text).clicked() {
+                        actions.push(Action::Open(path.clone()));
+                    }
+                }
+            });
+            ui.separator();
+            item(ui, has_scene, None, Action::ExportPly, actions);
+            item(ui, has_scene, None, Action::Screenshot, actions);
+            ui.separator();
+            item(ui, true, None, Action::Quit, actions);
+        });
+        ui.menu_button("View", |ui| {
+            ui.set_min_width(280.0);
+            for mode in ViewMode::ALL {
+                item(ui, has_scene, Some(layout.mode == mode), Action::Show(mode), actions);
+            }
+            ui.separator();
+            item(ui, has_photos, Some(layout.cameras), Action::ToggleCameras, actions);
+            item(ui, has_photos, Some(layout.compare), Action::ToggleCompare, actions);
+            ui.separator();
+            for action in [Action::FrameScene, Action::ResetView] {
+                item(ui, has_scene, None, action, actions);
+            }
+            for action in [Action::PreviousPhoto, Action::NextPhoto] {
+                item(ui, has_photos, None, action, actions);
+            }
+            ui.separator();
+            for pane in Pane::ALL {
+                item(ui, true, Some(layout.shows(pane)), Action::TogglePane(pane), actions);
+            }
+        });
+        ui.menu_button("Train", |ui| {
+            ui.set_min_width(260.0);
+            item(ui, has_photos && state.job.is_none(), None, Action::StartTraining, actions);
+            item(ui, state.is_training(), None, Action::PauseTraining, actions);
+            item(ui, state.job.is_some(), None, Action::Cancel, actions);
+            item(ui, has_photos && state.job.is_none(), None, Action::Evaluate, actions);
+        });
+        ui.menu_button("Help", |ui| {
+            ui.set_min_width(240.0);
+            item(ui, true, None, Action::Palette, actions);
+            item(ui, true, None, Action::Shortcuts, actions);
+        });
+        if let Some(scene) = &state.scene {
+            ui.separator();
+            ui.label(RichText::new(&scene.name).strong()).on_hover_text(scene.path.display().to_string());
+        }
+        ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
+            let search = Button::new(RichText::new("Search actions").color(theme::WEAK))
+                .shortcut_text(keys::label(ui.ctx(), &Action::Palette));
+            if ui.add(search).on_hover_text(Action::Palette.tooltip()).clicked() {
+                actions.push(Action::Palette);
+            }
+        });
+    });
+}
+
+/// A menu entry; `on` marks a switch.
+fn item(ui: &mut Ui, enabled: bool, on: Option<bool>, action: Action, actions: &mut Vec<Action>) {
+    let text = match on {
+        Some(true) => format!("•  {}", action.text()),
+        Some(false) => format!("    {}", action.text()),
+        None => action.text(),
+    };
+    let button = Button::new(text).shortcut_text(keys::label(ui.ctx(), &action));
+    if ui.add_enabled(enabled, button).on_hover_text(action.tooltip()).clicked() {
+        actions.push(action);
+    }
+}
+
+/// Draws the bar at the bottom.
+pub fn status(ui: &mut Ui, state: &AppState, layout: &Layout, backend: &str, actions: &mut Vec<Action>) {
+    ui.horizontal(|ui| {
+        match &state.job {
+            Some(job) => {
+                dot(ui, if job.paused { theme::WARNING } else { theme::ACCENT });
+                let title = if job.paused { format!("{} (paused)", job.title) } else { job.title.clone() };
+                ui.label(RichText::new(title).strong());
+                if let Some(p) = &job.progress {
+                    progress(ui, p, job.paused);
+                }
+                if ui.small_button("Cancel").on_hover_text("Esc").clicked() {
+                    actions.push(Action::Cancel);
+                }
+            }
+            None => {
+                ui.label(
+                    RichText::new(if state.scene.is_some() { "Ready" } else { "Nothing open" }).color(theme::WEAK),
+                );
+            }
+        }
+        ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
+            let log = ui.selectable_label(layout.shows(Pane::Log), "Log");
+            if log.on_hover_text("Show or hide the log").clicked() {
+                actions.push(Action::TogglePane(Pane::Log));
+            }
+            ui.label(RichText::new(backend).small().color(theme::WEAK)).on_hover_text("What renders and trains");
+        });
+    });
+}
+
+/// A small disc: something runs.
+fn dot(ui: &mut Ui, color: egui::Color32) {
+    let (rect, _) = ui.allocate_exact_size(egui::vec2(10.0, 10.0), egui::Sense::hover());
+    ui.painter().circle_filled(rect.center(), 4.0, color);
+}
+
+fn progress(ui: &mut Ui, p: &Progress, paused: bool) {
+    let fraction = p.done as f32 / p.total.max(1) as f32;
+    let fill = if paused { theme::WARNING } else { theme::ACCENT };
+    ui.add(egui::ProgressBar::new(fraction).desired_width(140.0).desired_height(6.0).fill(fill));
+    let mut parts = vec![format!("{} of {}", format::count(p.done), format::count(p.total))];
+    if p.rate > 0.0 && !paused {
+        parts.push(format!("{} left", p.eta_secs().map_or_else(|| "–".into(), format::duration)));
+    }
+    ui.label(RichText::new(format!("{}  {}", p.stage, parts.join("  ·  "))).color(theme::WEAK));
+}

@@ -1,0 +1,202 @@
+//! Facts about the photos, and their thumbnails, loaded as they come into view.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use egui::{
+    Color32, ColorImage, Rect, RichText, ScrollArea, Sense, Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2,
+};
+
+use super::super::layout::Layout;
+use super::super::state::AppState;
+use super::super::{format, theme};
+use crate::scene::{Dataset, PhotoPixels};
+use crate::worker::{Action, Command, JobId, Worker};
+
+/// Longest side of a thumbnail in px.
+const SIDE_PX: u32 = 224;
+/// Thumbnails that are loaded at once; more would keep a photo that is looked at waiting.
+const AT_ONCE: usize = 2;
+/// Thumbnails kept.
+const KEPT: usize = 400;
+/// Height of the text under a thumbnail.
+const CAPTION: f32 = 18.0;
+
+/// The thumbnails of one scene.
+#[derive(Default)]
+pub struct Thumbnails {
+    scene: u64,
+    loaded: BTreeMap<usize, TextureHandle>,
+    waiting: HashMap<JobId, usize>,
+    failed: BTreeSet<usize>,
+}
+
+impl Thumbnails {
+    /// Takes over what was loaded since.
+    pub fn update(&mut self, ctx: &egui::Context, state: &mut AppState) {
+        if self.scene != state.scene_number {
+            *self = Self { scene: state.scene_number, ..Self::default() };
+        }
+        let ready: Vec<usize> = state.photos.keys().filter(|k| k.1 == SIDE_PX).map(|k| k.0).collect();
+        for index in ready {
+            if let Some(pixels) = state.photos.remove(&(index, SIDE_PX)) {
+                self.waiting.retain(|_, i| *i != index);
+                self.loaded.insert(index, upload(ctx, index, &pixels));
+            }
+        }
+        let waiting = &mut self.waiting;
+        let failed = &mut self.failed;
+        state.failed_photos.retain(|job| waiting.remove(job).map(|i| failed.insert(i)).is_none());
+    }
+
+    fn wish(&mut self, index: usize, dataset: &Dataset, worker: &Worker) {
+        let known = self.loaded.contains_key(&index)
+            || self.failed.contains(&index)
+            || self.waiting.values().any(|i| *i == index);
+        if known || self.waiting.len() >= AT_ONCE {
+            return;
+        }
+        let Some(photo) = dataset.photos.get(index) else { return };
+        let command = Command::Photo { index, photo: Box::new(photo.clone()), max_side_px: SIDE_PX };
+        // With a full queue the wish comes again with the next redraw.
+        if let Ok(job) = worker.submit(command) {
+            self.waiting.insert(job, index);
+        }
+    }
+
+    /// Forgets thumbnails far from those in view.
+    fn forget_far(&mut self, visible: std::ops::Range<usize>) {
+        while self.loaded.len() > KEPT {
+            let (Some(first), Some(last)) =
+                (self.loaded.keys().next().copied(), self.loaded.keys().next_back().copied())
+            else {
+                return;
+            };
+            let before = visible.start.saturating_sub(first);
+            let after = last.saturating_sub(visible.end);
+            self.loaded.remove(if before > after { &first } else { &last });
+        }
+    }
+
+    /// Draws the pane.
+    pub fn show(
+        &mut self,
+        ui: &mut Ui,
+        state: &AppState,
+        layout: &Layout,
+        current: Option<usize>,
+        worker: &Worker,
+        actions: &mut Vec<Action>,
+    ) {
+        let Some(dataset) = state.scene.as_ref().and_then(|s| s.dataset.as_ref()) else {
+            ui.weak("This scene has no photos.");
+            return;
+        };
+        let (train, test) = dataset.split(layout.config.holdout_every);
+        facts(ui, dataset, train.len(), test.len());
+        let test: BTreeSet<usize> = test.into_iter().collect();
+        let scores: HashMap<&str, f64> = state
+            .history
+            .evaluations
+            .last()
+            .map(|e| e.views.iter().map(|v| (v.name.as_str(), v.psnr)).collect())
+            .unwrap_or_default();
+        ui.add_space(4.0);
+        let columns = ((ui.available_width() / 120.0) as usize).max(2);
+        let gap = 6.0;
+        let width = (ui.available_width() - gap * (columns - 1) as f32 - 4.0) / columns as f32;
+        let cell = vec2(width, width * 0.75 + CAPTION);
+        let rows = dataset.photos.len().div_ceil(columns);
+        ui.spacing_mut().item_spacing.y = gap;
+        ScrollArea::vertical().auto_shrink([false, false]).show_rows(ui, cell.y, rows, |ui, visible| {
+            for row in visible.clone() {
+                ui.horizontal(|ui| {
+                    ui.spacing_mut().item_spacing.x = gap;
+                    for index in (row * columns..(row + 1) * columns).take_while(|i| *i < dataset.photos.len()) {
+                        self.wish(index, dataset, worker);
+                        let name = dataset.photos[index].name.as_str();
+                        let held = test.contains(&index);
+                        let caption = Caption { name, held, psnr: scores.get(name).copied() };
+                        if self.cell(ui, cell, index, &caption, current == Some(index)) {
+                            actions.push(Action::GoToPhoto(index));
+                        }
+                    }
+                });
+            }
+            self.forget_far(visible.start * columns..visible.end * columns);
+        });
+    }
+
+    fn cell(&self, ui: &mut Ui, size: egui::Vec2, index: usize, caption: &Caption<'_>, selected: bool) -> bool {
+        let (rect, response) = ui.allocate_exact_size(size, Sense::click());
+        let held = if caption.held { ", held out" } else { "" };
+        response.widget_info(|| {
+            egui::WidgetInfo::selected(egui::Role::Button, true, selected, format!("Photo {}{held}", caption.name))
+        });
+        let picture = Rect::from_min_max(rect.min, pos2(rect.right(), rect.bottom() - CAPTION));
+        let painter = ui.painter();
+        painter.rect_filled(picture, 5.0, theme::CANVAS);
+        match self.loaded.get(&index) {
+            Some(texture) => {
+                let s = texture.size_vec2();
+                let scale = (picture.width() / s.x).min(picture.height() / s.y);
+                let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+                painter.image(texture.id(), Rect::from_center_size(picture.center(), s * scale), uv, Color32::WHITE);
+            }
+            None if self.failed.contains(&index) => {
+                text(ui, picture.center(), egui::Align2::CENTER_CENTER, "not readable", theme::WARNING);
+            }
+            None => {}
+        }
+        let border = match (selected, response.hovered()) {
+            (true, _) => Stroke::new(2.0, theme::ACCENT),
+            (false, true) => Stroke::new(1.0, theme::WEAK),
+            (false, false) => Stroke::new(1.0, theme::LINE),
+        };
+        ui.painter().rect_stroke(picture, 5.0, border, egui::StrokeKind::Inside);
+        let y = rect.bottom() - 0.5 * CAPTION;
+        let file = caption.name.rsplit('/').next().unwrap_or(caption.name);
+        let color = if caption.held { theme::WARNING } else { theme::WEAK };
+        let room = if caption.psnr.is_some() { 9 } else { 16 };
+        text(ui, pos2(rect.left() + 2.0, y), egui::Align2::LEFT_CENTER, &format::shortened(file, room), color);
+        if let Some(psnr) = caption.psnr {
+            text(ui, pos2(rect.right() - 2.0, y), egui::Align2::RIGHT_CENTER, &format!("{psnr:.1} dB"), theme::TEXT);
+        }
+        let use_ = if caption.held { "held out for measuring" } else { "used for training" };
+        response.on_hover_text(format!("{}\n{use_}\nClick to look through its camera", caption.name)).clicked()
+    }
+}
+
+struct Caption<'a> {
+    name: &'a str,
+    held: bool,
+    psnr: Option<f64>,
+}
+
+fn text(ui: &Ui, at: egui::Pos2, align: egui::Align2, text: &str, color: Color32) {
+    ui.painter().text(at, align, text, egui::FontId::proportional(11.0), color);
+}
+
+fn facts(ui: &mut Ui, dataset: &Dataset, train: usize, test: usize) {
+    ui.spacing_mut().item_spacing.y = 3.0;
+    ui.label(RichText::new(&dataset.name).heading()).on_hover_text(dataset.root.display().to_string());
+    let size = dataset.photos.first().map(|p| format!("{} x {} px", p.camera.width_px, p.camera.height_px));
+    let parts = [Some(dataset.format.clone()), size];
+    ui.label(RichText::new(parts.into_iter().flatten().collect::<Vec<_>>().join("  ·  ")).color(theme::WEAK));
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        ui.label(RichText::new(format!("{train} train")).color(theme::TEXT));
+        ui.weak("·");
+        ui.label(RichText::new(format!("{test} held out")).color(theme::WARNING));
+        ui.weak(format!("·  {} points", format::count(dataset.points.len() as u64)));
+    });
+    if !dataset.warnings.is_empty() {
+        let text = format!("{} warning{}", dataset.warnings.len(), if dataset.warnings.len() == 1 { "" } else { "s" });
+        ui.label(RichText::new(text).color(theme::WARNING)).on_hover_text(dataset.warnings.join("\n"));
+    }
+}
+
+fn upload(ctx: &egui::Context, index: usize, pixels: &PhotoPixels) -> TextureHandle {
+    let size = [pixels.width_px as usize, pixels.height_px as usize];
+    let colors = pixels.rgb.iter().map(|&[r, g, b]| Color32::from_rgb(r, g, b)).collect();
+    ctx.load_texture(format!("thumbnail {index}"), ColorImage::new(size, colors), TextureOptions::LINEAR)
+}

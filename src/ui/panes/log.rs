@@ -1,0 +1,31 @@
+//! The log.
+
+use egui::{RichText, ScrollArea, Ui};
+
+use super::super::state::AppState;
+use super::super::theme;
+
+/// Draws the log, newest line at the bottom.
+pub fn show(ui: &mut Ui, state: &AppState) {
+    ui.horizontal(|ui| {
+        ui.label(RichText::new("Log").strong());
+        ui.weak(format!("{} lines", state.log.len()));
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            if ui.small_button("Copy all").clicked() {
+                let lines: Vec<&str> = state.log.iter().map(|l| l.text.as_str()).collect();
+                ui.ctx().copy_text(lines.join("\n"));
+            }
+        });
+    });
+    let height = ui.text_style_height(&egui::TextStyle::Monospace);
+    ScrollArea::vertical().auto_shrink([false, false]).stick_to_bottom(true).show_rows(
+        ui,
+        height,
+        state.log.len(),
+        |ui, rows| {
+            for line in state.log.range(rows) {
+                ui.label(RichText::new(&line.text).monospace().color(theme::tone_color(line.tone)));
+            }
+        },
+    );
+}

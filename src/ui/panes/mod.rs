@@ -1,0 +1,9 @@
+//! One file per part of the window.
+
+pub mod bars;
+pub mod dataset;
+pub mod empty;
+pub mod log;
+pub mod plan;
+pub mod plots;
+pub mod training;

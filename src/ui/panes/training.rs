@@ -1,0 +1,178 @@
+//! Settings, progress and plots of training.
+
+use egui::{DragValue, Grid, RichText, Slider, Ui};
+
+use super::super::layout::Layout;
+use super::super::state::{AppState, RunningJob};
+use super::super::{format, keys, theme};
+use super::plots;
+use crate::pipeline::train::TrainConfig;
+use crate::worker::{Action, JobKind};
+
+/// Draws the pane.
+pub fn show(ui: &mut Ui, state: &AppState, layout: &mut Layout, actions: &mut Vec<Action>) {
+    let Some(scene) = &state.scene else { return };
+    let Some(dataset) = &scene.dataset else {
+        ui.add_space(6.0);
+        ui.weak("This scene has no photos, so there is nothing to train on. Open a folder of posed photos to train.");
+        return;
+    };
+    let job = state.job.as_ref().filter(|j| j.kind == JobKind::Train);
+    match job {
+        Some(job) => running(ui, job, actions),
+        None => {
+            let largest = dataset.photos.iter().map(|p| p.camera.width_px.max(p.camera.height_px)).max().unwrap_or(1);
+            settings(ui, &mut layout.config, largest);
+            start(ui, state, actions);
+        }
+    }
+    if !state.history.steps.is_empty() || !state.history.evaluations.is_empty() {
+        facts(ui, state, job);
+        plots::show(ui, &state.history, &mut layout.plot_axis);
+    } else if job.is_none() {
+        ui.add_space(4.0);
+        ui.weak("Loss and PSNR appear here once training runs.");
+    }
+}
+
+fn start(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
+    ui.add_space(2.0);
+    let busy = state.job.is_some();
+    ui.horizontal(|ui| {
+        let tip = format!("{}  {}", Action::StartTraining.tooltip(), keys::label(ui.ctx(), &Action::StartTraining));
+        let button = theme::primary_button("Start training").min_size(egui::vec2(150.0, 30.0));
+        let response =
+            ui.add_enabled(!busy, button).on_hover_text(tip).on_disabled_hover_text("Another job is running.");
+        if response.clicked() {
+            actions.push(Action::StartTraining);
+        }
+        let trained = state.training_job.is_some() || state.scene.as_ref().is_some_and(|s| s.trained);
+        let can_measure = trained && !busy;
+        let measure = ui.add_enabled(can_measure, egui::Button::new("Measure").min_size(egui::vec2(80.0, 30.0)));
+        if measure
+            .on_hover_text(Action::Evaluate.tooltip())
+            .on_disabled_hover_text("Needs trained Gaussians.")
+            .clicked()
+        {
+            actions.push(Action::Evaluate);
+        }
+    });
+}
+
+fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {
+    Grid::new("settings").num_columns(2).spacing([12.0, 6.0]).show(ui, |ui| {
+        let label = |ui: &mut Ui, text: &str, tip: &str| ui.label(text).on_hover_text(tip).id;
+        let id = label(ui, "Steps", "Optimiser steps in all; every schedule scales with it.");
+        ui.add(DragValue::new(&mut config.steps).range(100..=100_000).speed(50)).labelled_by(id);
+        ui.end_row();
+        let id = label(ui, "Longest side", "Size of the training pictures; photos are never enlarged.");
+        let range = 64..=largest_px.clamp(65, 4096);
+        config.max_side_px = config.max_side_px.clamp(64, *range.end());
+        ui.add(Slider::new(&mut config.max_side_px, range).suffix(" px").step_by(8.0)).labelled_by(id);
+        ui.end_row();
+        let id = label(ui, "Colour", "Highest spherical-harmonics degree: 0 is the same colour from everywhere.");
+        ui.add(Slider::new(&mut config.sh_degree, 0..=3).prefix("SH degree ")).labelled_by(id);
+        ui.end_row();
+        let id = label(ui, "Held out", "Photos kept for measuring. Datasets that mark test photos use those.");
+        let shown = |n: f64, _: std::ops::RangeInclusive<usize>| match n as u64 {
+            0 => "none".to_owned(),
+            n => format!("1 of {n}"),
+        };
+        ui.add(DragValue::new(&mut config.holdout_every).range(0..=100).speed(0.1).custom_formatter(shown))
+            .labelled_by(id);
+        ui.end_row();
+        let id = label(ui, "Gaussians", "Adds Gaussians where detail is missing and removes idle ones.");
+        ui.checkbox(&mut config.densify, "add and remove").labelled_by(id);
+        ui.end_row();
+    });
+    ui.collapsing("More", |ui| {
+        ui.checkbox(&mut config.antialias, "Anti-aliasing (2-D filter of Mip-Splatting)");
+        let mut limited = config.max_gaussians.is_some();
+        ui.horizontal(|ui| {
+            if ui.checkbox(&mut limited, "Limit Gaussians to").changed() {
+                config.max_gaussians = limited.then_some(200_000);
+            }
+            if let Some(n) = &mut config.max_gaussians {
+                ui.add(DragValue::new(n).range(1_000..=6_000_000).speed(1000)).accessible_name("Most Gaussians");
+            } else {
+                ui.weak("from free memory");
+            }
+        });
+        ui.horizontal(|ui| {
+            let id = ui.label("Measure every").id;
+            ui.add(DragValue::new(&mut config.eval_every).range(0..=100_000).speed(10).suffix(" steps"))
+                .labelled_by(id);
+        });
+        ui.horizontal(|ui| {
+            let id = ui.label("Seed").id;
+            ui.add(DragValue::new(&mut config.seed)).labelled_by(id);
+        });
+    });
+}
+
+fn running(ui: &mut Ui, job: &RunningJob, actions: &mut Vec<Action>) {
+    let done = job.progress.as_ref().map_or(0.0, |p| p.done as f32 / p.total.max(1) as f32);
+    let text = job.progress.as_ref().map_or_else(
+        || "starting".to_owned(),
+        |p| format!("{}  {} of {}", p.stage, format::count(p.done), format::count(p.total)),
+    );
+    ui.label(RichText::new(if job.paused { format!("{text}  (paused)") } else { text }).strong());
+    ui.add(egui::ProgressBar::new(done).desired_height(6.0).fill(if job.paused {
+        theme::WARNING
+    } else {
+        theme::ACCENT
+    }));
+    ui.horizontal(|ui| {
+        let pause = if job.paused { "Resume" } else { "Pause" };
+        let size = egui::vec2(92.0, 28.0);
+        let tip = format!("{}  T", Action::PauseTraining.tooltip());
+        let button = if job.paused { theme::primary_button(pause) } else { egui::Button::new(pause) };
+        if ui.add(button.min_size(size)).on_hover_text(tip).clicked() {
+            actions.push(Action::PauseTraining);
+        }
+        let tip = format!("{}  Esc", Action::Cancel.tooltip());
+        if ui.add(egui::Button::new("Cancel").min_size(size)).on_hover_text(tip).clicked() {
+            actions.push(Action::Cancel);
+        }
+    });
+}
+
+/// The figures: what it is now.
+fn facts(ui: &mut Ui, state: &AppState, job: Option<&RunningJob>) {
+    ui.add_space(4.0);
+    let last = state.history.steps.last();
+    let held = state.history.evaluations.last();
+    let progress = job.and_then(|j| j.progress.as_ref());
+    let dash = || "–".to_owned();
+    let best = state.history.evaluations.iter().map(|e| e.psnr).fold(f64::NAN, f64::max);
+    let left = [
+        ("Held-out PSNR", held.map_or_else(dash, |e| format::decibel(e.psnr))),
+        ("Held-out SSIM", held.map_or_else(dash, |e| format!("{:.3}", e.ssim))),
+        ("Best PSNR", format::decibel(best)),
+        (
+            "Gaussians",
+            last.map(|m| m.gaussians).or(held.map(|e| e.gaussians)).map_or_else(dash, |n| format::count(n as u64)),
+        ),
+    ];
+    let right = [
+        ("Loss", last.map_or_else(dash, |m| format!("{:.4}", m.loss))),
+        ("Rate", progress.map_or_else(dash, |p| format::rate(p.rate, "steps"))),
+        ("Elapsed", last.map(|m| m.secs).or(held.map(|e| e.secs)).map_or_else(dash, format::duration)),
+        ("To go", progress.and_then(crate::pipeline::observer::Progress::eta_secs).map_or_else(dash, format::duration)),
+    ];
+    egui::Frame::new().fill(theme::SURFACE).corner_radius(8).inner_margin(10).show(ui, |ui| {
+        ui.columns_const(|[a, b]| {
+            for (ui, rows) in [(a, &left), (b, &right)] {
+                ui.spacing_mut().item_spacing.y = 3.0;
+                for (name, value) in rows {
+                    ui.horizontal(|ui| {
+                        ui.label(RichText::new(*name).small().color(theme::WEAK));
+                        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                            ui.label(RichText::new(value).strong());
+                        });
+                    });
+                }
+            }
+        });
+    });
+}

@@ -1,0 +1,295 @@
+//! Everything the window knows, changed by events alone: [`AppState::apply`] is a pure fold.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use crate::pipeline::observer::{Evaluation, Level, Progress, StepMetrics};
+use crate::scene::{PhotoPixels, ScenePlan};
+use crate::worker::{Event, Failure, JobId, JobKind, Lane, OpenedScene, Outcome};
+
+/// Measurements kept for the plots; beyond that every second one is dropped.
+const MAX_STEPS: usize = 4_000;
+/// Lines kept in the log.
+const MAX_LOG: usize = 1_000;
+/// Files and folders kept in the recent list.
+const MAX_RECENT: usize = 8;
+
+/// How a message is meant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tone {
+    /// For the record.
+    Info,
+    /// Something was done.
+    Good,
+    /// Something was left out or changed.
+    Warning,
+    /// Something failed.
+    Error,
+}
+
+/// A line of the log.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LogLine {
+    /// How it is meant.
+    pub tone: Tone,
+    /// What it says.
+    pub text: String,
+}
+
+/// A message that goes away by itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Toast {
+    /// Names it, so that the window can time it.
+    pub id: u64,
+    /// How it is meant.
+    pub tone: Tone,
+    /// What it says.
+    pub text: String,
+}
+
+/// The long job that runs now.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunningJob {
+    /// Which.
+    pub id: JobId,
+    /// Its sort.
+    pub kind: JobKind,
+    /// What it does, for people.
+    pub title: String,
+    /// Where it stands, once it says.
+    pub progress: Option<Progress>,
+    /// Whether it waits.
+    pub paused: bool,
+}
+
+/// What training has shown so far.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TrainHistory {
+    /// Measurements, oldest first, thinned out when there are many.
+    pub steps: Vec<StepMetrics>,
+    /// Held-out evaluations, oldest first.
+    pub evaluations: Vec<Evaluation>,
+}
+
+/// An error that is shown until a person has read it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ErrorBox {
+    /// What was being done: "Opening fox".
+    pub doing: String,
+    /// What went wrong, and what to do.
+    pub failure: Failure,
+}
+
+/// Everything the window knows of the world.
+#[derive(Clone, Debug, Default)]
+pub struct AppState {
+    /// The scene on screen.
+    pub scene: Option<Arc<OpenedScene>>,
+    /// Counts the scenes shown so far; changes when `scene` does.
+    pub scene_number: u64,
+    /// What is left out for the scene, and why.
+    pub plan: ScenePlan,
+    /// The long job that runs.
+    pub job: Option<RunningJob>,
+    /// Training of the present scene.
+    pub history: TrainHistory,
+    /// Job whose Gaussians are those of the present scene.
+    pub training_job: Option<JobId>,
+    /// The log, oldest first.
+    pub log: VecDeque<LogLine>,
+    /// Messages on screen, oldest first.
+    pub toasts: Vec<Toast>,
+    /// The error on screen.
+    pub error: Option<ErrorBox>,
+    /// Files and folders opened lately, newest first.
+    pub recent: Vec<PathBuf>,
+    /// Photos loaded lately, by index and size limit; the window takes them out.
+    pub photos: BTreeMap<(usize, u32), Arc<PhotoPixels>>,
+    /// Photos that could not be loaded, by job, for the window to mark; the window takes them out.
+    pub failed_photos: Vec<JobId>,
+    /// Set when a demo was opened: the window is to train it.
+    pub wants_training: bool,
+    /// Short jobs that run, with their titles.
+    short_jobs: BTreeMap<JobId, (JobKind, String)>,
+    next_toast: u64,
+}
+
+impl AppState {
+    /// A window with nothing open.
+    pub fn new(recent: Vec<PathBuf>) -> Self {
+        Self { recent, ..Self::default() }
+    }
+
+    /// Takes in one event.
+    pub fn apply(&mut self, event: Event) {
+        match event {
+            Event::Started { job, kind, title } if kind.lane() == Lane::Short => {
+                self.short_jobs.insert(job, (kind, title));
+            }
+            Event::Started { job, kind, title } => {
+                if kind == JobKind::Train {
+                    self.training_job = Some(job);
+                }
+                self.say(Tone::Info, title.clone());
+                self.job = Some(RunningJob { id: job, kind, title, progress: None, paused: false });
+            }
+            Event::Progress(job, progress) => self.with_job(job, |j| j.progress = Some(progress)),
+            Event::Paused(job, paused) => self.with_job(job, |j| j.paused = paused),
+            Event::Step(job, metrics) => {
+                if self.training_job == Some(job) {
+                    self.history.push(metrics);
+                }
+            }
+            Event::Evaluation(job, evaluation) => self.evaluated(job, evaluation),
+            Event::Note(_, Level::Info, text) => self.say(Tone::Info, text),
+            Event::Note(_, Level::Warning, text) => self.say(Tone::Warning, text),
+            Event::Finished(job, outcome) => self.finished(job, outcome),
+            Event::Cancelled(job) => {
+                if let Some(ended) = self.end(job) {
+                    self.toast(Tone::Info, format!("{}: cancelled", ended.title));
+                }
+            }
+            Event::Failed(job, failure) => self.failed(job, failure),
+        }
+    }
+
+    /// Adds a line to the log.
+    pub fn say(&mut self, tone: Tone, text: impl Into<String>) {
+        if self.log.len() == MAX_LOG {
+            self.log.pop_front();
+        }
+        self.log.push_back(LogLine { tone, text: text.into() });
+    }
+
+    /// Shows a message that goes away by itself, and logs it.
+    pub fn toast(&mut self, tone: Tone, text: impl Into<String>) {
+        let text = text.into();
+        self.say(tone, text.clone());
+        self.toasts.push(Toast { id: self.next_toast, tone, text });
+        self.next_toast += 1;
+    }
+
+    /// Shows an error until it is dismissed, and logs it.
+    pub fn fail(&mut self, doing: impl Into<String>, failure: Failure) {
+        let doing = doing.into();
+        self.say(Tone::Error, format!("{doing}: {}", failure.message));
+        self.error = Some(ErrorBox { doing, failure });
+    }
+
+    /// Puts a path on top of the recent list.
+    pub fn remember(&mut self, path: PathBuf) {
+        self.recent.retain(|p| *p != path);
+        self.recent.insert(0, path);
+        self.recent.truncate(MAX_RECENT);
+    }
+
+    /// Whether training runs or waits.
+    pub fn is_training(&self) -> bool {
+        self.job.as_ref().is_some_and(|j| j.kind == JobKind::Train)
+    }
+
+    fn with_job(&mut self, job: JobId, change: impl FnOnce(&mut RunningJob)) {
+        if let Some(j) = self.job.as_mut().filter(|j| j.id == job) {
+            change(j);
+        }
+    }
+
+    /// Takes the long job off the screen if it is `job`.
+    fn end(&mut self, job: JobId) -> Option<RunningJob> {
+        self.short_jobs.remove(&job);
+        self.job.take_if(|j| j.id == job)
+    }
+
+    fn evaluated(&mut self, job: JobId, evaluation: Evaluation) {
+        if self.training_job == Some(job) {
+            self.say(
+                Tone::Info,
+                format!(
+                    "Step {}: held-out PSNR {:.2} dB, SSIM {:.3}",
+                    evaluation.step, evaluation.psnr, evaluation.ssim
+                ),
+            );
+            self.history.evaluations.push(evaluation);
+        }
+    }
+
+    fn finished(&mut self, job: JobId, outcome: Outcome) {
+        let ended = self.end(job);
+        match outcome {
+            Outcome::Opened(scene) => self.opened(*scene, ended.is_some_and(|j| j.kind == JobKind::Demo)),
+            Outcome::Trained { evaluations, out, plan } => {
+                if self.training_job == Some(job) {
+                    self.history.evaluations = evaluations;
+                    self.plan = plan;
+                }
+                let quality = self.history.evaluations.last().map(|e| format!(", held-out PSNR {:.2} dB", e.psnr));
+                self.say(Tone::Info, format!("Saved to {}", out.display()));
+                self.toast(Tone::Good, format!("Training finished{}", quality.unwrap_or_default()));
+            }
+            Outcome::Evaluated(mut e) => {
+                if let Some(last) = self.history.steps.last() {
+                    (e.step, e.secs) = (last.step, last.secs);
+                }
+                self.history.evaluations.retain(|old| old.step < e.step);
+                self.toast(Tone::Good, format!("Held-out PSNR {:.2} dB, SSIM {:.3}", e.psnr, e.ssim));
+                self.history.evaluations.push(e);
+            }
+            Outcome::Written(path) => self.toast(Tone::Good, format!("Wrote {}", path.display())),
+            Outcome::Photo { index, max_side_px, pixels } => {
+                self.photos.insert((index, max_side_px), pixels);
+            }
+        }
+    }
+
+    fn opened(&mut self, scene: OpenedScene, is_demo: bool) {
+        for warning in scene.dataset.iter().flat_map(|d| d.warnings.clone()) {
+            self.toast(Tone::Warning, warning);
+        }
+        self.history =
+            TrainHistory { steps: scene.history.steps.clone(), evaluations: scene.history.evaluations.clone() };
+        self.training_job = None;
+        self.photos.clear();
+        self.wants_training = is_demo;
+        if !is_demo {
+            self.remember(scene.path.clone());
+        }
+        self.scene_number += 1;
+        self.plan = scene.plan.clone();
+        self.scene = Some(Arc::new(scene));
+    }
+
+    fn failed(&mut self, job: JobId, failure: Failure) {
+        let doing = match self.short_jobs.remove(&job) {
+            // A photo that cannot be read is no reason to stop a person.
+            Some((JobKind::Photo, title)) => {
+                self.toast(Tone::Warning, format!("{title}: {}", failure.message));
+                self.failed_photos.push(job);
+                return;
+            }
+            Some((_, title)) => title,
+            None => self.end(job).map_or_else(|| "Working".to_owned(), |j| j.title),
+        };
+        self.fail(doing, failure);
+    }
+}
+
+impl TrainHistory {
+    fn push(&mut self, metrics: StepMetrics) {
+        // A resumed run goes on from what was measured before; a new one starts over.
+        self.steps.retain(|s| s.step < metrics.step);
+        self.evaluations.retain(|e| e.step <= metrics.step);
+        if self.steps.len() >= MAX_STEPS {
+            let mut keep = false;
+            self.steps.retain(|_| {
+                keep = !keep;
+                keep
+            });
+        }
+        self.steps.push(metrics);
+    }
+}
+
+#[cfg(test)]
+#[path = "state_tests.rs"]
+mod tests;

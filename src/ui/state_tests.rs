@@ -1,0 +1,141 @@
+//! Tests of the fold.
+
+use super::*;
+use crate::scene::Dataset;
+
+const JOB: JobId = JobId(7);
+
+fn started(kind: JobKind) -> Event {
+    Event::Started { job: JOB, kind, title: "Doing it".into() }
+}
+
+fn step(n: u64) -> Event {
+    Event::Step(JOB, StepMetrics { step: n, loss: 1.0 / n as f64, ..StepMetrics::default() })
+}
+
+fn opened(name: &str, warnings: &[&str]) -> Event {
+    let dataset = Dataset { warnings: warnings.iter().map(|w| (*w).to_owned()).collect(), ..Dataset::default() };
+    let scene = OpenedScene {
+        name: name.into(),
+        path: name.into(),
+        dataset: Some(Arc::new(dataset)),
+        ..OpenedScene::default()
+    };
+    Event::Finished(JOB, Outcome::Opened(Box::new(scene)))
+}
+
+fn fold(events: impl IntoIterator<Item = Event>) -> AppState {
+    let mut state = AppState::default();
+    for e in events {
+        state.apply(e);
+    }
+    state
+}
+
+#[test]
+fn training_moves_the_plot_and_ends() {
+    let mut s = fold([started(JobKind::Train), step(10), step(20)]);
+    assert!(s.is_training());
+    assert_eq!(s.history.steps.len(), 2);
+    s.apply(Event::Paused(JOB, true));
+    assert!(s.job.as_ref().is_some_and(|j| j.paused));
+    s.apply(Event::Cancelled(JOB));
+    assert!(s.job.is_none());
+    assert_eq!(s.history.steps.len(), 2, "what was measured stays");
+    assert_eq!(s.toasts.len(), 1);
+}
+
+#[test]
+fn events_of_another_job_change_nothing() {
+    let mut s = fold([started(JobKind::Train), step(10)]);
+    let other = JobId(99);
+    s.apply(Event::Step(other, StepMetrics { step: 11, ..StepMetrics::default() }));
+    s.apply(Event::Paused(other, true));
+    s.apply(Event::Cancelled(other));
+    assert_eq!(s.history.steps.len(), 1);
+    assert!(s.job.as_ref().is_some_and(|j| !j.paused));
+}
+
+#[test]
+fn a_failed_opening_keeps_the_scene_and_says_why() {
+    let failure = Failure { message: "x.ply, byte 12: truncated".into(), remedy: "Copy it again.".into() };
+    let s = fold([
+        started(JobKind::Open),
+        opened("good", &[]),
+        started(JobKind::Open),
+        Event::Failed(JOB, failure.clone()),
+    ]);
+    assert_eq!(s.scene.as_ref().map(|s| s.name.as_str()), Some("good"));
+    assert_eq!(s.error, Some(ErrorBox { doing: "Doing it".into(), failure }));
+    assert!(s.job.is_none());
+}
+
+#[test]
+fn a_photo_that_fails_does_not_stop_anybody() {
+    let failure = Failure { message: "a.jpg is empty".into(), remedy: String::new() };
+    let s = fold([started(JobKind::Photo), Event::Failed(JOB, failure)]);
+    assert!(s.error.is_none());
+    assert_eq!(s.toasts[0].tone, Tone::Warning);
+    assert_eq!(s.failed_photos, vec![JOB]);
+}
+
+#[test]
+fn opening_replaces_the_scene_and_is_remembered() {
+    let s = fold([
+        started(JobKind::Open),
+        opened("a", &["17 photos are missing"]),
+        started(JobKind::Open),
+        opened("b", &[]),
+    ]);
+    assert_eq!(s.scene_number, 2);
+    assert_eq!(s.recent, vec![PathBuf::from("b"), PathBuf::from("a")]);
+    assert_eq!(s.toasts[0].text, "17 photos are missing");
+    assert!(!s.wants_training);
+}
+
+#[test]
+fn the_demo_is_trained_at_once_and_not_listed_as_recent() {
+    let s = fold([started(JobKind::Demo), opened("demo", &[])]);
+    assert!(s.wants_training);
+    assert!(s.recent.is_empty());
+}
+
+#[test]
+fn a_resumed_run_overwrites_the_steps_it_repeats() {
+    let s = fold([started(JobKind::Train), step(10), step(20), step(15)]);
+    assert_eq!(s.history.steps.iter().map(|s| s.step).collect::<Vec<_>>(), vec![10, 15]);
+}
+
+#[test]
+fn a_new_run_starts_its_plot_over_and_a_resumed_one_goes_on() {
+    let evaluation = |step| {
+        let views = Vec::new();
+        Event::Evaluation(JOB, Evaluation { step, secs: 1.0, psnr: 20.0, ssim: 0.5, gaussians: 9, views })
+    };
+    let mut s = fold([started(JobKind::Train), step(10), step(20), evaluation(20), Event::Cancelled(JOB)]);
+    s.apply(started(JobKind::Train));
+    s.apply(step(30));
+    assert_eq!((s.history.steps.len(), s.history.evaluations.len()), (3, 1));
+    s.apply(Event::Cancelled(JOB));
+    s.apply(started(JobKind::Train));
+    s.apply(step(10));
+    assert_eq!((s.history.steps.len(), s.history.evaluations.len()), (1, 0));
+}
+
+#[test]
+fn long_histories_are_thinned_and_keep_their_ends() {
+    let s = fold(std::iter::once(started(JobKind::Train)).chain((1..=10_000).map(step)));
+    assert!(s.history.steps.len() <= MAX_STEPS);
+    assert_eq!(s.history.steps.first().map(|s| s.step), Some(1));
+    assert_eq!(s.history.steps.last().map(|s| s.step), Some(10_000));
+}
+
+#[test]
+fn the_recent_list_is_short_and_has_no_doubles() {
+    let mut s = AppState::default();
+    for i in (0..20).chain([19, 15]) {
+        s.remember(PathBuf::from(i.to_string()));
+    }
+    assert_eq!(s.recent.len(), MAX_RECENT);
+    assert_eq!(s.recent[..2], [PathBuf::from("15"), PathBuf::from("19")]);
+}

@@ -1,0 +1,225 @@
+//! The viewer's own camera: orbits a pivot, flies, pans, and zooms towards what is under the cursor.
+
+use glam::{DMat3, DVec2, DVec3};
+
+use crate::scene::{Bounds, Camera};
+
+/// Vertical field of view of a fresh eye, in radians.
+const FOV_Y_RAD: f64 = 0.85;
+/// How close the viewing direction may come to the up direction, in radians.
+const POLE_RAD: f64 = 0.03;
+
+/// The viewer's camera, without a picture size.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Eye {
+    /// Position in the world.
+    pub center: DVec3,
+    /// Columns: right, down, forward in the world.
+    pub world_from_eye: DMat3,
+    /// What orbiting turns about.
+    pub pivot: DVec3,
+    /// Upwards in the world, unit length.
+    pub up: DVec3,
+    /// Vertical field of view in radians.
+    pub fov_y_rad: f64,
+}
+
+impl Eye {
+    /// An eye that sees all of `bounds` from obliquely above.
+    pub fn framing(bounds: &Bounds, up: DVec3) -> Self {
+        let side = up.any_orthogonal_vector();
+        let mut eye = Self {
+            center: bounds.center() - side,
+            world_from_eye: DMat3::IDENTITY,
+            pivot: bounds.center(),
+            up,
+            fov_y_rad: FOV_Y_RAD,
+        };
+        eye.look_along(-(side + up * 0.45));
+        eye.frame(bounds);
+        eye
+    }
+
+    /// The eye of a photo's camera, with `pivot` to turn about.
+    pub fn of_camera(camera: &Camera, pivot: DVec3, up: DVec3) -> Self {
+        let half = f64::from(camera.height_px) * 0.5 / camera.focal_px.y;
+        Self {
+            center: camera.center,
+            world_from_eye: camera.world_from_camera,
+            pivot,
+            up,
+            fov_y_rad: 2.0 * half.atan(),
+        }
+    }
+
+    /// The camera for a picture of this size.
+    pub fn camera(&self, width_px: u32, height_px: u32) -> Camera {
+        let (w, h) = (f64::from(width_px.max(1)), f64::from(height_px.max(1)));
+        Camera {
+            width_px: width_px.max(1),
+            height_px: height_px.max(1),
+            focal_px: DVec2::splat(0.5 * h / (0.5 * self.fov_y_rad).tan()),
+            principal_px: DVec2::new(w, h) * 0.5,
+            world_from_camera: self.world_from_eye,
+            center: self.center,
+        }
+    }
+
+    /// Unit vector of the viewing direction.
+    pub fn forward(&self) -> DVec3 {
+        self.world_from_eye.z_axis
+    }
+
+    /// Distance to the pivot, never 0.
+    pub fn distance(&self) -> f64 {
+        self.center.distance(self.pivot).max(1e-9)
+    }
+
+    /// Turns about the pivot: `yaw_rad` about the up direction, `pitch_rad` about the eye's right
+    /// axis, stopping short of the poles.
+    pub fn orbit(&mut self, yaw_rad: f64, pitch_rad: f64) {
+        let from_up = self.forward().dot(self.up).clamp(-1.0, 1.0).acos();
+        // Positive pitch lifts the viewing direction towards up.
+        let lowest = (from_up - (std::f64::consts::PI - POLE_RAD)).min(0.0);
+        let highest = (from_up - POLE_RAD).max(0.0);
+        let pitch = pitch_rad.clamp(lowest, highest);
+        let Some(right) = self.world_from_eye.x_axis.try_normalize() else { return };
+        let turn = DMat3::from_axis_angle(self.up, yaw_rad) * DMat3::from_axis_angle(right, pitch);
+        self.center = self.pivot + turn * (self.center - self.pivot);
+        self.set_rotation(turn * self.world_from_eye);
+    }
+
+    /// Moves eye and pivot in the picture plane so that what is at the pivot's depth follows the
+    /// cursor.
+    pub fn pan(&mut self, delta_px: DVec2, height_px: f64) {
+        let depth = (self.pivot - self.center).dot(self.forward()).abs().max(0.05 * self.distance());
+        let per_px = 2.0 * depth * (0.5 * self.fov_y_rad).tan() / height_px.max(1.0);
+        let shift = self.world_from_eye * DVec3::new(-delta_px.x, -delta_px.y, 0.0) * per_px;
+        self.center += shift;
+        self.pivot += shift;
+    }
+
+    /// Moves towards `target` so that its distance is multiplied by `factor` (under 1: nearer).
+    /// The target stays where it is in the picture.
+    pub fn zoom(&mut self, target: DVec3, factor: f64) {
+        self.center = target + (self.center - target) * factor.clamp(0.05, 20.0);
+    }
+
+    /// Flies: `motion` is in eye axes (right, up, forward), in scene units. The pivot comes along.
+    pub fn fly(&mut self, motion: DVec3) {
+        let shift = self.world_from_eye * DVec3::new(motion.x, -motion.y, motion.z);
+        self.center += shift;
+        self.pivot += shift;
+    }
+
+    /// Moves back or forth along the viewing direction until `bounds` fills the view, and turns
+    /// about its middle from then on.
+    pub fn frame(&mut self, bounds: &Bounds) {
+        let radius = bounds.radius().max(1e-6);
+        self.pivot = bounds.center();
+        self.center = self.pivot - self.forward() * (1.15 * radius / (0.5 * self.fov_y_rad).sin());
+    }
+
+    /// Chooses another up direction and turns upright.
+    pub fn set_up(&mut self, up: DVec3) {
+        self.up = up;
+        self.look_along(self.forward());
+    }
+
+    /// Looks along `direction` with up upwards; keeps the old rotation where that has no answer.
+    fn look_along(&mut self, direction: DVec3) {
+        let Some(forward) = direction.try_normalize() else { return };
+        let right = forward.cross(self.up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
+        self.world_from_eye = DMat3::from_cols(right, forward.cross(right), forward);
+    }
+
+    /// Takes over a rotation, with the rounding errors of many products removed.
+    fn set_rotation(&mut self, m: DMat3) {
+        let Some(forward) = m.z_axis.try_normalize() else { return };
+        let Some(right) = (m.x_axis - forward * m.x_axis.dot(forward)).try_normalize() else { return };
+        self.world_from_eye = DMat3::from_cols(right, forward.cross(right), forward);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::rotation::rotation_error;
+
+    fn eye() -> Eye {
+        Eye::framing(&Bounds { min: DVec3::splat(-1.0), max: DVec3::splat(1.0) }, DVec3::Z)
+    }
+
+    #[test]
+    fn framing_shows_all_corners_with_up_upwards() {
+        let camera = eye().camera(640, 480);
+        camera.validate().expect("valid");
+        for i in 0..8 {
+            let corner = DVec3::new(
+                f64::from(i & 1) * 2.0 - 1.0,
+                f64::from((i >> 1) & 1) * 2.0 - 1.0,
+                f64::from((i >> 2) & 1) * 2.0 - 1.0,
+            );
+            let p = camera.project(corner).expect("in front");
+            assert!((0.0..640.0).contains(&p.x) && (0.0..480.0).contains(&p.y), "{corner} {p}");
+        }
+        let (low, high) = (camera.project(DVec3::ZERO), camera.project(DVec3::Z * 0.5));
+        assert!(high.expect("in front").y < low.expect("in front").y);
+        assert!(camera.center.z > 0.0, "from above");
+    }
+
+    #[test]
+    fn orbiting_keeps_the_distance_and_never_tips_over() {
+        let mut e = eye();
+        let before = e.distance();
+        for i in 0..2000 {
+            e.orbit(0.05, if i % 400 < 200 { 0.05 } else { -0.05 });
+            assert!(e.world_from_eye.y_axis.dot(e.up) < 0.0, "upside down at {i}");
+        }
+        assert!((e.distance() - before).abs() < 1e-6);
+        assert!(rotation_error(&e.world_from_eye) < 1e-12);
+        let middle = e.camera(100, 100).project(e.pivot).expect("in front");
+        assert!((middle - DVec2::splat(50.0)).length() < 1e-6, "the pivot left the middle: {middle}");
+    }
+
+    #[test]
+    fn zooming_keeps_the_target_under_the_cursor() {
+        let mut e = eye();
+        let target = DVec3::new(0.3, -0.2, 0.5);
+        let before = e.camera(640, 480).project(target).expect("in front");
+        let distance = e.center.distance(target);
+        e.zoom(target, 0.5);
+        let after = e.camera(640, 480).project(target).expect("in front");
+        assert!((before - after).length() < 1e-9);
+        assert!((e.center.distance(target) - 0.5 * distance).abs() < 1e-9);
+    }
+
+    #[test]
+    fn panning_moves_the_pivot_with_the_cursor() {
+        let mut e = eye();
+        let point = e.pivot;
+        let before = e.camera(640, 480).project(point).expect("in front");
+        e.pan(DVec2::new(30.0, -12.0), 480.0);
+        let after = e.camera(640, 480).project(point).expect("in front");
+        assert!((after - before - DVec2::new(30.0, -12.0)).length() < 1e-6);
+    }
+
+    #[test]
+    fn flying_forward_goes_where_the_eye_looks() {
+        let mut e = eye();
+        let (from, forward) = (e.center, e.forward());
+        e.fly(DVec3::new(0.0, 0.0, 2.0));
+        assert!((e.center - from - forward * 2.0).length() < 1e-12);
+        let from = e.center;
+        e.fly(DVec3::new(0.0, 1.0, 0.0));
+        assert!((e.center - from).dot(e.up) > 0.0, "up is up");
+    }
+
+    #[test]
+    fn the_eye_of_a_photo_sees_what_its_camera_sees() {
+        let camera = Camera::look_at(DVec3::new(3.0, 1.0, 2.0), DVec3::ZERO, DVec3::Z, 0.7, 400, 300).expect("valid");
+        let again = Eye::of_camera(&camera, DVec3::ZERO, DVec3::Z).camera(400, 300);
+        let p = DVec3::new(0.1, 0.2, -0.3);
+        assert!((camera.project(p).expect("front") - again.project(p).expect("front")).length() < 1e-9);
+    }
+}

@@ -1,0 +1,124 @@
+//! The cameras of the photos, drawn over the view.
+
+use egui::{Color32, Painter, Pos2, Rect, Response, Stroke, Ui};
+use glam::{DVec2, DVec3};
+
+use super::super::layout::Layout;
+use super::super::theme;
+use super::Viewport;
+use crate::scene::Camera;
+use crate::worker::{Action, OpenedScene};
+
+/// How near the cursor must come to a camera to point at it, in points.
+const REACH: f32 = 12.0;
+
+impl Viewport {
+    /// Draws every camera; a click on one looks through it.
+    pub(super) fn show_frusta(
+        &self,
+        ui: &Ui,
+        rect: Rect,
+        scene: &OpenedScene,
+        response: &Response,
+        layout: &Layout,
+        actions: &mut Vec<Action>,
+    ) {
+        let Some(dataset) = &scene.dataset else { return };
+        let painter = ui.painter_at(rect);
+        // Drawn as the picture saw it, so that lines and picture move together.
+        let eye = match &self.picture {
+            Some(p) => p.camera.resized(rect.width().max(1.0) as u32, rect.height().max(1.0) as u32),
+            None => self.eye.camera(rect.width() as u32, rect.height() as u32),
+        };
+        let size = 0.09 * scene.home.bounds.radius();
+        let held_out: std::collections::HashSet<usize> =
+            dataset.split(layout.config.holdout_every).1.into_iter().collect();
+        let cursor = response.hover_pos();
+        let place = |p: DVec2| rect.min + egui::vec2(p.x as f32, p.y as f32);
+        let nearest = cursor.and_then(|cursor| {
+            let apexes = dataset.photos.iter().enumerate();
+            let seen = apexes.filter_map(|(i, p)| Some((i, place(eye.project(p.camera.center)?))));
+            let (i, at) = seen.min_by(|a, b| a.1.distance(cursor).total_cmp(&b.1.distance(cursor)))?;
+            (at.distance(cursor) < REACH).then_some((i, at))
+        });
+        for (i, photo) in dataset.photos.iter().enumerate() {
+            // From inside, a camera is only lines along the border.
+            if photo.camera.center.distance(eye.center) < size {
+                continue;
+            }
+            let pointed = nearest.is_some_and(|n| n.0 == i);
+            let color = match (pointed, held_out.contains(&i)) {
+                (true, _) => theme::ACCENT,
+                (false, true) => theme::WARNING.gamma_multiply(0.75),
+                (false, false) => Color32::from_white_alpha(95),
+            };
+            let stroke = Stroke::new(if pointed { 2.0 } else { 1.0 }, color);
+            draw(&painter, &eye, &photo.camera, size, place, stroke);
+        }
+        if let Some((i, at)) = nearest {
+            label(&painter, at, &format!("{}  (click to look through)", dataset.photos[i].name));
+            if response.clicked() {
+                actions.push(Action::GoToPhoto(i));
+            }
+        }
+    }
+}
+
+fn label(painter: &Painter, at: Pos2, text: &str) {
+    let galley = painter.layout_no_wrap(text.to_owned(), egui::FontId::proportional(12.5), theme::TEXT);
+    let corner = at + egui::vec2(12.0, -24.0);
+    let back = Rect::from_min_size(corner, galley.size()).expand2(egui::vec2(6.0, 3.0));
+    painter.rect_filled(back, 5.0, Color32::from_black_alpha(200));
+    painter.galley(corner, galley, theme::TEXT);
+}
+
+/// One camera as a pyramid of depth `size`, with a mark on its upper side.
+fn draw(painter: &Painter, eye: &Camera, camera: &Camera, size: f64, place: impl Fn(DVec2) -> Pos2, stroke: Stroke) {
+    let (w, h) = (f64::from(camera.width_px), f64::from(camera.height_px));
+    // As deep as it is wide on a usual lens, whatever its focal length.
+    let depth = size * camera.focal_px.x / w.max(h);
+    let corner = |x: f64, y: f64| camera.center + camera.ray(DVec2::new(x, y)) * depth;
+    let c = [corner(0.0, 0.0), corner(w, 0.0), corner(w, h), corner(0.0, h)];
+    let line = |a: DVec3, b: DVec3| {
+        if let Some((a, b)) = clipped(eye, a, b) {
+            painter.line_segment([place(a), place(b)], stroke);
+        }
+    };
+    for i in 0..4 {
+        line(c[i], c[(i + 1) % 4]);
+        line(camera.center, c[i]);
+    }
+    let roof = corner(0.5 * w, -0.25 * h);
+    line(corner(0.3 * w, 0.0), roof);
+    line(corner(0.7 * w, 0.0), roof);
+}
+
+/// The part of a segment in front of the eye, projected; `None` if all of it is behind.
+fn clipped(eye: &Camera, a: DVec3, b: DVec3) -> Option<(DVec2, DVec2)> {
+    const NEAR: f64 = 1e-3;
+    let (za, zb) = (eye.camera_from_world(a).z, eye.camera_from_world(b).z);
+    let near = NEAR * za.abs().max(zb.abs());
+    if za < near && zb < near {
+        return None;
+    }
+    let cut = |from: DVec3, to: DVec3, zf: f64, zt: f64| {
+        if zf >= near { from } else { from + (to - from) * ((near - zf) / (zt - zf)) }
+    };
+    Some((eye.project(cut(a, b, za, zb))?, eye.project(cut(b, a, zb, za))?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn segments_are_cut_at_the_eye() {
+        let eye = Camera::look_at(DVec3::ZERO, DVec3::X, DVec3::Z, 0.8, 100, 100).expect("valid");
+        let (ahead, behind) = (DVec3::new(2.0, 0.5, 0.0), DVec3::new(-1.0, 0.5, 0.0));
+        let (a, b) = clipped(&eye, ahead, behind).expect("partly ahead");
+        assert!((a - eye.project(ahead).expect("ahead")).length() < 1e-9);
+        assert!(b.is_finite());
+        assert!(clipped(&eye, behind, behind * 2.0).is_none());
+        assert!(clipped(&eye, ahead, ahead * 2.0).is_some());
+    }
+}

@@ -1,0 +1,310 @@
+//! The viewport: shows what the drawing lane rendered, and moves the eye.
+
+pub mod eye;
+mod frusta;
+mod input;
+mod overlay;
+mod photo;
+
+use std::sync::Arc;
+
+use egui::{Color32, ColorImage, Rect, Sense, TextureHandle, TextureOptions, Ui};
+use glam::{DVec2, DVec3};
+
+use self::eye::Eye;
+use self::photo::PhotoView;
+use super::layout::Layout;
+use super::state::AppState;
+use super::theme;
+use crate::scene::{Camera, GaussianCloud, PhotoPixels};
+use crate::worker::view::{Effort, ViewLane, ViewPicture, ViewRequest};
+use crate::worker::{Action, CloudSnapshot, OpenedScene, Repaint, ViewMode, Worker};
+
+/// The eye counts as moving until it has rested this long.
+const REST_SECS: f64 = 0.15;
+/// Longest side of a picture in px: beyond this the eye gains nothing and waiting costs.
+const MAX_SIDE_PX: u32 = 1600;
+
+/// State of the viewport.
+pub struct Viewport {
+    lane: ViewLane,
+    eye: Eye,
+    /// Number of the scene that eye and cloud belong to.
+    scene: u64,
+    /// What is drawn.
+    cloud: Option<Arc<GaussianCloud>>,
+    /// Generation of the newest snapshot taken from training.
+    snapshot: u64,
+    /// Counts the clouds that were drawn.
+    cloud_number: u64,
+    /// The photo through whose camera the eye looks.
+    photo: Option<PhotoView>,
+    /// When the eye last moved, in window time.
+    moved_at: f64,
+    requested: Option<Asked>,
+    tickets: u64,
+    /// Generation of the newest picture.
+    shown: u64,
+    picture: Option<ViewPicture>,
+    texture: Option<TextureHandle>,
+    error: Option<String>,
+    /// World point that the wheel zooms to, while the cursor stays.
+    zoom_anchor: Option<(egui::Pos2, DVec3)>,
+}
+
+/// What a picture was asked for: a change means that a new one is needed.
+#[derive(Clone, PartialEq)]
+struct Asked {
+    camera: Camera,
+    cloud: u64,
+    mode: ViewMode,
+    effort: Effort,
+    with_photo: bool,
+}
+
+impl Viewport {
+    /// An empty viewport. Fails only if the system gives no thread.
+    pub fn new(repaint: Repaint) -> std::io::Result<Self> {
+        let home = crate::worker::HomeView::default();
+        Ok(Self {
+            lane: ViewLane::start(repaint)?,
+            eye: Eye::framing(&home.bounds, home.up),
+            scene: 0,
+            cloud: None,
+            snapshot: 0,
+            cloud_number: 0,
+            photo: None,
+            moved_at: f64::NEG_INFINITY,
+            requested: None,
+            tickets: 0,
+            shown: 0,
+            picture: None,
+            texture: None,
+            error: None,
+            zoom_anchor: None,
+        })
+    }
+
+    /// The newest picture.
+    pub fn picture(&self) -> Option<&ViewPicture> {
+        self.picture.as_ref()
+    }
+
+    /// The Gaussians on screen.
+    pub fn cloud(&self) -> Option<&Arc<GaussianCloud>> {
+        self.cloud.as_ref()
+    }
+
+    /// Index of the photo through whose camera the eye looks.
+    pub fn photo_index(&self) -> Option<usize> {
+        self.photo.as_ref().map(PhotoView::index)
+    }
+
+    /// The picture as pixels, for saving.
+    pub fn pixels(&self) -> Option<PhotoPixels> {
+        let p = self.picture.as_ref()?;
+        let (width_px, height_px) = (p.camera.width_px, p.camera.height_px);
+        Some(PhotoPixels { width_px, height_px, rgb: p.rgb.clone(), coverage: None })
+    }
+
+    /// Takes over a new scene, new Gaussians and loaded photos.
+    pub fn update(&mut self, state: &mut AppState, worker: &Worker) {
+        if let Some(scene) = state.scene.as_ref().filter(|_| state.scene_number != self.scene) {
+            self.scene = state.scene_number;
+            self.photo = None;
+            self.requested = None;
+            (self.picture, self.texture, self.error) = (None, None, None);
+            self.set_cloud(scene.cloud.clone());
+            self.eye = home_eye(scene);
+        }
+        if let Some((generation, snapshot)) = worker.clouds().newer_than(self.snapshot) {
+            self.snapshot = generation;
+            let CloudSnapshot { job, cloud, .. } = &*snapshot;
+            if state.training_job == Some(*job) {
+                self.set_cloud(Some(Arc::clone(cloud)));
+            }
+        }
+        if let Some(photo) = &mut self.photo {
+            photo.take_loaded(state, worker);
+        }
+    }
+
+    /// Does what a person asked of the view.
+    pub fn act(&mut self, action: &Action, state: &AppState, worker: &Worker, now: f64) {
+        let Some(scene) = state.scene.clone() else { return };
+        let photos = scene.dataset.as_ref().map_or(0, |d| d.photos.len());
+        let here = self.photo_index();
+        match action {
+            Action::FrameScene => {
+                self.leave_photo();
+                self.eye.frame(&scene.home.bounds);
+            }
+            Action::ResetView => {
+                self.photo = None;
+                self.eye = home_eye(&scene);
+            }
+            Action::NextPhoto if photos > 0 => self.look_through(here.map_or(0, |i| (i + 1) % photos), &scene, worker),
+            Action::PreviousPhoto if photos > 0 => {
+                self.look_through(here.map_or(photos - 1, |i| (i + photos - 1) % photos), &scene, worker);
+            }
+            Action::GoToPhoto(i) if *i < photos => self.look_through(*i, &scene, worker),
+            _ => return,
+        }
+        self.moved_at = now;
+    }
+
+    fn set_cloud(&mut self, cloud: Option<Arc<GaussianCloud>>) {
+        self.cloud = cloud;
+        self.cloud_number += 1;
+    }
+
+    fn look_through(&mut self, index: usize, scene: &OpenedScene, worker: &Worker) {
+        let Some(photo) = scene.dataset.as_ref().and_then(|d| d.photos.get(index)) else { return };
+        let c = &photo.camera;
+        let ahead = (scene.home.bounds.center() - c.center).dot(c.forward());
+        let pivot = c.center + c.forward() * ahead.max(0.1 * scene.home.bounds.radius());
+        self.eye = Eye::of_camera(c, pivot, scene.home.up);
+        self.photo = Some(PhotoView::new(index, photo, worker));
+    }
+
+    /// Goes on freely from the photo's place, at the scale that the picture had.
+    fn leave_photo(&mut self) {
+        if let Some(photo) = self.photo.take() {
+            self.eye.fov_y_rad = photo.free_fov(self.eye.fov_y_rad);
+        }
+    }
+
+    /// Draws the viewport into all that is left of `ui`.
+    pub fn show(&mut self, ui: &mut Ui, state: &AppState, layout: &mut Layout, actions: &mut Vec<Action>) {
+        let Some(scene) = state.scene.clone() else { return };
+        let rect = ui.available_rect_before_wrap();
+        let response = ui.allocate_rect(rect, Sense::click_and_drag());
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Viewport"));
+        ui.painter().rect_filled(rect, 0.0, theme::CANVAS);
+        self.take_picture(ui);
+        let now = ui.input(|i| i.time);
+        if self.handle_input(ui, &response, rect, &scene, actions) {
+            self.leave_photo();
+            self.moved_at = now;
+        }
+        let shown = self.photo.as_mut().map_or(rect, |p| p.fit(rect));
+        self.request(ui, shown, &scene, state, layout, now);
+        if let Some(texture) = &self.texture {
+            let uv = Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
+            ui.painter().image(texture.id(), shown, uv, Color32::WHITE);
+        }
+        if let Some(photo) = self.photo.as_mut().filter(|_| layout.compare) {
+            photo.show_split(ui, shown, &mut layout.split);
+        }
+        if layout.cameras && self.photo.is_none() {
+            self.show_frusta(ui, rect, &scene, &response, layout, actions);
+        }
+        self.show_overlay(ui, rect, &scene, state, layout, actions);
+    }
+
+    /// Uploads the newest picture if there is one.
+    fn take_picture(&mut self, ui: &Ui) {
+        let Some((generation, result)) = self.lane.pictures().newer_than(self.shown) else { return };
+        self.shown = generation;
+        match &*result {
+            Ok(picture) => {
+                let size = [picture.camera.width_px as usize, picture.camera.height_px as usize];
+                let pixels = picture.rgb.iter().map(|&[r, g, b]| Color32::from_rgb(r, g, b)).collect();
+                let image = ColorImage::new(size, pixels);
+                match &mut self.texture {
+                    Some(texture) => texture.set(image, TextureOptions::LINEAR),
+                    None => self.texture = Some(ui.ctx().load_texture("viewport", image, TextureOptions::LINEAR)),
+                }
+                self.picture = Some(picture.clone());
+                self.error = None;
+            }
+            Err(failure) => self.error = Some(format!("{} {}", failure.message, failure.remedy)),
+        }
+    }
+
+    /// Asks for a new picture if anything changed.
+    fn request(&mut self, ui: &Ui, shown: Rect, scene: &OpenedScene, state: &AppState, layout: &Layout, now: f64) {
+        let Some(cloud) = &self.cloud else { return };
+        let rests = now - self.moved_at - REST_SECS;
+        if rests < 0.0 {
+            ui.ctx().request_repaint_after_secs((-rests + 0.01) as f32);
+        }
+        let busy = state.job.as_ref().is_some_and(|j| !j.paused);
+        let effort = match (rests < 0.0, busy) {
+            (true, _) => Effort::Moving,
+            (false, true) => Effort::Shared,
+            (false, false) => Effort::Full,
+        };
+        let size = shown.size() * ui.pixels_per_point();
+        let (w, h) = ((size.x.round() as u32).max(1), (size.y.round() as u32).max(1));
+        let camera = match &self.photo {
+            Some(p) => p.camera().resized(w, h),
+            None => self.eye.camera(w, h),
+        };
+        let photo = self.photo.as_ref().and_then(PhotoView::pixels);
+        let asked = Asked {
+            camera: camera.limited_to(MAX_SIDE_PX),
+            cloud: self.cloud_number,
+            mode: layout.mode,
+            effort,
+            with_photo: photo.is_some(),
+        };
+        if self.requested.as_ref() == Some(&asked) {
+            return;
+        }
+        self.tickets += 1;
+        self.lane.request(ViewRequest {
+            cloud: Arc::clone(cloud),
+            camera: asked.camera.clone(),
+            mode: asked.mode,
+            sh_degree: if state.is_training() { 3 } else { state.plan.sh_degree },
+            background: scene.dataset.as_ref().and_then(|d| d.background).unwrap_or([0.0; 3]),
+            effort,
+            photo,
+            ticket: self.tickets,
+        });
+        self.requested = Some(asked);
+    }
+
+    /// The world point under a window position: at the drawn depth, else at the pivot's.
+    fn point_at(&self, pos: egui::Pos2, shown: Rect) -> DVec3 {
+        let at = DVec2::new(
+            f64::from((pos.x - shown.left()) / shown.width().max(1.0)),
+            f64::from((pos.y - shown.top()) / shown.height().max(1.0)),
+        );
+        self.picked(at).unwrap_or_else(|| {
+            let camera = self.eye.camera(1000, (1000.0 * shown.height() / shown.width().max(1.0)).max(1.0) as u32);
+            let ray = camera.ray(at * DVec2::new(f64::from(camera.width_px), f64::from(camera.height_px)));
+            let depth =
+                (self.eye.pivot - self.eye.center).dot(self.eye.forward()).abs().max(0.05 * self.eye.distance());
+            self.eye.center + ray * depth
+        })
+    }
+
+    /// The drawn surface at a relative position of the picture, if its depth was drawn.
+    fn picked(&self, at: DVec2) -> Option<DVec3> {
+        let picture = self.picture.as_ref()?;
+        // A picture from somewhere else says nothing about here.
+        if picture.camera.center.distance(self.eye.center) > 1e-3 * self.eye.distance() {
+            return None;
+        }
+        let size = DVec2::new(f64::from(picture.camera.width_px), f64::from(picture.camera.height_px));
+        let px = (at * size).clamp(DVec2::ZERO, size - 1.0);
+        let index = px.y as usize * picture.camera.width_px as usize + px.x as usize;
+        let depth = f64::from(*picture.median_depth.as_ref()?.get(index)?);
+        (depth > 0.0).then(|| picture.camera.center + picture.camera.ray(at * size) * depth)
+    }
+}
+
+/// The first view of a scene: from its first camera if it has one, else framed as a whole.
+fn home_eye(scene: &OpenedScene) -> Eye {
+    let home = &scene.home;
+    match &home.camera {
+        Some(c) => {
+            let mut eye = Eye::of_camera(c, home.bounds.center(), home.up);
+            eye.fov_y_rad = eye.fov_y_rad.clamp(0.5, 1.2);
+            eye
+        }
+        None => Eye::framing(&home.bounds, home.up),
+    }
+}

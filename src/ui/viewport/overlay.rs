@@ -1,0 +1,129 @@
+//! What lies over the picture: the choice of modes, the photo's name, and facts about the picture.
+
+use egui::{Align2, Area, Id, Order, Rect, RichText, Ui};
+
+use super::super::layout::Layout;
+use super::super::state::AppState;
+use super::super::{format, keys, theme};
+use super::Viewport;
+use crate::worker::{Action, OpenedScene, ViewMode};
+
+impl Viewport {
+    pub(super) fn show_overlay(
+        &self,
+        ui: &Ui,
+        rect: Rect,
+        scene: &OpenedScene,
+        state: &AppState,
+        layout: &Layout,
+        actions: &mut Vec<Action>,
+    ) {
+        let card = |name: &'static str, align: Align2, down: f32, add: &mut dyn FnMut(&mut Ui)| {
+            let at = align.pos_in_rect(&rect.shrink(12.0)) + egui::vec2(0.0, down);
+            Area::new(Id::unique(name)).order(Order::Middle).pivot(align).fixed_pos(at).constrain_to(rect).show(
+                ui.ctx(),
+                |ui| {
+                    theme::overlay().show(ui, |ui| ui.horizontal(|ui| add(ui)));
+                },
+            );
+        };
+        let has_photos = scene.dataset.as_ref().is_some_and(|d| !d.photos.is_empty());
+        card("modes", Align2::LEFT_TOP, 0.0, &mut |ui| self.modes(ui, layout, has_photos, actions));
+        if has_photos {
+            // Beside the modes where there is room, else below them.
+            let (align, down) = if rect.width() > 860.0 { (Align2::RIGHT_TOP, 0.0) } else { (Align2::LEFT_TOP, 46.0) };
+            card("photo", align, down, &mut |ui| self.photo_bar(ui, scene, layout, actions));
+        }
+        if let Some(facts) = self.facts(layout, state) {
+            card("facts", Align2::LEFT_BOTTOM, 0.0, &mut |ui| {
+                ui.label(RichText::new(&facts).small().color(theme::WEAK));
+            });
+        }
+        if let Some(error) = &self.error {
+            card("view error", Align2::CENTER_CENTER, 0.0, &mut |ui| {
+                ui.colored_label(theme::ERROR, error);
+            });
+        }
+    }
+
+    fn modes(&self, ui: &mut Ui, layout: &Layout, has_photos: bool, actions: &mut Vec<Action>) {
+        ui.spacing_mut().item_spacing.x = 2.0;
+        for mode in ViewMode::ALL {
+            if mode == ViewMode::Difference && !has_photos {
+                continue;
+            }
+            let action = Action::Show(mode);
+            let tip = format!("{}  {}", action.tooltip(), keys::label(ui.ctx(), &action));
+            if ui.selectable_label(layout.mode == mode, mode.text()).on_hover_text(tip).clicked() {
+                actions.push(action);
+            }
+        }
+        if has_photos {
+            ui.separator();
+            let tip = format!("{}  {}", Action::ToggleCameras.tooltip(), keys::label(ui.ctx(), &Action::ToggleCameras));
+            if ui.selectable_label(layout.cameras, "Cameras").on_hover_text(tip).clicked() {
+                actions.push(Action::ToggleCameras);
+            }
+        }
+    }
+
+    fn photo_bar(&self, ui: &mut Ui, scene: &OpenedScene, layout: &Layout, actions: &mut Vec<Action>) {
+        let total = scene.dataset.as_ref().map_or(0, |d| d.photos.len());
+        let step = |ui: &mut Ui, symbol: &str, action: Action, actions: &mut Vec<Action>| {
+            let tip = format!("{}  {}", action.text(), keys::label(ui.ctx(), &action));
+            let button = ui.button(symbol).on_hover_text(tip).accessible_name(action.text());
+            if button.clicked() {
+                actions.push(action);
+            }
+        };
+        step(ui, "‹", Action::PreviousPhoto, actions);
+        match &self.photo {
+            Some(p) => {
+                ui.label(RichText::new(format::shortened(p.name(), 28)).strong()).on_hover_text(p.name());
+                ui.weak(format!("{} of {total}", p.index() + 1));
+                if let Some(psnr) = self.picture.as_ref().and_then(|p| p.psnr) {
+                    ui.label(RichText::new(format::decibel(psnr)).color(theme::ACCENT))
+                        .on_hover_text("PSNR of this picture against the photo");
+                }
+                if p.failed() {
+                    ui.colored_label(theme::WARNING, "photo not loaded");
+                }
+            }
+            None => {
+                ui.weak("Free view");
+            }
+        }
+        step(ui, "›", Action::NextPhoto, actions);
+        if self.photo.is_some() {
+            ui.separator();
+            let tip = format!("{}  {}", Action::ToggleCompare.tooltip(), keys::label(ui.ctx(), &Action::ToggleCompare));
+            if ui.selectable_label(layout.compare, "Compare").on_hover_text(tip).clicked() {
+                actions.push(Action::ToggleCompare);
+            }
+        }
+    }
+
+    /// One line about the picture.
+    fn facts(&self, layout: &Layout, state: &AppState) -> Option<String> {
+        let p = self.picture.as_ref()?;
+        let mut parts = vec![
+            format!("{} x {} px", p.camera.width_px, p.camera.height_px),
+            format::millis(p.secs),
+            format!("{} Gaussians", format::count(self.cloud.as_ref().map_or(0, |c| c.len()) as u64)),
+        ];
+        if let Some((near, far)) = p.depth_range {
+            parts.push(format!("depth {near:.2} to {far:.2}, blue to red"));
+        }
+        if layout.mode == ViewMode::Difference {
+            parts.push(match (&self.photo, p.psnr) {
+                (None, _) => "choose a photo to see the difference ( [ and ] )".into(),
+                (Some(_), _) => "difference x 4".into(),
+            });
+        }
+        let trained = state.training_job.is_some() || state.scene.as_ref().is_some_and(|s| s.trained);
+        if !trained {
+            parts.push("sparse points, not trained yet".into());
+        }
+        Some(parts.join("  ·  "))
+    }
+}

@@ -1,0 +1,112 @@
+//! Looking through a photo's camera, and the photo beside the picture.
+
+use std::sync::Arc;
+
+use egui::{Color32, ColorImage, CursorIcon, Rect, Sense, Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2};
+
+use super::super::state::AppState;
+use super::super::theme;
+use crate::scene::{Camera, Photo, PhotoPixels};
+use crate::worker::{Command, JobId, Worker};
+
+/// Longest side at which the photo beside the picture is loaded, in px.
+const SIDE_PX: u32 = 1600;
+
+/// A photo that the eye looks through.
+pub(super) struct PhotoView {
+    index: usize,
+    photo: Photo,
+    job: Option<JobId>,
+    pixels: Option<Arc<PhotoPixels>>,
+    texture: Option<TextureHandle>,
+    failed: bool,
+    /// Height of the viewport over that of the picture in it.
+    margin: f64,
+}
+
+impl PhotoView {
+    pub(super) fn new(index: usize, photo: &Photo, worker: &Worker) -> Self {
+        let command = Command::Photo { index, photo: Box::new(photo.clone()), max_side_px: SIDE_PX };
+        // With a full queue there is no photo to compare with until the next visit.
+        let job = worker.submit(command).ok();
+        Self { index, photo: photo.clone(), job, pixels: None, texture: None, failed: job.is_none(), margin: 1.0 }
+    }
+
+    pub(super) fn index(&self) -> usize {
+        self.index
+    }
+
+    pub(super) fn name(&self) -> &str {
+        &self.photo.name
+    }
+
+    pub(super) fn camera(&self) -> &Camera {
+        &self.photo.camera
+    }
+
+    pub(super) fn pixels(&self) -> Option<Arc<PhotoPixels>> {
+        self.pixels.clone()
+    }
+
+    pub(super) fn failed(&self) -> bool {
+        self.failed
+    }
+
+    pub(super) fn take_loaded(&mut self, state: &mut AppState, worker: &Worker) {
+        if let Some(pixels) = state.photos.remove(&(self.index, SIDE_PX)) {
+            self.pixels = Some(pixels);
+        }
+        if let Some(job) = self.job.filter(|j| state.failed_photos.contains(j)) {
+            state.failed_photos.retain(|j| *j != job);
+            self.failed = true;
+        }
+        // Photos of earlier visits that came too late are not kept.
+        state.photos.retain(|(_, side), _| *side != SIDE_PX);
+        let _ = worker;
+    }
+
+    /// The largest rectangle of the photo's shape in `rect`.
+    pub(super) fn fit(&mut self, rect: Rect) -> Rect {
+        let (w, h) = (self.photo.camera.width_px as f32, self.photo.camera.height_px as f32);
+        let scale = (rect.width() / w).min(rect.height() / h);
+        self.margin = f64::from(rect.height() / (h * scale).max(1.0));
+        Rect::from_center_size(rect.center(), vec2(w * scale, h * scale))
+    }
+
+    /// The field of view with which the whole viewport shows what the photo's part of it showed.
+    pub(super) fn free_fov(&self, fov_y_rad: f64) -> f64 {
+        (2.0 * ((0.5 * fov_y_rad).tan() * self.margin).atan()).clamp(0.1, 2.2)
+    }
+
+    /// Draws the photo right of the split, and the handle that moves the split.
+    pub(super) fn show_split(&mut self, ui: &mut Ui, shown: Rect, split: &mut f32) {
+        let Some(pixels) = &self.pixels else { return };
+        let texture = self.texture.get_or_insert_with(|| {
+            let size = [pixels.width_px as usize, pixels.height_px as usize];
+            let colors = pixels.rgb.iter().map(|&[r, g, b]| Color32::from_rgb(r, g, b)).collect();
+            ui.ctx().load_texture("photo", ColorImage::new(size, colors), TextureOptions::LINEAR)
+        });
+        let x = shown.left() + shown.width() * *split;
+        let right = Rect::from_min_max(pos2(x, shown.top()), shown.max);
+        let uv = Rect::from_min_max(pos2(*split, 0.0), pos2(1.0, 1.0));
+        ui.painter().image(texture.id(), right, uv, Color32::WHITE);
+        let grip = Rect::from_center_size(pos2(x, shown.center().y), vec2(16.0, shown.height()));
+        let response =
+            ui.interact(grip, ui.scope_id().with("split"), Sense::drag()).on_hover_cursor(CursorIcon::ResizeHorizontal);
+        if let Some(pos) = response.interact_pointer_pos().filter(|_| response.dragged()) {
+            *split = ((pos.x - shown.left()) / shown.width().max(1.0)).clamp(0.02, 0.98);
+        }
+        let color =
+            if response.hovered() || response.dragged() { theme::ACCENT } else { Color32::from_white_alpha(220) };
+        ui.painter().vline(x, shown.y_range(), Stroke::new(1.5, color));
+        ui.painter().circle(pos2(x, shown.center().y), 9.0, theme::PANEL, Stroke::new(1.5, color));
+        for (side, text, align) in
+            [(-1.0, "Picture", egui::Align2::RIGHT_BOTTOM), (1.0, "Photo", egui::Align2::LEFT_BOTTOM)]
+        {
+            let at = pos2(x + side * 10.0, shown.bottom() - 12.0);
+            let font = egui::FontId::proportional(12.5);
+            ui.painter().text(at + vec2(1.0, 1.0), align, text, font.clone(), Color32::BLACK);
+            ui.painter().text(at, align, text, font, Color32::WHITE);
+        }
+    }
+}
