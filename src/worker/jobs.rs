@@ -1,6 +1,6 @@
 //! What each command does: the only implementation of [`Jobs`] that ships.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use super::machine;
@@ -9,8 +9,11 @@ use super::preview::{home_view, sparse_cloud};
 use super::protocol::{Command, Failure, OpenedScene, Outcome, Stop};
 use super::thread::Jobs;
 use crate::io::{self, IoError, OpenError, Opened, TrainedScene, trained};
+use crate::pipeline::evaluate::evaluate;
 use crate::pipeline::observer::{Level, Observer};
-use crate::pipeline::train::TrainConfig;
+use crate::pipeline::train::checkpoint::CheckpointError;
+use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainError};
+use crate::render::RenderSettings;
 use crate::scene::{Dataset, GaussianCloud, Machine, PhotoPixels, ScenePlan};
 
 /// Runs commands on the pipeline.
@@ -47,6 +50,36 @@ impl PipelineJobs {
         }
         scene.plan = self.plan(dataset, cloud.filter(|_| scene.trained), &TrainConfig::default());
         Ok(scene)
+    }
+
+    fn train(
+        &self,
+        dataset: &Dataset,
+        config: &TrainConfig,
+        out: PathBuf,
+        observer: &mut dyn Observer,
+    ) -> Result<Outcome, Stop> {
+        let (result, out) = match train::run(dataset, config, Some(&out), observer) {
+            // Other settings are another training: it gets its own folder, the earlier one stays.
+            Err(TrainError::Checkpoint(CheckpointError::OtherRun { .. })) => {
+                let fresh = self.places.fresh(&dataset.root);
+                observer.note(
+                    Level::Info,
+                    format!(
+                        "The settings changed, so this is a new training; the earlier one stays in {}",
+                        out.display()
+                    ),
+                );
+                (train::run(dataset, config, Some(&fresh), observer), fresh)
+            }
+            result => (result, out),
+        };
+        let outcome = result.map_err(|e| Stop::Failed(Failure::of(&e, "")))?;
+        if outcome.end == TrainEnd::Cancelled {
+            return Err(Stop::Cancelled);
+        }
+        let plan = self.plan(Some(dataset), Some(&outcome.cloud), config);
+        Ok(Outcome::Trained { evaluations: outcome.evaluations, out, plan })
     }
 
     fn plan(&self, dataset: Option<&Dataset>, cloud: Option<&GaussianCloud>, config: &TrainConfig) -> ScenePlan {
@@ -125,9 +158,11 @@ impl Jobs for PipelineJobs {
     fn run(&self, command: Command, observer: &mut dyn Observer) -> Result<Outcome, Stop> {
         match command {
             Command::Open { path } => Ok(Outcome::Opened(Box::new(self.open(&path, observer)?))),
-            Command::Demo | Command::Train { .. } | Command::Evaluate { .. } => {
-                Err(Stop::Failed(Failure { message: "This build has no trainer yet".into(), remedy: String::new() }))
+            Command::Demo => {
+                Err(Stop::Failed(Failure { message: "This build has no demo yet".into(), remedy: String::new() }))
             }
+            Command::Train { dataset, config, out } => self.train(&dataset, &config, out, observer),
+            Command::Evaluate { dataset, cloud, config } => measure(&dataset, &cloud, &config, observer),
             Command::Export { cloud, path } => export(&cloud, &path),
             Command::Photo { index, photo, max_side_px } => {
                 let pixels = io::photo::load(&photo, max_side_px).map_err(|e| io_failure(&e))?;
@@ -136,6 +171,32 @@ impl Jobs for PipelineJobs {
             Command::Picture { pixels, path } => save_picture(&pixels, &path),
         }
     }
+}
+
+/// Held-out quality of `cloud`.
+fn measure(
+    dataset: &Dataset,
+    cloud: &GaussianCloud,
+    config: &TrainConfig,
+    observer: &mut dyn Observer,
+) -> Result<Outcome, Stop> {
+    let (_, held) = dataset.split(config.holdout_every);
+    if held.is_empty() {
+        let message = "No photo is held out, so there is nothing to measure on".into();
+        return Err(Stop::Failed(Failure {
+            message,
+            remedy: "Choose how many to hold out in the Training pane.".into(),
+        }));
+    }
+    let views = train::load_views(dataset, &held, config, "Loading held-out photos", observer);
+    let views = views.map_err(|e| Stop::Failed(Failure::of(&e, "")))?.ok_or(Stop::Cancelled)?;
+    let settings = RenderSettings {
+        background: dataset.background.unwrap_or([0.0; 3]),
+        antialias: config.antialias,
+        ..RenderSettings::default()
+    };
+    let evaluation = evaluate(cloud, &views, &settings, 0, 0.0).map_err(|e| Stop::Failed(Failure::of(&e, "")))?;
+    Ok(Outcome::Evaluated(evaluation))
 }
 
 fn export(cloud: &GaussianCloud, path: &Path) -> Result<Outcome, Stop> {

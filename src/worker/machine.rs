@@ -1,14 +1,13 @@
 //! What this machine offers.
 
+use crate::pipeline::train::budget;
 use crate::scene::Machine;
 
 /// Looks at memory, cores and the graphics adapter. Takes some milliseconds: not for the window's
 /// thread.
 pub fn look() -> Machine {
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    let free_memory_bytes = free_memory_bytes();
-    let max_gaussians = usize::try_from(free_memory_bytes / 4 / 1024).unwrap_or(usize::MAX).clamp(10_000, 10_000_000);
-    Machine { free_memory_bytes, max_gaussians, cores, gpu: real_gpu() }
+    Machine { free_memory_bytes: free_memory_bytes(), max_gaussians: budget::gaussians(), cores, gpu: real_gpu() }
 }
 
 /// Memory that programs may still use; 0 where the system does not say.

@@ -13,7 +13,7 @@ pub mod schedule;
 pub mod trainer;
 
 pub use config::{BackendChoice, TrainConfig};
-pub use run::{TrainEnd, TrainError, TrainOutcome, run};
+pub use run::{TrainEnd, TrainError, TrainOutcome, load_views, run};
 
 use crate::scene::{Camera, PhotoPixels};
 
