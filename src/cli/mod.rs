@@ -1,9 +1,168 @@
-//! The command line: one file per subcommand.
-pub mod error;
-pub mod interrupt;
-pub mod progress;
+//! The command line: one file per subcommand, each of which checks its raw arguments once and then
+//! works on what it checked.
+//!
+//! Results go to standard output (as one JSON document with `--json`), everything else to standard
+//! error. Exit codes are listed in [`EXIT_CODES`].
 
-/// Runs the command line of this process and returns its exit code.
-pub fn main() -> std::process::ExitCode {
-    std::process::ExitCode::SUCCESS
+mod bench;
+mod demo;
+mod error;
+mod eval;
+mod export;
+mod info;
+mod interrupt;
+mod opened;
+mod output;
+mod progress;
+mod render;
+mod synth;
+mod train;
+mod view;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+pub use error::CliError;
+
+/// What each exit code means; part of `--help`.
+const EXIT_CODES: &str = "\
+Exit codes:
+  0    done
+  1    failed; the message names the file, the place in it and what can be done
+  2    the arguments make no sense
+  130  cancelled (Ctrl-C, SIGTERM); what was done so far is saved where the command saves anything";
+
+const EXAMPLES: &str = "\
+Examples:
+  fmlgs                                 open the window
+  fmlgs photos/                         open the window with a folder of posed photos
+  fmlgs demo                            open the window with the demo scene and train it
+  fmlgs info photos/                    say what a folder or file is
+  fmlgs train photos/ --out scene/      train; the same command again goes on where it stopped
+  fmlgs eval scene/ --pictures cmp/     PSNR and SSIM on held-out photos, pictures side by side
+  fmlgs render scene/ --camera 12 --out view.png
+  fmlgs export scene/ --out scene.ply   for any other splat viewer";
+
+/// Train 3D Gaussians from posed photos while you watch, and look around in them.
+#[derive(Debug, Parser)]
+#[command(name = "fmlgs", version, about, max_term_width = 100, args_conflicts_with_subcommands = true)]
+#[command(after_help = format!("{EXAMPLES}\n\n{EXIT_CODES}"))]
+struct Cli {
+    /// What to open in the window: a dataset's folder, a splat file or a trained scene
+    path: Option<PathBuf>,
+    /// Show warnings and results only
+    #[arg(short, long, global = true)]
+    quiet: bool,
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Info(info::Args),
+    Train(train::Args),
+    Render(render::Args),
+    Eval(eval::Args),
+    Synth(synth::Args),
+    Demo(demo::Args),
+    Export(export::Args),
+    Bench(bench::Args),
+}
+
+/// What the window is to show when it opens.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct WindowRequest {
+    /// A dataset, splat or trained scene.
+    pub path: Option<PathBuf>,
+    /// Make the demo scene and train it.
+    pub demo: bool,
+}
+
+/// Opens the window and returns when it is closed.
+pub type OpenWindow = fn(WindowRequest) -> Result<(), Box<dyn std::error::Error>>;
+
+/// Runs the command line of this process and returns its exit code. `open_window` stands above this
+/// module, so the caller hands it in.
+pub fn main(open_window: OpenWindow) -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and version are "errors" for clap, with exit code 0. A closed pipe is no failure.
+            let _ = error.print();
+            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
+        }
+    };
+    match run(cli, open_window) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => error.report(),
+    }
+}
+
+fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
+    let quiet = cli.quiet;
+    let Some(command) = cli.command else {
+        return window(WindowRequest { path: cli.path, demo: false }, open_window);
+    };
+    interrupt::listen();
+    match command {
+        Command::Info(args) => info::run(args),
+        Command::Train(args) => train::run(args, quiet),
+        Command::Render(args) => render::run(args),
+        Command::Eval(args) => eval::run(args, quiet),
+        Command::Synth(args) => synth::run(args, quiet),
+        Command::Demo(args) if args.headless => demo::run(args, quiet),
+        Command::Demo(_) => window(WindowRequest { path: None, demo: true }, open_window),
+        Command::Export(args) => export::run(args),
+        Command::Bench(args) => bench::run(args, quiet),
+    }
+}
+
+fn window(request: WindowRequest, open_window: OpenWindow) -> Result<(), CliError> {
+    if let Some(path) = request.path.as_ref().filter(|p| !p.exists()) {
+        let name = path.display();
+        return Err(CliError::Usage(format!("'{name}' is neither a file or folder nor a subcommand")));
+    }
+    let has_display = ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|v| std::env::var_os(v).is_some_and(|d| !d.is_empty()));
+    if cfg!(all(unix, not(target_os = "macos"))) && !has_display {
+        return Err(CliError::failed(
+            "no display was found (neither DISPLAY nor WAYLAND_DISPLAY is set), so the window cannot open. \
+             'fmlgs demo --headless' shows what the program does; 'fmlgs --help' lists what works without a window",
+        ));
+    }
+    open_window(request).map_err(|error| CliError::failed(format!("the window could not be opened: {error}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn arguments_are_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn every_subcommand_explains_itself() {
+        for command in Cli::command().get_subcommands() {
+            let name = command.get_name();
+            assert!(command.get_about().is_some(), "{name} has no description");
+            let help = command.clone().render_long_help().to_string();
+            assert!(help.contains(&format!("fmlgs {name}")), "{name} shows no example");
+            for argument in command.get_arguments() {
+                assert!(argument.get_help().is_some(), "{name} {} is not explained", argument.get_id());
+            }
+        }
+    }
+
+    #[test]
+    fn a_path_and_a_subcommand_are_told_apart() {
+        let cli = Cli::try_parse_from(["fmlgs", "photos"]).expect("a path");
+        assert_eq!(cli.path, Some(PathBuf::from("photos")));
+        let cli = Cli::try_parse_from(["fmlgs", "info", "photos"]).expect("a subcommand");
+        assert!(cli.path.is_none() && matches!(cli.command, Some(Command::Info(_))));
+        assert!(Cli::try_parse_from(["fmlgs", "photos", "info", "more"]).is_err());
+    }
 }

@@ -1,0 +1,244 @@
+//! `fmlgs demo`: the whole way on the scene that ships with the program, with or without a window.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use glam::DVec3;
+use image::ColorType;
+use serde::Serialize;
+
+use super::progress::{Console, evaluation_line};
+use super::train::Settings;
+use super::{CliError, eval, interrupt, opened, output, synth};
+use crate::io;
+use crate::math::stats::median;
+use crate::pipeline::observer::{Evaluation, Level, Observer, ViewScore};
+use crate::pipeline::synth::demo;
+use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainOutcome};
+use crate::render::cpu::Renderer;
+use crate::render::{Features, RenderSettings};
+use crate::scene::{Camera, Dataset, GaussianCloud, Machine};
+use crate::worker::machine;
+
+/// Pictures of the flight around the scene.
+const FLIGHT_PICTURES: usize = 24;
+
+/// Show the program on the demo scene: make photos, train, look around
+///
+/// Opens the window and trains there. With --headless it needs no display: it renders the demo
+/// scene's photos, trains on them, measures the result on held-out photos, flies around the scene,
+/// and leaves pictures and a report in the folder given by --out. Run again, it goes on where it
+/// was and reuses the photos.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    fmlgs demo\n  \
+    fmlgs demo --headless\n  \
+    fmlgs demo --headless --steps 300 --out quick/      a first look in a fraction of the time")]
+pub struct Args {
+    /// Do it without a window, and write pictures and a report
+    #[arg(long)]
+    pub headless: bool,
+    /// Folder for everything the headless demo makes
+    #[arg(long, default_value = "out/demo")]
+    out: PathBuf,
+    #[command(flatten)]
+    settings: Settings,
+    /// Print the report as one JSON document
+    #[arg(long)]
+    json: bool,
+}
+
+/// Settings of the demo's training: minutes on two cores.
+fn config() -> TrainConfig {
+    TrainConfig { steps: 1_500, max_side_px: 400, eval_every: 250, checkpoint_secs: 30.0, ..TrainConfig::default() }
+}
+
+/// What the demo found, as written to `report.json`.
+#[derive(Debug, Serialize)]
+struct Report {
+    machine: Machine,
+    config: TrainConfig,
+    photos: usize,
+    held_out: usize,
+    synth_secs: Option<f64>,
+    train_secs: f64,
+    steps: u64,
+    gaussians: usize,
+    psnr: f64,
+    ssim: f64,
+    views: Vec<ViewScore>,
+    curve: Vec<Evaluation>,
+    flight_pictures: usize,
+    flight_ms_per_picture: f64,
+    total_secs: f64,
+}
+
+pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+    let started = Instant::now();
+    let config = args.settings.over(config());
+    let mut console = Console::new(quiet);
+    let [photos, scene, compare, flight] = ["photos", "scene", "compare", "flight"].map(|f| args.out.join(f));
+
+    let synth_secs = make_photos(&photos, &mut console)?;
+    let dataset = opened::dataset(&photos)?;
+    let outcome = train::run(&dataset, &config, Some(&scene), &mut console)?;
+    if outcome.end == TrainEnd::Cancelled {
+        let (done, all) = (outcome.steps, config.steps);
+        return Err(CliError::Cancelled(format!("{done} of {all} steps are saved; the same command goes on from there")));
+    }
+    let job = eval::job(opened::drawable(&scene)?, &photos, None, None, Some(compare))?;
+    let views = eval::measure(&job, &mut console)?;
+    let millis = fly(&job.cloud, &job.settings, &dataset, &flight)?;
+
+    let report =
+        report(&dataset, &config, &outcome, views, synth_secs, millis, started.elapsed().as_secs_f64());
+    drop(console);
+    write_report(&report, &args.out)?;
+    if args.json {
+        return output::print_json(&report);
+    }
+    output::print(&format!("{}\nSee {}", text(&report), args.out.join("report.md").display()))
+}
+
+/// Renders the photos unless they are there; returns the seconds it took.
+fn make_photos(folder: &Path, console: &mut Console) -> Result<Option<f64>, CliError> {
+    if demo::demo_is_written(folder) {
+        console.note(Level::Info, format!("Using the photos in {}", folder.display()));
+        return Ok(None);
+    }
+    let report = demo::write_demo(folder, console).map_err(synth::failure)?;
+    console.note(Level::Info, synth::summary(&report));
+    Ok(Some(report.secs))
+}
+
+/// Draws a circle around what the photos look at; returns the median milliseconds per picture.
+fn fly(
+    cloud: &GaussianCloud,
+    settings: &RenderSettings,
+    dataset: &Dataset,
+    folder: &Path,
+) -> Result<f64, CliError> {
+    output::make_folder(folder)?;
+    let mut renderer = Renderer::<f32>::new();
+    let mut millis = Vec::with_capacity(FLIGHT_PICTURES);
+    for (i, camera) in circle(dataset).iter().enumerate() {
+        if interrupt::asked_to_stop() {
+            return Err(CliError::Cancelled(format!("{i} of {FLIGHT_PICTURES} pictures of the flight were drawn")));
+        }
+        let start = Instant::now();
+        let frame = renderer.render(cloud, Features::NONE, camera, settings)?;
+        millis.push(start.elapsed().as_secs_f64() * 1e3);
+        let path = folder.join(format!("{i:03}.png"));
+        let size = [camera.width_px, camera.height_px];
+        output::write_png(&path, frame.to_rgb8().as_flattened(), size, ColorType::Rgb8)?;
+    }
+    Ok(median(&millis))
+}
+
+/// Cameras on a circle around the focus, as far from it and as high over it as the photos are.
+fn circle(dataset: &Dataset) -> Vec<Camera> {
+    let Some(first) = dataset.photos.first() else { return Vec::new() };
+    let (focus, up) = (dataset.focus(), dataset.up());
+    let offsets: Vec<DVec3> = dataset.photos.iter().map(|p| p.camera.center - focus).collect();
+    let height = median(&offsets.iter().map(|o| o.dot(up)).collect::<Vec<_>>());
+    let radius = median(&offsets.iter().map(|o| o.reject_from(up).length()).collect::<Vec<_>>());
+    let side = up.any_orthonormal_vector();
+    let (width_px, height_px) = (first.camera.width_px, first.camera.height_px);
+    let fov_y_rad = 2.0 * (0.5 * f64::from(height_px) / first.camera.focal_px.y).atan();
+    let at = |i: usize| {
+        let (sin, cos) = (i as f64 / FLIGHT_PICTURES as f64 * std::f64::consts::TAU).sin_cos();
+        let eye = focus + up * height + (side * cos + up.cross(side) * sin) * radius;
+        Camera::look_at(eye, focus, up, fov_y_rad, width_px, height_px)
+    };
+    (0..FLIGHT_PICTURES).filter_map(at).collect()
+}
+
+fn report(
+    dataset: &Dataset,
+    config: &TrainConfig,
+    outcome: &TrainOutcome,
+    views: Vec<ViewScore>,
+    synth_secs: Option<f64>,
+    flight_ms_per_picture: f64,
+    total_secs: f64,
+) -> Report {
+    let (psnr, ssim) = eval::means(&views);
+    Report {
+        machine: machine::look(),
+        config: config.clone(),
+        photos: dataset.photos.len(),
+        held_out: views.len(),
+        synth_secs,
+        train_secs: outcome.secs,
+        steps: outcome.steps,
+        gaussians: outcome.cloud.len(),
+        psnr,
+        ssim,
+        views,
+        curve: outcome.evaluations.clone(),
+        flight_pictures: FLIGHT_PICTURES,
+        flight_ms_per_picture,
+        total_secs,
+    }
+}
+
+fn text(r: &Report) -> String {
+    format!(
+        "{} steps in {:.0} s: {} Gaussians, held-out PSNR {:.2} dB, SSIM {:.3} over {} views; {:.0} ms per picture",
+        r.steps, r.train_secs, r.gaussians, r.psnr, r.ssim, r.held_out, r.flight_ms_per_picture
+    )
+}
+
+/// Writes `report.json` and, for people, `report.md`.
+fn write_report(r: &Report, folder: &Path) -> Result<(), CliError> {
+    let json = serde_json::to_vec_pretty(r)?;
+    io::atomic::write(&folder.join("report.json"), |w| w.write_all(&json))?;
+    let curve: String = r.curve.iter().map(|e| format!("* {}\n", evaluation_line(e))).collect();
+    let mut rows = vec![vec!["view".to_owned(), "PSNR dB".to_owned(), "SSIM".to_owned()]];
+    rows.extend(r.views.iter().map(|s| vec![s.name.clone(), format!("{:.2}", s.psnr), format!("{:.4}", s.ssim)]));
+    let gpu = r.machine.gpu.as_deref().unwrap_or("no GPU");
+    let synth = r.synth_secs.map_or("reused".to_owned(), |s| format!("made in {s:.1} s"));
+    let markdown = format!(
+        "# Demo\n\n{}.\n\n* Machine: {} cores, {gpu}\n* Photos: {}, {synth}\n* In all: {:.0} s\n\n## While training\n\n\
+         {curve}\n## Held-out views\n\n`compare/` holds photo, render and difference (x 4) side by side.\n\n```text\n{}\n```\n\n\
+         ## Flight\n\n`flight/` holds {} pictures on a circle around the scene, {:.0} ms each.\n\n\
+         ## To look at it\n\n`scene/` is a trained scene: `fmlgs scene`, or open `scene/point_cloud.ply` in any splat viewer.\n",
+        text(r),
+        r.machine.cores,
+        r.photos,
+        r.total_secs,
+        output::table(&rows),
+        r.flight_pictures,
+        r.flight_ms_per_picture,
+    );
+    Ok(io::atomic::write(&folder.join("report.md"), |w| w.write_all(markdown.as_bytes()))?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Photo;
+
+    #[test]
+    fn the_flight_stays_with_the_photos() {
+        let photo = |i: usize| {
+            let (sin, cos) = (i as f64 * 0.7).sin_cos();
+            Photo {
+                name: i.to_string(),
+                path: PathBuf::new(),
+                camera: Camera::look_at(DVec3::new(3.0 * cos, 3.0 * sin, 1.0), DVec3::ZERO, DVec3::Z, 0.8, 64, 48)
+                    .expect("valid"),
+                distortion: None,
+                test_split: false,
+            }
+        };
+        let dataset = Dataset { photos: (0..9).map(photo).collect(), ..Dataset::default() };
+        let cameras = circle(&dataset);
+        assert_eq!(cameras.len(), FLIGHT_PICTURES);
+        for c in cameras {
+            assert!((c.center.length() - 10.0_f64.sqrt()).abs() < 0.05, "{}", c.center);
+            assert!((c.project(DVec3::ZERO).expect("in front") - glam::DVec2::new(32.0, 24.0)).length() < 1.0);
+        }
+        assert!(circle(&Dataset::default()).is_empty());
+    }
+}

@@ -1,0 +1,181 @@
+//! `fmlgs info`: what a folder or file is, and what would be left out for it.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use super::opened::named_cameras;
+use super::{CliError, output};
+use crate::io::{self, Opened, trained::TrainedScene};
+use crate::pipeline::train::TrainConfig;
+use crate::scene::{Bounds, Dataset, GaussianCloud, ScenePlan};
+use crate::worker::machine;
+
+/// Say what a folder or file holds, and the plan for it
+///
+/// Works on everything that can be opened: posed photos (COLMAP, transforms.json, Blender, LLFF),
+/// splats and trained scenes. The scene plan lists what the program leaves out for this scene on
+/// this machine, why, and what that saves.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  fmlgs info photos/\n  fmlgs info scene.ply --json | jq .gaussians")]
+pub struct Args {
+    /// Dataset folder, transforms.json, splat file or trained scene
+    path: PathBuf,
+    /// Training pictures are limited to this many px along the longer side; the plan depends on it
+    #[arg(long, default_value_t = TrainConfig::default().max_side_px, value_parser = clap::value_parser!(u32).range(1..=16384))]
+    max_side: u32,
+    /// Print one JSON document, with every camera
+    #[arg(long)]
+    json: bool,
+}
+
+/// Facts in two forms: label and text for people, and a JSON object.
+struct Facts {
+    lines: Vec<(&'static str, String)>,
+    json: serde_json::Map<String, Value>,
+    warnings: Vec<String>,
+}
+
+pub fn run(args: Args) -> Result<(), CliError> {
+    let defaults = TrainConfig::default();
+    let (mut facts, plan) = match io::open(&args.path)? {
+        Opened::Dataset(d) => {
+            let plan = ScenePlan::of(Some(&d), None, &machine::look(), args.max_side, defaults.sh_degree);
+            (of_dataset(&d, defaults.holdout_every), plan)
+        }
+        Opened::Cloud(c) => {
+            let plan = ScenePlan::of(None, Some(&c), &machine::look(), args.max_side, c.sh_degree);
+            (of_cloud(&c), plan)
+        }
+        Opened::Trained(t) => {
+            let plan = ScenePlan::of(None, Some(&t.cloud), &machine::look(), args.max_side, t.cloud.sh_degree);
+            (of_trained(&t), plan)
+        }
+    };
+    if args.json {
+        facts.json.insert("path".into(), json!(args.path));
+        facts.json.insert("warnings".into(), json!(facts.warnings));
+        facts.json.insert("plan".into(), serde_json::to_value(&plan)?);
+        return output::print_json(&facts.json);
+    }
+    output::print(&text(&args.path, &facts, &plan))
+}
+
+fn text(path: &Path, facts: &Facts, plan: &ScenePlan) -> String {
+    let mut out = format!("{}\n", path.display());
+    for (label, value) in &facts.lines {
+        out.push_str(&format!("  {label:<16} {value}\n"));
+    }
+    for warning in &facts.warnings {
+        out.push_str(&format!("  warning: {warning}\n"));
+    }
+    out.push_str("\nScene plan\n");
+    for line in &plan.lines {
+        let saving = if line.saving.is_empty() { String::new() } else { format!(" (saves {})", line.saving) };
+        out.push_str(&format!("  {:<16} {}: {}{saving}\n", line.subject, line.choice, line.reason));
+    }
+    out.trim_end().to_owned()
+}
+
+fn of_dataset(d: &Dataset, holdout_every: usize) -> Facts {
+    let (train, held_out) = d.split(holdout_every);
+    let mut sizes: BTreeMap<[u32; 2], usize> = BTreeMap::new();
+    for p in &d.photos {
+        *sizes.entry([p.camera.width_px, p.camera.height_px]).or_default() += 1;
+    }
+    let size_text = sizes.iter().map(|([w, h], n)| format!("{n} of {w} x {h} px")).collect::<Vec<_>>().join(", ");
+    let distorted = d.photos.iter().filter(|p| p.distortion.is_some()).count();
+    let points = d.points.len();
+    let (center, extent) = d.camera_extent();
+    let lines = vec![
+        ("kind", format!("posed photos, {}", d.format)),
+        ("photos", format!("{} ({} to train on, {} held out)", d.photos.len(), train.len(), held_out.len())),
+        ("sizes", size_text),
+        ("lens distortion", if distorted > 0 { format!("on {distorted}, undone on load") } else { "none".into() }),
+        ("sparse points", if points > 0 { points.to_string() } else { "none: training starts at random".into() }),
+        ("camera extent", format!("{extent:.3} scene units around {}", vector(center))),
+    ];
+    let json = json!({
+        "kind": "dataset",
+        "name": d.name,
+        "format": d.format,
+        "photos": d.photos.len(),
+        "train": train.len(),
+        "held_out": held_out.len(),
+        "distorted": distorted,
+        "points": points,
+        "camera_extent": extent,
+        "background": d.background,
+        "cameras": cameras_json(&named_cameras(d, holdout_every)),
+    });
+    facts(lines, json, d.warnings.clone())
+}
+
+fn of_cloud(c: &GaussianCloud) -> Facts {
+    let (lines, json) = cloud_facts(c);
+    let mut lines = lines;
+    lines.insert(0, ("kind", "Gaussian splat".into()));
+    let mut facts = facts(lines, json, Vec::new());
+    facts.json.insert("kind".into(), json!("splat"));
+    facts
+}
+
+fn of_trained(t: &TrainedScene) -> Facts {
+    let (cloud_lines, json) = cloud_facts(&t.cloud);
+    let held_out = t.info.cameras.iter().filter(|c| c.held_out).count();
+    let photos = match (t.dataset_path(), &t.info.dataset) {
+        (Some(path), _) => path.display().to_string(),
+        (None, Some(d)) => format!("{} (not found)", d.path.display()),
+        (None, None) => "not known".into(),
+    };
+    let mut lines = vec![
+        ("kind", format!("trained scene '{}'", t.info.name)),
+        ("cameras", format!("{} ({held_out} held out)", t.info.cameras.len())),
+        ("photos", photos),
+    ];
+    lines.extend(cloud_lines);
+    if let Some(e) = t.info.history.evaluations.last() {
+        lines.push(("held-out PSNR", format!("{:.2} dB, SSIM {:.3} after step {}, {:.0} s", e.psnr, e.ssim, e.step, e.secs)));
+    }
+    let mut facts = facts(lines, json, Vec::new());
+    facts.json.insert("kind".into(), json!("trained"));
+    facts.json.insert("name".into(), json!(t.info.name));
+    facts.json.insert("dataset".into(), json!(t.dataset_path()));
+    facts.json.insert("cameras".into(), json!(t.info.cameras));
+    facts.json.insert("history".into(), json!(t.info.history));
+    facts
+}
+
+fn cloud_facts(c: &GaussianCloud) -> (Vec<(&'static str, String)>, Value) {
+    let bounds = Bounds::robust((0..c.len()).map(|i| c.world_position(i)));
+    let extras: Vec<&str> = c.extras.iter().map(|e| e.name.as_str()).collect();
+    let mut lines = vec![
+        ("Gaussians", c.len().to_string()),
+        ("colour", format!("spherical harmonics of degree {}", c.sh_degree)),
+    ];
+    if let Some(b) = bounds {
+        lines.push(("middle 96 %", format!("{} to {} scene units", vector(b.min), vector(b.max))));
+    }
+    if !extras.is_empty() {
+        lines.push(("kept besides", extras.join(", ")));
+    }
+    (lines, json!({ "gaussians": c.len(), "sh_degree": c.sh_degree, "bounds": bounds, "extras": extras }))
+}
+
+fn facts(lines: Vec<(&'static str, String)>, json: Value, warnings: Vec<String>) -> Facts {
+    let json = match json {
+        Value::Object(map) => map,
+        other => serde_json::Map::from_iter([("value".to_owned(), other)]),
+    };
+    Facts { lines, json, warnings }
+}
+
+fn cameras_json(cameras: &[super::opened::NamedCamera]) -> Vec<Value> {
+    let entry = |c: &super::opened::NamedCamera| json!({ "name": c.name, "camera": c.camera, "held_out": c.held_out });
+    cameras.iter().map(entry).collect()
+}
+
+fn vector(v: glam::DVec3) -> String {
+    format!("({:.3}, {:.3}, {:.3})", v.x, v.y, v.z)
+}

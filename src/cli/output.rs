@@ -1,0 +1,104 @@
+//! What the subcommands write: results on standard output, pictures and arrays in files.
+
+use std::io::{ErrorKind, Write};
+use std::path::Path;
+
+use image::{ColorType, ImageEncoder, codecs::png::PngEncoder};
+use npyz::WriterBuilder;
+use serde::Serialize;
+
+use super::CliError;
+use crate::io::atomic;
+
+/// Prints `text` and a line break to standard output. A reader that has closed its end (`| head`)
+/// has seen enough, which is no failure.
+pub fn print(text: &str) -> Result<(), CliError> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(()),
+    }
+}
+
+/// Prints `value` as indented JSON.
+pub fn print_json(value: &impl Serialize) -> Result<(), CliError> {
+    print(&serde_json::to_string_pretty(value)?)
+}
+
+/// Rows of cells as aligned columns: the first to the left, the others to the right.
+pub fn table(rows: &[Vec<String>]) -> String {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..columns).map(width).collect();
+    let line = |row: &Vec<String>| {
+        let cell = |(c, s): (usize, &String)| {
+            let w = widths[c];
+            if c == 0 { format!("{s:<w$}") } else { format!("{s:>w$}") }
+        };
+        row.iter().enumerate().map(cell).collect::<Vec<_>>().join("  ").trim_end().to_owned()
+    };
+    rows.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+/// Makes the folder that `path` lies in.
+pub fn make_parent(path: &Path) -> Result<(), CliError> {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => make_folder(folder),
+        _ => Ok(()),
+    }
+}
+
+/// Makes `folder` and those above it.
+pub fn make_folder(folder: &Path) -> Result<(), CliError> {
+    std::fs::create_dir_all(folder).map_err(|error| {
+        CliError::failed(format!("cannot create the folder {}: {error}; choose another place", folder.display()))
+    })
+}
+
+/// Writes a PNG of `size_px` from raw samples, those of 16 bits in the machine's byte order.
+pub fn write_png(path: &Path, samples: &[u8], size_px: [u32; 2], color: ColorType) -> Result<(), CliError> {
+    let encode = |w: &mut dyn Write| {
+        PngEncoder::new(w)
+            .write_image(samples, size_px[0], size_px[1], color.into())
+            .map_err(std::io::Error::other)
+    };
+    Ok(atomic::write(path, encode)?)
+}
+
+/// Writes rows of `f32` values as a NumPy array of shape `[height, width]`.
+pub fn write_npy(path: &Path, values: &[f32], size_px: [u32; 2]) -> Result<(), CliError> {
+    let fill = |w: &mut dyn Write| {
+        let shape = [u64::from(size_px[1]), u64::from(size_px[0])];
+        let mut array = npyz::WriteOptions::new().default_dtype().shape(&shape).writer(w).begin_nd()?;
+        array.extend(values.iter().copied())?;
+        array.finish()
+    };
+    Ok(atomic::write(path, fill)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_line_up() {
+        let rows = [vec!["view".into(), "PSNR".into()], vec!["a long name".into(), "9.1".into()]];
+        assert_eq!(table(&rows), "view         PSNR\na long name   9.1");
+    }
+
+    #[test]
+    fn pictures_and_arrays_read_back() {
+        let folder = tempfile::tempdir().expect("folder");
+        let png = folder.path().join("a.png");
+        write_png(&png, &[1, 2, 3, 4, 5, 6], [2, 1], ColorType::Rgb8).expect("write");
+        assert_eq!(image::open(&png).expect("read").to_rgb8().into_raw(), [1, 2, 3, 4, 5, 6]);
+        let bytes: Vec<u8> = [258_u16, 3].iter().flat_map(|v| v.to_ne_bytes()).collect();
+        write_png(&png, &bytes, [1, 2], ColorType::L16).expect("write");
+        assert_eq!(image::open(&png).expect("read").to_luma16().into_raw(), [258, 3]);
+        let npy = folder.path().join("a.npy");
+        write_npy(&npy, &[1.0, 2.5, 3.0, 4.0, 5.0, 6.0], [3, 2]).expect("write");
+        let array = npyz::NpyFile::new(&std::fs::read(&npy).expect("read")[..]).expect("npy");
+        assert_eq!(array.shape(), [2, 3]);
+        assert_eq!(array.into_vec::<f32>().expect("values")[1], 2.5);
+    }
+}

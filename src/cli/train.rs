@@ -1,0 +1,208 @@
+//! `fmlgs train`: from posed photos to a trained scene.
+
+use std::path::PathBuf;
+
+use serde_json::json;
+
+use super::progress::{Console, evaluation_line};
+use super::{CliError, opened, output};
+use crate::io::{self, Opened};
+use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::train::{self, BackendChoice, TrainConfig, TrainEnd};
+use crate::scene::Dataset;
+
+/// Train 3D Gaussians from posed photos
+///
+/// Writes a trained scene: a folder with scene.json, point_cloud.ply and a checkpoint. The same
+/// command run again goes on where it stopped, also after a crash; at most the checkpoint interval
+/// is lost. Every eighth photo is held out and used to measure quality.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    fmlgs train photos/ --out scene/\n  \
+    fmlgs train photos/ --out scene/ --steps 30000 --max-side 1600\n  \
+    fmlgs train photos/ --out quick/ --steps 500 --max-side 256 --no-densify\n  \
+    fmlgs train scene/                       go on with a scene that was cancelled, same settings")]
+pub struct Args {
+    /// Dataset folder or transforms.json; or a trained scene, to go on with it
+    data: PathBuf,
+    /// Folder of the trained scene [default: out/<name of the dataset>]
+    #[arg(long)]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    settings: Settings,
+    /// Print one JSON document at the end
+    #[arg(long)]
+    json: bool,
+}
+
+/// Settings of a run as given; those left out keep their defaults.
+#[derive(Debug, Default, clap::Args)]
+pub struct Settings {
+    /// Optimiser steps in all; every schedule scales with it [default: 7000]
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
+    pub steps: Option<u64>,
+    /// Longer side of the training pictures in px; photos are never enlarged [default: 512]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(16..=16384))]
+    pub max_side: Option<u32>,
+    /// Hold out every n-th photo, 0 = none [default: 8]
+    #[arg(long)]
+    pub holdout_every: Option<usize>,
+    /// Highest degree of the spherical harmonics [default: 3]
+    #[arg(long, value_parser = clap::value_parser!(u8).range(0..=3))]
+    pub sh_degree: Option<u8>,
+    /// Keep the number of Gaussians that training starts with
+    #[arg(long)]
+    pub no_densify: bool,
+    /// Upper limit of Gaussians [default: what the memory holds]
+    #[arg(long)]
+    pub max_gaussians: Option<usize>,
+    /// Gaussians to start from where the dataset has no sparse points [default: 20000]
+    #[arg(long)]
+    pub random_points: Option<usize>,
+    /// Antialias (the 2-D filter of Mip-Splatting)
+    #[arg(long)]
+    pub antialias: bool,
+    /// Seed of every random choice [default: 0]
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// Steps between held-out evaluations, 0 = only at the end [default: 500]
+    #[arg(long)]
+    pub eval_every: Option<u64>,
+    /// Seconds between checkpoints, 0 = only at the end [default: 60]
+    #[arg(long, value_parser = parse_secs)]
+    pub checkpoint_secs: Option<f64>,
+    /// Which renderer trains [default: auto]
+    #[arg(long, value_enum)]
+    pub backend: Option<BackendChoice>,
+}
+
+fn parse_secs(text: &str) -> Result<f64, String> {
+    let secs: Option<f64> = text.parse().ok().filter(|s: &f64| s.is_finite() && *s >= 0.0);
+    secs.ok_or_else(|| "a number of seconds, 0 or more, is needed".into())
+}
+
+impl Settings {
+    /// `base` with what was given on the command line.
+    pub fn over(&self, base: TrainConfig) -> TrainConfig {
+        TrainConfig {
+            steps: self.steps.unwrap_or(base.steps),
+            max_side_px: self.max_side.unwrap_or(base.max_side_px),
+            holdout_every: self.holdout_every.unwrap_or(base.holdout_every),
+            sh_degree: self.sh_degree.unwrap_or(base.sh_degree),
+            densify: base.densify && !self.no_densify,
+            max_gaussians: self.max_gaussians.or(base.max_gaussians),
+            random_points: self.random_points.unwrap_or(base.random_points),
+            antialias: base.antialias || self.antialias,
+            seed: self.seed.unwrap_or(base.seed),
+            eval_every: self.eval_every.unwrap_or(base.eval_every),
+            checkpoint_secs: self.checkpoint_secs.unwrap_or(base.checkpoint_secs),
+            backend: self.backend.unwrap_or(base.backend),
+        }
+    }
+}
+
+/// A checked training job.
+struct Job {
+    dataset: Dataset,
+    config: TrainConfig,
+    out: PathBuf,
+}
+
+impl Args {
+    fn check(&self) -> Result<Job, CliError> {
+        match io::open(&self.data)? {
+            Opened::Dataset(dataset) => {
+                let out = self.out.clone().unwrap_or_else(|| PathBuf::from("out").join(&dataset.name));
+                Ok(Job { config: self.settings.over(TrainConfig::default()), dataset, out })
+            }
+            Opened::Trained(scene) => {
+                let Some(photos) = scene.dataset_path() else {
+                    return Err(CliError::failed(format!(
+                        "{}: its photos are no longer where they were; give their folder instead of the scene",
+                        self.data.display()
+                    )));
+                };
+                let trained_with = serde_json::from_value(scene.info.config).unwrap_or_default();
+                let out = self.out.clone().unwrap_or(scene.folder);
+                Ok(Job { dataset: opened::dataset(&photos)?, config: self.settings.over(trained_with), out })
+            }
+            Opened::Cloud(_) => Err(CliError::failed(format!(
+                "{} is a finished splat without photos; a folder of posed photos is needed to train",
+                self.data.display()
+            ))),
+        }
+    }
+}
+
+pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+    let job = args.check()?;
+    let mut console = Console::new(quiet);
+    for warning in &job.dataset.warnings {
+        console.note(Level::Warning, warning.clone());
+    }
+    let outcome = train::run(&job.dataset, &job.config, Some(&job.out), &mut console)?;
+    let out = job.out.display();
+    let finished = outcome.end == TrainEnd::Finished;
+    if args.json {
+        output::print_json(&json!({
+            "end": if finished { "finished" } else { "cancelled" },
+            "out": job.out,
+            "config": job.config,
+            "steps": outcome.steps,
+            "secs": outcome.secs,
+            "gaussians": outcome.cloud.len(),
+            "evaluations": outcome.evaluations,
+        }))?;
+    } else if finished {
+        if let Some(last) = outcome.evaluations.last() {
+            output::print(&evaluation_line(last))?;
+        }
+        output::print(&format!("trained scene: {out} (look at it with 'fmlgs {out}')"))?;
+    }
+    if finished {
+        return Ok(());
+    }
+    let (done, all) = (outcome.steps, job.config.steps);
+    Err(CliError::Cancelled(format!("{done} of {all} steps are saved in {out}; the same command goes on from there")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_given_keeps_its_value() {
+        let base = TrainConfig { steps: 3, seed: 9, densify: false, ..TrainConfig::default() };
+        assert_eq!(Settings::default().over(base.clone()), base);
+        let given = Settings { steps: Some(5), no_densify: true, antialias: true, ..Settings::default() };
+        let config = given.over(TrainConfig::default());
+        assert_eq!((config.steps, config.densify, config.antialias), (5, false, true));
+    }
+
+    #[test]
+    fn the_help_states_the_real_defaults() {
+        let d = TrainConfig::default();
+        let command = <Settings as clap::Args>::augment_args(clap::Command::new("x"));
+        let stated = |id: &str| {
+            let argument = command.get_arguments().find(|a| a.get_id() == id).expect("argument");
+            let help = argument.get_help().expect("help").to_string();
+            help.split("[default: ").nth(1).expect("default").trim_end_matches(']').to_owned()
+        };
+        assert_eq!(stated("steps"), d.steps.to_string());
+        assert_eq!(stated("max_side"), d.max_side_px.to_string());
+        assert_eq!(stated("holdout_every"), d.holdout_every.to_string());
+        assert_eq!(stated("sh_degree"), d.sh_degree.to_string());
+        assert_eq!(stated("random_points"), d.random_points.to_string());
+        assert_eq!(stated("seed"), d.seed.to_string());
+        assert_eq!(stated("eval_every"), d.eval_every.to_string());
+        assert_eq!(stated("checkpoint_secs"), d.checkpoint_secs.to_string());
+    }
+
+    #[test]
+    fn seconds_are_checked() {
+        assert_eq!(parse_secs("1.5"), Ok(1.5));
+        for bad in ["-1", "nan", "inf", "soon"] {
+            assert!(parse_secs(bad).is_err(), "{bad}");
+        }
+    }
+}

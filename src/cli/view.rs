@@ -1,0 +1,202 @@
+//! Which camera to draw from: a photo's, one from a file, or one that shows the whole splat.
+
+use std::path::Path;
+
+use glam::{DMat3, DVec2};
+use serde::Deserialize;
+
+use super::CliError;
+use super::opened::{DrawableScene, NamedCamera};
+use crate::io::files;
+use crate::scene::{Bounds, Camera, GaussianCloud};
+
+/// A camera file: a camera alone, or an entry of the cameras in `scene.json` or `info --json`.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum CameraFile {
+    Entry { camera: Camera },
+    Alone(Camera),
+}
+
+/// The camera that `wanted` names: an index from 0, a photo's name (its end is enough where that
+/// is unambiguous), or a JSON file. Without a wish it is the first photo's, or a view of the whole
+/// cloud where there are no photos.
+pub fn choose(wanted: Option<&str>, scene: &DrawableScene) -> Result<Camera, CliError> {
+    let Some(wanted) = wanted else {
+        return match scene.cameras.first() {
+            Some(first) => Ok(first.camera.clone()),
+            None => whole(&scene.cloud)
+                .ok_or_else(|| CliError::failed("the splat holds no Gaussians, so there is nothing to look at")),
+        };
+    };
+    if let Some(camera) = of_photo(wanted, &scene.cameras)? {
+        return Ok(camera);
+    }
+    let path = Path::new(wanted);
+    if path.is_file() {
+        return from_file(path);
+    }
+    let known = match scene.cameras.as_slice() {
+        [] => "The scene has no photos: give a JSON camera file, or --photos with their dataset".to_owned(),
+        [one] => format!("The only photo is '{}'", one.name),
+        [first, .., last] => {
+            let count = scene.cameras.len();
+            format!("Photos are 0 to {} or '{}' to '{}'", count - 1, first.name, last.name)
+        }
+    };
+    Err(CliError::failed(format!("no photo and no file is called '{wanted}'. {known}")))
+}
+
+fn of_photo(wanted: &str, cameras: &[NamedCamera]) -> Result<Option<Camera>, CliError> {
+    if let Some(exact) = cameras.iter().find(|c| c.name == wanted) {
+        return Ok(Some(exact.camera.clone()));
+    }
+    if let Some(at) = wanted.parse::<usize>().ok().and_then(|i| cameras.get(i)) {
+        return Ok(Some(at.camera.clone()));
+    }
+    let ends: Vec<&NamedCamera> = cameras.iter().filter(|c| ends_with_path(&c.name, wanted)).collect();
+    match ends.as_slice() {
+        [] => Ok(None),
+        [one] => Ok(Some(one.camera.clone())),
+        [a, b, ..] => Err(CliError::failed(format!("'{wanted}' may be '{}' or '{}': give more of it", a.name, b.name))),
+    }
+}
+
+/// Whether `wanted` is the last part of the path `name`, with or without its extension.
+fn ends_with_path(name: &str, wanted: &str) -> bool {
+    let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
+    [name, stem].iter().any(|n| *n == wanted || n.strip_suffix(wanted).is_some_and(|front| front.ends_with('/')))
+}
+
+fn from_file(path: &Path) -> Result<Camera, CliError> {
+    let text = files::read_text(path)?;
+    let camera = match serde_json::from_str(&text) {
+        Ok(CameraFile::Entry { camera } | CameraFile::Alone(camera)) => camera,
+        Err(_) => {
+            return Err(CliError::failed(format!(
+                "{} is no camera: width_px, height_px, focal_px [x, y], principal_px [x, y], world_from_camera \
+                 (9 numbers, the right, down and forward axes) and center [x, y, z] are needed, as in the output of \
+                 'fmlgs info --json'",
+                path.display()
+            )));
+        }
+    };
+    camera.validate().map_err(|error| CliError::failed(format!("{}: {error}", path.display())))?;
+    Ok(camera)
+}
+
+/// A 640 x 480 view of the cloud from its front, as splats are usually oriented: x right, y down,
+/// z away. `None` for an empty cloud.
+fn whole(cloud: &GaussianCloud) -> Option<Camera> {
+    let bounds = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i)))?;
+    let fov_y_rad = 0.8_f64;
+    let distance = bounds.radius().max(1e-6) / (0.5 * fov_y_rad).sin();
+    let (width_px, height_px) = (640, 480);
+    let focal = 0.5 * f64::from(height_px) / (0.5 * fov_y_rad).tan();
+    Some(Camera {
+        width_px,
+        height_px,
+        focal_px: DVec2::splat(focal),
+        principal_px: DVec2::new(f64::from(width_px), f64::from(height_px)) * 0.5,
+        world_from_camera: DMat3::IDENTITY,
+        center: bounds.center() - glam::DVec3::Z * distance,
+    })
+}
+
+/// The camera with a picture of `width_px` x `height_px`. The vertical field of view stays; where
+/// the shape differs, the picture shows more or less at the sides, never anything stretched.
+pub fn with_size(camera: &Camera, width_px: u32, height_px: u32) -> Camera {
+    let scale = f64::from(height_px) / f64::from(camera.height_px);
+    let shift = f64::from(width_px) * 0.5 - f64::from(camera.width_px) * 0.5 * scale;
+    Camera {
+        width_px,
+        height_px,
+        focal_px: camera.focal_px * scale,
+        principal_px: camera.principal_px * scale + DVec2::new(shift, 0.0),
+        ..camera.clone()
+    }
+}
+
+/// Parses `640x480`.
+pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
+    let side = |s: &str| s.trim().parse::<u32>().ok().filter(|v| (1..=Camera::MAX_SIDE_PX).contains(v));
+    let both = text.split_once(['x', 'X']).and_then(|(w, h)| Some([side(w)?, side(h)?]));
+    both.ok_or_else(|| format!("WIDTHxHEIGHT is needed, for example 640x480, each 1 to {}", Camera::MAX_SIDE_PX))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::train::TrainConfig;
+    use crate::render::RenderSettings;
+    use glam::DVec3;
+
+    fn scene(names: &[&str]) -> DrawableScene {
+        let camera = |i: usize| {
+            let eye = DVec3::new(1.0 + i as f64, -3.0, 1.0);
+            Camera::look_at(eye, DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid")
+        };
+        let named = |(i, name): (usize, &&str)| NamedCamera {
+            name: (*name).to_owned(),
+            camera: camera(i),
+            held_out: false,
+        };
+        DrawableScene {
+            cloud: GaussianCloud::default(),
+            cameras: names.iter().enumerate().map(named).collect(),
+            settings: RenderSettings::default(),
+            config: TrainConfig::default(),
+            dataset_path: None,
+        }
+    }
+
+    #[test]
+    fn photos_are_found_by_index_name_and_end_of_name() {
+        let s = scene(&["images/a.jpg", "images/b.jpg", "more/b.jpg", "images/7.png"]);
+        let index = |wanted: &str| {
+            let camera = choose(Some(wanted), &s).ok()?;
+            s.cameras.iter().position(|c| c.camera == camera)
+        };
+        assert_eq!(index("1"), Some(1));
+        assert_eq!(index("more/b.jpg"), Some(2));
+        assert_eq!(index("a.jpg"), Some(0));
+        assert_eq!(index("a"), Some(0));
+        assert_eq!(index("7"), Some(3), "a name wins where the index is out of range");
+        assert_eq!(index("b.jpg"), None, "two photos end like that");
+        assert_eq!(index("c.jpg"), None);
+        assert_eq!(index("99"), None);
+        assert_eq!(choose(None, &s).expect("first"), s.cameras[0].camera);
+        assert!(choose(None, &scene(&[])).is_err(), "nothing to see");
+    }
+
+    #[test]
+    fn a_camera_file_is_read_in_both_forms_and_checked() {
+        let folder = tempfile::tempdir().expect("folder");
+        let camera = scene(&["a"]).cameras[0].camera.clone();
+        let path = folder.path().join("camera.json");
+        std::fs::write(&path, serde_json::to_string(&camera).expect("json")).expect("write");
+        assert_eq!(from_file(&path).expect("alone"), camera);
+        let entry = serde_json::json!({ "name": "a", "camera": camera, "held_out": false });
+        std::fs::write(&path, entry.to_string()).expect("write");
+        assert_eq!(from_file(&path).expect("entry"), camera);
+        let bad = Camera { width_px: 0, ..camera };
+        std::fs::write(&path, serde_json::to_string(&bad).expect("json")).expect("write");
+        assert!(from_file(&path).is_err());
+        std::fs::write(&path, "[]").expect("write");
+        assert!(from_file(&path).is_err());
+    }
+
+    #[test]
+    fn another_size_keeps_the_middle_and_the_vertical_view() {
+        let camera = scene(&["a"]).cameras[0].camera.clone();
+        let wide = with_size(&camera, 200, 96);
+        wide.validate().expect("valid");
+        assert_eq!(wide.project(DVec3::ZERO), Some(DVec2::new(100.0, 48.0)));
+        let top = camera.center + camera.ray(DVec2::new(32.0, 0.0)) * 2.0;
+        assert!(wide.project(top).expect("in front").y.abs() < 1e-9);
+        assert_eq!(parse_size("640x480"), Ok([640, 480]));
+        for bad in ["640", "0x4", "4x", "x", "99999x4", "-1x4"] {
+            assert!(parse_size(bad).is_err(), "{bad}");
+        }
+    }
+}
