@@ -84,14 +84,15 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let outcome = train::run(&dataset, &config, Some(&scene), &mut console)?;
     if outcome.end == TrainEnd::Cancelled {
         let (done, all) = (outcome.steps, config.steps);
-        return Err(CliError::Cancelled(format!("{done} of {all} steps are saved; the same command goes on from there")));
+        return Err(CliError::Cancelled(format!(
+            "{done} of {all} steps are saved; the same command goes on from there"
+        )));
     }
     let job = eval::job(opened::drawable(&scene)?, &photos, None, None, Some(compare))?;
     let views = eval::measure(&job, &mut console)?;
     let millis = fly(&job.cloud, &job.settings, &dataset, &flight)?;
 
-    let report =
-        report(&dataset, &config, &outcome, views, synth_secs, millis, started.elapsed().as_secs_f64());
+    let report = report(&dataset, &config, &outcome, views, synth_secs, millis, started.elapsed().as_secs_f64());
     drop(console);
     write_report(&report, &args.out)?;
     if args.json {
@@ -112,12 +113,7 @@ fn make_photos(folder: &Path, console: &mut Console) -> Result<Option<f64>, CliE
 }
 
 /// Draws a circle around what the photos look at; returns the median milliseconds per picture.
-fn fly(
-    cloud: &GaussianCloud,
-    settings: &RenderSettings,
-    dataset: &Dataset,
-    folder: &Path,
-) -> Result<f64, CliError> {
+fn fly(cloud: &GaussianCloud, settings: &RenderSettings, dataset: &Dataset, folder: &Path) -> Result<f64, CliError> {
     output::make_folder(folder)?;
     let mut renderer = Renderer::<f32>::new();
     let mut millis = Vec::with_capacity(FLIGHT_PICTURES);

@@ -136,7 +136,10 @@ fn of_trained(t: &TrainedScene) -> Facts {
     ];
     lines.extend(cloud_lines);
     if let Some(e) = t.info.history.evaluations.last() {
-        lines.push(("held-out PSNR", format!("{:.2} dB, SSIM {:.3} after step {}, {:.0} s", e.psnr, e.ssim, e.step, e.secs)));
+        lines.push((
+            "held-out PSNR",
+            format!("{:.2} dB, SSIM {:.3} after step {}, {:.0} s", e.psnr, e.ssim, e.step, e.secs),
+        ));
     }
     let mut facts = facts(lines, json, Vec::new());
     facts.json.insert("kind".into(), json!("trained"));
@@ -150,10 +153,8 @@ fn of_trained(t: &TrainedScene) -> Facts {
 fn cloud_facts(c: &GaussianCloud) -> (Vec<(&'static str, String)>, Value) {
     let bounds = Bounds::robust((0..c.len()).map(|i| c.world_position(i)));
     let extras: Vec<&str> = c.extras.iter().map(|e| e.name.as_str()).collect();
-    let mut lines = vec![
-        ("Gaussians", c.len().to_string()),
-        ("colour", format!("spherical harmonics of degree {}", c.sh_degree)),
-    ];
+    let mut lines =
+        vec![("Gaussians", c.len().to_string()), ("colour", format!("spherical harmonics of degree {}", c.sh_degree))];
     if let Some(b) = bounds {
         lines.push(("middle 96 %", format!("{} to {} scene units", vector(b.min), vector(b.max))));
     }

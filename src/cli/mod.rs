@@ -4,7 +4,6 @@
 //! Results go to standard output (as one JSON document with `--json`), everything else to standard
 //! error. Exit codes are listed in [`EXIT_CODES`].
 
-mod bench;
 mod demo;
 mod error;
 mod eval;
@@ -68,7 +67,6 @@ enum Command {
     Synth(synth::Args),
     Demo(demo::Args),
     Export(export::Args),
-    Bench(bench::Args),
 }
 
 /// What the window is to show when it opens.
@@ -115,7 +113,6 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Demo(args) if args.headless => demo::run(args, quiet),
         Command::Demo(_) => window(WindowRequest { path: None, demo: true }, open_window),
         Command::Export(args) => export::run(args),
-        Command::Bench(args) => bench::run(args, quiet),
     }
 }
 

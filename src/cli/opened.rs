@@ -55,9 +55,10 @@ pub fn drawable(path: &Path) -> Result<DrawableScene, CliError> {
 pub fn dataset(path: &Path) -> Result<Dataset, CliError> {
     match io::open(path)? {
         Opened::Dataset(dataset) => Ok(dataset),
-        Opened::Trained(_) | Opened::Cloud(_) => {
-            Err(CliError::failed(format!("{} holds Gaussians; a folder of posed photos is needed here", path.display())))
-        }
+        Opened::Trained(_) | Opened::Cloud(_) => Err(CliError::failed(format!(
+            "{} holds Gaussians; a folder of posed photos is needed here",
+            path.display()
+        ))),
     }
 }
 

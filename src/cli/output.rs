@@ -58,9 +58,7 @@ pub fn make_folder(folder: &Path) -> Result<(), CliError> {
 /// Writes a PNG of `size_px` from raw samples, those of 16 bits in the machine's byte order.
 pub fn write_png(path: &Path, samples: &[u8], size_px: [u32; 2], color: ColorType) -> Result<(), CliError> {
     let encode = |w: &mut dyn Write| {
-        PngEncoder::new(w)
-            .write_image(samples, size_px[0], size_px[1], color.into())
-            .map_err(std::io::Error::other)
+        PngEncoder::new(w).write_image(samples, size_px[0], size_px[1], color.into()).map_err(std::io::Error::other)
     };
     Ok(atomic::write(path, encode)?)
 }

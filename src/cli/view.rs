@@ -136,11 +136,8 @@ mod tests {
             let eye = DVec3::new(1.0 + i as f64, -3.0, 1.0);
             Camera::look_at(eye, DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid")
         };
-        let named = |(i, name): (usize, &&str)| NamedCamera {
-            name: (*name).to_owned(),
-            camera: camera(i),
-            held_out: false,
-        };
+        let named =
+            |(i, name): (usize, &&str)| NamedCamera { name: (*name).to_owned(), camera: camera(i), held_out: false };
         DrawableScene {
             cloud: GaussianCloud::default(),
             cameras: names.iter().enumerate().map(named).collect(),

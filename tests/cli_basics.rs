@@ -1,0 +1,150 @@
+//! The real binary: help, exit codes, and errors that name the file and the remedy.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod cli_support;
+
+use cli_support::{fmlgs, folder, tiny_splat};
+
+#[test]
+fn help_and_version_are_no_failures() {
+    let help = fmlgs(&["--help"]).ok();
+    for word in ["train", "render", "eval", "synth", "demo", "export", "info", "bench", "Exit codes", "130"] {
+        assert!(help.stdout.contains(word), "'{word}' is missing from the help:\n{}", help.stdout);
+    }
+    for command in ["info", "train", "render", "eval", "synth", "demo", "export", "bench"] {
+        let help = fmlgs(&[command, "--help"]).ok();
+        assert!(help.stdout.contains("Examples:"), "{command} shows no example");
+    }
+    assert!(fmlgs(&["--version"]).ok().stdout.contains(env!("CARGO_PKG_VERSION")));
+}
+
+#[test]
+fn arguments_that_make_no_sense_exit_with_2() {
+    let folder = folder();
+    let splat = tiny_splat(&folder.path().join("a.ply"));
+    let splat = splat.to_str().unwrap();
+    for arguments in [
+        &["train"][..],
+        &["train", "x", "--steps", "0"],
+        &["train", "x", "--sh-degree", "4"],
+        &["render", splat, "--size", "0x3"],
+        &["render", splat, "--out", "a.jpg"],
+        &["render", splat, "--what", "picture", "--out", "a.npy"],
+        &["export", splat, "--out", "a.obj"],
+        &["synth", "a.glb", "--out", "x", "--views", "2", "--held-out", "2"],
+        &["no-such-command"],
+        &["--no-such-option"],
+    ] {
+        let done = fmlgs(arguments);
+        assert_eq!(done.code, Some(2), "{arguments:?}: {}", done.stderr);
+        assert!(done.stdout.is_empty(), "{arguments:?} printed a result");
+    }
+}
+
+#[test]
+fn failures_exit_with_1_and_name_the_file() {
+    let folder = folder();
+    let junk = folder.path().join("junk.ply");
+    std::fs::write(&junk, "not a splat").unwrap();
+    let empty = folder.path().join("empty");
+    std::fs::create_dir(&empty).unwrap();
+    let (junk, empty) = (junk.to_str().unwrap(), empty.to_str().unwrap());
+    for (arguments, named) in [
+        (&["info", "no/such/folder"][..], "no/such/folder"),
+        (&["info", junk], "junk.ply"),
+        (&["info", empty], "transforms.json"),
+        (&["train", empty], "empty"),
+        (&["render", junk], "junk.ply"),
+        (&["eval", junk], "junk.ply"),
+        (&["synth", "missing.glb", "--out", empty], "missing.glb"),
+        (&["export", junk, "--out", "x.ply"], "junk.ply"),
+    ] {
+        let done = fmlgs(arguments);
+        assert_eq!(done.code, Some(1), "{arguments:?}: {}", done.stderr);
+        assert!(done.stderr.starts_with("error: ") && done.stderr.contains(named), "{arguments:?}: {}", done.stderr);
+        assert!(!done.stderr.contains("panicked"), "{}", done.stderr);
+    }
+}
+
+#[test]
+fn the_wrong_kind_of_input_is_told_what_to_do() {
+    let folder = folder();
+    let splat = tiny_splat(&folder.path().join("a.ply"));
+    let splat = splat.to_str().unwrap();
+    let done = fmlgs(&["train", splat]).fails_with(1);
+    assert!(done.stderr.contains("posed photos"), "{}", done.stderr);
+    let done = fmlgs(&["eval", splat]).fails_with(1);
+    assert!(done.stderr.contains("--photos"), "{}", done.stderr);
+    let done = fmlgs(&["render", splat, "--camera", "nobody"]).fails_with(1);
+    assert!(done.stderr.contains("nobody") && done.stderr.contains("--photos"), "{}", done.stderr);
+}
+
+#[test]
+fn without_a_display_the_window_says_what_works() {
+    let done = fmlgs(&[]).fails_with(1);
+    assert!(done.stderr.contains("DISPLAY") && done.stderr.contains("demo --headless"), "{}", done.stderr);
+}
+
+#[test]
+fn a_closed_pipe_is_no_failure() {
+    let folder = folder();
+    let splat = tiny_splat(&folder.path().join("a.ply"));
+    let mut child = cli_support::command(&["info", splat.to_str().unwrap(), "--json"])
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let done = child.wait_with_output().unwrap();
+    let stderr = String::from_utf8_lossy(&done.stderr);
+    assert!(done.status.success() && !stderr.contains("panicked"), "{stderr}");
+}
+
+#[test]
+fn info_tells_people_and_scripts_the_same() {
+    let folder = folder();
+    let splat = tiny_splat(&folder.path().join("a.ply"));
+    let path = splat.to_str().unwrap();
+    let text = fmlgs(&["info", path]).ok().stdout;
+    assert!(text.contains("Gaussian splat") && text.contains("Scene plan"), "{text}");
+    let json = fmlgs(&["info", path, "--json"]).ok().json();
+    assert_eq!(json["kind"], "splat");
+    assert_eq!(json["gaussians"], 3);
+    assert_eq!(json["sh_degree"], 0);
+    assert!(json["plan"]["lines"].as_array().is_some_and(|l| !l.is_empty()));
+}
+
+#[test]
+fn a_splat_is_drawn_and_exported_again() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let splat = tiny_splat(&folder.path().join("a.ply"));
+    let splat = splat.to_str().unwrap();
+
+    let done = fmlgs(&["render", splat, "--size", "64x48", "--out", &at("a.png"), "--json"]).ok().json();
+    assert_eq!(done["size_px"], serde_json::json!([64, 48]));
+    let picture = image::open(at("a.png")).unwrap().to_rgb8();
+    assert_eq!(picture.dimensions(), (64, 48));
+    let brightest = picture.pixels().map(|p| p.0.into_iter().max().unwrap()).max().unwrap();
+    assert!(brightest > 100, "the picture is black");
+
+    fmlgs(&["render", splat, "--size", "64x48", "--what", "depth", "--out", &at("d.npy")]).ok();
+    let depth = npyz::NpyFile::new(&std::fs::read(at("d.npy")).unwrap()[..]).unwrap();
+    assert_eq!(depth.shape(), [48, 64]);
+    let depth: Vec<f32> = depth.into_vec().unwrap();
+    fmlgs(&["render", splat, "--size", "64x48", "--what", "depth", "--out", &at("d.png"), "--json"]).ok();
+    let coded = image::open(at("d.png")).unwrap().to_luma16().into_raw();
+    let far = depth.iter().copied().fold(0.0, f32::max);
+    assert!(far > 0.0);
+    for (d, c) in depth.iter().zip(&coded) {
+        assert!((d / far - f32::from(*c) / 65535.0).abs() < 1e-4);
+    }
+    fmlgs(&["render", splat, "--size", "64x48", "--what", "alpha", "--out", &at("alpha.png")]).ok();
+    assert!(image::open(at("alpha.png")).unwrap().to_luma8().pixels().any(|p| p.0[0] > 100));
+
+    fmlgs(&["export", splat, "--out", &at("new/b.ply")]).ok();
+    let again = fmlgs(&["info", &at("new/b.ply"), "--json"]).ok().json();
+    assert_eq!(again["gaussians"], 3);
+    fmlgs(&["render", &at("new/b.ply"), "--size", "64x48", "--out", &at("b.png")]).ok();
+    assert_eq!(image::open(at("b.png")).unwrap().to_rgb8(), picture, "export changed the picture");
+}
