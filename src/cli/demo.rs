@@ -225,6 +225,7 @@ mod tests {
                 camera: Camera::look_at(DVec3::new(3.0 * cos, 3.0 * sin, 1.0), DVec3::ZERO, DVec3::Z, 0.8, 64, 48)
                     .expect("valid"),
                 distortion: None,
+                background: None,
                 test_split: false,
             }
         };
