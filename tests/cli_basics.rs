@@ -129,7 +129,8 @@ fn a_splat_is_drawn_and_exported_again() {
     assert!(brightest > 100, "the picture is black");
 
     fmlgs(&["render", splat, "--size", "64x48", "--what", "depth", "--out", &at("d.npy")]).ok();
-    let depth = npyz::NpyFile::new(&std::fs::read(at("d.npy")).unwrap()[..]).unwrap();
+    let bytes = std::fs::read(at("d.npy")).unwrap();
+    let depth = npyz::NpyFile::new(&bytes[..]).unwrap();
     assert_eq!(depth.shape(), [48, 64]);
     let depth: Vec<f32> = depth.into_vec().unwrap();
     fmlgs(&["render", splat, "--size", "64x48", "--what", "depth", "--out", &at("d.png"), "--json"]).ok();

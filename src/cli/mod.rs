@@ -25,6 +25,8 @@ use clap::{Parser, Subcommand};
 
 pub use error::CliError;
 
+use crate::worker::Action;
+
 /// What each exit code means; part of `--help`.
 const EXIT_CODES: &str = "\
 Exit codes:
@@ -69,17 +71,8 @@ enum Command {
     Export(export::Args),
 }
 
-/// What the window is to show when it opens.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct WindowRequest {
-    /// A dataset, splat or trained scene.
-    pub path: Option<PathBuf>,
-    /// Make the demo scene and train it.
-    pub demo: bool,
-}
-
-/// Opens the window and returns when it is closed.
-pub type OpenWindow = fn(WindowRequest) -> Result<(), Box<dyn std::error::Error>>;
+/// Opens the window, does one action if one is given, and returns when the window is closed.
+pub type OpenWindow = fn(Option<Action>) -> Result<(), Box<dyn std::error::Error>>;
 
 /// Runs the command line of this process and returns its exit code. `open_window` stands above this
 /// module, so the caller hands it in.
@@ -101,7 +94,7 @@ pub fn main(open_window: OpenWindow) -> ExitCode {
 fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
     let quiet = cli.quiet;
     let Some(command) = cli.command else {
-        return window(WindowRequest { path: cli.path, demo: false }, open_window);
+        return window(cli.path.map(Action::Open), open_window);
     };
     interrupt::listen();
     match command {
@@ -111,15 +104,18 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Eval(args) => eval::run(args, quiet),
         Command::Synth(args) => synth::run(args, quiet),
         Command::Demo(args) if args.headless => demo::run(args, quiet),
-        Command::Demo(_) => window(WindowRequest { path: None, demo: true }, open_window),
+        Command::Demo(_) => window(Some(Action::TryDemo), open_window),
         Command::Export(args) => export::run(args),
     }
 }
 
-fn window(request: WindowRequest, open_window: OpenWindow) -> Result<(), CliError> {
-    if let Some(path) = request.path.as_ref().filter(|p| !p.exists()) {
-        let name = path.display();
-        return Err(CliError::Usage(format!("'{name}' is neither a file or folder nor a subcommand")));
+fn window(first: Option<Action>, open_window: OpenWindow) -> Result<(), CliError> {
+    match &first {
+        Some(Action::Open(path)) if !path.exists() => {
+            let name = path.display();
+            return Err(CliError::Usage(format!("'{name}' is neither a file or folder nor a subcommand")));
+        }
+        _ => {}
     }
     let has_display = ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|v| std::env::var_os(v).is_some_and(|d| !d.is_empty()));
     if cfg!(all(unix, not(target_os = "macos"))) && !has_display {
@@ -128,7 +124,7 @@ fn window(request: WindowRequest, open_window: OpenWindow) -> Result<(), CliErro
              'fmlgs demo --headless' shows what the program does; 'fmlgs --help' lists what works without a window",
         ));
     }
-    open_window(request).map_err(|error| CliError::failed(format!("the window could not be opened: {error}")))
+    open_window(first).map_err(|error| CliError::failed(format!("the window could not be opened: {error}")))
 }
 
 #[cfg(test)]

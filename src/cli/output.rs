@@ -95,7 +95,8 @@ mod tests {
         assert_eq!(image::open(&png).expect("read").to_luma16().into_raw(), [258, 3]);
         let npy = folder.path().join("a.npy");
         write_npy(&npy, &[1.0, 2.5, 3.0, 4.0, 5.0, 6.0], [3, 2]).expect("write");
-        let array = npyz::NpyFile::new(&std::fs::read(&npy).expect("read")[..]).expect("npy");
+        let bytes = std::fs::read(&npy).expect("read");
+        let array = npyz::NpyFile::new(&bytes[..]).expect("npy");
         assert_eq!(array.shape(), [2, 3]);
         assert_eq!(array.into_vec::<f32>().expect("values")[1], 2.5);
     }
