@@ -115,7 +115,7 @@ pub fn tiny_glb(path: &Path) -> PathBuf {
     json.resize(json.len().next_multiple_of(4), b' ');
     let mut file = b"glTF".to_vec();
     let total = 12 + 8 + json.len() + 8 + binary.len();
-    let mut word = |file: &mut Vec<u8>, v: usize| file.extend((v as u32).to_le_bytes());
+    let word = |file: &mut Vec<u8>, v: usize| file.extend((v as u32).to_le_bytes());
     word(&mut file, 2);
     word(&mut file, total);
     word(&mut file, json.len());
