@@ -1,0 +1,29 @@
+//! Forward pictures of trained splats: f32 against the f64 oracle, three views each.
+
+mod common;
+
+use common::psnr;
+use fmlgs::pipeline::bench::views_of;
+use fmlgs::render::cpu::Renderer;
+use fmlgs::render::{Features, RenderSettings};
+use fmlgs::scene::Camera;
+
+#[test]
+fn trained_splats_in_single_precision_are_within_60_db_of_the_oracle() {
+    for name in ["guitar_sh0_90854.ply", "statue_narcissus_sh0_101275.ply", "playbot_lod3_sh2_31000.ply"] {
+        let Some(path) = common::data(&format!("splats/{name}")) else { return };
+        let cloud = fmlgs::io::splat_ply::read(&path).expect("a readable splat file");
+        let oracle = cloud.cast::<f64>();
+        for camera in views_of(&cloud, 320, 240) {
+            let s = RenderSettings::default();
+            let a = Renderer::new().render(&oracle, Features::NONE, &camera, &s).expect("renders");
+            let b = Renderer::new().render(&cloud, Features::NONE, &camera, &s).expect("renders");
+            let db = psnr(&a.color, &b.color);
+            println!("{name}: {db:.1} dB");
+            assert!(db > 60.0, "{name}: {db} dB");
+            let tilted = Camera { center: camera.center * 1.002, ..camera.clone() };
+            let c = Renderer::new().render(&cloud, Features::NONE, &tilted, &s).expect("renders");
+            assert!(psnr(&a.color, &c.color) < 60.0, "negative control: another camera");
+        }
+    }
+}
