@@ -1,4 +1,5 @@
 //! Every parameter group's gradient against central differences in f64.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod common;
 

@@ -1,4 +1,5 @@
 //! The f64 CPU renderer against a brute-force one that shares no code with it, and f32 against f64.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod common;
 

@@ -28,7 +28,7 @@ impl Window {
             .with_size([1200.0, 800.0])
             .with_max_steps(20)
             .wgpu()
-            .build_eframe(|cc| App::new(cc, PipelineJobs::new(places), open).expect("threads"));
+            .build_eframe(|cc| App::new(cc, PipelineJobs::new(places), open.map(Action::Open)).expect("threads"));
         Self { harness, _folder: folder }
     }
 

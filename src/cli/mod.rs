@@ -4,6 +4,7 @@
 //! Results go to standard output (as one JSON document with `--json`), everything else to standard
 //! error. Exit codes are listed in [`EXIT_CODES`].
 
+mod bench;
 mod demo;
 mod error;
 mod eval;
@@ -69,6 +70,7 @@ enum Command {
     Synth(synth::Args),
     Demo(demo::Args),
     Export(export::Args),
+    Bench(bench::Args),
 }
 
 /// Opens the window, does one action if one is given, and returns when the window is closed.
@@ -106,6 +108,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Demo(args) if args.headless => demo::run(args, quiet),
         Command::Demo(_) => window(Some(Action::TryDemo), open_window),
         Command::Export(args) => export::run(args),
+        Command::Bench(args) => bench::run(args, quiet),
     }
 }
 
@@ -113,7 +116,7 @@ fn window(first: Option<Action>, open_window: OpenWindow) -> Result<(), CliError
     match &first {
         Some(Action::Open(path)) if !path.exists() => {
             let name = path.display();
-            return Err(CliError::Usage(format!("'{name}' is neither a file or folder nor a subcommand")));
+            return Err(CliError::Usage(format!("'{name}' is no file, no folder and no subcommand")));
         }
         _ => {}
     }

@@ -1,6 +1,5 @@
 //! The application: takes events in, draws the window, sends commands out.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
@@ -36,9 +35,9 @@ pub struct App {
 }
 
 impl App {
-    /// Starts the worker and opens `open`, if given. `jobs` does the work. Fails only if
+    /// Starts the worker and does `first`, if given. `jobs` does the work. Fails only if
     /// the system gives no threads.
-    pub fn new(cc: &eframe::CreationContext<'_>, jobs: impl Jobs, open: Option<PathBuf>) -> std::io::Result<Self> {
+    pub fn new(cc: &eframe::CreationContext<'_>, jobs: impl Jobs, first: Option<Action>) -> std::io::Result<Self> {
         theme::install(&cc.egui_ctx);
         let repaint = super::repainter(&cc.egui_ctx);
         let layout = Layout::load(cc.storage);
@@ -57,7 +56,7 @@ impl App {
             backend: "CPU".into(),
             thumbnails: Thumbnails::default(),
             toasts: Toasts::default(),
-            actions: open.map(Action::Open).into_iter().collect(),
+            actions: first.into_iter().collect(),
         })
     }
 

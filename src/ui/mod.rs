@@ -17,14 +17,14 @@ pub mod theme;
 pub mod toasts;
 pub mod viewport;
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
+use crate::worker::Action;
 use crate::worker::jobs::PipelineJobs;
 use crate::worker::places::Places;
 
-/// Opens the window, with a scene if `open` is given, and returns when it is closed.
-pub fn run(open: Option<PathBuf>) -> eframe::Result {
+/// Opens the window, does `first` if given, and returns when the window is closed.
+pub fn run(first: Option<Action>) -> eframe::Result {
     let viewport = egui::ViewportBuilder::default()
         .with_title("FMLGS")
         .with_app_id("fmlgs")
@@ -36,7 +36,7 @@ pub fn run(open: Option<PathBuf>) -> eframe::Result {
         "fmlgs",
         options,
         Box::new(|cc| {
-            let app = app::App::new(cc, PipelineJobs::new(Places::of_user()), open)?;
+            let app = app::App::new(cc, PipelineJobs::new(Places::of_user()), first)?;
             Ok(Box::new(app))
         }),
     )

@@ -291,10 +291,10 @@ mod tests {
     #[test]
     fn constant_and_equal_pictures_are_defined() {
         let n = noise(400, 5);
-        assert!((ssim(&[n.clone()], &[n.clone()], 20) - 1.0).abs() < 1e-12);
-        let black = vec![0.0; 400];
-        assert!((ssim(&[black.clone()], &[black.clone()], 20) - 1.0).abs() < 1e-12);
-        let s = ssim(&[black], &[vec![1.0; 400]], 20);
+        assert!((ssim(std::slice::from_ref(&n), std::slice::from_ref(&n), 20) - 1.0).abs() < 1e-12);
+        let black = [vec![0.0; 400]];
+        assert!((ssim(&black, &black, 20) - 1.0).abs() < 1e-12);
+        let s = ssim(&black, &[vec![1.0; 400]], 20);
         assert!(s.is_finite() && s < 0.01, "{s}");
         let f: Vec<f32> = n.iter().map(|&v| v as f32).collect();
         let g: Vec<f32> = noise(400, 6).iter().map(|&v| v as f32).collect();

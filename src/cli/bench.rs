@@ -1,0 +1,121 @@
+//! `fmlgs bench`: how long drawing and training take on this machine, stage by stage.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+use serde_json::json;
+
+use super::progress::Console;
+use super::{CliError, output, view};
+use crate::io::{self, Opened};
+use crate::pipeline::bench::{self, RenderTiming, StepTiming};
+use crate::pipeline::observer::{Level, Observer, Signal};
+use crate::pipeline::train::{TrainConfig, load_views};
+use crate::scene::Dataset;
+
+/// Time drawing and training on this machine, stage by stage
+///
+/// Splats and trained scenes are drawn from three views at each size; posed photos are trained on
+/// for a few steps. Products are pairs of a splat and a pixel that it may touch; their rate stands
+/// beside what one core could do at most. Times are medians; compare those of one run only.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    fmlgs bench splat.ply\n  \
+    fmlgs bench splats/*.ply photos/ --size 640x480 --size 1280x720 --max-side 504 --json")]
+pub struct Args {
+    /// Splats or trained scenes to draw, posed photos to train on
+    #[arg(required = true)]
+    paths: Vec<PathBuf>,
+    /// Size of the drawn pictures; may be given several times [default: 640x480 1280x720]
+    #[arg(long, value_parser = view::parse_size)]
+    size: Vec<[u32; 2]>,
+    /// Longer side of the training pictures in px
+    #[arg(long, default_value_t = TrainConfig::default().max_side_px, value_parser = clap::value_parser!(u32).range(16..=16384))]
+    max_side: u32,
+    /// Repeats of each measurement
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    repeats: u32,
+    /// Print one JSON document
+    #[arg(long)]
+    json: bool,
+}
+
+/// Everything that was measured.
+#[derive(Debug, Serialize)]
+struct Timings {
+    render: Vec<RenderTiming>,
+    train: Vec<StepTiming>,
+    one_core_products_per_sec: f64,
+}
+
+pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+    let mut console = Console::new(quiet);
+    let sizes = if args.size.is_empty() { vec![[640, 480], [1280, 720]] } else { args.size };
+    let repeats = args.repeats as usize;
+    let mut timings =
+        Timings { render: Vec::new(), train: Vec::new(), one_core_products_per_sec: bench::one_core_limit() };
+    for path in &args.paths {
+        let name = bench::label(path);
+        let cloud = match io::open(path)? {
+            Opened::Dataset(dataset) => {
+                timings.train.push(train(&dataset, args.max_side, repeats, &mut console)?);
+                continue;
+            }
+            Opened::Cloud(cloud) => cloud,
+            Opened::Trained(scene) => scene.cloud,
+        };
+        for &size in &sizes {
+            if console.signal() == Signal::Cancel {
+                return Err(CliError::Cancelled("nothing was printed".into()));
+            }
+            console.note(Level::Info, format!("Drawing {name} at {} x {}", size[0], size[1]));
+            timings.render.push(bench::render(&name, &cloud, size, repeats)?);
+        }
+    }
+    drop(console);
+    if args.json {
+        return output::print_json(&json!(timings));
+    }
+    output::print(&text(&timings))
+}
+
+fn train(dataset: &Dataset, max_side_px: u32, repeats: usize, console: &mut Console) -> Result<StepTiming, CliError> {
+    let config = TrainConfig { max_side_px, densify: false, ..TrainConfig::default() };
+    let (indices, _) = dataset.split(config.holdout_every);
+    let Some(views) = load_views(dataset, &indices, &config, "Loading photos", console)? else {
+        return Err(CliError::Cancelled("nothing was printed".into()));
+    };
+    if views.is_empty() {
+        return Err(CliError::failed(format!("{} has no photo to train on", dataset.root.display())));
+    }
+    console.note(Level::Info, format!("Training on {}", dataset.name));
+    Ok(bench::train_steps(dataset, &views, &config, repeats)?)
+}
+
+fn text(t: &Timings) -> String {
+    let mut parts = Vec::new();
+    if !t.render.is_empty() {
+        let head = ["drawing, CPU", "Gaussians", "size", "ms", "project", "sort", "bin", "blend", "products", "per s"];
+        let mut rows = vec![head.map(str::to_owned).to_vec()];
+        rows.extend(t.render.iter().map(|r| {
+            let mut row = vec![r.name.clone(), r.gaussians.to_string(), format!("{}x{}", r.size[0], r.size[1])];
+            row.push(format!("{:.1}", r.total_ms));
+            row.extend(r.stages_ms.iter().map(|ms| format!("{ms:.1}")));
+            row.extend([format!("{:.1e}", r.products), format!("{:.2e}", r.products_per_sec)]);
+            row
+        }));
+        parts.push(output::table(&rows));
+    }
+    if !t.train.is_empty() {
+        let head = ["training step, CPU", "Gaussians", "size", "ms", "steps per s"];
+        let mut rows = vec![head.map(str::to_owned).to_vec()];
+        rows.extend(t.train.iter().map(|s| {
+            let size = format!("{}x{}", s.size[0], s.size[1]);
+            let ms = format!("{:.1}", s.step_ms);
+            vec![s.name.clone(), s.gaussians.to_string(), size, ms, format!("{:.2}", s.steps_per_sec)]
+        }));
+        parts.push(output::table(&rows));
+    }
+    parts.push(format!("one core at most: {:.2e} products per s", t.one_core_products_per_sec));
+    parts.join("\n\n")
+}
