@@ -2,7 +2,7 @@
 //! works on what it checked.
 //!
 //! Results go to standard output (as one JSON document with `--json`), everything else to standard
-//! error. Exit codes are listed in [`EXIT_CODES`].
+//! error. Exit codes are listed in `EXIT_CODES`.
 
 mod bench;
 mod demo;

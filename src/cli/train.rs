@@ -25,7 +25,7 @@ use crate::scene::Dataset;
 pub struct Args {
     /// Dataset folder or transforms.json; or a trained scene, to go on with it
     data: PathBuf,
-    /// Folder of the trained scene [default: out/<name of the dataset>]
+    /// Folder of the trained scene [default: out/NAME, the name of the dataset]
     #[arg(long)]
     out: Option<PathBuf>,
     #[command(flatten)]

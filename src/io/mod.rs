@@ -1,4 +1,4 @@
-//! Files: one per format, and one [`open`] that sniffs.
+//! Files: one per format, and one [`open()`] that sniffs.
 //!
 //! Readers never trust a length field: what a file claims is held against the file's real size
 //! before memory is set aside for it, and paths inside a dataset may not leave its folder. Every

@@ -1,6 +1,6 @@
 //! Training Gaussians from posed photos.
 //!
-//! [`run`] is the whole job; [`trainer`] the state and its step; [`init`], [`schedule`] and
+//! [`run()`] is the whole job; [`trainer`] the state and its step; [`init`], [`schedule`] and
 //! [`density`] what the step consults; [`checkpoint`] what survives a kill.
 
 pub mod budget;

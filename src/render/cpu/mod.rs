@@ -2,7 +2,7 @@
 //! (tile-parallel, eight pixels a register) the fast path where there is no GPU.
 //!
 //! Stages, one file each: [`project`], [`sort`], [`bin`], [`blend`]; backward: [`blend_backward`],
-//! [`project_backward`]. Results do not depend on the number of threads.
+//! [`mod@project_backward`]. Results do not depend on the number of threads.
 
 pub mod adam;
 pub mod bin;
