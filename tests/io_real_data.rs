@@ -149,3 +149,32 @@ fn assert_same(a: &GaussianCloud, b: &GaussianCloud) {
         );
     }
 }
+
+#[test]
+fn sog_folders_and_archives() {
+    for (name, n, degree) in [
+        ("formats/sog/playbot_lod4", 8_406, 3),
+        ("formats/sog/massa.sog", 58_649, 0),
+        ("splats/playbot_500k_sog", 500_000, 2),
+    ] {
+        let Some(path) = data(name) else { return };
+        let start = Instant::now();
+        let c = cloud(&path);
+        println!("{name}: {:.1} ms", start.elapsed().as_secs_f64() * 1e3);
+        assert_eq!((c.len(), c.sh_degree), (n, degree), "{name}");
+        c.validate().expect("valid");
+        if n == 500_000 {
+            // Large files quickly: the bar is generous, the figures are printed.
+            let folder = tempfile::tempdir().expect("folder");
+            let file = folder.path().join("large.ply");
+            let start = Instant::now();
+            io::splat_ply::write(&file, &c).expect("write");
+            let wrote = start.elapsed().as_secs_f64();
+            let start = Instant::now();
+            assert!(cloud(&file) == c);
+            let read = start.elapsed().as_secs_f64();
+            println!("500,000 splats as .ply: written in {wrote:.2} s, read in {read:.2} s");
+            assert!(read < 10.0, "{read}");
+        }
+    }
+}

@@ -10,6 +10,7 @@ mod compressed_ply;
 mod error;
 pub mod files;
 pub mod gltf_mesh;
+pub mod khr_gltf;
 mod listing;
 pub mod llff;
 mod open;
@@ -20,6 +21,7 @@ mod quantised;
 mod reader;
 
 mod resample;
+pub mod sog;
 pub mod splat_ply;
 pub mod trained;
 pub mod transforms;

@@ -5,7 +5,7 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use image::{DynamicImage, ImageDecoder, ImageError, ImageReader, Limits};
+use image::{DynamicImage, ImageDecoder, ImageError, ImageReader, Limits, RgbaImage};
 
 use super::resample::{Pixels, resample};
 use super::{IoError, files};
@@ -62,6 +62,23 @@ fn decode(path: &Path, expected: (u32, u32)) -> Result<Pixels, IoError> {
     } else {
         Pixels { width, height, channels: 3, data: picture.into_rgb8().into_raw() }
     })
+}
+
+/// Decodes the bytes of a picture of at most `limit_px` pixels as 8-bit RGBA; `path` is for errors.
+pub(super) fn decode_rgba(bytes: &[u8], limit_px: u64, path: &Path) -> Result<RgbaImage, IoError> {
+    let decoder = decoder(bytes, path)?;
+    let (w, h) = decoder.dimensions();
+    let pixels = u64::from(w) * u64::from(h);
+    if pixels > limit_px {
+        return Err(IoError::OverBudget {
+            path: path.into(),
+            what: "the picture",
+            bytes: 4 * pixels,
+            limit: 4 * limit_px,
+            remedy: "it is larger than what refers to it can use",
+        });
+    }
+    Ok(DynamicImage::from_decoder(decoder).map_err(|e| failed(path, &e))?.into_rgba8())
 }
 
 /// A decoder that has read the header, with its memory bounded.

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use super::trained::{self, TrainedScene};
-use super::{IoError, OpenError, colmap, files, llff, splat_ply, transforms};
+use super::{IoError, OpenError, colmap, files, khr_gltf, llff, sog, splat_ply, transforms};
 use crate::scene::{Dataset, GaussianCloud};
 
 /// What a path turned out to be.
@@ -23,7 +23,7 @@ pub enum Opened {
 type Result<T> = std::result::Result<T, OpenError>;
 
 /// What is looked for in a folder, in this order, and the reader of each.
-const FOLDERS: [Layout; 5] = [
+const FOLDERS: [Layout; 6] = [
     Layout {
         name: "a trained scene (scene.json)",
         is: trained::is_scene,
@@ -49,6 +49,11 @@ const FOLDERS: [Layout; 5] = [
         is: |p| p.join(llff::POSES_FILE).is_file(),
         open: |p| Ok(Opened::Dataset(llff::read(p)?)),
     },
+    Layout {
+        name: "a SOG splat (meta.json)",
+        is: |p| p.join(sog::META_FILE).is_file(),
+        open: |p| Ok(Opened::Cloud(sog::read_folder(&p.join(sog::META_FILE))?)),
+    },
 ];
 
 /// A way to keep a scene in a folder.
@@ -59,7 +64,7 @@ struct Layout {
 }
 
 /// What is looked for in a file.
-const FILES: &str = "splats (.ply, .compressed.ply), transforms.json, scene.json, poses_bounds.npy";
+const FILES: &str = "splats (.ply, .compressed.ply, .sog, SOG's meta.json, .gltf or .glb with KHR_gaussian_splatting), transforms.json, scene.json, poses_bounds.npy";
 
 /// Bytes that tell file formats apart.
 const MAGIC_BYTES: u64 = 4;
@@ -101,6 +106,7 @@ fn open_file(path: &Path) -> Result<Opened> {
         {
             return Ok(Opened::Dataset(transforms::read_blender(folder)?));
         }
+        sog::META_FILE => return Ok(Opened::Cloud(sog::read_folder(path)?)),
         llff::POSES_FILE => return Ok(Opened::Dataset(llff::read(folder)?)),
         n if n.starts_with("transforms") && n.ends_with(".json") => {
             return Ok(Opened::Dataset(transforms::read(path)?));
@@ -109,6 +115,8 @@ fn open_file(path: &Path) -> Result<Opened> {
     }
     match files::read_start(path, MAGIC_BYTES)?.as_slice() {
         [b'p', b'l', b'y', b'\n' | b'\r'] => Ok(Opened::Cloud(splat_ply::read(path)?)),
+        start if khr_gltf::is_gltf(start, &name) => Ok(Opened::Cloud(khr_gltf::read(path)?)),
+        b"PK\x03\x04" => Ok(Opened::Cloud(sog::read_archive(path)?)),
         start => Err(OpenError::Unrecognised {
             path: path.into(),
             looked_for: FILES.into(),

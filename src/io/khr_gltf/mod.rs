@@ -1,0 +1,95 @@
+//! Splats in glTF 2.0 (`.gltf`, `.glb`): the extension `KHR_gaussian_splatting`.
+//!
+//! Scales are linear since the extension's draft of April 2026; earlier files hold logarithms.
+//! A negative value or a signed integer type gives the latter away. Colours of the linear colour
+//! space are carried over to the display's: the constant harmonic exactly, the higher ones to
+//! first order around it.
+
+mod container;
+mod primitive;
+
+use std::path::Path;
+
+use glam::DMat4;
+
+pub use container::is_gltf;
+
+use super::{IoError, files};
+use crate::math::sh::coefficients;
+use crate::scene::GaussianCloud;
+use container::Gltf;
+
+/// Name of the extension, and prefix of its attributes.
+const EXTENSION: &str = "KHR_gaussian_splatting";
+/// Deepest nesting of nodes.
+const MAX_DEPTH: usize = 64;
+/// Most nodes visited; shared subtrees could make that exponential.
+const MAX_VISITS: usize = 1 << 16;
+
+/// Reads every splat of a glTF file's scene.
+pub fn read(path: &Path) -> Result<GaussianCloud, IoError> {
+    parse(&files::read(path, u64::MAX)?, path)
+}
+
+/// The Gaussians in the bytes of a glTF file. External buffers are read from the folder of `path`.
+pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
+    let gltf = Gltf::parse(bytes, path)?;
+    let mut parts = Vec::new();
+    let mut visits = 0;
+    for root in gltf.roots() {
+        visit(&gltf, root, DMat4::IDENTITY, 0, &mut visits, &mut parts)?;
+    }
+    if parts.is_empty() {
+        return Err(IoError::Unsupported {
+            path: path.into(),
+            what: "meshes without Gaussians".into(),
+            remedy: "turn the meshes into posed photos first: fmlgs synth",
+        });
+    }
+    let cloud = joined(parts);
+    cloud.validate().map_err(|cause| IoError::Cloud { path: path.into(), cause })?;
+    Ok(cloud)
+}
+
+fn visit(
+    gltf: &Gltf<'_>,
+    index: usize,
+    parent: DMat4,
+    depth: usize,
+    visits: &mut usize,
+    parts: &mut Vec<GaussianCloud>,
+) -> Result<(), IoError> {
+    *visits += 1;
+    if depth > MAX_DEPTH || *visits > MAX_VISITS {
+        return Err(gltf.bad(format!("node {index}"), "the nodes are nested too deeply".into()));
+    }
+    let node = gltf.node(index)?;
+    let world = parent * node.local();
+    for primitive in node.mesh.map_or(Ok(&[][..]), |m| gltf.primitives(m))? {
+        if let Some(extension) = primitive.extensions.get(EXTENSION) {
+            parts.push(primitive::cloud(gltf, primitive, extension, world)?);
+        }
+    }
+    node.children.iter().try_for_each(|child| visit(gltf, *child, world, depth + 1, visits, parts))
+}
+
+/// One cloud of all parts, with the highest degree among them.
+fn joined(parts: Vec<GaussianCloud>) -> GaussianCloud {
+    let sh_degree = parts.iter().map(|p| p.sh_degree).max().unwrap_or(0);
+    let stride = coefficients(sh_degree);
+    let mut all = GaussianCloud { sh_degree, ..GaussianCloud::default() };
+    for part in parts {
+        for sh in part.sh.chunks_exact(part.sh_stride()) {
+            all.sh.extend_from_slice(sh);
+            all.sh.resize(all.sh.len() + stride - sh.len(), [0.0; 3]);
+        }
+        all.positions.extend(part.positions);
+        all.log_scales.extend(part.log_scales);
+        all.quaternions.extend(part.quaternions);
+        all.opacity_logits.extend(part.opacity_logits);
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,129 @@
+//! A primitive with the extension, as Gaussians in the world.
+
+use glam::{DMat3, DMat4, DQuat, DVec3};
+
+use super::EXTENSION;
+use super::container::{Gltf, Primitive};
+use crate::io::IoError;
+use crate::io::quantised::logit;
+use crate::math::rotation::{nearest_rotation, rotation_error};
+use crate::math::sh::{SH_C0, coefficients};
+use crate::scene::GaussianCloud;
+
+/// Standard deviations under this are raised to it: their logarithm would be infinite.
+const SMALLEST_SCALE: f32 = 1e-12;
+
+pub(super) fn cloud(
+    gltf: &Gltf<'_>,
+    primitive: &Primitive,
+    extension: &serde_json::Value,
+    world: DMat4,
+) -> Result<GaussianCloud, IoError> {
+    let setting = |key: &str| extension.get(key).and_then(|v| v.as_str()).unwrap_or("");
+    let kernel = setting("kernel");
+    if kernel != "ellipse" {
+        return Err(gltf.unsupported(format!("the splat kernel '{kernel}'"), "only the kernel 'ellipse' can be drawn"));
+    }
+    let linear = match setting("colorSpace") {
+        "srgb_rec709_display" => false,
+        "lin_rec709_display" => true,
+        other => return Err(gltf.unsupported(format!("the colour space '{other}'"), "convert the colours to sRGB")),
+    };
+    let find = |name: &str| primitive.attributes.get(name).copied();
+    let extended = |name: &str| {
+        let full = format!("{EXTENSION}:{name}");
+        find(&full).ok_or_else(|| gltf.bad("a splat primitive".into(), format!("attribute {full} is missing")))
+    };
+    let position =
+        find("POSITION").ok_or_else(|| gltf.bad("a splat primitive".into(), "POSITION is missing".into()))?;
+    let positions = gltf.values::<3>(position)?.rows;
+    let n = positions.len();
+    let rotations = gltf.values::<4>(extended("ROTATION")?)?.rows;
+    let scales = gltf.values::<3>(extended("SCALE")?)?;
+    let opacities = gltf.values::<1>(extended("OPACITY")?)?.rows;
+    let degree = (0..=3_u8).rev().find(|d| extended(&format!("SH_DEGREE_{d}_COEF_0")).is_ok()).unwrap_or(0);
+    let stride = coefficients(degree);
+    let mut sh = vec![[0.0; 3]; n * stride];
+    for l in 0..=degree {
+        for k in 0..2 * usize::from(l) + 1 {
+            let rows = gltf.values::<3>(extended(&format!("SH_DEGREE_{l}_COEF_{k}"))?)?.rows;
+            equal(gltf, n, rows.len())?;
+            let at = usize::from(l) * usize::from(l) + k;
+            sh.chunks_exact_mut(stride).zip(rows).for_each(|(out, rgb)| out[at] = rgb);
+        }
+    }
+    for count in [rotations.len(), scales.rows.len(), opacities.len()] {
+        equal(gltf, n, count)?;
+    }
+    if linear {
+        sh.chunks_exact_mut(stride).for_each(to_display);
+    }
+    let logarithms = scales.signed_integer || scales.rows.iter().flatten().any(|s| *s < 0.0);
+    let log_scale = |s: f32| if logarithms { s } else { s.max(SMALLEST_SCALE).ln() };
+    let (turn, scale) = similarity(gltf, world)?;
+    if degree > 0 && turn.is_some() {
+        return Err(
+            gltf.unsupported("a rotated node with view-dependent colours".into(), "apply the rotation to the splats")
+        );
+    }
+    let grown = scale.ln() as f32;
+    let turned = |[x, y, z, w]: [f32; 4]| match turn {
+        None => [w, x, y, z],
+        Some(turn) => {
+            let q = turn * DQuat::from_array([x, y, z, w].map(f64::from));
+            [q.w, q.x, q.y, q.z].map(|v| v as f32)
+        }
+    };
+    let place = |p: &[f32; 3]| world.transform_point3(DVec3::from_array(p.map(f64::from))).as_vec3().to_array();
+    Ok(GaussianCloud {
+        positions: positions.iter().map(place).collect(),
+        log_scales: scales.rows.iter().map(|s| s.map(|s| log_scale(s) + grown)).collect(),
+        quaternions: rotations.into_iter().map(turned).collect(),
+        opacity_logits: opacities.into_iter().map(|[o]| logit(o)).collect(),
+        sh_degree: degree,
+        sh,
+        ..GaussianCloud::default()
+    })
+}
+
+fn equal(gltf: &Gltf<'_>, n: usize, count: usize) -> Result<(), IoError> {
+    if n == count {
+        return Ok(());
+    }
+    Err(gltf.bad("a splat primitive".into(), format!("{n} positions, but another attribute has {count} values")))
+}
+
+/// Rotation (`None` for none) and scale of a node's transform.
+fn similarity(gltf: &Gltf<'_>, world: DMat4) -> Result<(Option<DQuat>, f64), IoError> {
+    let m = DMat3::from_mat4(world);
+    let scale = m.determinant().cbrt();
+    let unit = m * scale.recip();
+    let error = rotation_error(&unit);
+    if !world.is_finite() || error.is_nan() || error > 1e-4 {
+        return Err(gltf
+            .unsupported("a node that is stretched, sheared or mirrored".into(), "apply its transform to the splats"));
+    }
+    let r = nearest_rotation(&unit);
+    let turned = !r.abs_diff_eq(DMat3::IDENTITY, 1e-9);
+    Ok((turned.then(|| DQuat::from_mat3(&r)), scale))
+}
+
+/// Harmonics of linear light to those of display values.
+fn to_display(sh: &mut [[f32; 3]]) {
+    let c0 = SH_C0 as f32;
+    for channel in 0..3 {
+        let linear = 0.5 + c0 * sh[0][channel];
+        let (value, slope) = encode(linear.max(0.0));
+        sh[0][channel] = (value - 0.5) / c0;
+        sh[1..].iter_mut().for_each(|c| c[channel] *= slope);
+    }
+}
+
+/// The sRGB transfer function and its derivative.
+fn encode(linear: f32) -> (f32, f32) {
+    if linear <= 0.003_130_8 {
+        (12.92 * linear, 12.92)
+    } else {
+        (1.055 * linear.powf(1.0 / 2.4) - 0.055, 1.055 / 2.4 * linear.powf(1.0 / 2.4 - 1.0))
+    }
+}

@@ -1,0 +1,117 @@
+//! Tests of splats in glTF.
+
+use serde_json::{Value, json};
+
+use super::*;
+use crate::math::sh::SH_C0;
+
+/// One Gaussian of degree 0 with float attributes, in one embedded buffer.
+fn gltf() -> Value {
+    let floats: [f32; 14] = [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0, 0.5, 1.0, 2.0, 0.75, 0.1, 0.2, 0.3];
+    let bytes: Vec<u8> = floats.iter().flat_map(|v| v.to_le_bytes()).collect();
+    let accessor = |offset: usize, kind: &str| json!({ "bufferView": 0, "byteOffset": offset * 4, "componentType": 5126, "count": 1, "type": kind });
+    json!({
+        "asset": { "version": "2.0" }, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
+        "meshes": [{ "primitives": [{
+            "mode": 0,
+            "attributes": {
+                "POSITION": 0, "KHR_gaussian_splatting:ROTATION": 1, "KHR_gaussian_splatting:SCALE": 2,
+                "KHR_gaussian_splatting:OPACITY": 3, "KHR_gaussian_splatting:SH_DEGREE_0_COEF_0": 4,
+            },
+            "extensions": { "KHR_gaussian_splatting": { "kernel": "ellipse", "colorSpace": "srgb_rec709_display" } },
+        }] }],
+        "accessors": [accessor(0, "VEC3"), accessor(3, "VEC4"), accessor(7, "VEC3"), accessor(10, "SCALAR"), accessor(11, "VEC3")],
+        "bufferViews": [{ "buffer": 0, "byteLength": bytes.len() }],
+        "buffers": [{ "byteLength": bytes.len(), "uri": format!("data:application/octet-stream;base64,{}", base64::encode(&bytes)) }],
+    })
+}
+
+fn read_json(json: &Value) -> Result<GaussianCloud, IoError> {
+    parse(json.to_string().as_bytes(), Path::new("a.gltf"))
+}
+
+fn near(a: f32, b: f32) -> bool {
+    (a - b).abs() < 1e-5
+}
+
+#[test]
+fn values_arrive_in_our_units() {
+    let c = read_json(&gltf()).expect("read");
+    assert_eq!((c.len(), c.sh_degree, c.positions[0]), (1, 0, [1.0, 2.0, 3.0]));
+    assert_eq!(c.quaternions[0], [1.0, 0.0, 0.0, 0.0]);
+    assert!(near(c.log_scales[0][0], 0.5_f32.ln()) && near(c.log_scales[0][2], 2.0_f32.ln()));
+    assert!(near(c.opacity_logits[0], 3.0_f32.ln()));
+    assert_eq!(c.sh, [[0.1, 0.2, 0.3]]);
+}
+
+#[test]
+fn linear_colours_become_display_colours() {
+    let mut g = gltf();
+    g["meshes"][0]["primitives"][0]["extensions"]["KHR_gaussian_splatting"]["colorSpace"] = json!("lin_rec709_display");
+    let c = read_json(&g).expect("read");
+    let linear = 0.5 + SH_C0 as f32 * 0.2;
+    let display = 1.055 * linear.powf(1.0 / 2.4) - 0.055;
+    assert!(near(0.5 + SH_C0 as f32 * c.sh[0][1], display));
+}
+
+#[test]
+fn nodes_move_turn_and_scale() {
+    let mut g = gltf();
+    let half = 0.5_f64.sqrt();
+    g["nodes"] = json!([
+        { "children": [1], "translation": [10, 0, 0] },
+        { "mesh": 0, "rotation": [0, 0, half, half], "scale": [2, 2, 2] },
+    ]);
+    let c = read_json(&g).expect("read");
+    // (1, 2, 3) doubled is (2, 4, 6); a quarter turn about z makes it (-4, 2, 6).
+    assert!(c.positions[0].iter().zip([6.0, 2.0, 6.0]).all(|(a, b)| near(*a, b)), "{:?}", c.positions);
+    assert!(near(c.log_scales[0][1], 2.0_f32.ln()));
+    assert!(near(c.quaternions[0][0], half as f32) && near(c.quaternions[0][3], half as f32));
+    g["nodes"][1]["scale"] = json!([2, 1, 2]);
+    assert!(matches!(read_json(&g), Err(IoError::Unsupported { .. })));
+    g["nodes"][1] = json!({ "mesh": 0, "children": [0] });
+    assert!(matches!(read_json(&g), Err(IoError::Syntax { reason, .. }) if reason.contains("deeply")));
+}
+
+#[test]
+fn binary_files_hold_the_same() {
+    let mut g = gltf();
+    let text = g["buffers"][0]["uri"].as_str().expect("text").split_once(',').expect("data").1.to_owned();
+    g["buffers"][0].as_object_mut().expect("object").remove("uri");
+    let json = g.to_string();
+    let binary = base64::decode(text).expect("valid");
+    let mut glb = b"glTF\x02\0\0\0\0\0\0\0".to_vec();
+    for (kind, data) in [(b"JSON", json.as_bytes()), (b"BIN\0", &binary)] {
+        glb.extend((data.len() as u32).to_le_bytes());
+        glb.extend(kind);
+        glb.extend(data);
+    }
+    let path = Path::new("a.glb");
+    assert!(parse(&glb, path).expect("glb") == read_json(&gltf()).expect("gltf"));
+    for n in [4, 12, 19, 40, glb.len() - 1] {
+        assert!(matches!(parse(&glb[..n], path), Err(IoError::Truncated { .. })), "{n}");
+    }
+}
+
+#[test]
+fn hostile_files_are_named() {
+    let with = |change: fn(&mut Value)| {
+        let mut g = gltf();
+        change(&mut g);
+        read_json(&g).expect_err("hostile")
+    };
+    let e = with(|g| g["accessors"][0]["count"] = json!(1_u64 << 60));
+    assert!(matches!(e, IoError::Count { claimed, possible: 4, .. } if claimed == 1 << 60), "{e}");
+    assert!(matches!(with(|g| g["accessors"][0]["count"] = json!(2)), IoError::Syntax { .. }));
+    assert!(matches!(with(|g| g["accessors"][0]["byteOffset"] = json!(u64::MAX)), IoError::Syntax { .. }));
+    assert!(matches!(with(|g| g["bufferViews"][0]["byteLength"] = json!(u64::MAX)), IoError::Syntax { .. }));
+    assert!(matches!(with(|g| g["bufferViews"][0]["byteStride"] = json!(1)), IoError::Syntax { .. }));
+    assert!(matches!(with(|g| g["accessors"][0]["type"] = json!("MAT4")), IoError::Syntax { .. }));
+    assert!(matches!(with(|g| g["buffers"][0]["uri"] = json!("../secret.bin")), IoError::Outside { .. }));
+    assert!(matches!(with(|g| g["buffers"][0]["uri"] = json!("data:;base64,???")), IoError::Syntax { .. }));
+    let kernel =
+        with(|g| g["meshes"][0]["primitives"][0]["extensions"]["KHR_gaussian_splatting"]["kernel"] = json!("box"));
+    assert!(matches!(&kernel, IoError::Unsupported { what, .. } if what.contains("box")), "{kernel}");
+    let none = with(|g| g["meshes"][0]["primitives"][0]["extensions"] = json!({}));
+    assert!(matches!(&none, IoError::Unsupported { remedy, .. } if remedy.contains("synth")), "{none}");
+}
