@@ -1,10 +1,11 @@
 //! Fuzzing of every parser on stable Rust: small seeds, deterministic mutations, and three
 //! promises held against each input: no panic, bounded memory, bounded time.
 //!
-//! `FMLGS_FUZZ_ITERS=100000 cargo test --test fuzz` searches longer than the default;
-//! `FMLGS_FUZZ_SEED` starts elsewhere. An input that breaks a promise is written to
-//! `target/fuzz/` and named; once mended it belongs into `tests/corpus/<parser>/`, whose files are
-//! all tried unchanged as well. `cargo test --test fuzz -- --ignored` writes the seeds anew.
+//! `FMLGS_FUZZ_ITERS=100000 cargo test --test fuzz` searches longer than the default,
+//! `FMLGS_FUZZ_SEED` starts elsewhere, `FMLGS_FUZZ_ONLY=sog` tries one parser. An input that
+//! breaks a promise is written to `target/fuzz/` and named; once mended it belongs into
+//! `tests/corpus/<parser>/`, whose files are all tried unchanged as well. `cargo test --test fuzz
+//! -- --ignored` writes the seeds anew.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 #[path = "fuzz/memory.rs"]
@@ -90,7 +91,8 @@ fn fuzz(target: &Target) {
 
 #[test]
 fn every_parser_keeps_its_promises() {
-    for target in targets::all() {
+    let only = std::env::var("FMLGS_FUZZ_ONLY").ok();
+    for target in targets::all().into_iter().filter(|t| only.as_ref().is_none_or(|o| o == t.name)) {
         let start = Instant::now();
         fuzz(&target);
         println!("{}: {:.1} s", target.name, start.elapsed().as_secs_f64());

@@ -27,6 +27,8 @@ pub fn all() -> Vec<Seed> {
         ("sog", "v2.sog", sog()),
         ("sog_meta", "v2.json", sog_meta(2).to_string().into_bytes()),
         ("sog_meta", "v1.json", sog_meta(1).to_string().into_bytes()),
+        ("khr_gltf", "a.gltf", gltf(None)),
+        ("khr_gltf", "a.glb", gltf(Some(*b"glTF"))),
         ("llff", "two.npy", npy()),
         ("transforms", "nerfstudio.json", transforms().to_string().into_bytes()),
         ("transforms", "per_frame.json", per_frame().to_string().into_bytes()),
@@ -151,6 +153,37 @@ fn sog() -> Vec<u8> {
         zip.write_all(&bytes).expect("write");
     }
     zip.finish().expect("finish").into_inner()
+}
+
+/// One Gaussian below two nodes; as text with an embedded buffer, or binary.
+fn gltf(magic: Option<[u8; 4]>) -> Vec<u8> {
+    let floats = [1.0_f32, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0, 0.5, 1.0, 2.0, 0.75, 0.1, 0.2, 0.3];
+    let binary = floats.map(f32::to_le_bytes).concat();
+    let accessor = |offset: usize, kind: &str| json!({ "bufferView": 0, "byteOffset": offset * 4, "componentType": 5126, "count": 1, "type": kind });
+    let mut file = json!({
+        "scenes": [{ "nodes": [0] }],
+        "nodes": [{ "children": [1], "translation": [1, 0, 0] }, { "mesh": 0, "rotation": [0, 0, 1, 0], "scale": [2, 2, 2] }],
+        "meshes": [{ "primitives": [{
+            "attributes": { "POSITION": 0, "KHR_gaussian_splatting:ROTATION": 1, "KHR_gaussian_splatting:SCALE": 2,
+                "KHR_gaussian_splatting:OPACITY": 3, "KHR_gaussian_splatting:SH_DEGREE_0_COEF_0": 4 },
+            "extensions": { "KHR_gaussian_splatting": { "kernel": "ellipse", "colorSpace": "lin_rec709_display" } },
+        }] }],
+        "accessors": [accessor(0, "VEC3"), accessor(3, "VEC4"), accessor(7, "VEC3"), accessor(10, "SCALAR"), accessor(11, "VEC3")],
+        "bufferViews": [{ "buffer": 0, "byteLength": binary.len() }],
+        "buffers": [{ "byteLength": binary.len() }],
+    });
+    let Some(magic) = magic else {
+        file["buffers"][0]["uri"] = json!(format!("data:;base64,{}", base64::encode(&binary)));
+        return file.to_string().into_bytes();
+    };
+    let text = file.to_string().into_bytes();
+    let mut out = [&magic[..], &[2, 0, 0, 0, 0, 0, 0, 0]].concat();
+    for (kind, data) in [(b"JSON", &text), (b"BIN\0", &binary)] {
+        out.extend((data.len() as u32).to_le_bytes());
+        out.extend(kind);
+        out.extend(data);
+    }
+    out
 }
 
 fn npy() -> Vec<u8> {

@@ -69,6 +69,7 @@ pub fn all() -> Vec<Target> {
             },
             |folder| valid(io::sog::read_folder(&folder.join("meta.json"))),
         ),
+        target("khr_gltf", |b| valid(io::khr_gltf::parse(b, Path::new(P)))),
         target("colmap_cameras", |b| io::colmap::check_cameras(b, Path::new(P))),
         target("colmap_images", |b| io::colmap::check_images(b, Path::new(P))),
         target("colmap_points", |b| io::colmap::check_points(b, Path::new(P))),
