@@ -61,6 +61,12 @@ pub enum SynthError {
     /// The scene shows nothing.
     #[error("the scene has no triangles with any area; a scene of meshes is needed")]
     Empty,
+    /// Transforms take a node's vertices beyond what numbers hold.
+    #[error("node {node} of the scene lies at a position that is not finite; check its transforms")]
+    NotFinite {
+        /// Number of the node, parents counted before children.
+        node: usize,
+    },
     /// More geometry than is drawn.
     #[error("the scene has {count} triangles; at most {limit} are drawn. Simplify it first")]
     TooManyTriangles {

@@ -67,7 +67,7 @@ impl Surface {
                 let primitives = node.mesh.map_or(&[][..], |m| &scene.meshes[m].primitives[..]);
                 primitives.iter().map(move |primitive| (n, node.world_from_node, primitive))
             })
-            .map(|(n, world, primitive)| Instance { world, primitive, ids: identities.of_node[n] })
+            .map(|(node, world, primitive)| Instance { node, world, primitive, ids: identities.of_node[node] })
             .collect();
         let count = instances.iter().map(|i| i.primitive.triangles.len()).sum::<usize>();
         let vertices = instances.iter().map(|i| i.primitive.positions.len()).sum::<usize>();
@@ -84,7 +84,11 @@ impl Surface {
             let Some(slot) = usize::from(instance.ids.object).checked_sub(1) else { continue };
             objects.resize(objects.len().max(slot + 1), None);
             let known = objects[slot].iter().flat_map(|b| [b.min, b.max]).collect::<Vec<_>>();
-            objects[slot] = Bounds::of(corners(instance).into_iter().chain(known));
+            let corners = corners(instance);
+            if corners.iter().any(|c| !c.is_finite()) {
+                return Err(SynthError::NotFinite { node: instance.node });
+            }
+            objects[slot] = Bounds::of(corners.into_iter().chain(known));
         }
         let objects: Vec<Bounds> = objects.into_iter().flatten().collect();
         let all = Bounds::of(objects.iter().flat_map(|b| [b.min, b.max])).ok_or(SynthError::Empty)?;
@@ -217,6 +221,7 @@ impl Surface {
 
 /// One primitive of one node.
 struct Instance<'a> {
+    node: usize,
     world: glam::DMat4,
     primitive: &'a Primitive,
     ids: NodeIds,

@@ -375,6 +375,43 @@ fn a_scene_without_area_is_refused() {
 }
 
 #[test]
+fn transforms_that_overflow_are_refused() {
+    let with_last = |scale: f64| {
+        let nest = |i: usize| json!({ "scale": [1e38, 1e38, 1e38], "children": [i + 1] });
+        let mut nodes: Vec<Value> = (0..8).map(nest).collect();
+        nodes.push(json!({ "mesh": 0, "scale": [scale, scale, scale] }));
+        let (root, bin) = cubes(nodes.into(), json!([0]), json!([]));
+        gltf_mesh::read_slice(&glb(&root, &bin), "t.glb")
+    };
+    // 1e304 times 1e5 is no number; a thousandth of that is one, but has no square.
+    assert!(with_last(1e5).unwrap_err().to_string().contains("nodes[8]: its transform is not finite"));
+    let scene = with_last(1e2).unwrap();
+    let identities = levels::identities(&scene, Levels::Nodes, "t").unwrap();
+    assert!(matches!(stage(&scene, &identities), Err(SynthError::Empty)));
+}
+
+#[test]
+fn mutated_files_never_panic() {
+    let (root, bin) = cubes(json!([{ "name": "a", "mesh": 0, "children": [1] }, { "mesh": 0 }]), json!([0]), json!([{}]));
+    let whole = glb(&root, &bin);
+    let mut rng = Pcg32::seed_from_u64(5);
+    let (mut read, mut staged) = (0, 0);
+    for _ in 0..3000 {
+        let mut bytes = whole.clone();
+        for _ in 0..rng.random_range(1..4) {
+            let at = rng.random_range(0..bytes.len());
+            // Digits in the JSON part stay digits now and then, so that it still parses.
+            bytes[at] = if bytes[at].is_ascii_digit() { rng.random_range(b'0'..=b'9') } else { rng.random::<u8>() };
+        }
+        let Ok(scene) = gltf_mesh::read_slice(&bytes, "mutated.glb") else { continue };
+        read += 1;
+        let Ok(identities) = levels::identities(&scene, Levels::Nodes, "mutated") else { continue };
+        staged += usize::from(read % 16 == 0 && stage(&scene, &identities).is_ok());
+    }
+    assert!(read > 300 && staged > 10, "{read} of 3000 were read, {staged} made ready");
+}
+
+#[test]
 fn scenes_far_away_and_tiny_are_as_exact() {
     let nodes = json!([{ "mesh": 0, "translation": [1e6, 0, 0], "scale": [0.001, 0.001, 0.001] }]);
     let (root, bin) = cubes(nodes, json!([0]), json!([]));
