@@ -1,7 +1,8 @@
 //! The demo scene, made from formulas: a table with things on it, each of several named parts.
 //!
-//! [`build`] gives the bytes of `assets/demo.glb`. `cargo run --example make_demo` writes that file;
-//! a test holds the two equal. Units are metres, y is up, the table's middle stands on the origin.
+//! [`build`] gives the bytes of `assets/demo.glb`, and a test holds the two equal. After a change here,
+//! `cargo test --lib write_the_demo_scene -- --ignored` writes the file anew. Units are metres, y is up,
+//! the table's middle stands on the origin.
 
 mod glb;
 mod mesh;

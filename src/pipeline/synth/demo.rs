@@ -24,8 +24,8 @@ pub fn demo_options() -> SynthOptions {
         height_px: 300,
         samples: 3,
         rig: Rig::Survey,
-        focus: Some(DVec3::new(0.0, 0.84, 0.0)),
-        radius: Some(0.62),
+        focus: Some(DVec3::new(0.0, 0.82, 0.0)),
+        radius: Some(0.57),
         points: 12_000,
         ..SynthOptions::default()
     }

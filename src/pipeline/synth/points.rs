@@ -8,31 +8,25 @@ use super::options::SynthOptions;
 use super::view::View;
 use crate::scene::{Camera, SparsePoint};
 
-/// Pixels that are tried for each point that is wanted.
-const TRIES: usize = 4;
-
-/// Up to `count` points on surfaces that the photo shows, in its colours, each off by
-/// `point_noise_px` pixels of it in every direction.
+/// `count` points on surfaces that the photo shows, in its colours, each off by
+/// `point_noise_px` pixels of it in every direction. None if the photo shows no surface.
 pub fn sample(view: &View, camera: &Camera, index: usize, count: usize, options: &SynthOptions) -> Vec<SparsePoint> {
     let mut rng = Pcg32::seed_from_u64(options.seed.wrapping_mul(0x9e37_79b9).wrapping_add(index as u64));
     let width = camera.width_px as usize;
-    let mut points = Vec::with_capacity(count);
-    for _ in 0..count * TRIES {
-        if points.len() == count {
-            break;
-        }
-        let pixel = rng.random_range(0..view.depth.len());
+    let seen: Vec<usize> = (0..view.depth.len()).filter(|&i| view.depth[i] > 0.0).collect();
+    if seen.is_empty() {
+        return Vec::new();
+    }
+    let point = |_| {
+        let pixel = seen[rng.random_range(0..seen.len())];
         let depth = f64::from(view.depth[pixel]);
         let noise = DVec3::new(normal(&mut rng), normal(&mut rng), normal(&mut rng));
-        if depth <= 0.0 {
-            continue;
-        }
         let at = DVec2::new((pixel % width) as f64 + 0.5, (pixel / width) as f64 + 0.5);
         let on_surface = camera.center + camera.ray(at) * depth;
         let sigma = options.point_noise_px * depth / camera.focal_px.y;
-        points.push(SparsePoint { position: on_surface + noise * sigma, rgb: view.rgb[pixel] });
-    }
-    points
+        SparsePoint { position: on_surface + noise * sigma, rgb: view.rgb[pixel] }
+    };
+    (0..count).map(point).collect()
 }
 
 /// A normally distributed number (Box and Muller).

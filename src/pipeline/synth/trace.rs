@@ -11,6 +11,9 @@ use obvhs::rt_triangle::RtTriangle;
 
 use super::surface::Surface;
 
+/// How far beyond an edge a triangle reaches, as a share of its size.
+const EDGE: f32 = 2e-6;
+
 /// Where a ray meets the surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Hit {
@@ -50,7 +53,7 @@ impl Tracer {
     pub fn nearest(&self, origin: Vec3A, direction: Vec3A, t_min: f32) -> Option<Hit> {
         let ray = Ray::new(origin, direction, t_min, f32::INFINITY);
         let mut hit = RayHit::none();
-        if !self.bvh.ray_traverse(ray, &mut hit, |ray, i| self.triangles[i].intersect(ray)) {
+        if !self.bvh.ray_traverse(ray, &mut hit, |ray, i| distance(&self.triangles[i], ray)) {
             return None;
         }
         let i = hit.primitive_id as usize;
@@ -65,7 +68,7 @@ impl Tracer {
         let ray = Ray::new(origin, direction, 0.0, 1.0);
         self.bvh.ray_traverse_miss(ray, |ray, i| {
             let triangle = &self.triangles[i];
-            let t = triangle.intersect(ray);
+            let t = distance(triangle, ray);
             if t.is_finite() {
                 let w = triangle.compute_barycentric(ray);
                 if passes(self.original[i] as usize, Vec3::new(1.0 - w.x - w.y, w.x, w.y)) {
@@ -75,4 +78,18 @@ impl Tracer {
             t
         })
     }
+}
+
+/// Distance at which a ray meets a triangle, infinity if it does not (Möller and Trumbore). Edges
+/// belong to both triangles that share them, a rounding error beyond included, so that no ray slips
+/// through between two.
+fn distance(triangle: &RtTriangle, ray: &Ray) -> f32 {
+    let c = triangle.v0 - ray.origin;
+    let r = ray.direction.cross(c);
+    let inverse = 1.0 / triangle.ng.dot(ray.direction);
+    let (u, v) = (r.dot(triangle.e2) * inverse, r.dot(triangle.e1) * inverse);
+    let t = triangle.ng.dot(c) * inverse;
+    // NaN and infinity, from a ray within the triangle's plane, fail these.
+    let inside = u >= -EDGE && v >= -EDGE && u + v <= 1.0 + EDGE;
+    if inside && t >= ray.tmin && t <= ray.tmax { t } else { f32::INFINITY }
 }
