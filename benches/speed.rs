@@ -8,10 +8,13 @@ use fmlgs::pipeline::observer::Silent;
 use fmlgs::pipeline::train::{TrainConfig, load_views};
 
 fn main() {
-    let data = std::env::var("FMLGS_DATA").unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data").into());
+    let data =
+        std::env::var("FMLGS_DATA").unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data").into());
     let limit = bench::one_core_limit();
     println!("one core evaluates {:.2e} splat-pixel products per second", limit);
-    for name in ["playbot_lod3_sh2_31000.ply", "guitar_sh0_90854.ply", "statue_narcissus_sh0_101275.ply", "playbot_500k_sog"] {
+    for name in
+        ["playbot_lod3_sh2_31000.ply", "guitar_sh0_90854.ply", "statue_narcissus_sh0_101275.ply", "playbot_500k_sog"]
+    {
         let path = Path::new(&data).join("splats").join(name);
         let cloud = match io::open(&path) {
             Ok(Opened::Cloud(cloud)) => cloud,
@@ -48,7 +51,10 @@ fn main() {
         let (train, _) = dataset.split(config.holdout_every);
         match load_views(&dataset, &train, &config, "Loading", &mut Silent) {
             Ok(Some(views)) => match bench::train_steps(&dataset, &views, &config, 40) {
-                Ok(t) => println!("{name} at {}x{}, {} Gaussians: {:.1} ms a step, {:.1} steps/s", t.size[0], t.size[1], t.gaussians, t.step_ms, t.steps_per_sec),
+                Ok(t) => println!(
+                    "{name} at {}x{}, {} Gaussians: {:.1} ms a step, {:.1} steps/s",
+                    t.size[0], t.size[1], t.gaussians, t.step_ms, t.steps_per_sec
+                ),
                 Err(e) => println!("{name}: {e}"),
             },
             Ok(None) => {}

@@ -7,7 +7,13 @@ pub const BYTES_PER_GAUSSIAN: u64 = 59 * 4 * 5 + 12 + 64 + 4 * 60;
 /// Share of the memory that is free now which the Gaussians may take.
 const SHARE: f64 = 0.4;
 
-/// Most Gaussians that fit, between ten thousand and ten million.
+/// Most Gaussians that are worth having and fit: one per pixel of a training picture, at least
+/// `start` (those there are to begin with) and a half more, at most what the memory holds.
+pub fn worthwhile(pixels: usize, start: usize) -> usize {
+    pixels.max(start + start / 2).min(gaussians())
+}
+
+/// Most Gaussians that the memory holds, between ten thousand and ten million.
 pub fn gaussians() -> usize {
     let system = sysinfo::System::new_with_specifics(
         sysinfo::RefreshKind::nothing().with_memory(sysinfo::MemoryRefreshKind::nothing().with_ram()),
@@ -27,5 +33,7 @@ mod tests {
         assert!(super::fitting(1 << 30) > 200_000);
         assert!(super::fitting(1 << 30) < super::fitting(2 << 30));
         assert_eq!(super::fitting(0), 10_000);
+        assert_eq!(super::worthwhile(50_000, 20_000), 50_000);
+        assert_eq!(super::worthwhile(5_000, 8_000), 12_000);
     }
 }

@@ -8,10 +8,19 @@ use rstar::RTree;
 
 use super::TrainView;
 use crate::math::sh::{SH_C0, coefficients};
+use crate::math::stats::quantile;
+use crate::render::cpu::Renderer;
+use crate::render::{Features, RenderSettings};
 use crate::scene::{Bounds, Dataset, GaussianCloud, SparsePoint};
 
 /// Opacity of a new Gaussian.
 const OPACITY: f64 = 0.1;
+/// Longer side of the pictures in which holes are looked for, px.
+const HOLE_SIDE_PX: u32 = 128;
+/// Side of the squares that are found empty or covered, px.
+const HOLE_CELL_PX: usize = 8;
+/// How much farther than nearly everything else in a view its holes are filled.
+const HOLE_DEPTH: f64 = 1.3;
 
 /// A cloud at the dataset's sparse points or, where it has fewer than a hundred, at `random`
 /// points in front of the cameras, coloured by the photos they were shot from.
@@ -23,8 +32,69 @@ pub fn initial_cloud(
     rng: &mut Pcg64Mcg,
 ) -> GaussianCloud {
     let finite: Vec<SparsePoint> = dataset.points.iter().copied().filter(|p| p.position.is_finite()).collect();
-    let points = if finite.len() >= 100 { finite } else { random_points(dataset, views, random, rng) };
-    from_points(&points, degree)
+    if finite.len() < 100 {
+        return from_points(&random_points(dataset, views, random, rng), degree);
+    }
+    let mut cloud = from_points(&finite, degree);
+    fill_holes(&mut cloud, dataset, views);
+    cloud
+}
+
+/// Puts Gaussians where photos show something but no sparse point is: walls, sky, the rest of the
+/// room. They stand a little behind what the view shows otherwise, in its photo's colours, and
+/// training moves them from there. Views that already see such a Gaussian add none.
+fn fill_holes(cloud: &mut GaussianCloud, dataset: &Dataset, views: &[TrainView]) {
+    let stride = cloud.sh_stride();
+    let settings = RenderSettings { sh_degree: 0, depth: true, ..RenderSettings::default() };
+    let mut renderer = Renderer::<f32>::new();
+    // The same cloud all but opaque, so that its alpha says where it covers the picture.
+    let mut solid = cloud.clone();
+    solid.opacity_logits.fill(3.0);
+    for view in views {
+        let camera = view.camera.limited_to(HOLE_SIDE_PX);
+        let Ok(frame) = renderer.render(&solid, Features::NONE, &camera, &settings) else { continue };
+        let seen = frame.depth.iter().zip(&frame.alpha).filter(|(_, a)| **a > 0.5);
+        let depths: Vec<f64> = seen.map(|(d, a)| f64::from(d / a)).collect();
+        let focus = camera.center.distance(dataset.focus());
+        let depth = HOLE_DEPTH * if depths.is_empty() { focus } else { quantile(&depths, 0.9) };
+        let (width, height) = (camera.width_px as usize, camera.height_px as usize);
+        for y in (0..height).step_by(HOLE_CELL_PX) {
+            for x in (0..width).step_by(HOLE_CELL_PX) {
+                let (right, bottom) = ((x + HOLE_CELL_PX).min(width), (y + HOLE_CELL_PX).min(height));
+                let cell = || (y..bottom).flat_map(|v| (x..right).map(move |u| v * width + u));
+                let covered: f32 = cell().map(|i| frame.alpha[i]).sum::<f32>() / cell().count() as f32;
+                if covered > 0.4 {
+                    continue;
+                }
+                let at = DVec2::new((x + right) as f64, (y + bottom) as f64) * 0.5;
+                let scale = f64::from(view.pixels.width_px) / width as f64;
+                let (u, v) = ((at.x * scale) as u32, (at.y * scale) as u32);
+                let (u, v) = (u.min(view.pixels.width_px - 1), v.min(view.pixels.height_px - 1));
+                let pixel = (v * view.pixels.width_px + u) as usize;
+                if view.pixels.coverage.as_ref().is_some_and(|c| c[pixel] == 0) {
+                    continue;
+                }
+                let position = camera.center + camera.ray(at) * depth - cloud.origin;
+                let size = depth * HOLE_CELL_PX as f64 / camera.focal_px.x * 0.5;
+                for (c, opacity) in [(&mut *cloud, logit(OPACITY)), (&mut solid, 3.0)] {
+                    c.positions.push(position.as_vec3().to_array());
+                    c.log_scales.push([size.ln() as f32; 3]);
+                    c.quaternions.push([1.0, 0.0, 0.0, 0.0]);
+                    c.opacity_logits.push(opacity);
+                    c.sh.push(constant_color(view.pixels.rgb[pixel]));
+                    c.sh.extend(std::iter::repeat_n([0.0; 3], stride - 1));
+                }
+            }
+        }
+    }
+}
+
+fn logit(opacity: f64) -> f32 {
+    (opacity / (1.0 - opacity)).ln() as f32
+}
+
+fn constant_color(rgb: [u8; 3]) -> [f32; 3] {
+    rgb.map(|c| ((f64::from(c) / 255.0 - 0.5) / SH_C0) as f32)
 }
 
 /// One Gaussian per point, as wide as the mean distance to its three nearest neighbours.
@@ -50,8 +120,8 @@ pub fn from_points(points: &[SparsePoint], degree: u8) -> GaussianCloud {
         cloud.positions.push(at.map(|v| v as f32));
         cloud.log_scales.push([s.clamp(typical * 1e-3, typical * 30.0).ln() as f32; 3]);
         cloud.quaternions.push([1.0, 0.0, 0.0, 0.0]);
-        cloud.opacity_logits.push((OPACITY / (1.0 - OPACITY)).ln() as f32);
-        cloud.sh.push(p.rgb.map(|c| ((f64::from(c) / 255.0 - 0.5) / SH_C0) as f32));
+        cloud.opacity_logits.push(logit(OPACITY));
+        cloud.sh.push(constant_color(p.rgb));
         cloud.sh.extend(std::iter::repeat_n([0.0; 3], stride - 1));
     }
     cloud
@@ -78,6 +148,7 @@ fn random_points(dataset: &Dataset, views: &[TrainView], n: usize, rng: &mut Pcg
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::{Camera, PhotoPixels};
 
     #[test]
     fn scales_follow_the_spacing() {
@@ -94,6 +165,31 @@ mod tests {
         }
         let red = 0.5 + SH_C0 * f64::from(cloud.sh[0][0]);
         assert!((red - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn what_photos_show_without_points_is_filled_once() {
+        let photo = |eye: DVec3| {
+            let camera = Camera::look_at(eye, DVec3::ZERO, DVec3::Z, 0.8, 128, 96).expect("valid");
+            let pixels =
+                PhotoPixels { width_px: 128, height_px: 96, rgb: vec![[200, 30, 30]; 128 * 96], coverage: None };
+            TrainView { name: String::new(), camera, pixels }
+        };
+        let views = [photo(DVec3::new(0.0, -4.0, 0.1)), photo(DVec3::new(0.01, -4.0, 0.1))];
+        let points: Vec<SparsePoint> = (0..200)
+            .map(|i| SparsePoint {
+                position: DVec3::new(f64::from(i % 20) * 0.02, 0.0, f64::from(i / 20) * 0.02),
+                rgb: [0; 3],
+            })
+            .collect();
+        let dataset = Dataset { points, ..Dataset::default() };
+        let mut rng = <Pcg64Mcg as rand::SeedableRng>::seed_from_u64(1);
+        let cloud = initial_cloud(&dataset, &views, 1, 0, &mut rng);
+        cloud.validate().expect("valid");
+        let one = initial_cloud(&dataset, &views[..1], 1, 0, &mut rng);
+        assert!(one.len() > 200 + 100, "a picture of 16 x 12 squares is mostly empty: {}", one.len());
+        // The second view stands where the first one did and finds nothing left to fill.
+        assert!(cloud.len() - one.len() < 20, "{} {}", one.len(), cloud.len());
     }
 
     #[test]

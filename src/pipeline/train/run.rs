@@ -242,7 +242,12 @@ impl<'a> Job<'a> {
             }
             None => {
                 let cloud = init::initial_cloud(dataset, &views, config.sh_degree, config.random_points, &mut rng);
-                Trainer::new(cloud, config, background, extent, rng)
+                let mut t = Trainer::new(cloud, config, background, extent, rng);
+                if config.max_gaussians.is_none() {
+                    let pixels = views.iter().map(|v| v.pixels.len()).max().unwrap_or(0);
+                    t.budget = super::budget::worthwhile(pixels, t.cloud.len());
+                }
+                t
             }
         };
         let mut info = SceneInfo::of(dataset, held, out.unwrap_or(Path::new(".")));

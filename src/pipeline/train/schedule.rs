@@ -89,6 +89,12 @@ impl Schedule {
         done >= self.densify_from && done <= self.densify_until && done % self.densify_interval == 0
     }
 
+    /// Whether Gaussians that are too large may be removed after `done` steps: in the second half
+    /// of density control, when what they stood in for has had time to grow.
+    pub fn prunes_large(&self, done: u64) -> bool {
+        done >= self.densify_until / 2
+    }
+
     /// Whether opacities are reset after `done` steps. Never near the end of density control, so
     /// that what the reset hides can come back or be removed.
     pub fn resets(&self, done: u64) -> bool {

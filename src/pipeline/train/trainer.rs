@@ -73,7 +73,7 @@ impl Trainer {
             round: Vec::new(),
             step: 0,
             extent,
-            budget: config.max_gaussians.unwrap_or_else(super::budget::gaussians),
+            budget: config.max_gaussians.unwrap_or(usize::MAX),
             settings: RenderSettings { background, antialias: config.antialias, ..RenderSettings::default() },
             densify: config.densify,
             renderer: Renderer::new(),
@@ -112,7 +112,7 @@ impl Trainer {
         }
         let mut report = None;
         if self.schedule.densifies(self.step) {
-            let large = self.step > self.schedule.reset_interval;
+            let large = self.schedule.prunes_large(self.step);
             report = Some(density::control(
                 &mut self.cloud,
                 &mut self.moments,
