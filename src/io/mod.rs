@@ -19,7 +19,6 @@ mod ply;
 pub mod points_ply;
 mod quantised;
 mod reader;
-
 mod resample;
 pub mod sog;
 pub mod splat_ply;

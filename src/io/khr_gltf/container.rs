@@ -201,8 +201,11 @@ impl<'a> Gltf<'a> {
     }
 }
 
+/// Reads a component off the front of bytes.
+type ReadComponent = fn(&[u8]) -> f32;
+
 /// Bytes and reader of a component type.
-fn component(kind: u32, normalized: bool) -> Option<(usize, fn(&[u8]) -> f32)> {
+fn component(kind: u32, normalized: bool) -> Option<(usize, ReadComponent)> {
     fn get<const N: usize>(b: &[u8]) -> [u8; N] {
         b.first_chunk().copied().unwrap_or([0; N])
     }
