@@ -9,6 +9,7 @@
 //!   `TRANSMITTANCE_MIN`.
 
 pub mod cpu;
+pub mod gpu;
 
 use crate::math::Real;
 use crate::scene::CameraError;

@@ -1,0 +1,151 @@
+//! One compute pipeline with its bindings, and the recording of passes.
+
+use super::shader::{self, Variant};
+use super::timing::Timer;
+use super::{Context, GpuError};
+
+/// How a kernel uses a buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// A uniform.
+    Uniform,
+    /// A storage buffer that is only read.
+    Read,
+    /// A storage buffer that is written.
+    Write,
+}
+
+/// A compiled source, from which kernels are made by entry point.
+#[derive(Debug)]
+pub struct Module {
+    module: wgpu::ShaderModule,
+    name: &'static str,
+}
+
+impl Module {
+    /// Compiles kernel file `name`.
+    pub fn new(context: &Context, name: &'static str, variant: Variant) -> Result<Self, GpuError> {
+        let source = shader::source(name, variant)?;
+        let module = context.scoped(name, 0, || {
+            context.device().create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some(name),
+                source: wgpu::ShaderSource::Wgsl(source.into()),
+            })
+        })?;
+        Ok(Self { module, name })
+    }
+}
+
+/// One entry point, ready to run.
+#[derive(Debug)]
+pub struct Kernel {
+    pipeline: wgpu::ComputePipeline,
+    layout: wgpu::BindGroupLayout,
+    slots: Vec<u32>,
+}
+
+impl Kernel {
+    /// Makes the pipeline of `entry`, whose bindings in group 0 are `slots`.
+    pub fn new(context: &Context, module: &Module, entry: &str, slots: &[(u32, Access)]) -> Result<Self, GpuError> {
+        let entries: Vec<_> = slots
+            .iter()
+            .map(|&(binding, access)| wgpu::BindGroupLayoutEntry {
+                binding,
+                visibility: wgpu::ShaderStages::COMPUTE,
+                ty: wgpu::BindingType::Buffer {
+                    ty: match access {
+                        Access::Uniform => wgpu::BufferBindingType::Uniform,
+                        Access::Read => wgpu::BufferBindingType::Storage { read_only: true },
+                        Access::Write => wgpu::BufferBindingType::Storage { read_only: false },
+                    },
+                    has_dynamic_offset: false,
+                    min_binding_size: None,
+                },
+                count: None,
+            })
+            .collect();
+        let label = format!("{}::{entry}", module.name);
+        let device = context.device();
+        let (pipeline, layout) = context.scoped(&label, 0, || {
+            let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: Some(&label),
+                entries: &entries,
+            });
+            let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some(&label),
+                bind_group_layouts: &[Some(&layout)],
+                immediate_size: 0,
+            });
+            let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(&label),
+                layout: Some(&pipeline_layout),
+                module: &module.module,
+                entry_point: Some(entry),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                cache: None,
+            });
+            (pipeline, layout)
+        })?;
+        Ok(Self { pipeline, layout, slots: slots.iter().map(|s| s.0).collect() })
+    }
+
+    /// Records a dispatch. `buffers` are in the order of the slots.
+    pub fn dispatch(
+        &self,
+        context: &Context,
+        pass: &mut wgpu::ComputePass<'_>,
+        buffers: &[&wgpu::Buffer],
+        groups: [u32; 3],
+    ) {
+        if groups.contains(&0) {
+            return;
+        }
+        let entries: Vec<_> = self
+            .slots
+            .iter()
+            .zip(buffers)
+            .map(|(&binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
+            .collect();
+        let group = context.device().create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &self.layout,
+            entries: &entries,
+        });
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &group, &[]);
+        pass.dispatch_workgroups(groups[0], groups[1], groups[2]);
+    }
+}
+
+/// Commands of one frame or step, with its stages timed if a timer is there.
+#[derive(Debug)]
+pub struct Recorder<'t> {
+    /// The commands so far.
+    pub encoder: wgpu::CommandEncoder,
+    timer: Option<&'t mut Timer>,
+}
+
+impl<'t> Recorder<'t> {
+    /// Starts recording.
+    pub fn new(context: &Context, timer: Option<&'t mut Timer>) -> Self {
+        let encoder =
+            context.device().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("fmlgs") });
+        Self { encoder, timer }
+    }
+
+    /// Records one stage.
+    pub fn stage(&mut self, name: &'static str, record: impl FnOnce(&mut wgpu::ComputePass<'_>)) {
+        let timestamp_writes = self.timer.as_mut().and_then(|t| t.stage(name));
+        let mut pass =
+            self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(name), timestamp_writes });
+        record(&mut pass);
+    }
+
+    /// Hands the commands to the device.
+    pub fn submit(mut self, context: &Context) {
+        if let Some(timer) = self.timer {
+            timer.resolve(&mut self.encoder);
+        }
+        context.queue().submit([self.encoder.finish()]);
+    }
+}

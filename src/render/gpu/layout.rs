@@ -1,0 +1,184 @@
+//! Structures that the host and the shaders share, each with the offsets of its fields, so that
+//! a test can hold them against the shaders' own.
+
+use bytemuck::{Pod, Zeroable};
+
+/// A structure's memory layout.
+#[derive(Clone, Copy, Debug)]
+pub struct Twin {
+    /// Its name, here and in WGSL.
+    pub name: &'static str,
+    /// Size in bytes.
+    pub size: usize,
+    /// Names and byte offsets of its fields, in order.
+    pub fields: &'static [(&'static str, usize)],
+}
+
+macro_rules! twins {
+    ($($(#[$meta:meta])* struct $name:ident { $($(#[$field_meta:meta])* $field:ident: $ty:ty,)* })*) => {
+        $(
+            $(#[$meta])*
+            #[repr(C)]
+            #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+            pub struct $name { $($(#[$field_meta])* pub $field: $ty,)* }
+        )*
+        /// Every structure that the shaders share.
+        pub const TWINS: &[Twin] = &[$(
+            Twin {
+                name: stringify!($name),
+                size: size_of::<$name>(),
+                fields: &[$((stringify!($field), std::mem::offset_of!($name, $field)),)*],
+            },
+        )*];
+    };
+}
+
+twins! {
+    /// The camera and the picture; see `shaders/shared/view.wgsl`.
+    struct View {
+        /// The camera's right axis in the world; the last entry is unused here and below.
+        right: [f32; 4],
+        /// Its down axis.
+        down: [f32; 4],
+        /// Its forward axis.
+        forward: [f32; 4],
+        /// Cloud origin minus camera centre, leading part.
+        offset_hi: [f32; 4],
+        /// The rest of it.
+        offset_lo: [f32; 4],
+        /// Colour behind everything.
+        background: [f32; 4],
+        /// Focal lengths in px.
+        focal: [f32; 2],
+        /// Principal point in px.
+        principal: [f32; 2],
+        /// Smallest viewing tangents at which the projection is linearised.
+        tangent_min: [f32; 2],
+        /// Largest ones.
+        tangent_max: [f32; 2],
+        /// Picture size in px.
+        size_px: [u32; 2],
+        /// Picture size in tiles.
+        tiles: [u32; 2],
+        /// Gaussians in the cloud.
+        gaussians: u32,
+        /// Spherical-harmonics degree to use.
+        sh_degree: u32,
+        /// The one that is stored.
+        sh_stored: u32,
+        /// (Splat, tile) pairs that fit.
+        capacity: u32,
+        /// Near plane.
+        near: f32,
+        /// 1 = anti-aliasing compensation.
+        antialias: u32,
+        /// Extra channels per Gaussian.
+        channels: u32,
+        /// Unused.
+        pad0: u32,
+    }
+
+    /// A Gaussian in the picture; see `shaders/shared/splat.wgsl`.
+    struct Splat {
+        /// Centre in px.
+        mean: [f32; 2],
+        /// Camera-space depth.
+        depth: f32,
+        /// Peak opacity.
+        opacity: f32,
+        /// Triangular factor of the inverse covariance.
+        factor: [f32; 3],
+        /// Largest squared Mahalanobis distance that is drawn.
+        reach: f32,
+        /// Colour towards the camera.
+        color: [f32; 3],
+        /// 3 sigma along the longer axis in px; 0 = not drawn.
+        radius: f32,
+    }
+
+    /// One radix pass.
+    struct Pass {
+        /// Lowest bit of the digit.
+        shift: u32,
+        /// Which counter holds the number of pairs.
+        counter: u32,
+        /// Unused.
+        pad0: u32,
+        /// Unused.
+        pad1: u32,
+    }
+
+    /// Which extra channels a blending pass draws.
+    struct Chunk {
+        /// Channels per Gaussian in the buffers.
+        channels: u32,
+        /// First channel of the pass.
+        first: u32,
+        /// 1 = there is a gradient with respect to expected depth.
+        depth_gradient: u32,
+        /// Unused.
+        pad0: u32,
+    }
+
+    /// One evaluation of the training loss; see `shaders/ssim.wgsl`.
+    struct Loss {
+        /// Picture size in px.
+        size_px: [u32; 2],
+        /// Place in the ring of sums.
+        slot: u32,
+        /// Tiles of the picture.
+        tiles: u32,
+        /// Weight of L1 over the sum of weights and channels.
+        l1: f32,
+        /// Weight of D-SSIM, likewise.
+        dssim: f32,
+        /// Unused.
+        pad0: u32,
+        /// Unused.
+        pad1: u32,
+    }
+
+    /// One Adam step over one buffer.
+    struct AdamStep {
+        /// Rate of each float of a record; rates of 0 leave a float alone.
+        rates: [[f32; 4]; 7],
+        /// Floats in all.
+        floats: u32,
+        /// Floats per record.
+        stride: u32,
+        /// `1 / (1 - beta1^t)`.
+        unbias_first: f32,
+        /// `1 / (1 - beta2^t)`.
+        unbias_second: f32,
+        /// Decay of the first moment.
+        beta_first: f32,
+        /// Decay of the second moment.
+        beta_second: f32,
+        /// Added to the root of the second moment.
+        epsilon: f32,
+        /// Components of the gradient are cut to this size; 0 = not.
+        clip: f32,
+    }
+}
+
+/// Counters of one frame, in the order of `shaders/shared/counters.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct Counters {
+    /// Gaussians in the cloud.
+    pub gaussians: u32,
+    /// (Splat, tile) pairs blended; 0 when they did not fit.
+    pub pairs: u32,
+    /// Pairs that the frame needs.
+    pub wanted: u32,
+    /// 1 when they did not fit.
+    pub overflow: u32,
+    /// Gaussians drawn.
+    pub visible: u32,
+    /// Gaussians left out because their shape is degenerate.
+    pub degenerate: u32,
+    /// Gaussians whose gradient was not finite.
+    pub bad_gradients: u32,
+    /// Unused.
+    pub pad: u32,
+}

@@ -1,0 +1,17 @@
+//! The GPU renderer and trainer: wgpu compute, one launcher per WGSL kernel of `shaders/`.
+//!
+//! Forward: [`project`], [`sort`] by depth, [`bin`] (pairs of tile and splat, sorted by tile),
+//! [`blend`]. Backward: [`blend_backward`], [`project_backward`]. Training adds [`ssim`] (loss and
+//! its gradient) and [`adam`]. [`Renderer`] answers like the CPU renderer; [`Trainer`] keeps
+//! everything on the device from step to step.
+
+pub mod context;
+pub mod error;
+pub mod kernel;
+pub mod layout;
+pub mod shader;
+pub mod sort;
+pub mod timing;
+
+pub use context::Context;
+pub use error::GpuError;

@@ -1,0 +1,138 @@
+//! Stable radix sort of (key, value) pairs by the low bits of their keys; `shaders/sort.wgsl`.
+
+use super::kernel::{Access, Kernel, Module};
+use super::layout::Pass;
+use super::shader::Variant;
+use super::{Context, GpuError};
+
+/// Pairs of one workgroup.
+const BLOCK: u64 = 4096;
+/// Values of a digit.
+const DIGITS: u64 = 256;
+
+/// The three kernels of a pass and the passes' constants.
+#[derive(Debug)]
+pub struct Sort {
+    count: Kernel,
+    scan: Kernel,
+    scatter: Kernel,
+}
+
+/// Two sets of pairs that a sort goes back and forth between, with its scratch memory.
+#[derive(Debug)]
+pub struct SortBuffers {
+    /// Keys: the input, and the place of every other pass.
+    pub keys: [wgpu::Buffer; 2],
+    /// Their values.
+    pub values: [wgpu::Buffer; 2],
+    histogram: wgpu::Buffer,
+    totals: wgpu::Buffer,
+    passes: Vec<wgpu::Buffer>,
+    blocks: u32,
+}
+
+impl SortBuffers {
+    /// Room for `room` pairs, sorted by the low `bits` bits of their keys; how many there are
+    /// stands at word `counter` of the counters.
+    pub fn new(context: &Context, room: u64, bits: u32, counter: u32) -> Result<Self, GpuError> {
+        let blocks = room.div_ceil(BLOCK).max(1);
+        context.fits_dispatch("sorting", blocks, "use fewer Gaussians or smaller pictures")?;
+        let pairs = || context.storage("pairs to sort", room * 4);
+        let passes = (0..bits.div_ceil(8))
+            .map(|p| {
+                let pass = Pass { shift: 8 * p, counter, ..Pass::default() };
+                context.uniform("radix pass", bytemuck::bytes_of(&pass))
+            })
+            .collect::<Result<_, _>>()?;
+        Ok(Self {
+            keys: [pairs()?, pairs()?],
+            values: [pairs()?, pairs()?],
+            histogram: context.storage("digit counts", blocks * DIGITS * 4)?,
+            totals: context.storage("digit totals", DIGITS * 4)?,
+            passes,
+            blocks: blocks as u32,
+        })
+    }
+
+    /// Which of the two sets holds the result.
+    pub fn result(&self) -> usize {
+        self.passes.len() % 2
+    }
+}
+
+impl Sort {
+    /// Compiles the kernels.
+    pub fn new(context: &Context) -> Result<Self, GpuError> {
+        use Access::{Read, Uniform, Write};
+        let module = Module::new(context, "sort", Variant::default())?;
+        let kernel = |entry, slots: &[_]| Kernel::new(context, &module, entry, slots);
+        Ok(Self {
+            count: kernel("count", &[(0, Uniform), (1, Read), (2, Read), (6, Write)])?,
+            scan: kernel("scan", &[(0, Uniform), (1, Read), (6, Write), (7, Write)])?,
+            scatter: kernel(
+                "scatter",
+                &[
+                    (0, Uniform),
+                    (1, Read),
+                    (2, Read),
+                    (3, Read),
+                    (4, Write),
+                    (5, Write),
+                    (6, Write),
+                    (7, Write),
+                ],
+            )?,
+        })
+    }
+
+    /// Records the sort.
+    pub fn encode(&self, context: &Context, pass: &mut wgpu::ComputePass<'_>, on: &SortBuffers, counters: &wgpu::Buffer) {
+        let blocks = [on.blocks, 1, 1];
+        for (p, digit) in on.passes.iter().enumerate() {
+            let (from, to) = (p % 2, (p + 1) % 2);
+            self.count.dispatch(context, pass, &[digit, counters, &on.keys[from], &on.histogram], blocks);
+            self.scan.dispatch(context, pass, &[digit, counters, &on.histogram, &on.totals], [DIGITS as u32, 1, 1]);
+            self.scatter.dispatch(
+                context,
+                pass,
+                &[
+                    digit,
+                    counters,
+                    &on.keys[from],
+                    &on.values[from],
+                    &on.keys[to],
+                    &on.values[to],
+                    &on.histogram,
+                    &on.totals,
+                ],
+                blocks,
+            );
+        }
+    }
+}
+
+/// Sorts `(key, value)` pairs by the low `bits` bits of the keys and returns them: the sort alone,
+/// for tests and measurements.
+pub fn sort_pairs(
+    context: &Context,
+    keys: &[u32],
+    values: &[u32],
+    bits: u32,
+) -> Result<(Vec<u32>, Vec<u32>), GpuError> {
+    if keys.len() != values.len() {
+        return Err(GpuError::Size { what: "values to sort", have: values.len(), want: keys.len() });
+    }
+    let sort = Sort::new(context)?;
+    let buffers = SortBuffers::new(context, keys.len() as u64, bits, 0)?;
+    let counters = context.storage_with("pair count", bytemuck::bytes_of(&[keys.len() as u32; 4]))?;
+    context.queue().write_buffer(&buffers.keys[0], 0, bytemuck::cast_slice(keys));
+    context.queue().write_buffer(&buffers.values[0], 0, bytemuck::cast_slice(values));
+    let mut recorder = super::kernel::Recorder::new(context, None);
+    recorder.stage("sort", |pass| sort.encode(context, pass, &buffers, &counters));
+    recorder.submit(context);
+    let bytes = keys.len() as u64 * 4;
+    let result = buffers.result();
+    let out = context.read(&[(&buffers.keys[result], bytes), (&buffers.values[result], bytes)])?;
+    let [keys, values] = [0, 1].map(|i| out.get(i).map_or_else(Vec::new, |b| bytemuck::pod_collect_to_vec(b)));
+    Ok((keys, values))
+}

@@ -1,0 +1,80 @@
+//! Times of the stages of a frame or step, from timestamps that the device writes itself.
+
+use super::{Context, GpuError};
+
+/// Stages that one timer holds.
+const STAGES: u32 = 32;
+
+/// Seconds of each stage, in order.
+pub type StageTimes = Vec<(&'static str, f64)>;
+
+/// Timestamps around the stages of one submission.
+#[derive(Debug)]
+pub struct Timer {
+    queries: wgpu::QuerySet,
+    resolved: wgpu::Buffer,
+    names: Vec<&'static str>,
+    secs_per_tick: f64,
+}
+
+impl Timer {
+    /// A timer, or `None` on a device without timestamps.
+    pub fn new(context: &Context) -> Result<Option<Self>, GpuError> {
+        if !context.has_timestamps() {
+            return Ok(None);
+        }
+        let queries = context.scoped("timestamps", 0, || {
+            context.device().create_query_set(&wgpu::QuerySetDescriptor {
+                label: Some("stage times"),
+                ty: wgpu::QueryType::Timestamp,
+                count: 2 * STAGES,
+            })
+        })?;
+        let usage = wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC;
+        let resolved = context.buffer("stage times", u64::from(2 * STAGES) * 8, usage)?;
+        let secs_per_tick = f64::from(context.queue().get_timestamp_period()) * 1e-9;
+        Ok(Some(Self { queries, resolved, names: Vec::new(), secs_per_tick }))
+    }
+
+    /// Where the next pass writes its start and end; `None` past the last slot.
+    pub(super) fn stage(&mut self, name: &'static str) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
+        let at = 2 * self.names.len() as u32;
+        if at >= 2 * STAGES {
+            return None;
+        }
+        self.names.push(name);
+        Some(wgpu::ComputePassTimestampWrites {
+            query_set: &self.queries,
+            beginning_of_pass_write_index: Some(at),
+            end_of_pass_write_index: Some(at + 1),
+        })
+    }
+
+    pub(super) fn resolve(&self, encoder: &mut wgpu::CommandEncoder) {
+        if !self.names.is_empty() {
+            encoder.resolve_query_set(&self.queries, 0..2 * self.names.len() as u32, &self.resolved, 0);
+        }
+    }
+
+    /// Waits for the submission and returns its times; passes of one name are added up. The timer
+    /// is then ready for the next submission.
+    pub fn finish(&mut self, context: &Context) -> Result<StageTimes, GpuError> {
+        let names = std::mem::take(&mut self.names);
+        let bytes = context.read(&[(&self.resolved, names.len() as u64 * 16)])?;
+        let ticks: Vec<u64> =
+            bytes.iter().flatten().copied().collect::<Vec<u8>>().chunks_exact(8).map(read_u64).collect();
+        let mut out: StageTimes = Vec::new();
+        for (name, span) in names.into_iter().zip(ticks.chunks_exact(2)) {
+            let secs = span[1].saturating_sub(span[0]) as f64 * self.secs_per_tick;
+            match out.iter_mut().find(|(n, _)| *n == name) {
+                Some((_, sum)) => *sum += secs,
+                None => out.push((name, secs)),
+            }
+        }
+        Ok(out)
+    }
+}
+
+fn read_u64(bytes: &[u8]) -> u64 {
+    bytes.iter().rev().fold(0, |sum, &b| sum << 8 | u64::from(b))
+}
