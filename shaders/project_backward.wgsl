@@ -93,12 +93,12 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         return;
     }
     let p = linearise(i);
-    let from = i * (GRADIENT_BASE + view.channels);
-    let to_mean = vec2<f32>(gradient[from], gradient[from + 1u]);
-    let to_covariance = vec3<f32>(gradient[from + 2u], gradient[from + 3u], gradient[from + 4u]);
-    let to_peak = gradient[from + 5u];
-    let to_color = vec3<f32>(gradient[from + 6u], gradient[from + 7u], gradient[from + 8u]);
-    let to_depth = gradient[from + 9u];
+    let start_at = i * (GRADIENT_BASE + view.channels);
+    let to_mean = vec2<f32>(gradient[start_at], gradient[start_at + 1u]);
+    let to_covariance = vec3<f32>(gradient[start_at + 2u], gradient[start_at + 3u], gradient[start_at + 4u]);
+    let to_peak = gradient[start_at + 5u];
+    let to_color = vec3<f32>(gradient[start_at + 6u], gradient[start_at + 7u], gradient[start_at + 8u]);
+    let to_depth = gradient[start_at + 9u];
 
     var to_u = 2.0 * to_covariance.x * p.u + to_covariance.y * p.v;
     var to_v = 2.0 * to_covariance.z * p.v + to_covariance.y * p.u;

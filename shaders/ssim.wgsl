@@ -113,11 +113,11 @@ fn moments(
         }
         workgroupBarrier();
         for (var e = thread; e < WIDE * TILE_PX; e += 256u) {
-            let from = (e / TILE_PX) * WIDE + e % TILE_PX;
+            let start_at = (e / TILE_PX) * WIDE + e % TILE_PX;
             var s = array<f32, 5>();
             for (var k = 0u; k < TAPS; k++) {
-                let x = wide[from + k];
-                let y = wide[WIDE * WIDE + from + k];
+                let x = wide[start_at + k];
+                let y = wide[WIDE * WIDE + start_at + k];
                 s[0] += kernel[k] * x;
                 s[1] += kernel[k] * y;
                 s[2] += kernel[k] * x * x;
@@ -184,11 +184,11 @@ fn gradient(
         }
         workgroupBarrier();
         for (var e = thread; e < WIDE * TILE_PX; e += 256u) {
-            let from = (e / TILE_PX) * WIDE + e % TILE_PX;
+            let start_at = (e / TILE_PX) * WIDE + e % TILE_PX;
             for (var d = 0u; d < 3u; d++) {
                 var s = 0.0;
                 for (var k = 0u; k < TAPS; k++) {
-                    s += kernel[k] * wide[d * WIDE * WIDE + from + k];
+                    s += kernel[k] * wide[d * WIDE * WIDE + start_at + k];
                 }
                 rows[d * WIDE * TILE_PX + e] = s;
             }
