@@ -1,6 +1,8 @@
 //! What the GPU tests share: one device for all tests of a file, and what happens without one.
 #![allow(dead_code)]
 
+pub mod compare;
+
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use fmlgs::render::gpu::{Context, GpuError};

@@ -90,7 +90,7 @@ impl Kernel {
     }
 
     /// Records a dispatch. `buffers` are in the order of the slots.
-    pub fn dispatch(
+    fn dispatch(
         &self,
         context: &Context,
         pass: &mut wgpu::ComputePass<'_>,
@@ -117,35 +117,67 @@ impl Kernel {
     }
 }
 
-/// Commands of one frame or step, with its stages timed if a timer is there.
-#[derive(Debug)]
-pub struct Recorder<'t> {
-    /// The commands so far.
-    pub encoder: wgpu::CommandEncoder,
-    timer: Option<&'t mut Timer>,
+/// What every kernel of one frame is told.
+#[derive(Clone, Copy, Debug)]
+pub struct Shot<'a> {
+    /// The camera and the picture, see [`super::layout::View`].
+    pub view: &'a wgpu::Buffer,
+    /// See [`super::layout::Counters`].
+    pub counters: &'a wgpu::Buffer,
+    /// Gaussians in the cloud.
+    pub gaussians: u32,
+    /// Picture size in tiles.
+    pub tiles: [u32; 2],
 }
 
-impl<'t> Recorder<'t> {
+/// One stage that is being recorded.
+#[derive(Debug)]
+pub struct Stage<'a> {
+    context: &'a Context,
+    pass: wgpu::ComputePass<'a>,
+}
+
+impl Stage<'_> {
+    /// Records a dispatch. `buffers` are in the order of the kernel's slots.
+    pub fn run(&mut self, kernel: &Kernel, buffers: &[&wgpu::Buffer], groups: [u32; 3]) {
+        kernel.dispatch(self.context, &mut self.pass, buffers, groups);
+    }
+}
+
+/// Commands of one frame or step, with its stages timed if a timer is there.
+#[derive(Debug)]
+pub struct Recorder<'a> {
+    context: &'a Context,
+    encoder: wgpu::CommandEncoder,
+    timer: Option<&'a mut Timer>,
+}
+
+impl<'a> Recorder<'a> {
     /// Starts recording.
-    pub fn new(context: &Context, timer: Option<&'t mut Timer>) -> Self {
+    pub fn new(context: &'a Context, timer: Option<&'a mut Timer>) -> Self {
         let encoder =
             context.device().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("fmlgs") });
-        Self { encoder, timer }
+        Self { context, encoder, timer }
     }
 
     /// Records one stage.
-    pub fn stage(&mut self, name: &'static str, record: impl FnOnce(&mut wgpu::ComputePass<'_>)) {
+    pub fn stage(&mut self, name: &'static str, record: impl FnOnce(&mut Stage<'_>)) {
         let timestamp_writes = self.timer.as_mut().and_then(|t| t.stage(name));
-        let mut pass =
+        let pass =
             self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(name), timestamp_writes });
-        record(&mut pass);
+        record(&mut Stage { context: self.context, pass });
+    }
+
+    /// Records that a buffer is filled with zeros.
+    pub fn clear(&mut self, buffer: &wgpu::Buffer) {
+        self.encoder.clear_buffer(buffer, 0, None);
     }
 
     /// Hands the commands to the device.
-    pub fn submit(mut self, context: &Context) {
+    pub fn submit(mut self) {
         if let Some(timer) = self.timer {
             timer.resolve(&mut self.encoder);
         }
-        context.queue().submit([self.encoder.finish()]);
+        self.context.queue().submit([self.encoder.finish()]);
     }
 }

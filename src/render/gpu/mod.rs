@@ -5,13 +5,24 @@
 //! its gradient) and [`adam`]. [`Renderer`] answers like the CPU renderer; [`Trainer`] keeps
 //! everything on the device from step to step.
 
+pub mod bin;
+pub mod blend;
+pub mod blend_backward;
+pub mod cloud;
 pub mod context;
 pub mod error;
 pub mod kernel;
 pub mod layout;
+pub mod project;
+pub mod project_backward;
+pub mod rasterizer;
+pub mod renderer;
+pub mod scratch;
 pub mod shader;
 pub mod sort;
 pub mod timing;
 
+pub use cloud::Parameters;
 pub use context::Context;
 pub use error::GpuError;
+pub use renderer::Renderer;

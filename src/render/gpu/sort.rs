@@ -1,6 +1,6 @@
 //! Stable radix sort of (key, value) pairs by the low bits of their keys; `shaders/sort.wgsl`.
 
-use super::kernel::{Access, Kernel, Module};
+use super::kernel::{Access, Kernel, Module, Recorder, Stage};
 use super::layout::Pass;
 use super::shader::Variant;
 use super::{Context, GpuError};
@@ -86,15 +86,14 @@ impl Sort {
     }
 
     /// Records the sort.
-    pub fn encode(&self, context: &Context, pass: &mut wgpu::ComputePass<'_>, on: &SortBuffers, counters: &wgpu::Buffer) {
+    pub fn encode(&self, stage: &mut Stage<'_>, on: &SortBuffers, counters: &wgpu::Buffer) {
         let blocks = [on.blocks, 1, 1];
         for (p, digit) in on.passes.iter().enumerate() {
             let (from, to) = (p % 2, (p + 1) % 2);
-            self.count.dispatch(context, pass, &[digit, counters, &on.keys[from], &on.histogram], blocks);
-            self.scan.dispatch(context, pass, &[digit, counters, &on.histogram, &on.totals], [DIGITS as u32, 1, 1]);
-            self.scatter.dispatch(
-                context,
-                pass,
+            stage.run(&self.count, &[digit, counters, &on.keys[from], &on.histogram], blocks);
+            stage.run(&self.scan, &[digit, counters, &on.histogram, &on.totals], [DIGITS as u32, 1, 1]);
+            stage.run(
+                &self.scatter,
                 &[
                     digit,
                     counters,
@@ -127,9 +126,9 @@ pub fn sort_pairs(
     let counters = context.storage_with("pair count", bytemuck::bytes_of(&[keys.len() as u32; 4]))?;
     context.queue().write_buffer(&buffers.keys[0], 0, bytemuck::cast_slice(keys));
     context.queue().write_buffer(&buffers.values[0], 0, bytemuck::cast_slice(values));
-    let mut recorder = super::kernel::Recorder::new(context, None);
-    recorder.stage("sort", |pass| sort.encode(context, pass, &buffers, &counters));
-    recorder.submit(context);
+    let mut recorder = Recorder::new(context, None);
+    recorder.stage("sort", |stage| sort.encode(stage, &buffers, &counters));
+    recorder.submit();
     let bytes = keys.len() as u64 * 4;
     let result = buffers.result();
     let out = context.read(&[(&buffers.keys[result], bytes), (&buffers.values[result], bytes)])?;

@@ -1,0 +1,67 @@
+//! Front-to-back blending; `shaders/blend.wgsl`.
+
+use std::collections::BTreeMap;
+
+use super::kernel::{Access, Kernel, Module, Shot, Stage};
+use super::scratch::{PerGaussian, PerPair, PerPicture};
+use super::shader::Variant;
+use super::{Context, GpuError};
+
+/// The blending kernel, one pipeline for each number of extra channels in a pass.
+#[derive(Debug, Default)]
+pub struct Blend {
+    kernels: BTreeMap<usize, Kernel>,
+}
+
+impl Blend {
+    /// Compiles what passes of `channels` extra channels need, if that has not been done.
+    pub fn prepare(&mut self, context: &Context, channels: usize) -> Result<(), GpuError> {
+        use Access::{Read, Uniform, Write};
+        if self.kernels.contains_key(&channels) {
+            return Ok(());
+        }
+        let module = Module::new(context, "blend", Variant { channels, ..Variant::default() })?;
+        let slots = [
+            (0, Uniform),
+            (1, Uniform),
+            (2, Read),
+            (3, Read),
+            (4, Read),
+            (5, Read),
+            (6, Write),
+            (7, Write),
+            (8, Write),
+            (9, Write),
+        ];
+        self.kernels.insert(channels, Kernel::new(context, &module, "main", &slots)?);
+        Ok(())
+    }
+
+    /// Records the passes.
+    pub fn encode(
+        &self,
+        stage: &mut Stage<'_>,
+        shot: Shot<'_>,
+        scratch: (&PerGaussian, &PerPair, &PerPicture),
+        features: &wgpu::Buffer,
+    ) {
+        let (gaussians, pairs, picture) = scratch;
+        let list = &pairs.by_tile.values[pairs.by_tile.result()];
+        for (channels, chunk) in &picture.chunks {
+            let Some(kernel) = self.kernels.get(channels) else { continue };
+            let buffers = [
+                shot.view,
+                chunk,
+                &picture.ranges,
+                list,
+                &gaussians.splats,
+                features,
+                &picture.colors,
+                &picture.ends,
+                &picture.depths,
+                &picture.features,
+            ];
+            stage.run(kernel, &buffers, [shot.tiles[0], shot.tiles[1], 1]);
+        }
+    }
+}

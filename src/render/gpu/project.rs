@@ -1,0 +1,106 @@
+//! Gaussians to splats in the picture; `shaders/project.wgsl`.
+
+use super::kernel::{Access, Kernel, Module, Shot, Stage};
+use super::layout::View;
+use super::scratch::PerGaussian;
+use super::shader::Variant;
+use super::{Context, GpuError, Parameters};
+use crate::render::{RenderSettings, TANGENT_CLAMP, TILE_PX};
+use crate::scene::Camera;
+
+/// The projection kernel.
+#[derive(Debug)]
+pub struct Project {
+    kernel: Kernel,
+}
+
+impl Project {
+    /// Compiles the kernel.
+    pub fn new(context: &Context) -> Result<Self, GpuError> {
+        use Access::{Read, Uniform, Write};
+        let module = Module::new(context, "project", Variant::default())?;
+        let slots = [
+            (0, Uniform),
+            (1, Read),
+            (2, Read),
+            (3, Read),
+            (4, Write),
+            (5, Write),
+            (6, Write),
+            (7, Write),
+            (8, Write),
+        ];
+        Ok(Self { kernel: Kernel::new(context, &module, "main", &slots)? })
+    }
+
+    /// Records the projection.
+    pub fn encode(
+        &self,
+        stage: &mut Stage<'_>,
+        shot: Shot<'_>,
+        cloud: &Parameters,
+        scratch: &PerGaussian,
+    ) {
+        let [geometry, low, high] = &cloud.buffers;
+        let by_depth = &scratch.by_depth;
+        let buffers = [
+            shot.view,
+            geometry,
+            low,
+            high,
+            &scratch.splats,
+            &by_depth.keys[0],
+            &by_depth.values[0],
+            &scratch.tile_counts,
+            shot.counters,
+        ];
+        stage.run(&self.kernel, &buffers, [shot.gaussians.div_ceil(256), 1, 1]);
+    }
+}
+
+/// What the kernels need to know of a camera. `capacity` is the number of (splat, tile) pairs that
+/// fit, `channels` the extra channels per Gaussian.
+pub fn view(camera: &Camera, settings: &RenderSettings, cloud: CloudShape, channels: u32, capacity: u32) -> View {
+    let axis = |a: glam::DVec3| [a.x as f32, a.y as f32, a.z as f32, 0.0];
+    let m = camera.world_from_camera;
+    let offset = cloud.origin - camera.center;
+    let hi = offset.as_vec3();
+    let lo = (offset - hi.as_dvec3()).as_vec3();
+    let size = glam::DVec2::new(f64::from(camera.width_px), f64::from(camera.height_px));
+    let tangent = (TANGENT_CLAMP * 0.5 * size / camera.focal_px).as_vec2();
+    let [r, g, b] = settings.background;
+    let tiles = |side: u32| side.div_ceil(TILE_PX as u32);
+    View {
+        right: axis(m.x_axis),
+        down: axis(m.y_axis),
+        forward: axis(m.z_axis),
+        offset_hi: hi.extend(0.0).to_array(),
+        offset_lo: lo.extend(0.0).to_array(),
+        background: [r, g, b, 0.0],
+        focal: camera.focal_px.as_vec2().to_array(),
+        principal: camera.principal_px.as_vec2().to_array(),
+        tangent_min: (-tangent).to_array(),
+        tangent_max: tangent.to_array(),
+        size_px: [camera.width_px, camera.height_px],
+        tiles: [tiles(camera.width_px), tiles(camera.height_px)],
+        gaussians: cloud.gaussians,
+        sh_degree: u32::from(settings.sh_degree),
+        sh_stored: u32::from(cloud.degree),
+        capacity,
+        near: settings.near as f32,
+        antialias: u32::from(settings.antialias),
+        channels,
+        pad0: 0,
+    }
+}
+
+/// What a view must know of a cloud on the device.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CloudShape {
+    /// World position that the Gaussians are relative to.
+    pub origin: glam::DVec3,
+    /// How many there are.
+    pub gaussians: u32,
+    /// Spherical-harmonics degree that is stored.
+    pub degree: u8,
+}

@@ -1,0 +1,289 @@
+//! The renderer: a cloud in host memory to a frame in host memory, and gradients back.
+
+use super::blend_backward::{BlendBackward, BlendGradients};
+use super::cloud::{Packed, Parameters};
+use super::kernel::Recorder;
+use super::layout::{Counters, Splat};
+use super::project::CloudShape;
+use super::project_backward::ProjectBackward;
+use super::rasterizer::{Rasterizer, counters_of};
+use super::scratch::GRADIENT_BASE;
+use super::timing::{StageTimes, Timer};
+use super::{Context, GpuError};
+use crate::render::{CloudGradient, Features, Frame, FrameGradient, RenderError, RenderSettings};
+use crate::scene::{Camera, GaussianCloud};
+
+/// A renderer with its buffers and the cloud that was uploaded last.
+#[derive(Debug)]
+pub struct Renderer {
+    context: Context,
+    rasterizer: Rasterizer,
+    blend_backward: BlendBackward,
+    project_backward: ProjectBackward,
+    cloud: Parameters,
+    shape: CloudShape,
+    features: wgpu::Buffer,
+    channels: usize,
+    drawn: Option<Drawn>,
+    timer: Option<Timer>,
+    times: StageTimes,
+}
+
+/// Intermediate results of a frame.
+#[derive(Clone, Debug, Default)]
+pub struct Inspection {
+    /// One splat per Gaussian; radius 0 where it is not drawn.
+    pub splats: Vec<Splat>,
+    /// Each tile's part of the list, row by row.
+    pub ranges: Vec<[u32; 2]>,
+    /// Indices of Gaussians, tile by tile, front to back.
+    pub list: Vec<u32>,
+}
+
+/// What the backward pass must know of the last frame.
+#[derive(Debug, Clone, Copy)]
+struct Drawn {
+    size_px: [u32; 2],
+    depth: bool,
+    counters: Counters,
+}
+
+impl Renderer {
+    /// A renderer on `context`.
+    pub fn new(context: &Context) -> Result<Self, GpuError> {
+        Self::with_float_atomics(context, context.has_float_atomics())
+    }
+
+    /// A renderer that uses float atomics or not, whatever the device offers. Asking for what it
+    /// does not have is an error at the first backward pass.
+    pub fn with_float_atomics(context: &Context, float_atomics: bool) -> Result<Self, GpuError> {
+        Ok(Self {
+            context: context.clone(),
+            rasterizer: Rasterizer::new(context)?,
+            blend_backward: BlendBackward::new(float_atomics),
+            project_backward: ProjectBackward::new(context)?,
+            cloud: Parameters::new(context, "cloud", 0, 0)?,
+            shape: CloudShape::default(),
+            features: context.storage("features", 0)?,
+            channels: 0,
+            drawn: None,
+            timer: None,
+            times: StageTimes::new(),
+        })
+    }
+
+    /// Times the stages of every later frame, where the device can.
+    pub fn measure(&mut self) -> Result<(), GpuError> {
+        self.timer = Timer::new(&self.context)?;
+        Ok(())
+    }
+
+    /// Seconds per stage of the last frame and its backward pass; empty unless measured.
+    pub fn times(&self) -> &StageTimes {
+        &self.times
+    }
+
+    /// Counters of the last frame.
+    pub fn counters(&self) -> Option<Counters> {
+        self.drawn.map(|d| d.counters)
+    }
+
+    /// Sends a cloud to the device, with its extra channels.
+    pub fn upload(&mut self, cloud: &GaussianCloud, features: Features<'_, f32>) -> Result<(), GpuError> {
+        let want = cloud.len() * features.channels;
+        if features.values.len() != want {
+            return Err(RenderError::FeatureLength { have: features.values.len(), want }.into());
+        }
+        self.drawn = None;
+        let degree = cloud.sh_degree;
+        if self.shape.gaussians as usize != cloud.len() || self.shape.degree != degree {
+            self.cloud = Parameters::new(&self.context, "cloud", cloud.len(), degree)?;
+        }
+        self.cloud.write(&self.context, &Packed::of(cloud));
+        self.features = self.context.storage_with("features", bytemuck::cast_slice(features.values))?;
+        self.shape = CloudShape { origin: cloud.origin, gaussians: cloud.len() as u32, degree };
+        self.channels = features.channels;
+        Ok(())
+    }
+
+    /// Uploads `cloud` and draws it as `camera` sees it.
+    pub fn render(
+        &mut self,
+        cloud: &GaussianCloud,
+        features: Features<'_, f32>,
+        camera: &Camera,
+        settings: &RenderSettings,
+    ) -> Result<Frame<f32>, GpuError> {
+        self.upload(cloud, features)?;
+        self.draw(camera, settings)
+    }
+
+    /// Draws the uploaded cloud.
+    pub fn draw(&mut self, camera: &Camera, settings: &RenderSettings) -> Result<Frame<f32>, GpuError> {
+        loop {
+            self.rasterizer.prepare(&self.context, camera, settings, self.shape, self.channels)?;
+            let mut recorder = Recorder::new(&self.context, self.timer.as_mut());
+            self.rasterizer.encode_count(&mut recorder, &self.cloud);
+            self.rasterizer.encode_draw(&mut recorder, &self.features);
+            recorder.submit();
+            let (frame, counters) = self.read_frame(camera, settings)?;
+            if let Some(timer) = &mut self.timer {
+                self.times = timer.finish(&self.context)?;
+            }
+            if counters.overflow == 0 {
+                let size_px = [camera.width_px, camera.height_px];
+                self.drawn = Some(Drawn { size_px, depth: settings.depth, counters });
+                return Ok(frame);
+            }
+            self.rasterizer.grow_pairs(&self.context, counters.wanted)?;
+        }
+    }
+
+    /// What stands between the kernels of the last frame, for tests and for looking into faults;
+    /// `None` before the first frame.
+    pub fn inspect(&self) -> Result<Option<Inspection>, GpuError> {
+        let Some(drawn) = self.drawn else { return Ok(None) };
+        let r = &self.rasterizer;
+        let n = self.shape.gaussians as usize;
+        let tiles = r.shot().tiles.iter().product::<u32>() as u64;
+        let list = &r.pairs.by_tile.values[r.pairs.by_tile.result()];
+        let bytes = self.context.read(&[
+            (&r.gaussians.splats, (n * size_of::<Splat>()) as u64),
+            (&r.picture.ranges, tiles * 8),
+            (list, u64::from(drawn.counters.pairs) * 4),
+        ])?;
+        Ok(Some(Inspection {
+            splats: bytemuck::pod_collect_to_vec(&bytes[0]),
+            ranges: bytemuck::pod_collect_to_vec(&bytes[1]),
+            list: bytemuck::pod_collect_to_vec(&bytes[2]),
+        }))
+    }
+
+    fn read_frame(&self, camera: &Camera, settings: &RenderSettings) -> Result<(Frame<f32>, Counters), GpuError> {
+        let pixels = u64::from(camera.width_px) * u64::from(camera.height_px);
+        let picture = &self.rasterizer.picture;
+        let depth_bytes = if settings.depth { pixels * 8 } else { 0 };
+        let bytes = self.context.read(&[
+            (&self.rasterizer.counters, size_of::<Counters>() as u64),
+            (&picture.colors, pixels * 16),
+            (&picture.depths, depth_bytes),
+            (&picture.features, pixels * 4 * self.channels as u64),
+        ])?;
+        let colors: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes[1]);
+        let depths: Vec<[f32; 2]> = bytemuck::pod_collect_to_vec(&bytes[2]);
+        let features: Vec<f32> = bytemuck::pod_collect_to_vec(&bytes[3]);
+        let frame = Frame {
+            width_px: camera.width_px as usize,
+            height_px: camera.height_px as usize,
+            color: std::array::from_fn(|c| colors.iter().map(|p| p[c]).collect()),
+            features: (0..self.channels)
+                .map(|c| features.iter().skip(c).step_by(self.channels).copied().collect())
+                .collect(),
+            alpha: colors.iter().map(|p| 1.0 - p[3]).collect(),
+            depth: depths.iter().map(|d| d[0]).collect(),
+            median_depth: depths.iter().map(|d| d[1]).collect(),
+        };
+        Ok((frame, counters_of(&bytes[0])))
+    }
+
+    /// Gradient with respect to the whole cloud for the last rendered frame, which must have been
+    /// of this cloud and with these features. Zero before the first frame.
+    pub fn backward(
+        &mut self,
+        cloud: &GaussianCloud,
+        features: Features<'_, f32>,
+        gradient: &FrameGradient<f32>,
+    ) -> Result<CloudGradient<f32>, GpuError> {
+        let n = self.shape.gaussians as usize;
+        if cloud.len() != n {
+            return Err(GpuError::Size { what: "Gaussians of the drawn cloud", have: cloud.len(), want: n });
+        }
+        if features.channels != self.channels {
+            let have = features.channels;
+            return Err(GpuError::Size { what: "extra channels of the drawn cloud", have, want: self.channels });
+        }
+        let Some(drawn) = self.drawn else {
+            return Ok(unpack(&Packed { degree: cloud.sh_degree, ..Packed::default() }, &[], &[], 0));
+        };
+        let planes = if drawn.depth { 2 } else { 1 };
+        let pixels = (drawn.size_px[0] * drawn.size_px[1]) as usize;
+        let gradients = BlendGradients::new(&self.context, n, pixels, self.channels, planes)?;
+        let out = Parameters::new(&self.context, "gradient of the cloud", n, self.shape.degree)?;
+        self.write_gradient(gradient, &gradients, pixels, drawn.depth)?;
+        let r = &self.rasterizer;
+        for (carried, _) in &r.picture.chunks {
+            self.blend_backward.prepare(&self.context, *carried)?;
+        }
+        let shot = r.shot();
+        let splats = &r.gaussians.splats;
+        let mut recorder = Recorder::new(&self.context, self.timer.as_mut());
+        recorder.stage("blend backward", |s| {
+            self.blend_backward.encode(s, shot, (&r.gaussians, &r.pairs, &r.picture), &self.features, &gradients);
+        });
+        recorder.stage("project backward", |s| {
+            self.project_backward.encode(s, shot, &self.cloud, (splats, &gradients.splats), &out);
+        });
+        recorder.submit();
+        if let Some(timer) = &mut self.timer {
+            self.times.extend(timer.finish(&self.context)?);
+        }
+        let stride = GRADIENT_BASE + self.channels;
+        let bytes = self.context.read(&[
+            (&gradients.splats, if self.channels > 0 { (n * stride * 4) as u64 } else { 0 }),
+            (splats, (n * size_of::<Splat>()) as u64),
+        ])?;
+        let packed = out.read(&self.context, n, self.shape.degree)?;
+        let splat_gradient: Vec<f32> = bytemuck::pod_collect_to_vec(&bytes[0]);
+        let splats: Vec<Splat> = bytemuck::pod_collect_to_vec(&bytes[1]);
+        Ok(unpack(&packed, &splat_gradient, &splats, self.channels))
+    }
+
+    fn write_gradient(
+        &self,
+        gradient: &FrameGradient<f32>,
+        to: &BlendGradients,
+        pixels: usize,
+        depth: bool,
+    ) -> Result<(), GpuError> {
+        let planes = gradient.color.iter().chain(&gradient.features).chain([&gradient.alpha, &gradient.depth]);
+        for plane in planes {
+            if !plane.is_empty() && plane.len() != pixels {
+                return Err(GpuError::Size { what: "pixels of a gradient", have: plane.len(), want: pixels });
+            }
+        }
+        let at = |plane: &[f32], i: usize| plane.get(i).copied().unwrap_or(0.0);
+        let [r, g, b] = &gradient.color;
+        let mut values: Vec<[f32; 4]> =
+            (0..pixels).map(|i| [at(r, i), at(g, i), at(b, i), at(&gradient.alpha, i)]).collect();
+        if depth {
+            values.extend((0..pixels).map(|i| [at(&gradient.depth, i), 0.0, 0.0, 0.0]));
+        }
+        self.rasterizer.picture.set_depth_gradient(&self.context, depth);
+        self.context.queue().write_buffer(&to.pixels, 0, bytemuck::cast_slice(&values));
+        if self.channels > 0 {
+            let none = Vec::new();
+            let values: Vec<f32> = (0..pixels * self.channels)
+                .map(|k| at(gradient.features.get(k % self.channels).unwrap_or(&none), k / self.channels))
+                .collect();
+            self.context.queue().write_buffer(&to.features, 0, bytemuck::cast_slice(&values));
+        }
+        Ok(())
+    }
+}
+
+fn unpack(packed: &Packed, splat_gradient: &[f32], splats: &[Splat], channels: usize) -> CloudGradient<f32> {
+    let cloud = packed.to_cloud();
+    CloudGradient {
+        positions: cloud.positions,
+        log_scales: cloud.log_scales,
+        quaternions: cloud.quaternions,
+        opacity_logits: cloud.opacity_logits,
+        sh: cloud.sh,
+        features: splat_gradient
+            .chunks_exact(GRADIENT_BASE + channels)
+            .flat_map(|g| g[GRADIENT_BASE..].iter().copied())
+            .collect(),
+        screen: packed.pads().map(|s| s.max(0.0)).collect(),
+        radius_px: splats.iter().map(|s| s.radius).collect(),
+    }
+}

@@ -1,0 +1,135 @@
+//! Buffers that live between kernels, in three groups by what their size depends on. A group grows
+//! when it must and never shrinks.
+
+use super::layout::{Chunk, Splat};
+use super::sort::SortBuffers;
+use super::{Context, GpuError};
+use crate::render::TILE_PX;
+
+/// Word of the counters that holds the number of Gaussians.
+const COUNT_GAUSSIANS: u32 = 0;
+/// Word of the counters that holds the number of pairs.
+const COUNT_PAIRS: u32 = 1;
+/// Floats of one splat's gradient ahead of its extra channels; `GRADIENT_BASE` in the shaders.
+pub const GRADIENT_BASE: usize = 10;
+/// Splats that one workgroup of `bin` handles.
+pub const BIN_BLOCK: u32 = 1024;
+/// Extra channels that one blending pass carries at most.
+pub const CHUNK_CHANNELS: usize = 16;
+
+/// Buffers by number of Gaussians.
+#[derive(Debug)]
+pub struct PerGaussian {
+    /// Gaussians that fit.
+    pub room: usize,
+    /// Splats in the picture.
+    pub splats: wgpu::Buffer,
+    /// Tiles that each reaches.
+    pub tile_counts: wgpu::Buffer,
+    /// Depth keys with the Gaussians' indices.
+    pub by_depth: SortBuffers,
+    /// Pairs of each block of splats.
+    pub sums: wgpu::Buffer,
+}
+
+impl PerGaussian {
+    /// Room for `room` Gaussians.
+    pub fn new(context: &Context, room: usize) -> Result<Self, GpuError> {
+        let n = room as u64;
+        Ok(Self {
+            room,
+            splats: context.storage("splats", n * size_of::<Splat>() as u64)?,
+            tile_counts: context.storage("tile counts", n * 4)?,
+            by_depth: SortBuffers::new(context, n, 32, COUNT_GAUSSIANS)?,
+            sums: context.storage("sums of tile counts", n.div_ceil(u64::from(BIN_BLOCK)) * 4)?,
+        })
+    }
+}
+
+/// Buffers by number of (splat, tile) pairs.
+#[derive(Debug)]
+pub struct PerPair {
+    /// Pairs that fit.
+    pub room: u32,
+    /// Tiles that the sort's passes can tell apart.
+    pub tiles: u32,
+    /// Tile indices with the splats' indices.
+    pub by_tile: SortBuffers,
+}
+
+impl PerPair {
+    /// Room for `room` pairs in a picture of `tiles` tiles.
+    pub fn new(context: &Context, room: u32, tiles: u32) -> Result<Self, GpuError> {
+        // One value more than there are tiles: pairs that belong nowhere.
+        let bits = (32 - tiles.leading_zeros()).next_multiple_of(8);
+        let most = if bits >= 32 { u32::MAX } else { (1 << bits) - 1 };
+        Ok(Self { room, tiles: most, by_tile: SortBuffers::new(context, u64::from(room), bits, COUNT_PAIRS)? })
+    }
+}
+
+/// Buffers by picture size and number of extra channels.
+#[derive(Debug)]
+pub struct PerPicture {
+    /// Pixels that fit.
+    pub pixels: usize,
+    /// Tiles that fit.
+    pub tiles: usize,
+    /// Extra channels.
+    pub channels: usize,
+    /// Each tile's part of the pairs.
+    pub ranges: wgpu::Buffer,
+    /// Colour and transmittance.
+    pub colors: wgpu::Buffer,
+    /// Transmittance and end of each pixel's list.
+    pub ends: wgpu::Buffer,
+    /// Expected and median depth.
+    pub depths: wgpu::Buffer,
+    /// Extra channels.
+    pub features: wgpu::Buffer,
+    /// Constants of the blending passes, with the number of channels each carries.
+    pub chunks: Vec<(usize, wgpu::Buffer)>,
+}
+
+impl PerPicture {
+    /// Room for a picture of this size.
+    pub fn new(context: &Context, size_px: [u32; 2], channels: usize) -> Result<Self, GpuError> {
+        let [pixels, tiles] = extent(size_px);
+        let n = pixels as u64;
+        let mut chunks = Vec::new();
+        for first in (0..channels.max(1)).step_by(CHUNK_CHANNELS) {
+            let chunk = Chunk { channels: channels as u32, first: first as u32, ..Chunk::default() };
+            let buffer = context.uniform("channels of a pass", bytemuck::bytes_of(&chunk))?;
+            chunks.push(((channels - first).min(CHUNK_CHANNELS), buffer));
+        }
+        Ok(Self {
+            pixels,
+            tiles,
+            channels,
+            ranges: context.storage("tile ranges", tiles as u64 * 8)?,
+            colors: context.storage("picture", n * 16)?,
+            ends: context.storage("ends of lists", n * 8)?,
+            depths: context.storage("depths", n * 8)?,
+            features: context.storage("extra channels of the picture", n * 4 * channels as u64)?,
+            chunks,
+        })
+    }
+
+    /// Tells the blending passes whether the loss has a gradient with respect to depth.
+    pub fn set_depth_gradient(&self, context: &Context, present: bool) {
+        for (i, (_, buffer)) in self.chunks.iter().enumerate() {
+            let chunk = Chunk {
+                channels: self.channels as u32,
+                first: (i * CHUNK_CHANNELS) as u32,
+                depth_gradient: u32::from(present),
+                ..Chunk::default()
+            };
+            context.queue().write_buffer(buffer, 0, bytemuck::bytes_of(&chunk));
+        }
+    }
+}
+
+/// Pixels and tiles of a picture.
+pub fn extent(size_px: [u32; 2]) -> [usize; 2] {
+    let [w, h] = size_px.map(|s| s as usize);
+    [w * h, w.div_ceil(TILE_PX) * h.div_ceil(TILE_PX)]
+}

@@ -1,0 +1,289 @@
+//! The forward pass on the GPU, stage by stage, against the CPU renderer in f64.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+mod gpu_common;
+
+use common::{camera, random_cloud, rng};
+use fmlgs::math::Real;
+use fmlgs::render::cpu::project::{View, compensation, direction, geometry, raw_color};
+use fmlgs::render::gpu::{GpuError, Renderer};
+use fmlgs::render::{ALPHA_MIN, Features, Frame, RenderError, RenderSettings, TILE_PX, cpu};
+use fmlgs::scene::{Camera, GaussianCloud};
+use glam::DVec3;
+use gpu_common::compare::{agree_in_bands, bands};
+use gpu_common::with_context;
+use rand::RngExt;
+
+struct Scene {
+    cloud: GaussianCloud<f64>,
+    features: Vec<f64>,
+    channels: usize,
+    camera: Camera,
+    settings: RenderSettings,
+}
+
+impl Scene {
+    /// `n` Gaussians in f32 precision, so that both renderers are given the same numbers.
+    fn new(n: usize, degree: u8, channels: usize, size: [u32; 2]) -> Self {
+        let cloud = random_cloud(n, degree, 0.12, 7).cast::<f32>().cast::<f64>();
+        let mut r = rng(9);
+        let features = (0..n * channels).map(|_| f64::from(r.random_range(-1.0_f32..1.0))).collect();
+        let settings = RenderSettings { background: [0.2, 0.4, 0.6], depth: true, ..RenderSettings::default() };
+        Self { cloud, features, channels, camera: camera(size[0], size[1]), settings }
+    }
+
+    fn oracle(&self) -> Frame<f64> {
+        let features = Features { channels: self.channels, values: &self.features };
+        cpu::Renderer::new().render(&self.cloud, features, &self.camera, &self.settings).unwrap()
+    }
+
+    fn gpu(&self, renderer: &mut Renderer) -> Frame<f32> {
+        let features: Vec<f32> = self.features.iter().map(|&v| v as f32).collect();
+        let features = Features { channels: self.channels, values: &features };
+        renderer.render(&self.cloud.cast(), features, &self.camera, &self.settings).unwrap()
+    }
+
+    /// What differs between a picture and the oracle's.
+    fn compare(&self, ours: &Frame<f32>, oracle: &Frame<f64>) -> Result<(), String> {
+        let boundary = bands(&self.cloud, &self.camera, &self.settings, 1e-3).pixels;
+        let planes = ours.color.iter().zip(&oracle.color).chain(ours.features.iter().zip(&oracle.features));
+        for (c, (a, b)) in planes.enumerate() {
+            agree_in_bands(&format!("channel {c}"), a, b, &boundary)?;
+        }
+        agree_in_bands("alpha", &ours.alpha, &oracle.alpha, &boundary)?;
+        agree_in_bands("depth", &ours.depth, &oracle.depth, &boundary)?;
+        // The median jumps from splat to splat at its cut, so only the interior means anything.
+        let clear: Vec<usize> = (0..boundary.len()).filter(|&i| !boundary[i]).collect();
+        let wrong = clear.iter().filter(|&&i| (f64::from(ours.median_depth[i]) - oracle.median_depth[i]).abs() > 1e-4);
+        let wrong = wrong.count();
+        if wrong > 0 { Err(format!("median depth: {wrong} of {} pixels", clear.len())) } else { Ok(()) }
+    }
+}
+
+#[test]
+fn projection_matches_the_oracle() {
+    with_context(|context| {
+        let mut renderer = Renderer::new(context).unwrap();
+        for antialias in [false, true] {
+            let mut scene = Scene::new(400, 3, 0, [150, 110]);
+            scene.settings.antialias = antialias;
+            scene.gpu(&mut renderer);
+            let found = renderer.inspect().unwrap().unwrap();
+            let mut drawn = 0;
+            let mut worst = 0.0_f64;
+            let view = View::<f64>::new(&scene.camera, scene.cloud.origin, scene.settings.near);
+            for (i, splat) in found.splats.iter().enumerate().filter(|(_, s)| s.radius > 0.0) {
+                drawn += 1;
+                let gaussian = scene.cloud.gaussian(i);
+                let g = geometry(&gaussian, &view).unwrap();
+                let opacity = gaussian.opacity_logit.sigmoid() * if antialias { compensation(&g) } else { 1.0 };
+                let [xx, xy, yy] = g.covariance;
+                let det = g.determinants[1];
+                let basis = fmlgs::math::sh::basis(3, direction(g.relative));
+                let color = raw_color(gaussian.sh, &basis, 3).map(|c| c.max(0.0));
+                let mean = [0, 1].map(|a| view.focal[a] * g.local[a] / g.local[2] + view.principal[a]);
+                let [fx, fy, fz] = splat.factor.map(f64::from);
+                let pairs = [
+                    (f64::from(splat.mean[0]) / mean[0], 1.0),
+                    (f64::from(splat.mean[1]) / mean[1], 1.0),
+                    (f64::from(splat.depth) / g.local[2], 1.0),
+                    (f64::from(splat.opacity) / opacity, 1.0),
+                    (f64::from(splat.reach), 2.0 * (opacity / ALPHA_MIN).ln()),
+                    (fx * fx * det / yy, 1.0),
+                    (fx * fy * det, -xy),
+                    ((fy * fy + fz * fz) * det / xx, 1.0),
+                    (f64::from(splat.color[0]), color[0]),
+                    (f64::from(splat.color[1]), color[1]),
+                    (f64::from(splat.color[2]), color[2]),
+                ];
+                for (a, b) in pairs {
+                    worst = worst.max((a - b).abs() / (1.0 + b.abs()));
+                }
+            }
+            assert!(drawn > 300, "{drawn} drawn");
+            assert!(worst < 2e-4, "antialias {antialias}: worst deviation {worst:e}");
+        }
+    });
+}
+
+/// Faults of a tile's list: a Gaussian that a pixel of the tile needs is missing, or the list is
+/// not in order of depth.
+fn list_faults(scene: &Scene, found: &fmlgs::render::gpu::renderer::Inspection) -> usize {
+    let columns = (scene.camera.width_px as usize).div_ceil(TILE_PX);
+    let size = [scene.camera.width_px as usize, scene.camera.height_px as usize];
+    let mut faults = 0;
+    for (t, range) in found.ranges.iter().enumerate() {
+        let list = &found.list[range[0] as usize..range[1] as usize];
+        faults += list.windows(2).filter(|w| found.splats[w[0] as usize].depth > found.splats[w[1] as usize].depth).count();
+        let corner = [(t % columns) * TILE_PX, (t / columns) * TILE_PX];
+        for (i, s) in found.splats.iter().enumerate().filter(|(_, s)| s.radius > 0.0) {
+            let mut needed = false;
+            for y in corner[1]..(corner[1] + TILE_PX).min(size[1]) {
+                for x in corner[0]..(corner[0] + TILE_PX).min(size[0]) {
+                    let d = [x as f32 + 0.5 - s.mean[0], y as f32 + 0.5 - s.mean[1]];
+                    let q = (s.factor[0] * d[0] + s.factor[1] * d[1]).powi(2) + (s.factor[2] * d[1]).powi(2);
+                    needed |= q <= s.reach;
+                }
+            }
+            let times = list.iter().filter(|&&j| j as usize == i).count();
+            faults += usize::from(times > 1) + usize::from(needed && times == 0);
+        }
+    }
+    faults
+}
+
+#[test]
+fn every_tile_lists_what_its_pixels_need_in_order_of_depth() {
+    with_context(|context| {
+        let mut renderer = Renderer::new(context).unwrap();
+        let scene = Scene::new(300, 0, 0, [150, 110]);
+        scene.gpu(&mut renderer);
+        let mut found = renderer.inspect().unwrap().unwrap();
+        assert_eq!(list_faults(&scene, &found), 0);
+        // The exact test must leave out most of what the bounding boxes hold at this size.
+        let pairs = found.list.len();
+        assert!((300..6_000).contains(&pairs), "{pairs} pairs");
+        // Negative controls: two neighbours swapped, one dropped.
+        let full = found.ranges.iter().position(|r| r[1] - r[0] > 3).unwrap();
+        let at = found.ranges[full][0] as usize;
+        found.list.swap(at, at + 2);
+        assert!(list_faults(&scene, &found) > 0, "swapped");
+        found.list.swap(at, at + 2);
+        found.list[at] = found.list[at + 1];
+        assert!(list_faults(&scene, &found) > 0, "dropped");
+    });
+}
+
+#[test]
+fn pictures_match_the_oracle() {
+    with_context(|context| {
+        let mut renderer = Renderer::new(context).unwrap();
+        // Sizes beside multiples of the tile, every degree, channels below, at and over a pass.
+        for (degree, channels, antialias, size) in [
+            (0, 0, false, [33, 17]),
+            (1, 1, false, [64, 48]),
+            (2, 6, true, [70, 50]),
+            (3, 20, false, [47, 31]),
+        ] {
+            let mut scene = Scene::new(250, degree, channels, size);
+            scene.settings.antialias = antialias;
+            let oracle = scene.oracle();
+            let ours = scene.gpu(&mut renderer);
+            scene.compare(&ours, &oracle).unwrap();
+            assert_eq!(ours.features.len(), channels);
+            // Negative controls: some Gaussians moved, another blur.
+            let mut other = Scene::new(250, degree, channels, size);
+            other.settings.antialias = antialias;
+            other.cloud.positions.iter_mut().take(20).for_each(|p| p[0] += 0.05);
+            assert!(scene.compare(&other.gpu(&mut renderer), &oracle).is_err(), "some Gaussians moved");
+            other.cloud = scene.cloud.clone();
+            other.settings.antialias = !antialias;
+            assert!(scene.compare(&other.gpu(&mut renderer), &oracle).is_err(), "antialias switched");
+        }
+    });
+}
+
+#[test]
+fn lower_degree_than_stored_is_honoured() {
+    with_context(|context| {
+        let mut renderer = Renderer::new(context).unwrap();
+        let mut scene = Scene::new(150, 3, 0, [48, 40]);
+        scene.settings.sh_degree = 1;
+        let oracle = scene.oracle();
+        scene.compare(&scene.gpu(&mut renderer), &oracle).unwrap();
+        scene.settings.sh_degree = 3;
+        assert!(scene.compare(&scene.gpu(&mut renderer), &oracle).is_err(), "degree 3 differs");
+    });
+}
+
+#[test]
+fn a_scene_far_from_zero_renders_like_one_at_zero() {
+    with_context(|context| {
+        let mut renderer = Renderer::new(context).unwrap();
+        let mut scene = Scene::new(200, 1, 0, [60, 44]);
+        let here = scene.gpu(&mut renderer);
+        let away = DVec3::new(1e6, -2e6, 3e6 + 0.1);
+        scene.cloud.origin += away;
+        scene.camera.center += away;
+        let there = scene.gpu(&mut renderer);
+        let worst = |a: &Frame<f32>, b: &Frame<f32>| {
+            (0..3).flat_map(|c| a.color[c].iter().zip(&b.color[c])).fold(0.0_f32, |w, (x, y)| w.max((x - y).abs()))
+        };
+        assert!(worst(&here, &there) < 1e-3, "{}", worst(&here, &there));
+        scene.camera.center.x += 0.01;
+        assert!(worst(&here, &scene.gpu(&mut renderer)) > 1e-2, "a moved camera shows");
+    });
+}
+
+#[test]
+fn degenerate_gaussians_are_left_out_and_counted() {
+    with_context(|context| {
+        let mut renderer = Renderer::new(context).unwrap();
+        let mut scene = Scene::new(60, 0, 0, [40, 30]);
+        let clean = scene.gpu(&mut renderer);
+        assert_eq!(renderer.counters().unwrap().degenerate, 0);
+        for i in 0..4 {
+            scene.cloud.positions.push([0.0, 0.1, 0.0]);
+            scene.cloud.log_scales.push([-2.0; 3]);
+            scene.cloud.quaternions.push([1.0, 0.0, 0.0, 0.0]);
+            scene.cloud.opacity_logits.push(2.0);
+            scene.cloud.sh.push([1.0; 3]);
+            let last = 60 + i;
+            match i {
+                0 => scene.cloud.quaternions[last] = [0.0; 4],
+                1 => scene.cloud.log_scales[last] = [200.0; 3],
+                2 => scene.cloud.log_scales[last][1] = f64::NAN,
+                _ => scene.cloud.sh[last][2] = f64::INFINITY,
+            }
+        }
+        let poisoned = scene.gpu(&mut renderer);
+        assert_eq!(renderer.counters().unwrap().degenerate, 4);
+        assert_eq!(clean, poisoned);
+        scene.cloud.quaternions[60] = [1.0, 0.0, 0.0, 0.0];
+        assert_ne!(clean, scene.gpu(&mut renderer), "a sane Gaussian there is seen");
+    });
+}
+
+#[test]
+fn nothing_to_draw_gives_the_background() {
+    with_context(|context| {
+        let mut renderer = Renderer::new(context).unwrap();
+        let mut scene = Scene::new(3, 0, 0, [20, 10]);
+        scene.cloud = GaussianCloud { sh_degree: 0, ..GaussianCloud::default() };
+        let empty = scene.gpu(&mut renderer);
+        assert!(empty.color[2].iter().all(|&v| v == 0.6) && empty.alpha.iter().all(|&a| a == 0.0));
+        assert_eq!(empty.color[0].len(), 200);
+    });
+}
+
+#[test]
+fn a_frame_of_more_pairs_than_fit_is_drawn_in_the_end() {
+    with_context(|context| {
+        let mut renderer = Renderer::new(context).unwrap();
+        let mut scene = Scene::new(40, 0, 0, [320, 240]);
+        scene.cloud.log_scales.iter_mut().for_each(|s| *s = [0.0; 3]);
+        let ours = scene.gpu(&mut renderer);
+        let counters = renderer.counters().unwrap();
+        assert!(counters.pairs > 40 * 100 && counters.pairs == counters.wanted, "{counters:?}");
+        let oracle = scene.oracle();
+        let far = ours.alpha.iter().zip(&oracle.alpha).filter(|(a, b)| (f64::from(**a) - **b).abs() > 1e-2).count();
+        assert!(far < 40, "{far} pixels");
+    });
+}
+
+#[test]
+fn unusable_input_is_refused_by_name() {
+    with_context(|context| {
+        let mut renderer = Renderer::new(context).unwrap();
+        let scene = Scene::new(5, 0, 0, [20, 10]);
+        let cloud = scene.cloud.cast::<f32>();
+        let mut bad = scene.camera.clone();
+        bad.focal_px.x = f64::NAN;
+        let refused = renderer.render(&cloud, Features::NONE, &bad, &scene.settings);
+        assert!(matches!(refused, Err(GpuError::Render(RenderError::Camera(_)))), "{refused:?}");
+        let short = Features { channels: 2, values: &[0.0; 3] };
+        let refused = renderer.render(&cloud, short, &scene.camera, &scene.settings);
+        assert!(matches!(refused, Err(GpuError::Render(RenderError::FeatureLength { have: 3, want: 10 }))));
+    });
+}
