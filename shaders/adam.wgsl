@@ -23,7 +23,8 @@ struct AdamStep {
 @group(0) @binding(2) var<storage, read> gradient: array<f32>;
 @group(0) @binding(3) var<storage, read_write> first: array<f32>;
 @group(0) @binding(4) var<storage, read_write> second: array<f32>;
-// The geometry's gradient, whose pad marks Gaussians that must not move.
+// The geometry's gradient, whose pad is negative for Gaussians that must not move: those that
+// were not drawn keep their moments as they are.
 @group(0) @binding(5) var<storage, read> marks: array<f32>;
 @group(0) @binding(6) var<storage, read> counters: array<u32>;
 

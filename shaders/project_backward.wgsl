@@ -14,17 +14,21 @@
 @group(0) @binding(4) var<storage, read> splats: array<Splat>;
 // [Gaussian][GRADIENT_BASE + channels], see blend_backward.
 @group(0) @binding(5) var<storage, read> gradient: array<f32>;
-// Laid out like `geometry`; the pad holds the length of the screen gradient, or -1 where the
-// gradient was not finite and the Gaussian must not move.
+// Laid out like `geometry`; the pad holds the length of the screen gradient, or a mark for a
+// Gaussian that must not move: -1 not drawn, -2 its gradient was not finite.
 @group(0) @binding(6) var<storage, read_write> geometry_gradient: array<f32>;
 @group(0) @binding(7) var<storage, read_write> sh_low_gradient: array<f32>;
 @group(0) @binding(8) var<storage, read_write> sh_high_gradient: array<f32>;
 
-// [Gaussian]: sum of screen gradients' lengths, steps in which it was drawn, largest radius in px.
+// [Gaussian]: sum of screen gradients' lengths, frames in which it was drawn, largest radius as a
+// share of the picture's longer side.
 @group(0) @binding(9) var<storage, read_write> growth: array<vec4<f32>>;
 @group(0) @binding(10) var<storage, read_write> counters: array<atomic<u32>>;
 
 #include "shared/linearise.wgsl"
+
+const NOT_DRAWN: f32 = -1.0;
+const NOT_FINITE: f32 = -2.0;
 
 fn store_coefficient(i: u32, k: u32, value: vec3<f32>) {
     if k < 9u {
@@ -89,7 +93,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     let radius = splats[i].radius;
     if radius == 0.0 {
-        store_zero(i, 0.0);
+        store_zero(i, NOT_DRAWN);
         return;
     }
     let p = linearise(i);
@@ -148,7 +152,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     let finite = is_finite3(to_position) && is_finite3(to_log_scale) && is_finite2(to_quaternion.xy)
         && is_finite2(to_quaternion.zw) && is_finite(to_logit) && is_finite3(to_color) && is_finite(screen);
     if !finite {
-        store_zero(i, -1.0);
+        store_zero(i, NOT_FINITE);
         return;
     }
     let to = i * GEOMETRY_STRIDE;
@@ -165,14 +169,16 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
 @compute @workgroup_size(256)
 fn statistics(@builtin(global_invocation_id) global: vec3<u32>) {
     let i = global.x;
-    if i >= view.gaussians || splats[i].radius == 0.0 {
+    let drawn = atomicLoad(&counters[COUNT_OVERFLOW]) == 0u;
+    if i >= view.gaussians || splats[i].radius == 0.0 || !drawn {
         return;
     }
     let screen = geometry_gradient[i * GEOMETRY_STRIDE + 11u];
-    if screen < 0.0 {
+    if screen == NOT_FINITE {
         atomicAdd(&counters[COUNT_BAD_GRADIENTS], 1u);
         return;
     }
     let so_far = growth[i];
-    growth[i] = vec4<f32>(so_far.x + screen, so_far.y + 1.0, max(so_far.z, splats[i].radius), 0.0);
+    let share = splats[i].radius / f32(max(view.size_px.x, view.size_px.y));
+    growth[i] = vec4<f32>(so_far.x + screen, so_far.y + 1.0, max(so_far.z, share), 0.0);
 }

@@ -1,5 +1,5 @@
 // The training loss and its gradient: L1 and D-SSIM (11 x 11 Gaussian window of sigma 1.5, zeros
-// around the picture), each pixel weighted by the photo's coverage.
+// around the picture). Where the photo's coverage is partial, the picture is faded towards it.
 // `moments` -> `gradient`; `reduce` leaves the step's sums for the host.
 #include "constants"
 #include "shared/counters.wgsl"
@@ -10,7 +10,7 @@ struct Loss {
     slot: u32,
     // Tiles, whose partial sums `reduce` adds up.
     tiles: u32,
-    // Weights of L1 and of D-SSIM in the loss, over the sum of all pixels' weights and channels.
+    // Weights of L1 and of D-SSIM in the loss, over the number of pixels and channels.
     l1: f32,
     dssim: f32,
     pad0: u32,
@@ -25,7 +25,7 @@ struct Loss {
 // [channel][derivative][pixel]: of SSIM to the windowed means of x, x x and x y.
 @group(0) @binding(3) var<storage, read_write> maps: array<f32>;
 @group(0) @binding(4) var<storage, read_write> pixel_gradient: array<vec4<f32>>;
-// [tile]: sums of absolute errors, SSIM, squared errors, weights.
+// [tile]: sums of absolute errors, SSIM, squared errors over pixels and channels.
 @group(0) @binding(5) var<storage, read_write> partials: array<vec4<f32>>;
 // [slot]: those sums over the picture, then overflow, wanted pairs, visible, bad gradients.
 @group(0) @binding(6) var<storage, read_write> ring: array<vec4<f32>>;
@@ -60,6 +60,12 @@ fn index_of(pixel: vec2<u32>) -> u32 {
     return pixel.y * loss.size_px.x + pixel.x;
 }
 
+// Rendered and wanted value of a channel of a pixel.
+fn compared(at: u32, channel: u32) -> vec2<f32> {
+    let wanted = unpack4x8unorm(photo[at]);
+    return vec2<f32>(mix(wanted[channel], pixels[at][channel], wanted.w), wanted[channel]);
+}
+
 // Sum over the workgroup's 256 threads; the result is thread 0's.
 fn sum_up(thread: u32, value: vec4<f32>) -> vec4<f32> {
     // In four rounds, so that the scratch memory stays small.
@@ -92,24 +98,16 @@ fn moments(
     let inside = all(pixel < loss.size_px);
     let at = index_of(pixel);
     let plane = loss.size_px.x * loss.size_px.y;
-    var weight = 0.0;
-    if inside {
-        weight = unpack4x8unorm(photo[at]).w;
-    }
-    var found = vec4<f32>(0.0, 0.0, 0.0, weight);
+    var found = vec4<f32>(0.0);
     for (var channel = 0u; channel < 3u; channel++) {
         for (var e = thread; e < WIDE * WIDE; e += 256u) {
             let place = surrounding(group.xy, e);
-            var x = 0.0;
-            var y = 0.0;
+            var xy = vec2<f32>(0.0);
             if place.z != 0u {
-                let there = index_of(place.xy);
-                let target_color = unpack4x8unorm(photo[there]);
-                x = pixels[there][channel] * target_color.w;
-                y = target_color[channel] * target_color.w;
+                xy = compared(index_of(place.xy), channel);
             }
-            wide[e] = x;
-            wide[WIDE * WIDE + e] = y;
+            wide[e] = xy.x;
+            wide[WIDE * WIDE + e] = xy.y;
         }
         workgroupBarrier();
         for (var e = thread; e < WIDE * TILE_PX; e += 256u) {
@@ -146,11 +144,12 @@ fn moments(
             let to_xx = -ssim / b2;
             let to_xy = 2.0 * a1 / (b1 * b2);
             let to_x = 2.0 * my * a2 / (b1 * b2) - 2.0 * mx * ssim / b1 - 2.0 * mx * to_xx - my * to_xy;
-            maps[(channel * 3u) * plane + at] = weight * to_x;
-            maps[(channel * 3u + 1u) * plane + at] = weight * to_xx;
-            maps[(channel * 3u + 2u) * plane + at] = weight * to_xy;
-            let difference = pixels[at][channel] - unpack4x8unorm(photo[at])[channel];
-            found += vec4<f32>(weight * abs(difference), weight * ssim, weight * difference * difference, 0.0);
+            maps[(channel * 3u) * plane + at] = to_x;
+            maps[(channel * 3u + 1u) * plane + at] = to_xx;
+            maps[(channel * 3u + 2u) * plane + at] = to_xy;
+            let xy = compared(at, channel);
+            let difference = xy.x - xy.y;
+            found += vec4<f32>(abs(difference), ssim, difference * difference, 0.0);
         }
         workgroupBarrier();
     }
@@ -200,12 +199,10 @@ fn gradient(
                 let e = (local.y + k) * TILE_PX + local.x;
                 s += kernel[k] * vec3<f32>(rows[e], rows[WIDE * TILE_PX + e], rows[2u * WIDE * TILE_PX + e]);
             }
-            let target_color = unpack4x8unorm(photo[at]);
-            let weight = target_color.w;
-            let x = pixels[at][channel];
-            let y = target_color[channel];
-            let to_ssim = weight * (s.x + 2.0 * weight * x * s.y + weight * y * s.z);
-            found[channel] = loss.l1 * weight * sign(x - y) - loss.dssim * to_ssim;
+            let xy = compared(at, channel);
+            let to_ssim = s.x + 2.0 * xy.x * s.y + xy.y * s.z;
+            let coverage = unpack4x8unorm(photo[at]).w;
+            found[channel] = coverage * (loss.l1 * sign(xy.x - xy.y) - loss.dssim * to_ssim);
         }
         workgroupBarrier();
     }

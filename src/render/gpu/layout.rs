@@ -128,7 +128,7 @@ twins! {
         slot: u32,
         /// Tiles of the picture.
         tiles: u32,
-        /// Weight of L1 over the sum of weights and channels.
+        /// Weight of L1 over the number of pixels and channels.
         l1: f32,
         /// Weight of D-SSIM, likewise.
         dssim: f32,
@@ -140,7 +140,7 @@ twins! {
 
     /// One Adam step over one buffer.
     struct AdamStep {
-        /// Rate of each float of a record; rates of 0 leave a float alone.
+        /// Rate of each float of a record; a rate of 0 leaves the float and its moments alone.
         rates: [[f32; 4]; 7],
         /// Floats in all.
         floats: u32,

@@ -5,6 +5,7 @@
 //! its gradient) and [`adam`]. [`Renderer`] answers like the CPU renderer; [`Trainer`] keeps
 //! everything on the device from step to step.
 
+pub mod adam;
 pub mod bin;
 pub mod blend;
 pub mod blend_backward;
@@ -20,9 +21,14 @@ pub mod renderer;
 pub mod scratch;
 pub mod shader;
 pub mod sort;
+pub mod ssim;
 pub mod timing;
+pub mod trainer;
 
+pub use adam::Rates;
 pub use cloud::Parameters;
 pub use context::Context;
 pub use error::GpuError;
 pub use renderer::Renderer;
+pub use ssim::DevicePhoto;
+pub use trainer::{Trainer, TrainerSettings};

@@ -1,0 +1,116 @@
+//! The optimiser; `shaders/adam.wgsl`.
+
+use super::cloud::{Parameters, strides};
+use super::kernel::{Access, Kernel, Module, Stage};
+use super::layout::AdamStep;
+use super::shader::Variant;
+use super::{Context, GpuError};
+use crate::math::sh;
+use crate::render::cpu::adam::{AdamStep as Constants, BETA1, BETA2, EPSILON};
+
+/// Learning rates of one step, in units of the parameters.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Rates {
+    /// Positions, scene units.
+    pub position: f32,
+    /// Log-scales.
+    pub log_scale: f32,
+    /// Quaternions.
+    pub quaternion: f32,
+    /// Opacity logits.
+    pub opacity_logit: f32,
+    /// Constant colour.
+    pub sh_constant: f32,
+    /// Other coefficients.
+    pub sh_rest: f32,
+}
+
+impl Rates {
+    /// Rates of each float in the records of the three buffers; 0 past degree `active`.
+    fn records(&self, active: u8) -> [[f32; 28]; 3] {
+        let mut out = [[0.0; 28]; 3];
+        out[0][0..3].fill(self.position);
+        out[0][3..6].fill(self.log_scale);
+        out[0][6..10].fill(self.quaternion);
+        out[0][10] = self.opacity_logit;
+        let floats = 3 * sh::coefficients(active);
+        let [_, low, _] = strides(3);
+        for k in 0..floats {
+            let rate = if k < 3 { self.sh_constant } else { self.sh_rest };
+            out[if k < low { 1 } else { 2 }][k % low] = rate;
+        }
+        out
+    }
+}
+
+/// The kernel with the constants of the three buffers.
+#[derive(Debug)]
+pub struct Adam {
+    kernel: Kernel,
+    steps: [wgpu::Buffer; 3],
+}
+
+/// What one step works on.
+#[derive(Clone, Copy, Debug)]
+pub struct AdamBuffers<'a> {
+    /// Parameters to move.
+    pub parameters: &'a Parameters,
+    /// Their gradient, with the marks of `project_backward`.
+    pub gradient: &'a Parameters,
+    /// Both moments.
+    pub moments: &'a [Parameters; 2],
+}
+
+impl Adam {
+    /// Compiles the kernel.
+    pub fn new(context: &Context) -> Result<Self, GpuError> {
+        use Access::{Read, Uniform, Write};
+        let module = Module::new(context, "adam", Variant::default())?;
+        let slots = [(0, Uniform), (1, Write), (2, Read), (3, Write), (4, Write), (5, Read), (6, Read)];
+        let step = || context.uniform("Adam step", bytemuck::bytes_of(&AdamStep::default()));
+        Ok(Self { kernel: Kernel::new(context, &module, "main", &slots)?, steps: [step()?, step()?, step()?] })
+    }
+
+    /// Sets the constants of step `t`, counted from 1, for `gaussians` Gaussians of which `stored`
+    /// degrees are kept and `active` trained. Gradients are cut to `clip`; 0 = not.
+    pub fn prepare(&self, context: &Context, gaussians: u32, [stored, active]: [u8; 2], rates: &Rates, t: u64, clip: f32) {
+        let constants = Constants::new(t);
+        for ((buffer, stride), rates) in self.steps.iter().zip(strides(stored)).zip(rates.records(active)) {
+            let mut step = AdamStep {
+                floats: gaussians * stride as u32,
+                stride: stride.max(1) as u32,
+                unbias_first: constants.first_correction,
+                unbias_second: constants.second_correction,
+                beta_first: BETA1,
+                beta_second: BETA2,
+                epsilon: EPSILON,
+                clip,
+                ..AdamStep::default()
+            };
+            step.rates.as_flattened_mut().copy_from_slice(&rates);
+            context.queue().write_buffer(buffer, 0, bytemuck::bytes_of(&step));
+        }
+    }
+
+    /// Records the step.
+    pub fn encode(&self, stage: &mut Stage<'_>, on: AdamBuffers<'_>, counters: &wgpu::Buffer, gaussians: u32, stored: u8) {
+        let [first, second] = on.moments;
+        let marks = &on.gradient.buffers[0];
+        for (k, stride) in strides(stored).into_iter().enumerate() {
+            let groups = (u64::from(gaussians) * stride as u64).div_ceil(256);
+            // One axis holds 65,535 workgroups everywhere; the rest goes along the second.
+            let across = groups.min(32_768);
+            let down = groups.div_ceil(across.max(1));
+            let buffers = [
+                &self.steps[k],
+                &on.parameters.buffers[k],
+                &on.gradient.buffers[k],
+                &first.buffers[k],
+                &second.buffers[k],
+                marks,
+                counters,
+            ];
+            stage.run(&self.kernel, &buffers, [across as u32, down as u32, 1]);
+        }
+    }
+}

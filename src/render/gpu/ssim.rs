@@ -1,0 +1,195 @@
+//! The training loss and its gradient; `shaders/ssim.wgsl`.
+
+use super::kernel::{Access, Kernel, Module, Recorder, Stage};
+use super::layout::Loss;
+use super::scratch::extent;
+use super::shader::Variant;
+use super::{Context, GpuError};
+use crate::render::TILE_PX;
+use crate::scene::PhotoPixels;
+
+/// Steps whose sums the device keeps until the host fetches them.
+pub const RING: usize = 64;
+/// Bytes of one step's sums.
+const SLOT_BYTES: u64 = 32;
+
+/// A photo on the device, 4 bytes a pixel.
+#[derive(Clone, Debug)]
+pub struct DevicePhoto {
+    pixels: wgpu::Buffer,
+    /// Width and height in px.
+    pub size_px: [u32; 2],
+}
+
+impl DevicePhoto {
+    /// Sends a photo to the device.
+    pub fn new(context: &Context, photo: &PhotoPixels) -> Result<Self, GpuError> {
+        let size_px = [photo.width_px, photo.height_px];
+        let [want, _] = extent(size_px);
+        let lengths = [photo.rgb.len(), photo.coverage.as_ref().map_or(want, Vec::len)];
+        if let Some(&have) = lengths.iter().find(|&&l| l != want) {
+            return Err(GpuError::Size { what: "pixels of a photo", have, want });
+        }
+        let covered = |i: usize| photo.coverage.as_ref().map_or(255, |c| c[i]);
+        let packed: Vec<[u8; 4]> =
+            photo.rgb.iter().enumerate().map(|(i, &[r, g, b])| [r, g, b, covered(i)]).collect();
+        Ok(Self { pixels: context.storage_with("photo", packed.as_flattened())?, size_px })
+    }
+}
+
+/// Means over pixels and channels of one comparison, and what the frame's counters said.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LossSums {
+    /// Mean absolute difference.
+    pub l1: f64,
+    /// SSIM.
+    pub ssim: f64,
+    /// Mean squared difference.
+    pub mse: f64,
+    /// The frame's (splat, tile) pairs did not fit, so it was not drawn and nothing moved.
+    pub overflow: bool,
+    /// Pairs that it needed.
+    pub wanted: u32,
+    /// Gaussians drawn.
+    pub visible: u32,
+    /// Gaussians left alone because their gradient was not finite.
+    pub bad_gradients: u32,
+}
+
+impl LossSums {
+    /// `(1 - lambda) L1 + lambda (1 - SSIM)`.
+    pub fn total(&self, lambda: f64) -> f64 {
+        (1.0 - lambda) * self.l1 + lambda * (1.0 - self.ssim)
+    }
+
+    /// PSNR in dB for a peak of 1.
+    pub fn psnr(&self) -> f64 {
+        -10.0 * self.mse.log10()
+    }
+}
+
+/// The kernels with their buffers.
+#[derive(Debug)]
+pub struct Ssim {
+    moments: Kernel,
+    gradient: Kernel,
+    reduce: Kernel,
+    loss: wgpu::Buffer,
+    maps: wgpu::Buffer,
+    partials: wgpu::Buffer,
+    ring: wgpu::Buffer,
+    room: [usize; 2],
+}
+
+impl Ssim {
+    /// Compiles the kernels; the buffers grow with the first photo.
+    pub fn new(context: &Context) -> Result<Self, GpuError> {
+        use Access::{Read, Uniform, Write};
+        let module = Module::new(context, "ssim", Variant::default())?;
+        let kernel = |entry, slots: &[_]| Kernel::new(context, &module, entry, slots);
+        Ok(Self {
+            moments: kernel("moments", &[(0, Uniform), (1, Read), (2, Read), (3, Write), (5, Write)])?,
+            gradient: kernel("gradient", &[(0, Uniform), (1, Read), (2, Read), (3, Write), (4, Write)])?,
+            reduce: kernel("reduce", &[(0, Uniform), (5, Write), (6, Write), (7, Read)])?,
+            loss: context.uniform("loss", bytemuck::bytes_of(&Loss::default()))?,
+            maps: context.storage("derivatives of SSIM", 0)?,
+            partials: context.storage("sums of the loss", 0)?,
+            ring: context.storage("losses of steps", RING as u64 * SLOT_BYTES)?,
+            room: [0, 0],
+        })
+    }
+
+    /// Makes room for pictures of this size and says where the sums go. `lambda` is the share of
+    /// D-SSIM in the loss.
+    pub fn prepare(&mut self, context: &Context, size_px: [u32; 2], slot: usize, lambda: f64) -> Result<(), GpuError> {
+        let [pixels, tiles] = extent(size_px);
+        if self.room[0] < pixels {
+            self.maps = context.storage("derivatives of SSIM", pixels as u64 * 36)?;
+            self.room[0] = pixels;
+        }
+        if self.room[1] < tiles {
+            self.partials = context.storage("sums of the loss", tiles as u64 * 16)?;
+            self.room[1] = tiles;
+        }
+        let values = (pixels * 3) as f64;
+        let loss = Loss {
+            size_px,
+            slot: slot as u32,
+            tiles: tiles as u32,
+            l1: ((1.0 - lambda) / values) as f32,
+            dssim: (lambda / values) as f32,
+            ..Loss::default()
+        };
+        context.queue().write_buffer(&self.loss, 0, bytemuck::bytes_of(&loss));
+        Ok(())
+    }
+
+    /// Records the loss of `colors` and its gradient into `pixel_gradient`.
+    pub fn encode(
+        &self,
+        stage: &mut Stage<'_>,
+        colors: &wgpu::Buffer,
+        photo: &DevicePhoto,
+        pixel_gradient: &wgpu::Buffer,
+    ) {
+        let [w, h] = photo.size_px.map(|s| s.div_ceil(TILE_PX as u32));
+        stage.run(&self.moments, &[&self.loss, colors, &photo.pixels, &self.maps, &self.partials], [w, h, 1]);
+        stage.run(&self.gradient, &[&self.loss, colors, &photo.pixels, &self.maps, pixel_gradient], [w, h, 1]);
+    }
+
+    /// Records the last sums into the ring, with the frame's counters as they then are.
+    pub fn encode_sums(&self, stage: &mut Stage<'_>, counters: &wgpu::Buffer) {
+        stage.run(&self.reduce, &[&self.loss, &self.partials, &self.ring, counters], [1, 1, 1]);
+    }
+
+    /// Fetches the sums of slots from 0, one for each of `pixels`, the number of pixels compared.
+    pub fn read(&self, context: &Context, pixels: &[usize]) -> Result<Vec<LossSums>, GpuError> {
+        let bytes = context.read(&[(&self.ring, pixels.len() as u64 * SLOT_BYTES)])?;
+        let slots: Vec<[f32; 8]> = bytemuck::pod_collect_to_vec(&bytes[0]);
+        Ok(slots
+            .iter()
+            .zip(pixels)
+            .map(|(s, &n)| {
+                let mean = |sum: f32| f64::from(sum) / (3 * n) as f64;
+                LossSums {
+                    l1: mean(s[0]),
+                    ssim: mean(s[1]),
+                    mse: mean(s[2]),
+                    overflow: s[4] != 0.0,
+                    wanted: s[5] as u32,
+                    visible: s[6] as u32,
+                    bad_gradients: s[7] as u32,
+                }
+            })
+            .collect())
+    }
+}
+
+/// Loss of a rendered picture (interleaved RGB) against a photo, and its gradient: the loss alone,
+/// for tests and measurements.
+pub fn photo_loss(
+    context: &Context,
+    rendered: &[[f32; 3]],
+    photo: &PhotoPixels,
+    lambda: f64,
+) -> Result<(LossSums, Vec<[f32; 3]>), GpuError> {
+    let target = DevicePhoto::new(context, photo)?;
+    let [pixels, _] = extent(target.size_px);
+    if rendered.len() != pixels {
+        return Err(GpuError::Size { what: "pixels of a picture", have: rendered.len(), want: pixels });
+    }
+    let mut ssim = Ssim::new(context)?;
+    ssim.prepare(context, target.size_px, 0, lambda)?;
+    let wide: Vec<[f32; 4]> = rendered.iter().map(|&[r, g, b]| [r, g, b, 0.0]).collect();
+    let colors = context.storage_with("picture", bytemuck::cast_slice(&wide))?;
+    let gradient = context.storage("gradient of the picture", pixels as u64 * 16)?;
+    let counters = context.storage("counters", 32)?;
+    let mut recorder = Recorder::new(context, None);
+    recorder.stage("loss", |s| ssim.encode(s, &colors, &target, &gradient));
+    recorder.stage("loss", |s| ssim.encode_sums(s, &counters));
+    recorder.submit();
+    let sums = ssim.read(context, &[pixels])?.first().copied().unwrap_or_default();
+    let bytes = context.read(&[(&gradient, pixels as u64 * 16)])?;
+    let gradient: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes[0]);
+    Ok((sums, gradient.iter().map(|g| [g[0], g[1], g[2]]).collect()))
+}

@@ -1,0 +1,333 @@
+//! Training on the device: a step draws, compares, goes back and moves without the host waiting
+//! for any of it; sums of the losses are fetched every so many steps.
+
+use super::adam::{Adam, AdamBuffers, Rates};
+use super::blend_backward::{BlendBackward, BlendGradients};
+use super::cloud::{Packed, Parameters};
+use super::kernel::Recorder;
+use super::project::CloudShape;
+use super::project_backward::ProjectBackward;
+use super::rasterizer::Rasterizer;
+use super::scratch::extent;
+use super::ssim::{DevicePhoto, LossSums, RING, Ssim};
+use super::timing::{StageTimes, Timer};
+use super::{Context, GpuError};
+use crate::render::RenderSettings;
+use crate::scene::{Camera, GaussianCloud, PhotoPixels};
+
+/// What stays the same over a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrainerSettings {
+    /// Background, near plane and anti-aliasing; degree and depth are set per step.
+    pub render: RenderSettings,
+    /// Share of D-SSIM in the loss.
+    pub lambda: f64,
+    /// Components of gradients are cut to this size; 0 = not.
+    pub clip: f32,
+}
+
+impl Default for TrainerSettings {
+    fn default() -> Self {
+        Self { render: RenderSettings::default(), lambda: 0.2, clip: 0.0 }
+    }
+}
+
+/// What density control asks for, per Gaussian, since the cloud was last uploaded.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Growth {
+    /// Sum of the screen gradients' lengths, loss per half picture side.
+    pub gradient: Vec<f32>,
+    /// Frames in which it was drawn.
+    pub seen: Vec<u32>,
+    /// Largest radius as a share of the picture's longer side.
+    pub radius: Vec<f32>,
+}
+
+/// Measurements of one step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepLoss {
+    /// Which step, counted from 1.
+    pub step: u64,
+    /// Its sums.
+    pub sums: LossSums,
+    /// The loss.
+    pub loss: f64,
+}
+
+/// The state of a training run on the device.
+#[derive(Debug)]
+pub struct Trainer {
+    context: Context,
+    settings: TrainerSettings,
+    rasterizer: Rasterizer,
+    ssim: Ssim,
+    blend_backward: BlendBackward,
+    project_backward: ProjectBackward,
+    adam: Adam,
+    shape: CloudShape,
+    room: usize,
+    cloud: Parameters,
+    gradient: Parameters,
+    moments: [Parameters; 2],
+    growth: wgpu::Buffer,
+    gradients: BlendGradients,
+    gradient_room: [usize; 2],
+    features: wgpu::Buffer,
+    step: u64,
+    /// Whether a frame of this cloud has told how many pairs it needs.
+    sized: bool,
+    /// Steps in the ring: number and pixels.
+    pending: Vec<(u64, usize)>,
+    /// Steps fetched but not asked for yet.
+    fetched: Vec<StepLoss>,
+    timer: Option<Timer>,
+    times: StageTimes,
+}
+
+impl Trainer {
+    /// Starts a run from `cloud`.
+    pub fn new(context: &Context, cloud: &GaussianCloud, settings: TrainerSettings) -> Result<Self, GpuError> {
+        let empty = |what| Parameters::new(context, what, 0, 0);
+        let mut trainer = Self {
+            context: context.clone(),
+            settings,
+            rasterizer: Rasterizer::new(context)?,
+            ssim: Ssim::new(context)?,
+            blend_backward: BlendBackward::new(context.has_float_atomics()),
+            project_backward: ProjectBackward::new(context)?,
+            adam: Adam::new(context)?,
+            shape: CloudShape::default(),
+            room: 0,
+            cloud: empty("cloud")?,
+            gradient: empty("gradient of the cloud")?,
+            moments: [empty("first moments")?, empty("second moments")?],
+            growth: context.storage("density statistics", 0)?,
+            gradients: BlendGradients::new(context, 0, 0, 0, 1)?,
+            gradient_room: [0, 0],
+            features: context.storage("features", 0)?,
+            step: 0,
+            sized: false,
+            pending: Vec::new(),
+            fetched: Vec::new(),
+            timer: None,
+            times: StageTimes::new(),
+        };
+        trainer.blend_backward.prepare(context, 0)?;
+        trainer.upload(cloud, None, 0)?;
+        Ok(trainer)
+    }
+
+    /// Sends a photo to the device.
+    pub fn photo(&self, pixels: &PhotoPixels) -> Result<DevicePhoto, GpuError> {
+        DevicePhoto::new(&self.context, pixels)
+    }
+
+    /// Number of Gaussians.
+    pub fn len(&self) -> usize {
+        self.shape.gaussians as usize
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Steps done.
+    pub fn steps(&self) -> u64 {
+        self.step
+    }
+
+    /// Replaces the cloud, Adam's first and second moments (laid out like the cloud; `None` =
+    /// zero) and the number of steps done. Density statistics start again.
+    pub fn upload(
+        &mut self,
+        cloud: &GaussianCloud,
+        moments: Option<[&GaussianCloud; 2]>,
+        step: u64,
+    ) -> Result<(), GpuError> {
+        cloud.validate()?;
+        for m in moments.into_iter().flatten() {
+            if m.len() != cloud.len() || m.sh_degree != cloud.sh_degree {
+                return Err(GpuError::Size { what: "Gaussians of a moment", have: m.len(), want: cloud.len() });
+            }
+        }
+        let (context, n, degree) = (&self.context, cloud.len(), cloud.sh_degree);
+        if n > self.room || degree != self.shape.degree {
+            // Clouds grow a little at a time; room for a quarter more saves most reallocations.
+            let make = |room: usize| -> Result<_, GpuError> {
+                let new = |what| Parameters::new(context, what, room, degree);
+                let parameters = [new("cloud")?, new("gradient of the cloud")?, new("first moments")?];
+                Ok((parameters, new("second moments")?, context.storage("density statistics", room as u64 * 16)?))
+            };
+            let roomy = n + n / 4;
+            let (room, made) = match make(roomy) {
+                Ok(made) => (roomy, made),
+                Err(_) => (n, make(n)?),
+            };
+            let ([cloud, gradient, first], second, growth) = made;
+            (self.cloud, self.gradient, self.moments, self.growth) = (cloud, gradient, [first, second], growth);
+            self.room = room;
+        }
+        self.cloud.write(context, &Packed::of(cloud));
+        let mut recorder = Recorder::new(context, None);
+        recorder.clear(&self.growth);
+        self.moments.iter().flat_map(|m| &m.buffers).for_each(|b| recorder.clear(b));
+        recorder.submit();
+        if let Some(moments) = moments {
+            for (to, from) in self.moments.iter().zip(moments) {
+                to.write(context, &Packed::of(from));
+            }
+        }
+        self.shape = CloudShape { origin: cloud.origin, gaussians: n as u32, degree };
+        self.step = step;
+        self.sized = false;
+        self.context.check()
+    }
+
+    /// One step on one photo, with harmonics up to `sh_degree`. Returns as soon as the work is
+    /// handed to the device, except every [`RING`] steps, when losses are fetched.
+    pub fn step(
+        &mut self,
+        camera: &Camera,
+        photo: &DevicePhoto,
+        rates: &Rates,
+        sh_degree: u8,
+    ) -> Result<(), GpuError> {
+        let size_px = [camera.width_px, camera.height_px];
+        if size_px != photo.size_px {
+            let side = |s: [u32; 2]| s[0] as usize * s[1] as usize;
+            return Err(GpuError::Size {
+                what: "pixels of the photo against its camera",
+                have: side(photo.size_px),
+                want: side(size_px),
+            });
+        }
+        if self.pending.len() >= RING {
+            self.fetch()?;
+        }
+        let settings = RenderSettings { sh_degree, depth: false, ..self.settings.render.clone() };
+        self.make_room(size_px)?;
+        self.rasterizer.prepare(&self.context, camera, &settings, self.shape, 0)?;
+        if !self.sized {
+            self.size_up(camera, &settings)?;
+        }
+        self.ssim.prepare(&self.context, size_px, self.pending.len(), self.settings.lambda)?;
+        let degrees = [self.shape.degree, sh_degree.min(self.shape.degree)];
+        let n = self.shape.gaussians;
+        self.adam.prepare(&self.context, n, degrees, rates, self.step + 1, self.settings.clip);
+        self.encode_step(photo);
+        if let Some(timer) = &mut self.timer {
+            self.times = timer.finish(&self.context)?;
+        }
+        self.step += 1;
+        self.pending.push((self.step, extent(size_px)[0]));
+        self.context.check()
+    }
+
+    fn encode_step(&mut self, photo: &DevicePhoto) {
+        let r = &self.rasterizer;
+        let (shot, splats) = (r.shot(), &r.gaussians.splats);
+        let mut recorder = Recorder::new(&self.context, self.timer.as_mut());
+        recorder.clear(&self.gradients.splats);
+        r.encode_count(&mut recorder, &self.cloud);
+        r.encode_draw(&mut recorder, &self.features);
+        recorder.stage("loss", |s| self.ssim.encode(s, &r.picture.colors, photo, &self.gradients.pixels));
+        recorder.stage("blend backward", |s| {
+            let scratch = (&r.gaussians, &r.pairs, &r.picture);
+            self.blend_backward.encode(s, shot, scratch, &self.features, &self.gradients);
+        });
+        recorder.stage("project backward", |s| {
+            self.project_backward.encode(s, shot, &self.cloud, (splats, &self.gradients.splats), &self.gradient);
+            self.project_backward.encode_statistics(s, shot, splats, &self.gradient, &self.growth);
+        });
+        recorder.stage("adam", |s| {
+            let on = AdamBuffers { parameters: &self.cloud, gradient: &self.gradient, moments: &self.moments };
+            self.adam.encode(s, on, shot.counters, shot.gaussians, self.shape.degree);
+            self.ssim.encode_sums(s, shot.counters);
+        });
+        recorder.submit();
+    }
+
+    /// Counts the pairs of one frame, so that the first step of a cloud is not lost.
+    fn size_up(&mut self, camera: &Camera, settings: &RenderSettings) -> Result<(), GpuError> {
+        let mut recorder = Recorder::new(&self.context, None);
+        self.rasterizer.encode_count(&mut recorder, &self.cloud);
+        recorder.submit();
+        let counters = self.rasterizer.read_counters(&self.context)?;
+        self.rasterizer.grow_pairs(&self.context, counters.wanted)?;
+        self.sized = true;
+        self.rasterizer.prepare(&self.context, camera, settings, self.shape, 0)
+    }
+
+    fn make_room(&mut self, size_px: [u32; 2]) -> Result<(), GpuError> {
+        let [pixels, _] = extent(size_px);
+        let [room, area] = self.gradient_room;
+        if room < self.room || area < pixels {
+            let (room, area) = (self.room, area.max(pixels));
+            self.gradients = BlendGradients::new(&self.context, room, area, 0, 1)?;
+            self.gradient_room = [room, area];
+        }
+        Ok(())
+    }
+
+    /// Fetches the losses in the ring, and makes room where a frame did not fit.
+    fn fetch(&mut self) -> Result<(), GpuError> {
+        if self.pending.is_empty() {
+            return Ok(());
+        }
+        let pixels: Vec<usize> = self.pending.iter().map(|p| p.1).collect();
+        let sums = self.ssim.read(&self.context, &pixels)?;
+        let wanted = sums.iter().filter(|s| s.overflow).map(|s| s.wanted).max();
+        let lambda = self.settings.lambda;
+        let steps = self.pending.drain(..).zip(sums);
+        self.fetched.extend(steps.map(|((step, _), sums)| StepLoss { step, sums, loss: sums.total(lambda) }));
+        match wanted {
+            Some(wanted) => self.rasterizer.grow_pairs(&self.context, wanted),
+            None => Ok(()),
+        }
+    }
+
+    /// Losses of the steps since the last call, in order. Waits for the device.
+    pub fn metrics(&mut self) -> Result<Vec<StepLoss>, GpuError> {
+        self.fetch()?;
+        Ok(std::mem::take(&mut self.fetched))
+    }
+
+    /// Statistics for density control since the cloud was uploaded. Waits for the device.
+    pub fn stats(&self) -> Result<Growth, GpuError> {
+        let bytes = self.context.read(&[(&self.growth, self.len() as u64 * 16)])?;
+        let rows: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes[0]);
+        Ok(Growth {
+            gradient: rows.iter().map(|r| r[0]).collect(),
+            seen: rows.iter().map(|r| r[1] as u32).collect(),
+            radius: rows.iter().map(|r| r[2]).collect(),
+        })
+    }
+
+    /// The cloud as it is. Waits for the device.
+    pub fn cloud(&self) -> Result<GaussianCloud, GpuError> {
+        let packed = self.cloud.read(&self.context, self.len(), self.shape.degree)?;
+        Ok(GaussianCloud { origin: self.shape.origin, ..packed.to_cloud() })
+    }
+
+    /// The cloud and Adam's first and second moments, laid out like it. Waits for the device.
+    pub fn download(&self) -> Result<(GaussianCloud, [GaussianCloud; 2]), GpuError> {
+        let moment = |m: &Parameters| -> Result<GaussianCloud, GpuError> {
+            let packed = m.read(&self.context, self.len(), self.shape.degree)?;
+            Ok(GaussianCloud { origin: self.shape.origin, ..packed.to_cloud() })
+        };
+        let [first, second] = &self.moments;
+        Ok((self.cloud()?, [moment(first)?, moment(second)?]))
+    }
+
+    /// Times the stages of every later step, where the device can; steps then wait for it.
+    pub fn measure(&mut self) -> Result<(), GpuError> {
+        self.timer = Timer::new(&self.context)?;
+        Ok(())
+    }
+
+    /// Seconds per stage of the last step; empty unless measured.
+    pub fn times(&self) -> &StageTimes {
+        &self.times
+    }
+}
