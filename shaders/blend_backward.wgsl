@@ -118,7 +118,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     var done: Sums;
     // Position in the list, plus one; 0 where the batch has no splat for this thread.
     var slot = 0u;
-    for (var s = 0u; s < items + BATCH; s++) {
+    // The steps after the last item hand over and flush the last batch.
+    for (var s = 0u; s <= items + BATCH; s++) {
         let phase = s % PIXELS;
         if phase == 0u && s < items {
             let back = (s / PIXELS) * BATCH + thread;
@@ -130,7 +131,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         if phase == BATCH && s > PIXELS {
             flush(done_id, done);
         }
-        if s >= thread && s - thread < items {
+        if s >= thread && s - thread <= items {
             let item = s - thread;
             let p = item % PIXELS;
             if p == 0u {
@@ -141,7 +142,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
                 sums = Sums();
                 let back = (item / PIXELS) * BATCH + thread;
                 slot = 0u;
-                if first + back < end {
+                if item < items && first + back < end {
                     slot = end - back;
                 }
             }
@@ -187,5 +188,4 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         }
         workgroupBarrier();
     }
-    flush(id, sums);
 }
