@@ -21,14 +21,14 @@ struct Window {
 }
 
 impl Window {
-    fn new(open: Option<PathBuf>) -> Self {
+    fn new(first: Option<Action>) -> Self {
         let folder = tempfile::tempdir().expect("folder");
         let places = Places { data: folder.path().join("data") };
         let harness = Harness::builder()
             .with_size([1200.0, 800.0])
             .with_max_steps(20)
             .wgpu()
-            .build_eframe(|cc| App::new(cc, PipelineJobs::new(places), open.map(Action::Open)).expect("threads"));
+            .build_eframe(|cc| App::new(cc, PipelineJobs::new(places), first).expect("threads"));
         Self { harness, _folder: folder }
     }
 
@@ -98,7 +98,7 @@ fn the_empty_window_offers_what_to_do() {
 #[test]
 fn a_path_that_is_not_there_gives_an_error_and_loses_nothing() {
     let folder = tempfile::tempdir().expect("folder");
-    let mut w = Window::new(Some(write_splat(folder.path())));
+    let mut w = Window::new(Some(Action::Open(write_splat(folder.path()))));
     w.until("the splat", |a| a.state.scene.is_some());
     w.until("its picture", |a| a.viewport.picture().is_some());
     w.ask(Action::Open("/no/such/scene".into()));
@@ -113,7 +113,7 @@ fn a_path_that_is_not_there_gives_an_error_and_loses_nothing() {
 #[test]
 fn a_splat_is_drawn_in_every_mode_and_only_when_something_changes() {
     let folder = tempfile::tempdir().expect("folder");
-    let mut w = Window::new(Some(write_splat(folder.path())));
+    let mut w = Window::new(Some(Action::Open(write_splat(folder.path()))));
     w.until("a picture at rest", |a| a.viewport.picture().is_some_and(|p| p.full && p.median_depth.is_some()));
     let bright =
         |a: &App| a.viewport.picture().expect("drawn").rgb.iter().filter(|p| p.iter().any(|c| *c > 60)).count();
@@ -137,7 +137,7 @@ fn a_splat_is_drawn_in_every_mode_and_only_when_something_changes() {
 #[test]
 fn keys_move_the_eye_and_home_brings_it_back() {
     let folder = tempfile::tempdir().expect("folder");
-    let mut w = Window::new(Some(write_splat(folder.path())));
+    let mut w = Window::new(Some(Action::Open(write_splat(folder.path()))));
     w.until("a picture", |a| a.viewport.picture().is_some());
     let center = |a: &App| a.viewport.picture().expect("drawn").camera.center;
     let home = center(w.app());
@@ -164,4 +164,132 @@ fn the_palette_and_the_shortcut_sheet_list_the_actions() {
     w.harness.key_press(egui::Key::F1);
     w.harness.run_steps(3);
     assert!(w.shows("Keyboard and mouse") && w.shows("Ctrl+P"));
+}
+
+/// Photos of a few coloured boxes, as the program's own ray caster makes them.
+fn write_photos(out: &std::path::Path) {
+    use fmlgs::pipeline::observer::Silent;
+    use fmlgs::pipeline::synth::{self, SynthOptions};
+    let glb = out.with_extension("glb");
+    std::fs::write(&glb, synth::demo_glb()).expect("write");
+    let options = SynthOptions {
+        views: 8,
+        held_out: 1,
+        width_px: 96,
+        height_px: 72,
+        samples: 1,
+        points: 600,
+        ..SynthOptions::default()
+    };
+    synth::run(&glb, &options, out, &mut Silent).expect("photos");
+}
+
+fn last_step(app: &App) -> u64 {
+    app.state.history.steps.last().map_or(0, |s| s.step)
+}
+
+#[test]
+fn training_moves_the_plot_pauses_resumes_and_is_cancelled() {
+    let folder = tempfile::tempdir().expect("folder");
+    let photos = folder.path().join("boxes");
+    write_photos(&photos);
+    let mut w = Window::new(Some(Action::Open(photos)));
+    w.until("the photos", |a| a.state.scene.is_some());
+    assert!(w.shows("7 train") && w.shows("1 held out"), "the photos pane");
+    assert!(w.shows("Feature buffers"), "the scene plan");
+    w.harness.state_mut().layout.config.steps = 50_000;
+    w.click("Start training");
+    w.until("the plot", |a| a.state.history.steps.len() >= 5);
+    assert!(w.shows("Pause") && w.shows("Held-out PSNR"));
+    let before = w.app().viewport.picture().map(|p| p.ticket);
+    w.until("a newer picture of the scene", |a| a.viewport.picture().map(|p| p.ticket) > before);
+
+    w.harness.key_press(egui::Key::T);
+    w.until("the pause", |a| a.state.job.as_ref().is_some_and(|j| j.paused));
+    // A step that was under way may still report.
+    std::thread::sleep(Duration::from_millis(200));
+    w.harness.run_steps(2);
+    let held = last_step(w.app());
+    std::thread::sleep(Duration::from_millis(300));
+    w.harness.run_steps(2);
+    assert_eq!(last_step(w.app()), held, "nothing moves while paused");
+    w.click("Resume");
+    w.until("further steps", |a| last_step(a) > held);
+
+    w.harness.key_press(egui::Key::Escape);
+    w.until("the end", |a| a.state.job.is_none());
+    assert!(w.app().state.error.is_none(), "{:?}", w.app().state.error);
+    let reached = last_step(w.app());
+    assert!(reached < 50_000);
+    assert!(w.app().viewport.cloud().is_some_and(|c| !c.is_empty()), "what was trained stays");
+
+    w.click("Start training");
+    w.until("going on from the checkpoint", |a| last_step(a) > reached);
+    assert!(w.app().state.history.steps.iter().any(|s| s.step < reached), "the curve goes on where it was");
+    w.ask(Action::Cancel);
+    w.until("the end", |a| a.state.job.is_none());
+}
+
+#[test]
+fn looking_through_a_photo_compares_it_with_the_picture() {
+    let folder = tempfile::tempdir().expect("folder");
+    let photos = folder.path().join("boxes");
+    write_photos(&photos);
+    let mut w = Window::new(Some(Action::Open(photos)));
+    w.until("the photos", |a| a.state.scene.is_some());
+    w.harness.key_press(egui::Key::CloseBracket);
+    w.until("the first photo", |a| a.viewport.photo_index() == Some(0));
+    w.harness.key_press(egui::Key::CloseBracket);
+    w.until("its PSNR", |a| {
+        a.viewport.photo_index() == Some(1) && a.viewport.picture().is_some_and(|p| p.psnr.is_some())
+    });
+    let scene = w.app().state.scene.clone().expect("open");
+    let photo = &scene.dataset.as_ref().expect("photos").photos[1];
+    let drawn = &w.app().viewport.picture().expect("drawn").camera;
+    assert_eq!(drawn.center, photo.camera.center);
+    assert!(
+        (drawn.focal_px / f64::from(drawn.width_px) - photo.camera.focal_px / f64::from(photo.camera.width_px))
+            .length()
+            < 1e-3
+    );
+    w.harness.key_press(egui::Key::C);
+    w.harness.run_steps(3);
+    assert!(w.app().layout.compare);
+    assert!(w.is_drawn());
+    w.ask(Action::FrameScene);
+    assert_eq!(w.app().viewport.photo_index(), None);
+}
+
+#[test]
+fn opening_something_else_while_a_job_runs_asks_first() {
+    let folder = tempfile::tempdir().expect("folder");
+    let photos = folder.path().join("boxes");
+    write_photos(&photos);
+    let splat = write_splat(folder.path());
+    let mut w = Window::new(Some(Action::Open(photos)));
+    w.until("the photos", |a| a.state.scene.is_some());
+    w.harness.state_mut().layout.config.steps = 50_000;
+    w.ask(Action::StartTraining);
+    w.until("training", |a| a.state.is_training());
+    w.ask(Action::Open(splat.clone()));
+    assert!(w.shows("still running"));
+    w.click("Keep it running");
+    assert!(w.app().state.is_training());
+    w.ask(Action::Open(splat));
+    w.click("Cancel it and go on");
+    w.until("the splat", |a| a.state.scene.as_ref().is_some_and(|s| s.name == "dots"));
+}
+
+#[test]
+fn a_photo_that_is_broken_is_marked_and_the_rest_stays_usable() {
+    let folder = tempfile::tempdir().expect("folder");
+    let photos = folder.path().join("boxes");
+    write_photos(&photos);
+    let broken = photos.join("images/0003.png");
+    let bytes = std::fs::read(&broken).expect("a photo");
+    std::fs::write(&broken, &bytes[..bytes.len() / 2]).expect("write");
+    let mut w = Window::new(Some(Action::Open(photos)));
+    w.until("the warning", |a| a.state.log.iter().any(|l| l.text.contains("0003.png")));
+    assert!(w.app().state.error.is_none(), "it is no reason to stop a person");
+    assert!(w.app().state.scene.is_some());
 }

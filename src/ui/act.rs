@@ -105,7 +105,9 @@ impl App {
             self.state.toast(Tone::Warning, text);
             return;
         }
-        self.submit(Command::Train { dataset, config: self.layout.config.clone(), out });
+        let config = self.layout.config.clone();
+        self.state.antialias = config.antialias;
+        self.submit(Command::Train { dataset, config, out });
     }
 
     fn evaluate(&mut self) {

@@ -23,7 +23,7 @@ use crate::worker::Action;
 use crate::worker::jobs::PipelineJobs;
 use crate::worker::places::Places;
 
-/// Opens the window, does `first` if given, and returns when the window is closed.
+/// Opens the window, does `first` in it, and returns when it is closed.
 pub fn run(first: Option<Action>) -> eframe::Result {
     let viewport = egui::ViewportBuilder::default()
         .with_title("FMLGS")

@@ -90,6 +90,8 @@ pub struct AppState {
     pub scene_number: u64,
     /// What is left out for the scene, and why.
     pub plan: ScenePlan,
+    /// Whether the Gaussians on screen want the 2-D filter of Mip-Splatting.
+    pub antialias: bool,
     /// The long job that runs.
     pub job: Option<RunningJob>,
     /// Training of the present scene.
@@ -256,6 +258,7 @@ impl AppState {
         }
         self.scene_number += 1;
         self.plan = scene.plan.clone();
+        self.antialias = scene.render.antialias;
         self.scene = Some(Arc::new(scene));
     }
 

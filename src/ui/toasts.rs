@@ -31,6 +31,7 @@ impl Toasts {
         for toast in state.toasts.iter().rev().take(MOST) {
             let shown = Area::new(Id::unique(("toast", toast.id)))
                 .order(Order::Foreground)
+                .sense(egui::Sense::click())
                 .pivot(Align2::RIGHT_BOTTOM)
                 .fixed_pos(egui::pos2(area.right() - 14.0, y))
                 .show(ctx, |ui| {
@@ -46,7 +47,7 @@ impl Toasts {
                         },
                     );
                 });
-            if shown.response.interact(egui::Sense::click()).on_hover_text("Click to dismiss").clicked() {
+            if shown.response.clone().on_hover_text("Click to dismiss").clicked() {
                 dismissed = Some(toast.id);
             }
             y -= shown.response.rect.height() + 8.0;

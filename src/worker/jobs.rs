@@ -11,6 +11,7 @@ use super::thread::Jobs;
 use crate::io::{self, IoError, OpenError, Opened, TrainedScene, trained};
 use crate::pipeline::evaluate::evaluate;
 use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::synth::{SynthError, demo};
 use crate::pipeline::train::checkpoint::CheckpointError;
 use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainError};
 use crate::render::RenderSettings;
@@ -50,6 +51,17 @@ impl PipelineJobs {
         }
         scene.plan = self.plan(dataset, cloud.filter(|_| scene.trained), &TrainConfig::default());
         Ok(scene)
+    }
+
+    fn demo(&self, observer: &mut dyn Observer) -> Result<Outcome, Stop> {
+        let out = self.places.demo();
+        if !demo::demo_is_written(&out) {
+            demo::write_demo(&out, observer).map_err(|e| match e {
+                SynthError::Cancelled => Stop::Cancelled,
+                e => Stop::Failed(Failure::of(&e, "")),
+            })?;
+        }
+        Ok(Outcome::Opened(Box::new(self.open(&out, observer)?)))
     }
 
     fn train(
@@ -97,23 +109,39 @@ impl PipelineJobs {
             }
         });
         let name = dataset.name.clone();
+        let mut render = render_settings(dataset.background, false);
         let dataset = Some(Arc::new(dataset));
         match before {
-            Some(TrainedScene { info, cloud, .. }) => OpenedScene {
-                name,
-                dataset,
-                cloud: Some(Arc::new(cloud)),
-                trained: true,
-                out,
-                history: info.history,
-                ..OpenedScene::default()
-            },
+            Some(TrainedScene { info, cloud, .. }) => {
+                render.antialias = config_of(info.config).antialias;
+                let cloud = Some(Arc::new(cloud));
+                OpenedScene {
+                    name,
+                    dataset,
+                    cloud,
+                    trained: true,
+                    out,
+                    history: info.history,
+                    render,
+                    ..OpenedScene::default()
+                }
+            }
             None => {
                 let cloud = dataset.as_deref().and_then(sparse_cloud).map(Arc::new);
-                OpenedScene { name, dataset, cloud, out, ..OpenedScene::default() }
+                OpenedScene { name, dataset, cloud, out, render, ..OpenedScene::default() }
             }
         }
     }
+}
+
+fn render_settings(background: Option<[f32; 3]>, antialias: bool) -> RenderSettings {
+    RenderSettings { background: background.unwrap_or_default(), antialias, ..RenderSettings::default() }
+}
+
+/// The settings of a training; those of a later version of the program may not parse, and only the
+/// filter is needed here.
+fn config_of(config: serde_json::Value) -> TrainConfig {
+    serde_json::from_value(config).unwrap_or_default()
 }
 
 /// A trained scene, with its photos if they are still where they were.
@@ -138,12 +166,14 @@ fn trained_scene(scene: TrainedScene, observer: &mut dyn Observer) -> OpenedScen
         }
     };
     let TrainedScene { folder, info, cloud } = scene;
+    let render = render_settings(info.background, config_of(info.config).antialias);
     let mut opened = OpenedScene {
         name: info.name,
         dataset,
         trained: true,
         out: folder,
         history: info.history,
+        render,
         ..OpenedScene::default()
     };
     opened.home = home_view(opened.dataset.as_deref(), Some(&cloud));
@@ -190,11 +220,7 @@ fn measure(
     }
     let views = train::load_views(dataset, &held, config, "Loading held-out photos", observer);
     let views = views.map_err(|e| Stop::Failed(Failure::of(&e, "")))?.ok_or(Stop::Cancelled)?;
-    let settings = RenderSettings {
-        background: dataset.background.unwrap_or([0.0; 3]),
-        antialias: config.antialias,
-        ..RenderSettings::default()
-    };
+    let settings = render_settings(dataset.background, config.antialias);
     let evaluation = evaluate(cloud, &views, &settings, 0, 0.0).map_err(|e| Stop::Failed(Failure::of(&e, "")))?;
     Ok(Outcome::Evaluated(evaluation))
 }

@@ -8,6 +8,7 @@ use glam::DVec3;
 use crate::io::trained::History;
 use crate::pipeline::observer::{Evaluation, Level, Progress, StepMetrics};
 use crate::pipeline::train::TrainConfig;
+use crate::render::RenderSettings;
 use crate::scene::{Bounds, Camera, Dataset, GaussianCloud, Photo, PhotoPixels, ScenePlan};
 
 /// Names one job of one worker.
@@ -170,6 +171,8 @@ pub struct OpenedScene {
     pub history: History,
     /// How to look at it at first.
     pub home: HomeView,
+    /// How to draw it: background and filter.
+    pub render: RenderSettings,
     /// What is left out for it, and why.
     pub plan: ScenePlan,
 }

@@ -30,7 +30,7 @@ impl Effort {
     fn budget_secs(self) -> Option<f64> {
         match self {
             Self::Moving => Some(0.030),
-            Self::Shared => Some(0.080),
+            Self::Shared => Some(0.120),
             Self::Full => None,
         }
     }
@@ -45,10 +45,8 @@ pub struct ViewRequest {
     pub camera: Camera,
     /// What of it.
     pub mode: ViewMode,
-    /// Highest spherical-harmonics degree to draw.
-    pub sh_degree: u8,
-    /// Colour behind everything.
-    pub background: [f32; 3],
+    /// How: degree of the colours, background, filter. Depth is drawn where it is needed.
+    pub settings: RenderSettings,
     /// How long it may take.
     pub effort: Effort,
     /// The photo taken from this camera, for the difference and for PSNR.
@@ -156,8 +154,15 @@ fn next(mailbox: &(Mutex<Mailbox>, Condvar)) -> Option<ViewRequest> {
 #[derive(Default)]
 struct Painter {
     renderer: Renderer<f32>,
-    /// Seconds per pixel lately; `None` before the first picture.
-    secs_per_px: Option<f64>,
+    /// What pictures cost lately; `None` before the first.
+    cost: Option<Cost>,
+}
+
+/// What a picture costs: the part that every Gaussian has at any size, and that of the pixels.
+#[derive(Clone, Copy, Debug)]
+struct Cost {
+    fixed_secs: f64,
+    secs_per_px: f64,
 }
 
 impl Painter {
@@ -175,8 +180,7 @@ impl Painter {
             }
         };
         let secs = start.elapsed().as_secs_f64();
-        let now = secs / f64::from(camera.width_px * camera.height_px);
-        self.secs_per_px = Some(self.secs_per_px.map_or(now, |s| 0.7 * s + 0.3 * now));
+        self.learn(f64::from(camera.width_px * camera.height_px));
         let drawn = paint::paint(&frame, request.mode, request.photo.as_deref());
         let median_depth = (!frame.median_depth.is_empty()).then_some(frame.median_depth);
         Ok(ViewPicture {
@@ -192,22 +196,32 @@ impl Painter {
     }
 
     fn render(&mut self, request: &ViewRequest, camera: &Camera) -> Result<Frame<f32>, RenderError> {
-        let settings = RenderSettings {
-            sh_degree: request.sh_degree,
-            background: request.background,
-            depth: request.effort == Effort::Full || request.mode == ViewMode::Depth,
-            ..RenderSettings::default()
-        };
+        let depth = request.effort == Effort::Full || request.mode == ViewMode::Depth;
+        let settings = RenderSettings { depth, ..request.settings.clone() };
         self.renderer.render(&request.cloud, Features::NONE, camera, &settings)
+    }
+
+    /// Takes in what the last frame cost.
+    fn learn(&mut self, pixels: f64) {
+        let [project, sort, bin, blend] = self.renderer.stats().stage_secs;
+        let now = Cost { fixed_secs: project + sort, secs_per_px: (bin + blend) / pixels };
+        let old = self.cost.unwrap_or(now);
+        let mix = |old: f64, new: f64| 0.6 * old + 0.4 * new;
+        self.cost = Some(Cost {
+            fixed_secs: mix(old.fixed_secs, now.fixed_secs),
+            secs_per_px: mix(old.secs_per_px, now.secs_per_px),
+        });
     }
 
     /// The camera at a resolution that is likely to keep to the budget.
     fn fitting_camera(&self, camera: &Camera, effort: Effort) -> Camera {
         let pixels = f64::from(camera.width_px) * f64::from(camera.height_px);
         // The first picture says how fast this machine is with this scene; it must be quick itself.
-        let secs_per_px = self.secs_per_px.unwrap_or(4e-7);
+        let cost = self.cost.unwrap_or(Cost { fixed_secs: 0.0, secs_per_px: 4e-7 });
         let Some(budget) = effort.budget_secs() else { return camera.clone() };
-        let scale = (budget / (secs_per_px * pixels)).sqrt().clamp(0.2, 1.0);
+        // Where the fixed part alone breaks the budget, smaller pictures would help nobody.
+        let left = (budget - cost.fixed_secs).max(0.4 * budget);
+        let scale = (left / (cost.secs_per_px * pixels)).sqrt().clamp(0.2, 1.0);
         // In quarter-octave steps, so that the picture does not change its grain all the time.
         let scale = 2.0_f64.powf((scale.log2() * 4.0).floor() / 4.0);
         if scale >= 1.0 {
@@ -226,13 +240,15 @@ mod tests {
     #[test]
     fn a_slow_machine_draws_smaller_while_the_eye_moves() {
         let camera = Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 1000, 600).expect("valid");
-        let slow = Painter { secs_per_px: Some(1e-6), ..Painter::default() };
+        let of = |fixed_secs, secs_per_px| Painter { cost: Some(Cost { fixed_secs, secs_per_px }), ..Painter::default() };
+        let slow = of(0.0, 1e-6);
         let moving = slow.fitting_camera(&camera, Effort::Moving);
         assert!(moving.width_px < 300, "{}", moving.width_px);
         assert!((f64::from(moving.width_px) / f64::from(moving.height_px) - 5.0 / 3.0).abs() < 0.02);
         assert!(slow.fitting_camera(&camera, Effort::Shared).width_px > moving.width_px);
         assert_eq!(slow.fitting_camera(&camera, Effort::Full), camera);
-        let fast = Painter { secs_per_px: Some(1e-9), ..Painter::default() };
-        assert_eq!(fast.fitting_camera(&camera, Effort::Moving), camera);
+        assert_eq!(of(0.0, 1e-9).fitting_camera(&camera, Effort::Moving), camera);
+        // A scene whose Gaussians alone take longer than the budget is not drawn any smaller for it.
+        assert_eq!(of(5.0, 1e-9).fitting_camera(&camera, Effort::Moving), camera);
     }
 }

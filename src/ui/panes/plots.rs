@@ -49,6 +49,7 @@ fn plot(name: &'static str, quantity: &'static str, axis: PlotAxis) -> Plot<'sta
         .show_grid(Vec2b::new(true, true))
         .grid_color(theme::LINE)
         .allow_scroll(false)
+        .include_x(0.0)
         .allow_boxed_zoom(false)
         .set_margin_fraction(egui::vec2(0.02, 0.08))
         .y_axis_min_width(34.0)

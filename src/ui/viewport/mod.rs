@@ -16,6 +16,7 @@ use self::photo::PhotoView;
 use super::layout::Layout;
 use super::state::AppState;
 use super::theme;
+use crate::render::RenderSettings;
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
 use crate::worker::view::{Effort, ViewLane, ViewPicture, ViewRequest};
 use crate::worker::{Action, CloudSnapshot, OpenedScene, Repaint, ViewMode, Worker};
@@ -257,8 +258,11 @@ impl Viewport {
             cloud: Arc::clone(cloud),
             camera: asked.camera.clone(),
             mode: asked.mode,
-            sh_degree: if state.is_training() { 3 } else { state.plan.sh_degree },
-            background: scene.dataset.as_ref().and_then(|d| d.background).unwrap_or([0.0; 3]),
+            settings: RenderSettings {
+                sh_degree: if state.is_training() { 3 } else { state.plan.sh_degree },
+                antialias: state.antialias,
+                ..scene.render.clone()
+            },
             effort,
             photo,
             ticket: self.tickets,
