@@ -1,12 +1,15 @@
 //! The whole window, headless: what a person sees and does, with the software adapter.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
+use fmlgs::pipeline::observer::Silent;
+use fmlgs::pipeline::synth::{self, SynthOptions};
 use fmlgs::ui::app::App;
 use fmlgs::worker::jobs::PipelineJobs;
 use fmlgs::worker::places::Places;
@@ -70,7 +73,7 @@ impl Window {
 }
 
 /// A splat of a few Gaussians.
-fn write_splat(folder: &std::path::Path) -> PathBuf {
+fn write_splat(folder: &Path) -> PathBuf {
     let n = 40;
     let cloud = fmlgs::scene::GaussianCloud {
         positions: (0..n).map(|i| [(i % 7) as f32 * 0.1, (i / 7) as f32 * 0.1, 0.0]).collect(),
@@ -166,11 +169,20 @@ fn the_palette_and_the_shortcut_sheet_list_the_actions() {
     assert!(w.shows("Keyboard and mouse") && w.shows("Ctrl+P"));
 }
 
-/// Photos of a few coloured boxes, as the program's own ray caster makes them.
-fn write_photos(out: &std::path::Path) {
-    use fmlgs::pipeline::observer::Silent;
-    use fmlgs::pipeline::synth::{self, SynthOptions};
+/// A few photos of the demo scene, as the program's own ray caster makes them; the same for all tests.
+fn photos() -> PathBuf {
+    static ONCE: OnceLock<PathBuf> = OnceLock::new();
+    ONCE.get_or_init(|| {
+        let out = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("ui_photos/table");
+        write_photos(&out);
+        out
+    })
+    .clone()
+}
+
+fn write_photos(out: &Path) {
     let glb = out.with_extension("glb");
+    std::fs::create_dir_all(out).expect("folder");
     std::fs::write(&glb, synth::demo_glb()).expect("write");
     let options = SynthOptions {
         views: 8,
@@ -190,10 +202,7 @@ fn last_step(app: &App) -> u64 {
 
 #[test]
 fn training_moves_the_plot_pauses_resumes_and_is_cancelled() {
-    let folder = tempfile::tempdir().expect("folder");
-    let photos = folder.path().join("boxes");
-    write_photos(&photos);
-    let mut w = Window::new(Some(Action::Open(photos)));
+    let mut w = Window::new(Some(Action::Open(photos())));
     w.until("the photos", |a| a.state.scene.is_some());
     assert!(w.shows("7 train") && w.shows("1 held out"), "the photos pane");
     assert!(w.shows("Feature buffers"), "the scene plan");
@@ -232,10 +241,7 @@ fn training_moves_the_plot_pauses_resumes_and_is_cancelled() {
 
 #[test]
 fn looking_through_a_photo_compares_it_with_the_picture() {
-    let folder = tempfile::tempdir().expect("folder");
-    let photos = folder.path().join("boxes");
-    write_photos(&photos);
-    let mut w = Window::new(Some(Action::Open(photos)));
+    let mut w = Window::new(Some(Action::Open(photos())));
     w.until("the photos", |a| a.state.scene.is_some());
     w.harness.key_press(egui::Key::CloseBracket);
     w.until("the first photo", |a| a.viewport.photo_index() == Some(0));
@@ -263,10 +269,8 @@ fn looking_through_a_photo_compares_it_with_the_picture() {
 #[test]
 fn opening_something_else_while_a_job_runs_asks_first() {
     let folder = tempfile::tempdir().expect("folder");
-    let photos = folder.path().join("boxes");
-    write_photos(&photos);
     let splat = write_splat(folder.path());
-    let mut w = Window::new(Some(Action::Open(photos)));
+    let mut w = Window::new(Some(Action::Open(photos())));
     w.until("the photos", |a| a.state.scene.is_some());
     w.harness.state_mut().layout.config.steps = 50_000;
     w.ask(Action::StartTraining);
@@ -283,7 +287,7 @@ fn opening_something_else_while_a_job_runs_asks_first() {
 #[test]
 fn a_photo_that_is_broken_is_marked_and_the_rest_stays_usable() {
     let folder = tempfile::tempdir().expect("folder");
-    let photos = folder.path().join("boxes");
+    let photos = folder.path().join("table");
     write_photos(&photos);
     let broken = photos.join("images/0003.png");
     let bytes = std::fs::read(&broken).expect("a photo");

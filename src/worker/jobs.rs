@@ -188,9 +188,7 @@ impl Jobs for PipelineJobs {
     fn run(&self, command: Command, observer: &mut dyn Observer) -> Result<Outcome, Stop> {
         match command {
             Command::Open { path } => Ok(Outcome::Opened(Box::new(self.open(&path, observer)?))),
-            Command::Demo => {
-                Err(Stop::Failed(Failure { message: "This build has no demo yet".into(), remedy: String::new() }))
-            }
+            Command::Demo => self.demo(observer),
             Command::Train { dataset, config, out } => self.train(&dataset, &config, out, observer),
             Command::Evaluate { dataset, cloud, config } => measure(&dataset, &cloud, &config, observer),
             Command::Export { cloud, path } => export(&cloud, &path),

@@ -240,7 +240,8 @@ mod tests {
     #[test]
     fn a_slow_machine_draws_smaller_while_the_eye_moves() {
         let camera = Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 1000, 600).expect("valid");
-        let of = |fixed_secs, secs_per_px| Painter { cost: Some(Cost { fixed_secs, secs_per_px }), ..Painter::default() };
+        let of =
+            |fixed_secs, secs_per_px| Painter { cost: Some(Cost { fixed_secs, secs_per_px }), ..Painter::default() };
         let slow = of(0.0, 1e-6);
         let moving = slow.fitting_camera(&camera, Effort::Moving);
         assert!(moving.width_px < 300, "{}", moving.width_px);
