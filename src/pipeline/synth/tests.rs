@@ -77,6 +77,30 @@ fn ids_and_depth_of_boxes_are_exact() {
 }
 
 #[test]
+fn no_ray_slips_through_an_edge_or_along_an_axis() {
+    let (root, bin) = cubes(json!([{ "mesh": 0 }]), json!([0]), json!([]));
+    let stage = stage_of(&gltf_mesh::read_slice(&glb(&root, &bin), "t.glb").unwrap());
+    let steps = 64;
+    for i in 1..steps {
+        for j in 1..steps {
+            // Multiples of a 64th meet the edges of the split faces exactly.
+            let (u, v) = (f64::from(i) / f64::from(steps) - 0.5, f64::from(j) / f64::from(steps) - 0.5);
+            for [from, to] in [
+                [DVec3::new(u, v, 2.0), DVec3::NEG_Z],
+                [DVec3::new(2.0, u, v), DVec3::NEG_X],
+                [DVec3::new(u, -2.0, v), DVec3::Y],
+                [DVec3::new(u, v, 2.0), DVec3::new(1e-5, -0.0, -1.0)],
+            ] {
+                let hit = stage.tracer.nearest(stage.surface.local(from), to.as_vec3a(), 0.0);
+                let t = hit.map(|h| f64::from(h.t) * stage.surface.unit);
+                assert!(t.is_some_and(|t| (t - 1.5).abs() < 1e-5), "{from} {to}: {t:?}");
+            }
+        }
+    }
+    assert!(stage.tracer.nearest(stage.surface.local(DVec3::new(0.51, 0.0, 2.0)), glam::Vec3A::NEG_Z, 0.0).is_none());
+}
+
+#[test]
 fn anti_aliasing_covers_edges_by_area() {
     // An unlit black cube on white: a pixel's value tells how much of it the cube covers.
     let black = json!([{ "pbrMetallicRoughness": { "baseColorFactor": [0, 0, 0, 1] }, "extensions": { "KHR_materials_unlit": {} } }]);
@@ -524,4 +548,7 @@ fn the_demo_shows_every_thing_and_part() {
         assert!(identity.views >= enough, "{} is seen in {} of 64 photos", identity.path, identity.views);
     }
     assert!(!demo::demo_is_written(out.path()), "other settings than the demo's");
+    if let Some(keep) = std::env::var_os("SYNTH_KEEP") {
+        println!("{:.2}", demo::write_demo(Path::new(&keep), &mut Silent).unwrap().secs);
+    }
 }

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use glam::{Vec3, Vec3A};
 use obvhs::BvhBuildParams;
-use obvhs::cwbvh::CwBvh;
-use obvhs::cwbvh::builder::build_cwbvh_from_tris;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::builder::build_bvh2_from_tris;
 use obvhs::ray::{Ray, RayHit};
 use obvhs::rt_triangle::RtTriangle;
 
@@ -25,9 +25,10 @@ pub struct Hit {
     pub weights: Vec3,
 }
 
-/// The hierarchy over a surface.
+/// The hierarchy over a surface: a binary one, because the compressed wide one loses rays that are
+/// nearly parallel to an axis (its box test subtracts large products).
 pub struct Tracer {
-    bvh: CwBvh,
+    bvh: Bvh2,
     /// In the order of the hierarchy's leaves.
     triangles: Vec<RtTriangle>,
     /// Index in the surface of each.
@@ -43,7 +44,7 @@ impl Tracer {
             .map(|t| surface.corners(t))
             .map(|[v0, v1, v2]| obvhs::triangle::Triangle { v0, v1, v2 })
             .collect();
-        let bvh = build_cwbvh_from_tris(&triangles, BvhBuildParams::fast_build(), &mut Duration::default());
+        let bvh = build_bvh2_from_tris(&triangles, BvhBuildParams::medium_build(), &mut Duration::default());
         let original = bvh.primitive_indices.clone();
         let triangles = original.iter().map(|&i| RtTriangle::from(&triangles[i as usize])).collect();
         Self { bvh, triangles, original }
