@@ -127,7 +127,9 @@ fn window(first: Option<Action>, open_window: OpenWindow) -> Result<(), CliError
              'fmlgs demo --headless' shows what the program does; 'fmlgs --help' lists what works without a window",
         ));
     }
-    open_window(first).map_err(|error| CliError::failed(format!("the window could not be opened: {error}")))
+    open_window(first).map_err(|error| {
+        CliError::failed(format!("the window could not be opened: {error}. 'fmlgs demo --headless' works without one"))
+    })
 }
 
 #[cfg(test)]

@@ -18,14 +18,14 @@ pub struct Console {
     terminal: bool,
     bar: Option<(String, ProgressBar)>,
     metrics: String,
-    last_line: Option<Instant>,
+    last_line: Instant,
 }
 
 impl Console {
     /// `quiet` shows warnings only.
     pub fn new(quiet: bool) -> Self {
         let terminal = std::io::stderr().is_terminal();
-        Self { quiet, terminal, bar: None, metrics: String::new(), last_line: None }
+        Self { quiet, terminal, bar: None, metrics: String::new(), last_line: Instant::now() }
     }
 
     /// Prints a line without disturbing the bar.
@@ -75,9 +75,8 @@ impl Observer for Console {
             }
             return;
         }
-        let due = self.last_line.is_none_or(|at| at.elapsed() >= LINE_INTERVAL);
-        if due {
-            self.last_line = Some(Instant::now());
+        if self.last_line.elapsed() >= LINE_INTERVAL {
+            self.last_line = Instant::now();
             let (done, total) = (HumanCount(progress.done), HumanCount(progress.total));
             eprintln!("{} {done}/{total} {} {}", progress.stage, rate_and_times(&progress), self.metrics);
         }
