@@ -163,7 +163,8 @@ fn a_gradient_of_the_wrong_size_is_refused() {
 #[test]
 fn the_comparison_catches_bias_turning_and_outliers() {
     let oracle: Vec<f64> = (0..1_000).map(|i| (f64::from(i) * 0.37).sin()).collect();
-    let ours = |f: &dyn Fn(usize, f64) -> f64| oracle.iter().enumerate().map(|(i, &v)| f(i, v) as f32).collect::<Vec<_>>();
+    let ours =
+        |f: &dyn Fn(usize, f64) -> f64| oracle.iter().enumerate().map(|(i, &v)| f(i, v) as f32).collect::<Vec<_>>();
     let check = |values: &[f32]| agree("x", values, &oracle, &vec![true; 1_000], INTERIOR);
     check(&ours(&|_, v| v)).unwrap();
     check(&ours(&|i, v| v + if i % 2 == 0 { 3e-4 } else { -3e-4 })).unwrap();

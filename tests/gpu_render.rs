@@ -115,7 +115,8 @@ fn list_faults(scene: &Scene, found: &fmlgs::render::gpu::renderer::Inspection) 
     let mut faults = 0;
     for (t, range) in found.ranges.iter().enumerate() {
         let list = &found.list[range[0] as usize..range[1] as usize];
-        faults += list.windows(2).filter(|w| found.splats[w[0] as usize].depth > found.splats[w[1] as usize].depth).count();
+        faults +=
+            list.windows(2).filter(|w| found.splats[w[0] as usize].depth > found.splats[w[1] as usize].depth).count();
         let corner = [(t % columns) * TILE_PX, (t / columns) * TILE_PX];
         for (i, s) in found.splats.iter().enumerate().filter(|(_, s)| s.radius > 0.0) {
             let mut needed = false;
@@ -160,12 +161,9 @@ fn pictures_match_the_oracle() {
     with_context(|context| {
         let mut renderer = Renderer::new(context).unwrap();
         // Sizes beside multiples of the tile, every degree, channels below, at and over a pass.
-        for (degree, channels, antialias, size) in [
-            (0, 0, false, [33, 17]),
-            (1, 1, false, [64, 48]),
-            (2, 6, true, [70, 50]),
-            (3, 20, false, [47, 31]),
-        ] {
+        for (degree, channels, antialias, size) in
+            [(0, 0, false, [33, 17]), (1, 1, false, [64, 48]), (2, 6, true, [70, 50]), (3, 20, false, [47, 31])]
+        {
             let mut scene = Scene::new(250, degree, channels, size);
             scene.settings.antialias = antialias;
             let oracle = scene.oracle();

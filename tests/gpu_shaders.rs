@@ -36,7 +36,8 @@ fn compare(source: &str, twins: &[Twin], seen: &mut BTreeSet<&'static str>) -> V
         seen.insert(twin.name);
         let theirs: Vec<_> = members.iter().map(|m| (m.name.as_deref().unwrap_or(""), m.offset as usize)).collect();
         if theirs != twin.fields || *span as usize != twin.size {
-            complaints.push(format!("{}: {theirs:?} span {span}, host {:?} size {}", twin.name, twin.fields, twin.size));
+            complaints
+                .push(format!("{}: {theirs:?} span {span}, host {:?} size {}", twin.name, twin.fields, twin.size));
         }
     }
     complaints

@@ -174,8 +174,10 @@ fn one_step_moves_every_group_as_the_cpu_does() {
         assert!(strays(&lesson.cloud, &want, &lesson.rates) > 0.5, "the comparison sees a step that was not made");
         // Bands above the active one have not moved.
         let stride = got.sh_stride();
-        assert!((0..got.len()).all(|i| got.sh[i * stride + 9..(i + 1) * stride]
-            == lesson.cloud.sh[i * stride + 9..(i + 1) * stride]));
+        assert!(
+            (0..got.len())
+                .all(|i| got.sh[i * stride + 9..(i + 1) * stride] == lesson.cloud.sh[i * stride + 9..(i + 1) * stride])
+        );
         let stats = trainer.stats().unwrap();
         let screen64: Vec<f64> = screen.iter().map(|&s| f64::from(s)).collect();
         let bounds = gpu_common::compare::BOUNDARY;

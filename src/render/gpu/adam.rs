@@ -73,7 +73,15 @@ impl Adam {
 
     /// Sets the constants of step `t`, counted from 1, for `gaussians` Gaussians of which `stored`
     /// degrees are kept and `active` trained. Gradients are cut to `clip`; 0 = not.
-    pub fn prepare(&self, context: &Context, gaussians: u32, [stored, active]: [u8; 2], rates: &Rates, t: u64, clip: f32) {
+    pub fn prepare(
+        &self,
+        context: &Context,
+        gaussians: u32,
+        [stored, active]: [u8; 2],
+        rates: &Rates,
+        t: u64,
+        clip: f32,
+    ) {
         let constants = Constants::new(t);
         for ((buffer, stride), rates) in self.steps.iter().zip(strides(stored)).zip(rates.records(active)) {
             let mut step = AdamStep {
@@ -93,7 +101,14 @@ impl Adam {
     }
 
     /// Records the step.
-    pub fn encode(&self, stage: &mut Stage<'_>, on: AdamBuffers<'_>, counters: &wgpu::Buffer, gaussians: u32, stored: u8) {
+    pub fn encode(
+        &self,
+        stage: &mut Stage<'_>,
+        on: AdamBuffers<'_>,
+        counters: &wgpu::Buffer,
+        gaussians: u32,
+        stored: u8,
+    ) {
         let [first, second] = on.moments;
         let marks = &on.gradient.buffers[0];
         for (k, stride) in strides(stored).into_iter().enumerate() {

@@ -35,12 +35,7 @@ impl Bin {
     }
 
     /// Records the count of pairs, after which the counters say whether they fit.
-    pub fn encode_count(
-        &self,
-        stage: &mut Stage<'_>,
-        shot: Shot<'_>,
-        scratch: &PerGaussian,
-    ) {
+    pub fn encode_count(&self, stage: &mut Stage<'_>, shot: Shot<'_>, scratch: &PerGaussian) {
         let order = &scratch.by_depth.values[scratch.by_depth.result()];
         let blocks = [shot.gaussians.div_ceil(BIN_BLOCK), 1, 1];
         stage.run(&self.sum_counts, &[shot.view, order, &scratch.tile_counts, &scratch.sums], blocks);
@@ -48,13 +43,7 @@ impl Bin {
     }
 
     /// Records the emission of pairs.
-    pub fn encode_emit(
-        &self,
-        stage: &mut Stage<'_>,
-        shot: Shot<'_>,
-        scratch: &PerGaussian,
-        pairs: &PerPair,
-    ) {
+    pub fn encode_emit(&self, stage: &mut Stage<'_>, shot: Shot<'_>, scratch: &PerGaussian, pairs: &PerPair) {
         let order = &scratch.by_depth.values[scratch.by_depth.result()];
         let buffers = [
             shot.view,
@@ -70,13 +59,7 @@ impl Bin {
     }
 
     /// Records the search for each tile's range, after the sort. `ranges` must be zero.
-    pub fn encode_ranges(
-        &self,
-        stage: &mut Stage<'_>,
-        shot: Shot<'_>,
-        pairs: &PerPair,
-        ranges: &wgpu::Buffer,
-    ) {
+    pub fn encode_ranges(&self, stage: &mut Stage<'_>, shot: Shot<'_>, pairs: &PerPair, ranges: &wgpu::Buffer) {
         let tiles = &pairs.by_tile.keys[pairs.by_tile.result()];
         stage.run(&self.ranges, &[shot.view, shot.counters, tiles, ranges], [RANGE_GROUPS, 1, 1]);
     }

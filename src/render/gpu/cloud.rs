@@ -75,11 +75,8 @@ impl Packed {
     pub fn of(cloud: &GaussianCloud) -> Self {
         let [_, low, high] = strides(cloud.sh_degree);
         let n = cloud.len();
-        let mut floats = [
-            Vec::with_capacity(n * GEOMETRY_STRIDE),
-            Vec::with_capacity(n * low),
-            Vec::with_capacity(n * high),
-        ];
+        let mut floats =
+            [Vec::with_capacity(n * GEOMETRY_STRIDE), Vec::with_capacity(n * low), Vec::with_capacity(n * high)];
         for i in 0..n {
             let g = cloud.gaussian(i);
             floats[0].extend(g.position);

@@ -181,7 +181,12 @@ impl Context {
         // Bindings may not be empty, and copies move whole words.
         let size = bytes.max(16).next_multiple_of(4);
         self.scoped(what, size, || {
-            self.device.create_buffer(&wgpu::BufferDescriptor { label: Some(what), size, usage, mapped_at_creation: false })
+            self.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(what),
+                size,
+                usage,
+                mapped_at_creation: false,
+            })
         })
     }
 
@@ -228,7 +233,8 @@ impl Context {
         }
         self.wait()?;
         for _ in &staged {
-            let mapped = receiver.try_recv().map_err(|_| GpuError::Lost("a copy to the host never ended".to_owned()))?;
+            let mapped =
+                receiver.try_recv().map_err(|_| GpuError::Lost("a copy to the host never ended".to_owned()))?;
             mapped.map_err(|e| GpuError::Lost(format!("a copy to the host failed: {e}")))?;
         }
         let mut out = Vec::with_capacity(staged.len());

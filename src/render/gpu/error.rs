@@ -7,7 +7,9 @@ use crate::scene::CloudError;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GpuError {
     /// No adapter at all, not even a software one.
-    #[error("no GPU adapter was found ({0}); install a graphics driver or Mesa's software Vulkan driver, or use the CPU backend")]
+    #[error(
+        "no GPU adapter was found ({0}); install a graphics driver or Mesa's software Vulkan driver, or use the CPU backend"
+    )]
     NoAdapter(String),
     /// The adapter refused to open a device.
     #[error("adapter '{adapter}' did not open a device: {reason}")]

@@ -67,10 +67,8 @@ impl Kernel {
         let label = format!("{}::{entry}", module.name);
         let device = context.device();
         let (pipeline, layout) = context.scoped(&label, 0, || {
-            let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-                label: Some(&label),
-                entries: &entries,
-            });
+            let layout = device
+                .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(&label), entries: &entries });
             let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                 label: Some(&label),
                 bind_group_layouts: &[Some(&layout)],
@@ -155,8 +153,7 @@ pub struct Recorder<'a> {
 impl<'a> Recorder<'a> {
     /// Starts recording.
     pub fn new(context: &'a Context, timer: Option<&'a mut Timer>) -> Self {
-        let encoder =
-            context.device().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("fmlgs") });
+        let encoder = context.device().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("fmlgs") });
         Self { context, encoder, timer }
     }
 

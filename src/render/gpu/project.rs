@@ -19,28 +19,13 @@ impl Project {
     pub fn new(context: &Context) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
         let module = Module::new(context, "project", Variant::default())?;
-        let slots = [
-            (0, Uniform),
-            (1, Read),
-            (2, Read),
-            (3, Read),
-            (4, Write),
-            (5, Write),
-            (6, Write),
-            (7, Write),
-            (8, Write),
-        ];
+        let slots =
+            [(0, Uniform), (1, Read), (2, Read), (3, Read), (4, Write), (5, Write), (6, Write), (7, Write), (8, Write)];
         Ok(Self { kernel: Kernel::new(context, &module, "main", &slots)? })
     }
 
     /// Records the projection.
-    pub fn encode(
-        &self,
-        stage: &mut Stage<'_>,
-        shot: Shot<'_>,
-        cloud: &Parameters,
-        scratch: &PerGaussian,
-    ) {
+    pub fn encode(&self, stage: &mut Stage<'_>, shot: Shot<'_>, cloud: &Parameters, scratch: &PerGaussian) {
         let [geometry, low, high] = &cloud.buffers;
         let by_depth = &scratch.by_depth;
         let buffers = [

@@ -16,17 +16,8 @@ impl ProjectBackward {
     pub fn new(context: &Context) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
         let module = Module::new(context, "project_backward", Variant::default())?;
-        let slots = [
-            (0, Uniform),
-            (1, Read),
-            (2, Read),
-            (3, Read),
-            (4, Read),
-            (5, Read),
-            (6, Write),
-            (7, Write),
-            (8, Write),
-        ];
+        let slots =
+            [(0, Uniform), (1, Read), (2, Read), (3, Read), (4, Read), (5, Read), (6, Write), (7, Write), (8, Write)];
         let statistics = [(0, Uniform), (4, Read), (6, Write), (9, Write), (10, Write)];
         Ok(Self {
             main: Kernel::new(context, &module, "main", &slots)?,

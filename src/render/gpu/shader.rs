@@ -97,7 +97,8 @@ fn constants(variant: Variant) -> String {
         // Writing to a String cannot fail.
         let _ = writeln!(out, "const {name}: f32 = {:e};", value as f32);
     }
-    let _ = writeln!(out, "const CHANNELS: u32 = {}u;\nconst SLOTS: u32 = {}u;", variant.channels, variant.channels.max(1));
+    let _ =
+        writeln!(out, "const CHANNELS: u32 = {}u;\nconst SLOTS: u32 = {}u;", variant.channels, variant.channels.max(1));
     out
 }
 

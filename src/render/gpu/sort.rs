@@ -71,16 +71,7 @@ impl Sort {
             scan: kernel("scan", &[(0, Uniform), (1, Read), (6, Write), (7, Write)])?,
             scatter: kernel(
                 "scatter",
-                &[
-                    (0, Uniform),
-                    (1, Read),
-                    (2, Read),
-                    (3, Read),
-                    (4, Write),
-                    (5, Write),
-                    (6, Write),
-                    (7, Write),
-                ],
+                &[(0, Uniform), (1, Read), (2, Read), (3, Read), (4, Write), (5, Write), (6, Write), (7, Write)],
             )?,
         })
     }

@@ -31,8 +31,7 @@ impl DevicePhoto {
             return Err(GpuError::Size { what: "pixels of a photo", have, want });
         }
         let covered = |i: usize| photo.coverage.as_ref().map_or(255, |c| c[i]);
-        let packed: Vec<[u8; 4]> =
-            photo.rgb.iter().enumerate().map(|(i, &[r, g, b])| [r, g, b, covered(i)]).collect();
+        let packed: Vec<[u8; 4]> = photo.rgb.iter().enumerate().map(|(i, &[r, g, b])| [r, g, b, covered(i)]).collect();
         Ok(Self { pixels: context.storage_with("photo", packed.as_flattened())?, size_px })
     }
 }

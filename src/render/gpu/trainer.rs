@@ -186,13 +186,7 @@ impl Trainer {
 
     /// One step on one photo, with harmonics up to `sh_degree`. Returns as soon as the work is
     /// handed to the device, except every [`RING`] steps, when losses are fetched.
-    pub fn step(
-        &mut self,
-        camera: &Camera,
-        photo: &DevicePhoto,
-        rates: &Rates,
-        sh_degree: u8,
-    ) -> Result<(), GpuError> {
+    pub fn step(&mut self, camera: &Camera, photo: &DevicePhoto, rates: &Rates, sh_degree: u8) -> Result<(), GpuError> {
         let size_px = [camera.width_px, camera.height_px];
         if size_px != photo.size_px {
             let side = |s: [u32; 2]| s[0] as usize * s[1] as usize;
