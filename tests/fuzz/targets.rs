@@ -8,14 +8,19 @@ use fmlgs::scene::{Camera, GaussianCloud, Photo};
 use glam::{DMat3, DVec2, DVec3};
 use image::RgbImage;
 
+/// Feeds bytes to a parser.
+type Parse = Box<dyn Fn(&[u8])>;
+/// Asks a parser whether it accepts bytes.
+type Accepts = Box<dyn Fn(&[u8]) -> bool>;
+
 /// A parser.
 pub struct Target {
     /// Its folder in `tests/corpus`.
     pub name: &'static str,
     /// Parses; what it returns does not matter.
-    pub parse: Box<dyn Fn(&[u8])>,
+    pub parse: Parse,
     /// Whether it accepts an input.
-    pub accepts: Box<dyn Fn(&[u8]) -> bool>,
+    pub accepts: Accepts,
 }
 
 fn target<T>(name: &'static str, parse: impl Fn(&[u8]) -> Result<T, IoError> + Clone + 'static) -> Target {
