@@ -115,7 +115,7 @@ fn a_read_only_folder_is_named_and_left_alone() {
     if std::fs::write(out.join("probe"), "x").is_ok() {
         std::fs::remove_file(out.join("probe")).unwrap();
         let Some(mount) = Mount::new(&out, &["--bind"], &["-o", "remount,bind,ro"]) else { return };
-        refused(&photos, &out, "read");
+        refused(&photos, &out, "Read-only file system");
         drop(mount);
     } else {
         refused(&photos, &out, "ermission");

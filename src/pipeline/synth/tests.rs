@@ -548,7 +548,19 @@ fn the_demo_shows_every_thing_and_part() {
         assert!(identity.views >= enough, "{} is seen in {} of 64 photos", identity.path, identity.views);
     }
     assert!(!demo::demo_is_written(out.path()), "other settings than the demo's");
-    if let Some(keep) = std::env::var_os("SYNTH_KEEP") {
-        println!("{:.2}", demo::write_demo(Path::new(&keep), &mut Silent).unwrap().secs);
-    }
+}
+
+/// Not a check: renders the scene named by `SYNTH_SCENE` (else the demo) into `SYNTH_OUT`, to look at.
+#[test]
+#[ignore = "renders a scene to look at, and times it"]
+fn render_to_look_at() {
+    let Some(out) = std::env::var_os("SYNTH_OUT") else { return };
+    let report = match std::env::var_os("SYNTH_SCENE") {
+        Some(scene) => {
+            let options = SynthOptions { views: 6, held_out: 1, width_px: 480, height_px: 360, ..Default::default() };
+            run(Path::new(&scene), &options, Path::new(&out), &mut Silent).unwrap()
+        }
+        None => demo::write_demo(Path::new(&out), &mut Silent).unwrap(),
+    };
+    println!("{:.2} s, {} triangles, {} points", report.secs, report.triangles, report.points);
 }

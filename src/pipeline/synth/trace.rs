@@ -4,15 +4,19 @@ use std::time::Duration;
 
 use glam::{Vec3, Vec3A};
 use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::builder::build_bvh2_from_tris;
+use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ray::{Ray, RayHit};
 use obvhs::rt_triangle::RtTriangle;
 
 use super::surface::Surface;
 
-/// How far beyond an edge a triangle reaches, as a share of its size.
-const EDGE: f32 = 2e-6;
+/// How far triangles and boxes reach beyond their edges, in the frame's units: more than the rounding
+/// errors of a ray across the scene, far less than a pixel.
+const REACH: f32 = 1e-6;
+/// The same as a share of a triangle's size, for slivers at most.
+const MAX_SHARE: f32 = 0.02;
 
 /// Where a ray meets the surface.
 #[derive(Clone, Copy, Debug)]
@@ -29,8 +33,8 @@ pub struct Hit {
 /// nearly parallel to an axis (its box test subtracts large products).
 pub struct Tracer {
     bvh: Bvh2,
-    /// In the order of the hierarchy's leaves.
-    triangles: Vec<RtTriangle>,
+    /// In the order of the hierarchy's leaves, each with [`REACH`] as a share of its least height.
+    triangles: Vec<(RtTriangle, f32)>,
     /// Index in the surface of each.
     original: Vec<u32>,
 }
@@ -38,15 +42,22 @@ pub struct Tracer {
 impl Tracer {
     /// Builds it.
     pub fn new(surface: &Surface) -> Self {
-        let triangles: Vec<obvhs::triangle::Triangle> = surface
+        let boxes: Vec<Aabb> = surface
             .triangles
             .iter()
             .map(|t| surface.corners(t))
-            .map(|[v0, v1, v2]| obvhs::triangle::Triangle { v0, v1, v2 })
+            .map(|[a, b, c]| Aabb { min: a.min(b).min(c) - REACH, max: a.max(b).max(c) + REACH })
             .collect();
-        let bvh = build_bvh2_from_tris(&triangles, BvhBuildParams::medium_build(), &mut Duration::default());
+        let bvh = build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut Duration::default());
         let original = bvh.primitive_indices.clone();
-        let triangles = original.iter().map(|&i| RtTriangle::from(&triangles[i as usize])).collect();
+        let triangle = |&i: &u32| {
+            let [a, b, c] = surface.corners(&surface.triangles[i as usize]);
+            let triangle = RtTriangle::new(a, b, c);
+            let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+            // Twice the area over the longest side is the least height.
+            (triangle, (REACH * longest / triangle.ng.length()).min(MAX_SHARE))
+        };
+        let triangles = original.iter().map(triangle).collect();
         Self { bvh, triangles, original }
     }
 
@@ -58,7 +69,7 @@ impl Tracer {
             return None;
         }
         let i = hit.primitive_id as usize;
-        let w = self.triangles[i].compute_barycentric(&ray);
+        let w = self.triangles[i].0.compute_barycentric(&ray);
         let weights = Vec3::new(1.0 - w.x - w.y, w.x, w.y);
         Some(Hit { t: hit.t, triangle: self.original[i] as usize, weights })
     }
@@ -71,7 +82,7 @@ impl Tracer {
             let triangle = &self.triangles[i];
             let t = distance(triangle, ray);
             if t.is_finite() {
-                let w = triangle.compute_barycentric(ray);
+                let w = triangle.0.compute_barycentric(ray);
                 if passes(self.original[i] as usize, Vec3::new(1.0 - w.x - w.y, w.x, w.y)) {
                     return f32::INFINITY;
                 }
@@ -82,15 +93,14 @@ impl Tracer {
 }
 
 /// Distance at which a ray meets a triangle, infinity if it does not (Möller and Trumbore). Edges
-/// belong to both triangles that share them, a rounding error beyond included, so that no ray slips
-/// through between two.
-fn distance(triangle: &RtTriangle, ray: &Ray) -> f32 {
+/// belong to both triangles that share them, so that no ray slips through between two.
+fn distance((triangle, share): &(RtTriangle, f32), ray: &Ray) -> f32 {
     let c = triangle.v0 - ray.origin;
     let r = ray.direction.cross(c);
     let inverse = 1.0 / triangle.ng.dot(ray.direction);
     let (u, v) = (r.dot(triangle.e2) * inverse, r.dot(triangle.e1) * inverse);
     let t = triangle.ng.dot(c) * inverse;
     // NaN and infinity, from a ray within the triangle's plane, fail these.
-    let inside = u >= -EDGE && v >= -EDGE && u + v <= 1.0 + EDGE;
+    let inside = u >= -share && v >= -share && u + v <= 1.0 + share;
     if inside && t >= ray.tmin && t <= ray.tmax { t } else { f32::INFINITY }
 }
