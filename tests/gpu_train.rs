@@ -181,7 +181,7 @@ fn one_step_moves_every_group_as_the_cpu_does() {
         let stats = trainer.stats().unwrap();
         let screen64: Vec<f64> = screen.iter().map(|&s| f64::from(s)).collect();
         let bounds = gpu_common::compare::BOUNDARY;
-        agree("screen gradients", &stats.gradient, &screen64, &vec![true; 80], bounds).unwrap();
+        agree("screen gradients", &stats.gradient, &screen64, &[true; 80], bounds).unwrap();
         assert!(stats.seen.iter().all(|&s| s <= 1) && stats.seen.iter().sum::<u32>() > 60);
         assert!(stats.radius.iter().zip(&stats.seen).all(|(&r, &s)| (r > 0.0) == (s > 0)));
     });

@@ -1,5 +1,5 @@
 //! What several integration tests need: made-up scenes, cameras, and where real inputs lie.
-#![allow(dead_code)]
+#![allow(dead_code, clippy::expect_used)]
 
 use std::path::PathBuf;
 

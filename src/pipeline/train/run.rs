@@ -119,6 +119,9 @@ fn check(config: &TrainConfig) -> Result<(), TrainError> {
     if config.sh_degree > 3 {
         return bad("the spherical-harmonics degree must be 0 to 3");
     }
+    if config.backend == super::BackendChoice::Gpu {
+        return bad("whole runs train on the CPU so far; leave the backend at 'auto' or 'cpu'");
+    }
     Ok(())
 }
 
