@@ -59,8 +59,8 @@ impl Schedule {
             densify_from: scaled(1_000.0).clamp(50, 500),
             densify_until: scaled(17_000.0),
             densify_interval: scaled(400.0).clamp(20, 100),
-            // A short run has no time to recover from more than a few resets.
-            reset_interval: scaled(6_000.0).clamp(1_000, 3_000),
+            // Not scaled: a short run has no time to recover from a reset.
+            reset_interval: 3_000,
         }
     }
 
