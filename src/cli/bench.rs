@@ -9,8 +9,10 @@ use super::progress::Console;
 use super::{CliError, output, view};
 use crate::io::{self, Opened};
 use crate::pipeline::bench::{self, RenderTiming, StepTiming};
+use crate::pipeline::bench_gpu::{self, GpuTiming};
 use crate::pipeline::observer::{Level, Observer, Signal};
-use crate::pipeline::train::{TrainConfig, load_views};
+use crate::pipeline::train::{TrainConfig, TrainView, load_views};
+use crate::render::gpu::Context;
 use crate::scene::Dataset;
 
 /// Time drawing and training on this machine, stage by stage
@@ -21,7 +23,7 @@ use crate::scene::Dataset;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs bench splat.ply\n  \
-    fmlgs bench splats/*.ply photos/ --size 640x480 --size 1280x720 --max-side 504 --json")]
+    fmlgs bench splats/*.ply photos/ --size 640x480 --size 1280x720 --max-side 504 --gpu --json")]
 pub struct Args {
     /// Splats or trained scenes to draw, posed photos to train on
     #[arg(required = true)]
@@ -35,6 +37,9 @@ pub struct Args {
     /// Repeats of each measurement
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     repeats: u32,
+    /// Time the GPU beside the CPU, even a software one
+    #[arg(long)]
+    gpu: bool,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
@@ -45,6 +50,10 @@ pub struct Args {
 struct Timings {
     render: Vec<RenderTiming>,
     train: Vec<StepTiming>,
+    /// Name and features of the GPU, if it was asked for.
+    gpu: Option<String>,
+    gpu_render: Vec<GpuTiming>,
+    gpu_train: Vec<GpuTiming>,
     one_core_products_per_sec: f64,
 }
 
@@ -52,13 +61,24 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let mut console = Console::new(quiet);
     let sizes = if args.size.is_empty() { vec![[640, 480], [1280, 720]] } else { args.size };
     let repeats = args.repeats as usize;
-    let mut timings =
-        Timings { render: Vec::new(), train: Vec::new(), one_core_products_per_sec: bench::one_core_limit() };
+    let gpu = args.gpu.then(Context::new).transpose()?;
+    let mut timings = Timings {
+        render: Vec::new(),
+        train: Vec::new(),
+        gpu: gpu.as_ref().map(Context::describe),
+        gpu_render: Vec::new(),
+        gpu_train: Vec::new(),
+        one_core_products_per_sec: bench::one_core_limit(),
+    };
     for path in &args.paths {
         let name = bench::label(path);
         let cloud = match io::open(path)? {
             Opened::Dataset(dataset) => {
-                timings.train.push(train(&dataset, args.max_side, repeats, &mut console)?);
+                let (config, views) = photos(&dataset, args.max_side, &mut console)?;
+                timings.train.push(bench::train_steps(&dataset, &views, &config, repeats)?);
+                if let Some(context) = &gpu {
+                    timings.gpu_train.push(bench_gpu::train_steps(context, &dataset, &views, &config, repeats)?);
+                }
                 continue;
             }
             Opened::Cloud(cloud) => cloud,
@@ -70,6 +90,9 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
             }
             console.note(Level::Info, format!("Drawing {name} at {} x {}", size[0], size[1]));
             timings.render.push(bench::render(&name, &cloud, size, repeats)?);
+            if let Some(context) = &gpu {
+                timings.gpu_render.push(bench_gpu::render(context, &name, &cloud, size, repeats)?);
+            }
         }
     }
     drop(console);
@@ -79,7 +102,12 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     output::print(&text(&timings))
 }
 
-fn train(dataset: &Dataset, max_side_px: u32, repeats: usize, console: &mut Console) -> Result<StepTiming, CliError> {
+/// The photos to train on, and how.
+fn photos(
+    dataset: &Dataset,
+    max_side_px: u32,
+    console: &mut Console,
+) -> Result<(TrainConfig, Vec<TrainView>), CliError> {
     let config = TrainConfig { max_side_px, densify: false, ..TrainConfig::default() };
     let (indices, _) = dataset.split(config.holdout_every);
     let Some(views) = load_views(dataset, &indices, &config, "Loading photos", console)? else {
@@ -89,7 +117,7 @@ fn train(dataset: &Dataset, max_side_px: u32, repeats: usize, console: &mut Cons
         return Err(CliError::failed(format!("{} has no photo to train on", dataset.root.display())));
     }
     console.note(Level::Info, format!("Training on {}", dataset.name));
-    Ok(bench::train_steps(dataset, &views, &config, repeats)?)
+    Ok((config, views))
 }
 
 fn text(t: &Timings) -> String {
@@ -116,6 +144,23 @@ fn text(t: &Timings) -> String {
         }));
         parts.push(output::table(&rows));
     }
+    if let Some(gpu) = &t.gpu {
+        parts.push(format!("GPU: {gpu}"));
+        parts.extend(
+            [("drawing", &t.gpu_render), ("training step", &t.gpu_train)].map(|(what, rows)| gpu_text(what, rows)),
+        );
+    }
     parts.push(format!("one core at most: {:.2e} products per s", t.one_core_products_per_sec));
+    parts.retain(|p| !p.is_empty());
     parts.join("\n\n")
+}
+
+/// One line per measurement, its stages on the device behind it.
+fn gpu_text(what: &str, timings: &[GpuTiming]) -> String {
+    let line = |t: &GpuTiming| {
+        let stages: Vec<String> = t.stages_ms.iter().map(|(name, ms)| format!("{name} {ms:.2}")).collect();
+        let (size, ms) = (format!("{}x{}", t.size[0], t.size[1]), t.total_ms);
+        format!("{what} {}, {} Gaussians, {size}: {ms:.2} ms ({})", t.name, t.gaussians, stages.join(", "))
+    };
+    timings.iter().map(line).collect::<Vec<_>>().join("\n")
 }

@@ -7,9 +7,10 @@ use image::ColorType;
 use serde_json::json;
 
 use super::opened::DrawableScene;
+use super::painter::Painter;
 use super::{CliError, opened, output, view};
-use crate::render::cpu::Renderer;
-use crate::render::{Features, Frame, RenderSettings};
+use crate::pipeline::train::BackendChoice;
+use crate::render::{Frame, RenderSettings};
 use crate::scene::Camera;
 
 /// Draw a scene from a given camera into a file
@@ -46,6 +47,9 @@ pub struct Args {
     /// The file to write: .png, or .npy for depth and alpha
     #[arg(long, default_value = "render.png")]
     out: PathBuf,
+    /// Which renderer draws: auto takes a GPU if it is a real one
+    #[arg(long, value_enum, default_value_t = BackendChoice::Auto)]
+    backend: BackendChoice,
     /// Print one JSON document about what was drawn
     #[arg(long)]
     json: bool,
@@ -104,8 +108,9 @@ impl Args {
 pub fn run(args: Args) -> Result<(), CliError> {
     let job = args.check()?;
     let settings = RenderSettings { depth: args.what == What::Depth, ..job.scene.settings };
+    let (mut painter, backend) = Painter::new(args.backend)?;
     let started = Instant::now();
-    let frame = Renderer::<f32>::new().render(&job.scene.cloud, Features::NONE, &job.camera, &settings)?;
+    let frame = painter.draw(&job.scene.cloud, &job.camera, &settings)?;
     let millis = started.elapsed().as_secs_f64() * 1e3;
 
     output::make_parent(&args.out)?;
@@ -117,13 +122,17 @@ pub fn run(args: Args) -> Result<(), CliError> {
             "size_px": size,
             "camera": job.camera,
             "gaussians": job.scene.cloud.len(),
+            "backend": backend,
             "render_ms": millis,
             "depth_full_scale": far,
         }));
     }
     let scale = far.map_or(String::new(), |far| format!(", value 65535 = {far} scene units"));
     let [width, height] = size;
-    output::print(&format!("{}: {width} x {height} px, drawn in {millis:.0} ms{scale}", args.out.display()))
+    output::print(&format!(
+        "{}: {width} x {height} px, drawn in {millis:.0} ms on {backend}{scale}",
+        args.out.display()
+    ))
 }
 
 /// Writes the file; returns the depth that 65535 stands for, where that is how it is stored.
