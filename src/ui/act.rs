@@ -43,6 +43,7 @@ impl App {
             Action::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
             Action::FrameScene
             | Action::ResetView
+            | Action::TurnUp(_)
             | Action::PreviousPhoto
             | Action::NextPhoto
             | Action::GoToPhoto(_) => {

@@ -28,7 +28,6 @@ pub struct App {
     pub(super) question: Option<Question>,
     pub(super) palette: Palette,
     pub(super) sheet: bool,
-    pub(super) backend: String,
     thumbnails: Thumbnails,
     toasts: Toasts,
     actions: Vec<Action>,
@@ -53,7 +52,6 @@ impl App {
             question: None,
             palette: Palette::default(),
             sheet: false,
-            backend: "CPU".into(),
             thumbnails: Thumbnails::default(),
             toasts: Toasts::default(),
             actions: first.into_iter().collect(),
@@ -93,7 +91,7 @@ impl App {
         let pane = Frame::new().fill(theme::PANEL).inner_margin(Margin::same(12));
         let Self { state, layout, actions, viewport, .. } = self;
         Panel::top("menus").frame(bar).show(ui, |ui| bars::top(ui, state, layout, actions));
-        Panel::bottom("status").frame(bar).show(ui, |ui| bars::status(ui, state, layout, &self.backend, actions));
+        Panel::bottom("status").frame(bar).show(ui, |ui| bars::status(ui, state, layout, viewport.picture(), actions));
         if layout.shows(Pane::Log) {
             Panel::bottom("log")
                 .frame(pane)

@@ -3,6 +3,7 @@
 
 use std::path::PathBuf;
 
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// What the viewport shows.
@@ -62,6 +63,52 @@ impl Pane {
     }
 }
 
+/// A direction of the world that can be upwards.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Axis {
+    /// Along x.
+    PlusX,
+    /// Against x.
+    MinusX,
+    /// Along y.
+    PlusY,
+    /// Against y.
+    MinusY,
+    /// Along z.
+    PlusZ,
+    /// Against z.
+    MinusZ,
+}
+
+impl Axis {
+    /// All of them.
+    pub const ALL: [Self; 6] = [Self::PlusX, Self::MinusX, Self::PlusY, Self::MinusY, Self::PlusZ, Self::MinusZ];
+
+    /// Its name.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::PlusX => "+X",
+            Self::MinusX => "-X",
+            Self::PlusY => "+Y",
+            Self::MinusY => "-Y",
+            Self::PlusZ => "+Z",
+            Self::MinusZ => "-Z",
+        }
+    }
+
+    /// Its unit vector.
+    pub fn vector(self) -> DVec3 {
+        match self {
+            Self::PlusX => DVec3::X,
+            Self::MinusX => DVec3::NEG_X,
+            Self::PlusY => DVec3::Y,
+            Self::MinusY => DVec3::NEG_Y,
+            Self::PlusZ => DVec3::Z,
+            Self::MinusZ => DVec3::NEG_Z,
+        }
+    }
+}
+
 /// A key with modifiers. Keys are named as on the keyboard: "F", "Home", "F1", "[".
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Shortcut {
@@ -98,6 +145,8 @@ pub enum Action {
     FrameScene,
     /// Go back to the first view.
     ResetView,
+    /// Choose which way of the world is up.
+    TurnUp(Axis),
     /// Look through the previous photo's camera.
     PreviousPhoto,
     /// Look through the next photo's camera.
@@ -122,7 +171,7 @@ pub enum Action {
 
 impl Action {
     /// Every action that needs no further input, in the order of the palette.
-    pub const ALL: [Self; 25] = [
+    pub const ALL: [Self; 31] = [
         Self::TryDemo,
         Self::OpenFolder,
         Self::OpenFile,
@@ -142,6 +191,12 @@ impl Action {
         Self::Show(ViewMode::Difference),
         Self::ToggleCompare,
         Self::ToggleCameras,
+        Self::TurnUp(Axis::PlusX),
+        Self::TurnUp(Axis::MinusX),
+        Self::TurnUp(Axis::PlusY),
+        Self::TurnUp(Axis::MinusY),
+        Self::TurnUp(Axis::PlusZ),
+        Self::TurnUp(Axis::MinusZ),
         Self::TogglePane(Pane::Dataset),
         Self::TogglePane(Pane::Training),
         Self::TogglePane(Pane::Plan),
@@ -165,6 +220,7 @@ impl Action {
             Self::Evaluate => "Measure held-out quality".into(),
             Self::FrameScene => "Frame the scene".into(),
             Self::ResetView => "Reset the view".into(),
+            Self::TurnUp(axis) => format!("Turn {} upwards", axis.text()),
             Self::PreviousPhoto => "Previous photo".into(),
             Self::NextPhoto => "Next photo".into(),
             Self::GoToPhoto(index) => format!("Go to photo {}", index + 1),
@@ -197,6 +253,7 @@ impl Action {
             Self::Evaluate => "PSNR and SSIM on the photos that training does not see.",
             Self::FrameScene => "Move back until all of the scene is in view.",
             Self::ResetView => "Return to the view with which the scene opened.",
+            Self::TurnUp(_) => "For scenes that lie on their side.",
             Self::PreviousPhoto | Self::NextPhoto | Self::GoToPhoto(_) => "Look through the camera of a photo.",
             Self::Show(ViewMode::Picture) => "The rendered picture.",
             Self::Show(ViewMode::Depth) => "Distance from the camera, near to far as blue to red.",
@@ -242,6 +299,7 @@ impl Action {
             | Self::Open(_)
             | Self::Evaluate
             | Self::GoToPhoto(_)
+            | Self::TurnUp(_)
             | Self::TogglePane(_) => None,
         }
     }

@@ -4,6 +4,7 @@
 //! to do), [`Event`] (what happened). Bulk data never queues: it is published in a [`Slot`].
 
 pub mod action;
+mod backend;
 pub mod control;
 pub mod jobs;
 pub mod machine;
@@ -16,7 +17,7 @@ pub mod slot;
 pub mod thread;
 pub mod view;
 
-pub use action::{Action, Pane, Shortcut, ViewMode};
+pub use action::{Action, Axis, Pane, Shortcut, ViewMode};
 pub use control::Control;
 pub use protocol::{Command, Event, Failure, HomeView, JobId, JobKind, Lane, OpenedScene, Outcome, Stop};
 pub use slot::Slot;

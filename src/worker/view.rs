@@ -7,11 +7,11 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use super::action::ViewMode;
+use super::backend::Backend;
 use super::protocol::Failure;
 use super::thread::{Repaint, panic_failure};
 use super::{Slot, paint};
-use crate::render::cpu::Renderer;
-use crate::render::{Features, Frame, RenderError, RenderSettings};
+use crate::render::{Frame, RenderSettings};
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
 
 /// How much time a picture may take; decides its resolution.
@@ -74,6 +74,8 @@ pub struct ViewPicture {
     pub psnr: Option<f64>,
     /// Seconds that rendering took.
     pub secs: f64,
+    /// What drew it: "CPU", or the name of the GPU.
+    pub drawn_by: String,
 }
 
 /// The result of a request.
@@ -98,7 +100,8 @@ impl ViewLane {
         let pictures = Arc::new(Slot::default());
         let (box_, out) = (Arc::clone(&mailbox), Arc::clone(&pictures));
         let work = move || {
-            let mut painter = Painter::default();
+            // Looking for a GPU takes a moment; here nobody waits for it.
+            let mut painter = Painter::new(Backend::choose());
             while let Some(request) = next(&box_) {
                 out.publish(painter.draw(&request));
                 repaint();
@@ -151,36 +154,38 @@ fn next(mailbox: &(Mutex<Mailbox>, Condvar)) -> Option<ViewRequest> {
 }
 
 /// Draws requests, and learns how fast it can.
-#[derive(Default)]
 struct Painter {
-    renderer: Renderer<f32>,
+    backend: Backend,
     /// What pictures cost lately; `None` before the first.
-    cost: Option<Cost>,
+    cost: Option<Speed>,
 }
 
-/// What a picture costs: the part that every Gaussian has at any size, and that of the pixels.
+/// What a picture costs: the part that every Gaussian has at any size, and that of each pixel.
 #[derive(Clone, Copy, Debug)]
-struct Cost {
+struct Speed {
     fixed_secs: f64,
     secs_per_px: f64,
 }
 
 impl Painter {
+    fn new(backend: Backend) -> Self {
+        Self { backend, cost: None }
+    }
+
     fn draw(&mut self, request: &ViewRequest) -> ViewResult {
         let camera = self.fitting_camera(&request.camera, request.effort);
         let full = camera == request.camera;
         let start = Instant::now();
-        let frame = match catch_unwind(AssertUnwindSafe(|| self.render(request, &camera))) {
-            Ok(Ok(frame)) => frame,
-            Ok(Err(e)) => return Err(Failure::of(&e, "Reset the view (Home), or open the scene again.")),
-            Err(payload) => {
-                // Its buffers may be in any state.
-                self.renderer = Renderer::new();
-                return Err(panic_failure(payload.as_ref()));
+        let frame = match self.try_render(request, &camera) {
+            // A GPU that fails (lost, out of memory) leaves the CPU to draw from then on.
+            Err(_) if matches!(self.backend, Backend::Gpu(_)) => {
+                *self = Self::new(Backend::on_cpu());
+                self.try_render(request, &camera)?
             }
+            result => result?,
         };
         let secs = start.elapsed().as_secs_f64();
-        self.learn(f64::from(camera.width_px * camera.height_px));
+        self.learn(secs, f64::from(camera.width_px * camera.height_px));
         let drawn = paint::paint(&frame, request.mode, request.photo.as_deref());
         let median_depth = (!frame.median_depth.is_empty()).then_some(frame.median_depth);
         Ok(ViewPicture {
@@ -192,22 +197,30 @@ impl Painter {
             depth_range: drawn.depth_range,
             psnr: drawn.psnr,
             secs,
+            drawn_by: self.backend.name().to_owned(),
         })
     }
 
-    fn render(&mut self, request: &ViewRequest, camera: &Camera) -> Result<Frame<f32>, RenderError> {
+    fn try_render(&mut self, request: &ViewRequest, camera: &Camera) -> Result<Frame<f32>, Failure> {
         let depth = request.effort == Effort::Full || request.mode == ViewMode::Depth;
         let settings = RenderSettings { depth, ..request.settings.clone() };
-        self.renderer.render(&request.cloud, Features::NONE, camera, &settings)
+        match catch_unwind(AssertUnwindSafe(|| self.backend.render(&request.cloud, camera, &settings))) {
+            Ok(result) => result.map_err(|e| Failure::of(&e, "Reset the view (Home), or open the scene again.")),
+            Err(payload) => {
+                // Its buffers may be in any state.
+                *self = Self::new(Backend::on_cpu());
+                Err(panic_failure(payload.as_ref()))
+            }
+        }
     }
 
     /// Takes in what the last frame cost.
-    fn learn(&mut self, pixels: f64) {
-        let [project, sort, bin, blend] = self.renderer.stats().stage_secs;
-        let now = Cost { fixed_secs: project + sort, secs_per_px: (bin + blend) / pixels };
+    fn learn(&mut self, secs: f64, pixels: f64) {
+        let cost = self.backend.cost(secs);
+        let now = Speed { fixed_secs: cost.fixed_secs, secs_per_px: cost.pixels_secs / pixels };
         let old = self.cost.unwrap_or(now);
         let mix = |old: f64, new: f64| 0.6 * old + 0.4 * new;
-        self.cost = Some(Cost {
+        self.cost = Some(Speed {
             fixed_secs: mix(old.fixed_secs, now.fixed_secs),
             secs_per_px: mix(old.secs_per_px, now.secs_per_px),
         });
@@ -217,7 +230,7 @@ impl Painter {
     fn fitting_camera(&self, camera: &Camera, effort: Effort) -> Camera {
         let pixels = f64::from(camera.width_px) * f64::from(camera.height_px);
         // The first picture says how fast this machine is with this scene; it must be quick itself.
-        let cost = self.cost.unwrap_or(Cost { fixed_secs: 0.0, secs_per_px: 4e-7 });
+        let cost = self.cost.unwrap_or(Speed { fixed_secs: 0.0, secs_per_px: 4e-7 });
         let Some(budget) = effort.budget_secs() else { return camera.clone() };
         // Where the fixed part alone breaks the budget, smaller pictures would help nobody.
         let left = (budget - cost.fixed_secs).max(0.4 * budget);
@@ -240,8 +253,10 @@ mod tests {
     #[test]
     fn a_slow_machine_draws_smaller_while_the_eye_moves() {
         let camera = Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 1000, 600).expect("valid");
-        let of =
-            |fixed_secs, secs_per_px| Painter { cost: Some(Cost { fixed_secs, secs_per_px }), ..Painter::default() };
+        let of = |fixed_secs, secs_per_px| Painter {
+            backend: Backend::on_cpu(),
+            cost: Some(Speed { fixed_secs, secs_per_px }),
+        };
         let slow = of(0.0, 1e-6);
         let moving = slow.fitting_camera(&camera, Effort::Moving);
         assert!(moving.width_px < 300, "{}", moving.width_px);

@@ -6,7 +6,8 @@ use super::super::layout::Layout;
 use super::super::state::AppState;
 use super::super::{format, keys, theme};
 use crate::pipeline::observer::Progress;
-use crate::worker::{Action, Pane, ViewMode};
+use crate::worker::view::ViewPicture;
+use crate::worker::{Action, Axis, Pane, ViewMode};
 
 /// Draws the bar at the top.
 pub fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut Vec<Action>) {
@@ -47,6 +48,11 @@ pub fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut Vec<Act
             for action in [Action::FrameScene, Action::ResetView] {
                 item(ui, has_scene, None, action, actions);
             }
+            ui.menu_button("Up direction", |ui| {
+                for axis in Axis::ALL {
+                    item(ui, has_scene, None, Action::TurnUp(axis), actions);
+                }
+            });
             for action in [Action::PreviousPhoto, Action::NextPhoto] {
                 item(ui, has_photos, None, action, actions);
             }
@@ -95,7 +101,13 @@ fn item(ui: &mut Ui, enabled: bool, on: Option<bool>, action: Action, actions: &
 }
 
 /// Draws the bar at the bottom.
-pub fn status(ui: &mut Ui, state: &AppState, layout: &Layout, backend: &str, actions: &mut Vec<Action>) {
+pub fn status(
+    ui: &mut Ui,
+    state: &AppState,
+    layout: &Layout,
+    picture: Option<&ViewPicture>,
+    actions: &mut Vec<Action>,
+) {
     ui.horizontal(|ui| {
         match &state.job {
             Some(job) => {
@@ -105,7 +117,9 @@ pub fn status(ui: &mut Ui, state: &AppState, layout: &Layout, backend: &str, act
                 if let Some(p) = &job.progress {
                     progress(ui, p, job.paused);
                 }
-                if ui.small_button("Cancel").on_hover_text("Esc").clicked() {
+                // One button is enough: the pane and the first page have their own.
+                let elsewhere = state.scene.is_none() || state.is_training() && layout.shows(Pane::Training);
+                if !elsewhere && ui.small_button("Cancel").on_hover_text("Esc").clicked() {
                     actions.push(Action::Cancel);
                 }
             }
@@ -120,7 +134,9 @@ pub fn status(ui: &mut Ui, state: &AppState, layout: &Layout, backend: &str, act
             if log.on_hover_text("Show or hide the log").clicked() {
                 actions.push(Action::TogglePane(Pane::Log));
             }
-            ui.label(RichText::new(backend).small().color(theme::WEAK)).on_hover_text("What renders and trains");
+            if let Some(p) = picture {
+                ui.label(RichText::new(format!("Drawn by the {}", p.drawn_by)).small().color(theme::WEAK));
+            }
         });
     });
 }

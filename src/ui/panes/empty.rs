@@ -1,14 +1,16 @@
 //! What the window shows before anything is open.
 
-use egui::{Button, RichText, Ui, vec2};
+use egui::{Button, ProgressBar, RichText, Ui, vec2};
 
-use super::super::state::AppState;
+use super::super::state::{AppState, RunningJob};
 use super::super::{format, keys, theme};
-use crate::worker::Action;
+use crate::worker::{Action, JobKind};
 
 /// Draws the first page.
 pub fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
-    let busy = state.job.is_some();
+    if let Some(job) = &state.job {
+        return busy(ui, job, actions);
+    }
     let recent = state.recent.len().min(6);
     let height = 330.0 + if recent > 0 { 40.0 + 30.0 * recent as f32 } else { 0.0 };
     ui.vertical_centered(|ui| {
@@ -20,11 +22,7 @@ pub fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
         let wide = vec2(300.0, 38.0);
         let button = |ui: &mut Ui, button: Button<'_>, action: Action, actions: &mut Vec<Action>| {
             let key = keys::label(ui.ctx(), &action);
-            if ui
-                .add_enabled(!busy, button.min_size(wide))
-                .on_hover_text(format!("{}  {key}", action.tooltip()))
-                .clicked()
-            {
+            if ui.add(button.min_size(wide)).on_hover_text(format!("{}  {key}", action.tooltip())).clicked() {
                 actions.push(action);
             }
         };
@@ -49,10 +47,43 @@ pub fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
                     .right_text(RichText::new(parent).small().color(theme::WEAK))
                     .frame_when_inactive(false)
                     .min_size(vec2(420.0, 26.0));
-                if ui.add_enabled(!busy, row).on_hover_text(path.display().to_string()).clicked() {
+                if ui.add(row).on_hover_text(path.display().to_string()).clicked() {
                     actions.push(Action::Open(path.clone()));
                 }
             }
+        }
+    });
+}
+
+/// The first page while the first scene is being read or made.
+fn busy(ui: &mut Ui, job: &RunningJob, actions: &mut Vec<Action>) {
+    ui.vertical_centered(|ui| {
+        ui.add_space((ui.available_height() * 0.4).max(20.0));
+        ui.set_max_width(380.0);
+        ui.label(RichText::new(&job.title).size(20.0));
+        ui.add_space(10.0);
+        match &job.progress {
+            Some(p) => {
+                let fraction = p.done as f32 / p.total.max(1) as f32;
+                ui.add(ProgressBar::new(fraction).desired_height(8.0).fill(theme::ACCENT));
+                let left = p.eta_secs().map_or_else(String::new, |s| format!("  ·  {} left", format::duration(s)));
+                let text = format!("{}  {} of {}{left}", p.stage, format::count(p.done), format::count(p.total));
+                ui.label(RichText::new(text).color(theme::WEAK));
+            }
+            None => {
+                ui.spinner();
+            }
+        }
+        if job.kind == JobKind::Demo {
+            ui.add_space(6.0);
+            ui.label(
+                RichText::new("The photos are made once; training starts as soon as they are there.")
+                    .color(theme::WEAK),
+            );
+        }
+        ui.add_space(14.0);
+        if ui.add(Button::new("Cancel").min_size(vec2(110.0, 30.0))).clicked() {
+            actions.push(Action::Cancel);
         }
     });
 }

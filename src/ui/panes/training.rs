@@ -66,9 +66,12 @@ fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {
         ui.add(DragValue::new(&mut config.steps).range(100..=100_000).speed(50)).labelled_by(id);
         ui.end_row();
         let id = label(ui, "Longest side", "Size of the training pictures; photos are never enlarged.");
+        // Small photos limit what is shown here, not what a person chose for others.
         let range = 64..=largest_px.clamp(65, 4096);
-        config.max_side_px = config.max_side_px.clamp(64, *range.end());
-        ui.add(Slider::new(&mut config.max_side_px, range).suffix(" px").step_by(8.0)).labelled_by(id);
+        let mut side = config.max_side_px.clamp(64, *range.end());
+        if ui.add(Slider::new(&mut side, range).suffix(" px").step_by(8.0)).labelled_by(id).changed() {
+            config.max_side_px = side;
+        }
         ui.end_row();
         let id = label(ui, "Colour", "Highest spherical-harmonics degree: 0 is the same colour from everywhere.");
         ui.add(Slider::new(&mut config.sh_degree, 0..=3).prefix("SH degree ")).labelled_by(id);

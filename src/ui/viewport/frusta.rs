@@ -50,10 +50,13 @@ impl Viewport {
             let color = match (pointed, held_out.contains(&i)) {
                 (true, _) => theme::ACCENT,
                 (false, true) => theme::WARNING.gamma_multiply(0.75),
-                (false, false) => Color32::from_white_alpha(95),
+                (false, false) => Color32::from_white_alpha(130),
             };
-            let stroke = Stroke::new(if pointed { 2.0 } else { 1.0 }, color);
-            draw(&painter, &eye, &photo.camera, size, place, stroke);
+            let width = if pointed { 2.0 } else { 1.0 };
+            // A dark rim keeps the lines visible on bright scenes.
+            for stroke in [Stroke::new(width + 1.5, Color32::from_black_alpha(70)), Stroke::new(width, color)] {
+                draw(&painter, &eye, &photo.camera, size, place, stroke);
+            }
         }
         if let Some((i, at)) = nearest {
             label(&painter, at, &format!("{}  (click to look through)", dataset.photos[i].name));

@@ -30,6 +30,8 @@ const MAX_SIDE_PX: u32 = 1600;
 pub struct Viewport {
     lane: ViewLane,
     eye: Eye,
+    /// Upwards, where a person chose it.
+    up: Option<DVec3>,
     /// Number of the scene that eye and cloud belong to.
     scene: u64,
     /// What is drawn.
@@ -70,6 +72,7 @@ impl Viewport {
         Ok(Self {
             lane: ViewLane::start(repaint)?,
             eye: Eye::framing(&home.bounds, home.up),
+            up: None,
             scene: 0,
             cloud: None,
             snapshot: 0,
@@ -116,7 +119,8 @@ impl Viewport {
             self.requested = None;
             (self.picture, self.texture, self.error) = (None, None, None);
             self.set_cloud(scene.cloud.clone());
-            self.eye = home_eye(scene);
+            self.up = None;
+            self.eye = home_eye(scene, None);
         }
         if let Some((generation, snapshot)) = worker.clouds().newer_than(self.snapshot) {
             self.snapshot = generation;
@@ -142,7 +146,12 @@ impl Viewport {
             }
             Action::ResetView => {
                 self.photo = None;
-                self.eye = home_eye(&scene);
+                self.eye = home_eye(&scene, self.up);
+            }
+            Action::TurnUp(axis) => {
+                self.leave_photo();
+                self.up = Some(axis.vector());
+                self.eye.set_up(axis.vector());
             }
             Action::NextPhoto if photos > 0 => self.look_through(here.map_or(0, |i| (i + 1) % photos), &scene, worker),
             Action::PreviousPhoto if photos > 0 => {
@@ -164,7 +173,7 @@ impl Viewport {
         let c = &photo.camera;
         let ahead = (scene.home.bounds.center() - c.center).dot(c.forward());
         let pivot = c.center + c.forward() * ahead.max(0.1 * scene.home.bounds.radius());
-        self.eye = Eye::of_camera(c, pivot, scene.home.up);
+        self.eye = Eye::of_camera(c, pivot, self.up.unwrap_or(scene.home.up));
         self.photo = Some(PhotoView::new(index, photo, worker));
     }
 
@@ -300,15 +309,20 @@ impl Viewport {
     }
 }
 
-/// The first view of a scene: from its first camera if it has one, else framed as a whole.
-fn home_eye(scene: &OpenedScene) -> Eye {
+/// The first view of a scene: from its first camera if it has one, else framed as a whole; upright
+/// if a person chose what is up.
+fn home_eye(scene: &OpenedScene, up: Option<DVec3>) -> Eye {
     let home = &scene.home;
-    match &home.camera {
+    let mut eye = match &home.camera {
         Some(c) => {
             let mut eye = Eye::of_camera(c, home.bounds.center(), home.up);
             eye.fov_y_rad = eye.fov_y_rad.clamp(0.5, 1.2);
             eye
         }
-        None => Eye::framing(&home.bounds, home.up),
+        None => Eye::framing(&home.bounds, up.unwrap_or(home.up)),
+    };
+    if let Some(up) = up {
+        eye.set_up(up);
     }
+    eye
 }

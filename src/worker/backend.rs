@@ -1,0 +1,140 @@
+//! What draws the viewport: the GPU where there is a real one, else the CPU.
+
+use std::sync::{Arc, Weak};
+
+use crate::render::gpu::{self, GpuError};
+use crate::render::{Features, Frame, RenderError, RenderSettings, cpu};
+use crate::scene::{Camera, GaussianCloud};
+
+/// Why a view could not be drawn.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum DrawError {
+    /// By the CPU.
+    #[error(transparent)]
+    Cpu(#[from] RenderError),
+    /// By the GPU.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+}
+
+/// Seconds of a picture: the part that every Gaussian has at any size, and that of the pixels.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cost {
+    pub(super) fixed_secs: f64,
+    pub(super) pixels_secs: f64,
+}
+
+/// One of the renderers, with its buffers.
+pub(super) enum Backend {
+    Cpu(Box<cpu::Renderer<f32>>),
+    Gpu(Box<Gpu>),
+}
+
+/// The GPU renderer and the cloud that it holds.
+pub(super) struct Gpu {
+    renderer: gpu::Renderer,
+    name: String,
+    uploaded: Weak<GaussianCloud>,
+}
+
+impl Backend {
+    /// The GPU if a real one answers, else the CPU.
+    pub(super) fn choose() -> Self {
+        match gpu::Context::new() {
+            Ok(context) if !context.is_software() => Self::on_gpu(&context).unwrap_or_else(|_| Self::on_cpu()),
+            _ => Self::on_cpu(),
+        }
+    }
+
+    /// The CPU.
+    pub(super) fn on_cpu() -> Self {
+        Self::Cpu(Box::new(cpu::Renderer::new()))
+    }
+
+    /// This GPU, whether real or emulated.
+    pub(super) fn on_gpu(context: &gpu::Context) -> Result<Self, GpuError> {
+        let renderer = gpu::Renderer::new(context)?;
+        Ok(Self::Gpu(Box::new(Gpu { renderer, name: context.info().name.clone(), uploaded: Weak::new() })))
+    }
+
+    /// Its name, for people.
+    pub(super) fn name(&self) -> &str {
+        match self {
+            Self::Cpu(_) => "CPU",
+            Self::Gpu(gpu) => &gpu.name,
+        }
+    }
+
+    /// Draws a cloud; it is sent to the GPU only if it is another one than last time.
+    pub(super) fn render(
+        &mut self,
+        cloud: &Arc<GaussianCloud>,
+        camera: &Camera,
+        settings: &RenderSettings,
+    ) -> Result<Frame<f32>, DrawError> {
+        match self {
+            Self::Cpu(renderer) => Ok(renderer.render(cloud, Features::NONE, camera, settings)?),
+            Self::Gpu(gpu) => {
+                camera.validate().map_err(RenderError::from)?;
+                if gpu.uploaded.as_ptr() != Arc::as_ptr(cloud) {
+                    gpu.uploaded = Weak::new();
+                    gpu.renderer.upload(cloud, Features::NONE)?;
+                    // A weak handle keeps the address from being given to another cloud.
+                    gpu.uploaded = Arc::downgrade(cloud);
+                }
+                Ok(gpu.renderer.draw(camera, settings)?)
+            }
+        }
+    }
+
+    /// What the last picture cost, `secs` in all.
+    pub(super) fn cost(&self, secs: f64) -> Cost {
+        match self {
+            Self::Cpu(renderer) => {
+                let [project, sort, bin, blend] = renderer.stats().stage_secs;
+                Cost { fixed_secs: project + sort, pixels_secs: bin + blend }
+            }
+            Self::Gpu(_) => Cost { fixed_secs: 0.0, pixels_secs: secs },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    fn dots(shift: f32) -> Arc<GaussianCloud> {
+        let n = 60;
+        Arc::new(GaussianCloud {
+            positions: (0..n).map(|i| [(i % 8) as f32 * 0.1 - 0.4 + shift, (i / 8) as f32 * 0.1 - 0.4, 0.0]).collect(),
+            log_scales: vec![[-3.0; 3]; n],
+            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
+            opacity_logits: vec![1.0; n],
+            sh: (0..n).map(|i| [(i % 3) as f32 * 0.5, 0.2, 0.4]).collect(),
+            ..GaussianCloud::default()
+        })
+    }
+
+    #[test]
+    fn gpu_and_cpu_draw_the_same_view_and_follow_the_cloud() {
+        let Ok(context) = gpu::Context::new() else {
+            println!("skipped: no GPU adapter, not even a software one");
+            return;
+        };
+        let mut gpu = Backend::on_gpu(&context).expect("opens");
+        let mut cpu = Backend::on_cpu();
+        let camera =
+            Camera::look_at(DVec3::new(0.2, 0.1, -2.0), DVec3::ZERO, DVec3::NEG_Y, 0.8, 64, 48).expect("valid");
+        let settings = RenderSettings { depth: true, ..RenderSettings::default() };
+        let mut worst = |cloud: &Arc<GaussianCloud>, on_cpu: &Arc<GaussianCloud>| {
+            let a = gpu.render(cloud, &camera, &settings).expect("draws");
+            let b = cpu.render(on_cpu, &camera, &settings).expect("draws");
+            a.color.iter().flatten().zip(b.color.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+        };
+        let (one, other) = (dots(0.0), dots(0.07));
+        assert!(worst(&one, &one) < 1e-3);
+        assert!(worst(&other, &other) < 1e-3, "the other cloud was sent");
+        assert!(worst(&other, &one) > 0.1, "another scene must differ");
+    }
+}
