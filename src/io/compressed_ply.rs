@@ -40,7 +40,7 @@ pub(super) fn decode(ply: &Ply<'_>) -> Result<GaussianCloud, IoError> {
             out[1..].copy_from_slice(&rest[i * (stride - 1)..(i + 1) * (stride - 1)]);
         }
     });
-    Ok(GaussianCloud {
+    let cloud = GaussianCloud {
         positions: rows().map(|(c, row)| c.position(position.u32(row))).collect(),
         log_scales: rows().map(|(c, row)| c.scale(scale.u32(row))).collect(),
         quaternions: rows().map(|(_, row)| quaternion(rotation.u32(row))).collect(),
@@ -48,7 +48,10 @@ pub(super) fn decode(ply: &Ply<'_>) -> Result<GaussianCloud, IoError> {
         sh_degree: degree,
         sh,
         ..GaussianCloud::default()
-    })
+    };
+    // Bounds are finite, but their difference may not be.
+    cloud.validate().map_err(|cause| IoError::Cloud { path: ply.path.into(), cause })?;
+    Ok(cloud)
 }
 
 /// Bounds of a chunk: minimum and extent of position, log-scale and colour.

@@ -55,8 +55,13 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
 pub fn poses(bytes: &[u8], path: &Path) -> Result<Vec<[f64; ROW]>, IoError> {
     let bad = |reason: String| IoError::Syntax { path: path.into(), place: "npy".into(), reason };
     let header = header_len(bytes).ok_or_else(|| bad("not an .npy file, or its header is cut off".into()))?;
-    // The library multiplies the shape's entries unchecked.
-    let (claimed, possible) = (values_claimed(&bytes[..header]), (bytes.len() - header) as u64);
+    // The library that reads the header multiplies sizes and the shape's entries unchecked.
+    let text = String::from_utf8_lossy(&bytes[..header]);
+    let kind = text.split_once("'descr'").and_then(|(_, rest)| rest.split('\'').nth(1)).unwrap_or_default();
+    if !["<f4", ">f4", "<f8", ">f8", "=f4", "=f8"].contains(&kind) {
+        return Err(bad(format!("its numbers are of the kind '{kind}', expected 32- or 64-bit floating point")));
+    }
+    let (claimed, possible) = (values_claimed(&text), (bytes.len() - header) as u64);
     if claimed > possible {
         return Err(IoError::Count { path: path.into(), what: "numbers".into(), claimed, possible });
     }
@@ -101,10 +106,9 @@ fn header_len(bytes: &[u8]) -> Option<usize> {
 }
 
 /// The product of the shape in an `.npy` header; the largest number if it has none or overflows.
-fn values_claimed(header: &[u8]) -> u64 {
-    let text = String::from_utf8_lossy(header);
+fn values_claimed(text: &str) -> u64 {
     let tuple = |text: &str| Some(text.split_once("shape")?.1.split_once('(')?.1.split_once(')')?.0.to_owned());
-    let shape = tuple(&text).unwrap_or_else(|| "?".into());
+    let shape = tuple(text).unwrap_or_else(|| "?".into());
     let entries = shape.split(',').map(str::trim).filter(|e| !e.is_empty());
     entries.map(|e| e.parse().unwrap_or(u64::MAX)).fold(1, u64::saturating_mul)
 }
@@ -220,6 +224,8 @@ mod tests {
         let e = with_shape("(1152921504606846976, 17)").expect_err("too many");
         assert!(matches!(e, IoError::Count { claimed: u64::MAX, .. }), "{e}");
         assert!(matches!(with_shape("7"), Err(IoError::Count { .. })));
+        let other = String::from_utf8_lossy(&good).replace("<f8", "<i8");
+        assert!(matches!(poses(other.as_bytes(), path), Err(IoError::Syntax { .. })));
         assert!(matches!(with_shape("(17, 1)"), Err(IoError::Syntax { .. })));
         assert!(matches!(with_shape("(17,)"), Err(IoError::Syntax { .. })));
         let mut bad = POSE;
