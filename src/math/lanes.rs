@@ -44,10 +44,14 @@ pub trait Lanes<R: Real>: Copy + Send + Sync {
     fn mul_add(self, a: Self::V, b: Self::V, c: Self::V) -> Self::V;
     /// The smaller.
     fn min(self, a: Self::V, b: Self::V) -> Self::V;
+    /// The larger.
+    fn max(self, a: Self::V, b: Self::V) -> Self::V;
     /// Square root; NaN below 0.
     fn sqrt(self, v: Self::V) -> Self::V;
     /// `a >= b`, false for NaN.
     fn ge(self, a: Self::V, b: Self::V) -> Self::M;
+    /// `a > b`, false for NaN.
+    fn gt(self, a: Self::V, b: Self::V) -> Self::M;
     /// Both.
     fn both(self, a: Self::M, b: Self::M) -> Self::M;
     /// `a` where the mask holds, else `b`.
@@ -68,6 +72,12 @@ pub trait Lanes<R: Real>: Copy + Send + Sync {
     fn sum(self, v: Self::V) -> R {
         let v = self.store(v);
         ((v[0] + v[4]) + (v[2] + v[6])) + ((v[1] + v[5]) + (v[3] + v[7]))
+    }
+
+    /// The sums over the lanes of eight vectors, in a fixed order.
+    #[inline(always)]
+    fn sums(self, v: [Self::V; LANES]) -> Self::V {
+        self.load(&v.map(|v| self.sum(v)))
     }
 }
 
@@ -120,8 +130,16 @@ impl<R: Real> Lanes<R> for Plain {
         each(|l| if a[l] < b[l] { a[l] } else { b[l] })
     }
     #[inline(always)]
+    fn max(self, a: Lane<R>, b: Lane<R>) -> Lane<R> {
+        each(|l| if a[l] > b[l] { a[l] } else { b[l] })
+    }
+    #[inline(always)]
     fn ge(self, a: Lane<R>, b: Lane<R>) -> [bool; LANES] {
         std::array::from_fn(|l| a[l] >= b[l])
+    }
+    #[inline(always)]
+    fn gt(self, a: Lane<R>, b: Lane<R>) -> [bool; LANES] {
+        std::array::from_fn(|l| a[l] > b[l])
     }
     #[inline(always)]
     fn both(self, a: [bool; LANES], b: [bool; LANES]) -> [bool; LANES] {
@@ -151,7 +169,7 @@ mod avx2 {
     use pulp::x86::V3;
     use pulp::{f32x8, m32x8, u32x8};
 
-    use super::{Lane, LaneOp, Lanes};
+    use super::{LANES, Lane, LaneOp, Lanes};
 
     impl Lanes<f32> for V3 {
         type V = f32x8;
@@ -193,8 +211,16 @@ mod avx2 {
             self.min_f32x8(a, b)
         }
         #[inline(always)]
+        fn max(self, a: f32x8, b: f32x8) -> f32x8 {
+            self.max_f32x8(a, b)
+        }
+        #[inline(always)]
         fn ge(self, a: f32x8, b: f32x8) -> m32x8 {
             self.cmp_ge_f32x8(a, b)
+        }
+        #[inline(always)]
+        fn gt(self, a: f32x8, b: f32x8) -> m32x8 {
+            self.cmp_gt_f32x8(a, b)
         }
         #[inline(always)]
         fn both(self, a: m32x8, b: m32x8) -> m32x8 {
@@ -212,6 +238,18 @@ mod avx2 {
         fn bits(self, mask: m32x8) -> u32 {
             let all: u32x8 = self.select_u32x8(mask, self.splat_u32x8(!0), self.splat_u32x8(0));
             self.avx._mm256_movemask_ps(bytemuck::cast(all)) as u32
+        }
+        #[inline(always)]
+        fn sums(self, v: [f32x8; LANES]) -> f32x8 {
+            // Neighbours are added three times over; what is left are two halves.
+            let pairs = |a: f32x8, b: f32x8| -> f32x8 {
+                bytemuck::cast(self.avx._mm256_hadd_ps(bytemuck::cast(a), bytemuck::cast(b)))
+            };
+            let first = pairs(pairs(v[0], v[1]), pairs(v[2], v[3]));
+            let second = pairs(pairs(v[4], v[5]), pairs(v[6], v[7]));
+            let [a, b]: [[f32; 4]; 2] = bytemuck::cast(first);
+            let [c, d]: [[f32; 4]; 2] = bytemuck::cast(second);
+            self.add_f32x8(bytemuck::cast([a, c]), bytemuck::cast([b, d]))
         }
         #[inline(always)]
         fn exp_neg(self, v: f32x8) -> f32x8 {
@@ -273,9 +311,16 @@ mod tests {
             let (a, b) = (l.load(&self.0), l.load(&self.1));
             let e = l.exp_neg(a);
             let m = l.both(l.ge(a, b), l.ge(b, l.splat(-40.0)));
-            let v = l.select(m, l.mul_add(a, b, e), l.div(l.sub(a, l.min(a, b)), l.splat(3.0)));
+            let other = l.div(l.sub(l.max(a, e), l.min(a, b)), l.splat(3.0));
+            let v = l.select(l.both(m, l.gt(e, b)), l.mul_add(a, b, e), other);
             let root = l.sqrt(l.mul(a, l.splat(-1.0)));
             let v = l.add(v, l.keep(m, l.mul(e, root)));
+            let totals = l.store(l.sums(std::array::from_fn(|k| l.mul(v, l.splat(k as f32)))));
+            let total = l.sum(v);
+            for (k, t) in totals.iter().enumerate() {
+                let size: f32 = l.store(v).iter().map(|v| v.abs()).sum();
+                assert!((t - total * k as f32).abs() <= 1e-5 * size * 8.0 + 1e-30, "{t} {total} {k}");
+            }
             assert_eq!(
                 l.bits(l.ge(a, b)).count_ones() as usize,
                 (0..LANES).filter(|&i| self.0[i] >= self.1[i]).count()

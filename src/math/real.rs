@@ -64,6 +64,7 @@ pub trait Real:
     }
 
     /// `1 / (1 + exp(-x))` without overflow for any `x`.
+    #[inline(always)]
     fn sigmoid(self) -> Self {
         if self >= Self::ZERO {
             Self::ONE / (Self::ONE + (-self).exp())
@@ -154,7 +155,8 @@ impl Real for f32 {
     }
     #[inline(always)]
     fn exp(self) -> Self {
-        f32::exp(self)
+        // The fast form holds for positive numbers too, up to where the exponent field ends.
+        if self.abs() <= -fast_exp::SMALLEST { self.exp_neg() } else { f32::exp(self) }
     }
     #[inline(always)]
     fn exp_neg(self) -> Self {

@@ -5,7 +5,6 @@ use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use rayon::prelude::*;
 
 use super::project::Splat;
-use super::sort::splat_of;
 use crate::math::Real;
 use crate::render::TILE_PX;
 
@@ -95,25 +94,25 @@ fn each_tile<R: Real>(s: &Splat<R>, size: [usize; 2], columns: usize, mut found:
     }
 }
 
-/// One task's share of the depth-ordered splats.
+/// One task's share of the splats.
 struct Share {
     tiles: Vec<u32>,
     lengths: Vec<u32>,
     counts: Vec<u32>,
 }
 
-/// Finds the tiles of the splats in `keys`.
+/// Finds the tiles of these splats.
 #[multiversion::multiversion(targets("x86_64+avx2+fma"))]
-fn share_of<R: Real>(splats: &[Splat<R>], keys: &[u64], size: [usize; 2], grid: [usize; 2]) -> Share {
+fn share_of<R: Real>(splats: &[Splat<R>], size: [usize; 2], grid: [usize; 2]) -> Share {
     let mut s = Share {
-        tiles: Vec::with_capacity(keys.len() * 4),
-        lengths: Vec::with_capacity(keys.len()),
+        tiles: Vec::with_capacity(splats.len() * 4),
+        lengths: Vec::with_capacity(splats.len()),
         counts: vec![0; grid[0] * grid[1]],
     };
-    for &key in keys {
+    for splat in splats {
         let before = s.tiles.len();
         let (list, counts) = (&mut s.tiles, &mut s.counts);
-        each_tile(&splats[splat_of(key) as usize], size, grid[0], |t| {
+        each_tile(splat, size, grid[0], |t| {
             list.push(t);
             counts[t as usize] += 1;
         });
@@ -122,14 +121,14 @@ fn share_of<R: Real>(splats: &[Splat<R>], keys: &[u64], size: [usize; 2], grid: 
     s
 }
 
-/// Builds the lists. `order` is the sorted keys of [`super::sort::sort`].
-pub fn bin<R: Real>(out: &mut Tiles, splats: &[Splat<R>], order: &[u64], size: [usize; 2]) {
+/// Builds the lists of splats that are ordered front to back.
+pub fn bin<R: Real>(out: &mut Tiles, splats: &[Splat<R>], size: [usize; 2]) {
     let grid = [size[0].div_ceil(TILE_PX), size[1].div_ceil(TILE_PX)];
     let tiles = grid[0] * grid[1];
     // A fixed number of shares: the lists do not depend on the number of threads anyway, but the
     // counters of a share cost `tiles` words each.
-    let share = order.len().div_ceil(2 * rayon::current_num_threads()).max(1_024);
-    let mut shares: Vec<Share> = order.par_chunks(share).map(|keys| share_of(splats, keys, size, grid)).collect();
+    let share = splats.len().div_ceil(2 * rayon::current_num_threads()).max(1_024);
+    let mut shares: Vec<Share> = splats.par_chunks(share).map(|splats| share_of(splats, size, grid)).collect();
 
     // Counts become first places: tile-major, and within a tile share after share.
     out.grid = grid;
@@ -145,13 +144,10 @@ pub fn bin<R: Real>(out: &mut Tiles, splats: &[Splat<R>], order: &[u64], size: [
     out.first.push(at);
 
     out.span.clear();
-    out.span.resize(splats.len(), (0, 0));
     let mut entry = 0;
-    for (keys, s) in order.chunks(share).zip(&shares) {
-        for (&key, &length) in keys.iter().zip(&s.lengths) {
-            out.span[splat_of(key) as usize] = (entry, entry + length);
-            entry += length;
-        }
+    for &length in shares.iter().flat_map(|s| &s.lengths) {
+        out.span.push((entry, entry + length));
+        entry += length;
     }
 
     out.entries.resize_with(at as usize, AtomicU32::default);
@@ -164,12 +160,12 @@ pub fn bin<R: Real>(out: &mut Tiles, splats: &[Splat<R>], order: &[u64], size: [
         rest = tail;
     }
     let entries = &out.entries;
-    shares.par_iter_mut().zip(slices).zip(order.par_chunks(share)).for_each(|((s, places), keys)| {
+    shares.par_iter_mut().zip(slices).enumerate().for_each(|(k, (s, places))| {
         let mut e = 0;
-        for (&key, &length) in keys.iter().zip(&s.lengths) {
+        for (i, &length) in s.lengths.iter().enumerate() {
             for _ in 0..length {
                 let next = &mut s.counts[s.tiles[e] as usize];
-                entries[*next as usize].store(splat_of(key), Relaxed);
+                entries[*next as usize].store((k * share + i) as u32, Relaxed);
                 places[e] = *next;
                 *next += 1;
                 e += 1;

@@ -66,8 +66,10 @@ impl<R: Real, const C: usize> BlendRow<'_, '_, R, C> {
         let (zero, one) = (l.splat(R::ZERO), l.splat(R::ONE));
         let (half, least) = (l.splat(R::HALF), l.splat(R::of(TRANSMITTANCE_MIN)));
         let mut sums = [[zero; C]; SLOTS];
+        // Light left at each pixel; negative once the pixel is closed. Selecting between a new value
+        // and the one in memory would become a masked store, whose result the next splat would
+        // have to wait for; hence the sign, and `max` below.
         let mut left = [one; SLOTS];
-        let mut open = [one; SLOTS];
         let mut last = [zero; SLOTS];
         let mut median = [zero; SLOTS];
         let ramp = ramp(l);
@@ -93,24 +95,23 @@ impl<R: Real, const C: usize> BlendRow<'_, '_, R, C> {
                 slots &= slots - 1;
                 let alpha = lanes.alphas(l, dx[slot / TILE_PX], walk.row(l, slot % TILE_PX));
                 let before = left[slot];
-                let after = l.mul(before, l.sub(one, alpha));
                 // A pixel stays open while the next splat leaves it enough light.
-                let still = l.both(l.ge(open[slot], one), l.ge(after, least));
+                let still = l.ge(l.mul(before, l.sub(one, alpha)), least);
                 let weight = l.keep(still, l.mul(alpha, before));
-                open[slot] = l.keep(still, one);
-                left[slot] = l.select(still, after, before);
+                let after = l.sub(before, weight);
+                left[slot] = l.select(still, after, l.min(before, l.sub(zero, before)));
                 if MEDIAN {
-                    let arrived = l.select(l.ge(half, left[slot]), l.splat(s.depth), median[slot]);
+                    let arrived = l.select(l.ge(half, after), l.splat(s.depth), median[slot]);
                     median[slot] = l.select(l.ge(half, before), median[slot], arrived);
                 }
-                last[slot] = l.select(l.ge(zero, weight), last[slot], place);
+                last[slot] = l.max(last[slot], l.keep(l.gt(weight, zero), place));
                 for c in 0..C {
                     sums[slot][c] = l.mul_add(weight, value[c], sums[slot][c]);
                 }
             }
             if k % CLOSED_CHECK == CLOSED_CHECK - 1 {
                 alive = (0..SLOTS as u32)
-                    .filter(|&slot| all >> slot & 1 == 1 && l.bits(l.ge(open[slot as usize], one)) != 0)
+                    .filter(|&slot| all >> slot & 1 == 1 && l.bits(l.ge(left[slot as usize], zero)) != 0)
                     .fold(0, |m, slot| m | 1 << slot);
                 if alive == 0 {
                     break;
@@ -128,7 +129,8 @@ impl<R: Real, const C: usize> BlendRow<'_, '_, R, C> {
                 for (c, plane) in out.planes.iter_mut().enumerate() {
                     plane[at..at + count].copy_from_slice(&l.store(sums[slot][c])[..count]);
                 }
-                out.transmittance[at..at + count].copy_from_slice(&l.store(left[slot])[..count]);
+                out.transmittance[at..at + count]
+                    .copy_from_slice(&l.store(l.max(left[slot], l.sub(zero, left[slot])))[..count]);
                 for (o, v) in out.last[at..at + count].iter_mut().zip(l.store(last[slot])) {
                     *o = v.f32() as u32;
                 }

@@ -152,8 +152,13 @@ impl<R: Real, const C: usize> BlendRowBackward<'_, '_, R, C> {
                 moments[5] = l.mul_add(py, dy, moments[5]);
             }
             let record = &mut records[k * stride..(k + 1) * stride];
-            for (r, v) in record.iter_mut().zip(moments.iter().chain(&value_sums)) {
-                *r = l.sum(*v);
+            let sum = |i: usize| if i < MOMENTS { moments[i] } else { value_sums[i - MOMENTS] };
+            for (part, eight) in record.chunks_mut(LANES).enumerate() {
+                let sums = std::array::from_fn(|i| {
+                    let i = part * LANES + i;
+                    if i < MOMENTS + C { sum(i) } else { zero }
+                });
+                eight.copy_from_slice(&l.store(l.sums(sums))[..eight.len()]);
             }
         }
     }

@@ -21,8 +21,9 @@ use rayon::prelude::*;
 use self::bin::Tiles;
 use self::blend::{BlendRow, RowOut};
 use self::blend_backward::{BlendRowBackward, MOMENTS, RowIn};
-use self::project::{NONE, Projected, View};
+use self::project::{Part, View};
 use self::project_backward::{GaussianGradient, project_backward};
+use self::sort::Ordered;
 use super::{CloudGradient, Features, Frame, FrameGradient, MAX_CHANNELS, RenderError, RenderSettings, TILE_PX};
 use crate::math::Real;
 use crate::scene::{Camera, Gaussian, GaussianCloud};
@@ -56,6 +57,9 @@ fn padded(channels: usize) -> usize {
     [3, 4, 10].into_iter().find(|&c| channels <= c).unwrap_or(MAX_CHANNELS)
 }
 
+/// No splat.
+const NONE: u32 = u32::MAX;
+
 /// What the last frame cost.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RenderStats {
@@ -76,8 +80,10 @@ pub struct RenderStats {
 /// A renderer with its buffers, to be kept from frame to frame.
 #[derive(Debug, Default)]
 pub struct Renderer<R> {
-    projected: Projected<R>,
-    order: Vec<u64>,
+    parts: Vec<Part<R>>,
+    ordered: Ordered<R>,
+    /// For each Gaussian its splat, or `NONE`; filled by the backward pass.
+    splat_of: Vec<u32>,
     tiles: Tiles,
     transmittance: Vec<R>,
     last: Vec<u32>,
@@ -91,6 +97,8 @@ pub struct Renderer<R> {
 struct FrameInfo<R> {
     view: View<R>,
     settings: RenderSettings,
+    /// Size of the cloud.
+    gaussians: usize,
     /// Channels in use and as padded.
     channels: [usize; 2],
     depth_channel: Option<usize>,
@@ -128,11 +136,11 @@ impl<R: Real> Renderer<R> {
         let size = view.size;
         let channels = padded(used);
         let mut clock = Clock::start();
-        project::project(&mut self.projected, cloud, features, &view, settings, channels);
+        project::project(&mut self.parts, cloud, features, &view, settings, channels);
         let project_secs = clock.lap();
-        sort::sort(&self.projected.splats, &mut self.order);
+        sort::sort(&mut self.ordered, &self.parts, channels);
         let sort_secs = clock.lap();
-        bin::bin(&mut self.tiles, &self.projected.splats, &self.order, size);
+        bin::bin(&mut self.tiles, &self.ordered.splats, size);
         let bin_secs = clock.lap();
 
         let pixels = size[0] * size[1];
@@ -142,8 +150,8 @@ impl<R: Real> Renderer<R> {
         let products = self.blend(&mut frame, channels, size);
         finish(&mut frame, &self.transmittance, settings.background);
         self.stats = RenderStats {
-            visible: self.projected.splats.len(),
-            degenerate: self.projected.degenerate,
+            visible: self.ordered.splats.len(),
+            degenerate: self.parts.iter().map(|p| p.degenerate).sum(),
             entries: self.tiles.entries.len(),
             products,
             stage_secs: [project_secs, sort_secs, bin_secs, clock.lap()],
@@ -152,6 +160,7 @@ impl<R: Real> Renderer<R> {
         self.frame = Some(FrameInfo {
             view,
             settings: settings.clone(),
+            gaussians: cloud.len(),
             channels: [used, channels],
             depth_channel: settings.depth.then_some(used - 1),
         });
@@ -175,7 +184,7 @@ impl<R: Real> Renderer<R> {
         for (row, part) in rows.iter_mut().zip(frame.median_depth.chunks_mut(strip)) {
             row.median = part;
         }
-        let (splats, values, tiles) = (&self.projected.splats, &self.projected.values, &self.tiles);
+        let (splats, values, tiles) = (&self.ordered.splats, &self.ordered.values, &self.tiles);
         rows.par_iter_mut()
             .enumerate()
             .map(|(ty, out)| {
@@ -189,6 +198,11 @@ impl<R: Real> Renderer<R> {
     pub fn backward_tiles(&mut self, gradient: &FrameGradient<R>) {
         let Some(info) = &self.frame else { return };
         let clock = Instant::now();
+        self.splat_of.clear();
+        self.splat_of.resize(info.gaussians, NONE);
+        for (s, splat) in self.ordered.splats.iter().enumerate() {
+            self.splat_of[splat.gaussian as usize] = s as u32;
+        }
         let size = info.view.size;
         let pixels = size[0] * size[1];
         let background = info.settings.background;
@@ -225,7 +239,7 @@ impl<R: Real> Renderer<R> {
             rest = others;
             tasks.push((ty, input, own));
         }
-        let (splats, values, tiles) = (&self.projected.splats, &self.projected.values, &self.tiles);
+        let (splats, values, tiles) = (&self.ordered.splats, &self.ordered.values, &self.tiles);
         tasks.into_par_iter().for_each(|(ty, input, own)| {
             with_channels!(info.channels[1], C => {
                 let input = &input;
@@ -237,7 +251,7 @@ impl<R: Real> Renderer<R> {
 
     /// Sum of Gaussian `i`'s tile records, or `None` if it was not drawn.
     fn record(&self, i: usize, stride: usize) -> Option<(usize, [R; MOMENTS + MAX_CHANNELS])> {
-        let s = *self.projected.splat_of.get(i)?;
+        let s = *self.splat_of.get(i)?;
         if s == NONE {
             return None;
         }
@@ -258,7 +272,7 @@ impl<R: Real> Renderer<R> {
     pub fn gaussian_gradient(&self, gaussian: &Gaussian<'_, R>, i: usize) -> Option<GaussianGradient<R>> {
         let info = self.frame.as_ref()?;
         let (s, record) = self.record(i, MOMENTS + info.channels[1])?;
-        let splat = &self.projected.splats[s];
+        let splat = &self.ordered.splats[s];
         project_backward(gaussian, splat, &info.view, &info.settings, &record, info.depth_channel)
     }
 

@@ -7,7 +7,7 @@ use crate::render::{ALPHA_MIN, BLUR_PX2, Features, RenderSettings, TANGENT_CLAMP
 use crate::scene::{Camera, Gaussian, GaussianCloud};
 
 /// Gaussians that one task projects.
-const CHUNK: usize = 2_048;
+pub const CHUNK: usize = 2_048;
 
 /// A camera in the renderer's precision, relative to a cloud's origin.
 #[derive(Clone, Debug)]
@@ -187,31 +187,21 @@ pub fn compensation<R: Real>(g: &Geometry<R>) -> R {
     (g.determinants[0] / g.determinants[1]).sqrt()
 }
 
-/// Splats of one frame with their composited values.
+/// The splats of some consecutive Gaussians with their composited values, in the cloud's order.
 #[derive(Debug, Default)]
-pub struct Projected<R> {
-    /// The Gaussians that reach at least one pixel centre, in the cloud's order.
+pub struct Part<R> {
+    /// The Gaussians that reach at least one pixel centre.
     pub splats: Vec<Splat<R>>,
     /// `[splats * channels]`: colour, extra channels, depth if asked for, padding zeros.
     pub values: Vec<R>,
-    /// For each Gaussian its splat, or `NONE`.
-    pub splat_of: Vec<u32>,
     /// Gaussians left out because their covariance or rotation is degenerate.
     pub degenerate: usize,
 }
 
-/// No splat.
-pub const NONE: u32 = u32::MAX;
-
-struct Part<R> {
-    splats: Vec<Splat<R>>,
-    values: Vec<R>,
-    degenerate: usize,
-}
-
-/// Projects the whole cloud. `channels` is the padded number of values per splat.
+/// Projects the whole cloud, in parts of [`CHUNK`] Gaussians. `channels` is the padded number of
+/// values per splat.
 pub fn project<R: Real>(
-    out: &mut Projected<R>,
+    parts: &mut Vec<Part<R>>,
     cloud: &GaussianCloud<R>,
     features: Features<'_, R>,
     view: &View<R>,
@@ -219,39 +209,25 @@ pub fn project<R: Real>(
     channels: usize,
 ) {
     let n = cloud.len();
-    let parts: Vec<Part<R>> = (0..n.div_ceil(CHUNK))
-        .into_par_iter()
-        .map(|c| project_chunk(cloud, features, view, settings, channels, c * CHUNK..((c + 1) * CHUNK).min(n)))
-        .collect();
-    out.splats.clear();
-    out.values.clear();
-    out.degenerate = 0;
-    for part in &parts {
-        out.splats.extend_from_slice(&part.splats);
-        out.values.extend_from_slice(&part.values);
-        out.degenerate += part.degenerate;
-    }
-    out.splat_of.clear();
-    out.splat_of.resize(n, NONE);
-    for (s, splat) in out.splats.iter().enumerate() {
-        out.splat_of[splat.gaussian as usize] = s as u32;
-    }
+    parts.resize_with(n.div_ceil(CHUNK), Part::default);
+    parts.par_iter_mut().enumerate().for_each(|(c, part)| {
+        project_chunk(part, cloud, features, view, settings, channels, c * CHUNK..((c + 1) * CHUNK).min(n));
+    });
 }
 
 #[multiversion::multiversion(targets("x86_64+avx2+fma"))]
 fn project_chunk<R: Real>(
+    part: &mut Part<R>,
     cloud: &GaussianCloud<R>,
     features: Features<'_, R>,
     view: &View<R>,
     settings: &RenderSettings,
     channels: usize,
     range: std::ops::Range<usize>,
-) -> Part<R> {
-    let mut part = Part {
-        splats: Vec::with_capacity(range.len()),
-        values: Vec::with_capacity(range.len() * channels),
-        degenerate: 0,
-    };
+) {
+    part.splats.clear();
+    part.values.clear();
+    part.degenerate = 0;
     let degree = settings.sh_degree.min(cloud.sh_degree);
     let alpha_min = R::of(ALPHA_MIN);
     for i in range {
@@ -308,5 +284,4 @@ fn project_chunk<R: Real>(
         part.values.resize(first + channels, R::ZERO);
         part.splats.push(Splat { mean, conic, opacity, reach, half, depth: z, gaussian: i as u32 });
     }
-    part
 }

@@ -2,20 +2,42 @@
 
 use rayon::prelude::*;
 
-use super::project::Splat;
+use super::project::{CHUNK, Part, Splat};
 use crate::math::Real;
 
-/// Indices of `splats` by ascending depth; equal depths keep their order. Depths are positive, so
-/// their bit patterns order like the numbers; the index in the low half makes keys unique, which
-/// makes an unstable sort deterministic.
-pub fn sort<R: Real>(splats: &[Splat<R>], keys: &mut Vec<u64>) {
-    keys.clear();
-    keys.par_extend(splats.par_iter().enumerate().map(|(i, s)| (u64::from(s.depth.f32().to_bits()) << 32) | i as u64));
-    keys.par_sort_unstable();
+/// The splats of one frame, front to back.
+#[derive(Debug, Default)]
+pub struct Ordered<R> {
+    /// By ascending depth; equal depths in the cloud's order.
+    pub splats: Vec<Splat<R>>,
+    /// Their values, as in [`Part::values`].
+    pub values: Vec<R>,
+    keys: Vec<u64>,
 }
 
-/// The splat that a sorted key stands for.
-#[inline(always)]
-pub fn splat_of(key: u64) -> u32 {
-    key as u32
+/// Brings the splats of all parts into order. Everything after this reads them nearly from front
+/// to back, instead of jumping through the cloud.
+pub fn sort<R: Real>(out: &mut Ordered<R>, parts: &[Part<R>], channels: usize) {
+    // Depths are positive, so their bit patterns order like the numbers. The low half of a key is
+    // the splat's part and its place in there.
+    out.keys.clear();
+    for (p, part) in parts.iter().enumerate() {
+        let low = (p * CHUNK) as u64;
+        let key = |(i, s): (usize, &Splat<R>)| (u64::from(s.depth.f32().to_bits()) << 32) | (low + i as u64);
+        out.keys.extend(part.splats.iter().enumerate().map(key));
+    }
+    // Stable, hence deterministic.
+    radsort::sort_by_key(&mut out.keys, |key| (key >> 32) as u32);
+
+    let n = out.keys.len();
+    out.splats.resize(n, Splat::default());
+    out.values.resize(n * channels, R::ZERO);
+    let blocks = out.splats.par_chunks_mut(CHUNK).zip(out.values.par_chunks_mut(CHUNK * channels));
+    blocks.zip(out.keys.par_chunks(CHUNK)).for_each(|((splats, values), keys)| {
+        for ((splat, value), &key) in splats.iter_mut().zip(values.chunks_exact_mut(channels)).zip(keys) {
+            let (part, i) = (&parts[key as u32 as usize / CHUNK], key as u32 as usize % CHUNK);
+            *splat = part.splats[i];
+            value.copy_from_slice(&part.values[i * channels..(i + 1) * channels]);
+        }
+    });
 }
