@@ -287,8 +287,8 @@ fn descend_block(renderer: &Renderer<f32>, block: &mut Block<'_>, update: &Updat
         seen[i] += 1;
         radius[i] = radius[i].max(g.radius_px * radius_scale);
         let step = |p: &mut [f32], m: &mut [f32], v: &mut [f32], g: &[f32], rate: f32| {
-            for k in 0..g.len() {
-                adam.update(&mut p[k], g[k].clamp(-CLIP, CLIP), &mut m[k], &mut v[k], rate);
+            for (((p, m), v), g) in p.iter_mut().zip(m).zip(v).zip(g) {
+                adam.update(p, g.clamp(-CLIP, CLIP), m, v, rate);
             }
         };
         step(&mut p.positions[i], &mut m.positions[i], &mut v.positions[i], &g.position, rates.position);
@@ -302,11 +302,17 @@ fn descend_block(renderer: &Renderer<f32>, block: &mut Block<'_>, update: &Updat
             &[g.opacity_logit],
             rates.opacity_logit,
         );
-        for k in 0..*active {
-            let at = own.start + k;
-            let rate = if k == 0 { rates.sh_constant } else { rates.sh_rest };
-            step(&mut p.sh[at], &mut m.sh[at], &mut v.sh[at], &g.color.map(|c| c * g.basis[k]), rate);
+        // All SH coefficients in one loop, which then runs in vectors.
+        let mut d_sh = [0.0; 48];
+        for (d, (k, c)) in d_sh.iter_mut().zip((0..*active).flat_map(|k| (0..3).map(move |c| (k, c)))) {
+            *d = g.color[c] * g.basis[k];
         }
+        let own = own.start..own.start + active;
+        let (p, m, v) = (&mut p.sh[own.clone()], &mut m.sh[own.clone()], &mut v.sh[own]);
+        let (p, m, v) = (p.as_flattened_mut(), m.as_flattened_mut(), v.as_flattened_mut());
+        let ((p0, p1), (m0, m1), (v0, v1)) = (p.split_at_mut(3), m.split_at_mut(3), v.split_at_mut(3));
+        step(p0, m0, v0, &d_sh[..3], rates.sh_constant);
+        step(p1, m1, v1, &d_sh[3..3 * active], rates.sh_rest);
     }
     skipped
 }
