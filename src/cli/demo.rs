@@ -88,7 +88,8 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
             "{done} of {all} steps are saved; the same command goes on from there"
         )));
     }
-    let job = eval::job(opened::drawable(&scene)?, &photos, None, None, Some(compare))?;
+    let job =
+        eval::job(opened::drawable(&scene)?, &photos, eval::Options { pictures: Some(compare), ..Default::default() })?;
     let views = eval::measure(&job, &mut console)?;
     let millis = fly(&job.cloud, &job.settings, &dataset, &flight)?;
 

@@ -14,6 +14,7 @@ use crate::math::stats::mean;
 use crate::pipeline::evaluate::evaluate;
 use crate::pipeline::observer::{Level, Observer, Progress, Signal, ViewScore};
 use crate::pipeline::train::TrainView;
+use crate::pipeline::train::border::Borders;
 use crate::render::cpu::Renderer;
 use crate::render::{Features, RenderSettings};
 use crate::scene::{Dataset, GaussianCloud};
@@ -37,18 +38,28 @@ pub struct Args {
     /// Dataset with the photos [default: where the scene's photos are]
     #[arg(long)]
     photos: Option<PathBuf>,
-    /// Longer side of the compared pictures in px [default: as in training, else 512]
-    #[arg(long, value_parser = clap::value_parser!(u32).range(16..=16384))]
-    max_side: Option<u32>,
-    /// Which photos count as held out: every n-th, 0 = all photos [default: as in training, else 8]
-    #[arg(long)]
-    holdout_every: Option<usize>,
-    /// Folder for pictures: photo, render and difference side by side
-    #[arg(long)]
-    pictures: Option<PathBuf>,
+    #[command(flatten)]
+    options: Options,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
+}
+
+/// What is compared; by default as in training.
+#[derive(Debug, Default, clap::Args)]
+pub struct Options {
+    /// Longer side of the compared pictures in px [default: as in training, else 512]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(16..=16384))]
+    pub max_side: Option<u32>,
+    /// Which photos count as held out: every n-th, 0 = all photos [default: as in training, else 8]
+    #[arg(long)]
+    pub holdout_every: Option<usize>,
+    /// Compare the black borders of photos that were undistorted elsewhere, too
+    #[arg(long)]
+    pub keep_borders: bool,
+    /// Folder for pictures: photo, render and difference side by side
+    #[arg(long)]
+    pub pictures: Option<PathBuf>,
 }
 
 /// A checked evaluation.
@@ -63,6 +74,8 @@ pub struct Job {
     pub views: Vec<usize>,
     /// Longer side of the compared pictures in px.
     pub max_side_px: u32,
+    /// Borders of the photos, which are left out.
+    pub borders: Option<Borders>,
     /// Folder for pictures.
     pub pictures: Option<PathBuf>,
 }
@@ -74,18 +87,13 @@ impl Args {
             let path = self.scene.display();
             CliError::failed(format!("{path}: its photos are not known or no longer there; give them with --photos"))
         })?;
-        job(scene, &photos, self.max_side, self.holdout_every, self.pictures)
+        job(scene, &photos, self.options)
     }
 }
 
-/// The evaluation of `scene` on `photos`; what is `None` is as in training.
-pub fn job(
-    scene: DrawableScene,
-    photos: &Path,
-    max_side_px: Option<u32>,
-    holdout_every: Option<usize>,
-    pictures: Option<PathBuf>,
-) -> Result<Job, CliError> {
+/// The evaluation of `scene` on `photos`.
+pub fn job(scene: DrawableScene, photos: &Path, options: Options) -> Result<Job, CliError> {
+    let Options { max_side, holdout_every, keep_borders, pictures } = options;
     let dataset = opened::dataset(photos)?;
     let mut views = match holdout_every {
         Some(every) => dataset.split(every).1,
@@ -105,8 +113,10 @@ pub fn job(
             photos.display()
         )));
     }
-    let max_side_px = max_side_px.unwrap_or(scene.config.max_side_px);
-    Ok(Job { cloud: scene.cloud, settings: scene.settings, dataset, views, max_side_px, pictures })
+    let max_side_px = max_side.unwrap_or(scene.config.max_side_px);
+    let (training, _) = dataset.split(holdout_every.unwrap_or(scene.config.holdout_every));
+    let borders = if keep_borders { None } else { Some(Borders::of(&dataset, &training, max_side_px)?) };
+    Ok(Job { cloud: scene.cloud, settings: scene.settings, dataset, views, max_side_px, borders, pictures })
 }
 
 pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
@@ -152,7 +162,10 @@ pub fn measure(job: &Job, observer: &mut dyn Observer) -> Result<Vec<ViewScore>,
             return Err(CliError::Cancelled(format!("{done} of {} views were measured", job.views.len())));
         }
         let photo = &job.dataset.photos[index];
-        let pixels = io::photo::load(photo, job.max_side_px)?;
+        let pixels = match &job.borders {
+            Some(borders) => borders.load(photo)?,
+            None => io::photo::load(photo, job.max_side_px)?,
+        };
         let camera = photo.camera.resized(pixels.width_px, pixels.height_px);
         let view = TrainView { name: photo.name.clone(), camera, pixels };
         let evaluation = evaluate(&job.cloud, std::slice::from_ref(&view), &job.settings, 0, 0.0)?;
@@ -187,12 +200,15 @@ fn write_comparison(
     path: &Path,
 ) -> Result<(), CliError> {
     let frame = Renderer::<f32>::new().render(cloud, Features::NONE, &view.camera, settings)?;
-    let render = frame.to_rgb8();
+    let mut render = frame.to_rgb8();
     let width = frame.width_px;
     let difference = |(a, b): (&[u8; 3], &[u8; 3])| {
         std::array::from_fn(|c| ((i32::from(a[c]) - i32::from(b[c])).abs() * DIFFERENCE_GAIN).min(255) as u8)
     };
     let mut pixels: Vec<[u8; 3]> = Vec::with_capacity(3 * render.len());
+    if let Some(coverage) = &view.pixels.coverage {
+        render.iter_mut().zip(coverage).filter(|(_, c)| **c == 0).for_each(|(rgb, _)| *rgb = [0; 3]);
+    }
     for (photo_row, render_row) in view.pixels.rgb.chunks_exact(width).zip(render.chunks_exact(width)) {
         pixels.extend_from_slice(photo_row);
         pixels.extend_from_slice(render_row);

@@ -13,6 +13,7 @@ mod info;
 mod interrupt;
 mod opened;
 mod output;
+mod painter;
 mod progress;
 mod render;
 mod synth;

@@ -2,6 +2,7 @@
 //! Everything here talks to the outside through an [`observer::Observer`] and nothing else.
 
 pub mod bench;
+pub mod bench_gpu;
 pub mod demo_scene;
 pub mod evaluate;
 pub mod metrics;

@@ -3,17 +3,20 @@
 //! [`run()`] is the whole job; [`trainer`] the state and its step; [`init`], [`schedule`] and
 //! [`density`] what the step consults; [`checkpoint`] what survives a kill.
 
+pub mod border;
 pub mod budget;
 pub mod checkpoint;
 pub mod config;
 pub mod density;
 pub mod init;
+mod photos;
 mod run;
 pub mod schedule;
 pub mod trainer;
 
 pub use config::{BackendChoice, TrainConfig};
-pub use run::{TrainEnd, TrainError, TrainOutcome, load_views, run};
+pub use photos::load_views;
+pub use run::{TrainEnd, TrainError, TrainOutcome, run};
 
 use crate::scene::{Camera, PhotoPixels};
 

@@ -3,13 +3,13 @@
 use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
-use rayon::prelude::*;
 
 use super::checkpoint::{self, CheckpointError, Header};
+use super::photos::{load_views, wait};
 use super::trainer::Trainer;
 use super::{TrainConfig, TrainView, init};
 use crate::io::IoError;
@@ -153,52 +153,6 @@ fn resumable(
         return Err(CheckpointError::OtherRun { path, what: "photos" });
     }
     Ok(Some(saved))
-}
-
-/// Loads and scales photos, several at a time; `None` if the observer cancels.
-pub fn load_views(
-    dataset: &Dataset,
-    indices: &[usize],
-    config: &TrainConfig,
-    stage: &str,
-    observer: &mut dyn Observer,
-) -> Result<Option<Vec<TrainView>>, TrainError> {
-    let start = Instant::now();
-    let mut views = Vec::with_capacity(indices.len());
-    for batch in indices.chunks(8) {
-        if wait(observer) == Signal::Cancel {
-            return Ok(None);
-        }
-        let loaded: Result<Vec<TrainView>, IoError> = batch
-            .par_iter()
-            .map(|&i| {
-                let photo = &dataset.photos[i];
-                let pixels = crate::io::photo::load(photo, config.max_side_px)?;
-                let camera = photo.camera.resized(pixels.width_px, pixels.height_px);
-                Ok(TrainView { name: photo.name.clone(), camera, pixels })
-            })
-            .collect();
-        views.extend(loaded.map_err(TrainError::Photo)?);
-        let secs = start.elapsed().as_secs_f64();
-        observer.progress(Progress {
-            stage: stage.into(),
-            done: views.len() as u64,
-            total: indices.len() as u64,
-            elapsed_secs: secs,
-            rate: views.len() as f64 / secs.max(1e-9),
-        });
-    }
-    Ok(Some(views))
-}
-
-/// Waits out a pause.
-fn wait(observer: &mut dyn Observer) -> Signal {
-    loop {
-        match observer.signal() {
-            Signal::Pause => std::thread::sleep(Duration::from_millis(20)),
-            other => return other,
-        }
-    }
 }
 
 /// A running job.

@@ -89,10 +89,10 @@ impl Schedule {
         done >= self.densify_from && done <= self.densify_until && done % self.densify_interval == 0
     }
 
-    /// Whether Gaussians that are too large may be removed after `done` steps: in the second half
-    /// of density control, when what they stood in for has had time to grow.
+    /// Whether Gaussians that are too large may be removed after `done` steps: after the first
+    /// reset, as in 3DGS. Before it they are the walls behind everything else.
     pub fn prunes_large(&self, done: u64) -> bool {
-        done >= self.densify_until / 2
+        done > self.reset_interval
     }
 
     /// Whether opacities are reset after `done` steps. Never near the end of density control, so
