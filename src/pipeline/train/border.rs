@@ -164,7 +164,7 @@ mod tests {
 
     /// Photos of a bright, changing scene with `frame` black pixels around it.
     fn photos(n: usize, frame: u32) -> Vec<PhotoPixels> {
-        let (w, h) = (40, 30);
+        let (w, h) = (60, 40);
         let inside = |x: u32, y: u32| x >= frame && y >= frame && x < w - frame && y < h - frame;
         (0..n as u32)
             .map(|k| {
@@ -180,10 +180,10 @@ mod tests {
         let mut photos = photos(10, 2);
         let border = find(&photos.iter().collect::<Vec<_>>()).expect("a border");
         // Two black rows and two that resampling may have touched.
-        assert_eq!(border.iter().filter(|b| **b).count(), 40 * 30 - 32 * 22);
+        assert_eq!(border.iter().filter(|b| **b).count(), 60 * 40 - 52 * 32);
         leave_out(&border, &mut photos[0]);
         let coverage = photos[0].coverage.as_ref().expect("partial");
-        assert_eq!((coverage[0], coverage[15 * 40 + 20]), (0, 255));
+        assert_eq!((coverage[0], coverage[20 * 60 + 30]), (0, 255));
     }
 
     #[test]

@@ -19,15 +19,15 @@ pub struct Ordered<R> {
 /// to back, instead of jumping through the cloud.
 pub fn sort<R: Real>(out: &mut Ordered<R>, parts: &[Part<R>], channels: usize) {
     // Depths are positive, so their bit patterns order like the numbers. The low half of a key is
-    // the splat's part and its place in there.
+    // the splat's part and its place in there, which makes keys unique and an unstable sort
+    // deterministic.
     out.keys.clear();
-    for (p, part) in parts.iter().enumerate() {
+    out.keys.par_extend(parts.par_iter().enumerate().flat_map_iter(|(p, part)| {
         let low = (p * CHUNK) as u64;
-        let key = |(i, s): (usize, &Splat<R>)| (u64::from(s.depth.f32().to_bits()) << 32) | (low + i as u64);
-        out.keys.extend(part.splats.iter().enumerate().map(key));
-    }
-    // Stable, hence deterministic.
-    radsort::sort_by_key(&mut out.keys, |key| (key >> 32) as u32);
+        let key = move |(i, s): (usize, &Splat<R>)| (u64::from(s.depth.f32().to_bits()) << 32) | (low + i as u64);
+        part.splats.iter().enumerate().map(key)
+    }));
+    out.keys.par_sort_unstable();
 
     let n = out.keys.len();
     out.splats.resize(n, Splat::default());
