@@ -58,3 +58,28 @@ fn synth_train_eval_render_export() {
     assert_eq!(repeated["steps"], 150);
     assert!((psnr(&repeated) - psnr(&long)).abs() < 1e-6);
 }
+
+#[test]
+fn a_run_on_the_gpu_follows_the_one_on_the_cpu() {
+    if fmlgs::render::gpu::Context::new().is_err() {
+        println!("skipped: no GPU adapter, not even a software one");
+        return;
+    }
+    let folder = folder();
+    let photos = tiny_dataset(folder.path());
+    let train = |backend: &str, seed: &str| {
+        let out = folder.path().join(format!("{backend}{seed}"));
+        let (photos, out) = (photos.to_str().unwrap(), out.to_str().unwrap());
+        let arguments = ["train", photos, "--out", out, "--steps", "100", "--backend", backend, "--seed", seed];
+        fmlgs(&[&arguments[..], &["--max-side", "48", "--random-points", "1500", "--json"]].concat()).ok().json()
+    };
+    let (cpu, gpu, other) = (train("cpu", "0"), train("gpu", "0"), train("cpu", "1"));
+    let psnr = |j: &serde_json::Value| j["evaluations"].as_array().unwrap().last().unwrap()["psnr"].as_f64().unwrap();
+    let count = |j: &serde_json::Value| j["gaussians"].as_f64().unwrap();
+    // Sums in another order: the runs drift apart, but not far, and density control (from step 50)
+    // asks for nearly the same.
+    assert!((psnr(&cpu) - psnr(&gpu)).abs() < 0.5, "{} dB on the CPU, {} on the GPU", psnr(&cpu), psnr(&gpu));
+    assert!((count(&cpu) / count(&gpu) - 1.0).abs() < 0.03, "{} {}", count(&cpu), count(&gpu));
+    assert_ne!(psnr(&cpu), psnr(&gpu), "the GPU did not train");
+    assert_ne!(psnr(&cpu), psnr(&other), "another seed must give another run");
+}

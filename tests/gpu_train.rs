@@ -6,9 +6,10 @@ mod gpu_common;
 
 use common::{camera, random_cloud, rng};
 use fmlgs::render::cpu::adam::AdamStep;
+use fmlgs::render::cpu::adam::Rates;
 use fmlgs::render::cpu::ssim::PhotoLoss;
 use fmlgs::render::gpu::ssim::photo_loss;
-use fmlgs::render::gpu::{Context, GpuError, Parameters, Rates, Trainer, TrainerSettings};
+use fmlgs::render::gpu::{Context, GpuError, Parameters, Trainer, TrainerSettings};
 use fmlgs::render::{Features, FrameGradient, RenderSettings, cpu};
 use fmlgs::scene::{Camera, GaussianCloud, PhotoPixels};
 use gpu_common::compare::{INTERIOR, agree};

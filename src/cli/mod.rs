@@ -13,7 +13,6 @@ mod info;
 mod interrupt;
 mod opened;
 mod output;
-mod painter;
 mod progress;
 mod render;
 mod synth;

@@ -1,16 +1,15 @@
 //! `fmlgs render`: one picture, depth map or alpha map of a scene, from a given camera.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use image::ColorType;
 use serde_json::json;
 
 use super::opened::DrawableScene;
-use super::painter::Painter;
 use super::{CliError, opened, output, view};
-use crate::pipeline::train::BackendChoice;
-use crate::render::{Frame, RenderSettings};
+use crate::render::{Backend, BackendChoice, Frame, RenderSettings};
 use crate::scene::Camera;
 
 /// Draw a scene from a given camera into a file
@@ -108,9 +107,10 @@ impl Args {
 pub fn run(args: Args) -> Result<(), CliError> {
     let job = args.check()?;
     let settings = RenderSettings { depth: args.what == What::Depth, ..job.scene.settings };
-    let (mut painter, backend) = Painter::new(args.backend)?;
+    let mut backend = Backend::choose(args.backend)?;
+    let cloud = Arc::new(job.scene.cloud);
     let started = Instant::now();
-    let frame = painter.draw(&job.scene.cloud, &job.camera, &settings)?;
+    let frame = backend.render(&cloud, &job.camera, &settings)?;
     let millis = started.elapsed().as_secs_f64() * 1e3;
 
     output::make_parent(&args.out)?;
@@ -121,8 +121,8 @@ pub fn run(args: Args) -> Result<(), CliError> {
             "out": args.out,
             "size_px": size,
             "camera": job.camera,
-            "gaussians": job.scene.cloud.len(),
-            "backend": backend,
+            "gaussians": cloud.len(),
+            "backend": backend.name(),
             "render_ms": millis,
             "depth_full_scale": far,
         }));
@@ -130,8 +130,9 @@ pub fn run(args: Args) -> Result<(), CliError> {
     let scale = far.map_or(String::new(), |far| format!(", value 65535 = {far} scene units"));
     let [width, height] = size;
     output::print(&format!(
-        "{}: {width} x {height} px, drawn in {millis:.0} ms on {backend}{scale}",
-        args.out.display()
+        "{}: {width} x {height} px, drawn in {millis:.0} ms on {}{scale}",
+        args.out.display(),
+        backend.name()
     ))
 }
 

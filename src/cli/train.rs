@@ -8,7 +8,8 @@ use super::progress::{Console, evaluation_line};
 use super::{CliError, opened, output};
 use crate::io::{self, Opened};
 use crate::pipeline::observer::{Level, Observer};
-use crate::pipeline::train::{self, BackendChoice, TrainConfig, TrainEnd};
+use crate::pipeline::train::{self, TrainConfig, TrainEnd};
+use crate::render::BackendChoice;
 use crate::scene::Dataset;
 
 /// Train 3D Gaussians from posed photos

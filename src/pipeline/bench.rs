@@ -12,7 +12,7 @@ use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
 
 use super::train::init;
-use super::train::trainer::Trainer;
+use super::train::trainer::{StepError, Trainer};
 use super::train::{TrainConfig, TrainView};
 use crate::math::lanes::{LANES, LaneOp, Lanes};
 use crate::math::stats::median;
@@ -103,7 +103,7 @@ pub fn train_steps(
     views: &[TrainView],
     config: &TrainConfig,
     repeats: usize,
-) -> Result<StepTiming, RenderError> {
+) -> Result<StepTiming, StepError> {
     let mut rng = Pcg64Mcg::seed_from_u64(config.seed);
     let cloud = init::initial_cloud(dataset, views, config.sh_degree, config.random_points, &mut rng);
     let gaussians = cloud.len();

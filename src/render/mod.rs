@@ -8,8 +8,11 @@
 //! * a pixel is closed before the splat that would bring its transmittance under
 //!   `TRANSMITTANCE_MIN`.
 
+mod backend;
 pub mod cpu;
 pub mod gpu;
+
+pub use backend::{Backend, BackendChoice, Cost, DrawError};
 
 use crate::math::Real;
 use crate::scene::CameraError;

@@ -4,7 +4,6 @@
 //! to do), [`Event`] (what happened). Bulk data never queues: it is published in a [`Slot`].
 
 pub mod action;
-mod backend;
 pub mod control;
 pub mod jobs;
 pub mod machine;

@@ -7,11 +7,10 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use super::action::ViewMode;
-use super::backend::Backend;
 use super::protocol::Failure;
 use super::thread::{Repaint, panic_failure};
 use super::{Slot, paint};
-use crate::render::{Frame, RenderSettings};
+use crate::render::{Backend, BackendChoice, Frame, RenderSettings};
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
 
 /// How much time a picture may take; decides its resolution.
@@ -101,7 +100,7 @@ impl ViewLane {
         let (box_, out) = (Arc::clone(&mailbox), Arc::clone(&pictures));
         let work = move || {
             // Looking for a GPU takes a moment; here nobody waits for it.
-            let mut painter = Painter::new(Backend::choose());
+            let mut painter = Painter::new(Backend::choose(BackendChoice::Auto).unwrap_or_else(|_| Backend::on_cpu()));
             while let Some(request) = next(&box_) {
                 out.publish(painter.draw(&request));
                 repaint();

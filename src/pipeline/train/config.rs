@@ -2,18 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Which renderer trains.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "lowercase")]
-pub enum BackendChoice {
-    /// The GPU if the machine has a real one, else the CPU.
-    #[default]
-    Auto,
-    /// The CPU.
-    Cpu,
-    /// The GPU, even a software one.
-    Gpu,
-}
+use crate::render::BackendChoice;
 
 /// Settings of a run. Everything that a schedule depends on scales with `steps`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -8,13 +8,14 @@ pub mod budget;
 pub mod checkpoint;
 pub mod config;
 pub mod density;
+mod device;
 pub mod init;
 mod photos;
 mod run;
 pub mod schedule;
 pub mod trainer;
 
-pub use config::{BackendChoice, TrainConfig};
+pub use config::TrainConfig;
 pub use photos::load_views;
 pub use run::{TrainEnd, TrainError, TrainOutcome, run};
 

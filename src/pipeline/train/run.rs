@@ -10,7 +10,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::checkpoint::{self, CheckpointError, Header};
 use super::photos::{load_views, wait};
-use super::trainer::Trainer;
+use super::trainer::{REPORT_STEPS, StepError, StepResult, Trainer};
 use super::{TrainConfig, TrainView, init};
 use crate::io::IoError;
 use crate::io::trained::{self, History, SceneInfo};
@@ -18,10 +18,9 @@ use crate::math::stats::{mean, median};
 use crate::pipeline::evaluate::evaluate;
 use crate::pipeline::observer::{Evaluation, Level, Observer, Progress, Signal, StepMetrics};
 use crate::render::RenderError;
+use crate::render::gpu::GpuError;
 use crate::scene::{Dataset, GaussianCloud};
 
-/// Steps between measurements that are reported.
-const REPORT_STEPS: u64 = 10;
 /// Steps between copies of the cloud to roll back to.
 const SAFE_STEPS: u64 = 500;
 /// A loss this many times its running median means that the run diverges.
@@ -65,6 +64,9 @@ pub enum TrainError {
     /// A view could not be drawn.
     #[error("photo {0}: {1}")]
     Render(String, RenderError),
+    /// The GPU failed. The last checkpoint is intact.
+    #[error("the GPU failed: {0}; --backend cpu does without")]
+    Gpu(#[from] GpuError),
     /// The checkpoint in the result's folder cannot be used.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
@@ -104,6 +106,13 @@ pub fn run(
     };
     views.shrink_to_fit();
     let mut job = Job::start(dataset, config, out, &held, views, tests, saved);
+    match config.backend.gpu()? {
+        Some(context) => {
+            observer.note(Level::Info, format!("Training on {}", context.describe()));
+            job.trainer.move_to(&context, &job.views)?;
+        }
+        None => observer.note(Level::Info, "Training on the CPU".into()),
+    }
     let end = job.train(observer)?;
     job.finish(end, observer)
 }
@@ -118,9 +127,6 @@ fn check(config: &TrainConfig) -> Result<(), TrainError> {
     }
     if config.sh_degree > 3 {
         return bad("the spherical-harmonics degree must be 0 to 3");
-    }
-    if config.backend == super::BackendChoice::Gpu {
-        return bad("whole runs train on the CPU so far; leave the backend at 'auto' or 'cpu'");
     }
     Ok(())
 }
@@ -169,6 +175,8 @@ struct Job<'a> {
     safe: GaussianCloud,
     rollbacks: u32,
     recent: VecDeque<f64>,
+    /// Whether it was told that the budget is reached.
+    full: bool,
 }
 
 impl<'a> Job<'a> {
@@ -224,6 +232,7 @@ impl<'a> Job<'a> {
             safe,
             rollbacks: 0,
             recent: VecDeque::new(),
+            full: false,
         }
     }
 
@@ -246,9 +255,9 @@ impl<'a> Job<'a> {
                 return Ok(TrainEnd::Cancelled);
             }
             let start = Instant::now();
-            let result = self.step(observer)?;
+            let results = self.step(observer)?;
             self.secs += start.elapsed().as_secs_f64();
-            window.add(result.loss, result.psnr);
+            results.iter().for_each(|r| window.add(r.loss, r.psnr));
             let step = self.trainer.step;
             if step % REPORT_STEPS == 0 || step == self.config.steps {
                 let metrics = StepMetrics {
@@ -270,6 +279,7 @@ impl<'a> Job<'a> {
                 rate: meter.rate(step, self.secs),
             });
             if observer.wants_cloud() {
+                self.trainer.fetch_cloud()?;
                 observer.cloud(Arc::new(self.trainer.cloud.clone()), step);
             }
             if self.config.eval_every > 0 && step % self.config.eval_every == 0 && step < self.config.steps {
@@ -285,13 +295,39 @@ impl<'a> Job<'a> {
     }
 
     /// One step with its guard against divergence, and density control.
-    fn step(&mut self, observer: &mut dyn Observer) -> Result<super::trainer::StepResult, TrainError> {
+    fn step(&mut self, observer: &mut dyn Observer) -> Result<Vec<StepResult>, TrainError> {
         let name = || self.photos.first().cloned().unwrap_or_default();
-        let result = self.trainer.advance(&self.views).map_err(|e| TrainError::Render(name(), e))?;
-        if result.skipped > 0 && self.trainer.step % 100 == 0 {
-            observer.note(Level::Warning, format!("{} Gaussians had a gradient that is not finite", result.skipped));
+        let results = self.trainer.advance(&self.views).map_err(|e| match e {
+            StepError::Render(e) => TrainError::Render(name(), e),
+            StepError::Gpu(e) => TrainError::Gpu(e),
+        })?;
+        for result in &results {
+            if result.skipped > 0 && self.trainer.step % 100 == 0 {
+                let text = format!("{} Gaussians had a gradient that is not finite", result.skipped);
+                observer.note(Level::Warning, text);
+            }
+            if self.diverges(result.loss) {
+                self.roll_back(result.loss, observer)?;
+                return Ok(results);
+            }
         }
-        self.recent.push_back(result.loss);
+        if let Some(report) = self.trainer.control_density()? {
+            if report.refused > 0 && !self.full {
+                self.full = true;
+                observer.note(Level::Info, format!("The budget of {} Gaussians is reached", self.trainer.budget));
+            }
+            self.recent.clear();
+        }
+        if self.trainer.step % SAFE_STEPS == 0 {
+            self.trainer.fetch_cloud()?;
+            self.safe = self.trainer.cloud.clone();
+        }
+        Ok(results)
+    }
+
+    /// Whether this loss is not finite or far above what losses were recently.
+    fn diverges(&mut self, loss: f64) -> bool {
+        self.recent.push_back(loss);
         if self.recent.len() > 200 {
             self.recent.pop_front();
         }
@@ -300,38 +336,29 @@ impl<'a> Job<'a> {
         } else {
             f64::INFINITY
         };
-        if !result.loss.is_finite() || result.loss > DIVERGED * usual {
-            self.rollbacks += 1;
-            if self.rollbacks > MAX_ROLLBACKS {
-                return Err(TrainError::Diverged(self.rollbacks));
-            }
-            observer.note(
-                Level::Warning,
-                format!(
-                    "Step {}: the loss is {:.3}, far above what it was; back to the last good state with halved rates",
-                    self.trainer.step, result.loss
-                ),
-            );
-            self.trainer.roll_back(self.safe.clone());
-            self.recent.clear();
-            return Ok(result);
+        !loss.is_finite() || loss > DIVERGED * usual
+    }
+
+    fn roll_back(&mut self, loss: f64, observer: &mut dyn Observer) -> Result<(), TrainError> {
+        self.rollbacks += 1;
+        if self.rollbacks > MAX_ROLLBACKS {
+            return Err(TrainError::Diverged(self.rollbacks));
         }
-        if let Some(report) = self.trainer.control_density() {
-            if report.refused > 0 {
-                observer.note(Level::Info, format!("The budget of {} Gaussians is reached", self.trainer.budget));
-            }
-            self.recent.clear();
-        }
-        if self.trainer.step % SAFE_STEPS == 0 {
-            self.safe = self.trainer.cloud.clone();
-        }
-        Ok(result)
+        let text = format!(
+            "Step {}: the loss is {loss:.3}, far above what it was; back to the last good state with halved rates",
+            self.trainer.step
+        );
+        observer.note(Level::Warning, text);
+        self.trainer.roll_back(self.safe.clone())?;
+        self.recent.clear();
+        Ok(())
     }
 
     fn evaluate(&mut self, observer: &mut dyn Observer) -> Result<(), TrainError> {
         if self.tests.is_empty() {
             return Ok(());
         }
+        self.trainer.fetch_cloud()?;
         let settings = self.trainer.render_settings();
         let e = evaluate(&self.trainer.cloud, &self.tests, &settings, self.trainer.step, self.secs)
             .map_err(|e| TrainError::Render("held-out".into(), e))?;
@@ -340,8 +367,9 @@ impl<'a> Job<'a> {
         Ok(())
     }
 
-    fn checkpoint(&self) -> Result<(), TrainError> {
+    fn checkpoint(&mut self) -> Result<(), TrainError> {
         let Some(folder) = self.out else { return Ok(()) };
+        self.trainer.fetch()?;
         let t = &self.trainer;
         let header = Header {
             config: self.config.clone(),
@@ -369,6 +397,7 @@ impl<'a> Job<'a> {
 
     /// Scores and saves the final state.
     fn finish(mut self, end: TrainEnd, observer: &mut dyn Observer) -> Result<TrainOutcome, TrainError> {
+        self.trainer.fetch_cloud()?;
         self.checkpoint()?;
         let scored = self.history.evaluations.last().is_some_and(|e| e.step == self.trainer.step);
         if end == TrainEnd::Finished && !scored {

@@ -3,27 +3,10 @@
 //! 3DGS's values are made for 30,000 steps; a run of `n` steps goes through the same phases.
 
 use super::TrainConfig;
-use crate::render::cpu::adam::AdamStep;
+use crate::render::cpu::adam::{AdamStep, Rates};
 
 /// Steps that 3DGS's milestones are written for.
 const REFERENCE_STEPS: f64 = 30_000.0;
-
-/// Learning rates of one step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rates {
-    /// Positions, scene units.
-    pub position: f32,
-    /// Log-scales.
-    pub log_scale: f32,
-    /// Quaternions.
-    pub quaternion: f32,
-    /// Opacity logits.
-    pub opacity_logit: f32,
-    /// Constant colour.
-    pub sh_constant: f32,
-    /// Other SH coefficients.
-    pub sh_rest: f32,
-}
 
 /// When what happens.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,22 +1,27 @@
-//! The state of a run on the CPU and its single step: draw, compare, go back, move.
+//! The state of a run and its single step: draw, compare, go back, move; on the CPU, or handed to
+//! a [`Device`].
 
 use rand::seq::SliceRandom;
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
 use super::density::{self, DensityReport, DensityStats};
-use super::schedule::{Rates, Schedule};
+use super::device::Device;
+use super::schedule::Schedule;
 use super::{TrainConfig, TrainView};
 use crate::math::sh;
 use crate::pipeline::metrics;
 use crate::render::cpu::Renderer;
-use crate::render::cpu::adam::AdamStep;
+use crate::render::cpu::adam::{AdamStep, Rates};
 use crate::render::cpu::ssim::{LossParts, PhotoLoss};
+use crate::render::gpu::{Context, GpuError};
 use crate::render::{Features, FrameGradient, RenderError, RenderSettings};
 use crate::scene::{Gaussian, GaussianCloud};
 
 /// Weight of D-SSIM in the loss.
 pub const LAMBDA: f64 = 0.2;
+/// Steps between measurements that are reported.
+pub const REPORT_STEPS: u64 = 10;
 /// Gaussians that one task updates.
 const BLOCK: usize = 512;
 /// Gradients are clipped to this before they are squared, far from overflow.
@@ -33,10 +38,22 @@ pub struct StepResult {
     pub skipped: usize,
 }
 
-/// Everything that a step reads and writes. Deterministic: the same state and photos give the same
-/// next state, whatever the number of threads.
+/// Why a step failed.
+#[derive(Debug, thiserror::Error)]
+pub enum StepError {
+    /// The view cannot be drawn.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// The GPU failed.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+}
+
+/// Everything that a step reads and writes. Deterministic on the CPU: the same state and photos
+/// give the same next state, whatever the number of threads.
 pub struct Trainer {
-    /// The Gaussians.
+    /// The Gaussians. While a GPU trains, `cloud`, `moments` and `stats` are those of the last
+    /// [`Self::fetch`].
     pub cloud: GaussianCloud,
     /// Adam's first and second moments, laid out like the cloud.
     pub moments: [GaussianCloud; 2],
@@ -59,6 +76,7 @@ pub struct Trainer {
     renderer: Renderer<f32>,
     losses: [PhotoLoss<f32>; 3],
     gradient: FrameGradient<f32>,
+    device: Option<Device>,
 }
 
 impl Trainer {
@@ -79,7 +97,38 @@ impl Trainer {
             renderer: Renderer::new(),
             losses: Default::default(),
             gradient: FrameGradient::default(),
+            device: None,
             cloud,
+        }
+    }
+
+    /// Goes on on a GPU.
+    pub fn move_to(&mut self, context: &Context, views: &[TrainView]) -> Result<(), GpuError> {
+        let device = Device::new(context, &self.cloud, &self.moments, self.step, self.settings.clone(), views)?;
+        self.device = Some(device);
+        Ok(())
+    }
+
+    /// Brings cloud, moments and statistics up to date, where a GPU has them.
+    pub fn fetch(&mut self) -> Result<(), GpuError> {
+        if let Some(device) = &self.device {
+            (self.cloud, self.moments, self.stats) = device.download()?;
+        }
+        Ok(())
+    }
+
+    /// Brings the cloud up to date, where a GPU has it.
+    pub fn fetch_cloud(&mut self) -> Result<(), GpuError> {
+        if let Some(device) = &self.device {
+            self.cloud = device.cloud()?;
+        }
+        Ok(())
+    }
+
+    fn send(&mut self) -> Result<(), GpuError> {
+        match &mut self.device {
+            Some(device) => device.upload(&self.cloud, &self.moments, self.step),
+            None => Ok(()),
         }
     }
 
@@ -88,30 +137,40 @@ impl Trainer {
         RenderSettings { sh_degree: self.cloud.sh_degree, ..self.settings.clone() }
     }
 
-    /// One step on the next photo of the round.
-    pub fn advance(&mut self, views: &[TrainView]) -> Result<StepResult, RenderError> {
+    /// One step on the next photo of the round. Returns what is known by now and was not returned
+    /// before: of this step on the CPU; on a GPU of none, or, every `REPORT_STEPS` steps, of
+    /// those since.
+    pub fn advance(&mut self, views: &[TrainView]) -> Result<Vec<StepResult>, StepError> {
         if self.round.is_empty() {
             self.round = (0..views.len() as u32).collect();
             self.round.shuffle(&mut self.rng);
         }
-        let Some(view) = self.round.pop().and_then(|i| views.get(i as usize)) else { return Ok(StepResult::default()) };
+        let next = self.round.pop().map(|i| i as usize);
+        let Some((i, view)) = next.and_then(|i| Some((i, views.get(i)?))) else { return Ok(Vec::new()) };
         self.settings.sh_degree = self.schedule.sh_degree(self.step);
+        if let Some(device) = &mut self.device {
+            device.step(i, view, &self.schedule.rates(self.step), self.settings.sh_degree)?;
+            self.step += 1;
+            return Ok(if self.step % REPORT_STEPS == 0 { device.results()? } else { Vec::new() });
+        }
         let frame = self.renderer.render(&self.cloud, Features::NONE, &view.camera, &self.settings)?;
         let parts = self.compare(frame.color, view);
         self.renderer.backward_tiles(&self.gradient);
         let longer = view.camera.width_px.max(view.camera.height_px) as f32;
         let skipped = self.descend(1.0 / longer);
         self.step += 1;
-        Ok(StepResult { loss: parts.total(LAMBDA), psnr: metrics::psnr_of(parts.mse), skipped })
+        Ok(vec![StepResult { loss: parts.total(LAMBDA), psnr: metrics::psnr_of(parts.mse), skipped }])
     }
 
     /// Density control and opacity reset where they are due. Returns what was done.
-    pub fn control_density(&mut self) -> Option<DensityReport> {
-        if !self.densify {
-            return None;
+    pub fn control_density(&mut self) -> Result<Option<DensityReport>, GpuError> {
+        let (densifies, resets) = (self.schedule.densifies(self.step), self.schedule.resets(self.step));
+        if !self.densify || !(densifies || resets) {
+            return Ok(None);
         }
+        self.fetch()?;
         let mut report = None;
-        if self.schedule.densifies(self.step) {
+        if densifies {
             let large = self.schedule.prunes_large(self.step);
             report = Some(density::control(
                 &mut self.cloud,
@@ -124,19 +183,21 @@ impl Trainer {
             ));
             self.stats = DensityStats::new(self.cloud.len());
         }
-        if self.schedule.resets(self.step) {
+        if resets {
             density::reset_opacity(&mut self.cloud, &mut self.moments);
         }
-        report
+        self.send()?;
+        Ok(report)
     }
 
     /// Replaces the cloud by an earlier one and forgets the moments; rates are halved.
-    pub fn roll_back(&mut self, cloud: GaussianCloud) {
+    pub fn roll_back(&mut self, cloud: GaussianCloud) -> Result<(), GpuError> {
         let zero = zeros_like(&cloud);
         self.stats = DensityStats::new(cloud.len());
         self.moments = [zero.clone(), zero];
         self.cloud = cloud;
         self.schedule.damping *= 0.5;
+        self.send()
     }
 
     /// Fills the picture gradient and returns the loss.

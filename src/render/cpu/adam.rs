@@ -1,5 +1,22 @@
 //! Adam (Kingma and Ba 2015) on single parameters.
 
+/// Learning rates of one step, in units of the parameters.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Rates {
+    /// Positions, scene units.
+    pub position: f32,
+    /// Log-scales.
+    pub log_scale: f32,
+    /// Quaternions.
+    pub quaternion: f32,
+    /// Opacity logits.
+    pub opacity_logit: f32,
+    /// Constant colour.
+    pub sh_constant: f32,
+    /// Other coefficients.
+    pub sh_rest: f32,
+}
+
 /// Constants of one optimiser step.
 #[derive(Clone, Copy, Debug)]
 pub struct AdamStep {

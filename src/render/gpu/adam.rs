@@ -6,41 +6,22 @@ use super::layout::AdamStep;
 use super::shader::Variant;
 use super::{Context, GpuError};
 use crate::math::sh;
-use crate::render::cpu::adam::{AdamStep as Constants, BETA1, BETA2, EPSILON};
+use crate::render::cpu::adam::{AdamStep as Constants, BETA1, BETA2, EPSILON, Rates};
 
-/// Learning rates of one step, in units of the parameters.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Rates {
-    /// Positions, scene units.
-    pub position: f32,
-    /// Log-scales.
-    pub log_scale: f32,
-    /// Quaternions.
-    pub quaternion: f32,
-    /// Opacity logits.
-    pub opacity_logit: f32,
-    /// Constant colour.
-    pub sh_constant: f32,
-    /// Other coefficients.
-    pub sh_rest: f32,
-}
-
-impl Rates {
-    /// Rates of each float in the records of the three buffers; 0 past degree `active`.
-    fn records(&self, active: u8) -> [[f32; 28]; 3] {
-        let mut out = [[0.0; 28]; 3];
-        out[0][0..3].fill(self.position);
-        out[0][3..6].fill(self.log_scale);
-        out[0][6..10].fill(self.quaternion);
-        out[0][10] = self.opacity_logit;
-        let floats = 3 * sh::coefficients(active);
-        let [_, low, _] = strides(3);
-        for k in 0..floats {
-            let rate = if k < 3 { self.sh_constant } else { self.sh_rest };
-            out[if k < low { 1 } else { 2 }][k % low] = rate;
-        }
-        out
+/// Rates of each float in the records of the three buffers; 0 past degree `active`.
+fn records(rates: &Rates, active: u8) -> [[f32; 28]; 3] {
+    let mut out = [[0.0; 28]; 3];
+    out[0][0..3].fill(rates.position);
+    out[0][3..6].fill(rates.log_scale);
+    out[0][6..10].fill(rates.quaternion);
+    out[0][10] = rates.opacity_logit;
+    let floats = 3 * sh::coefficients(active);
+    let [_, low, _] = strides(3);
+    for k in 0..floats {
+        let rate = if k < 3 { rates.sh_constant } else { rates.sh_rest };
+        out[if k < low { 1 } else { 2 }][k % low] = rate;
     }
+    out
 }
 
 /// The kernel with the constants of the three buffers.
@@ -83,7 +64,7 @@ impl Adam {
         clip: f32,
     ) {
         let constants = Constants::new(t);
-        for ((buffer, stride), rates) in self.steps.iter().zip(strides(stored)).zip(rates.records(active)) {
+        for ((buffer, stride), rates) in self.steps.iter().zip(strides(stored)).zip(records(rates, active)) {
             let mut step = AdamStep {
                 floats: gaussians * stride as u32,
                 stride: stride.max(1) as u32,

@@ -4,8 +4,9 @@ use std::time::Instant;
 
 use super::ssim::DevicePhoto;
 use super::timing::StageTimes;
-use super::{Context, GpuError, Rates, Renderer, Trainer, TrainerSettings};
+use super::{Context, GpuError, Renderer, Trainer, TrainerSettings};
 use crate::math::stats::median;
+use crate::render::cpu::adam::Rates;
 use crate::render::{Features, RenderSettings};
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
 

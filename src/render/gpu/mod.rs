@@ -26,7 +26,6 @@ pub mod ssim;
 pub mod timing;
 pub mod trainer;
 
-pub use adam::Rates;
 pub use cloud::Parameters;
 pub use context::Context;
 pub use error::GpuError;

@@ -1,7 +1,7 @@
 //! Training on the device: a step draws, compares, goes back and moves without the host waiting
 //! for any of it; sums of the losses are fetched every so many steps.
 
-use super::adam::{Adam, AdamBuffers, Rates};
+use super::adam::{Adam, AdamBuffers};
 use super::blend_backward::{BlendBackward, BlendGradients};
 use super::cloud::{Packed, Parameters};
 use super::kernel::Recorder;
@@ -13,6 +13,7 @@ use super::ssim::{DevicePhoto, LossSums, RING, Ssim};
 use super::timing::{StageTimes, Timer};
 use super::{Context, GpuError};
 use crate::render::RenderSettings;
+use crate::render::cpu::adam::Rates;
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
 
 /// What stays the same over a run.

@@ -1,14 +1,44 @@
-//! What draws the viewport: the GPU where there is a real one, else the CPU.
+//! Which renderer works: the GPU where there is a real one, else the CPU.
 
 use std::sync::{Arc, Weak};
 
-use crate::render::gpu::{self, GpuError};
-use crate::render::{Features, Frame, RenderError, RenderSettings, cpu};
+use serde::{Deserialize, Serialize};
+
+use super::gpu::{self, GpuError};
+use super::{Features, Frame, RenderError, RenderSettings, cpu};
 use crate::scene::{Camera, GaussianCloud};
+
+/// Which renderer is wanted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum BackendChoice {
+    /// The GPU if the machine has a real one, else the CPU.
+    #[default]
+    Auto,
+    /// The CPU.
+    Cpu,
+    /// The GPU, even a software one.
+    Gpu,
+}
+
+impl BackendChoice {
+    /// The GPU to use; `None` = the CPU. `Auto` takes a GPU only if it is a real one: the CPU
+    /// renderer is faster than an emulated GPU.
+    ///
+    /// # Errors
+    /// If a GPU is demanded and there is none.
+    pub fn gpu(self) -> Result<Option<gpu::Context>, GpuError> {
+        match self {
+            Self::Cpu => Ok(None),
+            Self::Gpu => gpu::Context::new().map(Some),
+            Self::Auto => Ok(gpu::Context::new().ok().filter(|context| !context.is_software())),
+        }
+    }
+}
 
 /// Why a view could not be drawn.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum DrawError {
+pub enum DrawError {
     /// By the CPU.
     #[error(transparent)]
     Cpu(#[from] RenderError),
@@ -19,46 +49,57 @@ pub(super) enum DrawError {
 
 /// Seconds of a picture: the part that every Gaussian has at any size, and that of the pixels.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Cost {
-    pub(super) fixed_secs: f64,
-    pub(super) pixels_secs: f64,
+pub struct Cost {
+    /// For every Gaussian, whatever the picture's size.
+    pub fixed_secs: f64,
+    /// For the pixels.
+    pub pixels_secs: f64,
 }
 
 /// One of the renderers, with its buffers.
-pub(super) enum Backend {
+pub enum Backend {
+    /// The CPU.
     Cpu(Box<cpu::Renderer<f32>>),
+    /// A GPU.
     Gpu(Box<Gpu>),
 }
 
 /// The GPU renderer and the cloud that it holds.
-pub(super) struct Gpu {
+pub struct Gpu {
     renderer: gpu::Renderer,
     name: String,
     uploaded: Weak<GaussianCloud>,
 }
 
 impl Backend {
-    /// The GPU if a real one answers, else the CPU.
-    pub(super) fn choose() -> Self {
-        match gpu::Context::new() {
-            Ok(context) if !context.is_software() => Self::on_gpu(&context).unwrap_or_else(|_| Self::on_cpu()),
-            _ => Self::on_cpu(),
+    /// The renderer that `choice` asks for.
+    ///
+    /// # Errors
+    /// If a GPU is demanded and there is none that works.
+    pub fn choose(choice: BackendChoice) -> Result<Self, GpuError> {
+        match choice.gpu() {
+            Ok(None) => Ok(Self::on_cpu()),
+            Ok(Some(context)) if choice == BackendChoice::Auto => {
+                Ok(Self::on_gpu(&context).unwrap_or_else(|_| Self::on_cpu()))
+            }
+            Ok(Some(context)) => Self::on_gpu(&context),
+            Err(e) => Err(e),
         }
     }
 
     /// The CPU.
-    pub(super) fn on_cpu() -> Self {
+    pub fn on_cpu() -> Self {
         Self::Cpu(Box::new(cpu::Renderer::new()))
     }
 
     /// This GPU, whether real or emulated.
-    pub(super) fn on_gpu(context: &gpu::Context) -> Result<Self, GpuError> {
+    pub fn on_gpu(context: &gpu::Context) -> Result<Self, GpuError> {
         let renderer = gpu::Renderer::new(context)?;
         Ok(Self::Gpu(Box::new(Gpu { renderer, name: context.info().name.clone(), uploaded: Weak::new() })))
     }
 
     /// Its name, for people.
-    pub(super) fn name(&self) -> &str {
+    pub fn name(&self) -> &str {
         match self {
             Self::Cpu(_) => "CPU",
             Self::Gpu(gpu) => &gpu.name,
@@ -66,7 +107,7 @@ impl Backend {
     }
 
     /// Draws a cloud; it is sent to the GPU only if it is another one than last time.
-    pub(super) fn render(
+    pub fn render(
         &mut self,
         cloud: &Arc<GaussianCloud>,
         camera: &Camera,
@@ -88,7 +129,7 @@ impl Backend {
     }
 
     /// What the last picture cost, `secs` in all.
-    pub(super) fn cost(&self, secs: f64) -> Cost {
+    pub fn cost(&self, secs: f64) -> Cost {
         match self {
             Self::Cpu(renderer) => {
                 let [project, sort, bin, blend] = renderer.stats().stage_secs;

@@ -1,0 +1,72 @@
+//! The part of a run's state that lives on a GPU: cloud, moments, statistics and photos stay
+//! there from step to step; the host sees them when it asks.
+
+use super::TrainView;
+use super::density::DensityStats;
+use super::trainer::{LAMBDA, StepResult};
+use crate::render::RenderSettings;
+use crate::render::cpu::adam::Rates;
+use crate::render::gpu::trainer::Growth;
+use crate::render::gpu::{Context, DevicePhoto, GpuError, Trainer, TrainerSettings};
+use crate::scene::GaussianCloud;
+
+/// A run on a GPU.
+pub struct Device {
+    trainer: Trainer,
+    photos: Vec<DevicePhoto>,
+}
+
+impl Device {
+    /// Sends a run's state and photos to the device.
+    pub fn new(
+        context: &Context,
+        cloud: &GaussianCloud,
+        moments: &[GaussianCloud; 2],
+        step: u64,
+        render: RenderSettings,
+        views: &[TrainView],
+    ) -> Result<Self, GpuError> {
+        let settings = TrainerSettings { render, lambda: LAMBDA, ..TrainerSettings::default() };
+        let mut trainer = Trainer::new(context, cloud, settings)?;
+        trainer.upload(cloud, Some([&moments[0], &moments[1]]), step)?;
+        let photos = views.iter().map(|v| trainer.photo(&v.pixels)).collect::<Result<_, _>>()?;
+        Ok(Self { trainer, photos })
+    }
+
+    /// Replaces cloud and moments.
+    pub fn upload(&mut self, cloud: &GaussianCloud, moments: &[GaussianCloud; 2], step: u64) -> Result<(), GpuError> {
+        self.trainer.upload(cloud, Some([&moments[0], &moments[1]]), step)
+    }
+
+    /// One step on photo `i`, which `view` is of. Does not wait for the device.
+    pub fn step(&mut self, i: usize, view: &TrainView, rates: &Rates, sh_degree: u8) -> Result<(), GpuError> {
+        match self.photos.get(i) {
+            Some(photo) => self.trainer.step(&view.camera, photo, rates, sh_degree),
+            None => Ok(()),
+        }
+    }
+
+    /// What the steps since the last call measured; steps that did not fit into the device's
+    /// buffers, which have been enlarged since, moved nothing and are left out. Waits.
+    pub fn results(&mut self) -> Result<Vec<StepResult>, GpuError> {
+        let done = self.trainer.metrics()?;
+        let result = |s: &crate::render::gpu::trainer::StepLoss| StepResult {
+            loss: s.loss,
+            psnr: s.sums.psnr(),
+            skipped: s.sums.bad_gradients as usize,
+        };
+        Ok(done.iter().filter(|s| !s.sums.overflow).map(result).collect())
+    }
+
+    /// The cloud as it is. Waits.
+    pub fn cloud(&self) -> Result<GaussianCloud, GpuError> {
+        self.trainer.cloud()
+    }
+
+    /// Cloud, moments, and statistics since the last upload. Waits.
+    pub fn download(&self) -> Result<(GaussianCloud, [GaussianCloud; 2], DensityStats), GpuError> {
+        let (cloud, moments) = self.trainer.download()?;
+        let Growth { gradient, seen, radius } = self.trainer.stats()?;
+        Ok((cloud, moments, DensityStats { gradient, seen, radius }))
+    }
+}
