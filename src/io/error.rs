@@ -113,6 +113,15 @@ pub enum IoError {
         /// What the person can do.
         remedy: &'static str,
     },
+    /// A folder without masks.
+    #[error(
+        "{path} holds no labels: looked for identities.json with id maps (fmlgs synth) and for .json files with \
+         polygons (ISAT, as in lerf_ovs)"
+    )]
+    NoLabels {
+        /// The folder.
+        path: PathBuf,
+    },
     /// A path in a dataset that leads out of the dataset's folder.
     #[error("{path} refers to '{entry}', which lies outside the folder {folder}; copy the file into it")]
     Outside {

@@ -11,6 +11,7 @@ mod error;
 pub mod files;
 pub mod gltf_mesh;
 pub mod khr_gltf;
+pub mod labels;
 mod listing;
 pub mod llff;
 mod open;

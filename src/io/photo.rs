@@ -5,7 +5,7 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use image::{DynamicImage, ImageDecoder, ImageError, ImageReader, Limits, RgbaImage};
+use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageError, ImageReader, Limits, Luma, RgbaImage};
 
 use super::resample::{Pixels, resample};
 use super::{IoError, files};
@@ -79,6 +79,18 @@ pub(super) fn decode_rgba(bytes: &[u8], limit_px: u64, path: &Path) -> Result<Rg
         });
     }
     Ok(DynamicImage::from_decoder(decoder).map_err(|e| failed(path, &e))?.into_rgba8())
+}
+
+/// Decodes the bytes of a grey picture, 8 or 16 bits a pixel; `path` is for errors.
+pub(super) fn decode_grey16(bytes: &[u8], path: &Path) -> Result<ImageBuffer<Luma<u16>, Vec<u16>>, IoError> {
+    match DynamicImage::from_decoder(decoder(bytes, path)?).map_err(|e| failed(path, &e))? {
+        DynamicImage::ImageLuma16(grey) => Ok(grey),
+        DynamicImage::ImageLuma8(grey) => {
+            let (width, height) = grey.dimensions();
+            Ok(ImageBuffer::from_fn(width, height, |x, y| Luma([u16::from(grey.get_pixel(x, y).0[0])])))
+        }
+        _ => Err(IoError::Picture { path: path.into(), reason: "a map of ids has one grey channel".into() }),
+    }
 }
 
 /// A decoder that has read the header, with its memory bounded.

@@ -7,5 +7,6 @@ pub mod demo_scene;
 pub mod evaluate;
 pub mod metrics;
 pub mod observer;
+pub mod semantics;
 pub mod synth;
 pub mod train;

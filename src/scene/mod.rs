@@ -5,6 +5,8 @@ pub mod camera;
 pub mod cloud;
 pub mod dataset;
 pub mod history;
+pub mod identity;
+pub mod mask;
 pub mod photo;
 pub mod plan;
 
@@ -13,5 +15,7 @@ pub use camera::{Camera, CameraError};
 pub use cloud::{CloudError, ExtraProperty, Gaussian, GaussianCloud};
 pub use dataset::{Dataset, SparsePoint};
 pub use history::{Evaluation, StepMetrics, ViewScore};
+pub use identity::{Identities, Identity, IdentityId, Level, NOBODY};
+pub use mask::{Mask, PixelBox};
 pub use photo::{Distortion, Photo, PhotoPixels};
 pub use plan::{Machine, PlanLine, ScenePlan};

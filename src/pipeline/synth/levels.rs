@@ -23,16 +23,7 @@ use serde::Serialize;
 use super::SynthError;
 use super::options::Levels;
 use crate::io::gltf_mesh::MeshScene;
-
-/// Object or part.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Level {
-    /// A thing.
-    Object,
-    /// A piece of a thing.
-    Part,
-}
+use crate::scene::Level;
 
 /// A thing or a piece of one that the id maps show.
 #[derive(Clone, Debug, PartialEq, Serialize)]

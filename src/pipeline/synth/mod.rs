@@ -42,7 +42,7 @@ use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
 pub use demo::demo_glb;
-pub use levels::{Identity, Level};
+pub use levels::Identity;
 pub use options::{Levels, Rig, SynthOptions};
 
 use crate::io::gltf_mesh::{self, GltfError, MeshScene};

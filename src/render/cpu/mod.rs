@@ -13,6 +13,7 @@ pub mod project;
 pub mod project_backward;
 pub mod sort;
 pub mod ssim;
+pub mod weigh;
 
 use std::time::Instant;
 
@@ -24,6 +25,7 @@ use self::blend_backward::{BlendRowBackward, MOMENTS, RowIn};
 use self::project::{Part, View};
 use self::project_backward::{GaussianGradient, project_backward};
 use self::sort::Ordered;
+use self::weigh::{WeighRow, Weighed};
 use super::{CloudGradient, Features, Frame, FrameGradient, MAX_CHANNELS, RenderError, RenderSettings, TILE_PX};
 use crate::math::Real;
 use crate::scene::{Camera, Gaussian, GaussianCloud};
@@ -191,6 +193,34 @@ impl<R: Real> Renderer<R> {
                 with_channels!(channels, C => R::vectorize(BlendRow::<R, C> { splats, values, tiles, size, ty, out }))
             })
             .sum()
+    }
+
+    /// Hands the weight of every Gaussian at every pixel of a view to `counters`, one for each row
+    /// of tiles, which are `height.div_ceil(TILE_PX)`.
+    ///
+    /// # Errors
+    /// If the camera is not usable.
+    pub fn weigh<V: Weighed<R>>(
+        &mut self,
+        cloud: &GaussianCloud<R>,
+        camera: &Camera,
+        settings: &RenderSettings,
+        counters: &mut [V],
+    ) -> Result<(), RenderError> {
+        camera.validate()?;
+        let view = View::new(camera, cloud.origin, settings.near);
+        let settings = RenderSettings { sh_degree: 0, depth: false, ..settings.clone() };
+        let channels = padded(3);
+        project::project(&mut self.parts, cloud, Features::NONE, &view, &settings, channels);
+        sort::sort(&mut self.ordered, &self.parts, channels);
+        bin::bin(&mut self.tiles, &self.ordered.splats, view.size);
+        // The buffers no longer belong to a rendered frame.
+        self.frame = None;
+        let (splats, tiles) = (&self.ordered.splats, &self.tiles);
+        counters.par_iter_mut().take(tiles.grid[1]).enumerate().for_each(|(ty, counter)| {
+            R::vectorize(WeighRow { splats, tiles, size: view.size, ty, counter });
+        });
+        Ok(())
     }
 
     /// Backward pass over the tiles of the last frame. Afterwards [`Self::gaussian_gradient`]

@@ -1,0 +1,94 @@
+//! ISAT label files, as lerf_ovs has them: polygons with a category, several of which may make up
+//! one region. Two fields more are understood: `level` ("object" or "part") and `parent` (the
+//! category that it is a piece of).
+
+use std::path::Path;
+
+use serde::Deserialize;
+
+use super::Region;
+use crate::io::{IoError, files};
+use crate::scene::{Camera, Level, Mask};
+
+/// Most vertices of one file.
+const MAX_VERTICES: usize = 4_000_000;
+
+#[derive(Deserialize)]
+struct File {
+    info: Info,
+    objects: Vec<Polygon>,
+}
+
+#[derive(Deserialize)]
+struct Info {
+    width: u32,
+    height: u32,
+}
+
+#[derive(Deserialize)]
+struct Polygon {
+    category: String,
+    segmentation: Vec<[f64; 2]>,
+    #[serde(default)]
+    level: Option<Level>,
+    #[serde(default)]
+    parent: Option<String>,
+}
+
+/// The photo that a label file belongs to; `None` if it is JSON of another kind.
+pub fn photo_of(path: &Path) -> Result<Option<String>, IoError> {
+    let value: serde_json::Value = files::read_json(path)?;
+    let is_label = value["objects"].is_array();
+    Ok(value["info"]["name"].as_str().filter(|_| is_label).map(Into::into))
+}
+
+/// The regions of a label file: polygons of one category together, objects before parts.
+pub fn read(path: &Path) -> Result<Vec<Region>, IoError> {
+    let file: File = files::read_json(path)?;
+    let Info { width, height, .. } = file.info;
+    if width == 0 || height == 0 || width > Camera::MAX_SIDE_PX || height > Camera::MAX_SIDE_PX {
+        return Err(IoError::EmptyPicture { path: path.into(), width_px: width, height_px: height });
+    }
+    let bad = |place: String, reason: &str| IoError::Syntax { path: path.into(), place, reason: reason.into() };
+    if file.objects.iter().map(|p| p.segmentation.len()).sum::<usize>() > MAX_VERTICES {
+        return Err(bad("objects".into(), "more vertices than a label file can need"));
+    }
+    let mut regions: Vec<(Option<String>, Region)> = Vec::new();
+    for (i, polygon) in file.objects.into_iter().enumerate() {
+        if polygon.segmentation.iter().flatten().any(|v| !v.is_finite()) {
+            return Err(bad(format!("objects[{i}].segmentation"), "a vertex that is not a number"));
+        }
+        // The convention of the LERF evaluations: vertices are cut to whole pixels.
+        let whole: Vec<[f64; 2]> = polygon.segmentation.iter().map(|v| v.map(f64::trunc)).collect();
+        let mask = Mask::from_polygon(width as usize, height as usize, &whole);
+        match regions.iter_mut().find(|(_, r)| r.name == polygon.category) {
+            Some((_, region)) => region.mask.add(&mask),
+            None => {
+                let region = Region { name: polygon.category, level: polygon.level, parent: None, mask };
+                regions.push((polygon.parent, region));
+            }
+        }
+    }
+    // Whole before piece, as deep as pieces of pieces go.
+    let mut ordered: Vec<Region> = Vec::with_capacity(regions.len());
+    while !regions.is_empty() {
+        let before = regions.len();
+        let mut waiting = Vec::new();
+        for (parent, mut region) in regions {
+            let at = parent.as_ref().and_then(|p| ordered.iter().position(|r| r.name == *p));
+            match parent {
+                Some(_) if at.is_none() => waiting.push((parent, region)),
+                _ => {
+                    region.parent = at;
+                    ordered.push(region);
+                }
+            }
+        }
+        regions = waiting;
+        if regions.len() == before {
+            let place = format!("category '{}'", regions[0].1.name);
+            return Err(bad(place, "its parent is not in the file, or is a piece of itself"));
+        }
+    }
+    Ok(ordered)
+}

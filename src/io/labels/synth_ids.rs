@@ -1,0 +1,81 @@
+//! The id maps that `fmlgs synth` writes.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::{Region, read_ids};
+use crate::io::{IoError, files};
+use crate::scene::{Level, Mask};
+
+/// The list of identities.
+pub const LIST_FILE: &str = "identities.json";
+
+#[derive(Deserialize)]
+struct File {
+    identities: Vec<Listed>,
+}
+
+/// An object or part as listed.
+#[derive(Clone, Debug, Deserialize)]
+pub struct Listed {
+    /// Value in the id maps.
+    pub id: u16,
+    /// The node's name.
+    pub name: String,
+    /// Object or part.
+    pub level: Level,
+    /// For a part, its object's id.
+    #[serde(default)]
+    pub parent: Option<u16>,
+}
+
+/// A folder with id maps.
+pub struct SynthIds {
+    root: PathBuf,
+    list: Vec<Listed>,
+}
+
+impl SynthIds {
+    /// Reads the list in the folder `root`.
+    pub fn open(root: &Path) -> Result<Self, IoError> {
+        let file: File = files::read_json(&root.join(LIST_FILE))?;
+        Ok(Self { root: root.into(), list: file.identities })
+    }
+
+    /// Objects and parts, in the file's order.
+    pub fn list(&self) -> &[Listed] {
+        &self.list
+    }
+
+    fn path(&self, level: Level, stem: &str) -> PathBuf {
+        let folder = if level == Level::Object { "object_ids" } else { "part_ids" };
+        self.root.join(folder).join(format!("{stem}.png"))
+    }
+
+    /// Whether the photo `stem` has maps.
+    pub fn has(&self, stem: &str) -> bool {
+        self.path(Level::Object, stem).is_file()
+    }
+
+    /// The regions of the photo `stem`, those without a pixel too: objects, then parts, in the
+    /// list's order. Empty if it has no maps.
+    pub fn regions(&self, stem: &str) -> Result<Vec<Region>, IoError> {
+        if !self.has(stem) {
+            return Ok(Vec::new());
+        }
+        let mut regions = Vec::with_capacity(self.list.len());
+        let mut ids_of = Vec::new();
+        for level in [Level::Object, Level::Part] {
+            let path = self.path(level, stem);
+            let (width, height, ids) = read_ids(&path)?;
+            for listed in self.list.iter().filter(|l| l.level == level) {
+                let parent = listed.parent.and_then(|p| ids_of.iter().position(|id| *id == p));
+                let mask = Mask::from_fn(width, height, |i| ids[i] == listed.id);
+                regions.push(Region { name: listed.name.clone(), level: Some(level), parent, mask });
+                ids_of.push(listed.id);
+            }
+        }
+        Ok(regions)
+    }
+}

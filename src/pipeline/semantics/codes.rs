@@ -1,0 +1,154 @@
+//! Points in code space, one per identity, that stay apart when they are blended.
+//!
+//! Codes lie on the sphere around the middle of the unit cube, where the background's code is. A
+//! blend of two codes lies inside the sphere, so it cannot be mistaken for a third, and what is
+//! next to each other in the scene, and hence blended most, is put far apart on it.
+
+use glam::{DVec3, Vec3};
+
+use crate::scene::{Identities, IdentityId};
+
+/// The background's code.
+pub const BACKGROUND: [f32; 3] = [0.5; 3];
+/// Radius of the sphere.
+pub const RADIUS: f32 = 0.5;
+/// Largest difference per channel at which a blended code still counts as a code: the paper's
+/// tolerance.
+pub const TOLERANCE: f32 = 5.0 / 255.0;
+
+/// Rounds of repulsion.
+const RELAXATIONS: usize = 30;
+
+/// `n` directions spread evenly: a Fibonacci sphere relaxed by repulsion.
+pub fn sphere(n: usize) -> Vec<Vec3> {
+    let golden = std::f32::consts::PI * (3.0 - 5.0_f32.sqrt());
+    let point = |i: usize| {
+        let z = 1.0 - (2.0 * i as f32 + 1.0) / n as f32;
+        let (sin, cos) = (golden * i as f32).sin_cos();
+        let r = (1.0 - z * z).sqrt();
+        Vec3::new(r * cos, r * sin, z)
+    };
+    let mut points: Vec<Vec3> = (0..n).map(point).collect();
+    // Steps of a share of the spacing, getting smaller.
+    let spacing = (4.0 * std::f32::consts::PI / n.max(1) as f32).sqrt();
+    for round in 0..RELAXATIONS {
+        let length = 0.15 * spacing * (1.0 - round as f32 / RELAXATIONS as f32);
+        let pushed = |i: usize| {
+            let push: Vec3 = (0..n)
+                .filter(|&j| j != i)
+                .map(|j| {
+                    let away = points[i] - points[j];
+                    away / away.length_squared().max(1e-6).powi(2)
+                })
+                .sum();
+            let along = push - points[i] * push.dot(points[i]);
+            (points[i] + along.normalize_or_zero() * length).normalize_or(points[i])
+        };
+        points = (0..n).map(pushed).collect();
+    }
+    points
+}
+
+/// Gives every identity a code. `centers` are where identities are, by number less one; those that
+/// are near each other get codes far apart.
+pub fn assign(identities: &mut Identities, centers: &[DVec3]) {
+    let n = identities.len();
+    let mut free = sphere(n);
+    let mut given: Vec<(usize, Vec3)> = Vec::with_capacity(n);
+    for i in 0..n {
+        // The nearest in the scene matter most.
+        let nearness = |j: usize| match (centers.get(i), centers.get(j)) {
+            (Some(a), Some(b)) => 1.0 / (a.distance_squared(*b) + 1e-12),
+            _ => 1.0,
+        };
+        let mut weights: Vec<(f64, Vec3)> = given.iter().map(|&(j, code)| (nearness(j), code)).collect();
+        weights.sort_by(|a, b| b.0.total_cmp(&a.0));
+        weights.truncate(12);
+        let crowding = |p: &Vec3| weights.iter().map(|(w, code)| w * f64::from(1.0 + p.dot(*code))).sum::<f64>();
+        let best = (0..free.len()).min_by(|&a, &b| crowding(&free[a]).total_cmp(&crowding(&free[b])));
+        let Some(best) = best else { return };
+        let code = free.swap_remove(best);
+        given.push((i, code));
+        if let Some(identity) = identities.get_mut(i as IdentityId + 1) {
+            identity.code = (code * RADIUS + Vec3::splat(0.5)).to_array();
+        }
+    }
+}
+
+/// Whether a code blended with alpha and divided by it is `code`, within `tolerance` per channel.
+pub fn matches(blended: [f32; 3], code: [f32; 3], tolerance: f32) -> bool {
+    blended.iter().zip(code).all(|(b, c)| (b - c).abs() <= tolerance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Level, NOBODY};
+
+    #[test]
+    fn points_are_on_the_sphere_and_apart() {
+        for n in [1, 2, 3, 50, 300] {
+            let points = sphere(n);
+            assert_eq!(points.len(), n);
+            assert!(points.iter().all(|p| (p.length() - 1.0).abs() < 1e-4));
+            let closest = (0..n).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| points[i].distance(points[j]));
+            let closest = closest.fold(f32::INFINITY, f32::min);
+            let spacing = (4.0 * std::f32::consts::PI / n as f32).sqrt();
+            assert!(closest > 0.6 * spacing, "{n}: {closest} of {spacing}");
+        }
+        assert!(sphere(0).is_empty());
+    }
+
+    #[test]
+    fn no_blend_of_two_codes_is_a_third() {
+        let mut all = Identities::default();
+        (0..100).for_each(|_| {
+            all.add(Level::Object, NOBODY, vec![]);
+        });
+        let centers: Vec<DVec3> = (0..100).map(|i| DVec3::new(f64::from(i % 10), f64::from(i / 10), 0.0)).collect();
+        assign(&mut all, &centers);
+        let codes: Vec<[f32; 3]> = all.iter().map(|(_, i)| i.code).chain([BACKGROUND]).collect();
+        let (mut blends, mut wrong) = (0, 0);
+        for a in 0..codes.len() {
+            for b in 0..a {
+                for share in [0.2, 0.35, 0.5, 0.65, 0.8] {
+                    let blend = std::array::from_fn(|c| codes[a][c] * share + codes[b][c] * (1.0 - share));
+                    blends += 1;
+                    let third = |(k, code): (usize, &[f32; 3])| k != a && k != b && matches(blend, *code, TOLERANCE);
+                    // Two opposite codes pass through the background's; that is nobody's mask.
+                    wrong += usize::from(codes[..100].iter().enumerate().any(third));
+                }
+            }
+        }
+        assert!(f64::from(wrong as u32) < 1e-3 * f64::from(blends), "{wrong} of {blends}");
+        // Negative control: random codes in the cube do collide.
+        let mut state = 7_u32;
+        let mut next = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        };
+        let random: Vec<[f32; 3]> = (0..100).map(|_| std::array::from_fn(|_| next())).collect();
+        let mut collisions = 0;
+        for a in 0..100 {
+            for b in 0..a {
+                let blend: [f32; 3] = std::array::from_fn(|c| (random[a][c] + random[b][c]) * 0.5);
+                collisions += usize::from((0..100).any(|k| k != a && k != b && matches(blend, random[k], TOLERANCE)));
+            }
+        }
+        assert!(collisions > 5, "{collisions}");
+    }
+
+    #[test]
+    fn neighbours_get_distant_codes() {
+        let mut all = Identities::default();
+        (0..60).for_each(|_| {
+            all.add(Level::Object, NOBODY, vec![]);
+        });
+        let centers: Vec<DVec3> = (0..60).map(|i| DVec3::new(f64::from(i), 0.0, 0.0)).collect();
+        assign(&mut all, &centers);
+        let code = |i: u32| Vec3::from(all.get(i).expect("there").code);
+        let next: f32 = (1..60).map(|i| code(i).distance(code(i + 1))).sum::<f32>() / 59.0;
+        let far: f32 = (1..31).map(|i| code(i).distance(code(i + 30))).sum::<f32>() / 30.0;
+        assert!(next > far && next > 0.7, "{next} {far}");
+    }
+}

@@ -1,0 +1,129 @@
+//! Which of the masks of a photo are identities that are known already.
+
+use super::segmenter::FoundMask;
+use super::view_map::ViewMap;
+use super::votes::UNKNOWN;
+use crate::scene::{Identities, IdentityId, Level, Mask};
+
+/// Share of an identity's visible pixels, and of a mask's known pixels, that must be the same.
+const SAME: f64 = 0.5;
+/// Pixels that must be the same at least.
+const LEAST_PX: usize = 12;
+
+/// What a mask is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Link {
+    /// This identity.
+    Known(IdentityId),
+    /// Nobody seen before.
+    New,
+    /// Another mask fits this identity, which this one would fit too, better.
+    Split(IdentityId),
+}
+
+/// Compares the masks of a photo with what is `known` of its view. A part can only be a piece of
+/// what its whole is.
+pub fn link(found: &[FoundMask], known: Option<&ViewMap>, identities: &Identities) -> Vec<Link> {
+    let Some(map) = known else { return vec![Link::New; found.len()] };
+    let (w, h) = (map.width_px, map.height_px);
+    let anything = Mask::from_fn(w, h, |i| map.identity[i] != UNKNOWN);
+    let visible: Vec<Option<Mask>> =
+        identities.iter().map(|(id, _)| Some(map.mask(identities, id)).filter(|m| !m.is_empty())).collect();
+    let fit = |mask: &Mask, id: IdentityId| -> Option<f64> {
+        let seen = visible[id as usize - 1].as_ref()?;
+        let overlap = mask.overlap(seen);
+        let (of_seen, of_known) =
+            (overlap as f64 / seen.area() as f64, overlap as f64 / mask.overlap(&anything).max(1) as f64);
+        (overlap >= LEAST_PX && of_seen >= SAME && of_known >= SAME).then_some(of_seen * of_known)
+    };
+    let mut links: Vec<Link> = Vec::with_capacity(found.len());
+    let mut taken: Vec<(IdentityId, usize, f64)> = Vec::new();
+    for (i, mask) in found.iter().enumerate() {
+        let whole = mask.parent.map(|p| links[p]);
+        let candidates: Vec<IdentityId> = match (mask.level, whole) {
+            (Level::Object, _) => {
+                identities.iter().filter(|(_, i)| i.level == Level::Object).map(|(id, _)| id).collect()
+            }
+            (Level::Part, Some(Link::Known(whole))) => identities.pieces(whole).collect(),
+            (Level::Part, Some(_)) => Vec::new(),
+            (Level::Part, None) => {
+                identities.iter().filter(|(_, i)| i.level == Level::Part).map(|(id, _)| id).collect()
+            }
+        };
+        let fits = candidates.into_iter().filter_map(|id| Some((id, fit(&mask.mask, id)?)));
+        let best = fits.max_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((id, score)) = best else {
+            links.push(Link::New);
+            continue;
+        };
+        match taken.iter_mut().find(|t| t.0 == id) {
+            None => {
+                taken.push((id, i, score));
+                links.push(Link::Known(id));
+            }
+            Some(other) if other.2 < score => {
+                links[other.1] = Link::Split(id);
+                *other = (id, i, score);
+                links.push(Link::Known(id));
+            }
+            Some(_) => links.push(Link::Split(id)),
+        }
+    }
+    links
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::NOBODY;
+
+    fn mask(from: usize, to: usize) -> Mask {
+        Mask::from_fn(100, 1, |i| (from..to).contains(&i))
+    }
+
+    fn found(level: Level, parent: Option<usize>, mask: Mask) -> FoundMask {
+        FoundMask { level, parent, name: None, mask }
+    }
+
+    #[test]
+    fn masks_find_their_identity_where_something_is_known() {
+        let mut all = Identities::default();
+        let cup = all.add(Level::Object, NOBODY, vec![]);
+        let pot = all.add(Level::Object, NOBODY, vec![]);
+        let lid = all.add(Level::Part, pot, vec![]);
+        let mut identity = vec![NOBODY; 100];
+        identity[..20].fill(cup);
+        identity[20..40].fill(pot);
+        identity[40..55].fill(lid);
+        identity[60..].fill(UNKNOWN);
+        let map = ViewMap { width_px: 100, height_px: 1, identity, share: vec![1.0; 100], alpha: vec![1.0; 100] };
+        let masks = [
+            // The pot with its far side, of which nothing is known yet.
+            found(Level::Object, None, Mask::from_fn(100, 1, |i| (22..55).contains(&i) || i >= 70)),
+            found(Level::Object, None, mask(0, 19)),
+            found(Level::Object, None, mask(60, 70)),
+            found(Level::Part, Some(0), mask(41, 56)),
+            found(Level::Part, Some(0), mask(22, 39)),
+            // The cup's part cannot be the pot's lid.
+            found(Level::Part, Some(1), mask(41, 56)),
+        ];
+        let links = link(&masks, Some(&map), &all);
+        assert_eq!(links, [Link::Known(pot), Link::Known(cup), Link::New, Link::Known(lid), Link::New, Link::New]);
+        assert_eq!(link(&masks, None, &all), [Link::New; 6]);
+    }
+
+    #[test]
+    fn two_masks_cannot_be_the_same_identity() {
+        let mut all = Identities::default();
+        let cup = all.add(Level::Object, NOBODY, vec![]);
+        let map = ViewMap {
+            width_px: 100,
+            height_px: 1,
+            identity: vec![cup; 100],
+            share: vec![1.0; 100],
+            alpha: vec![1.0; 100],
+        };
+        let masks = [found(Level::Object, None, mask(0, 55)), found(Level::Object, None, mask(40, 100))];
+        assert_eq!(link(&masks, Some(&map), &all), [Link::Split(cup), Link::Known(cup)]);
+    }
+}

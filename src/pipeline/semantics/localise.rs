@@ -1,0 +1,195 @@
+//! Multilevel localisation: from scores of phrases to the identities meant, in the paper's two
+//! steps, with "not found" and "ambiguous" among the answers.
+
+use super::grammar::{Kind, Phrase};
+use crate::scene::{Identities, IdentityId, Level};
+
+/// Answers that are given at most.
+const TOP: usize = 8;
+
+/// Scores identities for phrases, by number less one; higher is better.
+pub trait Scorer {
+    /// Scores of all identities for a phrase. Where `against` is given, it is the phrase of the
+    /// whole, which then counts as another thing that a piece must be more than (the paper's
+    /// second step).
+    fn scores(&mut self, phrase: &str, against: Option<&str>) -> Vec<f32>;
+
+    /// Score under which an identity is not what was asked for.
+    fn threshold(&self) -> f32;
+
+    /// Difference of scores under which two identities cannot be told apart.
+    fn resolution(&self) -> f32;
+}
+
+/// An identity that may be meant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Which.
+    pub identity: IdentityId,
+    /// Its score.
+    pub score: f32,
+    /// How much more than the runner-up.
+    pub margin: f32,
+}
+
+/// What a query comes to.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Answer {
+    /// The first is meant; runners-up follow.
+    Found(Vec<Hit>),
+    /// The first two or more could be meant.
+    Ambiguous(Vec<Hit>),
+    /// Nothing fits; what fits best follows.
+    NotFound(Vec<Hit>),
+}
+
+impl Answer {
+    /// All candidates, best first.
+    pub fn hits(&self) -> &[Hit] {
+        match self {
+            Self::Found(hits) | Self::Ambiguous(hits) | Self::NotFound(hits) => hits,
+        }
+    }
+}
+
+/// Finds what `phrase` means among the identities.
+pub fn localise(identities: &Identities, phrase: &Phrase, kind: Kind, scorer: &mut dyn Scorer) -> Answer {
+    match (&phrase.whole, kind) {
+        (Some(whole), Kind::Auto | Kind::Part) => piece_of(identities, &phrase.target, whole, scorer),
+        _ => {
+            let scores = scorer.scores(&phrase.target, None);
+            let wanted = |level: Level| match kind {
+                Kind::Auto => true,
+                Kind::Object => level == Level::Object,
+                Kind::Part => level == Level::Part,
+            };
+            let all = identities.iter().filter(|(_, i)| wanted(i.level)).map(|(id, _)| id);
+            judge(identities, rank(all, &scores), scorer)
+        }
+    }
+}
+
+/// Step 1 finds the whole; in step 2 only its pieces compete.
+fn piece_of(identities: &Identities, piece: &str, whole: &str, scorer: &mut dyn Scorer) -> Answer {
+    let step1 = scorer.scores(whole, None);
+    // Wholes may be parts themselves: "the pupil of the eye".
+    let with_pieces = identities.iter().map(|(id, _)| id).filter(|id| identities.pieces(*id).next().is_some());
+    let wholes = rank(with_pieces, &step1);
+    let Some(best) = wholes.first().filter(|w| w.score >= scorer.threshold()) else {
+        return Answer::NotFound(wholes);
+    };
+    // Wholes that cannot be told apart all take part.
+    let close: Vec<IdentityId> =
+        wholes.iter().filter(|w| w.score > best.score - scorer.resolution()).map(|w| w.identity).collect();
+    let mine = |id: IdentityId| identities.line(id).skip(1).any(|i| close.contains(&i));
+    let pieces: Vec<IdentityId> = identities.iter().map(|(id, _)| id).filter(|id| mine(*id)).collect();
+    let plain = scorer.scores(piece, None);
+    let against = scorer.scores(piece, Some(whole));
+    // The whole's phrase can push every piece down; then the first order stands.
+    let usable = pieces.iter().any(|id| against[*id as usize - 1] >= scorer.threshold());
+    let hits = rank(pieces.into_iter(), if usable { &against } else { &plain });
+    judge(identities, hits, scorer)
+}
+
+/// Candidates by falling score; equal ones by number.
+fn rank(candidates: impl Iterator<Item = IdentityId>, scores: &[f32]) -> Vec<Hit> {
+    let hit = |id: IdentityId| Hit { identity: id, score: scores[id as usize - 1], margin: 0.0 };
+    let mut hits: Vec<Hit> = candidates.map(hit).collect();
+    hits.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.identity.cmp(&b.identity)));
+    for i in 0..hits.len() {
+        hits[i].margin = hits[i].score - hits.get(i + 1).map_or(0.0, |next| next.score);
+    }
+    hits.truncate(TOP);
+    hits
+}
+
+fn judge(identities: &Identities, hits: Vec<Hit>, scorer: &dyn Scorer) -> Answer {
+    let Some(first) = hits.first().filter(|h| h.score > 0.0 && h.score >= scorer.threshold()) else {
+        return Answer::NotFound(hits);
+    };
+    // A piece and its whole with the same name are not two things.
+    let related = |id: IdentityId| {
+        identities.line(id).any(|i| i == first.identity) || identities.line(first.identity).any(|i| i == id)
+    };
+    let rival = hits.iter().skip(1).find(|h| !related(h.identity));
+    match rival {
+        Some(rival) if first.score - rival.score < scorer.resolution() => Answer::Ambiguous(hits),
+        _ => Answer::Found(hits),
+    }
+}
+
+/// Scores by names alone; see [`super::names`].
+pub struct ByName<'a>(pub &'a Identities);
+
+impl Scorer for ByName<'_> {
+    fn scores(&mut self, phrase: &str, _against: Option<&str>) -> Vec<f32> {
+        super::names::scores(self.0, phrase)
+    }
+
+    fn threshold(&self) -> f32 {
+        0.45
+    }
+
+    fn resolution(&self) -> f32 {
+        0.02
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::NOBODY;
+
+    fn scene() -> Identities {
+        let mut all = Identities::default();
+        for color in ["red", "blue"] {
+            let controller = all.add(Level::Object, NOBODY, vec![format!("{color} controller")]);
+            for part in ["button a", "left stick"] {
+                all.add(Level::Part, controller, vec![part.into()]);
+            }
+        }
+        all.add(Level::Object, NOBODY, vec!["lamp".into()]);
+        all
+    }
+
+    fn ask(query: &str, kind: Kind) -> (Answer, Vec<String>) {
+        let all = scene();
+        let phrase = Phrase::parse(query).expect("a phrase");
+        let answer = localise(&all, &phrase, kind, &mut ByName(&all));
+        let names = answer.hits().iter().map(|h| {
+            let line: Vec<String> = all.line(h.identity).map(|i| all.name(i)).collect();
+            line.join(" < ")
+        });
+        let names = names.collect();
+        (answer, names)
+    }
+
+    #[test]
+    fn the_whole_decides_between_pieces_of_the_same_name() {
+        for color in ["red", "blue"] {
+            let (answer, names) = ask(&format!("a button of the {color} controller"), Kind::Auto);
+            assert!(matches!(answer, Answer::Found(_)), "{answer:?}");
+            assert_eq!(names[0], format!("button a < {color} controller"));
+        }
+        let (answer, names) = ask("button a", Kind::Auto);
+        assert!(matches!(answer, Answer::Ambiguous(_)), "{answer:?}");
+        assert_eq!(names[..2], ["button a < red controller", "button a < blue controller"]);
+    }
+
+    #[test]
+    fn a_kind_can_be_forced() {
+        assert_eq!(ask("red controller", Kind::Auto).1[0], "red controller");
+        assert!(matches!(ask("red controller", Kind::Part).0, Answer::NotFound(_)));
+        assert_eq!(ask("left stick of the blue controller", Kind::Object).0.hits().len(), 3);
+    }
+
+    #[test]
+    fn what_is_not_there_is_not_found() {
+        for absent in ["giraffe", "wing of the giraffe", "antenna of the red controller", "shade of the lamp"] {
+            assert!(matches!(ask(absent, Kind::Auto).0, Answer::NotFound(_)), "{absent}");
+        }
+        let all = Identities::default();
+        let phrase = Phrase::parse("lamp").expect("a phrase");
+        assert_eq!(localise(&all, &phrase, Kind::Auto, &mut ByName(&all)), Answer::NotFound(vec![]));
+    }
+}

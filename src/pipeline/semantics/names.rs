@@ -1,0 +1,124 @@
+//! Identities found by their names: exactly, by their words, or nearly. Needs no network and knows
+//! no language.
+
+use std::collections::HashSet;
+
+use crate::scene::{Identities, IdentityId};
+
+/// Similarity under which two words have nothing to do with each other.
+const ALIKE: f64 = 0.82;
+
+/// Score of every identity for a phrase, by number less one: 1 for the same name, 0 for nothing in
+/// common or no name.
+pub fn scores(identities: &Identities, phrase: &str) -> Vec<f32> {
+    let wanted = words(phrase);
+    let score = |names: &[String]| names.iter().map(|n| similarity(&wanted, &words(n))).fold(0.0, f64::max);
+    identities.iter().map(|(_, i)| score(&i.names) as f32).collect()
+}
+
+/// The words of a phrase that no name in the scene resembles.
+pub fn unknown_words(identities: &Identities, phrase: &str) -> Vec<String> {
+    let known: HashSet<String> = identities.iter().flat_map(|(_, i)| &i.names).flat_map(|n| words(n)).collect();
+    words(phrase).into_iter().filter(|w| !known.iter().any(|k| alike(w, k) > 0.0)).collect()
+}
+
+/// Names for a phrase that is being typed, best first.
+pub fn completions(identities: &Identities, typed: &str, most: usize) -> Vec<String> {
+    let typed = typed.to_lowercase();
+    let mut found: Vec<String> = Vec::new();
+    let full = |id: IdentityId| {
+        let line: Vec<String> = identities.line(id).map(|i| identities.name(i)).collect();
+        line.join(" of the ")
+    };
+    let named = identities.iter().filter(|(_, i)| !i.names.is_empty());
+    let mut all: Vec<String> = named.map(|(id, _)| full(id)).collect();
+    all.sort_by_key(|n| (!n.to_lowercase().starts_with(&typed), n.chars().count(), n.clone()));
+    for name in all {
+        if name.to_lowercase().contains(&typed) && !found.contains(&name) {
+            found.push(name);
+        }
+    }
+    found.truncate(most);
+    found
+}
+
+/// Lower-case words of a name; an English plural counts like its singular.
+fn words(text: &str) -> Vec<String> {
+    let lower = text.to_lowercase();
+    let apart = lower.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty() && *w != "s");
+    apart.map(singular).collect()
+}
+
+fn singular(word: &str) -> String {
+    match word.strip_suffix('s') {
+        Some(stem) if stem.chars().count() > 2 && !stem.ends_with(['s', 'u', 'i']) => stem.into(),
+        _ => word.into(),
+    }
+}
+
+/// How much alike two words are; 0 below [`ALIKE`].
+fn alike(a: &str, b: &str) -> f64 {
+    if a == b {
+        return 1.0;
+    }
+    let s = strsim::jaro_winkler(a, b);
+    // Short words differ by a letter and mean something else.
+    if a.chars().count().min(b.chars().count()) < 4 || s < ALIKE { 0.0 } else { s * s }
+}
+
+/// Harmonic mean of how much of the phrase is in the name and how much of the name in the phrase.
+fn similarity(phrase: &[String], name: &[String]) -> f64 {
+    let covered = |of: &[String], by: &[String]| {
+        let best = |w: &String| by.iter().map(|v| alike(w, v)).fold(0.0, f64::max);
+        of.iter().map(best).sum::<f64>() / of.len().max(1) as f64
+    };
+    let (asked, named) = (covered(phrase, name), covered(name, phrase));
+    if asked + named > 0.0 { 2.0 * asked * named / (asked + named) } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Level, NOBODY};
+
+    fn scene() -> Identities {
+        let mut all = Identities::default();
+        let red = all.add(Level::Object, NOBODY, vec!["red controller".into()]);
+        all.add(Level::Object, NOBODY, vec!["Blue_Controller".into(), "手柄".into()]);
+        all.add(Level::Part, red, vec!["button a".into()]);
+        all.add(Level::Object, NOBODY, vec![]);
+        all
+    }
+
+    #[test]
+    fn the_right_name_scores_highest() {
+        let all = scene();
+        let best = |phrase: &str| {
+            let s = scores(&all, phrase);
+            let best = (0..s.len()).max_by(|&a, &b| s[a].total_cmp(&s[b])).expect("scores");
+            (best + 1, s[best])
+        };
+        assert_eq!(best("red controller"), (1, 1.0));
+        assert_eq!(best("Blue controllers"), (2, 1.0));
+        assert_eq!(best("手柄"), (2, 1.0));
+        assert_eq!(best("blue contoller").0, 2, "a slip of the keys");
+        assert_eq!(best("button").0, 3);
+        assert!(best("button").1 > 0.6 && best("button").1 < 1.0);
+        assert!(scores(&all, "red controller")[1] < 0.6);
+        assert!(scores(&all, "giraffe").iter().all(|s| *s == 0.0));
+        assert!(scores(&all, "").iter().all(|s| *s == 0.0));
+    }
+
+    #[test]
+    fn unknown_words_and_completions() {
+        let all = scene();
+        assert_eq!(unknown_words(&all, "green button"), ["green"]);
+        assert!(unknown_words(&all, "red buttons").is_empty());
+        assert_eq!(
+            completions(&all, "con", 5),
+            ["red controller", "Blue_Controller", "button a of the red controller"]
+        );
+        assert_eq!(completions(&all, "button", 5), ["button a of the red controller"]);
+        assert!(completions(&all, "zebra", 5).is_empty());
+    }
+}

@@ -1,0 +1,119 @@
+//! Masks of one photo, and where they come from.
+
+use crate::io::IoError;
+use crate::io::labels::{Labels, Region};
+use crate::scene::{Level, Mask, Photo};
+
+/// A mask that a segmenter found in one photo.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FoundMask {
+    /// Object or part.
+    pub level: Level,
+    /// Index of the mask that it is a piece of; before its own.
+    pub parent: Option<usize>,
+    /// What it is called, if the segmenter knows.
+    pub name: Option<String>,
+    /// Its pixels.
+    pub mask: Mask,
+}
+
+/// Finds the objects and parts of a photo.
+pub trait Segmenter {
+    /// Name for people.
+    fn name(&self) -> &'static str;
+
+    /// Whether it can say anything about a photo.
+    fn covers(&self, photo: &Photo) -> bool;
+
+    /// Masks of a photo, undistorted and scaled to at most `max_side_px`, wholes before pieces.
+    /// Empty where it finds nothing.
+    ///
+    /// # Errors
+    /// If the photo or what is known about it cannot be read.
+    fn segment(&mut self, photo: &Photo, max_side_px: u32) -> Result<Vec<FoundMask>, IoError>;
+}
+
+/// Masks that come with the dataset. Regions that do not say what they are count as objects where
+/// no other contains them, and as parts of the smallest that does where one does.
+pub struct FileMasks(pub Labels);
+
+/// Share of a region that must lie in another for it to be a piece of that.
+const INSIDE: f64 = 0.9;
+
+impl Segmenter for FileMasks {
+    fn name(&self) -> &'static str {
+        "files"
+    }
+
+    fn covers(&self, photo: &Photo) -> bool {
+        self.0.has(photo)
+    }
+
+    fn segment(&mut self, photo: &Photo, max_side_px: u32) -> Result<Vec<FoundMask>, IoError> {
+        Ok(found(self.0.of(photo, max_side_px)?))
+    }
+}
+
+/// Gives every region a level and a parent, and puts wholes before pieces.
+fn found(regions: Vec<Region>) -> Vec<FoundMask> {
+    let areas: Vec<usize> = regions.iter().map(|r| r.mask.area()).collect();
+    let parent_of = |i: usize| -> Option<usize> {
+        let region = &regions[i];
+        if region.level == Some(Level::Object) {
+            return None;
+        }
+        region.parent.or_else(|| {
+            let around = (0..regions.len()).filter(|&j| {
+                areas[j] > areas[i] && region.mask.overlap(&regions[j].mask) as f64 >= INSIDE * areas[i] as f64
+            });
+            around.min_by_key(|&j| areas[j])
+        })
+    };
+    let parents: Vec<Option<usize>> = (0..regions.len()).map(parent_of).collect();
+    let depth = |i: usize| std::iter::successors(Some(i), |&i| parents[i]).take(regions.len() + 1).count();
+    let mut order: Vec<usize> = (0..regions.len()).collect();
+    order.sort_by_key(|&i| depth(i));
+    let mut place = vec![0; regions.len()];
+    order.iter().enumerate().for_each(|(at, &i)| place[i] = at);
+    let make = |&i: &usize| {
+        let region = &regions[i];
+        let level = region.level.unwrap_or(if parents[i].is_some() { Level::Part } else { Level::Object });
+        FoundMask {
+            level,
+            parent: parents[i].map(|p| place[p]).filter(|p| *p < place[i]),
+            name: Some(region.name.clone()).filter(|n| !n.is_empty()),
+            mask: region.mask.clone(),
+        }
+    };
+    order.iter().map(make).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn region(name: &str, level: Option<Level>, x: std::ops::Range<usize>) -> Region {
+        let mask = Mask::from_fn(20, 4, |i| x.contains(&(i % 20)));
+        Region { name: name.into(), level, parent: None, mask }
+    }
+
+    #[test]
+    fn what_lies_inside_another_is_its_part() {
+        let masks = found(vec![region("button", None, 3..5), region("pad", None, 2..9), region("box", None, 0..12)]);
+        let list: Vec<_> = masks.iter().map(|m| (m.name.as_deref(), m.level, m.parent)).collect();
+        let expected = [
+            (Some("box"), Level::Object, None),
+            (Some("pad"), Level::Part, Some(0)),
+            (Some("button"), Level::Part, Some(1)),
+        ];
+        assert_eq!(list, expected);
+    }
+
+    #[test]
+    fn objects_stay_objects_and_lone_parts_have_no_parent() {
+        let masks = found(vec![region("inner", Some(Level::Object), 3..5), region("outer", Some(Level::Object), 0..9)]);
+        assert!(masks.iter().all(|m| m.level == Level::Object && m.parent.is_none()));
+        let masks = found(vec![region("lone", Some(Level::Part), 3..5), region("", None, 8..12)]);
+        assert_eq!((masks[0].parent, masks[1].level, masks[1].name.clone()), (None, Level::Object, None));
+    }
+}

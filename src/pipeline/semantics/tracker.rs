@@ -1,0 +1,279 @@
+//! The same identity in every view, carried by the trained Gaussians: masks of a first photo vote,
+//! the votes are drawn into the other views, and photos of which too much is unknown are segmented
+//! too, their masks linked to what is known. No network is needed.
+
+use super::extend::extend;
+use super::link::{Link, link};
+use super::segmenter::{FoundMask, Segmenter};
+use super::view_map::ViewMap;
+use super::votes::{Belonging, Votes};
+use crate::io::IoError;
+use crate::pipeline::observer::{Level as Severity, Observer, Progress, Signal};
+use crate::render::cpu::Renderer;
+use crate::render::{RenderError, RenderSettings};
+use crate::scene::{GaussianCloud, Identities, IdentityId, NOBODY, Photo};
+
+/// Least weight of votes, in px of the photos voted on, that says something about a Gaussian.
+const LEAST_VOTES: f32 = 0.05;
+
+/// Settings of a tracking.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrackOptions {
+    /// Photo to begin with; `None` = the first that the segmenter can say something about.
+    pub seed: Option<usize>,
+    /// Longer side of the masks that vote, px.
+    pub max_side_px: u32,
+    /// Share of a view that may stay unknown before it is segmented too.
+    pub reseed_share: f64,
+    /// Most photos that are segmented.
+    pub max_seeds: usize,
+}
+
+impl Default for TrackOptions {
+    fn default() -> Self {
+        Self { seed: None, max_side_px: 1_024, reseed_share: 0.03, max_seeds: 12 }
+    }
+}
+
+/// An identity in a view.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sighting {
+    /// Whose pixels.
+    pub identity: IdentityId,
+    /// How many.
+    pub pixels: usize,
+    /// Mean share of its object in them, 0 to 1.
+    pub confidence: f64,
+}
+
+/// What became of one view.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ViewReport {
+    /// Index of the photo.
+    pub photo: usize,
+    /// Share of its pixels that only Gaussians without a vote cover.
+    pub unknown: f64,
+    /// Who is seen in it, innermost identities.
+    pub seen: Vec<Sighting>,
+}
+
+/// The result of a tracking.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tracked {
+    /// Objects and parts.
+    pub identities: Identities,
+    /// Per Gaussian.
+    pub belongings: Vec<Belonging>,
+    /// The photos that were segmented, in order.
+    pub seeds: Vec<usize>,
+    /// Every photo, before identities were extended to Gaussians that no photo voted for.
+    pub views: Vec<ViewReport>,
+}
+
+/// Why tracking failed.
+#[derive(Debug, thiserror::Error)]
+pub enum TrackError {
+    /// There is nothing to begin with.
+    #[error("the '{0}' masks say nothing about any photo; give masks of at least one")]
+    NoSeed(&'static str),
+    /// Masks could not be read.
+    #[error(transparent)]
+    Masks(#[from] IoError),
+    /// A view could not be drawn.
+    #[error("photo {0}: {1}")]
+    Render(String, RenderError),
+    /// The observer asked to stop.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+/// Finds the identities of `cloud` in `photos`.
+pub fn track(
+    cloud: &GaussianCloud,
+    photos: &[Photo],
+    settings: &RenderSettings,
+    segmenter: &mut dyn Segmenter,
+    options: &TrackOptions,
+    observer: &mut dyn Observer,
+) -> Result<Tracked, TrackError> {
+    let usable = |i: &usize| segmenter.covers(&photos[*i]);
+    let first = match options.seed {
+        Some(seed) => Some(seed).filter(|s| *s < photos.len()).filter(usable),
+        None => (0..photos.len()).find(usable),
+    };
+    let first = first.ok_or(TrackError::NoSeed(segmenter.name()))?;
+    let mut t = Tracker {
+        cloud,
+        photos,
+        settings,
+        options,
+        renderer: Renderer::new(),
+        identities: Identities::default(),
+        votes: Votes::new(cloud.len()),
+    };
+    let mut seeds = vec![first];
+    let mut tried = vec![false; photos.len()];
+    t.seed(first, segmenter, observer)?;
+    tried[first] = true;
+    let views = loop {
+        let views = t.look(seeds.len(), observer)?;
+        let needy = views.iter().filter(|v| !tried[v.photo] && v.unknown > options.reseed_share);
+        let needy = needy.filter(|v| segmenter.covers(&photos[v.photo]));
+        let next = needy.max_by(|a, b| a.unknown.total_cmp(&b.unknown)).map(|v| v.photo);
+        let Some(next) = next.filter(|_| seeds.len() < options.max_seeds) else { break views };
+        tried[next] = true;
+        if t.seed(next, segmenter, observer)? {
+            seeds.push(next);
+        }
+    };
+    let mut belongings = t.votes.decide(&t.identities, LEAST_VOTES);
+    extend(cloud, &mut belongings);
+    Ok(Tracked { identities: t.identities, belongings, seeds, views })
+}
+
+struct Tracker<'a> {
+    cloud: &'a GaussianCloud,
+    photos: &'a [Photo],
+    settings: &'a RenderSettings,
+    options: &'a TrackOptions,
+    renderer: Renderer<f32>,
+    identities: Identities,
+    votes: Votes,
+}
+
+impl Tracker<'_> {
+    /// Segments a photo, links its masks to known identities, and lets them vote. Whether there
+    /// was anything in it.
+    fn seed(
+        &mut self,
+        photo: usize,
+        segmenter: &mut dyn Segmenter,
+        observer: &mut dyn Observer,
+    ) -> Result<bool, TrackError> {
+        let found = segmenter.segment(&self.photos[photo], self.options.max_side_px)?;
+        if found.is_empty() {
+            return Ok(false);
+        }
+        let known = if self.identities.is_empty() { None } else { Some(self.map(photo, self.options.max_side_px)?) };
+        let links = link(&found, known.as_ref(), &self.identities);
+        let mut ids = Vec::with_capacity(found.len());
+        for (mask, link) in found.iter().zip(&links) {
+            let parent = mask.parent.map_or(NOBODY, |p| ids[p]);
+            ids.push(match link {
+                Link::Known(id) => *id,
+                Link::New => self.identities.add(mask.level, parent, mask.name.iter().cloned().collect()),
+                Link::Split(of) => {
+                    let text = format!(
+                        "{}: {} is seen in two pieces; one becomes an identity of its own",
+                        self.photos[photo].name,
+                        self.identities.name(*of)
+                    );
+                    observer.note(Severity::Warning, text);
+                    self.identities.add(mask.level, parent, mask.name.iter().cloned().collect())
+                }
+            });
+        }
+        let camera = self.photos[photo].camera.limited_to(self.options.max_side_px);
+        let labels = labels(&found, &ids, camera.width_px as usize * camera.height_px as usize);
+        self.votes
+            .add_view(&mut self.renderer, self.cloud, &camera, self.settings, &labels)
+            .map_err(|e| TrackError::Render(self.photos[photo].name.clone(), e))?;
+        Ok(true)
+    }
+
+    /// What is known of a view by now.
+    fn map(&mut self, photo: usize, max_side_px: u32) -> Result<ViewMap, TrackError> {
+        let of: Vec<IdentityId> = self.votes.decide(&self.identities, LEAST_VOTES).iter().map(|b| b.identity).collect();
+        self.map_of(photo, max_side_px, &of)
+    }
+
+    fn map_of(&mut self, photo: usize, max_side_px: u32, of: &[IdentityId]) -> Result<ViewMap, TrackError> {
+        let photo = &self.photos[photo];
+        let camera = photo.camera.limited_to(max_side_px);
+        ViewMap::render(&mut self.renderer, self.cloud, of, &self.identities, &camera, self.settings)
+            .map_err(|e| TrackError::Render(photo.name.clone(), e))
+    }
+
+    /// Draws what is known into every view.
+    fn look(&mut self, round: usize, observer: &mut dyn Observer) -> Result<Vec<ViewReport>, TrackError> {
+        let start = std::time::Instant::now();
+        // To see how much is unknown, small pictures will do.
+        let side = self.options.max_side_px.min(256);
+        let of: Vec<IdentityId> = self.votes.decide(&self.identities, LEAST_VOTES).iter().map(|b| b.identity).collect();
+        let mut views = Vec::with_capacity(self.photos.len());
+        for photo in 0..self.photos.len() {
+            if observer.signal() == Signal::Cancel {
+                return Err(TrackError::Cancelled);
+            }
+            let map = self.map_of(photo, side, &of)?;
+            views.push(report(photo, &map, self.identities.len()));
+            let elapsed_secs = start.elapsed().as_secs_f64();
+            observer.progress(Progress {
+                stage: format!("Carrying identities to all views, round {round}"),
+                done: photo as u64 + 1,
+                total: self.photos.len() as u64,
+                elapsed_secs,
+                rate: (photo + 1) as f64 / elapsed_secs.max(1e-9),
+            });
+        }
+        Ok(views)
+    }
+}
+
+/// The innermost identity of each pixel of a segmented photo; `NOBODY` where no mask is.
+fn labels(found: &[FoundMask], ids: &[IdentityId], pixels: usize) -> Vec<IdentityId> {
+    let mut labels = vec![NOBODY; pixels];
+    // Wholes come before pieces, so the innermost is painted last.
+    for (mask, id) in found.iter().zip(ids) {
+        mask.mask.pixels().for_each(|i| labels[i] = *id);
+    }
+    labels
+}
+
+fn report(photo: usize, map: &ViewMap, identities: usize) -> ViewReport {
+    let mut sums = vec![(0, 0.0); identities + 1];
+    let mut unknown = 0;
+    for (&id, &share) in map.identity.iter().zip(&map.share) {
+        match sums.get_mut(id as usize) {
+            Some(sum) => *sum = (sum.0 + 1, sum.1 + f64::from(share)),
+            None => unknown += 1,
+        }
+    }
+    let seen = sums.iter().enumerate().skip(1).filter(|(_, s)| s.0 > 0);
+    ViewReport {
+        photo,
+        unknown: f64::from(unknown) / map.identity.len().max(1) as f64,
+        seen: seen
+            .map(|(id, s)| Sighting { identity: id as IdentityId, pixels: s.0, confidence: s.1 / s.0 as f64 })
+            .collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::votes::UNKNOWN;
+    use super::*;
+    use crate::scene::{Level, Mask};
+
+    #[test]
+    fn the_innermost_mask_labels_a_pixel() {
+        let mask = |from: usize, to: usize| Mask::from_fn(10, 1, |i| (from..to).contains(&i));
+        let found = |level, mask| FoundMask { level, parent: None, name: None, mask };
+        let all = [found(Level::Object, mask(1, 8)), found(Level::Part, mask(2, 5))];
+        assert_eq!(labels(&all, &[4, 9], 10), [0, 4, 9, 9, 9, 4, 4, 4, 0, 0]);
+    }
+
+    #[test]
+    fn a_view_reports_who_is_seen_and_what_is_not_known() {
+        let map = ViewMap {
+            width_px: 4,
+            height_px: 1,
+            identity: vec![1, 1, UNKNOWN, NOBODY],
+            share: vec![1.0, 0.5, 1.0, 0.0],
+            alpha: vec![1.0; 4],
+        };
+        let r = report(3, &map, 2);
+        assert_eq!(r.unknown, 0.25);
+        assert_eq!(r.seen, [Sighting { identity: 1, pixels: 2, confidence: 0.75 }]);
+    }
+}

@@ -1,0 +1,176 @@
+//! What every pixel of a view belongs to: the identity of largest accumulated weight, exactly.
+//!
+//! Rendered once per view; every query then only reads it.
+
+use crate::math::lanes::Lane;
+use crate::render::cpu::Renderer;
+use crate::render::cpu::weigh::Weighed;
+use crate::render::{RenderError, RenderSettings, TILE_PX};
+use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, Mask, NOBODY};
+
+use super::votes::UNKNOWN;
+
+/// Identities that compete for one pixel at most; the least is dropped.
+const SLOTS: usize = 8;
+
+/// Identities of a view's pixels, row-major.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ViewMap {
+    /// Width in px.
+    pub width_px: usize,
+    /// Height in px.
+    pub height_px: usize,
+    /// Innermost identity; `NOBODY` where none wins or nothing is, `UNKNOWN` where Gaussians win
+    /// that no vote reached.
+    pub identity: Vec<IdentityId>,
+    /// Share of the pixel's weight that belongs to the winner's object.
+    pub share: Vec<f32>,
+    /// Accumulated alpha.
+    pub alpha: Vec<f32>,
+}
+
+impl ViewMap {
+    /// Draws the identities `of` the Gaussians of `cloud`.
+    ///
+    /// # Errors
+    /// If the camera is not usable.
+    pub fn render(
+        renderer: &mut Renderer<f32>,
+        cloud: &GaussianCloud,
+        of: &[IdentityId],
+        identities: &Identities,
+        camera: &Camera,
+        settings: &RenderSettings,
+    ) -> Result<Self, RenderError> {
+        assert_eq!(of.len(), cloud.len(), "one identity per Gaussian");
+        let (width, height) = (camera.width_px as usize, camera.height_px as usize);
+        let strips = height.div_ceil(TILE_PX);
+        let strip = |y: usize| TILE_PX.min(height - y * TILE_PX) * width;
+        let mut rows: Vec<Row<'_>> = (0..strips)
+            .map(|ty| Row { of, width, top: ty * TILE_PX, slots: vec![[(NOBODY, 0.0); SLOTS]; strip(ty)] })
+            .collect();
+        renderer.weigh(cloud, camera, settings, &mut rows)?;
+        let objects: Vec<IdentityId> = (0..=identities.len() as IdentityId).map(|i| identities.object_of(i)).collect();
+        let mut map = Self { width_px: width, height_px: height, ..Self::default() };
+        for slots in rows.iter().flat_map(|r| &r.slots) {
+            let (identity, share, alpha) = winner(slots, &objects);
+            map.identity.push(identity);
+            map.share.push(share);
+            map.alpha.push(alpha);
+        }
+        Ok(map)
+    }
+
+    /// The pixels of an identity and its pieces.
+    pub fn mask(&self, identities: &Identities, id: IdentityId) -> Mask {
+        let inside = identities.within(id);
+        Mask::from_fn(self.width_px, self.height_px, |i| {
+            inside.get(self.identity[i] as usize).copied().unwrap_or(false)
+        })
+    }
+}
+
+/// Winner of a pixel, the share of its object, and the pixel's alpha. An unknown Gaussian counts as
+/// an object of its own; where less than half of the light is blocked, nobody is there.
+fn winner(slots: &[(IdentityId, f32); SLOTS], objects: &[IdentityId]) -> (IdentityId, f32, f32) {
+    let alpha: f32 = slots.iter().map(|s| s.1).sum();
+    if alpha < 0.5 {
+        return (NOBODY, 0.0, alpha);
+    }
+    let object_of =
+        |id: IdentityId| if id == UNKNOWN { UNKNOWN } else { objects.get(id as usize).copied().unwrap_or(NOBODY) };
+    let together = |object: IdentityId| slots.iter().filter(|s| object_of(s.0) == object).map(|s| s.1).sum::<f32>();
+    let (mut best, mut most) = (NOBODY, 0.0);
+    for slot in slots.iter().filter(|s| s.1 > 0.0) {
+        let object = object_of(slot.0);
+        let sum = together(object);
+        if sum > most {
+            (best, most) = (object, sum);
+        }
+    }
+    let inner = slots.iter().filter(|s| s.1 > 0.0 && object_of(s.0) == best);
+    let identity = inner.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(NOBODY, |s| s.0);
+    (identity, most / alpha, alpha)
+}
+
+/// The competitors of the pixels of one row of tiles.
+struct Row<'a> {
+    of: &'a [IdentityId],
+    width: usize,
+    /// First row of pixels.
+    top: usize,
+    slots: Vec<[(IdentityId, f32); SLOTS]>,
+}
+
+impl Weighed<f32> for Row<'_> {
+    fn add(&mut self, gaussian: u32, x: usize, y: usize, weights: &Lane<f32>) {
+        let identity = self.of[gaussian as usize];
+        let first = (y - self.top) * self.width + x;
+        let end = weights.len().min(self.width - x);
+        for (slots, &weight) in self.slots[first..first + end].iter_mut().zip(weights) {
+            if weight <= 0.0 {
+                continue;
+            }
+            // Free slots have no weight.
+            match slots.iter_mut().find(|s| s.0 == identity && s.1 > 0.0) {
+                Some(slot) => slot.1 += weight,
+                None => {
+                    if let Some(least) = slots.iter_mut().min_by(|a, b| a.1.total_cmp(&b.1)).filter(|s| s.1 < weight) {
+                        *least = (identity, weight);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::scene::Level;
+
+    #[test]
+    fn the_object_wins_before_its_piece() {
+        let objects = [0, 1, 2, 1, 1];
+        let mut slots = [(NOBODY, 0.0); SLOTS];
+        slots[..3].copy_from_slice(&[(3, 0.25), (4, 0.2), (2, 0.4)]);
+        let (identity, share, alpha) = winner(&slots, &objects);
+        assert_eq!(identity, 3);
+        assert!((share - 0.45 / 0.85).abs() < 1e-6 && (alpha - 0.85).abs() < 1e-6);
+        slots[2] = (UNKNOWN, 0.5);
+        assert_eq!(winner(&slots, &objects).0, UNKNOWN);
+        assert_eq!(winner(&[(1, 0.05); SLOTS], &objects).0, NOBODY, "mostly see-through");
+    }
+
+    #[test]
+    fn what_stands_in_front_hides_what_is_behind() {
+        let mut all = Identities::default();
+        let (front, behind) = (all.add(Level::Object, NOBODY, vec![]), all.add(Level::Object, NOBODY, vec![]));
+        let cloud = GaussianCloud {
+            positions: vec![[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]],
+            log_scales: vec![[-1.8; 3], [-0.9; 3]],
+            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 2],
+            opacity_logits: vec![4.0; 2],
+            sh: vec![[0.0; 3]; 2],
+            ..GaussianCloud::default()
+        };
+        let camera =
+            Camera::look_at(DVec3::new(0.0, 0.0, -3.0), DVec3::ZERO, DVec3::NEG_Y, 0.6, 50, 37).expect("valid");
+        let settings = RenderSettings::default();
+        let mut renderer = Renderer::new();
+        let map = ViewMap::render(&mut renderer, &cloud, &[front, behind], &all, &camera, &settings).expect("drawn");
+        let frame = renderer.render(&cloud, crate::render::Features::NONE, &camera, &settings).expect("drawn");
+        for (a, b) in map.alpha.iter().zip(&frame.alpha) {
+            assert!((a - b).abs() < 1e-4, "{a} {b}");
+        }
+        assert_eq!(map.identity[18 * 50 + 25], front);
+        let (a, b) = (map.mask(&all, front), map.mask(&all, behind));
+        assert!(b.area() > a.area() && a.overlap(&b) == 0 && !a.is_empty());
+        // Seen from the other side, the order is the other way round.
+        let back = Camera::look_at(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, DVec3::NEG_Y, 0.6, 50, 37).expect("valid");
+        let map = ViewMap::render(&mut renderer, &cloud, &[front, behind], &all, &back, &settings).expect("drawn");
+        assert!(map.mask(&all, front).is_empty());
+    }
+}

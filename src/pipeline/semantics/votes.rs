@@ -1,0 +1,212 @@
+//! Closed-form lifting: every Gaussian takes the weighted vote of the pixels it contributed to
+//! (weight = alpha x transmittance), which gives its identity at all levels in one pass.
+
+use rayon::prelude::*;
+
+use crate::math::lanes::Lane;
+use crate::render::cpu::Renderer;
+use crate::render::cpu::weigh::Weighed;
+use crate::render::{RenderError, RenderSettings, TILE_PX};
+use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, NOBODY};
+
+/// A pixel about which nothing is known.
+pub const UNKNOWN: IdentityId = IdentityId::MAX;
+
+/// Most identities that a Gaussian keeps votes for.
+const KEPT: usize = 8;
+
+/// Votes of pixels for the identities of Gaussians.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Votes {
+    /// Per Gaussian: identity and weight in px, any order, each identity once.
+    of: Vec<Vec<(IdentityId, f32)>>,
+}
+
+/// What a Gaussian belongs to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Belonging {
+    /// The innermost identity; `NOBODY` if none claims it, `UNKNOWN` without a vote.
+    pub identity: IdentityId,
+    /// Share of its votes that went to that identity's object minus the share of the runner-up;
+    /// 0 without a vote.
+    pub margin: f32,
+}
+
+impl Votes {
+    /// No votes for `n` Gaussians.
+    pub fn new(n: usize) -> Self {
+        Self { of: vec![Vec::new(); n] }
+    }
+
+    /// Number of Gaussians.
+    pub fn len(&self) -> usize {
+        self.of.len()
+    }
+
+    /// Whether there are no Gaussians.
+    pub fn is_empty(&self) -> bool {
+        self.of.is_empty()
+    }
+
+    /// Weight of all votes for Gaussian `i`, px.
+    pub fn weight(&self, i: usize) -> f32 {
+        self.of[i].iter().map(|v| v.1).sum()
+    }
+
+    /// Adds the votes of one view. `labels` holds the innermost identity of each pixel, row-major.
+    ///
+    /// # Errors
+    /// If the camera is not usable or has another number of pixels.
+    pub fn add_view(
+        &mut self,
+        renderer: &mut Renderer<f32>,
+        cloud: &GaussianCloud,
+        camera: &Camera,
+        settings: &RenderSettings,
+        labels: &[IdentityId],
+    ) -> Result<(), RenderError> {
+        let (width, height) = (camera.width_px as usize, camera.height_px as usize);
+        assert_eq!(labels.len(), width * height, "one label per pixel");
+        let row = || Row { labels, width, gaussian: u32::MAX, sums: Vec::new(), found: Vec::new() };
+        let mut rows: Vec<Row<'_>> = (0..height.div_ceil(TILE_PX)).map(|_| row()).collect();
+        renderer.weigh(cloud, camera, settings, &mut rows)?;
+        for mut row in rows {
+            row.finish();
+            for (gaussian, identity, weight) in row.found {
+                add(&mut self.of[gaussian as usize], identity, weight);
+            }
+        }
+        Ok(())
+    }
+
+    /// What each Gaussian belongs to: the object with most votes, then within it the innermost
+    /// identity with most. Gaussians with less than `least` px of votes count as unseen.
+    pub fn decide(&self, identities: &Identities, least: f32) -> Vec<Belonging> {
+        let objects: Vec<IdentityId> = (0..=identities.len() as IdentityId).map(|i| identities.object_of(i)).collect();
+        self.of.par_iter().map(|votes| decide(votes, &objects, least)).collect()
+    }
+}
+
+fn add(votes: &mut Vec<(IdentityId, f32)>, identity: IdentityId, weight: f32) {
+    if let Some(v) = votes.iter_mut().find(|v| v.0 == identity) {
+        v.1 += weight;
+    } else if votes.len() < KEPT {
+        votes.push((identity, weight));
+    } else if let Some(least) = votes.iter_mut().min_by(|a, b| a.1.total_cmp(&b.1)).filter(|v| v.1 < weight) {
+        *least = (identity, weight);
+    }
+}
+
+fn decide(votes: &[(IdentityId, f32)], objects: &[IdentityId], least: f32) -> Belonging {
+    let total: f32 = votes.iter().map(|v| v.1).sum();
+    if !(total > 0.0 && total >= least) {
+        return Belonging { identity: UNKNOWN, margin: 0.0 };
+    }
+    let object_of = |id: IdentityId| objects.get(id as usize).copied().unwrap_or(NOBODY);
+    let mut sums: Vec<(IdentityId, f32)> = Vec::with_capacity(votes.len());
+    for &(id, weight) in votes {
+        let object = object_of(id);
+        match sums.iter_mut().find(|s| s.0 == object) {
+            Some(s) => s.1 += weight,
+            None => sums.push((object, weight)),
+        }
+    }
+    sums.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    let object = sums[0].0;
+    let inner = votes.iter().filter(|v| object_of(v.0) == object);
+    let identity = inner.max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0))).map_or(object, |v| v.0);
+    let second = sums.get(1).map_or(0.0, |s| s.1);
+    Belonging { identity, margin: (sums[0].1 - second) / total }
+}
+
+/// Collects the votes of one row of tiles.
+struct Row<'a> {
+    labels: &'a [IdentityId],
+    width: usize,
+    /// The Gaussian whose votes are being summed.
+    gaussian: u32,
+    sums: Vec<(IdentityId, f32)>,
+    found: Vec<(u32, IdentityId, f32)>,
+}
+
+impl Row<'_> {
+    fn finish(&mut self) {
+        let gaussian = self.gaussian;
+        self.found.extend(self.sums.drain(..).map(|(id, weight)| (gaussian, id, weight)));
+    }
+}
+
+impl Weighed<f32> for Row<'_> {
+    fn add(&mut self, gaussian: u32, x: usize, y: usize, weights: &Lane<f32>) {
+        if gaussian != self.gaussian {
+            self.finish();
+            self.gaussian = gaussian;
+        }
+        let end = (x + weights.len()).min(self.width);
+        for (&label, &weight) in self.labels[y * self.width + x..y * self.width + end].iter().zip(weights) {
+            if weight > 0.0 && label != UNKNOWN {
+                match self.sums.iter_mut().find(|s| s.0 == label) {
+                    Some(s) => s.1 += weight,
+                    None => self.sums.push((label, weight)),
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::scene::Level;
+
+    #[test]
+    fn objects_win_together_before_their_pieces_compete() {
+        let mut all = Identities::default();
+        let doll = all.add(Level::Object, NOBODY, vec![]);
+        let cat = all.add(Level::Object, NOBODY, vec![]);
+        let (eye, ear) = (all.add(Level::Part, doll, vec![]), all.add(Level::Part, doll, vec![]));
+        let votes = Votes {
+            of: vec![vec![(eye, 2.0), (ear, 3.0), (cat, 4.0)], vec![(NOBODY, 1.0)], vec![], vec![(cat, 0.01)]],
+        };
+        let b = votes.decide(&all, 0.05);
+        assert_eq!(b[0].identity, ear);
+        assert!((b[0].margin - 1.0 / 9.0).abs() < 1e-6);
+        assert_eq!((b[1].identity, b[2].identity, b[3].identity), (NOBODY, UNKNOWN, UNKNOWN));
+    }
+
+    #[test]
+    fn pixels_vote_for_what_they_show() {
+        // Two Gaussians side by side, labelled left and right; the middle columns say nothing.
+        let cloud = GaussianCloud {
+            positions: vec![[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]],
+            log_scales: vec![[-2.0; 3]; 2],
+            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 2],
+            opacity_logits: vec![2.0; 2],
+            sh: vec![[0.0; 3]; 2],
+            ..GaussianCloud::default()
+        };
+        let camera =
+            Camera::look_at(DVec3::new(0.0, 0.0, -3.0), DVec3::ZERO, DVec3::NEG_Y, 0.6, 45, 33).expect("valid");
+        let labels: Vec<IdentityId> = (0..45 * 33).map(|i| [1, UNKNOWN, 2][(i % 45) / 15]).collect();
+        let mut votes = Votes::new(2);
+        let mut renderer = Renderer::new();
+        votes.add_view(&mut renderer, &cloud, &camera, &RenderSettings::default(), &labels).expect("drawn");
+        let mut all = Identities::default();
+        (0..2).for_each(|_| {
+            all.add(Level::Object, NOBODY, vec![]);
+        });
+        let left = camera.project(DVec3::new(-0.5, 0.0, 0.0)).map(|p| p.x).expect("in front");
+        let expected = if left < 22.0 { [1, 2] } else { [2, 1] };
+        let b = votes.decide(&all, 0.0);
+        assert_eq!([b[0].identity, b[1].identity], expected);
+        assert!(b[0].margin > 0.9);
+        // The votes of a Gaussian are its share of the pixels that have a label.
+        let frame =
+            renderer.render(&cloud, crate::render::Features::NONE, &camera, &RenderSettings::default()).expect("drawn");
+        let known: f32 = frame.alpha.iter().zip(&labels).filter(|(_, l)| **l != UNKNOWN).map(|(a, _)| a).sum();
+        let voted = votes.weight(0) + votes.weight(1);
+        assert!((voted - known).abs() < 1e-3 * known, "{voted} {known}");
+    }
+}

@@ -1,0 +1,126 @@
+//! What a scene consists of: objects, their parts, and which Gaussian is whose.
+
+use serde::{Deserialize, Serialize};
+
+/// Object or part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Level {
+    /// A thing.
+    Object,
+    /// A piece of a thing.
+    Part,
+}
+
+/// Number of an identity: its place in the list plus one; 0 is nobody.
+pub type IdentityId = u32;
+
+/// Nobody: a pixel or Gaussian that no identity claims.
+pub const NOBODY: IdentityId = 0;
+
+/// One object or part, the same in every view.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Identity {
+    /// Object or part.
+    pub level: Level,
+    /// What it is a piece of; `NOBODY` for objects.
+    pub parent: IdentityId,
+    /// What people or a label file call it; the first is shown.
+    pub names: Vec<String>,
+    /// Its point in code space, each coordinate in 0..1.
+    pub code: [f32; 3],
+}
+
+/// All identities of a scene. Parents come before their pieces.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Identities {
+    list: Vec<Identity>,
+}
+
+impl Identities {
+    /// Adds an identity. A parent that does not exist yet is nobody.
+    pub fn add(&mut self, level: Level, parent: IdentityId, names: Vec<String>) -> IdentityId {
+        let parent = if self.get(parent).is_some() { parent } else { NOBODY };
+        self.list.push(Identity { level, parent, names, code: [0.5; 3] });
+        self.list.len() as IdentityId
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+
+    /// The identity with this number.
+    pub fn get(&self, id: IdentityId) -> Option<&Identity> {
+        self.list.get((id as usize).checked_sub(1)?)
+    }
+
+    /// The identity with this number, to change it.
+    pub fn get_mut(&mut self, id: IdentityId) -> Option<&mut Identity> {
+        self.list.get_mut((id as usize).checked_sub(1)?)
+    }
+
+    /// All of them with their numbers.
+    pub fn iter(&self) -> impl Iterator<Item = (IdentityId, &Identity)> {
+        self.list.iter().enumerate().map(|(i, identity)| (i as IdentityId + 1, identity))
+    }
+
+    /// The name to show: its first, or its number.
+    pub fn name(&self, id: IdentityId) -> String {
+        let named = self.get(id).and_then(|i| i.names.first()).cloned();
+        named.unwrap_or_else(|| if id == NOBODY { "nothing".into() } else { format!("#{id}") })
+    }
+
+    /// An identity and what it is a piece of, inside out. Ends at an object.
+    pub fn line(&self, id: IdentityId) -> impl Iterator<Item = IdentityId> + '_ {
+        let known = |id: IdentityId| self.get(id).map(|_| id);
+        // Parents come before their pieces, so numbers fall and the walk ends.
+        std::iter::successors(known(id), move |&at| self.get(at).and_then(|i| known(i.parent)).filter(|p| *p < at))
+    }
+
+    /// The object that an identity is, or is a piece of.
+    pub fn object_of(&self, id: IdentityId) -> IdentityId {
+        self.line(id).last().unwrap_or(NOBODY)
+    }
+
+    /// For each number from 0, whether it is `id` or a piece of it.
+    pub fn within(&self, id: IdentityId) -> Vec<bool> {
+        let mut inside = vec![false; self.list.len() + 1];
+        for (i, identity) in self.iter() {
+            inside[i as usize] = i == id || inside[identity.parent as usize];
+        }
+        inside
+    }
+
+    /// The direct pieces of an identity.
+    pub fn pieces(&self, id: IdentityId) -> impl Iterator<Item = IdentityId> + '_ {
+        self.iter().filter(move |(_, i)| i.parent == id && id != NOBODY).map(|(i, _)| i)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_and_pieces_follow_the_tree() {
+        let mut all = Identities::default();
+        let doll = all.add(Level::Object, NOBODY, vec!["doll".into()]);
+        let piano = all.add(Level::Object, NOBODY, vec![]);
+        let face = all.add(Level::Part, doll, vec!["face".into()]);
+        let eye = all.add(Level::Part, face, vec!["eye".into()]);
+        assert_eq!(all.line(eye).collect::<Vec<_>>(), [eye, face, doll]);
+        assert_eq!((all.object_of(eye), all.object_of(piano), all.object_of(99)), (doll, piano, NOBODY));
+        assert_eq!(all.within(doll), [false, true, false, true, true]);
+        assert_eq!(all.within(face), [false, false, false, true, true]);
+        assert_eq!(all.pieces(doll).collect::<Vec<_>>(), [face]);
+        assert_eq!((all.name(piano), all.name(eye), all.name(0)), ("#2".into(), "eye".into(), "nothing".into()));
+        assert_eq!(all.add(Level::Part, 77, vec![]), 5);
+        assert_eq!(all.get(5).map(|i| i.parent), Some(NOBODY));
+    }
+}

@@ -1,0 +1,190 @@
+//! Regions of one picture.
+
+use std::ops::Range;
+
+/// A set of pixels of a picture, one bit each, row-major.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Mask {
+    width_px: usize,
+    height_px: usize,
+    words: Vec<u64>,
+}
+
+/// Columns and rows that a region spans, ends exclusive.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PixelBox {
+    /// Columns.
+    pub x: Range<usize>,
+    /// Rows.
+    pub y: Range<usize>,
+}
+
+impl PixelBox {
+    /// Whether a pixel is inside.
+    pub fn contains(&self, x: usize, y: usize) -> bool {
+        self.x.contains(&x) && self.y.contains(&y)
+    }
+}
+
+impl Mask {
+    /// No pixel of a picture of this size.
+    pub fn empty(width_px: usize, height_px: usize) -> Self {
+        Self { width_px, height_px, words: vec![0; (width_px * height_px).div_ceil(64)] }
+    }
+
+    /// The pixels for which `inside(index)` holds.
+    pub fn from_fn(width_px: usize, height_px: usize, inside: impl Fn(usize) -> bool) -> Self {
+        let mut mask = Self::empty(width_px, height_px);
+        (0..width_px * height_px).filter(|&i| inside(i)).for_each(|i| mask.insert(i));
+        mask
+    }
+
+    /// The pixels whose centres are inside a polygon (even-odd rule), vertices in px. With vertices
+    /// on whole numbers, as in label files, a pixel centre is at its whole coordinates.
+    pub fn from_polygon(width_px: usize, height_px: usize, vertices: &[[f64; 2]]) -> Self {
+        let mut mask = Self::empty(width_px, height_px);
+        let mut crossings = Vec::new();
+        for y in 0..height_px {
+            let row = y as f64;
+            crossings.clear();
+            for (i, a) in vertices.iter().enumerate() {
+                let b = vertices[(i + 1) % vertices.len()];
+                if (a[1] <= row) != (b[1] <= row) {
+                    crossings.push(a[0] + (row - a[1]) / (b[1] - a[1]) * (b[0] - a[0]));
+                }
+            }
+            crossings.sort_by(f64::total_cmp);
+            for pair in crossings.chunks_exact(2) {
+                let from = pair[0].ceil().max(0.0) as usize;
+                let to = (pair[1].floor() + 1.0).clamp(0.0, width_px as f64) as usize;
+                (from..to).for_each(|x| mask.insert(y * width_px + x));
+            }
+        }
+        mask
+    }
+
+    /// Width of the picture, px.
+    pub fn width_px(&self) -> usize {
+        self.width_px
+    }
+
+    /// Height of the picture, px.
+    pub fn height_px(&self) -> usize {
+        self.height_px
+    }
+
+    /// Adds the pixel with this index.
+    pub fn insert(&mut self, index: usize) {
+        self.words[index / 64] |= 1 << (index % 64);
+    }
+
+    /// Whether the pixel with this index is in it.
+    pub fn contains(&self, index: usize) -> bool {
+        self.words[index / 64] >> (index % 64) & 1 == 1
+    }
+
+    /// Number of pixels.
+    pub fn area(&self) -> usize {
+        self.words.iter().map(|w| w.count_ones() as usize).sum()
+    }
+
+    /// Whether it has no pixel.
+    pub fn is_empty(&self) -> bool {
+        self.words.iter().all(|w| *w == 0)
+    }
+
+    /// Indices of its pixels, ascending.
+    pub fn pixels(&self) -> impl Iterator<Item = usize> + '_ {
+        self.words.iter().enumerate().flat_map(|(k, &word)| {
+            std::iter::successors((word != 0).then_some(word), |w| Some(w & (w - 1)).filter(|w| *w != 0))
+                .map(move |w| k * 64 + w.trailing_zeros() as usize)
+        })
+    }
+
+    /// Adds the pixels of another mask of the same size.
+    pub fn add(&mut self, other: &Self) {
+        self.words.iter_mut().zip(&other.words).for_each(|(a, b)| *a |= b);
+    }
+
+    /// Takes the pixels of another mask of the same size away.
+    pub fn subtract(&mut self, other: &Self) {
+        self.words.iter_mut().zip(&other.words).for_each(|(a, b)| *a &= !b);
+    }
+
+    /// Pixels in both masks.
+    pub fn overlap(&self, other: &Self) -> usize {
+        self.words.iter().zip(&other.words).map(|(a, b)| (a & b).count_ones() as usize).sum()
+    }
+
+    /// Intersection over union; 1 for two empty masks.
+    pub fn iou(&self, other: &Self) -> f64 {
+        let both = self.overlap(other);
+        let either = self.area() + other.area() - both;
+        if either == 0 { 1.0 } else { both as f64 / either as f64 }
+    }
+
+    /// The smallest box around it; `None` if it is empty.
+    pub fn bounds(&self) -> Option<PixelBox> {
+        let mut found: Option<PixelBox> = None;
+        for i in self.pixels() {
+            let (x, y) = (i % self.width_px, i / self.width_px);
+            let b = found.get_or_insert(PixelBox { x: x..x + 1, y: y..y + 1 });
+            b.x = b.x.start.min(x)..b.x.end.max(x + 1);
+            b.y = b.y.start..b.y.end.max(y + 1);
+        }
+        found
+    }
+
+    /// The same region in a picture of another size: each pixel takes the value at its centre.
+    pub fn resized(&self, width_px: usize, height_px: usize) -> Self {
+        let at = |i: usize, from: usize, to: usize| ((2 * i + 1) * from / (2 * to)).min(from.saturating_sub(1));
+        Self::from_fn(width_px, height_px, |i| {
+            let (x, y) = (i % width_px, i / width_px);
+            self.contains(at(y, self.height_px, height_px) * self.width_px + at(x, self.width_px, width_px))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sets_do_what_sets_do() {
+        let a = Mask::from_fn(13, 7, |i| i % 3 == 0);
+        let b = Mask::from_fn(13, 7, |i| i % 2 == 0);
+        assert_eq!(a.pixels().collect::<Vec<_>>(), (0..91).filter(|i| i % 3 == 0).collect::<Vec<_>>());
+        assert_eq!((a.area(), a.overlap(&b)), (31, 16));
+        let union = 31 + 46 - 16;
+        assert!((a.iou(&b) - 16.0 / f64::from(union)).abs() < 1e-12);
+        let mut c = a.clone();
+        c.add(&b);
+        assert_eq!(c.area(), union as usize);
+        c.subtract(&b);
+        assert_eq!(c.area(), 31 - 16);
+        let empty = Mask::empty(13, 7);
+        assert!(empty.is_empty() && empty.bounds().is_none() && empty.pixels().next().is_none());
+        assert_eq!((empty.iou(&empty), empty.iou(&a)), (1.0, 0.0));
+    }
+
+    #[test]
+    fn polygons_cover_their_inside() {
+        let square = [[2.0, 1.0], [6.0, 1.0], [6.0, 4.0], [2.0, 4.0]];
+        let mask = Mask::from_polygon(10, 8, &square);
+        assert_eq!(mask.bounds(), Some(PixelBox { x: 2..7, y: 1..4 }));
+        assert_eq!(mask.area(), 15);
+        // A hole by the even-odd rule, and vertices outside the picture.
+        let bow = [[-5.0, -5.0], [50.0, -5.0], [50.0, 50.0], [-5.0, 50.0]];
+        assert_eq!(Mask::from_polygon(10, 8, &bow).area(), 80);
+        assert!(Mask::from_polygon(10, 8, &[]).is_empty());
+        assert!(Mask::from_polygon(10, 8, &[[3.0, 3.0]]).is_empty());
+    }
+
+    #[test]
+    fn resizing_keeps_the_region() {
+        let mask = Mask::from_fn(40, 20, |i| i % 40 >= 20);
+        let small = mask.resized(10, 5);
+        assert_eq!(small, Mask::from_fn(10, 5, |i| i % 10 >= 5));
+        assert_eq!(small.resized(40, 20), mask);
+    }
+}
