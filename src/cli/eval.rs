@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::opened::DrawableScene;
 use super::progress::Console;
-use super::{CliError, opened, output};
+use super::{CliError, eval_masks, opened, output};
 use crate::io;
 use crate::math::stats::mean;
 use crate::pipeline::evaluate::evaluate;
@@ -31,6 +31,7 @@ const DIFFERENCE_GAIN: i32 = 4;
 #[command(after_help = "Examples:\n  \
     fmlgs eval scene/\n  \
     fmlgs eval scene/ --pictures compare/       photo | render | difference x 4, one PNG per view\n  \
+    fmlgs eval scene/ --masks photos/           objects and parts against labels, by name\n  \
     fmlgs eval splat.ply --photos photos/ --max-side 1600 --json")]
 pub struct Args {
     /// Trained scene or splat file
@@ -40,6 +41,10 @@ pub struct Args {
     photos: Option<PathBuf>,
     #[command(flatten)]
     options: Options,
+    /// Compare objects and parts instead, with these labels: each named region of a held-out photo
+    /// is asked for by its name
+    #[arg(long)]
+    masks: Option<PathBuf>,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
@@ -122,6 +127,9 @@ pub fn job(scene: DrawableScene, photos: &Path, options: Options) -> Result<Job,
 pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let json = args.json;
     let scene = args.scene.clone();
+    if let Some(masks) = args.masks.clone() {
+        return eval_masks::run(&scene, &masks, args.check()?, json);
+    }
     let job = args.check()?;
     let scores = measure(&job, &mut Console::new(quiet))?;
     let (psnr, ssim) = means(&scores);

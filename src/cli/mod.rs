@@ -8,12 +8,15 @@ mod bench;
 mod demo;
 mod error;
 mod eval;
+mod eval_masks;
 mod export;
 mod info;
 mod interrupt;
 mod opened;
 mod output;
+mod preprocess;
 mod progress;
+mod query;
 mod render;
 mod synth;
 mod train;
@@ -67,6 +70,8 @@ enum Command {
     Train(train::Args),
     Render(render::Args),
     Eval(eval::Args),
+    Preprocess(preprocess::Args),
+    Query(query::Args),
     Synth(synth::Args),
     Demo(demo::Args),
     Export(export::Args),
@@ -104,6 +109,8 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Train(args) => train::run(args, quiet),
         Command::Render(args) => render::run(args),
         Command::Eval(args) => eval::run(args, quiet),
+        Command::Preprocess(args) => preprocess::run(args, quiet),
+        Command::Query(args) => query::run(args),
         Command::Synth(args) => synth::run(args, quiet),
         Command::Demo(args) if args.headless => demo::run(args, quiet),
         Command::Demo(_) => window(Some(Action::TryDemo), open_window),

@@ -21,6 +21,7 @@ pub mod points_ply;
 mod quantised;
 mod reader;
 mod resample;
+pub mod semantic_map;
 pub mod sog;
 pub mod splat_ply;
 pub mod trained;

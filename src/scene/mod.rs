@@ -9,6 +9,7 @@ pub mod identity;
 pub mod mask;
 pub mod photo;
 pub mod plan;
+pub mod semantic_map;
 
 pub use bounds::Bounds;
 pub use camera::{Camera, CameraError};
@@ -19,3 +20,4 @@ pub use identity::{Identities, Identity, IdentityId, Level, NOBODY};
 pub use mask::{Mask, PixelBox};
 pub use photo::{Distortion, Photo, PhotoPixels};
 pub use plan::{Machine, PlanLine, ScenePlan};
+pub use semantic_map::SemanticMap;

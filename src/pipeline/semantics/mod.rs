@@ -12,6 +12,7 @@ pub mod grammar;
 mod link;
 pub mod localise;
 pub mod names;
+pub mod score;
 pub mod segmenter;
 pub mod tracker;
 pub mod view_map;

@@ -1,0 +1,144 @@
+//! `fmlgs preprocess`: objects and parts of a trained scene.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use glam::DVec3;
+use serde_json::json;
+
+use super::progress::Console;
+use super::{CliError, opened, output};
+use crate::io::{self, labels::Labels};
+use crate::pipeline::observer::{Level as Severity, Observer};
+use crate::pipeline::semantics::codes;
+use crate::pipeline::semantics::segmenter::FileMasks;
+use crate::pipeline::semantics::tracker::{self, TrackError, TrackOptions};
+use crate::scene::{GaussianCloud, Identities, IdentityId, Level, Photo, SemanticMap};
+
+/// Find the objects and parts of a trained scene
+///
+/// Masks of a first photo vote for the Gaussians that they show; the votes carry them to all other
+/// photos. Photos of which too much is unknown are segmented too, and their masks linked to what is
+/// known. Held-out photos are never used. The result is stored with the scene: identities in
+/// semantic_map.safetensors, each Gaussian's in point_cloud.ply.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    fmlgs preprocess scene/ --masks photos/               masks that came with the photos\n  \
+    fmlgs preprocess scene/ --masks labels/ --max-seeds 1  one labelled photo is enough to begin")]
+pub struct Args {
+    /// Trained scene
+    scene: PathBuf,
+    /// Where the masks are: id maps of 'fmlgs synth', or ISAT label files
+    #[arg(long)]
+    masks: PathBuf,
+    /// Dataset with the photos [default: where the scene's photos are]
+    #[arg(long)]
+    photos: Option<PathBuf>,
+    /// Photo to begin with, by name [default: the first with masks]
+    #[arg(long)]
+    seed: Option<String>,
+    /// Most photos whose masks are used
+    #[arg(long, default_value_t = TrackOptions::default().max_seeds)]
+    max_seeds: usize,
+    /// Share of a photo that may stay unknown before its masks are used too, in percent
+    #[arg(long, default_value_t = 100.0 * TrackOptions::default().reseed_share)]
+    unknown: f64,
+    /// Print one JSON document
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+    let mut observer = Console::new(quiet);
+    let mut scene = opened::drawable(&args.scene)?;
+    if !io::trained::is_scene(&args.scene) {
+        let path = args.scene.display();
+        return Err(CliError::failed(format!("{path} is no trained scene; the result is stored in its folder")));
+    }
+    let photos_path = args.photos.clone().or_else(|| scene.dataset_path.clone()).ok_or_else(|| {
+        let path = args.scene.display();
+        CliError::failed(format!("{path}: its photos are not known or no longer there; give them with --photos"))
+    })?;
+    let dataset = opened::dataset(&photos_path)?;
+    let held = |name: &str| scene.cameras.iter().any(|c| c.held_out && c.name == name);
+    let photos: Vec<Photo> = dataset.photos.iter().filter(|p| !held(&p.name)).cloned().collect();
+    let seed = match &args.seed {
+        None => None,
+        Some(name) => {
+            let ends = |p: &Photo| p.name.contains(name.as_str());
+            Some(photos.iter().position(ends).ok_or_else(|| {
+                CliError::failed(format!("no photo that was trained on is called '{name}'; see 'fmlgs info'"))
+            })?)
+        }
+    };
+    let mut segmenter = FileMasks(Labels::open(&args.masks)?);
+    let options = TrackOptions {
+        seed,
+        max_seeds: args.max_seeds.max(1),
+        reseed_share: args.unknown / 100.0,
+        ..TrackOptions::default()
+    };
+    let start = Instant::now();
+    let tracked = tracker::track(&scene.cloud, &photos, &scene.settings, &mut segmenter, &options, &mut observer)
+        .map_err(|e| match e {
+            TrackError::Cancelled => CliError::Cancelled("nothing was stored".into()),
+            other => other.into(),
+        })?;
+    let mut identities = tracked.identities;
+    let of: Vec<IdentityId> = tracked.belongings.iter().map(|b| b.identity).collect();
+    let centers = centers(&scene.cloud, &of, &identities);
+    codes::assign(&mut identities, &centers);
+    let map = SemanticMap {
+        identities,
+        of,
+        margin: tracked.belongings.iter().map(|b| b.margin).collect(),
+        seeds: tracked.seeds.iter().map(|&i| photos[i].name.clone()).collect(),
+    };
+    io::semantic_map::save(&args.scene, &map, &mut scene.cloud, codes::BACKGROUND)?;
+    let secs = start.elapsed().as_secs_f64();
+    let unknown: Vec<_> = tracked.views.iter().filter(|v| v.unknown > options.reseed_share).collect();
+    if let Some(worst) = unknown.iter().max_by(|a, b| a.unknown.total_cmp(&b.unknown)) {
+        let text = format!(
+            "{} of {} photos show more than {:.0}% that no mask has reached (most: {}, {:.0}%); what is there belongs \
+             to what it hangs together with",
+            unknown.len(),
+            photos.len(),
+            100.0 * options.reseed_share,
+            photos[worst.photo].name,
+            100.0 * worst.unknown
+        );
+        observer.note(Severity::Info, text);
+    }
+    let count = |level: Level| map.identities.iter().filter(|(_, i)| i.level == level).count();
+    if args.json {
+        let sizes = map.sizes();
+        let list = map.identities.iter().map(|(id, i)| {
+            json!({ "id": id, "level": i.level, "parent": i.parent, "names": i.names, "gaussians": sizes[id as usize] })
+        });
+        return output::print_json(&json!({
+            "scene": args.scene,
+            "seeds": map.seeds,
+            "secs": secs,
+            "identities": list.collect::<Vec<_>>(),
+        }));
+    }
+    output::print(&format!(
+        "{} objects and {} parts from {} photos in {secs:.1} s; ask with 'fmlgs query {} \"...\"'",
+        count(Level::Object),
+        count(Level::Part),
+        map.seeds.len(),
+        args.scene.display()
+    ))
+}
+
+/// Mean position of each identity's Gaussians, pieces included, by number less one.
+fn centers(cloud: &GaussianCloud, of: &[IdentityId], identities: &Identities) -> Vec<DVec3> {
+    let mut sums = vec![(DVec3::ZERO, 0.0); identities.len()];
+    for (i, &id) in of.iter().enumerate() {
+        for id in identities.line(id) {
+            let sum = &mut sums[id as usize - 1];
+            *sum = (sum.0 + cloud.world_position(i), sum.1 + 1.0);
+        }
+    }
+    sums.iter().map(|(sum, n)| if *n > 0.0 { *sum / *n } else { DVec3::ZERO }).collect()
+}
