@@ -3,17 +3,16 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use glam::DVec3;
 use serde_json::json;
 
 use super::progress::Console;
 use super::{CliError, opened, output};
 use crate::io::{self, labels::Labels};
-use crate::pipeline::observer::{Level as Severity, Observer};
 use crate::pipeline::semantics::codes;
+use crate::pipeline::semantics::find::find_objects;
 use crate::pipeline::semantics::segmenter::FileMasks;
-use crate::pipeline::semantics::tracker::{self, TrackError, TrackOptions};
-use crate::scene::{GaussianCloud, Identities, IdentityId, Level, Photo, SemanticMap};
+use crate::pipeline::semantics::tracker::{TrackError, TrackOptions};
+use crate::scene::{Level, Photo};
 
 /// Find the objects and parts of a trained scene
 ///
@@ -79,36 +78,15 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         ..TrackOptions::default()
     };
     let start = Instant::now();
-    let tracked = tracker::track(&scene.cloud, &photos, &scene.settings, &mut segmenter, &options, &mut observer)
-        .map_err(|e| match e {
-            TrackError::Cancelled => CliError::Cancelled("nothing was stored".into()),
-            other => other.into(),
+    let map =
+        find_objects(&scene.cloud, &photos, &scene.settings, &mut segmenter, &options, &mut observer).map_err(|e| {
+            match e {
+                TrackError::Cancelled => CliError::Cancelled("nothing was stored".into()),
+                other => other.into(),
+            }
         })?;
-    let mut identities = tracked.identities;
-    let of: Vec<IdentityId> = tracked.belongings.iter().map(|b| b.identity).collect();
-    let centers = centers(&scene.cloud, &of, &identities);
-    codes::assign(&mut identities, &centers);
-    let map = SemanticMap {
-        identities,
-        of,
-        margin: tracked.belongings.iter().map(|b| b.margin).collect(),
-        seeds: tracked.seeds.iter().map(|&i| photos[i].name.clone()).collect(),
-    };
     io::semantic_map::save(&args.scene, &map, &mut scene.cloud, codes::BACKGROUND)?;
     let secs = start.elapsed().as_secs_f64();
-    let unknown: Vec<_> = tracked.views.iter().filter(|v| v.unknown > options.reseed_share).collect();
-    if let Some(worst) = unknown.iter().max_by(|a, b| a.unknown.total_cmp(&b.unknown)) {
-        let text = format!(
-            "{} of {} photos show more than {:.0}% that no mask has reached (most: {}, {:.0}%); what is there belongs \
-             to what it hangs together with",
-            unknown.len(),
-            photos.len(),
-            100.0 * options.reseed_share,
-            photos[worst.photo].name,
-            100.0 * worst.unknown
-        );
-        observer.note(Severity::Info, text);
-    }
     let count = |level: Level| map.identities.iter().filter(|(_, i)| i.level == level).count();
     if args.json {
         let sizes = map.sizes();
@@ -129,16 +107,4 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         map.seeds.len(),
         args.scene.display()
     ))
-}
-
-/// Mean position of each identity's Gaussians, pieces included, by number less one.
-fn centers(cloud: &GaussianCloud, of: &[IdentityId], identities: &Identities) -> Vec<DVec3> {
-    let mut sums = vec![(DVec3::ZERO, 0.0); identities.len()];
-    for (i, &id) in of.iter().enumerate() {
-        for id in identities.line(id) {
-            let sum = &mut sums[id as usize - 1];
-            *sum = (sum.0 + cloud.world_position(i), sum.1 + 1.0);
-        }
-    }
-    sums.iter().map(|(sum, n)| if *n > 0.0 { *sum / *n } else { DVec3::ZERO }).collect()
 }

@@ -1,5 +1,6 @@
 //! What each action does.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::app::App;
@@ -29,6 +30,14 @@ impl App {
                 }
             }
             Action::Evaluate => self.evaluate(),
+            Action::FindObjects => self.find_objects(None),
+            Action::ChooseMasks => self.choose(Purpose::Masks),
+            Action::TypeQuestion => self.type_question(),
+            Action::Ask(text) => {
+                if let Some(semantics) = self.state.semantics.clone() {
+                    self.viewport.questions.ask(&text, &semantics);
+                }
+            }
             Action::Show(mode) => self.layout.mode = mode,
             Action::ToggleCompare => {
                 self.layout.compare = !self.layout.compare;
@@ -124,6 +133,38 @@ impl App {
         }
     }
 
+    /// Finds objects and parts with these masks, or those that came with the photos.
+    fn find_objects(&mut self, masks: Option<PathBuf>) {
+        let scene = self.state.scene.clone();
+        let Some((scene, dataset)) = scene.as_ref().and_then(|s| Some((s, s.dataset.clone()?))) else {
+            self.state.toast(Tone::Warning, "Open a folder of posed photos first: masks are masks of photos.");
+            return;
+        };
+        let Some(masks) = masks.or_else(|| scene.masks.clone()) else {
+            self.state.toast(Tone::Warning, "No masks came with these photos; choose a folder that has some.");
+            return;
+        };
+        match self.viewport.cloud().cloned().filter(|_| self.state.is_trained()) {
+            Some(cloud) => self.submit(Command::FindObjects {
+                dataset,
+                cloud,
+                holdout_every: self.layout.config.holdout_every,
+                settings: scene.render.clone(),
+                masks,
+                out: scene.out.clone(),
+            }),
+            None => self.state.toast(Tone::Warning, "Train first: objects are made of trained Gaussians."),
+        }
+    }
+
+    fn type_question(&mut self) {
+        if self.state.semantics.is_some() {
+            self.viewport.questions.start_typing();
+        } else {
+            self.state.toast(Tone::Warning, "Nothing can be asked for yet: find the objects first (Objects pane).");
+        }
+    }
+
     fn choose(&mut self, purpose: Purpose) {
         let writes = matches!(purpose, Purpose::ExportPly | Purpose::Screenshot);
         if writes && self.viewport.picture().is_none() {
@@ -140,6 +181,7 @@ impl App {
     pub(super) fn chosen(&mut self, answer: Chosen) {
         match answer {
             Chosen::Path(Purpose::OpenFolder | Purpose::OpenFile, path) => self.ask(Action::Open(path)),
+            Chosen::Path(Purpose::Masks, path) => self.find_objects(Some(path)),
             Chosen::Path(Purpose::ExportPly, path) => {
                 if let Some(cloud) = self.viewport.cloud().cloned() {
                     self.submit(Command::Export { cloud, path });

@@ -7,7 +7,7 @@ use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 use super::dialogs::{self, FileDialogs, Question};
 use super::layout::Layout;
 use super::palette::{Palette, shortcut_sheet};
-use super::panes::{bars, dataset::Thumbnails, empty, log, plan, training};
+use super::panes::{bars, dataset::Thumbnails, empty, log, objects, plan, training};
 use super::state::AppState;
 use super::toasts::Toasts;
 use super::viewport::Viewport;
@@ -73,6 +73,9 @@ impl App {
         if std::mem::take(&mut self.state.wants_training) {
             self.actions.push(Action::StartTraining);
         }
+        if std::mem::take(&mut self.state.wants_objects) {
+            self.actions.push(Action::FindObjects);
+        }
         while let Some(answer) = self.dialogs.answer() {
             self.chosen(answer);
         }
@@ -113,17 +116,31 @@ impl App {
                 },
             );
         }
-        if layout.shows(Pane::Training) || layout.shows(Pane::Plan) {
+        if [Pane::Training, Pane::Objects, Pane::Plan].iter().any(|p| layout.shows(*p)) {
             Panel::right("work").frame(pane).resizable(true).default_size(350.0).size_range(290.0..=640.0).show(
                 ui,
                 |ui| {
                     ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+                        let objects = layout.shows(Pane::Objects) && scene.dataset.is_some();
+                        let show_objects = |ui: &mut Ui, actions: &mut Vec<Action>| {
+                            egui::CollapsingHeader::new(Pane::Objects.text())
+                                .default_open(true)
+                                .show(ui, |ui| objects::show(ui, state, actions));
+                            ui.add_space(10.0);
+                        };
+                        // Once there are any, they are what a person works with.
+                        if objects && state.semantics.is_some() {
+                            show_objects(ui, actions);
+                        }
                         if layout.shows(Pane::Training) {
                             ui.heading(Pane::Training.text());
                             training::show(ui, state, layout, actions);
+                            ui.add_space(10.0);
+                        }
+                        if objects && state.semantics.is_none() {
+                            show_objects(ui, actions);
                         }
                         if layout.shows(Pane::Plan) {
-                            ui.add_space(10.0);
                             egui::CollapsingHeader::new(Pane::Plan.text())
                                 .default_open(state.history.steps.is_empty())
                                 .show(ui, |ui| plan::show(ui, &state.plan));

@@ -18,6 +18,8 @@ pub enum Purpose {
     OpenFolder,
     /// Open this file.
     OpenFile,
+    /// Find objects with the masks in this folder.
+    Masks,
     /// Write Gaussians there.
     ExportPly,
     /// Write the picture there.
@@ -68,6 +70,7 @@ impl FileDialogs {
                     .add_filter("All files", &["*"])
                     .pick_file(),
             ),
+            Purpose::Masks => Box::pin(dialog.set_title("Choose the folder with the masks").pick_folder()),
             Purpose::ExportPly => {
                 Box::pin(dialog.set_title("Export Gaussians").set_file_name(format!("{name}.ply")).save_file())
             }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::pipeline::observer::{Evaluation, Level, Progress, StepMetrics};
-use crate::scene::{PhotoPixels, ScenePlan};
+use crate::scene::{PhotoPixels, ScenePlan, SemanticMap};
 use crate::worker::{Event, Failure, JobId, JobKind, Lane, OpenedScene, Outcome};
 
 /// Measurements kept for the plots; beyond that every second one is dropped.
@@ -92,6 +92,8 @@ pub struct AppState {
     pub plan: ScenePlan,
     /// Whether the Gaussians on screen want the 2-D filter of Mip-Splatting.
     pub antialias: bool,
+    /// Objects and parts of the Gaussians on screen.
+    pub semantics: Option<Arc<SemanticMap>>,
     /// The long job that runs.
     pub job: Option<RunningJob>,
     /// Training of the present scene.
@@ -110,6 +112,8 @@ pub struct AppState {
     pub photos: BTreeMap<(usize, u32), Arc<PhotoPixels>>,
     /// Photos that could not be loaded, by job, for the window to mark; the window takes them out.
     pub failed_photos: Vec<JobId>,
+    /// Set when training has finished on photos with masks: the window is to find their objects.
+    pub wants_objects: bool,
     /// Set when a demo was opened: the window is to train it.
     pub wants_training: bool,
     /// Short jobs that run, with their titles.
@@ -131,6 +135,8 @@ impl AppState {
             }
             Event::Started { job, kind, title } => {
                 if kind == JobKind::Train {
+                    // They belong to Gaussians that are about to change.
+                    self.semantics = None;
                     self.training_job = Some(job);
                 }
                 self.say(Tone::Info, title.clone());
@@ -186,6 +192,11 @@ impl AppState {
         self.recent.truncate(MAX_RECENT);
     }
 
+    /// Whether the Gaussians on screen are a result.
+    pub fn is_trained(&self) -> bool {
+        !self.is_training() && (self.training_job.is_some() || self.scene.as_ref().is_some_and(|s| s.trained))
+    }
+
     /// Whether training runs or waits.
     pub fn is_training(&self) -> bool {
         self.job.as_ref().is_some_and(|j| j.kind == JobKind::Train)
@@ -228,6 +239,7 @@ impl AppState {
                 let quality = self.history.evaluations.last().map(|e| format!(", held-out PSNR {:.2} dB", e.psnr));
                 self.say(Tone::Info, format!("Saved to {}", out.display()));
                 self.toast(Tone::Good, format!("Training finished{}", quality.unwrap_or_default()));
+                self.wants_objects = self.scene.as_ref().is_some_and(|s| s.masks.is_some());
             }
             Outcome::Evaluated(mut e) => {
                 if let Some(last) = self.history.steps.last() {
@@ -236,6 +248,10 @@ impl AppState {
                 self.history.evaluations.retain(|old| old.step < e.step);
                 self.toast(Tone::Good, format!("Held-out PSNR {:.2} dB, SSIM {:.3}", e.psnr, e.ssim));
                 self.history.evaluations.push(e);
+            }
+            Outcome::Objects(map) => {
+                self.toast(Tone::Good, format!("{} objects and parts found; ask for one", map.identities.len()));
+                self.semantics = Some(map);
             }
             Outcome::Written(path) => self.toast(Tone::Good, format!("Wrote {}", path.display())),
             Outcome::Photo { index, max_side_px, pixels } => {
@@ -259,6 +275,7 @@ impl AppState {
         self.scene_number += 1;
         self.plan = scene.plan.clone();
         self.antialias = scene.render.antialias;
+        self.semantics = scene.semantics.clone();
         self.scene = Some(Arc::new(scene));
     }
 

@@ -42,6 +42,8 @@ pub enum Pane {
     Dataset,
     /// Settings, progress and plots of training.
     Training,
+    /// Objects and parts.
+    Objects,
     /// What is left out for this scene, and why.
     Plan,
     /// Messages.
@@ -50,13 +52,14 @@ pub enum Pane {
 
 impl Pane {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Dataset, Self::Training, Self::Plan, Self::Log];
+    pub const ALL: [Self; 5] = [Self::Dataset, Self::Training, Self::Objects, Self::Plan, Self::Log];
 
     /// Its title.
     pub fn text(self) -> &'static str {
         match self {
             Self::Dataset => "Photos",
             Self::Training => "Training",
+            Self::Objects => "Objects",
             Self::Plan => "Scene plan",
             Self::Log => "Log",
         }
@@ -141,6 +144,14 @@ pub enum Action {
     Cancel,
     /// Measure PSNR and SSIM on the held-out photos.
     Evaluate,
+    /// Find objects and parts with the masks that came with the photos.
+    FindObjects,
+    /// Choose masks, and find objects and parts with them.
+    ChooseMasks,
+    /// Type a question.
+    TypeQuestion,
+    /// Ask for an object or part.
+    Ask(String),
     /// Bring the scene into view.
     FrameScene,
     /// Go back to the first view.
@@ -171,7 +182,7 @@ pub enum Action {
 
 impl Action {
     /// Every action that needs no further input, in the order of the palette.
-    pub const ALL: [Self; 31] = [
+    pub const ALL: [Self; 35] = [
         Self::TryDemo,
         Self::OpenFolder,
         Self::OpenFile,
@@ -181,6 +192,9 @@ impl Action {
         Self::PauseTraining,
         Self::Cancel,
         Self::Evaluate,
+        Self::FindObjects,
+        Self::ChooseMasks,
+        Self::TypeQuestion,
         Self::FrameScene,
         Self::ResetView,
         Self::PreviousPhoto,
@@ -199,6 +213,7 @@ impl Action {
         Self::TurnUp(Axis::MinusZ),
         Self::TogglePane(Pane::Dataset),
         Self::TogglePane(Pane::Training),
+        Self::TogglePane(Pane::Objects),
         Self::TogglePane(Pane::Plan),
         Self::TogglePane(Pane::Log),
         Self::Palette,
@@ -218,6 +233,10 @@ impl Action {
             Self::PauseTraining => "Pause or resume training".into(),
             Self::Cancel => "Cancel the running job".into(),
             Self::Evaluate => "Measure held-out quality".into(),
+            Self::FindObjects => "Find objects and parts".into(),
+            Self::ChooseMasks => "Find objects with other masks…".into(),
+            Self::TypeQuestion => "Ask for an object or a part".into(),
+            Self::Ask(text) => format!("Ask for {text}"),
             Self::FrameScene => "Frame the scene".into(),
             Self::ResetView => "Reset the view".into(),
             Self::TurnUp(axis) => format!("Turn {} upwards", axis.text()),
@@ -251,6 +270,11 @@ impl Action {
             Self::PauseTraining => "Hold training without losing its state.",
             Self::Cancel => "Stop the running job at its next step. What is trained so far stays.",
             Self::Evaluate => "PSNR and SSIM on the photos that training does not see.",
+            Self::FindObjects => "Carry the masks that came with the photos to every view, through the Gaussians.",
+            Self::ChooseMasks => {
+                "Id maps of fmlgs synth, or ISAT label files as in lerf_ovs; one labelled photo will do."
+            }
+            Self::TypeQuestion | Self::Ask(_) => "A name, or \"the button of the red controller\".",
             Self::FrameScene => "Move back until all of the scene is in view.",
             Self::ResetView => "Return to the view with which the scene opened.",
             Self::TurnUp(_) => "For scenes that lie on their side.",
@@ -281,6 +305,7 @@ impl Action {
             Self::StartTraining => ctrl("T"),
             Self::PauseTraining => plain("T"),
             Self::Cancel => plain("Escape"),
+            Self::TypeQuestion => plain("/"),
             Self::FrameScene => plain("F"),
             Self::ResetView => plain("Home"),
             Self::PreviousPhoto => plain("["),
@@ -298,6 +323,9 @@ impl Action {
             | Self::OpenFile
             | Self::Open(_)
             | Self::Evaluate
+            | Self::FindObjects
+            | Self::ChooseMasks
+            | Self::Ask(_)
             | Self::GoToPhoto(_)
             | Self::TurnUp(_)
             | Self::TogglePane(_) => None,

@@ -8,14 +8,19 @@ use super::places::Places;
 use super::preview::{home_view, sparse_cloud};
 use super::protocol::{Command, Failure, OpenedScene, Outcome, Stop};
 use super::thread::Jobs;
+use crate::io::labels::Labels;
 use crate::io::{self, IoError, OpenError, Opened, TrainedScene, trained};
 use crate::pipeline::evaluate::evaluate;
 use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::semantics::codes;
+use crate::pipeline::semantics::find::find_objects;
+use crate::pipeline::semantics::segmenter::FileMasks;
+use crate::pipeline::semantics::tracker::{TrackError, TrackOptions};
 use crate::pipeline::synth::{SynthError, demo};
 use crate::pipeline::train::checkpoint::CheckpointError;
 use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainError};
 use crate::render::RenderSettings;
-use crate::scene::{Dataset, GaussianCloud, Machine, PhotoPixels, ScenePlan};
+use crate::scene::{Dataset, GaussianCloud, Machine, Photo, PhotoPixels, ScenePlan, SemanticMap};
 
 /// Runs commands on the pipeline.
 pub struct PipelineJobs {
@@ -45,6 +50,8 @@ impl PipelineJobs {
             Opened::Trained(trained) => trained_scene(trained, observer),
         };
         scene.path.clone_from(path);
+        let root = scene.dataset.as_ref().map(|d| d.root.clone());
+        scene.masks = root.filter(|root| Labels::open(root).is_ok());
         let (dataset, cloud) = (scene.dataset.as_deref(), scene.cloud.as_deref());
         if scene.home.camera.is_none() {
             scene.home = home_view(dataset, cloud);
@@ -112,13 +119,15 @@ impl PipelineJobs {
         let mut render = render_settings(dataset.background, false);
         let dataset = Some(Arc::new(dataset));
         match before {
-            Some(TrainedScene { info, cloud, .. }) => {
+            Some(TrainedScene { info, cloud, folder }) => {
+                let semantics = semantics_of(&folder, &cloud, observer);
                 render.antialias = config_of(info.config).antialias;
                 let cloud = Some(Arc::new(cloud));
                 OpenedScene {
                     name,
                     dataset,
                     cloud,
+                    semantics,
                     trained: true,
                     out,
                     history: info.history,
@@ -136,6 +145,17 @@ impl PipelineJobs {
 
 fn render_settings(background: Option<[f32; 3]>, antialias: bool) -> RenderSettings {
     RenderSettings { background: background.unwrap_or_default(), antialias, ..RenderSettings::default() }
+}
+
+/// The objects and parts stored with a trained scene; broken ones are told and left out.
+fn semantics_of(folder: &Path, cloud: &GaussianCloud, observer: &mut dyn Observer) -> Option<Arc<SemanticMap>> {
+    match io::semantic_map::load(folder, cloud) {
+        Ok(map) => map.map(Arc::new),
+        Err(e) => {
+            observer.note(Level::Warning, format!("Its objects cannot be shown: {e}"));
+            None
+        }
+    }
 }
 
 /// The settings of a training; those of a later version of the program may not parse, and only the
@@ -167,9 +187,11 @@ fn trained_scene(scene: TrainedScene, observer: &mut dyn Observer) -> OpenedScen
     };
     let TrainedScene { folder, info, cloud } = scene;
     let render = render_settings(info.background, config_of(info.config).antialias);
+    let semantics = semantics_of(&folder, &cloud, observer);
     let mut opened = OpenedScene {
         name: info.name,
         dataset,
+        semantics,
         trained: true,
         out: folder,
         history: info.history,
@@ -191,6 +213,11 @@ impl Jobs for PipelineJobs {
             Command::Demo => self.demo(observer),
             Command::Train { dataset, config, out } => self.train(&dataset, &config, out, observer),
             Command::Evaluate { dataset, cloud, config } => measure(&dataset, &cloud, &config, observer),
+            Command::FindObjects { dataset, cloud, holdout_every, settings, masks, out } => {
+                let (training, _) = dataset.split(holdout_every);
+                let photos: Vec<Photo> = training.iter().map(|&i| dataset.photos[i].clone()).collect();
+                find(&cloud, &photos, &settings, &masks, &out, observer)
+            }
             Command::Export { cloud, path } => export(&cloud, &path),
             Command::Photo { index, photo, max_side_px } => {
                 let pixels = io::photo::load(&photo, max_side_px).map_err(|e| io_failure(&e))?;
@@ -221,6 +248,26 @@ fn measure(
     let settings = render_settings(dataset.background, config.antialias);
     let evaluation = evaluate(cloud, &views, &settings, 0, 0.0).map_err(|e| Stop::Failed(Failure::of(&e, "")))?;
     Ok(Outcome::Evaluated(evaluation))
+}
+
+/// Objects and parts of `cloud`, stored in the trained scene `out`.
+fn find(
+    cloud: &GaussianCloud,
+    photos: &[Photo],
+    settings: &RenderSettings,
+    masks: &Path,
+    out: &Path,
+    observer: &mut dyn Observer,
+) -> Result<Outcome, Stop> {
+    let mut segmenter = FileMasks(Labels::open(masks).map_err(|e| io_failure(&e))?);
+    let options = TrackOptions::default();
+    let map = find_objects(cloud, photos, settings, &mut segmenter, &options, observer).map_err(|e| match e {
+        TrackError::Cancelled => Stop::Cancelled,
+        e => Stop::Failed(Failure::of(&e, "")),
+    })?;
+    let mut stored = cloud.clone();
+    io::semantic_map::save(out, &map, &mut stored, codes::BACKGROUND).map_err(|e| io_failure(&e))?;
+    Ok(Outcome::Objects(Arc::new(map)))
 }
 
 fn export(cloud: &GaussianCloud, path: &Path) -> Result<Outcome, Stop> {

@@ -9,7 +9,7 @@ use crate::io::trained::History;
 use crate::pipeline::observer::{Evaluation, Level, Progress, StepMetrics};
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
-use crate::scene::{Bounds, Camera, Dataset, GaussianCloud, Photo, PhotoPixels, ScenePlan};
+use crate::scene::{Bounds, Camera, Dataset, GaussianCloud, Photo, PhotoPixels, ScenePlan, SemanticMap};
 
 /// Names one job of one worker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -26,6 +26,8 @@ pub enum JobKind {
     Train,
     /// Measures held-out quality.
     Evaluate,
+    /// Finds objects and parts.
+    Objects,
     /// Writes a file.
     Export,
     /// Loads a photo's pixels.
@@ -38,7 +40,7 @@ impl JobKind {
     /// Which thread runs it.
     pub fn lane(self) -> Lane {
         match self {
-            Self::Open | Self::Demo | Self::Train | Self::Evaluate => Lane::Long,
+            Self::Open | Self::Demo | Self::Train | Self::Evaluate | Self::Objects => Lane::Long,
             Self::Export | Self::Photo | Self::Picture => Lane::Short,
         }
     }
@@ -81,6 +83,21 @@ pub enum Command {
         /// Picture size and hold-out rule.
         config: TrainConfig,
     },
+    /// Find the objects and parts of a trained scene, and store them with it.
+    FindObjects {
+        /// The photos.
+        dataset: Arc<Dataset>,
+        /// The Gaussians.
+        cloud: Arc<GaussianCloud>,
+        /// Every how-manieth photo is held out.
+        holdout_every: usize,
+        /// How the Gaussians are drawn.
+        settings: RenderSettings,
+        /// Where the masks are.
+        masks: PathBuf,
+        /// Folder of the trained scene.
+        out: PathBuf,
+    },
     /// Write Gaussians as a `.ply`.
     Export {
         /// The Gaussians.
@@ -114,6 +131,7 @@ impl Command {
             Self::Demo => JobKind::Demo,
             Self::Train { .. } => JobKind::Train,
             Self::Evaluate { .. } => JobKind::Evaluate,
+            Self::FindObjects { .. } => JobKind::Objects,
             Self::Export { .. } => JobKind::Export,
             Self::Photo { .. } => JobKind::Photo,
             Self::Picture { .. } => JobKind::Picture,
@@ -129,6 +147,7 @@ impl Command {
             Self::Demo => "Making the demo scene".into(),
             Self::Train { dataset, .. } => format!("Training {}", dataset.name),
             Self::Evaluate { dataset, .. } => format!("Measuring {}", dataset.name),
+            Self::FindObjects { dataset, .. } => format!("Finding objects in {}", dataset.name),
             Self::Export { path, .. } | Self::Picture { path, .. } => format!("Writing {}", name(path)),
             Self::Photo { photo, .. } => format!("Loading {}", photo.name),
         }
@@ -165,6 +184,10 @@ pub struct OpenedScene {
     pub cloud: Option<Arc<GaussianCloud>>,
     /// Whether `cloud` is a result, not just sparse points.
     pub trained: bool,
+    /// Objects and parts, if they were found before.
+    pub semantics: Option<Arc<SemanticMap>>,
+    /// Where masks of its photos are, if they came with them.
+    pub masks: Option<PathBuf>,
     /// Folder in which training keeps its results and checkpoints.
     pub out: PathBuf,
     /// Measurements of earlier training.
@@ -193,6 +216,8 @@ pub enum Outcome {
     },
     /// Held-out quality was measured.
     Evaluated(Evaluation),
+    /// Objects and parts were found.
+    Objects(Arc<SemanticMap>),
     /// A file was written.
     Written(PathBuf),
     /// A photo was loaded.

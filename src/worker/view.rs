@@ -10,8 +10,10 @@ use super::action::ViewMode;
 use super::protocol::Failure;
 use super::thread::{Repaint, panic_failure};
 use super::{Slot, paint};
+use crate::pipeline::semantics::view_map::ViewMap;
+use crate::render::cpu::Renderer;
 use crate::render::{Backend, BackendChoice, Frame, RenderSettings};
-use crate::scene::{Camera, GaussianCloud, PhotoPixels};
+use crate::scene::{Camera, GaussianCloud, PhotoPixels, SemanticMap};
 
 /// How much time a picture may take; decides its resolution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,8 +52,19 @@ pub struct ViewRequest {
     pub effort: Effort,
     /// The photo taken from this camera, for the difference and for PSNR.
     pub photo: Option<Arc<PhotoPixels>>,
+    /// Objects and parts of the Gaussians, to be drawn too once the eye rests.
+    pub semantics: Option<Arc<SemanticMap>>,
     /// Comes back with the picture.
     pub ticket: u64,
+}
+
+/// What the pixels of a view belong to.
+#[derive(Clone, Debug)]
+pub struct MappedView {
+    /// The request's.
+    pub ticket: u64,
+    /// Identities of the pixels.
+    pub map: Arc<ViewMap>,
 }
 
 /// A drawn view.
@@ -90,24 +103,33 @@ struct Mailbox {
 pub struct ViewLane {
     mailbox: Arc<(Mutex<Mailbox>, Condvar)>,
     pictures: Arc<Slot<ViewResult>>,
+    maps: Arc<Slot<MappedView>>,
 }
 
 impl ViewLane {
     /// Starts the thread. Fails only if the system gives none.
     pub fn start(repaint: Repaint) -> std::io::Result<Self> {
         let mailbox = Arc::new((Mutex::new(Mailbox::default()), Condvar::new()));
-        let pictures = Arc::new(Slot::default());
-        let (box_, out) = (Arc::clone(&mailbox), Arc::clone(&pictures));
+        let (pictures, maps) = (Arc::new(Slot::default()), Arc::new(Slot::default()));
+        let (box_, out, mapped) = (Arc::clone(&mailbox), Arc::clone(&pictures), Arc::clone(&maps));
+        let mut mapper = Renderer::new();
         let work = move || {
             // Looking for a GPU takes a moment; here nobody waits for it.
             let mut painter = Painter::new(Backend::choose(BackendChoice::Auto).unwrap_or_else(|_| Backend::on_cpu()));
             while let Some(request) = next(&box_) {
                 out.publish(painter.draw(&request));
                 repaint();
+                // What the pixels belong to comes second, and only if nobody waits for a picture.
+                if lock(&box_.0).request.is_none()
+                    && let Some(map) = map_of(&mut mapper, &request)
+                {
+                    mapped.publish(MappedView { ticket: request.ticket, map: Arc::new(map) });
+                    repaint();
+                }
             }
         };
         std::thread::Builder::new().name("viewport".into()).spawn(work)?;
-        Ok(Self { mailbox, pictures })
+        Ok(Self { mailbox, pictures, maps })
     }
 
     /// Asks for a view; replaces a request that was not begun yet.
@@ -116,6 +138,11 @@ impl ViewLane {
         let old = lock(mutex).request.replace(request);
         wake.notify_one();
         drop(old);
+    }
+
+    /// Where the identities of views are published.
+    pub fn maps(&self) -> &Slot<MappedView> {
+        &self.maps
     }
 
     /// Where pictures are published.
@@ -150,6 +177,19 @@ fn next(mailbox: &(Mutex<Mailbox>, Condvar)) -> Option<ViewRequest> {
         }
         guard = wake.wait(guard).unwrap_or_else(PoisonError::into_inner);
     }
+}
+
+/// What the pixels of a resting view belong to.
+fn map_of(renderer: &mut Renderer<f32>, request: &ViewRequest) -> Option<ViewMap> {
+    let semantics = request.semantics.as_ref().filter(|s| s.of.len() == request.cloud.len())?;
+    if request.effort != Effort::Full {
+        return None;
+    }
+    let draw = AssertUnwindSafe(|| {
+        let (of, identities) = (&semantics.of, &semantics.identities);
+        ViewMap::render(renderer, &request.cloud, of, identities, &request.camera, &request.settings).ok()
+    });
+    catch_unwind(draw).unwrap_or_default()
 }
 
 /// Draws requests, and learns how fast it can.

@@ -8,6 +8,7 @@
 
 pub mod codes;
 mod extend;
+pub mod find;
 pub mod grammar;
 mod link;
 pub mod localise;

@@ -5,6 +5,7 @@ mod frusta;
 mod input;
 mod overlay;
 mod photo;
+pub mod query;
 
 use std::sync::Arc;
 
@@ -13,6 +14,7 @@ use glam::{DVec2, DVec3};
 
 use self::eye::Eye;
 use self::photo::PhotoView;
+use self::query::Questions;
 use super::layout::Layout;
 use super::state::AppState;
 use super::theme;
@@ -51,6 +53,10 @@ pub struct Viewport {
     picture: Option<ViewPicture>,
     texture: Option<TextureHandle>,
     error: Option<String>,
+    /// What was asked, and where the answers are.
+    pub questions: Questions,
+    /// Generation of the newest map of identities.
+    mapped: u64,
     /// World point that the wheel zooms to, while the cursor stays.
     zoom_anchor: Option<(egui::Pos2, DVec3)>,
 }
@@ -63,6 +69,8 @@ struct Asked {
     mode: ViewMode,
     effort: Effort,
     with_photo: bool,
+    /// Which objects and parts, by address; 0 for none.
+    semantics: usize,
 }
 
 impl Viewport {
@@ -85,6 +93,8 @@ impl Viewport {
             picture: None,
             texture: None,
             error: None,
+            questions: Questions::default(),
+            mapped: 0,
             zoom_anchor: None,
         })
     }
@@ -120,6 +130,7 @@ impl Viewport {
             (self.picture, self.texture, self.error) = (None, None, None);
             self.set_cloud(scene.cloud.clone());
             self.up = None;
+            self.questions.clear();
             self.eye = home_eye(scene, None);
         }
         if let Some((generation, snapshot)) = worker.clouds().newer_than(self.snapshot) {
@@ -203,6 +214,9 @@ impl Viewport {
             let uv = Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
             ui.painter().image(texture.id(), shown, uv, Color32::WHITE);
         }
+        if let Some(semantics) = &state.semantics {
+            self.questions.paint(ui, shown, semantics);
+        }
         if let Some(photo) = self.photo.as_mut().filter(|_| layout.compare) {
             photo.show_split(ui, shown, &mut layout.split);
         }
@@ -210,10 +224,20 @@ impl Viewport {
             self.show_frusta(ui, rect, &scene, &response, layout, actions);
         }
         self.show_overlay(ui, rect, &scene, state, layout, actions);
+        if let Some(semantics) = &state.semantics {
+            self.questions.show(ui, shown, semantics);
+        }
     }
 
-    /// Uploads the newest picture if there is one.
+    /// Uploads the newest picture if there is one, and takes over what its pixels belong to.
     fn take_picture(&mut self, ui: &Ui) {
+        if let Some((generation, mapped)) = self.lane.maps().newer_than(self.mapped) {
+            self.mapped = generation;
+            // One of an earlier request is of another view.
+            if mapped.ticket == self.tickets {
+                self.questions.set_map(Some(Arc::clone(&mapped.map)));
+            }
+        }
         let Some((generation, result)) = self.lane.pictures().newer_than(self.shown) else { return };
         self.shown = generation;
         match &*result {
@@ -258,6 +282,7 @@ impl Viewport {
             mode: layout.mode,
             effort,
             with_photo: photo.is_some(),
+            semantics: state.semantics.as_ref().map_or(0, |s| Arc::as_ptr(s) as usize),
         };
         if self.requested.as_ref() == Some(&asked) {
             return;
@@ -274,8 +299,15 @@ impl Viewport {
             },
             effort,
             photo,
+            semantics: state.semantics.clone(),
             ticket: self.tickets,
         });
+        // A change of resolution alone does not move what the pixels belong to.
+        let same_view =
+            |r: &Asked| r.camera == asked.camera && r.cloud == asked.cloud && r.semantics == asked.semantics;
+        if !self.requested.as_ref().is_some_and(same_view) {
+            self.questions.set_map(None);
+        }
         self.requested = Some(asked);
     }
 

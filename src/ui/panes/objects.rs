@@ -1,0 +1,78 @@
+//! The objects and parts of the scene, as a tree; a click asks for one.
+
+use egui::{Button, CollapsingHeader, Color32, RichText, Ui, vec2};
+
+use super::super::state::AppState;
+use super::super::theme;
+use super::super::viewport::query::full_name;
+use crate::scene::{Identities, IdentityId, Level, NOBODY};
+use crate::worker::Action;
+
+/// Draws the pane.
+pub fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
+    let Some(map) = &state.semantics else {
+        return show_how_to_begin(ui, state, actions);
+    };
+    let identities = &map.identities;
+    let count = |level: Level| identities.iter().filter(|(_, i)| i.level == level).count();
+    let from = if map.seeds.len() == 1 { "1 photo".to_owned() } else { format!("{} photos", map.seeds.len()) };
+    ui.weak(format!("{} objects, {} parts, from the masks of {from}", count(Level::Object), count(Level::Part)));
+    ui.add_space(4.0);
+    let sizes = map.sizes();
+    for (id, _) in identities.iter().filter(|(_, i)| i.parent == NOBODY) {
+        branch(ui, identities, id, &sizes, actions);
+    }
+}
+
+fn branch(ui: &mut Ui, identities: &Identities, id: IdentityId, sizes: &[usize], actions: &mut Vec<Action>) {
+    let pieces: Vec<IdentityId> = identities.pieces(id).collect();
+    if pieces.is_empty() {
+        return leaf(ui, identities, id, sizes, actions);
+    }
+    CollapsingHeader::new(identities.name(id)).id_salt(id).show(ui, |ui| {
+        leaf(ui, identities, id, sizes, actions);
+        for piece in pieces {
+            branch(ui, identities, piece, sizes, actions);
+        }
+    });
+}
+
+fn leaf(ui: &mut Ui, identities: &Identities, id: IdentityId, sizes: &[usize], actions: &mut Vec<Action>) {
+    ui.horizontal(|ui| {
+        let code = identities.get(id).map_or([0.5; 3], |i| i.code).map(|c| (c * 255.0) as u8);
+        let (rect, _) = ui.allocate_exact_size(vec2(11.0, 11.0), egui::Sense::hover());
+        ui.painter().rect_filled(rect, 3.0, Color32::from_rgb(code[0], code[1], code[2]));
+        let button = Button::new(identities.name(id)).frame_when_inactive(false);
+        if ui.add(button).on_hover_text("Show where it is").clicked() {
+            actions.push(Action::Ask(full_name(identities, id)));
+        }
+        ui.label(RichText::new(format!("{} Gaussians", sizes[id as usize])).small().color(theme::WEAK));
+    });
+}
+
+fn show_how_to_begin(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
+    let has_masks = state.scene.as_ref().is_some_and(|s| s.masks.is_some());
+    ui.label(
+        RichText::new(
+            "Objects and parts are found from masks of one or a few photos; the Gaussians carry them to all others.",
+        )
+        .color(theme::WEAK),
+    );
+    ui.add_space(6.0);
+    let idle = state.job.is_none() && state.is_trained();
+    let why = if state.is_trained() { "Another job is running." } else { "Train the scene first." };
+    let button = |text: &str| Button::new(text.to_owned()).min_size(vec2(170.0, 28.0));
+    if has_masks {
+        let action = Action::FindObjects;
+        let found = ui.add_enabled(idle, button("Find objects")).on_disabled_hover_text(why);
+        if found.on_hover_text(action.tooltip()).clicked() {
+            actions.push(action);
+        }
+    } else {
+        ui.label(RichText::new("No masks came with these photos.").color(theme::WEAK));
+    }
+    let other = ui.add_enabled(idle, button("Choose masks\u{2026}")).on_disabled_hover_text(why);
+    if other.on_hover_text(Action::ChooseMasks.tooltip()).clicked() {
+        actions.push(Action::ChooseMasks);
+    }
+}
