@@ -38,12 +38,14 @@ impl App {
     /// the system gives no threads.
     pub fn new(cc: &eframe::CreationContext<'_>, jobs: impl Jobs, first: Option<Action>) -> std::io::Result<Self> {
         theme::install(&cc.egui_ctx);
-        let repaint = super::repainter(&cc.egui_ctx);
+        // Pictures answer a person's hand. Progress can be read no faster than it is written, and
+        // every frame takes from what it reports on.
+        let (repaint, unhurried) = (super::repainter(&cc.egui_ctx, 8), super::repainter(&cc.egui_ctx, 120));
         let layout = Layout::load(cc.storage);
         let mut state = AppState::new(layout.recent.clone());
         state.say(super::state::Tone::Info, format!("FMLGS {}", env!("CARGO_PKG_VERSION")));
         Ok(Self {
-            worker: Worker::start(jobs, Arc::clone(&repaint))?,
+            worker: Worker::start(jobs, unhurried)?,
             viewport: Viewport::new(Arc::clone(&repaint))?,
             state,
             layout,

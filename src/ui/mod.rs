@@ -31,7 +31,22 @@ pub fn run(first: Option<Action>) -> eframe::Result {
         .with_inner_size([1480.0, 920.0])
         .with_min_inner_size([860.0, 560.0])
         .with_drag_and_drop(true);
-    let options = eframe::NativeOptions { viewport, ..eframe::NativeOptions::default() };
+    // An emulated adapter draws the window several times faster through OpenGL: its Vulkan side
+    // runs both branches of every condition in the toolkit's shader.
+    if crate::worker::real_gpu().is_none() {
+        let first = first.clone();
+        match open(viewport.clone(), eframe::Renderer::Glow, first) {
+            // Not every system has it.
+            Err(eframe::Error::OpenGL(_) | eframe::Error::Glutin(_) | eframe::Error::NoGlutinConfigs(..)) => {}
+            result => return result,
+        }
+    }
+    open(viewport, eframe::Renderer::Wgpu, first)
+}
+
+fn open(viewport: egui::ViewportBuilder, renderer: eframe::Renderer, first: Option<Action>) -> eframe::Result {
+    // Shades that dithering would smooth do not occur in a flat theme.
+    let options = eframe::NativeOptions { viewport, renderer, dithering: false, ..eframe::NativeOptions::default() };
     eframe::run_native(
         "fmlgs",
         options,
@@ -42,9 +57,8 @@ pub fn run(first: Option<Action>) -> eframe::Result {
     )
 }
 
-/// Something that asks the window to look at what is new, from any thread.
-fn repainter(ctx: &egui::Context) -> crate::worker::Repaint {
+/// Something that asks the window to look at what is new, from any thread, at most so often.
+fn repainter(ctx: &egui::Context, millis: u64) -> crate::worker::Repaint {
     let ctx = ctx.clone();
-    // Twenty redraws a second show all that jobs report; pictures come through the same call.
-    Arc::new(move || ctx.request_repaint_after(std::time::Duration::from_millis(33)))
+    Arc::new(move || ctx.request_repaint_after(std::time::Duration::from_millis(millis)))
 }

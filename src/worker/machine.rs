@@ -19,7 +19,7 @@ fn free_memory_bytes() -> u64 {
 }
 
 /// Name of the first adapter that is not emulated.
-fn real_gpu() -> Option<String> {
+pub fn real_gpu() -> Option<String> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
     adapters

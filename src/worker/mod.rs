@@ -12,12 +12,14 @@ mod paint;
 pub mod places;
 pub mod preview;
 pub mod protocol;
+mod quiet;
 pub mod slot;
 pub mod thread;
 pub mod view;
 
 pub use action::{Action, Axis, Pane, Shortcut, ViewMode};
 pub use control::Control;
+pub use machine::real_gpu;
 pub use protocol::{Command, Event, Failure, HomeView, JobId, JobKind, Lane, OpenedScene, Outcome, Stop};
 pub use slot::Slot;
 pub use thread::{CloudSnapshot, Jobs, QueueFull, Repaint, Worker};

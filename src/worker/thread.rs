@@ -76,19 +76,23 @@ impl Worker {
         let clouds = Arc::new(Slot::default());
         let controls = Controls::default();
         let mut threads = Vec::new();
-        let mut lane = |name: &str| {
+        let mut lane = |name: &str, pool: Option<rayon::ThreadPool>| {
             let (sender, queue) = bounded::<Queued>(QUEUED);
             let (jobs, events, clouds, controls, repaint) =
                 (Arc::clone(&jobs), event_sender.clone(), Arc::clone(&clouds), Arc::clone(&controls), repaint.clone());
             let work = move || {
                 for queued in queue {
-                    run_one(&*jobs, queued, &events, &clouds, &controls, &repaint);
+                    let run = || run_one(&*jobs, queued, &events, &clouds, &controls, &repaint);
+                    match &pool {
+                        Some(pool) => pool.install(run),
+                        None => run(),
+                    }
                 }
             };
             threads.push(std::thread::Builder::new().name(name.to_owned()).spawn(work)?);
             Ok::<_, std::io::Error>(Some(sender))
         };
-        let (long, short) = (lane("long jobs")?, lane("short jobs")?);
+        let (long, short) = (lane("long jobs", super::quiet::pool())?, lane("short jobs", None)?);
         Ok(Self { long, short, events: Some(events), clouds, controls, next: AtomicU64::new(1), threads })
     }
 

@@ -201,7 +201,6 @@ impl Viewport {
         let rect = ui.available_rect_before_wrap();
         let response = ui.allocate_rect(rect, Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Viewport"));
-        ui.painter().rect_filled(rect, 0.0, theme::CANVAS);
         self.take_picture(ui);
         let now = ui.input(|i| i.time);
         if self.handle_input(ui, &response, rect, &scene, actions) {
@@ -210,6 +209,10 @@ impl Viewport {
         }
         let shown = self.photo.as_mut().map_or(rect, |p| p.fit(rect));
         self.request(ui, shown, &scene, state, layout, now);
+        // Filling what the picture covers anyway would be a fifth of a frame on an emulated adapter.
+        if self.texture.is_none() || shown != rect {
+            ui.painter().rect_filled(rect, 0.0, theme::CANVAS);
+        }
         if let Some(texture) = &self.texture {
             let uv = Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
             ui.painter().image(texture.id(), shown, uv, Color32::WHITE);
