@@ -31,11 +31,11 @@ need ca-certificates test -e /etc/ssl/certs/ca-certificates.crt -o -e /etc/pki/t
 # Vulkan: the loader, and Mesa's drivers (among them llvmpipe, which needs no GPU).
 need libvulkan1 has_library libvulkan.so.1
 need mesa-vulkan-drivers has_vulkan_driver
-# The window: X11 and Wayland clients are loaded at run time.
 # OpenGL, which draws the window where Vulkan is emulated.
 need libgl1 has_library libGL.so.1
 need libegl1 has_library libEGL.so.1
 need libgl1-mesa-dri test -n "$(compgen -G '/usr/lib/*/dri/swrast_dri.so' || compgen -G '/usr/lib*/dri/swrast_dri.so')"
+# The window: X11 and Wayland clients are loaded at run time.
 need libx11-6 has_library libX11.so.6
 need libx11-xcb1 has_library libX11-xcb.so.1
 need libxcb1 has_library libxcb.so.1

@@ -1,5 +1,5 @@
 //! The state of a run and its single step: draw, compare, go back, move; on the CPU, or handed to
-//! a [`Device`].
+//! a device.
 
 use rand::seq::SliceRandom;
 use rand_pcg::Pcg64Mcg;
