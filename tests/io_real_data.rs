@@ -217,3 +217,34 @@ fn gltf_conformance_matrix() {
     let e = io::open(&path.join("khr_extensible_fallback.gltf")).expect_err("another kernel");
     assert!(e.to_string().contains("customShape"), "{e}");
 }
+
+#[test]
+fn masklets_of_a_video() {
+    use fmlgs::io::labels::Labels;
+    use fmlgs::scene::{Camera, Photo};
+    use glam::DVec3;
+
+    let Some(path) = data("sam2_media/sav_example") else { return };
+    let frame = |number: usize| Photo {
+        name: format!("{number:05}.jpg"),
+        path: path.clone(),
+        camera: Camera::look_at(DVec3::X, DVec3::ZERO, DVec3::Z, 0.8, 480, 848).expect("valid"),
+        distortion: None,
+        test_split: false,
+        background: None,
+    };
+    // Areas by an independent decoder.
+    for (file, first, areas) in [
+        ("sav_000001_manual.json", 5, vec![2808, 52965, 6072, 8467]),
+        ("sav_000001_auto.json", 9, vec![23808, 16188, 15808, 13982, 10165, 5439, 4834, 3636, 2344]),
+    ] {
+        let labels = Labels::open(&path.join(file)).expect(file);
+        assert!(labels.has(&frame(480)) && !labels.has(&frame(481)) && !labels.has(&frame(484)));
+        let regions = labels.of(&frame(0), 4096).expect(file);
+        assert!(regions.len() <= first);
+        assert_eq!(regions.iter().map(|r| r.mask.area()).collect::<Vec<_>>(), areas, "{file}");
+        (0..121).for_each(|k| drop(labels.of(&frame(4 * k), 256).expect(file)));
+    }
+    // Which of the two?
+    assert!(Labels::open(&path).is_err());
+}

@@ -115,8 +115,9 @@ pub enum IoError {
     },
     /// A folder without masks.
     #[error(
-        "{path} holds no labels: looked for identities.json with id maps (fmlgs synth) and for .json files with \
-         polygons (ISAT, as in lerf_ovs)"
+        "{path} holds no labels: looked for identities.json with id maps (fmlgs synth), images_<factor>/label/*.png \
+         (SPIn-NeRF), segmentations/classes.txt (3D-OVS), test_mask/<view>/*.png (LERF-Mask), and .json files with \
+         polygons (ISAT, as in lerf_ovs) or masklets (SA-V)"
     )]
     NoLabels {
         /// The folder.

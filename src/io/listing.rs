@@ -201,7 +201,7 @@ fn rotation(m: DMat3) -> Result<DMat3, CameraError> {
 
 /// Whether a picture of `found` px shows the same as one of `expected` px, larger or smaller: one
 /// factor for both sides, up to rounding of the smaller picture's sides.
-fn is_scaled(expected: (u32, u32), found: (u32, u32)) -> bool {
+pub(super) fn is_scaled(expected: (u32, u32), found: (u32, u32)) -> bool {
     let scaled = |side: u32, by: (u32, u32)| f64::from(side) * f64::from(by.0) / f64::from(by.1);
     let across = scaled(expected.1, (found.0, expected.0)) - f64::from(found.1);
     let down = scaled(expected.0, (found.1, expected.1)) - f64::from(found.0);

@@ -113,14 +113,19 @@ fn values_claimed(text: &str) -> u64 {
     entries.map(|e| e.parse().unwrap_or(u64::MAX)).fold(1, u64::saturating_mul)
 }
 
+/// Whether this is one of SPIn-NeRF's pictures that are neither photo nor mask.
+pub(super) fn is_helper(name: &str) -> bool {
+    name.contains("cutout") || name.contains("pseudo")
+}
+
 /// The photos in a folder, sorted; SPIn-NeRF's helper pictures are left out.
-fn names(folder: &Path) -> Result<Vec<String>, IoError> {
+pub(super) fn names(folder: &Path) -> Result<Vec<String>, IoError> {
     let failed = |cause| IoError::Read { path: folder.into(), cause };
     let mut names = Vec::new();
     for entry in fs::read_dir(folder).map_err(failed)? {
         let name = entry.map_err(failed)?.file_name().to_string_lossy().into_owned();
         let ending = name.rsplit_once('.').map_or(String::new(), |(_, e)| e.to_lowercase());
-        if ENDINGS.contains(&ending.as_str()) && !name.contains("cutout") && !name.contains("pseudo") {
+        if ENDINGS.contains(&ending.as_str()) && !is_helper(&name) {
             names.push(name);
         }
     }

@@ -93,6 +93,24 @@ pub(super) fn decode_grey16(bytes: &[u8], path: &Path) -> Result<ImageBuffer<Lum
     }
 }
 
+/// Width, height and the brightest colour channel of every pixel, of 255, of the bytes of a picture.
+/// What is not black stays at least 1.
+pub(super) fn decode_brightest(bytes: &[u8], path: &Path) -> Result<(usize, usize, Vec<u8>), IoError> {
+    let picture = DynamicImage::from_decoder(decoder(bytes, path)?).map_err(|e| failed(path, &e))?;
+    let (width, height) = (picture.width() as usize, picture.height() as usize);
+    let values = match picture {
+        DynamicImage::ImageLuma8(grey) => grey.into_raw(),
+        DynamicImage::ImageLumaA8(grey) => grey.pixels().map(|p| p.0[0]).collect(),
+        DynamicImage::ImageRgb8(rgb) => rgb.pixels().map(|p| p.0[0].max(p.0[1]).max(p.0[2])).collect(),
+        DynamicImage::ImageRgba8(rgb) => rgb.pixels().map(|p| p.0[0].max(p.0[1]).max(p.0[2])).collect(),
+        other => {
+            let narrow = |v: u16| v.div_ceil(257) as u8;
+            other.into_rgb16().pixels().map(|p| narrow(p.0[0].max(p.0[1]).max(p.0[2]))).collect()
+        }
+    };
+    Ok((width, height, values))
+}
+
 /// A decoder that has read the header, with its memory bounded.
 fn decoder<'a>(bytes: &'a [u8], path: &Path) -> Result<impl ImageDecoder + 'a, IoError> {
     let mut reader = ImageReader::new(Cursor::new(bytes))

@@ -36,6 +36,7 @@ pub fn all() -> Vec<Seed> {
         ("scene", "scene.json", scene()),
     ];
     seeds.extend(colmap());
+    seeds.extend(labels());
     let rgba = RgbaImage::from_fn(16, 12, |x, y| Rgba([(x * 16) as u8, (y * 20) as u8, 99, 255 - (x * y) as u8]));
     seeds.push(("photo", "a.png", encode(&rgba, ImageFormat::Png)));
     seeds.push(("photo", "a.webp", encode(&rgba, ImageFormat::WebP)));
@@ -233,6 +234,41 @@ fn scene() -> Vec<u8> {
         views: vec![],
     });
     serde_json::to_vec(&info).expect("write")
+}
+
+/// What lists the objects and parts of the label targets' id maps.
+pub fn identities() -> serde_json::Value {
+    json!({ "identities": [{ "id": 255, "name": "cup", "level": "object" },
+        { "id": 1, "name": "handle", "level": "part", "parent": 255 }] })
+}
+
+fn labels() -> Vec<Seed> {
+    let square = |x: i32| [[x, 1], [x + 6, 1], [x + 6, 9], [x, 9]];
+    let polygons = json!({ "info": { "name": "photo.png", "width": 16, "height": 12 }, "objects": [
+        { "category": "cup", "segmentation": square(1), "level": "object" },
+        { "category": "handle", "segmentation": square(5), "level": "part", "parent": "cup" },
+        { "category": "cup", "segmentation": square(8) }] });
+    let rle = |counts: serde_json::Value| json!({ "size": [12, 16], "counts": counts });
+    let masklets = json!({ "video_frame_count": 8, "masklet": [
+        [rle(json!([30, 40, 122])), rle(json!("n0X1j3"))], [rle(json!([192])), rle(json!([0, 192]))]] });
+    let grey = RgbaImage::from_fn(16, 12, |x, y| if x + y > 9 { Rgba([255; 4]) } else { Rgba([1, 1, 1, 255]) });
+    let deep = image::DynamicImage::from(grey.clone()).into_luma16();
+    let luma = image::DynamicImage::from(grey.clone()).into_luma8();
+    let png = |picture: &dyn Fn(&mut Cursor<Vec<u8>>)| {
+        let mut out = Cursor::new(Vec::new());
+        picture(&mut out);
+        out.into_inner()
+    };
+    vec![
+        ("label_polygons", "isat.json", polygons.to_string().into_bytes()),
+        ("label_masklets", "sav.json", masklets.to_string().into_bytes()),
+        ("label_ids", "identities.json", identities().to_string().into_bytes()),
+        ("label_id_map", "grey8.png", png(&|w| luma.write_to(w, ImageFormat::Png).expect("encode"))),
+        ("label_id_map", "grey16.png", png(&|w| deep.write_to(w, ImageFormat::Png).expect("encode"))),
+        ("label_classes", "classes.txt", b"photo\nwall\n".to_vec()),
+        ("label_picture", "grey8.png", png(&|w| luma.write_to(w, ImageFormat::Png).expect("encode"))),
+        ("label_picture", "rgba.png", encode(&grey, ImageFormat::Png)),
+    ]
 }
 
 fn colmap() -> Vec<Seed> {

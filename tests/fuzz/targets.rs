@@ -6,7 +6,7 @@ use std::path::Path;
 use fmlgs::io::{self, IoError};
 use fmlgs::scene::{Camera, GaussianCloud, Photo};
 use glam::{DMat3, DVec2, DVec3};
-use image::RgbImage;
+use image::{GrayImage, RgbImage};
 
 /// Feeds bytes to a parser.
 type Parse = Box<dyn Fn(&[u8])>;
@@ -94,7 +94,41 @@ pub fn all() -> Vec<Target> {
                 io::photo::load(&photo(folder), 10)
             },
         ),
+        in_folder("label_polygons", "a.json", |_| {}, labels),
+        in_folder("label_masklets", "a.json", |_| {}, labels),
+        in_folder("label_ids", "identities.json", id_maps, labels),
+        in_folder("label_id_map", "object_ids/photo.png", id_maps, labels),
+        in_folder("label_classes", "segmentations/classes.txt", classes, labels),
+        in_folder("label_picture", "test_mask/photo/a.png", |f| grey(f, "test_mask/photo"), labels),
     ]
+}
+
+/// Masks of the photo, in whatever layout the folder has.
+fn labels(folder: &Path) -> Result<Vec<io::labels::Region>, IoError> {
+    let mut photo = photo(folder);
+    photo.name = "photo.png".into();
+    let found = io::labels::Labels::open(folder)?;
+    let regions = found.of(&photo, 16)?;
+    // The frame of a video.
+    photo.name = "0".into();
+    Ok([regions, found.of(&photo, 16)?].concat())
+}
+
+fn grey(folder: &Path, inner: &str) {
+    fs::create_dir_all(folder.join(inner)).expect("create");
+    let at = |x, _| image::Luma([if x < 8 { 255 } else { 1 }]);
+    GrayImage::from_fn(16, 12, at).save(folder.join(inner).join("photo.png")).expect("save");
+}
+
+fn id_maps(folder: &Path) {
+    grey(folder, "object_ids");
+    grey(folder, "part_ids");
+    fs::write(folder.join("identities.json"), super::seeds::identities().to_string()).expect("write");
+}
+
+fn classes(folder: &Path) {
+    grey(folder, "images");
+    grey(folder, "segmentations/00");
 }
 
 fn photo(folder: &Path) -> Photo {

@@ -6,9 +6,9 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use super::Region;
+use super::{Region, Sheet};
 use crate::io::{IoError, files};
-use crate::scene::{Camera, Level, Mask};
+use crate::scene::{Level, Mask};
 
 /// Most vertices of one file.
 const MAX_VERTICES: usize = 4_000_000;
@@ -36,19 +36,15 @@ struct Polygon {
 }
 
 /// The photo that a label file belongs to; `None` if it is JSON of another kind.
-pub fn photo_of(path: &Path) -> Result<Option<String>, IoError> {
-    let value: serde_json::Value = files::read_json(path)?;
-    let is_label = value["objects"].is_array();
-    Ok(value["info"]["name"].as_str().filter(|_| is_label).map(Into::into))
+pub fn photo_of(file: &serde_json::Value) -> Option<&str> {
+    file["info"]["name"].as_str().filter(|_| file["objects"].is_array())
 }
 
 /// The regions of a label file: polygons of one category together, objects before parts.
-pub fn read(path: &Path) -> Result<Vec<Region>, IoError> {
+pub fn read(path: &Path, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
     let file: File = files::read_json(path)?;
     let Info { width, height, .. } = file.info;
-    if width == 0 || height == 0 || width > Camera::MAX_SIDE_PX || height > Camera::MAX_SIDE_PX {
-        return Err(IoError::EmptyPicture { path: path.into(), width_px: width, height_px: height });
-    }
+    sheet.check(path, (width, height), file.objects.len())?;
     let bad = |place: String, reason: &str| IoError::Syntax { path: path.into(), place, reason: reason.into() };
     if file.objects.iter().map(|p| p.segmentation.len()).sum::<usize>() > MAX_VERTICES {
         return Err(bad("objects".into(), "more vertices than a label file can need"));

@@ -5,19 +5,33 @@
 //! | folder | what |
 //! |---|---|
 //! | `identities.json`, `object_ids/`, `part_ids/` | id maps of `fmlgs synth` ([`synth_ids`]) |
+//! | `images_<factor>/label/*.png` | SPIn-NeRF ([`spin_nerf`]) |
+//! | `segmentations/classes.txt` | 3D-OVS ([`three_d_ovs`]) |
+//! | `test_mask/<view>/*.png` | LERF-Mask ([`lerf_mask`]) |
 //! | `*.json` with `objects` of polygons | ISAT, as in lerf_ovs ([`isat`]); also a single such file |
+//! | `*.json` with `masklet` | a video's masklets, as in SA-V ([`masklets`]); also a single such file |
 //!
-//! Masks are drawn on the photos as stored; they are undistorted and scaled like them.
+//! Masks are drawn on the photos as stored, or on a larger or smaller copy of them; they are
+//! undistorted and scaled like the photos.
 
 pub mod isat;
+pub mod lerf_mask;
+pub mod masklets;
+pub mod pictures;
+pub mod rle;
+pub mod spin_nerf;
 pub mod synth_ids;
+pub mod three_d_ovs;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::resample::{Pixels, resample};
-use super::{IoError, files};
-use crate::scene::{Level, Mask, Photo};
+use super::{IoError, files, listing};
+use crate::scene::{Camera, Level, Mask, Photo};
+
+/// How many times longer than the photo's the sides of a mask may be.
+const MOST_LARGER: f64 = 8.0;
 
 /// A labelled region of one photo.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,33 +52,57 @@ pub enum Labels {
     SynthIds(synth_ids::SynthIds),
     /// Files of polygons, by the stem of the photo that they belong to.
     Isat(BTreeMap<String, PathBuf>),
+    /// A picture per mask: SPIn-NeRF, 3D-OVS, LERF-Mask.
+    Pictures(pictures::Pictures),
+    /// Masklets of a video.
+    Masklets(masklets::Masklets),
 }
 
 impl Labels {
     /// Finds out what is at `path`.
     ///
     /// # Errors
-    /// If there are no labels of a known kind, or the list of identities does not parse.
+    /// If there are no labels of a known kind, or what lists them does not parse.
     pub fn open(path: &Path) -> Result<Self, IoError> {
         if path.join(synth_ids::LIST_FILE).is_file() {
             return Ok(Self::SynthIds(synth_ids::SynthIds::open(path)?));
         }
+        for find in [spin_nerf::find, three_d_ovs::find, lerf_mask::find] {
+            if let Some(pictures) = find(path)? {
+                return Ok(Self::Pictures(pictures));
+            }
+        }
+        Self::open_json(path)
+    }
+
+    /// Labels in a JSON file, or in those of a folder.
+    fn open_json(path: &Path) -> Result<Self, IoError> {
         let json = |p: &Path| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-        let mut found = BTreeMap::new();
-        let candidates: Vec<PathBuf> = match std::fs::read_dir(path) {
+        let mut candidates: Vec<PathBuf> = match std::fs::read_dir(path) {
             Ok(entries) => entries.flatten().map(|e| e.path()).filter(|p| json(p)).collect(),
             Err(_) if json(path) => vec![path.into()],
             Err(cause) => return Err(IoError::Read { path: path.into(), cause }),
         };
+        candidates.sort();
+        let mut polygons = BTreeMap::new();
+        let mut video: Option<(PathBuf, masklets::Masklets)> = None;
         for file in candidates {
-            if let Some(photo) = isat::photo_of(&file)? {
-                found.insert(stem(&photo), file);
+            let value: serde_json::Value = files::read_json(&file)?;
+            if let Some(photo) = isat::photo_of(&value) {
+                polygons.insert(stem(photo), file);
+            } else if let Some(found) = masklets::Masklets::parse(value, &file)? {
+                if let Some((other, _)) = &video {
+                    let reason = format!("{} holds masklets too; name one of the two files", other.display());
+                    return Err(IoError::Syntax { path: file, place: "masklet".into(), reason });
+                }
+                video = Some((file, found));
             }
         }
-        if found.is_empty() {
-            return Err(IoError::NoLabels { path: path.into() });
+        match video {
+            _ if !polygons.is_empty() => Ok(Self::Isat(polygons)),
+            Some((_, masklets)) => Ok(Self::Masklets(masklets)),
+            None => Err(IoError::NoLabels { path: path.into() }),
         }
-        Ok(Self::Isat(found))
     }
 
     /// Whether a photo has labels.
@@ -72,6 +110,8 @@ impl Labels {
         match self {
             Self::SynthIds(ids) => ids.has(&stem(&photo.name)),
             Self::Isat(files) => files.contains_key(&stem(&photo.name)),
+            Self::Pictures(pictures) => pictures.has(&stem(&photo.name)),
+            Self::Masklets(masklets) => masklets.has(&stem(&photo.name)),
         }
     }
 
@@ -79,19 +119,23 @@ impl Labels {
     /// pixel are left out, and pieces of them then have no parent. Empty if it has no labels.
     ///
     /// # Errors
-    /// If its file is broken or of another size than the photo.
+    /// If its file is broken, of another shape than the photo, or needs more memory than there is.
     pub fn of(&self, photo: &Photo, max_side_px: u32) -> Result<Vec<Region>, IoError> {
+        let name = stem(&photo.name);
+        let sheet = Sheet(photo);
         let regions = match self {
-            Self::SynthIds(ids) => ids.regions(&stem(&photo.name))?,
-            Self::Isat(files) => match files.get(&stem(&photo.name)) {
-                Some(file) => isat::read(file)?,
+            Self::SynthIds(ids) => ids.regions(&name, sheet)?,
+            Self::Isat(files) => match files.get(&name) {
+                Some(file) => isat::read(file, sheet)?,
                 None => Vec::new(),
             },
+            Self::Pictures(pictures) => pictures.regions(&name, sheet)?,
+            Self::Masklets(masklets) => masklets.regions(&name, sheet)?,
         };
         let mut place = Vec::with_capacity(regions.len());
         let mut kept: Vec<Region> = Vec::new();
         for region in regions {
-            let mask = as_photo(&region.mask, photo, max_side_px)?;
+            let mask = as_photo(&region.mask, photo, max_side_px);
             let parent = region.parent.and_then(|p| place.get(p).copied().flatten());
             place.push((!mask.is_empty()).then_some(kept.len()));
             if !mask.is_empty() {
@@ -102,34 +146,66 @@ impl Labels {
     }
 }
 
+/// What masks are drawn on: a photo as stored, or a larger or smaller copy of it.
+#[derive(Clone, Copy)]
+pub struct Sheet<'a>(&'a Photo);
+
+impl Sheet<'_> {
+    /// Whether `masks` masks of `size_px` (width, height), which `path` holds, are of the photo's
+    /// shape and fit into memory. To be asked before they are made.
+    pub fn check(self, path: &Path, size_px: (u32, u32), masks: usize) -> Result<(), IoError> {
+        let (w, h) = size_px;
+        if w == 0 || h == 0 || w > Camera::MAX_SIDE_PX || h > Camera::MAX_SIDE_PX {
+            return Err(IoError::EmptyPicture { path: path.into(), width_px: w, height_px: h });
+        }
+        let expected = (self.0.camera.width_px, self.0.camera.height_px);
+        let larger = f64::from(w.max(h)) / f64::from(expected.0.max(expected.1));
+        if !listing::is_scaled(expected, size_px) || larger > MOST_LARGER {
+            return Err(IoError::PhotoSize { path: path.into(), found: size_px, expected });
+        }
+        let pixels = (u64::from(w) * u64::from(h)).max(u64::from(expected.0) * u64::from(expected.1));
+        let (bytes, limit) = (pixels.div_ceil(8).saturating_mul(masks as u64), files::memory_budget());
+        if bytes > limit {
+            let remedy = "label fewer regions, or smaller photos";
+            return Err(IoError::OverBudget { path: path.into(), what: "its masks", bytes, limit, remedy });
+        }
+        Ok(())
+    }
+}
+
 /// File name without folder and extension.
 fn stem(name: &str) -> String {
     let file = name.rsplit(['/', '\\']).next().unwrap_or(name);
     file.rsplit_once('.').map_or(file, |(stem, _)| stem).to_owned()
 }
 
-/// A mask of a photo as stored, as the photo is loaded.
-fn as_photo(mask: &Mask, photo: &Photo, max_side_px: u32) -> Result<Mask, IoError> {
-    let (camera, size) = (&photo.camera, (mask.width_px(), mask.height_px()));
-    let found = (size.0 as u32, size.1 as u32);
-    let target = camera.limited_to(max_side_px);
+/// A mask of a photo as stored, or of a scaled copy, as the photo is loaded.
+fn as_photo(mask: &Mask, photo: &Photo, max_side_px: u32) -> Mask {
+    let size = (mask.width_px(), mask.height_px());
+    let target = photo.camera.limited_to(max_side_px);
     let (w, h) = (target.width_px as usize, target.height_px as usize);
-    if found != (camera.width_px, camera.height_px) {
-        let expected = (camera.width_px, camera.height_px);
-        return Err(IoError::PhotoSize { path: photo.path.clone(), found, expected });
-    }
     if photo.distortion.is_none() {
-        return Ok(mask.resized(w, h));
+        return mask.resized(w, h);
     }
     let grey = |i| if mask.contains(i) { [u8::MAX; 3] } else { [0; 3] };
     let data = (0..size.0 * size.1).flat_map(grey).collect();
     let picture = Pixels { width: size.0, height: size.1, channels: 3, data };
-    let straight = resample(&picture, camera, photo.distortion.as_ref(), &target);
-    Ok(Mask::from_fn(w, h, |i| straight.rgb[i][0] > 127))
+    let camera = photo.camera.resized(size.0 as u32, size.1 as u32);
+    let straight = resample(&picture, &camera, photo.distortion.as_ref(), &target);
+    Mask::from_fn(w, h, |i| straight.rgb[i][0] > 127)
 }
 
-/// A picture file's id per pixel: 8- or 16-bit grey.
-fn read_ids(path: &Path) -> Result<(usize, usize, Vec<u16>), IoError> {
+/// File names in a folder, sorted; none if there is no such folder.
+fn entries(folder: &Path) -> Vec<String> {
+    let found = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut names: Vec<String> = found.filter_map(|e| e.file_name().into_string().ok()).collect();
+    names.sort();
+    names
+}
+
+/// A picture file's id per pixel: 8- or 16-bit grey, of the photo's shape; `masks` are made of it.
+fn read_ids(path: &Path, sheet: Sheet<'_>, masks: usize) -> Result<(usize, usize, Vec<u16>), IoError> {
+    sheet.check(path, super::photo::size(path)?, masks)?;
     let bytes = files::read(path, files::MAX_PICTURE_BYTES)?;
     let ids = super::photo::decode_grey16(&bytes, path)?;
     Ok((ids.width() as usize, ids.height() as usize, ids.into_raw()))

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::{Region, read_ids};
+use super::{Region, Sheet, read_ids};
 use crate::io::{IoError, files};
 use crate::scene::{Level, Mask};
 
@@ -60,7 +60,7 @@ impl SynthIds {
 
     /// The regions of the photo `stem`, those without a pixel too: objects, then parts, in the
     /// list's order. Empty if it has no maps.
-    pub fn regions(&self, stem: &str) -> Result<Vec<Region>, IoError> {
+    pub fn regions(&self, stem: &str, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
         if !self.has(stem) {
             return Ok(Vec::new());
         }
@@ -68,7 +68,7 @@ impl SynthIds {
         let mut ids_of = Vec::new();
         for level in [Level::Object, Level::Part] {
             let path = self.path(level, stem);
-            let (width, height, ids) = read_ids(&path)?;
+            let (width, height, ids) = read_ids(&path, sheet, self.list.len())?;
             for listed in self.list.iter().filter(|l| l.level == level) {
                 let parent = listed.parent.and_then(|p| ids_of.iter().position(|id| *id == p));
                 let mask = Mask::from_fn(width, height, |i| ids[i] == listed.id);

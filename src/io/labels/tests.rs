@@ -32,7 +32,7 @@ fn polygons_of_a_category_are_one_region_and_wholes_come_first() {
     assert_eq!((small[0].mask.width_px(), small[0].mask.height_px()), (10, 5));
     assert!(labels.of(&photo("c", 20, 10), 10).expect("none").is_empty());
     // A photo of another size is not this label's.
-    assert!(matches!(labels.of(&photo("a", 21, 10), 4096), Err(IoError::PhotoSize { .. })));
+    assert!(matches!(labels.of(&photo("a", 25, 10), 4096), Err(IoError::PhotoSize { .. })));
 }
 
 #[test]
@@ -42,7 +42,7 @@ fn broken_labels_are_named() {
     let at = folder.path().join("label.json");
     let read = |text: String| {
         fs::write(&at, text).expect("write");
-        isat::read(&at)
+        isat::read(&at, Sheet(&photo("a.png", 20, 10)))
     };
     assert!(matches!(read(LABEL.replace("\"doll\", \"level\"", "\"cat\", \"level\"")), Err(IoError::Syntax { .. })));
     assert!(matches!(read(LABEL.replace("\"width\": 20", "\"width\": 0")), Err(IoError::EmptyPicture { .. })));
@@ -69,4 +69,128 @@ fn id_maps_become_regions() {
     let seen: Vec<_> = regions.iter().map(|r| (r.name.as_str(), r.level, r.parent, r.mask.area())).collect();
     assert_eq!(seen, [("lamp", Some(Level::Object), None, 16), ("shade", Some(Level::Part), Some(0), 8)]);
     assert!(labels.of(&photo("0002", 6, 4), 4096).expect("none").is_empty());
+}
+
+/// A picture 8 wide and 6 high with `value` in the columns `x`, 0 elsewhere.
+fn picture(path: &Path, x: std::ops::Range<u32>, value: u8) {
+    fs::create_dir_all(path.parent().expect("parent")).expect("folder");
+    let at = |px: u32, _| image::Luma([if x.contains(&px) { value } else { 0 }]);
+    image::GrayImage::from_fn(8, 6, at).save(path).expect("save");
+}
+
+fn summary(labels: &Labels, name: &str) -> Vec<(String, Option<Level>, usize)> {
+    let regions = labels.of(&photo(name, 8, 6), 4096).expect(name);
+    regions.into_iter().map(|r| (r.name, r.level, r.mask.area())).collect()
+}
+
+#[test]
+fn spin_nerf_masks_are_anything_but_black() {
+    let folder = tempfile::tempdir().expect("folder");
+    let label = folder.path().join("images_4/label");
+    picture(&label.join("a.png"), 2..5, 1);
+    picture(&label.join("a_cutout.png"), 0..8, 255);
+    picture(&label.join("b_pseudo.png"), 0..8, 255);
+    picture(&folder.path().join("images_8/label/c.png"), 0..8, 255);
+    for root in [folder.path(), &label] {
+        let labels = Labels::open(root).expect("labels");
+        assert_eq!(summary(&labels, "images_4/a.jpg"), [(String::new(), Some(Level::Object), 3 * 6)]);
+        assert!(!labels.has(&photo("b.jpg", 8, 6)) && !labels.has(&photo("c.jpg", 8, 6)));
+        // The same photo at full size, bent and straight.
+        let large = photo("a.jpg", 32, 24);
+        assert_eq!(labels.of(&large, 4096).expect("scaled")[0].mask.area(), 12 * 24);
+        let bent = Photo { distortion: Some(crate::scene::Distortion::default()), ..large };
+        let area = labels.of(&bent, 4096).expect("scaled")[0].mask.area();
+        assert!(area.abs_diff(12 * 24) <= 24, "{area}");
+        assert!(matches!(labels.of(&photo("a.jpg", 12, 6), 99), Err(IoError::PhotoSize { .. })));
+    }
+    // A 16-bit picture in colour.
+    let deep = image::ImageBuffer::from_fn(8, 6, |x, _| image::Rgb([0, 0, u16::from(x == 3)]));
+    deep.save(label.join("a.png")).expect("save");
+    let labels = Labels::open(folder.path()).expect("labels");
+    assert_eq!(summary(&labels, "a")[0].2, 6);
+    fs::write(label.join("a.png"), "no picture").expect("write");
+    assert!(matches!(labels.of(&photo("a", 8, 6), 99), Err(IoError::Picture { .. })));
+}
+
+#[test]
+fn three_d_ovs_masks_are_white_and_belong_to_sorted_photos() {
+    let folder = tempfile::tempdir().expect("folder");
+    let root = folder.path();
+    for name in ["c.jpg", "b.JPG", "a.jpg"] {
+        picture(&root.join("images").join(name).with_extension("png"), 0..1, 1);
+    }
+    let masks = root.join("segmentations");
+    picture(&masks.join("02/red apple.png"), 2..5, 255);
+    picture(&masks.join("02/wall.png"), 5..8, 254);
+    picture(&masks.join("02/unlisted.png"), 0..2, 255);
+    fs::write(masks.join("classes.txt"), "wall\n red apple \n\n../secret\n").expect("write");
+    for path in [root, &masks] {
+        let labels = Labels::open(path).expect("labels");
+        // The wall is not white anywhere.
+        assert_eq!(summary(&labels, "c.jpg"), [("red apple".into(), Some(Level::Object), 3 * 6)]);
+        assert!(!labels.has(&photo("a.jpg", 8, 6)));
+    }
+    picture(&masks.join("03/wall.png"), 5..8, 255);
+    let e = Labels::open(root).err().expect("no fourth photo");
+    assert!(e.to_string().contains("there are 3 photos"), "{e}");
+    fs::remove_dir_all(masks.join("03")).expect("remove");
+    fs::write(masks.join("classes.txt"), "dog").expect("write");
+    assert!(matches!(Labels::open(root), Err(IoError::Syntax { .. })));
+    fs::write(masks.join("classes.txt"), b"\xff").expect("write");
+    assert!(matches!(Labels::open(root), Err(IoError::Syntax { .. })));
+    fs::write(masks.join("classes.txt"), "wall").expect("write");
+    fs::remove_dir_all(root.join("images")).expect("remove");
+    assert!(matches!(Labels::open(root), Err(IoError::Syntax { .. })));
+}
+
+#[test]
+fn lerf_masks_are_brighter_than_half() {
+    let folder = tempfile::tempdir().expect("folder");
+    let masks = folder.path().join("test_mask");
+    picture(&masks.join("0/apple.png"), 2..5, 129);
+    picture(&masks.join("0/green toy.png"), 5..8, 128);
+    picture(&masks.join("frame_7/apple.png"), 0..1, 255);
+    fs::create_dir(masks.join("empty")).expect("folder");
+    for path in [folder.path(), &masks] {
+        let labels = Labels::open(path).expect("labels");
+        for name in ["test_0.jpg", "0.png"] {
+            assert_eq!(summary(&labels, name), [("apple".into(), None, 3 * 6)]);
+        }
+        assert_eq!(summary(&labels, "images/frame_7.jpg")[0].2, 6);
+        assert!(!labels.has(&photo("empty.jpg", 8, 6)));
+    }
+}
+
+#[test]
+fn masklets_belong_to_numbered_photos() {
+    let folder = tempfile::tempdir().expect("folder");
+    let at = folder.path().join("sav.json");
+    let rle = |counts: &str| format!(r#"{{"size": [6, 8], "counts": {counts}}}"#);
+    let video = |frames: &str| format!(r#"{{"video_frame_count": 7.0, "masklet": [{frames}]}}"#);
+    let frames = format!("[{}, {}], [{}, {}]", rle("[6, 6, 36]"), rle("[48]"), rle("[0, 48]"), rle("[12, 6, 30]"));
+    fs::write(&at, video(&frames)).expect("write");
+    for path in [folder.path(), &at] {
+        let labels = Labels::open(path).expect("labels");
+        // Seven frames, two labelled: every fourth.
+        assert_eq!(summary(&labels, "v/00000.jpg"), [(String::new(), None, 6)]);
+        assert_eq!(summary(&labels, "\u{e9}4\u{e9}.jpg"), [(String::new(), None, 48), (String::new(), None, 6)]);
+        for other in ["1.jpg", "8.jpg", "none.jpg", "99999999999999999999999.jpg"] {
+            assert!(!labels.has(&photo(other, 8, 6)), "{other}");
+        }
+        assert!(matches!(labels.of(&photo("0.jpg", 8, 12), 99), Err(IoError::PhotoSize { .. })));
+    }
+    fs::write(folder.path().join("other.json"), video("")).expect("write");
+    let e = Labels::open(folder.path()).err().expect("which of the two?");
+    assert!(e.to_string().contains("name one"), "{e}");
+    for (hostile, place) in [
+        (rle("[18446744073709551615]"), "masklet[0][0]"),
+        (r#"{"size": [4000000000, 4000000000], "counts": "0"}"#.into(), "4000000000"),
+        (r#"{"size": [0, 8], "counts": []}"#.into(), "8 x 0"),
+    ] {
+        fs::write(&at, video(&format!("[{hostile}]"))).expect("write");
+        let e = Labels::open(&at).expect("lazy").of(&photo("0", 8, 6), 99).expect_err("hostile");
+        assert!(e.to_string().contains(place), "{e}");
+    }
+    fs::write(&at, video("[3]")).expect("write");
+    assert!(matches!(Labels::open(&at), Err(IoError::Syntax { .. })));
 }

@@ -1,0 +1,70 @@
+//! Masklets of a video as in SA-V: one JSON file with `masklet`, a list of frames, each a list of
+//! run-length masks, the n-th of every frame the same thing.
+//!
+//! SA-V labels every fourth frame; how many lie between labelled ones follows from
+//! `video_frame_count`. The photo of frame n has n as the last number in its name.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::rle::Rle;
+use super::{Region, Sheet};
+use crate::io::{IoError, files};
+
+#[derive(Deserialize)]
+struct File {
+    masklet: Vec<Vec<Rle>>,
+    #[serde(default)]
+    video_frame_count: Option<f64>,
+}
+
+/// The masklets of one video.
+pub struct Masklets {
+    path: PathBuf,
+    /// Labelled frames, each with a mask for every masklet.
+    frames: Vec<Vec<Rle>>,
+    /// Frames of the video for each labelled one.
+    stride: u64,
+}
+
+impl Masklets {
+    /// Takes a JSON file apart; `None` if it is of another kind.
+    pub fn parse(file: serde_json::Value, path: &Path) -> Result<Option<Self>, IoError> {
+        if !file["masklet"].is_array() {
+            return Ok(None);
+        }
+        let File { masklet, video_frame_count } =
+            serde_json::from_value(file).map_err(|e| files::json_error(path, &e))?;
+        // 483 frames of which 121 are labelled: every fourth, the last of them frame 480.
+        let ratio = video_frame_count.unwrap_or(0.0) / masklet.len().max(1) as f64;
+        let stride = if ratio >= 1.0 { ratio.round().min(1e6) as u64 } else { 1 };
+        Ok(Some(Self { path: path.into(), frames: masklet, stride }))
+    }
+
+    fn frame(&self, stem: &str) -> Option<usize> {
+        let digits = stem.trim_end_matches(|c: char| !c.is_ascii_digit());
+        let start = digits.trim_end_matches(|c: char| c.is_ascii_digit()).len();
+        let number: u64 = digits[start..].parse().ok()?;
+        let frame = usize::try_from(number / self.stride).ok()?;
+        (number % self.stride == 0 && frame < self.frames.len()).then_some(frame)
+    }
+
+    /// Whether the photo `stem` is a labelled frame.
+    pub fn has(&self, stem: &str) -> bool {
+        self.frame(stem).is_some()
+    }
+
+    /// The masks in the photo `stem`, nameless; none if it is no labelled frame.
+    pub fn regions(&self, stem: &str, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
+        let Some(frame) = self.frame(stem) else { return Ok(Vec::new()) };
+        let masks = &self.frames[frame];
+        let read = |(i, rle): (usize, &Rle)| {
+            sheet.check(&self.path, rle.size_px(), masks.len())?;
+            let place = format!("masklet[{frame}][{i}]");
+            let mask = rle.mask().map_err(|reason| IoError::Syntax { path: self.path.clone(), place, reason })?;
+            Ok(Region { name: String::new(), level: None, parent: None, mask })
+        };
+        masks.iter().enumerate().map(read).collect()
+    }
+}

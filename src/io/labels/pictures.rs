@@ -1,0 +1,49 @@
+//! Masks that are pictures, one of each region.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use super::{Region, Sheet};
+use crate::io::{IoError, files, photo};
+use crate::scene::{Level, Mask};
+
+/// Pictures of masks, by the stem of the photo that they belong to.
+#[derive(Debug)]
+pub struct Pictures {
+    /// Name of the region and its picture, in the order of their names.
+    pub of: BTreeMap<String, Vec<(String, PathBuf)>>,
+    /// Least value, of 255, that belongs to the region.
+    pub least: u8,
+    /// What all regions are, where the layout says.
+    pub level: Option<Level>,
+}
+
+impl Pictures {
+    /// Whether the photo `stem` has masks.
+    pub fn has(&self, stem: &str) -> bool {
+        self.of.contains_key(stem)
+    }
+
+    /// The regions of the photo `stem`; none if it has no masks.
+    pub fn regions(&self, stem: &str, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
+        let listed = self.of.get(stem).map_or(&[][..], Vec::as_slice);
+        let read = |(name, path): &(String, PathBuf)| {
+            let mask = read(path, self.least, sheet, listed.len())?;
+            Ok(Region { name: name.clone(), level: self.level, parent: None, mask })
+        };
+        listed.iter().map(read).collect()
+    }
+}
+
+/// The pixels of a picture that are at least `least` of 255 in any colour; `masks` such are held
+/// at once.
+fn read(path: &Path, least: u8, sheet: Sheet<'_>, masks: usize) -> Result<Mask, IoError> {
+    sheet.check(path, photo::size(path)?, masks)?;
+    let (width, height, values) = photo::decode_brightest(&files::read(path, files::MAX_PICTURE_BYTES)?, path)?;
+    Ok(Mask::from_fn(width, height, |i| values[i] >= least))
+}
+
+/// Whether a name is a `.png`'s; its stem then.
+pub fn png_stem(name: &str) -> Option<&str> {
+    name.rsplit_once('.').filter(|(stem, ending)| ending.eq_ignore_ascii_case("png") && !stem.is_empty()).map(|p| p.0)
+}
