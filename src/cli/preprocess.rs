@@ -8,7 +8,6 @@ use serde_json::json;
 use super::progress::Console;
 use super::{CliError, opened, output};
 use crate::io::{self, labels::Labels};
-use crate::pipeline::semantics::codes;
 use crate::pipeline::semantics::find::find_objects;
 use crate::pipeline::semantics::segmenter::FileMasks;
 use crate::pipeline::semantics::tracker::{TrackError, TrackOptions};
@@ -85,7 +84,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
                 other => other.into(),
             }
         })?;
-    io::semantic_map::save(&args.scene, &map, &mut scene.cloud, codes::BACKGROUND)?;
+    io::semantic_map::save(&args.scene, &map, &mut scene.cloud)?;
     let secs = start.elapsed().as_secs_f64();
     let count = |level: Level| map.identities.iter().filter(|(_, i)| i.level == level).count();
     if args.json {

@@ -8,14 +8,15 @@ use serde_json::{Value, json};
 
 use super::{CliError, opened, output, view};
 use crate::io;
-use crate::math::colormap::turbo;
+use crate::math::colormap::Colormap;
+use crate::pipeline::semantics::answer::{Answered, by_name};
 use crate::pipeline::semantics::grammar::{Kind, Phrase};
-use crate::pipeline::semantics::localise::{Answer, ByName, Hit, localise};
+use crate::pipeline::semantics::localise::{Answer, Hit};
 use crate::pipeline::semantics::names;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::cpu::Renderer;
 use crate::render::{Features, RenderSettings};
-use crate::scene::{Camera, GaussianCloud, Identities, Mask, SemanticMap};
+use crate::scene::{Camera, GaussianCloud, Mask, SemanticMap};
 
 /// Ask a scene for an object or a part
 ///
@@ -40,6 +41,9 @@ pub struct Args {
     /// Whether an object or a part is meant
     #[arg(long, value_enum, default_value_t = KindArg::Auto)]
     kind: KindArg,
+    /// Answers whose pixels go into the mask at most
+    #[arg(long, default_value_t = 1)]
+    top: usize,
     /// Write the mask of the answer: white on black
     #[arg(long)]
     mask: Option<PathBuf>,
@@ -79,11 +83,8 @@ pub fn run(args: Args) -> Result<(), CliError> {
     let map =
         ViewMap::render(&mut renderer, &scene.cloud, &semantics.of, &semantics.identities, &camera, &scene.settings)?;
     let start = Instant::now();
-    let answer = localise(&semantics.identities, &phrase, kind, &mut ByName(&semantics.identities));
-    let mask = match &answer {
-        Answer::NotFound(_) => Mask::empty(map.width_px, map.height_px),
-        found => map.mask(&semantics.identities, found.hits()[0].identity),
-    };
+    let answered = by_name(&semantics.identities, &phrase, kind);
+    let mask = answered.mask(&map, &semantics.identities, args.top);
     let query_ms = start.elapsed().as_secs_f64() * 1e3;
     if let Some(path) = &args.mask {
         let pixels: Vec<u8> = (0..map.identity.len()).map(|i| if mask.contains(i) { 255 } else { 0 }).collect();
@@ -91,28 +92,9 @@ pub fn run(args: Args) -> Result<(), CliError> {
         output::write_png(path, &pixels, [camera.width_px, camera.height_px], ColorType::L8)?;
     }
     if let Some(path) = &args.heat {
-        let scores = names::scores(&semantics.identities, &phrase.target);
-        write_heat(
-            path,
-            &scene.cloud,
-            &camera,
-            &scene.settings,
-            &map,
-            &relevancy(&semantics.identities, &answer, scores),
-        )?;
+        write_heat(path, &scene.cloud, &camera, &scene.settings, &answered.heat(&map))?;
     }
-    tell(&args, &semantics, &answer, &mask, query_ms)
-}
-
-/// Score of each identity by number: those of the answer count fully, others by their name alone
-/// and less than the answer, a piece at least as its whole.
-fn relevancy(identities: &Identities, answer: &Answer, scores: Vec<f32>) -> Vec<f32> {
-    let mut all = vec![0.0; identities.len() + 1];
-    for (id, identity) in identities.iter() {
-        let own = answer.hits().iter().find(|h| h.identity == id).map_or(0.5 * scores[id as usize - 1], |h| h.score);
-        all[id as usize] = f32::max(own, all[identity.parent as usize]);
-    }
-    all
+    tell(&args, &semantics, &answered, &mask, query_ms)
 }
 
 fn write_heat(
@@ -120,12 +102,11 @@ fn write_heat(
     cloud: &GaussianCloud,
     camera: &Camera,
     settings: &RenderSettings,
-    map: &ViewMap,
     relevancy: &[f32],
 ) -> Result<(), CliError> {
     let frame = Renderer::<f32>::new().render(cloud, Features::NONE, camera, settings)?;
-    let mixed = frame.to_rgb8().into_iter().zip(&map.identity).map(|(rgb, &id)| {
-        let heat = turbo(relevancy.get(id as usize).copied().unwrap_or(0.0));
+    let mixed = frame.to_rgb8().into_iter().zip(relevancy).map(|(rgb, &relevancy)| {
+        let heat = Colormap::Turbo.color(relevancy);
         let grey = (u32::from(rgb[0]) + u32::from(rgb[1]) + u32::from(rgb[2])) / 3;
         std::array::from_fn::<u8, 3, _>(|c| ((u32::from(heat[c]) * 6 + grey * 4) / 10) as u8)
     });
@@ -134,12 +115,13 @@ fn write_heat(
     output::write_png(path, pixels.as_flattened(), [camera.width_px, camera.height_px], ColorType::Rgb8)
 }
 
-fn tell(args: &Args, map: &SemanticMap, answer: &Answer, mask: &Mask, query_ms: f64) -> Result<(), CliError> {
+fn tell(args: &Args, map: &SemanticMap, answered: &Answered, mask: &Mask, query_ms: f64) -> Result<(), CliError> {
     let full_name = |hit: &Hit| {
         let line: Vec<String> = map.identities.line(hit.identity).map(|i| map.identities.name(i)).collect();
         line.join(" of the ")
     };
     let unknown = names::unknown_words(&map.identities, &args.text);
+    let answer = &answered.answer;
     let (verdict, hits) = match answer {
         Answer::Found(hits) => ("found", hits),
         Answer::Ambiguous(hits) => ("ambiguous", hits),

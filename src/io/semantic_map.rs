@@ -2,21 +2,25 @@
 //!
 //! | entry | what |
 //! |---|---|
-//! | metadata `fmlgs` | JSON: `version`, `seeds`, `identities` (`level`, `parent`, `names`, `code`) |
+//! | metadata `fmlgs` | JSON: `version`, `seeds`, `encoder`, `identities` (`level`, `parent`, `names`, `code`) |
 //! | tensor `codes` | `[identities, 3]` f32 |
 //! | tensor `parents` | `[identities]` u32, 0 = none; identities count from 1 |
+//! | tensor `views` | `[identities]` u32, views with language features, if an encoder has looked |
+//! | tensors `raw`, `deviated` | `[identities, 4, dimension]` f16, unit length; 0 beyond `views` |
 //!
-//! Which Gaussian is whose is in `point_cloud.ply`, beside the Gaussians.
+//! Which Gaussian is whose, and its codes, are in `point_cloud.ply`, beside the Gaussians.
 
 use std::collections::HashMap;
 use std::path::Path;
 
 use bytemuck::cast_slice;
+use half::f16;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 
 use super::{IoError, atomic, files, splat_ply};
-use crate::scene::{GaussianCloud, Identities, SemanticMap};
+use crate::scene::language::MAX_VIEWS;
+use crate::scene::{GaussianCloud, Identities, LanguageFeatures, SemanticMap, ViewFeatures};
 
 /// The file's name in a trained scene's folder.
 pub const FILE: &str = "semantic_map.safetensors";
@@ -32,16 +36,23 @@ struct Header {
     version: u64,
     #[serde(default)]
     seeds: Vec<String>,
+    #[serde(default)]
+    encoder: Option<String>,
     identities: Identities,
 }
 
-/// Writes the map into a trained scene's folder, and the Gaussians with it. `background` is the
-/// code of what is nobody's.
+/// Writes the map into a trained scene's folder, and the Gaussians with it.
 ///
 /// # Errors
 /// If a file cannot be written.
-pub fn save(folder: &Path, map: &SemanticMap, cloud: &mut GaussianCloud, background: [f32; 3]) -> Result<(), IoError> {
-    let header = Header { version: VERSION, seeds: map.seeds.clone(), identities: map.identities.clone() };
+pub fn save(folder: &Path, map: &SemanticMap, cloud: &mut GaussianCloud) -> Result<(), IoError> {
+    let language = map.language.as_ref();
+    let header = Header {
+        version: VERSION,
+        seeds: map.seeds.clone(),
+        encoder: language.map(|l| l.encoder.clone()),
+        identities: map.identities.clone(),
+    };
     let path = folder.join(FILE);
     let broken = |e: &dyn std::fmt::Display| IoError::Syntax {
         path: path.clone(),
@@ -53,13 +64,22 @@ pub fn save(folder: &Path, map: &SemanticMap, cloud: &mut GaussianCloud, backgro
     let parents: Vec<u32> = map.identities.iter().map(|(_, i)| i.parent).collect();
     let view = |dtype, shape, bytes| TensorView::new(dtype, shape, bytes).map_err(|e| broken(&e));
     let n = map.identities.len();
-    let tensors = [
+    let views: Vec<u32> = language.map_or_else(Vec::new, |l| l.of.iter().map(|f| f.raw.len() as u32).collect());
+    let raw = language.map_or_else(Vec::new, |l| packed(l, |f| &f.raw));
+    let deviated = language.map_or_else(Vec::new, |l| packed(l, |f| &f.deviated));
+    let mut tensors = vec![
         ("codes", view(Dtype::F32, vec![n, 3], cast_slice(&codes))?),
         ("parents", view(Dtype::U32, vec![n], cast_slice(&parents))?),
     ];
+    if let Some(l) = language {
+        let shape = vec![n, MAX_VIEWS, l.dimension];
+        tensors.push(("views", view(Dtype::U32, vec![n], cast_slice(&views))?));
+        tensors.push(("raw", view(Dtype::F16, shape.clone(), cast_slice(&raw))?));
+        tensors.push(("deviated", view(Dtype::F16, shape, cast_slice(&deviated))?));
+    }
     let metadata = HashMap::from([(KEY.to_owned(), text)]);
     let bytes = safetensors::serialize(tensors, Some(metadata)).map_err(|e| broken(&e))?;
-    map.store(cloud, background);
+    map.store(cloud);
     splat_ply::write(&folder.join(super::trained::CLOUD_FILE), cloud)?;
     atomic::write(&path, |w| w.write_all(&bytes))
 }
@@ -73,14 +93,59 @@ pub fn load(folder: &Path, cloud: &GaussianCloud) -> Result<Option<SemanticMap>,
     if !path.is_file() {
         return Ok(None);
     }
-    let header = read(&path)?;
-    Ok(SemanticMap::restore(header.identities, header.seeds, cloud))
+    let bytes = files::read(&path, MAX_BYTES)?;
+    let header = header(&path, &bytes)?;
+    let language = match header.encoder {
+        None => None,
+        Some(encoder) => Some(features(&path, &bytes, encoder, &header.identities)?),
+    };
+    let map = SemanticMap::restore(header.identities, header.seeds, cloud);
+    Ok(map.map(|map| SemanticMap { language, ..map }))
 }
 
-fn read(path: &Path) -> Result<Header, IoError> {
-    let bytes = files::read(path, MAX_BYTES)?;
+/// Features of all identities, those of the views that are missing as zeros.
+fn packed(language: &LanguageFeatures, of: impl Fn(&ViewFeatures) -> &Vec<Vec<f32>>) -> Vec<f16> {
+    let missing = vec![0.0; language.dimension];
+    let view =
+        |f: &ViewFeatures, k: usize| of(f).get(k).unwrap_or(&missing).iter().map(|v| f16::from_f32(*v)).collect();
+    language.of.iter().flat_map(|f| (0..MAX_VIEWS).flat_map(move |k| -> Vec<f16> { view(f, k) })).collect()
+}
+
+fn features(path: &Path, bytes: &[u8], encoder: String, identities: &Identities) -> Result<LanguageFeatures, IoError> {
+    let broken = |place: &str, reason: &str| IoError::Syntax {
+        path: path.into(),
+        place: format!("tensor '{place}'"),
+        reason: reason.into(),
+    };
+    let file = SafeTensors::deserialize(bytes).map_err(|e| broken("", &e.to_string()))?;
+    let tensor = |name: &str, dtype: Dtype| {
+        let found = file.tensor(name).map_err(|e| broken(name, &e.to_string()))?;
+        let fits = found.dtype() == dtype && found.shape().first() == Some(&identities.len());
+        if fits { Ok(found) } else { Err(broken(name, "another type or number of identities than the header's")) }
+    };
+    let views = tensor("views", Dtype::U32)?;
+    let views = views.data().chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
+    let (raw, deviated) = (tensor("raw", Dtype::F16)?, tensor("deviated", Dtype::F16)?);
+    let dimension = match raw.shape() {
+        [_, MAX_VIEWS, dimension] if *dimension > 0 && deviated.shape() == raw.shape() => *dimension,
+        _ => return Err(broken("raw", "its shape is not [identities, 4, dimension], or not that of 'deviated'")),
+    };
+    let number = |b: &[u8]| f16::from_le_bytes([b[0], b[1]]).to_f32();
+    let rows = |data: &[u8], i: usize, n: usize| -> Vec<Vec<f32>> {
+        let of_identity = data.chunks_exact(2 * dimension).skip(i * MAX_VIEWS).take(n.min(MAX_VIEWS));
+        of_identity.map(|row| row.chunks_exact(2).map(number).collect()).collect()
+    };
+    let of = views
+        .enumerate()
+        .map(|(i, n)| ViewFeatures { raw: rows(raw.data(), i, n), deviated: rows(deviated.data(), i, n) })
+        .collect();
+    let language = LanguageFeatures { encoder, dimension, of };
+    if language.is_valid(identities) { Ok(language) } else { Err(broken("raw", "a value that is no number")) }
+}
+
+fn header(path: &Path, bytes: &[u8]) -> Result<Header, IoError> {
     let broken = |reason: String| IoError::Syntax { path: path.into(), place: "header".into(), reason };
-    let (_, metadata) = SafeTensors::read_metadata(&bytes).map_err(|e| broken(e.to_string()))?;
+    let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| broken(e.to_string()))?;
     let text = metadata.metadata().as_ref().and_then(|m| m.get(KEY));
     let text = text.ok_or_else(|| broken(format!("no metadata '{KEY}': not a semantic map")))?;
     let value: serde_json::Value = serde_json::from_str(text).map_err(|e| broken(e.to_string()))?;
@@ -115,7 +180,14 @@ mod tests {
             sh: vec![[0.0; 3]; 2],
             ..GaussianCloud::default()
         };
-        (SemanticMap { identities, of: vec![eye, NOBODY], margin: vec![0.25, 0.0], seeds: vec!["a".into()] }, cloud)
+        let mut map = SemanticMap::of_identities(identities, vec![eye, NOBODY], vec![0.25, 0.0], vec!["a".into()]);
+        let views = |raw: [f32; 2], deviated: [f32; 2]| ViewFeatures {
+            raw: vec![raw.to_vec(); 2],
+            deviated: vec![deviated.to_vec(); 2],
+        };
+        let of = vec![views([1.0, 0.0], [1.0, 0.0]), views([0.0, 1.0], [0.25, 0.75])];
+        map.language = Some(LanguageFeatures { encoder: "test".into(), dimension: 2, of });
+        (map, cloud)
     }
 
     #[test]
@@ -123,7 +195,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("folder");
         let (map, mut cloud) = map();
         assert_eq!(load(folder.path(), &cloud).expect("none"), None);
-        save(folder.path(), &map, &mut cloud, [0.5; 3]).expect("save");
+        save(folder.path(), &map, &mut cloud).expect("save");
         let again = splat_ply::read(&folder.path().join(super::super::trained::CLOUD_FILE)).expect("read");
         assert_eq!(load(folder.path(), &again).expect("load"), Some(map));
         assert_eq!(load(folder.path(), &GaussianCloud::default()).expect("load"), None, "other Gaussians");
@@ -133,7 +205,7 @@ mod tests {
     fn broken_maps_are_named() {
         let folder = tempfile::tempdir().expect("folder");
         let (map, mut cloud) = map();
-        save(folder.path(), &map, &mut cloud, [0.5; 3]).expect("save");
+        save(folder.path(), &map, &mut cloud).expect("save");
         let path = folder.path().join(FILE);
         let good = std::fs::read(&path).expect("read");
         for bytes in [&good[..good.len() / 2], &[0xff; 64][..], &[][..]] {

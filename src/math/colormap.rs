@@ -1,8 +1,60 @@
 //! Colour maps from a number between 0 and 1 to sRGB.
 
+/// A colour map.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Colormap {
+    /// Blue over green to red.
+    #[default]
+    Turbo,
+    /// Dark violet to yellow, evenly brighter; safe for the colour-blind.
+    Viridis,
+    /// Black to white.
+    Grey,
+}
+
+impl Colormap {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Turbo, Self::Viridis, Self::Grey];
+
+    /// Its name.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Turbo => "turbo",
+            Self::Viridis => "viridis",
+            Self::Grey => "grey",
+        }
+    }
+
+    /// The colour of `t`, clamped to 0..1; NaN is black, so that holes stand out.
+    pub fn color(self, t: f32) -> [u8; 3] {
+        match self {
+            _ if t.is_nan() => [0; 3],
+            Self::Turbo => turbo(t),
+            Self::Viridis => viridis(t),
+            Self::Grey => [(t.clamp(0.0, 1.0) * 255.0 + 0.5) as u8; 3],
+        }
+    }
+}
+
+/// One channel of a polynomial fit, coefficients by rising power.
+fn channel<const N: usize>(k: [f32; N], t: f32) -> u8 {
+    let v = k.iter().rev().fold(0.0, |sum, c| sum * t + c);
+    (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
+}
+
+/// The viridis map (van der Walt and Smith, 2015) by a sixth-degree polynomial fit.
+fn viridis(t: f32) -> [u8; 3] {
+    const RED: [f32; 7] = [0.277_727_3, 0.105_093_04, -0.330_861_8, -4.634_230_6, 6.228_27, 4.776_385, -5.435_456];
+    const GREEN: [f32; 7] =
+        [0.005_407_345, 1.404_613_5, 0.214_847_56, -5.799_101, 14.179_934, -13.745_145, 4.645_852_6];
+    const BLUE: [f32; 7] = [0.334_099_8, 1.384_590_1, 0.095_095_16, -19.332_441, 56.690_55, -65.353_03, 26.312_435];
+    let t = t.clamp(0.0, 1.0);
+    [channel(RED, t), channel(GREEN, t), channel(BLUE, t)]
+}
+
 /// The turbo map (Mikhailov, 2019) by its fifth-degree polynomial fit. `t` is clamped to 0..1; NaN
 /// is black, so that holes stand out.
-pub fn turbo(t: f32) -> [u8; 3] {
+fn turbo(t: f32) -> [u8; 3] {
     const RED: [f32; 6] = [0.135_721_38, 4.615_392_6, -42.660_324, 132.131_09, -152.942_4, 59.286_38];
     const GREEN: [f32; 6] = [0.091_402_61, 2.194_188_4, 4.842_966_7, -14.185_033, 4.277_298_6, 2.829_566];
     const BLUE: [f32; 6] = [0.106_673_3, 12.641_946, -60.582_05, 110.362_77, -89.903_11, 27.348_25];
@@ -10,10 +62,7 @@ pub fn turbo(t: f32) -> [u8; 3] {
         return [0; 3];
     }
     let t = t.clamp(0.0, 1.0);
-    [RED, GREEN, BLUE].map(|k| {
-        let v = k.iter().rev().fold(0.0, |sum, c| sum * t + c);
-        (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
-    })
+    [RED, GREEN, BLUE].map(|k| channel(k, t))
 }
 
 #[cfg(test)]
@@ -33,5 +82,22 @@ mod tests {
         assert_eq!(turbo(-1.0), turbo(0.0));
         assert_eq!(turbo(f32::INFINITY), turbo(1.0));
         assert_eq!(turbo(f32::NAN), [0; 3]);
+    }
+
+    #[test]
+    fn viridis_and_grey_get_evenly_brighter() {
+        for map in [Colormap::Viridis, Colormap::Grey] {
+            let brightness = |t: f32| {
+                let [r, g, b] = map.color(t).map(f32::from);
+                0.21 * r + 0.72 * g + 0.07 * b
+            };
+            let steps: Vec<f32> = (0..=20).map(|i| brightness(i as f32 / 20.0)).collect();
+            assert!(steps.windows(2).all(|w| w[1] > w[0]), "{map:?} {steps:?}");
+        }
+        // The published ends of viridis: 440154 and fde725.
+        let near = |a: [u8; 3], b: [u8; 3]| a.iter().zip(b).all(|(a, b)| a.abs_diff(b) <= 8);
+        assert!(near(Colormap::Viridis.color(0.0), [0x44, 0x01, 0x54]), "{:?}", Colormap::Viridis.color(0.0));
+        assert!(near(Colormap::Viridis.color(1.0), [0xfd, 0xe7, 0x25]), "{:?}", Colormap::Viridis.color(1.0));
+        assert_eq!(Colormap::Viridis.color(f32::NAN), [0; 3]);
     }
 }

@@ -6,5 +6,6 @@ pub mod real;
 pub mod rotation;
 pub mod sh;
 pub mod stats;
+pub mod vector;
 
 pub use real::Real;

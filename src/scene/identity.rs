@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::semantic_map::{BACKGROUND_CODE, CODE_CHANNELS};
+
 /// Object or part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -95,6 +97,16 @@ impl Identities {
             inside[i as usize] = i == id || inside[identity.parent as usize];
         }
         inside
+    }
+
+    /// The codes of an identity's object and of itself as a part. An object that is no part, and
+    /// nobody, have the background's code in their place.
+    pub fn codes(&self, id: IdentityId) -> [f32; CODE_CHANNELS] {
+        let code = |id: IdentityId, level: Level| {
+            self.get(id).filter(|i| i.level == level).map_or(BACKGROUND_CODE, |i| i.code)
+        };
+        let (object, part) = (code(self.object_of(id), Level::Object), code(id, Level::Part));
+        std::array::from_fn(|c| if c < 3 { object[c] } else { part[c - 3] })
     }
 
     /// The direct pieces of an identity.

@@ -34,9 +34,9 @@ impl Mask {
 
     /// The pixels for which `inside(index)` holds.
     pub fn from_fn(width_px: usize, height_px: usize, inside: impl Fn(usize) -> bool) -> Self {
-        let mut mask = Self::empty(width_px, height_px);
-        (0..width_px * height_px).filter(|&i| inside(i)).for_each(|i| mask.insert(i));
-        mask
+        let n = width_px * height_px;
+        let word = |k: usize| (k * 64..n.min(k * 64 + 64)).fold(0, |word, i| word | u64::from(inside(i)) << (i % 64));
+        Self { width_px, height_px, words: (0..n.div_ceil(64)).map(word).collect() }
     }
 
     /// The pixels whose centres are inside a polygon (even-odd rule), vertices in px. With vertices

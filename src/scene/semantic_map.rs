@@ -1,11 +1,24 @@
 //! Identities together with the Gaussians that belong to them.
 
-use super::{ExtraProperty, GaussianCloud, Identities, IdentityId, NOBODY};
+use super::{ExtraProperty, GaussianCloud, Identities, IdentityId, LanguageFeatures, NOBODY};
 
-/// Per-Gaussian properties that carry the map in a `.ply`: identity, margin of its votes, code.
+/// Channels of a Gaussian's codes: those of its object, then those of its part.
+pub const CODE_CHANNELS: usize = 6;
+
+/// The code of what is nobody's: the middle of code space.
+pub const BACKGROUND_CODE: [f32; 3] = [0.5; 3];
+
+/// Per-Gaussian properties that carry the map in a `.ply`: identity, margin of its votes, codes.
 pub const IDENTITY: &str = "fmlgs_identity";
 const MARGIN: &str = "fmlgs_margin";
-const CODE: [&str; 3] = ["fmlgs_code_0", "fmlgs_code_1", "fmlgs_code_2"];
+const CODES: [&str; CODE_CHANNELS] = [
+    "fmlgs_object_code_0",
+    "fmlgs_object_code_1",
+    "fmlgs_object_code_2",
+    "fmlgs_part_code_0",
+    "fmlgs_part_code_1",
+    "fmlgs_part_code_2",
+];
 
 /// What a scene consists of.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -16,23 +29,32 @@ pub struct SemanticMap {
     pub of: Vec<IdentityId>,
     /// How clearly each Gaussian belongs there, 0 (a guess) to 1.
     pub margin: Vec<f32>,
+    /// Codes of each Gaussian, of its object and its part: those of its identity, or trained ones.
+    pub codes: Vec<[f32; CODE_CHANNELS]>,
+    /// What an encoder makes of the identities, if one has looked.
+    pub language: Option<LanguageFeatures>,
     /// Names of the photos whose masks it comes from.
     pub seeds: Vec<String>,
 }
 
 impl SemanticMap {
-    /// Writes identity, margin and code into the cloud's extra properties; `background` is the
-    /// code of what is nobody's.
-    pub fn store(&self, cloud: &mut GaussianCloud, background: [f32; 3]) {
-        let ours = |name: &str| name == IDENTITY || name == MARGIN || CODE.contains(&name);
+    /// A map whose Gaussians have the codes of their identities.
+    pub fn of_identities(identities: Identities, of: Vec<IdentityId>, margin: Vec<f32>, seeds: Vec<String>) -> Self {
+        let by_id: Vec<_> = (0..=identities.len() as IdentityId).map(|id| identities.codes(id)).collect();
+        let codes = of.iter().map(|id| by_id.get(*id as usize).copied().unwrap_or(by_id[0])).collect();
+        Self { identities, of, margin, codes, language: None, seeds }
+    }
+
+    /// Writes identities, margins and codes into the cloud's extra properties.
+    pub fn store(&self, cloud: &mut GaussianCloud) {
+        let ours = |name: &str| name == IDENTITY || name == MARGIN || CODES.contains(&name);
         cloud.extras.retain(|e| !ours(&e.name));
-        let code = |id: &IdentityId| self.identities.get(*id).map_or(background, |i| i.code);
         let mut add = |name: &str, values: Vec<f32>| cloud.extras.push(ExtraProperty { name: name.into(), values });
         // Whole numbers up to 2^24 are exact.
         add(IDENTITY, self.of.iter().map(|id| *id as f32).collect());
         add(MARGIN, self.margin.clone());
-        for (c, name) in CODE.iter().enumerate() {
-            add(name, self.of.iter().map(|id| code(id)[c]).collect());
+        for (c, name) in CODES.iter().enumerate() {
+            add(name, self.codes.iter().map(|codes| codes[c]).collect());
         }
     }
 
@@ -46,7 +68,19 @@ impl SemanticMap {
         };
         let of: Vec<IdentityId> = values(IDENTITY)?.iter().map(id).collect::<Option<_>>()?;
         let margin = values(MARGIN).map_or_else(|| vec![0.0; of.len()], <[f32]>::to_vec);
-        Some(Self { identities, of, margin, seeds })
+        let mut map = Self::of_identities(identities, of, margin, seeds);
+        for (c, name) in CODES.iter().enumerate() {
+            let stored = values(name).into_iter().flatten().filter(|v| v.is_finite());
+            map.codes.iter_mut().zip(stored).for_each(|(codes, v)| codes[c] = *v);
+        }
+        Some(map)
+    }
+
+    /// The Gaussians of an identity and its pieces, with what they belong to.
+    pub fn part_of_cloud(&self, cloud: &GaussianCloud, id: IdentityId) -> GaussianCloud {
+        let inside = self.identities.within(id);
+        let is_in = |i: &usize| self.of.get(*i).is_some_and(|of| inside.get(*of as usize) == Some(&true));
+        cloud.select(&(0..cloud.len()).filter(is_in).collect::<Vec<_>>())
     }
 
     /// Number of Gaussians of each identity, pieces included, by number; those of nobody first.
@@ -74,17 +108,14 @@ mod tests {
         let mut identities = Identities::default();
         let doll = identities.add(Level::Object, NOBODY, vec!["doll".into()]);
         let eye = identities.add(Level::Part, doll, vec!["eye".into()]);
-        let map = SemanticMap {
-            identities: identities.clone(),
-            of: vec![eye, NOBODY, doll],
-            margin: vec![0.5, 0.0, 1.0],
-            seeds: vec!["a.jpg".into()],
-        };
+        let (of, margin) = (vec![eye, NOBODY, doll], vec![0.5, 0.0, 1.0]);
+        let mut map = SemanticMap::of_identities(identities.clone(), of, margin, vec!["a.jpg".into()]);
+        map.codes[2][4] = 0.25;
         let mut cloud = GaussianCloud { positions: vec![[0.0; 3]; 3], ..GaussianCloud::default() };
         cloud.extras.push(ExtraProperty { name: "kept".into(), values: vec![7.0; 3] });
-        map.store(&mut cloud, [0.5; 3]);
-        map.store(&mut cloud, [0.5; 3]);
-        assert_eq!(cloud.extras.len(), 6);
+        map.store(&mut cloud);
+        map.store(&mut cloud);
+        assert_eq!(cloud.extras.len(), 9);
         assert_eq!(SemanticMap::restore(identities.clone(), map.seeds.clone(), &cloud), Some(map.clone()));
         assert_eq!(map.sizes(), [1, 2, 1]);
         assert_eq!(SemanticMap::restore(Identities::default(), vec![], &cloud), None, "identities are missing");

@@ -50,7 +50,11 @@ impl App {
             Action::Palette => self.palette.toggle(),
             Action::Shortcuts => self.sheet = !self.sheet,
             Action::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
+            Action::ExportTarget(id) => self.choose(Purpose::ExportTarget(id)),
             Action::FrameScene
+            | Action::GoToTarget(_)
+            | Action::Isolate(_)
+            | Action::Hide(_)
             | Action::ResetView
             | Action::TurnUp(_)
             | Action::PreviousPhoto
@@ -166,7 +170,7 @@ impl App {
     }
 
     fn choose(&mut self, purpose: Purpose) {
-        let writes = matches!(purpose, Purpose::ExportPly | Purpose::Screenshot);
+        let writes = matches!(purpose, Purpose::ExportPly | Purpose::ExportTarget(_) | Purpose::Screenshot);
         if writes && self.viewport.picture().is_none() {
             self.state.toast(Tone::Warning, "There is nothing to write yet: open a scene first.");
             return;
@@ -184,6 +188,12 @@ impl App {
             Chosen::Path(Purpose::Masks, path) => self.find_objects(Some(path)),
             Chosen::Path(Purpose::ExportPly, path) => {
                 if let Some(cloud) = self.viewport.cloud().cloned() {
+                    self.submit(Command::Export { cloud, path });
+                }
+            }
+            Chosen::Path(Purpose::ExportTarget(id), path) => {
+                if let (Some(cloud), Some(map)) = (self.viewport.cloud(), &self.state.semantics) {
+                    let cloud = Arc::new(map.part_of_cloud(cloud, id));
                     self.submit(Command::Export { cloud, path });
                 }
             }

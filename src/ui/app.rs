@@ -127,7 +127,7 @@ impl App {
                         let show_objects = |ui: &mut Ui, actions: &mut Vec<Action>| {
                             egui::CollapsingHeader::new(Pane::Objects.text())
                                 .default_open(true)
-                                .show(ui, |ui| objects::show(ui, state, actions));
+                                .show(ui, |ui| objects::show(ui, state, &viewport.visibility, actions));
                             ui.add_space(10.0);
                         };
                         // Once there are any, they are what a person works with.

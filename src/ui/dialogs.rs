@@ -9,6 +9,7 @@ use rfd::{AsyncFileDialog, FileHandle};
 
 use super::state::{ErrorBox, Tone};
 use super::theme;
+use crate::scene::IdentityId;
 use crate::worker::{Action, Repaint};
 
 /// What a chosen path is for.
@@ -22,6 +23,8 @@ pub enum Purpose {
     Masks,
     /// Write Gaussians there.
     ExportPly,
+    /// Write the Gaussians of an identity there.
+    ExportTarget(IdentityId),
     /// Write the picture there.
     Screenshot,
 }
@@ -71,7 +74,7 @@ impl FileDialogs {
                     .pick_file(),
             ),
             Purpose::Masks => Box::pin(dialog.set_title("Choose the folder with the masks").pick_folder()),
-            Purpose::ExportPly => {
+            Purpose::ExportPly | Purpose::ExportTarget(_) => {
                 Box::pin(dialog.set_title("Export Gaussians").set_file_name(format!("{name}.ply")).save_file())
             }
             Purpose::Screenshot => {

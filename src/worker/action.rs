@@ -6,6 +6,8 @@ use std::path::PathBuf;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+use crate::scene::IdentityId;
+
 /// What the viewport shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum ViewMode {
@@ -152,6 +154,14 @@ pub enum Action {
     TypeQuestion,
     /// Ask for an object or part.
     Ask(String),
+    /// Look at an identity from nearby.
+    GoToTarget(IdentityId),
+    /// Draw one identity alone; `None` draws everything again.
+    Isolate(Option<IdentityId>),
+    /// Leave an identity out of the picture, or draw it again.
+    Hide(IdentityId),
+    /// Write the Gaussians of an identity as a `.ply`.
+    ExportTarget(IdentityId),
     /// Bring the scene into view.
     FrameScene,
     /// Go back to the first view.
@@ -182,7 +192,7 @@ pub enum Action {
 
 impl Action {
     /// Every action that needs no further input, in the order of the palette.
-    pub const ALL: [Self; 35] = [
+    pub const ALL: [Self; 36] = [
         Self::TryDemo,
         Self::OpenFolder,
         Self::OpenFile,
@@ -195,6 +205,7 @@ impl Action {
         Self::FindObjects,
         Self::ChooseMasks,
         Self::TypeQuestion,
+        Self::Isolate(None),
         Self::FrameScene,
         Self::ResetView,
         Self::PreviousPhoto,
@@ -237,6 +248,11 @@ impl Action {
             Self::ChooseMasks => "Find objects with other masks…".into(),
             Self::TypeQuestion => "Ask for an object or a part".into(),
             Self::Ask(text) => format!("Ask for {text}"),
+            Self::GoToTarget(id) => format!("Go to #{id}"),
+            Self::Isolate(None) => "Show all objects".into(),
+            Self::Isolate(Some(id)) => format!("Show #{id} alone"),
+            Self::Hide(id) => format!("Hide or show #{id}"),
+            Self::ExportTarget(id) => format!("Export #{id} as .ply…"),
             Self::FrameScene => "Frame the scene".into(),
             Self::ResetView => "Reset the view".into(),
             Self::TurnUp(axis) => format!("Turn {} upwards", axis.text()),
@@ -275,6 +291,11 @@ impl Action {
                 "Id maps of fmlgs synth, or ISAT label files as in lerf_ovs; one labelled photo will do."
             }
             Self::TypeQuestion | Self::Ask(_) => "A name, or \"the button of the red controller\".",
+            Self::GoToTarget(_) => "Move until it fills the view, from the side on which the eye is.",
+            Self::Isolate(None) => "Draw everything again that was hidden.",
+            Self::Isolate(Some(_)) => "Draw nothing else.",
+            Self::Hide(_) => "Leave it out of the picture, or draw it again.",
+            Self::ExportTarget(_) => "Write its Gaussians in the format that 3DGS viewers read.",
             Self::FrameScene => "Move back until all of the scene is in view.",
             Self::ResetView => "Return to the view with which the scene opened.",
             Self::TurnUp(_) => "For scenes that lie on their side.",
@@ -326,6 +347,10 @@ impl Action {
             | Self::FindObjects
             | Self::ChooseMasks
             | Self::Ask(_)
+            | Self::GoToTarget(_)
+            | Self::Isolate(_)
+            | Self::Hide(_)
+            | Self::ExportTarget(_)
             | Self::GoToPhoto(_)
             | Self::TurnUp(_)
             | Self::TogglePane(_) => None,

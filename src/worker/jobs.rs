@@ -12,7 +12,6 @@ use crate::io::labels::Labels;
 use crate::io::{self, IoError, OpenError, Opened, TrainedScene, trained};
 use crate::pipeline::evaluate::evaluate;
 use crate::pipeline::observer::{Level, Observer};
-use crate::pipeline::semantics::codes;
 use crate::pipeline::semantics::find::find_objects;
 use crate::pipeline::semantics::segmenter::FileMasks;
 use crate::pipeline::semantics::tracker::{TrackError, TrackOptions};
@@ -266,7 +265,7 @@ fn find(
         e => Stop::Failed(Failure::of(&e, "")),
     })?;
     let mut stored = cloud.clone();
-    io::semantic_map::save(out, &map, &mut stored, codes::BACKGROUND).map_err(|e| io_failure(&e))?;
+    io::semantic_map::save(out, &map, &mut stored).map_err(|e| io_failure(&e))?;
     Ok(Outcome::Objects(Arc::new(map)))
 }
 

@@ -23,3 +23,4 @@ pub use machine::real_gpu;
 pub use protocol::{Command, Event, Failure, HomeView, JobId, JobKind, Lane, OpenedScene, Outcome, Stop};
 pub use slot::Slot;
 pub use thread::{CloudSnapshot, Jobs, QueueFull, Repaint, Worker};
+pub use view::ViewMaps;

@@ -1,7 +1,7 @@
 //! From a rendered frame to the pixels of a view mode.
 
 use super::action::ViewMode;
-use crate::math::colormap::turbo;
+use crate::math::colormap::Colormap;
 use crate::math::stats::quantile;
 use crate::render::Frame;
 use crate::scene::PhotoPixels;
@@ -49,7 +49,7 @@ fn depth(frame: &Frame<f32>) -> (Vec<[u8; 3]>, Option<(f32, f32)>) {
     }
     let (near, far) = (quantile(&sample, 0.02) as f32, quantile(&sample, 0.98) as f32);
     let span = (far - near).max(f32::MIN_POSITIVE);
-    (depths.iter().map(|d| turbo((d - near) / span)).collect(), Some((near, far)))
+    (depths.iter().map(|d| Colormap::Turbo.color((d - near) / span)).collect(), Some((near, far)))
 }
 
 /// Calls `each` with the drawn and the photographed colour of every pixel that the photo covers.

@@ -10,6 +10,7 @@ use super::action::ViewMode;
 use super::protocol::Failure;
 use super::thread::{Repaint, panic_failure};
 use super::{Slot, paint};
+use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::cpu::Renderer;
 use crate::render::{Backend, BackendChoice, Frame, RenderSettings};
@@ -54,6 +55,8 @@ pub struct ViewRequest {
     pub photo: Option<Arc<PhotoPixels>>,
     /// Objects and parts of the Gaussians, to be drawn too once the eye rests.
     pub semantics: Option<Arc<SemanticMap>>,
+    /// Whether blended codes are wanted too.
+    pub codes: bool,
     /// Comes back with the picture.
     pub ticket: u64,
 }
@@ -63,8 +66,17 @@ pub struct ViewRequest {
 pub struct MappedView {
     /// The request's.
     pub ticket: u64,
-    /// Identities of the pixels.
-    pub map: Arc<ViewMap>,
+    /// The pixels.
+    pub maps: Arc<ViewMaps>,
+}
+
+/// What the pixels of a view belong to, drawn once for all questions.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ViewMaps {
+    /// By identity of largest weight.
+    pub identities: ViewMap,
+    /// Blended codes, if they were wanted.
+    pub codes: Option<CodeMap>,
 }
 
 /// A drawn view.
@@ -121,9 +133,9 @@ impl ViewLane {
                 repaint();
                 // What the pixels belong to comes second, and only if nobody waits for a picture.
                 if lock(&box_.0).request.is_none()
-                    && let Some(map) = map_of(&mut mapper, &request)
+                    && let Some(maps) = maps_of(&mut mapper, &request)
                 {
-                    mapped.publish(MappedView { ticket: request.ticket, map: Arc::new(map) });
+                    mapped.publish(MappedView { ticket: request.ticket, maps: Arc::new(maps) });
                     repaint();
                 }
             }
@@ -180,14 +192,20 @@ fn next(mailbox: &(Mutex<Mailbox>, Condvar)) -> Option<ViewRequest> {
 }
 
 /// What the pixels of a resting view belong to.
-fn map_of(renderer: &mut Renderer<f32>, request: &ViewRequest) -> Option<ViewMap> {
+fn maps_of(renderer: &mut Renderer<f32>, request: &ViewRequest) -> Option<ViewMaps> {
     let semantics = request.semantics.as_ref().filter(|s| s.of.len() == request.cloud.len())?;
     if request.effort != Effort::Full {
         return None;
     }
+    let (cloud, camera, settings) = (&request.cloud, &request.camera, &request.settings);
     let draw = AssertUnwindSafe(|| {
-        let (of, identities) = (&semantics.of, &semantics.identities);
-        ViewMap::render(renderer, &request.cloud, of, identities, &request.camera, &request.settings).ok()
+        let identities =
+            ViewMap::render(renderer, cloud, &semantics.of, &semantics.identities, camera, settings).ok()?;
+        let codes = match request.codes {
+            true => CodeMap::render(renderer, cloud, &semantics.codes, camera, settings).ok(),
+            false => None,
+        };
+        Some(ViewMaps { identities, codes })
     });
     catch_unwind(draw).unwrap_or_default()
 }

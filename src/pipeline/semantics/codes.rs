@@ -8,8 +8,6 @@ use glam::{DVec3, Vec3};
 
 use crate::scene::{Identities, IdentityId};
 
-/// The background's code.
-pub const BACKGROUND: [f32; 3] = [0.5; 3];
 /// Radius of the sphere.
 pub const RADIUS: f32 = 0.5;
 /// Largest difference per channel at which a blended code still counts as a code: the paper's
@@ -107,7 +105,8 @@ mod tests {
         });
         let centers: Vec<DVec3> = (0..100).map(|i| DVec3::new(f64::from(i % 10), f64::from(i / 10), 0.0)).collect();
         assign(&mut all, &centers);
-        let codes: Vec<[f32; 3]> = all.iter().map(|(_, i)| i.code).chain([BACKGROUND]).collect();
+        let codes: Vec<[f32; 3]> =
+            all.iter().map(|(_, i)| i.code).chain([crate::scene::semantic_map::BACKGROUND_CODE]).collect();
         let (mut blends, mut wrong) = (0, 0);
         for a in 0..codes.len() {
             for b in 0..a {

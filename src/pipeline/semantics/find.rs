@@ -26,12 +26,9 @@ pub fn find_objects(
     let of: Vec<IdentityId> = tracked.belongings.iter().map(|b| b.identity).collect();
     let centers = centers(cloud, &of, &identities);
     codes::assign(&mut identities, &centers);
-    Ok(SemanticMap {
-        identities,
-        of,
-        margin: tracked.belongings.iter().map(|b| b.margin).collect(),
-        seeds: tracked.seeds.iter().map(|&i| photos[i].name.clone()).collect(),
-    })
+    let margin = tracked.belongings.iter().map(|b| b.margin).collect();
+    let seeds = tracked.seeds.iter().map(|&i| photos[i].name.clone()).collect();
+    Ok(SemanticMap::of_identities(identities, of, margin, seeds))
 }
 
 /// What to say about views that masks did not explain; `None` if there is no need.

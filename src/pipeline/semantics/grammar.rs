@@ -18,6 +18,8 @@ pub enum Kind {
 /// A query taken apart.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Phrase {
+    /// All of it, lower case, without what carries nothing.
+    pub text: String,
     /// What is looked for.
     pub target: String,
     /// What it is a piece of, if the query says so.
@@ -48,26 +50,27 @@ impl Phrase {
             .collect();
         let parted = words.iter().enumerate().rev().find_map(|(i, word)| {
             if PIECE_OF.contains(word) {
-                return both(&words[..i], &words[i + 1..]);
+                return both(&words, &words[..i], &words[i + 1..]);
             }
             let owner = word.strip_suffix("'s").or_else(|| word.strip_suffix("s'"))?;
             let whole: Vec<&str> = words[..i].iter().copied().chain([owner]).collect();
-            both(&words[i + 1..], &whole)
+            both(&words, &words[i + 1..], &whole)
         });
         if parted.is_some() {
             return parted;
         }
-        let target = phrase(&words)?;
-        let unspaced = target.rsplit_once(WHOLE_S).filter(|(whole, piece)| !whole.is_empty() && !piece.is_empty());
-        Some(match unspaced {
-            Some((whole, piece)) => Self { target: piece.into(), whole: Some(whole.into()) },
-            None => Self { target, whole: None },
-        })
+        let text = phrase(&words)?;
+        let unspaced = text.rsplit_once(WHOLE_S).filter(|(whole, piece)| !whole.is_empty() && !piece.is_empty());
+        let (target, whole) = match unspaced {
+            Some((whole, piece)) => (piece.to_owned(), Some(whole.to_owned())),
+            None => (text.clone(), None),
+        };
+        Some(Self { text, target, whole })
     }
 }
 
-fn both(piece: &[&str], whole: &[&str]) -> Option<Phrase> {
-    Some(Phrase { target: phrase(piece)?, whole: Some(phrase(whole)?) })
+fn both(all: &[&str], piece: &[&str], whole: &[&str]) -> Option<Phrase> {
+    Some(Phrase { text: phrase(all)?, target: phrase(piece)?, whole: Some(phrase(whole)?) })
 }
 
 /// The words without articles at the beginning; `None` if no letter or digit is left.

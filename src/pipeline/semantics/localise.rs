@@ -1,5 +1,5 @@
-//! Multilevel localisation: from scores of phrases to the identities meant, in the paper's two
-//! steps, with "not found" and "ambiguous" among the answers.
+//! Multilevel localisation: from scores of phrases to the identities meant, with "not found" and
+//! "ambiguous" among the answers.
 
 use super::grammar::{Kind, Phrase};
 use crate::scene::{Identities, IdentityId, Level};
@@ -7,12 +7,31 @@ use crate::scene::{Identities, IdentityId, Level};
 /// Answers that are given at most.
 const TOP: usize = 8;
 
+/// How a piece of a whole is looked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Strategy {
+    /// The whole by its own phrase, then its pieces by theirs. For scores that treat words one by
+    /// one, such as names.
+    #[default]
+    WholeFirst,
+    /// The paper's two steps: the whole query first; only if an object wins, its parts compete, with
+    /// the object's phrase among the canonical ones.
+    Paper,
+    /// The whole query once, whatever wins.
+    OneStep,
+}
+
 /// Scores identities for phrases, by number less one; higher is better.
 pub trait Scorer {
     /// Scores of all identities for a phrase. Where `against` is given, it is the phrase of the
     /// whole, which then counts as another thing that a piece must be more than (the paper's
     /// second step).
     fn scores(&mut self, phrase: &str, against: Option<&str>) -> Vec<f32>;
+
+    /// How this scorer finds pieces of wholes best.
+    fn strategy(&self) -> Strategy {
+        Strategy::WholeFirst
+    }
 
     /// Score under which an identity is not what was asked for.
     fn threshold(&self) -> f32;
@@ -54,10 +73,14 @@ impl Answer {
 
 /// Finds what `phrase` means among the identities.
 pub fn localise(identities: &Identities, phrase: &Phrase, kind: Kind, scorer: &mut dyn Scorer) -> Answer {
-    match (&phrase.whole, kind) {
-        (Some(whole), Kind::Auto | Kind::Part) => piece_of(identities, &phrase.target, whole, scorer),
-        _ => {
-            let scores = scorer.scores(&phrase.target, None);
+    match (&phrase.whole, kind, scorer.strategy()) {
+        (Some(whole), Kind::Auto | Kind::Part, Strategy::WholeFirst) => {
+            piece_of(identities, &phrase.target, whole, scorer)
+        }
+        (Some(whole), Kind::Auto | Kind::Part, Strategy::Paper) => two_steps(identities, &phrase.text, whole, scorer),
+        (_, _, strategy) => {
+            let text = if strategy == Strategy::WholeFirst { &phrase.target } else { &phrase.text };
+            let scores = scorer.scores(text, None);
             let wanted = |level: Level| match kind {
                 Kind::Auto => true,
                 Kind::Object => level == Level::Object,
@@ -67,6 +90,32 @@ pub fn localise(identities: &Identities, phrase: &Phrase, kind: Kind, scorer: &m
             judge(identities, rank(all, &scores), scorer)
         }
     }
+}
+
+/// The paper's steps for a query that is about a piece.
+fn two_steps(identities: &Identities, text: &str, whole: &str, scorer: &mut dyn Scorer) -> Answer {
+    let step1 = scorer.scores(text, None);
+    let ranked = rank(identities.iter().map(|(id, _)| id), &step1);
+    let preliminary = ranked.first().map(|h| h.identity);
+    let object = preliminary.filter(|id| identities.get(*id).is_some_and(|i| i.level == Level::Object));
+    let Some(object) = object else { return judge(identities, ranked, scorer) };
+    if ranked[0].score < scorer.threshold() {
+        return Answer::NotFound(ranked);
+    }
+    let pieces: Vec<IdentityId> =
+        identities.iter().map(|(id, _)| id).filter(|id| is_piece(identities, *id, object)).collect();
+    if pieces.is_empty() {
+        return Answer::NotFound(ranked);
+    }
+    let against = scorer.scores(text, Some(whole));
+    // The object's phrase can push every part down; then the order of step 1 stands.
+    let usable = pieces.iter().any(|id| against[*id as usize - 1] >= scorer.threshold());
+    judge(identities, rank(pieces.into_iter(), if usable { &against } else { &step1 }), scorer)
+}
+
+/// Whether `id` is a piece of `whole`, directly or not.
+fn is_piece(identities: &Identities, id: IdentityId, whole: IdentityId) -> bool {
+    identities.line(id).skip(1).any(|i| i == whole)
 }
 
 /// Step 1 finds the whole; in step 2 only its pieces compete.
@@ -81,7 +130,7 @@ fn piece_of(identities: &Identities, piece: &str, whole: &str, scorer: &mut dyn 
     // Wholes that cannot be told apart all take part.
     let close: Vec<IdentityId> =
         wholes.iter().filter(|w| w.score > best.score - scorer.resolution()).map(|w| w.identity).collect();
-    let mine = |id: IdentityId| identities.line(id).skip(1).any(|i| close.contains(&i));
+    let mine = |id: IdentityId| close.iter().any(|whole| is_piece(identities, id, *whole));
     let pieces: Vec<IdentityId> = identities.iter().map(|(id, _)| id).filter(|id| mine(*id)).collect();
     let plain = scorer.scores(piece, None);
     let against = scorer.scores(piece, Some(whole));
@@ -118,25 +167,9 @@ fn judge(identities: &Identities, hits: Vec<Hit>, scorer: &dyn Scorer) -> Answer
     }
 }
 
-/// Scores by names alone; see [`super::names`].
-pub struct ByName<'a>(pub &'a Identities);
-
-impl Scorer for ByName<'_> {
-    fn scores(&mut self, phrase: &str, _against: Option<&str>) -> Vec<f32> {
-        super::names::scores(self.0, phrase)
-    }
-
-    fn threshold(&self) -> f32 {
-        0.45
-    }
-
-    fn resolution(&self) -> f32 {
-        0.02
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::names::ByName;
     use super::*;
     use crate::scene::NOBODY;
 
@@ -191,5 +224,51 @@ mod tests {
         let all = Identities::default();
         let phrase = Phrase::parse("lamp").expect("a phrase");
         assert_eq!(localise(&all, &phrase, Kind::Auto, &mut ByName(&all)), Answer::NotFound(vec![]));
+    }
+
+    /// Scores from a table: (phrase, against) -> score per identity.
+    struct Table(Strategy, Vec<(&'static str, Option<&'static str>, Vec<f32>)>);
+
+    impl Scorer for Table {
+        fn scores(&mut self, phrase: &str, against: Option<&str>) -> Vec<f32> {
+            let row = self.1.iter().find(|r| (r.0, r.1) == (phrase, against));
+            row.unwrap_or_else(|| panic!("{phrase:?} {against:?}")).2.clone()
+        }
+
+        fn strategy(&self) -> Strategy {
+            self.0
+        }
+
+        fn threshold(&self) -> f32 {
+            0.5
+        }
+
+        fn resolution(&self) -> f32 {
+            0.001
+        }
+    }
+
+    #[test]
+    fn the_papers_second_step_looks_inside_the_winning_object() {
+        let all = scene();
+        let phrase = Phrase::parse("a button of the red controller").expect("a phrase");
+        let text = "button of the red controller";
+        // Identities: 1 red (2 button, 3 stick), 4 blue (5, 6), 7 lamp.
+        let step1 = vec![0.9, 0.6, 0.7, 0.8, 0.55, 0.5, 0.1];
+        let step2 = vec![0.2, 0.65, 0.6, 0.2, 0.7, 0.5, 0.1];
+        let table = |strategy, step1: Vec<f32>, step2: Vec<f32>| {
+            Table(strategy, vec![(text, None, step1), (text, Some("red controller"), step2)])
+        };
+        let ask = |mut t: Table| localise(&all, &phrase, Kind::Auto, &mut t);
+        assert_eq!(ask(table(Strategy::OneStep, step1.clone(), step2.clone())).hits()[0].identity, 1);
+        assert_eq!(ask(table(Strategy::Paper, step1.clone(), step2)).hits()[0].identity, 2);
+        // Pushed below the threshold, all of them: the order of step 1 stands.
+        let low = vec![0.1; 7];
+        assert_eq!(ask(table(Strategy::Paper, step1.clone(), low)).hits()[0].identity, 3);
+        // A part that wins at once is the answer.
+        let part_wins = vec![0.5, 0.6, 0.7, 0.5, 0.95, 0.5, 0.1];
+        assert_eq!(ask(table(Strategy::Paper, part_wins, step1)).hits()[0].identity, 5);
+        let nothing = vec![0.4; 7];
+        assert!(matches!(ask(table(Strategy::Paper, nothing.clone(), nothing)), Answer::NotFound(_)));
     }
 }

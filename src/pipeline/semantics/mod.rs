@@ -3,16 +3,22 @@
 //!
 //! In the order of the data: [`segmenter`] finds masks, [`tracker`] makes them identities over all
 //! views, [`votes`] gives every Gaussian its identity, [`codes`] every identity its point in code
-//! space, [`view_map`] draws identities into a view; [`grammar`] takes a query apart, and [`localise`]
-//! answers it from one view's map.
+//! space, [`view_map`] draws identities into a view; [`grammar`] takes a query apart, [`names`] and
+//! [`meaning`] score identities for it by words and by looks, [`localise`] picks those that are
+//! meant, and [`answer`] puts it together.
 
+pub mod answer;
+pub mod code_map;
 pub mod codes;
 mod extend;
 pub mod find;
 pub mod grammar;
 mod link;
 pub mod localise;
+pub mod matching;
+pub mod meaning;
 pub mod names;
+pub mod relevancy;
 pub mod score;
 pub mod segmenter;
 pub mod tracker;

@@ -3,10 +3,33 @@
 
 use std::collections::HashSet;
 
+use super::localise::Scorer;
 use crate::scene::{Identities, IdentityId};
 
 /// Similarity under which two words have nothing to do with each other.
 const ALIKE: f64 = 0.82;
+
+/// Score under which a name is not what was asked for.
+pub const THRESHOLD: f32 = 0.45;
+/// Difference of scores under which two names fit alike.
+pub const RESOLUTION: f32 = 0.02;
+
+/// Scores by names alone.
+pub struct ByName<'a>(pub &'a Identities);
+
+impl Scorer for ByName<'_> {
+    fn scores(&mut self, phrase: &str, _against: Option<&str>) -> Vec<f32> {
+        scores(self.0, phrase)
+    }
+
+    fn threshold(&self) -> f32 {
+        THRESHOLD
+    }
+
+    fn resolution(&self) -> f32 {
+        RESOLUTION
+    }
+}
 
 /// Score of every identity for a phrase, by number less one: 1 for the same name, 0 for nothing in
 /// common or no name.

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::answer::by_name;
 use super::grammar::{Kind, Phrase};
-use super::localise::{Answer, ByName, Scorer, localise};
 use super::segmenter::FoundMask;
 use super::view_map::ViewMap;
 use crate::math::stats::mean;
@@ -39,17 +39,8 @@ pub fn score_view(view: &str, map: &ViewMap, identities: &Identities, labels: &[
     }
     let mut scores = Vec::new();
     for (query, (level, truth)) in asked {
-        let mut scorer = ByName(identities);
-        let found = Phrase::parse(&query).map(|p| localise(identities, &p, Kind::Auto, &mut scorer));
-        let mut mask = Mask::empty(map.width_px, map.height_px);
-        match found {
-            Some(Answer::Found(hits)) => mask.add(&map.mask(identities, hits[0].identity)),
-            Some(Answer::Ambiguous(hits)) => {
-                let close = hits.iter().filter(|h| h.score > hits[0].score - scorer.resolution());
-                close.for_each(|h| mask.add(&map.mask(identities, h.identity)));
-            }
-            Some(Answer::NotFound(_)) | None => {}
-        }
+        let found = Phrase::parse(&query).map(|p| by_name(identities, &p, Kind::Auto));
+        let mask = found.map_or_else(|| Mask::empty(map.width_px, map.height_px), |f| f.mask(map, identities, 1));
         scores.push(QueryScore { view: view.into(), query, level, iou: mask.iou(&truth), pixels: truth.area() });
     }
     scores

@@ -5,11 +5,12 @@ use egui::{Button, CollapsingHeader, Color32, RichText, Ui, vec2};
 use super::super::state::AppState;
 use super::super::theme;
 use super::super::viewport::query::full_name;
+use super::super::viewport::visible::Visibility;
 use crate::scene::{Identities, IdentityId, Level, NOBODY};
 use crate::worker::Action;
 
 /// Draws the pane.
-pub fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
+pub fn show(ui: &mut Ui, state: &AppState, visibility: &Visibility, actions: &mut Vec<Action>) {
     let Some(map) = &state.semantics else {
         return show_how_to_begin(ui, state, actions);
     };
@@ -18,36 +19,53 @@ pub fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     let from = if map.seeds.len() == 1 { "1 photo".to_owned() } else { format!("{} photos", map.seeds.len()) };
     ui.weak(format!("{} objects, {} parts, from the masks of {from}", count(Level::Object), count(Level::Part)));
     ui.add_space(4.0);
-    let sizes = map.sizes();
+    if visibility.is_partial() && ui.button("Show all").clicked() {
+        actions.push(Action::Isolate(None));
+    }
+    let tree = Tree { identities, sizes: map.sizes(), visibility };
     for (id, _) in identities.iter().filter(|(_, i)| i.parent == NOBODY) {
-        branch(ui, identities, id, &sizes, actions);
+        tree.branch(ui, id, actions);
     }
 }
 
-fn branch(ui: &mut Ui, identities: &Identities, id: IdentityId, sizes: &[usize], actions: &mut Vec<Action>) {
-    let pieces: Vec<IdentityId> = identities.pieces(id).collect();
-    if pieces.is_empty() {
-        return leaf(ui, identities, id, sizes, actions);
-    }
-    CollapsingHeader::new(identities.name(id)).id_salt(id).show(ui, |ui| {
-        leaf(ui, identities, id, sizes, actions);
-        for piece in pieces {
-            branch(ui, identities, piece, sizes, actions);
-        }
-    });
+struct Tree<'a> {
+    identities: &'a Identities,
+    /// Gaussians by number.
+    sizes: Vec<usize>,
+    visibility: &'a Visibility,
 }
 
-fn leaf(ui: &mut Ui, identities: &Identities, id: IdentityId, sizes: &[usize], actions: &mut Vec<Action>) {
-    ui.horizontal(|ui| {
-        let code = identities.get(id).map_or([0.5; 3], |i| i.code).map(|c| (c * 255.0) as u8);
-        let (rect, _) = ui.allocate_exact_size(vec2(11.0, 11.0), egui::Sense::hover());
-        ui.painter().rect_filled(rect, 3.0, Color32::from_rgb(code[0], code[1], code[2]));
-        let button = Button::new(identities.name(id)).frame_when_inactive(false);
-        if ui.add(button).on_hover_text("Show where it is").clicked() {
-            actions.push(Action::Ask(full_name(identities, id)));
+impl Tree<'_> {
+    fn branch(&self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
+        let pieces: Vec<IdentityId> = self.identities.pieces(id).collect();
+        if pieces.is_empty() {
+            return self.leaf(ui, id, actions);
         }
-        ui.label(RichText::new(format!("{} Gaussians", sizes[id as usize])).small().color(theme::WEAK));
-    });
+        CollapsingHeader::new(self.identities.name(id)).id_salt(id).show(ui, |ui| {
+            self.leaf(ui, id, actions);
+            for piece in pieces {
+                self.branch(ui, piece, actions);
+            }
+        });
+    }
+
+    fn leaf(&self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
+        let Self { identities, sizes, visibility } = self;
+        ui.horizontal(|ui| {
+            let mut drawn = !visibility.is_hidden(id);
+            if ui.checkbox(&mut drawn, "").on_hover_text("Draw it").changed() {
+                actions.push(Action::Hide(id));
+            }
+            let code = identities.get(id).map_or([0.5; 3], |i| i.code).map(|c| (c * 255.0) as u8);
+            let (rect, _) = ui.allocate_exact_size(vec2(11.0, 11.0), egui::Sense::hover());
+            ui.painter().rect_filled(rect, 3.0, Color32::from_rgb(code[0], code[1], code[2]));
+            let button = Button::new(identities.name(id)).frame_when_inactive(false);
+            if ui.add(button).on_hover_text("Show where it is").clicked() {
+                actions.push(Action::Ask(full_name(identities, id)));
+            }
+            ui.label(RichText::new(format!("{} Gaussians", sizes[id as usize])).small().color(theme::WEAK));
+        });
+    }
 }
 
 fn show_how_to_begin(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {

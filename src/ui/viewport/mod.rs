@@ -6,6 +6,7 @@ mod input;
 mod overlay;
 mod photo;
 pub mod query;
+pub mod visible;
 
 use std::sync::Arc;
 
@@ -15,11 +16,12 @@ use glam::{DVec2, DVec3};
 use self::eye::Eye;
 use self::photo::PhotoView;
 use self::query::Questions;
+use self::visible::Visibility;
 use super::layout::Layout;
 use super::state::AppState;
 use super::theme;
 use crate::render::RenderSettings;
-use crate::scene::{Camera, GaussianCloud, PhotoPixels};
+use crate::scene::{Bounds, Camera, GaussianCloud, IdentityId, PhotoPixels};
 use crate::worker::view::{Effort, ViewLane, ViewPicture, ViewRequest};
 use crate::worker::{Action, CloudSnapshot, OpenedScene, Repaint, ViewMode, Worker};
 
@@ -55,6 +57,8 @@ pub struct Viewport {
     error: Option<String>,
     /// What was asked, and where the answers are.
     pub questions: Questions,
+    /// What is left out of the picture.
+    pub visibility: Visibility,
     /// Generation of the newest map of identities.
     mapped: u64,
     /// World point that the wheel zooms to, while the cursor stays.
@@ -65,12 +69,15 @@ pub struct Viewport {
 #[derive(Clone, PartialEq)]
 struct Asked {
     camera: Camera,
-    cloud: u64,
+    /// Its number, and the address of what is drawn of it.
+    cloud: (u64, usize),
     mode: ViewMode,
     effort: Effort,
     with_photo: bool,
     /// Which objects and parts, by address; 0 for none.
     semantics: usize,
+    /// With blended codes.
+    codes: bool,
 }
 
 impl Viewport {
@@ -94,6 +101,7 @@ impl Viewport {
             texture: None,
             error: None,
             questions: Questions::default(),
+            visibility: Visibility::default(),
             mapped: 0,
             zoom_anchor: None,
         })
@@ -131,6 +139,7 @@ impl Viewport {
             self.set_cloud(scene.cloud.clone());
             self.up = None;
             self.questions.clear();
+            self.visibility = Visibility::default();
             self.eye = home_eye(scene, None);
         }
         if let Some((generation, snapshot)) = worker.clouds().newer_than(self.snapshot) {
@@ -155,6 +164,9 @@ impl Viewport {
                 self.leave_photo();
                 self.eye.frame(&scene.home.bounds);
             }
+            Action::GoToTarget(id) => self.go_to(*id, state),
+            Action::Isolate(only) => self.visibility.isolate(*only),
+            Action::Hide(id) => self.visibility.toggle(*id),
             Action::ResetView => {
                 self.photo = None;
                 self.eye = home_eye(&scene, self.up);
@@ -186,6 +198,21 @@ impl Viewport {
         let pivot = c.center + c.forward() * ahead.max(0.1 * scene.home.bounds.radius());
         self.eye = Eye::of_camera(c, pivot, self.up.unwrap_or(scene.home.up));
         self.photo = Some(PhotoView::new(index, photo, worker));
+    }
+
+    /// Moves until an identity fills the view, from the side on which the eye is.
+    fn go_to(&mut self, id: IdentityId, state: &AppState) {
+        let (Some(map), Some(cloud)) = (&state.semantics, &self.cloud) else { return };
+        let inside = map.identities.within(id);
+        let is_in = |i: &usize| map.of.get(*i).is_some_and(|of| inside.get(*of as usize) == Some(&true));
+        let points = (0..cloud.len()).filter(is_in).map(|i| cloud.world_position(i));
+        if let Some(mut bounds) = Bounds::robust(points) {
+            // Some of what is around it, to see where it is.
+            let air = bounds.size() * 0.35;
+            (bounds.min, bounds.max) = (bounds.min - air, bounds.max + air);
+            self.leave_photo();
+            self.eye.frame(&bounds);
+        }
     }
 
     /// Goes on freely from the photo's place, at the scale that the picture had.
@@ -227,8 +254,8 @@ impl Viewport {
             self.show_frusta(ui, rect, &scene, &response, layout, actions);
         }
         self.show_overlay(ui, rect, &scene, state, layout, actions);
-        if let Some(semantics) = &state.semantics {
-            self.questions.show(ui, shown, semantics);
+        if let (Some(semantics), Some(cloud)) = (&state.semantics, &self.cloud) {
+            self.questions.show(ui, shown, semantics, cloud, actions);
         }
     }
 
@@ -238,7 +265,7 @@ impl Viewport {
             self.mapped = generation;
             // One of an earlier request is of another view.
             if mapped.ticket == self.tickets {
-                self.questions.set_map(Some(Arc::clone(&mapped.map)));
+                self.questions.set_maps(Some(Arc::clone(&mapped.maps)));
             }
         }
         let Some((generation, result)) = self.lane.pictures().newer_than(self.shown) else { return };
@@ -261,7 +288,14 @@ impl Viewport {
 
     /// Asks for a new picture if anything changed.
     fn request(&mut self, ui: &Ui, shown: Rect, scene: &OpenedScene, state: &AppState, layout: &Layout, now: f64) {
-        let Some(cloud) = &self.cloud else { return };
+        let Some(cloud) = self.cloud.clone() else { return };
+        let (cloud, semantics) = match &state.semantics {
+            Some(semantics) => {
+                let (cloud, semantics) = self.visibility.apply(&cloud, semantics);
+                (cloud, Some(semantics))
+            }
+            None => (cloud, None),
+        };
         let rests = now - self.moved_at - REST_SECS;
         if rests < 0.0 {
             ui.ctx().request_repaint_after_secs((-rests + 0.01) as f32);
@@ -281,18 +315,19 @@ impl Viewport {
         let photo = self.photo.as_ref().and_then(PhotoView::pixels);
         let asked = Asked {
             camera: camera.limited_to(MAX_SIDE_PX),
-            cloud: self.cloud_number,
+            cloud: (self.cloud_number, Arc::as_ptr(&cloud) as usize),
             mode: layout.mode,
             effort,
             with_photo: photo.is_some(),
-            semantics: state.semantics.as_ref().map_or(0, |s| Arc::as_ptr(s) as usize),
+            semantics: semantics.as_ref().map_or(0, |s| Arc::as_ptr(s) as usize),
+            codes: semantics.is_some() && self.questions.wants_codes(),
         };
         if self.requested.as_ref() == Some(&asked) {
             return;
         }
         self.tickets += 1;
         self.lane.request(ViewRequest {
-            cloud: Arc::clone(cloud),
+            cloud,
             camera: asked.camera.clone(),
             mode: asked.mode,
             settings: RenderSettings {
@@ -302,14 +337,15 @@ impl Viewport {
             },
             effort,
             photo,
-            semantics: state.semantics.clone(),
+            semantics,
+            codes: asked.codes,
             ticket: self.tickets,
         });
         // A change of resolution alone does not move what the pixels belong to.
         let same_view =
             |r: &Asked| r.camera == asked.camera && r.cloud == asked.cloud && r.semantics == asked.semantics;
         if !self.requested.as_ref().is_some_and(same_view) {
-            self.questions.set_map(None);
+            self.questions.set_maps(None);
         }
         self.requested = Some(asked);
     }

@@ -1,0 +1,177 @@
+//! One query, answered: by names where the scene's names know the words, else by meaning.
+
+use super::grammar::{Kind, Phrase};
+use super::localise::{Answer, Scorer, localise};
+use super::meaning::{ByMeaning, MeaningOptions, Phrasebook};
+use super::names::{self, ByName};
+use super::view_map::ViewMap;
+use crate::scene::{Identities, IdentityId, LanguageFeatures, Mask};
+
+/// What an answer rests on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Basis {
+    /// Names that people or label files gave.
+    Names,
+    /// What identities look like to an encoder.
+    Meaning,
+}
+
+/// An answered query.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Answered {
+    /// What is meant.
+    pub answer: Answer,
+    /// What that rests on.
+    pub basis: Basis,
+    /// Relevancy of every identity by number, 0 to 1; a piece is at least as relevant as its whole
+    /// where names decide.
+    pub relevancy: Vec<f32>,
+}
+
+/// Features and encoded phrases for answers by meaning.
+#[derive(Clone, Copy)]
+pub struct Language<'a> {
+    /// Of the scene's identities.
+    pub features: &'a LanguageFeatures,
+    /// With the query's phrases learnt; see [`phrases_of`].
+    pub phrases: &'a Phrasebook,
+    /// How to score.
+    pub options: MeaningOptions,
+}
+
+/// The phrases of a query that answers by meaning need.
+pub fn phrases_of(phrase: &Phrase) -> Vec<&str> {
+    let whole = phrase.whole.as_deref();
+    [Some(phrase.text.as_str()), Some(phrase.target.as_str()), whole].into_iter().flatten().collect()
+}
+
+/// Answers by names where all words are known, else by meaning where that finds something.
+pub fn answer(identities: &Identities, phrase: &Phrase, kind: Kind, language: Option<Language<'_>>) -> Answered {
+    let named = by_name(identities, phrase, kind);
+    let Some(language) = language else { return named };
+    let known = names::unknown_words(identities, &phrase.text).is_empty();
+    if known && !matches!(named.answer, Answer::NotFound(_)) {
+        return named;
+    }
+    let meant = by_meaning(identities, phrase, kind, language);
+    let nothing = |a: &Answer| matches!(a, Answer::NotFound(_));
+    if nothing(&meant.answer) && !nothing(&named.answer) { named } else { meant }
+}
+
+/// Answers by names alone.
+pub fn by_name(identities: &Identities, phrase: &Phrase, kind: Kind) -> Answered {
+    let answer = localise(identities, phrase, kind, &mut ByName(identities));
+    let alone = names::scores(identities, &phrase.target);
+    let mut relevancy = vec![0.0; identities.len() + 1];
+    for (id, identity) in identities.iter() {
+        let hit = answer.hits().iter().find(|h| h.identity == id);
+        // What shares the words but not the whole is related, not meant.
+        let own = hit.map_or(0.5 * alone[id as usize - 1], |h| h.score);
+        relevancy[id as usize] = f32::max(own, relevancy[identity.parent as usize]);
+    }
+    Answered { answer, basis: Basis::Names, relevancy }
+}
+
+/// Answers by meaning alone.
+pub fn by_meaning(identities: &Identities, phrase: &Phrase, kind: Kind, language: Language<'_>) -> Answered {
+    let Language { features, phrases, options } = language;
+    let mut scorer = ByMeaning { features, phrases, options };
+    let answer = localise(identities, phrase, kind, &mut scorer);
+    let mut relevancy = vec![0.0];
+    relevancy.extend(scorer.scores(&phrase.text, None));
+    relevancy.resize(identities.len() + 1, 0.0);
+    Answered { answer, basis: Basis::Meaning, relevancy }
+}
+
+impl Answered {
+    /// The best identities: none if nothing was found, all that fit alike if the answer is
+    /// ambiguous, else up to `top` that fit.
+    pub fn chosen(&self, top: usize) -> Vec<IdentityId> {
+        let hits = self.answer.hits();
+        let alike = |first: f32| hits.iter().take_while(|h| first - h.score < self.resolution()).count();
+        let (most, threshold) = match &self.answer {
+            Answer::Found(_) => (top.max(1), self.threshold()),
+            Answer::Ambiguous(hits) => (top.max(alike(hits[0].score)), self.threshold()),
+            Answer::NotFound(_) => (0, self.threshold()),
+        };
+        hits.iter().take(most).filter(|h| h.score >= threshold).map(|h| h.identity).collect()
+    }
+
+    /// Score from which an identity is what was asked for.
+    pub fn threshold(&self) -> f32 {
+        match self.basis {
+            Basis::Names => names::THRESHOLD,
+            Basis::Meaning => super::meaning::THRESHOLD,
+        }
+    }
+
+    fn resolution(&self) -> f32 {
+        match self.basis {
+            Basis::Names => names::RESOLUTION,
+            Basis::Meaning => super::meaning::resolution(super::relevancy::TEMPERATURE),
+        }
+    }
+
+    /// The pixels of what is meant, in a view.
+    pub fn mask(&self, map: &ViewMap, identities: &Identities, top: usize) -> Mask {
+        let mut mask = Mask::empty(map.width_px, map.height_px);
+        self.chosen(top).into_iter().for_each(|id| mask.add(&map.mask(identities, id)));
+        mask
+    }
+
+    /// Relevancy of every pixel of a view, row-major, 0 to 1.
+    pub fn heat(&self, map: &ViewMap) -> Vec<f32> {
+        map.identity.iter().map(|id| self.relevancy.get(*id as usize).copied().unwrap_or(0.0)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Level, NOBODY, ViewFeatures};
+
+    fn scene() -> (Identities, LanguageFeatures) {
+        let mut all = Identities::default();
+        let lamp = all.add(Level::Object, NOBODY, vec!["lamp".into()]);
+        all.add(Level::Part, lamp, vec!["shade".into()]);
+        all.add(Level::Object, NOBODY, vec!["mug".into()]);
+        let f = |v: [f32; 3]| ViewFeatures { raw: vec![v.to_vec()], deviated: vec![v.to_vec()] };
+        let of = vec![f([0.0, 1.0, 0.0]), f([0.0, 0.8, 0.6]), f([1.0, 0.0, 0.0])];
+        (all, LanguageFeatures { encoder: "test".into(), dimension: 3, of })
+    }
+
+    fn ask(text: &str, with_meaning: bool) -> Answered {
+        let (all, features) = scene();
+        let phrase = Phrase::parse(text).expect("a phrase");
+        let mut phrases = Phrasebook::default();
+        let encode = |p: &str| {
+            Ok::<_, ()>(match p {
+                "cup" => vec![1.0, 0.0, 0.0],
+                "giraffe" => vec![0.0, 0.0, -1.0],
+                _ => vec![0.5, 0.5, 0.5],
+            })
+        };
+        phrases.learn(&phrases_of(&phrase), encode).expect("encodes");
+        let language = Language { features: &features, phrases: &phrases, options: MeaningOptions::default() };
+        answer(&all, &phrase, Kind::Auto, with_meaning.then_some(language))
+    }
+
+    #[test]
+    fn names_come_first_and_meaning_where_they_fail() {
+        let a = ask("the lamp's shade", true);
+        assert_eq!((a.basis, a.chosen(1)), (Basis::Names, vec![2]));
+        assert!(a.relevancy[2] > a.relevancy[1] && a.relevancy[3] == 0.0);
+        let a = ask("cup", true);
+        assert_eq!((a.basis, a.chosen(1)), (Basis::Meaning, vec![3]));
+        assert!(a.relevancy[3] > 0.9 && a.relevancy[1] < 0.5);
+        assert!(ask("cup", false).chosen(1).is_empty());
+        assert!(ask("giraffe", true).chosen(3).is_empty());
+        let a = ask("lamp", true);
+        assert_eq!(a.chosen(2), [1], "only what fits");
+        let map =
+            ViewMap { width_px: 3, height_px: 1, identity: vec![1, 2, 3], share: vec![1.0; 3], alpha: vec![1.0; 3] };
+        let (all, _) = scene();
+        assert_eq!(a.mask(&map, &all, 1).area(), 2, "a piece belongs to its whole");
+        assert_eq!(a.heat(&map)[2], 0.0);
+    }
+}

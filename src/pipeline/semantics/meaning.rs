@@ -1,0 +1,178 @@
+//! Identities found by what they look like: relevancy of their language features for a phrase.
+
+use std::collections::HashMap;
+
+use super::localise::{Scorer, Strategy};
+use super::relevancy::{CANONICAL, TEMPERATURE, advantage, score};
+use crate::scene::{LanguageFeatures, ViewFeatures};
+
+/// Which features of parts are compared.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PartFeatures {
+    /// Moved towards their whole's: the paper's semantic deviation.
+    #[default]
+    Deviated,
+    /// Their own alone.
+    Raw,
+}
+
+/// How scores are made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MeaningOptions {
+    /// Which features of parts are compared.
+    pub parts: PartFeatures,
+    /// How pieces of wholes are looked for.
+    pub strategy: Strategy,
+    /// Spread of the scores; the order does not depend on it.
+    pub temperature: f32,
+}
+
+impl Default for MeaningOptions {
+    fn default() -> Self {
+        Self { parts: PartFeatures::Deviated, strategy: Strategy::Paper, temperature: TEMPERATURE }
+    }
+}
+
+/// Embeddings of phrases, kept from query to query.
+#[derive(Clone, Debug, Default)]
+pub struct Phrasebook(HashMap<String, Vec<f32>>);
+
+impl Phrasebook {
+    /// Phrases that are kept at most.
+    const MOST: usize = 4_096;
+
+    /// Adds the embedding that `encode` makes of each phrase, and of the canonical ones, unless it is
+    /// there already.
+    ///
+    /// # Errors
+    /// What `encode` fails with.
+    pub fn learn<E>(&mut self, phrases: &[&str], mut encode: impl FnMut(&str) -> Result<Vec<f32>, E>) -> Result<(), E> {
+        if self.0.len() > Self::MOST {
+            self.0.clear();
+        }
+        for phrase in phrases.iter().chain(&CANONICAL) {
+            if !self.0.contains_key(*phrase) {
+                self.0.insert((*phrase).to_owned(), encode(phrase)?);
+            }
+        }
+        Ok(())
+    }
+
+    /// The embedding of a phrase that was learnt.
+    pub fn get(&self, phrase: &str) -> Option<&[f32]> {
+        self.0.get(phrase).map(Vec::as_slice)
+    }
+}
+
+/// Score above which an identity is nearer to the query than to any canonical phrase.
+pub const THRESHOLD: f32 = 0.5;
+
+/// Difference of scores under which two identities fit alike: that of an advantage of 0.005.
+pub fn resolution(temperature: f32) -> f32 {
+    score(0.0025, temperature) - score(-0.0025, temperature)
+}
+
+/// Scores by language features.
+pub struct ByMeaning<'a> {
+    /// Features of the identities.
+    pub features: &'a LanguageFeatures,
+    /// Embeddings of the phrases that will be asked for; others score nothing.
+    pub phrases: &'a Phrasebook,
+    /// How.
+    pub options: MeaningOptions,
+}
+
+impl ByMeaning<'_> {
+    /// Advantage of every identity, by number less one: that of its best view. Negative infinity
+    /// without features.
+    pub fn advantages(&self, phrase: &str, against: Option<&str>) -> Vec<f32> {
+        let query = self.phrases.get(phrase);
+        let canonical: Vec<Vec<f32>> =
+            CANONICAL.into_iter().chain(against).filter_map(|p| self.phrases.get(p)).map(<[f32]>::to_vec).collect();
+        let best = |f: &ViewFeatures| {
+            let views = if self.options.parts == PartFeatures::Raw { &f.raw } else { &f.deviated };
+            let each = query.into_iter().flat_map(|q| views.iter().map(move |v| (v, q)));
+            each.map(|(v, q)| advantage(v, q, &canonical)).fold(f32::NEG_INFINITY, f32::max)
+        };
+        self.features.of.iter().map(best).collect()
+    }
+}
+
+impl Scorer for ByMeaning<'_> {
+    fn scores(&mut self, phrase: &str, against: Option<&str>) -> Vec<f32> {
+        self.advantages(phrase, against).into_iter().map(|d| score(d, self.options.temperature)).collect()
+    }
+
+    fn strategy(&self) -> Strategy {
+        self.options.strategy
+    }
+
+    fn threshold(&self) -> f32 {
+        THRESHOLD
+    }
+
+    fn resolution(&self) -> f32 {
+        resolution(self.options.temperature)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn features() -> LanguageFeatures {
+        let f = |raw: [f32; 2], deviated: [f32; 2]| ViewFeatures {
+            raw: vec![raw.to_vec()],
+            deviated: vec![deviated.to_vec()],
+        };
+        LanguageFeatures {
+            encoder: "test".into(),
+            dimension: 2,
+            of: vec![f([1.0, 0.0], [1.0, 0.0]), f([0.0, 1.0], [0.6, 0.8]), ViewFeatures::default()],
+        }
+    }
+
+    fn book() -> Phrasebook {
+        let mut book = Phrasebook::default();
+        let encode = |p: &str| {
+            Ok::<_, ()>(match p {
+                "lid" => vec![0.0, 1.0],
+                "pot" => vec![1.0, 0.0],
+                _ => vec![0.5, 0.5],
+            })
+        };
+        book.learn(&["lid", "pot"], encode).expect("encodes");
+        book
+    }
+
+    #[test]
+    fn the_best_view_counts_and_features_can_be_chosen() {
+        let (features, phrases) = (features(), book());
+        let mut by = ByMeaning { features: &features, phrases: &phrases, options: MeaningOptions::default() };
+        let d = by.advantages("lid", None);
+        assert!((d[0] + 0.5).abs() < 1e-6 && (d[1] - 0.1).abs() < 1e-6 && d[2] == f32::NEG_INFINITY, "{d:?}");
+        let s = by.scores("lid", None);
+        assert!(s[0] < 0.5 && s[1] > 0.5 && s[2] == 0.0);
+        // The whole's phrase is one more thing to be better than.
+        assert!((by.advantages("lid", Some("pot"))[1] - 0.1).abs() < 1e-6);
+        by.options.parts = PartFeatures::Raw;
+        assert!((by.advantages("lid", None)[1] - 0.5).abs() < 1e-6);
+        assert!(by.advantages("never learnt", None).iter().all(|d| *d == f32::NEG_INFINITY));
+    }
+
+    #[test]
+    fn phrases_are_encoded_once() {
+        let mut book = Phrasebook::default();
+        let mut calls = 0;
+        for _ in 0..3 {
+            book.learn(&["lid"], |_| {
+                calls += 1;
+                Ok::<_, ()>(vec![1.0])
+            })
+            .expect("encodes");
+        }
+        assert_eq!(calls, 1 + CANONICAL.len());
+        assert_eq!(book.learn(&["pot"], |_| Err("no")), Err("no"));
+        assert!(book.get("pot").is_none());
+    }
+}

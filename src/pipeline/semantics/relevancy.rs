@@ -1,0 +1,105 @@
+//! Relevancy: how much better a phrase describes a picture than the canonical phrases do, and
+//! semantic deviation, which tells a part what it is a part of.
+//!
+//! The paper's score `min_i exp(q) / (exp(q) + exp(c_i))` is `sigmoid(tau d)` with
+//! `d = q - max_i c_i` and temperature `tau = 1`; `q`, `c` are cosines. Order and the crossing at
+//! one half do not depend on the temperature; the spread does.
+
+use crate::math::vector::unit;
+
+/// Phrases that mean anything.
+pub const CANONICAL: [&str; 3] = ["object", "stuff", "texture"];
+/// Temperature of the paper.
+pub const PAPER_TEMPERATURE: f32 = 1.0;
+/// Temperature that spreads scores over the unit interval, for display.
+pub const TEMPERATURE: f32 = 10.0;
+/// Share of its own feature that a part keeps.
+pub const PART_WEIGHT: f32 = 0.7;
+
+/// Cosine of two vectors of unit length.
+pub fn cosine(a: &[f32], b: &[f32]) -> f32 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// How much nearer a feature is to the query than to the nearest of the `canonical` phrases. Above
+/// zero, it is what was asked for rather than anything.
+pub fn advantage(feature: &[f32], query: &[f32], canonical: &[Vec<f32>]) -> f32 {
+    let nearest = canonical.iter().map(|c| cosine(feature, c)).fold(f32::NEG_INFINITY, f32::max);
+    let nearest = if nearest.is_finite() { nearest } else { 0.0 };
+    cosine(feature, query) - nearest
+}
+
+/// The score of an advantage, 0 to 1.
+pub fn score(advantage: f32, temperature: f32) -> f32 {
+    1.0 / (1.0 + (-temperature * advantage).exp())
+}
+
+/// A part's feature moved towards its whole's (the paper's semantic deviation), of unit length
+/// again: the sum of two unit vectors is shorter, which would penalise parts. `None` if the two
+/// cancel out.
+pub fn deviate(part: &[f32], whole: &[f32], part_weight: f32) -> Option<Vec<f32>> {
+    unit(&part.iter().zip(whole).map(|(p, o)| (1.0 - part_weight) * o + part_weight * p).collect::<Vec<_>>())
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64Mcg;
+
+    use super::*;
+
+    fn random(rng: &mut Pcg64Mcg) -> Vec<f32> {
+        let v: Vec<f32> = (0..16).map(|_| rng.random_range(-1.0..1.0)).collect();
+        unit(&v).expect("not zero")
+    }
+
+    #[test]
+    fn the_stable_form_is_the_papers() {
+        let mut rng = Pcg64Mcg::seed_from_u64(7);
+        for _ in 0..500 {
+            let (feature, query) = (random(&mut rng), random(&mut rng));
+            let canonical: Vec<Vec<f32>> = (0..3).map(|_| random(&mut rng)).collect();
+            let q = f64::from(cosine(&feature, &query)).exp();
+            let paper = canonical.iter().map(|c| q / (f64::from(cosine(&feature, c)).exp() + q));
+            let paper = paper.fold(f64::INFINITY, f64::min);
+            let ours = f64::from(score(advantage(&feature, &query, &canonical), PAPER_TEMPERATURE));
+            assert!((paper - ours).abs() < 1e-6, "{paper} {ours}");
+        }
+    }
+
+    #[test]
+    fn order_and_the_crossing_do_not_depend_on_temperature() {
+        let mut rng = Pcg64Mcg::seed_from_u64(8);
+        for _ in 0..200 {
+            let d: [f32; 2] = [rng.random_range(-0.5..0.5), rng.random_range(-0.5..0.5)];
+            for tau in [0.1, 1.0, 10.0, 100.0] {
+                let s = d.map(|d| score(d, tau));
+                assert!((s[0] - s[1]) * (d[0] - d[1]) >= 0.0);
+                assert!(d.iter().zip(s).all(|(d, s)| (s > 0.5) == (*d > 0.0) || d.abs() * tau < 1e-6));
+            }
+        }
+    }
+
+    #[test]
+    fn extremes_stay_in_range() {
+        for d in [-2.0, 0.0, 2.0, f32::MIN, f32::MAX] {
+            for tau in [0.0, 1.0, 1e6] {
+                let s = score(d, tau);
+                assert!((0.0..=1.0).contains(&s), "{d} {tau}: {s}");
+            }
+        }
+        assert_eq!(advantage(&[1.0, 0.0], &[1.0, 0.0], &[]), 1.0);
+    }
+
+    #[test]
+    fn deviation_goes_from_the_whole_to_the_part() {
+        let mut rng = Pcg64Mcg::seed_from_u64(9);
+        let (part, whole) = (random(&mut rng), random(&mut rng));
+        assert!(cosine(&deviate(&part, &whole, 1.0).expect("unit"), &part) > 1.0 - 1e-6);
+        assert!(cosine(&deviate(&part, &whole, 0.0).expect("unit"), &whole) > 1.0 - 1e-6);
+        let mixed = deviate(&part, &whole, PART_WEIGHT).expect("unit");
+        assert!((cosine(&mixed, &mixed) - 1.0).abs() < 1e-5, "unit length");
+        assert!(cosine(&mixed, &whole) > cosine(&part, &whole));
+        assert_eq!(deviate(&[1.0, 0.0], &[-1.0, 0.0], 0.5), None, "opposites cancel out");
+    }
+}

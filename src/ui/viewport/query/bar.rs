@@ -1,0 +1,109 @@
+//! The question box: typing, completion from known names, history.
+
+use egui::{Key, Modifiers, RichText, TextEdit, Ui};
+
+use super::{COLORS, Questions};
+use crate::pipeline::semantics::names;
+use crate::scene::SemanticMap;
+use crate::ui::theme;
+
+/// Completions that are offered.
+const OFFERED: usize = 5;
+
+impl Questions {
+    pub(super) fn show_bar(&mut self, ui: &mut Ui, semantics: &SemanticMap) {
+        let id = ui.scope_id().with("typed");
+        // Taken before the field sees them: it would move its cursor.
+        let focused = ui.memory(|m| m.has_focus(id));
+        if focused {
+            self.recall(ui, semantics);
+        }
+        let offered = self.offered(semantics);
+        let complete = focused && !offered.is_empty() && ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Tab));
+        ui.horizontal(|ui| {
+            let width = ui.available_width() - 40.0;
+            let edit = TextEdit::singleline(&mut self.typed)
+                .id(id)
+                .hint_text("Find an object, or \"the button of the red controller\"   ( / )")
+                .char_limit(2_000)
+                .desired_width(width);
+            let response = ui.add(edit);
+            if std::mem::take(&mut self.focus) || complete {
+                response.request_focus();
+            }
+            if complete {
+                self.typed.clone_from(&offered[0]);
+            }
+            if response.changed() || complete {
+                self.recalled = None;
+                self.live = self.asked(&self.typed, semantics);
+            }
+            if response.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter)) {
+                self.keep();
+                response.request_focus();
+            }
+            ui.toggle_value(&mut self.open, "\u{2699}").on_hover_text("How answers are found and drawn");
+        });
+        if focused && !self.typed.is_empty() && offered.first().is_some_and(|o| *o != self.typed) {
+            self.show_offered(ui, &offered, semantics);
+        }
+    }
+
+    fn offered(&self, semantics: &SemanticMap) -> Vec<String> {
+        let typed = self.typed.trim();
+        if typed.is_empty() { Vec::new() } else { names::completions(&semantics.identities, typed, OFFERED) }
+    }
+
+    fn show_offered(&mut self, ui: &mut Ui, offered: &[String], semantics: &SemanticMap) {
+        let mut taken = None;
+        ui.horizontal_wrapped(|ui| {
+            ui.label(RichText::new("Tab:").small().color(theme::WEAK));
+            for text in offered {
+                if ui.small_button(text).clicked() {
+                    taken = Some(text.clone());
+                }
+            }
+        });
+        if let Some(text) = taken {
+            self.ask(&text, semantics);
+            self.focus = true;
+        }
+    }
+
+    /// Goes through what was asked before with the arrow keys.
+    fn recall(&mut self, ui: &Ui, semantics: &SemanticMap) {
+        let pressed = |key| ui.input_mut(|i| i.consume_key(Modifiers::NONE, key));
+        let n = self.history.len();
+        let next = match self.recalled {
+            _ if n == 0 => return,
+            None if pressed(Key::ArrowUp) => Some(n - 1),
+            Some(at) if pressed(Key::ArrowUp) => Some(at.saturating_sub(1)),
+            Some(at) if pressed(Key::ArrowDown) => (at + 1 < n).then_some(at + 1),
+            _ => return,
+        };
+        let text = next.and_then(|i| self.history.get(i)).cloned().unwrap_or_default();
+        self.ask(&text, semantics);
+        self.recalled = next;
+    }
+
+    /// Chips of the questions that stay on screen.
+    pub(super) fn show_kept(&mut self, ui: &mut Ui) {
+        if self.kept.is_empty() {
+            return;
+        }
+        let mut gone = None;
+        ui.horizontal_wrapped(|ui| {
+            for (k, question) in self.kept.iter().enumerate() {
+                let [r, g, b] = COLORS[k % COLORS.len()];
+                let text = RichText::new(format!("{}  \u{00d7}", question.text)).small();
+                let chip = ui.button(text.color(egui::Color32::from_rgb(r, g, b)));
+                if chip.on_hover_text("Take this question off the screen").clicked() {
+                    gone = Some(k);
+                }
+            }
+        });
+        if let Some(k) = gone {
+            self.kept.remove(k);
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! The answer to the newest question: verdict, hits, and what can be done with the one that is shown.
+
+use egui::{RichText, Ui};
+
+use super::{Look, Questions, full_name};
+use crate::pipeline::semantics::answer::Basis;
+use crate::pipeline::semantics::localise::Answer;
+use crate::pipeline::semantics::matching::{self, MatchMode};
+use crate::pipeline::semantics::names;
+use crate::scene::{Bounds, GaussianCloud, IdentityId, SemanticMap};
+use crate::ui::theme;
+use crate::worker::Action;
+
+/// Hits that are listed.
+const LISTED: usize = 5;
+
+impl Questions {
+    pub(super) fn show_answer(
+        &mut self,
+        ui: &mut Ui,
+        semantics: &SemanticMap,
+        cloud: &GaussianCloud,
+        actions: &mut Vec<Action>,
+    ) {
+        let Some(newest) = self.live.as_ref().or(self.kept.last()).cloned() else { return };
+        let identities = &semantics.identities;
+        show_verdict(ui, &newest, semantics);
+        let shown = newest.shown(&self.look);
+        let mut chosen = None;
+        let hits = newest.answered.answer.hits().iter();
+        for hit in hits.filter(|h| h.score > 0.0).take(LISTED) {
+            ui.horizontal(|ui| {
+                let name = RichText::new(full_name(identities, hit.identity)).strong();
+                if ui.selectable_label(shown.contains(&hit.identity), name).clicked() {
+                    chosen = Some(hit.identity);
+                }
+                let pixels = match &self.maps {
+                    Some(maps) => match self.mask_of(maps, semantics, hit.identity).area() {
+                        0 => "  not in this view".to_owned(),
+                        n => format!("  {n} px"),
+                    },
+                    None => String::new(),
+                };
+                ui.weak(format!("{:.2}  +{:.2}{pixels}", hit.score, hit.margin.max(0.0)))
+                    .on_hover_text("Score from 0 to 1, how much more than the next, and size in this view");
+            });
+        }
+        if let Some(&target) = shown.first() {
+            let facts = self.facts_of(target, semantics, cloud);
+            show_target(ui, target, &facts, actions);
+        }
+        if self.open {
+            let ms = |d: std::time::Duration| d.as_secs_f64() * 1e3;
+            let basis = match newest.answered.basis {
+                Basis::Names => "by names",
+                Basis::Meaning => "by looks",
+            };
+            let times =
+                format!("answered {basis} in {:.1} ms, drawn in {:.1} ms", ms(newest.time), ms(self.paint_time));
+            ui.label(RichText::new(times).small().color(theme::WEAK));
+        }
+        if newest.answered.answer.hits().iter().all(|h| h.score <= 0.0) {
+            let known = names::completions(identities, "", 6).join(", ");
+            ui.weak(format!("Known here, for example: {known}"));
+        }
+        if let (Some(id), Some(newest)) = (chosen, self.live.as_mut().or(self.kept.last_mut())) {
+            newest.chosen = (newest.chosen != Some(id)).then_some(id);
+        }
+    }
+}
+
+/// The target in space.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Facts {
+    /// What they were counted for.
+    of: (usize, IdentityId, MatchMode, u32),
+    gaussians: usize,
+    /// In scene units, without stray Gaussians.
+    bounds: Option<Bounds>,
+}
+
+impl Questions {
+    /// Facts of the target; counted anew only when it or the match has changed.
+    fn facts_of(&mut self, target: IdentityId, semantics: &SemanticMap, cloud: &GaussianCloud) -> Facts {
+        let Look { mode, tolerance, .. } = self.look;
+        let of = (std::ptr::from_ref(semantics) as usize, target, mode, tolerance.to_bits());
+        if let Some(facts) = self.facts.as_ref().filter(|f| f.of == of) {
+            return facts.clone();
+        }
+        let inside = matching::gaussians(semantics, target, mode, tolerance);
+        let gaussians = inside.iter().filter(|g| **g).count();
+        let points = (0..cloud.len()).filter(|&i| inside.get(i) == Some(&true)).map(|i| cloud.world_position(i));
+        let facts = Facts { of, gaussians, bounds: Bounds::robust(points) };
+        self.facts = Some(facts.clone());
+        facts
+    }
+}
+
+fn show_verdict(ui: &mut Ui, newest: &super::Asked, semantics: &SemanticMap) {
+    let text = match &newest.answered.answer {
+        Answer::Found(_) => return,
+        Answer::Ambiguous(_) => "Several fit equally well:".to_owned(),
+        Answer::NotFound(_) => {
+            let unknown = names::unknown_words(&semantics.identities, &newest.text);
+            if unknown.is_empty() || newest.answered.basis == Basis::Meaning {
+                "Nothing here fits all of it.".to_owned()
+            } else {
+                format!("Nothing here is called \"{}\".", shortened(&unknown.join("\", \"")))
+            }
+        }
+    };
+    ui.colored_label(theme::WARNING, text);
+}
+
+/// A text of reasonable length.
+fn shortened(text: &str) -> String {
+    match text.char_indices().nth(80) {
+        Some((end, _)) => format!("{}\u{2026}", &text[..end]),
+        None => text.to_owned(),
+    }
+}
+
+/// Facts of the target in space, and what can be done with it.
+fn show_target(ui: &mut Ui, target: IdentityId, facts: &Facts, actions: &mut Vec<Action>) {
+    let size = facts.bounds.map(size_text).unwrap_or_default();
+    ui.label(RichText::new(format!("{} Gaussians{size}", facts.gaussians)).small().color(theme::WEAK));
+    ui.horizontal(|ui| {
+        for (action, text) in [
+            (Action::GoToTarget(target), "Go there"),
+            (Action::Isolate(Some(target)), "Isolate"),
+            (Action::Hide(target), "Hide"),
+            (Action::ExportTarget(target), "Export\u{2026}"),
+        ] {
+            if ui.small_button(text).on_hover_text(action.tooltip()).clicked() {
+                actions.push(action);
+            }
+        }
+    });
+}
+
+/// " · box 0.21 x 0.10 x 0.08", in scene units.
+fn size_text(bounds: Bounds) -> String {
+    let s = bounds.size();
+    format!("  \u{00b7}  box {:.3} \u{00d7} {:.3} \u{00d7} {:.3}", s.x, s.y, s.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_words_are_cut_between_letters() {
+        assert_eq!(shortened("ééé"), "ééé");
+        assert_eq!(shortened(&"é".repeat(200)).chars().count(), 81);
+    }
+}

@@ -1,0 +1,173 @@
+//! How answers are drawn: the settings below the question box, and the histogram of relevancy.
+
+use egui::{Color32, ComboBox, Rect, Sense, Slider, Stroke, Ui, pos2, vec2};
+
+use super::super::super::theme;
+use crate::math::colormap::Colormap;
+use crate::pipeline::semantics::codes::TOLERANCE;
+use crate::pipeline::semantics::grammar::Kind;
+use crate::pipeline::semantics::matching::MatchMode;
+
+/// What tints the picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Tint {
+    /// Only the masks of the answers.
+    #[default]
+    Masks,
+    /// Relevancy for the newest question.
+    Heat,
+    /// A colour per object.
+    Objects,
+    /// A colour per part.
+    Parts,
+    /// The codes of the pixels, blended or exact.
+    Codes,
+    /// The three main directions of the language features.
+    Features,
+}
+
+impl Tint {
+    /// All of them.
+    pub const ALL: [Self; 6] = [Self::Masks, Self::Heat, Self::Objects, Self::Parts, Self::Codes, Self::Features];
+
+    /// Its name.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Masks => "Masks",
+            Self::Heat => "Relevancy",
+            Self::Objects => "Objects",
+            Self::Parts => "Parts",
+            Self::Codes => "Codes",
+            Self::Features => "Features",
+        }
+    }
+}
+
+/// How answers are found and drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// What tints the picture.
+    pub tint: Tint,
+    /// Colours of relevancy.
+    pub colormap: Colormap,
+    /// Opacity of the tint.
+    pub opacity: f32,
+    /// Which level questions are about.
+    pub kind: Kind,
+    /// Answers whose pixels are shown at most.
+    pub top: usize,
+    /// Where the codes that are matched come from.
+    pub mode: MatchMode,
+    /// Largest difference per channel of a match.
+    pub tolerance: f32,
+    /// Relevancy that is outlined too; 0 = none.
+    pub threshold: f32,
+}
+
+impl Default for Look {
+    fn default() -> Self {
+        Self {
+            tint: Tint::Masks,
+            colormap: Colormap::Turbo,
+            opacity: 0.6,
+            kind: Kind::Auto,
+            top: 1,
+            mode: MatchMode::Exact,
+            tolerance: TOLERANCE,
+            threshold: 0.0,
+        }
+    }
+}
+
+/// The settings. `heat` is the relevancy of the view's pixels, for the histogram. Whether the
+/// question has to be answered anew.
+pub fn show(ui: &mut Ui, look: &mut Look, heat: Option<&[f32]>) -> bool {
+    let kind = look.kind;
+    egui::Grid::new("look").num_columns(2).spacing(vec2(10.0, 5.0)).show(ui, |ui| {
+        ui.weak("Ask for");
+        ui.horizontal(|ui| {
+            for (kind, text) in [(Kind::Auto, "as worded"), (Kind::Object, "objects"), (Kind::Part, "parts")] {
+                ui.selectable_value(&mut look.kind, kind, text);
+            }
+        });
+        ui.end_row();
+        ui.weak("Best answers");
+        ui.add(Slider::new(&mut look.top, 1..=8)).on_hover_text("How many of the answers are outlined at once");
+        ui.end_row();
+        ui.weak("Colour by");
+        ui.horizontal(|ui| {
+            ComboBox::from_id_salt("tint").selected_text(look.tint.text()).width(86.0).show_ui(ui, |ui| {
+                for tint in Tint::ALL {
+                    ui.selectable_value(&mut look.tint, tint, tint.text());
+                }
+            });
+            ComboBox::from_id_salt("colours").selected_text(look.colormap.text()).width(70.0).show_ui(ui, |ui| {
+                for map in Colormap::ALL {
+                    ui.selectable_value(&mut look.colormap, map, map.text());
+                }
+            });
+        });
+        ui.end_row();
+        ui.weak("Opacity");
+        ui.add(Slider::new(&mut look.opacity, 0.0..=1.0).fixed_decimals(2));
+        ui.end_row();
+        ui.weak("Mask");
+        ui.horizontal(|ui| {
+            ui.selectable_value(&mut look.mode, MatchMode::Exact, "exact")
+                .on_hover_text("Pixels of the identity with the largest weight");
+            ui.selectable_value(&mut look.mode, MatchMode::Blend, "blended")
+                .on_hover_text("Pixels whose alpha-blended code lies within the tolerance, as in the paper");
+        });
+        ui.end_row();
+        ui.weak("Tolerance");
+        let mut steps = look.tolerance * 255.0;
+        let slider = Slider::new(&mut steps, 0.0..=64.0).fixed_decimals(0).suffix(" / 255");
+        if ui.add(slider).on_hover_text("Largest difference per channel from the target's code").changed() {
+            look.tolerance = steps / 255.0;
+        }
+        ui.end_row();
+    });
+    if let Some(heat) = heat {
+        histogram(ui, look, heat);
+    }
+    look.kind != kind
+}
+
+/// Bins of the histogram.
+const BINS: usize = 64;
+
+/// How many pixels have which relevancy, with the threshold as a line to drag.
+fn histogram(ui: &mut Ui, look: &mut Look, heat: &[f32]) {
+    let mut counts = [0_u32; BINS];
+    heat.iter().for_each(|h| counts[((h * BINS as f32) as usize).min(BINS - 1)] += 1);
+    ui.horizontal(|ui| {
+        ui.weak("Relevancy of the pixels");
+        if look.threshold > 0.0 {
+            let above = heat.iter().filter(|h| **h >= look.threshold).count();
+            ui.weak(format!("· {above} px from {:.2} on, outlined in white", look.threshold));
+        }
+    });
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 54.0), Sense::click_and_drag());
+    let response = response.on_hover_text("Drag: outline all pixels from this relevancy on. Double-click: none");
+    let painter = ui.painter_at(rect);
+    painter.rect_filled(rect, 3.0, theme::CANVAS);
+    // Logarithmic: most pixels have nothing to do with a question.
+    let height = |n: u32| (1.0 + n as f32).ln() / (1.0 + heat.len() as f32).ln() * rect.height();
+    let width = rect.width() / BINS as f32;
+    for (i, &n) in counts.iter().enumerate() {
+        let [r, g, b] = look.colormap.color((i as f32 + 0.5) / BINS as f32);
+        let left = rect.left() + i as f32 * width;
+        let bar = Rect::from_min_max(pos2(left, rect.bottom() - height(n)), pos2(left + width - 1.0, rect.bottom()));
+        painter.rect_filled(bar, 0.0, Color32::from_rgb(r, g, b));
+    }
+    if let Some(pos) = response.interact_pointer_pos() {
+        look.threshold = ((pos.x - rect.left()) / rect.width()).clamp(0.0, 1.0);
+    }
+    if response.double_clicked() {
+        look.threshold = 0.0;
+    }
+    if look.threshold > 0.0 {
+        let x = rect.left() + look.threshold * rect.width();
+        painter.vline(x, rect.y_range(), Stroke::new(1.5, Color32::WHITE));
+    }
+}

@@ -1,0 +1,318 @@
+//! Questions asked of the scene: the box to type them into, their answers, and what they draw over
+//! the picture.
+//!
+//! What the view's pixels belong to is drawn once, when the eye rests; every question then only
+//! reads it, while it is still being typed.
+
+mod bar;
+mod card;
+mod look;
+mod overlay;
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use egui::{Align2, Area, Color32, Id, Order, Rect, TextureHandle, TextureOptions, Ui, vec2};
+
+pub use self::look::{Look, Tint};
+use super::super::theme;
+use crate::pipeline::semantics::answer::{Answered, answer};
+use crate::pipeline::semantics::grammar::Phrase;
+use crate::pipeline::semantics::matching::{self, MatchMode};
+use crate::scene::{GaussianCloud, Identities, IdentityId, Mask, NOBODY, SemanticMap};
+use crate::worker::{Action, ViewMaps};
+
+/// Colours of questions, in turn.
+const COLORS: [[u8; 3]; 6] =
+    [[255, 179, 0], [0, 200, 215], [233, 84, 150], [128, 215, 70], [160, 130, 255], [255, 120, 70]];
+/// Questions that are kept on screen.
+const MOST: usize = COLORS.len();
+
+/// A question with its answer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Asked {
+    /// As it was typed.
+    pub text: String,
+    /// What it comes to.
+    pub answered: Answered,
+    /// A hit that was chosen among the others; else the best are shown.
+    chosen: Option<IdentityId>,
+    /// How long answering took.
+    time: Duration,
+}
+
+impl Asked {
+    /// The identities that are shown.
+    pub fn shown(&self, look: &Look) -> Vec<IdentityId> {
+        self.chosen.map_or_else(|| self.answered.chosen(look.top), |id| vec![id])
+    }
+}
+
+/// What the overlay was painted for.
+#[derive(Clone, PartialEq)]
+struct Painted {
+    map: usize,
+    semantics: usize,
+    shown: Vec<Vec<IdentityId>>,
+    newest: Option<String>,
+    look: Look,
+}
+
+/// The questions on screen.
+#[derive(Default)]
+pub struct Questions {
+    typed: String,
+    /// Set while the box is to take the keyboard.
+    focus: bool,
+    /// Place in the history while going through it.
+    recalled: Option<usize>,
+    /// Whether the settings are open.
+    open: bool,
+    look: Look,
+    live: Option<Asked>,
+    kept: Vec<Asked>,
+    /// What was asked, oldest first.
+    history: Vec<String>,
+    maps: Option<Arc<ViewMaps>>,
+    /// Relevancy of the pixels, for the histogram.
+    heat: Vec<f32>,
+    texture: Option<TextureHandle>,
+    painted: Option<Painted>,
+    /// Of the target that is shown.
+    facts: Option<card::Facts>,
+    /// How long masks and overlay took.
+    paint_time: Duration,
+}
+
+impl Questions {
+    /// All questions, the one being typed last.
+    pub fn all(&self) -> impl Iterator<Item = &Asked> {
+        self.kept.iter().chain(&self.live)
+    }
+
+    /// What the present view's pixels belong to, once that is drawn.
+    pub fn maps(&self) -> Option<&Arc<ViewMaps>> {
+        self.maps.as_ref()
+    }
+
+    /// Whether blended codes of the view are wanted.
+    pub fn wants_codes(&self) -> bool {
+        self.look.mode == MatchMode::Blend
+    }
+
+    /// Puts the cursor into the box.
+    pub fn start_typing(&mut self) {
+        self.focus = true;
+    }
+
+    /// Asks as if it had been typed.
+    pub fn ask(&mut self, text: &str, semantics: &SemanticMap) {
+        self.typed = text.to_owned();
+        self.live = self.asked(text, semantics);
+    }
+
+    /// Answers all questions anew: identities have changed.
+    pub fn ask_again(&mut self, semantics: &SemanticMap) {
+        let again = |q: &Asked| self.asked(&q.text, semantics);
+        let (kept, live) = (self.kept.iter().filter_map(again).collect(), self.live.as_ref().and_then(again));
+        (self.kept, self.live) = (kept, live);
+    }
+
+    /// Forgets questions and answers: another scene.
+    pub fn clear(&mut self) {
+        let history = std::mem::take(&mut self.history);
+        *self = Self { look: self.look, open: self.open, history, ..Self::default() };
+    }
+
+    /// Takes over what the present view's pixels belong to; `None` while it is not known.
+    pub fn set_maps(&mut self, maps: Option<Arc<ViewMaps>>) {
+        self.maps = maps;
+    }
+
+    fn asked(&self, text: &str, semantics: &SemanticMap) -> Option<Asked> {
+        let start = Instant::now();
+        let phrase = Phrase::parse(text)?;
+        let answered = answer(&semantics.identities, &phrase, self.look.kind, None);
+        Some(Asked { text: text.trim().to_owned(), answered, chosen: None, time: start.elapsed() })
+    }
+
+    /// Keeps the question being typed on screen, and makes room for the next.
+    fn keep(&mut self) {
+        let Some(live) = self.live.take() else { return };
+        self.kept.retain(|q| q.text != live.text);
+        if self.kept.len() == MOST {
+            self.kept.remove(0);
+        }
+        self.history.retain(|t| *t != live.text);
+        self.history.push(live.text.clone());
+        self.recalled = None;
+        self.kept.push(live);
+        self.typed.clear();
+    }
+
+    /// The target's pixels in the present view.
+    fn mask_of(&self, maps: &ViewMaps, semantics: &SemanticMap, target: IdentityId) -> Mask {
+        match (&maps.codes, self.look.mode) {
+            (Some(codes), MatchMode::Blend) => {
+                matching::blend(codes, &semantics.identities, target, self.look.tolerance)
+            }
+            _ => matching::exact(&maps.identities, &semantics.identities, target, self.look.tolerance),
+        }
+    }
+
+    /// Masks and tints over the picture in `rect`.
+    pub fn paint(&mut self, ui: &Ui, rect: Rect, semantics: &Arc<SemanticMap>) {
+        let Some(maps) = self.maps.clone() else { return };
+        let shown: Vec<Vec<IdentityId>> = self.all().map(|q| q.shown(&self.look)).collect();
+        let newest = self.all().last().map(|q| q.text.clone());
+        let nothing = shown.iter().all(Vec::is_empty) && matches!(self.look.tint, Tint::Masks | Tint::Heat);
+        if nothing && (newest.is_none() || self.look.tint == Tint::Masks) && self.look.threshold <= 0.0 {
+            return;
+        }
+        let painted = Painted {
+            map: Arc::as_ptr(&maps) as usize,
+            semantics: Arc::as_ptr(semantics) as usize,
+            shown,
+            newest,
+            look: self.look,
+        };
+        if self.painted.as_ref() != Some(&painted) {
+            let start = Instant::now();
+            let image = self.image(&maps, &painted.shown, semantics);
+            match &mut self.texture {
+                Some(texture) => texture.set(image, TextureOptions::LINEAR),
+                None => self.texture = Some(ui.ctx().load_texture("masks", image, TextureOptions::LINEAR)),
+            }
+            self.paint_time = start.elapsed();
+            self.painted = Some(painted);
+        }
+        if let Some(texture) = &self.texture {
+            let uv = Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
+            ui.painter().image(texture.id(), rect, uv, Color32::WHITE);
+        }
+    }
+
+    fn image(&mut self, maps: &ViewMaps, shown: &[Vec<IdentityId>], semantics: &SemanticMap) -> egui::ColorImage {
+        let union = |ids: &Vec<IdentityId>| {
+            let mut mask = Mask::empty(maps.identities.width_px, maps.identities.height_px);
+            ids.iter().for_each(|id| mask.add(&self.mask_of(maps, semantics, *id)));
+            mask
+        };
+        let masks: Vec<([u8; 3], Mask)> =
+            shown.iter().enumerate().map(|(k, ids)| (COLORS[k % COLORS.len()], union(ids))).collect();
+        let newest = self.all().last();
+        let relevancy = newest.map_or_else(Vec::new, |q| q.answered.relevancy.clone());
+        let features = match (&semantics.language, self.look.tint) {
+            (Some(language), Tint::Features) => {
+                let of = |f: &crate::scene::ViewFeatures| f.deviated.first().cloned();
+                let vectors: Vec<Option<Vec<f32>>> = std::iter::once(None).chain(language.of.iter().map(of)).collect();
+                overlay::main_directions(&vectors.iter().map(Option::as_deref).collect::<Vec<_>>())
+            }
+            _ => Vec::new(),
+        };
+        self.heat = newest.map_or_else(Vec::new, |q| q.answered.heat(&maps.identities));
+        let layers = overlay::Layers {
+            map: &maps.identities,
+            codes: maps.codes.as_ref(),
+            identities: &semantics.identities,
+            masks: &masks,
+            relevancy: &relevancy,
+            features: &features,
+            look: self.look,
+        };
+        layers.paint()
+    }
+
+    /// The box, the answers, and the questions that are kept.
+    pub fn show(
+        &mut self,
+        ui: &Ui,
+        rect: Rect,
+        semantics: &SemanticMap,
+        cloud: &GaussianCloud,
+        actions: &mut Vec<Action>,
+    ) {
+        let at = Align2::CENTER_TOP.pos_in_rect(&rect.shrink(12.0)) + vec2(0.0, 46.0);
+        let area = Area::new(Id::unique("question")).order(Order::Middle).pivot(Align2::CENTER_TOP).fixed_pos(at);
+        area.constrain_to(rect).show(ui.ctx(), |ui| {
+            theme::overlay().show(ui, |ui| {
+                ui.set_width(430.0_f32.min(rect.width() - 40.0));
+                self.show_bar(ui, semantics);
+                if self.open {
+                    let heat = (!self.heat.is_empty()).then_some(self.heat.as_slice());
+                    if look::show(ui, &mut self.look, heat) {
+                        self.ask_again(semantics);
+                    }
+                }
+                self.show_answer(ui, semantics, cloud, actions);
+                self.show_kept(ui);
+            });
+        });
+        self.show_name_under_cursor(ui, rect, &semantics.identities);
+    }
+
+    fn show_name_under_cursor(&self, ui: &Ui, rect: Rect, identities: &Identities) {
+        let Some(maps) = &self.maps else { return };
+        let map = &maps.identities;
+        let Some(pos) = ui.input(|i| i.pointer.hover_pos()).filter(|p| rect.contains(*p)) else { return };
+        let x = ((pos.x - rect.left()) / rect.width() * map.width_px as f32) as usize;
+        let y = ((pos.y - rect.top()) / rect.height() * map.height_px as f32) as usize;
+        let id = map.identity.get(y * map.width_px + x.min(map.width_px - 1)).copied().unwrap_or(NOBODY);
+        if identities.get(id).is_none() {
+            return;
+        }
+        let at = Align2::CENTER_BOTTOM.pos_in_rect(&rect.shrink(12.0));
+        let area =
+            Area::new(Id::unique("under cursor")).order(Order::Middle).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
+        area.interactable(false).show(ui.ctx(), |ui| {
+            theme::overlay().show(ui, |ui| ui.label(full_name(identities, id)));
+        });
+    }
+}
+
+/// The name of an identity with those of its wholes: "button a of the red controller".
+pub fn full_name(identities: &Identities, id: IdentityId) -> String {
+    identities.line(id).map(|i| identities.name(i)).collect::<Vec<_>>().join(" of the ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Level;
+
+    fn semantics() -> SemanticMap {
+        let mut identities = Identities::default();
+        let lamp = identities.add(Level::Object, NOBODY, vec!["lamp".into()]);
+        identities.add(Level::Part, lamp, vec!["shade".into()]);
+        SemanticMap { identities, ..SemanticMap::default() }
+    }
+
+    #[test]
+    fn a_question_is_kept_and_answers_follow_the_names() {
+        let (mut semantics, mut questions) = (semantics(), Questions::default());
+        questions.ask("the lamp's shade", &semantics);
+        questions.keep();
+        questions.ask("lamp", &semantics);
+        let shown = |q: &Questions| q.all().map(|a| a.shown(&q.look)).collect::<Vec<_>>();
+        assert_eq!(shown(&questions), [vec![2], vec![1]]);
+        questions.ask("giraffe", &semantics);
+        assert!(shown(&questions)[1].is_empty());
+        semantics.identities.get_mut(2).expect("there").names = vec!["giraffe".into()];
+        questions.ask_again(&semantics);
+        assert_eq!(shown(&questions), [Vec::new(), vec![2]]);
+        questions.ask("  ", &semantics);
+        assert!(questions.live.is_none());
+    }
+
+    #[test]
+    fn history_is_kept_once_each() {
+        let (semantics, mut questions) = (semantics(), Questions::default());
+        for text in ["lamp", "shade", "lamp"] {
+            questions.ask(text, &semantics);
+            questions.keep();
+        }
+        assert_eq!(questions.history, ["shade", "lamp"]);
+        questions.clear();
+        assert_eq!((questions.history.len(), questions.kept.len()), (2, 0));
+    }
+}

@@ -1,0 +1,203 @@
+//! The picture that lies over the view: outlines and fills of masks, and tints.
+
+use egui::{Color32, ColorImage};
+
+use super::look::{Look, Tint};
+use crate::pipeline::semantics::code_map::CodeMap;
+use crate::pipeline::semantics::matching::MatchMode;
+use crate::pipeline::semantics::view_map::ViewMap;
+use crate::scene::{Identities, IdentityId, Level, Mask};
+
+/// Opacity of a mask's fill.
+const FILL: f32 = 0.35;
+
+/// What is drawn over the view.
+pub struct Layers<'a> {
+    /// What the pixels belong to.
+    pub map: &'a ViewMap,
+    /// Their blended codes, where they are drawn.
+    pub codes: Option<&'a CodeMap>,
+    /// Objects and parts.
+    pub identities: &'a Identities,
+    /// Masks of the answers, with their colours; later ones on top.
+    pub masks: &'a [([u8; 3], Mask)],
+    /// Relevancy of each identity by number.
+    pub relevancy: &'a [f32],
+    /// Colours of the language features of each identity by number.
+    pub features: &'a [[u8; 3]],
+    /// Settings.
+    pub look: Look,
+}
+
+impl Layers<'_> {
+    /// All layers in one picture of the view's size.
+    pub fn paint(&self) -> ColorImage {
+        let (w, h) = (self.map.width_px, self.map.height_px);
+        let tints: Vec<Option<[u8; 3]>> = (0..=self.identities.len() as IdentityId).map(|id| self.tint(id)).collect();
+        let hot: Option<Mask> = (self.look.threshold > 0.0)
+            .then(|| Mask::from_fn(w, h, |i| self.relevancy_of(self.map.identity[i]) >= self.look.threshold));
+        let pixel = |i: usize| {
+            if hot.as_ref().is_some_and(|m| is_edge(m, i)) {
+                return Color32::WHITE;
+            }
+            let mask = self.masks.iter().rev().find(|(_, mask)| mask.contains(i));
+            match mask {
+                Some(([r, g, b], mask)) if is_edge(mask, i) => Color32::from_rgb(*r, *g, *b),
+                Some((color, _)) if self.look.tint == Tint::Masks => with_alpha(*color, FILL),
+                _ => {
+                    let blended = self.blended(i);
+                    let tint = blended.or_else(|| tints.get(self.map.identity[i] as usize).copied().flatten());
+                    tint.map_or(Color32::TRANSPARENT, |c| with_alpha(c, self.look.opacity))
+                }
+            }
+        };
+        ColorImage::new([w, h], (0..w * h).map(pixel).collect())
+    }
+
+    fn relevancy_of(&self, id: IdentityId) -> f32 {
+        self.relevancy.get(id as usize).copied().unwrap_or(0.0)
+    }
+
+    /// Colour of a pixel in the codes view while codes are blended.
+    fn blended(&self, i: usize) -> Option<[u8; 3]> {
+        let codes = self.codes.filter(|_| self.look.tint == Tint::Codes && self.look.mode == MatchMode::Blend)?;
+        let of = |level: Level| codes.level(level).iter().map(move |plane| plane.get(i).copied().unwrap_or(f32::NAN));
+        // A part where there is one, else the object.
+        let part: Vec<f32> = of(Level::Part).collect();
+        let is_part = part.iter().any(|c| (c - 0.5).abs() > 0.1);
+        let shown: Vec<f32> = if is_part { part } else { of(Level::Object).collect() };
+        shown.iter().all(|c| c.is_finite()).then(|| std::array::from_fn(|c| (shown[c].clamp(0.0, 1.0) * 255.0) as u8))
+    }
+
+    /// Colour of what has this identity; `None` leaves the picture as it is.
+    fn tint(&self, id: IdentityId) -> Option<[u8; 3]> {
+        let code = |id: IdentityId| self.identities.get(id).map(|i| i.code.map(|c| (c * 255.0) as u8));
+        match self.look.tint {
+            Tint::Masks => None,
+            Tint::Heat => Some(self.look.colormap.color(self.relevancy_of(id))),
+            Tint::Objects => code(self.identities.object_of(id)),
+            Tint::Parts => code(id).filter(|_| self.identities.get(id).is_some_and(|i| i.level == Level::Part)),
+            Tint::Codes => code(id),
+            Tint::Features => self.features.get(id as usize).copied().filter(|_| self.identities.get(id).is_some()),
+        }
+    }
+}
+
+fn with_alpha([r, g, b]: [u8; 3], alpha: f32) -> Color32 {
+    Color32::from_rgba_unmultiplied(r, g, b, (alpha * 255.0) as u8)
+}
+
+/// Whether a pixel of the mask has a neighbour outside of it.
+fn is_edge(mask: &Mask, i: usize) -> bool {
+    let (w, h) = (mask.width_px(), mask.height_px());
+    let (x, y) = (i % w, i / w);
+    let outside = |x: usize, y: usize| !mask.contains(y * w + x);
+    mask.contains(i)
+        && ((x > 0 && outside(x - 1, y))
+            || (x + 1 < w && outside(x + 1, y))
+            || (y > 0 && outside(x, y - 1))
+            || (y + 1 < h && outside(x, y + 1)))
+}
+
+/// Colours of vectors by their three main directions (principal components), by number from 0; grey
+/// for those without one.
+pub fn main_directions(vectors: &[Option<&[f32]>]) -> Vec<[u8; 3]> {
+    let some: Vec<&[f32]> = vectors.iter().flatten().copied().collect();
+    let Some(dimension) = some.first().map(|v| v.len()) else { return vec![[128; 3]; vectors.len()] };
+    let mean: Vec<f32> = (0..dimension).map(|c| some.iter().map(|v| v[c]).sum::<f32>() / some.len() as f32).collect();
+    let mut centered: Vec<Vec<f32>> = some.iter().map(|v| v.iter().zip(&mean).map(|(a, m)| a - m).collect()).collect();
+    let mut colors = vec![[128_u8; 3]; some.len()];
+    for channel in 0..3 {
+        let direction = main_direction(&centered);
+        let along: Vec<f32> = centered.iter().map(|v| dot(v, &direction)).collect();
+        let widest = along.iter().fold(1e-6_f32, |m, a| m.max(a.abs()));
+        for ((color, v), a) in colors.iter_mut().zip(&mut centered).zip(&along) {
+            color[channel] = (127.5 + 110.0 * a / widest) as u8;
+            v.iter_mut().zip(&direction).for_each(|(x, d)| *x -= a * d);
+        }
+    }
+    let mut next = colors.into_iter();
+    vectors.iter().map(|v| v.and_then(|_| next.next()).unwrap_or([128; 3])).collect()
+}
+
+/// Power iteration on the covariance, from the vector that differs most.
+fn main_direction(centered: &[Vec<f32>]) -> Vec<f32> {
+    let longest = centered.iter().max_by(|a, b| dot(a, a).total_cmp(&dot(b, b)));
+    let mut direction = longest.cloned().unwrap_or_default();
+    for _ in 0..30 {
+        let mut next = vec![0.0; direction.len()];
+        for v in centered {
+            let along = dot(v, &direction);
+            next.iter_mut().zip(v).for_each(|(n, x)| *n += along * x);
+        }
+        match crate::math::vector::unit(&next) {
+            Some(unit) => direction = unit,
+            None => return vec![0.0; direction.len()],
+        }
+    }
+    direction
+}
+
+fn dot(a: &[f32], b: &[f32]) -> f32 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::colormap::Colormap;
+    use crate::scene::NOBODY;
+
+    fn scene() -> (Identities, ViewMap) {
+        let mut all = Identities::default();
+        let lamp = all.add(Level::Object, NOBODY, vec!["lamp".into()]);
+        all.add(Level::Part, lamp, vec!["shade".into()]);
+        let identity = [[0, 0, 2, 2, 2, 1]; 3].concat();
+        (all, ViewMap { width_px: 6, height_px: 3, identity, share: vec![1.0; 18], alpha: vec![1.0; 18] })
+    }
+
+    fn paint(look: Look) -> ColorImage {
+        let (identities, map) = scene();
+        let masks = [([255, 179, 0], map.mask(&identities, 2))];
+        let relevancy = [0.0, 0.5, 1.0];
+        let layers = Layers {
+            map: &map,
+            codes: None,
+            identities: &identities,
+            masks: &masks,
+            relevancy: &relevancy,
+            features: &[],
+            look,
+        };
+        layers.paint()
+    }
+
+    #[test]
+    fn masks_have_an_outline_and_a_fill() {
+        let image = paint(Look::default());
+        assert_eq!(image.pixels[6], Color32::TRANSPARENT);
+        assert_eq!(image.pixels[8], Color32::from_rgb(255, 179, 0), "the outline");
+        assert_eq!(image.pixels[9], Color32::from_rgba_unmultiplied(255, 179, 0, 89), "the fill");
+    }
+
+    #[test]
+    fn heat_and_threshold_follow_relevancy() {
+        let image = paint(Look { tint: Tint::Heat, opacity: 1.0, ..Look::default() });
+        let [r, g, b] = Colormap::Turbo.color(1.0);
+        assert_eq!(image.pixels[9], Color32::from_rgb(r, g, b));
+        let image = paint(Look { threshold: 0.4, ..Look::default() });
+        assert_eq!(image.pixels[8], Color32::WHITE, "where it begins");
+        assert_eq!(image.pixels[6], Color32::TRANSPARENT);
+    }
+
+    #[test]
+    fn alike_features_have_alike_colours() {
+        let v: [&[f32]; 4] = [&[1.0, 0.0, 0.0], &[0.98, 0.05, 0.0], &[0.0, 1.0, 0.0], &[0.0, 0.0, 1.0]];
+        let colors = main_directions(&[None, Some(v[0]), Some(v[1]), Some(v[2]), Some(v[3])]);
+        let far = |a: [u8; 3], b: [u8; 3]| a.iter().zip(b).map(|(a, b)| a.abs_diff(b) as u32).sum::<u32>();
+        assert_eq!(colors[0], [128; 3]);
+        assert!(far(colors[1], colors[2]) * 4 < far(colors[1], colors[3]), "{colors:?}");
+        assert_eq!(main_directions(&[None, None]), [[128; 3]; 2]);
+        assert_eq!(main_directions(&[Some(v[0]), Some(v[0])]), [[127; 3]; 2], "nothing to tell apart");
+    }
+}

@@ -1,0 +1,130 @@
+//! Which identities are drawn: hidden ones left out, or one alone.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use crate::scene::{GaussianCloud, IdentityId, LanguageFeatures, SemanticMap};
+
+/// What of a scene is drawn.
+#[derive(Clone, Debug, Default)]
+pub struct Visibility {
+    hidden: BTreeSet<IdentityId>,
+    only: Option<IdentityId>,
+    /// The Gaussians that are left, with what they were made from.
+    left: Option<Left>,
+}
+
+#[derive(Clone, Debug)]
+struct Left {
+    of: (usize, usize),
+    cloud: Arc<GaussianCloud>,
+    semantics: Arc<SemanticMap>,
+}
+
+impl Visibility {
+    /// Whether anything is left out.
+    pub fn is_partial(&self) -> bool {
+        self.only.is_some() || !self.hidden.is_empty()
+    }
+
+    /// Whether an identity was hidden itself.
+    pub fn is_hidden(&self, id: IdentityId) -> bool {
+        self.hidden.contains(&id)
+    }
+
+    /// Hides an identity, or shows it again.
+    pub fn toggle(&mut self, id: IdentityId) {
+        if !self.hidden.remove(&id) {
+            self.hidden.insert(id);
+        }
+        self.left = None;
+    }
+
+    /// Shows one identity alone; `None` shows all.
+    pub fn isolate(&mut self, only: Option<IdentityId>) {
+        *self = Self { only, ..Self::default() };
+    }
+
+    /// The Gaussians to draw and what they belong to.
+    pub fn apply(
+        &mut self,
+        cloud: &Arc<GaussianCloud>,
+        semantics: &Arc<SemanticMap>,
+    ) -> (Arc<GaussianCloud>, Arc<SemanticMap>) {
+        if !self.is_partial() || semantics.of.len() != cloud.len() {
+            return (Arc::clone(cloud), Arc::clone(semantics));
+        }
+        let of = (Arc::as_ptr(cloud) as usize, Arc::as_ptr(semantics) as usize);
+        if self.left.as_ref().is_none_or(|l| l.of != of) {
+            let shown = self.shown(semantics);
+            let kept: Vec<usize> =
+                (0..cloud.len()).filter(|&i| shown.get(semantics.of[i] as usize).copied().unwrap_or(true)).collect();
+            let pick = |i: &usize| semantics.of[*i];
+            let left = SemanticMap {
+                identities: semantics.identities.clone(),
+                of: kept.iter().map(pick).collect(),
+                margin: kept.iter().map(|i| semantics.margin[*i]).collect(),
+                codes: kept.iter().map(|i| semantics.codes[*i]).collect(),
+                language: None::<LanguageFeatures>,
+                seeds: Vec::new(),
+            };
+            self.left = Some(Left { of, cloud: Arc::new(cloud.select(&kept)), semantics: Arc::new(left) });
+        }
+        match &self.left {
+            Some(l) => (Arc::clone(&l.cloud), Arc::clone(&l.semantics)),
+            None => (Arc::clone(cloud), Arc::clone(semantics)),
+        }
+    }
+
+    /// For each number from 0, whether it is drawn.
+    fn shown(&self, semantics: &SemanticMap) -> Vec<bool> {
+        let all = &semantics.identities;
+        let mut shown = match self.only {
+            Some(id) => all.within(id),
+            None => vec![true; all.len() + 1],
+        };
+        for &id in &self.hidden {
+            shown.iter_mut().zip(all.within(id)).for_each(|(s, inside)| *s &= !inside);
+        }
+        shown
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Identities, Level, NOBODY};
+
+    #[test]
+    fn what_is_hidden_is_not_drawn() {
+        let mut all = Identities::default();
+        let doll = all.add(Level::Object, NOBODY, vec![]);
+        let eye = all.add(Level::Part, doll, vec![]);
+        let cat = all.add(Level::Object, NOBODY, vec![]);
+        let map = Arc::new(SemanticMap::of_identities(all, vec![doll, eye, cat, NOBODY], vec![1.0; 4], vec![]));
+        let n = 4;
+        let cloud = Arc::new(GaussianCloud {
+            positions: (0..n).map(|i| [i as f32, 0.0, 0.0]).collect(),
+            log_scales: vec![[0.0; 3]; n],
+            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
+            opacity_logits: vec![0.0; n],
+            sh: vec![[0.0; 3]; n],
+            ..GaussianCloud::default()
+        });
+        let mut v = Visibility::default();
+        let xs = |v: &mut Visibility| {
+            let (cloud, map) = v.apply(&cloud, &map);
+            assert_eq!(cloud.len(), map.of.len());
+            cloud.positions.iter().map(|p| p[0] as i32).collect::<Vec<_>>()
+        };
+        assert_eq!(xs(&mut v), [0, 1, 2, 3]);
+        v.toggle(eye);
+        assert_eq!((xs(&mut v), v.is_hidden(eye)), (vec![0, 2, 3], true));
+        v.toggle(doll);
+        assert_eq!(xs(&mut v), [2, 3]);
+        v.isolate(Some(doll));
+        assert_eq!(xs(&mut v), [0, 1]);
+        v.isolate(None);
+        assert_eq!((xs(&mut v).len(), v.is_partial()), (4, false));
+    }
+}
