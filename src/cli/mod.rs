@@ -18,6 +18,7 @@ mod preprocess;
 mod progress;
 mod query;
 mod render;
+mod report;
 mod synth;
 mod train;
 mod view;
@@ -76,6 +77,7 @@ enum Command {
     Demo(demo::Args),
     Export(export::Args),
     Bench(bench::Args),
+    Report(report::Args),
 }
 
 /// Opens the window, does one action if one is given, and returns when the window is closed.
@@ -116,6 +118,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Demo(_) => window(Some(Action::TryDemo), open_window),
         Command::Export(args) => export::run(args),
         Command::Bench(args) => bench::run(args, quiet),
+        Command::Report(args) => report::run(args, quiet),
     }
 }
 

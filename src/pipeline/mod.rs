@@ -7,6 +7,7 @@ pub mod demo_scene;
 pub mod evaluate;
 pub mod metrics;
 pub mod observer;
+pub mod report;
 pub mod semantics;
 pub mod synth;
 pub mod train;

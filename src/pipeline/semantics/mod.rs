@@ -22,5 +22,6 @@ pub mod relevancy;
 pub mod score;
 pub mod segmenter;
 pub mod tracker;
+pub mod train_codes;
 pub mod view_map;
 pub mod votes;

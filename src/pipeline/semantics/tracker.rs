@@ -174,7 +174,7 @@ impl Tracker<'_> {
             });
         }
         let camera = self.photos[photo].camera.limited_to(self.options.max_side_px);
-        let labels = labels(&found, &ids, camera.width_px as usize * camera.height_px as usize);
+        let labels = labels_of(&found, &ids, camera.width_px as usize * camera.height_px as usize);
         self.votes
             .add_view(&mut self.renderer, self.cloud, &camera, self.settings, &labels)
             .map_err(|e| TrackError::Render(self.photos[photo].name.clone(), e))?;
@@ -221,7 +221,7 @@ impl Tracker<'_> {
 }
 
 /// The innermost identity of each pixel of a segmented photo; `NOBODY` where no mask is.
-fn labels(found: &[FoundMask], ids: &[IdentityId], pixels: usize) -> Vec<IdentityId> {
+pub fn labels_of(found: &[FoundMask], ids: &[IdentityId], pixels: usize) -> Vec<IdentityId> {
     let mut labels = vec![NOBODY; pixels];
     // Wholes come before pieces, so the innermost is painted last.
     for (mask, id) in found.iter().zip(ids) {
@@ -260,7 +260,7 @@ mod tests {
         let mask = |from: usize, to: usize| Mask::from_fn(10, 1, |i| (from..to).contains(&i));
         let found = |level, mask| FoundMask { level, parent: None, name: None, mask };
         let all = [found(Level::Object, mask(1, 8)), found(Level::Part, mask(2, 5))];
-        assert_eq!(labels(&all, &[4, 9], 10), [0, 4, 9, 9, 9, 4, 4, 4, 0, 0]);
+        assert_eq!(labels_of(&all, &[4, 9], 10), [0, 4, 9, 9, 9, 4, 4, 4, 0, 0]);
     }
 
     #[test]

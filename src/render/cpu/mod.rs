@@ -327,7 +327,6 @@ impl<R: Real> Renderer<R> {
             screen: vec![R::ZERO; n],
             radius_px: vec![0.0; n],
         };
-        let Some(record_stride) = self.frame.as_ref().map(|f| MOMENTS + f.channels[1]) else { return out };
         for i in 0..n {
             let Some(g) = self.gaussian_gradient(&cloud.gaussian(i), i) else { continue };
             out.positions[i] = g.position;
@@ -339,12 +338,18 @@ impl<R: Real> Renderer<R> {
             for (k, sh) in out.sh[i * stride..(i + 1) * stride].iter_mut().enumerate() {
                 *sh = g.color.map(|c| c * g.basis[k]);
             }
-            if let Some((_, record)) = self.record(i, record_stride) {
-                let own = &record[MOMENTS + 3..MOMENTS + 3 + features.channels];
-                out.features[i * features.channels..(i + 1) * features.channels].copy_from_slice(own);
-            }
+            self.feature_gradient(i, &mut out.features[i * features.channels..(i + 1) * features.channels]);
         }
         out
+    }
+
+    /// Gradient with respect to the extra channels of Gaussian `i`, after [`Self::backward_tiles`].
+    /// Leaves `out`, one value per channel, alone if the Gaussian was not drawn, and says whether it was.
+    pub fn feature_gradient(&self, i: usize, out: &mut [R]) -> bool {
+        let Some(stride) = self.frame.as_ref().map(|f| MOMENTS + f.channels[1]) else { return false };
+        let Some((_, record)) = self.record(i, stride) else { return false };
+        out.copy_from_slice(&record[MOMENTS + 3..MOMENTS + 3 + out.len()]);
+        true
     }
 }
 

@@ -107,10 +107,12 @@ pub fn main_directions(vectors: &[Option<&[f32]>]) -> Vec<[u8; 3]> {
     let mean: Vec<f32> = (0..dimension).map(|c| some.iter().map(|v| v[c]).sum::<f32>() / some.len() as f32).collect();
     let mut centered: Vec<Vec<f32>> = some.iter().map(|v| v.iter().zip(&mean).map(|(a, m)| a - m).collect()).collect();
     let mut colors = vec![[128_u8; 3]; some.len()];
+    // One scale for all directions, or the least of them would shout.
+    let mut widest = 1e-6_f32;
     for channel in 0..3 {
         let direction = main_direction(&centered);
         let along: Vec<f32> = centered.iter().map(|v| dot(v, &direction)).collect();
-        let widest = along.iter().fold(1e-6_f32, |m, a| m.max(a.abs()));
+        widest = along.iter().fold(widest, |m, a| m.max(a.abs()));
         for ((color, v), a) in colors.iter_mut().zip(&mut centered).zip(&along) {
             color[channel] = (127.5 + 110.0 * a / widest) as u8;
             v.iter_mut().zip(&direction).for_each(|(x, d)| *x -= a * d);

@@ -1,0 +1,221 @@
+//! The paper's lifting: codes of the Gaussians, both levels in one pass, trained until the rendered
+//! codes look like the masks' (L1 + 0.2 D-SSIM). The Gaussians themselves do not change.
+
+use std::time::Instant;
+
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_pcg::Pcg64Mcg;
+use rayon::prelude::*;
+
+use super::votes::UNKNOWN;
+use crate::pipeline::observer::{Observer, Progress, Signal};
+use crate::pipeline::train::trainer::LAMBDA;
+use crate::render::cpu::Renderer;
+use crate::render::cpu::adam::AdamStep;
+use crate::render::cpu::ssim::PhotoLoss;
+use crate::render::{Features, FrameGradient, RenderError, RenderSettings};
+use crate::scene::semantic_map::{BACKGROUND_CODE, CODE_CHANNELS};
+use crate::scene::{Camera, GaussianCloud, Identities, IdentityId};
+
+/// Learning rate at the first and at the last step, in units of code space.
+const RATES: [f64; 2] = [0.02, 0.002];
+
+/// The masks of one view.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CodeView {
+    /// From where.
+    pub camera: Camera,
+    /// Innermost identity of each pixel, row-major; `UNKNOWN` says nothing.
+    pub labels: Vec<IdentityId>,
+}
+
+/// Settings of a training of codes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CodeTraining {
+    /// Optimiser steps.
+    pub steps: u64,
+    /// Seed of the order of the views.
+    pub seed: u64,
+}
+
+/// Trains `codes`, one set per Gaussian of `cloud`, from where they stand. Returns the loss of the
+/// last tenth of the steps. The observer may stop it; codes are then those of the last step.
+///
+/// # Errors
+/// If a camera is not usable.
+pub fn train_codes(
+    cloud: &GaussianCloud,
+    codes: &mut [[f32; CODE_CHANNELS]],
+    views: &[CodeView],
+    identities: &Identities,
+    settings: &RenderSettings,
+    training: CodeTraining,
+    observer: &mut dyn Observer,
+) -> Result<f64, RenderError> {
+    assert_eq!(codes.len(), cloud.len(), "one set of codes per Gaussian");
+    let settings = RenderSettings { sh_degree: 0, depth: false, ..settings.clone() };
+    let targets: Vec<[Vec<f32>; CODE_CHANNELS]> = views.iter().map(|v| target(v, identities)).collect();
+    let mut moments = vec![[[0.0_f32; 2]; CODE_CHANNELS]; codes.len()];
+    let mut touched = vec![0_u64; codes.len()];
+    let mut renderer = Renderer::new();
+    let mut loss = PhotoLoss::default();
+    let mut rng = Pcg64Mcg::seed_from_u64(training.seed);
+    let (mut order, mut last): (Vec<usize>, Vec<f64>) = (Vec::new(), Vec::new());
+    let start = Instant::now();
+    for step in 0..training.steps {
+        if views.is_empty() || observer.signal() == Signal::Cancel {
+            break;
+        }
+        if order.is_empty() {
+            order = (0..views.len()).collect();
+            order.shuffle(&mut rng);
+        }
+        let Some(v) = order.pop() else { break };
+        let total = one_step(&mut renderer, &mut loss, cloud, codes, &views[v], &targets[v], &settings)?;
+        if (step + 1) * 10 > training.steps * 9 {
+            last.push(total);
+        }
+        let along = step as f64 / training.steps.max(1) as f64;
+        let rate = (RATES[0].ln() * (1.0 - along) + RATES[1].ln() * along).exp() as f32;
+        let renderer = &renderer;
+        codes.par_iter_mut().zip(&mut moments).zip(&mut touched).enumerate().for_each(|(i, ((code, moments), t))| {
+            let mut gradient = [0.0; CODE_CHANNELS];
+            if !renderer.feature_gradient(i, &mut gradient) || gradient.iter().any(|g| !g.is_finite()) {
+                return;
+            }
+            *t += 1;
+            let adam = AdamStep::new(*t);
+            for ((c, g), [first, second]) in code.iter_mut().zip(gradient).zip(moments) {
+                adam.update(c, g, first, second, rate);
+            }
+        });
+        if step % 10 == 9 {
+            let elapsed_secs = start.elapsed().as_secs_f64();
+            observer.progress(Progress {
+                stage: "Training codes".into(),
+                done: step + 1,
+                total: training.steps,
+                elapsed_secs,
+                rate: (step + 1) as f64 / elapsed_secs.max(1e-9),
+            });
+        }
+    }
+    Ok(last.iter().sum::<f64>() / last.len().max(1) as f64)
+}
+
+/// Draws a view and goes back; afterwards the renderer holds the gradient. Returns the loss.
+fn one_step(
+    renderer: &mut Renderer<f32>,
+    loss: &mut PhotoLoss<f32>,
+    cloud: &GaussianCloud,
+    codes: &[[f32; CODE_CHANNELS]],
+    view: &CodeView,
+    target: &[Vec<f32>; CODE_CHANNELS],
+    settings: &RenderSettings,
+) -> Result<f64, RenderError> {
+    let features = Features { channels: CODE_CHANNELS, values: codes.as_flattened() };
+    let frame = renderer.render(cloud, features, &view.camera, settings)?;
+    let (width, pixels) = (frame.width_px, frame.alpha.len());
+    let mut gradient = FrameGradient { features: vec![vec![0.0; pixels]; CODE_CHANNELS], ..FrameGradient::default() };
+    let mut total = 0.0;
+    for (c, plane) in gradient.features.iter_mut().enumerate() {
+        let behind = BACKGROUND_CODE[c % 3];
+        // What lets light through shows the background's code; where nothing is known, it is right.
+        let drawn = frame.features[c].iter().zip(&frame.alpha).zip(&target[c]);
+        let drawn: Vec<f32> =
+            drawn.map(|((f, a), t)| if t.is_nan() { behind } else { f + (1.0 - a) * behind }).collect();
+        let wanted: Vec<f32> = target[c].iter().map(|t| if t.is_nan() { behind } else { *t }).collect();
+        total += loss.channel(&drawn, &wanted, width, LAMBDA, CODE_CHANNELS, plane).total(LAMBDA);
+        plane.iter_mut().zip(&target[c]).filter(|(_, t)| t.is_nan()).for_each(|(g, _)| *g = 0.0);
+    }
+    renderer.backward_tiles(&gradient);
+    Ok(total / CODE_CHANNELS as f64)
+}
+
+/// The codes that the view should show; NaN where nothing is known.
+fn target(view: &CodeView, identities: &Identities) -> [Vec<f32>; CODE_CHANNELS] {
+    let by_id: Vec<_> = (0..=identities.len() as IdentityId).map(|id| identities.codes(id)).collect();
+    let code = |id: IdentityId, c: usize| match by_id.get(id as usize) {
+        Some(codes) => codes[c],
+        None if id == UNKNOWN => f32::NAN,
+        None => BACKGROUND_CODE[c % 3],
+    };
+    std::array::from_fn(|c| view.labels.iter().map(|id| code(*id, c)).collect())
+}
+
+/// Identity of each Gaussian by its codes: the part whose code is nearest, if it is nearer than the
+/// background's, else the object.
+pub fn decode(codes: &[[f32; CODE_CHANNELS]], identities: &Identities) -> Vec<IdentityId> {
+    let all: Vec<[f32; CODE_CHANNELS]> = (0..=identities.len() as IdentityId).map(|id| identities.codes(id)).collect();
+    let far =
+        |a: &[f32; CODE_CHANNELS], b: &[f32; CODE_CHANNELS]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f32>();
+    let nearest =
+        |c: &[f32; CODE_CHANNELS]| (0..all.len()).min_by(|&a, &b| far(c, &all[a]).total_cmp(&far(c, &all[b])));
+    codes.par_iter().map(|c| nearest(c).unwrap_or(0) as IdentityId).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::pipeline::observer::Silent;
+    use crate::scene::{Level, NOBODY};
+
+    /// Two Gaussians side by side, one of them a part, labelled as they are.
+    fn scene() -> (GaussianCloud, Identities, Vec<CodeView>) {
+        let mut all = Identities::default();
+        let doll = all.add(Level::Object, NOBODY, vec![]);
+        let eye = all.add(Level::Part, doll, vec![]);
+        for (id, code) in [(doll, [0.9, 0.2, 0.5]), (eye, [0.1, 0.3, 0.8])] {
+            all.get_mut(id).expect("there").code = code;
+        }
+        let cloud = GaussianCloud {
+            positions: vec![[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]],
+            log_scales: vec![[-1.6; 3]; 2],
+            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 2],
+            opacity_logits: vec![4.0; 2],
+            sh: vec![[0.0; 3]; 2],
+            ..GaussianCloud::default()
+        };
+        let camera =
+            Camera::look_at(DVec3::new(0.0, 0.0, -3.0), DVec3::ZERO, DVec3::NEG_Y, 0.6, 48, 32).expect("valid");
+        let mut renderer = Renderer::new();
+        let map = super::super::view_map::ViewMap::render(
+            &mut renderer,
+            &cloud,
+            &[doll, eye],
+            &all,
+            &camera,
+            &RenderSettings::default(),
+        )
+        .expect("drawn");
+        let views = vec![CodeView { camera, labels: map.identity }];
+        (cloud, all, views)
+    }
+
+    fn train(steps: u64, labels: impl Fn(IdentityId) -> IdentityId) -> (Vec<[f32; 6]>, Vec<IdentityId>, f64) {
+        let (cloud, all, mut views) = scene();
+        views[0].labels.iter_mut().for_each(|l| *l = labels(*l));
+        let mut codes = vec![[0.5; CODE_CHANNELS]; cloud.len()];
+        let training = CodeTraining { steps, seed: 1 };
+        let settings = RenderSettings::default();
+        let loss = train_codes(&cloud, &mut codes, &views, &all, &settings, training, &mut Silent).expect("trains");
+        let of = decode(&codes, &all);
+        (codes, of, loss)
+    }
+
+    #[test]
+    fn codes_are_learnt_from_masks() {
+        let (codes, of, loss) = train(400, |l| l);
+        assert_eq!(of, [1, 2], "{codes:?}");
+        let (_, _, first) = train(10, |l| l);
+        assert!(loss < 0.5 * first, "{loss} {first}");
+        // Without masks nothing is learnt; with the wrong ones, the wrong thing.
+        let (codes, of, _) = train(100, |_| UNKNOWN);
+        assert_eq!((codes[0], of), ([0.5; 6], vec![NOBODY; 2]));
+        let (_, of, _) = train(400, |l| [0, 2, 1].get(l as usize).copied().unwrap_or(l));
+        assert_eq!(of, [2, 1]);
+    }
+}
