@@ -8,8 +8,10 @@ use serde_json::json;
 use super::progress::Console;
 use super::{CliError, output, view};
 use crate::io::{self, Opened};
+use crate::models;
 use crate::pipeline::bench::{self, RenderTiming, StepTiming};
 use crate::pipeline::bench_gpu::{self, GpuTiming};
+use crate::pipeline::bench_query::{self, QueryTiming};
 use crate::pipeline::observer::{Level, Observer, Signal};
 use crate::pipeline::train::{TrainConfig, TrainView, load_views};
 use crate::render::gpu::Context;
@@ -23,10 +25,11 @@ use crate::scene::Dataset;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs bench splat.ply\n  \
+    fmlgs bench --queries 100\n  \
     fmlgs bench splats/*.ply photos/ --size 640x480 --size 1280x720 --max-side 504 --gpu --json")]
 pub struct Args {
     /// Splats or trained scenes to draw, posed photos to train on
-    #[arg(required = true)]
+    #[arg(required_unless_present = "queries")]
     paths: Vec<PathBuf>,
     /// Size of the drawn pictures; may be given several times [default: 640x480 1280x720]
     #[arg(long, value_parser = view::parse_size)]
@@ -40,6 +43,9 @@ pub struct Args {
     /// Time the GPU beside the CPU, even a software one
     #[arg(long)]
     gpu: bool,
+    /// Time this many typed queries too, on a made-up view of 1008 x 567 px with 300 objects and parts
+    #[arg(long, value_name = "COUNT")]
+    queries: Option<usize>,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
@@ -55,7 +61,13 @@ struct Timings {
     gpu_render: Vec<GpuTiming>,
     gpu_train: Vec<GpuTiming>,
     one_core_products_per_sec: f64,
+    queries: Option<QueryTiming>,
 }
+
+/// Objects and parts of the view that is asked.
+const QUERY_IDENTITIES: usize = 300;
+/// Its size in px.
+const QUERY_SIZE: [usize; 2] = [1_008, 567];
 
 pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let mut console = Console::new(quiet);
@@ -69,7 +81,12 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         gpu_render: Vec::new(),
         gpu_train: Vec::new(),
         one_core_products_per_sec: bench::one_core_limit(),
+        queries: None,
     };
+    if let Some(count) = args.queries {
+        let mut encoder = models::encoder(models::DEMO)?;
+        timings.queries = Some(bench_query::time(encoder.as_mut(), QUERY_IDENTITIES, QUERY_SIZE, count)?);
+    }
     for path in &args.paths {
         let name = bench::label(path);
         let cloud = match io::open(path)? {
@@ -122,6 +139,22 @@ fn photos(
 
 fn text(t: &Timings) -> String {
     let mut parts = Vec::new();
+    if let Some(q) = &t.queries {
+        let mut rows = vec![["query stage", "p50 ms", "p95 ms"].map(str::to_owned).to_vec()];
+        let stages = [
+            ("text encoding", q.encode),
+            ("relevancy, localisation", q.localise),
+            ("mask, heat map", q.mask),
+            ("without text encoding", q.without_encoding),
+            ("whole", q.whole),
+        ];
+        rows.extend(stages.map(|(name, p)| vec![name.into(), format!("{:.3}", p.p50_ms), format!("{:.3}", p.p95_ms)]));
+        let what = format!(
+            "{} queries, {} identities, {} x {} px, encoder '{}'",
+            q.queries, q.identities, q.size[0], q.size[1], q.encoder
+        );
+        parts.push(format!("{}\n{what}", output::table(&rows)));
+    }
     if !t.render.is_empty() {
         let head = ["drawing, CPU", "Gaussians", "size", "ms", "project", "sort", "bin", "blend", "products", "per s"];
         let mut rows = vec![head.map(str::to_owned).to_vec()];

@@ -7,6 +7,7 @@ use glam::DVec3;
 use image::ColorType;
 use serde::Serialize;
 
+use super::demo_queries::{self, Queries};
 use super::progress::{Console, evaluation_line};
 use super::train::Settings;
 use super::{CliError, eval, interrupt, opened, output, synth};
@@ -26,7 +27,8 @@ const FLIGHT_PICTURES: usize = 24;
 /// Show the program on the demo scene: make photos, train, look around
 ///
 /// Opens the window and trains there. With --headless it needs no display: it renders the demo
-/// scene's photos, trains on them, measures the result on held-out photos, flies around the scene,
+/// scene's photos, trains on them, measures the result on held-out photos, asks for objects and
+/// parts, flies around the scene,
 /// and leaves pictures and a report in the folder given by --out. Run again, it goes on where it
 /// was and reuses the photos.
 #[derive(Debug, clap::Args)]
@@ -68,6 +70,7 @@ struct Report {
     ssim: f64,
     views: Vec<ViewScore>,
     curve: Vec<Evaluation>,
+    queries: Queries,
     flight_pictures: usize,
     flight_ms_per_picture: f64,
     total_secs: f64,
@@ -77,7 +80,8 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let started = Instant::now();
     let config = args.settings.over(config());
     let mut console = Console::new(quiet);
-    let [photos, scene, compare, flight] = ["photos", "scene", "compare", "flight"].map(|f| args.out.join(f));
+    let [photos, scene, compare, queries, flight] =
+        ["photos", "scene", "compare", "queries", "flight"].map(|f| args.out.join(f));
 
     let synth_secs = make_photos(&photos, &mut console)?;
     let dataset = opened::dataset(&photos)?;
@@ -91,9 +95,11 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let job =
         eval::job(opened::drawable(&scene)?, &photos, eval::Options { pictures: Some(compare), ..Default::default() })?;
     let views = eval::measure(&job, &mut console)?;
+    let queries = demo_queries::run(&scene, &photos, &job, &queries, &mut console)?;
     let millis = fly(&job.cloud, &job.settings, &dataset, &flight)?;
 
-    let report = report(&dataset, &config, &outcome, views, synth_secs, millis, started.elapsed().as_secs_f64());
+    let total_secs = started.elapsed().as_secs_f64();
+    let report = report(&dataset, &config, &outcome, views, queries, synth_secs, millis, total_secs);
     drop(console);
     write_report(&report, &args.out)?;
     if args.json {
@@ -155,6 +161,7 @@ fn report(
     config: &TrainConfig,
     outcome: &TrainOutcome,
     views: Vec<ViewScore>,
+    queries: Queries,
     synth_secs: Option<f64>,
     flight_ms_per_picture: f64,
     total_secs: f64,
@@ -173,6 +180,7 @@ fn report(
         ssim,
         views,
         curve: outcome.evaluations.clone(),
+        queries,
         flight_pictures: FLIGHT_PICTURES,
         flight_ms_per_picture,
         total_secs,
@@ -181,8 +189,17 @@ fn report(
 
 fn text(r: &Report) -> String {
     format!(
-        "{} steps in {:.0} s: {} Gaussians, held-out PSNR {:.2} dB, SSIM {:.3} over {} views; {:.0} ms per picture",
-        r.steps, r.train_secs, r.gaussians, r.psnr, r.ssim, r.held_out, r.flight_ms_per_picture
+        "{} steps in {:.0} s: {} Gaussians, held-out PSNR {:.2} dB, SSIM {:.3} over {} views; asked by name, objects \
+         {:.3} and parts {:.3} mean IoU; {:.0} ms per picture",
+        r.steps,
+        r.train_secs,
+        r.gaussians,
+        r.psnr,
+        r.ssim,
+        r.held_out,
+        r.queries.object_miou,
+        r.queries.part_miou,
+        r.flight_ms_per_picture
     )
 }
 
@@ -193,11 +210,18 @@ fn write_report(r: &Report, folder: &Path) -> Result<(), CliError> {
     let curve: String = r.curve.iter().map(|e| format!("* {}\n", evaluation_line(e))).collect();
     let mut rows = vec![vec!["view".to_owned(), "PSNR dB".to_owned(), "SSIM".to_owned()]];
     rows.extend(r.views.iter().map(|s| vec![s.name.clone(), format!("{:.2}", s.psnr), format!("{:.4}", s.ssim)]));
+    let mut asked = vec![["question", "verdict", "answer", "px", "ms"].map(str::to_owned).to_vec()];
+    asked.extend(r.queries.asked.iter().map(|q| {
+        let answer = q.answer.join(", ");
+        vec![q.question.clone(), q.verdict.into(), answer, q.pixels.to_string(), format!("{:.1}", q.millis)]
+    }));
     let gpu = r.machine.gpu.as_deref().unwrap_or("no GPU");
     let synth = r.synth_secs.map_or("reused".to_owned(), |s| format!("made in {s:.1} s"));
     let markdown = format!(
         "# Demo\n\n{}.\n\n* Machine: {} cores, {gpu}\n* Photos: {}, {synth}\n* In all: {:.0} s\n\n## While training\n\n\
          {curve}\n## Held-out views\n\n`compare/` holds photo, render and difference (x 4) side by side.\n\n```text\n{}\n```\n\n\
+         ## Questions\n\n`queries/` holds relevancy maps in a held-out view. Objects were found in {:.0} s from the masks of \
+         {}.\n\n```text\n{}\n```\n\n\
          ## Flight\n\n`flight/` holds {} pictures on a circle around the scene, {:.0} ms each.\n\n\
          ## To look at it\n\n`scene/` is a trained scene: `fmlgs scene`, or open `scene/point_cloud.ply` in any splat viewer.\n",
         text(r),
@@ -205,6 +229,9 @@ fn write_report(r: &Report, folder: &Path) -> Result<(), CliError> {
         r.photos,
         r.total_secs,
         output::table(&rows),
+        r.queries.find_secs,
+        r.queries.seeds.join(", "),
+        output::table(&asked),
         r.flight_pictures,
         r.flight_ms_per_picture,
     );

@@ -6,9 +6,10 @@ use std::time::Instant;
 use image::ColorType;
 use serde_json::json;
 
+use super::eval_masks::{self, Protocol};
 use super::opened::DrawableScene;
 use super::progress::Console;
-use super::{CliError, eval_masks, opened, output};
+use super::{CliError, opened, output};
 use crate::io;
 use crate::math::stats::mean;
 use crate::pipeline::evaluate::evaluate;
@@ -31,7 +32,8 @@ const DIFFERENCE_GAIN: i32 = 4;
 #[command(after_help = "Examples:\n  \
     fmlgs eval scene/\n  \
     fmlgs eval scene/ --pictures compare/       photo | render | difference x 4, one PNG per view\n  \
-    fmlgs eval scene/ --masks photos/           objects and parts against labels, by name\n  \
+    fmlgs eval scene/ --masks photos/           objects and parts against labels\n  \
+    fmlgs eval scene/ --masks photos/ --protocol part-recall\n  \
     fmlgs eval splat.ply --photos photos/ --max-side 1600 --json")]
 pub struct Args {
     /// Trained scene or splat file
@@ -45,6 +47,12 @@ pub struct Args {
     /// is asked for by its name
     #[arg(long)]
     masks: Option<PathBuf>,
+    /// How objects and parts are compared
+    #[arg(long, value_enum, default_value_t = Protocol::Masks, requires = "masks")]
+    protocol: Protocol,
+    /// What to ask for, where labels do not name it (spin-nerf)
+    #[arg(long, requires = "masks")]
+    query: Option<String>,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
@@ -128,7 +136,8 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let json = args.json;
     let scene = args.scene.clone();
     if let Some(masks) = args.masks.clone() {
-        return eval_masks::run(&scene, &masks, args.check()?, json);
+        let (protocol, query) = (args.protocol, args.query.clone());
+        return eval_masks::run(&scene, &masks, protocol, query.as_deref(), args.check()?, json);
     }
     let job = args.check()?;
     let scores = measure(&job, &mut Console::new(quiet))?;

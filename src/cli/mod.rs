@@ -4,8 +4,10 @@
 //! Results go to standard output (as one JSON document with `--json`), everything else to standard
 //! error. Exit codes are listed in `EXIT_CODES`.
 
+mod asking;
 mod bench;
 mod demo;
+mod demo_queries;
 mod error;
 mod eval;
 mod eval_masks;
@@ -19,6 +21,7 @@ mod progress;
 mod query;
 mod render;
 mod report;
+mod segment;
 mod synth;
 mod train;
 mod view;
@@ -49,6 +52,8 @@ Examples:
   fmlgs train photos/ --out scene/      train; the same command again goes on where it stopped
   fmlgs eval scene/ --pictures cmp/     PSNR and SSIM on held-out photos, pictures side by side
   fmlgs render scene/ --camera 12 --out view.png
+  fmlgs preprocess scene/ --masks photos/   find objects and parts
+  fmlgs query scene/ \"the lid of the kettle\" --mask lid.png
   fmlgs export scene/ --out scene.ply   for any other splat viewer";
 
 /// Train 3D Gaussians from posed photos while you watch, and look around in them.
@@ -73,6 +78,7 @@ enum Command {
     Eval(eval::Args),
     Preprocess(preprocess::Args),
     Query(query::Args),
+    Segment(segment::Args),
     Synth(synth::Args),
     Demo(demo::Args),
     Export(export::Args),
@@ -113,6 +119,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Eval(args) => eval::run(args, quiet),
         Command::Preprocess(args) => preprocess::run(args, quiet),
         Command::Query(args) => query::run(args),
+        Command::Segment(args) => segment::run(args),
         Command::Synth(args) => synth::run(args, quiet),
         Command::Demo(args) if args.headless => demo::run(args, quiet),
         Command::Demo(_) => window(Some(Action::TryDemo), open_window),

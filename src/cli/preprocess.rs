@@ -8,9 +8,10 @@ use serde_json::json;
 use super::progress::Console;
 use super::{CliError, opened, output};
 use crate::io::{self, labels::Labels};
-use crate::pipeline::semantics::find::find_objects;
+use crate::models;
+use crate::pipeline::semantics::find::{FindOptions, Lifting, find_objects};
 use crate::pipeline::semantics::segmenter::FileMasks;
-use crate::pipeline::semantics::tracker::{TrackError, TrackOptions};
+use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::scene::{Level, Photo};
 
 /// Find the objects and parts of a trained scene
@@ -41,9 +42,28 @@ pub struct Args {
     /// Share of a photo that may stay unknown before its masks are used too, in percent
     #[arg(long, default_value_t = 100.0 * TrackOptions::default().reseed_share)]
     unknown: f64,
+    /// How Gaussians get their codes
+    #[arg(long, value_enum, default_value_t = LiftingArg::Votes)]
+    lifting: LiftingArg,
+    /// Steps of training codes
+    #[arg(long, default_value_t = 1_000)]
+    code_steps: u64,
+    /// What looks at the objects, so that they are found by what they look like: 'demo', or 'none'
+    #[arg(long, default_value = models::DEMO)]
+    encoder: String,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum LiftingArg {
+    /// Those of the identities they voted for
+    Votes,
+    /// The same, refined by training
+    Refined,
+    /// By training alone, as in the paper
+    Paper,
 }
 
 pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
@@ -70,20 +90,30 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         }
     };
     let mut segmenter = FileMasks(Labels::open(&args.masks)?);
-    let options = TrackOptions {
+    let track = TrackOptions {
         seed,
         max_seeds: args.max_seeds.max(1),
         reseed_share: args.unknown / 100.0,
         ..TrackOptions::default()
     };
+    let lifting = match args.lifting {
+        LiftingArg::Votes => Lifting::Votes,
+        LiftingArg::Refined => Lifting::Refined(args.code_steps),
+        LiftingArg::Paper => Lifting::Paper(args.code_steps),
+    };
+    let mut encoder = match args.encoder.as_str() {
+        "none" => None,
+        name => Some(models::encoder(name)?),
+    };
+    let encoder = encoder.as_mut().map(|e| e.as_mut() as &mut dyn models::Encoder);
     let start = Instant::now();
-    let map =
-        find_objects(&scene.cloud, &photos, &scene.settings, &mut segmenter, &options, &mut observer).map_err(|e| {
-            match e {
-                TrackError::Cancelled => CliError::Cancelled("nothing was stored".into()),
-                other => other.into(),
-            }
-        })?;
+    let options = FindOptions { track, lifting };
+    let (cloud, settings) = (&scene.cloud, &scene.settings);
+    let found = find_objects(cloud, &photos, settings, &mut segmenter, &options, encoder, &mut observer);
+    let map = found.map_err(|e| match e {
+        e if e.is_cancelled() => CliError::Cancelled("nothing was stored".into()),
+        other => other.into(),
+    })?;
     io::semantic_map::save(&args.scene, &map, &mut scene.cloud)?;
     let secs = start.elapsed().as_secs_f64();
     let count = |level: Level| map.identities.iter().filter(|(_, i)| i.level == level).count();

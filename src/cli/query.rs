@@ -6,13 +6,15 @@ use std::time::Instant;
 use image::ColorType;
 use serde_json::{Value, json};
 
+use super::asking::{Asker, semantics};
 use super::{CliError, opened, output, view};
-use crate::io;
 use crate::math::colormap::Colormap;
-use crate::pipeline::semantics::answer::{Answered, by_name};
-use crate::pipeline::semantics::grammar::{Kind, Phrase};
+use crate::pipeline::semantics::answer::{Answered, Basis};
+use crate::pipeline::semantics::code_map::CodeMap;
+use crate::pipeline::semantics::codes::TOLERANCE;
+use crate::pipeline::semantics::grammar::Kind;
 use crate::pipeline::semantics::localise::{Answer, Hit};
-use crate::pipeline::semantics::names;
+use crate::pipeline::semantics::matching;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::cpu::Renderer;
 use crate::render::{Features, RenderSettings};
@@ -20,8 +22,8 @@ use crate::scene::{Camera, GaussianCloud, Mask, SemanticMap};
 
 /// Ask a scene for an object or a part
 ///
-/// "X of the Y" and "Y's X" ask for a part. Answers by the names that came with the masks. Exit
-/// code 1 if nothing fits.
+/// "X of the Y" and "Y's X" ask for a part. Answers by the names that identities have, else by what
+/// they look like to the encoder that has looked at them. Exit code 1 if nothing fits.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs query scene/ \"a button of the red controller\"\n  \
@@ -44,6 +46,12 @@ pub struct Args {
     /// Answers whose pixels go into the mask at most
     #[arg(long, default_value_t = 1)]
     top: usize,
+    /// Match alpha-blended codes, as the paper does, instead of identities
+    #[arg(long)]
+    blend: bool,
+    /// Largest difference per channel of a match, in 255ths
+    #[arg(long, default_value_t = 255.0 * TOLERANCE)]
+    tolerance: f32,
     /// Write the mask of the answer: white on black
     #[arg(long)]
     mask: Option<PathBuf>,
@@ -56,7 +64,7 @@ pub struct Args {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum KindArg {
+pub enum KindArg {
     /// As the words say, else whatever fits better
     Auto,
     /// A whole object
@@ -65,39 +73,53 @@ enum KindArg {
     Part,
 }
 
+impl From<KindArg> for Kind {
+    fn from(arg: KindArg) -> Self {
+        match arg {
+            KindArg::Auto => Self::Auto,
+            KindArg::Object => Self::Object,
+            KindArg::Part => Self::Part,
+        }
+    }
+}
+
 pub fn run(args: Args) -> Result<(), CliError> {
     let scene = opened::drawable(&args.scene)?;
-    let semantics = io::semantic_map::load(&args.scene, &scene.cloud)?.ok_or_else(|| {
-        let path = args.scene.display();
-        CliError::failed(format!("{path} knows no objects yet; find them with 'fmlgs preprocess {path} --masks ...'"))
-    })?;
+    let map = semantics(&args.scene, &scene.cloud)?;
     let camera = view::choose(args.camera.as_deref(), &scene)?.limited_to(args.max_side);
-    let phrase = Phrase::parse(&args.text)
-        .ok_or_else(|| CliError::Usage("there is nothing to look for in the query; type an object's name".into()))?;
-    let kind = match args.kind {
-        KindArg::Auto => Kind::Auto,
-        KindArg::Object => Kind::Object,
-        KindArg::Part => Kind::Part,
-    };
     let mut renderer = Renderer::new();
-    let map =
-        ViewMap::render(&mut renderer, &scene.cloud, &semantics.of, &semantics.identities, &camera, &scene.settings)?;
+    let exact = ViewMap::render(&mut renderer, &scene.cloud, &map.of, &map.identities, &camera, &scene.settings)?;
+    let blended = match args.blend {
+        true => Some(CodeMap::render(&mut renderer, &scene.cloud, &map.codes, &camera, &scene.settings)?),
+        false => None,
+    };
+    let mut asker = Asker::new(&map)?;
     let start = Instant::now();
-    let answered = by_name(&semantics.identities, &phrase, kind);
-    let mask = answered.mask(&map, &semantics.identities, args.top);
+    let answered = asker.ask(&args.text, args.kind.into())?;
+    let answered = answered
+        .ok_or_else(|| CliError::Usage("there is nothing to look for in the query; type an object's name".into()))?;
+    let mut mask = Mask::empty(exact.width_px, exact.height_px);
+    let tolerance = args.tolerance / 255.0;
+    for id in answered.chosen(args.top) {
+        mask.add(&match &blended {
+            Some(codes) => matching::blend(codes, &map.identities, id, tolerance),
+            None => matching::exact(&exact, &map.identities, id, tolerance),
+        });
+    }
     let query_ms = start.elapsed().as_secs_f64() * 1e3;
     if let Some(path) = &args.mask {
-        let pixels: Vec<u8> = (0..map.identity.len()).map(|i| if mask.contains(i) { 255 } else { 0 }).collect();
+        let pixels: Vec<u8> = (0..exact.identity.len()).map(|i| if mask.contains(i) { 255 } else { 0 }).collect();
         output::make_parent(path)?;
         output::write_png(path, &pixels, [camera.width_px, camera.height_px], ColorType::L8)?;
     }
     if let Some(path) = &args.heat {
-        write_heat(path, &scene.cloud, &camera, &scene.settings, &answered.heat(&map))?;
+        write_heat(path, &scene.cloud, &camera, &scene.settings, &answered.heat(&exact))?;
     }
-    tell(&args, &semantics, &answered, &mask, query_ms)
+    tell(&args, &map, &answered, &asker.unknown_words(&args.text), &mask, query_ms)
 }
 
-fn write_heat(
+/// Writes the relevancy of every pixel over the picture in grey.
+pub fn write_heat(
     path: &Path,
     cloud: &GaussianCloud,
     camera: &Camera,
@@ -115,12 +137,16 @@ fn write_heat(
     output::write_png(path, pixels.as_flattened(), [camera.width_px, camera.height_px], ColorType::Rgb8)
 }
 
-fn tell(args: &Args, map: &SemanticMap, answered: &Answered, mask: &Mask, query_ms: f64) -> Result<(), CliError> {
-    let full_name = |hit: &Hit| {
-        let line: Vec<String> = map.identities.line(hit.identity).map(|i| map.identities.name(i)).collect();
-        line.join(" of the ")
-    };
-    let unknown = names::unknown_words(&map.identities, &args.text);
+fn tell(
+    args: &Args,
+    map: &SemanticMap,
+    answered: &Answered,
+    unknown: &[String],
+    mask: &Mask,
+    query_ms: f64,
+) -> Result<(), CliError> {
+    let full_name = |hit: &Hit| map.identities.full_name(hit.identity);
+    let basis = if answered.basis == Basis::Names { "names" } else { "looks" };
     let answer = &answered.answer;
     let (verdict, hits) = match answer {
         Answer::Found(hits) => ("found", hits),
@@ -134,6 +160,7 @@ fn tell(args: &Args, map: &SemanticMap, answered: &Answered, mask: &Mask, query_
         output::print_json(&json!({
             "query": args.text,
             "answer": verdict,
+            "basis": basis,
             "hits": hits.iter().map(hit).collect::<Vec<_>>(),
             "pixels": mask.area(),
             "unknown_words": unknown,
@@ -144,7 +171,11 @@ fn tell(args: &Args, map: &SemanticMap, answered: &Answered, mask: &Mask, query_
         Answer::NotFound(hits) => {
             let near = hits.iter().filter(|h| h.score > 0.0).map(full_name).collect::<Vec<_>>().join(", ");
             let near = if near.is_empty() { String::new() } else { format!("; nearest: {near}") };
-            Err(CliError::failed(format!("nothing here is called '{}'{near}", args.text)))
+            let known = match unknown {
+                [] => String::new(),
+                words => format!("; words that are not known: {}", words.join(", ")),
+            };
+            Err(CliError::failed(format!("nothing here fits '{}'{near}{known}", args.text)))
         }
         _ if args.json => Ok(()),
         _ => {
@@ -152,7 +183,7 @@ fn tell(args: &Args, map: &SemanticMap, answered: &Answered, mask: &Mask, query_
             rows.extend(hits.iter().map(|h| vec![full_name(h), format!("{:.3}", h.score), format!("{:.3}", h.margin)]));
             let note = if verdict == "ambiguous" { " (ambiguous: the first two fit alike)" } else { "" };
             output::print(&format!(
-                "{}\n{} px in this view, answered in {query_ms:.2} ms{note}",
+                "{}\n{} px in this view, answered by {basis} in {query_ms:.2} ms{note}",
                 output::table(&rows),
                 mask.area()
             ))

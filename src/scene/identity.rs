@@ -78,6 +78,11 @@ impl Identities {
         named.unwrap_or_else(|| if id == NOBODY { "nothing".into() } else { format!("#{id}") })
     }
 
+    /// The name of an identity with those of its wholes: "button a of the red controller".
+    pub fn full_name(&self, id: IdentityId) -> String {
+        self.line(id).map(|i| self.name(i)).collect::<Vec<_>>().join(" of the ")
+    }
+
     /// An identity and what it is a piece of, inside out. Ends at an object.
     pub fn line(&self, id: IdentityId) -> impl Iterator<Item = IdentityId> + '_ {
         let known = |id: IdentityId| self.get(id).map(|_| id);

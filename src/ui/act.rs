@@ -6,7 +6,8 @@ use std::sync::Arc;
 use super::app::App;
 use super::dialogs::{Chosen, Purpose, Question};
 use super::state::Tone;
-use crate::worker::{Action, Command, Failure, JobKind};
+use super::viewport::brush::Brush;
+use crate::worker::{Action, Command, EditRequest, Failure, JobKind};
 
 impl App {
     /// Does what a person asked for.
@@ -50,8 +51,17 @@ impl App {
             Action::Palette => self.palette.toggle(),
             Action::Shortcuts => self.sheet = !self.sheet,
             Action::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
+            Action::Change(edit) => self.edit(Some(EditRequest::Apply(edit))),
+            Action::AddPainted => {
+                let request = self.viewport.brush.as_ref().and_then(Brush::request);
+                self.viewport.brush = None;
+                self.edit(request);
+            }
+            Action::Undo => self.edit(self.state.undo.last().cloned().map(EditRequest::Restore)),
+            Action::Redo => self.edit(self.state.redo.last().cloned().map(EditRequest::Restore)),
             Action::ExportTarget(id) => self.choose(Purpose::ExportTarget(id)),
             Action::FrameScene
+            | Action::Paint(_)
             | Action::GoToTarget(_)
             | Action::Isolate(_)
             | Action::Hide(_)
@@ -158,6 +168,20 @@ impl App {
                 out: scene.out.clone(),
             }),
             None => self.state.toast(Tone::Warning, "Train first: objects are made of trained Gaussians."),
+        }
+    }
+
+    /// Changes objects and parts; `None` is a change that there is none of.
+    fn edit(&mut self, request: Option<EditRequest>) {
+        let Some(request) = request else {
+            self.state.toast(Tone::Warning, "There is no such change of objects and parts.");
+            return;
+        };
+        let (scene, map, cloud) =
+            (self.state.scene.clone(), self.state.semantics.clone(), self.viewport.cloud().cloned());
+        if let (Some(scene), Some(map), Some(cloud)) = (scene, map, cloud) {
+            let (settings, out) = (scene.render.clone(), scene.out.clone());
+            self.submit(Command::EditObjects { cloud, map, settings, request, out });
         }
     }
 

@@ -63,6 +63,9 @@ pub struct RunningJob {
     pub paused: bool,
 }
 
+/// States of objects and parts that are kept for undoing.
+const MAX_UNDO: usize = 100;
+
 /// What training has shown so far.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrainHistory {
@@ -94,6 +97,10 @@ pub struct AppState {
     pub antialias: bool,
     /// Objects and parts of the Gaussians on screen.
     pub semantics: Option<Arc<SemanticMap>>,
+    /// Earlier states of objects and parts, oldest first.
+    pub undo: Vec<Arc<SemanticMap>>,
+    /// States that were taken back, the latest last.
+    pub redo: Vec<Arc<SemanticMap>>,
     /// The long job that runs.
     pub job: Option<RunningJob>,
     /// Training of the present scene.
@@ -137,6 +144,7 @@ impl AppState {
                 if kind == JobKind::Train {
                     // They belong to Gaussians that are about to change.
                     self.semantics = None;
+                    (self.undo, self.redo) = (Vec::new(), Vec::new());
                     self.training_job = Some(job);
                 }
                 self.say(Tone::Info, title.clone());
@@ -252,10 +260,32 @@ impl AppState {
             Outcome::Objects(map) => {
                 self.toast(Tone::Good, format!("{} objects and parts found; ask for one", map.identities.len()));
                 self.semantics = Some(map);
+                (self.undo, self.redo) = (Vec::new(), Vec::new());
             }
+            Outcome::Edited(map) => self.edited(map),
             Outcome::Written(path) => self.toast(Tone::Good, format!("Wrote {}", path.display())),
             Outcome::Photo { index, max_side_px, pixels } => {
                 self.photos.insert((index, max_side_px), pixels);
+            }
+        }
+    }
+
+    /// Takes over a changed map. Going back and forth moves along the changes; a new one ends what
+    /// could be redone.
+    fn edited(&mut self, map: Arc<SemanticMap>) {
+        let is_last = |list: &[Arc<SemanticMap>]| list.last().is_some_and(|m| Arc::ptr_eq(m, &map));
+        let Some(old) = self.semantics.replace(Arc::clone(&map)) else { return };
+        if is_last(&self.undo) {
+            self.undo.pop();
+            self.redo.push(old);
+        } else if is_last(&self.redo) {
+            self.redo.pop();
+            self.undo.push(old);
+        } else {
+            self.undo.push(old);
+            self.redo.clear();
+            if self.undo.len() > MAX_UNDO {
+                self.undo.remove(0);
             }
         }
     }
@@ -276,6 +306,7 @@ impl AppState {
         self.plan = scene.plan.clone();
         self.antialias = scene.render.antialias;
         self.semantics = scene.semantics.clone();
+        (self.undo, self.redo) = (Vec::new(), Vec::new());
         self.scene = Some(Arc::new(scene));
     }
 

@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use crate::scene::IdentityId;
+use crate::pipeline::semantics::edit::Edit;
+use crate::scene::{IdentityId, NOBODY};
 
 /// What the viewport shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -162,6 +163,16 @@ pub enum Action {
     Hide(IdentityId),
     /// Write the Gaussians of an identity as a `.ply`.
     ExportTarget(IdentityId),
+    /// Correct objects and parts.
+    Change(Edit),
+    /// Mark a new piece of an identity in the view (of nobody, a new object); `None` stops it.
+    Paint(Option<IdentityId>),
+    /// Add what is marked.
+    AddPainted,
+    /// Take back the last correction.
+    Undo,
+    /// Make it again.
+    Redo,
     /// Bring the scene into view.
     FrameScene,
     /// Go back to the first view.
@@ -192,7 +203,7 @@ pub enum Action {
 
 impl Action {
     /// Every action that needs no further input, in the order of the palette.
-    pub const ALL: [Self; 36] = [
+    pub const ALL: [Self; 39] = [
         Self::TryDemo,
         Self::OpenFolder,
         Self::OpenFile,
@@ -206,6 +217,9 @@ impl Action {
         Self::ChooseMasks,
         Self::TypeQuestion,
         Self::Isolate(None),
+        Self::Paint(Some(NOBODY)),
+        Self::Undo,
+        Self::Redo,
         Self::FrameScene,
         Self::ResetView,
         Self::PreviousPhoto,
@@ -253,6 +267,16 @@ impl Action {
             Self::Isolate(Some(id)) => format!("Show #{id} alone"),
             Self::Hide(id) => format!("Hide or show #{id}"),
             Self::ExportTarget(id) => format!("Export #{id} as .ply…"),
+            Self::Change(Edit::Rename(_, name)) => format!("Rename to {name}"),
+            Self::Change(Edit::Merge(from, into)) => format!("Merge #{from} into #{into}"),
+            Self::Change(Edit::Split(id)) => format!("Split #{id}"),
+            Self::Change(Edit::AddPiece { name, .. }) => format!("Add {name}"),
+            Self::Paint(None) => "Stop marking".into(),
+            Self::Paint(Some(NOBODY)) => "Mark a new object by hand".into(),
+            Self::Paint(Some(id)) => format!("Mark a new part of #{id} by hand"),
+            Self::AddPainted => "Add what is marked".into(),
+            Self::Undo => "Undo the last change of objects".into(),
+            Self::Redo => "Redo the last change of objects".into(),
             Self::FrameScene => "Frame the scene".into(),
             Self::ResetView => "Reset the view".into(),
             Self::TurnUp(axis) => format!("Turn {} upwards", axis.text()),
@@ -296,6 +320,12 @@ impl Action {
             Self::Isolate(Some(_)) => "Draw nothing else.",
             Self::Hide(_) => "Leave it out of the picture, or draw it again.",
             Self::ExportTarget(_) => "Write its Gaussians in the format that 3DGS viewers read.",
+            Self::Change(_) => "Correct what was found; can be undone.",
+            Self::Paint(_) | Self::AddPainted => {
+                "Drag over it or click on it in the view; its Gaussians become a new one."
+            }
+            Self::Undo => "Take the last correction of objects and parts back.",
+            Self::Redo => "Make the correction again that was taken back.",
             Self::FrameScene => "Move back until all of the scene is in view.",
             Self::ResetView => "Return to the view with which the scene opened.",
             Self::TurnUp(_) => "For scenes that lie on their side.",
@@ -327,6 +357,8 @@ impl Action {
             Self::PauseTraining => plain("T"),
             Self::Cancel => plain("Escape"),
             Self::TypeQuestion => plain("/"),
+            Self::Undo => ctrl("Z"),
+            Self::Redo => ctrl("Y"),
             Self::FrameScene => plain("F"),
             Self::ResetView => plain("Home"),
             Self::PreviousPhoto => plain("["),
@@ -351,6 +383,9 @@ impl Action {
             | Self::Isolate(_)
             | Self::Hide(_)
             | Self::ExportTarget(_)
+            | Self::Change(_)
+            | Self::Paint(_)
+            | Self::AddPainted
             | Self::GoToPhoto(_)
             | Self::TurnUp(_)
             | Self::TogglePane(_) => None,

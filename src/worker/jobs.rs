@@ -3,18 +3,18 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-use super::machine;
 use super::places::Places;
 use super::preview::{home_view, sparse_cloud};
 use super::protocol::{Command, Failure, OpenedScene, Outcome, Stop};
 use super::thread::Jobs;
+use super::{edit, machine};
 use crate::io::labels::Labels;
 use crate::io::{self, IoError, OpenError, Opened, TrainedScene, trained};
+use crate::models;
 use crate::pipeline::evaluate::evaluate;
 use crate::pipeline::observer::{Level, Observer};
-use crate::pipeline::semantics::find::find_objects;
+use crate::pipeline::semantics::find::{FindOptions, find_objects};
 use crate::pipeline::semantics::segmenter::FileMasks;
-use crate::pipeline::semantics::tracker::{TrackError, TrackOptions};
 use crate::pipeline::synth::{SynthError, demo};
 use crate::pipeline::train::checkpoint::CheckpointError;
 use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainError};
@@ -217,6 +217,9 @@ impl Jobs for PipelineJobs {
                 let photos: Vec<Photo> = training.iter().map(|&i| dataset.photos[i].clone()).collect();
                 find(&cloud, &photos, &settings, &masks, &out, observer)
             }
+            Command::EditObjects { cloud, map, settings, request, out } => {
+                edit::run(&cloud, &map, &settings, &request, &out)
+            }
             Command::Export { cloud, path } => export(&cloud, &path),
             Command::Photo { index, photo, max_side_px } => {
                 let pixels = io::photo::load(&photo, max_side_px).map_err(|e| io_failure(&e))?;
@@ -259,9 +262,15 @@ fn find(
     observer: &mut dyn Observer,
 ) -> Result<Outcome, Stop> {
     let mut segmenter = FileMasks(Labels::open(masks).map_err(|e| io_failure(&e))?);
-    let options = TrackOptions::default();
-    let map = find_objects(cloud, photos, settings, &mut segmenter, &options, observer).map_err(|e| match e {
-        TrackError::Cancelled => Stop::Cancelled,
+    // Without the encoder, names alone are understood.
+    let mut encoder = models::encoder(models::DEMO)
+        .inspect_err(|e| observer.note(Level::Warning, format!("Objects are found without their looks: {e}")))
+        .ok();
+    let encoder = encoder.as_mut().map(|e| e.as_mut() as &mut dyn models::Encoder);
+    let options = FindOptions::default();
+    let found = find_objects(cloud, photos, settings, &mut segmenter, &options, encoder, observer);
+    let map = found.map_err(|e| match e {
+        e if e.is_cancelled() => Stop::Cancelled,
         e => Stop::Failed(Failure::of(&e, "")),
     })?;
     let mut stored = cloud.clone();

@@ -5,6 +5,7 @@
 
 pub mod action;
 pub mod control;
+pub mod edit;
 pub mod jobs;
 pub mod machine;
 pub mod observer;
@@ -19,6 +20,7 @@ pub mod view;
 
 pub use action::{Action, Axis, Pane, Shortcut, ViewMode};
 pub use control::Control;
+pub use edit::EditRequest;
 pub use machine::real_gpu;
 pub use protocol::{Command, Event, Failure, HomeView, JobId, JobKind, Lane, OpenedScene, Outcome, Stop};
 pub use slot::Slot;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::edit::EditRequest;
 use crate::io::trained::History;
 use crate::pipeline::observer::{Evaluation, Level, Progress, StepMetrics};
 use crate::pipeline::train::TrainConfig;
@@ -28,6 +29,8 @@ pub enum JobKind {
     Evaluate,
     /// Finds objects and parts.
     Objects,
+    /// Changes objects and parts.
+    Edit,
     /// Writes a file.
     Export,
     /// Loads a photo's pixels.
@@ -41,7 +44,7 @@ impl JobKind {
     pub fn lane(self) -> Lane {
         match self {
             Self::Open | Self::Demo | Self::Train | Self::Evaluate | Self::Objects => Lane::Long,
-            Self::Export | Self::Photo | Self::Picture => Lane::Short,
+            Self::Edit | Self::Export | Self::Photo | Self::Picture => Lane::Short,
         }
     }
 }
@@ -98,6 +101,19 @@ pub enum Command {
         /// Folder of the trained scene.
         out: PathBuf,
     },
+    /// Change the objects and parts of a scene, and store them with it.
+    EditObjects {
+        /// The Gaussians.
+        cloud: Arc<GaussianCloud>,
+        /// Objects and parts as they are.
+        map: Arc<SemanticMap>,
+        /// How the Gaussians are drawn.
+        settings: RenderSettings,
+        /// The change.
+        request: EditRequest,
+        /// Folder of the trained scene.
+        out: PathBuf,
+    },
     /// Write Gaussians as a `.ply`.
     Export {
         /// The Gaussians.
@@ -132,6 +148,7 @@ impl Command {
             Self::Train { .. } => JobKind::Train,
             Self::Evaluate { .. } => JobKind::Evaluate,
             Self::FindObjects { .. } => JobKind::Objects,
+            Self::EditObjects { .. } => JobKind::Edit,
             Self::Export { .. } => JobKind::Export,
             Self::Photo { .. } => JobKind::Photo,
             Self::Picture { .. } => JobKind::Picture,
@@ -148,6 +165,7 @@ impl Command {
             Self::Train { dataset, .. } => format!("Training {}", dataset.name),
             Self::Evaluate { dataset, .. } => format!("Measuring {}", dataset.name),
             Self::FindObjects { dataset, .. } => format!("Finding objects in {}", dataset.name),
+            Self::EditObjects { .. } => "Changing objects".into(),
             Self::Export { path, .. } | Self::Picture { path, .. } => format!("Writing {}", name(path)),
             Self::Photo { photo, .. } => format!("Loading {}", photo.name),
         }
@@ -218,6 +236,8 @@ pub enum Outcome {
     Evaluated(Evaluation),
     /// Objects and parts were found.
     Objects(Arc<SemanticMap>),
+    /// Objects and parts were changed.
+    Edited(Arc<SemanticMap>),
     /// A file was written.
     Written(PathBuf),
     /// A photo was loaded.

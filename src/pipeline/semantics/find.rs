@@ -3,23 +3,82 @@
 use glam::DVec3;
 
 use super::codes;
+use super::embed::{EmbedError, embed};
 use super::segmenter::Segmenter;
 use super::tracker::{TrackError, TrackOptions, ViewReport, track};
-use crate::pipeline::observer::{Level, Observer};
-use crate::render::RenderSettings;
+use super::train_codes::{CodeTraining, CodeView, decode, train_codes};
+use super::view_map::ViewMap;
+use crate::models::Encoder;
+use crate::pipeline::observer::{Level, Observer, Signal};
+use crate::render::cpu::Renderer;
+use crate::render::{RenderError, RenderSettings};
+use crate::scene::semantic_map::{BACKGROUND_CODE, CODE_CHANNELS};
 use crate::scene::{GaussianCloud, Identities, IdentityId, Photo, SemanticMap};
 
-/// Finds the objects and parts of `cloud`, which was trained on `photos`, and gives them codes.
+/// Longer side of the masks that codes are trained on, px.
+const CODE_SIDE_PX: u32 = 256;
+/// Seed of the order in which views are trained on.
+const SEED: u64 = 0;
+
+/// How Gaussians get their codes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Lifting {
+    /// Those of the identities they voted for.
+    #[default]
+    Votes,
+    /// The same, refined by this many steps of training.
+    Refined(u64),
+    /// By training alone, as in the paper; identities are read off the trained codes.
+    Paper(u64),
+}
+
+/// Settings of the whole way.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FindOptions {
+    /// How masks become identities.
+    pub track: TrackOptions,
+    /// How identities become codes of Gaussians.
+    pub lifting: Lifting,
+}
+
+/// Why objects could not be found.
+#[derive(Debug, thiserror::Error)]
+pub enum FindError {
+    /// In making identities of masks.
+    #[error(transparent)]
+    Track(#[from] TrackError),
+    /// In training codes.
+    #[error("training codes: {0}")]
+    Lift(#[from] RenderError),
+    /// In looking at the identities.
+    #[error(transparent)]
+    Embed(#[from] EmbedError),
+}
+
+impl FindError {
+    /// Whether the observer asked to stop.
+    pub fn is_cancelled(&self) -> bool {
+        matches!(self, Self::Track(TrackError::Cancelled) | Self::Embed(EmbedError::Cancelled))
+    }
+}
+
+/// Finds the objects and parts of `cloud`, which was trained on `photos`, gives them codes, and lets
+/// an encoder look at them, if there is one.
+///
+/// # Errors
+/// If masks or photos cannot be read, a view cannot be drawn, the encoder fails, or the observer asks
+/// to stop.
 pub fn find_objects(
     cloud: &GaussianCloud,
     photos: &[Photo],
     settings: &RenderSettings,
     segmenter: &mut dyn Segmenter,
-    options: &TrackOptions,
+    options: &FindOptions,
+    encoder: Option<&mut dyn Encoder>,
     observer: &mut dyn Observer,
-) -> Result<SemanticMap, TrackError> {
-    let tracked = track(cloud, photos, settings, segmenter, options, observer)?;
-    if let Some(text) = unknown(&tracked.views, photos, options.reseed_share) {
+) -> Result<SemanticMap, FindError> {
+    let tracked = track(cloud, photos, settings, segmenter, &options.track, observer)?;
+    if let Some(text) = unknown(&tracked.views, photos, options.track.reseed_share) {
         observer.note(Level::Info, text);
     }
     let mut identities = tracked.identities;
@@ -28,7 +87,47 @@ pub fn find_objects(
     codes::assign(&mut identities, &centers);
     let margin = tracked.belongings.iter().map(|b| b.margin).collect();
     let seeds = tracked.seeds.iter().map(|&i| photos[i].name.clone()).collect();
-    Ok(SemanticMap::of_identities(identities, of, margin, seeds))
+    let mut map = SemanticMap::of_identities(identities, of, margin, seeds);
+    lift(&mut map, cloud, photos, settings, options.lifting, observer)?;
+    if let Some(encoder) = encoder {
+        map.language = Some(embed(cloud, &map, photos, settings, encoder, observer)?);
+    }
+    Ok(map)
+}
+
+/// Trains the codes of the Gaussians, where that is wanted, on the masks as they were tracked.
+fn lift(
+    map: &mut SemanticMap,
+    cloud: &GaussianCloud,
+    photos: &[Photo],
+    settings: &RenderSettings,
+    lifting: Lifting,
+    observer: &mut dyn Observer,
+) -> Result<(), FindError> {
+    let steps = match lifting {
+        Lifting::Votes => return Ok(()),
+        Lifting::Refined(steps) | Lifting::Paper(steps) => steps,
+    };
+    let mut renderer = Renderer::new();
+    let mut views = Vec::with_capacity(photos.len());
+    for photo in photos {
+        let camera = photo.camera.limited_to(CODE_SIDE_PX);
+        let seen = ViewMap::render(&mut renderer, cloud, &map.of, &map.identities, &camera, settings)?;
+        views.push(CodeView { camera, labels: seen.identity });
+    }
+    if matches!(lifting, Lifting::Paper(_)) {
+        let nothing: [f32; CODE_CHANNELS] = std::array::from_fn(|c| BACKGROUND_CODE[c % 3]);
+        map.codes.fill(nothing);
+    }
+    let training = CodeTraining { steps, seed: SEED };
+    train_codes(cloud, &mut map.codes, &views, &map.identities, settings, training, observer)?;
+    if observer.signal() == Signal::Cancel {
+        return Err(TrackError::Cancelled.into());
+    }
+    if matches!(lifting, Lifting::Paper(_)) {
+        map.of = decode(&map.codes, &map.identities);
+    }
+    Ok(())
 }
 
 /// What to say about views that masks did not explain; `None` if there is no need.

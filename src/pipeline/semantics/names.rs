@@ -4,7 +4,7 @@
 use std::collections::HashSet;
 
 use super::localise::Scorer;
-use crate::scene::{Identities, IdentityId};
+use crate::scene::Identities;
 
 /// Similarity under which two words have nothing to do with each other.
 const ALIKE: f64 = 0.82;
@@ -49,12 +49,8 @@ pub fn unknown_words(identities: &Identities, phrase: &str) -> Vec<String> {
 pub fn completions(identities: &Identities, typed: &str, most: usize) -> Vec<String> {
     let typed = typed.to_lowercase();
     let mut found: Vec<String> = Vec::new();
-    let full = |id: IdentityId| {
-        let line: Vec<String> = identities.line(id).map(|i| identities.name(i)).collect();
-        line.join(" of the ")
-    };
     let named = identities.iter().filter(|(_, i)| !i.names.is_empty());
-    let mut all: Vec<String> = named.map(|(id, _)| full(id)).collect();
+    let mut all: Vec<String> = named.map(|(id, _)| identities.full_name(id)).collect();
     all.sort_by_key(|n| (!n.to_lowercase().starts_with(&typed), n.chars().count(), n.clone()));
     for name in all {
         if name.to_lowercase().contains(&typed) && !found.contains(&name) {

@@ -1,11 +1,11 @@
 //! The objects and parts of the scene, as a tree; a click asks for one.
 
-use egui::{Button, CollapsingHeader, Color32, RichText, Ui, vec2};
+use egui::{Button, CollapsingHeader, Color32, Id, Key, RichText, ScrollArea, TextEdit, Ui, vec2};
 
 use super::super::state::AppState;
 use super::super::theme;
-use super::super::viewport::query::full_name;
 use super::super::viewport::visible::Visibility;
+use crate::pipeline::semantics::edit::Edit;
 use crate::scene::{Identities, IdentityId, Level, NOBODY};
 use crate::worker::Action;
 
@@ -19,9 +19,20 @@ pub fn show(ui: &mut Ui, state: &AppState, visibility: &Visibility, actions: &mu
     let from = if map.seeds.len() == 1 { "1 photo".to_owned() } else { format!("{} photos", map.seeds.len()) };
     ui.weak(format!("{} objects, {} parts, from the masks of {from}", count(Level::Object), count(Level::Part)));
     ui.add_space(4.0);
-    if visibility.is_partial() && ui.button("Show all").clicked() {
-        actions.push(Action::Isolate(None));
-    }
+    ui.horizontal(|ui| {
+        if visibility.is_partial() && ui.button("Show all").clicked() {
+            actions.push(Action::Isolate(None));
+        }
+        let new = Action::Paint(Some(NOBODY));
+        if ui.button("Mark an object\u{2026}").on_hover_text(new.tooltip()).clicked() {
+            actions.push(new);
+        }
+        for (action, text, list) in [(Action::Undo, "Undo", &state.undo), (Action::Redo, "Redo", &state.redo)] {
+            if ui.add_enabled(!list.is_empty(), Button::new(text)).on_hover_text(action.tooltip()).clicked() {
+                actions.push(action);
+            }
+        }
+    });
     let tree = Tree { identities, sizes: map.sizes(), visibility };
     for (id, _) in identities.iter().filter(|(_, i)| i.parent == NOBODY) {
         tree.branch(ui, id, actions);
@@ -61,9 +72,56 @@ impl Tree<'_> {
             ui.painter().rect_filled(rect, 3.0, Color32::from_rgb(code[0], code[1], code[2]));
             let button = Button::new(identities.name(id)).frame_when_inactive(false);
             if ui.add(button).on_hover_text("Show where it is").clicked() {
-                actions.push(Action::Ask(full_name(identities, id)));
+                actions.push(Action::Ask(identities.full_name(id)));
             }
+            self.menu(ui, id, actions);
             ui.label(RichText::new(format!("{} Gaussians", sizes[id as usize])).small().color(theme::WEAK));
+        });
+    }
+}
+
+impl Tree<'_> {
+    /// What can be corrected about an identity.
+    fn menu(&self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
+        let all = self.identities;
+        ui.menu_button("\u{2026}", |ui| {
+            let key = Id::unique("new name").with(id);
+            let mut name = ui.data(|d| d.get_temp::<String>(key)).unwrap_or_else(|| all.name(id));
+            ui.horizontal(|ui| {
+                let edit = ui.add(TextEdit::singleline(&mut name).char_limit(80).desired_width(130.0));
+                let enter = edit.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
+                if ui.button("Rename").clicked() || enter {
+                    actions.push(Action::Change(Edit::Rename(id, name.clone())));
+                    ui.close();
+                }
+            });
+            ui.data_mut(|d| d.insert_temp(key, name));
+            let level = all.get(id).map(|i| i.level);
+            ui.menu_button("Merge into", |ui| {
+                ScrollArea::vertical().max_height(300.0).show(ui, |ui| {
+                    for (other, identity) in all.iter().filter(|(other, i)| *other != id && Some(i.level) == level) {
+                        // Parts of one whole first matter; others are told by their whole's name.
+                        let same_whole = all.get(id).is_some_and(|i| i.parent == identity.parent);
+                        let text = if same_whole { all.name(other) } else { all.full_name(other) };
+                        if ui.button(text).clicked() {
+                            actions.push(Action::Change(Edit::Merge(id, other)));
+                            ui.close();
+                        }
+                    }
+                });
+            });
+            for (action, text) in [
+                (Action::Change(Edit::Split(id)), "Split"),
+                (Action::Paint(Some(id)), "Mark a new part\u{2026}"),
+                (Action::GoToTarget(id), "Go there"),
+                (Action::Isolate(Some(id)), "Show it alone"),
+                (Action::ExportTarget(id), "Export\u{2026}"),
+            ] {
+                if ui.button(text).on_hover_text(action.tooltip()).clicked() {
+                    actions.push(action);
+                    ui.close();
+                }
+            }
         });
     }
 }

@@ -1,5 +1,6 @@
 //! The viewport: shows what the drawing lane rendered, and moves the eye.
 
+pub mod brush;
 pub mod eye;
 mod frusta;
 mod input;
@@ -13,6 +14,7 @@ use std::sync::Arc;
 use egui::{Color32, ColorImage, Rect, Sense, TextureHandle, TextureOptions, Ui};
 use glam::{DVec2, DVec3};
 
+use self::brush::Brush;
 use self::eye::Eye;
 use self::photo::PhotoView;
 use self::query::Questions;
@@ -59,6 +61,8 @@ pub struct Viewport {
     pub questions: Questions,
     /// What is left out of the picture.
     pub visibility: Visibility,
+    /// What is being marked by hand.
+    pub brush: Option<Brush>,
     /// Generation of the newest map of identities.
     mapped: u64,
     /// World point that the wheel zooms to, while the cursor stays.
@@ -102,6 +106,7 @@ impl Viewport {
             error: None,
             questions: Questions::default(),
             visibility: Visibility::default(),
+            brush: None,
             mapped: 0,
             zoom_anchor: None,
         })
@@ -140,6 +145,7 @@ impl Viewport {
             self.up = None;
             self.questions.clear();
             self.visibility = Visibility::default();
+            self.brush = None;
             self.eye = home_eye(scene, None);
         }
         if let Some((generation, snapshot)) = worker.clouds().newer_than(self.snapshot) {
@@ -164,6 +170,7 @@ impl Viewport {
                 self.leave_photo();
                 self.eye.frame(&scene.home.bounds);
             }
+            Action::Paint(of) => self.brush = of.filter(|_| state.semantics.is_some()).map(Brush::new),
             Action::GoToTarget(id) => self.go_to(*id, state),
             Action::Isolate(only) => self.visibility.isolate(*only),
             Action::Hide(id) => self.visibility.toggle(*id),
@@ -230,6 +237,7 @@ impl Viewport {
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Viewport"));
         self.take_picture(ui);
         let now = ui.input(|i| i.time);
+        self.use_brush(&response, rect, state);
         if self.handle_input(ui, &response, rect, &scene, actions) {
             self.leave_photo();
             self.moved_at = now;
@@ -245,6 +253,7 @@ impl Viewport {
             ui.painter().image(texture.id(), shown, uv, Color32::WHITE);
         }
         if let Some(semantics) = &state.semantics {
+            self.questions.keep_up(ui.ctx(), semantics);
             self.questions.paint(ui, shown, semantics);
         }
         if let Some(photo) = self.photo.as_mut().filter(|_| layout.compare) {
@@ -254,8 +263,34 @@ impl Viewport {
             self.show_frusta(ui, rect, &scene, &response, layout, actions);
         }
         self.show_overlay(ui, rect, &scene, state, layout, actions);
+        if let (Some(brush), Some(semantics)) = (&mut self.brush, &state.semantics) {
+            brush.paint(ui, shown);
+            brush.show(ui, shown, &semantics.identities, actions);
+        }
         if let (Some(semantics), Some(cloud)) = (&state.semantics, &self.cloud) {
             self.questions.show(ui, shown, semantics, cloud, actions);
+        }
+    }
+
+    /// Paints where the pointer drags, floods where it clicks.
+    fn use_brush(&mut self, response: &egui::Response, rect: Rect, state: &AppState) {
+        let (Some(brush), Some(picture)) = (&mut self.brush, &self.picture) else { return };
+        let shown = self.photo.as_mut().map_or(rect, |p| p.fit(rect));
+        // Only a full picture has the pixels that the maps have.
+        if !picture.full {
+            return;
+        }
+        brush.on_view(&picture.camera);
+        let Some(pos) = response.interact_pointer_pos() else { return };
+        let scale = picture.camera.width_px as f32 / shown.width();
+        let at = [(pos.x - shown.left()) * scale, (pos.y - shown.top()) * scale];
+        if response.dragged_by(egui::PointerButton::Primary) {
+            brush.dab(at, scale);
+        } else if response.clicked()
+            && let (Some(maps), Some(semantics)) = (self.questions.maps(), &state.semantics)
+            && at.iter().all(|v| *v >= 0.0)
+        {
+            brush.flood([at[0] as usize, at[1] as usize], &picture.rgb, &maps.identities, &semantics.identities);
         }
     }
 

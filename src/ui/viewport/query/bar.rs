@@ -36,7 +36,8 @@ impl Questions {
             }
             if response.changed() || complete {
                 self.recalled = None;
-                self.live = self.asked(&self.typed, semantics);
+                let typed = self.typed.clone();
+                self.live = self.asked(&typed, semantics);
             }
             if response.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter)) {
                 self.keep();

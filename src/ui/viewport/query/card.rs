@@ -2,7 +2,7 @@
 
 use egui::{RichText, Ui};
 
-use super::{Look, Questions, full_name};
+use super::{Look, Questions};
 use crate::pipeline::semantics::answer::Basis;
 use crate::pipeline::semantics::localise::Answer;
 use crate::pipeline::semantics::matching::{self, MatchMode};
@@ -24,13 +24,13 @@ impl Questions {
     ) {
         let Some(newest) = self.live.as_ref().or(self.kept.last()).cloned() else { return };
         let identities = &semantics.identities;
-        show_verdict(ui, &newest, semantics);
+        self.show_verdict(ui, &newest, semantics);
         let shown = newest.shown(&self.look);
         let mut chosen = None;
         let hits = newest.answered.answer.hits().iter();
         for hit in hits.filter(|h| h.score > 0.0).take(LISTED) {
             ui.horizontal(|ui| {
-                let name = RichText::new(full_name(identities, hit.identity)).strong();
+                let name = RichText::new(identities.full_name(hit.identity)).strong();
                 if ui.selectable_label(shown.contains(&hit.identity), name).clicked() {
                     chosen = Some(hit.identity);
                 }
@@ -96,20 +96,35 @@ impl Questions {
     }
 }
 
-fn show_verdict(ui: &mut Ui, newest: &super::Asked, semantics: &SemanticMap) {
-    let text = match &newest.answered.answer {
-        Answer::Found(_) => return,
-        Answer::Ambiguous(_) => "Several fit equally well:".to_owned(),
-        Answer::NotFound(_) => {
-            let unknown = names::unknown_words(&semantics.identities, &newest.text);
-            if unknown.is_empty() || newest.answered.basis == Basis::Meaning {
-                "Nothing here fits all of it.".to_owned()
-            } else {
-                format!("Nothing here is called \"{}\".", shortened(&unknown.join("\", \"")))
+impl Questions {
+    fn show_verdict(&self, ui: &mut Ui, newest: &super::Asked, semantics: &SemanticMap) {
+        let by_name = names::unknown_words(&semantics.identities, &newest.text);
+        let unknown = match self.speech.unknown_words(&newest.text) {
+            // Names may know words that the encoder does not.
+            Some(unknown) => unknown.into_iter().filter(|w| by_name.contains(w)).collect(),
+            None => by_name,
+        };
+        let unknown = shortened(&unknown.join("\", \""));
+        match &newest.answered.answer {
+            Answer::Found(_) if unknown.is_empty() || newest.answered.basis == Basis::Names => {}
+            Answer::Found(_) => {
+                ui.colored_label(theme::WARNING, format!("Not understood, and left out: \"{unknown}\"."));
+            }
+            Answer::Ambiguous(_) => {
+                ui.colored_label(theme::WARNING, "Several fit equally well:");
+            }
+            Answer::NotFound(_) => {
+                let text = match unknown.as_str() {
+                    "" => "Nothing here fits.".to_owned(),
+                    _ => format!("Nothing here is called \"{unknown}\"."),
+                };
+                ui.colored_label(theme::WARNING, text);
             }
         }
-    };
-    ui.colored_label(theme::WARNING, text);
+        if let Some(trouble) = self.speech.trouble() {
+            ui.label(RichText::new(format!("Only names are understood: {trouble}")).small().color(theme::WEAK));
+        }
+    }
 }
 
 /// A text of reasonable length.

@@ -8,6 +8,7 @@ mod bar;
 mod card;
 mod look;
 mod overlay;
+mod speech;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -15,10 +16,12 @@ use std::time::{Duration, Instant};
 use egui::{Align2, Area, Color32, Id, Order, Rect, TextureHandle, TextureOptions, Ui, vec2};
 
 pub use self::look::{Look, Tint};
+use self::speech::Speech;
 use super::super::theme;
-use crate::pipeline::semantics::answer::{Answered, answer};
+use crate::pipeline::semantics::answer::{Answered, Language, answer};
 use crate::pipeline::semantics::grammar::Phrase;
 use crate::pipeline::semantics::matching::{self, MatchMode};
+use crate::pipeline::semantics::meaning::MeaningOptions;
 use crate::scene::{GaussianCloud, Identities, IdentityId, Mask, NOBODY, SemanticMap};
 use crate::worker::{Action, ViewMaps};
 
@@ -74,6 +77,10 @@ pub struct Questions {
     /// What was asked, oldest first.
     history: Vec<String>,
     maps: Option<Arc<ViewMaps>>,
+    /// The objects and parts that were asked, by address.
+    answered_for: usize,
+    /// What compares phrases with looks, once it is loaded.
+    speech: Speech,
     /// Relevancy of the pixels, for the histogram.
     heat: Vec<f32>,
     texture: Option<TextureHandle>,
@@ -105,6 +112,16 @@ impl Questions {
         self.focus = true;
     }
 
+    /// Answers anew where objects and parts, or what understands phrases, have changed.
+    pub fn keep_up(&mut self, ctx: &egui::Context, semantics: &Arc<SemanticMap>) {
+        let encoder = semantics.language.as_ref().map(|l| l.encoder.as_str());
+        let now = Arc::as_ptr(semantics) as usize;
+        if self.speech.keep_up(ctx, encoder) || self.answered_for != now {
+            self.answered_for = now;
+            self.ask_again(semantics);
+        }
+    }
+
     /// Asks as if it had been typed.
     pub fn ask(&mut self, text: &str, semantics: &SemanticMap) {
         self.typed = text.to_owned();
@@ -113,15 +130,16 @@ impl Questions {
 
     /// Answers all questions anew: identities have changed.
     pub fn ask_again(&mut self, semantics: &SemanticMap) {
-        let again = |q: &Asked| self.asked(&q.text, semantics);
-        let (kept, live) = (self.kept.iter().filter_map(again).collect(), self.live.as_ref().and_then(again));
-        (self.kept, self.live) = (kept, live);
+        let texts: Vec<String> = self.kept.iter().map(|q| q.text.clone()).collect();
+        self.kept = texts.iter().filter_map(|text| self.asked(text, semantics)).collect();
+        self.live = self.live.take().and_then(|q| self.asked(&q.text, semantics));
     }
 
     /// Forgets questions and answers: another scene.
     pub fn clear(&mut self) {
         let history = std::mem::take(&mut self.history);
-        *self = Self { look: self.look, open: self.open, history, ..Self::default() };
+        let speech = std::mem::take(&mut self.speech);
+        *self = Self { look: self.look, open: self.open, history, speech, ..Self::default() };
     }
 
     /// Takes over what the present view's pixels belong to; `None` while it is not known.
@@ -129,10 +147,14 @@ impl Questions {
         self.maps = maps;
     }
 
-    fn asked(&self, text: &str, semantics: &SemanticMap) -> Option<Asked> {
+    fn asked(&mut self, text: &str, semantics: &SemanticMap) -> Option<Asked> {
         let start = Instant::now();
         let phrase = Phrase::parse(text)?;
-        let answered = answer(&semantics.identities, &phrase, self.look.kind, None);
+        let phrases = self.speech.learn(&phrase);
+        let language = semantics.language.as_ref().zip(phrases);
+        let language =
+            language.map(|(features, phrases)| Language { features, phrases, options: MeaningOptions::default() });
+        let answered = answer(&semantics.identities, &phrase, self.look.kind, language);
         Some(Asked { text: text.trim().to_owned(), answered, chosen: None, time: start.elapsed() })
     }
 
@@ -265,14 +287,9 @@ impl Questions {
         let area =
             Area::new(Id::unique("under cursor")).order(Order::Middle).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
         area.interactable(false).show(ui.ctx(), |ui| {
-            theme::overlay().show(ui, |ui| ui.label(full_name(identities, id)));
+            theme::overlay().show(ui, |ui| ui.label(identities.full_name(id)));
         });
     }
-}
-
-/// The name of an identity with those of its wholes: "button a of the red controller".
-pub fn full_name(identities: &Identities, id: IdentityId) -> String {
-    identities.line(id).map(|i| identities.name(i)).collect::<Vec<_>>().join(" of the ")
 }
 
 #[cfg(test)]

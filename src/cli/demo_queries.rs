@@ -1,0 +1,129 @@
+//! The demo's questions: objects found from one labelled photo, asked for in a held-out view.
+
+use std::path::Path;
+use std::time::Instant;
+
+use serde::Serialize;
+
+use super::asking::Asker;
+use super::eval::Job;
+use super::progress::Console;
+use super::{CliError, output, query};
+use crate::io::{self, labels::Labels};
+use crate::models::{self, Encoder};
+use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::semantics::find::{FindOptions, find_objects};
+use crate::pipeline::semantics::grammar::Kind;
+use crate::pipeline::semantics::localise::Answer;
+use crate::pipeline::semantics::protocols::categories;
+use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
+use crate::pipeline::semantics::tracker::TrackOptions;
+use crate::pipeline::semantics::view_map::ViewMap;
+use crate::render::cpu::Renderer;
+use crate::scene::Photo;
+
+/// What is asked; the last two are not in the scene.
+const QUESTIONS: [&str; 7] = [
+    "the red controller",
+    "a button of the blue controller",
+    "the handle of the kettle",
+    "the teddy bear's nose",
+    "the shade of the lamp",
+    "a giraffe",
+    "the trunk of the elephant",
+];
+
+/// What was asked and answered.
+#[derive(Debug, Serialize)]
+pub struct Asked {
+    /// The question.
+    pub question: String,
+    /// "found", "ambiguous" or "not found".
+    pub verdict: &'static str,
+    /// Names of what was chosen.
+    pub answer: Vec<String>,
+    /// Pixels of it in the view.
+    pub pixels: usize,
+    /// From the text to the mask, ms.
+    pub millis: f64,
+}
+
+/// How well every name was found in all held-out views, and the questions.
+#[derive(Debug, Serialize)]
+pub struct Queries {
+    /// Photos whose masks were used.
+    pub seeds: Vec<String>,
+    /// Seconds that finding objects took.
+    pub find_secs: f64,
+    /// Mean IoU of whole objects in held-out photos, asked for by name.
+    pub object_miou: f64,
+    /// Mean IoU of parts.
+    pub part_miou: f64,
+    /// The questions.
+    pub asked: Vec<Asked>,
+}
+
+/// Finds objects from the masks of one photo in `photos` (and of more where much is unknown), stores
+/// them in `scene`, and asks. Heat maps of the answers go to `pictures`.
+pub fn run(
+    scene: &Path,
+    photos: &Path,
+    job: &Job,
+    pictures: &Path,
+    console: &mut Console,
+) -> Result<Queries, CliError> {
+    let mut segmenter = FileMasks(Labels::open(photos)?);
+    let training: Vec<Photo> = (0..job.dataset.photos.len())
+        .filter(|i| !job.views.contains(i))
+        .map(|i| job.dataset.photos[i].clone())
+        .collect();
+    let mut encoder = models::encoder(models::DEMO)?;
+    let looking: Option<&mut dyn Encoder> = Some(encoder.as_mut());
+    let options =
+        FindOptions { track: TrackOptions { max_seeds: 3, ..TrackOptions::default() }, ..FindOptions::default() };
+    let start = Instant::now();
+    let found = find_objects(&job.cloud, &training, &job.settings, &mut segmenter, &options, looking, console);
+    let map = found.map_err(|e| match e {
+        e if e.is_cancelled() => CliError::Cancelled("the trained scene is saved".into()),
+        other => other.into(),
+    })?;
+    let find_secs = start.elapsed().as_secs_f64();
+    io::semantic_map::save(scene, &map, &mut job.cloud.clone())?;
+    console.note(Level::Info, format!("{} objects and parts found", map.identities.len()));
+
+    output::make_folder(pictures)?;
+    let mut asker = Asker::new(&map)?;
+    let (mut objects, mut parts, mut asked) = (Vec::new(), Vec::new(), Vec::new());
+    let mut renderer = Renderer::new();
+    for (k, &i) in job.views.iter().enumerate() {
+        let photo = &job.dataset.photos[i];
+        let camera = photo.camera.limited_to(job.max_side_px);
+        let view = ViewMap::render(&mut renderer, &job.cloud, &map.of, &map.identities, &camera, &job.settings)?;
+        for category in categories(&segmenter.segment(photo, job.max_side_px)?) {
+            let mask = asker.ask(&category.name, Kind::Auto)?.map(|a| a.mask(&view, &map.identities, 1));
+            let iou = mask.map_or(0.0, |m| m.iou(&category.mask));
+            if category.name.contains(" of the ") { parts.push(iou) } else { objects.push(iou) }
+        }
+        for (n, question) in QUESTIONS.iter().enumerate().filter(|_| k == 0) {
+            let start = Instant::now();
+            let Some(answered) = asker.ask(question, Kind::Auto)? else { continue };
+            let mask = answered.mask(&view, &map.identities, 1);
+            let millis = start.elapsed().as_secs_f64() * 1e3;
+            let path = pictures.join(format!("{n}_{}.png", question.replace([' ', '\''], "_")));
+            query::write_heat(&path, &job.cloud, &camera, &job.settings, &answered.heat(&view))?;
+            asked.push(Asked {
+                question: (*question).to_owned(),
+                verdict: match answered.answer {
+                    Answer::Found(_) => "found",
+                    Answer::Ambiguous(_) => "ambiguous",
+                    Answer::NotFound(_) => "not found",
+                },
+                answer: answered.chosen(1).iter().map(|id| map.identities.full_name(*id)).collect(),
+                pixels: mask.area(),
+                millis,
+            });
+        }
+    }
+    let mean = |v: &[f64]| crate::math::stats::mean(v);
+    Ok(Queries { seeds: map.seeds.clone(), find_secs, object_miou: mean(&objects), part_miou: mean(&parts), asked })
+}

@@ -1,0 +1,72 @@
+//! `fmlgs segment`: the Gaussians of what is asked for.
+
+use std::path::PathBuf;
+
+use super::asking::{Asker, semantics};
+use super::query::KindArg;
+use super::{CliError, opened, output};
+use crate::io;
+use crate::pipeline::semantics::codes::TOLERANCE;
+use crate::pipeline::semantics::matching::{MatchMode, gaussians};
+
+/// Write the Gaussians of an object or a part as a .ply
+///
+/// The same match as that of the mask, in space: by identities, or with --blend by the codes of the
+/// Gaussians. Exit code 1 if nothing fits.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    fmlgs segment scene/ \"the kettle\" --out kettle.ply\n  \
+    fmlgs segment scene/ \"lid of the kettle\" --out lid.ply\n  \
+    fmlgs segment scene/ \"the kettle\" --rest --out without_kettle.ply")]
+pub struct Args {
+    /// Trained scene with objects and parts ('fmlgs preprocess')
+    scene: PathBuf,
+    /// What to look for
+    text: String,
+    /// Write to this file
+    #[arg(long)]
+    out: PathBuf,
+    /// Write everything else instead
+    #[arg(long)]
+    rest: bool,
+    /// Answers that are written at most
+    #[arg(long, default_value_t = 1)]
+    top: usize,
+    /// Whether an object or a part is meant
+    #[arg(long, value_enum, default_value_t = KindArg::Auto)]
+    kind: KindArg,
+    /// Match the codes of the Gaussians instead of their identities
+    #[arg(long)]
+    blend: bool,
+    /// Largest difference per channel of a match, in 255ths
+    #[arg(long, default_value_t = 255.0 * TOLERANCE)]
+    tolerance: f32,
+}
+
+pub fn run(args: Args) -> Result<(), CliError> {
+    let scene = opened::drawable(&args.scene)?;
+    let map = semantics(&args.scene, &scene.cloud)?;
+    let answered = Asker::new(&map)?.ask(&args.text, args.kind.into())?;
+    let targets = answered.map(|a| a.chosen(args.top)).unwrap_or_default();
+    if targets.is_empty() {
+        return Err(CliError::failed(format!(
+            "nothing here is called '{}'; 'fmlgs query' says what is near",
+            args.text
+        )));
+    }
+    let mode = if args.blend { MatchMode::Blend } else { MatchMode::Exact };
+    let mut inside = vec![false; scene.cloud.len()];
+    for target in &targets {
+        let found = gaussians(&map, *target, mode, args.tolerance / 255.0);
+        inside.iter_mut().zip(found).for_each(|(a, b)| *a |= b);
+    }
+    let kept: Vec<usize> = (0..inside.len()).filter(|&i| inside[i] != args.rest).collect();
+    if kept.is_empty() {
+        return Err(CliError::failed("no Gaussian is left to write"));
+    }
+    output::make_parent(&args.out)?;
+    io::splat_ply::write(&args.out, &scene.cloud.select(&kept))?;
+    let names: Vec<String> = targets.iter().map(|id| map.identities.full_name(*id)).collect();
+    let what = if args.rest { format!("all but {}", names.join(", ")) } else { names.join(", ") };
+    output::print(&format!("{what}: {} of {} Gaussians in {}", kept.len(), inside.len(), args.out.display()))
+}

@@ -1,0 +1,317 @@
+//! Corrections by hand: names, merging, splitting, new parts. An edit makes a new map; the old one
+//! stays, so that it can be undone.
+
+use glam::Vec3;
+use rstar::RTree;
+use rstar::primitives::GeomWithData;
+
+use super::codes::{self, RADIUS};
+use crate::math::stats::median;
+use crate::scene::{GaussianCloud, Identities, IdentityId, Level, NOBODY, SemanticMap, ViewFeatures};
+
+/// A correction.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Edit {
+    /// Gives an identity another first name; the old one is still understood.
+    Rename(IdentityId, String),
+    /// The first becomes the second, with all its pieces.
+    Merge(IdentityId, IdentityId),
+    /// What does not hang together becomes identities of its own; what does is cut in two.
+    Split(IdentityId),
+    /// These Gaussians, as far as they belong to the identity, become a new piece of it. Of nobody,
+    /// a new object.
+    AddPiece {
+        /// Whose piece.
+        of: IdentityId,
+        /// What it is called; may be empty.
+        name: String,
+        /// Indices of Gaussians.
+        gaussians: Vec<u32>,
+    },
+}
+
+/// Why an edit cannot be made.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum EditError {
+    /// The identity is not there.
+    #[error("there is no object or part number {0}")]
+    Unknown(IdentityId),
+    /// A name without a letter.
+    #[error("a name needs at least one letter or digit")]
+    NoName,
+    /// An identity with itself or with a piece of itself.
+    #[error("'{0}' and '{1}' cannot become one: one is the other, or a piece of it")]
+    Related(String, String),
+    /// Nothing to split.
+    #[error("'{0}' has too few Gaussians to be split")]
+    TooSmall(String),
+    /// None of the Gaussians belongs to the whole.
+    #[error("nothing of '{0}' was marked")]
+    Nothing(String),
+}
+
+/// The map after an edit.
+///
+/// # Errors
+/// If the edit makes no sense; the map is as it was.
+pub fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Result<SemanticMap, EditError> {
+    let all = &map.identities;
+    let known = |id: IdentityId| if all.get(id).is_some() { Ok(id) } else { Err(EditError::Unknown(id)) };
+    let mut new = map.clone();
+    match edit {
+        Edit::Rename(id, name) => {
+            let name = name.trim();
+            if !name.chars().any(char::is_alphanumeric) {
+                return Err(EditError::NoName);
+            }
+            if let Some(identity) = new.identities.get_mut(known(*id)?) {
+                identity.names.retain(|n| n != name);
+                identity.names.insert(0, name.to_owned());
+            }
+        }
+        Edit::Merge(from, into) => {
+            let (from, into) = (known(*from)?, known(*into)?);
+            if all.within(from)[into as usize] {
+                return Err(EditError::Related(all.name(from), all.name(into)));
+            }
+            merge(&mut new, from, into);
+        }
+        Edit::Split(id) => {
+            let own: Vec<usize> = (0..map.of.len()).filter(|&i| map.of[i] == *id).collect();
+            let parts = pieces(cloud, &own).ok_or_else(|| EditError::TooSmall(all.name(*id)))?;
+            let (level, parent) = all.get(known(*id)?).map_or((Level::Object, NOBODY), |i| (i.level, i.parent));
+            for part in parts.iter().skip(1) {
+                add(&mut new, level, parent, String::new(), part);
+            }
+        }
+        Edit::AddPiece { of, name, gaussians } => {
+            let inside = if *of == NOBODY { vec![true] } else { all.within(known(*of)?) };
+            let is_in = |i: &usize| map.of.get(*i).is_some_and(|id| inside.get(*id as usize) == Some(&true));
+            let own: Vec<usize> = gaussians.iter().map(|i| *i as usize).filter(is_in).collect();
+            if own.is_empty() {
+                return Err(EditError::Nothing(all.name(*of)));
+            }
+            let level = if *of == NOBODY { Level::Object } else { Level::Part };
+            add(&mut new, level, *of, name.trim().to_owned(), &own);
+        }
+    }
+    Ok(new)
+}
+
+/// Adds an identity that takes over these Gaussians.
+fn add(map: &mut SemanticMap, level: Level, parent: IdentityId, name: String, gaussians: &[usize]) {
+    let code = free_code(&map.identities);
+    let id = map.identities.add(level, parent, Some(name).filter(|n| !n.is_empty()).into_iter().collect());
+    if let Some(identity) = map.identities.get_mut(id) {
+        identity.code = code;
+    }
+    if let Some(language) = &mut map.language {
+        language.of.push(ViewFeatures::default());
+    }
+    let codes = map.identities.codes(id);
+    for &i in gaussians {
+        (map.of[i], map.codes[i]) = (id, codes);
+    }
+}
+
+/// The point of the code sphere that is farthest from all codes that are taken.
+fn free_code(identities: &Identities) -> [f32; 3] {
+    let taken: Vec<Vec3> = identities.iter().map(|(_, i)| Vec3::from(i.code)).collect();
+    let points = codes::sphere(2 * taken.len() + 8).into_iter().map(|p| p * RADIUS + Vec3::splat(0.5));
+    let far = |p: &Vec3| taken.iter().map(|t| t.distance_squared(*p)).fold(f32::INFINITY, f32::min);
+    points.max_by(|a, b| far(a).total_cmp(&far(b))).unwrap_or(Vec3::ONE).to_array()
+}
+
+/// `from` becomes `into`. Numbers change, because there is one identity less.
+fn merge(map: &mut SemanticMap, from: IdentityId, into: IdentityId) {
+    let old = std::mem::take(&mut map.identities);
+    let codes_before: Vec<_> = (0..=old.len() as IdentityId).map(|id| old.codes(id)).collect();
+    // Wholes before pieces, whatever the numbers were.
+    let parent_of = |id: IdentityId| -> IdentityId {
+        let parent = old.get(id).map_or(NOBODY, |i| i.parent);
+        if parent == from { into } else { parent }
+    };
+    let depth = |id: IdentityId| {
+        std::iter::successors(Some(id), |&i| Some(parent_of(i)).filter(|p| *p != NOBODY)).take(old.len()).count()
+    };
+    let mut order: Vec<IdentityId> = old.iter().map(|(id, _)| id).filter(|id| *id != from).collect();
+    order.sort_by_key(|id| (depth(*id), *id));
+    let mut number = vec![NOBODY; old.len() + 1];
+    let mut features = Vec::new();
+    for &id in &order {
+        let Some(identity) = old.get(id) else { continue };
+        let mut names = identity.names.clone();
+        if id == into {
+            let others = old.get(from).map(|i| i.names.clone()).unwrap_or_default();
+            names.extend(others.into_iter().filter(|n| !identity.names.contains(n)));
+        }
+        number[id as usize] = map.identities.add(identity.level, number[parent_of(id) as usize], names);
+        if let Some(new) = map.identities.get_mut(number[id as usize]) {
+            new.code = identity.code;
+        }
+        features.extend(map.language.as_ref().map(|l| l.of.get(id as usize - 1).cloned().unwrap_or_default()));
+    }
+    number[from as usize] = number[into as usize];
+    if let Some(language) = &mut map.language {
+        language.of = features;
+    }
+    for (of, codes) in map.of.iter_mut().zip(&mut map.codes) {
+        let before = *of as usize;
+        *of = number.get(before).copied().unwrap_or(NOBODY);
+        let now = map.identities.codes(*of);
+        // Trained codes of those that stay what they were are kept.
+        if codes_before.get(before) != Some(&now) {
+            *codes = now;
+        }
+    }
+}
+
+/// Gaussians of a component that count; smaller ones stay with the largest.
+const LEAST: usize = 8;
+
+/// What hangs together among the Gaussians `own`, largest first; if all does, two halves. `None` if
+/// there are too few.
+fn pieces(cloud: &GaussianCloud, own: &[usize]) -> Option<Vec<Vec<usize>>> {
+    if own.len() < 2 * LEAST {
+        return None;
+    }
+    let place = |i: usize| cloud.positions[i].map(f64::from);
+    let tree = RTree::bulk_load(own.iter().enumerate().map(|(k, &i)| GeomWithData::new(place(i), k)).collect());
+    let near = |k: usize, n: usize| tree.nearest_neighbor_iter_with_distance_2(place(own[k])).skip(1).take(n);
+    let spacing: Vec<f64> = (0..own.len()).filter_map(|k| near(k, 1).next()).map(|(_, d)| d.sqrt()).collect();
+    let reach = 6.0 * median(&spacing).max(f64::MIN_POSITIVE);
+    let mut component = vec![usize::MAX; own.len()];
+    let mut found: Vec<Vec<usize>> = Vec::new();
+    for first in 0..own.len() {
+        if component[first] != usize::MAX {
+            continue;
+        }
+        let mut open = vec![first];
+        component[first] = found.len();
+        let mut members = Vec::new();
+        while let Some(k) = open.pop() {
+            members.push(own[k]);
+            for neighbour in tree.locate_within_distance(place(own[k]), reach * reach).map(|p| p.data) {
+                if component[neighbour] == usize::MAX {
+                    component[neighbour] = found.len();
+                    open.push(neighbour);
+                }
+            }
+        }
+        found.push(members);
+    }
+    found.sort_by_key(|m| std::cmp::Reverse(m.len()));
+    let (mut large, small): (Vec<_>, Vec<_>) = found.into_iter().partition(|m| m.len() >= LEAST);
+    if large.len() < 2 {
+        return Some(halves(own, place));
+    }
+    large[0].extend(small.into_iter().flatten());
+    Some(large)
+}
+
+/// Two halves of the Gaussians along the axis on which they spread most.
+fn halves(own: &[usize], place: impl Fn(usize) -> [f64; 3]) -> Vec<Vec<usize>> {
+    let spread = |axis: usize| {
+        let v: Vec<f64> = own.iter().map(|&i| place(i)[axis]).collect();
+        let mean = crate::math::stats::mean(&v);
+        v.iter().map(|x| (x - mean).powi(2)).sum::<f64>()
+    };
+    let axis = (0..3).max_by(|&a, &b| spread(a).total_cmp(&spread(b))).unwrap_or(0);
+    let middle = median(&own.iter().map(|&i| place(i)[axis]).collect::<Vec<_>>());
+    let (low, high) = own.iter().partition(|&&i| place(i)[axis] <= middle);
+    vec![low, high]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::LanguageFeatures;
+
+    /// Two dolls of 20 Gaussians each with 10 more as an eye, and a blob of 20 in two places.
+    fn scene() -> (SemanticMap, GaussianCloud) {
+        let mut all = Identities::default();
+        let red = all.add(Level::Object, NOBODY, vec!["red doll".into()]);
+        let red_eye = all.add(Level::Part, red, vec!["eye".into()]);
+        let blue = all.add(Level::Object, NOBODY, vec!["blue doll".into()]);
+        let blue_eye = all.add(Level::Part, blue, vec!["eye".into()]);
+        codes::assign(&mut all, &[]);
+        let of = [vec![red; 20], vec![red_eye; 10], vec![blue; 20], vec![blue_eye; 10]].concat();
+        let n = of.len();
+        let place = |i: usize| if i < 10 { [i as f32 * 0.01, 0.0, 0.0] } else { [5.0 + i as f32 * 0.01, 0.0, 0.0] };
+        let cloud = GaussianCloud {
+            positions: (0..n).map(place).collect(),
+            log_scales: vec![[-4.0; 3]; n],
+            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
+            opacity_logits: vec![0.0; n],
+            sh: vec![[0.0; 3]; n],
+            ..GaussianCloud::default()
+        };
+        let mut map = SemanticMap::of_identities(all, of, vec![1.0; n], vec![]);
+        map.language =
+            Some(LanguageFeatures { encoder: "t".into(), dimension: 1, of: vec![ViewFeatures::default(); 4] });
+        (map, cloud)
+    }
+
+    fn check(map: &SemanticMap) {
+        for (id, identity) in map.identities.iter() {
+            assert!(identity.parent < id, "wholes come before their pieces");
+        }
+        let codes: Vec<_> = map.of.iter().map(|id| map.identities.codes(*id)).collect();
+        assert_eq!(map.codes, codes);
+        assert!(map.language.as_ref().is_some_and(|l| l.is_valid(&map.identities)));
+    }
+
+    #[test]
+    fn renaming_keeps_the_old_name() {
+        let (map, cloud) = scene();
+        let new = apply(&map, &cloud, &Edit::Rename(1, " Rosa ".into())).expect("renamed");
+        assert_eq!(new.identities.get(1).map(|i| i.names.clone()), Some(vec!["Rosa".into(), "red doll".into()]));
+        assert_eq!(apply(&map, &cloud, &Edit::Rename(1, " - ".into())), Err(EditError::NoName));
+        assert_eq!(apply(&map, &cloud, &Edit::Rename(9, "x".into())), Err(EditError::Unknown(9)));
+        check(&new);
+    }
+
+    #[test]
+    fn merged_identities_are_one_with_all_pieces() {
+        let (map, cloud) = scene();
+        for (from, into) in [(1, 3), (3, 1)] {
+            let new = apply(&map, &cloud, &Edit::Merge(from, into)).expect("merged");
+            check(&new);
+            assert_eq!((new.identities.len(), new.sizes()[1]), (3, 60));
+            assert_eq!(new.identities.pieces(1).count(), 2);
+            assert_eq!(new.identities.get(1).map(|i| i.names.len()), Some(2), "both names are understood");
+        }
+        let new = apply(&map, &cloud, &Edit::Merge(2, 1)).expect("a part can go back into its whole");
+        check(&new);
+        assert_eq!((new.identities.len(), new.sizes()[1]), (3, 30));
+        for (from, into) in [(1, 1), (1, 2)] {
+            assert!(matches!(apply(&map, &cloud, &Edit::Merge(from, into)), Err(EditError::Related(..))));
+        }
+    }
+
+    #[test]
+    fn what_lies_apart_is_split_apart() {
+        let (map, cloud) = scene();
+        let new = apply(&map, &cloud, &Edit::Split(1)).expect("split");
+        check(&new);
+        assert_eq!((new.identities.len(), new.sizes()[5]), (5, 10));
+        assert!(new.of[..10].iter().all(|id| *id == new.of[0]) && new.of[0] != new.of[10]);
+        // In one place: two halves.
+        let new = apply(&map, &cloud, &Edit::Split(3)).expect("split");
+        assert_eq!((new.sizes()[3], new.sizes()[5]), (20, 10), "its eye stays with it");
+        assert!(matches!(apply(&map, &cloud, &Edit::Split(2)), Err(EditError::TooSmall(_))));
+    }
+
+    #[test]
+    fn a_piece_takes_only_what_belongs_to_its_whole() {
+        let (map, cloud) = scene();
+        let add = |of, gaussians: std::ops::Range<u32>| {
+            apply(&map, &cloud, &Edit::AddPiece { of, name: "foot".into(), gaussians: gaussians.collect() })
+        };
+        let new = add(1, 15..40).expect("added");
+        check(&new);
+        assert_eq!((new.identities.name(5), new.sizes()[5]), ("foot".into(), 15));
+        assert!(matches!(add(1, 40..50), Err(EditError::Nothing(_))));
+        assert!(matches!(add(NOBODY, 0..5), Err(EditError::Nothing(_))), "all of it is somebody's");
+    }
+}

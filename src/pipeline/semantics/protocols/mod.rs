@@ -1,0 +1,111 @@
+//! Evaluation protocols of the literature, one per file, each under the name that it is printed with.
+//!
+//! Every protocol asks a scene for the categories of labelled views and compares. Views are matched
+//! with labels by name, never by index.
+
+pub mod fastlgs_ex;
+pub mod langsplat;
+pub mod multi_class;
+pub mod part_recall;
+pub mod selection_3d;
+pub mod spin_nerf;
+
+use std::collections::BTreeMap;
+
+use super::answer::Answered;
+use super::code_map::CodeMap;
+use super::segmenter::FoundMask;
+use super::view_map::ViewMap;
+use crate::scene::{Camera, Mask, PixelBox, SemanticMap};
+
+/// A scene that is asked.
+pub struct AskedScene<'a> {
+    /// What it consists of.
+    pub map: &'a SemanticMap,
+    /// Answers a phrase; `None` for one with nothing in it.
+    pub ask: &'a mut dyn FnMut(&str) -> Option<Answered>,
+}
+
+/// A labelled view of it.
+pub struct LabelledView<'a> {
+    /// The photo's name.
+    pub name: &'a str,
+    /// From where.
+    pub camera: &'a Camera,
+    /// What its pixels belong to.
+    pub exact: &'a ViewMap,
+    /// Its blended codes.
+    pub blended: &'a CodeMap,
+    /// Labels, of the view's size.
+    pub categories: Vec<Category>,
+}
+
+/// All regions of one name in a view.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Category {
+    /// The name, as asked for: "button of the red controller".
+    pub name: String,
+    /// Its pixels.
+    pub mask: Mask,
+    /// Box of each region.
+    pub boxes: Vec<PixelBox>,
+}
+
+/// One compared category of a view.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Unit {
+    /// The photo.
+    pub view: String,
+    /// The category.
+    pub query: String,
+    /// Intersection over union.
+    pub iou: f64,
+    /// Whether the point of largest relevancy is on it, where the protocol asks that.
+    pub hit: Option<bool>,
+}
+
+/// The labels of a view by name: regions of one name together. A piece is called "X of the Y".
+pub fn categories(labels: &[FoundMask]) -> Vec<Category> {
+    let mut all: BTreeMap<String, Category> = BTreeMap::new();
+    for label in labels {
+        let Some(name) = &label.name else { continue };
+        let whole = label.parent.and_then(|p| labels[p].name.as_ref());
+        let name = whole.map_or_else(|| name.clone(), |w| format!("{name} of the {w}"));
+        let empty = || Mask::empty(label.mask.width_px(), label.mask.height_px());
+        let category = all.entry(name.clone()).or_insert_with(|| Category { name, mask: empty(), boxes: Vec::new() });
+        category.mask.add(&label.mask);
+        category.boxes.extend(label.mask.bounds());
+    }
+    all.into_values().collect()
+}
+
+/// Mean IoU of all units (micro), and of the views' means (macro); NaN without any.
+pub fn means(units: &[Unit]) -> (f64, f64) {
+    let mut views: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    units.iter().for_each(|u| views.entry(&u.view).or_default().push(u.iou));
+    let of = |v: &[f64]| crate::math::stats::mean(v);
+    let micro = of(&units.iter().map(|u| u.iou).collect::<Vec<_>>());
+    (micro, of(&views.values().map(|v| of(v)).collect::<Vec<_>>()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Level;
+
+    #[test]
+    fn regions_of_one_name_are_one_category_with_all_their_boxes() {
+        let label = |name: &str, parent, from: usize, to: usize| FoundMask {
+            level: Level::Object,
+            parent,
+            name: Some(name.into()),
+            mask: Mask::from_fn(20, 1, |i| (from..to).contains(&i)),
+        };
+        let all = categories(&[label("doll", None, 0, 9), label("eye", Some(0), 2, 3), label("eye", Some(0), 5, 7)]);
+        let list: Vec<_> = all.iter().map(|c| (c.name.as_str(), c.mask.area(), c.boxes.len())).collect();
+        assert_eq!(list, [("doll", 9, 1), ("eye of the doll", 3, 2)]);
+        let unit = |view: &str, iou| Unit { view: view.into(), query: String::new(), iou, hit: None };
+        let (micro, by_view) = means(&[unit("a", 1.0), unit("a", 0.0), unit("b", 1.0)]);
+        assert!((micro - 2.0 / 3.0).abs() < 1e-12 && (by_view - 0.75).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,115 @@
+//! `part-recall`, the paper's ablation: how many part queries are answered with a mask of IoU 0.5 or
+//! more, as multilevel extraction (ME), semantic deviation (SD) and multilevel localisation (ML) are
+//! switched on one after another.
+
+use super::{LabelledView, Unit};
+use crate::math::stats::mean;
+use crate::pipeline::semantics::answer::by_meaning;
+use crate::pipeline::semantics::answer::{Language, phrases_of};
+use crate::pipeline::semantics::grammar::{Kind, Phrase};
+use crate::pipeline::semantics::localise::Strategy;
+use crate::pipeline::semantics::meaning::{MeaningOptions, PartFeatures, Phrasebook};
+use crate::scene::{Identities, LanguageFeatures, Level, Mask, SemanticMap};
+
+/// IoU from which a query counts as answered.
+pub const HIT_IOU: f64 = 0.5;
+
+/// What is switched on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Components {
+    /// Parts are extracted, not objects alone.
+    pub extraction: bool,
+    /// Parts' features are moved towards their objects'.
+    pub deviation: bool,
+    /// Localisation in two steps.
+    pub localisation: bool,
+}
+
+impl Components {
+    /// The paper's rows, in its order.
+    pub const ROWS: [Self; 4] = [
+        Self::of(false, false, false),
+        Self::of(true, false, false),
+        Self::of(true, true, false),
+        Self::of(true, true, true),
+    ];
+
+    const fn of(extraction: bool, deviation: bool, localisation: bool) -> Self {
+        Self { extraction, deviation, localisation }
+    }
+
+    fn options(self) -> MeaningOptions {
+        MeaningOptions {
+            parts: if self.deviation { PartFeatures::Deviated } else { PartFeatures::Raw },
+            strategy: if self.localisation { Strategy::Paper } else { Strategy::OneStep },
+            ..MeaningOptions::default()
+        }
+    }
+}
+
+/// One row of the table.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Row {
+    /// What was switched on.
+    pub components: Components,
+    /// Share of part queries with an IoU of [`HIT_IOU`] or more.
+    pub recall: f64,
+    /// Mean IoU of the part queries.
+    pub mean_iou: f64,
+    /// Mean time of a query, its text's encoding included, seconds.
+    pub mean_secs: f64,
+    /// All queries.
+    pub units: Vec<Unit>,
+}
+
+/// Asks for every part of the `views` by its phrase and compares, for one row of the table. `encode`
+/// gives the embedding of a phrase.
+///
+/// # Errors
+/// What `encode` fails with.
+pub fn row<E>(
+    components: Components,
+    map: &SemanticMap,
+    language: &LanguageFeatures,
+    views: &[LabelledView<'_>],
+    mut encode: impl FnMut(&str) -> Result<Vec<f32>, E>,
+) -> Result<Row, E> {
+    let objects = objects_alone(language, &map.identities);
+    let features = if components.extraction { language } else { &objects };
+    let (mut units, mut secs) = (Vec::new(), Vec::new());
+    // Canonical phrases are encoded once for all queries.
+    let mut phrases = Phrasebook::default();
+    phrases.learn(&[], &mut encode)?;
+    for view in views {
+        for category in view.categories.iter().filter(|c| c.name.contains(" of the ")) {
+            let start = std::time::Instant::now();
+            let mut mask = Mask::empty(view.exact.width_px, view.exact.height_px);
+            if let Some(phrase) = Phrase::parse(&category.name) {
+                phrases.learn(&phrases_of(&phrase), &mut encode)?;
+                let language = Language { features, phrases: &phrases, options: components.options() };
+                let answered = by_meaning(&map.identities, &phrase, Kind::Auto, language);
+                // The best is the answer whatever its score: recall asks where, not whether.
+                if let Some(best) = answered.answer.hits().first() {
+                    mask = view.exact.mask(&map.identities, best.identity);
+                }
+            }
+            secs.push(start.elapsed().as_secs_f64());
+            let iou = mask.iou(&category.mask);
+            units.push(Unit { view: view.name.into(), query: category.name.clone(), iou, hit: None });
+        }
+    }
+    let recall = units.iter().filter(|u| u.iou >= HIT_IOU).count() as f64 / units.len() as f64;
+    let mean_iou = mean(&units.iter().map(|u| u.iou).collect::<Vec<_>>());
+    Ok(Row { components, recall, mean_iou, mean_secs: mean(&secs), units })
+}
+
+/// The features of a scene of which only objects were extracted.
+fn objects_alone(language: &LanguageFeatures, identities: &Identities) -> LanguageFeatures {
+    let mut objects = language.clone();
+    for ((_, identity), features) in identities.iter().zip(&mut objects.of) {
+        if identity.level == Level::Part {
+            *features = Default::default();
+        }
+    }
+    objects
+}

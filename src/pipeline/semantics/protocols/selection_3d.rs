@@ -1,0 +1,45 @@
+//! `3d-selection`: Gaussians chosen by text, their silhouette rendered alone, cut at 0.7.
+
+use super::{AskedScene, LabelledView, Unit};
+use crate::pipeline::semantics::codes::TOLERANCE;
+use crate::pipeline::semantics::matching::{MatchMode, gaussians};
+use crate::render::cpu::Renderer;
+use crate::render::{Features, RenderError, RenderSettings};
+use crate::scene::{GaussianCloud, Mask};
+
+/// Accumulated alpha that belongs to the silhouette.
+const CUT: f32 = 0.7;
+
+/// Compares all categories of a view.
+///
+/// # Errors
+/// If the view cannot be drawn.
+pub fn compare(
+    scene: &mut AskedScene<'_>,
+    view: &LabelledView<'_>,
+    cloud: &GaussianCloud,
+    settings: &RenderSettings,
+) -> Result<Vec<Unit>, RenderError> {
+    let settings = RenderSettings { sh_degree: 0, depth: false, ..settings.clone() };
+    let mut renderer = Renderer::new();
+    let mut units = Vec::new();
+    for category in &view.categories {
+        let targets = (scene.ask)(&category.name).map(|a| a.chosen(1)).unwrap_or_default();
+        let mut inside = vec![false; cloud.len()];
+        for id in targets {
+            let found = gaussians(scene.map, id, MatchMode::Exact, TOLERANCE);
+            inside.iter_mut().zip(found).for_each(|(a, b)| *a |= b);
+        }
+        let alone = cloud.select(&(0..cloud.len()).filter(|&i| inside[i]).collect::<Vec<_>>());
+        let frame = renderer.render(&alone, Features::NONE, view.camera, &settings)?;
+        let mask = Mask::from_fn(frame.width_px, frame.height_px, |i| frame.alpha[i] > CUT);
+        let iou = mask.iou(&category.mask);
+        units.push(Unit { view: view.name.into(), query: category.name.clone(), iou, hit: None });
+    }
+    Ok(units)
+}
+
+/// Share of units with at least this IoU; NaN without any.
+pub fn accuracy(units: &[Unit], least: f64) -> f64 {
+    units.iter().filter(|u| u.iou >= least).count() as f64 / units.len() as f64
+}

@@ -1,0 +1,64 @@
+//! The encoder that understands typed phrases: loaded off the window's thread when a scene has
+//! features of it, then asked while a person types.
+
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use crate::models::{self, Encoder};
+use crate::pipeline::semantics::answer::phrases_of;
+use crate::pipeline::semantics::grammar::Phrase;
+use crate::pipeline::semantics::meaning::Phrasebook;
+
+type Loaded = Result<Mutex<Box<dyn Encoder>>, String>;
+
+/// What turns phrases into vectors.
+#[derive(Default)]
+pub struct Speech {
+    /// Which encoder is wanted.
+    name: Option<String>,
+    loaded: Arc<OnceLock<Loaded>>,
+    /// Whether it has been noticed that it is there.
+    noticed: bool,
+    phrases: Phrasebook,
+}
+
+impl Speech {
+    /// Loads the encoder of this name if it is another one than before. Whether one has just come.
+    pub fn keep_up(&mut self, ctx: &egui::Context, name: Option<&str>) -> bool {
+        if self.name.as_deref() != name {
+            *self = Self { name: name.map(str::to_owned), ..Self::default() };
+            if let Some(name) = self.name.clone() {
+                let (slot, ctx) = (Arc::clone(&self.loaded), ctx.clone());
+                let load = move || {
+                    // Nobody else fills this slot.
+                    let _ = slot.set(models::encoder(&name).map(Mutex::new).map_err(|e| e.to_string()));
+                    ctx.request_repaint();
+                };
+                // Without a thread, names alone are understood.
+                let _ = std::thread::Builder::new().name("encoder".into()).spawn(load);
+            }
+        }
+        let came = !self.noticed && self.loaded.get().is_some();
+        self.noticed |= came;
+        came
+    }
+
+    /// Why phrases are not understood by looks, if they are not.
+    pub fn trouble(&self) -> Option<&str> {
+        self.loaded.get().and_then(|l| l.as_ref().err()).map(String::as_str)
+    }
+
+    /// The words of a phrase that it does not know; `None` without an encoder.
+    pub fn unknown_words(&self, text: &str) -> Option<Vec<String>> {
+        let encoder = self.loaded.get()?.as_ref().ok()?;
+        Some(encoder.lock().unwrap_or_else(PoisonError::into_inner).unknown_words(text))
+    }
+
+    /// Phrases with those of a question among them; `None` if there is no encoder, or it knows none of
+    /// the words.
+    pub fn learn(&mut self, phrase: &Phrase) -> Option<&Phrasebook> {
+        let encoder = self.loaded.get()?.as_ref().ok()?;
+        let mut encoder = encoder.lock().unwrap_or_else(PoisonError::into_inner);
+        self.phrases.learn(&phrases_of(phrase), |p| encoder.text(p)).ok()?;
+        Some(&self.phrases)
+    }
+}

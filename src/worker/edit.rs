@@ -1,0 +1,114 @@
+//! Edits of objects and parts, off the window's thread: applied, stored, handed back.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::protocol::{Failure, Outcome, Stop};
+use crate::io;
+use crate::pipeline::semantics::edit::{Edit, apply};
+use crate::pipeline::semantics::extend::extend;
+use crate::pipeline::semantics::votes::Votes;
+use crate::render::RenderSettings;
+use crate::render::cpu::Renderer;
+use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, Level, Mask, NOBODY, SemanticMap};
+
+/// What is to be changed.
+#[derive(Clone, Debug)]
+pub enum EditRequest {
+    /// A correction.
+    Apply(Edit),
+    /// What was painted in a view becomes a new piece.
+    Paint {
+        /// Whose piece; of nobody, an object.
+        of: IdentityId,
+        /// What it is called.
+        name: String,
+        /// The view.
+        camera: Box<Camera>,
+        /// Its painted pixels, of the view's size.
+        mask: Mask,
+    },
+    /// Another state of the map: undo and redo.
+    Restore(Arc<SemanticMap>),
+}
+
+/// Changes `map` and stores it with the trained scene in `out`, if there is one.
+pub fn run(
+    cloud: &GaussianCloud,
+    map: &SemanticMap,
+    settings: &RenderSettings,
+    request: &EditRequest,
+    out: &Path,
+) -> Result<Outcome, Stop> {
+    let failed = |e: &dyn std::error::Error| Stop::Failed(Failure::of(e, "Nothing has changed."));
+    let new = match request {
+        EditRequest::Restore(map) => Arc::clone(map),
+        EditRequest::Apply(edit) => Arc::new(apply(map, cloud, edit).map_err(|e| failed(&e))?),
+        EditRequest::Paint { of, name, camera, mask } => {
+            let gaussians = painted(cloud, camera, settings, mask).map_err(|e| failed(&e))?;
+            let edit = Edit::AddPiece { of: *of, name: name.clone(), gaussians };
+            Arc::new(apply(map, cloud, &edit).map_err(|e| failed(&e))?)
+        }
+    };
+    if io::trained::is_scene(out) {
+        let mut stored = cloud.clone();
+        io::semantic_map::save(out, &new, &mut stored)
+            .map_err(|e| Stop::Failed(Failure::of(&e, "The change is not stored.")))?;
+    }
+    Ok(Outcome::Edited(new))
+}
+
+/// Gaussians that the painted pixels show more than the others do, and those behind them that hang
+/// together with them rather than with the others.
+fn painted(
+    cloud: &GaussianCloud,
+    camera: &Camera,
+    settings: &RenderSettings,
+    mask: &Mask,
+) -> Result<Vec<u32>, crate::render::RenderError> {
+    let mut identities = Identities::default();
+    let inside = identities.add(Level::Object, NOBODY, Vec::new());
+    let labels: Vec<IdentityId> =
+        (0..mask.width_px() * mask.height_px()).map(|i| if mask.contains(i) { inside } else { NOBODY }).collect();
+    let mut votes = Votes::new(cloud.len());
+    votes.add_view(&mut Renderer::new(), cloud, camera, settings, &labels)?;
+    let mut belongings = votes.decide(&identities, 0.05);
+    extend(cloud, &mut belongings);
+    Ok((0..cloud.len() as u32).filter(|&i| belongings[i as usize].identity == inside).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    #[test]
+    fn painting_takes_what_the_paint_covers() {
+        let n = 20;
+        let cloud = GaussianCloud {
+            positions: (0..n).map(|i| [i as f32 * 0.1 - 0.95, 0.0, 0.0]).collect(),
+            log_scales: vec![[-3.2; 3]; n],
+            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
+            opacity_logits: vec![3.0; n],
+            sh: vec![[0.0; 3]; n],
+            ..GaussianCloud::default()
+        };
+        let camera =
+            Camera::look_at(DVec3::new(0.0, 0.0, -3.0), DVec3::ZERO, DVec3::NEG_Y, 0.9, 64, 64).expect("valid");
+        let left = Mask::from_fn(64, 64, |i| i % 64 < 32);
+        let settings = RenderSettings::default();
+        let found = painted(&cloud, &camera, &settings, &left).expect("drawn");
+        assert_eq!(found.len(), n / 2, "{found:?}");
+        assert!(painted(&cloud, &camera, &settings, &Mask::empty(64, 64)).expect("drawn").is_empty());
+
+        let folder = tempfile::tempdir().expect("folder");
+        let map = SemanticMap::of_identities(Identities::default(), vec![NOBODY; n], vec![1.0; n], vec![]);
+        let request = EditRequest::Paint { of: NOBODY, name: "left".into(), camera: Box::new(camera), mask: left };
+        let Ok(Outcome::Edited(new)) = run(&cloud, &map, &settings, &request, folder.path()) else {
+            panic!("not edited");
+        };
+        assert_eq!((new.identities.name(1), new.sizes()[1]), ("left".into(), n / 2));
+        let wrong = EditRequest::Apply(Edit::Split(7));
+        assert!(matches!(run(&cloud, &map, &settings, &wrong, folder.path()), Err(Stop::Failed(_))));
+    }
+}

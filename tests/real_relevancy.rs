@@ -1,0 +1,207 @@
+//! Relevancy and localisation on real OpenCLIP embeddings of a LERF scene: 36 identities, seen once
+//! and in many further views, and the scene's queries.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use fmlgs::pipeline::semantics::grammar::{Kind, Phrase};
+use fmlgs::pipeline::semantics::localise::{Answer, localise};
+use fmlgs::pipeline::semantics::meaning::{ByMeaning, MeaningOptions, Phrasebook};
+use fmlgs::pipeline::semantics::relevancy::{CANONICAL, PART_WEIGHT, advantage, cosine, deviate, score};
+use fmlgs::scene::{Identities, IdentityId, LanguageFeatures, Level, NOBODY, ViewFeatures};
+
+/// Queries of the LERF evaluation that have an embedding.
+const QUERIES: [&str; 17] = [
+    "apple",
+    "bag of cookies",
+    "bear nose",
+    "coffee",
+    "coffee mug",
+    "dall-e brand",
+    "glass of water",
+    "hooves",
+    "napkin",
+    "paper napkin",
+    "plate",
+    "sheep",
+    "spoon",
+    "stuffed bear",
+    "tea in a glass",
+    "three cookies",
+    "yellow pouf",
+];
+
+struct Scene {
+    /// One view of each identity.
+    single: Vec<Vec<f32>>,
+    /// Further views of each.
+    many: Vec<Vec<Vec<f32>>>,
+    texts: Vec<(String, Vec<f32>)>,
+}
+
+fn rows<T: npyz::Deserialize, U>(folder: &std::path::Path, name: &str, to: impl Fn(T) -> U) -> Vec<Vec<U>> {
+    let bytes = std::fs::read(folder.join(name)).expect("readable");
+    let file = npyz::NpyFile::new(&bytes[..]).expect("a NumPy array");
+    let width = file.shape()[1] as usize;
+    let all: Vec<U> = file.into_vec::<T>().expect("the type").into_iter().map(to).collect();
+    let mut all = all.into_iter();
+    (0..all.len() / width).map(|_| all.by_ref().take(width).collect()).collect()
+}
+
+fn load() -> Option<Scene> {
+    let folder = common::data("clip/teatime_identities")?;
+    let half = |name: &str| rows::<half::f16, f32>(&folder, name, half::f16::to_f32);
+    let codes = |name: &str| rows::<u8, u8>(&folder, name, |c| c);
+    let single = half("image_embeddings.npy");
+    let of_single = codes("image_embeddings_codes.npy");
+    let (views, of_views) = (half("image_embeddings_multiview.npy"), codes("image_embeddings_multiview_codes.npy"));
+    let of = |code: &Vec<u8>| views.iter().zip(&of_views).filter(|(_, c)| *c == code).map(|(v, _)| v.clone()).collect();
+    let many = of_single.iter().map(of).collect();
+    let names = std::fs::read_to_string(folder.join("text_names.txt")).expect("readable");
+    let names = names.lines().filter(|l| !l.is_empty()).map(str::to_owned);
+    let texts = names.zip(rows::<f32, f32>(&folder, "text_embeddings.npy", |x| x)).collect();
+    Some(Scene { single, many, texts })
+}
+
+impl Scene {
+    fn text(&self, name: &str) -> Vec<f32> {
+        self.texts.iter().find(|t| t.0 == name).unwrap_or_else(|| panic!("{name}")).1.clone()
+    }
+
+    fn canonical(&self) -> Vec<Vec<f32>> {
+        CANONICAL.iter().map(|c| self.text(c)).collect()
+    }
+
+    /// Advantages of all identities for a query.
+    fn advantages(&self, query: &str) -> Vec<f32> {
+        let (q, canonical) = (self.text(query), self.canonical());
+        self.single.iter().map(|f| advantage(f, &q, &canonical)).collect()
+    }
+
+    fn best(&self, query: &str) -> usize {
+        let d = self.advantages(query);
+        (0..d.len()).max_by(|&a, &b| d[a].total_cmp(&d[b])).expect("identities")
+    }
+}
+
+#[test]
+fn scores_spread_as_the_temperature_says() {
+    let Some(scene) = load() else { return };
+    let all: Vec<f32> = QUERIES.iter().flat_map(|q| scene.advantages(q)).collect();
+    let range = |temperature| {
+        let scores = all.iter().map(|d| score(*d, temperature));
+        scores.fold((f32::INFINITY, 0.0_f32), |(l, h), s| (l.min(s), h.max(s)))
+    };
+    let (low, high) = range(1.0);
+    assert!((low - 0.465).abs() < 1e-3 && (high - 0.527).abs() < 1e-3, "{low} {high}");
+    let (low, high) = range(10.0);
+    assert!((low - 0.196).abs() < 1e-3 && (high - 0.748).abs() < 1e-3, "{low} {high}");
+    // The order does not depend on it.
+    for query in QUERIES {
+        let d = scene.advantages(query);
+        let order = |t: f32| {
+            let s: Vec<f32> = d.iter().map(|d| score(*d, t)).collect();
+            let mut order: Vec<usize> = (0..s.len()).collect();
+            order.sort_by(|&a, &b| s[b].total_cmp(&s[a]).then(a.cmp(&b)));
+            order[0]
+        };
+        assert_eq!(order(1.0), order(10.0), "{query}");
+    }
+}
+
+#[test]
+fn different_words_for_a_thing_find_the_same_identity() {
+    let Some(scene) = load() else { return };
+    let same = [
+        ("coffee", "coffee mug"),
+        ("napkin", "paper napkin"),
+        ("tea in a glass", "glass of water"),
+        ("plate", "three cookies"),
+    ];
+    for (a, b) in same {
+        assert_eq!(scene.best(a), scene.best(b), "{a}, {b}");
+    }
+    let things = [
+        "apple",
+        "bag of cookies",
+        "bear nose",
+        "coffee mug",
+        "hooves",
+        "paper napkin",
+        "plate",
+        "sheep",
+        "spoon",
+        "stuffed bear",
+        "tea in a glass",
+        "yellow pouf",
+    ];
+    let found: std::collections::BTreeSet<usize> = things.iter().map(|q| scene.best(q)).collect();
+    assert_eq!(found.len(), things.len(), "things that differ are different identities");
+    // Negative control: with the phrases one off, the pairs fall apart.
+    let mut wrong = scene;
+    let first = wrong.texts[0].1.clone();
+    for i in 1..wrong.texts.len() {
+        wrong.texts[i - 1].1 = wrong.texts[i].1.clone();
+    }
+    wrong.texts.last_mut().expect("texts").1 = first;
+    assert!(same.iter().filter(|(a, b)| wrong.best(a) == wrong.best(b)).count() <= 1);
+}
+
+#[test]
+fn answers_say_when_nothing_or_several_fit() {
+    let Some(scene) = load() else { return };
+    let mut identities = Identities::default();
+    let features = scene.single.iter().map(|f| ViewFeatures { raw: vec![f.clone()], deviated: vec![f.clone()] });
+    let language = LanguageFeatures { encoder: "clip".into(), dimension: 512, of: features.collect() };
+    language.of.iter().for_each(|_| {
+        identities.add(Level::Object, NOBODY, Vec::new());
+    });
+    let mut phrases = Phrasebook::default();
+    phrases.learn(&QUERIES, |p| Ok::<_, ()>(scene.text(p))).expect("known");
+    let mut ask = |query: &str| {
+        let phrase = Phrase { text: query.into(), target: query.into(), whole: None };
+        let options = MeaningOptions::default();
+        localise(&identities, &phrase, Kind::Auto, &mut ByMeaning { features: &language, phrases: &phrases, options })
+    };
+    assert!(matches!(ask("dall-e brand"), Answer::NotFound(_)), "less relevant than a canonical phrase");
+    assert!(matches!(ask("spoon"), Answer::Ambiguous(_)), "two within 0.005");
+    for query in ["apple", "bag of cookies", "coffee mug", "hooves", "paper napkin", "sheep", "stuffed bear"] {
+        let Answer::Found(hits) = ask(query) else { panic!("{query}") };
+        assert_eq!(hits[0].identity, scene.best(query) as IdentityId + 1);
+    }
+}
+
+#[test]
+fn parts_are_moved_towards_their_whole_and_made_unit_again() {
+    let Some(scene) = load() else { return };
+    let (bear, nose) = (scene.best("stuffed bear"), scene.best("bear nose"));
+    assert_ne!(bear, nose);
+    let (whole, part) = (&scene.single[bear], &scene.single[nose]);
+    let sum: Vec<f32> = whole.iter().zip(part).map(|(o, p)| (1.0 - PART_WEIGHT) * o + PART_WEIGHT * p).collect();
+    let length = cosine(&sum, &sum).sqrt();
+    assert!((0.82..0.95).contains(&length), "without normalisation parts are penalised: {length}");
+    let moved = deviate(part, whole, PART_WEIGHT).expect("a direction");
+    assert!((cosine(&moved, &moved) - 1.0).abs() < 1e-4);
+    assert!(cosine(&moved, whole) > cosine(part, whole) + 0.1);
+}
+
+#[test]
+fn the_best_of_a_few_views_beats_their_mean() {
+    let Some(scene) = load() else { return };
+    let canonical = scene.canonical();
+    let (mut best_wins, mut compared) = (0, 0);
+    for query in QUERIES {
+        let (q, target) = (scene.text(query), scene.best(query));
+        let views: Vec<&Vec<f32>> = scene.many[target].iter().take(4).collect();
+        if views.len() < 2 {
+            continue;
+        }
+        let d = |f: &[f32]| advantage(f, &q, &canonical);
+        let best = views.iter().map(|v| d(v)).fold(f32::NEG_INFINITY, f32::max);
+        let mean: Vec<f32> = (0..512).map(|c| views.iter().map(|v| v[c]).sum::<f32>() / views.len() as f32).collect();
+        compared += 1;
+        best_wins += usize::from(best >= d(&mean));
+    }
+    assert!(compared >= 12 && best_wins == compared, "{best_wins} of {compared}");
+}
