@@ -7,6 +7,7 @@ use crate::models::{self, Encoder};
 use crate::pipeline::semantics::answer::phrases_of;
 use crate::pipeline::semantics::grammar::Phrase;
 use crate::pipeline::semantics::meaning::Phrasebook;
+use crate::pipeline::semantics::relevancy::CANONICAL;
 
 type Loaded = Result<Mutex<Box<dyn Encoder>>, String>;
 
@@ -29,8 +30,10 @@ impl Speech {
             if let Some(name) = self.name.clone() {
                 let (slot, ctx) = (Arc::clone(&self.loaded), ctx.clone());
                 let load = move || {
+                    // Networks are prepared at the first use, which shall not be a person's.
+                    let ready = models::encoder(&name).and_then(|mut e| e.text(CANONICAL[0]).map(|_| e));
                     // Nobody else fills this slot.
-                    let _ = slot.set(models::encoder(&name).map(Mutex::new).map_err(|e| e.to_string()));
+                    let _ = slot.set(ready.map(Mutex::new).map_err(|e| e.to_string()));
                     ctx.request_repaint();
                 };
                 // Without a thread, names alone are understood.
