@@ -159,7 +159,7 @@ fn answers_say_when_nothing_or_several_fit() {
     });
     let mut phrases = Phrasebook::default();
     phrases.learn(&QUERIES, |p| Ok::<_, ()>(scene.text(p))).expect("known");
-    let mut ask = |query: &str| {
+    let ask = |query: &str| {
         let phrase = Phrase { text: query.into(), target: query.into(), whole: None };
         let options = MeaningOptions::default();
         localise(&identities, &phrase, Kind::Auto, &mut ByMeaning { features: &language, phrases: &phrases, options })
