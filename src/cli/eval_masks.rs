@@ -206,13 +206,14 @@ fn recall(map: &SemanticMap, views: &[LabelledView<'_>]) -> Result<Outcome, CliE
         table.push(vec![
             tick(c.extraction),
             tick(c.deviation),
-            tick(c.localisation),
+            if c.joint { "joint".into() } else { tick(c.localisation) },
             format!("{:.1}", 100.0 * r.recall),
             format!("{:.3}", r.mean_iou),
             format!("{:.2}", 1e3 * r.mean_secs),
         ]);
     }
-    let units = rows.last().map(|r| r.units.clone()).unwrap_or_default();
+    // The paper's full method, not ours, is what others can compare with.
+    let units = rows.iter().rfind(|r| r.components.localisation).map(|r| r.units.clone()).unwrap_or_default();
     let text =
         format!("recall at IoU {}, encoder '{}'\n{}", part_recall::HIT_IOU, language.encoder, output::table(&table));
     Ok(Outcome { lines: vec![text], json: json!({ "encoder": language.encoder, "rows": rows }), units })

@@ -19,6 +19,9 @@ pub enum Strategy {
     Paper,
     /// The whole query once, whatever wins.
     OneStep,
+    /// Every part by the whole query and its object by the whole's phrase at once: neither alone
+    /// decides, so one slip in the first step does not lose the part.
+    Joint,
 }
 
 /// Scores identities for phrases, by number less one; higher is better.
@@ -78,6 +81,7 @@ pub fn localise(identities: &Identities, phrase: &Phrase, kind: Kind, scorer: &m
             piece_of(identities, &phrase.target, whole, scorer)
         }
         (Some(whole), Kind::Auto | Kind::Part, Strategy::Paper) => two_steps(identities, &phrase.text, whole, scorer),
+        (Some(whole), Kind::Auto | Kind::Part, Strategy::Joint) => jointly(identities, &phrase.text, whole, scorer),
         (_, _, strategy) => {
             let text = if strategy == Strategy::WholeFirst { &phrase.target } else { &phrase.text };
             let scores = scorer.scores(text, None);
@@ -111,6 +115,26 @@ fn two_steps(identities: &Identities, text: &str, whole: &str, scorer: &mut dyn 
     // The object's phrase can push every part down; then the order of step 1 stands.
     let usable = pieces.iter().any(|id| against[*id as usize - 1] >= scorer.threshold());
     judge(identities, rank(pieces.into_iter(), if usable { &against } else { &step1 }), scorer)
+}
+
+/// Parts by both phrases at once: the mean of both scores on the logistic scale, on which they are
+/// differences of similarity.
+fn jointly(identities: &Identities, text: &str, whole: &str, scorer: &mut dyn Scorer) -> Answer {
+    let (by_text, by_whole) = (scorer.scores(text, None), scorer.scores(whole, None));
+    let logit = |s: f32| {
+        let s = s.clamp(1e-6, 1.0 - 1e-6);
+        (s / (1.0 - s)).ln()
+    };
+    let both: Vec<f32> = identities
+        .iter()
+        .map(|(id, _)| {
+            // The nearest thing around it that fits the whole best; parts may have parts.
+            let around = identities.line(id).skip(1).map(|i| by_whole[i as usize - 1]).fold(0.0, f32::max);
+            1.0 / (1.0 + (-0.5 * (logit(by_text[id as usize - 1]) + logit(around))).exp())
+        })
+        .collect();
+    let pieces = identities.iter().filter(|(id, _)| identities.line(*id).nth(1).is_some()).map(|(id, _)| id);
+    judge(identities, rank(pieces, &both), scorer)
 }
 
 /// Whether `id` is a piece of `whole`, directly or not.
@@ -270,5 +294,24 @@ mod tests {
         assert_eq!(ask(table(Strategy::Paper, part_wins, step1)).hits()[0].identity, 5);
         let nothing = vec![0.4; 7];
         assert!(matches!(ask(table(Strategy::Paper, nothing.clone(), nothing)), Answer::NotFound(_)));
+    }
+
+    #[test]
+    fn both_phrases_together_survive_a_slip_of_either() {
+        let all = scene();
+        let phrase = Phrase::parse("a button of the red controller").expect("a phrase");
+        let text = "button of the red controller";
+        // Identities: 1 red (2 button, 3 stick), 4 blue (5, 6), 7 lamp.
+        let ask = |by_text: [f32; 7], by_whole: [f32; 7]| {
+            let rows = vec![(text, None, by_text.to_vec()), ("red controller", None, by_whole.to_vec())];
+            localise(&all, &phrase, Kind::Auto, &mut Table(Strategy::Joint, rows))
+        };
+        // The blue button is a little more like a button; the red controller is clearly the red one.
+        let answer = ask([0.9, 0.6, 0.4, 0.8, 0.63, 0.4, 0.1], [0.9, 0.1, 0.1, 0.4, 0.1, 0.1, 0.1]);
+        assert!(matches!(&answer, Answer::Found(hits) if hits[0].identity == 2), "{answer:?}");
+        // The blue controller is a little redder; the red button is clearly the one.
+        let answer = ask([0.5, 0.8, 0.4, 0.5, 0.4, 0.4, 0.1], [0.6, 0.1, 0.1, 0.65, 0.1, 0.1, 0.1]);
+        assert!(matches!(&answer, Answer::Found(hits) if hits[0].identity == 2), "{answer:?}");
+        assert!(matches!(ask([0.4; 7], [0.4; 7]), Answer::NotFound(_)));
     }
 }

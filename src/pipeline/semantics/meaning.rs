@@ -29,7 +29,7 @@ pub struct MeaningOptions {
 
 impl Default for MeaningOptions {
     fn default() -> Self {
-        Self { parts: PartFeatures::Deviated, strategy: Strategy::Paper, temperature: TEMPERATURE }
+        Self { parts: PartFeatures::Deviated, strategy: Strategy::Joint, temperature: TEMPERATURE }
     }
 }
 

@@ -21,27 +21,34 @@ pub struct Components {
     pub extraction: bool,
     /// Parts' features are moved towards their objects'.
     pub deviation: bool,
-    /// Localisation in two steps.
+    /// Localisation in the paper's two steps.
     pub localisation: bool,
+    /// Instead of those, part and whole at once, which is this program's default.
+    pub joint: bool,
 }
 
 impl Components {
-    /// The paper's rows, in its order.
-    pub const ROWS: [Self; 4] = [
-        Self::of(false, false, false),
-        Self::of(true, false, false),
-        Self::of(true, true, false),
-        Self::of(true, true, true),
+    /// The paper's rows, in its order, and this program's.
+    pub const ROWS: [Self; 5] = [
+        Self::of(false, false, false, false),
+        Self::of(true, false, false, false),
+        Self::of(true, true, false, false),
+        Self::of(true, true, true, false),
+        Self::of(true, true, false, true),
     ];
 
-    const fn of(extraction: bool, deviation: bool, localisation: bool) -> Self {
-        Self { extraction, deviation, localisation }
+    const fn of(extraction: bool, deviation: bool, localisation: bool, joint: bool) -> Self {
+        Self { extraction, deviation, localisation, joint }
     }
 
     fn options(self) -> MeaningOptions {
         MeaningOptions {
             parts: if self.deviation { PartFeatures::Deviated } else { PartFeatures::Raw },
-            strategy: if self.localisation { Strategy::Paper } else { Strategy::OneStep },
+            strategy: match self {
+                Self { joint: true, .. } => Strategy::Joint,
+                Self { localisation: true, .. } => Strategy::Paper,
+                _ => Strategy::OneStep,
+            },
             ..MeaningOptions::default()
         }
     }
