@@ -13,7 +13,8 @@ use crate::io::{self, IoError, OpenError, Opened, TrainedScene, trained};
 use crate::pipeline::evaluate::evaluate;
 use crate::pipeline::observer::{Level, Observer};
 use crate::pipeline::semantics::find::find_objects;
-use crate::pipeline::semantics::segmenter::FileMasks;
+use crate::pipeline::semantics::regions::Regions;
+use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
 use crate::pipeline::semantics::tracker::{TrackError, TrackOptions};
 use crate::pipeline::synth::{SynthError, demo};
 use crate::pipeline::train::checkpoint::CheckpointError;
@@ -215,7 +216,7 @@ impl Jobs for PipelineJobs {
             Command::FindObjects { dataset, cloud, holdout_every, settings, masks, out } => {
                 let (training, _) = dataset.split(holdout_every);
                 let photos: Vec<Photo> = training.iter().map(|&i| dataset.photos[i].clone()).collect();
-                find(&cloud, &photos, &settings, &masks, &out, observer)
+                find(&cloud, &photos, &settings, masks.as_deref(), &out, observer)
             }
             Command::Export { cloud, path } => export(&cloud, &path),
             Command::Photo { index, photo, max_side_px } => {
@@ -254,13 +255,16 @@ fn find(
     cloud: &GaussianCloud,
     photos: &[Photo],
     settings: &RenderSettings,
-    masks: &Path,
+    masks: Option<&Path>,
     out: &Path,
     observer: &mut dyn Observer,
 ) -> Result<Outcome, Stop> {
-    let mut segmenter = FileMasks(Labels::open(masks).map_err(|e| io_failure(&e))?);
+    let mut segmenter: Box<dyn Segmenter + '_> = match masks {
+        Some(masks) => Box::new(FileMasks(Labels::open(masks).map_err(|e| io_failure(&e))?)),
+        None => Box::new(Regions { trained: Some((cloud, settings)), ..Regions::default() }),
+    };
     let options = TrackOptions::default();
-    let map = find_objects(cloud, photos, settings, &mut segmenter, &options, observer).map_err(|e| match e {
+    let map = find_objects(cloud, photos, settings, &mut *segmenter, &options, observer).map_err(|e| match e {
         TrackError::Cancelled => Stop::Cancelled,
         e => Stop::Failed(Failure::of(&e, "")),
     })?;

@@ -1,8 +1,8 @@
 //! Objects and their parts: found in photos, carried to every view by the Gaussians, named, asked
 //! for (the paper's Method).
 //!
-//! In the order of the data: [`segmenter`] finds masks, [`tracker`] makes them identities over all
-//! views, [`votes`] gives every Gaussian its identity, [`codes`] every identity its point in code
+//! In the order of the data: [`segmenter`] finds masks ([`regions`] without any model; [`filters`]
+//! tell objects from parts), [`tracker`] makes them identities over all views, [`votes`] gives every Gaussian its identity, [`codes`] every identity its point in code
 //! space, [`view_map`] draws identities into a view; [`grammar`] takes a query apart, [`names`] and
 //! [`meaning`] score identities for it by words and by looks, [`localise`] picks those that are
 //! meant, and [`answer`] puts it together.
@@ -11,6 +11,7 @@ pub mod answer;
 pub mod code_map;
 pub mod codes;
 mod extend;
+pub mod filters;
 pub mod find;
 pub mod grammar;
 mod link;
@@ -18,6 +19,7 @@ pub mod localise;
 pub mod matching;
 pub mod meaning;
 pub mod names;
+pub mod regions;
 pub mod relevancy;
 pub mod score;
 pub mod segmenter;
