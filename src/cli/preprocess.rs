@@ -10,7 +10,8 @@ use super::{CliError, opened, output};
 use crate::io::{self, labels::Labels};
 use crate::models;
 use crate::pipeline::semantics::find::{FindOptions, Lifting, find_objects};
-use crate::pipeline::semantics::segmenter::FileMasks;
+use crate::pipeline::semantics::regions::Regions;
+use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
 use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::scene::{Level, Photo};
 
@@ -23,13 +24,18 @@ use crate::scene::{Level, Photo};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs preprocess scene/ --masks photos/               masks that came with the photos\n  \
-    fmlgs preprocess scene/ --masks labels/ --max-seeds 1  one labelled photo is enough to begin")]
+    fmlgs preprocess scene/ --masks labels/ --max-seeds 1  one labelled photo is enough to begin\n  \
+    fmlgs preprocess scene/ --segmenter regions           no masks: regions of the photos, unnamed and rough")]
 pub struct Args {
     /// Trained scene
     scene: PathBuf,
-    /// Where the masks are: id maps of 'fmlgs synth', or ISAT label files
+    /// Where the masks are: id maps of 'fmlgs synth', ISAT files as in lerf_ovs, the folders of SPIn-NeRF,
+    /// 3D-OVS or LERF-Mask, or masklets as in SA-V
     #[arg(long)]
-    masks: PathBuf,
+    masks: Option<PathBuf>,
+    /// Where masks come from [default: files where --masks is given, else regions]
+    #[arg(long, value_enum)]
+    segmenter: Option<SegmenterKind>,
     /// Dataset with the photos [default: where the scene's photos are]
     #[arg(long)]
     photos: Option<PathBuf>,
@@ -66,6 +72,29 @@ enum LiftingArg {
     Paper,
 }
 
+/// Where masks come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum SegmenterKind {
+    /// The masks in --masks
+    Files,
+    /// Built in, no weights: regions that are apart in colour, and pieces of them; unnamed and rough
+    Regions,
+}
+
+/// The segmenter that the arguments ask for.
+fn segmenter<'a>(args: &Args, scene: &'a opened::DrawableScene) -> Result<Box<dyn Segmenter + 'a>, CliError> {
+    match (&args.masks, args.segmenter) {
+        (Some(masks), None | Some(SegmenterKind::Files)) => Ok(Box::new(FileMasks(Labels::open(masks)?))),
+        (None, None | Some(SegmenterKind::Regions)) => {
+            Ok(Box::new(Regions { trained: Some((&scene.cloud, &scene.settings)), ..Regions::default() }))
+        }
+        (None, Some(SegmenterKind::Files)) => Err(CliError::Usage("--segmenter files needs --masks".into())),
+        (Some(_), Some(SegmenterKind::Regions)) => {
+            Err(CliError::Usage("--segmenter regions finds its own masks; leave --masks out".into()))
+        }
+    }
+}
+
 pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let mut observer = Console::new(quiet);
     let mut scene = opened::drawable(&args.scene)?;
@@ -89,7 +118,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
             })?)
         }
     };
-    let mut segmenter = FileMasks(Labels::open(&args.masks)?);
+    let mut segmenter = segmenter(&args, &scene)?;
     let track = TrackOptions {
         seed,
         max_seeds: args.max_seeds.max(1),
@@ -109,11 +138,12 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let start = Instant::now();
     let options = FindOptions { track, lifting };
     let (cloud, settings) = (&scene.cloud, &scene.settings);
-    let found = find_objects(cloud, &photos, settings, &mut segmenter, &options, encoder, &mut observer);
+    let found = find_objects(cloud, &photos, settings, &mut *segmenter, &options, encoder, &mut observer);
     let map = found.map_err(|e| match e {
         e if e.is_cancelled() => CliError::Cancelled("nothing was stored".into()),
         other => other.into(),
     })?;
+    drop(segmenter);
     io::semantic_map::save(&args.scene, &map, &mut scene.cloud)?;
     let secs = start.elapsed().as_secs_f64();
     let count = |level: Level| map.identities.iter().filter(|(_, i)| i.level == level).count();

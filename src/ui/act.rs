@@ -147,17 +147,14 @@ impl App {
         }
     }
 
-    /// Finds objects and parts with these masks, or those that came with the photos.
+    /// Finds objects and parts with these masks, those that came with the photos, or none.
     fn find_objects(&mut self, masks: Option<PathBuf>) {
         let scene = self.state.scene.clone();
         let Some((scene, dataset)) = scene.as_ref().and_then(|s| Some((s, s.dataset.clone()?))) else {
             self.state.toast(Tone::Warning, "Open a folder of posed photos first: masks are masks of photos.");
             return;
         };
-        let Some(masks) = masks.or_else(|| scene.masks.clone()) else {
-            self.state.toast(Tone::Warning, "No masks came with these photos; choose a folder that has some.");
-            return;
-        };
+        let masks = masks.or_else(|| scene.masks.clone());
         match self.viewport.cloud().cloned().filter(|_| self.state.is_trained()) {
             Some(cloud) => self.submit(Command::FindObjects {
                 dataset,

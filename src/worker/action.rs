@@ -147,7 +147,7 @@ pub enum Action {
     Cancel,
     /// Measure PSNR and SSIM on the held-out photos.
     Evaluate,
-    /// Find objects and parts with the masks that came with the photos.
+    /// Find objects and parts, with the masks that came with the photos if there are any.
     FindObjects,
     /// Choose masks, and find objects and parts with them.
     ChooseMasks,
@@ -310,9 +310,11 @@ impl Action {
             Self::PauseTraining => "Hold training without losing its state.",
             Self::Cancel => "Stop the running job at its next step. What is trained so far stays.",
             Self::Evaluate => "PSNR and SSIM on the photos that training does not see.",
-            Self::FindObjects => "Carry the masks that came with the photos to every view, through the Gaussians.",
+            Self::FindObjects => {
+                "Carry the masks that came with the photos, or else regions of even colour, to every view through the Gaussians."
+            }
             Self::ChooseMasks => {
-                "Id maps of fmlgs synth, or ISAT label files as in lerf_ovs; one labelled photo will do."
+                "Id maps of fmlgs synth, ISAT files, folders of SPIn-NeRF, 3D-OVS or LERF-Mask; one labelled photo will do."
             }
             Self::TypeQuestion | Self::Ask(_) => "A name, or \"the button of the red controller\".",
             Self::GoToTarget(_) => "Move until it fills the view, from the side on which the eye is.",

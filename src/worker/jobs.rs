@@ -14,7 +14,8 @@ use crate::models;
 use crate::pipeline::evaluate::evaluate;
 use crate::pipeline::observer::{Level, Observer};
 use crate::pipeline::semantics::find::{FindOptions, find_objects};
-use crate::pipeline::semantics::segmenter::FileMasks;
+use crate::pipeline::semantics::regions::Regions;
+use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
 use crate::pipeline::synth::{SynthError, demo};
 use crate::pipeline::train::checkpoint::CheckpointError;
 use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainError};
@@ -215,7 +216,7 @@ impl Jobs for PipelineJobs {
             Command::FindObjects { dataset, cloud, holdout_every, settings, masks, out } => {
                 let (training, _) = dataset.split(holdout_every);
                 let photos: Vec<Photo> = training.iter().map(|&i| dataset.photos[i].clone()).collect();
-                find(&cloud, &photos, &settings, &masks, &out, observer)
+                find(&cloud, &photos, &settings, masks.as_deref(), &out, observer)
             }
             Command::EditObjects { cloud, map, settings, request, out } => {
                 edit::run(&cloud, &map, &settings, &request, &out)
@@ -257,18 +258,21 @@ fn find(
     cloud: &GaussianCloud,
     photos: &[Photo],
     settings: &RenderSettings,
-    masks: &Path,
+    masks: Option<&Path>,
     out: &Path,
     observer: &mut dyn Observer,
 ) -> Result<Outcome, Stop> {
-    let mut segmenter = FileMasks(Labels::open(masks).map_err(|e| io_failure(&e))?);
+    let mut segmenter: Box<dyn Segmenter + '_> = match masks {
+        Some(masks) => Box::new(FileMasks(Labels::open(masks).map_err(|e| io_failure(&e))?)),
+        None => Box::new(Regions { trained: Some((cloud, settings)), ..Regions::default() }),
+    };
     // Without the encoder, names alone are understood.
     let mut encoder = models::encoder(models::DEMO)
         .inspect_err(|e| observer.note(Level::Warning, format!("Objects are found without their looks: {e}")))
         .ok();
     let encoder = encoder.as_mut().map(|e| e.as_mut() as &mut dyn models::Encoder);
     let options = FindOptions::default();
-    let found = find_objects(cloud, photos, settings, &mut segmenter, &options, encoder, observer);
+    let found = find_objects(cloud, photos, settings, &mut *segmenter, &options, encoder, observer);
     let map = found.map_err(|e| match e {
         e if e.is_cancelled() => Stop::Cancelled,
         e => Stop::Failed(Failure::of(&e, "")),

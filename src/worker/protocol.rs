@@ -96,8 +96,8 @@ pub enum Command {
         holdout_every: usize,
         /// How the Gaussians are drawn.
         settings: RenderSettings,
-        /// Where the masks are.
-        masks: PathBuf,
+        /// Where the masks are; `None` = regions of the photos are found.
+        masks: Option<PathBuf>,
         /// Folder of the trained scene.
         out: PathBuf,
     },

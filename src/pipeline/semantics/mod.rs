@@ -1,8 +1,8 @@
 //! Objects and their parts: found in photos, carried to every view by the Gaussians, named, asked
 //! for (the paper's Method).
 //!
-//! In the order of the data: [`segmenter`] finds masks, [`tracker`] makes them identities over all
-//! views, [`votes`] gives every Gaussian its identity, [`codes`] every identity its point in code
+//! In the order of the data: [`segmenter`] finds masks ([`regions`] without any model; [`filters`]
+//! tell objects from parts), [`tracker`] makes them identities over all views, [`votes`] gives every Gaussian its identity, [`codes`] every identity its point in code
 //! space, [`view_map`] draws identities into a view; [`grammar`] takes a query apart, [`names`] and
 //! [`meaning`] score identities for it by words and by looks, [`localise`] picks those that are
 //! meant, and [`answer`] puts it together.
@@ -13,6 +13,7 @@ pub mod codes;
 pub mod edit;
 pub mod embed;
 pub mod extend;
+pub mod filters;
 pub mod find;
 pub mod grammar;
 mod link;
@@ -21,6 +22,7 @@ pub mod matching;
 pub mod meaning;
 pub mod names;
 pub mod protocols;
+pub mod regions;
 pub mod relevancy;
 pub mod segmenter;
 pub mod tracker;

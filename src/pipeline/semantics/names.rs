@@ -36,12 +36,17 @@ impl Scorer for ByName<'_> {
 pub fn scores(identities: &Identities, phrase: &str) -> Vec<f32> {
     let wanted = words(phrase);
     let score = |names: &[String]| names.iter().map(|n| similarity(&wanted, &words(n))).fold(0.0, f64::max);
-    identities.iter().map(|(_, i)| score(&i.names) as f32).collect()
+    // What has no name is called by its number, and by nothing that looks like it.
+    let number = |id: IdentityId| f64::from(u8::from(identities.name(id) == phrase.trim()));
+    let either = |id: IdentityId, names: &[String]| if names.is_empty() { number(id) } else { score(names) };
+    identities.iter().map(|(id, i)| either(id, &i.names) as f32).collect()
 }
 
 /// The words of a phrase that no name in the scene resembles.
 pub fn unknown_words(identities: &Identities, phrase: &str) -> Vec<String> {
     let known: HashSet<String> = identities.iter().flat_map(|(_, i)| &i.names).flat_map(|n| words(n)).collect();
+    let numbers = identities.iter().filter(|(_, i)| i.names.is_empty()).map(|(id, _)| id.to_string());
+    let known: HashSet<String> = known.into_iter().chain(numbers).collect();
     words(phrase).into_iter().filter(|w| !known.iter().any(|k| alike(w, k) > 0.0)).collect()
 }
 
@@ -122,6 +127,8 @@ mod tests {
         assert_eq!(best("手柄"), (2, 1.0));
         assert_eq!(best("blue contoller").0, 2, "a slip of the keys");
         assert_eq!(best("button").0, 3);
+        assert_eq!(best("#4"), (4, 1.0));
+        assert!(scores(&all, "#3").iter().all(|s| *s < 0.5) && scores(&all, "#44").iter().all(|s| *s == 0.0));
         assert!(best("button").1 > 0.6 && best("button").1 < 1.0);
         assert!(scores(&all, "red controller")[1] < 0.6);
         assert!(scores(&all, "giraffe").iter().all(|s| *s == 0.0));

@@ -18,6 +18,9 @@ pub fn show(ui: &mut Ui, state: &AppState, visibility: &Visibility, actions: &mu
     let count = |level: Level| identities.iter().filter(|(_, i)| i.level == level).count();
     let from = if map.seeds.len() == 1 { "1 photo".to_owned() } else { format!("{} photos", map.seeds.len()) };
     ui.weak(format!("{} objects, {} parts, from the masks of {from}", count(Level::Object), count(Level::Part)));
+    if identities.iter().all(|(_, i)| i.names.is_empty()) {
+        ui.weak("Regions of the photos: unnamed and rough. Ask by number, such as #1.");
+    }
     ui.add_space(4.0);
     ui.horizontal(|ui| {
         if visibility.is_partial() && ui.button("Show all").clicked() {
@@ -138,14 +141,15 @@ fn show_how_to_begin(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     let idle = state.job.is_none() && state.is_trained();
     let why = if state.is_trained() { "Another job is running." } else { "Train the scene first." };
     let button = |text: &str| Button::new(text.to_owned()).min_size(vec2(170.0, 28.0));
-    if has_masks {
-        let action = Action::FindObjects;
-        let found = ui.add_enabled(idle, button("Find objects")).on_disabled_hover_text(why);
-        if found.on_hover_text(action.tooltip()).clicked() {
-            actions.push(action);
-        }
-    } else {
-        ui.label(RichText::new("No masks came with these photos.").color(theme::WEAK));
+    if !has_masks {
+        let text = "No masks came with these photos. Without any, regions of even colour are taken for objects and \
+                    parts: they have no names, and are rough.";
+        ui.label(RichText::new(text).color(theme::WEAK));
+    }
+    let action = Action::FindObjects;
+    let found = ui.add_enabled(idle, button("Find objects")).on_disabled_hover_text(why);
+    if found.on_hover_text(action.tooltip()).clicked() {
+        actions.push(action);
     }
     let other = ui.add_enabled(idle, button("Choose masks\u{2026}")).on_disabled_hover_text(why);
     if other.on_hover_text(Action::ChooseMasks.tooltip()).clicked() {

@@ -1,0 +1,161 @@
+//! From a picture to objects and their parts.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use super::basins::{OUTSIDE, basins};
+use super::edges::{Planes, strength};
+use super::lab::lab;
+use super::tree::{Border, Piece, Tree, grow};
+use crate::scene::Mask;
+
+/// A picture to be segmented.
+#[derive(Clone, Copy, Debug)]
+pub struct Picture<'a> {
+    /// Width in px.
+    pub width: usize,
+    /// sRGB, row-major.
+    pub rgb: &'a [[u8; 3]],
+    /// Pixels with 0 show nothing.
+    pub coverage: Option<&'a [u8]>,
+    /// How clearly a surface ends at each pixel, 0 to 1, where the shape of the scene is known.
+    pub ends: Option<&'a [f32]>,
+}
+
+/// Settings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RegionOptions {
+    /// Unlikeness, in steps of Lab colour between pieces of a thousandth of the whole, from which
+    /// things are different things.
+    pub object_step: f64,
+    /// The same between the parts of an object; the whole is the object then.
+    pub part_step: f64,
+    /// Least pixels of an object and of a part.
+    pub least_px: [usize; 2],
+    /// Most of the picture that an object may be; what is more is background.
+    pub most_share: f64,
+}
+
+impl Default for RegionOptions {
+    fn default() -> Self {
+        Self { object_step: 26.0, part_step: 18.0, least_px: [200, 60], most_share: 0.5 }
+    }
+}
+
+/// Weight of lightness beside the two colour axes: shadows change it within a thing.
+const LIGHTNESS: f32 = 0.7;
+/// Edge strength that basins are told apart by, Lab steps.
+const BASIN_STEP: f32 = 0.3;
+/// Weight of the edge along the border in unlikeness; the rest is the difference of the means.
+const EDGE: f64 = 0.2;
+/// Power of the smaller piece's size: how much longer large pieces stay apart.
+const SIZE_POWER: f64 = 0.25;
+/// What remains of the unlikeness of two neighbours on one unbroken surface, and how many steps the
+/// end of a surface between them adds.
+const UNBROKEN: f64 = 0.3;
+const END: f64 = 3.0;
+
+/// An object and the regions inside it, as found and not yet filtered.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    /// Its pixels.
+    pub mask: Mask,
+    /// Regions of its own tile.
+    pub pieces: Vec<Mask>,
+}
+
+/// Objects of the picture and their pieces.
+pub fn segment(picture: &Picture<'_>, options: &RegionOptions) -> Vec<Candidate> {
+    let mosaic = Mosaic::of(picture);
+    let area: f64 = mosaic.pieces.iter().map(|p| p.area).sum();
+    let known = picture.ends.is_some();
+    let everything: Vec<u32> = (0..mosaic.pieces.len() as u32).collect();
+    let objects = mosaic.grow(&everything, known);
+    let large = |tree: &Tree, node: u32, least: usize| tree.nodes[node as usize].area >= least as f64;
+    let mut kept = objects.cut(options.object_step);
+    kept.retain(|&n| large(&objects, n, options.least_px[0]));
+    kept.retain(|&n| objects.nodes[n as usize].area <= options.most_share * area);
+    let candidate = |node: u32| {
+        let leaves = objects.leaves_of(node);
+        let inner = mosaic.grow(&leaves, false);
+        let mut pieces = inner.cut(options.part_step);
+        pieces.retain(|&n| large(&inner, n, options.least_px[1]));
+        let of = |n: u32| mosaic.mask(inner.leaves_of(n).into_iter().map(|l| leaves[l as usize]));
+        Candidate { mask: mosaic.mask(leaves.iter().copied()), pieces: pieces.into_iter().map(of).collect() }
+    };
+    kept.into_par_iter().map(candidate).collect()
+}
+
+/// The picture as basins.
+struct Mosaic {
+    size: (usize, usize),
+    pieces: Vec<Piece>,
+    borders: BTreeMap<(u32, u32), Border>,
+    /// Pixels of each piece.
+    pixels: Vec<Vec<u32>>,
+}
+
+impl Mosaic {
+    fn of(picture: &Picture<'_>) -> Self {
+        let (n, width) = (picture.rgb.len(), picture.width.max(1));
+        let colors = lab(picture.rgb);
+        let weights = [LIGHTNESS, 1.0, 1.0];
+        let channels = [0, 1, 2].map(|c| colors.iter().map(|p| weights[c] * p[c]).collect::<Vec<f32>>());
+        let strength = strength(&Planes { width, channels: &channels });
+        let domain: Vec<bool> = (0..n).map(|i| picture.coverage.is_none_or(|c| c[i] > 0)).collect();
+        // Where a surface ends there is an edge, whatever the colours.
+        let end = |i: usize| picture.ends.map_or(0.0, |e| e[i]);
+        let walls: Vec<f32> = (0..n).map(|i| strength[i] + 10.0 * end(i)).collect();
+        let (label, count) = basins(&walls, &domain, width, BASIN_STEP);
+        let mut pieces = vec![Piece { area: 0.0, sums: vec![0.0; 3] }; count as usize];
+        let mut pixels = vec![Vec::new(); count as usize];
+        let mut borders: BTreeMap<(u32, u32), Border> = BTreeMap::new();
+        for i in 0..n {
+            if label[i] == OUTSIDE {
+                continue;
+            }
+            let piece = &mut pieces[label[i] as usize];
+            piece.area += 1.0;
+            piece.sums.iter_mut().zip(&channels).for_each(|(s, c)| *s += f64::from(c[i]));
+            pixels[label[i] as usize].push(i as u32);
+            for j in [(i % width + 1 < width).then_some(i + 1), Some(i + width)].into_iter().flatten() {
+                if j < n && label[j] != label[i] && label[j] != OUTSIDE {
+                    let between = Border {
+                        length: 1.0,
+                        strength: f64::from(strength[i].max(strength[j])),
+                        ends: f64::from(end(i).max(end(j))),
+                    };
+                    borders.entry((label[i].min(label[j]), label[i].max(label[j]))).or_default().add(&between);
+                }
+            }
+        }
+        Self { size: (width, n / width), pieces, borders, pixels }
+    }
+
+    /// The tree of some of the pieces; its leaves are numbered as listed.
+    fn grow(&self, leaves: &[u32], shape: bool) -> Tree {
+        let mut place = vec![u32::MAX; self.pieces.len()];
+        leaves.iter().enumerate().for_each(|(at, &l)| place[l as usize] = at as u32);
+        let inner = |(&(a, b), border): (&(u32, u32), &Border)| {
+            let (a, b) = (place[a as usize], place[b as usize]);
+            (a != u32::MAX && b != u32::MAX).then_some(((a.min(b), a.max(b)), *border))
+        };
+        let pieces: Vec<Piece> = leaves.iter().map(|&l| self.pieces[l as usize].clone()).collect();
+        let unit = pieces.iter().map(|p| p.area).sum::<f64>() / 1000.0;
+        let unlike = move |a: &Piece, b: &Piece, border: &Border| {
+            let apart = a.sums.iter().zip(&b.sums).map(|(p, q)| (p / a.area - q / b.area).powi(2)).sum::<f64>().sqrt();
+            let step = EDGE * border.strength / border.length + (1.0 - EDGE) * apart;
+            let ends = border.ends / border.length;
+            let step = if shape { step * (UNBROKEN + (1.0 - UNBROKEN) * ends) + END * ends } else { step };
+            step * (a.area.min(b.area) / unit).powf(SIZE_POWER)
+        };
+        grow(pieces, self.borders.iter().filter_map(inner).collect(), &unlike)
+    }
+
+    fn mask(&self, leaves: impl Iterator<Item = u32>) -> Mask {
+        let mut mask = Mask::empty(self.size.0, self.size.1);
+        leaves.for_each(|l| self.pixels[l as usize].iter().for_each(|&i| mask.insert(i as usize)));
+        mask
+    }
+}

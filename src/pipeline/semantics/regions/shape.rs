@@ -1,0 +1,98 @@
+//! Where surfaces end, as the trained Gaussians know: at jumps of depth, and in hollow folds, where
+//! one thing stands on or leans at another. Folds that bulge are within a thing.
+//!
+//! Inverse depth is linear in the picture on every plane, so that its second difference tells folds
+//! from slopes, and hollow from bulging by its sign.
+
+use rayon::prelude::*;
+
+use super::edges::blur;
+use crate::render::cpu::Renderer;
+use crate::render::{Features, RenderSettings};
+use crate::scene::{Camera, GaussianCloud};
+
+/// Focal lengths per distance over which depths are compared.
+const REACH: f64 = 1.0 / 205.0;
+/// Width of the blur of inverse depth, in reaches.
+const BLUR: f32 = 0.6;
+/// Opacity from which there is a surface.
+const SOLID: f32 = 0.3;
+/// Change of slope of a fold, in tangents, that certainly is the end of a surface.
+const FOLD: f32 = 1.4;
+/// Slopes, as relative depth per tangent, that may be and certainly are a jump from one surface to
+/// another behind it.
+const JUMP: [f32; 2] = [12.0, 37.0];
+
+/// How clearly a surface ends at each pixel of a view, 0 to 1; `None` if it cannot be drawn.
+pub fn ends_of(cloud: &GaussianCloud, settings: &RenderSettings, camera: &Camera) -> Option<Vec<f32>> {
+    let settings = RenderSettings { depth: true, sh_degree: 0, ..settings.clone() };
+    let frame = Renderer::<f32>::new().render(cloud, Features::NONE, camera, &settings).ok()?;
+    let depth = |(&d, &a): (&f32, &f32)| if a >= SOLID { d / a } else { 0.0 };
+    let depth: Vec<f32> = frame.depth.iter().zip(&frame.alpha).map(depth).collect();
+    Some(ends(&depth, frame.width_px, 0.5 * (camera.focal_px.x + camera.focal_px.y)))
+}
+
+/// The same from depths along the camera's axis, 0 where nothing is, for a focal length in px.
+pub fn ends(depth: &[f32], width: usize, focal_px: f64) -> Vec<f32> {
+    let farthest = depth.iter().copied().filter(|d| d.is_finite()).fold(0.0, f32::max);
+    if farthest <= 0.0 {
+        return vec![0.0; depth.len()];
+    }
+    // What is empty lies behind everything.
+    let inverse = |&d: &f32| if d > 0.0 && d.is_finite() { 1.0 / d } else { 0.66 / farthest };
+    let reach = (focal_px * REACH).clamp(1.0, 16.0);
+    let step = reach.round() as isize;
+    let near = blur(&depth.iter().map(inverse).collect::<Vec<_>>(), width, BLUR * reach as f32);
+    let (w, h) = (width as isize, (depth.len() / width.max(1)) as isize);
+    let at = |x: isize, y: isize| near[(y.clamp(0, h - 1) * w + x.clamp(0, w - 1)) as usize];
+    let mut out = vec![0.0_f32; depth.len()];
+    out.par_chunks_mut(width.max(1)).enumerate().for_each(|(y, row)| {
+        for (x, out) in row.iter_mut().enumerate() {
+            let (x, y) = (x as isize, y as isize);
+            let here = at(x, y);
+            for (dx, dy) in [(1, 0), (0, 1), (1, 1), (1, -1)] {
+                let (a, b) = (at(x - step * dx, y - step * dy), at(x + step * dx, y + step * dy));
+                let tangent = step as f32 * ((dx * dx + dy * dy) as f32).sqrt() / focal_px as f32;
+                // Nearer on both sides than a plane through here: hollow.
+                let fold = (a + b - 2.0 * here) / (2.0 * here * tangent) / FOLD;
+                let jump = ((a / b).ln().abs() / (2.0 * tangent) - JUMP[0]) / (JUMP[1] - JUMP[0]);
+                *out = out.max(fold.max(jump).clamp(0.0, 1.0));
+            }
+        }
+    });
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const W: usize = 120;
+
+    /// Largest value in the columns, of surfaces whose depth depends on the column.
+    fn found(depth: impl Fn(f32) -> f32, columns: std::ops::Range<usize>) -> f32 {
+        let depths: Vec<f32> = (0..W * 20).map(|i| depth((i % W) as f32 - 60.0)).collect();
+        let ends = ends(&depths, W, 820.0);
+        ends.chunks(W).flat_map(|row| &row[columns.clone()]).copied().fold(0.0, f32::max)
+    }
+
+    #[test]
+    fn surfaces_end_at_jumps_and_in_hollow_folds() {
+        // A plane seen askew, 1 / z linear in the picture.
+        let plane = |slope: f32| move |x: f32| 1.0 / (0.5 + slope * x / 820.0);
+        for slope in [0.0, 1.0, -2.0] {
+            assert!(found(plane(slope), 20..100) < 0.05, "{slope}: {}", found(plane(slope), 20..100));
+        }
+        let jump = |x: f32| if x < 0.0 { 1.0 } else { 2.0 };
+        assert!(found(jump, 58..62) > 0.9 && found(jump, 20..40) < 0.01);
+        // Two walls that meet at right angles: seen from inside, and from outside.
+        let corner = |hollow: f32| move |x: f32| 1.0 / (0.5 + hollow * 0.5 * x.abs() / 820.0);
+        assert!(found(corner(1.0), 57..63) > 0.3, "{}", found(corner(1.0), 57..63));
+        assert!(found(corner(-1.0), 20..100) < 0.05);
+        // Nothing lies behind everything.
+        assert!(found(|x| if x < 0.0 { 1.0 } else { 0.0 }, 58..62) > 0.9);
+        assert_eq!(found(|_| 0.0, 0..W), 0.0);
+        assert_eq!(found(|_| f32::NAN, 0..W), 0.0);
+        assert!(ends(&[], 0, 1.0).is_empty());
+    }
+}

@@ -1,0 +1,81 @@
+//! Quality of the built-in segmenter against pictures whose objects and parts are known, and
+//! against hand-drawn labels of a real photo. The bars are modest: regions are rough.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use std::path::Path;
+
+use common::data;
+use fmlgs::io::labels::{Labels, Region};
+use fmlgs::io::{self, Opened};
+use fmlgs::pipeline::observer::Silent;
+use fmlgs::pipeline::semantics::regions::Regions;
+use fmlgs::pipeline::semantics::regions::segment::Picture;
+use fmlgs::pipeline::semantics::segmenter::{FoundMask, Segmenter};
+use fmlgs::pipeline::synth::{self, SynthOptions};
+use fmlgs::scene::{Dataset, Level};
+
+/// Smaller ones are not asked for, px.
+const LEAST_PX: usize = 60;
+
+fn dataset(path: &Path) -> Dataset {
+    match io::open(path).expect("open") {
+        Opened::Dataset(d) => d,
+        other => panic!("{} is {other:?}", path.display()),
+    }
+}
+
+/// Share of the labelled objects, and of the parts, with which some region has an IoU of 0.5.
+fn recall(found: &[FoundMask], labels: &[Region]) -> [f64; 2] {
+    [Level::Object, Level::Part].map(|level| {
+        let asked = labels.iter().filter(|l| l.level == Some(level) && l.mask.area() >= LEAST_PX);
+        let hits: Vec<bool> = asked.map(|l| found.iter().any(|f| f.mask.iou(&l.mask) >= 0.5)).collect();
+        hits.iter().filter(|h| **h).count() as f64 / hits.len().max(1) as f64
+    })
+}
+
+#[test]
+fn objects_and_parts_of_the_demo_scene() {
+    let folder = tempfile::tempdir().expect("folder");
+    let options = SynthOptions {
+        views: 1,
+        held_out: 0,
+        width_px: 504,
+        height_px: 378,
+        samples: 2,
+        points: 0,
+        ..Default::default()
+    };
+    let glb = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/demo.glb");
+    synth::run(&glb, &options, folder.path(), &mut Silent).expect("render");
+    let photo = &dataset(folder.path()).photos[0];
+    let labels = Labels::open(folder.path()).expect("labels").of(photo, 504).expect("labels");
+    let found = Regions::default().segment(photo, 504).expect("regions");
+    let [objects, parts] = recall(&found, &labels);
+    println!("demo: objects {objects:.2}, parts {parts:.2}, {} regions", found.len());
+    assert!(objects >= 0.5 && parts >= 0.35, "objects {objects:.2}, parts {parts:.2}");
+    // Control: the same pixels in another order are no picture of these objects.
+    let pixels = io::photo::load(photo, 504).expect("photo");
+    let n = pixels.rgb.len();
+    let rgb: Vec<[u8; 3]> = (0..n).map(|i| pixels.rgb[i * 7919 % n]).collect();
+    let found = Regions::default().find(&Picture { width: 504, rgb: &rgb, coverage: None, ends: None });
+    let [objects, parts] = recall(&found, &labels);
+    assert!(objects < 0.1 && parts < 0.1, "shuffled: objects {objects:.2}, parts {parts:.2}");
+}
+
+#[test]
+fn objects_and_parts_of_the_plush_doll() {
+    let (Some(path), Some(drawn)) = (data("plush"), data("plush_labels")) else { return };
+    let photos = dataset(&path).photos;
+    for view in ["seed", "check"] {
+        let labels = Labels::open(&drawn.join(view)).expect("labels");
+        let photo = photos.iter().find(|p| labels.has(p)).expect("photo");
+        let start = std::time::Instant::now();
+        let found = Regions::default().segment(photo, 1024).expect("regions");
+        let secs = start.elapsed().as_secs_f64();
+        let [objects, parts] = recall(&found, &labels.of(photo, 1024).expect("labels"));
+        println!("{view}: objects {objects:.2}, parts {parts:.2}, {} regions, {secs:.2} s", found.len());
+        assert!(objects >= 0.6 && parts >= 0.5, "{view}: objects {objects:.2}, parts {parts:.2}");
+    }
+}
