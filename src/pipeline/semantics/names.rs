@@ -4,7 +4,7 @@
 use std::collections::HashSet;
 
 use super::localise::Scorer;
-use crate::scene::Identities;
+use crate::scene::{Identities, IdentityId};
 
 /// Similarity under which two words have nothing to do with each other.
 const ALIKE: f64 = 0.82;
