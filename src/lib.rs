@@ -5,6 +5,7 @@
 //! * [`math`]: spherical harmonics, rotations, stable scalar functions, statistics, colour maps;
 //! * [`scene`]: what a scene is made of: cameras, photos, Gaussians, masks; no I/O;
 //! * [`io`]: one file per format, and one `open(path)` that sniffs;
+//! * [`models`]: neural networks: pictures and phrases as vectors that can be compared;
 //! * [`render`]: the splat renderer, forward and backward, on the CPU and on the GPU;
 //! * [`pipeline`]: training, evaluation, synthetic data; reports to an `Observer` only;
 //! * [`worker`]: the background thread that runs the pipeline for the window;
@@ -14,6 +15,7 @@
 pub mod cli;
 pub mod io;
 pub mod math;
+pub mod models;
 pub mod pipeline;
 pub mod render;
 pub mod scene;

@@ -21,8 +21,8 @@ from texts import Noun, Phrase
 
 
 def encode(text, phrases):
-    longest = torch.from_numpy(np.array([texts.tokens(p) for p in phrases]))
-    return text(longest)
+    numbers = np.array([texts.tokens(p) for p in phrases])
+    return text(torch.from_numpy(numbers[:, :max(2, int((numbers > 0).sum(1).max()))]))
 
 
 def plain(p):
@@ -32,93 +32,88 @@ def plain(p):
 
 
 @torch.no_grad()
-def measure(image, text, held, size=64, most=None):
+def measure(image, text, held, most=None):
     image.eval(), text.eval()
-    rng, out = np.random.default_rng(0), {}
-    def note(name, value):
-        out.setdefault(name, []).append(float(value))
-    canonical = encode(text, texts.CANONICAL)
-    for scene in list(held.identities)[:most]:
-        ids, best = held.identities[scene], {}
-        for (s, _), seen in held.views.items():
-            for i, row in seen.items() if s == scene else ():
-                spread = int((held.tiles[row].max(-1) > 0).sum())
-                if i not in best or spread > best[i][0]:
-                    best[i] = (spread, row)
-        best = {i: r for i, (_, r) in best.items() if ids[i].part is None or ids[i].parent in best}
-        who = sorted(best)
-        x = torch.from_numpy(held.tiles[[best[i] for i in who]]).permute(0, 3, 1, 2).float() / 255
-        f = image(x if size == 64 else torch.nn.functional.interpolate(x, size=size, mode="area"))
-        place = {i: n for n, i in enumerate(who)}
-        things = [n for n, i in enumerate(who) if ids[i].part is None]
-        parts = [n for n, i in enumerate(who) if ids[i].part is not None]
-        parent = {n: place[ids[who[n]].parent] for n in parts}
+    out, canonical = {}, encode(text, texts.CANONICAL)
+    for n, scene in enumerate(list(held.identities)[:most]):
+        seen, parent, f = features(image, held, scene)
+        parts = sorted(parent)
         dev = f.clone()
-        dev[parts] = model.deviated(f[[parent[n] for n in parts]], f[parts])
-        block = torch.maximum((canonical @ f.T).amax(0), torch.full((len(who),), -2.0))
-        block_dev = (canonical @ dev.T).amax(0)
-        seen = [ids[i] for i in who]
-        def ask(p, features):
-            q = encode(text, [plain(p)])[0]
-            hit = data.matches([p], seen)[0]
-            return q @ features.T, hit
-        def first(score, among):
-            return among[int(torch.argmax(score[among]))]
-        for n in things:
-            t = seen[n].thing
-            p = Phrase(Noun(t["kind"], t["color"]))
-            s, hit = ask(p, f)
-            top = first(s, things)
-            note("object: colour kind", hit[top])
-            note("object: colour kind, among all", hit[first(torch.where(torch.arange(len(who)) >= 0, s, s), list(range(len(who))))])
-            note("found: object", (s - block)[n] > 0)
-            if sum(seen[k].thing["kind"] == t["kind"] for k in things) == 1:
-                s, hit = ask(Phrase(Noun(t["kind"])), f)
-                note("object: kind", hit[first(s, things)])
-        for n in parts:
-            t, part = seen[n].thing, seen[n].part
-            noun = texts.part_words(part["base"])[0]
-            whole = Noun(t["kind"], t["color"])
-            p = Phrase(Noun(noun), whole)
-            s, hit = ask(p, dev)
-            note("part: part of the colour kind, deviated", hit[first(s, parts)])
-            note("found: part of the colour kind", (s - block_dev)[n] > 0)
-            note("part: the same, raw features", hit[first(s * 0 + encode(text, [plain(p)])[0] @ f.T, parts)])
-            so, _ = ask(Phrase(whole), f)
-            chosen = first(so, things)
-            mine = [k for k in parts if parent[k] == chosen]
-            for name, features in (("raw", f), ("deviated", dev)):
-                sp, _ = ask(Phrase(Noun(noun)), features)
-                note(f"part: two steps, {name}", bool(mine) and hit[first(sp, mine)])
-                own = [k for k in parts if parent[k] == parent[n]]
-                note(f"part: noun among its own thing's parts, {name}", hit[first(sp, own)])
-            p = Phrase(Noun(noun, part["color"]))
-            for name, features in (("raw", f), ("deviated", dev)):
-                s, hit = ask(p, features)
-                note(f"part: colour part, {name}", hit[first(s, parts)])
-        kinds = {seen[n].thing["kind"] for n in things}
-        absent = [k for k in texts.things.KINDS if k not in kinds and not set(texts.kind_words(k)) & {w for x in seen for w in
-                  (texts.part_words(x.part["base"]) if x.part else texts.kind_words(x.thing["kind"]))}]
-        for k in rng.permutation(absent)[:8]:
-            s, _ = ask(Phrase(Noun(str(k))), f)
-            note("silent: absent kind", (s - block)[things].max() <= 0)
-            s, _ = ask(Phrase(Noun(str(k), palette.NAMES[rng.integers(12)])), f)
-            note("silent: absent colour and kind", (s - block)[things].max() <= 0)
-            s, _ = ask(Phrase(Noun("handle"), Noun(str(k))), dev)
-            note("silent: part of an absent kind", (s - block_dev)[parts].max() <= 0)
-        for n in things:
-            colors = [c for c in palette.NAMES if not any(seen[k].thing["kind"] == seen[n].thing["kind"] and seen[k].thing["color"] == c
-                                                          for k in things)]
-            s, hit = ask(Phrase(Noun(seen[n].thing["kind"], colors[rng.integers(len(colors))])), f)
-            note("silent: wrong colour", (s - block)[things].max() <= 0)
-            foreign = [p for p in texts.PARTS if p not in {b for k in parts if parent[k] == n for b in
-                       [seen[k].part["base"], *texts.part_words(seen[k].part["base"])]}]
-            t = seen[n].thing
-            p = Phrase(Noun(texts.part_words(foreign[rng.integers(len(foreign))])[0]), Noun(t["kind"], t["color"]))
-            s, hit = ask(p, dev)
-            if not hit.any() and parts:
-                note("silent: part that the thing lacks", (s - block_dev)[parts].max() <= 0)
+        if parts:
+            dev[parts] = model.deviated(f[[parent[k] for k in parts]], f[parts])
+        # Once to collect the phrases, once with their vectors.
+        phrases = {}
+        questions(np.random.default_rng(n), seen, parent, f, dev, canonical, lambda p: phrases.setdefault(p, f[0]), lambda *_: None)
+        vectors = dict(zip(phrases, encode(text, list(phrases))))
+        questions(np.random.default_rng(n), seen, parent, f, dev, canonical, vectors.__getitem__,
+                  lambda name, value: out.setdefault(name, []).append(float(value)))
     return {k: [round(float(np.mean(v)), 4), len(v)] for k, v in out.items()}
+
+
+def features(image, held, scene):
+    """Identities of the scene that are seen, the place of each part's thing, and their vectors."""
+    ids, best = held.identities[scene], {}
+    for (s, _), seen in held.views.items():
+        for i, row in seen.items() if s == scene else ():
+            spread = int((held.tiles[row].max(-1) > 0).sum())
+            if i not in best or spread > best[i][0]:
+                best[i] = (spread, row)
+    who = sorted(i for i in best if ids[i].part is None or ids[i].parent in best)
+    x = torch.from_numpy(held.tiles[[best[i][1] for i in who]]).permute(0, 3, 1, 2).float() / 255
+    f = image(x)
+    place = {i: n for n, i in enumerate(who)}
+    return [ids[i] for i in who], {place[i]: place[ids[i].parent] for i in who if ids[i].part is not None}, f
+
+
+def questions(rng, seen, parent, f, dev, canonical, vector, note):
+    """Asks everything about one scene."""
+    things = [k for k in range(len(seen)) if k not in parent]
+    parts, everyone = sorted(parent), list(range(len(seen)))
+    block, block_dev = (canonical @ f.T).amax(0), (canonical @ dev.T).amax(0)
+    def ask(p, features):
+        return vector(plain(p)) @ features.T, data.matches([p], seen)[0]
+    def first(score, among):
+        return among[int(torch.argmax(score[among]))]
+    for n in things:
+        t = seen[n].thing
+        s, hit = ask(Phrase(Noun(t["kind"], t["color"])), f)
+        note("object: colour kind", hit[first(s, things)])
+        note("object: colour kind, parts compete", hit[first(torch.maximum(s, vector(plain(Phrase(Noun(t["kind"], t["color"])))) @ dev.T), everyone)])
+        note("found: object", (s - block)[n] > 0)
+        if sum(seen[k].thing["kind"] == t["kind"] for k in things) == 1:
+            s, hit = ask(Phrase(Noun(t["kind"])), f)
+            note("object: kind", hit[first(s, things)])
+    for n in parts:
+        t, part = seen[n].thing, seen[n].part
+        noun, whole = texts.part_words(part["base"])[0], Noun(t["kind"], t["color"])
+        p = Phrase(Noun(noun), whole)
+        for name, features, limit in (("raw", f, block), ("deviated", dev, block_dev)):
+            s, hit = ask(p, features)
+            note(f"part: part of the colour kind, {name}", hit[first(s, parts)])
+            if name == "deviated":
+                note("found: part of the colour kind", (s - limit)[n] > 0)
+        chosen = first(ask(Phrase(whole), f)[0], things)
+        mine, own = ([k for k in parts if parent[k] == o] for o in (chosen, parent[n]))
+        for name, features in (("raw", f), ("deviated", dev)):
+            s, fits = ask(Phrase(Noun(noun)), features)
+            note(f"part: two steps, {name}", bool(mine) and hit[first(s, mine)])
+            note(f"part: noun among its own thing's parts, {name}", fits[first(s, own)])
+            s, fits = ask(Phrase(Noun(noun, part["color"])), features)
+            note(f"part: colour part, {name}", fits[first(s, parts)])
+    words = {w for x in seen for w in (texts.part_words(x.part["base"]) if x.part else texts.kind_words(x.thing["kind"]))}
+    absent = [k for k in texts.things.KINDS if not set(texts.kind_words(k)) & words]
+    silent = lambda name, p, features, limit, among: note(f"silent: {name}", (ask(p, features)[0] - limit)[among].max() <= 0)
+    for k in map(str, rng.permutation(absent)[:8]):
+        silent("absent kind", Phrase(Noun(k)), f, block, things)
+        silent("absent colour and kind", Phrase(Noun(k, palette.NAMES[rng.integers(12)])), f, block, things)
+        silent("part of an absent kind", Phrase(Noun("handle"), Noun(k)), dev, block_dev, parts)
+    for n in things:
+        t = seen[n].thing
+        colors = [c for c in palette.NAMES if not any(seen[k].thing["kind"] == t["kind"] and seen[k].thing["color"] == c for k in things)]
+        silent("wrong colour", Phrase(Noun(t["kind"], colors[rng.integers(len(colors))])), f, block, things)
+        p = Phrase(Noun(texts.part_words(texts.PARTS[rng.integers(len(texts.PARTS))])[0]), Noun(t["kind"], t["color"]))
+        if not ask(p, dev)[1].any():
+            silent("part that the thing lacks", p, dev, block_dev, parts)
 
 
 def summary(result):

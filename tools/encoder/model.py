@@ -32,6 +32,11 @@ class ImageEncoder(nn.Module):
         self.head = nn.Sequential(nn.Linear(320, 256), nn.ReLU(), nn.Linear(256, DIM))
 
     def forward(self, tile):
+        # Half the side is enough to learn from, at a quarter of the work.
+        return self.small(torch.nn.functional.avg_pool2d(tile, 2))
+
+    def small(self, tile):
+        """[n, 3, 32, 32], as forward makes it."""
         x = self.body((tile - .2) * 3)
         x = torch.cat([x.mean((2, 3)), x.amax((2, 3))], 1)
         return unit(self.head(x))

@@ -1,0 +1,73 @@
+//! The encoder that comes with the program: two small networks that this project trained on its own
+//! renders (`tools/encoder`), so that queries work with nothing to download.
+
+use super::engine::{Network, engine};
+use super::words::Vocabulary;
+use super::{Encoder, ModelError, Tile};
+
+const IMAGE: (&str, &[u8]) = ("demo_image.onnx", include_bytes!("../../assets/models/demo_image.onnx"));
+const TEXT: (&str, &[u8]) = ("demo_text.onnx", include_bytes!("../../assets/models/demo_text.onnx"));
+const WORDS: (&str, &str) = ("demo_vocab.json", include_str!("../../assets/models/demo_vocab.json"));
+
+/// The `demo` encoder. Its networks are prepared when they are first needed.
+pub struct DemoEncoder {
+    words: Vocabulary,
+    image: Option<Network>,
+    text: Option<Network>,
+}
+
+impl DemoEncoder {
+    /// Ready to be asked.
+    pub fn new() -> Result<Self, ModelError> {
+        Ok(Self { words: Vocabulary::parse(WORDS.1, WORDS.0)?, image: None, text: None })
+    }
+}
+
+/// The network in the slot, prepared if it is not yet.
+fn ready<'a>(slot: &'a mut Option<Network>, (name, bytes): (&str, &[u8])) -> Result<&'a mut Network, ModelError> {
+    if slot.is_none() {
+        *slot = Some(engine()?.load(bytes, name)?);
+    }
+    slot.as_mut().ok_or_else(|| ModelError::Load { model: name.into(), problem: "it is gone".into() })
+}
+
+impl Encoder for DemoEncoder {
+    fn name(&self) -> &str {
+        "demo"
+    }
+
+    fn dimension(&self) -> usize {
+        self.words.dimension
+    }
+
+    fn tile_side_px(&self) -> usize {
+        self.words.tile_side_px
+    }
+
+    fn image(&mut self, tile: &Tile) -> Result<Vec<f32>, ModelError> {
+        let side = self.words.tile_side_px;
+        if tile.side_px != side || tile.rgb.len() != side * side {
+            return Err(ModelError::TileSize { side_px: tile.side_px, pixels: tile.rgb.len(), expected_px: side });
+        }
+        if let Some(pixel) = tile.rgb.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
+            return Err(ModelError::TileColor { pixel });
+        }
+        let channel = |c: usize| tile.rgb.iter().map(move |p| p[c].clamp(0.0, 1.0));
+        let planes: Vec<f32> = (0..3).flat_map(channel).collect();
+        let shape = vec![1, 3, side as i64, side as i64];
+        ready(&mut self.image, IMAGE)?.unit_vector(shape, planes, self.words.dimension)
+    }
+
+    fn text(&mut self, phrase: &str) -> Result<Vec<f32>, ModelError> {
+        let tokens = self.words.encode(phrase)?;
+        let shape = vec![1, tokens.len() as i64];
+        ready(&mut self.text, TEXT)?.unit_vector(shape, tokens, self.words.dimension)
+    }
+
+    fn unknown_words(&self, phrase: &str) -> Vec<String> {
+        self.words.unknown(phrase)
+    }
+}
+
+#[cfg(test)]
+mod tests;
