@@ -32,9 +32,9 @@ def facts(words, color, surface):
 
 
 class Tiles:
-    """The rows of one or more files of tiles.py, by scene and view."""
+    """The rows of one or more files of tiles.py, by scene and view; without those of a few pixels."""
 
-    def __init__(self, paths):
+    def __init__(self, paths, least_px=0):
         self.tiles, self.identities, self.views = [], {}, {}
         for path in paths:
             f = np.load(path)
@@ -43,6 +43,8 @@ class Tiles:
             for n, spec in json.loads(str(f["specs"])).items():
                 self.identities[(path, int(n))] = identities((path, int(n)), spec)
             for i, (n, v, k, px) in enumerate(f["rows"]):
+                if px < least_px:
+                    continue
                 self.views.setdefault(((path, int(n)), int(v)), {})[int(k)] = first + i
         self.tiles = np.concatenate(self.tiles)
 

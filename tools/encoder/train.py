@@ -114,8 +114,8 @@ def step_loss(image, text, scale, batch, rng):
     tau, margin = 20.0, .04
     positive = F.softplus(tau * (margin - d))[hit].mean()
     rivals = torch.where(hit | skip, torch.tensor(-1e4), tau * (d + margin))
-    # As if a scene were a tenth of the batch.
-    negative = F.softplus(torch.logsumexp(rivals, 1) - math.log(10)).mean()
+    # As if a scene were a twentieth of the batch.
+    negative = F.softplus(torch.logsumexp(rivals, 1) - math.log(20)).mean()
     return ranking, positive, negative
 
 
@@ -127,6 +127,8 @@ def main():
     ap.add_argument("--minutes", type=float, default=20)
     ap.add_argument("--views", type=int, default=7)
     ap.add_argument("--rate", type=float, default=2e-3)
+    ap.add_argument("--least-px", type=int, default=40)
+    ap.add_argument("--weight", type=float, default=.35, help="of being above or below the canonical phrases")
     ap.add_argument("--start")
     ap.add_argument("--threads", type=int, default=2)
     ap.add_argument("--seed", type=int, default=0)
@@ -138,7 +140,7 @@ def main():
         old = torch.load(a.start)
         image.load_state_dict(old["image"]), text.load_state_dict(old["text"])
     image = image.to(memory_format=torch.channels_last)
-    batches, held = Batches(data.Tiles(a.tiles), a.seed), data.Tiles(a.held)
+    batches, held = Batches(data.Tiles(a.tiles, a.least_px), a.seed), data.Tiles(a.held)
     print(len(batches.t.tiles), "tiles,", len(held.tiles), "held out", flush=True)
     groups = [{"params": [*image.parameters(), *text.parameters()], "weight_decay": .02}, {"params": [scale], "weight_decay": 0}]
     optimiser = torch.optim.AdamW(groups, lr=a.rate)
@@ -149,7 +151,7 @@ def main():
             g["lr"] = rate
         image.train(), text.train()
         losses = step_loss(image, text, scale.exp().clamp(max=40), batches.draw(a.views), batches.rng)
-        loss = losses[0] + .35 * (losses[1] + losses[2])
+        loss = losses[0] + a.weight * (1.5 * losses[1] + losses[2])
         optimiser.zero_grad()
         loss.backward()
         torch.nn.utils.clip_grad_norm_([*image.parameters(), *text.parameters()], 1.0)
