@@ -162,7 +162,7 @@ fn answers_say_when_nothing_or_several_fit() {
     let ask = |query: &str| {
         let phrase = Phrase { text: query.into(), target: query.into(), whole: None };
         let options = MeaningOptions::default();
-        localise(&identities, &phrase, Kind::Auto, &mut ByMeaning { features: &language, phrases: &phrases, options })
+        localise(&identities, &phrase, Kind::Auto, &mut ByMeaning::new(&language, &phrases, options))
     };
     assert!(matches!(ask("dall-e brand"), Answer::NotFound(_)), "less relevant than a canonical phrase");
     assert!(matches!(ask("spoon"), Answer::Ambiguous(_)), "two within 0.005");

@@ -39,10 +39,9 @@ pub struct Language<'a> {
     pub options: MeaningOptions,
 }
 
-/// The phrases of a query that answers by meaning need.
+/// The phrases of a query that answers by meaning need: all of it, and the whole's.
 pub fn phrases_of(phrase: &Phrase) -> Vec<&str> {
-    let whole = phrase.whole.as_deref();
-    [Some(phrase.text.as_str()), Some(phrase.target.as_str()), whole].into_iter().flatten().collect()
+    std::iter::once(phrase.text.as_str()).chain(phrase.whole.as_deref()).collect()
 }
 
 /// Answers by names where all words are known, else by meaning where that finds something.
@@ -75,7 +74,7 @@ pub fn by_name(identities: &Identities, phrase: &Phrase, kind: Kind) -> Answered
 /// Answers by meaning alone.
 pub fn by_meaning(identities: &Identities, phrase: &Phrase, kind: Kind, language: Language<'_>) -> Answered {
     let Language { features, phrases, options } = language;
-    let mut scorer = ByMeaning { features, phrases, options };
+    let mut scorer = ByMeaning::new(features, phrases, options);
     let answer = localise(identities, phrase, kind, &mut scorer);
     let mut relevancy = vec![0.0];
     relevancy.extend(scorer.scores(&phrase.text, None));
@@ -121,7 +120,11 @@ impl Answered {
 
     /// Relevancy of every pixel of a view, row-major, 0 to 1.
     pub fn heat(&self, map: &ViewMap) -> Vec<f32> {
-        map.identity.iter().map(|id| self.relevancy.get(*id as usize).copied().unwrap_or(0.0)).collect()
+        // One more entry for numbers that nobody has.
+        let mut table = self.relevancy.clone();
+        table.push(0.0);
+        let last = table.len() - 1;
+        map.identity.iter().map(|id| table[(*id as usize).min(last)]).collect()
     }
 }
 

@@ -34,8 +34,11 @@ pub fn matching(identities: &Identities, target: IdentityId, tolerance: f32) -> 
 
 /// The target's pixels by the winning identities.
 pub fn exact(map: &ViewMap, identities: &Identities, target: IdentityId, tolerance: f32) -> Mask {
-    let found = matching(identities, target, tolerance);
-    Mask::from_fn(map.width_px, map.height_px, |i| found.get(map.identity[i] as usize).copied().unwrap_or(false))
+    let mut found = matching(identities, target, tolerance);
+    // One more entry for numbers that nobody has.
+    found.push(false);
+    let last = found.len() - 1;
+    Mask::from_fn(map.width_px, map.height_px, |i| found[(map.identity[i] as usize).min(last)])
 }
 
 /// The target's pixels by blended codes. Pieces of the target that have codes of their own belong to

@@ -80,9 +80,16 @@ pub struct ByMeaning<'a> {
     pub phrases: &'a Phrasebook,
     /// How.
     pub options: MeaningOptions,
+    /// Scores that were asked for already.
+    known: Vec<(String, Option<String>, Vec<f32>)>,
 }
 
-impl ByMeaning<'_> {
+impl<'a> ByMeaning<'a> {
+    /// Scores by these features and encoded phrases.
+    pub fn new(features: &'a LanguageFeatures, phrases: &'a Phrasebook, options: MeaningOptions) -> Self {
+        Self { features, phrases, options, known: Vec::new() }
+    }
+
     /// Advantage of every identity, by number less one: that of its best view. Negative infinity
     /// without features.
     pub fn advantages(&self, phrase: &str, against: Option<&str>) -> Vec<f32> {
@@ -100,7 +107,13 @@ impl ByMeaning<'_> {
 
 impl Scorer for ByMeaning<'_> {
     fn scores(&mut self, phrase: &str, against: Option<&str>) -> Vec<f32> {
-        self.advantages(phrase, against).into_iter().map(|d| score(d, self.options.temperature)).collect()
+        if let Some(known) = self.known.iter().find(|k| k.0 == phrase && k.1.as_deref() == against) {
+            return known.2.clone();
+        }
+        let advantages = self.advantages(phrase, against).into_iter();
+        let scores: Vec<f32> = advantages.map(|d| score(d, self.options.temperature)).collect();
+        self.known.push((phrase.to_owned(), against.map(str::to_owned), scores.clone()));
+        scores
     }
 
     fn strategy(&self) -> Strategy {
@@ -148,7 +161,7 @@ mod tests {
     #[test]
     fn the_best_view_counts_and_features_can_be_chosen() {
         let (features, phrases) = (features(), book());
-        let mut by = ByMeaning { features: &features, phrases: &phrases, options: MeaningOptions::default() };
+        let mut by = ByMeaning::new(&features, &phrases, MeaningOptions::default());
         let d = by.advantages("lid", None);
         assert!((d[0] + 0.5).abs() < 1e-6 && (d[1] - 0.1).abs() < 1e-6 && d[2] == f32::NEG_INFINITY, "{d:?}");
         let s = by.scores("lid", None);
