@@ -58,7 +58,7 @@ Examples:
 
 /// Train 3D Gaussians from posed photos while you watch, and look around in them.
 #[derive(Debug, Parser)]
-#[command(name = "fmlgs", version, about, max_term_width = 100, args_conflicts_with_subcommands = true)]
+#[command(name = "fmlgs", version, about, max_term_width = 100)]
 #[command(after_help = format!("{EXAMPLES}\n\n{EXIT_CODES}"))]
 struct Cli {
     /// What to open in the window: a dataset's folder, a splat file or a trained scene
@@ -111,6 +111,9 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
     let Some(command) = cli.command else {
         return window(cli.path.map(Action::Open), open_window);
     };
+    if let Some(path) = cli.path {
+        return Err(CliError::Usage(format!("'{}' before a command means nothing; put it after it", path.display())));
+    }
     interrupt::listen();
     match command {
         Command::Info(args) => info::run(args),
