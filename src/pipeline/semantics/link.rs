@@ -22,7 +22,8 @@ pub enum Link {
 }
 
 /// Compares the masks of a photo with what is `known` of its view. A part can only be a piece of
-/// what its whole is.
+/// what its whole is. A mask with the name of an identity of the same whole is that identity, however
+/// little of it has been seen; others must overlap with theirs.
 pub fn link(found: &[FoundMask], known: Option<&ViewMap>, identities: &Identities) -> Vec<Link> {
     let Some(map) = known else { return vec![Link::New; found.len()] };
     let (w, h) = (map.width_px, map.height_px);
@@ -50,7 +51,19 @@ pub fn link(found: &[FoundMask], known: Option<&ViewMap>, identities: &Identitie
                 identities.iter().filter(|(_, i)| i.level == Level::Part).map(|(id, _)| id).collect()
             }
         };
-        let fits = candidates.into_iter().filter_map(|id| Some((id, fit(&mask.mask, id)?)));
+        let called = |id: &&IdentityId| {
+            let names = identities.get(**id).map(|i| i.names.as_slice()).unwrap_or_default();
+            mask.name.as_ref().is_some_and(|name| names.contains(name)) && taken.iter().all(|t| t.0 != **id)
+        };
+        if let Some(&id) = candidates.iter().find(called) {
+            taken.push((id, i, f64::INFINITY));
+            links.push(Link::Known(id));
+            continue;
+        }
+        // Who has another name is somebody else.
+        let nameless = |id: &IdentityId| mask.name.is_none() || identities.get(*id).is_some_and(|i| i.names.is_empty());
+        let fits = candidates.into_iter().filter(nameless);
+        let fits = fits.filter_map(|id| Some((id, fit(&mask.mask, id)?)));
         let best = fits.max_by(|a, b| a.1.total_cmp(&b.1));
         let Some((id, score)) = best else {
             links.push(Link::New);
@@ -125,5 +138,31 @@ mod tests {
         };
         let masks = [found(Level::Object, None, mask(0, 55)), found(Level::Object, None, mask(40, 100))];
         assert_eq!(link(&masks, Some(&map), &all), [Link::Split(cup), Link::Known(cup)]);
+    }
+
+    #[test]
+    fn names_say_more_than_overlap() {
+        let mut all = Identities::default();
+        let cup = all.add(Level::Object, NOBODY, vec!["cup".into()]);
+        let handle = all.add(Level::Part, cup, vec!["handle".into()]);
+        let pot = all.add(Level::Object, NOBODY, vec!["pot".into()]);
+        let mut identity = vec![NOBODY; 100];
+        identity[..50].fill(pot);
+        let map = ViewMap { width_px: 100, height_px: 1, identity, share: vec![1.0; 100], alpha: vec![1.0; 100] };
+        let named = |name: &str, level, parent, from, to| FoundMask {
+            name: Some(name.into()),
+            ..found(level, parent, mask(from, to))
+        };
+        let masks = [
+            // Where the pot was thought to be, there is the cup, with its handle, never seen from here.
+            named("cup", Level::Object, None, 0, 50),
+            named("handle", Level::Part, Some(0), 0, 10),
+            // Another thing where the pot is, and the pot's own handle.
+            named("jug", Level::Object, None, 5, 50),
+            named("pot", Level::Object, None, 60, 80),
+            named("handle", Level::Part, Some(3), 60, 65),
+        ];
+        let links = link(&masks, Some(&map), &all);
+        assert_eq!(links, [Link::Known(cup), Link::Known(handle), Link::New, Link::Known(pot), Link::New]);
     }
 }

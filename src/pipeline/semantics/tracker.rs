@@ -31,7 +31,7 @@ pub struct TrackOptions {
 
 impl Default for TrackOptions {
     fn default() -> Self {
-        Self { seed: None, max_side_px: 1_024, reseed_share: 0.03, max_seeds: 12 }
+        Self { seed: None, max_side_px: 1_024, reseed_share: 0.005, max_seeds: 12 }
     }
 }
 
