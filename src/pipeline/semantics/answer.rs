@@ -164,6 +164,8 @@ mod tests {
         let a = ask("the lamp's shade", true);
         assert_eq!((a.basis, a.chosen(1)), (Basis::Names, vec![2]));
         assert!(a.relevancy[2] > a.relevancy[1] && a.relevancy[3] == 0.0);
+        let a = ask("a shade on the lamp", true);
+        assert_eq!((a.basis, a.chosen(1)), (Basis::Names, vec![2]), "words between names are nothing unknown");
         let a = ask("cup", true);
         assert_eq!((a.basis, a.chosen(1)), (Basis::Meaning, vec![3]));
         assert!(a.relevancy[3] > 0.9 && a.relevancy[1] < 0.5);

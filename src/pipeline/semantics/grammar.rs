@@ -34,6 +34,11 @@ const ARTICLES: [&str; 14] =
 /// Characters between a whole and its piece where words are not spaced.
 const WHOLE_S: [char; 2] = ['的', 'の'];
 
+/// Whether a word carries nothing by itself: an article, or one between a piece and its whole.
+pub fn is_glue(word: &str) -> bool {
+    ARTICLES.contains(&word) || PIECE_OF.contains(&word)
+}
+
 impl Phrase {
     /// Takes a query apart; `None` if there is nothing in it.
     ///

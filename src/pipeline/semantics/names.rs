@@ -3,6 +3,7 @@
 
 use std::collections::HashSet;
 
+use super::grammar::is_glue;
 use super::localise::Scorer;
 use crate::scene::{Identities, IdentityId};
 
@@ -42,12 +43,13 @@ pub fn scores(identities: &Identities, phrase: &str) -> Vec<f32> {
     identities.iter().map(|(id, i)| either(id, &i.names) as f32).collect()
 }
 
-/// The words of a phrase that no name in the scene resembles.
+/// The words of a phrase that no name in the scene resembles; articles and the like left out.
 pub fn unknown_words(identities: &Identities, phrase: &str) -> Vec<String> {
     let known: HashSet<String> = identities.iter().flat_map(|(_, i)| &i.names).flat_map(|n| words(n)).collect();
     let numbers = identities.iter().filter(|(_, i)| i.names.is_empty()).map(|(id, _)| id.to_string());
     let known: HashSet<String> = known.into_iter().chain(numbers).collect();
-    words(phrase).into_iter().filter(|w| !known.iter().any(|k| alike(w, k) > 0.0)).collect()
+    let carries = |w: &String| !is_glue(w) && !known.iter().any(|k| alike(w, k) > 0.0);
+    words(phrase).into_iter().filter(carries).collect()
 }
 
 /// Names for a phrase that is being typed, best first.
@@ -138,7 +140,7 @@ mod tests {
     #[test]
     fn unknown_words_and_completions() {
         let all = scene();
-        assert_eq!(unknown_words(&all, "green button"), ["green"]);
+        assert_eq!(unknown_words(&all, "the green button of a zebra"), ["green", "zebra"]);
         assert!(unknown_words(&all, "red buttons").is_empty());
         assert_eq!(
             completions(&all, "con", 5),
