@@ -181,6 +181,9 @@ mod tests {
         assert_eq!(cli.path, Some(PathBuf::from("photos")));
         let cli = Cli::try_parse_from(["fmlgs", "info", "photos"]).expect("a subcommand");
         assert!(cli.path.is_none() && matches!(cli.command, Some(Command::Info(_))));
-        assert!(Cli::try_parse_from(["fmlgs", "photos", "info", "more"]).is_err());
+        let cli = Cli::try_parse_from(["fmlgs", "photos", "info", "more"]).expect("words in an order");
+        assert!(matches!(run(cli, |_| Ok(())), Err(CliError::Usage(_))));
+        let cli = Cli::try_parse_from(["fmlgs", "-q", "info", "photos"]).expect("quiet comes before or after");
+        assert!(cli.quiet && cli.path.is_none());
     }
 }
