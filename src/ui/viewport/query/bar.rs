@@ -21,7 +21,7 @@ impl Questions {
         let offered = self.offered(semantics);
         let complete = focused && !offered.is_empty() && ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Tab));
         ui.horizontal(|ui| {
-            let width = ui.available_width() - 40.0;
+            let width = ui.available_width() - 72.0;
             let edit = TextEdit::singleline(&mut self.typed)
                 .id(id)
                 .hint_text("Find an object, or \"the button of the red controller\"   ( / )")
@@ -43,7 +43,7 @@ impl Questions {
                 self.keep();
                 response.request_focus();
             }
-            ui.toggle_value(&mut self.open, "\u{2699}").on_hover_text("How answers are found and drawn");
+            ui.toggle_value(&mut self.open, "Options").on_hover_text("How answers are found and drawn");
         });
         if focused && !self.typed.is_empty() && offered.first().is_some_and(|o| *o != self.typed) {
             self.show_offered(ui, &offered, semantics);
