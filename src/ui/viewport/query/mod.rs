@@ -13,7 +13,7 @@ mod speech;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use egui::{Align2, Area, Color32, Id, Order, Rect, TextureHandle, TextureOptions, Ui, vec2};
+use egui::{Align2, Area, Color32, Id, Order, Rect, TextureHandle, TextureOptions, Ui};
 
 pub use self::look::{Look, Tint};
 use self::speech::Speech;
@@ -254,11 +254,12 @@ impl Questions {
         cloud: &GaussianCloud,
         actions: &mut Vec<Action>,
     ) {
-        let at = Align2::CENTER_TOP.pos_in_rect(&rect.shrink(12.0)) + vec2(0.0, 46.0);
-        let area = Area::new(Id::unique("question")).order(Order::Middle).pivot(Align2::CENTER_TOP).fixed_pos(at);
+        // In the corner: what is looked for is mostly in the middle.
+        let at = Align2::RIGHT_TOP.pos_in_rect(&rect.shrink(12.0));
+        let area = Area::new(Id::unique("question")).order(Order::Middle).pivot(Align2::RIGHT_TOP).fixed_pos(at);
         area.constrain_to(rect).show(ui.ctx(), |ui| {
             theme::overlay().show(ui, |ui| {
-                ui.set_width(430.0_f32.min(rect.width() - 40.0));
+                ui.set_width(380.0_f32.min(rect.width() - 40.0));
                 self.show_bar(ui, semantics);
                 if self.open {
                     let heat = (!self.heat.is_empty()).then_some(self.heat.as_slice());
