@@ -3,7 +3,7 @@
 
 use std::collections::HashSet;
 
-use super::grammar::is_glue;
+use super::grammar::{MAX_CHARS, is_glue};
 use super::localise::Scorer;
 use crate::scene::{Identities, IdentityId};
 
@@ -70,7 +70,8 @@ pub fn completions(identities: &Identities, typed: &str, most: usize) -> Vec<Str
 
 /// Lower-case words of a name; an English plural counts like its singular.
 fn words(text: &str) -> Vec<String> {
-    let lower = text.to_lowercase();
+    // Nobody's name is longer, and comparing every letter of a pasted book would take long.
+    let lower = text.chars().take(MAX_CHARS).collect::<String>().to_lowercase();
     let apart = lower.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty() && *w != "s");
     apart.map(singular).collect()
 }
