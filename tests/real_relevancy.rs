@@ -5,10 +5,11 @@
 
 mod common;
 
+use fmlgs::math::vector::dot;
 use fmlgs::pipeline::semantics::grammar::{Kind, Phrase};
 use fmlgs::pipeline::semantics::localise::{Answer, localise};
 use fmlgs::pipeline::semantics::meaning::{ByMeaning, MeaningOptions, Phrasebook};
-use fmlgs::pipeline::semantics::relevancy::{CANONICAL, PART_WEIGHT, advantage, cosine, deviate, score};
+use fmlgs::pipeline::semantics::relevancy::{CANONICAL, PART_WEIGHT, advantage, deviate, score};
 use fmlgs::scene::{Identities, IdentityId, LanguageFeatures, Level, NOBODY, ViewFeatures};
 
 /// Queries of the LERF evaluation that have an embedding.
@@ -179,11 +180,11 @@ fn parts_are_moved_towards_their_whole_and_made_unit_again() {
     assert_ne!(bear, nose);
     let (whole, part) = (&scene.single[bear], &scene.single[nose]);
     let sum: Vec<f32> = whole.iter().zip(part).map(|(o, p)| (1.0 - PART_WEIGHT) * o + PART_WEIGHT * p).collect();
-    let length = cosine(&sum, &sum).sqrt();
+    let length = dot(&sum, &sum).sqrt();
     assert!((0.82..0.95).contains(&length), "without normalisation parts are penalised: {length}");
     let moved = deviate(part, whole, PART_WEIGHT).expect("a direction");
-    assert!((cosine(&moved, &moved) - 1.0).abs() < 1e-4);
-    assert!(cosine(&moved, whole) > cosine(part, whole) + 0.1);
+    assert!((dot(&moved, &moved) - 1.0).abs() < 1e-4);
+    assert!(dot(&moved, whole) > dot(part, whole) + 0.1);
 }
 
 #[test]

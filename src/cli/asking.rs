@@ -8,6 +8,7 @@ use crate::models::{self, Encoder, ModelError};
 use crate::pipeline::semantics::answer::{Answered, Language, answer, phrases_of};
 use crate::pipeline::semantics::grammar::{Kind, Phrase};
 use crate::pipeline::semantics::meaning::{MeaningOptions, Phrasebook};
+use crate::pipeline::semantics::names;
 use crate::scene::{GaussianCloud, SemanticMap};
 
 /// The objects of the scene in the folder `scene`, whose Gaussians are `cloud`.
@@ -56,13 +57,7 @@ impl<'a> Asker<'a> {
 
     /// The words of a question that nothing here knows.
     pub fn unknown_words(&self, text: &str) -> Vec<String> {
-        let by_name = crate::pipeline::semantics::names::unknown_words(&self.map.identities, text);
-        match &self.encoder {
-            Some(encoder) => {
-                let unknown = encoder.unknown_words(text);
-                by_name.into_iter().filter(|w| unknown.contains(w)).collect()
-            }
-            None => by_name,
-        }
+        let to_encoder = self.encoder.as_ref().map(|e| e.unknown_words(text));
+        names::unknown_to_all(&self.map.identities, text, to_encoder.as_deref())
     }
 }

@@ -15,7 +15,7 @@ use crate::io;
 use crate::math::stats::median;
 use crate::pipeline::observer::{Evaluation, Level, Observer, ViewScore};
 use crate::pipeline::synth::demo;
-use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainOutcome};
+use crate::pipeline::train::{self, TrainConfig, TrainEnd};
 use crate::render::cpu::Renderer;
 use crate::render::{Features, RenderSettings};
 use crate::scene::{Camera, Dataset, GaussianCloud, Machine};
@@ -28,9 +28,8 @@ const FLIGHT_PICTURES: usize = 24;
 ///
 /// Opens the window and trains there. With --headless it needs no display: it renders the demo
 /// scene's photos, trains on them, measures the result on held-out photos, asks for objects and
-/// parts, flies around the scene,
-/// and leaves pictures and a report in the folder given by --out. Run again, it goes on where it
-/// was and reuses the photos.
+/// parts, flies around the scene, and leaves pictures and a report in the folder given by --out.
+/// Run again, it goes on where it was and reuses the photos.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs demo\n  \
@@ -98,8 +97,25 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let queries = demo_queries::run(&scene, &photos, &job, &queries, &mut console)?;
     let millis = fly(&job.cloud, &job.settings, &dataset, &flight)?;
 
-    let mut report = report(&dataset, &config, &outcome, views, queries, millis);
-    (report.synth_secs, report.total_secs) = (synth_secs, started.elapsed().as_secs_f64());
+    let (psnr, ssim) = eval::means(&views);
+    let report = Report {
+        machine: machine::look(),
+        photos: dataset.photos.len(),
+        held_out: views.len(),
+        synth_secs,
+        train_secs: outcome.secs,
+        steps: outcome.steps,
+        gaussians: outcome.cloud.len(),
+        config,
+        psnr,
+        ssim,
+        views,
+        curve: outcome.evaluations,
+        queries,
+        flight_pictures: FLIGHT_PICTURES,
+        flight_ms_per_picture: millis,
+        total_secs: started.elapsed().as_secs_f64(),
+    };
     drop(console);
     write_report(&report, &args.out)?;
     if args.json {
@@ -154,35 +170,6 @@ fn circle(dataset: &Dataset) -> Vec<Camera> {
         Camera::look_at(eye, focus, up, fov_y_rad, width_px, height_px)
     };
     (0..FLIGHT_PICTURES).filter_map(at).collect()
-}
-
-fn report(
-    dataset: &Dataset,
-    config: &TrainConfig,
-    outcome: &TrainOutcome,
-    views: Vec<ViewScore>,
-    queries: Queries,
-    flight_ms_per_picture: f64,
-) -> Report {
-    let (psnr, ssim) = eval::means(&views);
-    Report {
-        machine: machine::look(),
-        config: config.clone(),
-        photos: dataset.photos.len(),
-        held_out: views.len(),
-        synth_secs: None,
-        train_secs: outcome.secs,
-        steps: outcome.steps,
-        gaussians: outcome.cloud.len(),
-        psnr,
-        ssim,
-        views,
-        curve: outcome.evaluations.clone(),
-        queries,
-        flight_pictures: FLIGHT_PICTURES,
-        flight_ms_per_picture,
-        total_secs: 0.0,
-    }
 }
 
 fn text(r: &Report) -> String {

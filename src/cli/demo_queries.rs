@@ -10,12 +10,12 @@ use super::eval::Job;
 use super::progress::Console;
 use super::{CliError, output, query};
 use crate::io::{self, labels::Labels};
-use crate::models::{self, Encoder};
+use crate::models;
 use crate::pipeline::observer::{Level, Observer};
-use crate::pipeline::semantics::find::{FindOptions, find_objects};
+use crate::pipeline::semantics::code_map::CodeMap;
+use crate::pipeline::semantics::find::{FindOptions, Found, find_objects};
 use crate::pipeline::semantics::grammar::Kind;
-use crate::pipeline::semantics::localise::Answer;
-use crate::pipeline::semantics::protocols::categories;
+use crate::pipeline::semantics::protocols::{AskedScene, LabelledView, categories, masks};
 use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
 use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::pipeline::semantics::view_map::ViewMap;
@@ -78,32 +78,37 @@ pub fn run(
         .map(|i| job.dataset.photos[i].clone())
         .collect();
     let mut encoder = models::encoder(models::DEMO)?;
-    let looking: Option<&mut dyn Encoder> = Some(encoder.as_mut());
     let options =
         FindOptions { track: TrackOptions { max_seeds: 3, ..TrackOptions::default() }, ..FindOptions::default() };
     let start = Instant::now();
-    let found = find_objects(&job.cloud, &training, &job.settings, &mut segmenter, &options, looking, console);
-    let map = found.map_err(|e| match e {
+    let found =
+        find_objects(&job.cloud, &training, &job.settings, &mut segmenter, &options, Some(&mut *encoder), console);
+    let Found { map, .. } = found.map_err(|e| match e {
         e if e.is_cancelled() => CliError::Cancelled("the trained scene is saved".into()),
         other => other.into(),
     })?;
     let find_secs = start.elapsed().as_secs_f64();
-    io::semantic_map::save(scene, &map, &mut job.cloud.clone())?;
+    io::semantic_map::save(scene, &map, &job.cloud)?;
     console.note(Level::Info, format!("{} objects and parts found", map.identities.len()));
 
     output::make_folder(pictures)?;
     let mut asker = Asker::new(&map)?;
-    let (mut objects, mut parts, mut asked) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut units, mut asked) = (Vec::new(), Vec::new());
     let mut renderer = Renderer::new();
     for (k, &i) in job.views.iter().enumerate() {
         let photo = &job.dataset.photos[i];
         let camera = photo.camera.limited_to(job.max_side_px);
         let view = ViewMap::render(&mut renderer, &job.cloud, &map.of, &map.identities, &camera, &job.settings)?;
-        for category in categories(&segmenter.segment(photo, job.max_side_px)?) {
-            let mask = asker.ask(&category.name, Kind::Auto)?.map(|a| a.mask(&view, &map.identities, 1));
-            let iou = mask.map_or(0.0, |m| m.iou(&category.mask));
-            if category.name.contains(" of the ") { parts.push(iou) } else { objects.push(iou) }
-        }
+        let labelled = LabelledView {
+            name: &photo.name,
+            camera: &camera,
+            exact: &view,
+            blended: &CodeMap::default(),
+            categories: categories(&segmenter.segment(photo, job.max_side_px)?),
+        };
+        // Names need no encoder, so asking for them does not fail.
+        let mut by_name = |text: &str| asker.ask(text, Kind::Auto).ok().flatten();
+        units.extend(masks::compare(&mut AskedScene { map: &map, ask: &mut by_name }, &labelled));
         for (n, question) in QUESTIONS.iter().enumerate().filter(|_| k == 0) {
             let start = Instant::now();
             let Some(answered) = asker.ask(question, Kind::Auto)? else { continue };
@@ -113,17 +118,13 @@ pub fn run(
             query::write_heat(&path, &job.cloud, &camera, &job.settings, &answered.heat(&view))?;
             asked.push(Asked {
                 question: (*question).to_owned(),
-                verdict: match answered.answer {
-                    Answer::Found(_) => "found",
-                    Answer::Ambiguous(_) => "ambiguous",
-                    Answer::NotFound(_) => "not found",
-                },
+                verdict: answered.answer.verdict(),
                 answer: answered.chosen(1).iter().map(|id| map.identities.full_name(*id)).collect(),
                 pixels: mask.area(),
                 millis,
             });
         }
     }
-    let mean = |v: &[f64]| crate::math::stats::mean(v);
-    Ok(Queries { seeds: map.seeds.clone(), find_secs, object_miou: mean(&objects), part_miou: mean(&parts), asked })
+    let [object_miou, part_miou] = masks::by_level(&units);
+    Ok(Queries { seeds: map.seeds.clone(), find_secs, object_miou, part_miou, asked })
 }

@@ -13,8 +13,8 @@ use crate::models;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::grammar::Kind;
 use crate::pipeline::semantics::protocols::{
-    AskedScene, Category, LabelledView, Unit, categories, fastlgs_ex, langsplat, means, multi_class, part_recall,
-    selection_3d, spin_nerf,
+    AskedScene, Category, LabelledView, Unit, categories, fastlgs_ex, langsplat, masks, means, multi_class,
+    part_recall, selection_3d, spin_nerf,
 };
 use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
 use crate::pipeline::semantics::view_map::ViewMap;
@@ -56,17 +56,17 @@ struct Outcome {
 
 pub fn run(
     scene: &Path,
-    masks: &Path,
+    labels: &Path,
     protocol: Protocol,
     query: Option<&str>,
     job: Job,
     as_json: bool,
 ) -> Result<(), CliError> {
     let map = semantics(scene, &job.cloud)?;
-    let mut labels = FileMasks(Labels::open(masks)?);
-    let views = labelled(&job, &map, &mut labels)?;
+    let mut known = FileMasks(Labels::open(labels)?);
+    let views = labelled(&job, &map, &mut known)?;
     if views.is_empty() {
-        return Err(CliError::failed(format!("{}: no photo to compare with has labels", masks.display())));
+        return Err(CliError::failed(format!("{}: no photo to compare with has labels", labels.display())));
     }
     if let Some(folder) = &job.pictures {
         write_pictures(folder, &job, &map, &views)?;
@@ -124,16 +124,8 @@ fn compare(
     let mut extra = json!({});
     match protocol {
         Protocol::Masks => {
-            for view in views {
-                for c in &view.categories {
-                    let mask = (scene.ask)(&c.name).map(|a| a.mask(view.exact, &scene.map.identities, 1));
-                    let iou = mask.map_or(0.0, |m| m.iou(&c.mask));
-                    units.push(Unit { view: view.name.into(), query: c.name.clone(), iou, hit: None });
-                }
-            }
-            let (parts, objects): (Vec<Unit>, Vec<Unit>) =
-                units.iter().cloned().partition(|u| u.query.contains(" of the "));
-            let (objects, parts) = (means(&objects).0, means(&parts).0);
+            views.iter().for_each(|v| units.extend(masks::compare(scene, v)));
+            let [objects, parts] = masks::by_level(&units);
             lines.push(format!("mean IoU: objects {objects:.4}, parts {parts:.4}"));
             extra = json!({ "object_miou": objects, "part_miou": parts });
         }

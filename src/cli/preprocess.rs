@@ -7,11 +7,9 @@ use serde_json::json;
 
 use super::progress::Console;
 use super::{CliError, opened, output};
-use crate::io::{self, labels::Labels};
+use crate::io;
 use crate::models;
-use crate::pipeline::semantics::find::{FindOptions, Lifting, find_objects};
-use crate::pipeline::semantics::regions::Regions;
-use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
+use crate::pipeline::semantics::find::{FindOptions, Found, Lifting, find_objects, segmenter};
 use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::scene::{Level, Photo};
 
@@ -81,23 +79,21 @@ enum SegmenterKind {
     Regions,
 }
 
-/// The segmenter that the arguments ask for.
-fn segmenter<'a>(args: &Args, scene: &'a opened::DrawableScene) -> Result<Box<dyn Segmenter + 'a>, CliError> {
+/// Whether the arguments agree on where masks come from.
+fn check_segmenter(args: &Args) -> Result<(), CliError> {
     match (&args.masks, args.segmenter) {
-        (Some(masks), None | Some(SegmenterKind::Files)) => Ok(Box::new(FileMasks(Labels::open(masks)?))),
-        (None, None | Some(SegmenterKind::Regions)) => {
-            Ok(Box::new(Regions { trained: Some((&scene.cloud, &scene.settings)), ..Regions::default() }))
-        }
         (None, Some(SegmenterKind::Files)) => Err(CliError::Usage("--segmenter files needs --masks".into())),
         (Some(_), Some(SegmenterKind::Regions)) => {
             Err(CliError::Usage("--segmenter regions finds its own masks; leave --masks out".into()))
         }
+        _ => Ok(()),
     }
 }
 
 pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let mut observer = Console::new(quiet);
-    let mut scene = opened::drawable(&args.scene)?;
+    check_segmenter(&args)?;
+    let scene = opened::drawable(&args.scene)?;
     if !io::trained::is_scene(&args.scene) {
         let path = args.scene.display();
         return Err(CliError::failed(format!("{path} is no trained scene; the result is stored in its folder")));
@@ -118,7 +114,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
             })?)
         }
     };
-    let mut segmenter = segmenter(&args, &scene)?;
+    let mut segmenter = segmenter(args.masks.as_deref(), &scene.cloud, &scene.settings)?;
     let track = TrackOptions {
         seed,
         max_seeds: args.max_seeds.max(1),
@@ -134,17 +130,16 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         "none" => None,
         name => Some(models::encoder(name)?),
     };
-    let encoder = encoder.as_mut().map(|e| e.as_mut() as &mut dyn models::Encoder);
     let start = Instant::now();
     let options = FindOptions { track, lifting };
     let (cloud, settings) = (&scene.cloud, &scene.settings);
-    let found = find_objects(cloud, &photos, settings, &mut *segmenter, &options, encoder, &mut observer);
-    let map = found.map_err(|e| match e {
+    let found =
+        find_objects(cloud, &photos, settings, &mut *segmenter, &options, encoder.as_deref_mut(), &mut observer);
+    let Found { map, views, disagreements } = found.map_err(|e| match e {
         e if e.is_cancelled() => CliError::Cancelled("nothing was stored".into()),
         other => other.into(),
     })?;
-    drop(segmenter);
-    io::semantic_map::save(&args.scene, &map, &mut scene.cloud)?;
+    io::semantic_map::save(&args.scene, &map, &scene.cloud)?;
     let secs = start.elapsed().as_secs_f64();
     let count = |level: Level| map.identities.iter().filter(|(_, i)| i.level == level).count();
     if args.json {
@@ -157,6 +152,12 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
             "seeds": map.seeds,
             "secs": secs,
             "identities": list.collect::<Vec<_>>(),
+            "views": views.iter().map(|v| json!({
+                "photo": photos[v.photo].name, "unknown": v.unknown, "seen": v.seen,
+            })).collect::<Vec<_>>(),
+            "disagreements": disagreements.iter().map(|(photo, what)| json!({
+                "photo": photos[*photo].name, "what": what,
+            })).collect::<Vec<_>>(),
         }));
     }
     output::print(&format!(

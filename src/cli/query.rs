@@ -148,18 +148,14 @@ fn tell(
     let full_name = |hit: &Hit| map.identities.full_name(hit.identity);
     let basis = if answered.basis == Basis::Names { "names" } else { "looks" };
     let answer = &answered.answer;
-    let (verdict, hits) = match answer {
-        Answer::Found(hits) => ("found", hits),
-        Answer::Ambiguous(hits) => ("ambiguous", hits),
-        Answer::NotFound(hits) => ("not found", hits),
-    };
+    let hits = answer.hits();
     if args.json {
         let hit = |h: &Hit| -> Value {
             json!({ "identity": h.identity, "name": full_name(h), "score": h.score, "margin": h.margin })
         };
         output::print_json(&json!({
             "query": args.text,
-            "answer": verdict,
+            "answer": answer.verdict(),
             "basis": basis,
             "hits": hits.iter().map(hit).collect::<Vec<_>>(),
             "pixels": mask.area(),
@@ -168,7 +164,7 @@ fn tell(
         }))?;
     }
     match answer {
-        Answer::NotFound(hits) => {
+        Answer::NotFound(_) => {
             let near = hits.iter().filter(|h| h.score > 0.0).map(full_name).collect::<Vec<_>>().join(", ");
             let near = if near.is_empty() { String::new() } else { format!("; nearest: {near}") };
             let known = match unknown {
@@ -181,7 +177,8 @@ fn tell(
         _ => {
             let mut rows = vec![vec!["answer".to_owned(), "score".to_owned(), "margin".to_owned()]];
             rows.extend(hits.iter().map(|h| vec![full_name(h), format!("{:.3}", h.score), format!("{:.3}", h.margin)]));
-            let note = if verdict == "ambiguous" { " (ambiguous: the first two fit alike)" } else { "" };
+            let ambiguous = matches!(answer, Answer::Ambiguous(_));
+            let note = if ambiguous { " (ambiguous: the first two fit alike)" } else { "" };
             output::print(&format!(
                 "{}\n{} px in this view, answered by {basis} in {query_ms:.2} ms{note}",
                 output::table(&rows),

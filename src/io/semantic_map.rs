@@ -41,11 +41,11 @@ struct Header {
     identities: Identities,
 }
 
-/// Writes the map into a trained scene's folder, and the Gaussians with it.
+/// Writes the map into a trained scene's folder, and the Gaussians `cloud` with what they belong to.
 ///
 /// # Errors
 /// If a file cannot be written.
-pub fn save(folder: &Path, map: &SemanticMap, cloud: &mut GaussianCloud) -> Result<(), IoError> {
+pub fn save(folder: &Path, map: &SemanticMap, cloud: &GaussianCloud) -> Result<(), IoError> {
     let language = map.language.as_ref();
     let header = Header {
         version: VERSION,
@@ -79,8 +79,9 @@ pub fn save(folder: &Path, map: &SemanticMap, cloud: &mut GaussianCloud) -> Resu
     }
     let metadata = HashMap::from([(KEY.to_owned(), text)]);
     let bytes = safetensors::serialize(tensors, Some(metadata)).map_err(|e| broken(&e))?;
-    map.store(cloud);
-    splat_ply::write(&folder.join(super::trained::CLOUD_FILE), cloud)?;
+    let mut stored = cloud.clone();
+    map.store(&mut stored);
+    splat_ply::write(&folder.join(super::trained::CLOUD_FILE), &stored)?;
     atomic::write(&path, |w| w.write_all(&bytes))
 }
 
@@ -193,9 +194,9 @@ mod tests {
     #[test]
     fn a_map_reads_back() {
         let folder = tempfile::tempdir().expect("folder");
-        let (map, mut cloud) = map();
+        let (map, cloud) = map();
         assert_eq!(load(folder.path(), &cloud).expect("none"), None);
-        save(folder.path(), &map, &mut cloud).expect("save");
+        save(folder.path(), &map, &cloud).expect("save");
         let again = splat_ply::read(&folder.path().join(super::super::trained::CLOUD_FILE)).expect("read");
         assert_eq!(load(folder.path(), &again).expect("load"), Some(map));
         assert_eq!(load(folder.path(), &GaussianCloud::default()).expect("load"), None, "other Gaussians");
@@ -204,8 +205,8 @@ mod tests {
     #[test]
     fn broken_maps_are_named() {
         let folder = tempfile::tempdir().expect("folder");
-        let (map, mut cloud) = map();
-        save(folder.path(), &map, &mut cloud).expect("save");
+        let (map, cloud) = map();
+        save(folder.path(), &map, &cloud).expect("save");
         let path = folder.path().join(FILE);
         let good = std::fs::read(&path).expect("read");
         for bytes in [&good[..good.len() / 2], &[0xff; 64][..], &[][..]] {

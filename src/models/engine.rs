@@ -120,11 +120,10 @@ fn unit(values: &[f32], length: usize, name: &str) -> Result<Vec<f32>, ModelErro
     if let Some(index) = values.iter().position(|v| !v.is_finite()) {
         return Err(ModelError::NotFinite { model: name.into(), index, value: values[index] });
     }
-    let norm = values.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>().sqrt();
-    if norm < 1e-6 {
-        return Err(ModelError::NotFinite { model: name.into(), index: 0, value: 0.0 });
-    }
-    Ok(values.iter().map(|v| (f64::from(*v) / norm) as f32).collect())
+    // A vector this short has no direction but that of rounding.
+    let zero = values.iter().all(|v| v.abs() < 1e-7);
+    let unit = crate::math::vector::unit(values).filter(|_| !zero);
+    unit.ok_or(ModelError::NotFinite { model: name.into(), index: 0, value: 0.0 })
 }
 
 #[cfg(test)]

@@ -2,6 +2,11 @@
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
+/// Words that one thread fills at least: less is not worth handing over.
+const WORDS_PER_TASK: usize = 1024;
+
 /// A set of pixels of a picture, one bit each, row-major.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mask {
@@ -33,10 +38,11 @@ impl Mask {
     }
 
     /// The pixels for which `inside(index)` holds.
-    pub fn from_fn(width_px: usize, height_px: usize, inside: impl Fn(usize) -> bool) -> Self {
+    pub fn from_fn(width_px: usize, height_px: usize, inside: impl Fn(usize) -> bool + Sync) -> Self {
         let n = width_px * height_px;
         let word = |k: usize| (k * 64..n.min(k * 64 + 64)).fold(0, |word, i| word | u64::from(inside(i)) << (i % 64));
-        Self { width_px, height_px, words: (0..n.div_ceil(64)).map(word).collect() }
+        let words = (0..n.div_ceil(64)).into_par_iter().with_min_len(WORDS_PER_TASK).map(word).collect();
+        Self { width_px, height_px, words }
     }
 
     /// The pixels whose centres are inside a polygon (even-odd rule), vertices in px. With vertices

@@ -76,11 +76,24 @@ impl SemanticMap {
         Some(map)
     }
 
-    /// The Gaussians of an identity and its pieces, with what they belong to.
-    pub fn part_of_cloud(&self, cloud: &GaussianCloud, id: IdentityId) -> GaussianCloud {
+    /// Indices of the Gaussians of an identity and its pieces, rising.
+    pub fn members(&self, id: IdentityId) -> Vec<usize> {
         let inside = self.identities.within(id);
-        let is_in = |i: &usize| self.of.get(*i).is_some_and(|of| inside.get(*of as usize) == Some(&true));
-        cloud.select(&(0..cloud.len()).filter(is_in).collect::<Vec<_>>())
+        let is_in = |i: &usize| inside.get(self.of[*i] as usize) == Some(&true);
+        (0..self.of.len()).filter(is_in).collect()
+    }
+
+    /// The map of these Gaussians alone, as [`GaussianCloud::select`] has them. Without language
+    /// features: it is for drawing.
+    pub fn select(&self, gaussians: &[usize]) -> Self {
+        Self {
+            identities: self.identities.clone(),
+            of: gaussians.iter().map(|&i| self.of[i]).collect(),
+            margin: gaussians.iter().map(|&i| self.margin[i]).collect(),
+            codes: gaussians.iter().map(|&i| self.codes[i]).collect(),
+            language: None,
+            seeds: self.seeds.clone(),
+        }
     }
 
     /// Number of Gaussians of each identity, pieces included, by number; those of nobody first.
@@ -118,6 +131,9 @@ mod tests {
         assert_eq!(cloud.extras.len(), 9);
         assert_eq!(SemanticMap::restore(identities.clone(), map.seeds.clone(), &cloud), Some(map.clone()));
         assert_eq!(map.sizes(), [1, 2, 1]);
+        assert_eq!((map.members(doll), map.members(eye), map.members(77)), (vec![0, 2], vec![0], vec![]));
+        let left = map.select(&[2]);
+        assert_eq!((left.of, left.margin, left.codes[0][4]), (vec![doll], vec![1.0], 0.25));
         assert_eq!(SemanticMap::restore(Identities::default(), vec![], &cloud), None, "identities are missing");
         for bad in [-1.0, 0.5, 3.0, f32::NAN] {
             cloud.extras[1].values[0] = bad;

@@ -214,7 +214,7 @@ impl App {
             }
             Chosen::Path(Purpose::ExportTarget(id), path) => {
                 if let (Some(cloud), Some(map)) = (self.viewport.cloud(), &self.state.semantics) {
-                    let cloud = Arc::new(map.part_of_cloud(cloud, id));
+                    let cloud = Arc::new(cloud.select(&map.members(id)));
                     self.submit(Command::Export { cloud, path });
                 }
             }

@@ -7,7 +7,7 @@ use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 use super::dialogs::{self, FileDialogs, Question};
 use super::layout::Layout;
 use super::palette::{Palette, shortcut_sheet};
-use super::panes::{bars, dataset::Thumbnails, empty, log, objects, plan, training};
+use super::panes::{bars, dataset::Thumbnails, empty, log, objects, plan, portraits::Portraits, training};
 use super::state::AppState;
 use super::toasts::Toasts;
 use super::viewport::Viewport;
@@ -29,6 +29,7 @@ pub struct App {
     pub(super) palette: Palette,
     pub(super) sheet: bool,
     thumbnails: Thumbnails,
+    portraits: Portraits,
     toasts: Toasts,
     actions: Vec<Action>,
 }
@@ -55,6 +56,7 @@ impl App {
             palette: Palette::default(),
             sheet: false,
             thumbnails: Thumbnails::default(),
+            portraits: Portraits::default(),
             toasts: Toasts::default(),
             actions: first.into_iter().collect(),
         })
@@ -72,6 +74,7 @@ impl App {
         }
         self.viewport.update(&mut self.state, &self.worker);
         self.thumbnails.update(ctx, &mut self.state);
+        self.portraits.update(ctx, &mut self.state, self.viewport.cloud(), &self.worker);
         if std::mem::take(&mut self.state.wants_training) {
             self.actions.push(Action::StartTraining);
         }
@@ -125,9 +128,9 @@ impl App {
                     ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
                         let objects = layout.shows(Pane::Objects) && scene.dataset.is_some();
                         let show_objects = |ui: &mut Ui, actions: &mut Vec<Action>| {
-                            egui::CollapsingHeader::new(Pane::Objects.text())
-                                .default_open(true)
-                                .show(ui, |ui| objects::show(ui, state, &viewport.visibility, actions));
+                            egui::CollapsingHeader::new(Pane::Objects.text()).default_open(true).show(ui, |ui| {
+                                objects::show(ui, state, &self.portraits, &viewport.visibility, actions)
+                            });
                             ui.add_space(10.0);
                         };
                         // Once there are any, they are what a person works with.

@@ -97,6 +97,10 @@ pub struct AppState {
     pub antialias: bool,
     /// Objects and parts of the Gaussians on screen.
     pub semantics: Option<Arc<SemanticMap>>,
+    /// Gaussians of each of them by number, pieces included.
+    pub sizes: Vec<usize>,
+    /// New portraits of objects and parts, until they are taken over.
+    pub portraits: Option<(Arc<SemanticMap>, Vec<Option<Vec<[u8; 3]>>>)>,
     /// Earlier states of objects and parts, oldest first.
     pub undo: Vec<Arc<SemanticMap>>,
     /// States that were taken back, the latest last.
@@ -143,7 +147,7 @@ impl AppState {
             Event::Started { job, kind, title } => {
                 if kind == JobKind::Train {
                     // They belong to Gaussians that are about to change.
-                    self.semantics = None;
+                    self.set_semantics(None);
                     (self.undo, self.redo) = (Vec::new(), Vec::new());
                     self.training_job = Some(job);
                 }
@@ -259,10 +263,11 @@ impl AppState {
             }
             Outcome::Objects(map) => {
                 self.toast(Tone::Good, format!("{} objects and parts found; ask for one", map.identities.len()));
-                self.semantics = Some(map);
+                self.set_semantics(Some(map));
                 (self.undo, self.redo) = (Vec::new(), Vec::new());
             }
             Outcome::Edited(map) => self.edited(map),
+            Outcome::Portraits(map, pictures) => self.portraits = Some((map, pictures)),
             Outcome::Written(path) => self.toast(Tone::Good, format!("Wrote {}", path.display())),
             Outcome::Photo { index, max_side_px, pixels } => {
                 self.photos.insert((index, max_side_px), pixels);
@@ -270,11 +275,17 @@ impl AppState {
         }
     }
 
+    /// Sets objects and parts, with what is counted of them; those that were there before.
+    fn set_semantics(&mut self, map: Option<Arc<SemanticMap>>) -> Option<Arc<SemanticMap>> {
+        self.sizes = map.as_ref().map_or_else(Vec::new, |m| m.sizes());
+        std::mem::replace(&mut self.semantics, map)
+    }
+
     /// Takes over a changed map. Going back and forth moves along the changes; a new one ends what
     /// could be redone.
     fn edited(&mut self, map: Arc<SemanticMap>) {
         let is_last = |list: &[Arc<SemanticMap>]| list.last().is_some_and(|m| Arc::ptr_eq(m, &map));
-        let Some(old) = self.semantics.replace(Arc::clone(&map)) else { return };
+        let Some(old) = self.set_semantics(Some(Arc::clone(&map))) else { return };
         if is_last(&self.undo) {
             self.undo.pop();
             self.redo.push(old);
@@ -305,7 +316,7 @@ impl AppState {
         self.scene_number += 1;
         self.plan = scene.plan.clone();
         self.antialias = scene.render.antialias;
-        self.semantics = scene.semantics.clone();
+        self.set_semantics(scene.semantics.clone());
         (self.undo, self.redo) = (Vec::new(), Vec::new());
         self.scene = Some(Arc::new(scene));
     }

@@ -51,8 +51,7 @@ pub fn run(
         }
     };
     if io::trained::is_scene(out) {
-        let mut stored = cloud.clone();
-        io::semantic_map::save(out, &new, &mut stored)
+        io::semantic_map::save(out, &new, cloud)
             .map_err(|e| Stop::Failed(Failure::of(&e, "The change is not stored.")))?;
     }
     Ok(Outcome::Edited(new))

@@ -13,9 +13,8 @@ use crate::io::{self, IoError, OpenError, Opened, TrainedScene, trained};
 use crate::models;
 use crate::pipeline::evaluate::evaluate;
 use crate::pipeline::observer::{Level, Observer};
-use crate::pipeline::semantics::find::{FindOptions, find_objects};
-use crate::pipeline::semantics::regions::Regions;
-use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
+use crate::pipeline::semantics::find::{FindOptions, Found, find_objects, segmenter};
+use crate::pipeline::semantics::portraits::portraits;
 use crate::pipeline::synth::{SynthError, demo};
 use crate::pipeline::train::checkpoint::CheckpointError;
 use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainError};
@@ -227,6 +226,11 @@ impl Jobs for PipelineJobs {
                 Ok(Outcome::Photo { index, max_side_px, pixels: Arc::new(pixels) })
             }
             Command::Picture { pixels, path } => save_picture(&pixels, &path),
+            Command::Portraits { cloud, map, settings, home } => {
+                let from = home.camera.as_ref().map_or(home.bounds.center() + home.up, |c| c.center);
+                let drawn = portraits(&cloud, &map, &settings, from, home.up);
+                Ok(Outcome::Portraits(map, drawn.map_err(|e| Stop::Failed(Failure::of(&e, "")))?))
+            }
         }
     }
 }
@@ -262,23 +266,18 @@ fn find(
     out: &Path,
     observer: &mut dyn Observer,
 ) -> Result<Outcome, Stop> {
-    let mut segmenter: Box<dyn Segmenter + '_> = match masks {
-        Some(masks) => Box::new(FileMasks(Labels::open(masks).map_err(|e| io_failure(&e))?)),
-        None => Box::new(Regions { trained: Some((cloud, settings)), ..Regions::default() }),
-    };
+    let mut segmenter = segmenter(masks, cloud, settings).map_err(|e| io_failure(&e))?;
     // Without the encoder, names alone are understood.
     let mut encoder = models::encoder(models::DEMO)
         .inspect_err(|e| observer.note(Level::Warning, format!("Objects are found without their looks: {e}")))
         .ok();
-    let encoder = encoder.as_mut().map(|e| e.as_mut() as &mut dyn models::Encoder);
     let options = FindOptions::default();
-    let found = find_objects(cloud, photos, settings, &mut *segmenter, &options, encoder, observer);
-    let map = found.map_err(|e| match e {
+    let found = find_objects(cloud, photos, settings, &mut *segmenter, &options, encoder.as_deref_mut(), observer);
+    let Found { map, .. } = found.map_err(|e| match e {
         e if e.is_cancelled() => Stop::Cancelled,
         e => Stop::Failed(Failure::of(&e, "")),
     })?;
-    let mut stored = cloud.clone();
-    io::semantic_map::save(out, &map, &mut stored).map_err(|e| io_failure(&e))?;
+    io::semantic_map::save(out, &map, cloud).map_err(|e| io_failure(&e))?;
     Ok(Outcome::Objects(Arc::new(map)))
 }
 

@@ -37,6 +37,8 @@ pub enum JobKind {
     Photo,
     /// Writes a picture.
     Picture,
+    /// Draws objects and parts alone.
+    Portraits,
 }
 
 impl JobKind {
@@ -44,7 +46,7 @@ impl JobKind {
     pub fn lane(self) -> Lane {
         match self {
             Self::Open | Self::Demo | Self::Train | Self::Evaluate | Self::Objects => Lane::Long,
-            Self::Edit | Self::Export | Self::Photo | Self::Picture => Lane::Short,
+            Self::Edit | Self::Export | Self::Photo | Self::Picture | Self::Portraits => Lane::Short,
         }
     }
 }
@@ -137,6 +139,17 @@ pub enum Command {
         /// The file.
         path: PathBuf,
     },
+    /// Draw every object and part alone, small.
+    Portraits {
+        /// The Gaussians.
+        cloud: Arc<GaussianCloud>,
+        /// Objects and parts.
+        map: Arc<SemanticMap>,
+        /// How the Gaussians are drawn.
+        settings: RenderSettings,
+        /// From where.
+        home: HomeView,
+    },
 }
 
 impl Command {
@@ -152,6 +165,7 @@ impl Command {
             Self::Export { .. } => JobKind::Export,
             Self::Photo { .. } => JobKind::Photo,
             Self::Picture { .. } => JobKind::Picture,
+            Self::Portraits { .. } => JobKind::Portraits,
         }
     }
 
@@ -168,6 +182,7 @@ impl Command {
             Self::EditObjects { .. } => "Changing objects".into(),
             Self::Export { path, .. } | Self::Picture { path, .. } => format!("Writing {}", name(path)),
             Self::Photo { photo, .. } => format!("Loading {}", photo.name),
+            Self::Portraits { .. } => "Drawing objects".into(),
         }
     }
 }
@@ -240,6 +255,8 @@ pub enum Outcome {
     Edited(Arc<SemanticMap>),
     /// A file was written.
     Written(PathBuf),
+    /// Portraits of objects and parts by number less one, as `semantics::portraits` draws them.
+    Portraits(Arc<SemanticMap>, Vec<Option<Vec<[u8; 3]>>>),
     /// A photo was loaded.
     Photo {
         /// Its index in the dataset.

@@ -8,6 +8,7 @@ use crate::io::IoError;
 use crate::io::quantised::logit;
 use crate::math::rotation::{nearest_rotation, rotation_error};
 use crate::math::sh::{SH_C0, coefficients};
+use crate::math::srgb;
 use crate::scene::GaussianCloud;
 
 /// Standard deviations under this are raised to it: their logarithm would be infinite.
@@ -113,17 +114,8 @@ fn to_display(sh: &mut [[f32; 3]]) {
     let c0 = SH_C0 as f32;
     for channel in 0..3 {
         let linear = 0.5 + c0 * sh[0][channel];
-        let (value, slope) = encode(linear.max(0.0));
+        let (value, slope) = srgb::encode(linear.max(0.0));
         sh[0][channel] = (value - 0.5) / c0;
         sh[1..].iter_mut().for_each(|c| c[channel] *= slope);
-    }
-}
-
-/// The sRGB transfer function and its derivative.
-fn encode(linear: f32) -> (f32, f32) {
-    if linear <= 0.003_130_8 {
-        (12.92 * linear, 12.92)
-    } else {
-        (1.055 * linear.powf(1.0 / 2.4) - 0.055, 1.055 / 2.4 * linear.powf(1.0 / 2.4 - 1.0))
     }
 }

@@ -225,7 +225,7 @@ impl File {
 
     fn material(&mut self, part: &Part) -> Result<usize, image::ImageError> {
         let look = &part.look;
-        // glTF's factors are linear. Five digits, so that no machine's power function shows.
+        // glTF's factors are linear. Five digits of an f64, so that no machine's power function shows.
         let linear = |c: u8| {
             let s = f64::from(c) / 255.0;
             let l = if s <= 0.040_45 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) };

@@ -1,5 +1,7 @@
 //! One query, answered: by names where the scene's names know the words, else by meaning.
 
+use rayon::prelude::*;
+
 use super::grammar::{Kind, Phrase};
 use super::localise::{Answer, Scorer, localise};
 use super::meaning::{ByMeaning, MeaningOptions, Phrasebook};
@@ -124,7 +126,7 @@ impl Answered {
         let mut table = self.relevancy.clone();
         table.push(0.0);
         let last = table.len() - 1;
-        map.identity.iter().map(|id| table[(*id as usize).min(last)]).collect()
+        map.identity.par_iter().with_min_len(1 << 16).map(|id| table[(*id as usize).min(last)]).collect()
     }
 }
 

@@ -1,13 +1,19 @@
 //! The whole way from trained Gaussians and masks to a semantic map.
 
+use std::path::Path;
+
 use glam::DVec3;
 
 use super::codes;
 use super::embed::{EmbedError, embed};
-use super::segmenter::Segmenter;
-use super::tracker::{TrackError, TrackOptions, ViewReport, track};
+use super::link::Disagreement;
+use super::regions::Regions;
+use super::segmenter::{FileMasks, Segmenter};
+use super::tracker::{TrackError, TrackOptions, Tracked, ViewReport, track};
 use super::train_codes::{CodeTraining, CodeView, decode, train_codes};
 use super::view_map::ViewMap;
+use crate::io::IoError;
+use crate::io::labels::Labels;
 use crate::models::Encoder;
 use crate::pipeline::observer::{Level, Observer, Signal};
 use crate::render::cpu::Renderer;
@@ -41,6 +47,17 @@ pub struct FindOptions {
     pub lifting: Lifting,
 }
 
+/// What was found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Found {
+    /// Objects and parts of the scene.
+    pub map: SemanticMap,
+    /// What masks of the first photos explain of each photo.
+    pub views: Vec<ViewReport>,
+    /// Photos whose masks disagreed with what was known before, and how.
+    pub disagreements: Vec<(usize, Disagreement)>,
+}
+
 /// Why objects could not be found.
 #[derive(Debug, thiserror::Error)]
 pub enum FindError {
@@ -62,6 +79,22 @@ impl FindError {
     }
 }
 
+/// What finds the masks of photos that `cloud` was trained on: files, where there are any, else
+/// regions of the photos.
+///
+/// # Errors
+/// If there are no masks at `files`.
+pub fn segmenter<'a>(
+    files: Option<&Path>,
+    cloud: &'a GaussianCloud,
+    settings: &'a RenderSettings,
+) -> Result<Box<dyn Segmenter + 'a>, IoError> {
+    Ok(match files {
+        Some(files) => Box::new(FileMasks(Labels::open(files)?)),
+        None => Box::new(Regions { trained: Some((cloud, settings)), ..Regions::default() }),
+    })
+}
+
 /// Finds the objects and parts of `cloud`, which was trained on `photos`, gives them codes, and lets
 /// an encoder look at them, if there is one.
 ///
@@ -74,14 +107,14 @@ pub fn find_objects(
     settings: &RenderSettings,
     segmenter: &mut dyn Segmenter,
     options: &FindOptions,
-    encoder: Option<&mut dyn Encoder>,
+    encoder: Option<&mut (dyn Encoder + 'static)>,
     observer: &mut dyn Observer,
-) -> Result<SemanticMap, FindError> {
+) -> Result<Found, FindError> {
     let tracked = track(cloud, photos, settings, segmenter, &options.track, observer)?;
     if let Some(text) = unknown(&tracked.views, photos, options.track.reseed_share) {
         observer.note(Level::Info, text);
     }
-    let mut identities = tracked.identities;
+    let mut identities = tracked.identities.clone();
     let of: Vec<IdentityId> = tracked.belongings.iter().map(|b| b.identity).collect();
     let centers = centers(cloud, &of, &identities);
     codes::assign(&mut identities, &centers);
@@ -92,7 +125,8 @@ pub fn find_objects(
     if let Some(encoder) = encoder {
         map.language = Some(embed(cloud, &map, photos, settings, encoder, observer)?);
     }
-    Ok(map)
+    let Tracked { views, disagreements, .. } = tracked;
+    Ok(Found { map, views, disagreements })
 }
 
 /// Trains the codes of the Gaussians, where that is wanted, on the masks as they were tracked.

@@ -85,6 +85,51 @@ pub fn link(found: &[FoundMask], known: Option<&ViewMap>, identities: &Identitie
     links
 }
 
+/// Where masks of a photo and what was known of its view disagree about who is who.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Disagreement {
+    /// Two masks fit the identity; one of them became an identity of its own.
+    Split(IdentityId),
+    /// One mask covers several identities that were thought to be apart.
+    Merge(Vec<IdentityId>),
+    /// A mask is known to be the first, by its name, where the second was thought to be.
+    Switch(IdentityId, IdentityId),
+}
+
+/// The disagreements between masks that were linked and what was known before.
+pub fn disagreements(
+    found: &[FoundMask],
+    links: &[Link],
+    known: &ViewMap,
+    identities: &Identities,
+) -> Vec<Disagreement> {
+    let mut list = Vec::new();
+    for (mask, link) in found.iter().zip(links) {
+        if let Link::Split(of) = link {
+            list.push(Disagreement::Split(*of));
+        }
+        let peers = identities.iter().filter(|(_, i)| i.level == mask.level);
+        let inside = |id: IdentityId| {
+            let seen = known.mask(identities, id);
+            let overlap = mask.mask.overlap(&seen);
+            overlap >= LEAST_PX && overlap as f64 >= SAME * seen.area() as f64
+        };
+        let covered: Vec<IdentityId> = peers.map(|(id, _)| id).filter(|id| inside(*id)).collect();
+        // A part of a part is no peer of its whole.
+        let apart = |id: &IdentityId| covered.iter().all(|o| o == id || !identities.line(*id).any(|i| i == *o));
+        let covered: Vec<IdentityId> = covered.iter().copied().filter(apart).collect();
+        match (link, covered.as_slice()) {
+            (_, [_, _, ..]) => list.push(Disagreement::Merge(covered)),
+            (Link::Known(is), [other]) if is != other && !identities.line(*other).any(|i| i == *is) => {
+                list.push(Disagreement::Switch(*is, *other));
+            }
+            _ => {}
+        }
+    }
+    list
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -137,7 +182,28 @@ mod tests {
             alpha: vec![1.0; 100],
         };
         let masks = [found(Level::Object, None, mask(0, 55)), found(Level::Object, None, mask(40, 100))];
-        assert_eq!(link(&masks, Some(&map), &all), [Link::Split(cup), Link::Known(cup)]);
+        let links = link(&masks, Some(&map), &all);
+        assert_eq!(links, [Link::Split(cup), Link::Known(cup)]);
+        assert_eq!(disagreements(&masks, &links, &map, &all), [Disagreement::Split(cup)]);
+    }
+
+    #[test]
+    fn one_mask_over_two_identities_is_told() {
+        let mut all = Identities::default();
+        let cup = all.add(Level::Object, NOBODY, vec![]);
+        let pot = all.add(Level::Object, NOBODY, vec![]);
+        let lid = all.add(Level::Part, pot, vec![]);
+        let mut identity = vec![cup; 50];
+        identity.extend(vec![pot; 30]);
+        identity.extend(vec![lid; 20]);
+        let map = ViewMap { width_px: 100, height_px: 1, identity, share: vec![1.0; 100], alpha: vec![1.0; 100] };
+        let both = [found(Level::Object, None, mask(5, 100))];
+        let links = link(&both, Some(&map), &all);
+        assert_eq!(disagreements(&both, &links, &map, &all), [Disagreement::Merge(vec![cup, pot])]);
+        // One mask for one identity, and one for its part, agree with what is known.
+        let each = [found(Level::Object, None, mask(50, 100)), found(Level::Part, Some(0), mask(80, 100))];
+        let links = link(&each, Some(&map), &all);
+        assert_eq!(disagreements(&each, &links, &map, &all), []);
     }
 
     #[test]
@@ -164,5 +230,7 @@ mod tests {
         ];
         let links = link(&masks, Some(&map), &all);
         assert_eq!(links, [Link::Known(cup), Link::Known(handle), Link::New, Link::Known(pot), Link::New]);
+        // The cup is where the pot was; the jug there is new, and says nothing about the pot.
+        assert_eq!(disagreements(&masks, &links, &map, &all), [Disagreement::Switch(cup, pot)]);
     }
 }

@@ -72,6 +72,15 @@ impl Answer {
             Self::Found(hits) | Self::Ambiguous(hits) | Self::NotFound(hits) => hits,
         }
     }
+
+    /// In a word or two: "found", "ambiguous" or "not found".
+    pub fn verdict(&self) -> &'static str {
+        match self {
+            Self::Found(_) => "found",
+            Self::Ambiguous(_) => "ambiguous",
+            Self::NotFound(_) => "not found",
+        }
+    }
 }
 
 /// Finds what `phrase` means among the identities.

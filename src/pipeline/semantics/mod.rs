@@ -21,6 +21,7 @@ pub mod localise;
 pub mod matching;
 pub mod meaning;
 pub mod names;
+pub mod portraits;
 pub mod protocols;
 pub mod regions;
 pub mod relevancy;

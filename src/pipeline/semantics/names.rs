@@ -43,6 +43,14 @@ pub fn scores(identities: &Identities, phrase: &str) -> Vec<f32> {
     identities.iter().map(|(id, i)| either(id, &i.names) as f32).collect()
 }
 
+/// The words of a phrase that neither names nor an encoder know: `to_encoder` are those that the
+/// encoder does not, if there is one.
+pub fn unknown_to_all(identities: &Identities, phrase: &str, to_encoder: Option<&[String]>) -> Vec<String> {
+    let mut unknown = unknown_words(identities, phrase);
+    unknown.retain(|w| to_encoder.is_none_or(|words| words.contains(w)));
+    unknown
+}
+
 /// The words of a phrase that no name in the scene resembles; articles and the like left out.
 pub fn unknown_words(identities: &Identities, phrase: &str) -> Vec<String> {
     let known: HashSet<String> = identities.iter().flat_map(|(_, i)| &i.names).flat_map(|n| words(n)).collect();

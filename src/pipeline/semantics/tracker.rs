@@ -3,7 +3,7 @@
 //! too, their masks linked to what is known. No network is needed.
 
 use super::extend::extend;
-use super::link::{Link, link};
+use super::link::{Disagreement, Link, disagreements, link};
 use super::segmenter::{FoundMask, Segmenter};
 use super::view_map::ViewMap;
 use super::votes::{Belonging, Votes};
@@ -36,7 +36,7 @@ impl Default for TrackOptions {
 }
 
 /// An identity in a view.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Sighting {
     /// Whose pixels.
     pub identity: IdentityId,
@@ -47,7 +47,7 @@ pub struct Sighting {
 }
 
 /// What became of one view.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct ViewReport {
     /// Index of the photo.
     pub photo: usize,
@@ -68,6 +68,8 @@ pub struct Tracked {
     pub seeds: Vec<usize>,
     /// Every photo, before identities were extended to Gaussians that no photo voted for.
     pub views: Vec<ViewReport>,
+    /// Where masks and what was known disagreed, with the photo.
+    pub disagreements: Vec<(usize, Disagreement)>,
 }
 
 /// Why tracking failed.
@@ -110,6 +112,7 @@ pub fn track(
         renderer: Renderer::new(),
         identities: Identities::default(),
         votes: Votes::new(cloud.len()),
+        disagreements: Vec::new(),
     };
     let mut seeds = vec![first];
     let mut tried = vec![false; photos.len()];
@@ -128,7 +131,7 @@ pub fn track(
     };
     let mut belongings = t.votes.decide(&t.identities, LEAST_VOTES);
     extend(cloud, &mut belongings);
-    Ok(Tracked { identities: t.identities, belongings, seeds, views })
+    Ok(Tracked { identities: t.identities, belongings, seeds, views, disagreements: t.disagreements })
 }
 
 struct Tracker<'a> {
@@ -139,6 +142,7 @@ struct Tracker<'a> {
     renderer: Renderer<f32>,
     identities: Identities,
     votes: Votes,
+    disagreements: Vec<(usize, Disagreement)>,
 }
 
 impl Tracker<'_> {
@@ -156,19 +160,19 @@ impl Tracker<'_> {
         }
         let known = if self.identities.is_empty() { None } else { Some(self.map(photo, self.options.max_side_px)?) };
         let links = link(&found, known.as_ref(), &self.identities);
+        if let Some(known) = &known {
+            for what in disagreements(&found, &links, known, &self.identities) {
+                let told = self.told(&what);
+                observer.note(Severity::Warning, format!("{}: {told}", self.photos[photo].name));
+                self.disagreements.push((photo, what));
+            }
+        }
         let mut ids = Vec::with_capacity(found.len());
         for (mask, link) in found.iter().zip(&links) {
             let parent = mask.parent.map_or(NOBODY, |p| ids[p]);
             ids.push(match link {
                 Link::Known(id) => *id,
-                Link::New => self.identities.add(mask.level, parent, mask.name.iter().cloned().collect()),
-                Link::Split(of) => {
-                    let text = format!(
-                        "{}: {} is seen in two pieces; one becomes an identity of its own",
-                        self.photos[photo].name,
-                        self.identities.name(*of)
-                    );
-                    observer.note(Severity::Warning, text);
+                Link::New | Link::Split(_) => {
                     self.identities.add(mask.level, parent, mask.name.iter().cloned().collect())
                 }
             });
@@ -179,6 +183,20 @@ impl Tracker<'_> {
             .add_view(&mut self.renderer, self.cloud, &camera, self.settings, &labels)
             .map_err(|e| TrackError::Render(self.photos[photo].name.clone(), e))?;
         Ok(true)
+    }
+
+    /// A disagreement, for people.
+    fn told(&self, what: &Disagreement) -> String {
+        let name = |id: &IdentityId| self.identities.full_name(*id);
+        match what {
+            Disagreement::Split(of) => {
+                format!("{} is seen in two pieces; one becomes an identity of its own", name(of))
+            }
+            Disagreement::Merge(all) => {
+                format!("one mask covers {}; they stay apart", all.iter().map(name).collect::<Vec<_>>().join(" and "))
+            }
+            Disagreement::Switch(is, other) => format!("{} is where {} was thought to be", name(is), name(other)),
+        }
     }
 
     /// What is known of a view by now.

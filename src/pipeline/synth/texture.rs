@@ -3,18 +3,7 @@
 use glam::{Vec2, Vec4};
 
 use crate::io::gltf_mesh::{TextureImage, TextureUse, Wrap};
-
-/// Linear light of an sRGB value in 0..1.
-pub fn linear(srgb: f32) -> f32 {
-    if srgb <= 0.040_45 { srgb / 12.92 } else { ((srgb + 0.055) / 1.055).powf(2.4) }
-}
-
-/// sRGB byte of linear light; clamps.
-pub fn srgb_byte(linear: f32) -> u8 {
-    let v = linear.clamp(0.0, 1.0);
-    let s = if v <= 0.003_130_8 { v * 12.92 } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
-    (s * 255.0 + 0.5) as u8
-}
+use crate::math::srgb;
 
 /// An image at all resolutions.
 pub struct Texture {
@@ -25,7 +14,7 @@ pub struct Texture {
 impl Texture {
     /// Builds the smaller resolutions.
     pub fn new(image: &TextureImage) -> Self {
-        let decode = std::array::from_fn(|i| linear(i as f32 / 255.0));
+        let decode = std::array::from_fn(|i| srgb::linear(i as f32 / 255.0));
         let mut texture = Self { levels: vec![image.clone()], decode };
         while let Some(last) = texture.levels.last().filter(|l| l.width_px > 1 || l.height_px > 1) {
             let (w, h) = ((last.width_px / 2).max(1), (last.height_px / 2).max(1));
@@ -44,7 +33,7 @@ impl Texture {
                     }
                     let mean = sum / count;
                     let alpha = (mean.w * 255.0 + 0.5) as u8;
-                    [srgb_byte(mean.x), srgb_byte(mean.y), srgb_byte(mean.z), alpha]
+                    [srgb::byte(mean.x), srgb::byte(mean.y), srgb::byte(mean.z), alpha]
                 })
                 .collect();
             texture.levels.push(TextureImage { width_px: w, height_px: h, rgba });

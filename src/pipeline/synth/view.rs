@@ -8,8 +8,8 @@ use super::light::{Light, Lit, highlight};
 use super::material::Materials;
 use super::options::SynthOptions;
 use super::surface::Surface;
-use super::texture::{linear, srgb_byte};
 use super::trace::{Hit, Tracer};
+use crate::math::srgb;
 use crate::scene::Camera;
 
 /// Surfaces that one sample looks through at most.
@@ -72,7 +72,7 @@ impl Stage {
         let n = options.samples;
         // Tangent of the angle between two samples.
         let step = 1.0 / (camera.focal_px.y as f32 * n as f32);
-        let background = Vec3A::from_array(options.background.map(|c| linear(f32::from(c) / 255.0)));
+        let background = Vec3A::from_array(options.background.map(|c| srgb::linear(f32::from(c) / 255.0)));
         let look = |dx: f64, dy: f64| self.sample(origin, along(dx, dy), step, background, options.specular);
         let stratum = |i: u32| {
             let [jx, jy] = jitter(options.seed, view, y * camera.width_px as usize + x, i);
@@ -92,7 +92,7 @@ impl Stage {
                 (sum + others.map(|i| stratum(i).color).sum::<Vec3A>()) / (n * n) as f32
             }
         };
-        let rgb = [srgb_byte(mean.x), srgb_byte(mean.y), srgb_byte(mean.z)];
+        let rgb = [srgb::byte(mean.x), srgb::byte(mean.y), srgb::byte(mean.z)];
         Pixel { rgb, depth: center.depth, object: center.ids.object, part: center.ids.part }
     }
 

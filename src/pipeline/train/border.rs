@@ -8,6 +8,7 @@ use std::collections::{BTreeMap, VecDeque};
 use rayon::prelude::*;
 
 use crate::io::{IoError, photo};
+use crate::math::grid::neighbours;
 use crate::math::stats::median;
 use crate::scene::{Camera, Dataset, Photo, PhotoPixels};
 
@@ -126,14 +127,7 @@ fn connected_to_edge(width: usize, height: usize, is: impl Fn(usize) -> bool) ->
     let mut queue: VecDeque<usize> = (0..width * height).filter(|&i| edge(i) && is(i)).collect();
     queue.iter().for_each(|&i| reached[i] = true);
     while let Some(i) = queue.pop_front() {
-        let (x, y) = (i % width, i / width);
-        let sides = [
-            (x > 0).then(|| i - 1),
-            (x + 1 < width).then(|| i + 1),
-            (y > 0).then(|| i - width),
-            (y + 1 < height).then(|| i + width),
-        ];
-        for j in sides.into_iter().flatten() {
+        for j in neighbours(i, width, width * height) {
             if !reached[j] && is(j) {
                 reached[j] = true;
                 queue.push_back(j);

@@ -7,4 +7,5 @@ pub mod log;
 pub mod objects;
 pub mod plan;
 pub mod plots;
+pub mod portraits;
 pub mod training;

@@ -5,12 +5,16 @@ use egui::{Button, CollapsingHeader, Color32, Id, Key, RichText, ScrollArea, Tex
 use super::super::state::AppState;
 use super::super::theme;
 use super::super::viewport::visible::Visibility;
+use super::portraits::Portraits;
 use crate::pipeline::semantics::edit::Edit;
 use crate::scene::{Identities, IdentityId, Level, NOBODY};
 use crate::worker::Action;
 
+/// Side of a portrait, points.
+const PORTRAIT: f32 = 30.0;
+
 /// Draws the pane.
-pub fn show(ui: &mut Ui, state: &AppState, visibility: &Visibility, actions: &mut Vec<Action>) {
+pub fn show(ui: &mut Ui, state: &AppState, portraits: &Portraits, visibility: &Visibility, actions: &mut Vec<Action>) {
     let Some(map) = &state.semantics else {
         return show_how_to_begin(ui, state, actions);
     };
@@ -36,7 +40,7 @@ pub fn show(ui: &mut Ui, state: &AppState, visibility: &Visibility, actions: &mu
             }
         }
     });
-    let tree = Tree { identities, sizes: map.sizes(), visibility };
+    let tree = Tree { identities, sizes: &state.sizes, portraits, visibility };
     for (id, _) in identities.iter().filter(|(_, i)| i.parent == NOBODY) {
         tree.branch(ui, id, actions);
     }
@@ -45,7 +49,8 @@ pub fn show(ui: &mut Ui, state: &AppState, visibility: &Visibility, actions: &mu
 struct Tree<'a> {
     identities: &'a Identities,
     /// Gaussians by number.
-    sizes: Vec<usize>,
+    sizes: &'a [usize],
+    portraits: &'a Portraits,
     visibility: &'a Visibility,
 }
 
@@ -64,12 +69,13 @@ impl Tree<'_> {
     }
 
     fn leaf(&self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
-        let Self { identities, sizes, visibility } = self;
+        let Self { identities, sizes, portraits, visibility } = self;
         ui.horizontal(|ui| {
             let mut drawn = !visibility.is_hidden(id);
             if ui.checkbox(&mut drawn, "").on_hover_text("Draw it").changed() {
                 actions.push(Action::Hide(id));
             }
+            portraits.show(ui, id, PORTRAIT);
             let code = identities.get(id).map_or([0.5; 3], |i| i.code).map(|c| (c * 255.0) as u8);
             let (rect, _) = ui.allocate_exact_size(vec2(11.0, 11.0), egui::Sense::hover());
             ui.painter().rect_filled(rect, 3.0, Color32::from_rgb(code[0], code[1], code[2]));
@@ -78,7 +84,9 @@ impl Tree<'_> {
                 actions.push(Action::Ask(identities.full_name(id)));
             }
             self.menu(ui, id, actions);
-            ui.label(RichText::new(format!("{} Gaussians", sizes[id as usize])).small().color(theme::WEAK));
+            ui.label(
+                RichText::new(format!("{} Gaussians", sizes.get(id as usize).unwrap_or(&0))).small().color(theme::WEAK),
+            );
         });
     }
 }

@@ -3,6 +3,7 @@
 use egui::{Align2, Area, Color32, ColorImage, Id, Order, Rect, Slider, TextEdit, TextureHandle, TextureOptions, Ui};
 
 use super::super::theme;
+use crate::math::grid::neighbours;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::{Camera, Identities, IdentityId, Mask, NOBODY};
 use crate::worker::{Action, EditRequest};
@@ -79,9 +80,7 @@ impl Brush {
                 continue;
             }
             seen.insert(i);
-            let (x, y) = (i % w, i / w);
-            let near = [(x > 0, i.wrapping_sub(1)), (x + 1 < w, i + 1), (y > 0, i.wrapping_sub(w)), (y + 1 < h, i + w)];
-            open.extend(near.into_iter().filter(|(is_in, j)| *is_in && alike(i, *j)).map(|(_, j)| j));
+            open.extend(neighbours(i, w, w * h).filter(|j| alike(i, *j)));
         }
         self.mask.add(&seen);
         self.changed = true;

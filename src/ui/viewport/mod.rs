@@ -210,9 +210,8 @@ impl Viewport {
     /// Moves until an identity fills the view, from the side on which the eye is.
     fn go_to(&mut self, id: IdentityId, state: &AppState) {
         let (Some(map), Some(cloud)) = (&state.semantics, &self.cloud) else { return };
-        let inside = map.identities.within(id);
-        let is_in = |i: &usize| map.of.get(*i).is_some_and(|of| inside.get(*of as usize) == Some(&true));
-        let points = (0..cloud.len()).filter(is_in).map(|i| cloud.world_position(i));
+        let mine = map.members(id).into_iter().filter(|i| *i < cloud.len());
+        let points = mine.map(|i| cloud.world_position(i));
         if let Some(mut bounds) = Bounds::robust(points) {
             // Some of what is around it, to see where it is.
             let air = bounds.size() * 0.35;

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use crate::scene::{GaussianCloud, IdentityId, LanguageFeatures, SemanticMap};
+use crate::scene::{GaussianCloud, IdentityId, SemanticMap};
 
 /// What of a scene is drawn.
 #[derive(Clone, Debug, Default)]
@@ -59,16 +59,8 @@ impl Visibility {
             let shown = self.shown(semantics);
             let kept: Vec<usize> =
                 (0..cloud.len()).filter(|&i| shown.get(semantics.of[i] as usize).copied().unwrap_or(true)).collect();
-            let pick = |i: &usize| semantics.of[*i];
-            let left = SemanticMap {
-                identities: semantics.identities.clone(),
-                of: kept.iter().map(pick).collect(),
-                margin: kept.iter().map(|i| semantics.margin[*i]).collect(),
-                codes: kept.iter().map(|i| semantics.codes[*i]).collect(),
-                language: None::<LanguageFeatures>,
-                seeds: Vec::new(),
-            };
-            self.left = Some(Left { of, cloud: Arc::new(cloud.select(&kept)), semantics: Arc::new(left) });
+            let left = Arc::new(semantics.select(&kept));
+            self.left = Some(Left { of, cloud: Arc::new(cloud.select(&kept)), semantics: left });
         }
         match &self.left {
             Some(l) => (Arc::clone(&l.cloud), Arc::clone(&l.semantics)),

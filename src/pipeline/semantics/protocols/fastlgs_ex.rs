@@ -29,7 +29,7 @@ pub fn compare(scene: &mut AskedScene<'_>, view: &LabelledView<'_>, pool: &mut P
         pool.intersection += both;
         pool.union += mask.area() + category.mask.area() - both;
         let iou = pool.intersection as f64 / pool.union.max(1) as f64;
-        units.push(Unit { view: view.name.into(), query: category.name.clone(), iou, hit: None });
+        units.push(category.unit(view.name, iou, None));
     }
     units
 }

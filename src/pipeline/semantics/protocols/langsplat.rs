@@ -27,7 +27,7 @@ pub fn compare(scene: &mut AskedScene<'_>, view: &LabelledView<'_>) -> Vec<Unit>
             None => (Mask::empty(w, h), 0),
         };
         let hit = answered.is_some() && category.boxes.iter().any(|b| b.contains(at % w, at / w));
-        Unit { view: view.name.into(), query: category.name.clone(), iou: mask.iou(&category.mask), hit: Some(hit) }
+        category.unit(view.name, mask.iou(&category.mask), Some(hit))
     };
     view.categories.iter().map(one).collect()
 }
@@ -169,7 +169,7 @@ mod tests {
                 Some(Answered { answer: Answer::NotFound(vec![]), basis: Basis::Meaning, relevancy: relevancy.clone() })
             };
             let boxes = truth.bounds().into_iter().collect();
-            let categories = vec![Category { name: "eye".into(), mask: truth.clone(), boxes }];
+            let categories = vec![Category { name: "eye".into(), level: Level::Object, mask: truth.clone(), boxes }];
             let view = LabelledView { name: "v", camera: &camera, exact: &exact, blended: &blended, categories };
             compare(&mut AskedScene { map: &map, ask: &mut ask }, &view).remove(0)
         };

@@ -5,6 +5,7 @@
 
 pub mod fastlgs_ex;
 pub mod langsplat;
+pub mod masks;
 pub mod multi_class;
 pub mod part_recall;
 pub mod selection_3d;
@@ -16,7 +17,7 @@ use super::answer::Answered;
 use super::code_map::CodeMap;
 use super::segmenter::FoundMask;
 use super::view_map::ViewMap;
-use crate::scene::{Camera, Mask, PixelBox, SemanticMap};
+use crate::scene::{Camera, Level, Mask, PixelBox, SemanticMap};
 
 /// A scene that is asked.
 pub struct AskedScene<'a> {
@@ -45,10 +46,19 @@ pub struct LabelledView<'a> {
 pub struct Category {
     /// The name, as asked for: "button of the red controller".
     pub name: String,
+    /// A part, if it is a piece of something that has a name.
+    pub level: Level,
     /// Its pixels.
     pub mask: Mask,
     /// Box of each region.
     pub boxes: Vec<PixelBox>,
+}
+
+impl Category {
+    /// A comparison of it in the photo `view`.
+    pub fn unit(&self, view: &str, iou: f64, hit: Option<bool>) -> Unit {
+        Unit { view: view.to_owned(), query: self.name.clone(), level: self.level, iou, hit }
+    }
 }
 
 /// One compared category of a view.
@@ -58,6 +68,8 @@ pub struct Unit {
     pub view: String,
     /// The category.
     pub query: String,
+    /// Whether that is an object or a part.
+    pub level: Level,
     /// Intersection over union.
     pub iou: f64,
     /// Whether the point of largest relevancy is on it, where the protocol asks that.
@@ -70,9 +82,13 @@ pub fn categories(labels: &[FoundMask]) -> Vec<Category> {
     for label in labels {
         let Some(name) = &label.name else { continue };
         let whole = label.parent.and_then(|p| labels[p].name.as_ref());
-        let name = whole.map_or_else(|| name.clone(), |w| format!("{name} of the {w}"));
+        let (level, name) = match whole {
+            Some(whole) => (Level::Part, format!("{name} of the {whole}")),
+            None => (Level::Object, name.clone()),
+        };
         let empty = || Mask::empty(label.mask.width_px(), label.mask.height_px());
-        let category = all.entry(name.clone()).or_insert_with(|| Category { name, mask: empty(), boxes: Vec::new() });
+        let category =
+            all.entry(name.clone()).or_insert_with(|| Category { name, level, mask: empty(), boxes: Vec::new() });
         category.mask.add(&label.mask);
         category.boxes.extend(label.mask.bounds());
     }
@@ -91,7 +107,6 @@ pub fn means(units: &[Unit]) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Level;
 
     #[test]
     fn regions_of_one_name_are_one_category_with_all_their_boxes() {
@@ -104,7 +119,8 @@ mod tests {
         let all = categories(&[label("doll", None, 0, 9), label("eye", Some(0), 2, 3), label("eye", Some(0), 5, 7)]);
         let list: Vec<_> = all.iter().map(|c| (c.name.as_str(), c.mask.area(), c.boxes.len())).collect();
         assert_eq!(list, [("doll", 9, 1), ("eye of the doll", 3, 2)]);
-        let unit = |view: &str, iou| Unit { view: view.into(), query: String::new(), iou, hit: None };
+        let unit =
+            |view: &str, iou| Unit { view: view.into(), query: String::new(), level: Level::Object, iou, hit: None };
         let (micro, by_view) = means(&[unit("a", 1.0), unit("a", 0.0), unit("b", 1.0)]);
         assert!((micro - 2.0 / 3.0).abs() < 1e-12 && (by_view - 0.75).abs() < 1e-12);
     }

@@ -19,7 +19,7 @@ pub fn compare(scene: &mut AskedScene<'_>, view: &LabelledView<'_>, classes: &[S
     let winners: Vec<Option<usize>> = (0..=identities.len() as u32).map(best_of).collect();
     let unit = |class: usize, mask: &Mask| -> Option<Unit> {
         let truth = view.categories.iter().find(|c| c.name == classes[class])?;
-        Some(Unit { view: view.name.into(), query: truth.name.clone(), iou: mask.iou(&truth.mask), hit: None })
+        Some(truth.unit(view.name, mask.iou(&truth.mask), None))
     };
     let own = |class: usize| {
         let mask = answers[class].as_ref().map(|a| a.mask(view.exact, identities, 1));

@@ -88,7 +88,7 @@ pub fn row<E>(
     let mut phrases = Phrasebook::default();
     phrases.learn(&[], &mut encode)?;
     for view in views {
-        for category in view.categories.iter().filter(|c| c.name.contains(" of the ")) {
+        for category in view.categories.iter().filter(|c| c.level == Level::Part) {
             let start = std::time::Instant::now();
             let mut mask = Mask::empty(view.exact.width_px, view.exact.height_px);
             if let Some(phrase) = Phrase::parse(&category.name) {
@@ -102,7 +102,7 @@ pub fn row<E>(
             }
             secs.push(start.elapsed().as_secs_f64());
             let iou = mask.iou(&category.mask);
-            units.push(Unit { view: view.name.into(), query: category.name.clone(), iou, hit: None });
+            units.push(category.unit(view.name, iou, None));
         }
     }
     let recall = units.iter().filter(|u| u.iou >= HIT_IOU).count() as f64 / units.len() as f64;

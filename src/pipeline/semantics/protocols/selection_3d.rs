@@ -34,7 +34,7 @@ pub fn compare(
         let frame = renderer.render(&alone, Features::NONE, view.camera, &settings)?;
         let mask = Mask::from_fn(frame.width_px, frame.height_px, |i| frame.alpha[i] > CUT);
         let iou = mask.iou(&category.mask);
-        units.push(Unit { view: view.name.into(), query: category.name.clone(), iou, hit: None });
+        units.push(category.unit(view.name, iou, None));
     }
     Ok(units)
 }

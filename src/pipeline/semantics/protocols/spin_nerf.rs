@@ -25,7 +25,8 @@ pub fn compare(scene: &mut AskedScene<'_>, view: &LabelledView<'_>, query: &str)
     let mask = answered.map(|a| a.mask(view.exact, &scene.map.identities, 1));
     let mask = mask.unwrap_or_else(|| Mask::empty(view.exact.width_px, view.exact.height_px));
     let (iou, accuracy) = score(&mask, &truth);
-    Some(Foreground { unit: Unit { view: view.name.into(), query: query.into(), iou, hit: None }, accuracy })
+    let unit = Unit { query: query.into(), ..first.unit(view.name, iou, None) };
+    Some(Foreground { unit, accuracy })
 }
 
 fn score(mask: &Mask, truth: &Mask) -> (f64, f64) {

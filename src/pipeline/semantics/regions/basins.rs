@@ -1,5 +1,7 @@
 //! The smallest pieces: the basins of the edge map, as water would fill them (watershed).
 
+use crate::math::grid::neighbours;
+
 /// The piece of pixels outside the domain.
 pub const OUTSIDE: u32 = u32::MAX;
 /// Not filled yet.
@@ -77,14 +79,6 @@ fn minima(levels: &[u16], label: &mut [u32], width: usize) -> u32 {
         }
     }
     count
-}
-
-/// The pixels left, right, above and below.
-pub fn neighbours(i: usize, width: usize, n: usize) -> impl Iterator<Item = usize> {
-    let x = i % width;
-    [(x > 0).then(|| i - 1), (x + 1 < width).then_some(i + 1), i.checked_sub(width), Some(i + width).filter(|j| *j < n)]
-        .into_iter()
-        .flatten()
 }
 
 #[cfg(test)]

@@ -1,8 +1,10 @@
 //! Colours as people tell them apart: CIELAB, D65.
 
+use crate::math::srgb::linear as linear_light;
+
 /// L* a* b* of sRGB bytes.
 pub fn lab(rgb: &[[u8; 3]]) -> Vec<[f32; 3]> {
-    let linear: Vec<f32> = (0..=255_u8).map(|v| to_linear(f32::from(v) / 255.0)).collect();
+    let linear: Vec<f32> = (0..=255_u8).map(|v| linear_light(f32::from(v) / 255.0)).collect();
     rgb.iter()
         .map(|p| {
             let [r, g, b] = p.map(|v| linear[usize::from(v)]);
@@ -13,10 +15,6 @@ pub fn lab(rgb: &[[u8; 3]]) -> Vec<[f32; 3]> {
             [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
         })
         .collect()
-}
-
-fn to_linear(v: f32) -> f32 {
-    if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
 }
 
 /// The cube root, made straight near zero.

@@ -24,7 +24,7 @@ impl Questions {
     ) {
         let Some(newest) = self.live.as_ref().or(self.kept.last()).cloned() else { return };
         let identities = &semantics.identities;
-        self.show_verdict(ui, &newest, semantics);
+        self.show_verdict(ui, &newest);
         let shown = newest.shown(&self.look);
         let mut chosen = None;
         let hits = newest.answered.answer.hits().iter();
@@ -34,11 +34,9 @@ impl Questions {
                 if ui.selectable_label(shown.contains(&hit.identity), name).clicked() {
                     chosen = Some(hit.identity);
                 }
-                let pixels = match &self.maps {
-                    Some(maps) => match self.mask_of(maps, semantics, hit.identity).area() {
-                        0 => "  not in this view".to_owned(),
-                        n => format!("  {n} px"),
-                    },
+                let pixels = match self.area_of(semantics, hit.identity) {
+                    Some(0) => "  not in this view".to_owned(),
+                    Some(n) => format!("  {n} px"),
                     None => String::new(),
                 };
                 ui.weak(format!("{:.2}  +{:.2}{pixels}", hit.score, hit.margin.max(0.0)))
@@ -97,14 +95,8 @@ impl Questions {
 }
 
 impl Questions {
-    fn show_verdict(&self, ui: &mut Ui, newest: &super::Asked, semantics: &SemanticMap) {
-        let by_name = names::unknown_words(&semantics.identities, &newest.text);
-        let unknown = match self.speech.unknown_words(&newest.text) {
-            // Names may know words that the encoder does not.
-            Some(unknown) => unknown.into_iter().filter(|w| by_name.contains(w)).collect(),
-            None => by_name,
-        };
-        let unknown = shortened(&unknown.join("\", \""));
+    fn show_verdict(&self, ui: &mut Ui, newest: &super::Asked) {
+        let unknown = shortened(&newest.unknown.join("\", \""));
         match &newest.answered.answer {
             Answer::Found(_) if unknown.is_empty() || newest.answered.basis == Basis::Names => {}
             Answer::Found(_) => {

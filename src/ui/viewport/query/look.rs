@@ -24,11 +24,14 @@ pub enum Tint {
     Codes,
     /// The three main directions of the language features.
     Features,
+    /// Where blended codes mean something else than the winning identities.
+    Difference,
 }
 
 impl Tint {
     /// All of them.
-    pub const ALL: [Self; 6] = [Self::Masks, Self::Heat, Self::Objects, Self::Parts, Self::Codes, Self::Features];
+    pub const ALL: [Self; 7] =
+        [Self::Masks, Self::Heat, Self::Objects, Self::Parts, Self::Codes, Self::Features, Self::Difference];
 
     /// Its name.
     pub fn text(self) -> &'static str {
@@ -39,6 +42,7 @@ impl Tint {
             Self::Parts => "Parts",
             Self::Codes => "Codes",
             Self::Features => "Features",
+            Self::Difference => "Exact \u{2260} blended",
         }
     }
 }
@@ -96,7 +100,7 @@ pub fn show(ui: &mut Ui, look: &mut Look, heat: Option<&[f32]>) -> bool {
         ui.end_row();
         ui.weak("Colour by");
         ui.horizontal(|ui| {
-            ComboBox::from_id_salt("tint").selected_text(look.tint.text()).width(86.0).show_ui(ui, |ui| {
+            ComboBox::from_id_salt("tint").selected_text(look.tint.text()).width(112.0).show_ui(ui, |ui| {
                 for tint in Tint::ALL {
                     ui.selectable_value(&mut look.tint, tint, tint.text());
                 }

@@ -10,6 +10,7 @@ mod look;
 mod overlay;
 mod speech;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -22,6 +23,7 @@ use crate::pipeline::semantics::answer::{Answered, Language, answer};
 use crate::pipeline::semantics::grammar::Phrase;
 use crate::pipeline::semantics::matching::{self, MatchMode};
 use crate::pipeline::semantics::meaning::MeaningOptions;
+use crate::pipeline::semantics::names;
 use crate::scene::{GaussianCloud, Identities, IdentityId, Mask, NOBODY, SemanticMap};
 use crate::worker::{Action, ViewMaps};
 
@@ -40,6 +42,8 @@ pub struct Asked {
     pub answered: Answered,
     /// A hit that was chosen among the others; else the best are shown.
     chosen: Option<IdentityId>,
+    /// Words that neither names nor the encoder know.
+    unknown: Vec<String>,
     /// How long answering took.
     time: Duration,
 }
@@ -87,8 +91,18 @@ pub struct Questions {
     painted: Option<Painted>,
     /// Of the target that is shown.
     facts: Option<card::Facts>,
+    /// Pixels of identities in the present view, counted as they are listed.
+    areas: Areas,
     /// How long masks and overlay took.
     paint_time: Duration,
+}
+
+/// Pixels of identities in a view, for one way of matching.
+#[derive(Default)]
+struct Areas {
+    /// View, objects and match that they were counted for.
+    of: (usize, usize, MatchMode, u32),
+    known: BTreeMap<IdentityId, usize>,
 }
 
 impl Questions {
@@ -104,7 +118,7 @@ impl Questions {
 
     /// Whether blended codes of the view are wanted.
     pub fn wants_codes(&self) -> bool {
-        self.look.mode == MatchMode::Blend
+        self.look.mode == MatchMode::Blend || self.look.tint == Tint::Difference
     }
 
     /// Puts the cursor into the box.
@@ -145,6 +159,8 @@ impl Questions {
     /// Takes over what the present view's pixels belong to; `None` while it is not known.
     pub fn set_maps(&mut self, maps: Option<Arc<ViewMaps>>) {
         self.maps = maps;
+        // What was painted and counted for the view before may have had the same address.
+        (self.painted, self.areas) = (None, Areas::default());
     }
 
     fn asked(&mut self, text: &str, semantics: &SemanticMap) -> Option<Asked> {
@@ -155,7 +171,10 @@ impl Questions {
         let language =
             language.map(|(features, phrases)| Language { features, phrases, options: MeaningOptions::default() });
         let answered = answer(&semantics.identities, &phrase, self.look.kind, language);
-        Some(Asked { text: text.trim().to_owned(), answered, chosen: None, time: start.elapsed() })
+        let time = start.elapsed();
+        let to_encoder = self.speech.unknown_words(text);
+        let unknown = names::unknown_to_all(&semantics.identities, text, to_encoder.as_deref());
+        Some(Asked { text: text.trim().to_owned(), answered, chosen: None, unknown, time })
     }
 
     /// Keeps the question being typed on screen, and makes room for the next.
@@ -180,6 +199,22 @@ impl Questions {
             }
             _ => matching::exact(&maps.identities, &semantics.identities, target, self.look.tolerance),
         }
+    }
+
+    /// Pixels of an identity in the present view, if that is drawn; counted once for a view.
+    fn area_of(&mut self, semantics: &SemanticMap, id: IdentityId) -> Option<usize> {
+        let maps = self.maps.clone()?;
+        let Look { mode, tolerance, .. } = self.look;
+        let of = (Arc::as_ptr(&maps) as usize, std::ptr::from_ref(semantics) as usize, mode, tolerance.to_bits());
+        if self.areas.of != of {
+            self.areas = Areas { of, known: BTreeMap::new() };
+        }
+        if let Some(area) = self.areas.known.get(&id) {
+            return Some(*area);
+        }
+        let area = self.mask_of(&maps, semantics, id).area();
+        self.areas.known.insert(id, area);
+        Some(area)
     }
 
     /// Masks and tints over the picture in `rect`.

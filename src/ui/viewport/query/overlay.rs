@@ -1,15 +1,23 @@
 //! The picture that lies over the view: outlines and fills of masks, and tints.
 
 use egui::{Color32, ColorImage};
+use rayon::prelude::*;
 
 use super::look::{Look, Tint};
+use crate::math::grid::neighbours;
+use crate::math::vector::dot;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::matching::MatchMode;
 use crate::pipeline::semantics::view_map::ViewMap;
+use crate::scene::semantic_map::CODE_CHANNELS;
 use crate::scene::{Identities, IdentityId, Level, Mask};
 
 /// Opacity of a mask's fill.
 const FILL: f32 = 0.35;
+/// Around outlines: whatever colour is beside them, they stand out.
+const RIM: Color32 = Color32::from_black_alpha(170);
+/// Where blended codes differ.
+const DIFFERENT: [u8; 3] = [255, 60, 160];
 
 /// What is drawn over the view.
 pub struct Layers<'a> {
@@ -36,6 +44,7 @@ impl Layers<'_> {
         let tints: Vec<Option<[u8; 3]>> = (0..=self.identities.len() as IdentityId).map(|id| self.tint(id)).collect();
         let hot: Option<Mask> = (self.look.threshold > 0.0)
             .then(|| Mask::from_fn(w, h, |i| self.relevancy_of(self.map.identity[i]) >= self.look.threshold));
+        let codes: Vec<_> = (0..=self.identities.len() as IdentityId).map(|id| self.identities.codes(id)).collect();
         let pixel = |i: usize| {
             if hot.as_ref().is_some_and(|m| is_edge(m, i)) {
                 return Color32::WHITE;
@@ -44,14 +53,20 @@ impl Layers<'_> {
             match mask {
                 Some(([r, g, b], mask)) if is_edge(mask, i) => Color32::from_rgb(*r, *g, *b),
                 Some((color, _)) if self.look.tint == Tint::Masks => with_alpha(*color, FILL),
+                None if self.masks.iter().any(|(_, mask)| is_beside(mask, i)) => RIM,
                 _ => {
-                    let blended = self.blended(i);
-                    let tint = blended.or_else(|| tints.get(self.map.identity[i] as usize).copied().flatten());
+                    let own = || tints.get(self.map.identity[i] as usize).copied().flatten();
+                    let tint = match self.look.tint {
+                        Tint::Difference => {
+                            codes.get(self.map.identity[i] as usize).and_then(|c| self.difference(i, c))
+                        }
+                        _ => self.blended(i).or_else(own),
+                    };
                     tint.map_or(Color32::TRANSPARENT, |c| with_alpha(c, self.look.opacity))
                 }
             }
         };
-        ColorImage::new([w, h], (0..w * h).map(pixel).collect())
+        ColorImage::new([w, h], (0..w * h).into_par_iter().map(pixel).collect())
     }
 
     fn relevancy_of(&self, id: IdentityId) -> f32 {
@@ -69,11 +84,19 @@ impl Layers<'_> {
         shown.iter().all(|c| c.is_finite()).then(|| std::array::from_fn(|c| (shown[c].clamp(0.0, 1.0) * 255.0) as u8))
     }
 
+    /// Colour of a pixel whose blended codes are farther from those of its identity than matches may
+    /// be. Where nothing is, nothing differs.
+    fn difference(&self, i: usize, own: &[f32; CODE_CHANNELS]) -> Option<[u8; 3]> {
+        let blended = self.codes?.planes.iter().map(|plane| plane.get(i).copied().unwrap_or(f32::NAN));
+        let far = blended.zip(own).any(|(b, o)| (b - o).abs() > self.look.tolerance);
+        far.then_some(DIFFERENT)
+    }
+
     /// Colour of what has this identity; `None` leaves the picture as it is.
     fn tint(&self, id: IdentityId) -> Option<[u8; 3]> {
         let code = |id: IdentityId| self.identities.get(id).map(|i| i.code.map(|c| (c * 255.0) as u8));
         match self.look.tint {
-            Tint::Masks => None,
+            Tint::Masks | Tint::Difference => None,
             Tint::Heat => Some(self.look.colormap.color(self.relevancy_of(id))),
             Tint::Objects => code(self.identities.object_of(id)),
             Tint::Parts => code(id).filter(|_| self.identities.get(id).is_some_and(|i| i.level == Level::Part)),
@@ -87,16 +110,15 @@ fn with_alpha([r, g, b]: [u8; 3], alpha: f32) -> Color32 {
     Color32::from_rgba_unmultiplied(r, g, b, (alpha * 255.0) as u8)
 }
 
+/// Whether a pixel outside of the mask has a neighbour in it.
+fn is_beside(mask: &Mask, i: usize) -> bool {
+    neighbours(i, mask.width_px(), mask.width_px() * mask.height_px()).any(|j| mask.contains(j))
+}
+
 /// Whether a pixel of the mask has a neighbour outside of it.
 fn is_edge(mask: &Mask, i: usize) -> bool {
     let (w, h) = (mask.width_px(), mask.height_px());
-    let (x, y) = (i % w, i / w);
-    let outside = |x: usize, y: usize| !mask.contains(y * w + x);
-    mask.contains(i)
-        && ((x > 0 && outside(x - 1, y))
-            || (x + 1 < w && outside(x + 1, y))
-            || (y > 0 && outside(x, y - 1))
-            || (y + 1 < h && outside(x, y + 1)))
+    mask.contains(i) && neighbours(i, w, w * h).any(|j| !mask.contains(j))
 }
 
 /// Colours of vectors by their three main directions (principal components), by number from 0; grey
@@ -140,10 +162,6 @@ fn main_direction(centered: &[Vec<f32>]) -> Vec<f32> {
     direction
 }
 
-fn dot(a: &[f32], b: &[f32]) -> f32 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -177,7 +195,7 @@ mod tests {
     #[test]
     fn masks_have_an_outline_and_a_fill() {
         let image = paint(Look::default());
-        assert_eq!(image.pixels[6], Color32::TRANSPARENT);
+        assert_eq!((image.pixels[6], image.pixels[7]), (Color32::TRANSPARENT, RIM), "the rim");
         assert_eq!(image.pixels[8], Color32::from_rgb(255, 179, 0), "the outline");
         assert_eq!(image.pixels[9], Color32::from_rgba_unmultiplied(255, 179, 0, 89), "the fill");
     }
@@ -190,6 +208,32 @@ mod tests {
         let image = paint(Look { threshold: 0.4, ..Look::default() });
         assert_eq!(image.pixels[8], Color32::WHITE, "where it begins");
         assert_eq!(image.pixels[6], Color32::TRANSPARENT);
+    }
+
+    #[test]
+    fn blended_codes_that_are_not_their_own_are_shown() {
+        let (identities, map) = scene();
+        let mut codes = CodeMap { width_px: 6, height_px: 3, ..CodeMap::default() };
+        for (c, plane) in codes.planes.iter_mut().enumerate() {
+            *plane = map.identity.iter().map(|id| identities.codes(*id)[c]).collect();
+        }
+        // One pixel of the shade is blended with something else; nothing is in the first.
+        codes.planes[4][9] += 0.1;
+        codes.planes[0][0] = f32::NAN;
+        let look = Look { tint: Tint::Difference, opacity: 1.0, ..Look::default() };
+        let layers = Layers {
+            map: &map,
+            codes: Some(&codes),
+            identities: &identities,
+            masks: &[],
+            relevancy: &[],
+            features: &[],
+            look,
+        };
+        let [r, g, b] = DIFFERENT;
+        let image = layers.paint();
+        let different: Vec<usize> = (0..18).filter(|i| image.pixels[*i] != Color32::TRANSPARENT).collect();
+        assert_eq!((different, image.pixels[9]), (vec![9], Color32::from_rgb(r, g, b)));
     }
 
     #[test]

@@ -1,0 +1,42 @@
+//! The sRGB transfer function.
+
+/// Linear light of an sRGB value in 0..1.
+pub fn linear(srgb: f32) -> f32 {
+    if srgb <= 0.040_45 { srgb / 12.92 } else { ((srgb + 0.055) / 1.055).powf(2.4) }
+}
+
+/// sRGB byte of linear light; clamps.
+pub fn byte(linear: f32) -> u8 {
+    (encode(linear.clamp(0.0, 1.0)).0 * 255.0 + 0.5) as u8
+}
+
+/// sRGB value of linear light, and its slope there.
+pub fn encode(linear: f32) -> (f32, f32) {
+    if linear <= 0.003_130_8 {
+        (12.92 * linear, 12.92)
+    } else {
+        (1.055 * linear.powf(1.0 / 2.4) - 0.055, 1.055 / 2.4 * linear.powf(1.0 / 2.4 - 1.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_survive_the_way_to_light_and_back() {
+        for v in 0..=255_u8 {
+            assert_eq!(byte(linear(f32::from(v) / 255.0)), v);
+        }
+        assert_eq!((byte(-1.0), byte(2.0), byte(f32::NAN)), (0, 255, 0));
+    }
+
+    #[test]
+    fn slopes_are_those_of_the_curve() {
+        for x in [0.001_f32, 0.01, 0.2, 0.9] {
+            let (step, slope) = (1e-3 * x, encode(x).1);
+            let difference = (encode(x + step).0 - encode(x - step).0) / (2.0 * step);
+            assert!((slope - difference).abs() < 2e-3 * slope, "{x}: {slope} {difference}");
+        }
+    }
+}

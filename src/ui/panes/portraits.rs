@@ -1,0 +1,104 @@
+//! The portraits of objects and parts as one texture, asked for when they change.
+
+use std::sync::Arc;
+
+use egui::{ColorImage, Rect, TextureHandle, TextureOptions, Ui, pos2, vec2};
+
+use super::super::state::AppState;
+use crate::pipeline::semantics::portraits::SIDE_PX;
+use crate::scene::{GaussianCloud, IdentityId, SemanticMap};
+use crate::worker::{Command, Worker};
+
+/// Portraits in a row of the texture.
+const COLUMNS: usize = 16;
+
+/// Portraits of what is on screen.
+#[derive(Default)]
+pub struct Portraits {
+    /// What they were asked for.
+    asked: Option<Arc<SemanticMap>>,
+    /// What they are of, and how many rows of them there are.
+    shown: Option<(Arc<SemanticMap>, TextureHandle, usize)>,
+}
+
+impl Portraits {
+    /// Asks for them if objects and parts have changed, and takes them over once they are drawn.
+    pub fn update(
+        &mut self,
+        ctx: &egui::Context,
+        state: &mut AppState,
+        cloud: Option<&Arc<GaussianCloud>>,
+        worker: &Worker,
+    ) {
+        let (Some(map), Some(cloud), Some(scene)) = (&state.semantics, cloud, &state.scene) else {
+            *self = Self::default();
+            return;
+        };
+        if self.asked.as_ref().is_none_or(|a| !Arc::ptr_eq(a, map)) && map.of.len() == cloud.len() {
+            let command = Command::Portraits {
+                cloud: Arc::clone(cloud),
+                map: Arc::clone(map),
+                settings: scene.render.clone(),
+                home: scene.home.clone(),
+            };
+            // With a full queue the wish comes again with the next event.
+            if worker.submit(command).is_ok() {
+                self.asked = Some(Arc::clone(map));
+            }
+        }
+        if let Some((of, pictures)) = state.portraits.take() {
+            let rows = pictures.len().div_ceil(COLUMNS).max(1);
+            let texture = ctx.load_texture("portraits", atlas(&pictures, rows), TextureOptions::LINEAR);
+            self.shown = Some((of, texture, rows));
+        }
+    }
+
+    /// Draws the portrait of an identity, `side` points wide; an empty place while there is none.
+    pub fn show(&self, ui: &mut Ui, id: IdentityId, side: f32) {
+        let (rect, _) = ui.allocate_exact_size(vec2(side, side), egui::Sense::hover());
+        let Some((of, texture, rows)) = &self.shown else { return };
+        if of.identities.get(id).is_none() {
+            return;
+        }
+        let at = id as usize - 1;
+        let (w, h) = (1.0 / COLUMNS as f32, 1.0 / *rows as f32);
+        let uv = Rect::from_min_size(pos2((at % COLUMNS) as f32 * w, (at / COLUMNS) as f32 * h), vec2(w, h));
+        ui.painter().image(texture.id(), rect, uv, egui::Color32::WHITE);
+    }
+}
+
+fn atlas(pictures: &[Option<Vec<[u8; 3]>>], rows: usize) -> ColorImage {
+    let (width, height) = (COLUMNS * SIDE_PX, rows * SIDE_PX);
+    let mut pixels = vec![egui::Color32::TRANSPARENT; width * height];
+    for (at, picture) in pictures.iter().enumerate() {
+        let Some(picture) = picture else { continue };
+        let (left, top) = (at % COLUMNS * SIDE_PX, at / COLUMNS * SIDE_PX);
+        for (y, row) in picture.chunks_exact(SIDE_PX).enumerate() {
+            let to = (top + y) * width + left;
+            pixels[to..to + SIDE_PX]
+                .iter_mut()
+                .zip(row)
+                .for_each(|(p, c)| *p = egui::Color32::from_rgb(c[0], c[1], c[2]));
+        }
+    }
+    ColorImage::new([width, height], pixels)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_portrait_has_its_place() {
+        let of = |v: u8| Some(vec![[v; 3]; SIDE_PX * SIDE_PX]);
+        let mut pictures = vec![None; 18];
+        (pictures[0], pictures[17]) = (of(10), of(20));
+        let image = atlas(&pictures, 2);
+        let at = |x: usize, y: usize| image.pixels[y * COLUMNS * SIDE_PX + x];
+        assert_eq!(
+            (at(0, 0), at(SIDE_PX - 1, SIDE_PX - 1)),
+            (egui::Color32::from_gray(10), egui::Color32::from_gray(10))
+        );
+        assert_eq!((at(SIDE_PX, SIDE_PX), at(SIDE_PX, 0)), (egui::Color32::from_gray(20), egui::Color32::TRANSPARENT));
+    }
+}
