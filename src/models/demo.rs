@@ -1,7 +1,8 @@
 //! The encoder that comes with the program: two small networks that this project trained on its own
 //! renders (`tools/encoder`), so that queries work with nothing to download.
 
-use super::engine::{Network, engine};
+use super::engine::engine;
+use super::network::{Array, Network};
 use super::words::Vocabulary;
 use super::{Encoder, ModelError, Tile};
 
@@ -28,7 +29,11 @@ fn ready<'a>(slot: &'a mut Option<Network>, (name, bytes): (&str, &[u8])) -> Res
     if slot.is_none() {
         *slot = Some(engine()?.load(bytes, name)?);
     }
-    slot.as_mut().ok_or_else(|| ModelError::Load { model: name.into(), problem: "it is gone".into() })
+    slot.as_mut().ok_or_else(|| ModelError::Load {
+        model: name.into(),
+        engine: "built-in",
+        problem: "it is gone".into(),
+    })
 }
 
 impl Encoder for DemoEncoder {
@@ -40,11 +45,31 @@ impl Encoder for DemoEncoder {
         self.words.dimension
     }
 
-    fn tile_side_px(&self) -> usize {
-        self.words.tile_side_px
+    fn tile_side_px(&self) -> Option<usize> {
+        Some(self.words.tile_side_px)
     }
 
-    fn image(&mut self, tile: &Tile) -> Result<Vec<f32>, ModelError> {
+    fn images(&mut self, tiles: &[Tile]) -> Result<Vec<Vec<f32>>, ModelError> {
+        tiles.iter().map(|tile| self.look(tile)).collect()
+    }
+
+    fn text(&mut self, phrase: &str) -> Result<Vec<f32>, ModelError> {
+        let tokens = self.words.encode(phrase)?;
+        let tokens = Array::new(&[1, tokens.len()], tokens);
+        only(ready(&mut self.text, TEXT)?.unit_rows(
+            vec![("tokens", tokens.into())],
+            "embedding",
+            self.words.dimension,
+        )?)
+    }
+
+    fn unknown_words(&self, phrase: &str) -> Vec<String> {
+        self.words.unknown(phrase)
+    }
+}
+
+impl DemoEncoder {
+    fn look(&mut self, tile: &Tile) -> Result<Vec<f32>, ModelError> {
         let side = self.words.tile_side_px;
         if tile.side_px != side || tile.rgb.len() != side * side {
             return Err(ModelError::TileSize { side_px: tile.side_px, pixels: tile.rgb.len(), expected_px: side });
@@ -54,19 +79,18 @@ impl Encoder for DemoEncoder {
         }
         let channel = |c: usize| tile.rgb.iter().map(move |p| p[c].clamp(0.0, 1.0));
         let planes: Vec<f32> = (0..3).flat_map(channel).collect();
-        let shape = vec![1, 3, side as i64, side as i64];
-        ready(&mut self.image, IMAGE)?.unit_vector(shape, planes, self.words.dimension)
+        let pixels = Array::new(&[1, 3, side, side], planes);
+        only(ready(&mut self.image, IMAGE)?.unit_rows(
+            vec![("tile", pixels.into())],
+            "embedding",
+            self.words.dimension,
+        )?)
     }
+}
 
-    fn text(&mut self, phrase: &str) -> Result<Vec<f32>, ModelError> {
-        let tokens = self.words.encode(phrase)?;
-        let shape = vec![1, tokens.len() as i64];
-        ready(&mut self.text, TEXT)?.unit_vector(shape, tokens, self.words.dimension)
-    }
-
-    fn unknown_words(&self, phrase: &str) -> Vec<String> {
-        self.words.unknown(phrase)
-    }
+/// The one row of a result.
+fn only(mut rows: Vec<Vec<f32>>) -> Result<Vec<f32>, ModelError> {
+    rows.pop().ok_or_else(|| ModelError::NoOutput { model: super::DEMO.into(), output: "embedding".into() })
 }
 
 #[cfg(test)]

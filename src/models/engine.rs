@@ -1,25 +1,78 @@
 //! What runs networks: an ONNX Runtime library where there is one, the built-in engine (tract)
 //! otherwise. Chosen once, at the first use of a network.
 //!
-//! A library is taken from the path in `ORT_DYLIB_PATH`, else from the program's own folder
-//! (`libonnxruntime.so`, `onnxruntime.dll`, `libonnxruntime.dylib`). One that cannot be loaded, or is
-//! older than version 1.24, is left aside, and [`Engine::note`] says so.
+//! A library is taken from the path in `FMLGS_ONNXRUNTIME` or `ORT_DYLIB_PATH`, else from the
+//! program's own folder, the active Python environment's `onnxruntime` wheel, or the system's
+//! library folders. One that cannot be loaded, or is older than version 1.24, is left aside, and
+//! [`Engine::note`] says so. `FMLGS_DEVICE` chooses what it computes on (`cpu`, `cuda`, `tensorrt`,
+//! `coreml`, `directml`); otherwise the first of CUDA, Core ML and DirectML that it offers.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use ort::environment::Environment;
+use ort::ep::{CUDA, CoreML, DirectML, ExecutionProvider, ExecutionProviderDispatch, TensorRT};
 use ort::session::Session;
 use ort::session::builder::GraphOptimizationLevel;
-use ort::value::Tensor;
 
 use super::ModelError;
+use super::network::Network;
 
 /// What runs networks in this process.
 pub struct Engine {
     environment: Environment,
     name: String,
+    device: Option<Device>,
     note: Option<String>,
+}
+
+/// What ONNX Runtime computes on other than the processor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Device {
+    Cuda,
+    TensorRt,
+    CoreMl,
+    DirectMl,
+}
+
+impl Device {
+    /// In the order in which they are tried; TensorRT only on request, because it takes minutes to
+    /// prepare a network.
+    const TRIED: [Self; 3] = [Self::Cuda, Self::CoreMl, Self::DirectMl];
+
+    fn named(name: &str) -> Option<Self> {
+        let all = [Self::Cuda, Self::TensorRt, Self::CoreMl, Self::DirectMl];
+        all.into_iter().find(|d| d.text().replace(' ', "").eq_ignore_ascii_case(name))
+    }
+
+    fn text(self) -> &'static str {
+        match self {
+            Self::Cuda => "CUDA",
+            Self::TensorRt => "TensorRT",
+            Self::CoreMl => "Core ML",
+            Self::DirectMl => "DirectML",
+        }
+    }
+
+    fn is_offered(self) -> bool {
+        let offered = match self {
+            Self::Cuda => CUDA::is_available(),
+            Self::TensorRt => TensorRT::is_available(),
+            Self::CoreMl => CoreML::is_available(),
+            Self::DirectMl => DirectML::is_available(),
+        };
+        offered.unwrap_or(false)
+    }
+
+    fn provider(self) -> ExecutionProviderDispatch {
+        match self {
+            Self::Cuda => CUDA::default().build(),
+            Self::TensorRt => TensorRT::default().build(),
+            Self::CoreMl => CoreML::default().build(),
+            Self::DirectMl => DirectML::default().build(),
+        }
+        .error_on_failure()
+    }
 }
 
 static CHOSEN: OnceLock<Result<Engine, (String, String)>> = OnceLock::new();
@@ -32,32 +85,76 @@ pub fn engine() -> Result<&'static Engine, ModelError> {
 
 /// Where an ONNX Runtime library is, or is said to be.
 fn library() -> Option<PathBuf> {
-    if let Some(path) = std::env::var_os("ORT_DYLIB_PATH").filter(|p| !p.is_empty()) {
-        return Some(path.into());
+    let var = |name: &str| std::env::var_os(name).filter(|p| !p.is_empty()).map(PathBuf::from);
+    if let Some(path) = var("FMLGS_ONNXRUNTIME").or_else(|| var("ORT_DYLIB_PATH")) {
+        // An explicit "none" keeps the built-in engine, whatever is installed.
+        return Some(path).filter(|p| p.as_os_str() != "none");
     }
-    let file = format!("{}onnxruntime{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
-    Some(std::env::current_exe().ok()?.parent()?.join(file)).filter(|p| p.is_file())
+    let own = std::env::current_exe().ok().and_then(|p| p.parent().map(Path::to_path_buf));
+    let wheels = ["VIRTUAL_ENV", "CONDA_PREFIX"].into_iter().filter_map(var).flat_map(|p| wheel_folders(&p));
+    let system =
+        ["/usr/local/lib", "/usr/lib", "/usr/lib/x86_64-linux-gnu", "/usr/lib/aarch64-linux-gnu", "/opt/homebrew/lib"];
+    let folders = own.into_iter().chain(wheels).chain(system.map(PathBuf::from));
+    folders.filter_map(|folder| library_in(&folder)).next()
+}
+
+/// Where a Python environment keeps the library of its `onnxruntime` package.
+fn wheel_folders(environment: &Path) -> Vec<PathBuf> {
+    let inside = |site: PathBuf| site.join("site-packages").join("onnxruntime").join("capi");
+    let pythons = std::fs::read_dir(environment.join("lib")).into_iter().flatten().flatten().map(|e| e.path());
+    let pythons = pythons.filter(|p| p.file_name().is_some_and(|n| n.to_string_lossy().starts_with("python")));
+    pythons.map(inside).chain([inside(environment.join("Lib"))]).collect()
+}
+
+/// The library in a folder: by its plain name, or with a version as in wheels.
+fn library_in(folder: &Path) -> Option<PathBuf> {
+    let plain = format!("{}onnxruntime{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+    let exact = folder.join(&plain);
+    if exact.is_file() {
+        return Some(exact);
+    }
+    let versioned = |name: &str| {
+        name.starts_with(&format!("{plain}.")) || (name.starts_with("libonnxruntime.") && name.ends_with(".dylib"))
+    };
+    let mut found: Vec<PathBuf> = std::fs::read_dir(folder).ok()?.flatten().map(|e| e.path()).collect();
+    found.retain(|p| p.file_name().is_some_and(|n| versioned(&n.to_string_lossy())));
+    found.sort();
+    found.pop()
 }
 
 impl Engine {
     fn choose(library: Option<PathBuf>) -> Result<Self, (String, String)> {
         let mut note = None;
-        let (builder, name) = match library.map(|path| (loaded(&path), path)) {
-            Some((Ok(builder), path)) => (builder, format!("ONNX Runtime ({})", path.display())),
+        let (builder, name, is_runtime) = match library.map(|path| (loaded(&path), path)) {
+            Some((Ok(builder), path)) => (builder, format!("ONNX Runtime ({})", path.display()), true),
             other => {
                 if let Some((Err(problem), path)) = other {
                     note = Some(format!(
                         "the built-in engine runs the models, because the ONNX Runtime library {} is of no use: \
-                         {problem}; unset ORT_DYLIB_PATH or set it to a library of version 1.24 or later",
+                         {problem}; set FMLGS_ONNXRUNTIME to a library of version 1.24 or later, or to 'none'",
                         path.display()
                     ));
                 }
                 ort::set_api(ort_tract::api());
-                (ort::init(), "tract (built in)".to_owned())
+                (ort::init(), "tract (built in)".to_owned(), false)
             }
         };
         let environment = builder.build().map_err(|e| (name.clone(), e.to_string()))?;
-        Ok(Self { environment, name, note })
+        let wanted = std::env::var("FMLGS_DEVICE").unwrap_or_default();
+        let device = match (is_runtime, wanted.as_str()) {
+            (false, _) | (true, "cpu") => None,
+            (true, "") => Device::TRIED.into_iter().find(|d| d.is_offered()),
+            (true, name) => {
+                let device = Device::named(name).filter(|d| d.is_offered());
+                if device.is_none() {
+                    note = Some(format!(
+                        "FMLGS_DEVICE is '{name}', which this ONNX Runtime does not offer; the processor computes"
+                    ));
+                }
+                device
+            }
+        };
+        Ok(Self { environment, name, device, note })
     }
 
     /// Which engine it is, for people.
@@ -65,20 +162,54 @@ impl Engine {
         &self.name
     }
 
-    /// Why a library that was named is not used.
+    /// What it computes on, for people.
+    pub fn device(&self) -> &'static str {
+        self.device.map_or("processor", Device::text)
+    }
+
+    /// What was asked for but is not so.
     pub fn note(&self) -> Option<&str> {
         self.note.as_deref()
     }
 
-    /// Prepares a network.
+    /// Prepares a network that is in memory.
+    ///
+    /// # Errors
+    /// If it is no network, or one that this engine cannot run.
     pub fn load(&self, bytes: &[u8], name: &str) -> Result<Network, ModelError> {
-        // Not asked to optimise, the built-in engine prepares nothing and is ten times slower.
-        let load = || -> ort::Result<Session> {
+        self.prepare(name, |builder| builder.commit_from_memory(bytes))
+    }
+
+    /// Prepares a network in a file.
+    ///
+    /// # Errors
+    /// If it is no network, or one that this engine cannot run.
+    pub fn load_file(&self, path: &Path) -> Result<Network, ModelError> {
+        self.prepare(&path.display().to_string(), |builder| builder.commit_from_file(path))
+    }
+
+    fn prepare(
+        &self,
+        name: &str,
+        commit: impl Fn(&mut ort::session::builder::SessionBuilder) -> ort::Result<Session>,
+    ) -> Result<Network, ModelError> {
+        let load = |device: Option<Device>| -> ort::Result<Session> {
             let builder = Session::builder(&self.environment)?;
-            builder.with_optimization_level(GraphOptimizationLevel::Level3)?.commit_from_memory(bytes)
+            // Not asked to optimise, the built-in engine prepares nothing and is ten times slower.
+            let mut builder = builder.with_optimization_level(GraphOptimizationLevel::Level3)?;
+            if let Some(device) = device {
+                builder = builder.with_execution_providers([device.provider()])?;
+            }
+            commit(&mut builder)
         };
-        let session = load().map_err(|e| ModelError::Load { model: name.into(), problem: e.to_string() })?;
-        Ok(Network { session, name: name.into() })
+        // A device that refuses a network is no reason to do without it.
+        let session = match self.device {
+            Some(device) => load(Some(device)).or_else(|_| load(None)),
+            None => load(None),
+        };
+        let engine = if self.name.starts_with("tract") { "built-in" } else { "ONNX Runtime" };
+        let session = session.map_err(|e| ModelError::Load { model: name.into(), engine, problem: e.to_string() })?;
+        Ok(Network::new(session, name))
     }
 }
 
@@ -91,67 +222,44 @@ fn loaded(path: &Path) -> Result<ort::environment::EnvironmentBuilder, String> {
     ort::init_from(path).map_err(|e| e.to_string())
 }
 
-/// A network that takes one input and gives one vector.
-pub struct Network {
-    session: Session,
-    name: String,
-}
-
-impl Network {
-    /// Runs it on an input of this shape; `length` numbers are expected, scaled to unit length.
-    pub fn unit_vector<T>(&mut self, shape: Vec<i64>, input: Vec<T>, length: usize) -> Result<Vec<f32>, ModelError>
-    where
-        T: ort::value::PrimitiveTensorElementType + std::fmt::Debug + Clone + 'static,
-    {
-        let name = self.name.clone();
-        let failed = |e: ort::Error| ModelError::Run { model: name.clone(), problem: e.to_string() };
-        let tensor = Tensor::from_array((shape, input)).map_err(failed)?;
-        let outputs = self.session.run(ort::inputs![tensor]).map_err(failed)?;
-        let (_, values) = outputs[0].try_extract_tensor::<f32>().map_err(failed)?;
-        unit(values, length, &self.name)
-    }
-}
-
-/// Values scaled to unit length, if they are numbers and have a direction.
-fn unit(values: &[f32], length: usize, name: &str) -> Result<Vec<f32>, ModelError> {
-    if values.len() != length {
-        return Err(ModelError::Output { model: name.into(), expected: length, got: values.len() });
-    }
-    if let Some(index) = values.iter().position(|v| !v.is_finite()) {
-        return Err(ModelError::NotFinite { model: name.into(), index, value: values[index] });
-    }
-    // A vector this short has no direction but that of rounding.
-    let zero = values.iter().all(|v| v.abs() < 1e-7);
-    let unit = crate::math::vector::unit(values).filter(|_| !zero);
-    unit.ok_or(ModelError::NotFinite { model: name.into(), index: 0, value: 0.0 })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn vectors_are_checked() {
-        assert_eq!(unit(&[3.0, 4.0], 2, "m").expect("sound"), [0.6, 0.8]);
-        let huge = unit(&[1e30, 1e30], 2, "m").expect("large numbers are no harm");
-        assert!((huge[0] - std::f32::consts::FRAC_1_SQRT_2).abs() < 1e-6);
-        assert!(matches!(unit(&[1.0], 2, "m"), Err(ModelError::Output { expected: 2, got: 1, .. })));
-        assert!(matches!(unit(&[1.0, f32::NAN], 2, "m"), Err(ModelError::NotFinite { index: 1, .. })));
-        assert!(matches!(unit(&[f32::INFINITY, 1.0], 2, "m"), Err(ModelError::NotFinite { index: 0, .. })));
-        assert!(matches!(unit(&[0.0, 0.0], 2, "m"), Err(ModelError::NotFinite { .. })));
-    }
-
-    #[test]
     fn an_engine_starts_and_refuses_what_is_no_model() {
         let engine = engine().expect("an engine");
-        assert!(!engine.name().is_empty());
-        let refused = engine.load(b"not a model", "x.onnx");
-        assert!(matches!(refused, Err(ModelError::Load { .. })));
+        assert!(!engine.name().is_empty() && !engine.device().is_empty());
+        assert!(matches!(engine.load(b"not a model", "x.onnx"), Err(ModelError::Load { .. })));
+        let missing = engine.load_file(Path::new("/nowhere/x.onnx"));
+        assert!(matches!(missing, Err(ModelError::Load { model, .. }) if model.contains("x.onnx")));
     }
 
     #[test]
     fn a_library_that_is_not_there_is_refused() {
         let problem = loaded(Path::new("/nowhere/libonnxruntime.so")).err().expect("an error");
         assert!(problem.contains("no such file"), "{problem}");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn libraries_are_found_by_their_plain_name_and_inside_wheels() {
+        let root = tempfile::tempdir().expect("folder");
+        let capi = root.path().join("lib/python3.11/site-packages/onnxruntime/capi");
+        std::fs::create_dir_all(&capi).expect("made");
+        assert_eq!(wheel_folders(root.path())[0], capi);
+        assert_eq!(library_in(&capi), None);
+        for name in ["libonnxruntime.so.1.24.1", "libonnxruntime.so.1.25.0", "libonnxruntime_providers_shared.so"] {
+            std::fs::write(capi.join(name), "").expect("written");
+        }
+        assert_eq!(library_in(&capi), Some(capi.join("libonnxruntime.so.1.25.0")));
+        std::fs::write(capi.join("libonnxruntime.so"), "").expect("written");
+        assert_eq!(library_in(&capi), Some(capi.join("libonnxruntime.so")));
+    }
+
+    #[test]
+    fn devices_have_names() {
+        assert_eq!((Device::named("cuda"), Device::named("CoreML")), (Some(Device::Cuda), Some(Device::CoreMl)));
+        assert_eq!(Device::named("abacus"), None);
     }
 }

@@ -17,10 +17,15 @@ pub enum ModelError {
         problem: String,
     },
     /// A network cannot be loaded.
-    #[error("cannot load the model {model}: {problem}; the file is damaged or made for another version")]
+    #[error(
+        "the {engine} engine cannot load the model {model}: {problem}; the file is damaged, or it needs {}",
+        if *engine == "built-in" { "ONNX Runtime (set FMLGS_ONNXRUNTIME to its library)" } else { "a newer ONNX Runtime" }
+    )]
     Load {
         /// Its file name.
         model: String,
+        /// Which engine.
+        engine: &'static str,
         /// What the engine says.
         problem: String,
     },
@@ -51,6 +56,28 @@ pub enum ModelError {
         index: usize,
         /// What.
         value: f32,
+    },
+    /// An output that is not there.
+    #[error("the model {model} has no output '{output}'; the file is made for another version")]
+    NoOutput {
+        /// Its file name.
+        model: String,
+        /// The output.
+        output: String,
+    },
+    /// Nothing to look at.
+    #[error("the picture has no pixels, or no picture was looked at yet")]
+    NoPicture,
+    /// Nothing to follow.
+    #[error("no object is marked in any frame")]
+    NothingMarked,
+    /// A description of a model that does not fit.
+    #[error("{path}: {problem}")]
+    Metadata {
+        /// The file.
+        path: std::path::PathBuf,
+        /// What is wrong.
+        problem: String,
     },
     /// A word list that does not say what it must.
     #[error("the word list {file} is damaged: {problem}")]

@@ -3,9 +3,16 @@
 //! A network is an ONNX file, run by [`engine`]. [`Encoder`] is what the rest of the program sees of
 //! it; [`DemoEncoder`] is the small one that comes with the program (made by `tools/encoder`).
 
+pub mod clip;
 mod demo;
 pub mod engine;
 mod error;
+pub mod fetch;
+pub mod metadata;
+pub mod network;
+pub mod prepare;
+pub mod sam;
+pub mod sam2;
 mod tile;
 mod words;
 
@@ -29,11 +36,17 @@ pub trait Encoder: Send {
     /// Length of its vectors.
     fn dimension(&self) -> usize;
 
-    /// Side of the tiles it takes, px.
-    fn tile_side_px(&self) -> usize;
+    /// Side of the tiles it takes, px; `None` if it resizes them itself.
+    fn tile_side_px(&self) -> Option<usize>;
 
-    /// The vector of a picture; of unit length.
-    fn image(&mut self, tile: &Tile) -> Result<Vec<f32>, ModelError>;
+    /// The vectors of pictures; of unit length.
+    fn images(&mut self, tiles: &[Tile]) -> Result<Vec<Vec<f32>>, ModelError>;
+
+    /// The vector of one picture.
+    fn image(&mut self, tile: &Tile) -> Result<Vec<f32>, ModelError> {
+        let mut one = self.images(std::slice::from_ref(tile))?;
+        one.pop().ok_or_else(|| ModelError::NoOutput { model: self.name().to_owned(), output: "embedding".into() })
+    }
 
     /// The vector of a phrase; of unit length. Words it does not know are left out; a phrase with
     /// no other words is an error ([`ModelError::NoKnownWord`]).

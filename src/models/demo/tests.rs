@@ -68,7 +68,7 @@ fn distance(a: &[f32], b: &[f32]) -> f32 {
 #[test]
 fn vectors_are_those_of_training() {
     let mut encoder = DemoEncoder::new().unwrap();
-    assert_eq!((encoder.name(), encoder.tile_side_px()), ("demo", 64));
+    assert_eq!((encoder.name(), encoder.tile_side_px()), ("demo", Some(64)));
     let golden = golden();
     let (_, tiles) = held_out();
     assert!(golden.text.len() >= 3 && golden.image.len() >= 2);

@@ -1,6 +1,6 @@
 //! Language features of identities: an encoder looks at each in the photos that show it best.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::time::Instant;
 
 use super::relevancy::{PART_WEIGHT, deviate};
@@ -80,11 +80,15 @@ pub fn embed(
         let pixels = io::photo::load(&photos[*photo], MAX_SIDE_PX)?;
         let view = looker.draw(&photos[*photo], MAX_SIDE_PX)?;
         let mut eye = Eye { rgb: to_float(&pixels), view, identities: &map.identities, looked: HashMap::new() };
-        for &id in &wanted[photo] {
-            let Some(raw) = eye.look(id, encoder)? else { continue };
+        let whole_of = |id: IdentityId| {
             let whole = map.identities.object_of(id);
-            let is_part = map.identities.get(id).is_some_and(|i| i.level == Level::Part) && whole != id;
-            let whole = if is_part { eye.look(whole, encoder)? } else { None };
+            let is_part = map.identities.get(id).is_some_and(|i| i.level == Level::Part);
+            Some(whole).filter(|whole| is_part && *whole != id)
+        };
+        eye.look(wanted[photo].iter().flat_map(|id| [Some(*id), whole_of(*id)]).flatten(), encoder)?;
+        for &id in &wanted[photo] {
+            let Some(raw) = eye.seen(id) else { continue };
+            let whole = whole_of(id).and_then(|whole| eye.seen(whole));
             let deviated = whole.and_then(|whole| deviate(&raw, &whole, PART_WEIGHT)).unwrap_or_else(|| raw.clone());
             let features = &mut of[id as usize - 1];
             features.raw.push(raw);
@@ -116,21 +120,26 @@ struct Eye<'a> {
     rgb: Vec<[f32; 3]>,
     view: ViewMap,
     identities: &'a Identities,
-    looked: HashMap<IdentityId, Option<Vec<f32>>>,
+    looked: HashMap<IdentityId, Vec<f32>>,
 }
 
 impl Eye<'_> {
-    fn look(&mut self, id: IdentityId, encoder: &mut dyn Encoder) -> Result<Option<Vec<f32>>, ModelError> {
-        if let Some(known) = self.looked.get(&id) {
-            return Ok(known.clone());
-        }
-        let mask: Mask = self.view.mask(self.identities, id);
-        let made = match Tile::cut(&self.rgb, &mask, encoder.tile_side_px()) {
-            Some(tile) => Some(encoder.image(&tile)?),
-            None => None,
+    /// Looks at these identities, all together.
+    fn look(&mut self, ids: impl Iterator<Item = IdentityId>, encoder: &mut dyn Encoder) -> Result<(), ModelError> {
+        let ids: BTreeSet<IdentityId> = ids.collect();
+        let tile = |id: &IdentityId| {
+            let mask: Mask = self.view.mask(self.identities, *id);
+            let own_side = mask.bounds().map_or(0, |b| b.x.len().max(b.y.len()));
+            Some((*id, Tile::cut(&self.rgb, &mask, encoder.tile_side_px().unwrap_or(own_side))?))
         };
-        self.looked.insert(id, made.clone());
-        Ok(made)
+        let (ids, tiles): (Vec<IdentityId>, Vec<Tile>) = ids.iter().filter_map(tile).unzip();
+        self.looked = ids.into_iter().zip(encoder.images(&tiles)?).collect();
+        Ok(())
+    }
+
+    /// What was made of one of them; `None` if nothing of it is seen.
+    fn seen(&self, id: IdentityId) -> Option<Vec<f32>> {
+        self.looked.get(&id).cloned()
     }
 }
 

@@ -1,6 +1,7 @@
 //! The objects and parts of the scene, as a tree; a click asks for one.
 
-use egui::{Button, CollapsingHeader, Color32, Id, Key, RichText, ScrollArea, TextEdit, Ui, vec2};
+use egui::collapsing_header::CollapsingState;
+use egui::{Button, Color32, Id, Key, RichText, ScrollArea, TextEdit, Ui, vec2};
 
 use super::super::state::AppState;
 use super::super::theme;
@@ -60,12 +61,9 @@ impl Tree<'_> {
         if pieces.is_empty() {
             return self.leaf(ui, id, actions);
         }
-        CollapsingHeader::new(self.identities.name(id)).id_salt(id).show(ui, |ui| {
-            self.leaf(ui, id, actions);
-            for piece in pieces {
-                self.branch(ui, piece, actions);
-            }
-        });
+        let state = CollapsingState::load_with_default_open(ui.ctx(), Id::unique("branch").with(id), false);
+        let header = state.show_header(ui, |ui| self.leaf(ui, id, actions));
+        header.body(|ui| pieces.into_iter().for_each(|piece| self.branch(ui, piece, actions)));
     }
 
     fn leaf(&self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {

@@ -1,0 +1,179 @@
+//! CLIP and its relatives: pictures and phrases as vectors of one space, by two networks that
+//! `tools/export/export_clip.py` makes of an official checkpoint.
+
+pub mod tokens;
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use self::tokens::Tokens;
+use super::engine::engine;
+use super::network::{Array, Network};
+use super::prepare::{Filter, Prepare, Side};
+use super::{Encoder, ModelError, Tile, metadata};
+use crate::scene::PhotoPixels;
+
+/// Tiles that go through the network together.
+const BATCH: usize = 8;
+
+/// What the metadata file says.
+#[derive(Clone, Debug, Deserialize)]
+struct Metadata {
+    name: String,
+    embed_dim: usize,
+    image_size: [usize; 2],
+    mean: [f32; 3],
+    std: [f32; 3],
+    interpolation: String,
+    resize_mode: String,
+    context_length: usize,
+    vocab_size: usize,
+    tokenizer: TokenizerKind,
+    graphs: Graphs,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+struct TokenizerKind {
+    kind: String,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+struct Graphs {
+    image: metadata::Graph,
+    text: metadata::Graph,
+}
+
+/// Tokens that CLIP's own vocabulary has.
+const VOCABULARY: usize = 49_408;
+
+/// A CLIP with its networks, each prepared when it is first needed.
+pub struct ClipEncoder {
+    folder: PathBuf,
+    about: Metadata,
+    prepare: Prepare,
+    tokens: Tokens,
+    image: Option<Network>,
+    text: Option<Network>,
+}
+
+impl ClipEncoder {
+    /// The model that a metadata file describes; its graphs lie beside it.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or describes what this program cannot do.
+    pub fn open(path: &Path) -> Result<Self, ModelError> {
+        let about: Metadata = metadata::read(path, "clip")?;
+        let refused = |problem: String| ModelError::Metadata { path: path.into(), problem };
+        let [height, width] = about.image_size;
+        if height != width {
+            return Err(refused(format!("pictures of {width} x {height} px; only square ones are supported")));
+        }
+        if about.tokenizer.kind != "clip-bpe" || about.vocab_size > VOCABULARY {
+            return Err(refused(format!(
+                "its tokeniser is '{}' with {} tokens; only CLIP's own (clip-bpe) is built in",
+                about.tokenizer.kind, about.vocab_size
+            )));
+        }
+        let filter = Filter::named(&about.interpolation)
+            .ok_or_else(|| refused(format!("interpolation '{}' is not known", about.interpolation)))?;
+        let side = match about.resize_mode.as_str() {
+            "shortest" => Side::Shorter,
+            "squash" => Side::Both,
+            other => return Err(refused(format!("resize mode '{other}' is not known; there is: shortest, squash"))),
+        };
+        let prepare = Prepare { side_px: width, filter, side, mean: about.mean, std: about.std };
+        let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+        let tokens = Tokens::new(about.context_length);
+        Ok(Self { folder, about, prepare, tokens, image: None, text: None })
+    }
+
+    /// How pictures are prepared for it.
+    pub fn prepare(&self) -> &Prepare {
+        &self.prepare
+    }
+
+    /// Embeddings of prepared pictures `[n, 3, S, S]`, of unit length.
+    ///
+    /// # Errors
+    /// If the network cannot be loaded, or fails.
+    pub fn embed_pixels(&mut self, pixels: Array) -> Result<Vec<Vec<f32>>, ModelError> {
+        let network = ready(&mut self.image, &self.folder, &self.about.graphs.image)?;
+        network.unit_rows(vec![("pixels", pixels.into())], "embedding", self.about.embed_dim)
+    }
+
+    /// Embeddings of rows of tokens, of unit length.
+    ///
+    /// # Errors
+    /// If the network cannot be loaded, or fails.
+    pub fn embed_tokens(&mut self, tokens: Array<i64>) -> Result<Vec<Vec<f32>>, ModelError> {
+        let network = ready(&mut self.text, &self.folder, &self.about.graphs.text)?;
+        network.unit_rows(vec![("tokens", tokens.into())], "embedding", self.about.embed_dim)
+    }
+}
+
+fn ready<'a>(
+    slot: &'a mut Option<Network>,
+    folder: &Path,
+    graph: &metadata::Graph,
+) -> Result<&'a mut Network, ModelError> {
+    if slot.is_none() {
+        *slot = Some(engine()?.load_file(&folder.join(&graph.file))?);
+    }
+    slot.as_mut().ok_or_else(|| ModelError::NoOutput { model: graph.file.clone(), output: "session".into() })
+}
+
+impl Encoder for ClipEncoder {
+    fn name(&self) -> &str {
+        &self.about.name
+    }
+
+    fn dimension(&self) -> usize {
+        self.about.embed_dim
+    }
+
+    fn tile_side_px(&self) -> Option<usize> {
+        None
+    }
+
+    fn images(&mut self, tiles: &[Tile]) -> Result<Vec<Vec<f32>>, ModelError> {
+        let mut all = Vec::with_capacity(tiles.len());
+        for batch in tiles.chunks(BATCH) {
+            let pixels: Result<Vec<Array>, ModelError> =
+                batch.iter().map(|tile| self.prepare.picture(&picture(tile)?).ok_or(tile_error(tile))).collect();
+            all.extend(self.embed_pixels(Array::joined(&pixels?))?);
+        }
+        Ok(all)
+    }
+
+    fn text(&mut self, phrase: &str) -> Result<Vec<f32>, ModelError> {
+        if !phrase.chars().any(char::is_alphanumeric) {
+            return Err(ModelError::NoKnownWord { unknown: Vec::new() });
+        }
+        let row = self.tokens.row(phrase);
+        let mut rows = self.embed_tokens(Array::new(&[1, row.len()], row))?;
+        rows.pop().ok_or(ModelError::NoKnownWord { unknown: Vec::new() })
+    }
+
+    fn unknown_words(&self, _: &str) -> Vec<String> {
+        // Its tokens spell every word.
+        Vec::new()
+    }
+}
+
+fn tile_error(tile: &Tile) -> ModelError {
+    ModelError::TileSize { side_px: tile.side_px, pixels: tile.rgb.len(), expected_px: tile.side_px }
+}
+
+/// A tile as bytes.
+fn picture(tile: &Tile) -> Result<PhotoPixels, ModelError> {
+    if tile.rgb.len() != tile.side_px * tile.side_px {
+        return Err(tile_error(tile));
+    }
+    if let Some(pixel) = tile.rgb.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
+        return Err(ModelError::TileColor { pixel });
+    }
+    let side = tile.side_px as u32;
+    let rgb = tile.rgb.iter().map(|p| p.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8)).collect();
+    Ok(PhotoPixels { width_px: side, height_px: side, rgb, coverage: None })
+}

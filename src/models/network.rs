@@ -1,0 +1,202 @@
+//! A network: named arrays in, named arrays out.
+
+use std::collections::BTreeMap;
+
+use ort::session::{Session, SessionInputValue};
+use ort::value::Tensor;
+
+use super::ModelError;
+
+/// Numbers with a shape, row-major.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Array<T = f32> {
+    /// Length of each axis.
+    pub shape: Vec<usize>,
+    /// As many numbers as the axes' product.
+    pub values: Vec<T>,
+}
+
+impl<T: Clone> Array<T> {
+    /// An array; its numbers have to fill its shape.
+    pub fn new(shape: &[usize], values: Vec<T>) -> Self {
+        debug_assert_eq!(shape.iter().product::<usize>(), values.len(), "{shape:?}");
+        Self { shape: shape.to_vec(), values }
+    }
+
+    /// The same number everywhere.
+    pub fn filled(shape: &[usize], value: T) -> Self {
+        Self { shape: shape.to_vec(), values: vec![value; shape.iter().product()] }
+    }
+
+    /// Arrays of one shape one after another along their first axis.
+    pub fn joined<'a>(parts: impl IntoIterator<Item = &'a Self>) -> Self
+    where
+        T: 'a,
+    {
+        let mut joined: Option<Self> = None;
+        for part in parts {
+            match &mut joined {
+                None => joined = Some(part.clone()),
+                Some(all) => {
+                    all.shape[0] += part.shape[0];
+                    all.values.extend_from_slice(&part.values);
+                }
+            }
+        }
+        joined.unwrap_or_else(|| Self { shape: vec![0], values: Vec::new() })
+    }
+
+    /// The `i`-th piece along the first axis, which stays, with length 1.
+    pub fn row(&self, i: usize) -> Self {
+        let n = self.values.len() / self.shape[0].max(1);
+        let mut shape = self.shape.clone();
+        shape[0] = 1;
+        Self { shape, values: self.values[i * n..(i + 1) * n].to_vec() }
+    }
+}
+
+/// What goes into a network.
+pub enum Input {
+    /// Floating-point numbers.
+    Floats(Array<f32>),
+    /// Whole numbers.
+    Ints(Array<i64>),
+}
+
+impl From<Array<f32>> for Input {
+    fn from(array: Array<f32>) -> Self {
+        Self::Floats(array)
+    }
+}
+
+impl From<&Array<f32>> for Input {
+    fn from(array: &Array<f32>) -> Self {
+        Self::Floats(array.clone())
+    }
+}
+
+impl From<Array<i64>> for Input {
+    fn from(array: Array<i64>) -> Self {
+        Self::Ints(array)
+    }
+}
+
+/// What comes out of a network, by name.
+#[derive(Clone, Debug, Default)]
+pub struct Outputs {
+    model: String,
+    arrays: BTreeMap<String, Array<f32>>,
+}
+
+impl Outputs {
+    /// Takes an output.
+    ///
+    /// # Errors
+    /// If there is none of that name.
+    pub fn take(&mut self, name: &str) -> Result<Array<f32>, ModelError> {
+        self.arrays.remove(name).ok_or_else(|| ModelError::NoOutput { model: self.model.clone(), output: name.into() })
+    }
+}
+
+/// A network that is ready to run.
+pub struct Network {
+    session: Session,
+    name: String,
+}
+
+impl Network {
+    /// Of a session, with the file name for messages.
+    pub(super) fn new(session: Session, name: &str) -> Self {
+        Self { session, name: name.into() }
+    }
+
+    /// Its file's name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Runs it. Every number that comes out is finite.
+    ///
+    /// # Errors
+    /// If the engine fails, an input is missing or of another shape, or an output is not finite.
+    pub fn run(&mut self, inputs: Vec<(&'static str, Input)>) -> Result<Outputs, ModelError> {
+        let name = self.name.clone();
+        let failed = |e: ort::Error| ModelError::Run { model: name.clone(), problem: e.to_string() };
+        let mut given: Vec<(&'static str, SessionInputValue<'_>)> = Vec::with_capacity(inputs.len());
+        for (input, value) in inputs {
+            let value: SessionInputValue<'_> = match value {
+                Input::Floats(a) => tensor(a).map_err(failed)?,
+                Input::Ints(a) => tensor(a).map_err(failed)?,
+            };
+            given.push((input, value));
+        }
+        let outputs = self.session.run(given).map_err(failed)?;
+        let mut arrays = BTreeMap::new();
+        for (output, value) in outputs.iter() {
+            let (shape, values) = value.try_extract_tensor::<f32>().map_err(failed)?;
+            if let Some(index) = values.iter().position(|v| !v.is_finite()) {
+                return Err(ModelError::NotFinite { model: name.clone(), index, value: values[index] });
+            }
+            let shape = shape.iter().map(|n| usize::try_from(*n).unwrap_or(0)).collect();
+            arrays.insert(output.to_owned(), Array { shape, values: values.to_vec() });
+        }
+        Ok(Outputs { model: name.clone(), arrays })
+    }
+
+    /// The rows of an output, each scaled to unit length; `length` numbers in each are expected.
+    ///
+    /// # Errors
+    /// As [`Self::run`]; and if rows are of another length, or have no direction.
+    pub fn unit_rows(
+        &mut self,
+        inputs: Vec<(&'static str, Input)>,
+        output: &str,
+        length: usize,
+    ) -> Result<Vec<Vec<f32>>, ModelError> {
+        let rows = self.run(inputs)?.take(output)?;
+        if length == 0 || rows.shape.last() != Some(&length) {
+            let got = rows.shape.last().copied().unwrap_or(0);
+            return Err(ModelError::Output { model: self.name.clone(), expected: length, got });
+        }
+        rows.values.chunks_exact(length).map(|row| unit(row, &self.name)).collect()
+    }
+}
+
+fn tensor<T>(array: Array<T>) -> ort::Result<SessionInputValue<'static>>
+where
+    T: ort::value::PrimitiveTensorElementType + std::fmt::Debug + Clone + 'static,
+{
+    let shape: Vec<i64> = array.shape.iter().map(|n| *n as i64).collect();
+    Ok(SessionInputValue::from(Tensor::from_array((shape, array.values))?))
+}
+
+/// A row scaled to unit length, if it has a direction.
+fn unit(values: &[f32], name: &str) -> Result<Vec<f32>, ModelError> {
+    // A vector this short has no direction but that of rounding.
+    let zero = values.iter().all(|v| v.abs() < 1e-7);
+    let unit = crate::math::vector::unit(values).filter(|_| !zero);
+    unit.ok_or(ModelError::NotFinite { model: name.into(), index: 0, value: 0.0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_have_a_direction_or_are_refused() {
+        assert_eq!(unit(&[3.0, 4.0], "m").expect("sound"), [0.6, 0.8]);
+        let huge = unit(&[1e30, 1e30], "m").expect("large numbers are no harm");
+        assert!((huge[0] - std::f32::consts::FRAC_1_SQRT_2).abs() < 1e-6);
+        for bad in [[1.0, f32::NAN], [f32::INFINITY, 1.0], [0.0, 0.0], [1e-9, 0.0]] {
+            assert!(matches!(unit(&bad, "m"), Err(ModelError::NotFinite { .. })), "{bad:?}");
+        }
+    }
+
+    #[test]
+    fn arrays_join_and_part_along_their_first_axis() {
+        let (a, b) = (Array::new(&[1, 2], vec![1.0, 2.0]), Array::new(&[2, 2], vec![3.0, 4.0, 5.0, 6.0]));
+        let both = Array::joined([&a, &b]);
+        assert_eq!((both.shape.as_slice(), both.row(2)), ([3, 2].as_slice(), Array::new(&[1, 2], vec![5.0, 6.0])));
+        assert_eq!(Array::<f32>::joined([]).values.len(), 0);
+    }
+}

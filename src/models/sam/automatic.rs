@@ -1,0 +1,316 @@
+//! Masks of everything in a picture: a grid of points, on the whole picture and on crops of it, and
+//! of what the network answers that which it is sure of, which is stable, and which is not there
+//! already. As the official generators do it.
+
+use rayon::prelude::*;
+
+use super::PromptedMasks;
+use super::enlarge::enlarge;
+use crate::math::grid::regions;
+use crate::models::ModelError;
+use crate::models::network::Array;
+use crate::models::prepare::Side;
+use crate::scene::{Mask, PhotoPixels};
+
+/// Settings; the defaults are LangSplat's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AutomaticOptions {
+    /// Points along a side of the grid.
+    pub points_per_side: usize,
+    /// Points that go through the network together.
+    pub batch: usize,
+    /// Least predicted IoU; 0 = any.
+    pub predicted_iou: f32,
+    /// Least stability: IoU of the masks at logits of 1 and of -1; 0 = any.
+    pub stability: f32,
+    /// Overlap of boxes from which the worse of two masks is left out.
+    pub box_nms: f64,
+    /// Layers of crops besides the whole picture.
+    pub crop_layers: u32,
+    /// Points along a side of the grid are divided by this once per layer.
+    pub crop_point_divisor: usize,
+    /// Overlap of boxes from which masks of larger crops are left out.
+    pub crop_nms: f64,
+    /// Holes and islands smaller than this are filled and removed; 0 = none. In px of the picture
+    /// for SAM, of the low-resolution masks for SAM 2.
+    pub least_region_px: usize,
+}
+
+impl Default for AutomaticOptions {
+    fn default() -> Self {
+        Self {
+            points_per_side: 32,
+            batch: 64,
+            predicted_iou: 0.7,
+            stability: 0.85,
+            box_nms: 0.7,
+            crop_layers: 1,
+            crop_point_divisor: 1,
+            crop_nms: 0.7,
+            least_region_px: 100,
+        }
+    }
+}
+
+/// Shift of the threshold that stability is measured with, logits.
+const OFFSET: f32 = 1.0;
+/// How near to a crop's edge a box must be to be cut off by it, px.
+const EDGE_PX: f64 = 20.0;
+/// Overlap of crops, as a share of the shorter side.
+const CROP_OVERLAP: f64 = 512.0 / 1500.0;
+
+/// A mask of something in the picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Something {
+    /// Its pixels.
+    pub mask: Mask,
+    /// Left, top, right and bottom pixel.
+    pub bounds: [f64; 4],
+    /// The network's estimate of its IoU.
+    pub predicted_iou: f32,
+    /// How little it depends on the threshold, 0 to 1.
+    pub stability: f32,
+    /// The point that found it, px.
+    pub point: [f64; 2],
+    /// The crop in which it was found: left, top, right, bottom.
+    pub crop: [usize; 4],
+}
+
+/// The crops of a picture: the whole, then those of each layer.
+pub fn crops(width: usize, height: usize, layers: u32) -> Vec<([usize; 4], u32)> {
+    let mut boxes = vec![([0, 0, width, height], 0)];
+    for layer in 1..=layers {
+        let side = 1_usize << layer;
+        let shared = (CROP_OVERLAP * width.min(height) as f64 * (2.0 / side as f64)) as usize;
+        let of = |size: usize| (shared * (side - 1) + size).div_ceil(side);
+        let (w, h) = (of(width), of(height));
+        for i in 0..side {
+            for j in 0..side {
+                let (x, y) = (i * (w - shared), j * (h - shared));
+                boxes.push(([x, y, (x + w).min(width), (y + h).min(height)], layer));
+            }
+        }
+    }
+    boxes
+}
+
+/// The points of a grid over the unit square, row by row.
+fn grid(per_side: usize) -> Vec<[f64; 2]> {
+    let at = |i: usize| (i as f64 + 0.5) / per_side as f64;
+    (0..per_side * per_side).map(|k| [at(k % per_side), at(k / per_side)]).collect()
+}
+
+/// Masks of everything in a picture, best first. `go_on` is told the share that is done, and says
+/// whether to go on; what was found until then is returned.
+///
+/// # Errors
+/// If the network fails.
+pub fn everything(
+    network: &mut dyn PromptedMasks,
+    picture: &PhotoPixels,
+    options: &AutomaticOptions,
+    go_on: &mut dyn FnMut(f64) -> bool,
+) -> Result<Vec<Something>, ModelError> {
+    let size = (picture.width_px as usize, picture.height_px as usize);
+    let boxes = crops(size.0, size.1, options.crop_layers);
+    let (side, fit) = (network.side_px(), network.fit());
+    let mut collector = Collector { size, side, fit, options, found: Vec::new() };
+    for (done, (crop, layer)) in boxes.iter().enumerate() {
+        let (w, h) = (crop[2] - crop[0], crop[3] - crop[1]);
+        network.look(&cut(picture, crop))?;
+        let per_side = (options.points_per_side / options.crop_point_divisor.max(1).pow(*layer)).max(1);
+        let points = grid(per_side);
+        let mut of_crop = Vec::new();
+        for (k, batch) in points.chunks(options.batch.max(1)).enumerate() {
+            let share = (done as f64 + (k * options.batch) as f64 / points.len() as f64) / boxes.len() as f64;
+            if !go_on(share) {
+                return Ok(collector.finish(boxes.len() > 1));
+            }
+            let scale = match fit {
+                // Whole pixels of the square, as the picture itself is resized.
+                Side::Longer => [w, h].map(|n| {
+                    let used = (n as f64 * side as f64 / w.max(h) as f64 + 0.5).floor();
+                    used / n as f64
+                }),
+                _ => [side as f64 / w as f64, side as f64 / h as f64],
+            };
+            // The point, and the empty one that marks the absence of a box.
+            let coords = batch
+                .iter()
+                .flat_map(|[x, y]| [(x * w as f64 * scale[0]) as f32, (y * h as f64 * scale[1]) as f32, 0.0, 0.0]);
+            let n = batch.len();
+            let coords = Array::new(&[n, 2, 2], coords.collect());
+            let labels = Array::new(&[n, 2], [1.0, -1.0].repeat(n));
+            let answer = network.masks(coords, labels, None)?;
+            // The three masks for ambiguous prompts.
+            let low = answer.masks.shape[3];
+            for (p, [x, y]) in batch.iter().enumerate() {
+                let at = |j: usize| 4 * p + 1 + j;
+                let planes: [&[f32]; 3] =
+                    std::array::from_fn(|j| &answer.masks.values[at(j) * low * low..(at(j) + 1) * low * low]);
+                let iou = std::array::from_fn(|j| answer.iou.values[at(j)]);
+                let point = [x * w as f64 + crop[0] as f64, y * h as f64 + crop[1] as f64];
+                of_crop.push((planes.map(<[f32]>::to_vec), iou, point));
+            }
+        }
+        collector.add_crop(*crop, &of_crop);
+    }
+    Ok(collector.finish(boxes.len() > 1))
+}
+
+/// A point's three planes of logits, their predicted IoU, and the point.
+pub type Answer = ([Vec<f32>; 3], [f32; 3], [f64; 2]);
+
+/// Keeps the good ones of what a network answers.
+pub struct Collector<'a> {
+    /// Size of the picture, px.
+    pub size: (usize, usize),
+    /// Side of the network's square, px.
+    pub side: usize,
+    /// How the picture lies in it.
+    pub fit: Side,
+    /// Settings.
+    pub options: &'a AutomaticOptions,
+    /// What is kept so far.
+    pub found: Vec<Something>,
+}
+
+impl Collector<'_> {
+    /// Takes the answers to the points of a crop.
+    pub fn add_crop(&mut self, crop: [usize; 4], answers: &[Answer]) {
+        let judged = answers.par_iter().flat_map_iter(|(planes, iou, point)| {
+            planes.iter().zip(iou).filter_map(|(plane, iou)| self.judge(plane, *iou, *point, crop)).collect::<Vec<_>>()
+        });
+        let found: Vec<Something> = judged.collect();
+        let boxes: Vec<[f64; 4]> = found.iter().map(|f| f.bounds).collect();
+        let scores: Vec<f32> = found.iter().map(|f| f.predicted_iou).collect();
+        let kept = suppress(&boxes, &scores, self.options.box_nms);
+        self.found.extend(kept.into_iter().map(|i| found[i].clone()));
+    }
+
+    fn judge(&self, plane: &[f32], iou: f32, point: [f64; 2], crop: [usize; 4]) -> Option<Something> {
+        let options = self.options;
+        if options.predicted_iou > 0.0 && !(iou > options.predicted_iou) {
+            return None;
+        }
+        let low = plane.len().isqrt();
+        let (w, h) = (crop[2] - crop[0], crop[3] - crop[1]);
+        // SAM 2 cleans before it enlarges.
+        let full = if self.fit == Side::Longer || options.least_region_px == 0 {
+            enlarge(plane, low, self.side, self.fit, (w, h))
+        } else {
+            enlarge(&cleaned_logits(plane, low, options.least_region_px), low, self.side, self.fit, (w, h))
+        };
+        let above = |threshold: f32| full.iter().filter(|v| **v > threshold).count();
+        let (inner, outer) = (above(OFFSET), above(-OFFSET));
+        let stability = inner as f32 / outer as f32;
+        if options.stability > 0.0 && !(stability >= options.stability) {
+            return None;
+        }
+        let inside = Mask::from_fn(w, h, |i| full[i] > 0.0);
+        let [x0, y0] = [crop[0], crop[1]];
+        let [l, t, r, b] = corners(&inside);
+        let bounds = [l + x0 as f64, t + y0 as f64, r + x0 as f64, b + y0 as f64];
+        let ends = [0, 0, self.size.0, self.size.1];
+        // Cut off by the crop, but not by the picture.
+        let cut_off =
+            |k: usize| (bounds[k] - crop[k] as f64).abs() <= EDGE_PX && (bounds[k] - ends[k] as f64).abs() > EDGE_PX;
+        if (0..4).any(cut_off) {
+            return None;
+        }
+        let mut mask = Mask::empty(self.size.0, self.size.1);
+        inside.pixels().for_each(|i| mask.insert((y0 + i / w) * self.size.0 + x0 + i % w));
+        Some(Something { mask, bounds, predicted_iou: iou, stability, point, crop })
+    }
+
+    /// What is left when crops are compared with one another and small regions are cleaned.
+    pub fn finish(self, with_crops: bool) -> Vec<Something> {
+        let Self { options, mut found, fit, .. } = self;
+        let boxes = |found: &[Something]| found.iter().map(|f| f.bounds).collect::<Vec<_>>();
+        if with_crops {
+            // Smaller crops see more.
+            let area = |f: &Something| ((f.crop[2] - f.crop[0]) * (f.crop[3] - f.crop[1])) as f32;
+            let scores: Vec<f32> = found.iter().map(|f| 1.0 / area(f)).collect();
+            found = suppress(&boxes(&found), &scores, options.crop_nms).into_iter().map(|i| found[i].clone()).collect();
+        }
+        if fit == Side::Longer && options.least_region_px > 0 {
+            let mut untouched = Vec::with_capacity(found.len());
+            for f in &mut found {
+                let (filled, changed) = cleaned(&f.mask, options.least_region_px, true);
+                let (removed, changed_again) = cleaned(&filled, options.least_region_px, false);
+                f.bounds = corners(&removed);
+                f.mask = removed;
+                untouched.push(if changed || changed_again { 0.0 } else { 1.0 });
+            }
+            let threshold = options.box_nms.max(options.crop_nms);
+            found = suppress(&boxes(&found), &untouched, threshold).into_iter().map(|i| found[i].clone()).collect();
+        }
+        found
+    }
+}
+
+/// Left, top, right and bottom pixel of a mask; zeros without any.
+fn corners(mask: &Mask) -> [f64; 4] {
+    mask.bounds().map_or([0.0; 4], |b| [b.x.start, b.y.start, b.x.end - 1, b.y.end - 1].map(|v| v as f64))
+}
+
+/// Indices of the boxes that are kept, best first (equal ones in their order): those that overlap
+/// with no better one by more than `threshold`.
+fn suppress(boxes: &[[f64; 4]], scores: &[f32], threshold: f64) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..boxes.len()).collect();
+    order.sort_by(|&a, &b| scores[b].total_cmp(&scores[a]));
+    let area = |b: &[f64; 4]| (b[2] - b[0]) * (b[3] - b[1]);
+    let overlap = |a: &[f64; 4], b: &[f64; 4]| {
+        let both = (a[2].min(b[2]) - a[0].max(b[0])).max(0.0) * (a[3].min(b[3]) - a[1].max(b[1])).max(0.0);
+        let all = area(a) + area(b) - both;
+        if all > 0.0 { both / all } else { 0.0 }
+    };
+    let mut kept: Vec<usize> = Vec::new();
+    for i in order {
+        if kept.iter().all(|&j| !(overlap(&boxes[i], &boxes[j]) > threshold)) {
+            kept.push(i);
+        }
+    }
+    kept
+}
+
+/// A mask with its small holes filled, or its small islands removed; whether anything changed. The
+/// largest island stays, however small.
+fn cleaned(mask: &Mask, least: usize, holes: bool) -> (Mask, bool) {
+    let (w, h) = (mask.width_px(), mask.height_px());
+    let (label, areas) = regions(w, w * h, |i| mask.contains(i) != holes);
+    if areas.iter().all(|a| *a >= least) {
+        return (mask.clone(), false);
+    }
+    // The first of the largest.
+    let largest = (0..areas.len()).rev().max_by_key(|k| areas[*k]);
+    let any_large = areas.iter().any(|a| *a >= least);
+    let stays = |k: usize| areas[k] >= least || (!holes && !any_large && Some(k) == largest);
+    let inside = |i: usize| match (label[i], holes) {
+        (0, holes) => holes,
+        (k, true) => !stays(k as usize - 1),
+        (k, false) => stays(k as usize - 1),
+    };
+    (Mask::from_fn(w, h, inside), true)
+}
+
+/// Logits whose holes of at most `most` px are inside, and whose islands of at most that are outside.
+fn cleaned_logits(plane: &[f32], low: usize, most: usize) -> Vec<f32> {
+    let mut out = plane.to_vec();
+    for (background, value) in [(true, 10.0), (false, -10.0)] {
+        let (label, areas) = regions(low, plane.len(), |i| (plane[i] <= 0.0) == background);
+        for (v, label) in out.iter_mut().zip(label) {
+            if label > 0 && areas[label as usize - 1] <= most {
+                *v = value;
+            }
+        }
+    }
+    out
+}
+
+fn cut(picture: &PhotoPixels, crop: &[usize; 4]) -> PhotoPixels {
+    let [x0, y0, x1, y1] = *crop;
+    let rows = picture.rgb.chunks_exact((picture.width_px as usize).max(1)).skip(y0).take(y1 - y0);
+    let rgb = rows.flat_map(|row| row[x0..x1].iter().copied()).collect();
+    PhotoPixels { width_px: (x1 - x0) as u32, height_px: (y1 - y0) as u32, rgb, coverage: None }
+}

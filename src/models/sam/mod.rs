@@ -1,0 +1,157 @@
+//! Segment Anything: masks of a picture from points, boxes and masks, and of everything in it.
+//!
+//! [`PromptedMasks`] is what SAM and SAM 2 have in common once a picture is encoded; [`automatic`]
+//! asks it for a grid of points and keeps what is good.
+
+pub mod automatic;
+pub mod enlarge;
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::engine::engine;
+use super::network::{Array, Network};
+use super::prepare::{Filter, Prepare, Side};
+use super::{ModelError, metadata};
+use crate::scene::PhotoPixels;
+
+/// Masks for a batch of prompts.
+pub struct Prompted {
+    /// Low-resolution logits, `[prompts, 4, S/4, S/4]`: one mask for unambiguous prompts, then three
+    /// of growing size for ambiguous ones.
+    pub masks: Array,
+    /// Predicted IoU of each, `[prompts, 4]`.
+    pub iou: Array,
+}
+
+/// A network that gives masks for prompts on the picture that it has looked at last.
+pub trait PromptedMasks {
+    /// Its name.
+    fn name(&self) -> &str;
+
+    /// Looks at a picture.
+    ///
+    /// # Errors
+    /// If the picture has no pixels or the network fails.
+    fn look(&mut self, picture: &PhotoPixels) -> Result<(), ModelError>;
+
+    /// Masks for points `[prompts, points, 2]` in px of the network's square, with labels
+    /// `[prompts, points]` (-1 none, 0 background, 1 foreground, 2 and 3 a box's corners).
+    ///
+    /// # Errors
+    /// If no picture was looked at, or the network fails.
+    fn masks(&mut self, points: Array, labels: Array, earlier: Option<Array>) -> Result<Prompted, ModelError>;
+
+    /// Side of the network's square, px.
+    fn side_px(&self) -> usize;
+
+    /// How a picture lies in that square.
+    fn fit(&self) -> Side;
+}
+
+#[derive(Clone, Debug, Deserialize)]
+struct Metadata {
+    name: String,
+    image_size: usize,
+    mean: [f32; 3],
+    std: [f32; 3],
+    graphs: Graphs,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+struct Graphs {
+    encoder: metadata::Graph,
+    decoder: metadata::Graph,
+}
+
+/// SAM of the first generation.
+pub struct Sam {
+    folder: PathBuf,
+    about: Metadata,
+    prepare: Prepare,
+    encoder: Option<Network>,
+    decoder: Option<Network>,
+    embeddings: Option<Array>,
+}
+
+impl Sam {
+    /// The model that a metadata file describes; its graphs lie beside it.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or describes another kind of model.
+    pub fn open(path: &Path) -> Result<Self, ModelError> {
+        let about: Metadata = metadata::read(path, "sam")?;
+        let Metadata { image_size, mean, std, .. } = about;
+        let prepare = Prepare { side_px: image_size, filter: Filter::Bilinear, side: Side::Longer, mean, std };
+        let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+        Ok(Self { folder, about, prepare, encoder: None, decoder: None, embeddings: None })
+    }
+
+    /// What the network made of the picture it looked at.
+    pub fn embeddings(&self) -> Option<&Array> {
+        self.embeddings.as_ref()
+    }
+}
+
+impl PromptedMasks for Sam {
+    fn name(&self) -> &str {
+        &self.about.name
+    }
+
+    fn look(&mut self, picture: &PhotoPixels) -> Result<(), ModelError> {
+        self.embeddings = None;
+        let image = self.prepare.picture(picture).ok_or(ModelError::NoPicture)?;
+        let encoder = ready(&mut self.encoder, &self.folder, &self.about.graphs.encoder)?;
+        self.embeddings = Some(encoder.run(vec![("image", image.into())])?.take("image_embeddings")?);
+        Ok(())
+    }
+
+    fn masks(&mut self, points: Array, labels: Array, earlier: Option<Array>) -> Result<Prompted, ModelError> {
+        let embeddings = self.embeddings.as_ref().ok_or(ModelError::NoPicture)?;
+        let decoder = ready(&mut self.decoder, &self.folder, &self.about.graphs.decoder)?;
+        let mut inputs = prompt_inputs(points, labels, earlier, self.about.image_size);
+        inputs.push(("image_embeddings", embeddings.into()));
+        let mut out = decoder.run(inputs)?;
+        Ok(Prompted { masks: out.take("masks")?, iou: out.take("iou")? })
+    }
+
+    fn side_px(&self) -> usize {
+        self.about.image_size
+    }
+
+    fn fit(&self) -> Side {
+        Side::Longer
+    }
+}
+
+/// The decoder's inputs that describe prompts.
+pub(super) fn prompt_inputs(
+    points: Array,
+    labels: Array,
+    earlier: Option<Array>,
+    side_px: usize,
+) -> Vec<(&'static str, super::network::Input)> {
+    let (n, low) = (points.shape[0], side_px / 4);
+    let has = Array::filled(&[n], if earlier.is_some() { 1.0 } else { 0.0 });
+    let mask = earlier.unwrap_or_else(|| Array::filled(&[n, 1, low, low], 0.0));
+    vec![
+        ("point_coords", points.into()),
+        ("point_labels", labels.into()),
+        ("mask_input", mask.into()),
+        ("has_mask", has.into()),
+    ]
+}
+
+/// The network in the slot, loaded from its file if it is not yet.
+pub(super) fn ready<'a>(
+    slot: &'a mut Option<Network>,
+    folder: &Path,
+    graph: &metadata::Graph,
+) -> Result<&'a mut Network, ModelError> {
+    let loaded = match slot.take() {
+        Some(network) => network,
+        None => engine()?.load_file(&folder.join(&graph.file))?,
+    };
+    Ok(slot.insert(loaded))
+}

@@ -1,0 +1,283 @@
+//! SAM 2: masks of a picture as SAM gives them, and the same objects followed through a sequence of
+//! pictures by what is remembered of them.
+//!
+//! [`Sam2`] holds the five networks; [`track`] is the memory: which earlier frames an object is
+//! compared with, forward and backward.
+
+pub mod track;
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::network::{Array, Network};
+use super::prepare::{Filter, Prepare, Side};
+use super::sam::{Prompted, PromptedMasks, prompt_inputs, ready};
+use super::{ModelError, metadata};
+use crate::scene::PhotoPixels;
+
+/// What the metadata file says.
+#[derive(Clone, Debug, Deserialize)]
+pub struct Metadata {
+    /// The model's name.
+    pub name: String,
+    /// Side of its square, px.
+    pub image_size: usize,
+    mean: [f32; 3],
+    std: [f32; 3],
+    /// Memories that a frame sees: the prompted ones, and one less of those before it.
+    pub memories: usize,
+    /// Object pointers that a frame sees.
+    pub pointers: usize,
+    /// Whether pointers carry their distance in time.
+    pub pointer_time: bool,
+    /// Whether that distance has a sign.
+    pub pointer_time_signed: bool,
+    /// Whether pointers of later frames are left out.
+    pub pointers_only_from_past: bool,
+    /// Most prompted frames that a frame sees; -1 = all.
+    pub max_conditioning_frames: i64,
+    /// Fewest and most points for which three masks are tried.
+    pub multimask_points: [usize; 2],
+    /// Whether three masks are tried while following.
+    pub multimask_when_tracking: bool,
+    /// Whether the pointer is that of the best mask of three.
+    pub pointer_of_best_mask: bool,
+    /// Shift of the threshold that stability is measured with, logits.
+    pub stability_delta: f32,
+    /// Stability under which the single mask gives way to the best of three.
+    pub stability_threshold: f32,
+    /// Whether it does.
+    pub single_mask_falls_back: bool,
+    /// Whether masks of prompted frames are remembered as yes or no.
+    pub binarise_prompted: bool,
+    /// Holes of at most this many low-resolution pixels are filled.
+    pub fill_hole_area: usize,
+    /// Logit of an object that is not there.
+    pub absent_score: f32,
+    no_memory_embedding: Vec<f32>,
+    no_object_pointer: Vec<f32>,
+    graphs: Graphs,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+struct Graphs {
+    encoder: metadata::Graph,
+    decoder: metadata::Graph,
+    mask_prompt: metadata::Graph,
+    memory_encoder: metadata::Graph,
+    memory_attention: metadata::Graph,
+}
+
+/// What the encoder makes of a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// `[1, C, S/16, S/16]`.
+    pub embeddings: Array,
+    /// `[1, C/8, S/4, S/4]`.
+    pub fine: Array,
+    /// `[1, C/4, S/8, S/8]`.
+    pub middle: Array,
+}
+
+/// What the decoder says about one object in a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Decoded {
+    /// Low-resolution logits of four masks, `[1, 4, S/4, S/4]`.
+    pub masks: Array,
+    /// Predicted IoU of each, `[1, 4]`.
+    pub iou: Array,
+    /// Logit of the object being there at all.
+    pub score: f32,
+    /// Pointer of each mask, `[1, 4, C]`.
+    pub pointers: Array,
+}
+
+/// SAM 2's networks, each loaded when it is first needed.
+pub struct Sam2 {
+    folder: PathBuf,
+    /// What the model's metadata says.
+    pub about: Metadata,
+    prepare: Prepare,
+    encoder: Option<Network>,
+    decoder: Option<Network>,
+    mask_prompt: Option<Network>,
+    memory_encoder: Option<Network>,
+    memory_attention: Option<Network>,
+    /// The picture that [`PromptedMasks`] is about.
+    looked: Option<Frame>,
+}
+
+impl Sam2 {
+    /// The model that a metadata file describes; its graphs lie beside it.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or describes another kind of model.
+    pub fn open(path: &Path) -> Result<Self, ModelError> {
+        let about: Metadata = metadata::read(path, "sam2")?;
+        let Metadata { image_size, mean, std, .. } = about;
+        if image_size == 0 || image_size % 16 != 0 || about.memories < 2 {
+            let problem = format!("a side of {image_size} px and {} memories make no sense", about.memories);
+            return Err(ModelError::Metadata { path: path.into(), problem });
+        }
+        let prepare = Prepare { side_px: image_size, filter: Filter::Bicubic, side: Side::Both, mean, std };
+        let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+        Ok(Self {
+            folder,
+            about,
+            prepare,
+            encoder: None,
+            decoder: None,
+            mask_prompt: None,
+            memory_encoder: None,
+            memory_attention: None,
+            looked: None,
+        })
+    }
+
+    /// Looks at a frame of a sequence.
+    ///
+    /// # Errors
+    /// If it has no pixels, or the network fails.
+    pub fn encode(&mut self, picture: &PhotoPixels) -> Result<Frame, ModelError> {
+        let image = self.prepare.picture(picture).ok_or(ModelError::NoPicture)?;
+        self.encode_pixels(image)
+    }
+
+    /// Looks at a prepared picture, `[1, 3, S, S]`.
+    ///
+    /// # Errors
+    /// If the network fails.
+    pub fn encode_pixels(&mut self, image: Array) -> Result<Frame, ModelError> {
+        let encoder = ready(&mut self.encoder, &self.folder, &self.about.graphs.encoder)?;
+        let mut out = encoder.run(vec![("image", image.into())])?;
+        Ok(Frame {
+            embeddings: out.take("image_embeddings")?,
+            fine: out.take("high_res_features1")?,
+            middle: out.take("high_res_features2")?,
+        })
+    }
+
+    /// The embeddings of a frame of which nothing is remembered.
+    pub fn without_memory(&self, frame: &Frame) -> Array {
+        let mut embeddings = frame.embeddings.clone();
+        let plane = embeddings.values.len() / self.about.no_memory_embedding.len().max(1);
+        for (values, add) in embeddings.values.chunks_exact_mut(plane.max(1)).zip(&self.about.no_memory_embedding) {
+            values.iter_mut().for_each(|v| *v += add);
+        }
+        embeddings
+    }
+
+    /// The pointer of an object that is not there, `[1, C]`.
+    pub fn no_pointer(&self) -> Array {
+        Array::new(&[1, self.about.no_object_pointer.len()], self.about.no_object_pointer.clone())
+    }
+
+    /// Masks for prompts on a frame whose embeddings may be conditioned on memories.
+    ///
+    /// # Errors
+    /// If the network fails.
+    pub fn decode(
+        &mut self,
+        frame: &Frame,
+        embeddings: &Array,
+        points: Array,
+        labels: Array,
+        mask: Option<Array>,
+    ) -> Result<Decoded, ModelError> {
+        let decoder = ready(&mut self.decoder, &self.folder, &self.about.graphs.decoder)?;
+        let mut inputs = prompt_inputs(points, labels, mask, self.about.image_size);
+        inputs.extend([
+            ("image_embeddings", embeddings.into()),
+            ("high_res_features1", (&frame.fine).into()),
+            ("high_res_features2", (&frame.middle).into()),
+        ]);
+        let mut out = decoder.run(inputs)?;
+        let score = out.take("object_score")?.values.first().copied().unwrap_or(0.0);
+        Ok(Decoded { masks: out.take("masks")?, iou: out.take("iou")?, score, pointers: out.take("object_pointers")? })
+    }
+
+    /// A mask of the square's size, `[1, 1, S, S]` of 0 and 1, as the decoder's prompt and as
+    /// low-resolution logits.
+    fn mask_prompt(&mut self, mask: Array) -> Result<(Array, Array), ModelError> {
+        let network = ready(&mut self.mask_prompt, &self.folder, &self.about.graphs.mask_prompt)?;
+        let mut out = network.run(vec![("mask", mask.into())])?;
+        Ok((out.take("mask_input")?, out.take("low_res_mask")?))
+    }
+
+    /// What is remembered of an object's mask in a frame.
+    fn remember(&mut self, frame: &Frame, logits: &Array, score: f32, binarise: bool) -> Result<Array, ModelError> {
+        let network = ready(&mut self.memory_encoder, &self.folder, &self.about.graphs.memory_encoder)?;
+        let inputs = vec![
+            ("image_embeddings", (&frame.embeddings).into()),
+            ("mask_logits", logits.into()),
+            ("object_score", Array::filled(&[1, 1], score).into()),
+            ("binarise", Array::filled(&[1], f32::from(u8::from(binarise))).into()),
+        ];
+        let mut memory = network.run(inputs)?.take("memory_features")?;
+        memory.values.iter_mut().for_each(|v| *v = half::bf16::from_f32(*v).to_f32());
+        Ok(memory)
+    }
+
+    /// A frame's embeddings, conditioned on memories with their rows of the time table, and on
+    /// pointers with their distances in time.
+    fn condition(
+        &mut self,
+        frame: &Frame,
+        memories: &[(i64, &Array)],
+        pointers: &[(f32, &Array)],
+    ) -> Result<Array, ModelError> {
+        let nothing = self.no_pointer();
+        let network = ready(&mut self.memory_attention, &self.folder, &self.about.graphs.memory_attention)?;
+        let n = memories.len();
+        let mut inputs = vec![
+            ("image_embeddings", (&frame.embeddings).into()),
+            ("memory_features", Array::joined(memories.iter().map(|m| m.1)).into()),
+            ("memory_time", Array::new(&[n], memories.iter().map(|m| m.0).collect::<Vec<i64>>()).into()),
+            ("memory_valid", Array::filled(&[n], 1.0).into()),
+        ];
+        // No engine likes empty arrays: one row that counts for nothing.
+        let (rows, offsets, valid) = match pointers {
+            [] => (nothing, vec![0.0], 0.0),
+            some => (Array::joined(some.iter().map(|p| p.1)), some.iter().map(|p| p.0).collect(), 1.0),
+        };
+        let m = offsets.len();
+        inputs.push(("object_pointers", rows.into()));
+        if self.about.pointer_time {
+            inputs.push(("pointer_offset", Array::new(&[m], offsets).into()));
+        }
+        inputs.push(("pointer_valid", Array::filled(&[m], valid).into()));
+        network.run(inputs)?.take("conditioned")
+    }
+}
+
+impl PromptedMasks for Sam2 {
+    fn name(&self) -> &str {
+        &self.about.name
+    }
+
+    fn look(&mut self, picture: &PhotoPixels) -> Result<(), ModelError> {
+        self.looked = None;
+        self.looked = Some(self.encode(picture)?);
+        Ok(())
+    }
+
+    fn masks(&mut self, points: Array, labels: Array, earlier: Option<Array>) -> Result<Prompted, ModelError> {
+        let frame = self.looked.take().ok_or(ModelError::NoPicture)?;
+        let embeddings = self.without_memory(&frame);
+        let decoded = self.decode(&frame, &embeddings, points, labels, earlier);
+        self.looked = Some(frame);
+        let Decoded { mut masks, iou, .. } = decoded?;
+        // As for the official single-picture predictor.
+        masks.values.iter_mut().for_each(|v| *v = v.clamp(-32.0, 32.0));
+        Ok(Prompted { masks, iou })
+    }
+
+    fn side_px(&self) -> usize {
+        self.about.image_size
+    }
+
+    fn fit(&self) -> Side {
+        Side::Both
+    }
+}

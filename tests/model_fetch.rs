@@ -1,0 +1,269 @@
+//! Downloads from a server on this machine that stalls, breaks off, lies about lengths, sends web
+//! pages, and changes its mind: the file is right or there is a clear error, and nothing is lost.
+
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
+use std::net::{TcpListener, TcpStream};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use fmlgs::models::fetch::{FetchError, Patience, Wanted, fetch, sha256};
+
+/// What the server does with one request.
+#[derive(Clone, Copy, Debug)]
+enum Turn {
+    /// Serves it, or the range that was asked for.
+    Serve,
+    /// Breaks off after so many bytes of the body.
+    BreakAfter(usize),
+    /// Says nothing more after so many bytes.
+    StallAfter(usize),
+    /// Claims to send so many bytes.
+    Claim(usize),
+    /// A page for people.
+    Page,
+    /// This status and nothing else.
+    Status(u16),
+    /// From now on another file.
+    Change,
+    /// Serves all of it, whatever range was asked for.
+    IgnoreRange,
+    /// A range that was not asked for.
+    WrongRange,
+}
+
+/// The requests that came, by their Range.
+type Log = Arc<Mutex<Vec<Option<String>>>>;
+
+struct Server {
+    url: String,
+    log: Log,
+}
+
+fn content(version: u8) -> Vec<u8> {
+    (0..200_000_u32).map(|i| (i % 251) as u8 ^ version).collect()
+}
+
+/// Takes `turns` one after another, the last again and again.
+fn server(turns: &[Turn]) -> Server {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let url = format!("http://{}/model.onnx", listener.local_addr().expect("bound"));
+    let log: Log = Arc::default();
+    let (turns, seen) = (turns.to_vec(), Arc::clone(&log));
+    std::thread::spawn(move || {
+        let mut version = 0;
+        for (n, stream) in listener.incoming().enumerate() {
+            let Ok(mut stream) = stream else { return };
+            let turn = turns[n.min(turns.len() - 1)];
+            if matches!(turn, Turn::Change) {
+                version += 1;
+            }
+            // Whoever called may have gone: then there is nobody to tell.
+            let _ = answer(&mut stream, turn, version, &seen);
+        }
+    });
+    Server { url, log }
+}
+
+fn answer(stream: &mut TcpStream, turn: Turn, version: u8, log: &Log) -> std::io::Result<()> {
+    let (mut range, mut if_range) = (None, None);
+    for line in BufReader::new(stream.try_clone()?).lines() {
+        let line = line?;
+        if line.is_empty() {
+            break;
+        }
+        if let Some((name, value)) = line.split_once(": ") {
+            match name.to_ascii_lowercase().as_str() {
+                "range" => range = Some(value.to_owned()),
+                "if-range" => if_range = Some(value.to_owned()),
+                _ => {}
+            }
+        }
+    }
+    log.lock().expect("log").push(range.clone());
+    let (all, tag) = (content(version), format!("\"v{version}\""));
+    let start = range.as_deref().and_then(|r| r.strip_prefix("bytes=")?.strip_suffix('-')?.parse::<usize>().ok());
+    let start = start.filter(|_| if_range.as_ref().is_none_or(|t| *t == tag));
+    let start = start.filter(|_| !matches!(turn, Turn::IgnoreRange));
+    let body = &all[start.unwrap_or(0).min(all.len())..];
+    let mut head = match (turn, start) {
+        (Turn::Page, _) => "HTTP/1.1 200 OK\r\nContent-Type: text/html; charset=utf-8\r\n".to_owned(),
+        (Turn::Status(status), _) => format!("HTTP/1.1 {status} No\r\n"),
+        (Turn::WrongRange, _) => format!("HTTP/1.1 206 Partial\r\nContent-Range: bytes 7-9/{}\r\n", all.len()),
+        (_, Some(start)) => {
+            format!("HTTP/1.1 206 Partial\r\nContent-Range: bytes {start}-{}/{}\r\n", all.len() - 1, all.len())
+        }
+        _ => "HTTP/1.1 200 OK\r\nContent-Type: application/octet-stream\r\n".to_owned(),
+    };
+    let claimed = match turn {
+        Turn::Claim(bytes) => bytes,
+        Turn::Status(_) => 0,
+        _ => body.len(),
+    };
+    head += &format!("ETag: {tag}\r\nContent-Length: {claimed}\r\nConnection: close\r\n\r\n");
+    stream.write_all(head.as_bytes())?;
+    match turn {
+        Turn::BreakAfter(n) => stream.write_all(&body[..n.min(body.len())]),
+        Turn::StallAfter(n) => {
+            stream.write_all(&body[..n.min(body.len())])?;
+            std::thread::sleep(Duration::from_secs(20));
+            Ok(())
+        }
+        Turn::Status(_) => Ok(()),
+        _ => stream.write_all(body),
+    }
+}
+
+fn impatient() -> Patience {
+    Patience { stall: Duration::from_millis(300), attempts: 3, pause: Duration::from_millis(5) }
+}
+
+struct Place {
+    _folder: tempfile::TempDir,
+    to: PathBuf,
+}
+
+fn place() -> Place {
+    let folder = tempfile::tempdir().expect("folder");
+    let to = folder.path().join("deep").join("model.onnx");
+    Place { _folder: folder, to }
+}
+
+fn digest(version: u8) -> String {
+    let folder = tempfile::tempdir().expect("folder");
+    let path = folder.path().join("x");
+    fs::write(&path, content(version)).expect("written");
+    sha256(&path).expect("read")
+}
+
+fn get(server: &Server, to: &Path, bytes: Option<u64>, sha256: Option<&str>) -> Result<(), FetchError> {
+    fetch(&Wanted { url: &server.url, to, bytes, sha256 }, impatient(), &mut |_, _| true)
+}
+
+fn is_right(to: &Path, version: u8) -> bool {
+    let leftovers = fs::read_dir(to.parent().expect("folder")).expect("listed").count();
+    fs::read(to).expect("there") == content(version) && leftovers == 1
+}
+
+#[test]
+fn a_file_arrives_whole_and_is_checked() {
+    let (s, p, digest) = (server(&[Turn::Serve]), place(), digest(0));
+    let mut seen = Vec::new();
+    let wanted = Wanted { url: &s.url, to: &p.to, bytes: Some(200_000), sha256: Some(&digest) };
+    fetch(&wanted, impatient(), &mut |there, all| {
+        seen.push((there, all));
+        true
+    })
+    .expect("fetched");
+    assert!(is_right(&p.to, 0));
+    assert_eq!((seen[0], *seen.last().expect("told")), ((0, Some(200_000)), (200_000, Some(200_000))));
+}
+
+#[test]
+fn what_breaks_off_or_stalls_is_gone_on_with() {
+    let turns = [Turn::BreakAfter(70_000), Turn::StallAfter(50_000), Turn::Serve];
+    let (s, p) = (server(&turns), place());
+    get(&s, &p.to, None, Some(&digest(0))).expect("fetched at the third attempt");
+    assert!(is_right(&p.to, 0));
+    let log = s.log.lock().expect("log");
+    assert_eq!(*log, [None, Some("bytes=70000-".to_owned()), Some("bytes=120000-".to_owned())]);
+}
+
+#[test]
+fn a_server_that_stays_silent_is_given_up_and_what_came_is_kept() {
+    let (s, p) = (server(&[Turn::StallAfter(10_000), Turn::StallAfter(0)]), place());
+    let error = get(&s, &p.to, None, None).expect_err("silent");
+    assert!(matches!(error, FetchError::Stalled { got: 10_000, .. }), "{error}");
+    assert!(!p.to.exists());
+    // Another day, another connection: only the rest is asked for.
+    let part = p.to.with_file_name("model.onnx.part");
+    assert_eq!(fs::metadata(part).expect("kept").len(), 10_000);
+}
+
+#[test]
+fn lengths_that_are_lies_are_found_out() {
+    // More than there is: the connection ends early, again and again.
+    let (s, p) = (server(&[Turn::Claim(300_000), Turn::Status(503)]), place());
+    let error = get(&s, &p.to, None, None).expect_err("short");
+    assert!(matches!(error, FetchError::Refused { status: 503, .. }), "{error}");
+    assert!(!p.to.exists());
+    // Less than there is: the file is cut, which its checksum tells, and its known size at once.
+    let (s, p) = (server(&[Turn::Claim(150_000)]), place());
+    let error = get(&s, &p.to, None, Some(&digest(0))).expect_err("cut");
+    assert!(matches!(error, FetchError::Checksum { .. }), "{error}");
+    let error = get(&s, &p.to, Some(200_000), None).expect_err("cut");
+    assert!(matches!(error, FetchError::OtherSize { offered: 150_000, expected: 200_000, .. }), "{error}");
+    assert!(!p.to.exists());
+}
+
+#[test]
+fn pages_and_refusals_are_no_files() {
+    let (s, p) = (server(&[Turn::Page]), place());
+    let error = get(&s, &p.to, None, None).expect_err("a page");
+    assert!(matches!(error, FetchError::WebPage { .. }), "{error}");
+    let (s, p2) = (server(&[Turn::Status(404)]), place());
+    let error = get(&s, &p2.to, None, None).expect_err("not there");
+    assert!(matches!(error, FetchError::Refused { status: 404, .. }) && s.log.lock().expect("log").len() == 1);
+    assert!(!p.to.exists() && !p2.to.exists());
+}
+
+#[test]
+fn a_file_that_changes_on_the_way_is_fetched_anew() {
+    let (s, p) = (server(&[Turn::BreakAfter(70_000), Turn::Change, Turn::Serve]), place());
+    get(&s, &p.to, None, None).expect("fetched");
+    assert!(is_right(&p.to, 1), "not half of each");
+    // Without its tag, the two halves would have been joined; the checksum refuses that.
+    let (s, p) = (server(&[Turn::Serve]), place());
+    let part = p.to.with_file_name("model.onnx.part");
+    fs::create_dir_all(part.parent().expect("folder")).expect("made");
+    fs::write(&part, &content(1)[..70_000]).expect("written");
+    let error = get(&s, &p.to, None, Some(&digest(0))).expect_err("half of each");
+    assert!(matches!(error, FetchError::Checksum { .. }) && !part.exists(), "{error}");
+    get(&s, &p.to, None, Some(&digest(0))).expect("fetched anew");
+    assert!(is_right(&p.to, 0));
+}
+
+#[test]
+fn servers_that_cannot_resume_send_all_again() {
+    let turns = [Turn::BreakAfter(70_000), Turn::IgnoreRange];
+    let (s, p) = (server(&turns), place());
+    get(&s, &p.to, None, None).expect("fetched");
+    assert!(is_right(&p.to, 0));
+    let turns = [Turn::BreakAfter(70_000), Turn::WrongRange, Turn::Serve];
+    let (s, p) = (server(&turns), place());
+    get(&s, &p.to, None, None).expect("fetched");
+    assert!(is_right(&p.to, 0));
+}
+
+#[test]
+fn a_swapped_file_is_refused() {
+    let (s, p) = (server(&[Turn::Serve]), place());
+    let error = get(&s, &p.to, None, Some(&digest(7))).expect_err("another file");
+    assert!(matches!(error, FetchError::Checksum { .. }), "{error}");
+    assert!(!p.to.exists() && !p.to.with_file_name("model.onnx.part").exists());
+}
+
+#[test]
+fn without_a_network_the_error_says_what_to_do() {
+    let p = place();
+    // A port that was free a moment ago.
+    let port = TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("bound").port();
+    let url = format!("http://127.0.0.1:{port}/model.onnx");
+    let error = fetch(&Wanted { url: &url, to: &p.to, bytes: None, sha256: None }, impatient(), &mut |_, _| true);
+    let error = error.expect_err("nobody there");
+    assert!(matches!(error, FetchError::Unreachable { .. }));
+    assert!(error.to_string().contains("bring the file yourself"), "{error}");
+}
+
+#[test]
+fn cancelling_keeps_what_arrived() {
+    let (s, p) = (server(&[Turn::Serve]), place());
+    let wanted = Wanted { url: &s.url, to: &p.to, bytes: None, sha256: None };
+    let error = fetch(&wanted, impatient(), &mut |there, _| there < 60_000).expect_err("cancelled");
+    let FetchError::Cancelled { got } = error else { panic!("{error}") };
+    assert!((60_000..200_000).contains(&got));
+    get(&s, &p.to, None, None).expect("fetched");
+    assert_eq!(s.log.lock().expect("log")[1], Some(format!("bytes={got}-")));
+    assert!(is_right(&p.to, 0));
+}
