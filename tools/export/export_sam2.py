@@ -17,6 +17,7 @@ import torch.nn.functional as F
 import graphs
 import matrices
 import sam2_models
+from prompts import embed_points
 
 # Rows of queries that attend to the memories at a time. At full size all 4,096 together would need
 # half a gigabyte of scores per layer; the result does not depend on it.
@@ -71,19 +72,6 @@ class Decoder(torch.nn.Module):
         pointers = self.pointer(mask_tokens)
         pointers = (there * pointers if self.fixed else pointers) + (1 - there) * self.no_pointer
         return masks, d.iou_prediction_head(hidden[:, 1]), score, pointers
-
-
-def embed_points(prompt, coords, labels, side, matrix=None):
-    """Sparse prompt embeddings: points [n,p,2] in model pixels, labels [n,p] (-1 none, 0 background,
-    1 foreground, 2 and 3 the corners of a box). The table row is chosen by products with 0 and 1."""
-    at = 2 * ((coords + 0.5) / side) - 1
-    at = (2 * torch.pi) * (at @ prompt.pe_layer.positional_encoding_gaussian_matrix)
-    embedding = torch.cat([torch.sin(at), torch.cos(at)], dim=-1)
-    labels = labels[..., None]
-    embedding = embedding * (labels != -1).to(embedding.dtype)
-    for value, table in [(-1, prompt.not_a_point_embed), *enumerate(prompt.point_embeddings)]:
-        embedding = embedding + (labels == value).to(embedding.dtype) * table.weight
-    return embedding
 
 
 class MaskPrompt(torch.nn.Module):

@@ -23,6 +23,8 @@ def export(module, inputs, outputs, path, dynamic=None):
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     module.eval()
+    # The fused attention that PyTorch prefers in evaluation has no ONNX form; the plain one is the same function.
+    torch.backends.mha.set_fastpath_enabled(False)
     with torch.no_grad():
         torch.onnx.export(module, tuple(inputs.values()), str(path), input_names=list(inputs), output_names=list(outputs),
                           dynamic_axes=dynamic or {}, opset_version=OPSET, dynamo=False, do_constant_folding=True)
@@ -34,10 +36,7 @@ def export(module, inputs, outputs, path, dynamic=None):
     kept = {value.name for value in model.graph.input}
     if kept != set(inputs):
         raise SystemExit(f"{path.name}: inputs {sorted(set(inputs) - kept)} have no effect")
-    # The exporter records where in the sources every node came from, with file paths.
-    for node in model.graph.node:
-        node.doc_string = ""
-        del node.metadata_props[:]
+    shorten(model.graph)
     onnx.save(model, str(path))
     onnx.checker.check_model(str(path))
     print(f"{path.name}: {path.stat().st_size:,} bytes, {len(model.graph.node)} nodes")
@@ -56,6 +55,20 @@ def label_shapes(model, inputs, dynamic):
             elif dim.dim_param and dim.dim_param not in symbols:
                 # Not declared dynamic, so the number is known to the caller; drop the invented name.
                 dim.ClearField("dim_param")
+
+
+def shorten(graph):
+    """Short names for nodes and for what passes between them. The exporter's spell out the whole path through the
+    module (most of the bytes of a small graph), and record where in the sources a node came from, with file paths."""
+    kept = {v.name for v in graph.input} | {v.name for v in graph.output} | {t.name for t in graph.initializer}
+    names = {}
+    for k, node in enumerate(graph.node):
+        node.doc_string, node.name = "", f"{node.op_type}{k}"
+        del node.metadata_props[:]
+        for values in (node.input, node.output):
+            for i, name in enumerate(values):
+                if name and name not in kept:
+                    values[i] = names.setdefault(name, f"v{len(names)}")
 
 
 class Graph:
