@@ -72,6 +72,8 @@ def check_decoder(folder, report, kind):
                  "mask_input": np.zeros((len(coords), 1, side, side), np.float32) if mask is None else mask, **features}
         out = decoder(point_coords=coords, **given)
         wrong = decoder(point_coords=coords[:, :, ::-1], **given)
+        if kind == "sam2":  # the official image predictor returns low-resolution logits clamped
+            out["masks"] = np.clip(out["masks"], -32, 32)
         report.tensor(f"{kind} {name} masks", out["masks"], f[f"{name}.masks"], wrong["masks"])
         report.tensor(f"{kind} {name} iou", out["iou"], f[f"{name}.iou"], wrong["iou"])
         if kind == "sam2":

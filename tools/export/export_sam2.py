@@ -158,6 +158,7 @@ class MemoryAttention(torch.nn.Module):
         # One number per key, added to its score. -1e9 leaves nothing of it.
         hidden = torch.cat([((memory_valid - 1) * 1e9)[:, None].expand(-1, hw).reshape(1, -1),
                             ((pointer_valid - 1) * 1e9)[:, None].expand(-1, parts).reshape(1, -1)], dim=1)
+        values = torch.cat([memory.reshape(1, -1, m), pointers.reshape(1, -1, m)], dim=1)
         x = image_embeddings.reshape(1, c, hw).transpose(1, 2)
         if self.attention.pos_enc_at_input:
             x = x + 0.1 * self.image_position
@@ -169,14 +170,15 @@ class MemoryAttention(torch.nn.Module):
             key_memory, key_pointers = (memory_at, pointers_at) if layer.pos_enc_at_cross_attn_keys else (memory, pointers)
             q = self.turned(a.q_proj(y))
             k = torch.cat([self.turned(a.k_proj(key_memory)).reshape(1, -1, c), a.k_proj(key_pointers).reshape(1, -1, c)], dim=1)
-            v = torch.cat([a.v_proj(memory).reshape(1, -1, c), a.v_proj(pointers).reshape(1, -1, c)], dim=1)
-            x = x + a.out_proj(attend(q, k, v, hidden))
+            # Values are projected after the weighted mean instead of before (the weights sum to 1, so it is the same):
+            # 64 wide instead of 256, a third less work.
+            x = x + a.out_proj(a.v_proj(attend(q, k, values, hidden)))
             x = x + layer.linear2(layer.activation(layer.linear1(layer.norm3(x))))
         return self.attention.norm(x).transpose(1, 2).reshape(1, c, self.side, self.side)
 
 
 def attend(q, k, v, hidden):
-    """Attention of one head, QUERY_ROWS queries at a time: q [1,n,C], k and v [1,keys,C]."""
+    """Attention of one head, QUERY_ROWS queries at a time: q [1,n,C], k [1,keys,C], v [1,keys,any]."""
     turned, out = (k * q.shape[-1] ** -0.5).transpose(1, 2), []
     for start in range(0, q.shape[1], QUERY_ROWS):
         scores = q[:, start:start + QUERY_ROWS] @ turned

@@ -13,7 +13,7 @@ import sam2_models
 import scenes
 import weights
 
-SEED = 5
+SEED = 13
 SEED_FRAME = 3
 
 

@@ -18,6 +18,10 @@ def randomise(module, seed, gain=1.0):
     tables and tokens     normal, deviation 0.5 (added to features of about unit size)
     """
     g = torch.Generator().manual_seed(seed)
+    for name, buffer in module.named_buffers():
+        # Random frequencies of point encodings: drawn when the official module is made, from no seed.
+        if name.endswith("positional_encoding_gaussian_matrix"):
+            buffer.copy_(torch.randn(buffer.shape, generator=g))
 
     def normal(p, deviation):
         return torch.randn(p.shape, generator=g) * deviation
@@ -46,7 +50,7 @@ def randomise(module, seed, gain=1.0):
 
 
 @torch.no_grad()
-def calibrate_decoder(decoder, run, spread=4.0, area=0.3, iou=(0.8, 0.8), score=(1.2, 1.0), rounds=4):
+def calibrate_decoder(decoder, run, spread=8.0, area=0.3, iou=(0.8, 0.8), score=(1.2, 1.0), rounds=4):
     """Makes the masks of a random decoder worth comparing: neither empty nor full.
 
     `run()` decodes a set of example prompts. Measured on them, the last layers are shifted and scaled:
