@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from safetensors.numpy import load_file
 
+import automatic
 import tracker as tracking
 from graphs import Graph, iou, relative_error
 
@@ -208,6 +209,44 @@ def check_conditioned(tracker, report, tensors, track):
         report.holds(f"track first: embeddings after memory attention, frame {frame}", error, error < 2e-3)
 
 
+def check_automatic(folder, report):
+    """Every record equal: order, box, mask to the pixel, scores. The controls have to give another list."""
+    f, d = load_file(folder / "automatic.safetensors"), json.loads((folder / "automatic.json").read_text())
+    for kind in ("sam", "sam2"):
+        values, iou_scores = (f[f"{kind}.logits"].astype(np.float32) + np.float32(d["shift"])) * np.float32(d["step"]), f[f"{kind}.iou"]
+
+        def answers(crop, layer):
+            k = d["crop_boxes"].index(list(crop))
+            return values[k], iou_scores[k]
+        for name, settings in d["settings"].items():
+            if kind == "sam2":
+                settings = {**settings, "min_mask_region_area": d["sam2_min_mask_region_area"][name]}
+            expected = d["results"][kind][name]
+
+            def differing(changed):
+                found = automatic.masks(kind, d["height"], d["width"], d["side"], d["points_per_side"], {**settings, **changed}, answers)
+                return abs(len(found) - len(expected)) + sum(not same(a, b) for a, b in zip(found, expected))
+            wrong = differing({})
+            report.holds(f"automatic masks, {kind}, {name}: {len(expected)} kept", wrong, wrong == 0, "differing")
+            controls = ({"box_nms_thresh": 0.95, "crop_nms_thresh": 0.95}, {"stability_score_thresh": 0.97}, {"pred_iou_thresh": 0.9},
+                        {"min_mask_region_area": 10 * settings["min_mask_region_area"] or 17})
+            for change in controls:
+                value = differing(change)
+                report.holds(f"  control, {change}", value, value > 0, "differing")
+
+
+def same(found, expected):
+    mask = np.zeros(found["mask"].size, bool)
+    at = 0
+    for k, run in enumerate(expected["counts"]):
+        mask[at:at + run] = k % 2
+        at += run
+    box, (bx, by, bw, bh) = found["box"], expected["bbox"]
+    return (np.array_equal(found["mask"].T.reshape(-1), mask) and np.array_equal(box, [bx, by, bx + bw, by + bh])
+            and abs(found["iou"] - expected["predicted_iou"]) < 1e-6 and abs(found["stability"] - expected["stability_score"]) < 1e-5
+            and np.allclose(found["point"], expected["point"], atol=1e-4) and int(found["mask"].sum()) == expected["area"])
+
+
 def main():
     ap = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     ap.add_argument("folder", type=Path)
@@ -216,6 +255,7 @@ def main():
     check_clip(a.folder, report)
     check_decoder(a.folder, report, "sam")
     check_decoder(a.folder, report, "sam2")
+    check_automatic(a.folder, report)
     check_video(a.folder, report)
     if report.failed:
         raise SystemExit(f"{report.failed} failed")

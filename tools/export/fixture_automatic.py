@@ -18,7 +18,9 @@ import sam_models
 
 HEIGHT, WIDTH, SIDE, LOW = 180, 240, 128, 32
 POINTS = 4  # a side
-STEP = 0.125  # logits are stored as int8 in units of this
+# A logit is (stored int8 + 0.37) * 0.125: between two pixels nothing then adds up to exactly 0 or 1, where the
+# last bit of a sum would decide.
+STEP, SHIFT = 0.125, 0.37
 
 SETTINGS = {
     # The thresholds of LangSplat, one crop layer, small regions cleaned.
@@ -98,7 +100,7 @@ class Stored:
     """Answers in the order in which the generators ask: crop by crop, batch by batch."""
 
     def __init__(self, values, iou):
-        self.values, self.iou = torch.from_numpy(values.astype(np.float32) * np.float32(STEP)).flatten(0, 1), torch.from_numpy(iou).flatten(0, 1)
+        self.values, self.iou = torch.from_numpy((values.astype(np.float32) + np.float32(SHIFT)) * np.float32(STEP)).flatten(0, 1), torch.from_numpy(iou).flatten(0, 1)
         self.next = 0
 
     def take(self, count):
@@ -132,7 +134,7 @@ def plain(results):
 
 
 def write(out):
-    tensors, described = {}, {"height": HEIGHT, "width": WIDTH, "side": SIDE, "points_per_side": POINTS, "step": STEP,
+    tensors, described = {}, {"height": HEIGHT, "width": WIDTH, "side": SIDE, "points_per_side": POINTS, "step": STEP, "shift": SHIFT,
                               "crop_boxes": crops(), "settings": SETTINGS, "sam2_min_mask_region_area": SAM2_AREA, "results": {"sam": {}, "sam2": {}}}
     model = fixture_sam2.model()
     for kind, square in (("sam", False), ("sam2", True)):

@@ -4,6 +4,7 @@ The pattern for the program's own tracker: README.md describes the same steps in
 time, frames encoded once. Masks are logits; a pixel belongs to the object where the logit is > 0.
 """
 
+import functools
 import json
 from pathlib import Path
 
@@ -255,6 +256,7 @@ def to_bfloat16(values):
     return rounded.astype(np.uint32).view(np.float32)
 
 
+@functools.cache
 def triangle(inputs, outputs, antialias):
     """[outputs, inputs] weights of bilinear resizing. Anti-aliased, the triangle grows with the shrinkage."""
     scale = inputs / outputs
@@ -262,13 +264,15 @@ def triangle(inputs, outputs, antialias):
     centre = (np.arange(outputs) + 0.5) * scale
     weights = np.maximum(0.0, 1.0 - np.abs((np.arange(inputs)[None] + 0.5 - centre[:, None]) / reach))
     if not antialias:
-        # Rows past the border take the border pixel.
-        weights = np.zeros((outputs, inputs))
-        at = np.maximum(centre - 0.5, 0.0)
+        # Rows past the border take the border pixel. Positions in float32, as PyTorch has them: in float64 a mask's
+        # border differs by a pixel now and then.
+        weights = np.zeros((outputs, inputs), np.float32)
+        at = np.maximum((np.arange(outputs, dtype=np.float32) + np.float32(0.5)) * np.float32(scale) - np.float32(0.5), np.float32(0))
         low = np.minimum(at.astype(int), inputs - 1)
         share = at - low
         weights[np.arange(outputs), low] += 1 - share
         weights[np.arange(outputs), np.minimum(low + 1, inputs - 1)] += share
+        return weights
     return (weights / weights.sum(1, keepdims=True)).astype(np.float32)
 
 
