@@ -1,0 +1,138 @@
+"""OpenCLIP checkpoint -> `NAME_image.onnx`, `NAME_text.onnx`, `NAME.json`.
+
+    python export_clip.py ViT-B-16 --checkpoint open_clip_pytorch_model.bin --out models/ --name clip-vit-b16
+    python export_clip.py ViT-B-16 --random 1 --out models/ --name clip-random
+    python export_clip.py --reduced --random 1 --out models/ --name clip-small
+
+Image graph: `pixels` float32 [n,3,S,S] -> `embedding` float32 [n,D]; text graph: `tokens` int64 [n,T]
+-> `embedding` float32 [n,D]. Embeddings are raw: the caller scales them to unit length.
+"""
+
+import argparse
+from pathlib import Path
+
+import open_clip
+import torch
+from open_clip import transformer as open_clip_transformer
+
+import graphs
+import weights
+
+# A ViT and a text transformer of 1/500 of ViT-B/16. The small vocabulary keeps the table of a
+# committed graph small; its last id still ends a text.
+REDUCED = {
+    "embed_dim": 32,
+    "vision_cfg": {"image_size": 64, "layers": 2, "width": 32, "head_width": 16, "patch_size": 16},
+    "text_cfg": {"context_length": 77, "vocab_size": 1024, "width": 32, "heads": 2, "layers": 2},
+}
+
+
+class Image(torch.nn.Module):
+    def __init__(self, model):
+        super().__init__()
+        self.model = model
+
+    def forward(self, pixels):
+        return self.model.encode_image(pixels)
+
+
+class Text(torch.nn.Module):
+    def __init__(self, model):
+        super().__init__()
+        self.model = model
+
+    def forward(self, tokens):
+        return self.model.encode_text(tokens)
+
+
+def pool_by_one_hot(pool):
+    """The official pooling of text features, with the row of the end token taken by a product with
+    zeros and one 1 (the same value) instead of by indices, which small engines do not gather by."""
+    def pooled(x, text=None, pool_type="argmax", **more):
+        if pool_type != "argmax":
+            return pool(x, text, pool_type, **more)
+        at = text.argmax(dim=-1)
+        hot = (torch.arange(x.shape[1])[None] == at[:, None]).to(x.dtype)
+        return (x * hot[:, :, None]).sum(1)
+    return pooled
+
+
+def load(name=None, checkpoint=None, seed=None, reduced=False):
+    """The official model, its image settings, and its tokeniser's kind."""
+    if reduced:
+        model = open_clip.CLIP(REDUCED["embed_dim"], REDUCED["vision_cfg"], REDUCED["text_cfg"])
+    else:
+        model = open_clip.create_model(name, pretrained=checkpoint, load_weights=checkpoint is not None) if checkpoint \
+            else open_clip.create_model(name, pretrained=None)
+    if checkpoint is None:
+        weights.randomise(model, seed)
+    return model.eval()
+
+
+def image_settings(model):
+    """How pictures are prepared: official defaults where the model states nothing else."""
+    visual = model.visual
+    size = visual.image_size
+    stated = dict(getattr(visual, "preprocess_cfg", {}) or {})
+    stated.setdefault("size", size)
+    pre = open_clip.transform.PreprocessCfg(**stated)
+    size = pre.size if isinstance(pre.size, (tuple, list)) else (pre.size, pre.size)
+    return {"image_size": list(size), "mean": list(pre.mean), "std": list(pre.std), "interpolation": pre.interpolation,
+            "resize_mode": pre.resize_mode, "fill": 0}
+
+
+def tokeniser_kind(name, vocab):
+    """What turns text to tokens; `clip-bpe` is the byte pair encoding of CLIP with 49,408 ids."""
+    config = (open_clip.get_model_config(name) or {}) if name else {}
+    text = config.get("text_cfg", {})
+    if "hf_tokenizer_name" in text:
+        return {"kind": "hugging-face", "source": text["hf_tokenizer_name"], "settings": text.get("tokenizer_kwargs", {})}
+    return {"kind": "clip-bpe", "start": vocab - 2, "end": vocab - 1, "pad": 0, "clean": "lower", "truncate": "keep end"}
+
+
+def main():
+    ap = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    ap.add_argument("model", nargs="?", default="ViT-B-16", help="name of an OpenCLIP architecture")
+    ap.add_argument("--checkpoint", type=Path)
+    ap.add_argument("--random", type=int, metavar="SEED", help="random weights")
+    ap.add_argument("--reduced", action="store_true", help="a tiny architecture, for tests")
+    ap.add_argument("--out", type=Path, required=True)
+    ap.add_argument("--name", required=True)
+    ap.add_argument("--source", default="", help="where the checkpoint is from, for the metadata")
+    a = ap.parse_args()
+    if (a.checkpoint is None) == (a.random is None):
+        ap.error("give either --checkpoint or --random")
+    model = load(a.model, str(a.checkpoint) if a.checkpoint else None, a.random, a.reduced)
+    write(model, a.out, a.name, None if a.reduced else a.model, a.source)
+
+
+def write(model, out, name, architecture=None, source=""):
+    settings = image_settings(model)
+    context, vocab = model.context_length, getattr(model, "vocab_size", None) or model.text.vocab_size
+    height, width = settings["image_size"]
+    # Two of each, so that nothing of the example's size is taken for granted.
+    pixels = torch.zeros(2, 3, height, width)
+    tokens = torch.zeros(2, context, dtype=torch.int64)
+    tokens[:, 0], tokens[0, 4], tokens[1, 9] = vocab - 2, vocab - 1, vocab - 1
+    image = graphs.export(Image(model), {"pixels": pixels}, ["embedding"], out / f"{name}_image.onnx",
+                          {"pixels": {0: "n"}, "embedding": {0: "n"}})
+    official = open_clip_transformer.text_global_pool
+    from open_clip import model as open_clip_model
+    open_clip_transformer.text_global_pool = open_clip_model.text_global_pool = pool_by_one_hot(official)
+    try:
+        text = graphs.export(Text(model), {"tokens": tokens}, ["embedding"], out / f"{name}_text.onnx",
+                             {"tokens": {0: "n"}, "embedding": {0: "n"}})
+    finally:
+        open_clip_transformer.text_global_pool = open_clip_model.text_global_pool = official
+    with torch.no_grad():
+        dimension = model.encode_text(tokens).shape[1]
+    bias = getattr(model, "logit_bias", None)
+    quick = any(type(m).__name__ == "QuickGELU" for m in model.modules())
+    graphs.save_metadata(out / f"{name}.json", {"image": image, "text": text}, kind="clip", name=name, architecture=architecture or "reduced",
+                         source=source, embed_dim=dimension, **settings, context_length=context, vocab_size=vocab,
+                         tokenizer=tokeniser_kind(architecture, vocab), activation="quick_gelu" if quick else "gelu",
+                         logit_scale=float(model.logit_scale.exp()), logit_bias=None if bias is None else float(bias))
+
+
+if __name__ == "__main__":
+    main()
