@@ -1,0 +1,11 @@
+//! CLIP, SAM and SAM 2 against the official code: reduced networks with fixed random weights, exported
+//! by `tools/export`, with the official results beside them. Every comparison has a negative control.
+
+#[path = "networks/clip.rs"]
+mod clip;
+#[path = "networks/fixture.rs"]
+mod fixture;
+#[path = "networks/sam.rs"]
+mod sam;
+#[path = "networks/video.rs"]
+mod video;
