@@ -3,6 +3,7 @@
 
 #[path = "networks/clip.rs"]
 mod clip;
+mod common;
 #[path = "networks/fixture.rs"]
 mod fixture;
 #[path = "networks/sam.rs"]

@@ -13,7 +13,7 @@ use crate::io::{self, labels::Labels};
 use crate::models;
 use crate::pipeline::observer::{Level, Observer};
 use crate::pipeline::semantics::code_map::CodeMap;
-use crate::pipeline::semantics::find::{FindOptions, Found, find_objects};
+use crate::pipeline::semantics::find::{FindOptions, Found, Tools, find_objects};
 use crate::pipeline::semantics::grammar::Kind;
 use crate::pipeline::semantics::protocols::{AskedScene, LabelledView, categories, masks};
 use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
@@ -81,8 +81,14 @@ pub fn run(
     let options =
         FindOptions { track: TrackOptions { max_seeds: 3, ..TrackOptions::default() }, ..FindOptions::default() };
     let start = Instant::now();
-    let found =
-        find_objects(&job.cloud, &training, &job.settings, &mut segmenter, &options, Some(&mut *encoder), console);
+    let found = find_objects(
+        &job.cloud,
+        &training,
+        &job.settings,
+        Tools { segmenter: &mut segmenter, follower: None, encoder: Some(&mut *encoder) },
+        &options,
+        console,
+    );
     let Found { map, .. } = found.map_err(|e| match e {
         e if e.is_cancelled() => CliError::Cancelled("the trained scene is saved".into()),
         other => other.into(),

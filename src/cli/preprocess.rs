@@ -9,7 +9,9 @@ use super::progress::Console;
 use super::{CliError, opened, output};
 use crate::io;
 use crate::models;
-use crate::pipeline::semantics::find::{FindOptions, Found, Lifting, find_objects, segmenter};
+use crate::models::catalogue::{self, Role};
+use crate::pipeline::semantics::find::{FindOptions, Found, Lifting, Tools, find_objects, segmenter};
+use crate::pipeline::semantics::follow::Follower;
 use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::scene::{Level, Photo};
 
@@ -31,9 +33,17 @@ pub struct Args {
     /// 3D-OVS or LERF-Mask, or masklets as in SA-V
     #[arg(long)]
     masks: Option<PathBuf>,
-    /// Where masks come from [default: files where --masks is given, else regions]
-    #[arg(long, value_enum)]
-    segmenter: Option<SegmenterKind>,
+    /// Where masks come from: 'files', 'regions' (built in, no weights: rough and unnamed), a model of
+    /// 'fmlgs models', or the path of a model's .json [default: files where --masks is given, else the
+    /// best model that is here, else regions]
+    #[arg(long)]
+    segmenter: Option<String>,
+    /// How masks are carried to the other photos
+    #[arg(long, value_enum, default_value_t = TrackerKind::Geometry)]
+    tracker: TrackerKind,
+    /// The SAM 2 that follows masks: a model of 'fmlgs models', or the path of a model's .json
+    #[arg(long, default_value = "sam2.1-tiny")]
+    tracker_model: String,
     /// Dataset with the photos [default: where the scene's photos are]
     #[arg(long)]
     photos: Option<PathBuf>,
@@ -52,9 +62,10 @@ pub struct Args {
     /// Steps of training codes
     #[arg(long, default_value_t = 1_000)]
     code_steps: u64,
-    /// What looks at the objects, so that they are found by what they look like: 'demo', or 'none'
-    #[arg(long, default_value = models::DEMO)]
-    encoder: String,
+    /// What looks at the objects, so that they are found by what they look like: 'demo', a model of
+    /// 'fmlgs models', the path of a model's .json, or 'none' [default: the best that is here]
+    #[arg(long)]
+    encoder: Option<String>,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
@@ -70,21 +81,23 @@ enum LiftingArg {
     Paper,
 }
 
-/// Where masks come from.
+/// How masks are carried to the other photos.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum SegmenterKind {
-    /// The masks in --masks
-    Files,
-    /// Built in, no weights: regions that are apart in colour, and pieces of them; unnamed and rough
-    Regions,
+enum TrackerKind {
+    /// By the trained Gaussians; no network
+    Geometry,
+    /// By SAM 2 from photo to photo, as in the paper; photos have to be in the order of a walk
+    Sam2,
+    /// By both, each correcting the other
+    Both,
 }
 
 /// Whether the arguments agree on where masks come from.
 fn check_segmenter(args: &Args) -> Result<(), CliError> {
-    match (&args.masks, args.segmenter) {
-        (None, Some(SegmenterKind::Files)) => Err(CliError::Usage("--segmenter files needs --masks".into())),
-        (Some(_), Some(SegmenterKind::Regions)) => {
-            Err(CliError::Usage("--segmenter regions finds its own masks; leave --masks out".into()))
+    match (&args.masks, args.segmenter.as_deref()) {
+        (None, Some("files")) => Err(CliError::Usage("--segmenter files needs --masks".into())),
+        (Some(_), Some(other)) if other != "files" => {
+            Err(CliError::Usage(format!("--segmenter {other} finds its own masks; leave --masks out")))
         }
         _ => Ok(()),
     }
@@ -114,11 +127,17 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
             })?)
         }
     };
-    let mut segmenter = segmenter(args.masks.as_deref(), &scene.cloud, &scene.settings)?;
+    let network = match args.segmenter.as_deref() {
+        Some("files" | "regions") => None,
+        Some(name) => Some(name.to_owned()),
+        None => catalogue::usable(Role::Segmenter).into_iter().next(),
+    };
+    let mut segmenter = segmenter(args.masks.as_deref(), &scene.cloud, &scene.settings, network.as_deref())?;
     let track = TrackOptions {
         seed,
         max_seeds: args.max_seeds.max(1),
         reseed_share: args.unknown / 100.0,
+        veto: args.tracker == TrackerKind::Both,
         ..TrackOptions::default()
     };
     let lifting = match args.lifting {
@@ -126,15 +145,20 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         LiftingArg::Refined => Lifting::Refined(args.code_steps),
         LiftingArg::Paper => Lifting::Paper(args.code_steps),
     };
-    let mut encoder = match args.encoder.as_str() {
-        "none" => None,
-        name => Some(models::encoder(name)?),
+    let mut encoder = match args.encoder.as_deref() {
+        Some("none") => None,
+        Some(name) => Some(models::encoder(name)?),
+        None => Some(models::best_encoder()?),
+    };
+    let mut follower = match args.tracker {
+        TrackerKind::Geometry => None,
+        _ => Some(Follower::open(&args.tracker_model, Some(args.scene.join("cache")))?),
     };
     let start = Instant::now();
     let options = FindOptions { track, lifting };
     let (cloud, settings) = (&scene.cloud, &scene.settings);
-    let found =
-        find_objects(cloud, &photos, settings, &mut *segmenter, &options, encoder.as_deref_mut(), &mut observer);
+    let tools = Tools { segmenter: &mut *segmenter, follower: follower.as_mut(), encoder: encoder.as_deref_mut() };
+    let found = find_objects(cloud, &photos, settings, tools, &options, &mut observer);
     let Found { map, views, disagreements } = found.map_err(|e| match e {
         e if e.is_cancelled() => CliError::Cancelled("nothing was stored".into()),
         other => other.into(),

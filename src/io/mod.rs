@@ -7,6 +7,7 @@
 pub mod atomic;
 pub mod colmap;
 mod compressed_ply;
+pub mod data_folder;
 mod error;
 pub mod files;
 pub mod gltf_mesh;

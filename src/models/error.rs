@@ -3,9 +3,15 @@
 /// A network that could not be used, or an input that it cannot take.
 #[derive(Debug, thiserror::Error)]
 pub enum ModelError {
-    /// No encoder has that name.
-    #[error("there is no encoder called '{0}'; there is: demo")]
-    UnknownEncoder(String),
+    /// No model has that name.
+    #[error("there is no model called '{0}'; 'fmlgs models' lists them, and the path of a model's .json will do too")]
+    Unknown(String),
+    /// A model whose files are not on this machine.
+    #[error("the model '{id}' is not on this machine; see 'fmlgs models' for what it needs")]
+    NotHere {
+        /// Its name.
+        id: String,
+    },
     /// The engine that runs networks does not start.
     #[error(
         "the engine for neural networks ({engine}) does not start: {problem}; unset ORT_DYLIB_PATH to use the built-in one"

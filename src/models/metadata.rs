@@ -1,11 +1,14 @@
 //! The JSON file that describes an exported model, beside its graphs.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::ModelError;
+use super::engine::engine;
+use super::network::Network;
 
 /// Version of the file that this program reads.
 const VERSION: u64 = 1;
@@ -17,6 +20,74 @@ const MAX_BYTES: u64 = 16 << 20;
 pub struct Graph {
     /// Its file, in the same folder.
     pub file: String,
+    /// Its size.
+    pub bytes: u64,
+    /// Its SHA-256, in hexadecimal digits.
+    pub sha256: String,
+}
+
+impl Graph {
+    /// The network in the slot; loaded from a folder if it is not there yet, and only if the file is
+    /// what its description says.
+    ///
+    /// # Errors
+    /// If it is missing, broken or another file, or the engine cannot run it.
+    pub fn ready<'a>(&self, slot: &'a mut Option<Network>, folder: &Path) -> Result<&'a mut Network, ModelError> {
+        let loaded = match slot.take() {
+            Some(network) => network,
+            None => {
+                self.check(folder)?;
+                engine()?.load_file(&folder.join(&self.file))?
+            }
+        };
+        Ok(slot.insert(loaded))
+    }
+
+    /// Compares its size with what the description says.
+    ///
+    /// # Errors
+    /// If it is missing, or of another size.
+    pub fn check_size(&self, folder: &Path) -> Result<(), ModelError> {
+        let path = folder.join(&self.file);
+        let refused = |problem: String| ModelError::Metadata { path: path.clone(), problem };
+        let bytes = std::fs::metadata(&path).map_err(|e| refused(e.to_string()))?.len();
+        if bytes != self.bytes {
+            let wanted = self.bytes;
+            return Err(refused(format!("{bytes} bytes, its description says {wanted}; it is broken or another file")));
+        }
+        Ok(())
+    }
+
+    /// Compares its content with what the description says.
+    ///
+    /// # Errors
+    /// If it is missing, broken or another file.
+    pub fn check(&self, folder: &Path) -> Result<(), ModelError> {
+        self.check_size(folder)?;
+        let path = folder.join(&self.file);
+        let wrong = |e: super::fetch::FetchError| ModelError::Metadata { path: path.clone(), problem: e.to_string() };
+        super::fetch::check(&path, &self.sha256).map_err(wrong)
+    }
+}
+
+#[derive(Deserialize)]
+struct AnyModel {
+    graphs: BTreeMap<String, Graph>,
+}
+
+/// The graphs that a description names.
+///
+/// # Errors
+/// If the file cannot be read, or is no description.
+pub fn graphs(path: &Path) -> Result<Vec<Graph>, ModelError> {
+    let kind = kind(path)?;
+    let graphs: AnyModel = read(path, &kind)?;
+    let all: Vec<Graph> = graphs.graphs.into_values().collect();
+    // A name with a path in it would reach out of the folder.
+    match all.iter().find(|g| Path::new(&g.file).file_name() != Some(std::ffi::OsStr::new(&g.file))) {
+        Some(g) => Err(ModelError::Metadata { path: path.into(), problem: format!("'{}' is no file name", g.file) }),
+        None => Ok(all),
+    }
 }
 
 #[derive(Deserialize)]

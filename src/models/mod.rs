@@ -1,8 +1,11 @@
 //! Neural networks: what turns a picture of a thing, and a phrase, into vectors that can be compared.
 //!
-//! A network is an ONNX file, run by [`engine`]. [`Encoder`] is what the rest of the program sees of
-//! it; [`DemoEncoder`] is the small one that comes with the program (made by `tools/encoder`).
+//! A network is an ONNX file, run by [`engine`]. [`Encoder`] compares pictures with phrases:
+//! [`DemoEncoder`] is the small one that comes with the program (made by `tools/encoder`),
+//! [`ClipEncoder`] the one of the paper. [`sam`] and [`sam2`] find masks. [`catalogue`] knows which
+//! there are, and [`fetch`] brings them.
 
+pub mod catalogue;
 pub mod clip;
 mod demo;
 pub mod engine;
@@ -16,6 +19,8 @@ pub mod sam2;
 mod tile;
 mod words;
 
+pub use catalogue::Role;
+pub use clip::ClipEncoder;
 pub use demo::DemoEncoder;
 pub use error::ModelError;
 
@@ -59,13 +64,22 @@ pub trait Encoder: Send {
 /// Name of the encoder that comes with the program.
 pub const DEMO: &str = "demo";
 
-/// The encoder of this name.
+/// The best encoder that can be used on this machine.
+///
+/// # Errors
+/// If it cannot be loaded.
+pub fn best_encoder() -> Result<Box<dyn Encoder>, ModelError> {
+    let best = catalogue::usable(Role::Encoder).into_iter().next();
+    encoder(best.as_deref().unwrap_or(DEMO))
+}
+
+/// The encoder of this name: 'demo', a model of the catalogue, or the path of a model's description.
 ///
 /// # Errors
 /// If there is none, or it cannot be loaded.
 pub fn encoder(name: &str) -> Result<Box<dyn Encoder>, ModelError> {
     match name {
         DEMO => Ok(Box::new(DemoEncoder::new()?)),
-        _ => Err(ModelError::UnknownEncoder(name.to_owned())),
+        name => Ok(Box::new(ClipEncoder::open(&catalogue::find(name, Role::Encoder)?)?.called(name))),
     }
 }

@@ -11,9 +11,10 @@ use super::{edit, machine};
 use crate::io::labels::Labels;
 use crate::io::{self, IoError, OpenError, Opened, TrainedScene, trained};
 use crate::models;
+use crate::models::catalogue::{self, Role};
 use crate::pipeline::evaluate::evaluate;
 use crate::pipeline::observer::{Level, Observer};
-use crate::pipeline::semantics::find::{FindOptions, Found, find_objects, segmenter};
+use crate::pipeline::semantics::find::{FindOptions, Found, Tools, find_objects, segmenter};
 use crate::pipeline::semantics::portraits::portraits;
 use crate::pipeline::synth::{SynthError, demo};
 use crate::pipeline::train::checkpoint::CheckpointError;
@@ -266,13 +267,18 @@ fn find(
     out: &Path,
     observer: &mut dyn Observer,
 ) -> Result<Outcome, Stop> {
-    let mut segmenter = segmenter(masks, cloud, settings).map_err(|e| io_failure(&e))?;
+    let network = catalogue::usable(Role::Segmenter).into_iter().next();
+    let found = segmenter(masks, cloud, settings, network.as_deref());
+    let mut segmenter = found.map_err(|e| Stop::Failed(Failure::of(&e, "")))?;
     // Without the encoder, names alone are understood.
-    let mut encoder = models::encoder(models::DEMO)
+    let mut encoder = models::best_encoder()
         .inspect_err(|e| observer.note(Level::Warning, format!("Objects are found without their looks: {e}")))
         .ok();
     let options = FindOptions::default();
-    let found = find_objects(cloud, photos, settings, &mut *segmenter, &options, encoder.as_deref_mut(), observer);
+    let found = {
+        let tools = Tools { segmenter: &mut *segmenter, follower: None, encoder: encoder.as_deref_mut() };
+        find_objects(cloud, photos, settings, tools, &options, observer)
+    };
     let Found { map, .. } = found.map_err(|e| match e {
         e if e.is_cancelled() => Stop::Cancelled,
         e => Stop::Failed(Failure::of(&e, "")),

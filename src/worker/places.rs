@@ -1,8 +1,9 @@
 //! Where the window keeps what it makes: demo photos and trained scenes.
 
-use std::ffi::OsString;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
+
+use crate::io::data_folder::data_folder;
 
 /// The program's folders, all below one.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -14,8 +15,7 @@ pub struct Places {
 impl Places {
     /// Below the user's data folder; below the system's temporary folder where there is none.
     pub fn of_user() -> Self {
-        let data = base(|name| std::env::var_os(name)).unwrap_or_else(std::env::temp_dir);
-        Self { data: data.join("fmlgs") }
+        Self { data: data_folder() }
     }
 
     /// Folder of the demo's photos. Carries the version, because another version may make others.
@@ -46,26 +46,9 @@ impl Places {
     }
 }
 
-fn base(var: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
-    let absolute = |name: &str| var(name).map(PathBuf::from).filter(|p| p.is_absolute());
-    absolute("XDG_DATA_HOME").or_else(|| absolute("LOCALAPPDATA")).or_else(|| {
-        let home = absolute("HOME")?;
-        let mac = home.join("Library").join("Application Support");
-        Some(if cfg!(target_os = "macos") { mac } else { home.join(".local").join("share") })
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_data_folder_follows_the_environment() {
-        let home = |name: &str| (name == "HOME").then(|| OsString::from("/home/someone"));
-        assert!(base(home).expect("a home").starts_with("/home/someone"));
-        let relative = |name: &str| (name == "XDG_DATA_HOME").then(|| OsString::from("relative"));
-        assert_eq!(base(relative), None);
-    }
 
     #[test]
     fn datasets_of_one_name_do_not_share_a_folder() {

@@ -4,7 +4,11 @@ use fmlgs::math::vector::{dot, unit};
 use fmlgs::models::clip::ClipEncoder;
 use fmlgs::models::clip::tokens::{Tokens, clean};
 use fmlgs::models::network::Array;
+use fmlgs::models::prepare::{Filter, Prepare, Side};
 use fmlgs::models::{Encoder, ModelError, Tile};
+use fmlgs::scene::PhotoPixels;
+
+use super::common;
 
 use super::fixture::{self, Tensors, agrees};
 
@@ -60,7 +64,8 @@ fn embeddings_are_those_of_open_clip() {
         })
         .collect();
     let got = clip.embed_pixels(Array::joined(&pixels)).expect("embeds").concat();
-    let mirrored: Vec<Array> = pixels.iter().map(|p| Array::new(&p.shape, p.values.iter().rev().copied().collect())).collect();
+    let mirrored: Vec<Array> =
+        pixels.iter().map(|p| Array::new(&p.shape, p.values.iter().rev().copied().collect())).collect();
     let wrong = clip.embed_pixels(Array::joined(&mirrored)).expect("embeds").concat();
     agrees("image embeddings", &got, &wrong, &units(&t.floats("image_embedding")));
 
@@ -76,7 +81,8 @@ fn embeddings_are_those_of_open_clip() {
 fn tiles_of_any_size_and_phrases_without_words() {
     let mut clip = ClipEncoder::open(&fixture::path("clip.json")).expect("opens");
     assert_eq!((clip.name(), clip.dimension(), clip.tile_side_px()), ("clip", 32, None));
-    let tile = |side_px: usize| Tile { side_px, rgb: (0..side_px * side_px).map(|i| [(i % 7) as f32 / 7.0; 3]).collect() };
+    let tile =
+        |side_px: usize| Tile { side_px, rgb: (0..side_px * side_px).map(|i| [(i % 7) as f32 / 7.0; 3]).collect() };
     let both = clip.images(&[tile(9), tile(300)]).expect("embeds");
     assert_eq!(both.len(), 2);
     for v in &both {
@@ -115,8 +121,39 @@ fn metadata_that_does_not_fit_is_refused() {
         let error = with(key, value);
         assert!(error.contains(says) && error.contains("clip.json"), "{key}: {error}");
     }
-    // Graphs that are not there are told when they are needed.
+    // Graphs that are not there, or have been swapped, are told when they are needed.
     assert_eq!(with("name", "other".into()), "");
     let mut clip = ClipEncoder::open(&path).expect("opens");
-    assert!(matches!(clip.text("a cat"), Err(ModelError::Load { model, .. }) if model.contains("clip_text.onnx")));
+    let missing = clip.text("a cat").expect_err("no graph").to_string();
+    assert!(missing.contains("clip_text.onnx"), "{missing}");
+    std::fs::copy(fixture::path("clip_image.onnx"), folder.path().join("clip_text.onnx")).expect("copied");
+    let swapped = clip.text("a cat").expect_err("another graph").to_string();
+    assert!(swapped.contains("another file"), "{swapped}");
+}
+
+#[test]
+fn a_real_photo_is_prepared_as_the_golden_tensor() {
+    let Some(folder) = common::data("clip/clip_bpe_vocab/data") else { return };
+    let bytes = std::fs::read(folder.join("expected_preprocessed_image.npy")).expect("readable");
+    let golden: Vec<f32> = npyz::NpyFile::new(&bytes[..]).expect("NumPy").into_vec().expect("floats");
+    let prepare = Prepare {
+        side_px: 224,
+        filter: Filter::Bicubic,
+        side: Side::Shorter,
+        mean: [0.481_454_66, 0.457_827_5, 0.408_210_73],
+        std: [0.268_629_54, 0.261_302_58, 0.275_777_11],
+    };
+    let of = |name: &str| {
+        let picture = image::open(folder.join(name)).expect("a picture").to_rgb8();
+        let (width_px, height_px) = picture.dimensions();
+        let rgb = picture.pixels().map(|p| p.0).collect();
+        prepare.picture(&PhotoPixels { width_px, height_px, rgb, coverage: None }).expect("pixels").values
+    };
+    let mean =
+        |got: &[f32]| got.iter().zip(&golden).map(|(a, b)| f64::from((a - b).abs())).sum::<f64>() / golden.len() as f64;
+    let (photo, drawing) = (mean(&of("franz-kafka.jpg")), mean(&of("CLIP.png")));
+    let (right, wrong) = (photo.min(drawing), photo.max(drawing));
+    println!("mean difference from the golden tensor {right:.2e}, of another picture {wrong:.2e}");
+    // Decoders of JPEG differ in the last bit, which is 0.015 here.
+    assert!(right < 5e-3 && wrong > 0.1, "{right} {wrong}");
 }

@@ -16,7 +16,8 @@ const CASES: [&str; 6] = ["points", "click", "box", "box_points", "refined", "ba
 fn decoder_agrees(network: &mut dyn PromptedMasks, t: &Tensors) {
     for case in CASES {
         let (coords, labels) = (t.floats(&format!("{case}.coords")), t.floats(&format!("{case}.labels")));
-        let earlier = || t.names().contains(&format!("{case}.mask_input")).then(|| t.floats(&format!("{case}.mask_input")));
+        let earlier =
+            || t.names().contains(&format!("{case}.mask_input")).then(|| t.floats(&format!("{case}.mask_input")));
         let mut swapped = coords.clone();
         swapped.values.chunks_exact_mut(2).for_each(<[f32]>::reverse);
         let right = network.masks(coords, labels.clone(), earlier()).expect("masks");
@@ -66,7 +67,9 @@ fn full_size_agrees(network: &mut dyn PromptedMasks, t: &Tensors) {
     let answer = network.masks(t.floats("click.coords"), t.floats("click.labels"), None).expect("masks");
     let (low, expected) = (answer.masks.shape[3], t.floats("click.full"));
     let (h, w) = (expected.shape[1], expected.shape[2]);
-    let full = |j: usize, fit: Side| enlarge(&answer.masks.values[j * low * low..(j + 1) * low * low], low, network.side_px(), fit, (w, h));
+    let full = |j: usize, fit: Side| {
+        enlarge(&answer.masks.values[j * low * low..(j + 1) * low * low], low, network.side_px(), fit, (w, h))
+    };
     let all = |fit: Side| (1..4).flat_map(|j| full(j, fit)).collect::<Vec<f32>>();
     let other = if network.fit() == Side::Longer { Side::Both } else { Side::Longer };
     agrees("at full size", &all(network.fit()), &all(other), &expected.values);
@@ -150,7 +153,11 @@ fn automatic_masks_are_those_of_the_official_generators() {
     let (mut masks, mut different) = (0, 0);
     for kind in ["sam", "sam2"] {
         for (name, settings) in known["settings"].as_object().expect("settings") {
-            let area = if kind == "sam" { &settings["min_mask_region_area"] } else { &known["sam2_min_mask_region_area"][name] };
+            let area = if kind == "sam" {
+                &settings["min_mask_region_area"]
+            } else {
+                &known["sam2_min_mask_region_area"][name]
+            };
             let options = options(settings, area, &known["points_per_side"]);
             let got = kept(&known, &t, kind, &options);
             let expected = known["results"][kind][name].as_array().expect("results");
@@ -181,7 +188,14 @@ fn automatic_masks_are_those_of_the_official_generators() {
 fn everything_in_a_picture_is_asked_for_crop_by_crop() {
     let t = Tensors::open("sam2.safetensors");
     let picture = t.picture("picture", 0);
-    let options = AutomaticOptions { points_per_side: 3, batch: 4, predicted_iou: 0.0, stability: 0.3, least_region_px: 2, ..AutomaticOptions::default() };
+    let options = AutomaticOptions {
+        points_per_side: 3,
+        batch: 4,
+        predicted_iou: 0.0,
+        stability: 0.3,
+        least_region_px: 2,
+        ..AutomaticOptions::default()
+    };
     let networks: [Box<dyn PromptedMasks>; 2] = [
         Box::new(Sam::open(&fixture::path("sam.json")).expect("opens")),
         Box::new(Sam2::open(&fixture::path("sam2.json")).expect("opens")),

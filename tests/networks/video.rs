@@ -9,7 +9,7 @@ use fmlgs::models::{ModelError, sam2::Frame};
 use fmlgs::scene::Mask;
 use serde_json::Value;
 
-use super::fixture::{self, Tensors, TOLERANCE, agrees, error};
+use super::fixture::{self, TOLERANCE, Tensors, agrees, error};
 
 const SIZE: (usize, usize) = (96, 72);
 
@@ -78,7 +78,8 @@ fn compare(t: &Tensors, track: &str, name: &str, order: &Value, pass: &Pass) -> 
     let (shape, bits) = t.bytes(&format!("{track}.{name}.full"));
     let (pointers, scores) = (t.floats(&format!("{track}.{name}.pointer")), t.floats(&format!("{track}.{name}.score")));
     let (mut least, mut worst, mut identical) = (1.0_f64, 0.0_f64, 0);
-    let order: Vec<usize> = order.as_array().expect("frames").iter().map(|v| v.as_u64().expect("frame") as usize).collect();
+    let order: Vec<usize> =
+        order.as_array().expect("frames").iter().map(|v| v.as_u64().expect("frame") as usize).collect();
     assert_eq!(pass.keys().copied().collect::<std::collections::BTreeSet<_>>(), order.iter().copied().collect());
     for (f, frame) in order.iter().enumerate() {
         for o in 0..3 {
@@ -112,7 +113,12 @@ fn three_objects_are_followed_as_by_the_official_predictor() {
     let mut frames = InMemory::of(&mut model, &pictures).expect("encoded");
     let first = &frames.0[0];
     let other = &frames.0[5];
-    agrees("embeddings", &first.embeddings.values, &other.embeddings.values, &t.floats("frame0.image_embeddings").values);
+    agrees(
+        "embeddings",
+        &first.embeddings.values,
+        &other.embeddings.values,
+        &t.floats("frame0.image_embeddings").values,
+    );
     agrees("fine features", &first.fine.values, &other.fine.values, &t.floats("frame0.high_res_features1").values);
     for name in ["first", "second"] {
         let of_track = &described["tracks"][name];

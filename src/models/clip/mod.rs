@@ -8,7 +8,6 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use self::tokens::Tokens;
-use super::engine::engine;
 use super::network::{Array, Network};
 use super::prepare::{Filter, Prepare, Side};
 use super::{Encoder, ModelError, Tile, metadata};
@@ -88,6 +87,12 @@ impl ClipEncoder {
         Ok(Self { folder, about, prepare, tokens, image: None, text: None })
     }
 
+    /// The same under the name by which it is found again.
+    pub fn called(mut self, name: &str) -> Self {
+        name.clone_into(&mut self.about.name);
+        self
+    }
+
     /// How pictures are prepared for it.
     pub fn prepare(&self) -> &Prepare {
         &self.prepare
@@ -98,7 +103,7 @@ impl ClipEncoder {
     /// # Errors
     /// If the network cannot be loaded, or fails.
     pub fn embed_pixels(&mut self, pixels: Array) -> Result<Vec<Vec<f32>>, ModelError> {
-        let network = ready(&mut self.image, &self.folder, &self.about.graphs.image)?;
+        let network = self.about.graphs.image.ready(&mut self.image, &self.folder)?;
         network.unit_rows(vec![("pixels", pixels.into())], "embedding", self.about.embed_dim)
     }
 
@@ -107,20 +112,9 @@ impl ClipEncoder {
     /// # Errors
     /// If the network cannot be loaded, or fails.
     pub fn embed_tokens(&mut self, tokens: Array<i64>) -> Result<Vec<Vec<f32>>, ModelError> {
-        let network = ready(&mut self.text, &self.folder, &self.about.graphs.text)?;
+        let network = self.about.graphs.text.ready(&mut self.text, &self.folder)?;
         network.unit_rows(vec![("tokens", tokens.into())], "embedding", self.about.embed_dim)
     }
-}
-
-fn ready<'a>(
-    slot: &'a mut Option<Network>,
-    folder: &Path,
-    graph: &metadata::Graph,
-) -> Result<&'a mut Network, ModelError> {
-    if slot.is_none() {
-        *slot = Some(engine()?.load_file(&folder.join(&graph.file))?);
-    }
-    slot.as_mut().ok_or_else(|| ModelError::NoOutput { model: graph.file.clone(), output: "session".into() })
 }
 
 impl Encoder for ClipEncoder {

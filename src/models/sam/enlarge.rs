@@ -6,11 +6,12 @@ use crate::models::prepare::Side;
 
 /// The two pixels and their shares that a line of `to` pixels takes from one of `from`.
 fn taps(from: usize, to: usize) -> Vec<(usize, usize, f32)> {
-    let scale = from as f64 / to as f64;
+    // In f32, as the official code has them: in f64 a mask's border differs by a pixel now and then.
+    let scale = (from as f64 / to as f64) as f32;
     let tap = |i: usize| {
-        let at = ((i as f64 + 0.5) * scale - 0.5).max(0.0);
+        let at = ((i as f32 + 0.5) * scale - 0.5).max(0.0);
         let low = (at as usize).min(from - 1);
-        (low, (low + 1).min(from - 1), (at - low as f64) as f32)
+        (low, (low + 1).min(from - 1), at - low as f32)
     };
     (0..to).map(tap).collect()
 }
@@ -25,9 +26,8 @@ pub fn bilinear(plane: &[f32], from: (usize, usize), to: (usize, usize)) -> Vec<
     out.par_chunks_exact_mut(to.0.max(1)).with_min_len(32).zip(&rows).for_each(|(line, &(low, high, share))| {
         let (a, b) = (&plane[low * from.0..], &plane[high * from.0..]);
         for (value, &(left, right, part)) in line.iter_mut().zip(&columns) {
-            let across = |row: &[f32]| row[left] + (row[right] - row[left]) * part;
-            let (top, bottom) = (across(a), across(b));
-            *value = top + (bottom - top) * share;
+            let across = |row: &[f32]| row[left] * (1.0 - part) + row[right] * part;
+            *value = across(a) * (1.0 - share) + across(b) * share;
         }
     });
     out

@@ -10,7 +10,6 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::engine::engine;
 use super::network::{Array, Network};
 use super::prepare::{Filter, Prepare, Side};
 use super::{ModelError, metadata};
@@ -102,14 +101,14 @@ impl PromptedMasks for Sam {
     fn look(&mut self, picture: &PhotoPixels) -> Result<(), ModelError> {
         self.embeddings = None;
         let image = self.prepare.picture(picture).ok_or(ModelError::NoPicture)?;
-        let encoder = ready(&mut self.encoder, &self.folder, &self.about.graphs.encoder)?;
+        let encoder = self.about.graphs.encoder.ready(&mut self.encoder, &self.folder)?;
         self.embeddings = Some(encoder.run(vec![("image", image.into())])?.take("image_embeddings")?);
         Ok(())
     }
 
     fn masks(&mut self, points: Array, labels: Array, earlier: Option<Array>) -> Result<Prompted, ModelError> {
         let embeddings = self.embeddings.as_ref().ok_or(ModelError::NoPicture)?;
-        let decoder = ready(&mut self.decoder, &self.folder, &self.about.graphs.decoder)?;
+        let decoder = self.about.graphs.decoder.ready(&mut self.decoder, &self.folder)?;
         let mut inputs = prompt_inputs(points, labels, earlier, self.about.image_size);
         inputs.push(("image_embeddings", embeddings.into()));
         let mut out = decoder.run(inputs)?;
@@ -141,17 +140,4 @@ pub(super) fn prompt_inputs(
         ("mask_input", mask.into()),
         ("has_mask", has.into()),
     ]
-}
-
-/// The network in the slot, loaded from its file if it is not yet.
-pub(super) fn ready<'a>(
-    slot: &'a mut Option<Network>,
-    folder: &Path,
-    graph: &metadata::Graph,
-) -> Result<&'a mut Network, ModelError> {
-    let loaded = match slot.take() {
-        Some(network) => network,
-        None => engine()?.load_file(&folder.join(&graph.file))?,
-    };
-    Ok(slot.insert(loaded))
 }

@@ -12,7 +12,7 @@ use serde::Deserialize;
 
 use super::network::{Array, Network};
 use super::prepare::{Filter, Prepare, Side};
-use super::sam::{Prompted, PromptedMasks, prompt_inputs, ready};
+use super::sam::{Prompted, PromptedMasks, prompt_inputs};
 use super::{ModelError, metadata};
 use crate::scene::PhotoPixels;
 
@@ -135,6 +135,11 @@ impl Sam2 {
         })
     }
 
+    /// What tells its encoder from others: frames that another one encoded are not its own.
+    pub fn digest(&self) -> &str {
+        &self.about.graphs.encoder.sha256
+    }
+
     /// Looks at a frame of a sequence.
     ///
     /// # Errors
@@ -149,7 +154,7 @@ impl Sam2 {
     /// # Errors
     /// If the network fails.
     pub fn encode_pixels(&mut self, image: Array) -> Result<Frame, ModelError> {
-        let encoder = ready(&mut self.encoder, &self.folder, &self.about.graphs.encoder)?;
+        let encoder = self.about.graphs.encoder.ready(&mut self.encoder, &self.folder)?;
         let mut out = encoder.run(vec![("image", image.into())])?;
         Ok(Frame {
             embeddings: out.take("image_embeddings")?,
@@ -185,7 +190,7 @@ impl Sam2 {
         labels: Array,
         mask: Option<Array>,
     ) -> Result<Decoded, ModelError> {
-        let decoder = ready(&mut self.decoder, &self.folder, &self.about.graphs.decoder)?;
+        let decoder = self.about.graphs.decoder.ready(&mut self.decoder, &self.folder)?;
         let mut inputs = prompt_inputs(points, labels, mask, self.about.image_size);
         inputs.extend([
             ("image_embeddings", embeddings.into()),
@@ -200,14 +205,14 @@ impl Sam2 {
     /// A mask of the square's size, `[1, 1, S, S]` of 0 and 1, as the decoder's prompt and as
     /// low-resolution logits.
     fn mask_prompt(&mut self, mask: Array) -> Result<(Array, Array), ModelError> {
-        let network = ready(&mut self.mask_prompt, &self.folder, &self.about.graphs.mask_prompt)?;
+        let network = self.about.graphs.mask_prompt.ready(&mut self.mask_prompt, &self.folder)?;
         let mut out = network.run(vec![("mask", mask.into())])?;
         Ok((out.take("mask_input")?, out.take("low_res_mask")?))
     }
 
     /// What is remembered of an object's mask in a frame.
     fn remember(&mut self, frame: &Frame, logits: &Array, score: f32, binarise: bool) -> Result<Array, ModelError> {
-        let network = ready(&mut self.memory_encoder, &self.folder, &self.about.graphs.memory_encoder)?;
+        let network = self.about.graphs.memory_encoder.ready(&mut self.memory_encoder, &self.folder)?;
         let inputs = vec![
             ("image_embeddings", (&frame.embeddings).into()),
             ("mask_logits", logits.into()),
@@ -228,7 +233,7 @@ impl Sam2 {
         pointers: &[(f32, &Array)],
     ) -> Result<Array, ModelError> {
         let nothing = self.no_pointer();
-        let network = ready(&mut self.memory_attention, &self.folder, &self.about.graphs.memory_attention)?;
+        let network = self.about.graphs.memory_attention.ready(&mut self.memory_attention, &self.folder)?;
         let n = memories.len();
         let mut inputs = vec![
             ("image_embeddings", (&frame.embeddings).into()),

@@ -6,13 +6,14 @@ use glam::DVec3;
 
 use super::codes;
 use super::embed::{EmbedError, embed};
+use super::everything::NetworkMasks;
+use super::follow::Follower;
 use super::link::Disagreement;
 use super::regions::Regions;
-use super::segmenter::{FileMasks, Segmenter};
+use super::segmenter::{FileMasks, SegmentError, Segmenter};
 use super::tracker::{TrackError, TrackOptions, Tracked, ViewReport, track};
 use super::train_codes::{CodeTraining, CodeView, decode, train_codes};
 use super::view_map::ViewMap;
-use crate::io::IoError;
 use crate::io::labels::Labels;
 use crate::models::Encoder;
 use crate::pipeline::observer::{Level, Observer, Signal};
@@ -79,20 +80,32 @@ impl FindError {
     }
 }
 
-/// What finds the masks of photos that `cloud` was trained on: files, where there are any, else
-/// regions of the photos.
+/// What finds the masks of photos that `cloud` was trained on: files, where there are any, else the
+/// network of this name, else regions of the photos.
 ///
 /// # Errors
-/// If there are no masks at `files`.
+/// If there are no masks at `files`, or the network cannot be used.
 pub fn segmenter<'a>(
     files: Option<&Path>,
     cloud: &'a GaussianCloud,
     settings: &'a RenderSettings,
-) -> Result<Box<dyn Segmenter + 'a>, IoError> {
-    Ok(match files {
-        Some(files) => Box::new(FileMasks(Labels::open(files)?)),
-        None => Box::new(Regions { trained: Some((cloud, settings)), ..Regions::default() }),
+    network: Option<&str>,
+) -> Result<Box<dyn Segmenter + 'a>, SegmentError> {
+    Ok(match (files, network) {
+        (Some(files), _) => Box::new(FileMasks(Labels::open(files)?)),
+        (None, Some(network)) => Box::new(NetworkMasks::open(network)?),
+        (None, None) => Box::new(Regions { trained: Some((cloud, settings)), ..Regions::default() }),
     })
+}
+
+/// What finds masks, carries them on, and looks at what they are of.
+pub struct Tools<'a> {
+    /// Finds masks.
+    pub segmenter: &'a mut dyn Segmenter,
+    /// Follows them through the photos, besides what the Gaussians carry.
+    pub follower: Option<&'a mut Follower>,
+    /// Looks at the identities, so that they are found by their looks.
+    pub encoder: Option<&'a mut (dyn Encoder + 'static)>,
 }
 
 /// Finds the objects and parts of `cloud`, which was trained on `photos`, gives them codes, and lets
@@ -105,12 +118,12 @@ pub fn find_objects(
     cloud: &GaussianCloud,
     photos: &[Photo],
     settings: &RenderSettings,
-    segmenter: &mut dyn Segmenter,
+    tools: Tools<'_>,
     options: &FindOptions,
-    encoder: Option<&mut (dyn Encoder + 'static)>,
     observer: &mut dyn Observer,
 ) -> Result<Found, FindError> {
-    let tracked = track(cloud, photos, settings, segmenter, &options.track, observer)?;
+    let Tools { segmenter, follower, encoder } = tools;
+    let tracked = track(cloud, photos, settings, segmenter, follower, &options.track, observer)?;
     if let Some(text) = unknown(&tracked.views, photos, options.track.reseed_share) {
         observer.note(Level::Info, text);
     }

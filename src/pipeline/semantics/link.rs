@@ -3,7 +3,7 @@
 use super::segmenter::FoundMask;
 use super::view_map::ViewMap;
 use super::votes::UNKNOWN;
-use crate::scene::{Identities, IdentityId, Level, Mask};
+use crate::scene::{Identities, IdentityId, Level, Mask, NOBODY};
 
 /// Share of an identity's visible pixels, and of a mask's known pixels, that must be the same.
 const SAME: f64 = 0.5;
@@ -95,6 +95,8 @@ pub enum Disagreement {
     Merge(Vec<IdentityId>),
     /// A mask is known to be the first, by its name, where the second was thought to be.
     Switch(IdentityId, IdentityId),
+    /// Masks that were followed and Gaussians that were voted for put the identity in different places.
+    Drift(IdentityId),
 }
 
 /// The disagreements between masks that were linked and what was known before.
@@ -105,6 +107,8 @@ pub fn disagreements(
     identities: &Identities,
 ) -> Vec<Disagreement> {
     let mut list = Vec::new();
+    // What has a mask of its own in this photo is told apart, wherever it was thought to be.
+    let has_mask = |id: IdentityId| links.contains(&Link::Known(id));
     for (mask, link) in found.iter().zip(links) {
         if let Link::Split(of) = link {
             list.push(Disagreement::Split(*of));
@@ -119,8 +123,10 @@ pub fn disagreements(
         // A part of a part is no peer of its whole.
         let apart = |id: &IdentityId| covered.iter().all(|o| o == id || !identities.line(*id).any(|i| i == *o));
         let covered: Vec<IdentityId> = covered.iter().copied().filter(apart).collect();
+        let own = if let Link::Known(id) = link { *id } else { NOBODY };
+        let merged: Vec<IdentityId> = covered.iter().copied().filter(|id| *id == own || !has_mask(*id)).collect();
         match (link, covered.as_slice()) {
-            (_, [_, _, ..]) => list.push(Disagreement::Merge(covered)),
+            (_, [_, _, ..]) if merged.len() > 1 => list.push(Disagreement::Merge(merged)),
             (Link::Known(is), [other]) if is != other && !identities.line(*other).any(|i| i == *is) => {
                 list.push(Disagreement::Switch(*is, *other));
             }
@@ -133,7 +139,6 @@ pub fn disagreements(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::NOBODY;
 
     fn mask(from: usize, to: usize) -> Mask {
         Mask::from_fn(100, 1, |i| (from..to).contains(&i))

@@ -2,6 +2,7 @@
 
 use crate::io::IoError;
 use crate::io::labels::{Labels, Region};
+use crate::models::ModelError;
 use crate::scene::{Level, Mask, Photo};
 
 /// A mask that a segmenter found in one photo.
@@ -20,7 +21,7 @@ pub struct FoundMask {
 /// Finds the objects and parts of a photo.
 pub trait Segmenter {
     /// Name for people.
-    fn name(&self) -> &'static str;
+    fn name(&self) -> &str;
 
     /// Whether it can say anything about a photo.
     fn covers(&self, photo: &Photo) -> bool;
@@ -30,7 +31,18 @@ pub trait Segmenter {
     ///
     /// # Errors
     /// If the photo or what is known about it cannot be read.
-    fn segment(&mut self, photo: &Photo, max_side_px: u32) -> Result<Vec<FoundMask>, IoError>;
+    fn segment(&mut self, photo: &Photo, max_side_px: u32) -> Result<Vec<FoundMask>, SegmentError>;
+}
+
+/// Why a photo could not be segmented.
+#[derive(Debug, thiserror::Error)]
+pub enum SegmentError {
+    /// The photo or what is known about it cannot be read.
+    #[error(transparent)]
+    Io(#[from] IoError),
+    /// A network fails.
+    #[error(transparent)]
+    Model(#[from] ModelError),
 }
 
 /// Masks that come with the dataset. Regions that do not say what they are count as objects where
@@ -41,7 +53,7 @@ pub struct FileMasks(pub Labels);
 const INSIDE: f64 = 0.9;
 
 impl Segmenter for FileMasks {
-    fn name(&self) -> &'static str {
+    fn name(&self) -> &str {
         "files"
     }
 
@@ -49,7 +61,7 @@ impl Segmenter for FileMasks {
         self.0.has(photo)
     }
 
-    fn segment(&mut self, photo: &Photo, max_side_px: u32) -> Result<Vec<FoundMask>, IoError> {
+    fn segment(&mut self, photo: &Photo, max_side_px: u32) -> Result<Vec<FoundMask>, SegmentError> {
         Ok(found(self.0.of(photo, max_side_px)?))
     }
 }

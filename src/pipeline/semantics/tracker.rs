@@ -3,11 +3,11 @@
 //! too, their masks linked to what is known. No network is needed.
 
 use super::extend::extend;
+use super::follow::{FollowError, Follower, LABEL_SIDE_PX};
 use super::link::{Disagreement, Link, disagreements, link};
-use super::segmenter::{FoundMask, Segmenter};
+use super::segmenter::{FoundMask, SegmentError, Segmenter};
 use super::view_map::ViewMap;
-use super::votes::{Belonging, Votes};
-use crate::io::IoError;
+use super::votes::{Belonging, UNKNOWN, Votes};
 use crate::pipeline::observer::{Level as Severity, Observer, Progress, Signal};
 use crate::render::cpu::Renderer;
 use crate::render::{RenderError, RenderSettings};
@@ -15,6 +15,11 @@ use crate::scene::{GaussianCloud, Identities, IdentityId, NOBODY, Photo};
 
 /// Least weight of votes, in px of the photos voted on, that says something about a Gaussian.
 const LEAST_VOTES: f32 = 0.05;
+
+/// IoU under which a followed mask and the Gaussians' contradict each other.
+const DRIFT: f64 = 0.2;
+/// Pixels from which each of them says something.
+const DRIFT_PX: usize = 30;
 
 /// Settings of a tracking.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,11 +32,13 @@ pub struct TrackOptions {
     pub reseed_share: f64,
     /// Most photos that are segmented.
     pub max_seeds: usize,
+    /// Whether a mask that was followed counts only where the Gaussians do not contradict it.
+    pub veto: bool,
 }
 
 impl Default for TrackOptions {
     fn default() -> Self {
-        Self { seed: None, max_side_px: 1_024, reseed_share: 0.005, max_seeds: 12 }
+        Self { seed: None, max_side_px: 1_024, reseed_share: 0.005, max_seeds: 12, veto: true }
     }
 }
 
@@ -77,10 +84,13 @@ pub struct Tracked {
 pub enum TrackError {
     /// There is nothing to begin with.
     #[error("the '{0}' masks say nothing about any photo; give masks of at least one")]
-    NoSeed(&'static str),
+    NoSeed(String),
     /// Masks could not be read.
     #[error(transparent)]
-    Masks(#[from] IoError),
+    Masks(#[from] SegmentError),
+    /// Masks could not be followed.
+    #[error(transparent)]
+    Follow(FollowError),
     /// A view could not be drawn.
     #[error("photo {0}: {1}")]
     Render(String, RenderError),
@@ -89,12 +99,14 @@ pub enum TrackError {
     Cancelled,
 }
 
-/// Finds the identities of `cloud` in `photos`.
+/// Finds the identities of `cloud` in `photos`. With a `follower`, the first photo's masks are followed
+/// to the others and vote there too.
 pub fn track(
     cloud: &GaussianCloud,
     photos: &[Photo],
     settings: &RenderSettings,
     segmenter: &mut dyn Segmenter,
+    follower: Option<&mut Follower>,
     options: &TrackOptions,
     observer: &mut dyn Observer,
 ) -> Result<Tracked, TrackError> {
@@ -103,7 +115,7 @@ pub fn track(
         Some(seed) => Some(seed).filter(|s| *s < photos.len()).filter(usable),
         None => (0..photos.len()).find(usable),
     };
-    let first = first.ok_or(TrackError::NoSeed(segmenter.name()))?;
+    let first = first.ok_or(TrackError::NoSeed(segmenter.name().to_owned()))?;
     let mut t = Tracker {
         cloud,
         photos,
@@ -116,8 +128,11 @@ pub fn track(
     };
     let mut seeds = vec![first];
     let mut tried = vec![false; photos.len()];
-    t.seed(first, segmenter, observer)?;
+    let seeded = t.seed(first, segmenter, observer)?;
     tried[first] = true;
+    if let (Some(follower), Some((found, ids))) = (follower, seeded) {
+        t.follow(follower, first, &found, &ids, observer)?;
+    }
     let views = loop {
         let views = t.look(seeds.len(), observer)?;
         let needy = views.iter().filter(|v| !tried[v.photo] && v.unknown > options.reseed_share);
@@ -125,7 +140,7 @@ pub fn track(
         let next = needy.max_by(|a, b| a.unknown.total_cmp(&b.unknown)).map(|v| v.photo);
         let Some(next) = next.filter(|_| seeds.len() < options.max_seeds) else { break views };
         tried[next] = true;
-        if t.seed(next, segmenter, observer)? {
+        if t.seed(next, segmenter, observer)?.is_some() {
             seeds.push(next);
         }
     };
@@ -146,17 +161,17 @@ struct Tracker<'a> {
 }
 
 impl Tracker<'_> {
-    /// Segments a photo, links its masks to known identities, and lets them vote. Whether there
-    /// was anything in it.
+    /// Segments a photo, links its masks to known identities, and lets them vote. The masks and whose
+    /// they are; `None` if there was nothing in it.
     fn seed(
         &mut self,
         photo: usize,
         segmenter: &mut dyn Segmenter,
         observer: &mut dyn Observer,
-    ) -> Result<bool, TrackError> {
+    ) -> Result<Option<(Vec<FoundMask>, Vec<IdentityId>)>, TrackError> {
         let found = segmenter.segment(&self.photos[photo], self.options.max_side_px)?;
         if found.is_empty() {
-            return Ok(false);
+            return Ok(None);
         }
         let known = if self.identities.is_empty() { None } else { Some(self.map(photo, self.options.max_side_px)?) };
         let links = link(&found, known.as_ref(), &self.identities);
@@ -182,7 +197,40 @@ impl Tracker<'_> {
         self.votes
             .add_view(&mut self.renderer, self.cloud, &camera, self.settings, &labels)
             .map_err(|e| TrackError::Render(self.photos[photo].name.clone(), e))?;
-        Ok(true)
+        Ok(Some((found, ids)))
+    }
+
+    /// Follows the masks of a photo to all others, where they vote.
+    fn follow(
+        &mut self,
+        follower: &mut Follower,
+        seed: usize,
+        found: &[FoundMask],
+        ids: &[IdentityId],
+        observer: &mut dyn Observer,
+    ) -> Result<(), TrackError> {
+        let followed = follower.follow(self.photos, seed, found, ids, observer);
+        let mut followed = followed.map_err(|e| match e {
+            FollowError::Cancelled => TrackError::Cancelled,
+            e => TrackError::Follow(e),
+        })?;
+        // What is known from the seed alone: it shall not be judged by what it is to judge.
+        let of: Vec<IdentityId> = self.votes.decide(&self.identities, LEAST_VOTES).iter().map(|b| b.identity).collect();
+        for photo in (0..self.photos.len()).filter(|photo| *photo != seed) {
+            let labels = &mut followed[photo];
+            if self.options.veto {
+                let known = self.map_of(photo, LABEL_SIDE_PX, &of)?;
+                for id in contradicted(labels, &known.identity, self.identities.len()) {
+                    labels.iter_mut().filter(|l| **l == id).for_each(|l| *l = UNKNOWN);
+                    self.disagreements.push((photo, Disagreement::Drift(id)));
+                }
+            }
+            let camera = self.photos[photo].camera.limited_to(LABEL_SIDE_PX);
+            self.votes
+                .add_view(&mut self.renderer, self.cloud, &camera, self.settings, labels)
+                .map_err(|e| TrackError::Render(self.photos[photo].name.clone(), e))?;
+        }
+        Ok(())
     }
 
     /// A disagreement, for people.
@@ -195,6 +243,7 @@ impl Tracker<'_> {
             Disagreement::Merge(all) => {
                 format!("one mask covers {}; they stay apart", all.iter().map(name).collect::<Vec<_>>().join(" and "))
             }
+            Disagreement::Drift(id) => format!("{} was followed to where it is not, and is left out there", name(id)),
             Disagreement::Switch(is, other) => format!("{} is where {} was thought to be", name(is), name(other)),
         }
     }
@@ -238,6 +287,23 @@ impl Tracker<'_> {
     }
 }
 
+/// The identities that two label maps of one view put in different places: both show them, and they
+/// hardly overlap.
+fn contradicted(followed: &[IdentityId], known: &[IdentityId], identities: usize) -> Vec<IdentityId> {
+    let mut counts = vec![[0_usize; 3]; identities + 1];
+    for (&a, &b) in followed.iter().zip(known) {
+        for (at, id) in [(0, a), (1, b)] {
+            if let Some(count) = counts.get_mut(id as usize) {
+                count[at] += 1;
+                count[2] += usize::from(a == b && at == 0);
+            }
+        }
+    }
+    let apart =
+        |c: &[usize; 3]| c[0] >= DRIFT_PX && c[1] >= DRIFT_PX && (c[2] as f64) < DRIFT * (c[0] + c[1] - c[2]) as f64;
+    (1..counts.len()).filter(|id| apart(&counts[*id])).map(|id| id as IdentityId).collect()
+}
+
 /// The innermost identity of each pixel of a segmented photo; `NOBODY` where no mask is.
 pub fn labels_of(found: &[FoundMask], ids: &[IdentityId], pixels: usize) -> Vec<IdentityId> {
     let mut labels = vec![NOBODY; pixels];
@@ -269,7 +335,6 @@ fn report(photo: usize, map: &ViewMap, identities: usize) -> ViewReport {
 
 #[cfg(test)]
 mod tests {
-    use super::super::votes::UNKNOWN;
     use super::*;
     use crate::scene::{Level, Mask};
 
@@ -279,6 +344,18 @@ mod tests {
         let found = |level, mask| FoundMask { level, parent: None, name: None, mask };
         let all = [found(Level::Object, mask(1, 8)), found(Level::Part, mask(2, 5))];
         assert_eq!(labels_of(&all, &[4, 9], 10), [0, 4, 9, 9, 9, 4, 4, 4, 0, 0]);
+    }
+
+    #[test]
+    fn what_was_followed_elsewhere_is_contradicted() {
+        let map = |from: usize, to: usize, id: IdentityId| -> Vec<IdentityId> {
+            (0..400).map(|i| if (from..to).contains(&i) { id } else { UNKNOWN }).collect()
+        };
+        assert_eq!(contradicted(&map(0, 100, 2), &map(200, 300, 2), 3), [2]);
+        assert!(contradicted(&map(0, 100, 2), &map(50, 150, 2), 3).is_empty(), "half of it agrees");
+        assert!(contradicted(&map(0, 100, 2), &map(0, 400, UNKNOWN), 3).is_empty(), "nothing is known");
+        assert!(contradicted(&map(0, 20, 2), &map(200, 300, 2), 3).is_empty(), "too few pixels to say");
+        assert!(contradicted(&map(0, 100, 1), &map(0, 100, 2), 3).is_empty(), "each is seen once");
     }
 
     #[test]

@@ -16,8 +16,8 @@ pub mod tree;
 
 use self::segment::{Picture, RegionOptions, segment};
 use super::filters::{self, FilterOptions};
-use super::segmenter::{FoundMask, Segmenter};
-use crate::io::{self, IoError};
+use super::segmenter::{FoundMask, SegmentError, Segmenter};
+use crate::io;
 use crate::render::RenderSettings;
 use crate::scene::{GaussianCloud, Level, Mask, Photo};
 
@@ -33,7 +33,7 @@ pub struct Regions<'a> {
 }
 
 impl Segmenter for Regions<'_> {
-    fn name(&self) -> &'static str {
+    fn name(&self) -> &str {
         "regions"
     }
 
@@ -41,7 +41,7 @@ impl Segmenter for Regions<'_> {
         true
     }
 
-    fn segment(&mut self, photo: &Photo, max_side_px: u32) -> Result<Vec<FoundMask>, IoError> {
+    fn segment(&mut self, photo: &Photo, max_side_px: u32) -> Result<Vec<FoundMask>, SegmentError> {
         let pixels = io::photo::load(photo, max_side_px)?;
         let camera = photo.camera.limited_to(max_side_px);
         let ends = self.trained.and_then(|(cloud, settings)| shape::ends_of(cloud, settings, &camera));
