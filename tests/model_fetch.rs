@@ -59,8 +59,12 @@ fn server(turns: &[Turn]) -> Server {
             if matches!(turn, Turn::Change) {
                 version += 1;
             }
-            // Whoever called may have gone: then there is nobody to tell.
-            let _ = answer(&mut stream, turn, version, &seen);
+            // One that stalls must not hold up the next.
+            let seen = Arc::clone(&seen);
+            std::thread::spawn(move || {
+                // Whoever called may have gone: then there is nobody to tell.
+                let _ = answer(&mut stream, turn, version, &seen);
+            });
         }
     });
     Server { url, log }

@@ -14,6 +14,7 @@ mod eval_masks;
 mod export;
 mod info;
 mod interrupt;
+mod models;
 mod opened;
 mod output;
 mod preprocess;
@@ -54,7 +55,8 @@ Examples:
   fmlgs render scene/ --camera 12 --out view.png
   fmlgs preprocess scene/ --masks photos/   find objects and parts
   fmlgs query scene/ \"the lid of the kettle\" --mask lid.png
-  fmlgs export scene/ --out scene.ply   for any other splat viewer";
+  fmlgs export scene/ --out scene.ply   for any other splat viewer
+  fmlgs models                          neural networks: what is here, what each adds";
 
 /// Train 3D Gaussians from posed photos while you watch, and look around in them.
 #[derive(Debug, Parser)]
@@ -78,6 +80,7 @@ enum Command {
     Eval(eval::Args),
     Preprocess(preprocess::Args),
     Query(query::Args),
+    Models(models::Args),
     Segment(segment::Args),
     Synth(synth::Args),
     Demo(demo::Args),
@@ -117,6 +120,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
     interrupt::listen();
     match command {
         Command::Info(args) => info::run(args),
+        Command::Models(args) => models::run(args, quiet),
         Command::Train(args) => train::run(args, quiet),
         Command::Render(args) => render::run(args),
         Command::Eval(args) => eval::run(args, quiet),

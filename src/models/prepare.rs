@@ -1,8 +1,7 @@
 //! Pictures as networks take them: resized as Pillow does, which the networks were trained with,
 //! then normalised.
 
-use fast_image_resize::images::{Image, ImageRef};
-use fast_image_resize::{FilterType, PixelType, ResizeAlg, ResizeOptions, Resizer};
+use rayon::prelude::*;
 
 use super::network::Array;
 use crate::scene::PhotoPixels;
@@ -101,19 +100,79 @@ impl Prepare {
     }
 }
 
-/// A picture of another size; `None` if that has no pixels.
+/// A picture of another size, bit by bit as Pillow's 8-bit resampling has it; `None` if that has no
+/// pixels, or the picture has not as many as it says.
 pub fn resize(picture: &PhotoPixels, to_w: usize, to_h: usize, filter: Filter) -> Option<Vec<[u8; 3]>> {
-    if (to_w, to_h) == (picture.width_px as usize, picture.height_px as usize) {
-        return Some(picture.rgb.clone());
+    let (w, h) = (picture.width_px as usize, picture.height_px as usize);
+    if w == 0 || h == 0 || to_w == 0 || to_h == 0 || picture.rgb.len() != w * h {
+        return None;
     }
-    let bytes = picture.rgb.as_flattened();
-    let source = ImageRef::new(picture.width_px, picture.height_px, bytes, PixelType::U8x3).ok()?;
-    let mut target = Image::new(u32::try_from(to_w).ok()?, u32::try_from(to_h).ok()?, PixelType::U8x3);
-    let filter = match filter {
-        Filter::Bilinear => FilterType::Bilinear,
-        Filter::Bicubic => FilterType::CatmullRom,
+    // Columns first; what has the size already is left as it is.
+    let wide = match w == to_w {
+        true => picture.rgb.clone(),
+        false => {
+            let taps = taps(w, to_w, filter);
+            let row = |row: &[[u8; 3]]| taps.iter().map(|tap| tap.mix(|i| row[i])).collect::<Vec<_>>();
+            picture.rgb.par_chunks_exact(w).flat_map_iter(row).collect()
+        }
     };
-    let options = ResizeOptions::new().resize_alg(ResizeAlg::Convolution(filter));
-    Resizer::new().resize(&source, &mut target, &options).ok()?;
-    Some(target.buffer().chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect())
+    if h == to_h {
+        return Some(wide);
+    }
+    let taps = taps(h, to_h, filter);
+    let line = |tap: &Tap| (0..to_w).map(|x| tap.mix(|i| wide[i * to_w + x])).collect::<Vec<_>>();
+    Some(taps.par_iter().flat_map_iter(line).collect())
+}
+
+/// Bits after the point of a weight.
+const PRECISION_BITS: u32 = 22;
+
+/// The pixels of a line that one pixel of the resized line is made of, with fixed-point weights.
+struct Tap {
+    first: usize,
+    weights: Vec<i64>,
+}
+
+impl Tap {
+    fn mix(&self, pixel: impl Fn(usize) -> [u8; 3]) -> [u8; 3] {
+        let mut sums = [1_i64 << (PRECISION_BITS - 1); 3];
+        for (k, weight) in self.weights.iter().enumerate() {
+            let pixel = pixel(self.first + k);
+            sums.iter_mut().zip(pixel).for_each(|(sum, p)| *sum += weight * i64::from(p));
+        }
+        sums.map(|sum| (sum >> PRECISION_BITS).clamp(0, 255) as u8)
+    }
+}
+
+fn taps(from: usize, to: usize, filter: Filter) -> Vec<Tap> {
+    let scale = from as f64 / to as f64;
+    let stretch = scale.max(1.0);
+    let (reach, weight): (f64, fn(f64) -> f64) = match filter {
+        Filter::Bilinear => (1.0, |x| (1.0 - x.abs()).max(0.0)),
+        Filter::Bicubic => (2.0, cubic),
+    };
+    let support = reach * stretch;
+    let tap = |i: usize| {
+        let centre = (i as f64 + 0.5) * scale;
+        let first = (centre - support + 0.5).max(0.0) as usize;
+        let end = ((centre + support + 0.5) as usize).min(from);
+        let weights: Vec<f64> = (first..end).map(|j| weight((j as f64 - centre + 0.5) / stretch)).collect();
+        let sum: f64 = weights.iter().sum();
+        let fixed = |w: &f64| (w / sum * f64::from(1_u32 << PRECISION_BITS)).round() as i64;
+        Tap { first, weights: weights.iter().map(fixed).collect() }
+    };
+    (0..to).map(tap).collect()
+}
+
+/// The cubic filter with a = -1/2.
+fn cubic(x: f64) -> f64 {
+    const A: f64 = -0.5;
+    let x = x.abs();
+    if x < 1.0 {
+        ((A + 2.0) * x - (A + 3.0)) * x * x + 1.0
+    } else if x < 2.0 {
+        (((x - 5.0) * x + 8.0) * x - 4.0) * A
+    } else {
+        0.0
+    }
 }

@@ -33,6 +33,8 @@ impl App {
             Action::Evaluate => self.evaluate(),
             Action::FindObjects => self.find_objects(None),
             Action::ChooseMasks => self.choose(Purpose::Masks),
+            Action::FetchModel(id) => self.submit(Command::InstallModel { id, brought: None }),
+            Action::AddModel(id) => self.choose(Purpose::Model(id)),
             Action::TypeQuestion => self.type_question(),
             Action::Ask(text) => {
                 if let Some(semantics) = self.state.semantics.clone() {
@@ -207,6 +209,7 @@ impl App {
         match answer {
             Chosen::Path(Purpose::OpenFolder | Purpose::OpenFile, path) => self.ask(Action::Open(path)),
             Chosen::Path(Purpose::Masks, path) => self.find_objects(Some(path)),
+            Chosen::Path(Purpose::Model(id), path) => self.submit(Command::InstallModel { id, brought: Some(path) }),
             Chosen::Path(Purpose::ExportPly, path) => {
                 if let Some(cloud) = self.viewport.cloud().cloned() {
                     self.submit(Command::Export { cloud, path });

@@ -7,7 +7,9 @@ use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 use super::dialogs::{self, FileDialogs, Question};
 use super::layout::Layout;
 use super::palette::{Palette, shortcut_sheet};
-use super::panes::{bars, dataset::Thumbnails, empty, log, objects, plan, portraits::Portraits, training};
+use super::panes::{
+    bars, dataset::Thumbnails, empty, log, models::Models, objects, plan, portraits::Portraits, training,
+};
 use super::state::AppState;
 use super::toasts::Toasts;
 use super::viewport::Viewport;
@@ -30,6 +32,7 @@ pub struct App {
     pub(super) sheet: bool,
     thumbnails: Thumbnails,
     portraits: Portraits,
+    models: Models,
     toasts: Toasts,
     actions: Vec<Action>,
 }
@@ -57,6 +60,7 @@ impl App {
             sheet: false,
             thumbnails: Thumbnails::default(),
             portraits: Portraits::default(),
+            models: Models::default(),
             toasts: Toasts::default(),
             actions: first.into_iter().collect(),
         })
@@ -121,7 +125,7 @@ impl App {
                 },
             );
         }
-        if [Pane::Training, Pane::Objects, Pane::Plan].iter().any(|p| layout.shows(*p)) {
+        if [Pane::Training, Pane::Objects, Pane::Plan, Pane::Models].iter().any(|p| layout.shows(*p)) {
             Panel::right("work").frame(pane).resizable(true).default_size(350.0).size_range(290.0..=640.0).show(
                 ui,
                 |ui| {
@@ -149,6 +153,10 @@ impl App {
                             egui::CollapsingHeader::new(Pane::Plan.text())
                                 .default_open(state.history.steps.is_empty())
                                 .show(ui, |ui| plan::show(ui, &state.plan));
+                        }
+                        if layout.shows(Pane::Models) {
+                            egui::CollapsingHeader::new(Pane::Models.text())
+                                .show(ui, |ui| self.models.show(ui, state, actions));
                         }
                     });
                 },

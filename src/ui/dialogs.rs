@@ -13,7 +13,7 @@ use crate::scene::IdentityId;
 use crate::worker::{Action, Repaint};
 
 /// What a chosen path is for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Purpose {
     /// Open this folder.
     OpenFolder,
@@ -21,6 +21,8 @@ pub enum Purpose {
     OpenFile,
     /// Find objects with the masks in this folder.
     Masks,
+    /// Take over the files of this model from there.
+    Model(String),
     /// Write Gaussians there.
     ExportPly,
     /// Write the Gaussians of an identity there.
@@ -62,7 +64,7 @@ impl FileDialogs {
         // Some systems want the dialog made on the window's thread; waiting for it is what must not
         // happen here.
         let dialog = AsyncFileDialog::new();
-        let answer: std::pin::Pin<Box<dyn Future<Output = Option<FileHandle>> + Send>> = match purpose {
+        let answer: std::pin::Pin<Box<dyn Future<Output = Option<FileHandle>> + Send>> = match &purpose {
             Purpose::OpenFolder => {
                 Box::pin(dialog.set_title("Open a folder of photos or a trained scene").pick_folder())
             }
@@ -73,6 +75,9 @@ impl FileDialogs {
                     .add_filter("All files", &["*"])
                     .pick_file(),
             ),
+            Purpose::Model(id) => {
+                Box::pin(dialog.set_title(format!("Choose the folder with the files of {id}")).pick_folder())
+            }
             Purpose::Masks => Box::pin(dialog.set_title("Choose the folder with the masks").pick_folder()),
             Purpose::ExportPly | Purpose::ExportTarget(_) => {
                 Box::pin(dialog.set_title("Export Gaussians").set_file_name(format!("{name}.ply")).save_file())

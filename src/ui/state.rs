@@ -101,6 +101,8 @@ pub struct AppState {
     pub sizes: Vec<usize>,
     /// New portraits of objects and parts, until they are taken over.
     pub portraits: Option<(Arc<SemanticMap>, Vec<Option<Vec<[u8; 3]>>>)>,
+    /// Models that were put in place so far.
+    pub models_installed: u64,
     /// Earlier states of objects and parts, oldest first.
     pub undo: Vec<Arc<SemanticMap>>,
     /// States that were taken back, the latest last.
@@ -267,6 +269,10 @@ impl AppState {
                 (self.undo, self.redo) = (Vec::new(), Vec::new());
             }
             Outcome::Edited(map) => self.edited(map),
+            Outcome::ModelInstalled(id) => {
+                self.models_installed += 1;
+                self.toast(Tone::Good, format!("The model {id} can be used now"));
+            }
             Outcome::Portraits(map, pictures) => self.portraits = Some((map, pictures)),
             Outcome::Written(path) => self.toast(Tone::Good, format!("Wrote {}", path.display())),
             Outcome::Photo { index, max_side_px, pixels } => {

@@ -49,13 +49,15 @@ pub enum Pane {
     Objects,
     /// What is left out for this scene, and why.
     Plan,
+    /// Neural networks: which are here, which are missing.
+    Models,
     /// Messages.
     Log,
 }
 
 impl Pane {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::Dataset, Self::Training, Self::Objects, Self::Plan, Self::Log];
+    pub const ALL: [Self; 6] = [Self::Dataset, Self::Training, Self::Objects, Self::Plan, Self::Models, Self::Log];
 
     /// Its title.
     pub fn text(self) -> &'static str {
@@ -64,6 +66,7 @@ impl Pane {
             Self::Training => "Training",
             Self::Objects => "Objects",
             Self::Plan => "Scene plan",
+            Self::Models => "Models",
             Self::Log => "Log",
         }
     }
@@ -151,6 +154,10 @@ pub enum Action {
     FindObjects,
     /// Choose masks, and find objects and parts with them.
     ChooseMasks,
+    /// Fetch a model of the catalogue.
+    FetchModel(String),
+    /// Choose the folder that has the files of a model, and take them over.
+    AddModel(String),
     /// Type a question.
     TypeQuestion,
     /// Ask for an object or part.
@@ -203,7 +210,7 @@ pub enum Action {
 
 impl Action {
     /// Every action that needs no further input, in the order of the palette.
-    pub const ALL: [Self; 39] = [
+    pub const ALL: [Self; 40] = [
         Self::TryDemo,
         Self::OpenFolder,
         Self::OpenFile,
@@ -240,6 +247,7 @@ impl Action {
         Self::TogglePane(Pane::Training),
         Self::TogglePane(Pane::Objects),
         Self::TogglePane(Pane::Plan),
+        Self::TogglePane(Pane::Models),
         Self::TogglePane(Pane::Log),
         Self::Palette,
         Self::Shortcuts,
@@ -260,6 +268,8 @@ impl Action {
             Self::Evaluate => "Measure held-out quality".into(),
             Self::FindObjects => "Find objects and parts".into(),
             Self::ChooseMasks => "Find objects with other masks…".into(),
+            Self::FetchModel(id) => format!("Fetch the model {id}"),
+            Self::AddModel(id) => format!("Add files of the model {id}…"),
             Self::TypeQuestion => "Ask for an object or a part".into(),
             Self::Ask(text) => format!("Ask for {text}"),
             Self::GoToTarget(id) => format!("Go to #{id}"),
@@ -316,6 +326,8 @@ impl Action {
             Self::ChooseMasks => {
                 "Id maps of fmlgs synth, ISAT files, folders of SPIn-NeRF, 3D-OVS or LERF-Mask; one labelled photo will do."
             }
+            Self::FetchModel(_) => "Download it, check it, and use it from then on.",
+            Self::AddModel(_) => "Choose a folder with its files; they are checked and copied.",
             Self::TypeQuestion | Self::Ask(_) => "A name, or \"the button of the red controller\".",
             Self::GoToTarget(_) => "Move until it fills the view, from the side on which the eye is.",
             Self::Isolate(None) => "Draw everything again that was hidden.",
@@ -380,6 +392,8 @@ impl Action {
             | Self::Evaluate
             | Self::FindObjects
             | Self::ChooseMasks
+            | Self::FetchModel(_)
+            | Self::AddModel(_)
             | Self::Ask(_)
             | Self::GoToTarget(_)
             | Self::Isolate(_)

@@ -11,9 +11,10 @@ use super::{edit, machine};
 use crate::io::labels::Labels;
 use crate::io::{self, IoError, OpenError, Opened, TrainedScene, trained};
 use crate::models;
-use crate::models::catalogue::{self, Role};
+use crate::models::catalogue::{self, InstallError, Role};
+use crate::models::fetch::{FetchError, Patience};
 use crate::pipeline::evaluate::evaluate;
-use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::observer::{Level, Observer, Progress, Signal};
 use crate::pipeline::semantics::find::{FindOptions, Found, Tools, find_objects, segmenter};
 use crate::pipeline::semantics::portraits::portraits;
 use crate::pipeline::synth::{SynthError, demo};
@@ -227,6 +228,7 @@ impl Jobs for PipelineJobs {
                 Ok(Outcome::Photo { index, max_side_px, pixels: Arc::new(pixels) })
             }
             Command::Picture { pixels, path } => save_picture(&pixels, &path),
+            Command::InstallModel { id, brought } => install(&id, brought.as_deref(), observer),
             Command::Portraits { cloud, map, settings, home } => {
                 let from = home.camera.as_ref().map_or(home.bounds.center() + home.up, |c| c.center);
                 let drawn = portraits(&cloud, &map, &settings, from, home.up);
@@ -285,6 +287,31 @@ fn find(
     })?;
     io::semantic_map::save(out, &map, cloud).map_err(|e| io_failure(&e))?;
     Ok(Outcome::Objects(Arc::new(map)))
+}
+
+/// Puts a model in place.
+fn install(id: &str, brought: Option<&Path>, observer: &mut dyn Observer) -> Result<Outcome, Stop> {
+    let folder = catalogue::folder();
+    let start = std::time::Instant::now();
+    let done = catalogue::entry(id).and_then(|entry| match brought {
+        Some(brought) => entry.add(&folder, brought),
+        None => entry.fetch(&folder, None, Patience::default(), &mut |name, there, all| {
+            let elapsed_secs = start.elapsed().as_secs_f64();
+            observer.progress(Progress {
+                stage: format!("Fetching {name} (kB)"),
+                done: there / 1000,
+                total: all.unwrap_or(there) / 1000,
+                elapsed_secs,
+                rate: there as f64 / 1000.0 / elapsed_secs.max(1e-9),
+            });
+            observer.signal() != Signal::Cancel
+        }),
+    });
+    match done {
+        Ok(()) => Ok(Outcome::ModelInstalled(id.to_owned())),
+        Err(InstallError::Fetch(FetchError::Cancelled { .. })) => Err(Stop::Cancelled),
+        Err(e) => Err(Stop::Failed(Failure::of(&e, ""))),
+    }
 }
 
 fn export(cloud: &GaussianCloud, path: &Path) -> Result<Outcome, Stop> {

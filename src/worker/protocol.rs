@@ -39,13 +39,15 @@ pub enum JobKind {
     Picture,
     /// Draws objects and parts alone.
     Portraits,
+    /// Puts a model in place.
+    Model,
 }
 
 impl JobKind {
     /// Which thread runs it.
     pub fn lane(self) -> Lane {
         match self {
-            Self::Open | Self::Demo | Self::Train | Self::Evaluate | Self::Objects => Lane::Long,
+            Self::Open | Self::Demo | Self::Train | Self::Evaluate | Self::Objects | Self::Model => Lane::Long,
             Self::Edit | Self::Export | Self::Photo | Self::Picture | Self::Portraits => Lane::Short,
         }
     }
@@ -139,6 +141,13 @@ pub enum Command {
         /// The file.
         path: PathBuf,
     },
+    /// Fetch a model of the catalogue, or take over files that somebody brings.
+    InstallModel {
+        /// Its name.
+        id: String,
+        /// The folder with its files; `None` = its address.
+        brought: Option<PathBuf>,
+    },
     /// Draw every object and part alone, small.
     Portraits {
         /// The Gaussians.
@@ -166,6 +175,7 @@ impl Command {
             Self::Photo { .. } => JobKind::Photo,
             Self::Picture { .. } => JobKind::Picture,
             Self::Portraits { .. } => JobKind::Portraits,
+            Self::InstallModel { .. } => JobKind::Model,
         }
     }
 
@@ -183,6 +193,7 @@ impl Command {
             Self::Export { path, .. } | Self::Picture { path, .. } => format!("Writing {}", name(path)),
             Self::Photo { photo, .. } => format!("Loading {}", photo.name),
             Self::Portraits { .. } => "Drawing objects".into(),
+            Self::InstallModel { id, .. } => format!("Fetching the model {id}"),
         }
     }
 }
@@ -257,6 +268,8 @@ pub enum Outcome {
     Written(PathBuf),
     /// Portraits of objects and parts by number less one, as `semantics::portraits` draws them.
     Portraits(Arc<SemanticMap>, Vec<Option<Vec<[u8; 3]>>>),
+    /// A model can be used now.
+    ModelInstalled(String),
     /// A photo was loaded.
     Photo {
         /// Its index in the dataset.

@@ -4,6 +4,7 @@ pub mod bars;
 pub mod dataset;
 pub mod empty;
 pub mod log;
+pub mod models;
 pub mod objects;
 pub mod plan;
 pub mod plots;

@@ -1,0 +1,194 @@
+//! The catalogue: what is here, bringing files, fetching them from a folder on a server, and refusing
+//! what is not what it should be. With the reduced networks of the fixtures in place of real ones.
+
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use fmlgs::models::catalogue::{self, Entry, InstallError, State};
+use fmlgs::models::fetch::{FetchError, Patience};
+
+mod cli_support;
+
+fn fixtures() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/networks")
+}
+
+/// The reduced CLIP as if it were listed.
+fn reduced() -> Entry {
+    let file = |name: &str| serde_json::json!({ "name": name, "megabytes": 1 });
+    serde_json::from_value(serde_json::json!({
+        "id": "reduced", "role": "encoder", "title": "Reduced", "adds": "Nothing.", "licence": "MIT", "source": "here",
+        "description": "clip.json", "file": [file("clip_image.onnx"), file("clip_text.onnx")],
+    }))
+    .expect("an entry")
+}
+
+/// Serves the files of a folder.
+fn server(folder: &Path) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let url = format!("http://{}/models", listener.local_addr().expect("bound"));
+    let folder = folder.to_path_buf();
+    std::thread::spawn(move || {
+        for stream in listener.incoming().flatten() {
+            let mut lines = BufReader::new(&stream).lines();
+            let first = lines.next().and_then(Result::ok).unwrap_or_default();
+            while lines.next().and_then(Result::ok).is_some_and(|l| !l.is_empty()) {}
+            let name = first.split(' ').nth(1).and_then(|p| p.strip_prefix("/models/")).unwrap_or_default().to_owned();
+            let mut stream = &stream;
+            // Whoever called may have gone.
+            let _ = match fs::read(folder.join(name)) {
+                Ok(bytes) => {
+                    write!(stream, "HTTP/1.1 200 OK\r\nContent-Length: {}\r\nConnection: close\r\n\r\n", bytes.len())
+                        .and_then(|()| stream.write_all(&bytes))
+                }
+                Err(_) => write!(stream, "HTTP/1.1 404 No\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"),
+            };
+        }
+    });
+    url
+}
+
+fn impatient() -> Patience {
+    Patience { stall: Duration::from_secs(5), attempts: 2, pause: Duration::from_millis(5) }
+}
+
+#[test]
+fn the_list_is_sound() {
+    let all = catalogue::entries().expect("the list");
+    assert!(all.len() >= 4);
+    for e in &all {
+        assert!(!e.title.is_empty() && e.adds.ends_with('.') && !e.licence.is_empty(), "{}", e.id);
+        assert_eq!(e.built_in, e.description.is_empty(), "{}", e.id);
+        assert_eq!(e.built_in, e.file.is_empty(), "{}", e.id);
+        if !e.built_in {
+            // The export tool that it names is there.
+            let tool = e.export.split(' ').next().expect("a tool");
+            assert!(Path::new(env!("CARGO_MANIFEST_DIR")).join("tools/export").join(tool).is_file(), "{tool}");
+            assert!(e.export.contains(&format!("--name {}", e.id)), "{}", e.export);
+            assert!(e.megabytes() > 100 && e.description == format!("{}.json", e.id));
+        }
+    }
+    assert!(matches!(catalogue::entry("no-such-model"), Err(InstallError::Unknown(_))));
+    assert!(matches!(catalogue::entry("demo").expect("listed").state(Path::new("/nowhere")), State::BuiltIn));
+}
+
+#[test]
+fn files_that_somebody_brings_are_checked_and_copied() {
+    let (here, entry) = (tempfile::tempdir().expect("folder"), reduced());
+    let folder = here.path().join("models");
+    assert!(matches!(entry.state(&folder), State::Missing(files) if files.len() == 3));
+    entry.add(&folder, &fixtures()).expect("added");
+    assert_eq!(entry.state(&folder), State::Here);
+    entry.verify(&folder).expect("right");
+
+    // A swapped file of the same size, which only its content tells.
+    let image = folder.join("clip_image.onnx");
+    let mut bytes = fs::read(&image).expect("read");
+    bytes[1000] ^= 1;
+    fs::write(&image, &bytes).expect("written");
+    assert_eq!(entry.state(&folder), State::Here);
+    let error = entry.verify(&folder).expect_err("swapped").to_string();
+    assert!(error.contains("clip_image.onnx") && error.contains("refused"), "{error}");
+    // One of another size is seen at once.
+    bytes.pop();
+    fs::write(&image, &bytes).expect("written");
+    assert!(matches!(entry.state(&folder), State::Broken(problem) if problem.contains("clip_image.onnx")));
+
+    // What is wrong where it comes from changes nothing here.
+    let other = here.path().join("other");
+    entry.add(&other, &fixtures()).expect("added");
+    let error = entry.add(&other, &folder).expect_err("broken there").to_string();
+    assert!(error.contains("clip_image.onnx"), "{error}");
+    entry.verify(&other).expect("untouched");
+    let error = entry.add(&other, here.path()).expect_err("nothing there").to_string();
+    assert!(error.contains("clip.json"), "{error}");
+}
+
+#[test]
+fn a_model_is_fetched_from_a_folder_on_a_server() {
+    let (here, entry) = (tempfile::tempdir().expect("folder"), reduced());
+    let error = entry.fetch(here.path(), None, impatient(), &mut |_, _, _| true).expect_err("nobody hosts it");
+    assert!(matches!(&error, InstallError::NoAddress { id, .. } if id == "reduced"));
+    assert!(error.to_string().contains("--from"), "{error}");
+
+    let url = server(&fixtures());
+    let mut names = Vec::new();
+    entry
+        .fetch(here.path(), Some(&url), impatient(), &mut |name, _, _| {
+            if names.last().is_none_or(|last| last != name) {
+                names.push(name.to_owned());
+            }
+            true
+        })
+        .expect("fetched");
+    assert_eq!(names, ["clip.json", "clip_image.onnx", "clip_text.onnx"]);
+    assert_eq!(entry.state(here.path()), State::Here);
+    // What is here is not fetched again; what is broken is.
+    fs::write(here.path().join("clip_text.onnx"), "broken").expect("written");
+    names.clear();
+    let mut told = |name: &str, _, _| {
+        names.push(name.to_owned());
+        true
+    };
+    entry.fetch(here.path(), Some(&url), impatient(), &mut told).expect("fetched");
+    assert!(names.iter().all(|n| n == "clip_text.onnx") && !names.is_empty(), "{names:?}");
+
+    // A server whose graphs are not those of its description.
+    let wrong = tempfile::tempdir().expect("folder");
+    for name in ["clip.json", "clip_image.onnx"] {
+        fs::copy(fixtures().join(name), wrong.path().join(name)).expect("copied");
+    }
+    fs::copy(fixtures().join("clip_image.onnx"), wrong.path().join("clip_text.onnx")).expect("copied");
+    let fresh = tempfile::tempdir().expect("folder");
+    let error = entry.fetch(fresh.path(), Some(&server(wrong.path())), impatient(), &mut |_, _, _| true);
+    let error = error.expect_err("another graph");
+    assert!(matches!(error, InstallError::Fetch(FetchError::OtherSize { .. })), "{error}");
+    assert!(matches!(entry.state(fresh.path()), State::Missing(files) if files == ["clip_text.onnx"]));
+}
+
+#[test]
+fn a_description_cannot_reach_out_of_its_folder() {
+    let (here, entry) = (tempfile::tempdir().expect("folder"), reduced());
+    let text = fs::read_to_string(fixtures().join("clip.json")).expect("read");
+    fs::write(here.path().join("clip.json"), text.replace("clip_text.onnx", "../clip_text.onnx")).expect("written");
+    for name in ["clip_image.onnx", "clip_text.onnx"] {
+        fs::copy(fixtures().join(name), here.path().join(name)).expect("copied");
+    }
+    let error = entry.verify(here.path()).expect_err("a path").to_string();
+    assert!(error.contains("no file name"), "{error}");
+}
+
+#[test]
+fn the_command_line_says_what_is_here_and_what_to_do() {
+    let folder = cli_support::folder();
+    let run = |arguments: &[&str]| -> cli_support::Done {
+        let mut command = cli_support::command(arguments);
+        command.env("FMLGS_MODELS", folder.path()).env("FMLGS_ONNXRUNTIME", "none").output().expect("runs").into()
+    };
+    let list = run(&["models", "--json"]).ok().json();
+    let state = |id: &str| {
+        let models = list["models"].as_array().expect("models");
+        models.iter().find(|m| m["id"] == id).expect("listed")["state"].clone()
+    };
+    assert_eq!(state("demo"), "built_in");
+    assert!(state("clip-vit-b16")["missing"].as_array().is_some_and(|files| files.len() == 3));
+    assert!(list["engine"].as_str().is_some_and(|e| e.contains("tract")) && list["device"] == "processor");
+    let text = run(&["models"]).ok().stdout;
+    assert!(text.contains("sam2.1-tiny") && text.contains("not here") && text.contains("tools/export"), "{text}");
+    // Without an address nothing is fetched, and the error says what to do instead.
+    let error = run(&["models", "fetch", "clip-vit-b16"]).fails_with(1).stderr;
+    assert!(error.contains("export_clip.py") && error.contains("--from"), "{error}");
+    let error = run(&["models", "fetch", "no-such-model"]).fails_with(1).stderr;
+    assert!(error.contains("no-such-model"), "{error}");
+    let error = run(&["models", "add", "clip-vit-b16", "/nowhere"]).fails_with(1).stderr;
+    assert!(error.contains("clip-vit-b16.json"), "{error}");
+    assert!(run(&["models", "check"]).ok().stdout.contains("demo: right"));
+    // An air-gapped machine: the address cannot be reached.
+    let port = TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("bound").port();
+    let url = format!("http://127.0.0.1:{port}");
+    let offline = run(&["-q", "models", "fetch", "sam2.1-tiny", "--from", &url]).fails_with(1).stderr;
+    assert!(offline.contains("cannot be reached") && offline.contains("bring the file yourself"), "{offline}");
+}
