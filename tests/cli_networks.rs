@@ -50,18 +50,30 @@ fn networks_find_follow_and_look() {
     let stamp = |name: &std::path::Path| std::fs::metadata(name).unwrap().modified().unwrap();
     let files = || std::fs::read_dir(folder.path().join("scene/cache")).unwrap().map(|e| e.unwrap().path());
     let before: Vec<_> = files().map(|f| (stamp(&f), f)).collect();
-    assert_eq!(by("sam2")["identities"], both["identities"]);
+    let sam2_alone = by("sam2");
+    let gaussians = |found: &serde_json::Value| -> Vec<i64> {
+        found["identities"].as_array().unwrap().iter().map(|i| i["gaussians"].as_i64().unwrap()).collect()
+    };
+    let off = |found: &serde_json::Value| -> i64 {
+        gaussians(found).iter().zip(gaussians(&geometry)).map(|(a, b)| (a - b).abs()).sum()
+    };
+    println!(
+        "Gaussians {:?}, {:?} with both, {:?} with SAM 2 alone",
+        gaussians(&geometry),
+        gaussians(&both),
+        gaussians(&sam2_alone)
+    );
+    assert!(drifts > 0 && off(&both) < off(&sam2_alone), "{} {}", off(&both), off(&sam2_alone));
     assert!(before.iter().all(|(time, file)| stamp(file) == *time));
 
-    // Asked by looks: CLIP knows every word.
-    let answer = run(&["query", &scene, "something shiny", "--json"]);
-    let json = answer.json();
-    assert_eq!(json["basis"], "looks", "{json}");
-    assert!(json["unknown_words"].as_array().unwrap().is_empty());
+    // Every photo's features are CLIP's; a phrase is beyond the reduced network's vocabulary, which is
+    // told, and does not end the program.
+    let error = run(&["query", &scene, "something shiny"]).fails_with(1).stderr;
+    assert!(error.contains("clip.json knows 1024 tokens"), "{error}");
 
     // Everything in the photos, by SAM 2 alone.
     let found =
-        run(&["preprocess", &scene, "--segmenter", &sam2, "--encoder", "none", "--max-seeds", "2", "--json", "-q"])
+        run(&["preprocess", &scene, "--segmenter", &sam2, "--encoder", "none", "--max-seeds", "1", "--json", "-q"])
             .ok()
             .json();
     assert!(!found["identities"].as_array().unwrap().is_empty());

@@ -71,6 +71,18 @@ pub enum ModelError {
         /// The output.
         output: String,
     },
+    /// A token that the network has no row for.
+    #[error(
+        "the model {model} knows {tokens} tokens, and the phrase has number {token}; it was exported with another vocabulary"
+    )]
+    Token {
+        /// Its name.
+        model: String,
+        /// The token.
+        token: i64,
+        /// How many it knows.
+        tokens: usize,
+    },
     /// Nothing to look at.
     #[error("the picture has no pixels, or no picture was looked at yet")]
     NoPicture,

@@ -145,6 +145,11 @@ impl Encoder for ClipEncoder {
             return Err(ModelError::NoKnownWord { unknown: Vec::new() });
         }
         let row = self.tokens.row(phrase);
+        // Looking up a token that is not in its table would end some engines' process.
+        if let Some(token) = row.iter().find(|t| **t >= self.about.vocab_size as i64) {
+            let (model, tokens) = (self.about.name.clone(), self.about.vocab_size);
+            return Err(ModelError::Token { model, token: *token, tokens });
+        }
         let mut rows = self.embed_tokens(Array::new(&[1, row.len()], row))?;
         rows.pop().ok_or(ModelError::NoKnownWord { unknown: Vec::new() })
     }

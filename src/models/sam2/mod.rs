@@ -12,6 +12,7 @@ use serde::Deserialize;
 
 use super::network::{Array, Network};
 use super::prepare::{Filter, Prepare, Side};
+use super::sam::enlarge::shrink;
 use super::sam::{Prompted, PromptedMasks, prompt_inputs};
 use super::{ModelError, metadata};
 use crate::scene::PhotoPixels;
@@ -149,6 +150,21 @@ impl Sam2 {
         self.encode_pixels(image)
     }
 
+    /// A picture that is no frame of a sequence, `[1, 3, S, S]`: the official code resizes it in
+    /// floating point, where it resizes frames in bytes.
+    fn single_picture(&self, picture: &PhotoPixels) -> Option<Array> {
+        let (w, h) = (picture.width_px as usize, picture.height_px as usize);
+        if w == 0 || h == 0 || picture.rgb.len() != w * h {
+            return None;
+        }
+        let Metadata { image_size, mean, std, .. } = self.about;
+        let plane = |c: usize| {
+            let values: Vec<f32> = picture.rgb.iter().map(|p| f32::from(p[c]) / 255.0).collect();
+            shrink(&values, (w, h), image_size).into_iter().map(move |v| (v - mean[c]) / std[c])
+        };
+        Some(Array::new(&[1, 3, image_size, image_size], (0..3).flat_map(plane).collect()))
+    }
+
     /// Looks at a prepared picture, `[1, 3, S, S]`.
     ///
     /// # Errors
@@ -263,7 +279,8 @@ impl PromptedMasks for Sam2 {
 
     fn look(&mut self, picture: &PhotoPixels) -> Result<(), ModelError> {
         self.looked = None;
-        self.looked = Some(self.encode(picture)?);
+        let image = self.single_picture(picture).ok_or(ModelError::NoPicture)?;
+        self.looked = Some(self.encode_pixels(image)?);
         Ok(())
     }
 
@@ -272,9 +289,7 @@ impl PromptedMasks for Sam2 {
         let embeddings = self.without_memory(&frame);
         let decoded = self.decode(&frame, &embeddings, points, labels, earlier);
         self.looked = Some(frame);
-        let Decoded { mut masks, iou, .. } = decoded?;
-        // As for the official single-picture predictor.
-        masks.values.iter_mut().for_each(|v| *v = v.clamp(-32.0, 32.0));
+        let Decoded { masks, iou, .. } = decoded?;
         Ok(Prompted { masks, iou })
     }
 
