@@ -1,5 +1,7 @@
 //! The catalogue: what is here, bringing files, fetching them from a folder on a server, and refusing
 //! what is not what it should be. With the reduced networks of the fixtures in place of real ones.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+#![allow(clippy::disallowed_methods)] // A server for a second needs no name.
 
 use std::fs;
 use std::io::{BufRead, BufReader, Write};

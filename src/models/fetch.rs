@@ -305,7 +305,7 @@ fn receive(
         .truncate(there == 0)
         .open(&part.path)
         .map_err(|e| part.failed(e))?;
-    let pieces = pieces(response);
+    let pieces = pieces(response).map_err(|e| part.failed(e))?;
     let expected = wanted.bytes.or(total);
     loop {
         if !progress(there, expected) {
@@ -338,9 +338,9 @@ fn content_range(value: &str) -> Option<(u64, Option<u64>)> {
 }
 
 /// The body, read by a thread of its own, so that a silent server can be told from a slow one.
-fn pieces(response: Response<Body>) -> crossbeam_channel::Receiver<io::Result<Vec<u8>>> {
+fn pieces(response: Response<Body>) -> io::Result<crossbeam_channel::Receiver<io::Result<Vec<u8>>>> {
     let (send, receive) = bounded(4);
-    std::thread::spawn(move || {
+    let read = move || {
         let mut reader = response.into_body().into_reader();
         loop {
             let mut piece = vec![0; 1 << 16];
@@ -348,13 +348,18 @@ fn pieces(response: Response<Body>) -> crossbeam_channel::Receiver<io::Result<Ve
                 piece.truncate(n);
                 piece
             });
-            let ends = !matches!(&read, Ok(piece) if !piece.is_empty());
-            if (ends && read.is_ok()) || send.send(read).is_err() || ends {
+            // The end: whoever receives sees that nobody sends any more.
+            if read.as_ref().is_ok_and(Vec::is_empty) {
+                return;
+            }
+            let failed = read.is_err();
+            if send.send(read).is_err() || failed {
                 return;
             }
         }
-    });
-    receive
+    };
+    std::thread::Builder::new().name("download".into()).spawn(read)?;
+    Ok(receive)
 }
 
 #[cfg(test)]

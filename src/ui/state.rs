@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::pipeline::observer::{Evaluation, Level, Progress, StepMetrics};
+use crate::pipeline::semantics::portraits::Gallery;
 use crate::scene::{PhotoPixels, ScenePlan, SemanticMap};
 use crate::worker::{Event, Failure, JobId, JobKind, Lane, OpenedScene, Outcome};
 
@@ -100,7 +101,7 @@ pub struct AppState {
     /// Gaussians of each of them by number, pieces included.
     pub sizes: Vec<usize>,
     /// New portraits of objects and parts, until they are taken over.
-    pub portraits: Option<(Arc<SemanticMap>, Vec<Option<Vec<[u8; 3]>>>)>,
+    pub portraits: Option<(Arc<SemanticMap>, Gallery)>,
     /// Models that were put in place so far.
     pub models_installed: u64,
     /// Earlier states of objects and parts, oldest first.

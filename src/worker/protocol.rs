@@ -8,6 +8,7 @@ use glam::DVec3;
 use super::edit::EditRequest;
 use crate::io::trained::History;
 use crate::pipeline::observer::{Evaluation, Level, Progress, StepMetrics};
+use crate::pipeline::semantics::portraits::Gallery;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::{Bounds, Camera, Dataset, GaussianCloud, Photo, PhotoPixels, ScenePlan, SemanticMap};
@@ -267,7 +268,7 @@ pub enum Outcome {
     /// A file was written.
     Written(PathBuf),
     /// Portraits of objects and parts by number less one, as `semantics::portraits` draws them.
-    Portraits(Arc<SemanticMap>, Vec<Option<Vec<[u8; 3]>>>),
+    Portraits(Arc<SemanticMap>, Gallery),
     /// A model can be used now.
     ModelInstalled(String),
     /// A photo was loaded.

@@ -141,7 +141,7 @@ fn a_real_photo_is_prepared_as_the_golden_tensor() {
         filter: Filter::Bicubic,
         side: Side::Shorter,
         mean: [0.481_454_66, 0.457_827_5, 0.408_210_73],
-        std: [0.268_629_54, 0.261_302_58, 0.275_777_11],
+        std: [0.268_629_54, 0.261_302_6, 0.275_777_1],
     };
     let of = |name: &str| {
         let picture = image::open(folder.join(name)).expect("a picture").to_rgb8();

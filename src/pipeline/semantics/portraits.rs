@@ -11,8 +11,11 @@ pub const SIDE_PX: usize = 64;
 /// Field of view; narrow, so that near and far are alike in size, radians.
 const FOV_RAD: f64 = 0.5;
 
-/// A picture of every identity by number less one, SIDE_PX x SIDE_PX, row-major, as somebody at
-/// `from` sees it; `None` for those without Gaussians.
+/// A picture of each identity by number less one, SIDE_PX x SIDE_PX, row-major; `None` for those
+/// without Gaussians.
+pub type Gallery = Vec<Option<Vec<[u8; 3]>>>;
+
+/// A picture of every identity as somebody at `from` sees it.
 ///
 /// # Errors
 /// If one cannot be drawn.
@@ -22,7 +25,7 @@ pub fn portraits(
     settings: &RenderSettings,
     from: DVec3,
     up: DVec3,
-) -> Result<Vec<Option<Vec<[u8; 3]>>>, RenderError> {
+) -> Result<Gallery, RenderError> {
     let mut renderer = Renderer::<f32>::new();
     let mut list = Vec::with_capacity(map.identities.len());
     for (id, _) in map.identities.iter() {

@@ -149,6 +149,9 @@ pub fn track(
     Ok(Tracked { identities: t.identities, belongings, seeds, views, disagreements: t.disagreements })
 }
 
+/// Masks of a photo, and whose they are.
+type Seeded = (Vec<FoundMask>, Vec<IdentityId>);
+
 struct Tracker<'a> {
     cloud: &'a GaussianCloud,
     photos: &'a [Photo],
@@ -168,7 +171,7 @@ impl Tracker<'_> {
         photo: usize,
         segmenter: &mut dyn Segmenter,
         observer: &mut dyn Observer,
-    ) -> Result<Option<(Vec<FoundMask>, Vec<IdentityId>)>, TrackError> {
+    ) -> Result<Option<Seeded>, TrackError> {
         let found = segmenter.segment(&self.photos[photo], self.options.max_side_px)?;
         if found.is_empty() {
             return Ok(None);
