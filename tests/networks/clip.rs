@@ -90,6 +90,8 @@ fn tiles_of_any_size_and_phrases_without_words() {
     }
     assert_eq!(clip.images(&[]).expect("nothing to do").len(), 0);
     assert_eq!(clip.image(&tile(9)).expect("embeds"), both[0]);
+    // Tokens of CLIP's own vocabulary, of which the reduced network has the first thousand.
+    assert!(matches!(clip.text("a cat"), Err(ModelError::Token { tokens: 1024, .. })));
     for empty in ["", "  ", "?!"] {
         assert!(matches!(clip.text(empty), Err(ModelError::NoKnownWord { .. })), "{empty:?}");
     }
@@ -124,10 +126,11 @@ fn metadata_that_does_not_fit_is_refused() {
     // Graphs that are not there, or have been swapped, are told when they are needed.
     assert_eq!(with("name", "other".into()), "");
     let mut clip = ClipEncoder::open(&path).expect("opens");
-    let missing = clip.text("a cat").expect_err("no graph").to_string();
+    let tokens = || Tensors::open("clip.safetensors").ints("tokens").row(2);
+    let missing = clip.embed_tokens(tokens()).expect_err("no graph").to_string();
     assert!(missing.contains("clip_text.onnx"), "{missing}");
     std::fs::copy(fixture::path("clip_image.onnx"), folder.path().join("clip_text.onnx")).expect("copied");
-    let swapped = clip.text("a cat").expect_err("another graph").to_string();
+    let swapped = clip.embed_tokens(tokens()).expect_err("another graph").to_string();
     assert!(swapped.contains("another file"), "{swapped}");
 }
 

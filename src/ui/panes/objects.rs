@@ -82,9 +82,8 @@ impl Tree<'_> {
                 actions.push(Action::Ask(identities.full_name(id)));
             }
             self.menu(ui, id, actions);
-            ui.label(
-                RichText::new(format!("{} Gaussians", sizes.get(id as usize).unwrap_or(&0))).small().color(theme::WEAK),
-            );
+            let size = sizes.get(id as usize).unwrap_or(&0).to_string();
+            ui.label(RichText::new(size).small().color(theme::WEAK)).on_hover_text("Gaussians");
         });
     }
 }

@@ -11,6 +11,9 @@ use crate::worker::{Action, EditRequest};
 /// Largest difference of colour, per channel, over which a click spreads.
 const SAME_COLOR: u8 = 14;
 
+/// Colour of the paint: nothing in a scene is likely to have it.
+const PAINT: [u8; 3] = [255, 60, 200];
+
 /// What is being marked.
 pub struct Brush {
     /// Whose piece it will be; of nobody, an object.
@@ -92,7 +95,7 @@ impl Brush {
             let size = [self.mask.width_px(), self.mask.height_px()];
             let pixel = |i| {
                 if self.mask.contains(i) {
-                    Color32::from_rgba_unmultiplied(255, 255, 255, 130)
+                    Color32::from_rgba_unmultiplied(PAINT[0], PAINT[1], PAINT[2], 140)
                 } else {
                     Color32::TRANSPARENT
                 }

@@ -294,7 +294,8 @@ impl Questions {
         let area = Area::new(Id::unique("question")).order(Order::Middle).pivot(Align2::RIGHT_TOP).fixed_pos(at);
         area.constrain_to(rect).show(ui.ctx(), |ui| {
             theme::overlay().show(ui, |ui| {
-                ui.set_width(380.0_f32.min(rect.width() - 40.0));
+                // Beside the view's own buttons, as long as there is room.
+                ui.set_width((rect.width() - 410.0).clamp(300.0, 380.0).min(rect.width() - 40.0));
                 self.show_bar(ui, semantics);
                 if self.open {
                     let heat = (!self.heat.is_empty()).then_some(self.heat.as_slice());
