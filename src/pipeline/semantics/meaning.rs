@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 
+use rayon::prelude::*;
+
 use super::localise::{Scorer, Strategy};
 use super::relevancy::{CANONICAL, TEMPERATURE, advantage, score};
 use crate::scene::{LanguageFeatures, ViewFeatures};
@@ -72,6 +74,9 @@ pub fn resolution(temperature: f32) -> f32 {
     score(0.0025, temperature) - score(-0.0025, temperature)
 }
 
+/// Identities that one thread scores at least: less is not worth handing over.
+const IDENTITIES_PER_TASK: usize = 32;
+
 /// Scores by language features.
 pub struct ByMeaning<'a> {
     /// Features of the identities.
@@ -101,7 +106,7 @@ impl<'a> ByMeaning<'a> {
             let each = query.into_iter().flat_map(|q| views.iter().map(move |v| (v, q)));
             each.map(|(v, q)| advantage(v, q, &canonical)).fold(f32::NEG_INFINITY, f32::max)
         };
-        self.features.of.iter().map(best).collect()
+        self.features.of.par_iter().with_min_len(IDENTITIES_PER_TASK).map(best).collect()
     }
 }
 
