@@ -16,6 +16,7 @@ pub mod cli;
 pub mod io;
 pub mod math;
 pub mod models;
+pub mod navigate;
 pub mod pipeline;
 pub mod render;
 pub mod scene;

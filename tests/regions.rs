@@ -51,7 +51,7 @@ fn objects_and_parts_of_the_demo_scene() {
     synth::run(&glb, &options, folder.path(), &mut Silent).expect("render");
     let photo = &dataset(folder.path()).photos[0];
     let labels = Labels::open(folder.path()).expect("labels").of(photo, 504).expect("labels");
-    let found = Regions::default().segment(photo, 504).expect("regions");
+    let found = Regions::default().segment(photo, 504, &mut Silent).expect("regions");
     let [objects, parts] = recall(&found, &labels);
     println!("demo: objects {objects:.2}, parts {parts:.2}, {} regions", found.len());
     assert!(objects >= 0.5 && parts >= 0.35, "objects {objects:.2}, parts {parts:.2}");
@@ -72,7 +72,7 @@ fn objects_and_parts_of_the_plush_doll() {
         let labels = Labels::open(&drawn.join(view)).expect("labels");
         let photo = photos.iter().find(|p| labels.has(p)).expect("photo");
         let start = std::time::Instant::now();
-        let found = Regions::default().segment(photo, 1024).expect("regions");
+        let found = Regions::default().segment(photo, 1024, &mut Silent).expect("regions");
         let secs = start.elapsed().as_secs_f64();
         let [objects, parts] = recall(&found, &labels.of(photo, 1024).expect("labels"));
         println!("{view}: objects {objects:.2}, parts {parts:.2}, {} regions, {secs:.2} s", found.len());

@@ -11,7 +11,7 @@ use super::progress::Console;
 use super::{CliError, output, query};
 use crate::io::{self, labels::Labels};
 use crate::models;
-use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::observer::{Level, Observer, Silent};
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::find::{FindOptions, Found, Tools, find_objects};
 use crate::pipeline::semantics::grammar::Kind;
@@ -110,7 +110,7 @@ pub fn run(
             camera: &camera,
             exact: &view,
             blended: &CodeMap::default(),
-            categories: categories(&segmenter.segment(photo, job.max_side_px)?),
+            categories: categories(&segmenter.segment(photo, job.max_side_px, &mut Silent)?),
         };
         // Names need no encoder, so asking for them does not fail.
         let mut by_name = |text: &str| asker.ask(text, Kind::Auto).ok().flatten();

@@ -10,6 +10,7 @@ use super::eval::Job;
 use super::{CliError, output};
 use crate::io::{self, labels::Labels};
 use crate::models;
+use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::grammar::Kind;
 use crate::pipeline::semantics::protocols::{
@@ -249,7 +250,7 @@ fn labelled(job: &Job, map: &SemanticMap, labels: &mut FileMasks) -> Result<Vec<
         let camera = photo.camera.limited_to(job.max_side_px);
         let exact = ViewMap::render(&mut renderer, &job.cloud, &map.of, &map.identities, &camera, &job.settings)?;
         let blended = CodeMap::render(&mut renderer, &job.cloud, &map.codes, &camera, &job.settings)?;
-        let categories = categories(&labels.segment(photo, job.max_side_px)?);
+        let categories = categories(&labels.segment(photo, job.max_side_px, &mut Silent)?);
         drawn.push(Drawn { index, name: photo.name.clone(), camera, trained_on, exact, blended, categories });
     }
     Ok(drawn)

@@ -10,7 +10,7 @@ use super::{CliError, opened, output};
 use crate::io;
 use crate::models;
 use crate::models::catalogue::{self, Role};
-use crate::pipeline::semantics::find::{FindOptions, Found, Lifting, Tools, find_objects, segmenter};
+use crate::pipeline::semantics::find::{FindOptions, Found, Lifting, REGIONS, Tools, find_objects, segmenter};
 use crate::pipeline::semantics::follow::Follower;
 use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::scene::{Level, Photo};
@@ -42,7 +42,7 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = TrackerKind::Geometry)]
     tracker: TrackerKind,
     /// The SAM 2 that follows masks: a model of 'fmlgs models', or the path of a model's .json
-    #[arg(long, default_value = "sam2.1-tiny")]
+    #[arg(long, default_value = catalogue::SAM2)]
     tracker_model: String,
     /// Dataset with the photos [default: where the scene's photos are]
     #[arg(long)]
@@ -128,7 +128,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         }
     };
     let network = match args.segmenter.as_deref() {
-        Some("files" | "regions") => None,
+        Some("files" | REGIONS) => None,
         Some(name) => Some(name.to_owned()),
         None => catalogue::usable(Role::Segmenter).into_iter().next(),
     };
@@ -159,7 +159,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let (cloud, settings) = (&scene.cloud, &scene.settings);
     let tools = Tools { segmenter: &mut *segmenter, follower: follower.as_mut(), encoder: encoder.as_deref_mut() };
     let found = find_objects(cloud, &photos, settings, tools, &options, &mut observer);
-    let Found { map, views, disagreements } = found.map_err(|e| match e {
+    let Found { map, views, disagreements, secs: stages } = found.map_err(|e| match e {
         e if e.is_cancelled() => CliError::Cancelled("nothing was stored".into()),
         other => other.into(),
     })?;
@@ -175,6 +175,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
             "scene": args.scene,
             "seeds": map.seeds,
             "secs": secs,
+            "stages": stages.iter().map(|(stage, secs)| json!({ "stage": stage, "secs": secs })).collect::<Vec<_>>(),
             "identities": list.collect::<Vec<_>>(),
             "views": views.iter().map(|v| json!({
                 "photo": photos[v.photo].name, "unknown": v.unknown, "seen": v.seen,

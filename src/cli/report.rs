@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::progress::Console;
 use super::{CliError, opened, output};
 use crate::io::{self, labels::Labels};
+use crate::pipeline::observer::Silent;
 use crate::pipeline::report::{self, FeatureStudy, Report};
 use crate::pipeline::semantics::segmenter::{FileMasks, FoundMask, Segmenter};
 use crate::pipeline::semantics::tracker::labels_of;
@@ -87,7 +88,7 @@ fn view(
     if !segmenter.covers(photo) {
         return Ok(None);
     }
-    let found: Vec<FoundMask> = segmenter.segment(photo, max_side_px)?;
+    let found: Vec<FoundMask> = segmenter.segment(photo, max_side_px, &mut Silent)?;
     let mut ids: Vec<IdentityId> = Vec::with_capacity(found.len());
     for mask in &found {
         let parent = mask.parent.map_or(NOBODY, |p| ids[p]);

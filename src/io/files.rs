@@ -15,17 +15,20 @@ pub const MAX_PICTURE_BYTES: u64 = 256 << 20;
 /// Bytes that one reader may use: half of the memory that is free when the program first asks.
 pub fn memory_budget() -> u64 {
     static BUDGET: OnceLock<u64> = OnceLock::new();
-    *BUDGET.get_or_init(|| {
-        // Systems that do not say get what any of them can spare.
-        const UNKNOWN: u64 = 1 << 30;
-        let Ok(mut system) = sysinfo::System::new() else { return UNKNOWN };
-        system.refresh_memory();
-        let group = system.cgroup_limits().map_or(u64::MAX, |g| g.free_memory);
-        match system.available_memory().min(group) {
-            0 => UNKNOWN,
-            free => free / 2,
-        }
-    })
+    *BUDGET.get_or_init(|| free_memory() / 2)
+}
+
+/// Bytes of memory that programs may still use, limits of their group included.
+pub fn free_memory() -> u64 {
+    // Systems that do not say get what any of them can spare.
+    const UNKNOWN: u64 = 2 << 30;
+    let Ok(mut system) = sysinfo::System::new() else { return UNKNOWN };
+    system.refresh_memory();
+    let group = system.cgroup_limits().map_or(u64::MAX, |g| g.free_memory);
+    match system.available_memory().min(group) {
+        0 => UNKNOWN,
+        free => free,
+    }
 }
 
 /// The whole file, if it is a regular file of at most `limit` bytes.

@@ -16,6 +16,9 @@ use crate::io::data_folder::data_folder;
 /// The list that comes with the program.
 const LIST: &str = include_str!("../../assets/models.toml");
 
+/// Name of the model that follows masks.
+pub const SAM2: &str = "sam2.1-tiny";
+
 /// What a model is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]

@@ -17,6 +17,7 @@ use ort::session::builder::GraphOptimizationLevel;
 
 use super::ModelError;
 use super::network::Network;
+use super::room;
 
 /// What runs networks in this process.
 pub struct Engine {
@@ -177,7 +178,7 @@ impl Engine {
     /// # Errors
     /// If it is no network, or one that this engine cannot run.
     pub fn load(&self, bytes: &[u8], name: &str) -> Result<Network, ModelError> {
-        self.prepare(name, |builder| builder.commit_from_memory(bytes))
+        Ok(Network::new(self.prepare(name, |builder| builder.commit_from_memory(bytes))?, name))
     }
 
     /// Prepares a network in a file.
@@ -185,6 +186,12 @@ impl Engine {
     /// # Errors
     /// If it is no network, or one that this engine cannot run.
     pub fn load_file(&self, path: &Path) -> Result<Network, ModelError> {
+        Ok(Network::new(self.session(path)?, &path.display().to_string()).in_file(path))
+    }
+
+    /// A session of a network in a file, for which room is made.
+    pub(super) fn session(&self, path: &Path) -> Result<Session, ModelError> {
+        room::make(std::fs::metadata(path).map_or(0, |m| m.len()));
         self.prepare(&path.display().to_string(), |builder| builder.commit_from_file(path))
     }
 
@@ -192,7 +199,7 @@ impl Engine {
         &self,
         name: &str,
         commit: impl Fn(&mut ort::session::builder::SessionBuilder) -> ort::Result<Session>,
-    ) -> Result<Network, ModelError> {
+    ) -> Result<Session, ModelError> {
         let load = |device: Option<Device>| -> ort::Result<Session> {
             let builder = Session::builder(&self.environment)?;
             // Not asked to optimise, the built-in engine prepares nothing and is ten times slower.
@@ -208,8 +215,7 @@ impl Engine {
             None => load(None),
         };
         let engine = if self.name.starts_with("tract") { "built-in" } else { "ONNX Runtime" };
-        let session = session.map_err(|e| ModelError::Load { model: name.into(), engine, problem: e.to_string() })?;
-        Ok(Network::new(session, name))
+        session.map_err(|e| ModelError::Load { model: name.into(), engine, problem: e.to_string() })
     }
 }
 

@@ -14,6 +14,7 @@ pub mod fetch;
 pub mod metadata;
 pub mod network;
 pub mod prepare;
+pub mod room;
 pub mod sam;
 pub mod sam2;
 mod tile;

@@ -1,11 +1,16 @@
 //! A network: named arrays in, named arrays out.
 
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
 
 use ort::session::{Session, SessionInputValue};
 use ort::value::Tensor;
 
 use super::ModelError;
+use super::engine::engine;
+use super::room::{self, Place};
 
 /// Numbers with a shape, row-major.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -100,14 +105,22 @@ impl Outputs {
 
 /// A network that is ready to run.
 pub struct Network {
-    session: Session,
+    place: Arc<Mutex<Place>>,
     name: String,
+    /// Its file, if it has one; without, it stays open.
+    file: Option<PathBuf>,
 }
 
 impl Network {
     /// Of a session, with the file name for messages.
     pub(super) fn new(session: Session, name: &str) -> Self {
-        Self { session, name: name.into() }
+        Self { place: Place::of(session), name: name.into(), file: None }
+    }
+
+    /// The same, known to lie in a file: it may be closed where memory is short.
+    pub(super) fn in_file(self, path: &Path) -> Self {
+        room::register(&self.place);
+        Self { file: Some(path.into()), ..self }
     }
 
     /// Its file's name.
@@ -121,6 +134,15 @@ impl Network {
     /// If the engine fails, an input is missing or of another shape, or an output is not finite.
     pub fn run(&mut self, inputs: Vec<(&'static str, Input)>) -> Result<Outputs, ModelError> {
         let name = self.name.clone();
+        // A panic while it ran leaves a session that runs again.
+        let mut place = self.place.lock().unwrap_or_else(PoisonError::into_inner);
+        if let (None, Some(file)) = (&place.session, &self.file) {
+            place.session = Some(engine()?.session(file)?);
+        }
+        place.used = Instant::now();
+        let Some(session) = &mut place.session else {
+            return Err(ModelError::Run { model: name, problem: "it is closed".into() });
+        };
         let failed = |e: ort::Error| ModelError::Run { model: name.clone(), problem: e.to_string() };
         let mut given: Vec<(&'static str, SessionInputValue<'_>)> = Vec::with_capacity(inputs.len());
         for (input, value) in inputs {
@@ -130,7 +152,7 @@ impl Network {
             };
             given.push((input, value));
         }
-        let outputs = self.session.run(given).map_err(failed)?;
+        let outputs = session.run(given).map_err(failed)?;
         let mut arrays = BTreeMap::new();
         for (output, value) in outputs.iter() {
             let (shape, values) = value.try_extract_tensor::<f32>().map_err(failed)?;

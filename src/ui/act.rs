@@ -164,6 +164,7 @@ impl App {
                 holdout_every: self.layout.config.holdout_every,
                 settings: scene.render.clone(),
                 masks,
+                with: self.layout.finding.clone(),
                 out: scene.out.clone(),
             }),
             None => self.state.toast(Tone::Warning, "Train first: objects are made of trained Gaussians."),

@@ -156,7 +156,7 @@ impl App {
                         }
                         if layout.shows(Pane::Models) {
                             egui::CollapsingHeader::new(Pane::Models.text())
-                                .show(ui, |ui| self.models.show(ui, state, actions));
+                                .show(ui, |ui| self.models.show(ui, state, &mut layout.finding, actions));
                         }
                     });
                 },

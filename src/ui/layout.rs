@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
+use crate::pipeline::semantics::find::Finding;
 use crate::pipeline::train::TrainConfig;
 use crate::worker::{Pane, ViewMode};
 
@@ -38,6 +39,8 @@ pub struct Layout {
     pub plot_axis: PlotAxis,
     /// Settings of the next training.
     pub config: TrainConfig,
+    /// Models that find objects.
+    pub finding: Finding,
     /// Files and folders opened lately.
     pub recent: Vec<PathBuf>,
 }
@@ -52,6 +55,7 @@ impl Default for Layout {
             mode: ViewMode::Picture,
             plot_axis: PlotAxis::default(),
             config: TrainConfig { steps: 3_000, eval_every: 250, ..TrainConfig::default() },
+            finding: Finding::default(),
             recent: Vec::new(),
         }
     }

@@ -11,11 +11,12 @@ use super::{edit, machine};
 use crate::io::labels::Labels;
 use crate::io::{self, IoError, OpenError, Opened, TrainedScene, trained};
 use crate::models;
-use crate::models::catalogue::{self, InstallError, Role};
+use crate::models::catalogue::{self, InstallError, Role, SAM2};
 use crate::models::fetch::{FetchError, Patience};
 use crate::pipeline::evaluate::evaluate;
 use crate::pipeline::observer::{Level, Observer, Progress, Signal};
-use crate::pipeline::semantics::find::{FindOptions, Found, Tools, find_objects, segmenter};
+use crate::pipeline::semantics::find::{Carry, FindOptions, Finding, Found, REGIONS, Tools, find_objects, segmenter};
+use crate::pipeline::semantics::follow::Follower;
 use crate::pipeline::semantics::portraits::portraits;
 use crate::pipeline::synth::{SynthError, demo};
 use crate::pipeline::train::checkpoint::CheckpointError;
@@ -214,10 +215,10 @@ impl Jobs for PipelineJobs {
             Command::Demo => self.demo(observer),
             Command::Train { dataset, config, out } => self.train(&dataset, &config, out, observer),
             Command::Evaluate { dataset, cloud, config } => measure(&dataset, &cloud, &config, observer),
-            Command::FindObjects { dataset, cloud, holdout_every, settings, masks, out } => {
+            Command::FindObjects { dataset, cloud, holdout_every, settings, masks, with, out } => {
                 let (training, _) = dataset.split(holdout_every);
                 let photos: Vec<Photo> = training.iter().map(|&i| dataset.photos[i].clone()).collect();
-                find(&cloud, &photos, &settings, masks.as_deref(), &out, observer)
+                find(&cloud, &photos, &settings, masks.as_deref(), &with, &out, observer)
             }
             Command::EditObjects { cloud, map, settings, request, out } => {
                 edit::run(&cloud, &map, &settings, &request, &out)
@@ -266,19 +267,36 @@ fn find(
     photos: &[Photo],
     settings: &RenderSettings,
     masks: Option<&Path>,
+    with: &Finding,
     out: &Path,
     observer: &mut dyn Observer,
 ) -> Result<Outcome, Stop> {
-    let network = catalogue::usable(Role::Segmenter).into_iter().next();
+    let network = match with.segmenter.as_deref() {
+        Some(REGIONS) => None,
+        Some(name) => Some(name.to_owned()),
+        None => catalogue::usable(Role::Segmenter).into_iter().next(),
+    };
     let found = segmenter(masks, cloud, settings, network.as_deref());
     let mut segmenter = found.map_err(|e| Stop::Failed(Failure::of(&e, "")))?;
+    let mut follower = match with.carry {
+        Carry::Gaussians => None,
+        _ => {
+            let opened = Follower::open(SAM2, Some(out.join("cache")));
+            Some(opened.map_err(|e| Stop::Failed(Failure::of(&e, "")))?)
+        }
+    };
     // Without the encoder, names alone are understood.
-    let mut encoder = models::best_encoder()
+    let mut encoder = with
+        .encoder
+        .as_deref()
+        .map_or_else(models::best_encoder, models::encoder)
         .inspect_err(|e| observer.note(Level::Warning, format!("Objects are found without their looks: {e}")))
         .ok();
-    let options = FindOptions::default();
+    let mut options = FindOptions::default();
+    options.track.veto = with.carry == Carry::Both;
     let found = {
-        let tools = Tools { segmenter: &mut *segmenter, follower: None, encoder: encoder.as_deref_mut() };
+        let (follower, encoder) = (follower.as_mut(), encoder.as_deref_mut());
+        let tools = Tools { segmenter: &mut *segmenter, follower, encoder };
         find_objects(cloud, photos, settings, tools, &options, observer)
     };
     let Found { map, .. } = found.map_err(|e| match e {

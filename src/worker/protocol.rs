@@ -8,6 +8,7 @@ use glam::DVec3;
 use super::edit::EditRequest;
 use crate::io::trained::History;
 use crate::pipeline::observer::{Evaluation, Level, Progress, StepMetrics};
+use crate::pipeline::semantics::find::Finding;
 use crate::pipeline::semantics::portraits::Gallery;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
@@ -103,6 +104,8 @@ pub enum Command {
         settings: RenderSettings,
         /// Where the masks are; `None` = regions of the photos are found.
         masks: Option<PathBuf>,
+        /// With which models.
+        with: Finding,
         /// Folder of the trained scene.
         out: PathBuf,
     },

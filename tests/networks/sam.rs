@@ -2,6 +2,7 @@
 
 use fmlgs::models::network::Array;
 use fmlgs::models::prepare::{Filter, Side, resize};
+use fmlgs::models::room::close_idle;
 use fmlgs::models::sam::automatic::{AutomaticOptions, Collector, Something, crops, everything};
 use fmlgs::models::sam::enlarge::enlarge;
 use fmlgs::models::sam::{PromptedMasks, Sam};
@@ -228,4 +229,15 @@ fn everything_in_a_picture_is_asked_for_crop_by_crop() {
         });
         assert!(some.expect("cancelled").len() <= all.len() && asked == 3);
     }
+}
+
+#[test]
+fn networks_that_were_closed_to_make_room_open_again() {
+    let (t, mut sam) = (Tensors::open("sam.safetensors"), Sam::open(&fixture::path("sam.json")).expect("opens"));
+    sam.look(&t.picture("picture", 0)).expect("looks");
+    let before = sam.embeddings().expect("looked").clone();
+    assert!(close_idle() >= 1, "one lies idle");
+    sam.look(&t.picture("picture", 0)).expect("opens again");
+    assert_eq!(sam.embeddings(), Some(&before));
+    drop(sam);
 }

@@ -1,8 +1,10 @@
 //! The whole way from trained Gaussians and masks to a semantic map.
 
 use std::path::Path;
+use std::time::Instant;
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use super::codes;
 use super::embed::{EmbedError, embed};
@@ -39,6 +41,33 @@ pub enum Lifting {
     Paper(u64),
 }
 
+/// How masks are carried to the other photos.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Carry {
+    /// By the trained Gaussians; no network.
+    #[default]
+    Gaussians,
+    /// By SAM 2 from photo to photo besides, as in the paper; photos have to be in the order of a walk.
+    Sam2,
+    /// By both, and where SAM 2 contradicts the Gaussians it is not believed.
+    Both,
+}
+
+/// Name of the masks that need no model.
+pub const REGIONS: &str = "regions";
+
+/// Which models find objects; `None` = the best that is here.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Finding {
+    /// Finds masks where none came with the photos.
+    pub segmenter: Option<String>,
+    /// Carries them to the other photos.
+    pub carry: Carry,
+    /// Looks at what was found.
+    pub encoder: Option<String>,
+}
+
 /// Settings of the whole way.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FindOptions {
@@ -57,6 +86,8 @@ pub struct Found {
     pub views: Vec<ViewReport>,
     /// Photos whose masks disagreed with what was known before, and how.
     pub disagreements: Vec<(usize, Disagreement)>,
+    /// Seconds that each stage took, in order.
+    pub secs: Vec<(&'static str, f64)>,
 }
 
 /// Why objects could not be found.
@@ -134,12 +165,17 @@ pub fn find_objects(
     let margin = tracked.belongings.iter().map(|b| b.margin).collect();
     let seeds = tracked.seeds.iter().map(|&i| photos[i].name.clone()).collect();
     let mut map = SemanticMap::of_identities(identities, of, margin, seeds);
+    let Tracked { views, disagreements, mut secs, .. } = tracked;
+    let mut timed = |stage: &'static str, start: Instant| secs.push((stage, start.elapsed().as_secs_f64()));
+    let start = Instant::now();
     lift(&mut map, cloud, photos, settings, options.lifting, observer)?;
+    timed("train codes", start);
     if let Some(encoder) = encoder {
+        let start = Instant::now();
         map.language = Some(embed(cloud, &map, photos, settings, encoder, observer)?);
+        timed("look at identities", start);
     }
-    let Tracked { views, disagreements, .. } = tracked;
-    Ok(Found { map, views, disagreements })
+    Ok(Found { map, views, disagreements, secs })
 }
 
 /// Trains the codes of the Gaussians, where that is wanted, on the masks as they were tracked.

@@ -36,6 +36,8 @@ pub struct Follower {
     model: Sam2,
     /// Where frames are kept, if anywhere.
     cache: Option<PathBuf>,
+    /// Seconds that looking at frames has taken, reading kept ones included.
+    pub encode_secs: f64,
 }
 
 impl Follower {
@@ -45,7 +47,7 @@ impl Follower {
     /// # Errors
     /// If it is not on this machine.
     pub fn open(name: &str, cache: Option<PathBuf>) -> Result<Self, ModelError> {
-        Ok(Self { model: Sam2::open(&catalogue::find(name, Role::Segmenter)?)?, cache })
+        Ok(Self { model: Sam2::open(&catalogue::find(name, Role::Segmenter)?)?, cache, encode_secs: 0.0 })
     }
 
     /// The label of every pixel of every photo, scaled to at most [`LABEL_SIDE_PX`], row-major: the
@@ -69,7 +71,7 @@ impl Follower {
         };
         let sizes: Vec<(usize, usize)> = photos.iter().map(size).collect();
         let mut labels: Vec<Vec<IdentityId>> = sizes.iter().map(|(w, h)| vec![UNKNOWN; w * h]).collect();
-        let mut frames = Cached { photos, folder: self.cache.clone(), kept: None };
+        let mut frames = Cached { photos, folder: self.cache.clone(), kept: None, secs: &mut self.encode_secs };
         let batches = found.len().div_ceil(BATCH) as u64;
         let total = batches * photos.len() as u64;
         let mut done = 0_u64;
@@ -116,6 +118,8 @@ struct Cached<'a> {
     folder: Option<PathBuf>,
     /// The frame that was used last: it is asked for by every object.
     kept: Option<(usize, Frame)>,
+    /// Time spent.
+    secs: &'a mut f64,
 }
 
 impl Frames for Cached<'_> {
@@ -127,6 +131,7 @@ impl Frames for Cached<'_> {
         if let Some((_, frame)) = self.kept.as_ref().filter(|(at, _)| *at == index) {
             return Ok(frame.clone());
         }
+        let start = std::time::Instant::now();
         let photo = &self.photos[index];
         let file = self.folder.as_ref().map(|folder| folder.join(file_name(model, photo)));
         let frame = match file.as_deref().and_then(read) {
@@ -142,6 +147,7 @@ impl Frames for Cached<'_> {
             }
         };
         self.kept = Some((index, frame.clone()));
+        *self.secs += start.elapsed().as_secs_f64();
         Ok(frame)
     }
 }

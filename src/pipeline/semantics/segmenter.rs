@@ -3,6 +3,7 @@
 use crate::io::IoError;
 use crate::io::labels::{Labels, Region};
 use crate::models::ModelError;
+use crate::pipeline::observer::Observer;
 use crate::scene::{Level, Mask, Photo};
 
 /// A mask that a segmenter found in one photo.
@@ -30,8 +31,13 @@ pub trait Segmenter {
     /// Empty where it finds nothing.
     ///
     /// # Errors
-    /// If the photo or what is known about it cannot be read.
-    fn segment(&mut self, photo: &Photo, max_side_px: u32) -> Result<Vec<FoundMask>, SegmentError>;
+    /// If the photo or what is known about it cannot be read, or the observer asks to stop.
+    fn segment(
+        &mut self,
+        photo: &Photo,
+        max_side_px: u32,
+        observer: &mut dyn Observer,
+    ) -> Result<Vec<FoundMask>, SegmentError>;
 }
 
 /// Why a photo could not be segmented.
@@ -43,6 +49,9 @@ pub enum SegmentError {
     /// A network fails.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// The observer asked to stop.
+    #[error("cancelled")]
+    Cancelled,
 }
 
 /// Masks that come with the dataset. Regions that do not say what they are count as objects where
@@ -61,7 +70,12 @@ impl Segmenter for FileMasks {
         self.0.has(photo)
     }
 
-    fn segment(&mut self, photo: &Photo, max_side_px: u32) -> Result<Vec<FoundMask>, SegmentError> {
+    fn segment(
+        &mut self,
+        photo: &Photo,
+        max_side_px: u32,
+        _: &mut dyn Observer,
+    ) -> Result<Vec<FoundMask>, SegmentError> {
         Ok(found(self.0.of(photo, max_side_px)?))
     }
 }

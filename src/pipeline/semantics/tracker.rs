@@ -2,6 +2,8 @@
 //! the votes are drawn into the other views, and photos of which too much is unknown are segmented
 //! too, their masks linked to what is known. No network is needed.
 
+use std::time::Instant;
+
 use super::extend::extend;
 use super::follow::{FollowError, Follower, LABEL_SIDE_PX};
 use super::link::{Disagreement, Link, disagreements, link};
@@ -77,6 +79,8 @@ pub struct Tracked {
     pub views: Vec<ViewReport>,
     /// Where masks and what was known disagreed, with the photo.
     pub disagreements: Vec<(usize, Disagreement)>,
+    /// Seconds that each stage took, in order.
+    pub secs: Vec<(&'static str, f64)>,
 }
 
 /// Why tracking failed.
@@ -125,13 +129,18 @@ pub fn track(
         identities: Identities::default(),
         votes: Votes::new(cloud.len()),
         disagreements: Vec::new(),
+        segment_secs: 0.0,
     };
+    let (start, mut follow_secs, mut encode_secs) = (Instant::now(), 0.0, 0.0);
     let mut seeds = vec![first];
     let mut tried = vec![false; photos.len()];
     let seeded = t.seed(first, segmenter, observer)?;
     tried[first] = true;
     if let (Some(follower), Some((found, ids))) = (follower, seeded) {
+        let start = Instant::now();
         t.follow(follower, first, &found, &ids, observer)?;
+        encode_secs = follower.encode_secs;
+        follow_secs = start.elapsed().as_secs_f64() - encode_secs;
     }
     let views = loop {
         let views = t.look(seeds.len(), observer)?;
@@ -146,7 +155,14 @@ pub fn track(
     };
     let mut belongings = t.votes.decide(&t.identities, LEAST_VOTES);
     extend(cloud, &mut belongings);
-    Ok(Tracked { identities: t.identities, belongings, seeds, views, disagreements: t.disagreements })
+    let carry_secs = start.elapsed().as_secs_f64() - t.segment_secs - encode_secs - follow_secs;
+    let secs = vec![
+        ("segment", t.segment_secs),
+        ("encode frames", encode_secs),
+        ("follow masks", follow_secs),
+        ("carry by Gaussians", carry_secs),
+    ];
+    Ok(Tracked { identities: t.identities, belongings, seeds, views, disagreements: t.disagreements, secs })
 }
 
 /// Masks of a photo, and whose they are.
@@ -161,6 +177,7 @@ struct Tracker<'a> {
     identities: Identities,
     votes: Votes,
     disagreements: Vec<(usize, Disagreement)>,
+    segment_secs: f64,
 }
 
 impl Tracker<'_> {
@@ -172,7 +189,13 @@ impl Tracker<'_> {
         segmenter: &mut dyn Segmenter,
         observer: &mut dyn Observer,
     ) -> Result<Option<Seeded>, TrackError> {
-        let found = segmenter.segment(&self.photos[photo], self.options.max_side_px)?;
+        let start = Instant::now();
+        let found = segmenter.segment(&self.photos[photo], self.options.max_side_px, observer);
+        self.segment_secs += start.elapsed().as_secs_f64();
+        let found = found.map_err(|e| match e {
+            SegmentError::Cancelled => TrackError::Cancelled,
+            e => e.into(),
+        })?;
         if found.is_empty() {
             return Ok(None);
         }
@@ -266,7 +289,7 @@ impl Tracker<'_> {
 
     /// Draws what is known into every view.
     fn look(&mut self, round: usize, observer: &mut dyn Observer) -> Result<Vec<ViewReport>, TrackError> {
-        let start = std::time::Instant::now();
+        let start = Instant::now();
         // To see how much is unknown, small pictures will do.
         let side = self.options.max_side_px.min(256);
         let of: Vec<IdentityId> = self.votes.decide(&self.identities, LEAST_VOTES).iter().map(|b| b.identity).collect();

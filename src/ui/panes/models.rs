@@ -6,8 +6,9 @@ use egui::{Button, RichText, Ui};
 
 use super::super::state::AppState;
 use super::super::theme;
-use crate::models::catalogue::{self, Entry, State};
+use crate::models::catalogue::{self, Entry, Role, SAM2, State};
 use crate::models::engine::engine;
+use crate::pipeline::semantics::find::{Carry, Finding, REGIONS};
 use crate::worker::Action;
 
 /// What is known of engine and models; looked up off the window's thread.
@@ -39,7 +40,7 @@ impl Known {
 
 impl Models {
     /// Draws the pane.
-    pub fn show(&mut self, ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
+    pub fn show(&mut self, ui: &mut Ui, state: &AppState, finding: &mut Finding, actions: &mut Vec<Action>) {
         if self.installed != state.models_installed {
             *self = Self { installed: state.models_installed, ..Self::default() };
         }
@@ -61,11 +62,68 @@ impl Models {
         for (entry, model) in &known.models {
             one(ui, entry, model, state.job.is_none(), actions);
         }
+        choose(ui, &known.models, finding);
         ui.label(RichText::new(format!("Run by {}", known.engine)).small().color(theme::WEAK));
         if let Some(note) = &known.note {
             ui.label(RichText::new(note).small().color(theme::WARNING));
         }
     }
+}
+
+/// The models that find objects, of those that are here.
+fn choose(ui: &mut Ui, models: &[(Entry, State)], finding: &mut Finding) {
+    let here = |role: Role| {
+        let of_role = models.iter().filter(move |(e, s)| e.role == role && matches!(s, State::Here | State::BuiltIn));
+        of_role.map(|(e, _)| (e.id.clone(), e.title.clone())).collect::<Vec<_>>()
+    };
+    ui.label(RichText::new("Finding objects").strong());
+    let mut segmenters = vec![(REGIONS.to_owned(), "regions of even colour".to_owned())];
+    segmenters.extend(here(Role::Segmenter));
+    let follows = segmenters.iter().any(|(id, _)| id == SAM2);
+    egui::Grid::new("finding").num_columns(2).show(ui, |ui| {
+        ui.weak("Masks");
+        one_of(ui, "masks", &mut finding.segmenter, &segmenters)
+            .on_hover_text("Where no masks came with the photos, and none were chosen.");
+        ui.end_row();
+        ui.weak("Carried by");
+        let names = [
+            (Carry::Gaussians, "the Gaussians"),
+            (Carry::Sam2, "the Gaussians and SAM 2"),
+            (Carry::Both, "both, Gaussians have the last word"),
+        ];
+        let chosen = names.iter().find(|(c, _)| *c == finding.carry).map_or("", |(_, name)| *name);
+        ui.add_enabled_ui(follows || finding.carry != Carry::Gaussians, |ui| {
+            egui::ComboBox::from_id_salt("carry").selected_text(chosen).width(180.0).show_ui(ui, |ui| {
+                for (carry, name) in names {
+                    ui.selectable_value(&mut finding.carry, carry, name);
+                }
+            });
+        })
+        .response
+        .on_disabled_hover_text("Following masks from photo to photo needs SAM 2.");
+        ui.end_row();
+        ui.weak("Looked at by");
+        one_of(ui, "encoder", &mut finding.encoder, &here(Role::Encoder))
+            .on_hover_text("What turns their looks into something that words can be compared with.");
+        ui.end_row();
+    });
+    ui.add_space(4.0);
+}
+
+/// A choice among models; none = the best.
+fn one_of(ui: &mut Ui, id: &str, chosen: &mut Option<String>, models: &[(String, String)]) -> egui::Response {
+    const BEST: &str = "the best that is here";
+    let title =
+        |id: &str| models.iter().find(|(m, _)| m == id).map_or_else(|| format!("{id} (missing)"), |m| m.1.clone());
+    let text = chosen.as_deref().map_or_else(|| BEST.to_owned(), title);
+    let combo = egui::ComboBox::from_id_salt(id).selected_text(text).width(180.0);
+    let shown = combo.show_ui(ui, |ui| {
+        ui.selectable_value(chosen, None, BEST);
+        for (id, title) in models {
+            ui.selectable_value(chosen, Some(id.clone()), title);
+        }
+    });
+    shown.response
 }
 
 fn one(ui: &mut Ui, entry: &Entry, model: &State, idle: bool, actions: &mut Vec<Action>) {

@@ -18,6 +18,7 @@ use self::segment::{Picture, RegionOptions, segment};
 use super::filters::{self, FilterOptions};
 use super::segmenter::{FoundMask, SegmentError, Segmenter};
 use crate::io;
+use crate::pipeline::observer::Observer;
 use crate::render::RenderSettings;
 use crate::scene::{GaussianCloud, Level, Mask, Photo};
 
@@ -41,7 +42,12 @@ impl Segmenter for Regions<'_> {
         true
     }
 
-    fn segment(&mut self, photo: &Photo, max_side_px: u32) -> Result<Vec<FoundMask>, SegmentError> {
+    fn segment(
+        &mut self,
+        photo: &Photo,
+        max_side_px: u32,
+        _: &mut dyn Observer,
+    ) -> Result<Vec<FoundMask>, SegmentError> {
         let pixels = io::photo::load(photo, max_side_px)?;
         let camera = photo.camera.limited_to(max_side_px);
         let ends = self.trained.and_then(|(cloud, settings)| shape::ends_of(cloud, settings, &camera));

@@ -1,0 +1,24 @@
+//! Ways through a scene: where matter is, where one may stand, how to get from here to there, and
+//! from where a target is seen best (the paper's Interactive Agent; Scene Initialization and Visible
+//! Interaction).
+//!
+//! In the order of the data: [`matter`] from the Gaussians, [`keypoints`] from the cameras, [`graph`]
+//! of both; [`target`] chooses a view, [`navigator`] finds the way to it, [`curve`] rounds it, and
+//! [`flight`] makes pictures' poses of it.
+
+pub mod curve;
+mod distance;
+pub mod flight;
+pub mod graph;
+pub mod keypoints;
+pub mod matter;
+pub mod navigator;
+pub mod pose;
+pub mod target;
+#[cfg(test)]
+mod testing;
+
+pub use flight::{FRAMES, Flight, Speed};
+pub use matter::Matter;
+pub use navigator::{Navigator, NoWay};
+pub use pose::Pose;

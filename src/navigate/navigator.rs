@@ -1,0 +1,241 @@
+//! Goes places in a scene: a way from where the eye is to where it is wanted, or why there is none.
+
+use glam::DVec3;
+
+use super::flight::{Flight, Speed};
+use super::graph::Graph;
+use super::keypoints::{keypoints, spacing};
+use super::matter::Matter;
+use super::pose::Pose;
+use crate::scene::{Bounds, Camera, GaussianCloud};
+
+/// Distance kept to matter, as a share of how far the cameras are spread.
+const CLEARANCE: f64 = 0.02;
+/// Keypoints that the eye and its goal are tried to be joined to.
+const ENTRIES: usize = 48;
+/// What edges keep more than flights must, so that corners can be rounded.
+const SPARE: f64 = 1.05;
+
+/// All that is needed to move about in a scene.
+pub struct Navigator {
+    /// Where matter is.
+    pub matter: Matter,
+    /// Where one can go.
+    pub graph: Graph,
+    /// The photos' cameras.
+    pub cameras: Vec<Camera>,
+    /// Mean distance between cameras, scene units.
+    pub spacing: f64,
+    /// Distance that flights keep to matter, scene units.
+    pub clearance: f64,
+    /// Which way is up.
+    pub up: DVec3,
+    /// Keypoints that were left out because they are in matter.
+    pub in_matter: usize,
+}
+
+/// Why there is no way.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NoWay {
+    /// There are no keypoints.
+    #[error("there is nowhere to stand: the scene came without cameras, or all of them are inside matter")]
+    NoKeypoints,
+    /// The eye cannot get away from where it is.
+    #[error("there is no way out of where the eye is: matter is all around it")]
+    Enclosed,
+    /// The goal lies in a part that cannot be reached.
+    #[error(
+        "there is no way there that keeps clear of matter; the nearest that can be reached is {distance:.2} units away from it"
+    )]
+    Parted {
+        /// The nearest keypoint to it that can be reached.
+        nearest: usize,
+        /// Its distance from the goal, scene units.
+        distance: f64,
+    },
+    /// The goal is inside matter, or outside of what is known.
+    #[error("one cannot stand there: it is inside matter or outside of the scene")]
+    Inside,
+}
+
+impl Navigator {
+    /// Looks at a scene. Takes about a second: once per scene, when somebody first wants to move.
+    pub fn new(cloud: &GaussianCloud, cameras: &[Camera], up: DVec3) -> Self {
+        let eyes: Vec<DVec3> = cameras.iter().map(|c| c.center).filter(|c| c.is_finite()).collect();
+        let spread = Bounds::of(eyes.iter().copied()).map_or(0.0, |b| b.radius());
+        let scene = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i))).map_or(1.0, |b| b.radius());
+        let spacing = spacing(cameras);
+        let wanted = CLEARANCE * if spread > 0.01 * scene { spread } else { scene };
+        let matter = Matter::of(cloud, &eyes, (0.5 * spacing).min(2.0 * wanted));
+        let clearance = wanted.max(matter.voxel());
+        let (keypoints, in_matter) = keypoints(cameras, &matter, SPARE * clearance);
+        let graph = Graph::new(keypoints, SPARE * clearance);
+        let up = up.try_normalize().unwrap_or(DVec3::NEG_Y);
+        Self { matter, graph, cameras: cameras.to_vec(), spacing, clearance, up, in_matter }
+    }
+
+    /// Keypoints that can be gone to straight from a place, nearest first. A place with less
+    /// clearance than wanted is left without losing any more of it.
+    fn entries(&self, place: DVec3) -> Vec<usize> {
+        let here = self.matter.clearance(place);
+        let keep = self.clearance.min(here - 0.01 * self.matter.voxel());
+        let near: Vec<usize> = self.graph.nearest(place).take(ENTRIES).collect();
+        let all = near.iter().copied();
+        if keep < 0.5 * self.matter.voxel() {
+            // Inside matter: any way out is better than none.
+            return all.take(4).collect();
+        }
+        all.filter(|i| self.matter.is_free(place, self.graph.keypoints[*i].center, keep)).take(8).collect()
+    }
+
+    /// The straight legs of the shortest way from one place to another that keeps clear of matter.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn legs(&self, from: DVec3, to: DVec3) -> Result<Vec<DVec3>, NoWay> {
+        if self.matter.is_inside(to) {
+            return Err(NoWay::Inside);
+        }
+        let ends = self.matter.clearance(from).min(self.matter.clearance(to));
+        if !self.matter.is_inside(from) && self.matter.is_free(from, to, self.clearance.min(0.99 * ends)) {
+            return Ok(vec![from, to]);
+        }
+        if self.graph.keypoints.is_empty() {
+            return Err(NoWay::NoKeypoints);
+        }
+        let (starts, goals) = (self.entries(from), self.entries(to));
+        if starts.is_empty() {
+            return Err(NoWay::Enclosed);
+        }
+        let place = |i: usize| self.graph.keypoints[i].center;
+        let mut best: Option<(f64, Vec<DVec3>)> = None;
+        for &start in &starts {
+            let Some(route) = self.graph.route_to(start, |i| goals.contains(&i), &self.matter) else { continue };
+            let legs: Vec<DVec3> =
+                std::iter::once(from).chain(route.through.iter().map(|i| place(*i))).chain([to]).collect();
+            let length = legs.windows(2).map(|w| w[0].distance(w[1])).sum();
+            if best.as_ref().is_none_or(|(shortest, _)| length < *shortest) {
+                best = Some((length, legs));
+            }
+        }
+        if let Some((_, legs)) = best {
+            return Ok(legs);
+        }
+        let parts = self.graph.parts(&self.matter);
+        let reached = |i: &usize| starts.iter().any(|s| parts[*s] == parts[*i]);
+        let nearest = self.graph.nearest(to).find(reached).unwrap_or(starts[0]);
+        Err(NoWay::Parted { nearest, distance: place(nearest).distance(to) })
+    }
+
+    /// A flight from one pose to another. On the way it looks at `look_at`, if there is such a thing.
+    ///
+    /// # Errors
+    /// If there is no way.
+    pub fn fly(
+        &self,
+        from: &Pose,
+        to: &Pose,
+        look_at: Option<DVec3>,
+        frames: usize,
+        speed: Speed,
+    ) -> Result<Flight, NoWay> {
+        let legs = self.legs(from.center, to.center)?;
+        let ends = self.matter.clearance(from.center).min(self.matter.clearance(to.center));
+        let clearance = self.clearance.min(0.99 * ends);
+        let look_at = look_at.map(|target| (target, self.up));
+        let flight = Flight::new(&legs, [from, to], look_at, Some((&self.matter, clearance)), frames, speed);
+        flight.ok_or(NoWay::Inside)
+    }
+
+    /// How far one can go from a pose in a direction of its own (right, down, forward), at most
+    /// `distance` scene units, and whether matter ends it.
+    pub fn step(&self, from: &Pose, direction: DVec3, distance: f64) -> (DVec3, bool) {
+        let Some(direction) = (from.world_from_camera * direction).try_normalize() else { return (from.center, false) };
+        let goal = from.center + direction * distance.max(0.0);
+        let here = self.matter.clearance(from.center);
+        // Who is too near already may go away from matter, not nearer.
+        let keep = self.clearance.min(here - 0.01 * self.matter.voxel());
+        if keep < 0.5 * self.matter.voxel() {
+            let out = self.matter.clearance(goal) > here;
+            return if out { (goal, false) } else { (from.center, true) };
+        }
+        let share = self.matter.free_share(from.center, goal, keep);
+        (from.center.lerp(goal, share), share < 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::navigate::flight::FRAMES;
+    use crate::navigate::testing::{camera_at, cloud_of_wall, joined, wall_with_hole};
+    use glam::DMat3;
+
+    fn cameras() -> Vec<Camera> {
+        let ring = (0..24).map(|i| {
+            let angle = f64::from(i) / 24.0 * std::f64::consts::TAU;
+            DVec3::new(1.3 * angle.cos(), 0.3 * (3.0 * angle).sin(), 1.3 * angle.sin())
+        });
+        ring.map(camera_at).collect()
+    }
+
+    fn pose(center: DVec3) -> Pose {
+        Pose { center, world_from_camera: DMat3::IDENTITY, fov_y_rad: 0.8 }
+    }
+
+    #[test]
+    fn flights_keep_their_distance_where_the_papers_do_not() {
+        let n = Navigator::new(&wall_with_hole(0.0, 0.6), &cameras(), DVec3::NEG_Y);
+        let (from, to) = (pose(DVec3::new(0.9, 0.1, -1.0)), pose(DVec3::new(1.0, 0.0, 1.0)));
+        let flight = n.fly(&from, &to, None, FRAMES, Speed::Eased).expect("through the hole");
+        let ours = flight.smoothness(&n.matter, n.clearance);
+        assert_eq!(ours.violations, 0, "{ours:?}");
+        let keys = [from, to];
+        let paper = Flight::of_paper(&keys, FRAMES).expect("a line").smoothness(&n.matter, n.clearance);
+        assert!(paper.violations > 0, "straight through the wall: {paper:?}");
+    }
+
+    #[test]
+    fn a_closed_wall_has_no_way_and_the_nearest_place_is_offered() {
+        let mut walls = cloud_of_wall(0.0);
+        for far in [-1.9, 1.9] {
+            walls = joined(&walls, &cloud_of_wall(far));
+        }
+        let close: Vec<Camera> =
+            cameras().into_iter().map(|c| camera_at(c.center * 0.6)).filter(|c| c.center.z.abs() > 0.2).collect();
+        let n = Navigator::new(&walls, &close, DVec3::NEG_Y);
+        let (from, to) = (DVec3::new(0.0, 0.0, -0.7), DVec3::new(0.0, 0.0, 0.7));
+        match n.legs(from, to) {
+            Err(NoWay::Parted { nearest, distance }) => {
+                let place = n.graph.keypoints[nearest].center;
+                assert!(place.z < 0.0 && (place.distance(to) - distance).abs() < 1e-9);
+            }
+            other => panic!("{other:?}"),
+        }
+        assert_eq!(n.legs(from, DVec3::ZERO), Err(NoWay::Inside));
+        assert_eq!(n.legs(from, DVec3::splat(99.0)), Err(NoWay::Inside));
+    }
+
+    #[test]
+    fn steps_end_before_matter() {
+        let n = Navigator::new(&cloud_of_wall(0.0), &cameras(), DVec3::NEG_Y);
+        let from = pose(DVec3::new(0.0, 0.0, -1.0));
+        let (short, stopped) = n.step(&from, DVec3::Z, 0.2);
+        assert!((short.z + 0.8).abs() < 1e-9 && !stopped);
+        let (long, stopped) = n.step(&from, DVec3::Z, 5.0);
+        assert!(stopped && long.z < 0.0 && long.z > -0.3, "{long}");
+        assert!(n.matter.clearance(long) >= 0.9 * n.clearance);
+        let (back, stopped) = n.step(&pose(long), DVec3::NEG_Z, 0.2);
+        assert!(!stopped && back.z < long.z, "away from the wall");
+        assert_eq!(n.step(&from, DVec3::ZERO, 1.0), (from.center, false));
+    }
+
+    #[test]
+    fn scenes_without_cameras_say_so() {
+        let n = Navigator::new(&cloud_of_wall(0.0), &[], DVec3::ZERO);
+        let way = n.legs(DVec3::new(0.0, 0.0, -0.1), DVec3::new(0.0, 0.0, 0.1));
+        assert!(matches!(way, Err(NoWay::NoKeypoints | NoWay::Inside)), "{way:?}");
+        let one = Navigator::new(&cloud_of_wall(0.0), &[camera_at(DVec3::Z)], DVec3::Y);
+        assert_eq!(one.graph.keypoints.len(), 1);
+    }
+}
