@@ -1,7 +1,9 @@
 //! Files that are either the old one or the new one, whatever happens in between.
 
-use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
 
 use super::IoError;
 
@@ -12,38 +14,100 @@ use super::IoError;
 /// # Errors
 /// [`IoError::Write`] with the system's reason and a remedy; errors of `fill` arrive the same way.
 pub fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), IoError> {
-    replace(path, fill).map_err(|cause| IoError::Write { path: path.into(), remedy: remedy(cause.kind()), cause })
+    let mut draft = Draft::create(path)?;
+    fill(&mut draft).map_err(|cause| write_error(path, cause))?;
+    draft.commit().map(drop)
 }
 
-fn replace(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+/// A file in the making: bytes go to a temporary file beside `path`, which [`Draft::commit`] puts
+/// in its place. Dropped before that, it leaves nothing behind.
+pub struct Draft {
+    path: PathBuf,
+    file: BufWriter<NamedTempFile>,
+}
+
+impl Draft {
+    /// Starts a file at `path`; what is there stays until [`Draft::commit`].
+    ///
+    /// # Errors
+    /// [`IoError::Write`] where the folder is missing or not writable, or `path` is a folder.
+    pub fn create(path: &Path) -> Result<Self, IoError> {
+        let file = temporary_file(path, "tmp").map_err(|cause| write_error(path, cause))?;
+        Ok(Self { path: path.into(), file: BufWriter::with_capacity(1 << 20, file) })
+    }
+
+    /// Puts the file in its place and returns its size in bytes.
+    ///
+    /// # Errors
+    /// [`IoError::Write`]; what was at the path before is then unchanged.
+    pub fn commit(self) -> Result<u64, IoError> {
+        let Self { path, file } = self;
+        let end = || {
+            let file = file.into_inner().map_err(io::IntoInnerError::into_error)?;
+            let bytes = file.as_file().metadata()?.len();
+            put(file, &path)?;
+            Ok(bytes)
+        };
+        end().map_err(|cause| write_error(&path, cause))
+    }
+}
+
+impl Write for Draft {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Seek for Draft {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.file.seek(to)
+    }
+}
+
+/// An empty temporary file beside `path`, its name ending in `.extension`.
+pub(super) fn temporary_file(path: &Path, extension: &str) -> io::Result<NamedTempFile> {
     let name = path.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "not a file name"))?;
-    let folder = match path.parent() {
-        Some(p) if !p.as_os_str().is_empty() => p,
-        _ => Path::new("."),
-    };
     if path.is_dir() {
         return Err(io::Error::new(io::ErrorKind::IsADirectory, "a folder of that name exists"));
     }
     let mut prefix = std::ffi::OsString::from(".");
     prefix.push(name);
     prefix.push(".");
+    let suffix = format!(".{extension}");
     let mut builder = tempfile::Builder::new();
-    builder.prefix(&prefix).suffix(".tmp");
+    builder.prefix(&prefix).suffix(&suffix);
     // Temporary files are private by default; the finished one has the usual permissions.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder)?;
-    let mut out = BufWriter::with_capacity(1 << 20, file.as_file_mut());
-    fill(&mut out)?;
-    out.flush()?;
-    drop(out);
+    builder.tempfile_in(folder_of(path))
+}
+
+/// Syncs a temporary file, renames it to `path` and syncs the folder.
+pub(super) fn put(file: NamedTempFile, path: &Path) -> io::Result<()> {
     file.as_file().sync_all()?;
     file.persist(path).map_err(|e| e.error)?;
-    sync_folder(folder)
+    sync_folder(folder_of(path))
+}
+
+/// The folder that a file is in.
+pub(super) fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(p) if !p.as_os_str().is_empty() => p,
+        _ => Path::new("."),
+    }
+}
+
+/// The error of a failed write, with its remedy.
+pub(super) fn write_error(path: &Path, cause: io::Error) -> IoError {
+    IoError::Write { path: path.into(), remedy: remedy(cause.kind()), cause }
 }
 
 /// Makes a rename in `folder` survive a power cut, on systems where folders can be synced.
-fn sync_folder(folder: &Path) -> io::Result<()> {
+pub(super) fn sync_folder(folder: &Path) -> io::Result<()> {
     if cfg!(unix) { std::fs::File::open(folder)?.sync_all() } else { Ok(()) }
 }
 
@@ -80,6 +144,24 @@ mod tests {
         write(&path, |w| w.write_all(b"one")).expect("first");
         write(&path, |w| w.write_all(b"two")).expect("second");
         assert_eq!(fs::read(&path).expect("read"), b"two");
+        assert_eq!(entries(folder.path()), ["a.bin"]);
+    }
+
+    #[test]
+    fn a_draft_appears_when_it_is_committed() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("a.bin");
+        let mut draft = Draft::create(&path).expect("create");
+        draft.write_all(b"x234").expect("write");
+        draft.seek(SeekFrom::Start(0)).expect("seek");
+        draft.write_all(b"1").expect("write");
+        assert!(!path.exists());
+        assert_eq!(draft.commit().expect("commit"), 4);
+        assert_eq!(fs::read(&path).expect("read"), b"1234");
+        let mut draft = Draft::create(&path).expect("create");
+        draft.write_all(b"half").expect("write");
+        drop(draft);
+        assert_eq!(fs::read(&path).expect("read"), b"1234");
         assert_eq!(entries(folder.path()), ["a.bin"]);
     }
 

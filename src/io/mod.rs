@@ -4,7 +4,9 @@
 //! before memory is set aside for it, and paths inside a dataset may not leave its folder. Every
 //! error names the file and the place in it.
 
+pub mod animation;
 pub mod atomic;
+pub mod camera_path;
 pub mod colmap;
 mod compressed_ply;
 pub mod data_folder;

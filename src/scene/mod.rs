@@ -2,6 +2,7 @@
 
 pub mod bounds;
 pub mod camera;
+pub mod camera_path;
 pub mod cloud;
 pub mod dataset;
 pub mod history;
@@ -14,6 +15,7 @@ pub mod semantic_map;
 
 pub use bounds::Bounds;
 pub use camera::{Camera, CameraError};
+pub use camera_path::{CameraPath, PathError, PathKey};
 pub use cloud::{CloudError, ExtraProperty, Gaussian, GaussianCloud};
 pub use dataset::{Dataset, SparsePoint};
 pub use history::{Evaluation, StepMetrics, ViewScore};
