@@ -17,6 +17,7 @@ mod interrupt;
 mod models;
 mod opened;
 mod output;
+mod path;
 mod preprocess;
 mod progress;
 mod query;
@@ -55,6 +56,8 @@ Examples:
   fmlgs render scene/ --camera 12 --out view.png
   fmlgs preprocess scene/ --masks photos/   find objects and parts
   fmlgs query scene/ \"the lid of the kettle\" --mask lid.png
+  fmlgs path scene/ --to \"the lid of the kettle\" --out path.json
+  fmlgs render scene/ --path path.json --out film.mp4
   fmlgs export scene/ --out scene.ply   for any other splat viewer
   fmlgs models                          neural networks: what is here, what each adds";
 
@@ -82,6 +85,7 @@ enum Command {
     Query(query::Args),
     Models(models::Args),
     Segment(segment::Args),
+    Path(path::Args),
     Synth(synth::Args),
     Demo(demo::Args),
     Export(export::Args),
@@ -122,11 +126,12 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Info(args) => info::run(args),
         Command::Models(args) => models::run(args, quiet),
         Command::Train(args) => train::run(args, quiet),
-        Command::Render(args) => render::run(args),
+        Command::Render(args) => render::run(args, quiet),
         Command::Eval(args) => eval::run(args, quiet),
         Command::Preprocess(args) => preprocess::run(args, quiet),
         Command::Query(args) => query::run(args),
         Command::Segment(args) => segment::run(args),
+        Command::Path(args) => path::run(args),
         Command::Synth(args) => synth::run(args, quiet),
         Command::Demo(args) if args.headless => demo::run(args, quiet),
         Command::Demo(_) => window(Some(Action::TryDemo), open_window),

@@ -7,8 +7,15 @@ use std::time::Instant;
 use image::ColorType;
 use serde_json::json;
 
+use super::asking::{Asker, semantics};
 use super::opened::DrawableScene;
+use super::progress::Console;
 use super::{CliError, opened, output, view};
+use crate::io;
+use crate::io::animation::{Encoder, Settings};
+use crate::navigate::{Film, Speed};
+use crate::pipeline::film::{self, FilmError, Marked};
+use crate::pipeline::semantics::grammar::Kind;
 use crate::render::{Backend, BackendChoice, Frame, RenderSettings};
 use crate::scene::Camera;
 
@@ -23,7 +30,8 @@ use crate::scene::Camera;
     fmlgs render scene/ --camera IMG_0041 --size 1280x720 --out view.png\n  \
     fmlgs render scene/ --what depth --out depth.npy\n  \
     fmlgs render splat.ply --camera camera.json --out view.png\n  \
-    fmlgs render splat.ply --photos photos/ --camera 0 --out view.png\n\n\
+    fmlgs render splat.ply --photos photos/ --camera 0 --out view.png\n  \
+    fmlgs render scene/ --path path.json --size 1280x720 --out film.mp4\n\n\
     A camera file holds one entry of 'cameras' in the output of 'fmlgs info photos/ --json'.")]
 pub struct Args {
     /// Trained scene or splat file
@@ -46,6 +54,21 @@ pub struct Args {
     /// The file to write: .png, or .npy for depth and alpha
     #[arg(long, default_value = "render.png")]
     out: PathBuf,
+    /// Draw a film along this camera path instead: .mp4, .gif, .webp, or a folder of frames
+    #[arg(long, conflicts_with_all = ["camera", "what"])]
+    path: Option<PathBuf>,
+    /// Pictures per second of the film [default: the path's own]
+    #[arg(long, requires = "path")]
+    fps: Option<f64>,
+    /// Quality of the film, 0 to 100
+    #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u8).range(0..=100))]
+    quality: u8,
+    /// Mark what is asked for in every picture of the film
+    #[arg(long, requires = "path")]
+    mark: Option<String>,
+    /// Let this ffmpeg write the film
+    #[arg(long, requires = "path")]
+    ffmpeg: Option<PathBuf>,
     /// Which renderer draws: auto takes a GPU if it is a real one
     #[arg(long, value_enum, default_value_t = BackendChoice::Auto)]
     backend: BackendChoice,
@@ -104,7 +127,10 @@ impl Args {
     }
 }
 
-pub fn run(args: Args) -> Result<(), CliError> {
+pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+    if let Some(path) = args.path.clone() {
+        return film(&args, &path, quiet);
+    }
     let job = args.check()?;
     let settings = RenderSettings { depth: args.what == What::Depth, ..job.scene.settings };
     let mut backend = Backend::choose(args.backend)?;
@@ -132,6 +158,66 @@ pub fn run(args: Args) -> Result<(), CliError> {
     output::print(&format!(
         "{}: {width} x {height} px, drawn in {millis:.0} ms on {}{scale}",
         args.out.display(),
+        backend.name()
+    ))
+}
+
+/// Draws a film along the camera path in `path`.
+fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
+    let keys = io::camera_path::open(path)?;
+    let film = Film::new(&keys, Speed::Constant);
+    let film = film.ok_or_else(|| CliError::failed(format!("{}: there are no keys in it", path.display())))?;
+    let scene = opened::drawable(&args.scene)?;
+    let fps = args.fps.unwrap_or(keys.fps);
+    let [width, height] = args.size.unwrap_or_else(|| {
+        let limit = args.max_side.unwrap_or(1280);
+        [limit, (f64::from(limit) * 9.0 / 16.0).round().max(1.0) as u32]
+    });
+    let mut settings = Settings::new(width, height, fps);
+    (settings.quality, settings.overwrite) = (args.quality, true);
+    if let Some(program) = &args.ffmpeg {
+        settings.encoder = Encoder::Ffmpeg { program: program.clone(), args: Vec::new() };
+    }
+    let frames = (film.seconds() * fps).round().clamp(1.0, 1e6) as usize + 1;
+    let cameras: Vec<Camera> = film.flight(frames).poses.iter().map(|p| p.camera(width, height)).collect();
+    let map = match &args.mark {
+        Some(_) => Some(semantics(&args.scene, &scene.cloud)?),
+        None => None,
+    };
+    let mut ids = Vec::new();
+    if let (Some(map), Some(query)) = (&map, &args.mark) {
+        let answered = Asker::new(map)?.ask(query, Kind::Auto)?;
+        ids = answered.map(|a| a.chosen(1)).unwrap_or_default();
+        if ids.is_empty() {
+            return Err(CliError::failed(format!("nothing here fits '{query}'; see 'fmlgs query'")));
+        }
+    }
+    let marked = map.as_ref().map(|map| Marked { map, ids: &ids, color: [255, 64, 160] });
+    let mut backend = Backend::choose(args.backend)?;
+    let started = Instant::now();
+    output::make_parent(&args.out)?;
+    let mut console = Console::new(quiet);
+    let cloud = Arc::new(scene.cloud);
+    let out = (args.out.as_path(), &settings);
+    let made = film::write(&cloud, &scene.settings, &cameras, marked, &mut backend, out, &mut console);
+    let summary = made.map_err(|e| match e {
+        FilmError::Cancelled => CliError::Cancelled("no film was written".into()),
+        other => CliError::failed(other.to_string()),
+    })?;
+    let secs = started.elapsed().as_secs_f64();
+    let (w, h) = summary.size_px;
+    if args.json {
+        return output::print_json(&json!({
+            "out": summary.path, "frames": summary.frames, "bytes": summary.bytes, "film_secs": summary.secs,
+            "size_px": [w, h], "backend": backend.name(), "secs": secs,
+        }));
+    }
+    output::print(&format!(
+        "{}: {} pictures of {w} x {h} px, {:.1} s long, {:.1} MB, drawn in {secs:.1} s on {}",
+        summary.path.display(),
+        summary.frames,
+        summary.secs,
+        summary.bytes as f64 / 1e6,
         backend.name()
     ))
 }

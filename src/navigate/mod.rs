@@ -4,10 +4,11 @@
 //!
 //! In the order of the data: [`matter`] from the Gaussians, [`keypoints`] from the cameras, [`graph`]
 //! of both; [`target`] chooses a view, [`navigator`] finds the way to it, [`curve`] rounds it, and
-//! [`flight`] makes pictures' poses of it.
+//! [`visit`] does all of that for an identity; [`flight`] makes pictures' poses of it. [`film`] does the same for a path that a person has put together.
 
 pub mod curve;
 mod distance;
+pub mod film;
 pub mod flight;
 pub mod graph;
 pub mod keypoints;
@@ -17,7 +18,9 @@ pub mod pose;
 pub mod target;
 #[cfg(test)]
 mod testing;
+pub mod visit;
 
+pub use film::Film;
 pub use flight::{FRAMES, Flight, Speed};
 pub use matter::Matter;
 pub use navigator::{Navigator, NoWay};

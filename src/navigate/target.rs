@@ -26,7 +26,7 @@ const DRAWN_PX: u32 = 128;
 const PHOTO_ANGLE: f64 = 0.6;
 
 /// From which side.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Side {
     /// Whichever shows it best.
     #[default]
@@ -45,6 +45,26 @@ pub enum Side {
     Above,
     /// Under it.
     Below,
+}
+
+impl Side {
+    /// All of them.
+    pub const ALL: [Self; 8] =
+        [Self::Best, Self::Same, Self::Other, Self::Front, Self::Left, Self::Right, Self::Above, Self::Below];
+
+    /// In words.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Best => "where it is seen best",
+            Self::Same => "from this side",
+            Self::Other => "from the other side",
+            Self::Front => "from its front",
+            Self::Left => "from its left",
+            Self::Right => "from its right",
+            Self::Above => "from above",
+            Self::Below => "from below",
+        }
+    }
 }
 
 /// What is wanted of a view.

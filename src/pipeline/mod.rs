@@ -6,6 +6,7 @@ pub mod bench_gpu;
 pub mod bench_query;
 pub mod demo_scene;
 pub mod evaluate;
+pub mod film;
 pub mod metrics;
 pub mod observer;
 pub mod report;

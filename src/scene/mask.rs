@@ -167,7 +167,7 @@ mod tests {
         assert_eq!(a.pixels().collect::<Vec<_>>(), (0..91).filter(|i| i % 3 == 0).collect::<Vec<_>>());
         assert_eq!((a.area(), a.overlap(&b)), (31, 16));
         let union = 31 + 46 - 16;
-        assert!((a.iou(&b) - 16.0 / f64::from(union)).abs() < 1e-12);
+        assert!((a.iou(&b) - 16.0 / union as f64).abs() < 1e-12);
         let mut c = a.clone();
         c.add(&b);
         assert_eq!(c.area(), union as usize);

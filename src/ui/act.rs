@@ -4,10 +4,13 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::app::App;
+use super::camera;
 use super::dialogs::{Chosen, Purpose, Question};
 use super::state::Tone;
 use super::viewport::brush::Brush;
-use crate::worker::{Action, Command, EditRequest, Failure, JobKind};
+use crate::navigate::target::Wish;
+use crate::scene::IdentityId;
+use crate::worker::{Action, Command, EditRequest, Failure, FilmRequest, JobKind, Pane, VisitRequest, Visited};
 
 impl App {
     /// Does what a person asked for.
@@ -61,10 +64,20 @@ impl App {
             }
             Action::Undo => self.edit(self.state.undo.last().cloned().map(EditRequest::Restore)),
             Action::Redo => self.edit(self.state.redo.last().cloned().map(EditRequest::Restore)),
+            Action::GoToTarget(id, side) => self.visit(id, Wish { side, ..Wish::default() }),
+            Action::PlayPath => self.camera.toggle(),
+            Action::StepBack => self.step_in_time(-1.0, ctx),
+            Action::StepForward => self.step_in_time(1.0, ctx),
+            Action::AddKey => {
+                self.camera.record(&self.viewport.pose());
+                self.layout.hidden.retain(|p| *p != Pane::Camera);
+            }
+            Action::OpenPath => self.choose(Purpose::OpenPath),
+            Action::SavePath => self.choose(Purpose::SavePath),
+            Action::SaveFilm => self.choose(Purpose::SaveFilm),
             Action::ExportTarget(id) => self.choose(Purpose::ExportTarget(id)),
             Action::FrameScene
             | Action::Paint(_)
-            | Action::GoToTarget(_)
             | Action::Isolate(_)
             | Action::Hide(_)
             | Action::ResetView
@@ -171,6 +184,62 @@ impl App {
         }
     }
 
+    fn step_in_time(&mut self, pictures: f64, ctx: &egui::Context) {
+        if let Some(pose) = self.camera.step(pictures) {
+            self.viewport.stand(&pose, &self.state, ctx.input(|i| i.time));
+        }
+    }
+
+    /// Looks for the way to an identity; the flight begins when it is found.
+    fn visit(&mut self, id: IdentityId, wish: Wish) {
+        let (scene, map, cloud) =
+            (self.state.scene.clone(), self.state.semantics.clone(), self.viewport.cloud().cloned());
+        let (Some(scene), Some(map), Some(cloud)) = (scene, map, cloud) else { return };
+        let photos = scene.dataset.iter().flat_map(|d| &d.photos);
+        self.submit(Command::Visit(Box::new(VisitRequest {
+            explored: self.state.explored.clone(),
+            cloud,
+            cameras: photos.map(|p| p.camera.clone()).collect(),
+            up: self.viewport.up(&scene),
+            settings: scene.render.clone(),
+            map,
+            id,
+            wish,
+            from: self.viewport.pose(),
+            aspect: self.viewport.aspect(),
+        })));
+    }
+
+    /// Begins the flight that was found, or says why there is none.
+    pub(super) fn visited(&mut self) {
+        let Some(Visited { name, flight, problem }) = self.state.visited.take() else { return };
+        match (&problem, &flight) {
+            (Some(problem), Some(_)) => {
+                self.state.toast(Tone::Warning, format!("{name}: {problem}. Going to the nearest place instead."));
+            }
+            (Some(problem), None) => self.state.toast(Tone::Warning, format!("{name}: {problem}.")),
+            (None, _) => {}
+        }
+        if let Some(visit) = flight {
+            self.viewport.turn_about(visit.target);
+            self.camera.play_flight(visit.flight);
+        }
+    }
+
+    /// Makes a film of what is played.
+    fn make_film(&mut self, out: PathBuf) {
+        let (scene, cloud) = (self.state.scene.clone(), self.viewport.cloud().cloned());
+        let (Some(scene), Some(cloud)) = (scene, cloud) else { return };
+        let Some((cameras, settings)) = self.camera.film(&out, self.viewport.aspect()) else {
+            self.state.toast(Tone::Warning, "There is nothing to film: record keys, or go to something first.");
+            return;
+        };
+        let found = self.viewport.questions.found();
+        let marked = self.state.semantics.clone().filter(|_| self.camera.mark).map(|map| (map, found));
+        let draw = scene.render.clone();
+        self.submit(Command::Film(Box::new(FilmRequest { cloud, draw, cameras, marked, out, settings })));
+    }
+
     /// Changes objects and parts; `None` is a change that there is none of.
     fn edit(&mut self, request: Option<EditRequest>) {
         let Some(request) = request else {
@@ -222,6 +291,24 @@ impl App {
                     self.submit(Command::Export { cloud, path });
                 }
             }
+            Chosen::Path(Purpose::OpenPath, path) => match camera::read(&path) {
+                Ok(read) => {
+                    self.camera.open(read);
+                    self.layout.hidden.retain(|p| *p != Pane::Camera);
+                }
+                Err(message) => {
+                    self.state.fail("Opening the camera path", Failure { message, remedy: String::new() });
+                }
+            },
+            Chosen::Path(Purpose::SavePath, path) => {
+                match camera::write(&path, &self.camera.path, self.viewport.aspect()) {
+                    Ok(()) => self.state.toast(Tone::Good, format!("Wrote {}", path.display())),
+                    Err(message) => {
+                        self.state.fail("Saving the camera path", Failure { message, remedy: String::new() });
+                    }
+                }
+            }
+            Chosen::Path(Purpose::SaveFilm, path) => self.make_film(path),
             Chosen::Path(Purpose::Screenshot, path) => {
                 if let Some(pixels) = self.viewport.pixels() {
                     self.submit(Command::Picture { pixels: Arc::new(pixels), path });

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 
+use super::camera::CameraPane;
 use super::dialogs::{self, FileDialogs, Question};
 use super::layout::Layout;
 use super::palette::{Palette, shortcut_sheet};
@@ -33,8 +34,12 @@ pub struct App {
     thumbnails: Thumbnails,
     portraits: Portraits,
     models: Models,
+    /// The camera's path and its player.
+    pub camera: CameraPane,
     toasts: Toasts,
     actions: Vec<Action>,
+    /// Window time of the last frame.
+    last_frame: f64,
 }
 
 impl App {
@@ -61,7 +66,9 @@ impl App {
             thumbnails: Thumbnails::default(),
             portraits: Portraits::default(),
             models: Models::default(),
+            camera: CameraPane::default(),
             toasts: Toasts::default(),
+            last_frame: 0.0,
             actions: first.into_iter().collect(),
         })
     }
@@ -77,6 +84,9 @@ impl App {
             self.state.apply(event);
         }
         self.viewport.update(&mut self.state, &self.worker);
+        self.camera.on_scene(self.state.scene_number);
+        self.visited();
+        self.play(ctx);
         self.thumbnails.update(ctx, &mut self.state);
         self.portraits.update(ctx, &mut self.state, self.viewport.cloud(), &self.worker);
         if std::mem::take(&mut self.state.wants_training) {
@@ -87,6 +97,19 @@ impl App {
         }
         while let Some(answer) = self.dialogs.answer() {
             self.chosen(answer);
+        }
+    }
+
+    /// Moves the eye along what is played.
+    fn play(&mut self, ctx: &egui::Context) {
+        let now = ctx.input(|i| i.time);
+        let step = now - std::mem::replace(&mut self.last_frame, now);
+        if let Some(pose) = self.camera.player.tick(step) {
+            self.viewport.stand(&pose, &self.state, now);
+            ctx.request_repaint();
+        }
+        if self.viewport.take_new_picture() && self.camera.player.playing {
+            self.camera.player.count(now);
         }
     }
 
@@ -111,6 +134,14 @@ impl App {
                 .default_size(150.0)
                 .min_size(80.0)
                 .show(ui, |ui| log::show(ui, state));
+        }
+        if layout.shows(Pane::Camera) && state.scene.is_some() {
+            let eye = viewport.pose();
+            let shown = Panel::bottom("camera").frame(pane).resizable(true).default_size(190.0).min_size(120.0);
+            let wanted = shown.show(ui, |ui| self.camera.show(ui, state, &eye, actions)).inner;
+            if let Some(pose) = wanted {
+                viewport.stand(&pose, state, ui.input(|i| i.time));
+            }
         }
         let Some(scene) = state.scene.clone() else {
             let canvas = Frame::new().fill(theme::CANVAS);
@@ -162,7 +193,8 @@ impl App {
                 },
             );
         }
-        CentralPanel::no_frame().show(ui, |ui| viewport.show(ui, state, layout, actions));
+        let route = layout.shows(Pane::Camera).then_some(&self.camera);
+        CentralPanel::no_frame().show(ui, |ui| viewport.show(ui, state, layout, route, actions));
     }
 
     fn over_everything(&mut self, ctx: &egui::Context) {

@@ -29,6 +29,12 @@ pub enum Purpose {
     ExportTarget(IdentityId),
     /// Write the picture there.
     Screenshot,
+    /// Read a camera path.
+    OpenPath,
+    /// Write the camera path there.
+    SavePath,
+    /// Write a film there.
+    SaveFilm,
 }
 
 /// The system's answer.
@@ -81,6 +87,15 @@ impl FileDialogs {
             Purpose::Masks => Box::pin(dialog.set_title("Choose the folder with the masks").pick_folder()),
             Purpose::ExportPly | Purpose::ExportTarget(_) => {
                 Box::pin(dialog.set_title("Export Gaussians").set_file_name(format!("{name}.ply")).save_file())
+            }
+            Purpose::OpenPath => {
+                Box::pin(dialog.set_title("Open a camera path").add_filter("Camera paths", &["json"]).pick_file())
+            }
+            Purpose::SavePath => Box::pin(
+                dialog.set_title("Save the camera path").set_file_name(format!("{name}-path.json")).save_file(),
+            ),
+            Purpose::SaveFilm => {
+                Box::pin(dialog.set_title("Make a film").set_file_name(format!("{name}.mp4")).save_file())
             }
             Purpose::Screenshot => {
                 Box::pin(dialog.set_title("Save the view").set_file_name(format!("{name}.png")).save_file())

@@ -6,6 +6,7 @@
 
 mod act;
 pub mod app;
+pub mod camera;
 pub mod dialogs;
 pub mod format;
 pub mod keys;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use crate::pipeline::observer::{Evaluation, Level, Progress, StepMetrics};
 use crate::pipeline::semantics::portraits::Gallery;
 use crate::scene::{PhotoPixels, ScenePlan, SemanticMap};
-use crate::worker::{Event, Failure, JobId, JobKind, Lane, OpenedScene, Outcome};
+use crate::worker::{Event, Explored, Failure, JobId, JobKind, Lane, OpenedScene, Outcome, Visited};
 
 /// Measurements kept for the plots; beyond that every second one is dropped.
 const MAX_STEPS: usize = 4_000;
@@ -102,6 +102,10 @@ pub struct AppState {
     pub sizes: Vec<usize>,
     /// New portraits of objects and parts, until they are taken over.
     pub portraits: Option<(Arc<SemanticMap>, Gallery)>,
+    /// What is known of moving about in the scene.
+    pub explored: Option<Arc<Explored>>,
+    /// The way that was looked for last, until the window takes it.
+    pub visited: Option<Visited>,
     /// Models that were put in place so far.
     pub models_installed: u64,
     /// Earlier states of objects and parts, oldest first.
@@ -274,6 +278,10 @@ impl AppState {
                 self.models_installed += 1;
                 self.toast(Tone::Good, format!("The model {id} can be used now"));
             }
+            Outcome::Visited(explored, visited) => {
+                self.explored = Some(explored);
+                self.visited = Some(visited);
+            }
             Outcome::Portraits(map, pictures) => self.portraits = Some((map, pictures)),
             Outcome::Written(path) => self.toast(Tone::Good, format!("Wrote {}", path.display())),
             Outcome::Photo { index, max_side_px, pixels } => {
@@ -315,6 +323,7 @@ impl AppState {
         self.history =
             TrainHistory { steps: scene.history.steps.clone(), evaluations: scene.history.evaluations.clone() };
         self.training_job = None;
+        (self.explored, self.visited) = (None, None);
         self.photos.clear();
         self.wants_training = is_demo;
         if !is_demo {

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+use crate::navigate::target::Side;
 use crate::pipeline::semantics::edit::Edit;
 use crate::scene::{IdentityId, NOBODY};
 
@@ -51,13 +52,16 @@ pub enum Pane {
     Plan,
     /// Neural networks: which are here, which are missing.
     Models,
+    /// The camera's path.
+    Camera,
     /// Messages.
     Log,
 }
 
 impl Pane {
     /// All of them.
-    pub const ALL: [Self; 6] = [Self::Dataset, Self::Training, Self::Objects, Self::Plan, Self::Models, Self::Log];
+    pub const ALL: [Self; 7] =
+        [Self::Dataset, Self::Training, Self::Objects, Self::Plan, Self::Models, Self::Camera, Self::Log];
 
     /// Its title.
     pub fn text(self) -> &'static str {
@@ -67,6 +71,7 @@ impl Pane {
             Self::Objects => "Objects",
             Self::Plan => "Scene plan",
             Self::Models => "Models",
+            Self::Camera => "Camera path",
             Self::Log => "Log",
         }
     }
@@ -162,8 +167,22 @@ pub enum Action {
     TypeQuestion,
     /// Ask for an object or part.
     Ask(String),
-    /// Look at an identity from nearby.
-    GoToTarget(IdentityId),
+    /// Fly to where an identity is seen best, or from this side.
+    GoToTarget(IdentityId, Side),
+    /// Play the flight or path, or hold it.
+    PlayPath,
+    /// One picture back.
+    StepBack,
+    /// One picture on.
+    StepForward,
+    /// Record the view as a key of the path.
+    AddKey,
+    /// Choose a camera path to open.
+    OpenPath,
+    /// Choose where to save the camera path.
+    SavePath,
+    /// Choose where to write a film of what is played.
+    SaveFilm,
     /// Draw one identity alone; `None` draws everything again.
     Isolate(Option<IdentityId>),
     /// Leave an identity out of the picture, or draw it again.
@@ -210,7 +229,7 @@ pub enum Action {
 
 impl Action {
     /// Every action that needs no further input, in the order of the palette.
-    pub const ALL: [Self; 40] = [
+    pub const ALL: [Self; 48] = [
         Self::TryDemo,
         Self::OpenFolder,
         Self::OpenFile,
@@ -248,7 +267,15 @@ impl Action {
         Self::TogglePane(Pane::Objects),
         Self::TogglePane(Pane::Plan),
         Self::TogglePane(Pane::Models),
+        Self::TogglePane(Pane::Camera),
         Self::TogglePane(Pane::Log),
+        Self::PlayPath,
+        Self::StepBack,
+        Self::StepForward,
+        Self::AddKey,
+        Self::OpenPath,
+        Self::SavePath,
+        Self::SaveFilm,
         Self::Palette,
         Self::Shortcuts,
     ];
@@ -272,7 +299,14 @@ impl Action {
             Self::AddModel(id) => format!("Add files of the model {id}…"),
             Self::TypeQuestion => "Ask for an object or a part".into(),
             Self::Ask(text) => format!("Ask for {text}"),
-            Self::GoToTarget(id) => format!("Go to #{id}"),
+            Self::GoToTarget(id, side) => format!("Go to #{id}, {}", side.text()),
+            Self::PlayPath => "Play or hold the camera path".into(),
+            Self::StepBack => "One picture back".into(),
+            Self::StepForward => "One picture on".into(),
+            Self::AddKey => "Record the view as a key of the camera path".into(),
+            Self::OpenPath => "Open a camera path…".into(),
+            Self::SavePath => "Save the camera path…".into(),
+            Self::SaveFilm => "Make a film…".into(),
             Self::Isolate(None) => "Show all objects".into(),
             Self::Isolate(Some(id)) => format!("Show #{id} alone"),
             Self::Hide(id) => format!("Hide or show #{id}"),
@@ -329,7 +363,13 @@ impl Action {
             Self::FetchModel(_) => "Download it, check it, and use it from then on.",
             Self::AddModel(_) => "Choose a folder with its files; they are checked and copied.",
             Self::TypeQuestion | Self::Ask(_) => "A name, or \"the button of the red controller\".",
-            Self::GoToTarget(_) => "Move until it fills the view, from the side on which the eye is.",
+            Self::GoToTarget(..) => "Fly to where it is seen best, clear of everything in between.",
+            Self::PlayPath => "Fly along the path, or stop where you are.",
+            Self::StepBack | Self::StepForward => "Move along the path by one picture.",
+            Self::AddKey => "The camera will pass here, looking this way.",
+            Self::OpenPath => "A path of this program, or of nerfstudio's viewer.",
+            Self::SavePath => "As .json; for nerfstudio, end its name in .nerfstudio.json.",
+            Self::SaveFilm => "H.264 (.mp4), .gif, .webp, or .png frames in a folder.",
             Self::Isolate(None) => "Draw everything again that was hidden.",
             Self::Isolate(Some(_)) => "Draw nothing else.",
             Self::Hide(_) => "Leave it out of the picture, or draw it again.",
@@ -375,6 +415,10 @@ impl Action {
             Self::Redo => ctrl("Y"),
             Self::FrameScene => plain("F"),
             Self::ResetView => plain("Home"),
+            Self::PlayPath => plain("Space"),
+            Self::StepBack => plain(","),
+            Self::StepForward => plain("."),
+            Self::AddKey => plain("K"),
             Self::PreviousPhoto => plain("["),
             Self::NextPhoto => plain("]"),
             Self::Show(ViewMode::Picture) => plain("1"),
@@ -395,7 +439,10 @@ impl Action {
             | Self::FetchModel(_)
             | Self::AddModel(_)
             | Self::Ask(_)
-            | Self::GoToTarget(_)
+            | Self::GoToTarget(..)
+            | Self::OpenPath
+            | Self::SavePath
+            | Self::SaveFilm
             | Self::Isolate(_)
             | Self::Hide(_)
             | Self::ExportTarget(_)

@@ -7,7 +7,7 @@ use super::places::Places;
 use super::preview::{home_view, sparse_cloud};
 use super::protocol::{Command, Failure, OpenedScene, Outcome, Stop};
 use super::thread::Jobs;
-use super::{edit, machine};
+use super::{edit, guide, machine};
 use crate::io::labels::Labels;
 use crate::io::{self, IoError, OpenError, Opened, TrainedScene, trained};
 use crate::models;
@@ -230,6 +230,8 @@ impl Jobs for PipelineJobs {
             }
             Command::Picture { pixels, path } => save_picture(&pixels, &path),
             Command::InstallModel { id, brought } => install(&id, brought.as_deref(), observer),
+            Command::Visit(request) => guide::visit(*request),
+            Command::Film(request) => guide::film(*request, observer),
             Command::Portraits { cloud, map, settings, home } => {
                 let from = home.camera.as_ref().map_or(home.bounds.center() + home.up, |c| c.center);
                 let drawn = portraits(&cloud, &map, &settings, from, home.up);

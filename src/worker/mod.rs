@@ -6,6 +6,7 @@
 pub mod action;
 pub mod control;
 pub mod edit;
+pub mod guide;
 pub mod jobs;
 pub mod machine;
 pub mod observer;
@@ -21,6 +22,7 @@ pub mod view;
 pub use action::{Action, Axis, Pane, Shortcut, ViewMode};
 pub use control::Control;
 pub use edit::EditRequest;
+pub use guide::{Explored, FilmRequest, VisitRequest, Visited};
 pub use machine::real_gpu;
 pub use protocol::{Command, Event, Failure, HomeView, JobId, JobKind, Lane, OpenedScene, Outcome, Stop};
 pub use slot::Slot;

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::edit::EditRequest;
+use super::guide::{Explored, FilmRequest, VisitRequest, Visited};
 use crate::io::trained::History;
 use crate::pipeline::observer::{Evaluation, Level, Progress, StepMetrics};
 use crate::pipeline::semantics::find::Finding;
@@ -43,14 +44,20 @@ pub enum JobKind {
     Portraits,
     /// Puts a model in place.
     Model,
+    /// Finds the way to an identity.
+    Visit,
+    /// Draws a film.
+    Film,
 }
 
 impl JobKind {
     /// Which thread runs it.
     pub fn lane(self) -> Lane {
         match self {
-            Self::Open | Self::Demo | Self::Train | Self::Evaluate | Self::Objects | Self::Model => Lane::Long,
-            Self::Edit | Self::Export | Self::Photo | Self::Picture | Self::Portraits => Lane::Short,
+            Self::Open | Self::Demo | Self::Train | Self::Evaluate | Self::Objects | Self::Model | Self::Film => {
+                Lane::Long
+            }
+            Self::Edit | Self::Export | Self::Photo | Self::Picture | Self::Portraits | Self::Visit => Lane::Short,
         }
     }
 }
@@ -152,6 +159,10 @@ pub enum Command {
         /// The folder with its files; `None` = its address.
         brought: Option<PathBuf>,
     },
+    /// Find the way to where an identity is seen best.
+    Visit(Box<VisitRequest>),
+    /// Draw a film.
+    Film(Box<FilmRequest>),
     /// Draw every object and part alone, small.
     Portraits {
         /// The Gaussians.
@@ -180,6 +191,8 @@ impl Command {
             Self::Picture { .. } => JobKind::Picture,
             Self::Portraits { .. } => JobKind::Portraits,
             Self::InstallModel { .. } => JobKind::Model,
+            Self::Visit(_) => JobKind::Visit,
+            Self::Film(_) => JobKind::Film,
         }
     }
 
@@ -198,6 +211,8 @@ impl Command {
             Self::Photo { photo, .. } => format!("Loading {}", photo.name),
             Self::Portraits { .. } => "Drawing objects".into(),
             Self::InstallModel { id, .. } => format!("Fetching the model {id}"),
+            Self::Visit(request) => format!("Finding the way to {}", request.map.identities.full_name(request.id)),
+            Self::Film(request) => format!("Drawing {}", name(&request.out)),
         }
     }
 }
@@ -274,6 +289,8 @@ pub enum Outcome {
     Portraits(Arc<SemanticMap>, Gallery),
     /// A model can be used now.
     ModelInstalled(String),
+    /// The way to an identity, or why there is none; and what was learnt about the scene.
+    Visited(Arc<Explored>, Visited),
     /// A photo was loaded.
     Photo {
         /// Its index in the dataset.

@@ -7,6 +7,7 @@ use super::super::state::AppState;
 use super::super::theme;
 use super::super::viewport::visible::Visibility;
 use super::portraits::Portraits;
+use crate::navigate::target::Side;
 use crate::pipeline::semantics::edit::Edit;
 use crate::scene::{Identities, IdentityId, Level, NOBODY};
 use crate::worker::Action;
@@ -121,7 +122,7 @@ impl Tree<'_> {
             for (action, text) in [
                 (Action::Change(Edit::Split(id)), "Split"),
                 (Action::Paint(Some(id)), "Mark a new part\u{2026}"),
-                (Action::GoToTarget(id), "Go there"),
+                (Action::GoToTarget(id, Side::Best), "Go there"),
                 (Action::Isolate(Some(id)), "Show it alone"),
                 (Action::ExportTarget(id), "Export\u{2026}"),
             ] {

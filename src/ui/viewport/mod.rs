@@ -7,6 +7,7 @@ mod input;
 mod overlay;
 mod photo;
 pub mod query;
+mod route;
 pub mod visible;
 
 use std::sync::Arc;
@@ -19,11 +20,13 @@ use self::eye::Eye;
 use self::photo::PhotoView;
 use self::query::Questions;
 use self::visible::Visibility;
+use super::camera::CameraPane;
 use super::layout::Layout;
 use super::state::AppState;
 use super::theme;
+use crate::navigate::Pose;
 use crate::render::RenderSettings;
-use crate::scene::{Bounds, Camera, GaussianCloud, IdentityId, PhotoPixels};
+use crate::scene::{Camera, GaussianCloud, PhotoPixels};
 use crate::worker::view::{Effort, ViewLane, ViewPicture, ViewRequest};
 use crate::worker::{Action, CloudSnapshot, OpenedScene, Repaint, ViewMode, Worker};
 
@@ -54,6 +57,8 @@ pub struct Viewport {
     tickets: u64,
     /// Generation of the newest picture.
     shown: u64,
+    /// The same, when it was asked for last.
+    counted: u64,
     picture: Option<ViewPicture>,
     texture: Option<TextureHandle>,
     error: Option<String>,
@@ -101,6 +106,7 @@ impl Viewport {
             requested: None,
             tickets: 0,
             shown: 0,
+            counted: 0,
             picture: None,
             texture: None,
             error: None,
@@ -171,7 +177,6 @@ impl Viewport {
                 self.eye.frame(&scene.home.bounds);
             }
             Action::Paint(of) => self.brush = of.filter(|_| state.semantics.is_some()).map(Brush::new),
-            Action::GoToTarget(id) => self.go_to(*id, state),
             Action::Isolate(only) => self.visibility.isolate(*only),
             Action::Hide(id) => self.visibility.toggle(*id),
             Action::ResetView => {
@@ -207,18 +212,51 @@ impl Viewport {
         self.photo = Some(PhotoView::new(index, photo, worker));
     }
 
-    /// Moves until an identity fills the view, from the side on which the eye is.
-    fn go_to(&mut self, id: IdentityId, state: &AppState) {
-        let (Some(map), Some(cloud)) = (&state.semantics, &self.cloud) else { return };
-        let mine = map.members(id).into_iter().filter(|i| *i < cloud.len());
-        let points = mine.map(|i| cloud.world_position(i));
-        if let Some(mut bounds) = Bounds::robust(points) {
-            // Some of what is around it, to see where it is.
-            let air = bounds.size() * 0.35;
-            (bounds.min, bounds.max) = (bounds.min - air, bounds.max + air);
-            self.leave_photo();
-            self.eye.frame(&bounds);
-        }
+    /// Where the eye is.
+    pub fn pose(&self) -> Pose {
+        let (center, world_from_camera) = (self.eye.center, self.eye.world_from_eye);
+        let fov_y_rad = match &self.photo {
+            Some(photo) => photo.free_fov(self.eye.fov_y_rad),
+            None => self.eye.fov_y_rad,
+        };
+        Pose { center, world_from_camera, fov_y_rad }
+    }
+
+    /// Width by height of the picture.
+    pub fn aspect(&self) -> f64 {
+        self.picture.as_ref().map_or(16.0 / 9.0, |p| f64::from(p.camera.width_px) / f64::from(p.camera.height_px))
+    }
+
+    /// Which way is up in a scene.
+    pub fn up(&self, scene: &OpenedScene) -> DVec3 {
+        self.up.unwrap_or(scene.home.up)
+    }
+
+    /// Puts the eye into a pose.
+    pub fn stand(&mut self, pose: &Pose, state: &AppState, now: f64) {
+        let Some(scene) = state.scene.clone() else { return };
+        self.photo = None;
+        // What it turns about stays ahead, at the distance that it has.
+        let ahead = (self.eye.pivot - pose.center).dot(pose.forward());
+        let distance = if ahead > 0.0 { ahead } else { 0.5 * scene.home.bounds.radius() };
+        self.eye = Eye {
+            center: pose.center,
+            world_from_eye: pose.world_from_camera,
+            pivot: pose.center + pose.forward() * distance,
+            up: self.up(&scene),
+            fov_y_rad: pose.fov_y_rad,
+        };
+        self.moved_at = now;
+    }
+
+    /// Turns about this point from now on.
+    pub fn turn_about(&mut self, point: DVec3) {
+        self.eye.pivot = point;
+    }
+
+    /// Whether a picture has come since this was asked last.
+    pub fn take_new_picture(&mut self) -> bool {
+        std::mem::replace(&mut self.counted, self.shown) != self.shown
     }
 
     /// Goes on freely from the photo's place, at the scale that the picture had.
@@ -229,7 +267,14 @@ impl Viewport {
     }
 
     /// Draws the viewport into all that is left of `ui`.
-    pub fn show(&mut self, ui: &mut Ui, state: &AppState, layout: &mut Layout, actions: &mut Vec<Action>) {
+    pub fn show(
+        &mut self,
+        ui: &mut Ui,
+        state: &AppState,
+        layout: &mut Layout,
+        route: Option<&CameraPane>,
+        actions: &mut Vec<Action>,
+    ) {
         let Some(scene) = state.scene.clone() else { return };
         let rect = ui.available_rect_before_wrap();
         let response = ui.allocate_rect(rect, Sense::click_and_drag());
@@ -260,6 +305,9 @@ impl Viewport {
         }
         if layout.cameras && self.photo.is_none() {
             self.show_frusta(ui, rect, &scene, &response, layout, actions);
+        }
+        if let Some(pane) = route {
+            self.show_route(ui, rect, pane, state.explored.as_deref());
         }
         self.show_overlay(ui, rect, &scene, state, layout, actions);
         if let (Some(brush), Some(semantics)) = (&mut self.brush, &state.semantics) {

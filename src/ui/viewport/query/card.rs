@@ -3,6 +3,7 @@
 use egui::{RichText, Ui};
 
 use super::{Look, Questions};
+use crate::navigate::target::Side;
 use crate::pipeline::semantics::answer::Basis;
 use crate::pipeline::semantics::localise::Answer;
 use crate::pipeline::semantics::matching::{self, MatchMode};
@@ -132,8 +133,19 @@ fn show_target(ui: &mut Ui, target: IdentityId, facts: &Facts, actions: &mut Vec
     let size = facts.bounds.map(size_text).unwrap_or_default();
     ui.label(RichText::new(format!("{} Gaussians{size}", facts.gaussians)).small().color(theme::WEAK));
     ui.horizontal(|ui| {
+        let go = Action::GoToTarget(target, Side::Best);
+        if ui.small_button("Go there").on_hover_text(go.tooltip()).clicked() {
+            actions.push(go);
+        }
+        ui.menu_button(RichText::new("from\u{2026}").small(), |ui| {
+            for side in Side::ALL {
+                if ui.button(side.text()).clicked() {
+                    actions.push(Action::GoToTarget(target, side));
+                    ui.close();
+                }
+            }
+        });
         for (action, text) in [
-            (Action::GoToTarget(target), "Go there"),
             (Action::Isolate(Some(target)), "Isolate"),
             (Action::Hide(target), "Hide"),
             (Action::ExportTarget(target), "Export\u{2026}"),

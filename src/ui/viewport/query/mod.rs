@@ -111,6 +111,11 @@ impl Questions {
         self.kept.iter().chain(&self.live)
     }
 
+    /// The identities that are found on screen.
+    pub fn found(&self) -> Vec<IdentityId> {
+        self.all().flat_map(|asked| asked.shown(&self.look)).collect()
+    }
+
     /// What the present view's pixels belong to, once that is drawn.
     pub fn maps(&self) -> Option<&Arc<ViewMaps>> {
         self.maps.as_ref()

@@ -1,0 +1,243 @@
+//! `fmlgs path`: a flight through a scene.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use glam::DVec3;
+use serde_json::{Value, json};
+
+use super::asking::{Asker, semantics};
+use super::opened::DrawableScene;
+use super::{CliError, opened, output, view};
+use crate::io;
+use crate::navigate::flight::Smoothness;
+use crate::navigate::target::{Side, Wish};
+use crate::navigate::visit::{NoVisit, Place};
+use crate::navigate::{FRAMES, Flight, Navigator, NoWay, Pose, Speed};
+use crate::pipeline::semantics::grammar::Kind;
+use crate::scene::{Camera, CameraPath, PathKey};
+
+/// Find a way through a scene, to what is asked for or to a photo
+///
+/// The way leads over the photos' cameras and places around them, keeps clear of matter, and ends
+/// where the target is seen best. Exit code 1 if there is none.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    fmlgs path scene/ --to \"the handle of the kettle\" --side other --out path.json\n  \
+    fmlgs path scene/ --from 0 --to-photo 24 --compare\n  \
+    fmlgs render scene/ --path path.json --out film.mp4")]
+pub struct Args {
+    /// Trained scene
+    scene: PathBuf,
+    /// Photo to start from, by index or name, or a JSON camera file [default: the first photo]
+    #[arg(long)]
+    from: Option<String>,
+    /// What to go to: an object or a part
+    #[arg(long, required_unless_present = "to_photo")]
+    to: Option<String>,
+    /// Photo to go to, by index or name, or a JSON camera file
+    #[arg(long, conflicts_with = "to")]
+    to_photo: Option<String>,
+    /// From which side the target is seen
+    #[arg(long, value_enum, default_value_t = SideArg::Best)]
+    side: SideArg,
+    /// Distance to the target as a multiple of the usual one
+    #[arg(long, default_value_t = 1.0)]
+    distance: f64,
+    /// Width by height of the picture
+    #[arg(long, default_value_t = 16.0 / 9.0)]
+    aspect: f64,
+    /// Poses of the flight
+    #[arg(long, default_value_t = FRAMES as u32, value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    frames: u32,
+    /// Hold the paper's interpolation of the same keypoints beside it
+    #[arg(long)]
+    compare: bool,
+    /// Write the flight as a camera path: .json of this program, or .nerfstudio.json
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Print one JSON document
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum SideArg {
+    /// Whichever shows it best
+    Best,
+    /// As it is seen now
+    Same,
+    /// The opposite
+    Other,
+    /// Its front
+    Front,
+    /// Its left, seen from the start
+    Left,
+    /// Its right, seen from the start
+    Right,
+    /// From above
+    Above,
+    /// From below
+    Below,
+}
+
+impl From<SideArg> for Side {
+    fn from(side: SideArg) -> Self {
+        match side {
+            SideArg::Best => Self::Best,
+            SideArg::Same => Self::Same,
+            SideArg::Other => Self::Other,
+            SideArg::Front => Self::Front,
+            SideArg::Left => Self::Left,
+            SideArg::Right => Self::Right,
+            SideArg::Above => Self::Above,
+            SideArg::Below => Self::Below,
+        }
+    }
+}
+
+/// What moves about in a scene that was opened.
+pub fn navigator(scene: &DrawableScene) -> Navigator {
+    let cameras: Vec<Camera> = scene.cameras.iter().map(|c| c.camera.clone()).collect();
+    Navigator::new(&scene.cloud, &cameras, up_of(&cameras))
+}
+
+/// Upwards: against what most cameras call down.
+fn up_of(cameras: &[Camera]) -> DVec3 {
+    let sum: DVec3 = cameras.iter().map(|c| -c.world_from_camera.y_axis).sum();
+    sum.try_normalize().unwrap_or(DVec3::NEG_Y)
+}
+
+pub fn run(args: Args) -> Result<(), CliError> {
+    let scene = opened::drawable(&args.scene)?;
+    let start = Instant::now();
+    let navigator = navigator(&scene);
+    let build_ms = start.elapsed().as_secs_f64() * 1e3;
+    let from = Pose::of(&view::choose(args.from.as_deref(), &scene)?);
+    let start = Instant::now();
+    let (flight, what) = match (&args.to, &args.to_photo) {
+        (Some(query), _) => to_target(&args, query, &scene, &navigator, &from)?,
+        (None, photo) => {
+            let to = Pose::of(&view::choose(photo.as_deref(), &scene)?);
+            let flight = navigator.fly(&from, &to, None, args.frames as usize, Speed::Eased);
+            (flight.map_err(|e| no_way(&e, &navigator))?, "the photo".to_owned())
+        }
+    };
+    let route_ms = start.elapsed().as_secs_f64() * 1e3;
+    if let Some(out) = &args.out {
+        output::make_parent(out)?;
+        let path = as_path(&flight);
+        if out.to_string_lossy().ends_with(".nerfstudio.json") {
+            io::camera_path::nerfstudio::write(out, &path, &path.keys, (1280, (1280.0 / args.aspect) as u32))?;
+        } else {
+            io::camera_path::write(out, &path)?;
+        }
+    }
+    let ours = flight.smoothness(&navigator.matter, navigator.clearance);
+    let paper = match args.compare {
+        true => Flight::of_paper(&keys(&flight), args.frames as usize)
+            .map(|p| p.smoothness(&navigator.matter, navigator.clearance)),
+        false => None,
+    };
+    if args.json {
+        return output::print_json(&json!({
+            "target": what,
+            "frames": flight.poses.len(),
+            "seconds": flight.seconds,
+            "length": flight.length,
+            "sharp_corners": flight.sharp,
+            "clearance": navigator.clearance,
+            "keypoints": navigator.graph.keypoints.len(),
+            "keypoints_in_matter": navigator.in_matter,
+            "smoothness": told(&ours),
+            "paper": paper.as_ref().map(told),
+            "build_ms": build_ms,
+            "route_ms": route_ms,
+            "out": args.out,
+        }));
+    }
+    let mut rows =
+        vec![["way", "largest step", "largest turn", "least clearance", "poses too near"].map(str::to_owned).to_vec()];
+    rows.push(row("this", &ours));
+    rows.extend(paper.as_ref().map(|p| row("paper", p)));
+    output::print(&format!(
+        "to {what}: {:.2} units in {:.1} s, {} poses\n{}\nscene looked at in {build_ms:.0} ms, way found in {route_ms:.0} ms",
+        flight.length,
+        flight.seconds,
+        flight.poses.len(),
+        output::table(&rows)
+    ))
+}
+
+fn to_target(
+    args: &Args,
+    query: &str,
+    scene: &DrawableScene,
+    navigator: &Navigator,
+    from: &Pose,
+) -> Result<(Flight, String), CliError> {
+    let map = semantics(&args.scene, &scene.cloud)?;
+    let answered = Asker::new(&map)?.ask(query, Kind::Auto)?;
+    let id = answered.as_ref().and_then(|a| a.chosen(1).first().copied());
+    let id = id.ok_or_else(|| CliError::failed(format!("nothing here fits '{query}'; see 'fmlgs query'")))?;
+    if !(args.distance.is_finite() && args.distance > 0.0 && args.aspect.is_finite() && args.aspect > 0.0) {
+        return Err(CliError::Usage("--distance and --aspect have to be over 0".into()));
+    }
+    let wish = Wish { side: args.side.into(), distance: args.distance };
+    let place = Place { cloud: &scene.cloud, settings: &scene.settings, map: &map };
+    let name = map.identities.full_name(id);
+    match navigator.visit(place, id, wish, from, args.aspect, args.frames as usize) {
+        Ok(visit) => Ok((visit.flight, name)),
+        Err(NoVisit::NoWay { why, .. }) => Err(no_way(&why, navigator)),
+        Err(e) => Err(CliError::failed(format!("{name}: {e}"))),
+    }
+}
+
+/// Why there is no way, with how much of the scene hangs together.
+fn no_way(why: &NoWay, navigator: &Navigator) -> CliError {
+    let parts = navigator.graph.parts(&navigator.matter);
+    let count = parts.iter().max().map_or(0, |m| m + 1);
+    CliError::failed(format!("{why} ({} keypoints in {count} parts that are not connected)", parts.len()))
+}
+
+/// The flight as a path with a key per pose.
+fn as_path(flight: &Flight) -> CameraPath {
+    let last = (flight.poses.len() - 1).max(1) as f64;
+    let key = |(i, p): (usize, &Pose)| PathKey {
+        center: p.center,
+        world_from_camera: p.world_from_camera,
+        fov_y_rad: p.fov_y_rad,
+        roll_rad: 0.0,
+        dwell_secs: 0.0,
+        time_secs: Some(flight.seconds * i as f64 / last),
+        name: None,
+    };
+    let keys = flight.poses.iter().enumerate().map(key).collect();
+    CameraPath { keys, closed: false, fps: last / flight.seconds.max(1e-3), seconds: flight.seconds }
+}
+
+/// The poses that the paper's interpolation starts from: both ends.
+fn keys(flight: &Flight) -> Vec<Pose> {
+    [flight.poses.first(), flight.poses.last()].into_iter().flatten().copied().collect()
+}
+
+fn told(s: &Smoothness) -> Value {
+    json!({
+        "largest_step": s.largest_step,
+        "largest_turn_deg": s.largest_turn.to_degrees(),
+        "largest_jolt": s.largest_jolt,
+        "least_clearance": s.least_clearance,
+        "poses_too_near": s.violations,
+        "rotation_error": s.rotation_error,
+    })
+}
+
+fn row(name: &str, s: &Smoothness) -> Vec<String> {
+    vec![
+        name.to_owned(),
+        format!("{:.4}", s.largest_step),
+        format!("{:.2}\u{b0}", s.largest_turn.to_degrees()),
+        format!("{:.4}", s.least_clearance),
+        s.violations.to_string(),
+    ]
+}

@@ -1,0 +1,114 @@
+//! The table of a path's keys.
+
+use egui::{Button, DragValue, Grid, ScrollArea, TextEdit, Ui};
+
+use super::{CameraPane, caption, key_of, pose_of};
+use crate::navigate::Pose;
+use crate::scene::PathKey;
+
+/// What a person wants of a key.
+enum Wish {
+    Choose,
+    Go,
+    Update,
+    Copy,
+    Up,
+    Down,
+    Delete,
+}
+
+/// Draws it. The pose of the key that a person wants to see.
+pub fn show(ui: &mut Ui, pane: &mut CameraPane, eye: &Pose) -> Option<Pose> {
+    let mut keys = pane.path.keys.clone();
+    let mut wish: Option<(usize, Wish)> = None;
+    ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+        Grid::new("keys").num_columns(12).striped(true).spacing([10.0, 4.0]).show(ui, |ui| {
+            for text in ["Key", "Name", "Time", "View angle", "Roll", "Wait"] {
+                ui.label(caption(text));
+            }
+            ui.end_row();
+            for (i, key) in keys.iter_mut().enumerate() {
+                if let Some(wanted) = row(ui, i, key, pane.selected == Some(i)) {
+                    wish = Some((i, wanted));
+                }
+                ui.end_row();
+            }
+        });
+    });
+    if pane.path.keys != keys {
+        pane.change(|path| path.keys = keys);
+    }
+    let (i, wish) = wish?;
+    pane.selected = Some(i);
+    match wish {
+        Wish::Choose => {}
+        Wish::Go => return pane.path.keys.get(i).map(pose_of),
+        Wish::Update => pane.change(|path| {
+            let old = &path.keys[i];
+            path.keys[i] =
+                PathKey { name: old.name.clone(), dwell_secs: old.dwell_secs, time_secs: old.time_secs, ..key_of(eye) };
+        }),
+        Wish::Copy => pane.change(|path| {
+            let copy = PathKey { time_secs: None, ..path.keys[i].clone() };
+            path.keys.insert(i + 1, copy);
+        }),
+        Wish::Up if i > 0 => pane.change(|path| swap(path.keys.as_mut_slice(), i, i - 1)),
+        Wish::Down if i + 1 < pane.path.keys.len() => pane.change(|path| swap(path.keys.as_mut_slice(), i, i + 1)),
+        Wish::Up | Wish::Down => {}
+        Wish::Delete => {
+            pane.change(|path| drop(path.keys.remove(i)));
+            pane.selected = None;
+        }
+    }
+    None
+}
+
+/// Swaps two keys; their times stay where they are.
+fn swap(keys: &mut [PathKey], a: usize, b: usize) {
+    keys.swap(a, b);
+    let times = (keys[a].time_secs, keys[b].time_secs);
+    (keys[b].time_secs, keys[a].time_secs) = times;
+}
+
+fn row(ui: &mut Ui, i: usize, key: &mut PathKey, chosen: bool) -> Option<Wish> {
+    let mut wish = None;
+    if ui.selectable_label(chosen, format!("{}", i + 1)).clicked() {
+        wish = Some(Wish::Choose);
+    }
+    let mut name = key.name.clone().unwrap_or_default();
+    ui.add(TextEdit::singleline(&mut name).desired_width(110.0).char_limit(80).hint_text("name"));
+    key.name = Some(name).filter(|n| !n.is_empty());
+    ui.horizontal(|ui| {
+        let mut fixed = key.time_secs.is_some();
+        if ui.checkbox(&mut fixed, "").on_hover_text("Fix when it is reached.").changed() {
+            key.time_secs = fixed.then_some(i as f64);
+        }
+        match &mut key.time_secs {
+            Some(time) => drop(ui.add(DragValue::new(time).range(0.0..=3600.0).speed(0.02).suffix(" s"))),
+            None => drop(ui.label(caption("even"))),
+        }
+    });
+    let mut degrees = key.fov_y_rad.to_degrees();
+    if ui.add(DragValue::new(&mut degrees).range(5.0..=150.0).speed(0.2).suffix("\u{b0}")).changed() {
+        key.fov_y_rad = degrees.to_radians();
+    }
+    let mut roll = key.roll_rad.to_degrees();
+    if ui.add(DragValue::new(&mut roll).range(-180.0..=180.0).speed(0.5).suffix("\u{b0}")).changed() {
+        key.roll_rad = roll.to_radians();
+    }
+    ui.add(DragValue::new(&mut key.dwell_secs).range(0.0..=600.0).speed(0.02).suffix(" s"));
+    let buttons = [
+        ("Go", "Look from here.", Wish::Go),
+        ("Set", "Make the present view this key.", Wish::Update),
+        ("Copy", "Another one like it behind it.", Wish::Copy),
+        ("\u{2b06}", "Earlier.", Wish::Up),
+        ("\u{2b07}", "Later.", Wish::Down),
+        ("\u{2716}", "Delete it.", Wish::Delete),
+    ];
+    for (text, tip, wanted) in buttons {
+        if ui.add(Button::new(text).small()).on_hover_text(tip).clicked() {
+            wish = Some(wanted);
+        }
+    }
+    wish
+}

@@ -1,0 +1,348 @@
+//! The camera pane: the keys of a path, a timeline to play and retime them, and films of it.
+
+mod keys;
+pub mod player;
+mod timeline;
+
+use std::path::PathBuf;
+
+use egui::{Button, ComboBox, DragValue, RichText, Slider, Ui};
+use glam::DMat3;
+
+use self::player::{Player, Reel};
+use super::state::AppState;
+use super::theme;
+use crate::io::animation::Settings;
+use crate::navigate::{Film, Flight, Pose, Speed};
+use crate::scene::{Camera, CameraPath, PathKey};
+use crate::worker::Action;
+
+/// States of the path that are kept for undoing.
+const MAX_UNDO: usize = 200;
+
+/// The path that is being edited, and how it is played.
+pub struct CameraPane {
+    /// The path.
+    pub path: CameraPath,
+    /// How speed runs over it.
+    pub speed: Speed,
+    /// What is played.
+    pub player: Player,
+    /// The key that was chosen.
+    selected: Option<usize>,
+    undo: Vec<CameraPath>,
+    redo: Vec<CameraPath>,
+    /// The path as it was last made a film of.
+    filmed: Option<(CameraPath, Speed)>,
+    /// Height of films, px.
+    film_height: u32,
+    /// Quality of films, 0 to 100.
+    quality: u8,
+    /// Whether what was found is marked in films.
+    pub mark: bool,
+    /// The scene that it belongs to.
+    scene: u64,
+}
+
+impl Default for CameraPane {
+    fn default() -> Self {
+        Self {
+            path: empty(),
+            speed: Speed::Constant,
+            player: Player::default(),
+            selected: None,
+            undo: Vec::new(),
+            redo: Vec::new(),
+            filmed: None,
+            film_height: 720,
+            quality: 80,
+            mark: false,
+            scene: 0,
+        }
+    }
+}
+
+fn empty() -> CameraPath {
+    CameraPath { keys: Vec::new(), closed: false, fps: 30.0, seconds: 5.0 }
+}
+
+impl CameraPane {
+    /// Forgets the path of another scene.
+    pub fn on_scene(&mut self, scene: u64) {
+        if self.scene != scene {
+            *self = Self { scene, ..Self::default() };
+        }
+    }
+
+    /// Plays a flight to a target.
+    pub fn play_flight(&mut self, flight: Flight) {
+        self.player.load(Reel::Flight(Box::new(flight)), true);
+    }
+
+    /// Plays or stops; the path, if nothing else is in.
+    pub fn toggle(&mut self) {
+        if self.player.reel().is_none() {
+            self.put_path_in();
+        }
+        self.player.toggle();
+    }
+
+    /// One picture on or back; the pose there.
+    pub fn step(&mut self, pictures: f64) -> Option<Pose> {
+        let time = self.player.time + pictures / self.path.fps.max(1.0);
+        self.player.seek(time)
+    }
+
+    /// Records the present view as a key behind the chosen one.
+    pub fn record(&mut self, pose: &Pose) {
+        let place = self.selected.map_or(self.path.keys.len(), |i| (i + 1).min(self.path.keys.len()));
+        self.change(|path| path.keys.insert(place, key_of(pose)));
+        self.selected = Some(place);
+        self.put_path_in();
+    }
+
+    /// Takes over a path that was read.
+    pub fn open(&mut self, path: CameraPath) {
+        self.change(|p| *p = path);
+        self.selected = None;
+        self.put_path_in();
+    }
+
+    /// Changes the path, so that it can be undone.
+    fn change(&mut self, change: impl FnOnce(&mut CameraPath)) {
+        let before = self.path.clone();
+        change(&mut self.path);
+        if self.path != before {
+            self.undo.push(before);
+            self.redo.clear();
+            if self.undo.len() > MAX_UNDO {
+                self.undo.remove(0);
+            }
+        }
+    }
+
+    fn step_back_in_time(&mut self, redo: bool) {
+        let (from, to) = if redo { (&mut self.redo, &mut self.undo) } else { (&mut self.undo, &mut self.redo) };
+        if let Some(path) = from.pop() {
+            to.push(std::mem::replace(&mut self.path, path));
+            self.selected = self.selected.filter(|i| *i < self.path.keys.len());
+        }
+    }
+
+    /// Makes the path what is played.
+    fn put_path_in(&mut self) {
+        self.filmed = Some((self.path.clone(), self.speed));
+        match Film::new(&self.path, self.speed) {
+            Some(film) if matches!(self.player.reel(), Some(Reel::Path(_))) => {
+                self.player.replace(Some(Reel::Path(Box::new(film))));
+            }
+            Some(film) => self.player.load(Reel::Path(Box::new(film)), false),
+            None => self.player.replace(None),
+        }
+    }
+
+    /// The film of the path as it is.
+    fn keep_up(&mut self) {
+        let is_path = matches!(self.player.reel(), Some(Reel::Path(_)) | None);
+        let current = self.filmed.as_ref().is_some_and(|(path, speed)| *path == self.path && *speed == self.speed);
+        if is_path && !current {
+            self.put_path_in();
+        }
+    }
+
+    /// The cameras of a film of what is played, and how it is written; `None` if there is nothing.
+    pub fn film(&self, out: &std::path::Path, aspect: f64) -> Option<(Vec<Camera>, Settings)> {
+        let height = self.film_height;
+        let width = (((f64::from(height) * aspect) / 2.0).round().max(1.0) * 2.0) as u32;
+        let reel = self.player.reel()?;
+        let frames = (reel.seconds() * self.path.fps).round().clamp(1.0, 1e6) as usize;
+        let time = |i: usize| reel.seconds() * i as f64 / frames as f64;
+        let cameras = (0..=frames).filter_map(|i| reel.at(time(i))).map(|p| p.camera(width, height)).collect();
+        let mut settings = Settings::new(width, height, self.path.fps);
+        // The dialog has asked whether it may be replaced.
+        (settings.quality, settings.overwrite) = (self.quality, out.exists());
+        Some((cameras, settings))
+    }
+
+    /// Points along what is played, for drawing its way.
+    pub fn way(&self) -> Vec<glam::DVec3> {
+        let Some(reel) = self.player.reel() else { return Vec::new() };
+        let last = 120;
+        (0..=last).filter_map(|i| reel.at(reel.seconds() * f64::from(i) / f64::from(last))).map(|p| p.center).collect()
+    }
+
+    /// Places of the path's keys, and which of them is chosen.
+    pub fn key_places(&self) -> impl Iterator<Item = (glam::DVec3, bool)> + '_ {
+        self.path.keys.iter().enumerate().map(|(i, k)| (k.center, self.selected == Some(i)))
+    }
+
+    /// Draws the pane. `eye` is the present view. The pose to show, if a person moved in time or asked
+    /// for a key.
+    pub fn show(&mut self, ui: &mut Ui, state: &AppState, eye: &Pose, actions: &mut Vec<Action>) -> Option<Pose> {
+        self.keep_up();
+        let mut wanted = None;
+        ui.horizontal(|ui| self.controls(ui, actions));
+        ui.add_space(2.0);
+        wanted = timeline::show(ui, self).or(wanted);
+        ui.add_space(2.0);
+        ui.horizontal_wrapped(|ui| self.tools(ui, state, eye, actions));
+        if self.path.keys.is_empty() {
+            ui.add_space(4.0);
+            ui.weak(
+                "No keys yet. Move the view and record it (K), open a path, or find something and go there: the \
+                 flight can be kept as a path.",
+            );
+        } else {
+            wanted = keys::show(ui, self, eye).or(wanted);
+        }
+        wanted
+    }
+
+    fn controls(&mut self, ui: &mut Ui, actions: &mut Vec<Action>) {
+        let has_reel = self.player.reel().is_some();
+        let tip = |a: &Action| format!("{}  {}", a.tooltip(), super::keys::label(ui.ctx(), a));
+        let symbol = if self.player.playing { "\u{23f8}" } else { "\u{25b6}" };
+        let entries = [("\u{23ee}", Action::StepBack), (symbol, Action::PlayPath), ("\u{23ed}", Action::StepForward)];
+        let entries = entries.map(|(symbol, action)| (symbol, tip(&action), action));
+        for (symbol, tip, action) in entries {
+            let button = Button::new(symbol).min_size(egui::vec2(30.0, 24.0));
+            if ui.add_enabled(has_reel, button).on_hover_text(tip).clicked() {
+                actions.push(action);
+            }
+        }
+        ui.checkbox(&mut self.player.looped, "Loop");
+        ComboBox::from_id_salt("rate").selected_text(format!("{}\u{d7}", self.player.rate)).width(56.0).show_ui(
+            ui,
+            |ui| {
+                for rate in [0.25, 0.5, 1.0, 2.0, 4.0] {
+                    ui.selectable_value(&mut self.player.rate, rate, format!("{rate}\u{d7}"));
+                }
+            },
+        );
+        let seconds = self.player.reel().map_or(0.0, Reel::seconds);
+        ui.label(RichText::new(format!("{:.2} / {seconds:.2} s", self.player.time)).monospace());
+        let what = match self.player.reel() {
+            Some(Reel::Flight(_)) => "flight to what was found",
+            Some(Reel::Path(_)) => "path",
+            None => "nothing to play",
+        };
+        ui.weak(what);
+        if let Some(rate) = self.player.rate_shown().filter(|_| self.player.playing) {
+            ui.weak(format!("{rate:.0} pictures/s shown"));
+        }
+        if let Some(Reel::Flight(flight)) = self.player.reel() {
+            let flight = (**flight).clone();
+            if ui.button("Keep as path").on_hover_text("Make keys of this flight, so that it can be edited.").clicked()
+            {
+                self.keep(&flight);
+            }
+            if !self.path.keys.is_empty() && ui.button("Back to the path").clicked() {
+                self.player.replace(None);
+                self.put_path_in();
+            }
+        }
+    }
+
+    /// Makes keys of a flight: enough of them that the path follows it.
+    fn keep(&mut self, flight: &Flight) {
+        let last = flight.poses.len().saturating_sub(1);
+        let count = last.min(8);
+        let at = |i: usize| flight.poses.get(i * last / count.max(1));
+        let time = |i: usize| flight.seconds * (i * last / count.max(1)) as f64 / last.max(1) as f64;
+        let keys = (0..=count).filter_map(|i| Some(PathKey { time_secs: Some(time(i)), ..key_of(at(i)?) })).collect();
+        let (closed, fps) = (false, self.path.fps);
+        self.change(|path| *path = CameraPath { keys, closed, fps, seconds: flight.seconds });
+        self.selected = None;
+        self.player.replace(None);
+        self.put_path_in();
+    }
+
+    fn tools(&mut self, ui: &mut Ui, state: &AppState, eye: &Pose, actions: &mut Vec<Action>) {
+        let tip = format!("{}  {}", Action::AddKey.tooltip(), super::keys::label(ui.ctx(), &Action::AddKey));
+        if ui.button("Record this view").on_hover_text(tip).clicked() {
+            self.record(eye);
+        }
+        for (text, redo, any) in [("Undo", false, !self.undo.is_empty()), ("Redo", true, !self.redo.is_empty())] {
+            if ui.add_enabled(any, Button::new(text)).clicked() {
+                self.step_back_in_time(redo);
+            }
+        }
+        for (text, action, enabled) in
+            [("Open\u{2026}", Action::OpenPath, true), ("Save\u{2026}", Action::SavePath, !self.path.keys.is_empty())]
+        {
+            if ui.add_enabled(enabled, Button::new(text)).on_hover_text(action.tooltip()).clicked() {
+                actions.push(action);
+            }
+        }
+        ui.separator();
+        let mut path = self.path.clone();
+        ui.label("Seconds");
+        ui.add(DragValue::new(&mut path.seconds).range(0.1..=3600.0).speed(0.05));
+        ui.checkbox(&mut path.closed, "Closed").on_hover_text("Go on from the last key to the first.");
+        let mut eased = self.speed == Speed::Eased;
+        ui.checkbox(&mut eased, "Eased").on_hover_text("Start and stop gently, at waits too.");
+        self.speed = if eased { Speed::Eased } else { Speed::Constant };
+        ui.separator();
+        let idle = state.job.is_none() && self.player.reel().is_some();
+        let film = ui.add_enabled(idle, Button::new("Film\u{2026}"));
+        let why = if state.job.is_some() { "Another job is running." } else { "There is nothing to film." };
+        if film.on_hover_text(Action::SaveFilm.tooltip()).on_disabled_hover_text(why).clicked() {
+            actions.push(Action::SaveFilm);
+        }
+        ComboBox::from_id_salt("film height").selected_text(format!("{} px", self.film_height)).width(72.0).show_ui(
+            ui,
+            |ui| {
+                for height in [360, 480, 720, 1080, 2160] {
+                    ui.selectable_value(&mut self.film_height, height, format!("{height} px"));
+                }
+            },
+        );
+        ui.add(DragValue::new(&mut path.fps).range(1.0..=120.0).speed(0.2).suffix(" per s"));
+        ui.add(Slider::new(&mut self.quality, 0..=100).text("Quality"));
+        ui.checkbox(&mut self.mark, "Mark").on_hover_text("Mark what was found in every picture of the film.");
+        self.change(|p| *p = path);
+    }
+}
+
+/// A key of a pose. What is rolled stays in its rotation.
+fn key_of(pose: &Pose) -> PathKey {
+    PathKey {
+        center: pose.center,
+        world_from_camera: pose.world_from_camera,
+        fov_y_rad: pose.fov_y_rad,
+        roll_rad: 0.0,
+        dwell_secs: 0.0,
+        time_secs: None,
+        name: None,
+    }
+}
+
+/// The pose of a key.
+fn pose_of(key: &PathKey) -> Pose {
+    let world_from_camera: DMat3 = key.rotation();
+    Pose { center: key.center, world_from_camera, fov_y_rad: key.fov_y_rad }
+}
+
+/// Reads a path's file; the error for people.
+pub fn read(path: &std::path::Path) -> Result<CameraPath, String> {
+    crate::io::camera_path::open(path).map_err(|e| e.to_string())
+}
+
+/// Writes a path's file, in nerfstudio's format if its name says so.
+pub fn write(file: &PathBuf, path: &CameraPath, aspect: f64) -> Result<(), String> {
+    let written = if file.to_string_lossy().ends_with(".nerfstudio.json") {
+        let frames: Vec<PathKey> = Film::new(path, Speed::Constant).map_or_else(Vec::new, |film| {
+            let count = (film.seconds() * path.fps).round().clamp(1.0, 1e5) as usize;
+            film.flight(count + 1).poses.iter().map(key_of).collect()
+        });
+        crate::io::camera_path::nerfstudio::write(file, path, &frames, (1280, (1280.0 / aspect.max(0.01)) as u32))
+    } else {
+        crate::io::camera_path::write(file, path)
+    };
+    written.map_err(|e| e.to_string())
+}
+
+/// A small caption.
+fn caption(text: &str) -> RichText {
+    RichText::new(text).small().color(theme::WEAK)
+}

@@ -1,0 +1,160 @@
+//! Plays a flight or a path, and counts the pictures that are shown while it runs.
+
+use crate::navigate::{Film, Flight, Pose};
+
+/// Seconds over which pictures are counted.
+const COUNTED_SECS: f64 = 1.0;
+
+/// What is played.
+#[derive(Clone, Debug)]
+pub enum Reel {
+    /// A flight to a target.
+    Flight(Box<Flight>),
+    /// The path that is being edited.
+    Path(Box<Film>),
+}
+
+impl Reel {
+    /// How long it runs.
+    pub fn seconds(&self) -> f64 {
+        match self {
+            Self::Flight(flight) => flight.seconds,
+            Self::Path(film) => film.seconds(),
+        }
+    }
+
+    /// The pose at a time. Between the poses of a flight the nearest is taken.
+    pub fn at(&self, time: f64) -> Option<Pose> {
+        match self {
+            Self::Path(film) => Some(film.at(time)),
+            Self::Flight(flight) => {
+                let last = flight.poses.len().checked_sub(1)?;
+                let share = if flight.seconds > 0.0 { time / flight.seconds } else { 1.0 };
+                flight.poses.get((share.clamp(0.0, 1.0) * last as f64).round() as usize).copied()
+            }
+        }
+    }
+}
+
+/// The state of playing.
+#[derive(Debug)]
+pub struct Player {
+    reel: Option<Reel>,
+    /// Seconds into it.
+    pub time: f64,
+    /// Whether it runs.
+    pub playing: bool,
+    /// Whether it begins again at its end.
+    pub looped: bool,
+    /// Speed as a multiple of the usual one.
+    pub rate: f64,
+    /// When pictures were shown lately, window time.
+    shown: Vec<f64>,
+}
+
+impl Default for Player {
+    fn default() -> Self {
+        Self { reel: None, time: 0.0, playing: false, looped: false, rate: 1.0, shown: Vec::new() }
+    }
+}
+
+impl Player {
+    /// Puts a reel in, at its beginning; running if wanted.
+    pub fn load(&mut self, reel: Reel, playing: bool) {
+        self.reel = Some(reel);
+        self.time = 0.0;
+        self.playing = playing;
+        self.shown.clear();
+    }
+
+    /// The same path, changed: time and running stay.
+    pub fn replace(&mut self, reel: Option<Reel>) {
+        self.time = self.time.min(reel.as_ref().map_or(0.0, Reel::seconds));
+        self.playing &= reel.is_some();
+        self.reel = reel;
+    }
+
+    /// What is in.
+    pub fn reel(&self) -> Option<&Reel> {
+        self.reel.as_ref()
+    }
+
+    /// Starts or stops; begins anew at the end.
+    pub fn toggle(&mut self) {
+        let Some(reel) = &self.reel else { return };
+        if !self.playing && self.time >= reel.seconds() {
+            self.time = 0.0;
+        }
+        self.playing = !self.playing;
+        self.shown.clear();
+    }
+
+    /// Goes on by `step_secs` of window time; the pose to show, if it runs.
+    pub fn tick(&mut self, step_secs: f64) -> Option<Pose> {
+        let reel = self.reel.as_ref().filter(|_| self.playing)?;
+        let seconds = reel.seconds();
+        let rate = if self.rate > 0.0 { self.rate } else { 1.0 };
+        self.time += step_secs.clamp(0.0, 0.5) * rate;
+        if self.time >= seconds {
+            self.time = if self.looped && seconds > 0.0 { self.time % seconds } else { seconds };
+            self.playing = self.looped && seconds > 0.0;
+        }
+        reel.at(self.time)
+    }
+
+    /// Stops and moves to a time; the pose there.
+    pub fn seek(&mut self, time: f64) -> Option<Pose> {
+        let reel = self.reel.as_ref()?;
+        self.playing = false;
+        self.time = time.clamp(0.0, reel.seconds());
+        reel.at(self.time)
+    }
+
+    /// Counts a picture that was shown at this window time.
+    pub fn count(&mut self, now: f64) {
+        self.shown.push(now);
+        self.shown.retain(|t| now - t <= COUNTED_SECS);
+    }
+
+    /// Pictures per second lately; `None` before anything is known.
+    pub fn rate_shown(&self) -> Option<f64> {
+        let (first, last) = (self.shown.first()?, self.shown.last()?);
+        (last - first > 0.2).then(|| (self.shown.len() - 1) as f64 / (last - first))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{DMat3, DVec3};
+
+    fn reel() -> Reel {
+        let pose = |i: usize| Pose { center: DVec3::X * i as f64, world_from_camera: DMat3::IDENTITY, fov_y_rad: 0.8 };
+        Reel::Flight(Box::new(Flight { poses: (0..11).map(pose).collect(), seconds: 2.0, length: 10.0, sharp: 0 }))
+    }
+
+    #[test]
+    fn it_runs_to_its_end_and_begins_anew() {
+        let mut p = Player::default();
+        assert!(p.tick(0.1).is_none() && p.seek(1.0).is_none());
+        p.load(reel(), true);
+        assert_eq!(p.tick(0.4).map(|p| p.center.x), Some(2.0));
+        (0..10).for_each(|_| assert!(p.time <= 2.0 && p.tick(0.4).is_some() || !p.playing));
+        assert!(!p.playing && p.time == 2.0);
+        p.toggle();
+        assert!(p.playing && p.time == 0.0);
+        p.looped = true;
+        (0..20).for_each(|_| assert!(p.tick(0.3).is_some()));
+        assert!(p.playing && p.time < 2.0);
+        assert_eq!(p.seek(99.0).map(|p| p.center.x), Some(10.0));
+        assert!(!p.playing);
+    }
+
+    #[test]
+    fn pictures_are_counted_over_the_last_second() {
+        let mut p = Player::default();
+        assert_eq!(p.rate_shown(), None);
+        (0..100).for_each(|i| p.count(f64::from(i) * 0.04));
+        assert!((p.rate_shown().expect("counted") - 25.0).abs() < 0.1);
+    }
+}

@@ -1,0 +1,116 @@
+//! The timeline: where in time one is, and keys that can be dragged to other times.
+
+use egui::{CursorIcon, Rect, Sense, Stroke, Ui, pos2, vec2};
+
+use super::super::theme;
+use super::CameraPane;
+use super::player::Reel;
+use crate::navigate::Pose;
+
+/// Height of the timeline, points.
+const HEIGHT: f32 = 26.0;
+/// How near the pointer must come to a key, points.
+const REACH: f32 = 7.0;
+
+/// Draws it. The pose of the time that a person chose.
+pub fn show(ui: &mut Ui, pane: &mut CameraPane) -> Option<Pose> {
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), HEIGHT), Sense::click_and_drag());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, "Timeline"));
+    let line = rect.shrink2(vec2(8.0, 0.0));
+    let painter = ui.painter_at(rect);
+    painter.rect_filled(rect.shrink2(vec2(0.0, 5.0)), 6.0, theme::CANVAS);
+    let seconds = pane.player.reel().map_or(0.0, Reel::seconds).max(1e-3);
+    let x = |time: f64| line.left() + (time / seconds).clamp(0.0, 1.0) as f32 * line.width();
+    let time = |x: f32| f64::from(((x - line.left()) / line.width().max(1.0)).clamp(0.0, 1.0)) * seconds;
+    ticks(&painter, line, seconds, x);
+    let times: Vec<[f64; 2]> = match pane.player.reel() {
+        Some(Reel::Path(film)) => film.times.clone(),
+        _ => Vec::new(),
+    };
+    let count = pane.path.keys.len();
+    let near = |at: egui::Pos2| {
+        let apart = |t: &[f64; 2]| (x(t[0]) - at.x).abs();
+        let found = times.iter().take(count).enumerate();
+        found.min_by(|a, b| apart(a.1).total_cmp(&apart(b.1))).filter(|(_, t)| apart(t) < REACH).map(|(i, _)| i)
+    };
+    let dragged = ui.scope_id().with("dragged key");
+    let mut wanted = None;
+    if response.drag_started()
+        && let Some(at) = response.interact_pointer_pos()
+    {
+        let key = near(at).filter(|i| *i > 0);
+        ui.data_mut(|d| d.insert_temp(dragged, key));
+        pane.selected = near(at).or(pane.selected);
+    }
+    if let Some(at) = response.interact_pointer_pos() {
+        let held: Option<usize> = ui.data(|d| d.get_temp(dragged)).flatten();
+        match held.filter(|_| response.dragged()) {
+            Some(key) => {
+                let t = between_neighbours(pane, key, time(at.x), &times);
+                let one_step = response.drag_started();
+                retime(pane, key, t, one_step);
+            }
+            None if response.dragged() || response.clicked() => {
+                pane.selected = near(at).or(pane.selected);
+                wanted = pane.player.seek(time(at.x));
+            }
+            None => {}
+        }
+    }
+    for (i, [arrives, leaves]) in times.iter().take(pane.path.keys.len()).enumerate() {
+        let (a, b) = (x(*arrives), x(*leaves));
+        if b - a > 1.0 {
+            let wait = Rect::from_min_max(pos2(a, rect.center().y - 2.0), pos2(b, rect.center().y + 2.0));
+            painter.rect_filled(wait, 2.0, theme::WARNING);
+        }
+        let chosen = pane.selected == Some(i);
+        let (size, color) = if chosen { (7.0, theme::ACCENT) } else { (5.0, theme::TEXT) };
+        let c = pos2(a, rect.center().y);
+        let corners = [vec2(0.0, -size), vec2(size, 0.0), vec2(0.0, size), vec2(-size, 0.0)].map(|v| c + v);
+        painter.add(egui::Shape::convex_polygon(corners.to_vec(), color, Stroke::new(1.0, theme::PANEL)));
+    }
+    if pane.player.reel().is_some() {
+        let at = x(pane.player.time);
+        painter.line_segment([pos2(at, rect.top()), pos2(at, rect.bottom())], Stroke::new(2.0, theme::ACCENT));
+    }
+    if let Some(at) = response.hover_pos() {
+        let over = near(at);
+        ui.ctx().set_cursor_icon(if over.is_some() { CursorIcon::ResizeHorizontal } else { CursorIcon::PointingHand });
+        let text = match over.and_then(|i| pane.path.keys.get(i).map(|k| (i, k))) {
+            Some((i, k)) => format!("Key {}{}", i + 1, k.name.as_ref().map_or(String::new(), |n| format!(": {n}"))),
+            None => format!("{:.2} s", time(at.x)),
+        };
+        response.on_hover_text_at_pointer(text);
+    }
+    wanted
+}
+
+fn ticks(painter: &egui::Painter, line: Rect, seconds: f64, x: impl Fn(f64) -> f32) {
+    let step = [0.1, 0.5, 1.0, 5.0, 10.0, 60.0, 300.0].into_iter().find(|s| seconds / s <= 24.0).unwrap_or(900.0);
+    for i in 0..=(seconds / step) as usize {
+        let at = x(i as f64 * step);
+        let stroke = Stroke::new(1.0, theme::WEAK.gamma_multiply(0.5));
+        painter.line_segment([pos2(at, line.bottom() - 9.0), pos2(at, line.bottom() - 6.0)], stroke);
+    }
+}
+
+/// The time, kept after the key before and before the key after.
+fn between_neighbours(pane: &CameraPane, key: usize, time: f64, times: &[[f64; 2]]) -> f64 {
+    const GAP: f64 = 0.02;
+    let lowest = times.get(key.wrapping_sub(1)).map_or(0.0, |t| t[1] + GAP);
+    let wait = pane.path.keys.get(key).map_or(0.0, |k| k.dwell_secs);
+    let highest = times.get(key + 1).map_or(f64::INFINITY, |t| t[0] - wait - GAP);
+    time.clamp(lowest, highest.max(lowest))
+}
+
+/// Fixes a key's time. All steps of one drag are undone together.
+fn retime(pane: &mut CameraPane, key: usize, time: f64, first: bool) {
+    if key >= pane.path.keys.len() {
+        return;
+    }
+    if first {
+        pane.change(|path| path.keys[key].time_secs = Some(time));
+    } else {
+        pane.path.keys[key].time_secs = Some(time);
+    }
+}

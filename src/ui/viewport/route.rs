@@ -1,0 +1,48 @@
+//! The way of the camera drawn over the view: where it leads, its keys, and where one could stand.
+
+use egui::{Color32, Rect, Stroke, Ui, pos2};
+use glam::DVec3;
+
+use super::super::camera::CameraPane;
+use super::super::theme;
+use super::Viewport;
+use crate::worker::Explored;
+
+impl Viewport {
+    /// Draws the way that is played, the keys of the path, and the keypoints of the scene.
+    pub fn show_route(&self, ui: &Ui, rect: Rect, pane: &CameraPane, explored: Option<&Explored>) {
+        let painter = ui.painter_at(rect);
+        // Drawn as the picture saw it, so that lines and picture move together.
+        let eye = match &self.picture {
+            Some(p) => p.camera.resized(rect.width().max(1.0) as u32, rect.height().max(1.0) as u32),
+            None => self.eye.camera(rect.width() as u32, rect.height() as u32),
+        };
+        let place = |p: DVec3| eye.project(p).map(|q| pos2(rect.left() + q.x as f32, rect.top() + q.y as f32));
+        if let Some(explored) = explored.filter(|_| !pane.player.playing) {
+            for (keypoint, part) in explored.navigator.graph.keypoints.iter().zip(&explored.parts) {
+                let Some(at) = place(keypoint.center).filter(|at| rect.contains(*at)) else { continue };
+                let color = if *part == 0 { theme::GOOD } else { theme::ERROR };
+                let radius = if keypoint.original { 2.5 } else { 1.5 };
+                painter.circle_filled(at, radius + 0.8, Color32::from_black_alpha(90));
+                painter.circle_filled(at, radius, color.gamma_multiply(0.8));
+            }
+        }
+        let way = pane.way();
+        for stroke in [Stroke::new(4.0, Color32::from_black_alpha(110)), Stroke::new(2.0, theme::ACCENT)] {
+            for pair in way.windows(2) {
+                if let (Some(a), Some(b)) = (place(pair[0]), place(pair[1]))
+                    && (rect.expand(2000.0).contains(a) && rect.expand(2000.0).contains(b))
+                {
+                    painter.line_segment([a, b], stroke);
+                }
+            }
+        }
+        for (i, (center, chosen)) in pane.key_places().enumerate() {
+            let Some(at) = place(center).filter(|at| rect.contains(*at)) else { continue };
+            let (radius, color) = if chosen { (7.0, theme::ACCENT) } else { (5.0, theme::TEXT) };
+            painter.circle(at, radius, color, Stroke::new(1.5, Color32::from_black_alpha(160)));
+            let font = egui::FontId::proportional(11.0);
+            painter.text(at + egui::vec2(9.0, -9.0), egui::Align2::LEFT_BOTTOM, (i + 1).to_string(), font, theme::TEXT);
+        }
+    }
+}
