@@ -85,7 +85,8 @@ impl CameraPath {
         if self.keys.len() > Self::MAX_KEYS {
             return Err(PathError::TooManyKeys(self.keys.len()));
         }
-        let path = |field, value: f64, what: &str| PathError::Path { field, reason: format!("= {value} is not {what}") };
+        let path =
+            |field, value: f64, what: &str| PathError::Path { field, reason: format!("= {value} is not {what}") };
         if !(self.fps > 0.0 && self.fps <= Self::MAX_FPS) {
             return Err(path("fps", self.fps, &format!("above 0 and at most {}", Self::MAX_FPS)));
         }

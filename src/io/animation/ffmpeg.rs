@@ -48,9 +48,10 @@ impl Ffmpeg {
         let start = |cause| AnimationError::Program { program: program.into(), cause };
         let mut child = command.spawn().map_err(start)?;
         let frames_in = child.stdin.take();
-        let last_words = child.stderr.take().map(|words| {
-            std::thread::Builder::new().name("ffmpeg errors".into()).spawn(move || last_lines(words))
-        });
+        let last_words = child
+            .stderr
+            .take()
+            .map(|words| std::thread::Builder::new().name("ffmpeg errors".into()).spawn(move || last_lines(words)));
         let mut ffmpeg = Self {
             path: path.into(),
             program: program.into(),
@@ -86,7 +87,9 @@ impl Sink for Ffmpeg {
     }
 
     fn push(&mut self, rgb: &[u8]) -> Result<()> {
-        let Some(frames_in) = &mut self.frames_in else { return Err(AnimationError::Broken { path: self.path.clone() }) };
+        let Some(frames_in) = &mut self.frames_in else {
+            return Err(AnimationError::Broken { path: self.path.clone() });
+        };
         let Err(cause) = frames_in.write_all(rgb) else { return Ok(()) };
         // The program closed the pipe; its own words say more than "broken pipe".
         match self.wait() {

@@ -74,9 +74,10 @@ impl Format {
                 let what = format!("{size} is less than the {MP4_LEAST_PX} px a side that the MP4 encoder takes");
                 bad(what, "choose a larger size, GIF, WebP or PNG frames")
             }
-            Self::WebP if w.max(h) > WEBP_PX => {
-                bad(format!("{size} is more than the {WEBP_PX} px a side of WebP"), "choose a smaller size or PNG frames")
-            }
+            Self::WebP if w.max(h) > WEBP_PX => bad(
+                format!("{size} is more than the {WEBP_PX} px a side of WebP"),
+                "choose a smaller size or PNG frames",
+            ),
             Self::Gif if fps > GIF_FPS => {
                 let what = format!("{fps} frames per second are more than the {GIF_FPS} that viewers of GIF show");
                 bad(what, "choose a lower rate, MP4 or WebP")

@@ -50,7 +50,8 @@ impl Planes {
                 }
                 let y = luma(mean);
                 // 224 steps from 16 to 240.
-                let colour = |value: f32, weight: f32| byte(128.0 + (value - y) / (2.0 - 2.0 * weight) * (224.0 / 255.0));
+                let colour =
+                    |value: f32, weight: f32| byte(128.0 + (value - y) / (2.0 - 2.0 * weight) * (224.0 / 255.0));
                 self.u[row * colour_row + column] = colour(mean[2], BLUE);
                 self.v[row * colour_row + column] = colour(mean[0], RED);
             }

@@ -168,8 +168,7 @@ fn spans(path: &CameraPath) -> Vec<f64> {
 /// World_from_camera with OpenGL axes, row by row.
 fn matrix(key: &PathKey) -> [f64; 16] {
     let r = key.rotation();
-    let columns =
-        [r.x_axis.extend(0.0), (-r.y_axis).extend(0.0), (-r.z_axis).extend(0.0), key.center.extend(1.0)];
+    let columns = [r.x_axis.extend(0.0), (-r.y_axis).extend(0.0), (-r.z_axis).extend(0.0), key.center.extend(1.0)];
     DMat4::from_cols(columns[0], columns[1], columns[2], columns[3]).transpose().to_cols_array()
 }
 
