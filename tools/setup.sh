@@ -23,8 +23,9 @@ need() {
     "$@" || missing+=("$package")
 }
 
-# A linker and the C library's start-up files, for Rust.
+# A linker and the C library's start-up files, for Rust; a C++ compiler, for the video encoder.
 need gcc has_command cc
+need g++ has_command c++
 need libc6-dev test -n "$(compgen -G '/usr/lib/*/crt1.o' || compgen -G '/usr/lib*/crt1.o')"
 # Certificates, for crates.io.
 need ca-certificates test -e /etc/ssl/certs/ca-certificates.crt -o -e /etc/pki/tls/certs/ca-bundle.crt

@@ -32,6 +32,9 @@ pub fn all() -> Vec<Seed> {
         ("llff", "two.npy", npy()),
         ("transforms", "nerfstudio.json", transforms().to_string().into_bytes()),
         ("transforms", "per_frame.json", per_frame().to_string().into_bytes()),
+        ("camera_path", "own.json", camera_path().to_string().into_bytes()),
+        ("camera_path", "nerfstudio.json", nerfstudio_path(json!(ROWS)).to_string().into_bytes()),
+        ("camera_path", "nerfstudio_old.json", nerfstudio_path(json!(COLUMNS)).to_string().into_bytes()),
         ("blender", "train.json", blender().to_string().into_bytes()),
         ("scene", "scene.json", scene()),
     ];
@@ -218,6 +221,23 @@ fn blender() -> serde_json::Value {
     let mut f = frame();
     f["file_path"] = json!("./a");
     json!({ "camera_angle_x": 0.69, "frames": [f] })
+}
+
+/// A camera at (1, 2, 3) in nerfstudio's two ways.
+const ROWS: [f64; 16] = [0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 2.0, 0.0, 1.0, 0.0, 3.0, 0.0, 0.0, 0.0, 1.0];
+const COLUMNS: &str = "[0,1,0,0,0,0,1,0,1,0,0,0,1,2,3,1]";
+
+fn nerfstudio_path(matrix: serde_json::Value) -> serde_json::Value {
+    json!({ "keyframes": [{ "matrix": matrix, "fov": 50, "aspect": 1.5, "override_transition_enabled": true,
+        "override_transition_sec": 0.5 }], "camera_type": "perspective", "render_height": 480, "render_width": 640,
+        "fps": 24, "seconds": 4, "is_cycle": false, "smoothness_value": 0.5, "default_transition_sec": 2.0,
+        "camera_path": [{ "camera_to_world": ROWS, "fov": 50.0, "aspect": 1.5 }] })
+}
+
+fn camera_path() -> serde_json::Value {
+    let key = json!({ "name": "start", "center": [1, 2.5, -3], "world_from_camera": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+        "fov_y_rad": 0.8, "roll_rad": 0.1, "dwell_secs": 1, "time_secs": 2 });
+    json!({ "format": "fmlgs-camera-path", "version": 1, "closed": true, "fps": 30, "seconds": 4, "keys": [key, key] })
 }
 
 fn scene() -> Vec<u8> {

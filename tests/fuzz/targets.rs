@@ -83,6 +83,9 @@ pub fn all() -> Vec<Target> {
         target("colmap_points_text", |b| io::colmap::check_text_points(&text(b), Path::new(P))),
         target("llff", |b| io::llff::poses(b, Path::new(P))),
         in_folder("transforms", "transforms.json", picture, |f| io::transforms::read(&f.join("transforms.json"))),
+        target("camera_path", |b| {
+            io::camera_path::parse(b, Path::new(P)).inspect(|p| p.validate().expect("an accepted path is valid"))
+        }),
         in_folder("blender", "transforms_train.json", picture, io::transforms::read_blender),
         in_folder("scene", "scene.json", |_| {}, io::trained::load_info),
         in_folder(

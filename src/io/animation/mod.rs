@@ -120,8 +120,8 @@ impl AnimationWriter {
         self.frames
     }
 
-    /// Adds the next frame: sRGB, `width * height * 3` bytes, row by row from the top. After an error
-    /// the film is lost: every further call fails, and nothing is left on disk.
+    /// Adds the next frame: sRGB, `width * height * 3` bytes, row by row from the top. After an error of
+    /// the encoder or the disk the film is lost: every further call fails, and nothing is left on disk.
     ///
     /// # Errors
     /// [`AnimationError`]: wrong length, an encoder that gives up, a full disk.
@@ -157,3 +157,6 @@ impl AnimationWriter {
         Ok(Summary { path: self.path, format: self.format, frames: self.frames, bytes, secs, size_px: self.size_px })
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -134,7 +134,7 @@ fn config(settings: &Settings) -> EncoderConfig {
     let bits = (0.5 * pixels * f64::from(rate)).clamp(100_000.0, 100_000_000.0) as u32;
     let quantiser = settings.quantiser();
     EncoderConfig::new()
-        .usage_type(UsageType::CameraVideoNonRealTime)
+        .usage_type(UsageType::CameraVideoRealTime)
         .rate_control_mode(RateControlMode::Quality)
         .qp(QpRange::new(quantiser, quantiser))
         .skip_frames(false)

@@ -1,7 +1,8 @@
 //! Animated WebP, with loss (without at quality 100), by libwebp.
 //!
 //! libwebp's encoder belongs to one thread, so it gets one. It keeps the compressed frames until the
-//! end. A frame equal to the one before it makes that one longer.
+//! end. A frame equal to the one before it makes that one longer; a film of equal frames becomes a
+//! still picture.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};

@@ -58,9 +58,9 @@ struct Marks {
 fn error(path: &Path, e: &PathError) -> IoError {
     let (place, reason) = match e {
         PathError::Key { field, reason, .. } => {
-            let text = e.to_string();
-            let place = text.split_once(", ").map_or(text.as_str(), |(key, _)| key);
-            (place.to_owned(), format!("{field} {reason}"))
+            let (text, reason) = (e.to_string(), format!("{field} {reason}"));
+            let place = text.strip_suffix(&reason).map_or(text.as_str(), |key| key.trim_end_matches([',', ' ']));
+            (place.to_owned(), reason)
         }
         other => ("the head".to_owned(), other.to_string()),
     };
