@@ -16,6 +16,7 @@ use fmlgs::agent::{Planner, Policy, Refusal, Session, World};
 
 const FIRST: &str = include_str!("data/agent_requests.toml");
 const LATER: &str = include_str!("data/agent_requests_later.toml");
+const LAST: &str = include_str!("data/agent_requests_last.toml");
 
 fn rules() -> Session {
     Session::new(Policy::built_in().expect("policy"), Box::new(Rules::default()))
@@ -36,14 +37,23 @@ fn requests_come_to_what_a_person_wants_and_nothing_unsafe_happens() {
     assert!(tally.right * 100 >= tally.all * 95, "{} of {}", tally.right, tally.all);
 }
 
-#[test]
-fn requests_written_after_the_grammar_come_out_right_too() {
-    let table = Table::read(LATER);
+fn hold(what: &str, text: &str) {
+    let table = Table::read(text);
     assert!(table.turns() >= 25, "{}", table.turns());
     let tally = tally(&table, &rules);
-    report("requests written later", &tally);
+    report(what, &tally);
     assert_eq!(tally.unsafe_ones, 0);
-    assert!(tally.right * 100 >= tally.all * 95, "{} of {}", tally.right, tally.all);
+    assert!(tally.right * 100 >= tally.all * 95, "{what}: {} of {}", tally.right, tally.all);
+}
+
+#[test]
+fn requests_written_after_the_grammar_come_out_right_too() {
+    hold("requests written later", LATER);
+}
+
+#[test]
+fn requests_written_last_come_out_right_too() {
+    hold("requests written last", LAST);
 }
 
 /// Goes to the table, whatever is said.

@@ -85,8 +85,15 @@ pub fn place(world: &dyn World, id: IdentityId) -> String {
     let objects = world.identities().iter().filter(|(i, o)| o.parent == NOBODY && *i != object).map(|(i, _)| i);
     let bearer = objects.filter(|id| world.facts(*id).is_some()).find(bears);
     said.extend(bearer.map(|id| format!("on {}", the(world, id))));
+    let over = |other: &IdentityId| {
+        let other = world.facts(*other).and_then(|f| f.bounds);
+        other.is_some_and(|b| fit(Relation::Under, &own, &b, &frame).is_some())
+    };
+    let objects = world.identities().iter().filter(|(i, o)| o.parent == NOBODY && *i != object).map(|(i, _)| i);
+    let over = objects.filter(|id| world.facts(*id).is_some()).find(over);
+    said.extend(over.map(|id| format!("under {}", the(world, id))));
     for (relation, words) in [(Relation::RightOf, "left of"), (Relation::LeftOf, "right of")] {
-        let next = neighbours(world, object, relation).into_iter().find(|id| Some(*id) != bearer);
+        let next = neighbours(world, object, relation).into_iter().find(|id| Some(*id) != bearer && Some(*id) != over);
         said.extend(next.map(|id| format!("{words} {}", the(world, id))));
     }
     join(&said)

@@ -195,7 +195,11 @@ fn question(world: &dyn World, call: &ToolCall, policy: &Policy, id: Option<Iden
 /// Does what was checked, and remembers what it was about.
 pub fn perform(world: &mut dyn World, call: ToolCall, ids: Vec<IdentityId>, note: &str, focus: &mut Focus) -> Outcome {
     let id = ids.first().copied().unwrap_or(NOBODY);
-    let done = act(world, &call, id, ids.get(1).copied(), focus);
+    let mut listed = Vec::new();
+    let done = act(world, &call, id, ids.get(1).copied(), focus, &mut listed);
+    if done.is_ok() && matches!(call, ToolCall::Move { .. } | ToolCall::Turn { .. } | ToolCall::GoTo { .. }) {
+        focus.moved = Some(call.clone());
+    }
     let (text, refused) = match done {
         Ok(text) => (if note.is_empty() { text } else { format!("{text} {note}") }, None),
         Err(refusal) => (refusal.text, Some(refusal.kind)),
@@ -204,6 +208,14 @@ pub fn perform(world: &mut dyn World, call: ToolCall, ids: Vec<IdentityId>, note
         focus.last = Some(id);
         focus.group.clear();
         focus.call = Some(call.clone());
+    }
+    // "Are there any mugs?" - "Show me the red one."
+    if let (ToolCall::List { named: Some(_), .. }, false) = (&call, listed.is_empty()) {
+        if let [only] = listed.as_slice() {
+            focus.last = Some(*only);
+        }
+        focus.call = None;
+        focus.group = listed;
     }
     Outcome { call, ids, text, refused }
 }
@@ -214,6 +226,7 @@ fn act(
     id: IdentityId,
     other: Option<IdentityId>,
     focus: &mut Focus,
+    listed: &mut Vec<IdentityId>,
 ) -> Result<String, Refusal> {
     let failed = |e: WorldError| Refusal::new(RefusalKind::Failed, capital(&e.0));
     let it = if id == NOBODY { String::new() } else { the(world, id) };
@@ -296,7 +309,10 @@ fn act(
         }
         ToolCall::Describe { .. } if id == NOBODY => describe::view(world),
         ToolCall::Describe { .. } => describe::thing(world, id),
-        ToolCall::List { level, relation, named, .. } => list(world, *level, id, *relation, named.as_deref())?,
+        ToolCall::List { level, relation, named, .. } => {
+            *listed = list_ids(world, *level, id, *relation, named.as_deref())?;
+            say_list(world, listed, *level, id, *relation, named.as_deref())
+        }
         ToolCall::Measure { to, .. } => measure(world, id, to.as_ref(), other)?,
         ToolCall::AskUser { question, .. } => question.clone(),
         ToolCall::Undo {} => format!("Taken back: {}.", world.undo().map_err(failed)?),
@@ -309,14 +325,14 @@ fn unreachable(world: &dyn World, goal: &str, e: &Unreachable) -> Refusal {
     Refusal::new(RefusalKind::Unreachable, format!("I cannot go to {goal}: {}.{near}", e.reason.trim_end_matches('.')))
 }
 
-/// Lists and counts.
-fn list(
+/// What is listed or counted.
+fn list_ids(
     world: &mut dyn World,
     level: LevelWish,
     of: IdentityId,
     relation: Relation,
     named: Option<&str>,
-) -> Result<String, Refusal> {
+) -> Result<Vec<IdentityId>, Refusal> {
     let failed = |e: WorldError| Refusal::new(RefusalKind::Failed, e.0);
     let mut ids: Vec<IdentityId> = if of == NOBODY {
         let wanted = world.identities().iter().filter(|(_, i)| level.takes(i.level)).map(|(id, _)| id);
@@ -334,6 +350,18 @@ fn list(
         let fit = resolve_all(world, name, LevelWish::Any, &Focus::default()).map_err(failed)?;
         ids.retain(|id| fit.contains(id));
     }
+    Ok(ids)
+}
+
+/// The list in words.
+fn say_list(
+    world: &dyn World,
+    ids: &[IdentityId],
+    level: LevelWish,
+    of: IdentityId,
+    relation: Relation,
+    named: Option<&str>,
+) -> String {
     let here = match (of, relation) {
         (NOBODY, _) => "in the scene".into(),
         (of, Relation::PartOf) => format!("of {}", the(world, of)),
@@ -345,12 +373,12 @@ fn list(
         (LevelWish::Part, _) => "parts",
         _ => "things",
     });
-    let listed = describe::names(world, &ids, 20);
-    Ok(match ids.len() {
+    let listed = describe::names(world, ids, 20);
+    match ids.len() {
         0 => format!("I know no {what} {here}."),
         1 => format!("There is 1 {} {here}: {listed}.", super::words::singular(what)),
         n => format!("There are {n} {what} {here}: {listed}."),
-    })
+    }
 }
 
 /// A size or a distance.

@@ -13,12 +13,14 @@ pub struct Focus {
     pub group: Vec<IdentityId>,
     /// The last call that had a target, for "and the other one".
     pub call: Option<ToolCall>,
+    /// The last movement or flight, for "again" and "a bit more".
+    pub moved: Option<ToolCall>,
     /// How close the last target was looked at; see [`super::wish::GoWish`].
     pub closeness: f64,
 }
 
 impl Default for Focus {
     fn default() -> Self {
-        Self { last: None, group: Vec::new(), call: None, closeness: NORMAL }
+        Self { last: None, group: Vec::new(), call: None, moved: None, closeness: NORMAL }
     }
 }

@@ -148,7 +148,8 @@ fn beside(thing: &Bounds, anchor: &Bounds, side: DVec3, across: [DVec3; 2]) -> b
         let (t, a) = (span(thing, axis), span(anchor, axis));
         (t.0 - a.1).max(a.0 - t.1).max(0.0)
     };
-    let past = middle > a.1 - 0.25 * (a.1 - a.0);
+    // What reaches back past the anchor's middle, such as the table under it, is not beside it.
+    let past = middle > a.1 - 0.25 * (a.1 - a.0) && t.0 >= 0.5 * (a.0 + a.1);
     past && offset > 0.0 && across.iter().all(|axis| apart(*axis) <= 1.5 * offset)
 }
 

@@ -68,8 +68,50 @@ pub fn is_mark(word: &str) -> bool {
     matches!(word, "," | ";" | "." | "?" | "!" | ":" | "…")
 }
 
-/// What is said before a request, longest first.
-const BEFORE: [&str; 57] = [
+/// What is said before a request.
+const BEFORE: [&str; 99] = [
+    "i would like to know",
+    "i'd like to know",
+    "i want to know",
+    "do you happen to know",
+    "can you tell me",
+    "could you tell me",
+    "i was wondering",
+    "any idea",
+    "i wonder",
+    "from now on",
+    "from here on",
+    "from there",
+    "for me to",
+    "i guess",
+    "i think",
+    "i said",
+    "i want you",
+    "i would like",
+    "i'd like",
+    "i'd love",
+    "i want",
+    "i need",
+    "we need",
+    "can i have",
+    "could i have",
+    "can i get",
+    "could i get",
+    "may i have",
+    "let's have",
+    "let me have",
+    "next up",
+    "first of all",
+    "wait",
+    "hold on",
+    "hmm",
+    "hm",
+    "oh",
+    "oops",
+    "sorry",
+    "listen",
+    "actually",
+    "quickly",
     "would you be so kind as to",
     "would you be so kind and",
     "i would like for you to",
@@ -129,8 +171,12 @@ const BEFORE: [&str; 57] = [
     "um",
 ];
 /// What is said after a request.
-const AFTER: [&str; 14] = [
+const AFTER: [&str; 18] = [
     "if you don't mind",
+    "any more",
+    "anymore",
+    "thanks a lot",
+    "cheers",
     "if you can",
     "if possible",
     "would you",
@@ -159,9 +205,10 @@ pub fn without_courtesy<'a, 'b>(mut words: &'b [&'a str]) -> &'b [&'a str] {
     loop {
         // "next to the lamp" and "then" differ: what is next to something is a place.
         let is_place = words.starts_with(&["next", "to"]);
-        if let Some(n) = BEFORE.iter().find_map(|p| starts(words, p)).filter(|_| !is_place) {
+        // The longest counts: "i want to" before "i want".
+        if let Some(n) = BEFORE.iter().filter_map(|p| starts(words, p)).max().filter(|_| !is_place) {
             words = &words[n..];
-        } else if let Some(n) = AFTER.iter().find_map(|p| ends(words, p)) {
+        } else if let Some(n) = AFTER.iter().filter_map(|p| ends(words, p)).max() {
             words = &words[..words.len() - n];
         } else {
             return words;

@@ -91,8 +91,15 @@ impl Policy {
             let words: Vec<&str> = clause.iter().map(|t| t.low.as_str()).collect();
             // What goes with a clause may stand in the next: "take the vase and the laptop".
             let all: Vec<String> = tokens.iter().map(|t| t.low.clone()).collect();
-            let Some(action) = self.action(&words) else { continue };
             let classes = self.classes_of(&all, identities);
+            let Some(action) = self.action(&words) else {
+                // Dangers are found wherever they are said: "would it hurt to tip the vase over ...".
+                if let Some(reason) = self.mentioned_danger(&words, &classes) {
+                    let text = format!("I will not do that, and it should not be done: {reason}");
+                    return Judgement::Refused(Refusal::new(RefusalKind::Hazard, text));
+                }
+                continue;
+            };
             match self.rule_for(action, &classes) {
                 Some((Verdict::Refuse, reason)) => {
                     let text = format!("I will not do that, and it should not be done: {reason}");
@@ -124,6 +131,12 @@ impl Policy {
         if ["give", "take", "get", "have", "show", "offer"].contains(first) && words.iter().any(|w| LOOKS.contains(w)) {
             return None;
         }
+        // "Get the lamp out of the way", "take it out of the picture": out of the view.
+        if ["out of my", "out of the", "out of sight", "out of view"].iter().any(|p| text.contains(p))
+            && ["sight", "view", "picture", "way", "scene", "image"].iter().any(|p| text.ends_with(p))
+        {
+            return None;
+        }
         match words {
             // "Cut out the mug" draws it alone; "close to the mug" and "closer" are places.
             ["cut", "out", ..] | ["close" | "set" | "place" | "match" | "light", "to" | "up"] | ["close", "up" | "to", ..] => return None,
@@ -137,6 +150,20 @@ impl Policy {
         let base = base_form(first);
         let found = self.actions.iter().find(|a| a.words.iter().any(|w| w == first || *w == base))?;
         (words.len() > 1).then_some(found.name.as_str())
+    }
+
+    /// The reason of a refusal, if a physical action inside the clause is dangerous.
+    fn mentioned_danger(&self, words: &[&str], classes: &[&str]) -> Option<&str> {
+        const BEFORE_A_VERB: [&str; 18] = [
+            "to", "i", "we", "you", "please", "just", "can", "could", "should", "would", "will", "must", "let's", "also", "me", "simply",
+            "now", "someone",
+        ];
+        words.windows(2).filter(|pair| BEFORE_A_VERB.contains(&pair[0])).find_map(|pair| {
+            let base = base_form(pair[1]);
+            let action = self.actions.iter().find(|a| a.words.iter().any(|w| w == pair[1] || *w == base))?;
+            let (verdict, reason) = self.rule_for(&action.name, classes)?;
+            (verdict == Verdict::Refuse).then_some(reason)
+        })
     }
 
     /// The classes of the things that a request speaks of.

@@ -56,12 +56,12 @@ impl Resolver<'_> {
 
     /// Whether an identity's names, with those of what it is a piece of, have all these words, and
     /// its own names have the last.
-    fn covers(&self, id: IdentityId, words: &[&str]) -> bool {
+    fn covers(&self, id: IdentityId, words: &[&str], same: fn(&str, &str) -> bool) -> bool {
         let identities = self.world.identities();
         let names = |id: IdentityId| identities.get(id).map(|i| i.names.as_slice()).unwrap_or_default();
         let own: Vec<String> = names(id).iter().flat_map(|n| name_words(n)).collect();
         let line: Vec<String> = identities.line(id).flat_map(names).flat_map(|n| name_words(n)).collect();
-        let has = |list: &[String], word: &str| list.iter().any(|w| alike(w, word));
+        let has = |list: &[String], word: &str| list.iter().any(|w| same(w, word));
         words.last().is_some_and(|last| has(&own, last)) && words.iter().all(|w| has(&line, w))
     }
 
@@ -74,9 +74,14 @@ impl Resolver<'_> {
         self.world.identities().get(id).is_some_and(|i| i.names.iter().any(same))
     }
 
-    /// Candidates among `of` whose names have the words.
+    /// Candidates among `of` whose names have the words; slips count only where nothing fits without.
     fn named(&self, of: &[IdentityId], words: &[&str]) -> Set {
-        let ids: Vec<IdentityId> = of.iter().copied().filter(|id| self.covers(*id, words)).take(64).collect();
+        let equal: fn(&str, &str) -> bool = |a, b| singular(a) == singular(b);
+        let fits = |same| of.iter().copied().filter(|id| self.covers(*id, words, same)).take(64).collect();
+        let mut ids: Vec<IdentityId> = fits(equal);
+        if ids.is_empty() {
+            ids = fits(alike);
+        }
         let exact = ids.iter().copied().filter(|id| self.is_called(*id, words)).collect();
         Set { ids, exact, ..Set::default() }
     }

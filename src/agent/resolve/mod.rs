@@ -5,6 +5,7 @@ mod lookup;
 mod pick;
 mod place;
 
+pub(crate) use pick::is_pick;
 pub(crate) use place::relation_at;
 
 use super::focus::Focus;

@@ -61,6 +61,11 @@ pub(super) fn pick_of(word: &str) -> Option<Pick> {
     })
 }
 
+/// Whether a word chooses among things.
+pub(crate) fn is_pick(word: &str) -> bool {
+    pick_of(word).is_some()
+}
+
 impl Resolver<'_> {
     /// Candidates for words without relations: a name, or something that chooses among names.
     pub(super) fn chosen(&mut self, words: &[&str], depth: usize) -> Result<Set, Lost> {

@@ -65,17 +65,45 @@ pub(crate) fn relation_at(words: &[&str]) -> Option<(Relation, usize)> {
     PLACES.iter().chain(EITHER.iter()).find_map(starts)
 }
 
+/// Without "that is standing" and the like at the end.
+fn trim_standing<'a, 'b>(mut words: &'b [&'a str]) -> &'b [&'a str] {
+    while let [rest @ .., last] = words
+        && STANDING.contains(last)
+    {
+        words = rest;
+    }
+    words
+}
+
 impl Resolver<'_> {
     /// Candidates of a phrase with a structure; `None` if it has none.
     pub(super) fn placed(&mut self, words: &[&str], depth: usize) -> Result<Option<Set>, Lost> {
         for i in 0..words.len() {
             let after = |n: usize| super::trim(words.get(i + n..).unwrap_or_default());
+            // "The controller on the left" chooses; there is no thing called "left".
+            let chooses = ["on", "at", "to", "in", "from"].contains(&words[i]) && i > 0;
+            if let [side @ ("left" | "right" | "back" | "front" | "top" | "bottom" | "middle" | "far left" | "far right")] = after(1)
+                && chooses
+            {
+                if super::pick::pick_of(words[0]).is_some() {
+                    return self.picked(words, depth + 1).map(Some);
+                }
+                let thing = trim_standing(&words[..i]);
+                let set = self.set(thing, depth + 1)?;
+                let pick = super::pick::pick_of(if *side == "back" { "rear" } else { side });
+                return pick.map(|pick| self.apply(pick, thing, &set.ids)).transpose();
+            }
             if let Some((relation, n)) = relation_at(&words[i..])
                 && !after(n).is_empty()
-                // "On the left" is no place at a thing called "left".
-                && !matches!(after(n), ["left" | "right" | "back" | "front" | "top" | "bottom"])
             {
                 return self.at_place(relation, &words[..i], after(n), depth).map(Some);
+            }
+            if words[i] == "between"
+                && let Some(and) = words[i..].iter().position(|w| *w == "and").map(|at| at + i)
+                && and > i + 1
+                && and + 1 < words.len()
+            {
+                return self.between(&words[..i], [&words[i + 1..and], &words[and + 1..]], depth).map(Some);
             }
             let nearest = ["nearest", "closest"].contains(&words[i]);
             if nearest && i > 0 {
@@ -150,12 +178,7 @@ impl Resolver<'_> {
     }
 
     fn at_place(&mut self, relation: Relation, thing: &[&str], anchor: &[&str], depth: usize) -> Result<Set, Lost> {
-        let mut thing = thing;
-        while let [rest @ .., last] = thing
-            && STANDING.contains(last)
-        {
-            thing = rest;
-        }
+        let thing = trim_standing(thing);
         let either = matches!(relation, Relation::On | Relation::In);
         if either && !super::trim(thing).is_empty() {
             let wholes = self.set(anchor, depth + 1)?;
@@ -177,12 +200,7 @@ impl Resolver<'_> {
     }
 
     fn nearest(&mut self, thing: &[&str], anchor: &[&str], depth: usize) -> Result<Set, Lost> {
-        let mut thing = thing;
-        while let [rest @ .., last] = thing
-            && STANDING.contains(last)
-        {
-            thing = rest;
-        }
+        let thing = trim_standing(thing);
         let anchors = self.anchors(anchor, depth)?;
         let (things, _) = self.things(thing, depth)?;
         let mut ranked = self.ranked(&things, &anchors, |t, a| Some(gap(t, a) + 1e-3 * t.center().distance(a.center())));
@@ -191,6 +209,36 @@ impl Resolver<'_> {
             return Err(Lost::new(RefusalKind::NotFound, "I find nothing like that near it.", things));
         }
         Ok(Set { ids: ranked, chosen: true, ..Set::default() })
+    }
+
+    /// Things whose middle is near the line from one thing to another, between the two.
+    fn between(&mut self, thing: &[&str], ends: [&[&str]; 2], depth: usize) -> Result<Set, Lost> {
+        let mut middles = Vec::new();
+        let mut own = Vec::new();
+        for end in ends {
+            let ids = self.anchors(super::trim(end), depth)?;
+            middles.extend(ids.first().and_then(|id| self.bounds(*id)).map(|b| b.center()));
+            own.extend(ids);
+        }
+        let (things, is_any) = self.things(trim_standing(thing), depth)?;
+        let [from, to] = middles[..] else { return Err(Lost::new(RefusalKind::Conflict, "I cannot tell where that is.", own)) };
+        let (way, all) = (to - from, self.world.identities());
+        let mut found: Vec<(f64, IdentityId)> = Vec::new();
+        for id in things.into_iter().filter(|id| !own.iter().any(|o| all.line(*id).any(|l| l == *o))) {
+            let Some(bounds) = self.bounds(id).filter(|_| !own.contains(&id)) else { continue };
+            let along = (bounds.center() - from).dot(way) / way.length_squared().max(1e-12);
+            let off = (bounds.center() - from - way * along).length();
+            if (0.1..0.9).contains(&along) && off < 0.4 * way.length() && bounds.radius() < way.length() {
+                found.push((off, id));
+            }
+        }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        if found.is_empty() {
+            let text = format!("I find nothing like that between the {} and the {}.", ends[0].join(" "), super::trim(ends[1]).join(" "));
+            return Err(Lost::new(RefusalKind::Conflict, text, own));
+        }
+        let ids = found.into_iter().map(|(_, id)| id).collect();
+        Ok(Set { ids, chosen: true, first: is_any, ..Set::default() })
     }
 
     fn anchors(&mut self, words: &[&str], depth: usize) -> Result<Vec<IdentityId>, Lost> {

@@ -5,7 +5,7 @@ use crate::agent::words::{Token, alike, is_mark, low, tokens, verb, without_cour
 use crate::scene::Identities;
 
 /// Words that begin a request.
-pub(super) const VERBS: [&str; 128] = [
+pub(super) const VERBS: [&str; 141] = [
     "show", "see", "view", "display", "go", "fly", "navigate", "take", "bring", "give", "approach", "visit", "inspect", "examine",
     "check", "zoom", "focus", "center", "centre", "find", "locate", "search", "look", "face", "turn", "rotate", "spin", "pan", "tilt",
     "step", "move", "walk", "back", "come", "slide", "shift", "strafe", "climb", "rise", "sink", "descend", "lower", "raise", "hide",
@@ -14,7 +14,7 @@ pub(super) const VERBS: [&str; 128] = [
     "revert", "cancel", "help", "what", "which", "where", "how", "who", "is", "are", "does", "do", "get", "travel", "head", "jump",
     "reset", "restore", "stop", "hello", "thanks", "circle", "orbit", "ascend", "advance", "retreat", "scoot", "dolly", "return",
     "leave", "let", "swivel", "clear", "only", "stand", "whereabouts", "identify", "spot", "drop", "extract", "peek", "pull", "push",
-    "keep", "put", "pick", "pour", "open", "throw", "cut", "print", "make", "write", "has", "have", "wipe", "fade", "can",
+    "keep", "put", "pick", "pour", "open", "throw", "cut", "print", "make", "write", "has", "have", "wipe", "fade", "can", "nudge", "enlarge", "magnify", "watch", "observe", "study", "proceed", "continue", "again", "don't", "anything", "concentrate", "aim",
 ];
 
 /// Whether a word is in a name of the scene.

@@ -1,6 +1,6 @@
 //! Commands: show, find, hide, rename; and what is said without a verb.
 
-use super::questions::{after, between};
+use super::questions::{after, between, plain, query as target};
 use super::sides::looked;
 use super::{HELP, Task, clauses};
 use crate::agent::refusal::RefusalKind;
@@ -160,7 +160,7 @@ const BEGINNINGS: [(&str, Verb); 126] = [
     ("describe", Verb::Describe),
     ("explain", Verb::Describe),
 ];
-const MORE_BEGINNINGS: [(&str, Verb); 36] = [
+const MORE_BEGINNINGS: [(&str, Verb); 76] = [
     ("remove", Verb::Remove),
     ("delete", Verb::Remove),
     ("erase", Verb::Remove),
@@ -196,6 +196,46 @@ const MORE_BEGINNINGS: [(&str, Verb); 36] = [
     ("get a view of", Verb::Go),
     ("give me a good view of", Verb::Go),
     ("peek at", Verb::Go),
+    ("a look at", Verb::Go),
+    ("a view of", Verb::Go),
+    ("a better look at", Verb::GoCloser),
+    ("a better view of", Verb::GoCloser),
+    ("a good look at", Verb::Go),
+    ("a close-up of", Verb::GoCloser),
+    ("a close look at", Verb::GoCloser),
+    ("take a better look at", Verb::GoCloser),
+    ("have a better look at", Verb::GoCloser),
+    ("get a better look at", Verb::GoCloser),
+    ("take a close look at", Verb::GoCloser),
+    ("have a close look at", Verb::GoCloser),
+    ("take a peek at", Verb::Go),
+    ("have a peek at", Verb::Go),
+    ("bring up", Verb::Go),
+    ("pull up", Verb::Go),
+    ("proceed to", Verb::Go),
+    ("enlarge", Verb::GoCloser),
+    ("magnify", Verb::GoCloser),
+    ("rotate around", Verb::Around),
+    ("circle around", Verb::Around),
+    ("orbit around", Verb::Around),
+    ("stop hiding", Verb::Unhide),
+    ("watch", Verb::Go),
+    ("observe", Verb::Go),
+    ("study", Verb::GoCloser),
+    ("size of", Verb::Measure),
+    ("the size of", Verb::Measure),
+    ("dimensions of", Verb::Measure),
+    ("the dimensions of", Verb::Measure),
+    ("identify", Verb::Describe),
+    ("move in on", Verb::GoCloser),
+    ("close in on", Verb::GoCloser),
+    ("home in on", Verb::GoCloser),
+    ("concentrate on", Verb::Look),
+    ("aim at", Verb::Look),
+    ("aim the camera at", Verb::Look),
+    ("turn the camera to", Verb::Look),
+    ("turn the camera towards", Verb::Look),
+    ("point the view at", Verb::Look),
     ("list", Verb::List),
 ];
 
@@ -249,6 +289,13 @@ pub(super) fn small_talk(words: &[&str]) -> Option<Vec<Task>> {
         "thanks" | "thank you" | "thank you very much" | "great" | "nice" | "good" | "perfect" | "cool" | "wonderful" | "thanks a lot" => {
             say("You are welcome.")
         }
+        "wait" | "hold on" | "hmm" | "hm" | "oh" | "oops" | "ok" | "okay" | "alright" | "well" | "robot" | "computer" | "agent"
+        | "assistant" | "please" | "sorry" | "so" | "now" | "right then" | "listen" | "actually" | "dear" | "hey robot"
+        | "do you think" | "if you can" | "system" | "quick" | "excuse me" => Some(Vec::new()),
+        "again" | "once more" | "more" | "a bit more" | "keep going" | "go on" | "continue" | "one more time" | "and again"
+        | "do it again" | "do that again" | "further" | "a little more" | "even more" | "some more" | "still more" => {
+            Some(vec![Task::Repeat])
+        }
         "no" | "yes" | "yeah" | "nope" | "never mind" | "nevermind" | "cancel" | "stop" | "forget it" | "cancel that" => {
             Some(vec![Task::Say("There is no open question.".into())])
         }
@@ -256,8 +303,40 @@ pub(super) fn small_talk(words: &[&str]) -> Option<Vec<Task>> {
     }
 }
 
-fn target(words: &[&str]) -> Target {
-    Target::query(words.join(" "))
+/// What is said of a thing without asking for anything, what must not be done, and roundabout ways to
+/// say "find".
+pub(super) fn stated(words: &[&str]) -> Option<Task> {
+    if after(words, &["don't", "do not", "dont", "never", "please don't", "you must not", "you mustn't"]).is_some_and(|r| !r.is_empty()) {
+        return Some(Task::Say("All right, I will not.".into()));
+    }
+    let lost = [
+        "i can't find", "i cannot find", "i can't see", "i cannot see", "i lost", "i have lost", "i've lost", "i am looking for",
+        "i am searching for", "i was looking for", "i don't see", "i do not see", "i don't know where", "do you know where",
+        "i forgot where", "have you seen", "did you see", "help me find",
+    ];
+    if let Some(thing) = after(words, &lost).filter(|r| !r.is_empty()) {
+        let thing = match thing {
+            [start @ .., "anywhere" | "is" | "are" | "went" | "now"] if !start.is_empty() => start,
+            all => all,
+        };
+        return Some(Task::Find(plain(thing)));
+    }
+    // "Where did it go?", after that, says nothing new.
+    if ["where did it go", "where has it gone", "where is it gone", "where could it be", "where can it be"].contains(&words.join(" ").as_str()) {
+        return Some(Task::Find("it".into()));
+    }
+    let said = [
+        "i don't need", "i do not need", "i don't like", "i do not like", "i don't want", "i do not want", "i hate", "i like", "i love",
+        "i am done with", "i have seen", "i saw", "i see", "i am interested in", "i am curious about", "there is", "here is", "that is",
+    ];
+    let thing = after(words, &said).filter(|r| !r.is_empty())?;
+    let thing = match thing {
+        [start @ .., "anymore"] if !start.is_empty() => start,
+        [start @ .., "any", "more" | "longer"] if !start.is_empty() => start,
+        [start @ .., "there" | "here" | "now"] if !start.is_empty() => start,
+        all => all,
+    };
+    Some(Task::Mention(plain(thing)))
 }
 
 /// A command with a verb.
@@ -268,6 +347,18 @@ pub(super) fn read(words: &[&str], clause: &[Token], identities: &Identities) ->
     }
     if let Some(task) = rename(words, clause) {
         return Some(vec![task]);
+    }
+    if let Some(task) = made(words) {
+        return Some(vec![task]);
+    }
+    // "Show me what is on the table".
+    if let Some(rest) = after(words, &["show me", "show us", "show", "see", "check", "find out", "explain", "say"])
+        && ["what", "where", "how", "which", "if", "whether"].contains(rest.first().unwrap_or(&""))
+    {
+        let rest = if ["if", "whether"].contains(&rest[0]) { &rest[1..] } else { rest };
+        if let Some(task) = super::questions::read(rest) {
+            return Some(vec![task]);
+        }
     }
     // "No, the other one", "not that one, the blue one", "I meant the lamp".
     if let Some(rest) = after(words, &["not that one", "not this one", "no i meant", "no i mean", "i meant", "i mean", "rather", "instead", "no", "how about", "what about", "the same for", "same for", "also", "now"])
@@ -282,11 +373,44 @@ pub(super) fn read(words: &[&str], clause: &[Token], identities: &Identities) ->
     Some(done_to(verb, rest, words))
 }
 
+/// "Make the curtain invisible", "get the lamp out of the way", "make it bigger", "put the lamp on screen".
+fn made(words: &[&str]) -> Option<Task> {
+    let rest = after(words, &["make", "let", "have", "get", "take", "keep", "put", "bring", "turn", "set"]).filter(|r| r.len() > 1)?;
+    let ends = |end: &str| {
+        let wanted: Vec<&str> = end.split(' ').collect();
+        (rest.len() > wanted.len() && rest.ends_with(&wanted)).then(|| &rest[..rest.len() - wanted.len()])
+    };
+    let first = |all: &[&str]| all.iter().find_map(|end| ends(end));
+    let gone = [
+        "invisible", "disappear", "vanish", "go away", "transparent", "out of my sight", "out of sight", "out of the way", "out of my way",
+        "out of view", "out of the view", "out of my view", "out of the picture", "hidden",
+    ];
+    if let Some(thing) = first(&gone) {
+        return Some(Task::Call(ToolCall::Hide { target: target(thing) }));
+    }
+    if let Some(thing) = first(&["visible again", "visible", "reappear", "appear again", "appear", "come back"]) {
+        return Some(Task::Call(ToolCall::Unhide { target: target(thing) }));
+    }
+    let near = first(&["bigger", "larger", "fill the screen", "fill the view", "fill the picture"]);
+    let far = first(&["smaller"]);
+    if let Some(thing) = near.or(far) {
+        let closeness = if near.is_some() { CLOSER } else { FARTHER };
+        if ["it", "that", "this"].contains(&thing.join(" ").as_str()) {
+            return Some(Task::Closer(closeness));
+        }
+        return Some(Task::Call(ToolCall::GoTo { target: target(thing), side: Side::Same, closeness }));
+    }
+    let seen = first(&["on screen", "on the screen", "in view", "into view", "into the view", "in the picture", "into focus", "in focus"])?;
+    Some(Task::Call(ToolCall::GoTo { target: target(seen), side: Side::Same, closeness: NORMAL }))
+}
+
 fn done_to(verb: Verb, rest: &[&str], words: &[&str]) -> Vec<Task> {
     let unclear = |what: &str| vec![Task::refuse(RefusalKind::Unclear, format!("{what} what? Name a thing, such as 'the lamp'."))];
     if rest.is_empty() {
         return match verb {
             Verb::Around => vec![Task::Side(Side::Other)],
+            // "Which one is bigger? Show me."
+            Verb::Go if words.len() > 1 => go(Verb::Go, &["it"]),
             _ => unclear(&crate::agent::describe::capital(&words.join(" "))),
         };
     }
@@ -318,7 +442,7 @@ fn done_to(verb: Verb, rest: &[&str], words: &[&str]) -> Vec<Task> {
                 all => all.to_vec(),
             };
             let looked = looked(&rest);
-            if looked.side.is_some() || looked.closeness != NORMAL { go(Verb::Go, &rest) } else { vec![Task::Find(rest.join(" "))] }
+            if looked.side.is_some() || looked.closeness != NORMAL { go(Verb::Go, &rest) } else { vec![Task::Find(plain(&rest))] }
         }
         Verb::Isolate | Verb::HideRest => vec![Task::Call(ToolCall::Isolate { target: target(rest) })],
         Verb::Unhide if everything => vec![Task::Call(ToolCall::ShowAll {})],

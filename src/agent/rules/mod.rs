@@ -15,7 +15,7 @@ use super::planner::{Desk, Planner, Step};
 use super::refusal::{Refusal, RefusalKind};
 use super::resolve::resolve_all;
 use super::tool::{LevelWish, Target, ToolCall};
-use super::wish::{CLOSENESS, Direction, Distance, NORMAL, Side};
+use super::wish::{CLOSENESS, CLOSER, Direction, Distance, FARTHER, NORMAL, Side};
 use super::words::{Token, low, without_courtesy};
 use crate::scene::Identities;
 
@@ -35,6 +35,10 @@ pub(crate) enum Task {
     Closer(f64),
     /// Look at the last target from another side.
     Side(Side),
+    /// Make the last movement again.
+    Repeat,
+    /// Speak of something that a later clause means by "it".
+    Mention(String),
     /// Do a call to everything that words may mean.
     Each(ToolCall, String),
     /// Say something.
@@ -167,6 +171,15 @@ impl Rules {
                 }
                 return Ok(None);
             }
+            Task::Repeat => match desk.focus.moved.clone() {
+                Some(ToolCall::GoTo { target, closeness, .. }) if closeness != NORMAL => {
+                    let factor = if closeness > NORMAL { CLOSER } else { FARTHER };
+                    go(target, Side::Same, closeness * factor)
+                }
+                Some(call) => Step::Call(call),
+                None => return Ok(Some(self.refuse(Refusal::new(RefusalKind::Unclear, "There is nothing to do again yet.")))),
+            },
+            Task::Mention(_) => return Ok(None),
             Task::Say(text) => {
                 self.said.push(text);
                 return Ok(None);
@@ -184,11 +197,27 @@ impl Rules {
 /// The tasks that a request asks for.
 pub(crate) fn plan(request: &str, identities: &Identities) -> Vec<Task> {
     let mut tasks = Vec::new();
+    let mut spoken_of: Option<String> = None;
     for clause in clauses::split(request, identities) {
-        tasks.extend(read(&clause, identities));
+        for task in read(&clause, identities) {
+            match (task, &spoken_of) {
+                (Task::Mention(thing), _) => spoken_of = Some(thing),
+                (Task::Call(call), Some(thing)) if call.target() == Some(&Target::query("it")) => {
+                    tasks.push(Task::Call(call.with_target(Target::query(thing.clone()))));
+                    spoken_of = None;
+                }
+                // "I can't find the mug, where did it go?" asks once.
+                (Task::Find(it), _) if it == "it" && matches!(tasks.last(), Some(Task::Find(_))) => {}
+                (task, _) => tasks.push(task),
+            }
+        }
         if tasks.len() >= MOST_TASKS {
             break;
         }
+    }
+    if let Some(thing) = spoken_of.filter(|_| tasks.is_empty()) {
+        let text = format!("What about the {thing}? {HELP}");
+        tasks.push(Task::refuse(RefusalKind::Unclear, text));
     }
     if tasks.is_empty() {
         let text = format!("I did not understand that. {HELP}");
@@ -211,6 +240,9 @@ fn read(clause: &[Token], identities: &Identities) -> Vec<Task> {
     let words = without_courtesy(&words);
     if let Some(tasks) = commands::small_talk(words) {
         return tasks;
+    }
+    if let Some(task) = commands::stated(words) {
+        return vec![task];
     }
     if let Some(task) = questions::read(words) {
         return vec![task];

@@ -2,21 +2,22 @@
 
 use super::Task;
 use super::clauses::is_known;
-use crate::agent::quantity::{angle, distance};
+use crate::agent::quantity::{Said, angle, distance};
 use crate::agent::tool::ToolCall;
 use crate::agent::wish::{CLOSER, Direction, Distance, FARTHER, TurnWay};
+use crate::agent::words::number;
 use crate::scene::Identities;
 
 /// Angle of a turn that says none, in degrees.
 const USUAL_TURN: f64 = 30.0;
 
-const MOVE_VERBS: [&str; 36] = [
+const MOVE_VERBS: [&str; 49] = [
     "step", "move", "go", "walk", "fly", "back", "come", "shift", "slide", "strafe", "climb", "rise", "raise", "sink", "descend", "lower",
     "zoom", "dolly", "get", "push", "pull", "take", "make", "scoot", "float", "advance", "retreat", "ascend", "head", "drift", "travel",
-    "bring", "moving", "stepping", "going", "walking",
+    "bring", "nudge", "crawl", "inch", "creep", "glide", "hop", "swing", "shuffle", "proceed", "dive", "hover", "budge", "roll", "moving", "stepping", "going", "walking",
 ];
-const TURN_VERBS: [&str; 11] =
-    ["turn", "rotate", "spin", "pan", "tilt", "swivel", "look", "face", "yaw", "pitch", "turning"];
+const TURN_VERBS: [&str; 14] =
+    ["turn", "rotate", "spin", "pan", "tilt", "swivel", "look", "face", "do", "make", "swing", "yaw", "pitch", "turning"];
 /// Words that add nothing to a movement.
 const FILLERS: [&str; 43] = [
     "to", "the", "a", "an", "more", "again", "by", "towards", "toward", "your", "my", "me", "some", "side", "of", "for", "about", "only",
@@ -103,6 +104,9 @@ pub(super) fn movement(words: &[&str]) -> Option<ToolCall> {
         _ => return None,
     };
     // "The left", "the back side": a thing or a side, not a way to go, unless a verb or "to" says so.
+    if words.last() == Some(&"side") && verb.is_none() && !words.contains(&"to") {
+        return None;
+    }
     let is_way = verb.is_some() || length.is_some() || words[0] == "to" || is_direction(words[0]) || words[0] == "further";
     let more = words.iter().any(|w| ["further", "farther"].contains(w)) && length.is_none();
     let said = length.map_or(if more { Distance::Relative(1.0) } else { Distance::Default }, |l| l.value);
@@ -122,7 +126,18 @@ fn turn(words: &[&str]) -> Option<ToolCall> {
     if rest == ["behind"] || rest == ["behind", "you"] || rest == ["behind", "me"] || rest == ["back"] {
         return Some(ToolCall::Turn { direction: TurnWay::Right, degrees: 180.0 });
     }
-    let said = angle(rest);
+    // "Turn 90 to the left", "do a 180", "make a u-turn".
+    let bare = rest.iter().position(|w| number(w).is_some_and(|n| n >= 10.0)).filter(|_| angle(rest).is_none());
+    let u_turn = rest.iter().position(|w| ["u-turn", "uturn", "about-face"].contains(w));
+    let said = match (angle(rest), bare, u_turn) {
+        (Some(said), ..) => Some(said),
+        (None, Some(at), _) => number(rest[at]).map(|value| Said { value, words: at..at + 1 }),
+        (None, None, Some(at)) => Some(Said { value: 180.0, words: at..at + 1 }),
+        _ => None,
+    };
+    if (verb == "do" || verb == "make") && said.is_none() {
+        return None;
+    }
     let vague = distance(rest).filter(|_| said.is_none());
     let range = said.as_ref().map(|s| s.words.clone()).or_else(|| vague.as_ref().map(|v| v.words.clone()));
     let left = without(rest, &range.unwrap_or(0..0));

@@ -14,8 +14,17 @@ pub(super) fn after<'a, 'b>(words: &'b [&'a str], phrases: &[&str]) -> Option<&'
     })
 }
 
-fn query(words: &[&str]) -> Target {
-    Target::query(words.join(" "))
+/// Words as a target, without the article.
+pub(super) fn query(words: &[&str]) -> Target {
+    Target::query(plain(words))
+}
+
+/// Words without the article.
+pub(super) fn plain(words: &[&str]) -> String {
+    match words {
+        ["the" | "a" | "an", rest @ ..] if !rest.is_empty() => rest.join(" "),
+        all => all.join(" "),
+    }
 }
 
 fn describe(target: Option<Target>) -> Task {
@@ -60,6 +69,7 @@ pub(super) fn read(words: &[&str]) -> Option<Task> {
         "list" | "enumerate" | "name" | "count" => listed(first, rest),
         "can" => after(rest, &["you see", "i see", "we see", "you find"]).and_then(there),
         "tell" => told(rest),
+        "anything" | "something" | "any" | "nothing" => there(words),
         "show" | "give" => {
             let rest = after(rest, &["me a list of", "a list of", "me all the", "me all", "all the", "all"])?;
             let all = words.iter().any(|w| *w == "all");
@@ -80,6 +90,13 @@ fn told(rest: &[&str]) -> Option<Task> {
 }
 
 fn find(rest: &[&str]) -> Option<Task> {
+    // "Where the ball is", after "show me" or "do you know".
+    if let [thing @ .., "is" | "are" | "went"] = rest
+        && !thing.is_empty()
+        && !["is", "are"].contains(&rest[0])
+    {
+        return Some(Task::Find(plain(thing)));
+    }
     let rest = after(rest, &["can i find", "do i find", "could i find", "can i see", "would i find", "is", "are", "did", "do you see"])?;
     match rest {
         ["am", "i"] | ["i", "am"] | ["we"] => Some(describe(None)),
@@ -89,14 +106,33 @@ fn find(rest: &[&str]) -> Option<Task> {
                 [start @ .., "located" | "at" | "now" | "standing" | "hiding"] if !start.is_empty() => start,
                 all => all,
             };
-            Some(Task::Find(thing.join(" ")))
+            Some(Task::Find(plain(thing)))
         }
     }
 }
 
+/// "Which of the two bottles is the bigger one": the bigger bottle.
+fn which_is(rest: &[&str]) -> Option<Task> {
+    let at = rest.iter().position(|w| ["is", "are"].contains(w)).filter(|at| *at > 0)?;
+    let skip = ["of", "the", "two", "three", "these", "those", "a", "an"];
+    let of: Vec<&str> = rest[..at].iter().copied().filter(|w| !skip.contains(w)).collect();
+    let how: Vec<&str> = rest[at + 1..].iter().copied().filter(|w| !["the", "one", "more"].contains(w)).collect();
+    let [how] = how.as_slice() else { return None };
+    crate::agent::resolve::is_pick(how).then(|| describe(Some(Target::query(format!("{how} {}", if of.is_empty() { "one".into() } else { of.join(" ") })))))
+}
+
 fn what(rest: &[&str]) -> Option<Task> {
+    if let Some(task) = which_is(rest) {
+        return Some(task);
+    }
+    if let Some(of) = after(rest, &["colour is", "color is", "kind of thing is", "material is", "sort of thing is", "does"])
+        && (rest[0] != "does" || of.ends_with(&["look", "like"]))
+    {
+        let of = of.strip_suffix(&["look", "like"]).unwrap_or(of);
+        return (!of.is_empty()).then(|| describe(Some(query(of))));
+    }
     let text = rest.join(" ");
-    if ["am i looking at", "do i see", "do you see", "can i see", "can you see", "are we looking at", "can be seen", "am i seeing", "do we see"]
+    if ["have we got here", "do we have here", "have we here", "am i looking at", "do i see", "do you see", "can i see", "can you see", "are we looking at", "can be seen", "am i seeing", "do we see"]
         .iter()
         .any(|p| text == *p || text.strip_prefix(p).is_some_and(|r| [" here", " now", " there", " right now"].contains(&r)))
         || after(rest, &["is", "are", "things are", "objects are"]).is_some_and(is_view)
@@ -161,7 +197,10 @@ fn what(rest: &[&str]) -> Option<Task> {
     if ["can you do", "can i say", "can i ask", "can i do", "do you understand", "are you able to do"].contains(&text.as_str()) {
         return Some(Task::Say(super::HELP.into()));
     }
-    let thing = after(rest, &["is", "are", "about"])?;
+    if let Some(thing) = after(rest, &["about"]).filter(|t| !t.is_empty()) {
+        return Some(Task::Again(thing.join(" ")));
+    }
+    let thing = after(rest, &["is", "are"])?;
     match thing {
         [] => None,
         ["this" | "that" | "it", "thing" | "object"] | ["this" | "that"] => Some(describe(Some(query(&["it"])))),
@@ -325,7 +364,7 @@ fn is_there(rest: &[&str]) -> Option<Task> {
         // "Is the mug left of the laptop?"
         thing => {
             let place = (1..thing.len()).any(|i| relation_at(&thing[i..]).is_some());
-            place.then(|| Task::Call(ToolCall::Locate { query: thing.join(" "), kind: LevelWish::Any }))
+            place.then(|| Task::Call(ToolCall::Locate { query: plain(thing), kind: LevelWish::Any }))
         }
     }
 }
