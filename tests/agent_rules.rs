@@ -16,6 +16,7 @@ use fmlgs::agent::{Planner, Policy, Refusal, Session, World};
 
 const FIRST: &str = include_str!("data/agent_requests.toml");
 const LATER: &str = include_str!("data/agent_requests_later.toml");
+const FRESH: &str = include_str!("data/agent_requests_fresh.toml");
 const LAST: &str = include_str!("data/agent_requests_last.toml");
 
 fn rules() -> Session {
@@ -54,6 +55,11 @@ fn requests_written_after_the_grammar_come_out_right_too() {
 #[test]
 fn requests_written_last_come_out_right_too() {
     hold("requests written last", LAST);
+}
+
+#[test]
+fn fresh_requests_come_out_right_too() {
+    hold("fresh requests", FRESH);
 }
 
 /// Goes to the table, whatever is said.

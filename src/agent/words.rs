@@ -69,7 +69,7 @@ pub fn is_mark(word: &str) -> bool {
 }
 
 /// What is said before a request.
-const BEFORE: [&str; 99] = [
+const BEFORE: [&str; 102] = [
     "i would like to know",
     "i'd like to know",
     "i want to know",
@@ -112,6 +112,9 @@ const BEFORE: [&str; 99] = [
     "listen",
     "actually",
     "quickly",
+    "i mean",
+    "i meant",
+    "pretty please",
     "would you be so kind as to",
     "would you be so kind and",
     "i would like for you to",
@@ -171,8 +174,13 @@ const BEFORE: [&str; 99] = [
     "um",
 ];
 /// What is said after a request.
-const AFTER: [&str; 18] = [
+const AFTER: [&str; 23] = [
     "if you don't mind",
+    "pretty please",
+    "of course",
+    "if you like",
+    "as well",
+    "would you kindly",
     "any more",
     "anymore",
     "thanks a lot",

@@ -219,14 +219,14 @@ impl Llm {
         let mut take = |head: &http::Head, bytes: &[u8]| {
             is_stream = head.is_stream;
             let ended = collector.take(head.is_stream, bytes);
-            let said = key.map_or_else(|| collector.text().to_owned(), |k| k.redact(collector.text()));
-            let mut end = said.len().saturating_sub(held).max(told);
-            while !said.is_char_boundary(end.min(said.len())) {
-                end -= 1;
-            }
-            if end > told && end <= said.len() && said.is_char_boundary(told) {
-                on(AgentEvent::Piece(said[told..end].to_owned()));
-                told = end;
+            let fresh = &collector.text()[told..];
+            let clean = key.map_or_else(|| fresh.to_owned(), |k| k.redact(fresh));
+            let keep = |t: &str| (0..=t.len().saturating_sub(held)).rev().find(|at| t.is_char_boundary(*at)).unwrap_or(0);
+            let (raw, shown) = (keep(fresh), keep(&clean));
+            // Where a key reaches into what is held back, nothing is shown yet.
+            if shown > 0 && fresh[raw..] == clean[shown..] {
+                on(AgentEvent::Piece(clean[..shown].to_owned()));
+                told += raw;
             }
             ended
         };
@@ -239,6 +239,7 @@ impl Llm {
             }
             Err(broken) => return Err(self.problem(&broken)),
         }
+        let rest = self.clean(&collector.text()[told..]);
         let answer = match collector.finish(is_stream) {
             Ok(answer) => answer,
             Err(problem) => {
@@ -250,8 +251,9 @@ impl Llm {
         let answer = self.cleaned(answer);
         let said: usize = answer.text.len() + answer.calls.iter().map(|c| c.arguments.len()).sum::<usize>();
         self.tokens += answer.tokens.unwrap_or((sent + said as u64) / 4);
-        if told < answer.text.len() && answer.text.is_char_boundary(told) {
-            (desk.on)(AgentEvent::Piece(answer.text[told..].to_owned()));
+        let rest = if is_stream { rest } else { answer.text.clone() };
+        if !rest.is_empty() {
+            (desk.on)(AgentEvent::Piece(rest));
         }
         Ok(answer)
     }

@@ -1,7 +1,7 @@
 //! A request parted into clauses, each of which asks for one thing.
 
 use super::moves;
-use crate::agent::words::{Token, alike, is_mark, low, tokens, verb, without_courtesy};
+use crate::agent::words::{Token, alike, is_mark, low, number, tokens, verb, without_courtesy};
 use crate::scene::Identities;
 
 /// Words that begin a request.
@@ -36,11 +36,17 @@ pub(super) fn starts_request(words: &[&str]) -> bool {
     moves::movement(&first_clause).is_some() || moves::closer(&first_clause).is_some() || super::sides::is_side_only(&first_clause)
 }
 
+/// A clause, and whether only a comma parts it from the one before.
+pub(super) struct Clause {
+    pub words: Vec<Token>,
+    pub follows_comma: bool,
+}
+
 /// The clauses of a request.
-pub(super) fn split(request: &str, identities: &Identities) -> Vec<Vec<Token>> {
+pub(super) fn split(request: &str, identities: &Identities) -> Vec<Clause> {
     let all = tokens(request);
     let whole = protected(&all, identities);
-    let mut clauses: Vec<Vec<Token>> = vec![Vec::new()];
+    let mut clauses = vec![Clause { words: Vec::new(), follows_comma: false }];
     let mut i = 0;
     while i < all.len() {
         let word = all[i].low.as_str();
@@ -48,18 +54,20 @@ pub(super) fn split(request: &str, identities: &Identities) -> Vec<Vec<Token>> {
         let skip = if whole[i] { None } else { parting(word, &rest) };
         match skip {
             Some(n) => {
-                clauses.push(Vec::new());
+                let joins = rest.iter().find(|w| !["but", ",", "please"].contains(*w));
+                let follows_comma = [",", "but"].contains(&word) && !joins.is_some_and(|w| ["then", "and", "now", "also"].contains(w));
+                clauses.push(Clause { words: Vec::new(), follows_comma });
                 i += n;
             }
             None => {
                 if let Some(clause) = clauses.last_mut().filter(|_| whole[i] || !is_mark(word)) {
-                    clause.push(all[i].clone());
+                    clause.words.push(all[i].clone());
                 }
                 i += 1;
             }
         }
     }
-    clauses.retain(|c| !low(c).is_empty());
+    clauses.retain(|c| !low(&c.words).is_empty());
     clauses
 }
 
@@ -129,6 +137,8 @@ pub(super) fn corrected(words: &[&str], identities: &Identities) -> Vec<String> 
         && !VERBS.contains(&first.as_str())
         && !is_known(first, identities)
         && !moves::is_direction(first)
+        && number(first).is_none()
+        && !crate::agent::resolve::is_pick(first)
         && !["from", "closer", "nearer", "farther", "further", "other", "another", "their", "there", "these", "those", "this", "that"]
             .contains(&first.as_str())
         && let Some(right) = verb(first, &VERBS)

@@ -160,7 +160,7 @@ const BEGINNINGS: [(&str, Verb); 126] = [
     ("describe", Verb::Describe),
     ("explain", Verb::Describe),
 ];
-const MORE_BEGINNINGS: [(&str, Verb); 76] = [
+const MORE_BEGINNINGS: [(&str, Verb); 82] = [
     ("remove", Verb::Remove),
     ("delete", Verb::Remove),
     ("erase", Verb::Remove),
@@ -195,6 +195,12 @@ const MORE_BEGINNINGS: [(&str, Verb); 76] = [
     ("give me a view of", Verb::Go),
     ("get a view of", Verb::Go),
     ("give me a good view of", Verb::Go),
+    ("distance from", Verb::Distance),
+    ("distance between", Verb::Distance),
+    ("the distance from", Verb::Distance),
+    ("the distance between", Verb::Distance),
+    ("distance to", Verb::Distance),
+    ("the distance to", Verb::Distance),
     ("peek at", Verb::Go),
     ("a look at", Verb::Go),
     ("a view of", Verb::Go),
@@ -296,6 +302,11 @@ pub(super) fn small_talk(words: &[&str]) -> Option<Vec<Task>> {
         | "do it again" | "do that again" | "further" | "a little more" | "even more" | "some more" | "still more" => {
             Some(vec![Task::Repeat])
         }
+        "too close" | "that is too close" | "that is too near" | "too near" => Some(vec![Task::Remark(FARTHER)]),
+        "too far" | "too far away" | "that is too far" | "that is too far away" => Some(vec![Task::Remark(CLOSER)]),
+        "good afternoon" | "good day" | "very good" | "very well" | "well done" | "lovely" | "fine" | "got it" | "i see" | "excellent" => {
+            Some(vec![Task::Noise(text)])
+        }
         "no" | "yes" | "yeah" | "nope" | "never mind" | "nevermind" | "cancel" | "stop" | "forget it" | "cancel that" => {
             Some(vec![Task::Say("There is no open question.".into())])
         }
@@ -370,7 +381,7 @@ pub(super) fn read(words: &[&str], clause: &[Token], identities: &Identities) ->
     let all = BEGINNINGS.iter().chain(MORE_BEGINNINGS.iter());
     let fits = all.filter_map(|(begin, verb)| Some((begin.len(), *verb, after(words, &[begin])?)));
     let Some((_, verb, rest)) = fits.max_by_key(|(n, ..)| *n) else { return unknown_verb(words, identities) };
-    Some(done_to(verb, rest, words))
+    Some(done_to(verb, rest, words, identities))
 }
 
 /// "Make the curtain invisible", "get the lamp out of the way", "make it bigger", "put the lamp on screen".
@@ -404,13 +415,36 @@ fn made(words: &[&str]) -> Option<Task> {
     Some(Task::Call(ToolCall::GoTo { target: target(seen), side: Side::Same, closeness: NORMAL }))
 }
 
-fn done_to(verb: Verb, rest: &[&str], words: &[&str]) -> Vec<Task> {
+/// A command inside roundabout words: "might I trouble you for the size of the table". Only where the
+/// clause begins with nothing that the scene or the grammar knows.
+pub(super) fn salvaged(words: &[&str], clause: &[Token], identities: &Identities) -> Option<Vec<Task>> {
+    let begins_known = words.first().is_some_and(|w| {
+        clauses::VERBS.contains(w) || clauses::is_known(w, identities) || crate::agent::resolve::is_pick(w) || w.starts_with('#')
+            || ["the", "a", "an", "it", "its", "one", "this", "that", "my", "both", "all", "thing"].contains(w)
+    });
+    if begins_known {
+        return None;
+    }
+    for start in 1..words.len() {
+        let rest = crate::agent::words::without_courtesy(&words[start..]);
+        let all = BEGINNINGS.iter().chain(MORE_BEGINNINGS.iter());
+        let begins = all.map(|(begin, _)| *begin).any(|begin| after(rest, &[begin]).is_some_and(|r| !r.is_empty()));
+        // What destroys is not guessed from the middle of a sentence.
+        let destroys = ["remove", "delete", "erase", "get", "wipe", "export", "save", "write", "rename", "call", "name"];
+        if begins && !destroys.contains(&rest[0]) {
+            return read(rest, clause, identities);
+        }
+    }
+    None
+}
+
+fn done_to(verb: Verb, rest: &[&str], words: &[&str], identities: &Identities) -> Vec<Task> {
     let unclear = |what: &str| vec![Task::refuse(RefusalKind::Unclear, format!("{what} what? Name a thing, such as 'the lamp'."))];
     if rest.is_empty() {
         return match verb {
             Verb::Around => vec![Task::Side(Side::Other)],
             // "Which one is bigger? Show me."
-            Verb::Go if words.len() > 1 => go(Verb::Go, &["it"]),
+            Verb::Go if words.len() > 1 => go(Verb::Go, &["it"], identities),
             _ => unclear(&crate::agent::describe::capital(&words.join(" "))),
         };
     }
@@ -425,14 +459,14 @@ fn done_to(verb: Verb, rest: &[&str], words: &[&str]) -> Vec<Task> {
         if many && !words.is_empty() {
             return vec![Task::Each(call(target(words)), words.join(" "))];
         }
-        split_and(rest).into_iter().map(|words| Task::Call(call(target(&words)))).collect()
+        split_and(rest, identities).into_iter().map(|words| Task::Call(call(target(&words)))).collect()
     };
     match verb {
-        Verb::Go | Verb::GoCloser | Verb::GoFarther | Verb::Around => go(verb, rest),
+        Verb::Go | Verb::GoCloser | Verb::GoFarther | Verb::Around => go(verb, rest, identities),
         Verb::Look => {
             let looked = looked(rest);
             if looked.side.is_some() || looked.closeness != NORMAL {
-                return go(Verb::Go, rest);
+                return go(Verb::Go, rest, identities);
             }
             vec![Task::Call(ToolCall::LookAt { target: target(rest) })]
         }
@@ -442,7 +476,7 @@ fn done_to(verb: Verb, rest: &[&str], words: &[&str]) -> Vec<Task> {
                 all => all.to_vec(),
             };
             let looked = looked(&rest);
-            if looked.side.is_some() || looked.closeness != NORMAL { go(Verb::Go, &rest) } else { vec![Task::Find(plain(&rest))] }
+            if looked.side.is_some() || looked.closeness != NORMAL { go(Verb::Go, &rest, identities) } else { vec![Task::Find(plain(&rest))] }
         }
         Verb::Isolate | Verb::HideRest => vec![Task::Call(ToolCall::Isolate { target: target(rest) })],
         Verb::Unhide if everything => vec![Task::Call(ToolCall::ShowAll {})],
@@ -482,14 +516,16 @@ fn done_to(verb: Verb, rest: &[&str], words: &[&str]) -> Vec<Task> {
     }
 }
 
-/// "The mug and the lamp" as two.
-fn split_and<'a>(words: &[&'a str]) -> Vec<Vec<&'a str>> {
+/// "The mug and the lamp" as two; "knife and candle", too, if these are names.
+fn split_and<'a>(words: &[&'a str], identities: &Identities) -> Vec<Vec<&'a str>> {
     let parts: Vec<Vec<&str>> = words.split(|w| *w == "and" || is_mark(w)).map(<[&str]>::to_vec).collect();
     let sound = parts.len() > 1 && parts[1..].iter().all(|p| p.first().is_some_and(|w| ["the", "a", "an", "its", "my", "this", "that"].contains(w)));
-    if sound && !parts[0].is_empty() { parts } else { vec![words.to_vec()] }
+    let named = parts.len() > 1 && parts.iter().all(|p| !p.is_empty() && p.iter().all(|w| clauses::is_known(w, identities) || *w == "the"));
+    let is_name = identities.iter().flat_map(|(_, i)| &i.names).any(|n| n.to_lowercase().contains(&words.join(" ")));
+    if (sound || (named && !is_name)) && !parts[0].is_empty() { parts } else { vec![words.to_vec()] }
 }
 
-fn go(verb: Verb, rest: &[&str]) -> Vec<Task> {
+fn go(verb: Verb, rest: &[&str], identities: &Identities) -> Vec<Task> {
     let looked = looked(rest);
     let mut rest: Vec<&str> = looked.rest;
     let mut closeness = looked.closeness;
@@ -521,7 +557,7 @@ fn go(verb: Verb, rest: &[&str]) -> Vec<Task> {
     let side = side.unwrap_or_default();
     // "The mug again", of something hidden, is clear from the scene; the camera goes there all the same.
     let go = |words: Vec<&str>| Task::Call(ToolCall::GoTo { target: target(&words), side, closeness });
-    split_and(&rest).into_iter().map(go).collect()
+    split_and(&rest, identities).into_iter().map(go).collect()
 }
 
 /// "Rename the mug to cup", "call the mug 'tea cup'". The name is kept as it was typed.
@@ -552,7 +588,8 @@ fn rename(words: &[&str], clause: &[Token]) -> Option<Task> {
 fn unknown_verb(words: &[&str], identities: &Identities) -> Option<Vec<Task>> {
     let first = *words.first()?;
     // "Move the mug to the left" moves no mug.
-    let things: Vec<&&str> = words[1..].iter().filter(|w| clauses::is_known(w, identities)).collect();
+    let is_thing = |w: &&&str| clauses::is_known(w, identities) || ["it", "that", "this", "them"].contains(*w);
+    let things: Vec<&&str> = words[1..].iter().filter(is_thing).collect();
     if ["move", "turn", "rotate", "push", "pull", "lower", "raise", "slide", "shift", "tilt", "spin", "put", "pick"].contains(&first)
         && !things.is_empty()
     {
@@ -563,7 +600,7 @@ fn unknown_verb(words: &[&str], identities: &Identities) -> Option<Vec<Task>> {
     if first == "go" || first == "walk" || first == "fly" || first == "move" || first == "take" || first == "get" {
         let rest = after(&words[1..], &["me to", "to", "over to", "me"]).unwrap_or(&words[1..]);
         if !rest.is_empty() && rest.iter().any(|w| clauses::is_known(w, identities)) {
-            return Some(go(Verb::Go, rest));
+            return Some(go(Verb::Go, rest, identities));
         }
     }
     None
@@ -591,7 +628,15 @@ pub(super) fn bare(words: &[&str], identities: &Identities) -> Task {
     let pointing = ["it", "its", "one", "ones", "other", "another", "this", "that", "them", "thing", "their"];
     let known = rest.iter().any(|w| pointing.contains(w) || clauses::is_known(w, identities) || w.starts_with('#'));
     if !known && (rest.len() > 3 || clauses::VERBS.contains(&rest.first().copied().unwrap_or_default())) {
-        return Task::refuse(RefusalKind::Unclear, format!("I did not understand '{}'. {HELP}", words.join(" ")));
+        return Task::Noise(words.join(" "));
+    }
+    // Talk about a thing asks for nothing yet: "I believe there was a candle somewhere".
+    if ["i", "we", "my", "he", "she", "they", "somebody", "someone", "there"].contains(rest.first().unwrap_or(&"")) && rest.len() > 2 {
+        let first = rest.iter().position(|w| clauses::is_known(w, identities));
+        if let Some(first) = first {
+            let run: Vec<&str> = rest[first..].iter().copied().take_while(|w| clauses::is_known(w, identities)).collect();
+            return Task::Mention(run.join(" "));
+        }
     }
     if rest.is_empty() {
         return Task::refuse(RefusalKind::Unclear, format!("I did not understand that. {HELP}"));

@@ -39,6 +39,10 @@ pub(crate) enum Task {
     Repeat,
     /// Speak of something that a later clause means by "it".
     Mention(String),
+    /// It is too close or too far: what mends that, unless something else is asked for.
+    Remark(f64),
+    /// Words that ask for nothing.
+    Noise(String),
     /// Do a call to everything that words may mean.
     Each(ToolCall, String),
     /// Say something.
@@ -146,7 +150,7 @@ impl Rules {
                     None => go(Target::Query(words), Side::Same, NORMAL),
                 }
             }
-            Task::Closer(factor) => match last {
+            Task::Closer(factor) | Task::Remark(factor) => match last {
                 Some(id) => go(Target::Identity(id), Side::Same, desk.focus.closeness * factor),
                 None => {
                     let direction = if factor >= 1.0 { Direction::Forward } else { Direction::Back };
@@ -179,7 +183,7 @@ impl Rules {
                 Some(call) => Step::Call(call),
                 None => return Ok(Some(self.refuse(Refusal::new(RefusalKind::Unclear, "There is nothing to do again yet.")))),
             },
-            Task::Mention(_) => return Ok(None),
+            Task::Mention(_) | Task::Noise(_) => return Ok(None),
             Task::Say(text) => {
                 self.said.push(text);
                 return Ok(None);
@@ -196,20 +200,16 @@ impl Rules {
 
 /// The tasks that a request asks for.
 pub(crate) fn plan(request: &str, identities: &Identities) -> Vec<Task> {
-    let mut tasks = Vec::new();
+    let mut tasks: Vec<Task> = Vec::new();
     let mut spoken_of: Option<String> = None;
+    let mut noise: Option<String> = None;
     for clause in clauses::split(request, identities) {
-        for task in read(&clause, identities) {
-            match (task, &spoken_of) {
-                (Task::Mention(thing), _) => spoken_of = Some(thing),
-                (Task::Call(call), Some(thing)) if call.target() == Some(&Target::query("it")) => {
-                    tasks.push(Task::Call(call.with_target(Target::query(thing.clone()))));
-                    spoken_of = None;
-                }
-                // "I can't find the mug, where did it go?" asks once.
-                (Task::Find(it), _) if it == "it" && matches!(tasks.last(), Some(Task::Find(_))) => {}
-                (task, _) => tasks.push(task),
-            }
+        // "Turn it, I mean hide it": what was said wrongly is not done.
+        if low(&clause.words).starts_with(&["i", "mean"]) {
+            tasks.pop();
+        }
+        for task in read(&clause.words, identities) {
+            add(&mut tasks, task, clause.follows_comma, &mut spoken_of, &mut noise);
         }
         if tasks.len() >= MOST_TASKS {
             break;
@@ -220,10 +220,35 @@ pub(crate) fn plan(request: &str, identities: &Identities) -> Vec<Task> {
         tasks.push(Task::refuse(RefusalKind::Unclear, text));
     }
     if tasks.is_empty() {
-        let text = format!("I did not understand that. {HELP}");
-        tasks.push(Task::refuse(RefusalKind::Unclear, text));
+        let said = noise.map_or_else(|| "that".to_owned(), |n| format!("'{n}'"));
+        tasks.push(Task::refuse(RefusalKind::Unclear, format!("I did not understand {said}. {HELP}")));
     }
     tasks
+}
+
+/// Adds a task to those before it in the same request, or makes it part of the last.
+fn add(tasks: &mut Vec<Task>, task: Task, follows_comma: bool, spoken_of: &mut Option<String>, noise: &mut Option<String>) {
+    match (task, tasks.last_mut()) {
+        // What asks for nothing is left out, if anything else is asked for.
+        (Task::Noise(text), _) => *noise = Some(text),
+        (Task::Mention(thing), _) => *spoken_of = Some(thing),
+        // "I can't find the mug, where did it go?" asks once.
+        (Task::Find(it), Some(Task::Find(_))) if it == "it" => {}
+        // "Too close, back off a little" moves once.
+        (task, Some(last @ Task::Remark(_))) => *last = task,
+        // "Again but closer".
+        (task @ (Task::Closer(_) | Task::Side(_)), Some(last @ Task::Repeat)) => *last = task,
+        // "The mug, from above, close" is one flight.
+        (Task::Side(which), Some(Task::Call(ToolCall::GoTo { side, .. }))) if follows_comma && *side == Side::Same => *side = which,
+        (Task::Closer(factor), Some(Task::Call(ToolCall::GoTo { closeness, .. }))) if follows_comma => {
+            *closeness = (*closeness * factor).clamp(*CLOSENESS.start(), *CLOSENESS.end());
+        }
+        (Task::Call(call), _) if call.target() == Some(&Target::query("it")) && spoken_of.is_some() => {
+            let thing = spoken_of.take().unwrap_or_default();
+            tasks.push(Task::Call(call.with_target(Target::query(thing))));
+        }
+        (task, _) => tasks.push(task),
+    }
 }
 
 /// What one clause asks for.
@@ -251,6 +276,9 @@ fn read(clause: &[Token], identities: &Identities) -> Vec<Task> {
         return vec![task];
     }
     if let Some(tasks) = commands::read(words, clause, identities) {
+        return tasks;
+    }
+    if let Some(tasks) = commands::salvaged(words, clause, identities) {
         return tasks;
     }
     vec![commands::bare(words, identities)]

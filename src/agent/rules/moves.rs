@@ -11,16 +11,16 @@ use crate::scene::Identities;
 /// Angle of a turn that says none, in degrees.
 const USUAL_TURN: f64 = 30.0;
 
-const MOVE_VERBS: [&str; 49] = [
+const MOVE_VERBS: [&str; 53] = [
     "step", "move", "go", "walk", "fly", "back", "come", "shift", "slide", "strafe", "climb", "rise", "raise", "sink", "descend", "lower",
     "zoom", "dolly", "get", "push", "pull", "take", "make", "scoot", "float", "advance", "retreat", "ascend", "head", "drift", "travel",
-    "bring", "nudge", "crawl", "inch", "creep", "glide", "hop", "swing", "shuffle", "proceed", "dive", "hover", "budge", "roll", "moving", "stepping", "going", "walking",
+    "bring", "nudge", "crawl", "inch", "creep", "glide", "hop", "swing", "shuffle", "proceed", "dive", "hover", "budge", "roll", "set", "translate", "displace", "jog", "moving", "stepping", "going", "walking",
 ];
 const TURN_VERBS: [&str; 14] =
     ["turn", "rotate", "spin", "pan", "tilt", "swivel", "look", "face", "do", "make", "swing", "yaw", "pitch", "turning"];
 /// Words that add nothing to a movement.
-const FILLERS: [&str; 43] = [
-    "to", "the", "a", "an", "more", "again", "by", "towards", "toward", "your", "my", "me", "some", "side", "of", "for", "about", "only",
+const FILLERS: [&str; 44] = [
+    "off", "to", "the", "a", "an", "more", "again", "by", "towards", "toward", "your", "my", "me", "some", "side", "of", "for", "about", "only",
     "just", "and", "camera", "view", "eye", "us", "further", "farther", "little", "bit", "slowly", "straight", "then", "please", "step",
     "steps", "another", "one", "distance", "direction", "hand", "over", "on", "around", "even",
 ];
