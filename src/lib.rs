@@ -9,9 +9,11 @@
 //! * [`render`]: the splat renderer, forward and backward, on the CPU and on the GPU;
 //! * [`pipeline`]: training, evaluation, synthetic data; reports to an `Observer` only;
 //! * [`worker`]: the background thread that runs the pipeline for the window;
+//! * [`agent`]: plain sentences become checked calls of a closed set of tools;
 //! * [`cli`]: one file per subcommand;
 //! * [`ui`]: the window.
 
+pub mod agent;
 pub mod cli;
 pub mod io;
 pub mod math;

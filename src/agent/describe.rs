@@ -1,0 +1,163 @@
+//! Sentences about things: what they are, where they are, how large they are.
+
+use super::relation::{Relation, fit, span};
+use super::tool::short;
+use super::world::World;
+use crate::scene::{Bounds, IdentityId, Level, NOBODY};
+
+/// Share of the view under which something is not really seen.
+pub const SEEN: f64 = 0.0005;
+
+/// "a, b and c".
+pub fn join(items: &[String]) -> String {
+    match items {
+        [] => String::new(),
+        [one] => one.clone(),
+        [start @ .., last] => format!("{} and {last}", start.join(", ")),
+    }
+}
+
+/// "the kettle", or "#7" for what has no name.
+pub fn the(world: &dyn World, id: IdentityId) -> String {
+    let name = world.identities().full_name(id);
+    if name.starts_with('#') { name } else { format!("the {name}") }
+}
+
+/// A list of names, at most `most` of them.
+pub fn names(world: &dyn World, ids: &[IdentityId], most: usize) -> String {
+    let mut list: Vec<String> = ids.iter().take(most).map(|id| world.identities().name(*id)).collect();
+    if ids.len() > most {
+        list.push(format!("{} more", ids.len() - most));
+    }
+    join(&list)
+}
+
+/// A length in scene units as people say it.
+pub fn length(world: &dyn World, units: f64) -> String {
+    match world.metres_per_unit() {
+        Some(scale) => match units * scale {
+            m if m >= 1.0 => format!("{} m", short((m * 100.0).round() / 100.0)),
+            m if m >= 0.01 => format!("{} cm", short((m * 1000.0).round() / 10.0)),
+            m => format!("{} mm", short((m * 10_000.0).round() / 10.0)),
+        },
+        None => format!("{} scene units", short(units)),
+    }
+}
+
+/// Width, depth and height of a box as seen now.
+pub fn size(world: &dyn World, bounds: &Bounds) -> String {
+    let frame = world.view().frame();
+    let along = |axis| {
+        let (low, high) = span(bounds, axis);
+        length(world, high - low)
+    };
+    let (wide, deep, high) = (along(frame.right), along(frame.ahead), along(frame.up));
+    let unknown = if world.metres_per_unit().is_none() { " (the scene's scale in metres is not known)" } else { "" };
+    format!("about {wide} wide, {deep} deep and {high} high{unknown}")
+}
+
+/// The objects that stand in `relation` to an identity, nearest first.
+pub fn neighbours(world: &dyn World, id: IdentityId, relation: Relation) -> Vec<IdentityId> {
+    let all = world.identities();
+    let Some(anchor) = world.facts(id).and_then(|f| f.bounds) else { return Vec::new() };
+    let frame = world.view().frame();
+    let mut found: Vec<(f64, IdentityId)> = Vec::new();
+    for (other, identity) in all.iter().filter(|(_, i)| i.level == Level::Object) {
+        let related = all.line(id).any(|l| l == other) || identity.parent != NOBODY;
+        let bounds = if related { None } else { world.facts(other).and_then(|f| f.bounds) };
+        found.extend(bounds.and_then(|b| fit(relation, &b, &anchor, &frame)).map(|d| (d, other)));
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found.into_iter().map(|(_, id)| id).collect()
+}
+
+/// Where a thing is: on what it stands and what is next to it; empty if nothing is near.
+pub fn place(world: &dyn World, id: IdentityId) -> String {
+    let object = world.identities().object_of(id);
+    let Some(own) = world.facts(object).and_then(|f| f.bounds) else { return String::new() };
+    let frame = world.view().frame();
+    let mut said = Vec::new();
+    // On what it stands: what has it on top.
+    let bears = |other: &IdentityId| {
+        let other = world.facts(*other).and_then(|f| f.bounds);
+        other.is_some_and(|b| fit(Relation::On, &own, &b, &frame).is_some())
+    };
+    let objects = world.identities().iter().filter(|(i, o)| o.parent == NOBODY && *i != object).map(|(i, _)| i);
+    let bearer = objects.filter(|id| world.facts(*id).is_some()).find(bears);
+    said.extend(bearer.map(|id| format!("on {}", the(world, id))));
+    let over = |other: &IdentityId| {
+        let other = world.facts(*other).and_then(|f| f.bounds);
+        other.is_some_and(|b| fit(Relation::Under, &own, &b, &frame).is_some())
+    };
+    let objects = world.identities().iter().filter(|(i, o)| o.parent == NOBODY && *i != object).map(|(i, _)| i);
+    let over = objects.filter(|id| world.facts(*id).is_some()).find(over);
+    said.extend(over.map(|id| format!("under {}", the(world, id))));
+    for (relation, words) in [(Relation::RightOf, "left of"), (Relation::LeftOf, "right of")] {
+        let next = neighbours(world, object, relation).into_iter().find(|id| Some(*id) != bearer && Some(*id) != over);
+        said.extend(next.map(|id| format!("{words} {}", the(world, id))));
+    }
+    join(&said)
+}
+
+/// All that is known of one thing.
+pub fn thing(world: &dyn World, id: IdentityId) -> String {
+    let Some(facts) = world.facts(id) else { return "It is not in the scene.".into() };
+    let all = world.identities();
+    let name = the(world, id);
+    let level = if facts.level == Level::Object { "an object" } else { "a part" };
+    let mut text = format!("{} is {level}", capital(&name));
+    let pieces: Vec<IdentityId> = all.pieces(id).filter(|p| world.facts(*p).is_some()).collect();
+    if !pieces.is_empty() {
+        let word = if pieces.len() == 1 { "one part".into() } else { format!("{} parts", pieces.len()) };
+        text += &format!(" with {word}: {}", names(world, &pieces, 10));
+    }
+    text += ".";
+    if let Some(bounds) = &facts.bounds {
+        text += &format!(" It is {}.", size(world, bounds));
+    }
+    let place = place(world, id);
+    if !place.is_empty() {
+        text += &format!(" It is {place}.");
+    }
+    if facts.hidden {
+        text += " It is hidden now.";
+    } else if facts.in_view > SEEN {
+        text += &format!(" It covers {} % of the view.", short((facts.in_view * 1000.0).round() / 10.0));
+    } else {
+        text += " It is not in view.";
+    }
+    if facts.names.len() > 1 {
+        text += &format!(" It is also called {}.", join(&facts.names[1..]));
+    }
+    text
+}
+
+/// The objects in the present view, largest share first.
+pub fn in_view(world: &dyn World) -> Vec<IdentityId> {
+    let mut seen: Vec<(f64, IdentityId)> = Vec::new();
+    for (id, _) in world.identities().iter().filter(|(_, i)| i.level == Level::Object) {
+        if let Some(facts) = world.facts(id).filter(|f| !f.hidden && f.in_view > SEEN) {
+            seen.push((facts.in_view, id));
+        }
+    }
+    seen.sort_by(|a, b| b.0.total_cmp(&a.0));
+    seen.into_iter().map(|(_, id)| id).collect()
+}
+
+/// What the present view shows.
+pub fn view(world: &dyn World) -> String {
+    let seen = in_view(world);
+    match seen.as_slice() {
+        [] => "Nothing in view has a name or number; move back or to the side to see more.".into(),
+        [only] => format!("You are looking at {}.", the(world, *only)),
+        [most, rest @ ..] => {
+            format!("You are looking at {}; also in view: {}.", the(world, *most), names(world, rest, 12))
+        }
+    }
+}
+
+/// With a capital letter at the start.
+pub fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |c| c.to_uppercase().chain(letters).collect())
+}

@@ -1,0 +1,404 @@
+//! From a planned call to what happens: permission, target, the scene's facts, confirmation; then the
+//! world acts. Every planner's calls pass here, and only here.
+
+use super::describe::{self, SEEN, capital, length, the};
+use super::focus::Focus;
+use super::policy::{Permission, Policy};
+use super::refusal::{Refusal, RefusalKind};
+use super::relation::{Relation, gap};
+use super::resolve::{Resolved, resolve, resolve_all};
+use super::tool::{LevelWish, Reference, Target, ToolCall};
+use super::wish::{GoWish, NORMAL, Side};
+use super::world::{Unreachable, World, WorldError};
+use crate::scene::{IdentityId, NOBODY};
+
+/// What became of a call.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// The call, with targets by number where they were found.
+    pub call: ToolCall,
+    /// What it was about.
+    pub ids: Vec<IdentityId>,
+    /// What happened, in plain words.
+    pub text: String,
+    /// Why it was not done, if it was not.
+    pub refused: Option<RefusalKind>,
+}
+
+/// A call after its checks.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Checked {
+    /// It may be done.
+    Ready {
+        /// With targets by number.
+        call: ToolCall,
+        /// What it is about.
+        ids: Vec<IdentityId>,
+        /// What was not taken literally; mostly empty.
+        note: String,
+    },
+    /// It is not done.
+    Refused {
+        /// Why.
+        refusal: Refusal,
+        /// What comes near.
+        near: Vec<IdentityId>,
+    },
+    /// The user must say which is meant.
+    Choose {
+        /// What to ask.
+        question: String,
+        /// What can be chosen.
+        candidates: Vec<IdentityId>,
+    },
+    /// The user must say yes.
+    Confirm {
+        /// What to ask.
+        question: String,
+        /// What is done then.
+        call: ToolCall,
+        /// What it is about.
+        ids: Vec<IdentityId>,
+    },
+}
+
+impl Checked {
+    fn refused(kind: RefusalKind, text: impl Into<String>) -> Self {
+        Self::Refused { refusal: Refusal::new(kind, text), near: Vec::new() }
+    }
+}
+
+/// Checks a call. `is_confirmed` says that the user has said yes to it.
+pub fn check(world: &mut dyn World, call: &ToolCall, policy: &Policy, focus: &Focus, is_confirmed: bool) -> Checked {
+    if let Err(problem) = call.sound() {
+        return Checked::refused(RefusalKind::Unclear, format!("That cannot be done: {problem}."));
+    }
+    if let Some(refusal) = policy.refusal(call) {
+        return Checked::Refused { refusal, near: Vec::new() };
+    }
+    let mut call = call.clone();
+    let (mut ids, mut note) = (Vec::new(), String::new());
+    let wanted = match &call {
+        ToolCall::Locate { query, kind } => Some((Target::Query(query.clone()), *kind)),
+        // "The part of" may be asked of parts, too.
+        other => other.target().map(|t| (t.clone(), LevelWish::Any)),
+    };
+    if let Some((target, level)) = wanted {
+        match find(world, &target, level, focus) {
+            Ok(Resolved::One { id, note: said }) => {
+                note = said;
+                ids.push(id);
+                if !matches!(call, ToolCall::Locate { .. }) {
+                    call = call.with_target(Target::Identity(id));
+                }
+            }
+            Ok(Resolved::Several(candidates)) => {
+                let question = format!("Which one do you mean: {}?", choices(world, &candidates));
+                return Checked::Choose { question, candidates };
+            }
+            Ok(Resolved::Missing { refusal, near }) => return Checked::Refused { refusal, near },
+            Err(e) => return Checked::refused(RefusalKind::Failed, e.to_string()),
+        }
+    }
+    if let ToolCall::Measure { to: Some(Reference::Thing(other)), .. } = &mut call {
+        match find(world, &other.clone(), LevelWish::Any, focus) {
+            Ok(Resolved::One { id, .. }) => {
+                ids.push(id);
+                *other = Target::Identity(id);
+            }
+            Ok(Resolved::Several(some)) => {
+                let text = format!("From which one: {}? Please say it in full.", choices(world, &some));
+                return Checked::Refused { refusal: Refusal::new(RefusalKind::Unclear, text), near: some };
+            }
+            Ok(Resolved::Missing { refusal, near }) => return Checked::Refused { refusal, near },
+            Err(e) => return Checked::refused(RefusalKind::Failed, e.to_string()),
+        }
+    }
+    if let Some(conflict) = conflict(world, &call, ids.first().copied()) {
+        return Checked::Refused { refusal: conflict, near: ids };
+    }
+    if !is_confirmed && let Some(question) = question(world, &call, policy, ids.first().copied()) {
+        return Checked::Confirm { question, call, ids };
+    }
+    Checked::Ready { call, ids, note }
+}
+
+fn find(world: &mut dyn World, target: &Target, level: LevelWish, focus: &Focus) -> Result<Resolved, WorldError> {
+    match target {
+        Target::Query(words) => resolve(world, words, level, focus),
+        Target::Identity(id) if world.facts(*id).is_some() => Ok(Resolved::One { id: *id, note: String::new() }),
+        Target::Identity(id) => {
+            let refusal = Refusal::new(RefusalKind::NotFound, format!("There is nothing with the number {id} here."));
+            Ok(Resolved::Missing { refusal, near: Vec::new() })
+        }
+    }
+}
+
+/// "the red controller or the blue controller".
+fn choices(world: &dyn World, candidates: &[IdentityId]) -> String {
+    let all = world.identities();
+    let mut names: Vec<String> = candidates.iter().take(6).map(|id| the(world, *id)).collect();
+    // What has the same name is told apart by its number.
+    for i in 0..names.len() {
+        if candidates.iter().take(6).filter(|c| all.full_name(**c) == all.full_name(candidates[i])).count() > 1 {
+            names[i] += &format!(" (#{})", candidates[i]);
+        }
+    }
+    if candidates.len() > 6 {
+        names.push(format!("one of {} more", candidates.len() - 6));
+    }
+    match names.as_slice() {
+        [start @ .., last] if !start.is_empty() => format!("{} or {last}", start.join(", ")),
+        _ => names.concat(),
+    }
+}
+
+/// What is against the facts.
+fn conflict(world: &dyn World, call: &ToolCall, id: Option<IdentityId>) -> Option<Refusal> {
+    let id = id?;
+    let facts = world.facts(id)?;
+    let it = the(world, id);
+    let text = match call {
+        ToolCall::Hide { .. } if facts.hidden => format!("{} is hidden already.", capital(&it)),
+        ToolCall::Unhide { .. } if !facts.hidden => format!("{} is not hidden.", capital(&it)),
+        ToolCall::Rename { name, .. } if !name.chars().any(char::is_alphanumeric) => {
+            return Some(Refusal::new(RefusalKind::Unclear, "A name needs at least one letter or digit."));
+        }
+        ToolCall::Rename { name, .. } if facts.names.first() == Some(name) => format!("It is called '{name}' already."),
+        ToolCall::GoTo { .. } | ToolCall::LookAt { .. } | ToolCall::Measure { .. } | ToolCall::Export { .. }
+            if facts.bounds.is_none() =>
+        {
+            format!("{} has no matter in this scene, only a name.", capital(&it))
+        }
+        _ => return None,
+    };
+    Some(Refusal::new(RefusalKind::Conflict, text))
+}
+
+/// What the user has to say yes to.
+fn question(world: &dyn World, call: &ToolCall, policy: &Policy, id: Option<IdentityId>) -> Option<String> {
+    let permission = policy.permission(call.name());
+    let it = id.map(|id| the(world, id)).unwrap_or_default();
+    match (permission, call) {
+        (Permission::ConfirmOverwrite, ToolCall::Export { .. }) => {
+            let path = id.and_then(|id| world.export_replaces(id))?;
+            Some(format!("Exporting {it} would replace {path}. Shall I? (yes or no)"))
+        }
+        (Permission::ConfirmOverwrite | Permission::Free | Permission::Never, _) => None,
+        (Permission::Confirm, ToolCall::Remove { .. }) => Some(format!("Remove {it} from the scene? (yes or no)")),
+        (Permission::Confirm, ToolCall::Rename { name, .. }) => Some(format!("Rename {it} to '{name}'? (yes or no)")),
+        (Permission::Confirm, ToolCall::AskUser { .. }) => None,
+        (Permission::Confirm, other) => Some(format!("{}: shall I? (yes or no)", other.line(world.identities()))),
+    }
+}
+
+/// Does what was checked, and remembers what it was about.
+pub fn perform(world: &mut dyn World, call: ToolCall, ids: Vec<IdentityId>, note: &str, focus: &mut Focus) -> Outcome {
+    let id = ids.first().copied().unwrap_or(NOBODY);
+    let mut listed = Vec::new();
+    let done = act(world, &call, id, ids.get(1).copied(), focus, &mut listed);
+    if done.is_ok() && matches!(call, ToolCall::Move { .. } | ToolCall::Turn { .. } | ToolCall::GoTo { .. }) {
+        focus.moved = Some(call.clone());
+    }
+    let (text, refused) = match done {
+        Ok(text) => (if note.is_empty() { text } else { format!("{text} {note}") }, None),
+        Err(refusal) => (refusal.text, Some(refusal.kind)),
+    };
+    if id != NOBODY {
+        focus.last = Some(id);
+        focus.group.clear();
+        focus.call = Some(call.clone());
+    }
+    // "Are there any mugs?" - "Show me the red one."
+    if let (ToolCall::List { named: Some(_), .. }, false) = (&call, listed.is_empty()) {
+        if let [only] = listed.as_slice() {
+            focus.last = Some(*only);
+        }
+        focus.call = None;
+        focus.group = listed;
+    }
+    Outcome { call, ids, text, refused }
+}
+
+fn act(
+    world: &mut dyn World,
+    call: &ToolCall,
+    id: IdentityId,
+    other: Option<IdentityId>,
+    focus: &mut Focus,
+    listed: &mut Vec<IdentityId>,
+) -> Result<String, Refusal> {
+    let failed = |e: WorldError| Refusal::new(RefusalKind::Failed, capital(&e.0));
+    let it = if id == NOBODY { String::new() } else { the(world, id) };
+    Ok(match call {
+        ToolCall::Locate { .. } | ToolCall::Highlight { .. } => {
+            world.highlight(&[id]).map_err(failed)?;
+            let place = describe::place(world, id);
+            let facts = world.facts(id);
+            let seen = facts.as_ref().is_some_and(|f| f.in_view > SEEN && !f.hidden);
+            let place = if place.is_empty() { String::new() } else { format!(" It is {place}.") };
+            let hidden = facts.is_some_and(|f| f.hidden);
+            match (seen, hidden) {
+                (true, _) => format!("{} is marked in the view.{place}", capital(&it)),
+                (false, true) => format!("I found {it}; it is hidden now.{place}"),
+                (false, false) => format!("I found {it}; it is not in view.{place}"),
+            }
+        }
+        ToolCall::GoTo { side, closeness, .. } => {
+            let wish = GoWish { side: *side, closeness: *closeness };
+            let arrival = world.go_to(id, wish).map_err(|e| unreachable(world, &it, &e))?;
+            focus.closeness = *closeness;
+            let from = if *side == Side::Same { String::new() } else { format!(" from {}", side.text()) };
+            let close = match *closeness {
+                c if c > NORMAL => ", closer",
+                c if c < NORMAL => ", from farther away",
+                _ => "",
+            };
+            let hidden = world.facts(id).is_some_and(|f| f.hidden);
+            let note = match (hidden, arrival.in_view <= SEEN) {
+                (true, _) => " It is hidden now; say 'show everything' to see it.",
+                (false, true) => " Something may be in the way: little of it is in view.",
+                _ => "",
+            };
+            format!("Here is {it}{from}{close}.{note}")
+        }
+        ToolCall::LookAt { .. } => {
+            world.look_at(id).map_err(|e| unreachable(world, &it, &e))?;
+            format!("Looking at {it}.")
+        }
+        ToolCall::Move { direction, distance } => {
+            if matches!(distance, super::wish::Distance::Metres(_)) && world.metres_per_unit().is_none() {
+                let text = "This scene's scale in metres is not known; say it in steps, such as 'two steps back'.";
+                return Err(Refusal::new(RefusalKind::Conflict, text));
+            }
+            let moved = world.move_eye(*direction, *distance).map_err(|e| unreachable(world, "there", &e))?;
+            let far = length(world, moved.distance_done);
+            if moved.stopped_by_matter {
+                format!("Moved {} {far}, and stopped there: something is in the way.", direction.text())
+            } else {
+                format!("Moved {} {far}.", direction.text())
+            }
+        }
+        ToolCall::Turn { direction, degrees } => {
+            world.turn(*direction, *degrees).map_err(|e| unreachable(world, "that way", &e))?;
+            format!("Turned {} by {} degrees.", direction.text(), super::tool::short(*degrees))
+        }
+        ToolCall::Isolate { .. } => {
+            world.isolate(id).map_err(failed)?;
+            format!("Only {it} is drawn now; say 'show everything' for the rest.")
+        }
+        ToolCall::Hide { .. } => {
+            world.set_hidden(id, true).map_err(failed)?;
+            format!("{} is hidden.", capital(&it))
+        }
+        ToolCall::Unhide { .. } => {
+            world.set_hidden(id, false).map_err(failed)?;
+            format!("{} is drawn again.", capital(&it))
+        }
+        ToolCall::ShowAll {} => {
+            world.show_all().map_err(failed)?;
+            "Everything is drawn again.".into()
+        }
+        ToolCall::Remove { .. } => {
+            world.remove(id).map_err(failed)?;
+            format!("{} is removed from the scene; 'undo' brings it back.", capital(&it))
+        }
+        ToolCall::Rename { name, .. } => {
+            world.rename(id, name).map_err(failed)?;
+            format!("{} is now called '{name}'.", capital(&it))
+        }
+        ToolCall::Describe { .. } if id == NOBODY => describe::view(world),
+        ToolCall::Describe { .. } => describe::thing(world, id),
+        ToolCall::List { level, relation, named, .. } => {
+            *listed = list_ids(world, *level, id, *relation, named.as_deref())?;
+            say_list(world, listed, *level, id, *relation, named.as_deref())
+        }
+        ToolCall::Measure { to, .. } => measure(world, id, to.as_ref(), other)?,
+        ToolCall::AskUser { question, .. } => question.clone(),
+        ToolCall::Undo {} => format!("Taken back: {}.", world.undo().map_err(failed)?),
+        ToolCall::Export { .. } => format!("{} is written to {}.", capital(&it), world.export(id).map_err(failed)?),
+    })
+}
+
+fn unreachable(world: &dyn World, goal: &str, e: &Unreachable) -> Refusal {
+    let near = e.nearest.map(|d| format!(" The camera can come as near as {}.", length(world, d))).unwrap_or_default();
+    Refusal::new(RefusalKind::Unreachable, format!("I cannot go to {goal}: {}.{near}", e.reason.trim_end_matches('.')))
+}
+
+/// What is listed or counted.
+fn list_ids(
+    world: &mut dyn World,
+    level: LevelWish,
+    of: IdentityId,
+    relation: Relation,
+    named: Option<&str>,
+) -> Result<Vec<IdentityId>, Refusal> {
+    let failed = |e: WorldError| Refusal::new(RefusalKind::Failed, e.0);
+    let mut ids: Vec<IdentityId> = if of == NOBODY {
+        let wanted = world.identities().iter().filter(|(_, i)| level.takes(i.level)).map(|(id, _)| id);
+        let all: Vec<IdentityId> = wanted.collect();
+        all.into_iter().filter(|id| world.facts(*id).is_some()).collect()
+    } else if relation == Relation::PartOf {
+        let inside = world.identities().within(of);
+        let is_in = |id: &IdentityId| *id != of && inside.get(*id as usize) == Some(&true);
+        let all: Vec<IdentityId> = world.identities().iter().map(|(id, _)| id).filter(is_in).collect();
+        all.into_iter().filter(|id| world.facts(*id).is_some()).collect()
+    } else {
+        describe::neighbours(world, of, relation)
+    };
+    if let Some(name) = named {
+        let fit = resolve_all(world, name, LevelWish::Any, &Focus::default()).map_err(failed)?;
+        ids.retain(|id| fit.contains(id));
+    }
+    Ok(ids)
+}
+
+/// The list in words.
+fn say_list(
+    world: &dyn World,
+    ids: &[IdentityId],
+    level: LevelWish,
+    of: IdentityId,
+    relation: Relation,
+    named: Option<&str>,
+) -> String {
+    let here = match (of, relation) {
+        (NOBODY, _) => "in the scene".into(),
+        (of, Relation::PartOf) => format!("of {}", the(world, of)),
+        (of, relation) => format!("{} {}", relation.text(), the(world, of)),
+    };
+    let what = named.unwrap_or(match (level, relation) {
+        (LevelWish::Object, _) => "objects",
+        (LevelWish::Part, _) | (_, Relation::PartOf) if of != NOBODY => "parts",
+        (LevelWish::Part, _) => "parts",
+        _ => "things",
+    });
+    let listed = describe::names(world, ids, 20);
+    match ids.len() {
+        0 => format!("I know no {what} {here}."),
+        1 => format!("There is 1 {} {here}: {listed}.", super::words::singular(what)),
+        n => format!("There are {n} {what} {here}: {listed}."),
+    }
+}
+
+/// A size or a distance.
+fn measure(world: &dyn World, id: IdentityId, to: Option<&Reference>, other: Option<IdentityId>) -> Result<String, Refusal> {
+    let nothing = || Refusal::new(RefusalKind::Conflict, "It has no matter that could be measured.");
+    let own = world.facts(id).and_then(|f| f.bounds).ok_or_else(nothing)?;
+    let it = capital(&the(world, id));
+    Ok(match to {
+        None => format!("{it} is {}.", describe::size(world, &own)),
+        Some(Reference::Eye) => {
+            let far = own.center().distance(world.view().eye);
+            format!("{it} is {} from here.", length(world, far))
+        }
+        Some(Reference::Thing(_)) => {
+            let other = other.ok_or_else(nothing)?;
+            let bounds = world.facts(other).and_then(|f| f.bounds).ok_or_else(nothing)?;
+            let (middle, free) = (own.center().distance(bounds.center()), gap(&own, &bounds));
+            let name = the(world, other);
+            let free = if free > 0.0 { format!("{} apart", length(world, free)) } else { "touching".into() };
+            format!("{it} is {} from {name}, middle to middle ({free}).", length(world, middle))
+        }
+    })
+}

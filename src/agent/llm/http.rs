@@ -1,0 +1,189 @@
+//! One question to a server and its answer: pieces as they arrive, stalls told from slowness, ended
+//! when the user wants.
+
+use std::io::Read;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use crossbeam_channel::{Receiver, RecvTimeoutError, bounded};
+use ureq::Agent;
+
+use super::secret::Secret;
+use super::settings::Patience;
+
+/// How often a wait looks whether it is to end.
+const TICK: Duration = Duration::from_millis(20);
+
+/// Why there is no answer.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Broken {
+    /// No connection, or it ended.
+    Connection(String),
+    /// Nothing came for too long.
+    Stall,
+    /// More came than an answer may have.
+    TooLong,
+    /// The server refused.
+    Status {
+        /// HTTP status.
+        code: u16,
+        /// How long it wants to be left alone.
+        retry_after: Option<Duration>,
+        /// What it said.
+        body: String,
+    },
+    /// The user wants it to end.
+    Cancelled,
+}
+
+impl Broken {
+    /// Whether another attempt may help.
+    pub fn is_passing(&self) -> bool {
+        match self {
+            Self::Connection(_) | Self::Stall => true,
+            Self::Status { code, .. } => *code == 429 || *code == 408 || *code >= 500,
+            Self::TooLong | Self::Cancelled => false,
+        }
+    }
+}
+
+enum Piece {
+    Head { code: u16, retry_after: Option<Duration>, is_stream: bool },
+    Bytes(Vec<u8>),
+    Failed(String),
+}
+
+/// What arrived: whether it is a stream of events.
+pub struct Head {
+    /// Whether the server sends events.
+    pub is_stream: bool,
+}
+
+/// Sends `body` and hands each piece of the answer to `take`, which says whether it has all it
+/// wants. The address and the key go into the connection only.
+///
+/// # Errors
+/// See [`Broken`].
+pub fn post(
+    url: &str,
+    key: Option<&Secret>,
+    body: String,
+    patience: &Patience,
+    most_bytes: usize,
+    cancel: &AtomicBool,
+    take: &mut dyn FnMut(&Head, &[u8]) -> bool,
+) -> Result<(), Broken> {
+    let pieces = ask(url, key, body, patience).map_err(|e| Broken::Connection(e.to_string()))?;
+    let begin = Instant::now();
+    let mut heard = Instant::now();
+    let mut head: Option<(Head, u16, Option<Duration>)> = None;
+    let (mut refused, mut bytes) = (Vec::new(), 0_usize);
+    loop {
+        if cancel.load(Ordering::Relaxed) {
+            return Err(Broken::Cancelled);
+        }
+        if heard.elapsed() > patience.stall || begin.elapsed() > patience.answer {
+            return Err(Broken::Stall);
+        }
+        match pieces.recv_timeout(TICK) {
+            Err(RecvTimeoutError::Timeout) => continue,
+            Err(RecvTimeoutError::Disconnected) => break,
+            Ok(Piece::Failed(problem)) => return Err(Broken::Connection(problem)),
+            Ok(Piece::Head { code, retry_after, is_stream }) => {
+                heard = Instant::now();
+                head = Some((Head { is_stream }, code, retry_after));
+            }
+            Ok(Piece::Bytes(piece)) => {
+                heard = Instant::now();
+                bytes += piece.len();
+                if bytes > most_bytes {
+                    return Err(Broken::TooLong);
+                }
+                match &head {
+                    Some((head, 200..300, _)) => {
+                        if take(head, &piece) {
+                            return Ok(());
+                        }
+                    }
+                    _ => refused.extend(piece),
+                }
+            }
+        }
+    }
+    match head {
+        Some((_, 200..300, _)) => Ok(()),
+        Some((_, code, retry_after)) => {
+            Err(Broken::Status { code, retry_after, body: String::from_utf8_lossy(&refused).into_owned() })
+        }
+        None => Err(Broken::Connection("the connection ended".into())),
+    }
+}
+
+/// Asks on a thread of its own, which ends by itself: its own time limits are those of `patience`,
+/// and it stops at the first piece that nobody takes.
+fn ask(url: &str, key: Option<&Secret>, body: String, patience: &Patience) -> std::io::Result<Receiver<Piece>> {
+    let config = Agent::config_builder()
+        .http_status_as_error(false)
+        // Neither the key nor the user's words follow a server elsewhere.
+        .max_redirects(0)
+        .max_redirects_will_error(false)
+        .timeout_global(Some(patience.answer + patience.stall))
+        .timeout_connect(Some(patience.stall))
+        .timeout_recv_response(Some(patience.stall + TICK))
+        .build();
+    let agent: Agent = config.into();
+    let mut request = agent.post(url).header("Content-Type", "application/json");
+    if let Some(key) = key {
+        request = request.header("Authorization", key.bearer());
+    }
+    let (send, receive) = bounded(4);
+    let talk = move || {
+        let response = match request.send(body) {
+            Ok(response) => response,
+            Err(e) => {
+                // Whoever asked may have gone.
+                let _ = send.send(Piece::Failed(e.to_string()));
+                return;
+            }
+        };
+        let header = |name: &str| response.headers().get(name).and_then(|v| v.to_str().ok()).map(str::to_owned);
+        let retry_after = header("retry-after").and_then(|v| v.trim().parse::<f64>().ok());
+        let retry_after = retry_after.filter(|s| (0.0..1e6).contains(s)).map(Duration::from_secs_f64);
+        let is_stream = header("content-type").is_some_and(|t| t.starts_with("text/event-stream"));
+        let code = response.status().as_u16();
+        if send.send(Piece::Head { code, retry_after, is_stream }).is_err() {
+            return;
+        }
+        let mut reader = response.into_body().into_reader();
+        loop {
+            let mut piece = vec![0; 1 << 14];
+            match reader.read(&mut piece) {
+                Ok(0) => return,
+                Ok(n) => {
+                    piece.truncate(n);
+                    if send.send(Piece::Bytes(piece)).is_err() {
+                        return;
+                    }
+                }
+                Err(e) => {
+                    let _ = send.send(Piece::Failed(e.to_string()));
+                    return;
+                }
+            }
+        }
+    };
+    std::thread::Builder::new().name("chat model".into()).spawn(talk)?;
+    Ok(receive)
+}
+
+/// Waits, unless the user wants it to end; says whether the wait was over.
+pub fn wait(time: Duration, cancel: &AtomicBool) -> bool {
+    let begin = Instant::now();
+    while begin.elapsed() < time {
+        if cancel.load(Ordering::Relaxed) {
+            return false;
+        }
+        std::thread::sleep(TICK.min(time.saturating_sub(begin.elapsed())));
+    }
+    true
+}

@@ -1,0 +1,394 @@
+//! The planner that asks a chat model behind an OpenAI-compatible address, used only if the user
+//! chose it. What the model says is never executed: only its tool calls that are valid reach the
+//! session, whose checks are the same as for every planner. Its key leaves in one header only.
+
+pub mod http;
+mod prompt;
+pub mod secret;
+pub mod settings;
+pub mod sse;
+pub mod wire;
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+use self::http::{Broken, post, wait};
+use self::secret::Secret;
+use self::settings::{Limits, LlmError, LlmSettings, Patience};
+use self::wire::{Answer, Collector, RawCall, assistant};
+use super::event::AgentEvent;
+use super::execute::Outcome;
+use super::planner::{Desk, Planner, Step};
+use super::refusal::{Refusal, RefusalKind};
+use super::schema;
+use super::tool::ToolCall;
+
+/// How often the same call may be asked for in one request.
+const MOST_ALIKE: usize = 3;
+/// Letters of the talk that go back to the model; older turns are left out.
+const LONGEST_TALK: usize = 80_000;
+/// Longest piece of a server's error that is shown, in characters.
+const LONGEST_ERROR: usize = 200;
+
+/// Plans by a chat model.
+pub struct Llm {
+    settings: LlmSettings,
+    url: String,
+    key: Option<Secret>,
+    patience: Patience,
+    limits: Limits,
+    talk: Vec<Value>,
+    /// Calls of the last answer that are still to be made.
+    waiting: VecDeque<RawCall>,
+    /// The call that the session is making.
+    current: Option<RawCall>,
+    stream: bool,
+    begun: Instant,
+    answers: u32,
+    wrong: u32,
+    tokens: u64,
+    asked: Vec<(String, String)>,
+}
+
+impl Llm {
+    /// A planner with the key that the named environment variable holds.
+    ///
+    /// # Errors
+    /// If the settings cannot be used.
+    pub fn new(settings: LlmSettings) -> Result<Self, LlmError> {
+        let key = settings.key()?;
+        Self::with(settings, key, Patience::default(), Limits::default())
+    }
+
+    /// A planner with this key and these limits.
+    ///
+    /// # Errors
+    /// If the settings cannot be used.
+    pub fn with(
+        settings: LlmSettings,
+        key: Option<Secret>,
+        patience: Patience,
+        limits: Limits,
+    ) -> Result<Self, LlmError> {
+        let url = settings.endpoint(key.is_some())?;
+        let stream = settings.stream;
+        Ok(Self {
+            settings,
+            url,
+            key,
+            patience,
+            limits,
+            talk: Vec::new(),
+            waiting: VecDeque::new(),
+            current: None,
+            stream,
+            begun: Instant::now(),
+            answers: 0,
+            wrong: 0,
+            tokens: 0,
+            asked: Vec::new(),
+        })
+    }
+
+    fn clean(&self, text: &str) -> String {
+        self.key.as_ref().map_or_else(|| text.to_owned(), |key| key.redact(text))
+    }
+
+    fn failed(&self, text: &str) -> Refusal {
+        Refusal::new(RefusalKind::Failed, self.clean(text))
+    }
+
+    /// The result of a call, as the model hears it.
+    fn tell(&mut self, call: &RawCall, result: &Value) {
+        self.talk.push(json!({ "role": "tool", "tool_call_id": call.id, "content": result.to_string() }));
+    }
+
+    /// A call that is none: the model hears why, and may do so a few times.
+    fn object(&mut self, call: &RawCall, problem: &str, desk: &mut Desk<'_>) -> Result<(), Refusal> {
+        self.tell(call, &json!({ "done": false, "error": problem }));
+        (desk.on)(AgentEvent::Note(self.clean(&format!("The model's call was not valid: {problem}"))));
+        self.wrong += 1;
+        if self.wrong > self.limits.wrong {
+            let text = "I stopped: the model kept asking for things that are no valid calls. Try other words, or the built-in planner.";
+            return Err(Refusal::new(RefusalKind::Limit, text));
+        }
+        Ok(())
+    }
+
+    /// The next call that is valid, of those that the model wants.
+    fn next_call(&mut self, desk: &mut Desk<'_>) -> Result<Option<ToolCall>, Refusal> {
+        while let Some(raw) = self.waiting.pop_front() {
+            match ToolCall::parse(&raw.name, &raw.arguments) {
+                Err(problem) => self.object(&raw, &problem.to_string(), desk)?,
+                Ok(call) => {
+                    let same = (raw.name.clone(), raw.arguments.clone());
+                    let before = self.asked.iter().filter(|a| **a == same).count();
+                    self.asked.push(same);
+                    if before >= MOST_ALIKE {
+                        self.object(&raw, "the same call was made several times; do something else or finish", desk)?;
+                        continue;
+                    }
+                    self.current = Some(raw);
+                    return Ok(Some(call));
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// The messages that go to the model: the task, and as much of the talk as fits, from a request on.
+    fn messages(&self) -> Vec<Value> {
+        let mut length = 0;
+        let mut start = self.talk.len();
+        for (i, message) in self.talk.iter().enumerate().rev() {
+            length += message.to_string().len();
+            let is_request = message["role"] == "user";
+            // The present request always goes.
+            if length > LONGEST_TALK && start < self.talk.len() {
+                break;
+            }
+            if is_request {
+                start = i;
+            }
+        }
+        std::iter::once(json!({ "role": "system", "content": prompt::TASK })).chain(self.talk[start..].iter().cloned()).collect()
+    }
+
+    fn body(&self, desk: &Desk<'_>) -> String {
+        let usable: Vec<&str> = desk.policy.usable().collect();
+        let is_usable = |tool: &Value| tool["function"]["name"].as_str().is_some_and(|n| usable.contains(&n));
+        let tools: Vec<Value> = schema::tools().into_iter().filter(is_usable).collect();
+        let body = json!({
+            "model": self.settings.model,
+            "messages": self.messages(),
+            "tools": tools,
+            "tool_choice": "auto",
+            "temperature": 0,
+            "stream": self.stream
+        });
+        // Whatever a name or a server's word brought in, the key does not go into a text.
+        self.clean(&body.to_string())
+    }
+
+    /// One answer of the model, asked for as often as patience has it.
+    fn ask(&mut self, desk: &mut Desk<'_>) -> Result<Answer, Refusal> {
+        let mut pause = self.patience.pause;
+        for attempt in 1.. {
+            let (problem, asked_wait) = match self.attempt(desk) {
+                Ok(answer) => return Ok(answer),
+                Err(Problem::Final(text)) => return Err(self.failed(&text)),
+                Err(Problem::Cancelled) => return Err(Refusal::new(RefusalKind::Stopped, "Stopped.")),
+                Err(Problem::Passing { text, wait }) => (text, wait),
+            };
+            if attempt >= self.patience.attempts {
+                return Err(self.failed(&format!("The chat model gave no answer: {problem}. Try again later.")));
+            }
+            // Some chance in the wait keeps many askers from coming back at once.
+            let own = pause.mul_f64(rand::random_range(0.5..1.0));
+            let next = asked_wait.map_or(own, |w| w.max(own));
+            if next > self.patience.longest_pause {
+                let secs = next.as_secs();
+                return Err(self.failed(&format!("The chat model wants to be left alone for {secs} s ({problem}). Try again then.")));
+            }
+            if self.begun.elapsed() + next > self.patience.request {
+                return Err(self.failed(&format!("The chat model gave no answer in time: {problem}.")));
+            }
+            (desk.on)(AgentEvent::Note(self.clean(&format!("Asking again: {problem}."))));
+            if !wait(next, desk.cancel) {
+                return Err(Refusal::new(RefusalKind::Stopped, "Stopped."));
+            }
+            pause = (pause * 2).min(self.patience.longest_pause);
+        }
+        Err(self.failed("The chat model gave no answer."))
+    }
+
+    fn attempt(&mut self, desk: &mut Desk<'_>) -> Result<Answer, Problem> {
+        let body = self.body(desk);
+        let sent = body.len() as u64;
+        let left = self.patience.request.saturating_sub(self.begun.elapsed());
+        let patience = Patience { answer: self.patience.answer.min(left), ..self.patience };
+        let mut collector = Collector::default();
+        let mut is_stream = false;
+        let mut told = 0;
+        let key = self.key.as_ref();
+        // A key may be cut in two between pieces: its length is held back until the end.
+        let held = key.map_or(0, Secret::len) * 3;
+        let on = &mut *desk.on;
+        let mut take = |head: &http::Head, bytes: &[u8]| {
+            is_stream = head.is_stream;
+            let ended = collector.take(head.is_stream, bytes);
+            let fresh = &collector.text()[told..];
+            let clean = key.map_or_else(|| fresh.to_owned(), |k| k.redact(fresh));
+            let keep = |t: &str| (0..=t.len().saturating_sub(held)).rev().find(|at| t.is_char_boundary(*at)).unwrap_or(0);
+            let (raw, shown) = (keep(fresh), keep(&clean));
+            // Where a key reaches into what is held back, nothing is shown yet.
+            if shown > 0 && fresh[raw..] == clean[shown..] {
+                on(AgentEvent::Piece(clean[..shown].to_owned()));
+                told += raw;
+            }
+            ended
+        };
+        let sent_to = post(&self.url, key, body, &patience, self.limits.bytes, desk.cancel, &mut take);
+        match sent_to {
+            Ok(()) => {}
+            Err(Broken::Cancelled) => return Err(Problem::Cancelled),
+            Err(Broken::TooLong) => {
+                return Err(Problem::Final("The chat model's answer is too long; I did not read it to the end.".into()));
+            }
+            Err(broken) => return Err(self.problem(&broken)),
+        }
+        let rest = self.clean(&collector.text()[told..]);
+        let answer = match collector.finish(is_stream) {
+            Ok(answer) => answer,
+            Err(problem) => {
+                // What does not come well in pieces may come whole.
+                self.stream = false;
+                return Err(Problem::Passing { text: problem, wait: None });
+            }
+        };
+        let answer = self.cleaned(answer);
+        let said: usize = answer.text.len() + answer.calls.iter().map(|c| c.arguments.len()).sum::<usize>();
+        self.tokens += answer.tokens.unwrap_or((sent + said as u64) / 4);
+        let rest = if is_stream { rest } else { answer.text.clone() };
+        if !rest.is_empty() {
+            (desk.on)(AgentEvent::Piece(rest));
+        }
+        Ok(answer)
+    }
+
+    /// An answer without the key, whose calls all have numbers of their own.
+    fn cleaned(&self, mut answer: Answer) -> Answer {
+        answer.text = self.clean(&answer.text);
+        for (i, call) in answer.calls.iter_mut().enumerate() {
+            let mut fixed = [&call.id, &call.name, &call.arguments].map(|t| match &self.key {
+                Some(key) => key.redact(t),
+                None => t.clone(),
+            });
+            if fixed[0].is_empty() {
+                fixed[0] = format!("call_{}_{i}", self.answers);
+            }
+            let [id, name, arguments] = fixed;
+            *call = RawCall { id, name, arguments };
+        }
+        answer
+    }
+
+    fn problem(&mut self, broken: &Broken) -> Problem {
+        let text = match broken {
+            Broken::Connection(problem) => {
+                // A stream that broke off may come whole.
+                self.stream = false;
+                format!("the connection failed ({})", self.clean(problem))
+            }
+            Broken::Stall => format!("it said nothing for {:.0} s", self.patience.stall.as_secs_f64().ceil()),
+            Broken::Status { code, body, .. } => {
+                let body = self.clean(body);
+                let said: String = body.chars().filter(|c| !c.is_control()).take(LONGEST_ERROR).collect();
+                if said.is_empty() { format!("it answered {code}") } else { format!("it answered {code}: {said}") }
+            }
+            Broken::TooLong | Broken::Cancelled => "it was ended".to_owned(),
+        };
+        if broken.is_passing() {
+            let wait = match broken {
+                Broken::Status { retry_after, .. } => *retry_after,
+                _ => None,
+            };
+            return Problem::Passing { text, wait };
+        }
+        if let Broken::Status { code: 400 | 404 | 405 | 406 | 415 | 422 | 501, .. } = broken
+            && self.stream
+        {
+            // Perhaps it cannot stream.
+            self.stream = false;
+            return Problem::Passing { text, wait: None };
+        }
+        let hint = match broken {
+            Broken::Status { code: 401 | 403, .. } => " Check the key in the environment variable that the settings name.",
+            Broken::Status { code: 404, .. } => " Check the address and the model's name.",
+            Broken::Status { code: 300..=399, .. } => " It points elsewhere, where I do not follow.",
+            _ => "",
+        };
+        Problem::Final(format!("The chat model cannot be asked: {text}.{hint}"))
+    }
+}
+
+/// Why an attempt gave no answer.
+enum Problem {
+    Passing { text: String, wait: Option<Duration> },
+    Final(String),
+    Cancelled,
+}
+
+impl Planner for Llm {
+    fn name(&self) -> &'static str {
+        "llm"
+    }
+
+    fn start(&mut self, request: &str, desk: &mut Desk<'_>) {
+        // Every call needs a result before the talk goes on.
+        for call in self.current.take().into_iter().chain(std::mem::take(&mut self.waiting)) {
+            let why = if call.name == "ask_user" {
+                "the user answers in the next message"
+            } else {
+                "not done: the user did not say yes, or said something else"
+            };
+            self.tell(&call, &json!({ "done": false, "result": why }));
+        }
+        let message = prompt::request(desk.world, desk.focus, request);
+        self.talk.push(json!({ "role": "user", "content": message }));
+        (self.begun, self.answers, self.wrong, self.tokens) = (Instant::now(), 0, 0, 0);
+        self.asked.clear();
+        self.stream = self.settings.stream;
+    }
+
+    fn next(&mut self, last: Option<&Outcome>, desk: &mut Desk<'_>) -> Result<Step, Refusal> {
+        if let (Some(call), Some(outcome)) = (self.current.take(), last) {
+            let result = json!({ "done": outcome.refused.is_none(), "result": outcome.text, "ids": outcome.ids });
+            self.tell(&call, &result);
+        }
+        loop {
+            if let Some(call) = self.next_call(desk)? {
+                return Ok(Step::Call(call));
+            }
+            if self.answers >= self.limits.answers {
+                let text = format!("I stopped after {} answers of the model without an end.", self.answers);
+                return Err(Refusal::new(RefusalKind::Limit, text));
+            }
+            if self.tokens > self.limits.tokens {
+                return Err(Refusal::new(RefusalKind::Limit, "I stopped: the request used up its tokens."));
+            }
+            if self.begun.elapsed() >= self.patience.request {
+                return Err(Refusal::new(RefusalKind::Limit, "I stopped: the request took too long."));
+            }
+            self.answers += 1;
+            (desk.on)(AgentEvent::Thinking);
+            let mut answer = self.ask(desk)?;
+            let too_many = answer.calls.split_off(answer.calls.len().min(self.limits.calls));
+            if !too_many.is_empty() {
+                (desk.on)(AgentEvent::Note(format!("{} calls of one answer were left out.", too_many.len())));
+            }
+            self.talk.push(assistant(&answer));
+            if answer.calls.is_empty() {
+                if answer.text.trim().is_empty() {
+                    return Err(self.failed("The chat model gave an empty answer."));
+                }
+                return Ok(Step::Finish { text: answer.text, refusal: None });
+            }
+            self.waiting.extend(answer.calls);
+        }
+    }
+
+    fn speaks(&self) -> bool {
+        true
+    }
+
+    fn is_remote(&self) -> bool {
+        true
+    }
+
+    fn redact(&self, text: &str) -> String {
+        self.clean(text)
+    }
+}

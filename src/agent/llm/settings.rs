@@ -1,0 +1,163 @@
+//! Where a chat model is, and how patient and generous the agent is with it.
+
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+use ureq::http::Uri;
+
+use super::secret::Secret;
+
+/// A chat model behind an OpenAI-compatible address. The key itself is never part of settings: only
+/// the name of the environment variable that holds it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LlmSettings {
+    /// Address up to and with the version, such as `http://127.0.0.1:11434/v1`.
+    pub base_url: String,
+    /// The model's name there.
+    pub model: String,
+    /// Name of the environment variable that holds the key; empty if none is needed.
+    pub key_variable: String,
+    /// Whether answers are asked for piece by piece.
+    pub stream: bool,
+}
+
+impl Default for LlmSettings {
+    fn default() -> Self {
+        Self { base_url: String::new(), model: String::new(), key_variable: String::new(), stream: true }
+    }
+}
+
+/// How patient the agent is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Patience {
+    /// How long the server may say nothing.
+    pub stall: Duration,
+    /// How long one answer may take.
+    pub answer: Duration,
+    /// How long all answers to one request may take together.
+    pub request: Duration,
+    /// How often one answer is asked for.
+    pub attempts: u32,
+    /// Wait before the second attempt; doubled before each further one, with some chance in it.
+    pub pause: Duration,
+    /// Longest wait, also where the server asks for one.
+    pub longest_pause: Duration,
+}
+
+impl Default for Patience {
+    fn default() -> Self {
+        Self {
+            stall: Duration::from_secs(45),
+            answer: Duration::from_secs(120),
+            request: Duration::from_secs(300),
+            attempts: 4,
+            pause: Duration::from_secs(1),
+            longest_pause: Duration::from_secs(30),
+        }
+    }
+}
+
+/// How much one request may take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Answers of the model.
+    pub answers: u32,
+    /// Calls in an answer that are looked at.
+    pub calls: usize,
+    /// Calls that are none: unknown tools, wrong arguments, the same again and again.
+    pub wrong: u32,
+    /// Tokens, as the server counts them, or as a quarter of the letters.
+    pub tokens: u64,
+    /// Bytes of one answer.
+    pub bytes: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self { answers: 12, calls: 8, wrong: 3, tokens: 100_000, bytes: 1 << 20 }
+    }
+}
+
+/// Why a chat model cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum LlmError {
+    /// No address or one of another kind.
+    #[error("'{0}' is no address of a chat model; it should look like https://host/v1")]
+    Address(String),
+    /// No model's name.
+    #[error("no model is named: set the name that the server gives it")]
+    NoModel,
+    /// The variable is not set, or what it holds is no key.
+    #[error("the environment variable '{0}' holds no key; set it, or leave its name empty if the server needs none")]
+    NoKey(String),
+    /// A key would travel in the open.
+    #[error("the key would be sent to {0} without encryption; use https, or a server on this machine")]
+    Unencrypted(String),
+}
+
+impl LlmSettings {
+    /// The key that the named environment variable holds; `None` if no variable is named.
+    ///
+    /// # Errors
+    /// If the variable is not set or what it holds cannot be a key.
+    pub fn key(&self) -> Result<Option<Secret>, LlmError> {
+        if self.key_variable.is_empty() {
+            return Ok(None);
+        }
+        let held = std::env::var(&self.key_variable).ok().and_then(|key| Secret::new(&key));
+        held.map(Some).ok_or_else(|| LlmError::NoKey(self.key_variable.clone()))
+    }
+
+    /// The address that requests go to.
+    ///
+    /// # Errors
+    /// If the base address is none, no model is named, or a key would travel unencrypted.
+    pub fn endpoint(&self, has_key: bool) -> Result<String, LlmError> {
+        let base = self.base_url.trim().trim_end_matches('/');
+        let wrong = || LlmError::Address(base.chars().take(200).collect());
+        let uri: Uri = base.parse().map_err(|_| wrong())?;
+        let host = uri.host().filter(|h| !h.is_empty()).ok_or_else(wrong)?;
+        // A name and password in an address would end in logs.
+        if uri.authority().is_none_or(|a| a.as_str().contains('@')) || uri.query().is_some() {
+            return Err(LlmError::Address(format!("{host} (with a name, password or question mark)")));
+        }
+        let is_local = host == "localhost" || host.starts_with("127.") || host == "[::1]";
+        match uri.scheme_str() {
+            Some("https") => {}
+            Some("http") if is_local || !has_key => {}
+            Some("http") => return Err(LlmError::Unencrypted(host.to_owned())),
+            _ => return Err(wrong()),
+        }
+        if self.model.trim().is_empty() {
+            return Err(LlmError::NoModel);
+        }
+        Ok(format!("{base}/chat/completions"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_are_checked_before_anything_is_sent() {
+        let at = |url: &str, has_key| {
+            let settings = LlmSettings { base_url: url.into(), model: "m".into(), ..LlmSettings::default() };
+            settings.endpoint(has_key)
+        };
+        assert_eq!(at("https://host/v1/", true).as_deref(), Ok("https://host/v1/chat/completions"));
+        assert_eq!(at("http://127.0.0.1:80/v1", true).as_deref(), Ok("http://127.0.0.1:80/v1/chat/completions"));
+        assert!(at("http://host/v1", false).is_ok());
+        assert_eq!(at("http://host/v1", true), Err(LlmError::Unencrypted("host".into())));
+        for bad in ["", "host", "ftp://host", "https://", "file:///etc/passwd", "https://me:secret@host/v1", "https://h/v1?key=1"] {
+            let error = at(bad, false).expect_err(bad);
+            assert!(matches!(error, LlmError::Address(_)) && !error.to_string().contains("secret"), "{bad}: {error}");
+        }
+        let none = LlmSettings { base_url: "https://h".into(), ..LlmSettings::default() };
+        assert_eq!(none.endpoint(false), Err(LlmError::NoModel));
+        let unset = LlmSettings { key_variable: "FMLGS_NO_SUCH_VARIABLE".into(), ..LlmSettings::default() };
+        assert!(matches!(unset.key(), Err(LlmError::NoKey(_))));
+        assert!(LlmSettings::default().key().is_ok_and(|k| k.is_none()));
+    }
+}

@@ -1,0 +1,254 @@
+//! Answers of a chat model, whole or in pieces, as text and tool calls.
+
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use super::sse::Events;
+
+/// Calls that one answer can hold at all.
+const MOST_CALLS: usize = 64;
+
+/// A call as the model wrote it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct RawCall {
+    /// Its number, as the model gave it.
+    pub id: String,
+    /// The tool's name.
+    pub name: String,
+    /// Its arguments, JSON if the model kept to it.
+    pub arguments: String,
+}
+
+/// An answer.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Answer {
+    /// What it says.
+    pub text: String,
+    /// What it wants done.
+    pub calls: Vec<RawCall>,
+    /// Tokens, as the server counted them.
+    pub tokens: Option<u64>,
+    /// Whether the answer came to its end.
+    pub is_whole: bool,
+}
+
+#[derive(Deserialize)]
+struct Body {
+    #[serde(default)]
+    choices: Vec<Choice>,
+    #[serde(default)]
+    usage: Option<Usage>,
+    #[serde(default)]
+    error: Option<Value>,
+}
+
+#[derive(Deserialize)]
+struct Usage {
+    #[serde(default)]
+    total_tokens: Option<u64>,
+}
+
+#[derive(Deserialize)]
+struct Choice {
+    #[serde(default, alias = "delta")]
+    message: Option<Message>,
+    #[serde(default)]
+    finish_reason: Option<String>,
+}
+
+#[derive(Deserialize)]
+struct Message {
+    #[serde(default)]
+    content: Option<String>,
+    #[serde(default)]
+    tool_calls: Option<Vec<Call>>,
+}
+
+#[derive(Deserialize)]
+struct Call {
+    #[serde(default)]
+    index: Option<usize>,
+    #[serde(default)]
+    id: Option<String>,
+    #[serde(default)]
+    function: Option<Function>,
+}
+
+#[derive(Deserialize)]
+struct Function {
+    #[serde(default)]
+    name: Option<String>,
+    #[serde(default)]
+    arguments: Option<Value>,
+}
+
+impl Function {
+    /// Arguments are JSON in a string; some servers send the object itself.
+    fn arguments(&self) -> String {
+        match &self.arguments {
+            Some(Value::String(text)) => text.clone(),
+            Some(Value::Null) | None => String::new(),
+            Some(other) => other.to_string(),
+        }
+    }
+}
+
+/// Collects an answer from pieces.
+#[derive(Default)]
+pub struct Collector {
+    events: Events,
+    whole: Vec<u8>,
+    answer: Answer,
+    problem: Option<String>,
+}
+
+impl Collector {
+    /// Takes a piece of a stream or of a whole answer; says whether the answer is complete.
+    pub fn take(&mut self, is_stream: bool, bytes: &[u8]) -> bool {
+        if !is_stream {
+            self.whole.extend_from_slice(bytes);
+            return false;
+        }
+        for data in self.events.feed(bytes) {
+            if self.event(&data) {
+                return true;
+            }
+        }
+        self.problem.is_some()
+    }
+
+    /// What has been said so far.
+    pub fn text(&self) -> &str {
+        &self.answer.text
+    }
+
+    /// One event's data; says whether it was the last.
+    fn event(&mut self, data: &str) -> bool {
+        if data.trim() == "[DONE]" {
+            self.answer.is_whole = true;
+            return true;
+        }
+        match serde_json::from_str::<Body>(data) {
+            Ok(body) => self.merge(body),
+            Err(_) => self.problem = Some("a piece of the answer is no JSON".into()),
+        }
+        false
+    }
+
+    fn merge(&mut self, body: Body) {
+        if body.error.as_ref().is_some_and(|e| !e.is_null()) {
+            self.problem = Some("the server reports an error in its answer".into());
+        }
+        self.answer.tokens = body.usage.and_then(|u| u.total_tokens).or(self.answer.tokens);
+        let Some(choice) = body.choices.into_iter().next() else { return };
+        if choice.finish_reason.is_some() {
+            self.answer.is_whole = true;
+        }
+        let Some(message) = choice.message else { return };
+        self.answer.text.push_str(message.content.as_deref().unwrap_or_default());
+        for (place, call) in message.tool_calls.unwrap_or_default().into_iter().enumerate() {
+            let at = call.index.unwrap_or(place);
+            if at >= MOST_CALLS {
+                self.problem = Some("the answer has too many calls".into());
+                return;
+            }
+            if self.answer.calls.len() <= at {
+                self.answer.calls.resize(at + 1, RawCall::default());
+            }
+            let Some(slot) = self.answer.calls.get_mut(at) else { return };
+            if let Some(id) = call.id.filter(|id| !id.is_empty()) {
+                slot.id = id;
+            }
+            if let Some(function) = call.function {
+                slot.arguments.push_str(&function.arguments());
+                slot.name.push_str(function.name.as_deref().unwrap_or_default());
+            }
+        }
+    }
+
+    /// The answer.
+    ///
+    /// # Errors
+    /// In words, if it is none or broke off.
+    pub fn finish(mut self, is_stream: bool) -> Result<Answer, String> {
+        if is_stream {
+            if let Some(rest) = self.events.end() {
+                self.event(&rest);
+            }
+        } else {
+            let body: Body = serde_json::from_slice(&self.whole).map_err(|_| "the answer is no JSON of a chat model")?;
+            if body.choices.is_empty() {
+                self.problem = Some("the answer has no choices".into());
+            }
+            self.merge(body);
+            // A whole body is a whole answer.
+            self.answer.is_whole = true;
+        }
+        if let Some(problem) = self.problem {
+            return Err(problem);
+        }
+        if !self.answer.is_whole {
+            return Err("the answer broke off".into());
+        }
+        // Gaps in the numbering are no calls.
+        self.answer.calls.retain(|c| !c.name.is_empty() || !c.arguments.is_empty() || !c.id.is_empty());
+        Ok(self.answer)
+    }
+}
+
+/// The model's turn as it goes back to it.
+pub fn assistant(answer: &Answer) -> Value {
+    let mut message = json!({ "role": "assistant", "content": answer.text });
+    if !answer.calls.is_empty() {
+        let calls = answer.calls.iter().map(|c| {
+            json!({ "id": c.id, "type": "function", "function": { "name": c.name, "arguments": c.arguments } })
+        });
+        message["tool_calls"] = calls.collect();
+    }
+    message
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stream(events: &[&str]) -> Result<Answer, String> {
+        let mut collector = Collector::default();
+        for event in events {
+            collector.take(true, format!("data: {event}\n\n").as_bytes());
+        }
+        collector.finish(true)
+    }
+
+    #[test]
+    fn calls_come_together_from_pieces() {
+        let answer = stream(&[
+            r#"{"choices":[{"delta":{"role":"assistant","content":"On "}}]}"#,
+            r#"{"choices":[{"delta":{"content":"it."}}]}"#,
+            r#"{"choices":[{"delta":{"tool_calls":[{"index":0,"id":"a","function":{"name":"go_to","arguments":"{\"tar"}}]}}]}"#,
+            r#"{"choices":[{"delta":{"tool_calls":[{"index":0,"function":{"arguments":"get\":1}"}}]}}]}"#,
+            r#"{"choices":[{"delta":{},"finish_reason":"tool_calls"}],"usage":{"total_tokens":7}}"#,
+            "[DONE]",
+        ]);
+        let call = RawCall { id: "a".into(), name: "go_to".into(), arguments: r#"{"target":1}"#.into() };
+        let wanted = Answer { text: "On it.".into(), calls: vec![call], tokens: Some(7), is_whole: true };
+        assert_eq!(answer, Ok(wanted));
+    }
+
+    #[test]
+    fn what_breaks_off_is_no_answer() {
+        assert!(stream(&[r#"{"choices":[{"delta":{"content":"On "}}]}"#]).is_err());
+        assert!(stream(&["{\"choices\":", "[DONE]"]).is_err());
+        assert!(stream(&[r#"{"error":{"message":"x"}}"#, "[DONE]"]).is_err());
+        assert!(stream(&[r#"{"choices":[{"delta":{"tool_calls":[{"index":999999999}]}}]}"#, "[DONE]"]).is_err());
+        let whole = |text: &str| {
+            let mut collector = Collector::default();
+            collector.take(false, text.as_bytes());
+            collector.finish(false)
+        };
+        assert!(whole("{").is_err() && whole("{}").is_err() && whole("[]").is_err());
+        let object = r#"{"choices":[{"message":{"content":null,"tool_calls":[{"id":"b","function":{"name":"undo","arguments":{}}}]}}]}"#;
+        let answer = whole(object).expect("an answer");
+        assert_eq!((answer.text.as_str(), answer.calls[0].arguments.as_str()), ("", "{}"));
+    }
+}

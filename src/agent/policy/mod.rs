@@ -1,0 +1,249 @@
+//! What the agent may do and what it refuses: read from `assets/policy.toml` or a file of the user's.
+
+mod physical;
+
+pub use physical::Judgement;
+
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::refusal::{Refusal, RefusalKind};
+use super::tool::{NAMES, ToolCall};
+
+/// The environment variable with the path of a policy that takes the place of the built-in one.
+pub const VARIABLE: &str = "FMLGS_POLICY";
+/// Largest policy file in bytes.
+const MAX_BYTES: u64 = 1 << 20;
+/// The policy that comes with the program.
+const BUILT_IN: &str = include_str!("../../../assets/policy.toml");
+
+/// What a rule decides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Not done.
+    Refuse,
+    /// Done only if the user says yes.
+    Confirm,
+    /// Said along with the answer.
+    Warn,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Tools {
+    allowed: Vec<String>,
+    #[serde(default)]
+    confirm: Vec<String>,
+    #[serde(default)]
+    confirm_overwrite: Vec<String>,
+    #[serde(default)]
+    forbidden: Vec<String>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Words {
+    name: String,
+    words: Vec<String>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Rule {
+    actions: Vec<String>,
+    #[serde(default)]
+    of: Option<String>,
+    #[serde(default)]
+    with: Option<String>,
+    verdict: Verdict,
+    reason: String,
+}
+
+/// What may be done.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Policy {
+    tools: Tools,
+    #[serde(default, rename = "class")]
+    classes: Vec<Words>,
+    #[serde(default, rename = "action")]
+    actions: Vec<Words>,
+    #[serde(default, rename = "rule")]
+    rules: Vec<Rule>,
+    /// Whether physical requests are looked for at all.
+    #[serde(skip, default = "yes")]
+    is_on: bool,
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// Why a policy cannot be used. Without one nothing may be done, so the agent does not start.
+#[derive(Debug, thiserror::Error)]
+pub enum PolicyError {
+    /// The file cannot be read.
+    #[error("{path}: {source}; set {VARIABLE} to a policy file, or to nothing for the built-in one")]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// It is too long.
+    #[error("{0}: a policy has at most {MAX_BYTES} bytes")]
+    TooLong(PathBuf),
+    /// It is no policy.
+    #[error("{place}: {problem}")]
+    Wrong {
+        /// The file, or "built-in policy".
+        place: String,
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+/// Whether a tool may be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Permission {
+    /// It may.
+    Free,
+    /// If the user says yes.
+    Confirm,
+    /// If no file is replaced, or the user says yes.
+    ConfirmOverwrite,
+    /// It may not.
+    Never,
+}
+
+impl Policy {
+    /// The one that comes with the program.
+    ///
+    /// # Errors
+    /// Never, unless the program was built with a broken one.
+    pub fn built_in() -> Result<Self, PolicyError> {
+        Self::parse(BUILT_IN, "built-in policy")
+    }
+
+    /// The file that `FMLGS_POLICY` names, else the built-in one.
+    ///
+    /// # Errors
+    /// If that file cannot be read or is no policy.
+    pub fn from_environment() -> Result<Self, PolicyError> {
+        match std::env::var_os(VARIABLE).filter(|v| !v.is_empty()) {
+            Some(path) => Self::load(Path::new(&path)),
+            None => Self::built_in(),
+        }
+    }
+
+    /// Reads a policy file.
+    ///
+    /// # Errors
+    /// If it cannot be read or is no policy.
+    pub fn load(path: &Path) -> Result<Self, PolicyError> {
+        let failed = |source| PolicyError::File { path: path.into(), source };
+        let mut text = String::new();
+        let read = File::open(path).map_err(failed)?.take(MAX_BYTES + 1).read_to_string(&mut text).map_err(failed)?;
+        if read as u64 > MAX_BYTES {
+            return Err(PolicyError::TooLong(path.into()));
+        }
+        Self::parse(&text, &path.display().to_string())
+    }
+
+    /// Reads a policy; `place` is named in errors.
+    ///
+    /// # Errors
+    /// If it is no policy: broken TOML, or names of tools, classes or actions that are not there.
+    pub fn parse(text: &str, place: &str) -> Result<Self, PolicyError> {
+        let wrong = |problem: String| PolicyError::Wrong { place: place.to_owned(), problem };
+        let policy: Self = toml::from_str(text).map_err(|e| wrong(e.to_string()))?;
+        let tools = &policy.tools;
+        let lists = [&tools.allowed, &tools.confirm, &tools.confirm_overwrite, &tools.forbidden];
+        if let Some(stranger) = lists.into_iter().flatten().find(|t| !NAMES.contains(&t.as_str())) {
+            return Err(wrong(format!("there is no tool '{stranger}'; tools are: {}", NAMES.join(", "))));
+        }
+        for rule in &policy.rules {
+            let known = |list: &[Words], name: &str| list.iter().any(|w| w.name == name);
+            if let Some(name) = rule.actions.iter().find(|a| !known(&policy.actions, a)) {
+                return Err(wrong(format!("a rule names the action '{name}', which is not defined")));
+            }
+            if let Some(name) = [&rule.of, &rule.with].into_iter().flatten().find(|c| !known(&policy.classes, c)) {
+                return Err(wrong(format!("a rule names the class '{name}', which is not defined")));
+            }
+        }
+        Ok(policy)
+    }
+
+    /// One that permits everything and refuses nothing, to show in tests what the policy is for.
+    pub fn off() -> Self {
+        let allowed = NAMES.iter().map(|n| (*n).to_owned()).collect();
+        let tools = Tools { allowed, confirm: Vec::new(), confirm_overwrite: Vec::new(), forbidden: Vec::new() };
+        Self { tools, classes: Vec::new(), actions: Vec::new(), rules: Vec::new(), is_on: false }
+    }
+
+    /// Whether a tool may be used.
+    pub fn permission(&self, tool: &str) -> Permission {
+        let has = |list: &[String]| list.iter().any(|t| t == tool);
+        match &self.tools {
+            t if has(&t.forbidden) || !has(&t.allowed) => Permission::Never,
+            t if has(&t.confirm) => Permission::Confirm,
+            t if has(&t.confirm_overwrite) => Permission::ConfirmOverwrite,
+            _ => Permission::Free,
+        }
+    }
+
+    /// The tools that may be used.
+    pub fn usable(&self) -> impl Iterator<Item = &'static str> + '_ {
+        NAMES.into_iter().filter(|n| self.permission(n) != Permission::Never)
+    }
+
+    /// A refusal, if `call` may never be made.
+    pub fn refusal(&self, call: &ToolCall) -> Option<Refusal> {
+        let never = self.permission(call.name()) == Permission::Never;
+        never.then(|| Refusal::new(RefusalKind::NotPermitted, format!("The policy does not permit '{}'.", call.name())))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_built_in_policy_is_whole() {
+        let policy = Policy::built_in().expect("policy");
+        assert_eq!(policy.permission("remove"), Permission::Confirm);
+        assert_eq!(policy.permission("go_to"), Permission::Free);
+        assert_eq!(policy.permission("export"), Permission::ConfirmOverwrite);
+        assert_eq!(policy.permission("shell"), Permission::Never);
+        assert_eq!(policy.usable().count(), NAMES.len());
+        assert_eq!(Policy::off().permission("remove"), Permission::Free);
+    }
+
+    #[test]
+    fn a_policy_of_ones_own_is_checked() {
+        let own = "[tools]\nallowed = [\"go_to\", \"remove\"]\nforbidden = [\"remove\"]";
+        let policy = Policy::parse(own, "own").expect("policy");
+        assert_eq!((policy.permission("remove"), policy.permission("move")), (Permission::Never, Permission::Never));
+        assert!(policy.refusal(&ToolCall::Undo {}).is_some());
+        for bad in [
+            "",
+            "[tools]",
+            "[tools]\nallowed = [\"fly\"]",
+            "[tools]\nallowed = []\nallow = 3",
+            "[tools]\nallowed = []\n[[rule]]\nactions = [\"pour\"]\nverdict = \"refuse\"\nreason = \"x\"",
+            "[tools]\nallowed = []\n[[rule]]\nactions = []\nof = \"x\"\nverdict = \"refuse\"\nreason = \"x\"",
+            "[tools]\nallowed = []\n[[rule]]\nactions = []\nverdict = \"maybe\"\nreason = \"x\"",
+        ] {
+            assert!(matches!(Policy::parse(bad, "bad"), Err(PolicyError::Wrong { .. })), "{bad}");
+        }
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("policy.toml");
+        assert!(matches!(Policy::load(&path), Err(PolicyError::File { .. })));
+        std::fs::write(&path, "#".repeat(MAX_BYTES as usize + 1)).expect("written");
+        assert!(matches!(Policy::load(&path), Err(PolicyError::TooLong(_))));
+    }
+}

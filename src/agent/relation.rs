@@ -1,0 +1,239 @@
+//! How things stand to each other, judged from their boxes: left of, on, under, near. Pure geometry,
+//! in the frame of the present view and of what is up in the scene.
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use crate::scene::Bounds;
+
+/// How one thing stands to another.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Relation {
+    /// A piece of it. No matter of boxes.
+    #[default]
+    PartOf,
+    /// To its left as seen now.
+    LeftOf,
+    /// To its right as seen now.
+    RightOf,
+    /// Between it and the eye.
+    InFrontOf,
+    /// Beyond it.
+    Behind,
+    /// Standing or lying on it.
+    On,
+    /// Higher than it, over its place.
+    Above,
+    /// Lower than it, in its place.
+    Under,
+    /// Within its box.
+    In,
+    /// Not far from it.
+    Near,
+}
+
+impl Relation {
+    /// All of them.
+    pub const ALL: [Self; 10] = [
+        Self::PartOf,
+        Self::LeftOf,
+        Self::RightOf,
+        Self::InFrontOf,
+        Self::Behind,
+        Self::On,
+        Self::Above,
+        Self::Under,
+        Self::In,
+        Self::Near,
+    ];
+
+    /// As in "a mug ... the laptop".
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::PartOf => "part of",
+            Self::LeftOf => "left of",
+            Self::RightOf => "right of",
+            Self::InFrontOf => "in front of",
+            Self::Behind => "behind",
+            Self::On => "on",
+            Self::Above => "above",
+            Self::Under => "under",
+            Self::In => "in",
+            Self::Near => "near",
+        }
+    }
+}
+
+/// The eye and the scene's up, in world space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// Where the eye is.
+    pub eye: DVec3,
+    /// Where it looks; of any length.
+    pub forward: DVec3,
+    /// What is up in the scene; of any length.
+    pub up: DVec3,
+}
+
+/// Unit axes of a view that stand upright: to the right, up, and ahead.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame {
+    /// To the right.
+    pub right: DVec3,
+    /// Up in the scene.
+    pub up: DVec3,
+    /// Ahead, level with the ground.
+    pub ahead: DVec3,
+}
+
+impl View {
+    /// Its upright axes. A view straight up or down, or without a direction, has some level axis.
+    pub fn frame(&self) -> Frame {
+        let up = self.up.try_normalize().unwrap_or(DVec3::Z);
+        let level = self.forward.try_normalize().map(|f| f - up * f.dot(up)).filter(|l| l.length() > 1e-3);
+        let ahead = level.and_then(DVec3::try_normalize).unwrap_or_else(|| up.any_orthonormal_vector());
+        Frame { right: ahead.cross(up), up, ahead }
+    }
+}
+
+/// From where to where a box reaches along a unit axis.
+pub fn span(bounds: &Bounds, axis: DVec3) -> (f64, f64) {
+    let (middle, reach) = (bounds.center().dot(axis), (bounds.size() * 0.5).dot(axis.abs()));
+    (middle - reach, middle + reach)
+}
+
+/// Distance between two boxes; 0 if they touch.
+pub fn gap(a: &Bounds, b: &Bounds) -> f64 {
+    (a.min - b.max).max(b.min - a.max).max(DVec3::ZERO).length()
+}
+
+/// How well `thing` stands in `relation` to `anchor`: a distance, smaller is better; `None` if it
+/// does not. [`Relation::PartOf`] never holds here.
+pub fn fit(relation: Relation, thing: &Bounds, anchor: &Bounds, frame: &Frame) -> Option<f64> {
+    let distance = gap(thing, anchor);
+    let holds = match relation {
+        Relation::PartOf => false,
+        Relation::LeftOf => beside(thing, anchor, -frame.right, [frame.ahead, frame.up]),
+        Relation::RightOf => beside(thing, anchor, frame.right, [frame.ahead, frame.up]),
+        Relation::InFrontOf => beside(thing, anchor, -frame.ahead, [frame.right, frame.up]),
+        Relation::Behind => beside(thing, anchor, frame.ahead, [frame.right, frame.up]),
+        Relation::On => is_on(thing, anchor, frame),
+        Relation::Above => {
+            let (t, a) = (span(thing, frame.up), span(anchor, frame.up));
+            is_over(thing, anchor, frame, 0.5) && t.0 >= a.1 - 0.25 * (t.1 - t.0)
+        }
+        Relation::Under => {
+            let (t, a) = (span(thing, frame.up), span(anchor, frame.up));
+            let lower = t.1 <= a.1 - 0.2 * (a.1 - a.0) && t.0 + t.1 < a.0 + a.1 + 0.2 * (a.1 - a.0);
+            is_over(thing, anchor, frame, 0.0) && (lower || t.1 <= a.0 + 0.25 * (t.1 - t.0))
+        }
+        Relation::In => {
+            let middle = thing.center();
+            let inside = middle.cmpge(anchor.min).all() && middle.cmple(anchor.max).all();
+            inside && thing.radius() < anchor.radius()
+        }
+        Relation::Near => distance <= 1.5 * anchor.radius().max(thing.radius()) && thing != anchor,
+    };
+    holds.then_some(distance)
+}
+
+/// Whether a thing is off to one side: past most of the anchor, and more to the side than any other
+/// way.
+fn beside(thing: &Bounds, anchor: &Bounds, side: DVec3, across: [DVec3; 2]) -> bool {
+    let (t, a) = (span(thing, side), span(anchor, side));
+    let middle = 0.5 * (t.0 + t.1);
+    let offset = middle - 0.5 * (a.0 + a.1);
+    let apart = |axis: DVec3| {
+        let (t, a) = (span(thing, axis), span(anchor, axis));
+        (t.0 - a.1).max(a.0 - t.1).max(0.0)
+    };
+    // What reaches back past the anchor's middle, such as the table under it, is not beside it.
+    let past = middle > a.1 - 0.25 * (a.1 - a.0) && t.0 >= 0.5 * (a.0 + a.1);
+    past && offset > 0.0 && across.iter().all(|axis| apart(*axis) <= 1.5 * offset)
+}
+
+/// Whether the thing's middle is over the anchor's footprint, widened by a share of it.
+fn is_over(thing: &Bounds, anchor: &Bounds, frame: &Frame, widened: f64) -> bool {
+    [frame.right, frame.ahead].iter().all(|axis| {
+        let (t, a) = (span(thing, *axis), span(anchor, *axis));
+        let (middle, more) = (0.5 * (t.0 + t.1), widened * (a.1 - a.0));
+        middle >= a.0 - more && middle <= a.1 + more
+    })
+}
+
+/// Whether the thing rests on the anchor: over it, its bottom about where the anchor's top is.
+fn is_on(thing: &Bounds, anchor: &Bounds, frame: &Frame) -> bool {
+    let (t, a) = (span(thing, frame.up), span(anchor, frame.up));
+    let (height, under) = (t.1 - t.0, a.1 - a.0);
+    let gap = t.0 - a.1;
+    is_over(thing, anchor, frame, 0.0) && gap >= -0.35 * height - 0.05 * under && gap <= 0.3 * height + 0.02 * under
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cube(center: [f64; 3], size: [f64; 3]) -> Bounds {
+        let (c, h) = (DVec3::from(center), DVec3::from(size) * 0.5);
+        Bounds { min: c - h, max: c + h }
+    }
+
+    fn holds(relation: Relation, thing: &Bounds, anchor: &Bounds, view: &View) -> bool {
+        fit(relation, thing, anchor, &view.frame()).is_some()
+    }
+
+    #[test]
+    fn sides_are_those_of_the_view() {
+        let view = View { eye: DVec3::new(0.0, -3.0, 1.0), forward: DVec3::new(0.0, 1.0, -0.3), up: DVec3::Z };
+        assert!((view.frame().right - DVec3::X).length() < 1e-9);
+        let (laptop, mug) = (cube([0.0; 3], [0.4, 0.3, 0.2]), cube([-0.4, 0.0, 0.0], [0.1; 3]));
+        assert!(holds(Relation::LeftOf, &mug, &laptop, &view) && !holds(Relation::RightOf, &mug, &laptop, &view));
+        assert!(holds(Relation::RightOf, &laptop, &mug, &view) && !holds(Relation::InFrontOf, &mug, &laptop, &view));
+        let turned = View { forward: -view.forward, ..view };
+        assert!(holds(Relation::RightOf, &mug, &laptop, &turned), "seen from the other side");
+        let from_left = View { forward: DVec3::X, ..view };
+        assert!(holds(Relation::InFrontOf, &mug, &laptop, &from_left));
+        assert!(holds(Relation::Behind, &laptop, &mug, &from_left));
+        let far = cube([-0.4, 9.0, 0.0], [0.1; 3]);
+        assert!(!holds(Relation::LeftOf, &far, &laptop, &view), "more behind than left");
+        assert!(fit(Relation::PartOf, &mug, &laptop, &view.frame()).is_none());
+    }
+
+    #[test]
+    fn above_and_below_follow_the_scenes_up() {
+        let view = View { eye: DVec3::ZERO, forward: DVec3::Z, up: DVec3::NEG_Y };
+        // y points down: the table's top is at y = 0, its feet at y = 0.8.
+        let table = cube([0.0, 0.4, 2.0], [1.6, 0.8, 0.8]);
+        let mug = cube([0.3, -0.05, 2.1], [0.1, 0.1, 0.1]);
+        let lamp = cube([0.3, -1.0, 2.1], [0.2, 0.2, 0.2]);
+        let ball = cube([0.0, 0.7, 2.0], [0.2, 0.2, 0.2]);
+        let chair = cube([2.0, 0.3, 2.0], [0.5, 1.0, 0.5]);
+        assert!(holds(Relation::On, &mug, &table, &view) && !holds(Relation::On, &lamp, &table, &view));
+        assert!(!holds(Relation::On, &ball, &table, &view) && !holds(Relation::On, &chair, &table, &view));
+        assert!(holds(Relation::Above, &lamp, &table, &view) && holds(Relation::Above, &lamp, &mug, &view));
+        assert!(holds(Relation::Under, &ball, &table, &view) && holds(Relation::Under, &table, &mug, &view));
+        assert!(!holds(Relation::Under, &mug, &table, &view) && holds(Relation::Under, &mug, &lamp, &view));
+        assert!(holds(Relation::Near, &mug, &lamp, &view) || gap(&mug, &lamp) > 0.0);
+        assert!(!holds(Relation::Near, &mug, &chair, &view));
+        let spoon = cube([0.3, -0.05, 2.1], [0.02, 0.02, 0.02]);
+        assert!(holds(Relation::In, &spoon, &mug, &view) && !holds(Relation::In, &mug, &spoon, &view));
+        assert!(!holds(Relation::Near, &mug, &mug, &view));
+    }
+
+    #[test]
+    fn broken_views_and_boxes_give_no_nonsense() {
+        let view = View { eye: DVec3::ZERO, forward: DVec3::Z, up: DVec3::Z };
+        let frame = view.frame();
+        assert!(frame.right.is_normalized() && frame.ahead.is_normalized());
+        let nothing = View { eye: DVec3::ZERO, forward: DVec3::ZERO, up: DVec3::ZERO }.frame();
+        assert!(nothing.right.is_normalized());
+        let point = cube([0.0; 3], [0.0; 3]);
+        for relation in Relation::ALL {
+            let found = fit(relation, &point, &point, &frame);
+            assert!(found.is_none_or(f64::is_finite), "{relation:?}");
+        }
+        let lost = Bounds { min: DVec3::NAN, max: DVec3::NAN };
+        assert!(fit(Relation::LeftOf, &lost, &point, &frame).is_none());
+    }
+}

@@ -1,0 +1,359 @@
+//! A talk with the agent: requests in, calls checked and done, questions and answers kept.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::answer::{Choice, Confirmation, choice, confirmation};
+use super::event::AgentEvent;
+use super::execute::{Checked, Outcome, check, perform};
+use super::focus::Focus;
+use super::planner::{Desk, Planner, Step};
+use super::policy::{Judgement, Policy};
+use super::refusal::{Refusal, RefusalKind};
+use super::tool::ToolCall;
+use super::transcript::{Transcript, What};
+use super::words::MAX_CHARS;
+use super::world::World;
+use crate::scene::IdentityId;
+
+/// Calls that one request may lead to.
+pub const MOST_CALLS: usize = 24;
+/// How often in a row the same call may be made.
+const MOST_ALIKE: usize = 5;
+
+/// What the session waits for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Awaited {
+    /// A yes or a no.
+    Confirmation,
+    /// Which of the candidates is meant.
+    Choice,
+}
+
+/// What the agent answers.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Reply {
+    /// In plain words.
+    pub text: String,
+    /// What can be chosen, or what comes near; may be empty.
+    pub candidates: Vec<IdentityId>,
+    /// Why the request was not carried out, if it was not.
+    pub refused: Option<Refusal>,
+    /// What the session waits for, if it does.
+    pub pending: Option<Awaited>,
+}
+
+/// A question to the user that is open.
+enum Pending {
+    /// This waits for a yes.
+    Confirm { call: ToolCall, ids: Vec<IdentityId> },
+    /// A request waits for a yes before it is planned.
+    Request(String),
+    /// This waits for a target. A model's own question has no call.
+    Choose { call: Option<ToolCall>, candidates: Vec<IdentityId>, question: String },
+}
+
+/// A talk with the agent.
+pub struct Session {
+    policy: Policy,
+    planner: Box<dyn Planner>,
+    focus: Focus,
+    pending: Option<Pending>,
+    transcript: Transcript,
+}
+
+/// Where a session's loop tells what goes on, and hears that it is to end.
+struct Line<'a> {
+    on: &'a mut dyn FnMut(AgentEvent),
+    cancel: &'a AtomicBool,
+}
+
+impl Session {
+    /// A talk that keeps to `policy`, planned by `planner`.
+    pub fn new(policy: Policy, planner: Box<dyn Planner>) -> Self {
+        Self { policy, planner, focus: Focus::default(), pending: None, transcript: Transcript::default() }
+    }
+
+    /// Everything that was said and done.
+    pub fn transcript(&self) -> &Transcript {
+        &self.transcript
+    }
+
+    /// The planner's name.
+    pub fn planner(&self) -> &'static str {
+        self.planner.name()
+    }
+
+    /// What was spoken of last.
+    pub fn focus(&self) -> &Focus {
+        &self.focus
+    }
+
+    /// Tells the session that the user has chosen this by other means, so that "it" means it.
+    pub fn point_at(&mut self, id: IdentityId) {
+        self.focus.last = Some(id);
+        self.focus.group.clear();
+    }
+
+    /// What the session waits for.
+    pub fn awaited(&self) -> Option<Awaited> {
+        self.pending.as_ref().map(|p| match p {
+            Pending::Confirm { .. } | Pending::Request(_) => Awaited::Confirmation,
+            Pending::Choose { .. } => Awaited::Choice,
+        })
+    }
+
+    /// Carries out what `text` asks for. `on` is told what goes on; `cancel` ends it after the
+    /// call that is under way.
+    pub fn say(
+        &mut self,
+        world: &mut dyn World,
+        text: &str,
+        on: &mut dyn FnMut(AgentEvent),
+        cancel: &AtomicBool,
+    ) -> Reply {
+        let text = self.planner.redact(text);
+        self.transcript.add(What::User { text: text.chars().take(2 * MAX_CHARS).collect() });
+        let mut line = Line { on, cancel };
+        let mut reply = self.answer(world, &text, &mut line);
+        reply.text = self.planner.redact(&reply.text);
+        reply.pending = self.awaited();
+        self.transcript.add(What::Reply { text: reply.text.clone() });
+        reply
+    }
+
+    fn answer(&mut self, world: &mut dyn World, text: &str, line: &mut Line<'_>) -> Reply {
+        if !text.chars().any(char::is_alphanumeric) {
+            return self.refuse(RefusalKind::Unclear, "Tell me what you would like to see, such as 'show me the lamp'.");
+        }
+        if text.chars().count() > MAX_CHARS {
+            let text = format!("That is too long for me: say it in fewer than {MAX_CHARS} characters.");
+            return self.refuse(RefusalKind::Unclear, &text);
+        }
+        match self.pending.take() {
+            Some(Pending::Confirm { call, ids }) => match confirmation(text) {
+                Confirmation::Yes => return self.confirmed(world, call, ids, line),
+                Confirmation::No => return self.refuse(RefusalKind::Stopped, "All right, I leave it as it is."),
+                Confirmation::Neither => self.note("no yes", "The open question is dropped: something else was said."),
+            },
+            Some(Pending::Request(request)) => match confirmation(text) {
+                Confirmation::Yes => return self.plan(world, &request, line),
+                Confirmation::No => return self.refuse(RefusalKind::Stopped, "All right, I leave it."),
+                Confirmation::Neither => self.note("no yes", "The open question is dropped: something else was said."),
+            },
+            Some(Pending::Choose { call, candidates, question }) => {
+                self.focus.group.clone_from(&candidates);
+                match choice(world, text, &candidates, &self.focus) {
+                    Choice::One(id) => return self.chosen(world, call, id, text, line),
+                    Choice::None => return self.refuse(RefusalKind::Stopped, "All right, never mind."),
+                    // What a planner asked, it hears the answer to.
+                    Choice::Unclear(_) if call.is_none() => {}
+                    Choice::Unclear(refusal) => {
+                        let reply = Reply {
+                            text: format!("{} {question}", refusal.text),
+                            candidates: candidates.clone(),
+                            ..Reply::default()
+                        };
+                        self.note("still open", &refusal.text);
+                        self.pending = Some(Pending::Choose { call, candidates, question });
+                        return reply;
+                    }
+                    Choice::Else => {}
+                }
+            }
+            None => {}
+        }
+        match self.policy.judge(text, world.identities()) {
+            Judgement::Fine => self.plan(world, text, line),
+            Judgement::Refused(refusal) => self.refuse(refusal.kind, &refusal.text),
+            Judgement::Confirm(reason) => {
+                self.pending = Some(Pending::Request(text.to_owned()));
+                Reply { text: format!("{reason} Go on all the same? (yes or no)"), ..Reply::default() }
+            }
+        }
+    }
+
+    /// A new request: the outer loop.
+    fn plan(&mut self, world: &mut dyn World, text: &str, line: &mut Line<'_>) -> Reply {
+        let (focus, policy) = (&self.focus, &self.policy);
+        self.planner.start(text, &mut Desk { world: &mut *world, focus, policy, on: &mut *line.on, cancel: line.cancel });
+        self.run(world, None, line)
+    }
+
+    fn confirmed(&mut self, world: &mut dyn World, call: ToolCall, ids: Vec<IdentityId>, line: &mut Line<'_>) -> Reply {
+        // The scene may have changed since the question.
+        let outcome = match check(world, &call, &self.policy, &self.focus, true) {
+            Checked::Ready { call, note, .. } => self.perform(world, call, ids, &note, line),
+            Checked::Refused { refusal, .. } => self.refused_call(call, refusal, line),
+            Checked::Choose { question, .. } | Checked::Confirm { question, .. } => {
+                self.refused_call(call, Refusal::new(RefusalKind::Unclear, question), line)
+            }
+        };
+        self.run(world, Some(outcome), line)
+    }
+
+    fn chosen(
+        &mut self,
+        world: &mut dyn World,
+        call: Option<ToolCall>,
+        id: IdentityId,
+        text: &str,
+        line: &mut Line<'_>,
+    ) -> Reply {
+        let Some(call) = call else {
+            // The planner asked: it hears the answer as it was given.
+            self.focus.last = Some(id);
+            return self.plan(world, text, line);
+        };
+        let call = call.with_target(super::tool::Target::Identity(id));
+        match self.attempt(world, call, line) {
+            Ok(outcome) => self.run(world, Some(outcome), line),
+            Err(reply) => *reply,
+        }
+    }
+
+    /// The inner loop: one call after another, each planned after the last one's result.
+    fn run(&mut self, world: &mut dyn World, first: Option<Outcome>, line: &mut Line<'_>) -> Reply {
+        let mut outcomes: Vec<Outcome> = first.into_iter().collect();
+        let mut alike = (None, 0);
+        for calls in 0.. {
+            if line.cancel.load(Ordering::Relaxed) {
+                return self.ended(&outcomes, Refusal::new(RefusalKind::Stopped, "Stopped."));
+            }
+            if calls >= MOST_CALLS {
+                let text = format!("I stopped after {MOST_CALLS} steps; ask for less at once.");
+                return self.ended(&outcomes, Refusal::new(RefusalKind::Limit, text));
+            }
+            let (focus, policy) = (&self.focus, &self.policy);
+            let mut desk = Desk { world: &mut *world, focus, policy, on: &mut *line.on, cancel: line.cancel };
+            let call = match self.planner.next(outcomes.last(), &mut desk) {
+                Ok(Step::Call(call)) => call,
+                Ok(Step::Finish { text, refusal }) => return self.finished(&outcomes, text, refusal),
+                Err(refusal) => return self.ended(&outcomes, refusal),
+            };
+            alike = if alike.0.as_ref() == Some(&call) { (alike.0, alike.1 + 1) } else { (Some(call.clone()), 1) };
+            if alike.1 > MOST_ALIKE {
+                let text = "I stopped: the same step came again and again.";
+                return self.ended(&outcomes, Refusal::new(RefusalKind::Limit, text));
+            }
+            match self.attempt(world, call, line) {
+                Ok(outcome) => outcomes.push(outcome),
+                Err(mut reply) => {
+                    let done: Vec<&str> =
+                        outcomes.iter().filter(|o| o.refused.is_none()).map(|o| o.text.as_str()).collect();
+                    if !done.is_empty() {
+                        reply.text = format!("{} {}", done.join(" "), reply.text);
+                    }
+                    return *reply;
+                }
+            }
+        }
+        Reply::default()
+    }
+
+    /// Checks a call and makes it. `Err` is the reply that asks the user.
+    fn attempt(&mut self, world: &mut dyn World, call: ToolCall, line: &mut Line<'_>) -> Result<Outcome, Box<Reply>> {
+        let said = call.line(world.identities());
+        self.transcript.add(What::Call { call: call.clone(), line: said });
+        if let ToolCall::AskUser { question, candidates } = &call {
+            if let Some(refusal) = self.policy.refusal(&call) {
+                return Ok(self.refused_call(call, refusal, line));
+            }
+            let there: Vec<IdentityId> = candidates.iter().copied().filter(|id| world.facts(*id).is_some()).collect();
+            let reply = Reply { text: question.clone(), candidates: there.clone(), ..Reply::default() };
+            self.pending = Some(Pending::Choose { call: None, candidates: there, question: question.clone() });
+            return Err(Box::new(reply));
+        }
+        match check(world, &call, &self.policy, &self.focus, false) {
+            Checked::Ready { call, ids, note } => Ok(self.perform(world, call, ids, &note, line)),
+            Checked::Refused { refusal, near } => {
+                let mut outcome = self.refused_call(call, refusal, line);
+                outcome.ids = near;
+                Ok(outcome)
+            }
+            Checked::Choose { question, candidates } => {
+                self.note("ambiguous", &question);
+                let reply = Reply { text: question.clone(), candidates: candidates.clone(), ..Reply::default() };
+                self.pending = Some(Pending::Choose { call: Some(call), candidates, question });
+                Err(Box::new(reply))
+            }
+            Checked::Confirm { question, call, ids } => {
+                self.note("needs a yes", &question);
+                self.focus.last = ids.first().copied().or(self.focus.last);
+                let reply = Reply { text: question, candidates: ids.clone(), ..Reply::default() };
+                self.pending = Some(Pending::Confirm { call, ids });
+                Err(Box::new(reply))
+            }
+        }
+    }
+
+    fn perform(
+        &mut self,
+        world: &mut dyn World,
+        call: ToolCall,
+        ids: Vec<IdentityId>,
+        note: &str,
+        line: &mut Line<'_>,
+    ) -> Outcome {
+        let said = call.line(world.identities());
+        (line.on)(AgentEvent::Call { call: call.clone(), line: said.clone() });
+        let outcome = perform(world, call, ids, note, &mut self.focus);
+        let done = outcome.refused.is_none();
+        (line.on)(AgentEvent::Result { text: outcome.text.clone(), done });
+        self.transcript.add(What::Result {
+            call: outcome.call.clone(),
+            line: said,
+            text: outcome.text.clone(),
+            done,
+        });
+        outcome
+    }
+
+    /// A call that a check has stopped.
+    fn refused_call(&mut self, call: ToolCall, refusal: Refusal, line: &mut Line<'_>) -> Outcome {
+        self.note("refused", &refusal.text);
+        (line.on)(AgentEvent::Result { text: refusal.text.clone(), done: false });
+        Outcome { call, ids: Vec::new(), text: refusal.text, refused: Some(refusal.kind) }
+    }
+
+    fn note(&mut self, verdict: &str, text: &str) {
+        self.transcript.add(What::Check { verdict: verdict.into(), text: text.into() });
+    }
+
+    fn refuse(&mut self, kind: RefusalKind, text: &str) -> Reply {
+        self.note("refused", text);
+        Reply { text: text.into(), refused: Some(Refusal::new(kind, text)), ..Reply::default() }
+    }
+
+    /// The reply when a planner is through.
+    fn finished(&mut self, outcomes: &[Outcome], text: String, refusal: Option<Refusal>) -> Reply {
+        let failed = outcomes.iter().rev().find_map(|o| Some((o, o.refused?)));
+        let refused = refusal.or_else(|| {
+            // What a planner got over is no refusal of the request.
+            let last = outcomes.last().filter(|o| o.refused.is_some())?;
+            Some(Refusal::new(last.refused?, last.text.clone()))
+        });
+        let mut said: Vec<&str> = if self.planner.speaks() && !text.is_empty() {
+            Vec::new()
+        } else {
+            outcomes.iter().map(|o| o.text.as_str()).collect()
+        };
+        if let Some(refusal) = refused.as_ref().filter(|r| said.last() != Some(&r.text.as_str()) && text != r.text) {
+            said.push(&refusal.text);
+        }
+        if !text.is_empty() {
+            said.push(&text);
+        }
+        let text = said.join(" ");
+        let near = failed.filter(|_| refused.is_some()).map(|(o, _)| o.ids.clone());
+        let candidates = near.unwrap_or_else(|| outcomes.last().map(|o| o.ids.clone()).unwrap_or_default());
+        Reply { text, candidates, refused, pending: None }
+    }
+
+    /// The reply when a planner could not go on.
+    fn ended(&mut self, outcomes: &[Outcome], refusal: Refusal) -> Reply {
+        self.note("ended", &refusal.text);
+        let mut said: Vec<&str> = outcomes.iter().map(|o| o.text.as_str()).collect();
+        said.push(&refusal.text);
+        Reply { text: said.join(" "), refused: Some(refusal.clone()), ..Reply::default() }
+    }
+}

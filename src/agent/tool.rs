@@ -1,0 +1,470 @@
+//! What the agent can do: one closed enum. Whatever a planner says, only these happen.
+
+use serde::{Deserialize, Serialize};
+
+use super::relation::Relation;
+use super::wish::{self, Direction, Distance, Side, TurnWay};
+use crate::pipeline::semantics::grammar::Kind;
+use crate::scene::{Identities, IdentityId, Level};
+
+/// Longest text in a call, in characters.
+pub const MAX_TEXT: usize = 300;
+
+/// Which thing is meant.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Target {
+    /// By its number.
+    Identity(IdentityId),
+    /// In words, such as "the handle of the mug left of the laptop".
+    Query(String),
+}
+
+impl Target {
+    /// In words.
+    pub fn query(words: impl Into<String>) -> Self {
+        Self::Query(words.into())
+    }
+}
+
+/// Which level to look at.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LevelWish {
+    /// Objects and parts.
+    #[default]
+    Any,
+    /// Whole objects.
+    Object,
+    /// Parts.
+    Part,
+}
+
+impl LevelWish {
+    /// As queries have it.
+    pub fn kind(self) -> Kind {
+        match self {
+            Self::Any => Kind::Auto,
+            Self::Object => Kind::Object,
+            Self::Part => Kind::Part,
+        }
+    }
+
+    /// Whether an identity of `level` is asked for.
+    pub fn takes(self, level: Level) -> bool {
+        match self {
+            Self::Any => true,
+            Self::Object => level == Level::Object,
+            Self::Part => level == Level::Part,
+        }
+    }
+}
+
+/// One thing to do.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "name", content = "arguments", rename_all = "snake_case", deny_unknown_fields)]
+pub enum ToolCall {
+    /// Find what words mean, and mark it in the view.
+    Locate {
+        /// The words.
+        query: String,
+        /// Object or part.
+        #[serde(default)]
+        kind: LevelWish,
+    },
+    /// Fly to a target.
+    GoTo {
+        /// Which.
+        target: Target,
+        /// From where to look at it.
+        #[serde(default)]
+        side: Side,
+        /// 1 as usual, 2 twice as close, 0.5 from twice as far.
+        #[serde(default = "wish::normal", deserialize_with = "wish::closeness")]
+        closeness: f64,
+    },
+    /// Turn towards a target without moving.
+    LookAt {
+        /// Which.
+        target: Target,
+    },
+    /// Move the eye.
+    Move {
+        /// Where to.
+        direction: Direction,
+        /// How far.
+        #[serde(default)]
+        distance: Distance,
+    },
+    /// Turn the eye.
+    Turn {
+        /// Where to.
+        direction: TurnWay,
+        /// By how much, in degrees, above 0 to 360.
+        degrees: f64,
+    },
+    /// Draw one thing alone.
+    Isolate {
+        /// Which.
+        target: Target,
+    },
+    /// Mark a thing in the view.
+    Highlight {
+        /// Which.
+        target: Target,
+    },
+    /// Leave a thing out of the picture.
+    Hide {
+        /// Which.
+        target: Target,
+    },
+    /// Draw a hidden thing again.
+    Unhide {
+        /// Which.
+        target: Target,
+    },
+    /// Draw everything again.
+    ShowAll {},
+    /// Take a thing out of the scene.
+    Remove {
+        /// Which.
+        target: Target,
+    },
+    /// Give a thing another name.
+    Rename {
+        /// Which.
+        target: Target,
+        /// The new name.
+        name: String,
+    },
+    /// Tell about a thing, or about what is in the view.
+    Describe {
+        /// Which; none for the view.
+        #[serde(default)]
+        target: Option<Target>,
+    },
+    /// List or count things.
+    List {
+        /// Objects or parts.
+        #[serde(default)]
+        level: LevelWish,
+        /// Only what stands in `relation` to this.
+        #[serde(default)]
+        of: Option<Target>,
+        /// How it stands to `of`.
+        #[serde(default)]
+        relation: Relation,
+        /// Only what is called like this.
+        #[serde(default)]
+        named: Option<String>,
+    },
+    /// Size of a thing, or its distance.
+    Measure {
+        /// Which.
+        target: Target,
+        /// Distance to what, in place of its size.
+        #[serde(default)]
+        to: Option<Reference>,
+    },
+    /// Ask the user.
+    AskUser {
+        /// What.
+        question: String,
+        /// Numbers of the identities that can be chosen from; may be empty.
+        #[serde(default)]
+        candidates: Vec<IdentityId>,
+    },
+    /// Take back the last change.
+    Undo {},
+    /// Write the Gaussians of a thing to a file.
+    Export {
+        /// Which.
+        target: Target,
+    },
+}
+
+/// From what a distance is measured.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reference {
+    /// The viewer's eye.
+    Eye,
+    /// Another thing.
+    Thing(Target),
+}
+
+/// Why something is no call.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ToolError {
+    /// No such tool.
+    #[error("there is no tool '{0}'")]
+    Unknown(String),
+    /// Arguments of another kind than the tool's.
+    #[error("wrong arguments for '{tool}': {problem}")]
+    Arguments {
+        /// The tool.
+        tool: String,
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+/// Names of all tools, in the order of [`ToolCall`].
+pub const NAMES: [&str; 18] = [
+    "locate",
+    "go_to",
+    "look_at",
+    "move",
+    "turn",
+    "isolate",
+    "highlight",
+    "hide",
+    "unhide",
+    "show_all",
+    "remove",
+    "rename",
+    "describe",
+    "list",
+    "measure",
+    "ask_user",
+    "undo",
+    "export",
+];
+
+impl ToolCall {
+    /// Reads a call from a tool's name and its arguments as JSON.
+    ///
+    /// # Errors
+    /// If there is no such tool, or the arguments are not its own.
+    pub fn parse(name: &str, arguments: &str) -> Result<Self, ToolError> {
+        if !NAMES.contains(&name) {
+            return Err(ToolError::Unknown(name.chars().take(60).collect()));
+        }
+        let wrong = |problem: String| ToolError::Arguments { tool: name.into(), problem };
+        let given = if arguments.trim().is_empty() { "{}" } else { arguments };
+        let given: serde_json::Value =
+            serde_json::from_str(given).map_err(|e| wrong(format!("they are no JSON ({e})")))?;
+        if !given.is_object() {
+            return Err(wrong("they must be a JSON object".into()));
+        }
+        let whole = serde_json::json!({ "name": name, "arguments": given });
+        let call: Self = serde_json::from_value(whole).map_err(|e| wrong(e.to_string()))?;
+        call.sound().map_err(wrong)?;
+        Ok(call)
+    }
+
+    /// Whether the numbers and texts can be used.
+    ///
+    /// # Errors
+    /// In words, if not.
+    pub fn sound(&self) -> Result<(), String> {
+        match self {
+            Self::Move { distance, .. } if !distance.is_sound() => {
+                return Err(format!("the distance must be above 0 and at most {}", wish::FARTHEST));
+            }
+            Self::Turn { degrees, .. } if !(*degrees > 0.0 && *degrees <= 360.0) => {
+                return Err("degrees must be above 0 and at most 360".into());
+            }
+            Self::GoTo { closeness, .. } if !wish::CLOSENESS.contains(closeness) => {
+                return Err("closeness must be between 0.1 and 10".into());
+            }
+            _ => {}
+        }
+        let texts = [
+            match self {
+                Self::Locate { query, .. } => Some(query),
+                Self::Rename { name, .. } => Some(name),
+                Self::AskUser { question, .. } => Some(question),
+                Self::List { named, .. } => named.as_ref(),
+                _ => None,
+            },
+            match self.target() {
+                Some(Target::Query(query)) => Some(query),
+                _ => None,
+            },
+        ];
+        for text in texts.into_iter().flatten() {
+            if text.trim().is_empty() {
+                return Err("a text is empty".into());
+            }
+            if text.chars().count() > MAX_TEXT {
+                return Err(format!("a text is longer than {MAX_TEXT} characters"));
+            }
+        }
+        Ok(())
+    }
+
+    /// The tool's name.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Locate { .. } => "locate",
+            Self::GoTo { .. } => "go_to",
+            Self::LookAt { .. } => "look_at",
+            Self::Move { .. } => "move",
+            Self::Turn { .. } => "turn",
+            Self::Isolate { .. } => "isolate",
+            Self::Highlight { .. } => "highlight",
+            Self::Hide { .. } => "hide",
+            Self::Unhide { .. } => "unhide",
+            Self::ShowAll {} => "show_all",
+            Self::Remove { .. } => "remove",
+            Self::Rename { .. } => "rename",
+            Self::Describe { .. } => "describe",
+            Self::List { .. } => "list",
+            Self::Measure { .. } => "measure",
+            Self::AskUser { .. } => "ask_user",
+            Self::Undo {} => "undo",
+            Self::Export { .. } => "export",
+        }
+    }
+
+    /// What it is done to.
+    pub fn target(&self) -> Option<&Target> {
+        match self {
+            Self::GoTo { target, .. }
+            | Self::LookAt { target }
+            | Self::Isolate { target }
+            | Self::Highlight { target }
+            | Self::Hide { target }
+            | Self::Unhide { target }
+            | Self::Remove { target }
+            | Self::Rename { target, .. }
+            | Self::Measure { target, .. }
+            | Self::Export { target } => Some(target),
+            Self::Describe { target } | Self::List { of: target, .. } => target.as_ref(),
+            Self::Locate { .. }
+            | Self::Move { .. }
+            | Self::Turn { .. }
+            | Self::ShowAll {}
+            | Self::AskUser { .. }
+            | Self::Undo {} => None,
+        }
+    }
+
+    /// The same done to another target; itself if it has none. What was located is then known.
+    #[must_use]
+    pub fn with_target(&self, new: Target) -> Self {
+        let mut call = self.clone();
+        match &mut call {
+            Self::GoTo { target, .. }
+            | Self::LookAt { target }
+            | Self::Isolate { target }
+            | Self::Highlight { target }
+            | Self::Hide { target }
+            | Self::Unhide { target }
+            | Self::Remove { target }
+            | Self::Rename { target, .. }
+            | Self::Measure { target, .. }
+            | Self::Export { target } => *target = new,
+            Self::Describe { target } | Self::List { of: target, .. } => *target = Some(new),
+            Self::Locate { .. } => return Self::Highlight { target: new },
+            Self::Move { .. } | Self::Turn { .. } | Self::ShowAll {} | Self::AskUser { .. } | Self::Undo {} => {}
+        }
+        call
+    }
+
+    /// In one line for people, with names in place of numbers.
+    pub fn line(&self, identities: &Identities) -> String {
+        let name = |target: &Target| match target {
+            Target::Identity(id) => identities.full_name(*id),
+            Target::Query(words) => format!("\"{words}\""),
+        };
+        let mut parts: Vec<String> = self.target().map(name).into_iter().collect();
+        match self {
+            Self::Locate { query, kind } => {
+                parts.push(format!("\"{query}\""));
+                match kind {
+                    LevelWish::Any => {}
+                    LevelWish::Object => parts.push("object".into()),
+                    LevelWish::Part => parts.push("part".into()),
+                }
+            }
+            Self::GoTo { side, closeness, .. } => {
+                if *side != Side::Same {
+                    parts.push(format!("from {}", side.text()));
+                }
+                if *closeness > wish::NORMAL {
+                    parts.push("closer".into());
+                } else if *closeness < wish::NORMAL {
+                    parts.push("farther".into());
+                }
+            }
+            Self::Move { direction, distance } => {
+                parts.push(direction.text().into());
+                match distance {
+                    Distance::Metres(m) => parts.push(format!("{} m", short(*m))),
+                    Distance::Relative(r) => parts.push(format!("{} steps", short(*r))),
+                    Distance::Default => {}
+                }
+            }
+            Self::Turn { direction, degrees } => {
+                parts.extend([direction.text().into(), format!("{} degrees", short(*degrees))]);
+            }
+            Self::Rename { name, .. } => parts.push(format!("\"{name}\"")),
+            Self::List { level, relation, named, of } => {
+                if of.is_some() && *relation != Relation::PartOf {
+                    parts.insert(0, relation.text().into());
+                }
+                match level {
+                    LevelWish::Any => {}
+                    LevelWish::Object => parts.insert(0, "objects".into()),
+                    LevelWish::Part => parts.insert(0, "parts".into()),
+                }
+                parts.extend(named.iter().map(|n| format!("\"{n}\"")));
+            }
+            Self::Measure { to: Some(Reference::Eye), .. } => parts.push("from here".into()),
+            Self::Measure { to: Some(Reference::Thing(t)), .. } => parts.push(format!("from {}", name(t))),
+            Self::AskUser { question, .. } => parts.push(format!("\"{question}\"")),
+            _ => {}
+        }
+        format!("{}({})", self.name(), parts.join(", "))
+    }
+}
+
+/// A number without needless digits.
+pub(super) fn short(number: f64) -> String {
+    let text = format!("{number:.3}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn calls_survive_json() {
+        let call = ToolCall::parse("go_to", r#"{"target": "the lamp", "side": "other", "closeness": "closer"}"#);
+        let wanted = ToolCall::GoTo { target: Target::query("the lamp"), side: Side::Other, closeness: 2.0 };
+        assert_eq!(call, Ok(wanted.clone()));
+        let text = serde_json::to_string(&wanted).expect("JSON");
+        assert_eq!(serde_json::from_str::<ToolCall>(&text).expect("read"), wanted);
+        assert_eq!(ToolCall::parse("undo", ""), Ok(ToolCall::Undo {}));
+        assert_eq!(
+            ToolCall::parse("move", r#"{"direction": "back", "distance": {"metres": 0.5}}"#),
+            Ok(ToolCall::Move { direction: Direction::Back, distance: Distance::Metres(0.5) })
+        );
+    }
+
+    #[test]
+    fn what_is_no_call_is_refused() {
+        for (name, arguments) in [
+            ("format_disk", "{}"),
+            ("go_to", "{"),
+            ("go_to", "{}"),
+            ("go_to", "[]"),
+            ("go_to", r#"{"target": "lamp", "speed": 9}"#),
+            ("go_to", r#"{"target": -3}"#),
+            ("go_to", r#"{"target": "lamp", "closeness": 1e9}"#),
+            ("go_to", r#"{"target": ""}"#),
+            ("show_all", r#"{"and": "remove"}"#),
+            ("turn", r#"{"direction": "left", "degrees": -5}"#),
+            ("turn", r#"{"direction": "left", "degrees": "many"}"#),
+            ("move", r#"{"direction": "sideways"}"#),
+            ("move", r#"{"direction": "up", "distance": {"metres": 1e30}}"#),
+        ] {
+            assert!(ToolCall::parse(name, arguments).is_err(), "{name} {arguments}");
+        }
+        let long = format!(r#"{{"query": "{}"}}"#, "x".repeat(MAX_TEXT + 1));
+        assert!(ToolCall::parse("locate", &long).is_err());
+    }
+}

@@ -1,0 +1,167 @@
+//! Everything that was said, checked and done, for people to read.
+
+use std::time::Instant;
+
+use serde::{Deserialize, Serialize};
+
+use super::tool::ToolCall;
+
+/// Entries that are kept; the oldest go first.
+const MOST: usize = 4000;
+
+/// What happened.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum What {
+    /// The user said something.
+    User {
+        /// What.
+        text: String,
+    },
+    /// A planner wants this done.
+    Call {
+        /// What.
+        call: ToolCall,
+        /// The same for people.
+        line: String,
+    },
+    /// A check stopped or changed the course.
+    Check {
+        /// In a word or two.
+        verdict: String,
+        /// In plain words.
+        text: String,
+    },
+    /// Something was done.
+    Result {
+        /// The call as it was done, targets by number.
+        call: ToolCall,
+        /// The same for people.
+        line: String,
+        /// What came of it.
+        text: String,
+        /// Whether it was done.
+        done: bool,
+    },
+    /// The planner reports about itself: retries, limits.
+    Planner {
+        /// What.
+        text: String,
+    },
+    /// What the agent answered.
+    Reply {
+        /// What.
+        text: String,
+    },
+}
+
+/// One line of the transcript.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Entry {
+    /// Milliseconds since the session began.
+    pub elapsed_ms: u64,
+    /// What happened.
+    #[serde(flatten)]
+    pub what: What,
+}
+
+/// Everything that happened in a session.
+#[derive(Clone, Debug, Serialize)]
+pub struct Transcript {
+    /// Oldest first.
+    pub entries: Vec<Entry>,
+    #[serde(skip)]
+    start: Instant,
+}
+
+impl Default for Transcript {
+    fn default() -> Self {
+        Self { entries: Vec::new(), start: Instant::now() }
+    }
+}
+
+impl Transcript {
+    /// Adds an entry.
+    pub fn add(&mut self, what: What) {
+        if self.entries.len() >= MOST {
+            self.entries.drain(..MOST / 4);
+        }
+        let elapsed_ms = u64::try_from(self.start.elapsed().as_millis()).unwrap_or(u64::MAX);
+        self.entries.push(Entry { elapsed_ms, what });
+    }
+
+    /// The calls that were done.
+    pub fn done(&self) -> impl Iterator<Item = &ToolCall> {
+        self.entries.iter().filter_map(|e| match &e.what {
+            What::Result { call, done: true, .. } => Some(call),
+            _ => None,
+        })
+    }
+
+    /// As JSON.
+    pub fn to_json(&self) -> String {
+        // Plain texts and finite numbers always become JSON.
+        serde_json::to_string_pretty(self).unwrap_or_default()
+    }
+
+    /// As Markdown.
+    pub fn to_markdown(&self) -> String {
+        let mut text = String::from("# Transcript\n");
+        for entry in &self.entries {
+            let secs = entry.elapsed_ms as f64 / 1000.0;
+            let line = match &entry.what {
+                What::User { text } => format!("\n**You** ({secs:.1} s): {}\n", flat(text)),
+                What::Call { line, .. } => format!("- {secs:.1} s plan: `{}`", code(line)),
+                What::Check { verdict, text } => format!("- {secs:.1} s check: {} ({})", flat(text), flat(verdict)),
+                What::Result { line, text, done, .. } => {
+                    let sign = if *done { "done" } else { "not done" };
+                    format!("- {secs:.1} s {sign}: `{}`: {}", code(line), flat(text))
+                }
+                What::Planner { text } => format!("- {secs:.1} s planner: {}", flat(text)),
+                What::Reply { text } => format!("\n**Agent** ({secs:.1} s): {}", flat(text)),
+            };
+            text += &line;
+            text.push('\n');
+        }
+        text
+    }
+}
+
+/// On one line, with nothing that Markdown would take for markup.
+fn flat(text: &str) -> String {
+    let mut flat = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '\n' | '\r' => flat.push(' '),
+            '*' | '_' | '`' | '#' | '[' | ']' | '<' | '>' | '|' | '\\' => flat.extend(['\\', c]),
+            c => flat.push(c),
+        }
+    }
+    flat
+}
+
+/// For between backticks.
+fn code(text: &str) -> String {
+    text.replace('`', "'").replace(['\n', '\r'], " ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_transcript_is_read_by_people_and_programs() {
+        let mut t = Transcript::default();
+        t.add(What::User { text: "hide\n# the `mug`".into() });
+        t.add(What::Result { call: ToolCall::Undo {}, line: "undo()".into(), text: "Taken back.".into(), done: true });
+        let json: serde_json::Value = serde_json::from_str(&t.to_json()).expect("JSON");
+        assert_eq!(json["entries"][1]["call"]["name"], "undo");
+        let text = t.to_markdown();
+        assert!(text.contains("hide \\# the \\`mug\\`") && text.contains("done: `undo()`"), "{text}");
+        assert_eq!(t.done().count(), 1);
+        for _ in 0..2 * MOST {
+            t.add(What::Planner { text: String::new() });
+        }
+        assert!(t.entries.len() <= MOST);
+    }
+}

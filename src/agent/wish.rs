@@ -1,0 +1,186 @@
+//! What a person can wish for a camera, as plain data: sides, directions, distances. Whoever moves
+//! the camera decides what they come to in the scene.
+
+use serde::{Deserialize, Deserializer, Serialize};
+
+/// From where to look at a target.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Side {
+    /// As it is seen now.
+    #[default]
+    Same,
+    /// The side that is turned away now.
+    Other,
+    /// The side that is turned to the scene's cameras.
+    Front,
+    /// Left of the present view.
+    Left,
+    /// Right of the present view.
+    Right,
+    /// From above.
+    Above,
+    /// From below.
+    Below,
+}
+
+impl Side {
+    /// All of them.
+    pub const ALL: [Self; 7] =
+        [Self::Same, Self::Other, Self::Front, Self::Left, Self::Right, Self::Above, Self::Below];
+
+    /// As in "from ...".
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Same => "this side",
+            Self::Other => "the other side",
+            Self::Front => "the front",
+            Self::Left => "the left",
+            Self::Right => "the right",
+            Self::Above => "above",
+            Self::Below => "below",
+        }
+    }
+}
+
+/// Where to move, as the viewer sees it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Direction {
+    /// Into the picture.
+    Forward,
+    /// Out of the picture.
+    Back,
+    /// To the left.
+    Left,
+    /// To the right.
+    Right,
+    /// Upwards.
+    Up,
+    /// Downwards.
+    Down,
+}
+
+impl Direction {
+    /// All of them.
+    pub const ALL: [Self; 6] = [Self::Forward, Self::Back, Self::Left, Self::Right, Self::Up, Self::Down];
+
+    /// Its word.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Forward => "forward",
+            Self::Back => "back",
+            Self::Left => "left",
+            Self::Right => "right",
+            Self::Up => "up",
+            Self::Down => "down",
+        }
+    }
+}
+
+/// Where to turn without moving.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TurnWay {
+    /// To the left.
+    Left,
+    /// To the right.
+    Right,
+    /// Upwards.
+    Up,
+    /// Downwards.
+    Down,
+}
+
+impl TurnWay {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Left, Self::Right, Self::Up, Self::Down];
+
+    /// Its word.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Left => "left",
+            Self::Right => "right",
+            Self::Up => "up",
+            Self::Down => "down",
+        }
+    }
+}
+
+/// How far to move.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Distance {
+    /// So many metres, which needs a scene whose scale is known.
+    Metres(f64),
+    /// So many steps; a step is what suits the scene.
+    Relative(f64),
+    /// One step.
+    #[default]
+    Default,
+}
+
+/// Longest way that is walked at once, in metres or steps.
+pub const FARTHEST: f64 = 1000.0;
+
+impl Distance {
+    /// Whether it can be walked: finite, above 0 and at most [`FARTHEST`].
+    pub fn is_sound(self) -> bool {
+        match self {
+            Self::Metres(d) | Self::Relative(d) => d > 0.0 && d <= FARTHEST,
+            Self::Default => true,
+        }
+    }
+}
+
+/// The usual distance from a target.
+pub const NORMAL: f64 = 1.0;
+/// Twice as close as usual.
+pub const CLOSER: f64 = 2.0;
+/// Half as close as usual.
+pub const FARTHER: f64 = 0.5;
+/// How close and how far a target can be looked at.
+pub const CLOSENESS: std::ops::RangeInclusive<f64> = 0.1..=10.0;
+
+/// How to go to a target.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GoWish {
+    /// From where to look at it.
+    pub side: Side,
+    /// 1 as usual, 2 twice as close, 0.5 from twice as far; in [`CLOSENESS`].
+    pub closeness: f64,
+}
+
+impl Default for GoWish {
+    fn default() -> Self {
+        Self { side: Side::Same, closeness: NORMAL }
+    }
+}
+
+/// Reads a closeness: a number, or "normal", "closer", "farther".
+pub(super) fn closeness<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Given {
+        Number(f64),
+        Word(String),
+    }
+    let number = match Given::deserialize(from)? {
+        Given::Number(n) => n,
+        Given::Word(w) => match w.as_str() {
+            "normal" => NORMAL,
+            "closer" => CLOSER,
+            "farther" => FARTHER,
+            _ => return Err(serde::de::Error::custom("closeness is normal, closer, farther or a number")),
+        },
+    };
+    if CLOSENESS.contains(&number) {
+        return Ok(number);
+    }
+    Err(serde::de::Error::custom("closeness must be between 0.1 and 10"))
+}
+
+/// The closeness that is meant if none is given.
+pub(super) fn normal() -> f64 {
+    NORMAL
+}

@@ -1,0 +1,128 @@
+//! What the agent needs of the scene. The window, the command line and tests supply it; everything
+//! that does not need a camera or a file is in [`super::resolve`] and [`super::describe`].
+
+use super::relation::View;
+use super::wish::{Direction, Distance, GoWish, TurnWay};
+use crate::pipeline::semantics::answer::{Answered, by_name};
+use crate::pipeline::semantics::grammar::{Kind, Phrase};
+use crate::pipeline::semantics::localise::Answer;
+use crate::scene::{Bounds, Identities, IdentityId, Level};
+
+/// What is known of one identity.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Facts {
+    /// What it is called; the first is shown.
+    pub names: Vec<String>,
+    /// Object or part.
+    pub level: Level,
+    /// What it is a piece of; `NOBODY` for objects.
+    pub parent: IdentityId,
+    /// Its box in world space, in scene units, if it has any matter.
+    pub bounds: Option<Bounds>,
+    /// The share of the present view that it covers, 0 to 1.
+    pub in_view: f64,
+    /// Whether it is left out of the picture.
+    pub hidden: bool,
+}
+
+/// What came of a flight.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Arrival {
+    /// Length of the way, in scene units.
+    pub distance: f64,
+    /// The share of the picture that the target covers now, 0 to 1.
+    pub in_view: f64,
+}
+
+/// Why the camera cannot go somewhere.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{reason}")]
+pub struct Unreachable {
+    /// In plain words.
+    pub reason: String,
+    /// How near to the goal the camera could come, in scene units, if that is known.
+    pub nearest: Option<f64>,
+}
+
+/// What came of a movement.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Moved {
+    /// How far it went, in scene units.
+    pub distance_done: f64,
+    /// Whether matter ended it early.
+    pub stopped_by_matter: bool,
+}
+
+/// Why the scene could not do something, in plain words.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct WorldError(pub String);
+
+/// A scene that can be asked and looked at. Methods may block while a way is computed.
+pub trait World {
+    /// Objects and parts.
+    fn identities(&self) -> &Identities;
+
+    /// What a query means. Errors if the scene cannot be asked.
+    fn locate(&mut self, query: &str, kind: Kind) -> Result<Answered, WorldError>;
+
+    /// What is known of an identity; `None` if it is not (or no more) in the scene.
+    fn facts(&self, id: IdentityId) -> Option<Facts>;
+
+    /// The present view.
+    fn view(&self) -> View;
+
+    /// Length of a scene unit in metres, if that is known.
+    fn metres_per_unit(&self) -> Option<f64>;
+
+    /// Flies to an identity.
+    fn go_to(&mut self, id: IdentityId, wish: GoWish) -> Result<Arrival, Unreachable>;
+
+    /// Turns towards an identity.
+    fn look_at(&mut self, id: IdentityId) -> Result<Arrival, Unreachable>;
+
+    /// Moves the eye; stops before matter.
+    fn move_eye(&mut self, direction: Direction, distance: Distance) -> Result<Moved, Unreachable>;
+
+    /// Turns the eye by degrees.
+    fn turn(&mut self, way: TurnWay, degrees: f64) -> Result<(), Unreachable>;
+
+    /// Marks these in the view, and nothing else.
+    fn highlight(&mut self, ids: &[IdentityId]) -> Result<(), WorldError>;
+
+    /// Draws one identity alone.
+    fn isolate(&mut self, id: IdentityId) -> Result<(), WorldError>;
+
+    /// Leaves an identity out of the picture, or draws it again.
+    fn set_hidden(&mut self, id: IdentityId, hidden: bool) -> Result<(), WorldError>;
+
+    /// Draws everything again.
+    fn show_all(&mut self) -> Result<(), WorldError>;
+
+    /// Takes an identity out of the scene, so that [`Self::undo`] can bring it back.
+    fn remove(&mut self, id: IdentityId) -> Result<(), WorldError>;
+
+    /// Gives an identity another first name.
+    fn rename(&mut self, id: IdentityId, name: &str) -> Result<(), WorldError>;
+
+    /// Takes back the last change; says which.
+    fn undo(&mut self) -> Result<String, WorldError>;
+
+    /// Writes the Gaussians of an identity to a file; says which.
+    fn export(&mut self, id: IdentityId) -> Result<String, WorldError>;
+
+    /// The file that [`Self::export`] would replace, if there is one.
+    fn export_replaces(&self, id: IdentityId) -> Option<String>;
+}
+
+/// Answers a query by names alone: a [`World::locate`] for scenes without an encoder.
+pub fn locate_by_names(identities: &Identities, query: &str, kind: Kind) -> Answered {
+    match Phrase::parse(query) {
+        Some(phrase) => by_name(identities, &phrase, kind),
+        None => Answered {
+            answer: Answer::NotFound(Vec::new()),
+            basis: crate::pipeline::semantics::answer::Basis::Names,
+            relevancy: vec![0.0; identities.len() + 1],
+        },
+    }
+}

@@ -1,0 +1,77 @@
+//! The tools' JSON schemas against their snapshot and against the calls that the agent reads.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use fmlgs::agent::schema::tools;
+use fmlgs::agent::tool::{NAMES, ToolCall};
+use serde_json::{Value, json};
+
+const SNAPSHOT: &str = include_str!("data/agent_tools.json");
+
+#[test]
+fn the_schemas_are_those_of_the_snapshot() {
+    let now = serde_json::to_string_pretty(&tools()).expect("JSON");
+    if now.trim() != SNAPSHOT.trim() {
+        let path = std::env::temp_dir().join("agent_tools.json");
+        std::fs::write(&path, &now).expect("written");
+        panic!("the tools changed; if that is meant, copy {} over tests/data/agent_tools.json", path.display());
+    }
+}
+
+/// Some value that a schema allows, of each of its alternatives.
+fn samples(schema: &Value) -> Vec<Value> {
+    if let Some(any) = schema["anyOf"].as_array() {
+        return any.iter().flat_map(samples).collect();
+    }
+    if let Some(words) = schema["enum"].as_array() {
+        return words.clone();
+    }
+    match schema["type"].as_str().expect("a type") {
+        "string" => vec![json!("lamp")],
+        "integer" => vec![json!(1)],
+        "number" => vec![json!(1.5)],
+        "array" => vec![json!([]), json!([samples(&schema["items"])[0]])],
+        "object" => {
+            let properties = schema["properties"].as_object().expect("properties");
+            let first = |s: &Value| samples(s).first().cloned().expect("a sample");
+            let whole: Value = properties.iter().map(|(k, s)| (k.clone(), first(s))).collect::<serde_json::Map<_, _>>().into();
+            vec![whole]
+        }
+        other => panic!("type {other}"),
+    }
+}
+
+#[test]
+fn what_a_schema_allows_is_a_call_and_what_it_forbids_is_none() {
+    let all = tools();
+    let names: Vec<&str> = all.iter().map(|t| t["function"]["name"].as_str().expect("a name")).collect();
+    assert_eq!(names, NAMES);
+    for tool in &all {
+        let (name, schema) = (tool["function"]["name"].as_str().expect("a name"), &tool["function"]["parameters"]);
+        let whole = samples(schema)[0].clone();
+        assert!(ToolCall::parse(name, &whole.to_string()).is_ok(), "{name} {whole}");
+        let required: Vec<&str> = schema["required"].as_array().expect("required").iter().filter_map(Value::as_str).collect();
+        let mut least = whole.clone();
+        least.as_object_mut().expect("an object").retain(|k, _| required.contains(&k.as_str()));
+        let call = ToolCall::parse(name, &least.to_string()).expect(name);
+        assert_eq!(call.name(), name);
+        for (key, property) in schema["properties"].as_object().expect("properties") {
+            for sample in samples(property) {
+                let mut with = whole.clone();
+                with[key] = sample;
+                assert!(ToolCall::parse(name, &with.to_string()).is_ok(), "{name} {with}");
+            }
+            for wrong in [json!({ "no": 1 }), json!(-1), json!([[]]), json!(true)] {
+                let mut with = whole.clone();
+                with[key] = wrong.clone();
+                assert!(ToolCall::parse(name, &with.to_string()).is_err(), "{name} {with}");
+            }
+            let mut without = whole.clone();
+            without.as_object_mut().expect("an object").remove(key);
+            let parses = ToolCall::parse(name, &without.to_string()).is_ok();
+            assert_eq!(parses, !required.contains(&key.as_str()), "{name} without {key}");
+        }
+        let mut more = whole.clone();
+        more["surprise"] = json!(1);
+        assert!(ToolCall::parse(name, &more.to_string()).is_err(), "{name}");
+    }
+}
