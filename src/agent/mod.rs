@@ -8,7 +8,8 @@
 //! and clear, it is not against the scene's facts, and the user has said yes to what is destructive.
 //! Names in the scene and the user's words are data throughout.
 //!
-//! The scene is a [`world::World`], which the window, the command line and tests supply.
+//! The scene is a [`world::World`]: [`scene::SceneWorld`] for the window and the command line, a
+//! made-up room for tests.
 
 pub mod answer;
 pub mod describe;
@@ -23,6 +24,7 @@ pub mod refusal;
 pub mod relation;
 pub mod resolve;
 pub mod rules;
+pub mod scene;
 pub mod schema;
 pub mod session;
 pub mod tool;

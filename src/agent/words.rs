@@ -380,8 +380,14 @@ mod tests {
     fn numbers_and_ordinals() {
         assert_eq!((number("half"), number("twenty-five"), number("1/2")), (None, Some(25.0), Some(0.5)));
         assert_eq!((number("0,5"), number("1e999"), number("nan"), number("1/0")), (Some(0.5), None, None, None));
-        assert_eq!((ordinal("second"), ordinal("3rd"), ordinal("last"), ordinal("th")), (Some(2), Some(3), Some(-1), None));
+        assert_eq!(
+            (ordinal("second"), ordinal("3rd"), ordinal("last"), ordinal("th")),
+            (Some(2), Some(3), Some(-1), None)
+        );
         assert!(alike("controllers", "controller") && alike("contoller", "controller") && !alike("mug", "mag"));
-        assert_eq!((singular("knives"), singular("glasses"), singular("dishes")), ("knife".into(), "glass".into(), "dish".into()));
+        assert_eq!(
+            (singular("knives"), singular("glasses"), singular("dishes")),
+            ("knife".into(), "glass".into(), "dish".into())
+        );
     }
 }

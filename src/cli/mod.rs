@@ -4,6 +4,7 @@
 //! Results go to standard output (as one JSON document with `--json`), everything else to standard
 //! error. Exit codes are listed in `EXIT_CODES`.
 
+mod agent;
 mod asking;
 mod bench;
 mod demo;
@@ -18,6 +19,7 @@ mod models;
 mod opened;
 mod output;
 mod path;
+mod path_survey;
 mod preprocess;
 mod progress;
 mod query;
@@ -58,6 +60,7 @@ Examples:
   fmlgs query scene/ \"the lid of the kettle\" --mask lid.png
   fmlgs path scene/ --to \"the lid of the kettle\" --out path.json
   fmlgs render scene/ --path path.json --out film.mp4
+  fmlgs agent scene/ \"what is on the table?\"
   fmlgs export scene/ --out scene.ply   for any other splat viewer
   fmlgs models                          neural networks: what is here, what each adds";
 
@@ -86,6 +89,7 @@ enum Command {
     Models(models::Args),
     Segment(segment::Args),
     Path(path::Args),
+    Agent(agent::Args),
     Synth(synth::Args),
     Demo(demo::Args),
     Export(export::Args),
@@ -132,6 +136,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Query(args) => query::run(args),
         Command::Segment(args) => segment::run(args),
         Command::Path(args) => path::run(args),
+        Command::Agent(args) => agent::run(args),
         Command::Synth(args) => synth::run(args, quiet),
         Command::Demo(args) if args.headless => demo::run(args, quiet),
         Command::Demo(_) => window(Some(Action::TryDemo), open_window),

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::asking::{Asker, semantics};
 use super::opened::DrawableScene;
-use super::{CliError, opened, output, view};
+use super::{CliError, opened, output, path_survey, view};
 use crate::io;
 use crate::navigate::flight::Smoothness;
 use crate::navigate::target::{Side, Wish};
@@ -25,6 +25,7 @@ use crate::scene::{Camera, CameraPath, PathKey};
 #[command(after_help = "Examples:\n  \
     fmlgs path scene/ --to \"the handle of the kettle\" --side other --out path.json\n  \
     fmlgs path scene/ --from 0 --to-photo 24 --compare\n  \
+    fmlgs path scene/ --survey 100 --cameras 50 --cameras 200\n  \
     fmlgs render scene/ --path path.json --out film.mp4")]
 pub struct Args {
     /// Trained scene
@@ -33,7 +34,7 @@ pub struct Args {
     #[arg(long)]
     from: Option<String>,
     /// What to go to: an object or a part
-    #[arg(long, required_unless_present = "to_photo")]
+    #[arg(long, required_unless_present_any = ["to_photo", "survey"])]
     to: Option<String>,
     /// Photo to go to, by index or name, or a JSON camera file
     #[arg(long, conflicts_with = "to")]
@@ -50,6 +51,12 @@ pub struct Args {
     /// Poses of the flight
     #[arg(long, default_value_t = FRAMES as u32, value_parser = clap::value_parser!(u32).range(2..=100_000))]
     frames: u32,
+    /// Fly between this many random pairs of keypoints instead, and sum up how that went
+    #[arg(long, value_name = "FLIGHTS", conflicts_with_all = ["to", "to_photo", "out", "compare"])]
+    survey: Option<usize>,
+    /// With this many cameras: some left out, or more added nearby; may be given several times
+    #[arg(long, requires = "survey", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    cameras: Vec<u32>,
     /// Hold the paper's interpolation of the same keypoints beside it
     #[arg(long)]
     compare: bool,
@@ -103,13 +110,17 @@ pub fn navigator(scene: &DrawableScene) -> Navigator {
 }
 
 /// Upwards: against what most cameras call down.
-fn up_of(cameras: &[Camera]) -> DVec3 {
+pub fn up_of(cameras: &[Camera]) -> DVec3 {
     let sum: DVec3 = cameras.iter().map(|c| -c.world_from_camera.y_axis).sum();
     sum.try_normalize().unwrap_or(DVec3::NEG_Y)
 }
 
 pub fn run(args: Args) -> Result<(), CliError> {
     let scene = opened::drawable(&args.scene)?;
+    if let Some(flights) = args.survey {
+        let counts: Vec<usize> = args.cameras.iter().map(|n| *n as usize).collect();
+        return path_survey::run(&scene, flights, &counts, args.frames as usize, args.json);
+    }
     let start = Instant::now();
     let navigator = navigator(&scene);
     let build_ms = start.elapsed().as_secs_f64() * 1e3;
@@ -221,7 +232,7 @@ fn keys(flight: &Flight) -> Vec<Pose> {
     [flight.poses.first(), flight.poses.last()].into_iter().flatten().copied().collect()
 }
 
-fn told(s: &Smoothness) -> Value {
+pub fn told(s: &Smoothness) -> Value {
     json!({
         "largest_step": s.largest_step,
         "largest_turn_deg": s.largest_turn.to_degrees(),

@@ -15,6 +15,7 @@ pub mod keypoints;
 pub mod matter;
 pub mod navigator;
 pub mod pose;
+pub mod survey;
 pub mod target;
 #[cfg(test)]
 mod testing;

@@ -1,14 +1,17 @@
 //! What each action does.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::app::App;
 use super::camera;
+use super::chat::Snapshot;
 use super::dialogs::{Chosen, Purpose, Question};
 use super::state::Tone;
 use super::viewport::brush::Brush;
+use crate::agent::scene::{Deed, Parts};
 use crate::navigate::target::Wish;
+use crate::pipeline::semantics::edit::Edit;
 use crate::scene::IdentityId;
 use crate::worker::{Action, Command, EditRequest, Failure, FilmRequest, JobKind, Pane, VisitRequest, Visited};
 
@@ -75,6 +78,11 @@ impl App {
             Action::OpenPath => self.choose(Purpose::OpenPath),
             Action::SavePath => self.choose(Purpose::SavePath),
             Action::SaveFilm => self.choose(Purpose::SaveFilm),
+            Action::SaveTalk => self.choose(Purpose::SaveTalk),
+            Action::Talk => {
+                self.layout.hidden.retain(|p| *p != Pane::Chat);
+                self.chat.start_typing();
+            }
             Action::ExportTarget(id) => self.choose(Purpose::ExportTarget(id)),
             Action::FrameScene
             | Action::Paint(_)
@@ -240,6 +248,66 @@ impl App {
         self.submit(Command::Film(Box::new(FilmRequest { cloud, draw, cameras, marked, out, settings })));
     }
 
+    /// Sends what was typed to the assistant, with the scene as it is.
+    pub(super) fn talk(&mut self) {
+        let Some(text) = self.chat.wants() else { return };
+        let (scene, map, cloud) =
+            (self.state.scene.clone(), self.state.semantics.clone(), self.viewport.cloud().cloned());
+        let (Some(scene), Some(map), Some(cloud)) = (scene, map, cloud) else {
+            self.chat.answer("There is no scene with objects yet: open or train one, and find its objects.");
+            return;
+        };
+        let photos = scene.dataset.iter().flat_map(|d| &d.photos);
+        let parts = Parts {
+            cloud,
+            settings: scene.render.clone(),
+            map,
+            cameras: photos.map(|p| p.camera.clone()).collect(),
+            up: self.viewport.up(&scene),
+            metres: None,
+            exports: scene.out.join("exports"),
+            explored: self.state.explored.clone(),
+        };
+        let snapshot = Snapshot {
+            parts,
+            scene: self.state.scene_number,
+            eye: self.viewport.pose(),
+            aspect: self.viewport.aspect(),
+            hidden: self.viewport.visibility.hidden().collect(),
+        };
+        self.chat.send(text, snapshot, self.layout.chat.clone(), &self.repaint);
+    }
+
+    /// Does to the window what the assistant has done.
+    pub(super) fn deed(&mut self, deed: Deed) {
+        match deed {
+            Deed::Fly(flight, about) => {
+                if let Some(point) = about {
+                    self.viewport.turn_about(point);
+                }
+                self.camera.play_flight(*flight);
+            }
+            Deed::Mark(ids) => {
+                if let Some(map) = self.state.semantics.clone() {
+                    let names: Vec<String> = ids.iter().take(6).map(|id| map.identities.full_name(*id)).collect();
+                    self.viewport.questions.mark(&names, &map);
+                }
+            }
+            Deed::Hidden(ids) => self.viewport.visibility.set_hidden(ids),
+            Deed::Renamed(id, name) => self.ask(Action::Change(Edit::Rename(id, name))),
+            Deed::Explored(explored) => self.state.explored = Some(explored),
+        }
+    }
+
+    fn save_talk(&mut self, path: &Path) {
+        let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+        let Some(text) = self.chat.transcript(json).map(str::to_owned) else { return };
+        match crate::io::atomic::write(path, |w| w.write_all(text.as_bytes())) {
+            Ok(()) => self.state.toast(Tone::Good, format!("Wrote {}", path.display())),
+            Err(e) => self.state.fail("Saving the talk", Failure::of(&e, "")),
+        }
+    }
+
     /// Changes objects and parts; `None` is a change that there is none of.
     fn edit(&mut self, request: Option<EditRequest>) {
         let Some(request) = request else {
@@ -309,6 +377,7 @@ impl App {
                 }
             }
             Chosen::Path(Purpose::SaveFilm, path) => self.make_film(path),
+            Chosen::Path(Purpose::SaveTalk, path) => self.save_talk(&path),
             Chosen::Path(Purpose::Screenshot, path) => {
                 if let Some(pixels) = self.viewport.pixels() {
                     self.submit(Command::Picture { pixels: Arc::new(pixels), path });

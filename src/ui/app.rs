@@ -5,6 +5,7 @@ use std::sync::Arc;
 use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 
 use super::camera::CameraPane;
+use super::chat::Chat;
 use super::dialogs::{self, FileDialogs, Question};
 use super::layout::Layout;
 use super::palette::{Palette, shortcut_sheet};
@@ -36,6 +37,8 @@ pub struct App {
     models: Models,
     /// The camera's path and its player.
     pub camera: CameraPane,
+    /// The talk with the assistant.
+    pub chat: Chat,
     toasts: Toasts,
     actions: Vec<Action>,
     /// Window time of the last frame.
@@ -67,6 +70,7 @@ impl App {
             portraits: Portraits::default(),
             models: Models::default(),
             camera: CameraPane::default(),
+            chat: Chat::default(),
             toasts: Toasts::default(),
             last_frame: 0.0,
             actions: first.into_iter().collect(),
@@ -86,6 +90,10 @@ impl App {
         self.viewport.update(&mut self.state, &self.worker);
         self.camera.on_scene(self.state.scene_number);
         self.visited();
+        for deed in self.chat.news() {
+            self.deed(deed);
+        }
+        self.talk();
         self.play(ctx);
         self.thumbnails.update(ctx, &mut self.state);
         self.portraits.update(ctx, &mut self.state, self.viewport.cloud(), &self.worker);
@@ -104,7 +112,7 @@ impl App {
     fn play(&mut self, ctx: &egui::Context) {
         let now = ctx.input(|i| i.time);
         let step = now - std::mem::replace(&mut self.last_frame, now);
-        if let Some(pose) = self.camera.player.tick(step) {
+        if let Some(pose) = self.camera.tick(step) {
             self.viewport.stand(&pose, &self.state, now);
             ctx.request_repaint();
         }
@@ -156,7 +164,7 @@ impl App {
                 },
             );
         }
-        if [Pane::Training, Pane::Objects, Pane::Plan, Pane::Models].iter().any(|p| layout.shows(*p)) {
+        if [Pane::Chat, Pane::Training, Pane::Objects, Pane::Plan, Pane::Models].iter().any(|p| layout.shows(*p)) {
             Panel::right("work").frame(pane).resizable(true).default_size(350.0).size_range(290.0..=640.0).show(
                 ui,
                 |ui| {
@@ -168,6 +176,13 @@ impl App {
                             });
                             ui.add_space(10.0);
                         };
+                        if layout.shows(Pane::Chat) {
+                            let ready = state.semantics.is_some();
+                            egui::CollapsingHeader::new(Pane::Chat.text()).default_open(ready).show(ui, |ui| {
+                                self.chat.show(ui, &mut layout.chat, &self.portraits, ready, actions);
+                            });
+                            ui.add_space(8.0);
+                        }
                         // Once there are any, they are what a person works with.
                         if objects && state.semantics.is_some() {
                             show_objects(ui, actions);

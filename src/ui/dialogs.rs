@@ -35,6 +35,8 @@ pub enum Purpose {
     SavePath,
     /// Write a film there.
     SaveFilm,
+    /// Write the talk with the assistant there.
+    SaveTalk,
 }
 
 /// The system's answer.
@@ -94,6 +96,9 @@ impl FileDialogs {
             Purpose::SavePath => Box::pin(
                 dialog.set_title("Save the camera path").set_file_name(format!("{name}-path.json")).save_file(),
             ),
+            Purpose::SaveTalk => {
+                Box::pin(dialog.set_title("Save the talk").set_file_name(format!("{name}-talk.md")).save_file())
+            }
             Purpose::SaveFilm => {
                 Box::pin(dialog.set_title("Make a film").set_file_name(format!("{name}.mp4")).save_file())
             }

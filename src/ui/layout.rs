@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
+use super::chat::ChatSettings;
 use crate::pipeline::semantics::find::Finding;
 use crate::pipeline::train::TrainConfig;
 use crate::worker::{Pane, ViewMode};
@@ -41,6 +42,8 @@ pub struct Layout {
     pub config: TrainConfig,
     /// Models that find objects.
     pub finding: Finding,
+    /// What plans for the assistant.
+    pub chat: ChatSettings,
     /// Files and folders opened lately.
     pub recent: Vec<PathBuf>,
 }
@@ -48,7 +51,7 @@ pub struct Layout {
 impl Default for Layout {
     fn default() -> Self {
         Self {
-            hidden: vec![Pane::Log],
+            hidden: vec![Pane::Log, Pane::Camera],
             cameras: true,
             compare: false,
             split: 0.5,
@@ -56,6 +59,7 @@ impl Default for Layout {
             plot_axis: PlotAxis::default(),
             config: TrainConfig { steps: 3_000, eval_every: 250, ..TrainConfig::default() },
             finding: Finding::default(),
+            chat: ChatSettings::default(),
             recent: Vec::new(),
         }
     }

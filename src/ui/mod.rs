@@ -7,6 +7,7 @@
 mod act;
 pub mod app;
 pub mod camera;
+pub mod chat;
 pub mod dialogs;
 pub mod format;
 pub mod keys;

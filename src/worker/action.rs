@@ -54,14 +54,16 @@ pub enum Pane {
     Models,
     /// The camera's path.
     Camera,
+    /// The talk with the agent.
+    Chat,
     /// Messages.
     Log,
 }
 
 impl Pane {
     /// All of them.
-    pub const ALL: [Self; 7] =
-        [Self::Dataset, Self::Training, Self::Objects, Self::Plan, Self::Models, Self::Camera, Self::Log];
+    pub const ALL: [Self; 8] =
+        [Self::Dataset, Self::Chat, Self::Training, Self::Objects, Self::Plan, Self::Models, Self::Camera, Self::Log];
 
     /// Its title.
     pub fn text(self) -> &'static str {
@@ -72,6 +74,7 @@ impl Pane {
             Self::Plan => "Scene plan",
             Self::Models => "Models",
             Self::Camera => "Camera path",
+            Self::Chat => "Assistant",
             Self::Log => "Log",
         }
     }
@@ -183,6 +186,10 @@ pub enum Action {
     SavePath,
     /// Choose where to write a film of what is played.
     SaveFilm,
+    /// Type a sentence to the assistant.
+    Talk,
+    /// Choose where to write the talk with the assistant.
+    SaveTalk,
     /// Draw one identity alone; `None` draws everything again.
     Isolate(Option<IdentityId>),
     /// Leave an identity out of the picture, or draw it again.
@@ -229,7 +236,7 @@ pub enum Action {
 
 impl Action {
     /// Every action that needs no further input, in the order of the palette.
-    pub const ALL: [Self; 48] = [
+    pub const ALL: [Self; 51] = [
         Self::TryDemo,
         Self::OpenFolder,
         Self::OpenFile,
@@ -276,6 +283,9 @@ impl Action {
         Self::OpenPath,
         Self::SavePath,
         Self::SaveFilm,
+        Self::Talk,
+        Self::SaveTalk,
+        Self::TogglePane(Pane::Chat),
         Self::Palette,
         Self::Shortcuts,
     ];
@@ -307,6 +317,8 @@ impl Action {
             Self::OpenPath => "Open a camera path…".into(),
             Self::SavePath => "Save the camera path…".into(),
             Self::SaveFilm => "Make a film…".into(),
+            Self::Talk => "Talk to the assistant".into(),
+            Self::SaveTalk => "Save the talk with the assistant…".into(),
             Self::Isolate(None) => "Show all objects".into(),
             Self::Isolate(Some(id)) => format!("Show #{id} alone"),
             Self::Hide(id) => format!("Hide or show #{id}"),
@@ -369,6 +381,8 @@ impl Action {
             Self::AddKey => "The camera will pass here, looking this way.",
             Self::OpenPath => "A path of this program, or of nerfstudio's viewer.",
             Self::SavePath => "As .json; for nerfstudio, end its name in .nerfstudio.json.",
+            Self::Talk => "Ask in plain sentences: show me the lid of the kettle, then step back.",
+            Self::SaveTalk => "As Markdown, or .json, with every step and its result.",
             Self::SaveFilm => "H.264 (.mp4), .gif, .webp, or .png frames in a folder.",
             Self::Isolate(None) => "Draw everything again that was hidden.",
             Self::Isolate(Some(_)) => "Draw nothing else.",
@@ -419,6 +433,7 @@ impl Action {
             Self::StepBack => plain(","),
             Self::StepForward => plain("."),
             Self::AddKey => plain("K"),
+            Self::Talk => plain("Enter"),
             Self::PreviousPhoto => plain("["),
             Self::NextPhoto => plain("]"),
             Self::Show(ViewMode::Picture) => plain("1"),
@@ -443,6 +458,7 @@ impl Action {
             | Self::OpenPath
             | Self::SavePath
             | Self::SaveFilm
+            | Self::SaveTalk
             | Self::Isolate(_)
             | Self::Hide(_)
             | Self::ExportTarget(_)

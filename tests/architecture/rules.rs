@@ -15,7 +15,7 @@ const MODULES: [(&str, &[&str]); 11] = [
     ("pipeline", &["math", "scene", "io", "models", "render"]),
     ("navigate", &["math", "scene", "render"]),
     ("worker", &["math", "scene", "io", "models", "render", "pipeline", "navigate"]),
-    ("agent", &["math", "scene", "pipeline", "navigate", "worker"]),
+    ("agent", &["math", "scene", "io", "render", "pipeline", "navigate", "worker"]),
     ("cli", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "worker", "agent"]),
     ("ui", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "worker", "agent"]),
 ];

@@ -6,15 +6,147 @@ use crate::scene::Identities;
 
 /// Words that begin a request.
 pub(super) const VERBS: [&str; 141] = [
-    "show", "see", "view", "display", "go", "fly", "navigate", "take", "bring", "give", "approach", "visit", "inspect", "examine",
-    "check", "zoom", "focus", "center", "centre", "find", "locate", "search", "look", "face", "turn", "rotate", "spin", "pan", "tilt",
-    "step", "move", "walk", "back", "come", "slide", "shift", "strafe", "climb", "rise", "sink", "descend", "lower", "raise", "hide",
-    "conceal", "isolate", "segment", "unhide", "reveal", "remove", "delete", "erase", "rename", "call", "name", "highlight", "mark",
-    "outline", "select", "point", "export", "save", "describe", "explain", "tell", "list", "count", "enumerate", "measure", "undo",
-    "revert", "cancel", "help", "what", "which", "where", "how", "who", "is", "are", "does", "do", "get", "travel", "head", "jump",
-    "reset", "restore", "stop", "hello", "thanks", "circle", "orbit", "ascend", "advance", "retreat", "scoot", "dolly", "return",
-    "leave", "let", "swivel", "clear", "only", "stand", "whereabouts", "identify", "spot", "drop", "extract", "peek", "pull", "push",
-    "keep", "put", "pick", "pour", "open", "throw", "cut", "print", "make", "write", "has", "have", "wipe", "fade", "can", "nudge", "enlarge", "magnify", "watch", "observe", "study", "proceed", "continue", "again", "don't", "anything", "concentrate", "aim",
+    "show",
+    "see",
+    "view",
+    "display",
+    "go",
+    "fly",
+    "navigate",
+    "take",
+    "bring",
+    "give",
+    "approach",
+    "visit",
+    "inspect",
+    "examine",
+    "check",
+    "zoom",
+    "focus",
+    "center",
+    "centre",
+    "find",
+    "locate",
+    "search",
+    "look",
+    "face",
+    "turn",
+    "rotate",
+    "spin",
+    "pan",
+    "tilt",
+    "step",
+    "move",
+    "walk",
+    "back",
+    "come",
+    "slide",
+    "shift",
+    "strafe",
+    "climb",
+    "rise",
+    "sink",
+    "descend",
+    "lower",
+    "raise",
+    "hide",
+    "conceal",
+    "isolate",
+    "segment",
+    "unhide",
+    "reveal",
+    "remove",
+    "delete",
+    "erase",
+    "rename",
+    "call",
+    "name",
+    "highlight",
+    "mark",
+    "outline",
+    "select",
+    "point",
+    "export",
+    "save",
+    "describe",
+    "explain",
+    "tell",
+    "list",
+    "count",
+    "enumerate",
+    "measure",
+    "undo",
+    "revert",
+    "cancel",
+    "help",
+    "what",
+    "which",
+    "where",
+    "how",
+    "who",
+    "is",
+    "are",
+    "does",
+    "do",
+    "get",
+    "travel",
+    "head",
+    "jump",
+    "reset",
+    "restore",
+    "stop",
+    "hello",
+    "thanks",
+    "circle",
+    "orbit",
+    "ascend",
+    "advance",
+    "retreat",
+    "scoot",
+    "dolly",
+    "return",
+    "leave",
+    "let",
+    "swivel",
+    "clear",
+    "only",
+    "stand",
+    "whereabouts",
+    "identify",
+    "spot",
+    "drop",
+    "extract",
+    "peek",
+    "pull",
+    "push",
+    "keep",
+    "put",
+    "pick",
+    "pour",
+    "open",
+    "throw",
+    "cut",
+    "print",
+    "make",
+    "write",
+    "has",
+    "have",
+    "wipe",
+    "fade",
+    "can",
+    "nudge",
+    "enlarge",
+    "magnify",
+    "watch",
+    "observe",
+    "study",
+    "proceed",
+    "continue",
+    "again",
+    "don't",
+    "anything",
+    "concentrate",
+    "aim",
 ];
 
 /// Whether a word is in a name of the scene.
@@ -33,7 +165,9 @@ pub(super) fn starts_request(words: &[&str]) -> bool {
     let first_clause: Vec<&str> =
         words.iter().copied().take_while(|w| !is_mark(w) && !["and", "then"].contains(w)).collect();
     let first_clause: Vec<&str> = first_clause.into_iter().filter(|w| !is_mark(w)).collect();
-    moves::movement(&first_clause).is_some() || moves::closer(&first_clause).is_some() || super::sides::is_side_only(&first_clause)
+    moves::movement(&first_clause).is_some()
+        || moves::closer(&first_clause).is_some()
+        || super::sides::is_side_only(&first_clause)
 }
 
 /// A clause, and whether only a comma parts it from the one before.
@@ -55,7 +189,8 @@ pub(super) fn split(request: &str, identities: &Identities) -> Vec<Clause> {
         match skip {
             Some(n) => {
                 let joins = rest.iter().find(|w| !["but", ",", "please"].contains(*w));
-                let follows_comma = [",", "but"].contains(&word) && !joins.is_some_and(|w| ["then", "and", "now", "also"].contains(w));
+                let follows_comma =
+                    [",", "but"].contains(&word) && !joins.is_some_and(|w| ["then", "and", "now", "also"].contains(w));
                 clauses.push(Clause { words: Vec::new(), follows_comma });
                 i += n;
             }
@@ -122,7 +257,9 @@ pub(super) fn expand(words: &[&str]) -> Vec<String> {
             "i'm" => "i am".into(),
             "isn't" => "is".into(),
             _ => match word.strip_suffix("'s") {
-                Some(stem @ ("what" | "where" | "who" | "how" | "that" | "there" | "here" | "it")) => format!("{stem} is"),
+                Some(stem @ ("what" | "where" | "who" | "how" | "that" | "there" | "here" | "it")) => {
+                    format!("{stem} is")
+                }
                 _ => word.into(),
             },
         }
@@ -139,8 +276,11 @@ pub(super) fn corrected(words: &[&str], identities: &Identities) -> Vec<String> 
         && !moves::is_direction(first)
         && number(first).is_none()
         && !crate::agent::resolve::is_pick(first)
-        && !["from", "closer", "nearer", "farther", "further", "other", "another", "their", "there", "these", "those", "this", "that"]
-            .contains(&first.as_str())
+        && ![
+            "from", "closer", "nearer", "farther", "further", "other", "another", "their", "there", "these", "those",
+            "this", "that",
+        ]
+        .contains(&first.as_str())
         && let Some(right) = verb(first, &VERBS)
     {
         *first = right.to_owned();

@@ -292,24 +292,30 @@ pub(super) fn small_talk(words: &[&str]) -> Option<Vec<Task>> {
         "hello" | "hi" | "hey" | "good morning" | "good evening" | "hello there" | "hi there" => {
             say("Hello. Tell me what to show, or say 'help'.")
         }
-        "thanks" | "thank you" | "thank you very much" | "great" | "nice" | "good" | "perfect" | "cool" | "wonderful" | "thanks a lot" => {
-            say("You are welcome.")
+        "thanks"
+        | "thank you"
+        | "thank you very much"
+        | "great"
+        | "nice"
+        | "good"
+        | "perfect"
+        | "cool"
+        | "wonderful"
+        | "thanks a lot" => say("You are welcome."),
+        "wait" | "hold on" | "hmm" | "hm" | "oh" | "oops" | "ok" | "okay" | "alright" | "well" | "robot"
+        | "computer" | "agent" | "assistant" | "please" | "sorry" | "so" | "now" | "right then" | "listen"
+        | "actually" | "dear" | "hey robot" | "do you think" | "if you can" | "system" | "quick" | "excuse me" => {
+            Some(Vec::new())
         }
-        "wait" | "hold on" | "hmm" | "hm" | "oh" | "oops" | "ok" | "okay" | "alright" | "well" | "robot" | "computer" | "agent"
-        | "assistant" | "please" | "sorry" | "so" | "now" | "right then" | "listen" | "actually" | "dear" | "hey robot"
-        | "do you think" | "if you can" | "system" | "quick" | "excuse me" => Some(Vec::new()),
-        "again" | "once more" | "more" | "a bit more" | "keep going" | "go on" | "continue" | "one more time" | "and again"
-        | "do it again" | "do that again" | "further" | "a little more" | "even more" | "some more" | "still more" => {
-            Some(vec![Task::Repeat])
-        }
+        "again" | "once more" | "more" | "a bit more" | "keep going" | "go on" | "continue" | "one more time"
+        | "and again" | "do it again" | "do that again" | "further" | "a little more" | "even more" | "some more"
+        | "still more" => Some(vec![Task::Repeat]),
         "too close" | "that is too close" | "that is too near" | "too near" => Some(vec![Task::Remark(FARTHER)]),
         "too far" | "too far away" | "that is too far" | "that is too far away" => Some(vec![Task::Remark(CLOSER)]),
-        "good afternoon" | "good day" | "very good" | "very well" | "well done" | "lovely" | "fine" | "got it" | "i see" | "excellent" => {
-            Some(vec![Task::Noise(text)])
-        }
-        "no" | "yes" | "yeah" | "nope" | "never mind" | "nevermind" | "cancel" | "stop" | "forget it" | "cancel that" => {
-            Some(vec![Task::Say("There is no open question.".into())])
-        }
+        "good afternoon" | "good day" | "very good" | "very well" | "well done" | "lovely" | "fine" | "got it"
+        | "i see" | "excellent" => Some(vec![Task::Noise(text)]),
+        "no" | "yes" | "yeah" | "nope" | "never mind" | "nevermind" | "cancel" | "stop" | "forget it"
+        | "cancel that" => Some(vec![Task::Say("There is no open question.".into())]),
         _ => None,
     }
 }
@@ -317,13 +323,30 @@ pub(super) fn small_talk(words: &[&str]) -> Option<Vec<Task>> {
 /// What is said of a thing without asking for anything, what must not be done, and roundabout ways to
 /// say "find".
 pub(super) fn stated(words: &[&str]) -> Option<Task> {
-    if after(words, &["don't", "do not", "dont", "never", "please don't", "you must not", "you mustn't"]).is_some_and(|r| !r.is_empty()) {
+    if after(words, &["don't", "do not", "dont", "never", "please don't", "you must not", "you mustn't"])
+        .is_some_and(|r| !r.is_empty())
+    {
         return Some(Task::Say("All right, I will not.".into()));
     }
     let lost = [
-        "i can't find", "i cannot find", "i can't see", "i cannot see", "i lost", "i have lost", "i've lost", "i am looking for",
-        "i am searching for", "i was looking for", "i don't see", "i do not see", "i don't know where", "do you know where",
-        "i forgot where", "have you seen", "did you see", "help me find",
+        "i can't find",
+        "i cannot find",
+        "i can't see",
+        "i cannot see",
+        "i lost",
+        "i have lost",
+        "i've lost",
+        "i am looking for",
+        "i am searching for",
+        "i was looking for",
+        "i don't see",
+        "i do not see",
+        "i don't know where",
+        "do you know where",
+        "i forgot where",
+        "have you seen",
+        "did you see",
+        "help me find",
     ];
     if let Some(thing) = after(words, &lost).filter(|r| !r.is_empty()) {
         let thing = match thing {
@@ -333,12 +356,30 @@ pub(super) fn stated(words: &[&str]) -> Option<Task> {
         return Some(Task::Find(plain(thing)));
     }
     // "Where did it go?", after that, says nothing new.
-    if ["where did it go", "where has it gone", "where is it gone", "where could it be", "where can it be"].contains(&words.join(" ").as_str()) {
+    if ["where did it go", "where has it gone", "where is it gone", "where could it be", "where can it be"]
+        .contains(&words.join(" ").as_str())
+    {
         return Some(Task::Find("it".into()));
     }
     let said = [
-        "i don't need", "i do not need", "i don't like", "i do not like", "i don't want", "i do not want", "i hate", "i like", "i love",
-        "i am done with", "i have seen", "i saw", "i see", "i am interested in", "i am curious about", "there is", "here is", "that is",
+        "i don't need",
+        "i do not need",
+        "i don't like",
+        "i do not like",
+        "i don't want",
+        "i do not want",
+        "i hate",
+        "i like",
+        "i love",
+        "i am done with",
+        "i have seen",
+        "i saw",
+        "i see",
+        "i am interested in",
+        "i am curious about",
+        "there is",
+        "here is",
+        "that is",
     ];
     let thing = after(words, &said).filter(|r| !r.is_empty())?;
     let thing = match thing {
@@ -372,10 +413,32 @@ pub(super) fn read(words: &[&str], clause: &[Token], identities: &Identities) ->
         }
     }
     // "No, the other one", "not that one, the blue one", "I meant the lamp".
-    if let Some(rest) = after(words, &["not that one", "not this one", "no i meant", "no i mean", "i meant", "i mean", "rather", "instead", "no", "how about", "what about", "the same for", "same for", "also", "now"])
-        && !rest.is_empty()
+    if let Some(rest) = after(
+        words,
+        &[
+            "not that one",
+            "not this one",
+            "no i meant",
+            "no i mean",
+            "i meant",
+            "i mean",
+            "rather",
+            "instead",
+            "no",
+            "how about",
+            "what about",
+            "the same for",
+            "same for",
+            "also",
+            "now",
+        ],
+    ) && !rest.is_empty()
     {
-        let rest: Vec<&str> = rest.iter().copied().skip_while(|w| ["but", "rather", "instead", "show", "me", "that", "is", "wrong"].contains(w)).collect();
+        let rest: Vec<&str> = rest
+            .iter()
+            .copied()
+            .skip_while(|w| ["but", "rather", "instead", "show", "me", "that", "is", "wrong"].contains(w))
+            .collect();
         return (!rest.is_empty()).then(|| vec![bare(&rest, identities)]);
     }
     let all = BEGINNINGS.iter().chain(MORE_BEGINNINGS.iter());
@@ -386,15 +449,28 @@ pub(super) fn read(words: &[&str], clause: &[Token], identities: &Identities) ->
 
 /// "Make the curtain invisible", "get the lamp out of the way", "make it bigger", "put the lamp on screen".
 fn made(words: &[&str]) -> Option<Task> {
-    let rest = after(words, &["make", "let", "have", "get", "take", "keep", "put", "bring", "turn", "set"]).filter(|r| r.len() > 1)?;
+    let rest = after(words, &["make", "let", "have", "get", "take", "keep", "put", "bring", "turn", "set"])
+        .filter(|r| r.len() > 1)?;
     let ends = |end: &str| {
         let wanted: Vec<&str> = end.split(' ').collect();
         (rest.len() > wanted.len() && rest.ends_with(&wanted)).then(|| &rest[..rest.len() - wanted.len()])
     };
     let first = |all: &[&str]| all.iter().find_map(|end| ends(end));
     let gone = [
-        "invisible", "disappear", "vanish", "go away", "transparent", "out of my sight", "out of sight", "out of the way", "out of my way",
-        "out of view", "out of the view", "out of my view", "out of the picture", "hidden",
+        "invisible",
+        "disappear",
+        "vanish",
+        "go away",
+        "transparent",
+        "out of my sight",
+        "out of sight",
+        "out of the way",
+        "out of my way",
+        "out of view",
+        "out of the view",
+        "out of my view",
+        "out of the picture",
+        "hidden",
     ];
     if let Some(thing) = first(&gone) {
         return Some(Task::Call(ToolCall::Hide { target: target(thing) }));
@@ -411,7 +487,16 @@ fn made(words: &[&str]) -> Option<Task> {
         }
         return Some(Task::Call(ToolCall::GoTo { target: target(thing), side: Side::Same, closeness }));
     }
-    let seen = first(&["on screen", "on the screen", "in view", "into view", "into the view", "in the picture", "into focus", "in focus"])?;
+    let seen = first(&[
+        "on screen",
+        "on the screen",
+        "in view",
+        "into view",
+        "into the view",
+        "in the picture",
+        "into focus",
+        "in focus",
+    ])?;
     Some(Task::Call(ToolCall::GoTo { target: target(seen), side: Side::Same, closeness: NORMAL }))
 }
 
@@ -419,7 +504,10 @@ fn made(words: &[&str]) -> Option<Task> {
 /// clause begins with nothing that the scene or the grammar knows.
 pub(super) fn salvaged(words: &[&str], clause: &[Token], identities: &Identities) -> Option<Vec<Task>> {
     let begins_known = words.first().is_some_and(|w| {
-        clauses::VERBS.contains(w) || clauses::is_known(w, identities) || crate::agent::resolve::is_pick(w) || w.starts_with('#')
+        clauses::VERBS.contains(w)
+            || clauses::is_known(w, identities)
+            || crate::agent::resolve::is_pick(w)
+            || w.starts_with('#')
             || ["the", "a", "an", "it", "its", "one", "this", "that", "my", "both", "all", "thing"].contains(w)
     });
     if begins_known {
@@ -430,7 +518,8 @@ pub(super) fn salvaged(words: &[&str], clause: &[Token], identities: &Identities
         let all = BEGINNINGS.iter().chain(MORE_BEGINNINGS.iter());
         let begins = all.map(|(begin, _)| *begin).any(|begin| after(rest, &[begin]).is_some_and(|r| !r.is_empty()));
         // What destroys is not guessed from the middle of a sentence.
-        let destroys = ["remove", "delete", "erase", "get", "wipe", "export", "save", "write", "rename", "call", "name"];
+        let destroys =
+            ["remove", "delete", "erase", "get", "wipe", "export", "save", "write", "rename", "call", "name"];
         if begins && !destroys.contains(&rest[0]) {
             return read(rest, clause, identities);
         }
@@ -439,7 +528,9 @@ pub(super) fn salvaged(words: &[&str], clause: &[Token], identities: &Identities
 }
 
 fn done_to(verb: Verb, rest: &[&str], words: &[&str], identities: &Identities) -> Vec<Task> {
-    let unclear = |what: &str| vec![Task::refuse(RefusalKind::Unclear, format!("{what} what? Name a thing, such as 'the lamp'."))];
+    let unclear = |what: &str| {
+        vec![Task::refuse(RefusalKind::Unclear, format!("{what} what? Name a thing, such as 'the lamp'."))]
+    };
     if rest.is_empty() {
         return match verb {
             Verb::Around => vec![Task::Side(Side::Other)],
@@ -448,7 +539,8 @@ fn done_to(verb: Verb, rest: &[&str], words: &[&str], identities: &Identities) -
             _ => unclear(&crate::agent::describe::capital(&words.join(" "))),
         };
     }
-    let everything = ["everything", "all", "all of it", "all of them", "all objects", "all things", "everything here"].contains(&rest.join(" ").as_str());
+    let everything = ["everything", "all", "all of it", "all of them", "all objects", "all things", "everything here"]
+        .contains(&rest.join(" ").as_str());
     let each = |call: fn(Target) -> ToolCall| {
         let rest = match rest {
             ["me", rest @ ..] if !rest.is_empty() => rest,
@@ -476,7 +568,11 @@ fn done_to(verb: Verb, rest: &[&str], words: &[&str], identities: &Identities) -
                 all => all.to_vec(),
             };
             let looked = looked(&rest);
-            if looked.side.is_some() || looked.closeness != NORMAL { go(Verb::Go, &rest, identities) } else { vec![Task::Find(plain(&rest))] }
+            if looked.side.is_some() || looked.closeness != NORMAL {
+                go(Verb::Go, &rest, identities)
+            } else {
+                vec![Task::Find(plain(&rest))]
+            }
         }
         Verb::Isolate | Verb::HideRest => vec![Task::Call(ToolCall::Isolate { target: target(rest) })],
         Verb::Unhide if everything => vec![Task::Call(ToolCall::ShowAll {})],
@@ -493,14 +589,25 @@ fn done_to(verb: Verb, rest: &[&str], words: &[&str], identities: &Identities) -
         Verb::Remove => each(|target| ToolCall::Remove { target }),
         Verb::Highlight => each(|target| ToolCall::Highlight { target }),
         Verb::Describe => {
-            let view = ["the view", "the scene", "what i see", "what you see", "this view", "what is here", "this scene", "the room"];
+            let view = [
+                "the view",
+                "the scene",
+                "what i see",
+                "what you see",
+                "this view",
+                "what is here",
+                "this scene",
+                "the room",
+            ];
             if view.contains(&rest.join(" ").as_str()) {
                 return vec![Task::Call(ToolCall::Describe { target: None })];
             }
             each(|target| ToolCall::Describe { target: Some(target) })
         }
         Verb::Measure => match after(rest, &["the distance to", "how far"]) {
-            Some(to) if !to.is_empty() => vec![Task::Call(ToolCall::Measure { target: target(to), to: Some(Reference::Eye) })],
+            Some(to) if !to.is_empty() => {
+                vec![Task::Call(ToolCall::Measure { target: target(to), to: Some(Reference::Eye) })]
+            }
             _ => each(|target| ToolCall::Measure { target, to: None }),
         },
         Verb::Distance => match between(rest).or_else(|| {
@@ -519,8 +626,12 @@ fn done_to(verb: Verb, rest: &[&str], words: &[&str], identities: &Identities) -
 /// "The mug and the lamp" as two; "knife and candle", too, if these are names.
 fn split_and<'a>(words: &[&'a str], identities: &Identities) -> Vec<Vec<&'a str>> {
     let parts: Vec<Vec<&str>> = words.split(|w| *w == "and" || is_mark(w)).map(<[&str]>::to_vec).collect();
-    let sound = parts.len() > 1 && parts[1..].iter().all(|p| p.first().is_some_and(|w| ["the", "a", "an", "its", "my", "this", "that"].contains(w)));
-    let named = parts.len() > 1 && parts.iter().all(|p| !p.is_empty() && p.iter().all(|w| clauses::is_known(w, identities) || *w == "the"));
+    let sound = parts.len() > 1
+        && parts[1..]
+            .iter()
+            .all(|p| p.first().is_some_and(|w| ["the", "a", "an", "its", "my", "this", "that"].contains(w)));
+    let named = parts.len() > 1
+        && parts.iter().all(|p| !p.is_empty() && p.iter().all(|w| clauses::is_known(w, identities) || *w == "the"));
     let is_name = identities.iter().flat_map(|(_, i)| &i.names).any(|n| n.to_lowercase().contains(&words.join(" ")));
     if (sound || (named && !is_name)) && !parts[0].is_empty() { parts } else { vec![words.to_vec()] }
 }
@@ -573,7 +684,9 @@ fn rename(words: &[&str], clause: &[Token]) -> Option<Task> {
     let (what, name) = match rest.iter().rposition(|t| ["to", "as", "into"].contains(&t.low.as_str())) {
         Some(at) => (&rest[..at], &rest[at + 1..]),
         // "Call the mug 'tea cup'": a quoted text, or the last word.
-        None if verb != "rename" || rest.last().is_some_and(|t| t.low.starts_with('"')) => rest.split_at(rest.len().checked_sub(1)?),
+        None if verb != "rename" || rest.last().is_some_and(|t| t.low.starts_with('"')) => {
+            rest.split_at(rest.len().checked_sub(1)?)
+        }
         None => (rest, &rest[..0]),
     };
     let what: Vec<&str> = what.iter().map(|t| t.low.trim_start_matches('"')).collect();
@@ -590,7 +703,8 @@ fn unknown_verb(words: &[&str], identities: &Identities) -> Option<Vec<Task>> {
     // "Move the mug to the left" moves no mug.
     let is_thing = |w: &&&str| clauses::is_known(w, identities) || ["it", "that", "this", "them"].contains(*w);
     let things: Vec<&&str> = words[1..].iter().filter(is_thing).collect();
-    if ["move", "turn", "rotate", "push", "pull", "lower", "raise", "slide", "shift", "tilt", "spin", "put", "pick"].contains(&first)
+    if ["move", "turn", "rotate", "push", "pull", "lower", "raise", "slide", "shift", "tilt", "spin", "put", "pick"]
+        .contains(&first)
         && !things.is_empty()
     {
         let text = "I can only look and show; I cannot move or use anything in the real world. I can move the view instead: \
@@ -612,7 +726,12 @@ pub(super) fn bare(words: &[&str], identities: &Identities) -> Task {
         return task;
     }
     let looked = looked(words);
-    let rest: Vec<&str> = looked.rest.iter().copied().filter(|w| !["and", "but", "then", "too", "instead", "now", "also"].contains(w)).collect();
+    let rest: Vec<&str> = looked
+        .rest
+        .iter()
+        .copied()
+        .filter(|w| !["and", "but", "then", "too", "instead", "now", "also"].contains(w))
+        .collect();
     let said = looked.side.is_some() || looked.closeness != NORMAL;
     if said && (rest.is_empty() || rest == ["it"]) {
         return match looked.side {
@@ -631,10 +750,13 @@ pub(super) fn bare(words: &[&str], identities: &Identities) -> Task {
         return Task::Noise(words.join(" "));
     }
     // Talk about a thing asks for nothing yet: "I believe there was a candle somewhere".
-    if ["i", "we", "my", "he", "she", "they", "somebody", "someone", "there"].contains(rest.first().unwrap_or(&"")) && rest.len() > 2 {
+    if ["i", "we", "my", "he", "she", "they", "somebody", "someone", "there"].contains(rest.first().unwrap_or(&""))
+        && rest.len() > 2
+    {
         let first = rest.iter().position(|w| clauses::is_known(w, identities));
         if let Some(first) = first {
-            let run: Vec<&str> = rest[first..].iter().copied().take_while(|w| clauses::is_known(w, identities)).collect();
+            let run: Vec<&str> =
+                rest[first..].iter().copied().take_while(|w| clauses::is_known(w, identities)).collect();
             return Task::Mention(run.join(" "));
         }
     }

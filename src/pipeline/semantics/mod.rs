@@ -8,6 +8,7 @@
 //! meant, and [`answer`] puts it together.
 
 pub mod answer;
+pub mod asker;
 pub mod code_map;
 pub mod codes;
 pub mod edit;

@@ -4,6 +4,7 @@ mod keys;
 pub mod player;
 mod timeline;
 
+use std::collections::VecDeque;
 use std::path::PathBuf;
 
 use egui::{Button, ComboBox, DragValue, RichText, Slider, Ui};
@@ -40,6 +41,8 @@ pub struct CameraPane {
     quality: u8,
     /// Whether what was found is marked in films.
     pub mark: bool,
+    /// Flights that follow the one that is played.
+    next: VecDeque<Flight>,
     /// The scene that it belongs to.
     scene: u64,
 }
@@ -57,6 +60,7 @@ impl Default for CameraPane {
             film_height: 720,
             quality: 80,
             mark: false,
+            next: VecDeque::new(),
             scene: 0,
         }
     }
@@ -74,9 +78,26 @@ impl CameraPane {
         }
     }
 
-    /// Plays a flight to a target.
+    /// Plays a flight, after those that were asked for before it.
     pub fn play_flight(&mut self, flight: Flight) {
-        self.player.load(Reel::Flight(Box::new(flight)), true);
+        self.next.push_back(flight);
+        self.go_on();
+    }
+
+    /// Plays the next flight, if one waits and none is being played.
+    fn go_on(&mut self) {
+        if !self.player.playing
+            && let Some(flight) = self.next.pop_front()
+        {
+            self.player.looped = false;
+            self.player.load(Reel::Flight(Box::new(flight)), true);
+        }
+    }
+
+    /// The pose to show after `step_secs` of window time, if something is played.
+    pub fn tick(&mut self, step_secs: f64) -> Option<Pose> {
+        self.go_on();
+        self.player.tick(step_secs)
     }
 
     /// Plays or stops; the path, if nothing else is in.

@@ -32,6 +32,16 @@ impl Visibility {
         self.hidden.contains(&id)
     }
 
+    /// Identities that were hidden themselves.
+    pub fn hidden(&self) -> impl Iterator<Item = IdentityId> + '_ {
+        self.hidden.iter().copied()
+    }
+
+    /// Hides these and no others.
+    pub fn set_hidden(&mut self, ids: impl IntoIterator<Item = IdentityId>) {
+        *self = Self { hidden: ids.into_iter().collect(), ..Self::default() };
+    }
+
     /// Hides an identity, or shows it again.
     pub fn toggle(&mut self, id: IdentityId) {
         if !self.hidden.remove(&id) {

@@ -147,6 +147,17 @@ impl Questions {
         self.live = self.asked(text, semantics);
     }
 
+    /// Shows the answers to these questions, and no others.
+    pub fn mark(&mut self, texts: &[String], semantics: &SemanticMap) {
+        self.typed.clear();
+        self.kept = texts.iter().filter_map(|text| self.asked(text, semantics)).collect();
+        self.live = None;
+        if let Some(last) = self.kept.pop() {
+            self.typed.clone_from(&last.text);
+            self.live = Some(last);
+        }
+    }
+
     /// Answers all questions anew: identities have changed.
     pub fn ask_again(&mut self, semantics: &SemanticMap) {
         let texts: Vec<String> = self.kept.iter().map(|q| q.text.clone()).collect();

@@ -1,0 +1,437 @@
+//! A scene on this machine as the agent's [`World`]: what it asks is answered here, what it does is
+//! done to a copy and told to whoever shows the scene.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use glam::{DMat3, DVec3};
+
+use super::relation::View;
+use super::wish::{Direction, Distance, GoWish, NORMAL, Side, TurnWay};
+use super::world::{Arrival, Facts, Moved, Unreachable, World, WorldError};
+use crate::io;
+use crate::navigate::target::{self, Wish};
+use crate::navigate::visit::{NoVisit, Place, Visit};
+use crate::navigate::{FRAMES, Flight, Pose, Speed};
+use crate::pipeline::semantics::answer::Answered;
+use crate::pipeline::semantics::asker::Asker;
+use crate::pipeline::semantics::grammar::Kind;
+use crate::pipeline::semantics::view_map::ViewMap;
+use crate::render::RenderSettings;
+use crate::render::cpu::Renderer;
+use crate::scene::{Bounds, Camera, GaussianCloud, Identities, IdentityId, SemanticMap};
+use crate::worker::Explored;
+
+/// Longer side of the picture in which pixels of identities are counted, px.
+const COUNT_SIDE_PX: u32 = 256;
+/// A step, as a multiple of the distance that flights keep to matter.
+const STEP: f64 = 6.0;
+
+/// Something that was done, for whoever shows the scene.
+#[derive(Clone, Debug)]
+pub enum Deed {
+    /// The camera flies; the point is what it turns about from then on.
+    Fly(Box<Flight>, Option<DVec3>),
+    /// These are marked, and nothing else.
+    Mark(Vec<IdentityId>),
+    /// Which identities are left out of the picture.
+    Hidden(Vec<IdentityId>),
+    /// Names have changed.
+    Renamed(IdentityId, String),
+    /// The scene was looked at: where matter is is known.
+    Explored(Arc<Explored>),
+}
+
+/// What a scene is made of.
+pub struct Parts {
+    /// The Gaussians.
+    pub cloud: Arc<GaussianCloud>,
+    /// How they are drawn.
+    pub settings: RenderSettings,
+    /// Objects and parts.
+    pub map: Arc<SemanticMap>,
+    /// The photos' cameras.
+    pub cameras: Vec<Camera>,
+    /// Which way is up.
+    pub up: DVec3,
+    /// Length of a unit in metres, if that is known.
+    pub metres: Option<f64>,
+    /// Folder that exports go to.
+    pub exports: PathBuf,
+    /// What is known of moving about, if the scene was looked at before.
+    pub explored: Option<Arc<Explored>>,
+}
+
+/// Whom deeds are told to.
+pub type Tell = Box<dyn FnMut(Deed) + Send>;
+
+/// A scene that the agent acts in.
+pub struct SceneWorld {
+    parts: Parts,
+    asker: Asker,
+    eye: Pose,
+    aspect: f64,
+    hidden: Vec<bool>,
+    bounds: Vec<Option<Bounds>>,
+    /// Share of the view that each identity covers, with the view that they were counted in.
+    shares: Mutex<Option<(Pose, Vec<bool>, Vec<f64>)>>,
+    done: Vec<Before>,
+    tell: Tell,
+}
+
+/// How it was before something was done.
+enum Before {
+    Hidden(Vec<bool>, String),
+    Named(Arc<SemanticMap>, IdentityId, String),
+    Eye(Pose, String),
+}
+
+impl SceneWorld {
+    /// A scene, seen from `eye` in a picture of this width by height.
+    ///
+    /// # Errors
+    /// If the encoder that looked at it cannot be loaded.
+    pub fn new(parts: Parts, eye: Pose, aspect: f64, tell: Tell) -> Result<Self, WorldError> {
+        let asker = Asker::new(parts.map.language.as_ref()).map_err(|e| WorldError(e.to_string()))?;
+        let n = parts.map.identities.len() + 1;
+        let bounds = bounds(&parts);
+        Ok(Self {
+            parts,
+            asker,
+            eye,
+            aspect,
+            hidden: vec![false; n],
+            bounds,
+            shares: Mutex::new(None),
+            done: Vec::new(),
+            tell,
+        })
+    }
+
+    /// Takes over what a person has done since: where the eye is, what is hidden, and what things are
+    /// called.
+    pub fn keep_up(&mut self, eye: Pose, aspect: f64, hidden: &[IdentityId], map: &Arc<SemanticMap>) {
+        (self.eye, self.aspect) = (eye, aspect);
+        if !Arc::ptr_eq(map, &self.parts.map) {
+            self.parts.map = Arc::clone(map);
+            self.bounds = bounds(&self.parts);
+            self.done.clear();
+        }
+        self.hidden = (0..=map.identities.len() as IdentityId).map(|id| hidden.contains(&id)).collect();
+    }
+
+    /// Where the eye is.
+    pub fn eye(&self) -> Pose {
+        self.eye
+    }
+
+    fn explored(&mut self) -> Arc<Explored> {
+        if let Some(known) = self.parts.explored.as_ref().filter(|e| Arc::ptr_eq(&e.cloud, &self.parts.cloud)) {
+            return Arc::clone(known);
+        }
+        let new = Arc::new(Explored::new(Arc::clone(&self.parts.cloud), &self.parts.cameras, self.parts.up));
+        self.parts.explored = Some(Arc::clone(&new));
+        (self.tell)(Deed::Explored(Arc::clone(&new)));
+        new
+    }
+
+    /// The Gaussians that a person sees.
+    fn drawn(&self, id: IdentityId) -> bool {
+        !self.parts.map.identities.line(id).any(|i| self.hidden.get(i as usize).copied().unwrap_or(false))
+    }
+
+    /// Share of the present view that each identity covers, pieces included, by number.
+    fn shares(&self) -> Vec<f64> {
+        let mut known = self.shares.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, _, shares)) = known.as_ref().filter(|k| k.0 == self.eye && k.1 == self.hidden) {
+            return shares.clone();
+        }
+        let Parts { cloud, settings, map, .. } = &self.parts;
+        let (w, h) = if self.aspect >= 1.0 {
+            (COUNT_SIDE_PX, (f64::from(COUNT_SIDE_PX) / self.aspect).max(1.0) as u32)
+        } else {
+            ((f64::from(COUNT_SIDE_PX) * self.aspect).max(1.0) as u32, COUNT_SIDE_PX)
+        };
+        let camera = self.eye.camera(w, h);
+        let identities = &map.identities;
+        let mut shares = vec![0.0; identities.len() + 1];
+        let view = if self.hidden.contains(&true) {
+            let kept: Vec<usize> =
+                (0..cloud.len()).filter(|i| map.of.get(*i).is_none_or(|id| self.drawn(*id))).collect();
+            let of: Vec<IdentityId> = kept.iter().map(|i| map.of[*i]).collect();
+            ViewMap::render(&mut Renderer::new(), &cloud.select(&kept), &of, identities, &camera, settings)
+        } else {
+            ViewMap::render(&mut Renderer::new(), cloud, &map.of, identities, &camera, settings)
+        };
+        // A view that cannot be drawn shows nothing.
+        for id in view.map(|v| v.identity).unwrap_or_default() {
+            identities.line(id).for_each(|i| shares[i as usize] += 1.0);
+        }
+        shares.iter_mut().for_each(|s| *s /= f64::from(w * h));
+        *known = Some((self.eye, self.hidden.clone(), shares.clone()));
+        shares
+    }
+
+    fn fly(&mut self, flight: Flight, about: Option<DVec3>, what: String) {
+        self.done.push(Before::Eye(self.eye, what));
+        if let Some(last) = flight.poses.last() {
+            self.eye = *last;
+        }
+        (self.tell)(Deed::Fly(Box::new(flight), about));
+    }
+
+    fn tell_hidden(&mut self) {
+        let hidden = (0..self.hidden.len()).filter(|i| self.hidden[*i]).map(|i| i as IdentityId).collect();
+        (self.tell)(Deed::Hidden(hidden));
+    }
+
+    fn set_hidden_list(&mut self, hidden: Vec<bool>, what: String) {
+        let before = std::mem::replace(&mut self.hidden, hidden);
+        self.done.push(Before::Hidden(before, what));
+        self.tell_hidden();
+    }
+
+    fn name(&self, id: IdentityId) -> String {
+        self.parts.map.identities.full_name(id)
+    }
+
+    /// The file that an identity is exported to: a name that every system takes.
+    fn export_file(&self, id: IdentityId) -> PathBuf {
+        let safe = |c: char| if c.is_alphanumeric() { c } else { '-' };
+        let name: String = self.name(id).chars().take(60).map(safe).collect();
+        self.parts.exports.join(format!("{id}-{}.ply", name.trim_matches('-')))
+    }
+
+    /// A turn or a straight way, without looking for one.
+    fn straight(&mut self, to: Pose, what: String) -> Result<f64, Unreachable> {
+        let eye = self.eye;
+        let flight = Flight::new(&[eye.center, to.center], [&eye, &to], None, None, FRAMES / 2, Speed::Eased);
+        let mut flight = flight.ok_or_else(|| Unreachable { reason: "the view has no place".into(), nearest: None })?;
+        flight.seconds = 1.2;
+        let length = flight.length;
+        self.fly(flight, None, what);
+        Ok(length)
+    }
+}
+
+/// The boxes of all identities, by number.
+fn bounds(parts: &Parts) -> Vec<Option<Bounds>> {
+    let Parts { cloud, map, .. } = parts;
+    let mut places: Vec<Vec<DVec3>> = vec![Vec::new(); map.identities.len() + 1];
+    for (i, &id) in map.of.iter().enumerate().take(cloud.len()) {
+        map.identities.line(id).for_each(|id| places[id as usize].push(cloud.world_position(i)));
+    }
+    places.into_iter().map(Bounds::robust).collect()
+}
+
+/// The side in navigation's terms. What is in view is seen from where it is seen now, unless another
+/// side is asked for; what is not, from wherever it is seen best.
+fn side(side: Side, in_view: bool) -> target::Side {
+    match side {
+        Side::Same if in_view => target::Side::Same,
+        Side::Same => target::Side::Best,
+        Side::Other => target::Side::Other,
+        Side::Front => target::Side::Front,
+        Side::Left => target::Side::Left,
+        Side::Right => target::Side::Right,
+        Side::Above => target::Side::Above,
+        Side::Below => target::Side::Below,
+    }
+}
+
+impl World for SceneWorld {
+    fn identities(&self) -> &Identities {
+        &self.parts.map.identities
+    }
+
+    fn locate(&mut self, query: &str, kind: Kind) -> Result<Answered, WorldError> {
+        let answered = self.asker.ask(&self.parts.map, query, kind).map_err(|e| WorldError(e.to_string()))?;
+        Ok(answered.unwrap_or_else(|| super::world::locate_by_names(&self.parts.map.identities, query, kind)))
+    }
+
+    fn facts(&self, id: IdentityId) -> Option<Facts> {
+        let identity = self.parts.map.identities.get(id)?;
+        Some(Facts {
+            names: identity.names.clone(),
+            level: identity.level,
+            parent: identity.parent,
+            bounds: self.bounds.get(id as usize).copied().flatten(),
+            in_view: self.shares().get(id as usize).copied().unwrap_or(0.0),
+            hidden: !self.drawn(id),
+        })
+    }
+
+    fn view(&self) -> View {
+        View { eye: self.eye.center, forward: self.eye.forward(), up: self.parts.up }
+    }
+
+    fn metres_per_unit(&self) -> Option<f64> {
+        self.parts.metres
+    }
+
+    fn go_to(&mut self, id: IdentityId, wish: GoWish) -> Result<Arrival, Unreachable> {
+        let explored = self.explored();
+        let in_view = self.shares().get(id as usize).is_some_and(|s| *s > 0.0);
+        let eye = self.eye;
+        let place = Place { cloud: &self.parts.cloud, settings: &self.parts.settings, map: &self.parts.map };
+        let distance = NORMAL / wish.closeness.max(0.01);
+        let go = |side: target::Side| {
+            explored.navigator.visit(place, id, Wish { side, distance }, &eye, self.aspect, FRAMES)
+        };
+        let wanted = side(wish.side, in_view);
+        let mut visit = go(wanted);
+        if visit.is_err() && wish.side == Side::Same && wanted != target::Side::Best {
+            visit = go(target::Side::Best);
+        }
+        match visit {
+            Ok(Visit { view, target, flight }) => {
+                let arrival = Arrival { distance: flight.length, in_view: view.covers };
+                let what = format!("going to {}", self.name(id));
+                (self.tell)(Deed::Mark(vec![id]));
+                self.fly(flight, Some(target), what);
+                Ok(arrival)
+            }
+            Err(NoVisit::NoWay { why, nearest }) => {
+                let center = self.bounds.get(id as usize).copied().flatten().map(|b| b.center());
+                let nearest = nearest.and_then(|n| Some(n.view.pose.center.distance(center?)));
+                Err(Unreachable { reason: why.to_string(), nearest })
+            }
+            Err(e) => Err(Unreachable { reason: e.to_string(), nearest: None }),
+        }
+    }
+
+    fn look_at(&mut self, id: IdentityId) -> Result<Arrival, Unreachable> {
+        let center = self.bounds.get(id as usize).copied().flatten().map(|b| b.center());
+        let center =
+            center.ok_or_else(|| Unreachable { reason: "nothing in the scene belongs to it".into(), nearest: None })?;
+        let eye = self.eye;
+        let to = Pose::looking_at(eye.center, center, self.parts.up, eye.fov_y_rad, &eye.world_from_camera);
+        let what = format!("looking at {}", self.name(id));
+        self.straight(to, what)?;
+        Ok(Arrival { distance: 0.0, in_view: self.shares().get(id as usize).copied().unwrap_or(0.0) })
+    }
+
+    fn move_eye(&mut self, direction: Direction, distance: Distance) -> Result<Moved, Unreachable> {
+        let explored = self.explored();
+        let step = STEP * explored.navigator.clearance;
+        let wanted = match (distance, self.parts.metres) {
+            (Distance::Metres(m), Some(metres)) => m / metres.max(1e-9),
+            // Without a scale, a metre is what a step is.
+            (Distance::Metres(n), None) | (Distance::Relative(n), _) => n * step,
+            (Distance::Default, _) => step,
+        };
+        let axis = match direction {
+            Direction::Forward => DVec3::Z,
+            Direction::Back => DVec3::NEG_Z,
+            Direction::Left => DVec3::NEG_X,
+            Direction::Right => DVec3::X,
+            Direction::Up => DVec3::NEG_Y,
+            Direction::Down => DVec3::Y,
+        };
+        let (center, stopped_by_matter) = explored.navigator.step(&self.eye, axis, wanted);
+        let to = Pose { center, ..self.eye };
+        let distance_done = self.straight(to, format!("moving {}", direction.text()))?;
+        Ok(Moved { distance_done, stopped_by_matter })
+    }
+
+    fn turn(&mut self, way: TurnWay, degrees: f64) -> Result<(), Unreachable> {
+        let eye = self.eye;
+        let (axis, sign) = match way {
+            TurnWay::Left => (self.parts.up, 1.0),
+            TurnWay::Right => (self.parts.up, -1.0),
+            TurnWay::Up => (eye.world_from_camera.x_axis, 1.0),
+            TurnWay::Down => (eye.world_from_camera.x_axis, -1.0),
+        };
+        let axis = axis.try_normalize().unwrap_or(DVec3::Z);
+        let turn = DMat3::from_axis_angle(axis, sign * degrees.to_radians());
+        let to = Pose { world_from_camera: turn * eye.world_from_camera, ..eye };
+        self.straight(to, format!("turning {}", way.text())).map(|_| ())
+    }
+
+    fn highlight(&mut self, ids: &[IdentityId]) -> Result<(), WorldError> {
+        (self.tell)(Deed::Mark(ids.to_vec()));
+        Ok(())
+    }
+
+    fn isolate(&mut self, id: IdentityId) -> Result<(), WorldError> {
+        let all = &self.parts.map.identities;
+        let inside = all.within(id);
+        let line: Vec<IdentityId> = all.line(id).collect();
+        let hidden = (0..=all.len() as IdentityId).map(|i| !inside[i as usize] && !line.contains(&i)).collect();
+        let what = format!("showing only {}", self.name(id));
+        self.set_hidden_list(hidden, what);
+        Ok(())
+    }
+
+    fn set_hidden(&mut self, id: IdentityId, hide: bool) -> Result<(), WorldError> {
+        let mut hidden = self.hidden.clone();
+        let slot = hidden.get_mut(id as usize).ok_or_else(|| WorldError(format!("there is no #{id}")))?;
+        *slot = hide;
+        let what = format!("{} {}", if hide { "hiding" } else { "showing" }, self.name(id));
+        self.set_hidden_list(hidden, what);
+        Ok(())
+    }
+
+    fn show_all(&mut self) -> Result<(), WorldError> {
+        self.set_hidden_list(vec![false; self.hidden.len()], "showing everything".into());
+        Ok(())
+    }
+
+    fn remove(&mut self, id: IdentityId) -> Result<(), WorldError> {
+        // Files stay as they are: what is left out of the picture is left out of exports too.
+        self.set_hidden(id, true)
+    }
+
+    fn rename(&mut self, id: IdentityId, name: &str) -> Result<(), WorldError> {
+        let before = Arc::clone(&self.parts.map);
+        let map = Arc::make_mut(&mut self.parts.map);
+        let identity = map.identities.get_mut(id).ok_or_else(|| WorldError(format!("there is no #{id}")))?;
+        let old = identity.names.first().cloned().unwrap_or_default();
+        match identity.names.first_mut() {
+            Some(first) => name.clone_into(first),
+            None => identity.names.push(name.to_owned()),
+        }
+        self.done.push(Before::Named(before, id, old));
+        (self.tell)(Deed::Renamed(id, name.to_owned()));
+        Ok(())
+    }
+
+    fn undo(&mut self) -> Result<String, WorldError> {
+        match self.done.pop().ok_or_else(|| WorldError("There is nothing to take back.".into()))? {
+            Before::Hidden(hidden, what) => {
+                self.hidden = hidden;
+                self.tell_hidden();
+                Ok(what)
+            }
+            Before::Named(map, id, old) => {
+                let new = self.parts.map.identities.name(id);
+                self.parts.map = map;
+                (self.tell)(Deed::Renamed(id, old));
+                Ok(format!("calling it {new}"))
+            }
+            Before::Eye(eye, what) => {
+                self.straight(eye, String::new()).map_err(|e| WorldError(e.reason))?;
+                // The way back is not itself something to take back.
+                self.done.pop();
+                Ok(what)
+            }
+        }
+    }
+
+    fn export(&mut self, id: IdentityId) -> Result<String, WorldError> {
+        let file = self.export_file(id);
+        let failed = |e: &dyn std::fmt::Display| WorldError(format!("{}: {e}", file.display()));
+        std::fs::create_dir_all(&self.parts.exports).map_err(|e| failed(&e))?;
+        let members = self.parts.map.members(id);
+        if members.is_empty() {
+            return Err(WorldError(format!("nothing in the scene belongs to {}", self.name(id))));
+        }
+        io::splat_ply::write(&file, &self.parts.cloud.select(&members)).map_err(|e| failed(&e))?;
+        Ok(file.display().to_string())
+    }
+
+    fn export_replaces(&self, id: IdentityId) -> Option<String> {
+        let file = self.export_file(id);
+        file.exists().then(|| file.display().to_string())
+    }
+}

@@ -1,0 +1,241 @@
+//! `fmlgs agent`: plain sentences to what is shown.
+
+use std::io::BufRead;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use serde_json::json;
+
+use super::asking::semantics;
+use super::{CliError, interrupt, opened, output, view};
+use crate::agent::llm::Llm;
+use crate::agent::llm::settings::LlmSettings;
+use crate::agent::rules::Rules;
+use crate::agent::scene::{Deed, Parts, SceneWorld};
+use crate::agent::{AgentEvent, Planner, Policy, Session};
+use crate::io;
+use crate::navigate::Pose;
+use crate::scene::Camera;
+
+/// Talk to a scene: it shows, goes there, tells, hides, measures
+///
+/// Each TEXT is one request of the same talk; without any, requests are read from standard input, one
+/// a line. The planner 'rules' is built in; 'llm' asks a chat model behind an OpenAI-compatible
+/// address, and sends it the names of the scene's objects. Exit code 1 if the last request was refused.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    fmlgs agent scene/ \"show me the handle of the kettle from the other side\" \"step back half a metre\"\n  \
+    fmlgs agent scene/ \"what is on the table?\" --json\n  \
+    fmlgs agent scene/ \"go to the lamp\" --view lamp.png --transcript talk.md\n  \
+    fmlgs agent scene/ --planner llm --url http://127.0.0.1:11434/v1 --model qwen3 \"find something to cut with\"")]
+pub struct Args {
+    /// Trained scene with objects and parts ('fmlgs preprocess')
+    scene: PathBuf,
+    /// Requests, in order
+    text: Vec<String>,
+    /// Photo to start from, by index or name, or a JSON camera file [default: the first photo]
+    #[arg(long)]
+    from: Option<String>,
+    /// What turns sentences into steps
+    #[arg(long, value_enum, default_value_t = PlannerArg::Rules)]
+    planner: PlannerArg,
+    /// Address of the chat model, up to and with its version
+    #[arg(long, required_if_eq("planner", "llm"))]
+    url: Option<String>,
+    /// Name of the chat model
+    #[arg(long, required_if_eq("planner", "llm"))]
+    model: Option<String>,
+    /// Name of the environment variable that holds the model's key
+    #[arg(long)]
+    key_variable: Option<String>,
+    /// What may be done: a policy file [default: FMLGS_POLICY, else the built-in one]
+    #[arg(long)]
+    policy: Option<PathBuf>,
+    /// Length of a scene unit in metres, if that is known
+    #[arg(long)]
+    metres: Option<f64>,
+    /// Write the picture at the end
+    #[arg(long)]
+    view: Option<PathBuf>,
+    /// Write everything that was said and done: .json, else Markdown
+    #[arg(long)]
+    transcript: Option<PathBuf>,
+    /// Print one JSON document
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum PlannerArg {
+    /// A grammar of English; no network
+    Rules,
+    /// A chat model
+    Llm,
+}
+
+impl Args {
+    fn planner(&self) -> Result<Box<dyn Planner>, CliError> {
+        let settings = LlmSettings {
+            base_url: self.url.clone().unwrap_or_default(),
+            model: self.model.clone().unwrap_or_default(),
+            key_variable: self.key_variable.clone().unwrap_or_default(),
+            ..LlmSettings::default()
+        };
+        Ok(match self.planner {
+            PlannerArg::Rules => Box::new(Rules::default()),
+            PlannerArg::Llm => Box::new(Llm::new(settings).map_err(|e| CliError::failed(e.to_string()))?),
+        })
+    }
+
+    fn policy(&self) -> Result<Policy, CliError> {
+        let policy = match &self.policy {
+            Some(path) => Policy::load(path),
+            None => Policy::from_environment(),
+        };
+        policy.map_err(|e| CliError::failed(e.to_string()))
+    }
+}
+
+pub fn run(args: Args) -> Result<(), CliError> {
+    let (planner, policy) = (args.planner()?, args.policy()?);
+    if args.metres.is_some_and(|m| !(m.is_finite() && m > 0.0)) {
+        return Err(CliError::Usage("--metres has to be over 0".into()));
+    }
+    let scene = opened::drawable(&args.scene)?;
+    let map = semantics(&args.scene, &scene.cloud)?;
+    let camera = view::choose(args.from.as_deref(), &scene)?;
+    let cameras: Vec<Camera> = scene.cameras.iter().map(|c| c.camera.clone()).collect();
+    let parts = Parts {
+        cloud: Arc::new(scene.cloud),
+        settings: scene.settings,
+        map: Arc::new(map),
+        up: super::path::up_of(&cameras),
+        cameras,
+        metres: args.metres,
+        exports: args.scene.join("exports"),
+        explored: None,
+    };
+    let deeds: Arc<Mutex<Vec<String>>> = Arc::default();
+    let tell = {
+        let deeds = Arc::clone(&deeds);
+        Box::new(move |deed: Deed| {
+            let mut deeds = deeds.lock().unwrap_or_else(PoisonError::into_inner);
+            deeds.extend(line(&deed));
+        })
+    };
+    let (cloud, settings) = (Arc::clone(&parts.cloud), parts.settings.clone());
+    let aspect = f64::from(camera.width_px) / f64::from(camera.height_px);
+    let world = SceneWorld::new(parts, Pose::of(&camera), aspect, tell);
+    let mut world = world.map_err(|e| CliError::failed(e.to_string()))?;
+    let mut session = Session::new(policy, planner);
+    let mut talk = Talk { json: args.json, ..Talk::default() };
+    if args.text.is_empty() {
+        for text in std::io::stdin().lock().lines() {
+            let text = text.map_err(|e| CliError::failed(format!("standard input: {e}")))?;
+            if !text.trim().is_empty() {
+                talk.say(&mut session, &mut world, &text, &deeds)?;
+            }
+        }
+    }
+    for text in &args.text {
+        talk.say(&mut session, &mut world, text, &deeds)?;
+    }
+    if let Some(path) = &args.transcript {
+        let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+        let text = if json { session.transcript().to_json() } else { session.transcript().to_markdown() };
+        output::make_parent(path)?;
+        io::atomic::write(path, |w| std::io::Write::write_all(w, text.as_bytes()))?;
+    }
+    if let Some(path) = &args.view {
+        let camera = world.eye().camera(camera.width_px, camera.height_px).limited_to(1280);
+        let mut backend = crate::render::Backend::on_cpu();
+        let frame = backend.render(&cloud, &camera, &settings)?;
+        output::make_parent(path)?;
+        let size = [camera.width_px, camera.height_px];
+        output::write_png(path, frame.to_rgb8().as_flattened(), size, image::ColorType::Rgb8)?;
+    }
+    if args.json {
+        output::print_json(&json!({ "planner": session.planner(), "requests": talk.told }))?;
+    }
+    match talk.refused {
+        Some(text) if !args.json => Err(CliError::failed(format!("the last request was not carried out: {text}"))),
+        Some(_) => Err(CliError::failed("the last request was not carried out".to_owned())),
+        None => Ok(()),
+    }
+}
+
+/// What was said so far.
+#[derive(Default)]
+struct Talk {
+    json: bool,
+    told: Vec<serde_json::Value>,
+    /// Why the last request was refused, if it was.
+    refused: Option<String>,
+}
+
+impl Talk {
+    fn say(
+        &mut self,
+        session: &mut Session,
+        world: &mut SceneWorld,
+        text: &str,
+        deeds: &Mutex<Vec<String>>,
+    ) -> Result<(), CliError> {
+        let cancel = AtomicBool::new(false);
+        let mut calls = Vec::new();
+        let reply = session.say(
+            world,
+            text,
+            &mut |event| {
+                if interrupt::asked_to_stop() {
+                    cancel.store(true, Ordering::Relaxed);
+                }
+                if let AgentEvent::Call { line, .. } = event {
+                    calls.push(line);
+                }
+            },
+            &cancel,
+        );
+        if interrupt::asked_to_stop() {
+            return Err(CliError::Cancelled("the talk ends here".into()));
+        }
+        let done = std::mem::take(&mut *deeds.lock().unwrap_or_else(PoisonError::into_inner));
+        self.refused = reply.refused.as_ref().map(|r| r.text.clone());
+        if self.json {
+            let refused = reply.refused.as_ref().map(|r| json!({ "kind": format!("{:?}", r.kind), "text": r.text }));
+            let names = reply.candidates.iter().map(|id| {
+                use crate::agent::World;
+                world.identities().full_name(*id)
+            });
+            self.told.push(json!({
+                "request": text,
+                "calls": calls,
+                "deeds": done,
+                "reply": reply.text,
+                "candidates": names.collect::<Vec<_>>(),
+                "refused": refused,
+                "awaits": reply.pending.map(|p| format!("{p:?}")),
+            }));
+            return Ok(());
+        }
+        let mut lines = vec![format!("> {text}")];
+        lines.extend(done.iter().map(|d| format!("  {d}")));
+        lines.push(reply.text);
+        output::print(&lines.join("\n"))
+    }
+}
+
+/// A deed for people; `None` where there is nothing to say.
+fn line(deed: &Deed) -> Option<String> {
+    match deed {
+        Deed::Fly(flight, _) => {
+            let (length, secs) = (flight.length, flight.seconds);
+            Some(format!("flies {length:.2} units in {secs:.1} s, {} poses", flight.poses.len()))
+        }
+        Deed::Mark(ids) => Some(format!("marks {} of them", ids.len())),
+        Deed::Hidden(ids) => Some(format!("leaves {} out of the picture", ids.len())),
+        Deed::Renamed(id, name) => Some(format!("calls #{id} {name}")),
+        Deed::Explored(_) => None,
+    }
+}
