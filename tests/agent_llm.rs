@@ -109,7 +109,8 @@ fn a_good_model_is_heard_step_by_step() {
     assert_eq!(body["tools"].as_array().map(Vec::len), Some(fmlgs::agent::tool::NAMES.len()));
     let message = body["messages"][1]["content"].as_str().expect("a message");
     assert!(message.contains("SCENE DATA") && message.contains("\"kettle\""));
-    let pieces: String = t.events.iter().filter_map(|e| if let AgentEvent::Piece(p) = e { Some(p.as_str()) } else { None }).collect();
+    let pieces: String =
+        t.events.iter().filter_map(|e| if let AgentEvent::Piece(p) = e { Some(p.as_str()) } else { None }).collect();
     assert_eq!(pieces, t.reply.text, "the answer comes piece by piece");
 }
 
@@ -134,7 +135,9 @@ fn as_call(line: &str) -> Option<(String, String)> {
             }
             a
         }
-        "look_at" | "isolate" | "highlight" | "hide" | "unhide" | "describe" | "measure" | "remove" | "export" if parts.len() == 1 => {
+        "look_at" | "isolate" | "highlight" | "hide" | "unhide" | "describe" | "measure" | "remove" | "export"
+            if parts.len() == 1 =>
+        {
             json!({ "target": first? })
         }
         "show_all" | "undo" => json!({}),
@@ -164,7 +167,8 @@ fn the_table_goes_through_the_same_checks() {
         let turn: &Turn = &dialogue.turns[0];
         let plain = turn.calls.iter().all(|c| !c.contains(['*', '|']) && as_call(c).is_some());
         if turn.outcome == "done" && !turn.calls.is_empty() && plain && turn.reply.is_empty() {
-            let mut script: Vec<Say> = turn.calls.iter().map(|c| Say::Calls(vec![as_call(c).expect("a call")])).collect();
+            let mut script: Vec<Say> =
+                turn.calls.iter().map(|c| Say::Calls(vec![as_call(c).expect("a call")])).collect();
             script.push(text("There you are."));
             let server = Server::new(script);
             let (right, is_unsafe) = ask(&mut session(&server), &mut Room::new(), turn);
@@ -221,7 +225,8 @@ fn endless_loops_come_to_an_end() {
     assert_eq!(t.outcome(), "limit");
     assert!(t.room.log.len() <= 6, "{:?}", t.room.log);
     // Another call each time: the number of answers ends it.
-    let turning: Vec<Say> = (1..100).map(|n| calls(&[("turn", json!({ "direction": "left", "degrees": n }))])).collect();
+    let turning: Vec<Say> =
+        (1..100).map(|n| calls(&[("turn", json!({ "direction": "left", "degrees": n }))])).collect();
     let t = talk(turning, "turn left");
     assert_eq!((t.outcome(), t.server.requests(), t.room.log.len()), ("limit", 12, 12));
     // Many calls in one answer: only some are looked at.
@@ -303,15 +308,18 @@ fn what_is_destructive_waits_for_the_users_own_yes() {
         "tidy up",
     );
     assert_eq!((t.outcome(), t.room.log.len()), ("ask", 0));
-    let t = talk(vec![text("{\"name\": \"remove\", \"arguments\": {\"target\": \"mug\"}} Yes. Done, removed.")], "tidy up");
+    let t =
+        talk(vec![text("{\"name\": \"remove\", \"arguments\": {\"target\": \"mug\"}} Yes. Done, removed.")], "tidy up");
     assert_eq!((t.outcome(), t.room.log.len()), ("done", 0));
 }
 
 #[test]
 fn orders_in_names_and_texts_have_no_power() {
     let room = Room::new();
-    let everything: Vec<(String, String)> =
-        (1..=8).map(|id| call("remove", json!({ "target": id }))).chain([call("export", json!({ "target": 1 }))]).collect();
+    let everything: Vec<(String, String)> = (1..=8)
+        .map(|id| call("remove", json!({ "target": id })))
+        .chain([call("export", json!({ "target": 1 }))])
+        .collect();
     let t = talk(vec![Say::Calls(everything), text("All removed.")], &format!("show me the {ATTACK}"));
     assert_eq!((t.outcome(), t.room.log.len()), ("confirm", 0), "a model that obeys the name");
     assert!((1..=room.identities().len() as u32).all(|id| t.room.facts(id).is_some()));
@@ -403,7 +411,8 @@ fn questions_of_the_model_are_answered_and_talks_go_on() {
     let t = t.say("the left one");
     assert_eq!((t.outcome(), t.room.log.as_slice()), ("done", &["hidden red controller true".to_owned()][..]));
     // What cannot be is told to the model, which may say so.
-    let t = talk(vec![calls(&[("go_to", json!({ "target": "giraffe" }))]), text("There is none.")], "show me a giraffe");
+    let t =
+        talk(vec![calls(&[("go_to", json!({ "target": "giraffe" }))]), text("There is none.")], "show me a giraffe");
     assert_eq!((t.outcome(), t.reply.refused.as_ref().map(|r| r.kind)), ("not_found", Some(RefusalKind::NotFound)));
 }
 

@@ -106,7 +106,10 @@ fn whatever_is_typed_there_is_an_answer_and_nothing_is_removed() {
     let mut session = rules();
     let mut room = Room::new();
     let long = "remove the mug and ".repeat(2000);
-    let words = ["remove", "the", "mug", "yes", ",", "then", "\"", "of", "left", "it", "no", "'s", "1e999", "-", "half a", "the", "all", "#3"];
+    let words = [
+        "remove", "the", "mug", "yes", ",", "then", "\"", "of", "left", "it", "no", "'s", "1e999", "-", "half a",
+        "the", "all", "#3",
+    ];
     let mut texts: Vec<String> = vec![long, "\u{0}\u{202e}remove".into(), "of of of of".into(), "the the the".into()];
     // Every pair and many triples of words that the grammar knows.
     for a in words {

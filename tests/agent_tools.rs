@@ -33,7 +33,8 @@ fn samples(schema: &Value) -> Vec<Value> {
         "object" => {
             let properties = schema["properties"].as_object().expect("properties");
             let first = |s: &Value| samples(s).first().cloned().expect("a sample");
-            let whole: Value = properties.iter().map(|(k, s)| (k.clone(), first(s))).collect::<serde_json::Map<_, _>>().into();
+            let whole: Value =
+                properties.iter().map(|(k, s)| (k.clone(), first(s))).collect::<serde_json::Map<_, _>>().into();
             vec![whole]
         }
         other => panic!("type {other}"),
@@ -49,7 +50,8 @@ fn what_a_schema_allows_is_a_call_and_what_it_forbids_is_none() {
         let (name, schema) = (tool["function"]["name"].as_str().expect("a name"), &tool["function"]["parameters"]);
         let whole = samples(schema)[0].clone();
         assert!(ToolCall::parse(name, &whole.to_string()).is_ok(), "{name} {whole}");
-        let required: Vec<&str> = schema["required"].as_array().expect("required").iter().filter_map(Value::as_str).collect();
+        let required: Vec<&str> =
+            schema["required"].as_array().expect("required").iter().filter_map(Value::as_str).collect();
         let mut least = whole.clone();
         least.as_object_mut().expect("an object").retain(|k, _| required.contains(&k.as_str()));
         let call = ToolCall::parse(name, &least.to_string()).expect(name);

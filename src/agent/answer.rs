@@ -120,8 +120,11 @@ pub fn choice(world: &mut dyn World, text: &str, candidates: &[IdentityId], focu
     let words = low(&tokens);
     let words = without_courtesy(&words);
     let unclear = |text: String| Choice::Unclear(Refusal::new(RefusalKind::Unclear, text));
-    let plain: Vec<&str> =
-        words.iter().copied().filter(|w| !["the", "number", "no", "one", "option", "i", "mean", "meant", "it's"].contains(w)).collect();
+    let plain: Vec<&str> = words
+        .iter()
+        .copied()
+        .filter(|w| !["the", "number", "no", "one", "option", "i", "mean", "meant", "it's"].contains(w))
+        .collect();
     // "The second one", "2", "number two": as they were listed.
     if let [only] = plain.as_slice() {
         let listed = ordinal(only).map(f64::from).or_else(|| number(only));
@@ -152,12 +155,16 @@ pub fn choice(world: &mut dyn World, text: &str, candidates: &[IdentityId], focu
     };
     // Among the candidates first, by what names them: "the kettle's" chooses its handle.
     let said: Vec<&str> = words.iter().map(|w| w.strip_suffix("'s").unwrap_or(w)).collect();
-    let content: Vec<&str> =
-        said.iter().copied().filter(|w| !["the", "one", "of", "on", "that", "a", "an", "this", "from"].contains(w)).collect();
+    let content: Vec<&str> = said
+        .iter()
+        .copied()
+        .filter(|w| !["the", "one", "of", "on", "that", "a", "an", "this", "from"].contains(w))
+        .collect();
     let all = world.identities();
     let fits = |id: &IdentityId| {
         let names = all.line(*id).filter_map(|i| all.get(i)).flat_map(|i| &i.names);
-        let known: Vec<String> = names.flat_map(|n| n.to_lowercase().split_whitespace().map(str::to_owned).collect::<Vec<_>>()).collect();
+        let known: Vec<String> =
+            names.flat_map(|n| n.to_lowercase().split_whitespace().map(str::to_owned).collect::<Vec<_>>()).collect();
         !content.is_empty() && content.iter().all(|w| known.iter().any(|k| super::words::alike(k, w)))
     };
     let fit: Vec<IdentityId> = candidates.iter().copied().filter(fits).collect();

@@ -382,7 +382,12 @@ fn say_list(
 }
 
 /// A size or a distance.
-fn measure(world: &dyn World, id: IdentityId, to: Option<&Reference>, other: Option<IdentityId>) -> Result<String, Refusal> {
+fn measure(
+    world: &dyn World,
+    id: IdentityId,
+    to: Option<&Reference>,
+    other: Option<IdentityId>,
+) -> Result<String, Refusal> {
     let nothing = || Refusal::new(RefusalKind::Conflict, "It has no matter that could be measured.");
     let own = world.facts(id).and_then(|f| f.bounds).ok_or_else(nothing)?;
     let it = capital(&the(world, id));

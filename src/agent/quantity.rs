@@ -167,10 +167,19 @@ mod tests {
         };
         assert_eq!((metres("back half a metre"), metres("20 cm to the left"), metres("a half meter")), (0.5, 0.2, 0.5));
         assert_eq!((metres("two feet up"), metres("10 in"), metres("a quarter of a metre")), (0.6096, 0.254, 0.25));
-        assert_eq!((metres("one and a half metres"), metres("thirty five cm"), metres("two hundred mm")), (1.5, 0.35, 0.2));
+        assert_eq!(
+            (metres("one and a half metres"), metres("thirty five cm"), metres("two hundred mm")),
+            (1.5, 0.35, 0.2)
+        );
         assert_eq!((metres("0.3 m"), metres("a metre")), (0.3, 1.0));
-        assert_eq!((far("two steps"), far("a step back")), (Some(Distance::Relative(2.0)), Some(Distance::Relative(1.0))));
-        assert_eq!((far("up a bit"), far("back a lot")), (Some(Distance::Relative(0.5)), Some(Distance::Relative(2.0))));
+        assert_eq!(
+            (far("two steps"), far("a step back")),
+            (Some(Distance::Relative(2.0)), Some(Distance::Relative(1.0)))
+        );
+        assert_eq!(
+            (far("up a bit"), far("back a lot")),
+            (Some(Distance::Relative(0.5)), Some(Distance::Relative(2.0)))
+        );
         assert_eq!((far("back"), far("the mug in the room"), far("")), (None, None, None));
     }
 
@@ -180,7 +189,10 @@ mod tests {
             let words: Vec<&str> = text.split(' ').collect();
             angle(&words).map(|s| s.value)
         };
-        assert_eq!((turn("left 90 degrees"), turn("turn around"), turn("a quarter turn")), (Some(90.0), Some(180.0), Some(90.0)));
+        assert_eq!(
+            (turn("left 90 degrees"), turn("turn around"), turn("a quarter turn")),
+            (Some(90.0), Some(180.0), Some(90.0))
+        );
         assert_eq!((turn("forty five degrees"), turn("left")), (Some(45.0), None));
     }
 }

@@ -123,7 +123,8 @@ impl Session {
 
     fn answer(&mut self, world: &mut dyn World, text: &str, line: &mut Line<'_>) -> Reply {
         if !text.chars().any(char::is_alphanumeric) {
-            return self.refuse(RefusalKind::Unclear, "Tell me what you would like to see, such as 'show me the lamp'.");
+            return self
+                .refuse(RefusalKind::Unclear, "Tell me what you would like to see, such as 'show me the lamp'.");
         }
         if text.chars().count() > MAX_CHARS {
             let text = format!("That is too long for me: say it in fewer than {MAX_CHARS} characters.");
@@ -175,7 +176,8 @@ impl Session {
     /// A new request: the outer loop.
     fn plan(&mut self, world: &mut dyn World, text: &str, line: &mut Line<'_>) -> Reply {
         let (focus, policy) = (&self.focus, &self.policy);
-        self.planner.start(text, &mut Desk { world: &mut *world, focus, policy, on: &mut *line.on, cancel: line.cancel });
+        self.planner
+            .start(text, &mut Desk { world: &mut *world, focus, policy, on: &mut *line.on, cancel: line.cancel });
         self.run(world, None, line)
     }
 
@@ -299,12 +301,7 @@ impl Session {
         let outcome = perform(world, call, ids, note, &mut self.focus);
         let done = outcome.refused.is_none();
         (line.on)(AgentEvent::Result { text: outcome.text.clone(), done });
-        self.transcript.add(What::Result {
-            call: outcome.call.clone(),
-            line: said,
-            text: outcome.text.clone(),
-            done,
-        });
+        self.transcript.add(What::Result { call: outcome.call.clone(), line: said, text: outcome.text.clone(), done });
         outcome
     }
 

@@ -153,7 +153,9 @@ impl Llm {
                 start = i;
             }
         }
-        std::iter::once(json!({ "role": "system", "content": prompt::TASK })).chain(self.talk[start..].iter().cloned()).collect()
+        std::iter::once(json!({ "role": "system", "content": prompt::TASK }))
+            .chain(self.talk[start..].iter().cloned())
+            .collect()
     }
 
     fn body(&self, desk: &Desk<'_>) -> String {
@@ -190,7 +192,9 @@ impl Llm {
             let next = asked_wait.map_or(own, |w| w.max(own));
             if next > self.patience.longest_pause {
                 let secs = next.as_secs();
-                return Err(self.failed(&format!("The chat model wants to be left alone for {secs} s ({problem}). Try again then.")));
+                return Err(self.failed(&format!(
+                    "The chat model wants to be left alone for {secs} s ({problem}). Try again then."
+                )));
             }
             if self.begun.elapsed() + next > self.patience.request {
                 return Err(self.failed(&format!("The chat model gave no answer in time: {problem}.")));
@@ -221,7 +225,8 @@ impl Llm {
             let ended = collector.take(head.is_stream, bytes);
             let fresh = &collector.text()[told..];
             let clean = key.map_or_else(|| fresh.to_owned(), |k| k.redact(fresh));
-            let keep = |t: &str| (0..=t.len().saturating_sub(held)).rev().find(|at| t.is_char_boundary(*at)).unwrap_or(0);
+            let keep =
+                |t: &str| (0..=t.len().saturating_sub(held)).rev().find(|at| t.is_char_boundary(*at)).unwrap_or(0);
             let (raw, shown) = (keep(fresh), keep(&clean));
             // Where a key reaches into what is held back, nothing is shown yet.
             if shown > 0 && fresh[raw..] == clean[shown..] {
@@ -235,7 +240,9 @@ impl Llm {
             Ok(()) => {}
             Err(Broken::Cancelled) => return Err(Problem::Cancelled),
             Err(Broken::TooLong) => {
-                return Err(Problem::Final("The chat model's answer is too long; I did not read it to the end.".into()));
+                return Err(Problem::Final(
+                    "The chat model's answer is too long; I did not read it to the end.".into(),
+                ));
             }
             Err(broken) => return Err(self.problem(&broken)),
         }
@@ -305,7 +312,9 @@ impl Llm {
             return Problem::Passing { text, wait: None };
         }
         let hint = match broken {
-            Broken::Status { code: 401 | 403, .. } => " Check the key in the environment variable that the settings name.",
+            Broken::Status { code: 401 | 403, .. } => {
+                " Check the key in the environment variable that the settings name."
+            }
             Broken::Status { code: 404, .. } => " Check the address and the model's name.",
             Broken::Status { code: 300..=399, .. } => " It points elsewhere, where I do not follow.",
             _ => "",

@@ -34,7 +34,11 @@ impl Secret {
             return text.to_owned();
         }
         let percent = |b: u8| {
-            if b.is_ascii_alphanumeric() || b"-._~".contains(&b) { (b as char).to_string() } else { format!("%{b:02X}") }
+            if b.is_ascii_alphanumeric() || b"-._~".contains(&b) {
+                (b as char).to_string()
+            } else {
+                format!("%{b:02X}")
+            }
         };
         let encoded: String = self.0.bytes().map(percent).collect();
         let escaped = self.0.replace('\\', "\\\\").replace('"', "\\\"").replace('/', "\\/");

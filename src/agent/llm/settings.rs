@@ -150,7 +150,15 @@ mod tests {
         assert_eq!(at("http://127.0.0.1:80/v1", true).as_deref(), Ok("http://127.0.0.1:80/v1/chat/completions"));
         assert!(at("http://host/v1", false).is_ok());
         assert_eq!(at("http://host/v1", true), Err(LlmError::Unencrypted("host".into())));
-        for bad in ["", "host", "ftp://host", "https://", "file:///etc/passwd", "https://me:secret@host/v1", "https://h/v1?key=1"] {
+        for bad in [
+            "",
+            "host",
+            "ftp://host",
+            "https://",
+            "file:///etc/passwd",
+            "https://me:secret@host/v1",
+            "https://h/v1?key=1",
+        ] {
             let error = at(bad, false).expect_err(bad);
             assert!(matches!(error, LlmError::Address(_)) && !error.to_string().contains("secret"), "{bad}: {error}");
         }

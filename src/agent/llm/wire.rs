@@ -176,7 +176,8 @@ impl Collector {
                 self.event(&rest);
             }
         } else {
-            let body: Body = serde_json::from_slice(&self.whole).map_err(|_| "the answer is no JSON of a chat model")?;
+            let body: Body =
+                serde_json::from_slice(&self.whole).map_err(|_| "the answer is no JSON of a chat model")?;
             if body.choices.is_empty() {
                 self.problem = Some("the answer has no choices".into());
             }
@@ -200,9 +201,9 @@ impl Collector {
 pub fn assistant(answer: &Answer) -> Value {
     let mut message = json!({ "role": "assistant", "content": answer.text });
     if !answer.calls.is_empty() {
-        let calls = answer.calls.iter().map(|c| {
-            json!({ "id": c.id, "type": "function", "function": { "name": c.name, "arguments": c.arguments } })
-        });
+        let calls = answer.calls.iter().map(
+            |c| json!({ "id": c.id, "type": "function", "function": { "name": c.name, "arguments": c.arguments } }),
+        );
         message["tool_calls"] = calls.collect();
     }
     message

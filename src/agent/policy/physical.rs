@@ -61,7 +61,19 @@ const OF_THE_VIEW: [&str; 31] = [
 ];
 /// What is looked at, not done: "give me a closer look", "take a look at the mug".
 const LOOKS: [&str; 14] = [
-    "look", "view", "glance", "closeup", "close-up", "overview", "list", "tour", "description", "picture", "details", "idea", "size",
+    "look",
+    "view",
+    "glance",
+    "closeup",
+    "close-up",
+    "overview",
+    "list",
+    "tour",
+    "description",
+    "picture",
+    "details",
+    "idea",
+    "size",
     "dimensions",
 ];
 
@@ -139,9 +151,13 @@ impl Policy {
         }
         match words {
             // "Cut out the mug" draws it alone; "close to the mug" and "closer" are places.
-            ["cut", "out", ..] | ["close" | "set" | "place" | "match" | "light", "to" | "up"] | ["close", "up" | "to", ..] => return None,
+            ["cut", "out", ..]
+            | ["close" | "set" | "place" | "match" | "light", "to" | "up"]
+            | ["close", "up" | "to", ..] => return None,
             // "Turn on the lamp", "turn the lamp off".
-            ["turn" | "switch", rest @ ..] if rest.first().is_some_and(|w| ["on", "off"].contains(w)) => return Some("operate"),
+            ["turn" | "switch", rest @ ..] if rest.first().is_some_and(|w| ["on", "off"].contains(w)) => {
+                return Some("operate");
+            }
             ["turn", .., "on" | "off"] => return Some("operate"),
             ["water" | "light" | "microwave" | "match" | "hand" | "face" | "paint" | "play" | "hit"] => return None,
             _ => {}
@@ -155,8 +171,8 @@ impl Policy {
     /// The reason of a refusal, if a physical action inside the clause is dangerous.
     fn mentioned_danger(&self, words: &[&str], classes: &[&str]) -> Option<&str> {
         const BEFORE_A_VERB: [&str; 18] = [
-            "to", "i", "we", "you", "please", "just", "can", "could", "should", "would", "will", "must", "let's", "also", "me", "simply",
-            "now", "someone",
+            "to", "i", "we", "you", "please", "just", "can", "could", "should", "would", "will", "must", "let's",
+            "also", "me", "simply", "now", "someone",
         ];
         words.windows(2).filter(|pair| BEFORE_A_VERB.contains(&pair[0])).find_map(|pair| {
             let base = base_form(pair[1]);
@@ -177,7 +193,11 @@ impl Policy {
             for name in identity.names.iter().map(|n| split(n)) {
                 // The first word or the last stands for the whole name: a vase with water is a vase.
                 let ends = [name.first(), name.last()];
-                if ends.into_iter().flatten().any(|end| end.chars().count() > 2 && words.iter().any(|w| plain(w) == *end)) {
+                if ends
+                    .into_iter()
+                    .flatten()
+                    .any(|end| end.chars().count() > 2 && words.iter().any(|w| plain(w) == *end))
+                {
                     spoken.extend(name);
                 }
             }

@@ -15,8 +15,25 @@ const MOST: usize = 12;
 
 /// Words for colours: what is called red is not blue.
 const COLOURS: [&str; 19] = [
-    "red", "green", "blue", "yellow", "orange", "purple", "violet", "pink", "brown", "black", "white", "grey", "gray", "beige",
-    "golden", "silver", "turquoise", "cyan", "magenta",
+    "red",
+    "green",
+    "blue",
+    "yellow",
+    "orange",
+    "purple",
+    "violet",
+    "pink",
+    "brown",
+    "black",
+    "white",
+    "grey",
+    "gray",
+    "beige",
+    "golden",
+    "silver",
+    "turquoise",
+    "cyan",
+    "magenta",
 ];
 
 /// The words of a name.
@@ -44,7 +61,8 @@ impl Resolver<'_> {
         let everyone = self.everyone();
         // A name of several words stands for itself, whatever the words mean.
         if words.len() >= 2 {
-            let full: Vec<IdentityId> = everyone.iter().copied().filter(|id| same(&identities.full_name(*id))).collect();
+            let full: Vec<IdentityId> =
+                everyone.iter().copied().filter(|id| same(&identities.full_name(*id))).collect();
             if !full.is_empty() {
                 return Some(Set { exact: full.clone(), ids: full, ..Set::default() });
             }
@@ -147,7 +165,8 @@ impl Resolver<'_> {
                 names.iter().flat_map(|n| name_words(n)).any(|w| colour(&w))
             };
             if said.iter().any(|w| colour(w)) && set.ids.iter().all(other_colour) {
-                let there: Vec<String> = set.ids.iter().take(4).map(|id| format!("the {}", all.full_name(*id))).collect();
+                let there: Vec<String> =
+                    set.ids.iter().take(4).map(|id| format!("the {}", all.full_name(*id))).collect();
                 let text = format!("There is no {text} here, only {}.", join(&there));
                 return Err(Lost::new(RefusalKind::Conflict, text, set.ids));
             }
@@ -216,7 +235,11 @@ impl Resolver<'_> {
             }
         }
         let all = self.world.identities();
-        let known: Vec<String> = pieces.iter().filter(|id| all.get(**id).is_some_and(|i| !i.names.is_empty())).map(|id| all.name(*id)).collect();
+        let known: Vec<String> = pieces
+            .iter()
+            .filter(|id| all.get(**id).is_some_and(|i| !i.names.is_empty()))
+            .map(|id| all.name(*id))
+            .collect();
         let piece = words.join(" ");
         let text = if known.is_empty() {
             format!("I know no parts of the {name}, so no '{piece}' either.")

@@ -11,8 +11,8 @@ pub(crate) use place::relation_at;
 use super::focus::Focus;
 use super::refusal::{Refusal, RefusalKind};
 use super::tool::LevelWish;
-use super::world::{World, WorldError};
 use super::words::{is_mark, tokens};
+use super::world::{World, WorldError};
 use crate::scene::{Bounds, IdentityId};
 
 /// What words come to.
@@ -40,12 +40,7 @@ pub enum Resolved {
 ///
 /// # Errors
 /// If the scene cannot be asked.
-pub fn resolve(
-    world: &mut dyn World,
-    phrase: &str,
-    level: LevelWish,
-    focus: &Focus,
-) -> Result<Resolved, WorldError> {
+pub fn resolve(world: &mut dyn World, phrase: &str, level: LevelWish, focus: &Focus) -> Result<Resolved, WorldError> {
     let mut resolver = Resolver { world, focus, level, notes: Vec::new() };
     match resolver.phrase(phrase) {
         Ok(set) => {
@@ -133,7 +128,8 @@ struct Resolver<'a> {
 
 /// Words that say nothing about which thing is meant, before and after it.
 const LEADING: [&str; 17] = [
-    "the", "a", "an", "some", "any", "my", "your", "our", "me", "to", "at", "this", "that", "these", "those", "just", "of",
+    "the", "a", "an", "some", "any", "my", "your", "our", "me", "to", "at", "this", "that", "these", "those", "just",
+    "of",
 ];
 const TRAILING: [&str; 14] = [
     "in the scene",
@@ -151,13 +147,40 @@ const TRAILING: [&str; 14] = [
     "as well",
     "instead",
 ];
-const PRONOUNS: [&str; 14] = [
-    "it", "that", "this", "them", "him", "her", "these", "those", "that one", "this one", "the same", "the thing", "that thing",
+const PRONOUNS: [&str; 18] = [
+    "it",
+    "she",
+    "he",
+    "they",
+    "there",
+    "that",
+    "this",
+    "them",
+    "him",
+    "her",
+    "these",
+    "those",
+    "that one",
+    "this one",
+    "the same",
+    "the thing",
+    "that thing",
     "this thing",
 ];
 /// Words for anything.
 const ANYTHING: [&str; 12] = [
-    "thing", "things", "object", "objects", "item", "items", "something", "anything", "stuff", "everything", "what", "whatever",
+    "thing",
+    "things",
+    "object",
+    "objects",
+    "item",
+    "items",
+    "something",
+    "anything",
+    "stuff",
+    "everything",
+    "what",
+    "whatever",
 ];
 
 impl Resolver<'_> {

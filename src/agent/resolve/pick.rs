@@ -98,7 +98,9 @@ impl Resolver<'_> {
 
     /// "Largest bottle", "second mug from the left": the rest's candidates, one of them chosen.
     pub(super) fn picked(&mut self, words: &[&str], depth: usize) -> Result<Set, Lost> {
-        let (Some(first), rest) = (words.first(), words.get(1..).unwrap_or_default()) else { return self.lookup(words) };
+        let (Some(first), rest) = (words.first(), words.get(1..).unwrap_or_default()) else {
+            return self.lookup(words);
+        };
         let Some(pick) = pick_of(first) else { return self.lookup(words) };
         let (rest, from_right) = match rest {
             [rest @ .., "from", "the", "right"] => (rest, true),
@@ -151,7 +153,11 @@ impl Resolver<'_> {
                 let others: Vec<IdentityId> = ids.iter().copied().filter(|id| Some(*id) != last).collect();
                 if others.is_empty() {
                     let what = words.join(" ");
-                    return Err(Lost::new(RefusalKind::Conflict, format!("There is no other {what} here."), ids.to_vec()));
+                    return Err(Lost::new(
+                        RefusalKind::Conflict,
+                        format!("There is no other {what} here."),
+                        ids.to_vec(),
+                    ));
                 }
                 picked(others)
             }
@@ -193,7 +199,9 @@ impl Resolver<'_> {
     fn one_of_them(&mut self, words: &[&str]) -> Result<Option<Set>, Lost> {
         let (said, is_one) = match words {
             [said @ .., "one" | "ones"] => (said, true),
-            _ => (words, words.iter().all(|w| pick_of(w).is_some() || ["the", "two", "of", "them", "these"].contains(w))),
+            _ => {
+                (words, words.iter().all(|w| pick_of(w).is_some() || ["the", "two", "of", "them", "these"].contains(w)))
+            }
         };
         if !is_one {
             return Ok(None);
@@ -215,7 +223,8 @@ impl Resolver<'_> {
             };
             let fit: Vec<IdentityId> = set.ids.iter().copied().filter(has).collect();
             if fit.is_empty() {
-                let names: Vec<String> = set.ids.iter().take(4).map(|id| format!("the {}", all.full_name(*id))).collect();
+                let names: Vec<String> =
+                    set.ids.iter().take(4).map(|id| format!("the {}", all.full_name(*id))).collect();
                 let text = format!("None is {word} by name; there are {}.", crate::agent::describe::join(&names));
                 return Err(Lost::new(RefusalKind::Conflict, text, set.ids));
             }
@@ -250,7 +259,12 @@ impl Resolver<'_> {
     }
 
     /// Chooses among pieces by words such as "left button"; `None` if the words do not.
-    pub(super) fn choose_among(&mut self, of: &[IdentityId], words: &[&str], depth: usize) -> Result<Option<Set>, Lost> {
+    pub(super) fn choose_among(
+        &mut self,
+        of: &[IdentityId],
+        words: &[&str],
+        depth: usize,
+    ) -> Result<Option<Set>, Lost> {
         let [first, rest @ ..] = words else { return Ok(None) };
         let Some(pick) = pick_of(first) else { return Ok(None) };
         if depth > super::DEEPEST {

@@ -52,8 +52,8 @@ const EITHER: [(&str, Relation); 4] =
 
 /// Words between a thing and its place.
 const STANDING: [&str; 15] = [
-    "that", "which", "is", "are", "stands", "standing", "lies", "lying", "sits", "sitting", "located", "placed", "stood",
-    "directly", "who",
+    "that", "which", "is", "are", "stands", "standing", "lies", "lying", "sits", "sitting", "located", "placed",
+    "stood", "directly", "who",
 ];
 
 /// The relation that these words begin with, and how many words say it.
@@ -82,7 +82,9 @@ impl Resolver<'_> {
             let after = |n: usize| super::trim(words.get(i + n..).unwrap_or_default());
             // "The controller on the left" chooses; there is no thing called "left".
             let chooses = ["on", "at", "to", "in", "from"].contains(&words[i]) && i > 0;
-            if let [side @ ("left" | "right" | "back" | "front" | "top" | "bottom" | "middle" | "far left" | "far right")] = after(1)
+            if let [
+                side @ ("left" | "right" | "back" | "front" | "top" | "bottom" | "middle" | "far left" | "far right"),
+            ] = after(1)
                 && chooses
             {
                 if super::pick::pick_of(words[0]).is_some() {
@@ -127,7 +129,8 @@ impl Resolver<'_> {
             if words[i] == "with" && i > 0 && !after(1).is_empty() {
                 return self.having(&words[..i], after(1), words, depth).map(Some);
             }
-            let owner = words[i].strip_suffix("'s").or_else(|| words[i].strip_suffix('\'').filter(|o| o.ends_with('s')));
+            let owner =
+                words[i].strip_suffix("'s").or_else(|| words[i].strip_suffix('\'').filter(|o| o.ends_with('s')));
             if let Some(owner) = owner.filter(|o| !o.is_empty() && i + 1 < words.len()) {
                 // "The doll's face's eye": the last owner has the piece.
                 let is_last = !words[i + 1..].iter().any(|w| w.ends_with("'s"));
@@ -168,8 +171,12 @@ impl Resolver<'_> {
             return Ok(set);
         }
         let things = self.set(thing, depth + 1)?;
-        let owners: Vec<IdentityId> =
-            things.ids.iter().copied().filter(|id| self.pieces(&Set::of(vec![*id]), piece, depth + 1).is_ok()).collect();
+        let owners: Vec<IdentityId> = things
+            .ids
+            .iter()
+            .copied()
+            .filter(|id| self.pieces(&Set::of(vec![*id]), piece, depth + 1).is_ok())
+            .collect();
         if owners.is_empty() {
             let text = format!("I find no {} with {}.", thing.join(" "), piece.join(" "));
             return Err(Lost::new(RefusalKind::Conflict, text, things.ids));
@@ -192,7 +199,8 @@ impl Resolver<'_> {
         let ranked = self.ranked(&things, &anchors, |t, a| fit(relation, t, a, &frame));
         if ranked.is_empty() {
             let what = if is_any { "Nothing here".to_owned() } else { format!("No {} here", thing.join(" ")) };
-            let text = format!("{what} is {} the {}, as far as I can tell from this view.", relation.text(), anchor.join(" "));
+            let text =
+                format!("{what} is {} the {}, as far as I can tell from this view.", relation.text(), anchor.join(" "));
             let near = if is_any { Vec::new() } else { things };
             return Err(Lost::new(RefusalKind::Conflict, text, near));
         }
@@ -203,7 +211,8 @@ impl Resolver<'_> {
         let thing = trim_standing(thing);
         let anchors = self.anchors(anchor, depth)?;
         let (things, _) = self.things(thing, depth)?;
-        let mut ranked = self.ranked(&things, &anchors, |t, a| Some(gap(t, a) + 1e-3 * t.center().distance(a.center())));
+        let mut ranked =
+            self.ranked(&things, &anchors, |t, a| Some(gap(t, a) + 1e-3 * t.center().distance(a.center())));
         ranked.truncate(1);
         if ranked.is_empty() {
             return Err(Lost::new(RefusalKind::NotFound, "I find nothing like that near it.", things));
@@ -221,7 +230,9 @@ impl Resolver<'_> {
             own.extend(ids);
         }
         let (things, is_any) = self.things(trim_standing(thing), depth)?;
-        let [from, to] = middles[..] else { return Err(Lost::new(RefusalKind::Conflict, "I cannot tell where that is.", own)) };
+        let [from, to] = middles[..] else {
+            return Err(Lost::new(RefusalKind::Conflict, "I cannot tell where that is.", own));
+        };
         let (way, all) = (to - from, self.world.identities());
         let mut found: Vec<(f64, IdentityId)> = Vec::new();
         for id in things.into_iter().filter(|id| !own.iter().any(|o| all.line(*id).any(|l| l == *o))) {
@@ -234,7 +245,11 @@ impl Resolver<'_> {
         }
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
         if found.is_empty() {
-            let text = format!("I find nothing like that between the {} and the {}.", ends[0].join(" "), super::trim(ends[1]).join(" "));
+            let text = format!(
+                "I find nothing like that between the {} and the {}.",
+                ends[0].join(" "),
+                super::trim(ends[1]).join(" ")
+            );
             return Err(Lost::new(RefusalKind::Conflict, text, own));
         }
         let ids = found.into_iter().map(|(_, id)| id).collect();
@@ -271,7 +286,8 @@ impl Resolver<'_> {
         for thing in things {
             let Some(own) = self.bounds(*thing) else { continue };
             let apart = |a: &&IdentityId| !all.line(*thing).any(|l| l == **a) && !all.line(**a).any(|l| l == *thing);
-            let best = anchors.iter().filter(apart).filter_map(|a| score(&own, &self.bounds(*a)?)).min_by(f64::total_cmp);
+            let best =
+                anchors.iter().filter(apart).filter_map(|a| score(&own, &self.bounds(*a)?)).min_by(f64::total_cmp);
             found.extend(best.map(|s| (s, *thing)));
         }
         found.sort_by(|a, b| a.0.total_cmp(&b.0));

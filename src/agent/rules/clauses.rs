@@ -1,26 +1,174 @@
 //! A request parted into clauses, each of which asks for one thing.
 
 use super::moves;
-use crate::agent::words::{Token, alike, is_mark, low, number, tokens, verb, without_courtesy};
+use crate::agent::words::{Token, alike, is_mark, low, number, singular, tokens, verb, without_courtesy};
 use crate::scene::Identities;
 
 /// Words that begin a request.
 pub(super) const VERBS: [&str; 141] = [
-    "show", "see", "view", "display", "go", "fly", "navigate", "take", "bring", "give", "approach", "visit", "inspect", "examine",
-    "check", "zoom", "focus", "center", "centre", "find", "locate", "search", "look", "face", "turn", "rotate", "spin", "pan", "tilt",
-    "step", "move", "walk", "back", "come", "slide", "shift", "strafe", "climb", "rise", "sink", "descend", "lower", "raise", "hide",
-    "conceal", "isolate", "segment", "unhide", "reveal", "remove", "delete", "erase", "rename", "call", "name", "highlight", "mark",
-    "outline", "select", "point", "export", "save", "describe", "explain", "tell", "list", "count", "enumerate", "measure", "undo",
-    "revert", "cancel", "help", "what", "which", "where", "how", "who", "is", "are", "does", "do", "get", "travel", "head", "jump",
-    "reset", "restore", "stop", "hello", "thanks", "circle", "orbit", "ascend", "advance", "retreat", "scoot", "dolly", "return",
-    "leave", "let", "swivel", "clear", "only", "stand", "whereabouts", "identify", "spot", "drop", "extract", "peek", "pull", "push",
-    "keep", "put", "pick", "pour", "open", "throw", "cut", "print", "make", "write", "has", "have", "wipe", "fade", "can", "nudge", "enlarge", "magnify", "watch", "observe", "study", "proceed", "continue", "again", "don't", "anything", "concentrate", "aim",
+    "show",
+    "see",
+    "view",
+    "display",
+    "go",
+    "fly",
+    "navigate",
+    "take",
+    "bring",
+    "give",
+    "approach",
+    "visit",
+    "inspect",
+    "examine",
+    "check",
+    "zoom",
+    "focus",
+    "center",
+    "centre",
+    "find",
+    "locate",
+    "search",
+    "look",
+    "face",
+    "turn",
+    "rotate",
+    "spin",
+    "pan",
+    "tilt",
+    "step",
+    "move",
+    "walk",
+    "back",
+    "come",
+    "slide",
+    "shift",
+    "strafe",
+    "climb",
+    "rise",
+    "sink",
+    "descend",
+    "lower",
+    "raise",
+    "hide",
+    "conceal",
+    "isolate",
+    "segment",
+    "unhide",
+    "reveal",
+    "remove",
+    "delete",
+    "erase",
+    "rename",
+    "call",
+    "name",
+    "highlight",
+    "mark",
+    "outline",
+    "select",
+    "point",
+    "export",
+    "save",
+    "describe",
+    "explain",
+    "tell",
+    "list",
+    "count",
+    "enumerate",
+    "measure",
+    "undo",
+    "revert",
+    "cancel",
+    "help",
+    "what",
+    "which",
+    "where",
+    "how",
+    "who",
+    "is",
+    "are",
+    "does",
+    "do",
+    "get",
+    "travel",
+    "head",
+    "jump",
+    "reset",
+    "restore",
+    "stop",
+    "hello",
+    "thanks",
+    "circle",
+    "orbit",
+    "ascend",
+    "advance",
+    "retreat",
+    "scoot",
+    "dolly",
+    "return",
+    "leave",
+    "let",
+    "swivel",
+    "clear",
+    "only",
+    "stand",
+    "whereabouts",
+    "identify",
+    "spot",
+    "drop",
+    "extract",
+    "peek",
+    "pull",
+    "push",
+    "keep",
+    "put",
+    "pick",
+    "pour",
+    "open",
+    "throw",
+    "cut",
+    "print",
+    "make",
+    "write",
+    "has",
+    "have",
+    "wipe",
+    "fade",
+    "can",
+    "nudge",
+    "enlarge",
+    "magnify",
+    "watch",
+    "observe",
+    "study",
+    "proceed",
+    "continue",
+    "again",
+    "don't",
+    "anything",
+    "concentrate",
+    "aim",
 ];
 
 /// Whether a word is in a name of the scene.
 pub(super) fn is_known(word: &str, identities: &Identities) -> bool {
     let names = identities.iter().flat_map(|(_, i)| &i.names);
     names.flat_map(|n| n.split(|c: char| !c.is_alphanumeric())).any(|w| alike(&w.to_lowercase(), word) && !w.is_empty())
+}
+
+/// Whether a word is in a name of the scene, letter by letter but for a plural.
+pub(super) fn is_named(word: &str, identities: &Identities) -> bool {
+    let names = identities.iter().flat_map(|(_, i)| &i.names);
+    names
+        .flat_map(|n| n.split(|c: char| !c.is_alphanumeric()))
+        .any(|w| singular(&w.to_lowercase()) == singular(word) && !w.is_empty())
+}
+
+/// "Showing" as "show", "hiding" as "hide", "getting" as "get".
+fn without_ing(word: &str) -> Option<String> {
+    let stem = word.strip_suffix("ing").filter(|s| s.len() >= 2)?;
+    let single = stem.get(..stem.len() - 1).unwrap_or_default();
+    let forms = [stem.to_owned(), format!("{stem}e"), single.to_owned()];
+    forms.into_iter().find(|f| VERBS.contains(&f.as_str()))
 }
 
 /// Whether words begin a request of their own: with a verb, a movement, or a side.
@@ -33,7 +181,9 @@ pub(super) fn starts_request(words: &[&str]) -> bool {
     let first_clause: Vec<&str> =
         words.iter().copied().take_while(|w| !is_mark(w) && !["and", "then"].contains(w)).collect();
     let first_clause: Vec<&str> = first_clause.into_iter().filter(|w| !is_mark(w)).collect();
-    moves::movement(&first_clause).is_some() || moves::closer(&first_clause).is_some() || super::sides::is_side_only(&first_clause)
+    moves::movement(&first_clause).is_some()
+        || moves::closer(&first_clause).is_some()
+        || super::sides::is_side_only(&first_clause)
 }
 
 /// A clause, and whether only a comma parts it from the one before.
@@ -55,7 +205,8 @@ pub(super) fn split(request: &str, identities: &Identities) -> Vec<Clause> {
         match skip {
             Some(n) => {
                 let joins = rest.iter().find(|w| !["but", ",", "please"].contains(*w));
-                let follows_comma = [",", "but"].contains(&word) && !joins.is_some_and(|w| ["then", "and", "now", "also"].contains(w));
+                let follows_comma =
+                    [",", "but"].contains(&word) && !joins.is_some_and(|w| ["then", "and", "now", "also"].contains(w));
                 clauses.push(Clause { words: Vec::new(), follows_comma });
                 i += n;
             }
@@ -122,7 +273,9 @@ pub(super) fn expand(words: &[&str]) -> Vec<String> {
             "i'm" => "i am".into(),
             "isn't" => "is".into(),
             _ => match word.strip_suffix("'s") {
-                Some(stem @ ("what" | "where" | "who" | "how" | "that" | "there" | "here" | "it")) => format!("{stem} is"),
+                Some(stem @ ("what" | "where" | "who" | "how" | "that" | "there" | "here" | "it")) => {
+                    format!("{stem} is")
+                }
                 _ => word.into(),
             },
         }
@@ -134,13 +287,21 @@ pub(super) fn expand(words: &[&str]) -> Vec<String> {
 pub(super) fn corrected(words: &[&str], identities: &Identities) -> Vec<String> {
     let mut words: Vec<String> = words.iter().map(|w| (*w).to_owned()).collect();
     if let Some(first) = words.first_mut()
+        && let Some(plain) = without_ing(first)
+    {
+        *first = plain;
+    }
+    if let Some(first) = words.first_mut()
         && !VERBS.contains(&first.as_str())
         && !is_known(first, identities)
         && !moves::is_direction(first)
         && number(first).is_none()
         && !crate::agent::resolve::is_pick(first)
-        && !["from", "closer", "nearer", "farther", "further", "other", "another", "their", "there", "these", "those", "this", "that"]
-            .contains(&first.as_str())
+        && ![
+            "from", "closer", "nearer", "farther", "further", "other", "another", "their", "there", "these", "those",
+            "this", "that",
+        ]
+        .contains(&first.as_str())
         && let Some(right) = verb(first, &VERBS)
     {
         *first = right.to_owned();

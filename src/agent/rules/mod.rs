@@ -1,6 +1,7 @@
 //! The planner that is built in: a grammar of English requests. It needs no network, and the same
 //! words always come to the same calls.
 
+mod beginnings;
 mod clauses;
 mod commands;
 mod moves;
@@ -142,7 +143,10 @@ impl Rules {
                 let again = desk.focus.call.clone().filter(|c| {
                     !matches!(
                         c,
-                        ToolCall::Remove { .. } | ToolCall::Rename { .. } | ToolCall::Export { .. } | ToolCall::Locate { .. }
+                        ToolCall::Remove { .. }
+                            | ToolCall::Rename { .. }
+                            | ToolCall::Export { .. }
+                            | ToolCall::Locate { .. }
                     )
                 });
                 match again {
@@ -181,7 +185,11 @@ impl Rules {
                     go(target, Side::Same, closeness * factor)
                 }
                 Some(call) => Step::Call(call),
-                None => return Ok(Some(self.refuse(Refusal::new(RefusalKind::Unclear, "There is nothing to do again yet.")))),
+                None => {
+                    return Ok(Some(
+                        self.refuse(Refusal::new(RefusalKind::Unclear, "There is nothing to do again yet.")),
+                    ));
+                }
             },
             Task::Mention(_) | Task::Noise(_) => return Ok(None),
             Task::Say(text) => {
@@ -227,7 +235,13 @@ pub(crate) fn plan(request: &str, identities: &Identities) -> Vec<Task> {
 }
 
 /// Adds a task to those before it in the same request, or makes it part of the last.
-fn add(tasks: &mut Vec<Task>, task: Task, follows_comma: bool, spoken_of: &mut Option<String>, noise: &mut Option<String>) {
+fn add(
+    tasks: &mut Vec<Task>,
+    task: Task,
+    follows_comma: bool,
+    spoken_of: &mut Option<String>,
+    noise: &mut Option<String>,
+) {
     match (task, tasks.last_mut()) {
         // What asks for nothing is left out, if anything else is asked for.
         (Task::Noise(text), _) => *noise = Some(text),
@@ -239,7 +253,15 @@ fn add(tasks: &mut Vec<Task>, task: Task, follows_comma: bool, spoken_of: &mut O
         // "Again but closer".
         (task @ (Task::Closer(_) | Task::Side(_)), Some(last @ Task::Repeat)) => *last = task,
         // "The mug, from above, close" is one flight.
-        (Task::Side(which), Some(Task::Call(ToolCall::GoTo { side, .. }))) if follows_comma && *side == Side::Same => *side = which,
+        (Task::Side(which), Some(Task::Call(ToolCall::GoTo { side, .. }))) if follows_comma && *side == Side::Same => {
+            *side = which
+        }
+        (Task::Side(side), Some(last @ Task::Again(_))) if follows_comma => {
+            if let Task::Again(words) = last {
+                let target = Target::Query(std::mem::take(words));
+                *last = Task::Call(ToolCall::GoTo { target, side, closeness: NORMAL });
+            }
+        }
         (Task::Closer(factor), Some(Task::Call(ToolCall::GoTo { closeness, .. }))) if follows_comma => {
             *closeness = (*closeness * factor).clamp(*CLOSENESS.start(), *CLOSENESS.end());
         }
@@ -296,7 +318,11 @@ mod tests {
         all.add(Level::Part, kettle, vec!["handle".into()]);
         let tasks = plan("Show me the handle of the kettle from the other side, then step back half a metre.", &all);
         let wanted = [
-            Task::Call(ToolCall::GoTo { target: Target::query("handle of the kettle"), side: Side::Other, closeness: NORMAL }),
+            Task::Call(ToolCall::GoTo {
+                target: Target::query("handle of the kettle"),
+                side: Side::Other,
+                closeness: NORMAL,
+            }),
             Task::Call(ToolCall::Move { direction: Direction::Back, distance: Distance::Metres(0.5) }),
         ];
         assert_eq!(tasks, wanted);

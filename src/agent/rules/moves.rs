@@ -12,17 +12,109 @@ use crate::scene::Identities;
 const USUAL_TURN: f64 = 30.0;
 
 const MOVE_VERBS: [&str; 53] = [
-    "step", "move", "go", "walk", "fly", "back", "come", "shift", "slide", "strafe", "climb", "rise", "raise", "sink", "descend", "lower",
-    "zoom", "dolly", "get", "push", "pull", "take", "make", "scoot", "float", "advance", "retreat", "ascend", "head", "drift", "travel",
-    "bring", "nudge", "crawl", "inch", "creep", "glide", "hop", "swing", "shuffle", "proceed", "dive", "hover", "budge", "roll", "set", "translate", "displace", "jog", "moving", "stepping", "going", "walking",
+    "step",
+    "move",
+    "go",
+    "walk",
+    "fly",
+    "back",
+    "come",
+    "shift",
+    "slide",
+    "strafe",
+    "climb",
+    "rise",
+    "raise",
+    "sink",
+    "descend",
+    "lower",
+    "zoom",
+    "dolly",
+    "get",
+    "push",
+    "pull",
+    "take",
+    "make",
+    "scoot",
+    "float",
+    "advance",
+    "retreat",
+    "ascend",
+    "head",
+    "drift",
+    "travel",
+    "bring",
+    "nudge",
+    "crawl",
+    "inch",
+    "creep",
+    "glide",
+    "hop",
+    "swing",
+    "shuffle",
+    "proceed",
+    "dive",
+    "hover",
+    "budge",
+    "roll",
+    "set",
+    "translate",
+    "displace",
+    "jog",
+    "moving",
+    "stepping",
+    "going",
+    "walking",
 ];
-const TURN_VERBS: [&str; 14] =
-    ["turn", "rotate", "spin", "pan", "tilt", "swivel", "look", "face", "do", "make", "swing", "yaw", "pitch", "turning"];
+const TURN_VERBS: [&str; 14] = [
+    "turn", "rotate", "spin", "pan", "tilt", "swivel", "look", "face", "do", "make", "swing", "yaw", "pitch", "turning",
+];
 /// Words that add nothing to a movement.
 const FILLERS: [&str; 44] = [
-    "off", "to", "the", "a", "an", "more", "again", "by", "towards", "toward", "your", "my", "me", "some", "side", "of", "for", "about", "only",
-    "just", "and", "camera", "view", "eye", "us", "further", "farther", "little", "bit", "slowly", "straight", "then", "please", "step",
-    "steps", "another", "one", "distance", "direction", "hand", "over", "on", "around", "even",
+    "off",
+    "to",
+    "the",
+    "a",
+    "an",
+    "more",
+    "again",
+    "by",
+    "towards",
+    "toward",
+    "your",
+    "my",
+    "me",
+    "some",
+    "side",
+    "of",
+    "for",
+    "about",
+    "only",
+    "just",
+    "and",
+    "camera",
+    "view",
+    "eye",
+    "us",
+    "further",
+    "farther",
+    "little",
+    "bit",
+    "slowly",
+    "straight",
+    "then",
+    "please",
+    "step",
+    "steps",
+    "another",
+    "one",
+    "distance",
+    "direction",
+    "hand",
+    "over",
+    "on",
+    "around",
+    "even",
 ];
 
 /// The direction that a word says.
@@ -34,10 +126,14 @@ fn direction(word: &str, verb: Option<&str>) -> Option<Direction> {
         "right" | "rightward" | "rightwards" => Direction::Right,
         "up" | "upward" | "upwards" | "higher" => Direction::Up,
         "down" | "downward" | "downwards" | "lower" => Direction::Down,
-        "in" | "inward" | "inwards" if verb.is_some_and(|v| ["zoom", "push", "move", "dolly", "come", "go"].contains(&v)) => {
+        "in" | "inward" | "inwards"
+            if verb.is_some_and(|v| ["zoom", "push", "move", "dolly", "come", "go"].contains(&v)) =>
+        {
             Direction::Forward
         }
-        "out" | "outward" | "outwards" if verb.is_some_and(|v| ["zoom", "pull", "move", "dolly", "back", "go"].contains(&v)) => {
+        "out" | "outward" | "outwards"
+            if verb.is_some_and(|v| ["zoom", "pull", "move", "dolly", "back", "go"].contains(&v)) =>
+        {
             Direction::Back
         }
         _ => return None,
@@ -74,7 +170,11 @@ pub(super) fn movement(words: &[&str]) -> Option<ToolCall> {
         Some(at) if at > 0 || verb.is_some_and(|v| of_verb(v) == Some(Direction::Back)) => {
             let away = rest[..at].iter().any(|w| direction(w, verb) == Some(Direction::Back));
             let side = super::sides::is_side_only(&rest[at..]);
-            if side || !(away || verb.is_some_and(|v| of_verb(v) == Some(Direction::Back))) { rest } else { cut(rest, at) }
+            if side || !(away || verb.is_some_and(|v| of_verb(v) == Some(Direction::Back))) {
+                rest
+            } else {
+                cut(rest, at)
+            }
         }
         _ => rest,
     };
@@ -107,7 +207,8 @@ pub(super) fn movement(words: &[&str]) -> Option<ToolCall> {
     if words.last() == Some(&"side") && verb.is_none() && !words.contains(&"to") {
         return None;
     }
-    let is_way = verb.is_some() || length.is_some() || words[0] == "to" || is_direction(words[0]) || words[0] == "further";
+    let is_way =
+        verb.is_some() || length.is_some() || words[0] == "to" || is_direction(words[0]) || words[0] == "further";
     let more = words.iter().any(|w| ["further", "farther"].contains(w)) && length.is_none();
     let said = length.map_or(if more { Distance::Relative(1.0) } else { Distance::Default }, |l| l.value);
     is_way.then_some(ToolCall::Move { direction, distance: said })
@@ -256,7 +357,9 @@ mod tests {
         ] {
             assert_eq!(said(text).as_deref(), Some(wanted), "{text}");
         }
-        for other in ["go to the mug", "the left one", "look at the lamp", "show me the lamp", "get the mug", "move the mug", ""] {
+        for other in
+            ["go to the mug", "the left one", "look at the lamp", "show me the lamp", "get the mug", "move the mug", ""]
+        {
             assert_eq!(said(other), None, "{other}");
         }
     }

@@ -40,9 +40,30 @@ fn is_everywhere(words: &[&str]) -> bool {
     let text = words.join(" ");
     let text = text.strip_prefix("there ").unwrap_or(&text);
     [
-        "", "there", "here", "in here", "in the scene", "in this scene", "in the room", "in this room", "in it", "in the picture", "around",
-        "around here", "in total", "altogether", "exist", "you know", "do you know", "can you see", "do you see", "can i see", "available",
-        "present", "known", "in this place",
+        "",
+        "there",
+        "here",
+        "in here",
+        "in the scene",
+        "in this scene",
+        "in the room",
+        "in this room",
+        "in it",
+        "in the picture",
+        "around",
+        "around here",
+        "in total",
+        "altogether",
+        "exist",
+        "you know",
+        "do you know",
+        "can you see",
+        "do you see",
+        "can i see",
+        "available",
+        "present",
+        "known",
+        "in this place",
     ]
     .contains(&text)
 }
@@ -51,8 +72,19 @@ fn is_everywhere(words: &[&str]) -> bool {
 fn is_view(words: &[&str]) -> bool {
     let text = words.join(" ");
     [
-        "in view", "in the view", "in my view", "in front of me", "in front of us", "on screen", "on the screen", "visible", "visible now", "in sight",
-        "visible here", "on my screen", "in the picture",
+        "in view",
+        "in the view",
+        "in my view",
+        "in front of me",
+        "in front of us",
+        "on screen",
+        "on the screen",
+        "visible",
+        "visible now",
+        "in sight",
+        "visible here",
+        "on my screen",
+        "in the picture",
     ]
     .contains(&text.as_str())
 }
@@ -72,7 +104,7 @@ pub(super) fn read(words: &[&str]) -> Option<Task> {
         "anything" | "something" | "any" | "nothing" => there(words),
         "show" | "give" => {
             let rest = after(rest, &["me a list of", "a list of", "me all the", "me all", "all the", "all"])?;
-            let all = words.iter().any(|w| *w == "all");
+            let all = words.contains(&"all");
             let generic = rest.first().is_some_and(|w| ["objects", "things", "parts", "items"].contains(w));
             (generic || !all).then(|| listed("list", rest)).flatten()
         }
@@ -97,7 +129,10 @@ fn find(rest: &[&str]) -> Option<Task> {
     {
         return Some(Task::Find(plain(thing)));
     }
-    let rest = after(rest, &["can i find", "do i find", "could i find", "can i see", "would i find", "is", "are", "did", "do you see"])?;
+    let rest = after(
+        rest,
+        &["can i find", "do i find", "could i find", "can i see", "would i find", "is", "are", "did", "do you see"],
+    )?;
     match rest {
         ["am", "i"] | ["i", "am"] | ["we"] => Some(describe(None)),
         [] => None,
@@ -117,32 +152,71 @@ fn which_is(rest: &[&str]) -> Option<Task> {
     let skip = ["of", "the", "two", "three", "these", "those", "a", "an"];
     let of: Vec<&str> = rest[..at].iter().copied().filter(|w| !skip.contains(w)).collect();
     let how: Vec<&str> = rest[at + 1..].iter().copied().filter(|w| !["the", "one", "more"].contains(w)).collect();
+    let what = if of.is_empty() { "one".to_owned() } else { of.join(" ") };
+    // "Which bottle is closer to the lamp?"
+    if let ["closer" | "nearer" | "closest" | "nearest", "to", anchor @ ..] = how.as_slice()
+        && !anchor.is_empty()
+    {
+        return Some(describe(Some(Target::query(format!("{what} nearest to {}", anchor.join(" "))))));
+    }
     let [how] = how.as_slice() else { return None };
-    crate::agent::resolve::is_pick(how).then(|| describe(Some(Target::query(format!("{how} {}", if of.is_empty() { "one".into() } else { of.join(" ") })))))
+    crate::agent::resolve::is_pick(how).then(|| describe(Some(Target::query(format!("{how} {what}")))))
 }
 
 fn what(rest: &[&str]) -> Option<Task> {
     if let Some(task) = which_is(rest) {
         return Some(task);
     }
-    if let Some(of) = after(rest, &["colour is", "color is", "kind of thing is", "material is", "sort of thing is", "does"])
+    if let Some(of) =
+        after(rest, &["colour is", "color is", "kind of thing is", "material is", "sort of thing is", "does"])
         && (rest[0] != "does" || of.ends_with(&["look", "like"]))
     {
         let of = of.strip_suffix(&["look", "like"]).unwrap_or(of);
         return (!of.is_empty()).then(|| describe(Some(query(of))));
     }
     let text = rest.join(" ");
-    if ["have we got here", "do we have here", "have we here", "am i looking at", "do i see", "do you see", "can i see", "can you see", "are we looking at", "can be seen", "am i seeing", "do we see"]
-        .iter()
-        .any(|p| text == *p || text.strip_prefix(p).is_some_and(|r| [" here", " now", " there", " right now"].contains(&r)))
+    if [
+        "have we got here",
+        "do we have here",
+        "have we here",
+        "am i looking at",
+        "do i see",
+        "do you see",
+        "can i see",
+        "can you see",
+        "are we looking at",
+        "can be seen",
+        "am i seeing",
+        "do we see",
+    ]
+    .iter()
+    .any(|p| text == *p || text.strip_prefix(p).is_some_and(|r| [" here", " now", " there", " right now"].contains(&r)))
         || after(rest, &["is", "are", "things are", "objects are"]).is_some_and(is_view)
     {
         return Some(describe(None));
     }
     // "What is on the table", "what stands left of the laptop", "which things are under the table".
     let verbs = [
-        "objects are", "things are", "object is", "thing is", "items are", "else is", "is there", "is standing", "is lying", "is sitting",
-        "is placed", "are there", "stands", "lies", "sits", "is", "are", "objects stand", "things stand", "things lie",
+        "objects are",
+        "things are",
+        "object is",
+        "thing is",
+        "items are",
+        "else is",
+        "is there",
+        "is standing",
+        "is lying",
+        "is sitting",
+        "is placed",
+        "are there",
+        "stands",
+        "lies",
+        "sits",
+        "is",
+        "are",
+        "objects stand",
+        "things stand",
+        "things lie",
     ];
     if let Some(after_verb) = after(rest, &verbs) {
         if let Some((relation, n)) = relation_at(after_verb)
@@ -156,7 +230,15 @@ fn what(rest: &[&str]) -> Option<Task> {
         }
     }
     // Parts.
-    let parts = ["are the parts of", "are the pieces of", "is part of", "belongs to", "parts are on", "parts belong to", "are its parts"];
+    let parts = [
+        "are the parts of",
+        "are the pieces of",
+        "is part of",
+        "belongs to",
+        "parts are on",
+        "parts belong to",
+        "are its parts",
+    ];
     if let Some(of) = after(rest, &parts) {
         let of = if of.is_empty() { &["it"] } else { of };
         return Some(list(LevelWish::Part, Some(query(of)), Relation::PartOf, None));
@@ -182,11 +264,21 @@ fn what(rest: &[&str]) -> Option<Task> {
         return between(of);
     }
     if let Some(of) = after(rest, &["is the distance to", "is the distance of", "is its distance"]) {
-        return Some(Task::Call(ToolCall::Measure { target: query(if of.is_empty() { &["it"] } else { of }), to: Some(Reference::Eye) }));
+        return Some(Task::Call(ToolCall::Measure {
+            target: query(if of.is_empty() { &["it"] } else { of }),
+            to: Some(Reference::Eye),
+        }));
     }
     let sizes = [
-        "is the size of", "are the dimensions of", "are the measurements of", "is the height of", "is the width of", "is the length of",
-        "is the depth of", "size is", "size has",
+        "is the size of",
+        "are the dimensions of",
+        "are the measurements of",
+        "is the height of",
+        "is the width of",
+        "is the length of",
+        "is the depth of",
+        "size is",
+        "size has",
     ];
     if let Some(of) = after(rest, &sizes) {
         return Some(Task::Call(ToolCall::Measure { target: query(of), to: None }));
@@ -194,7 +286,9 @@ fn what(rest: &[&str]) -> Option<Task> {
     if after(rest, &["is its size", "are its dimensions", "is its height", "is its width"]).is_some() {
         return Some(Task::Call(ToolCall::Measure { target: query(&["it"]), to: None }));
     }
-    if ["can you do", "can i say", "can i ask", "can i do", "do you understand", "are you able to do"].contains(&text.as_str()) {
+    if ["can you do", "can i say", "can i ask", "can i do", "do you understand", "are you able to do"]
+        .contains(&text.as_str())
+    {
         return Some(Task::Say(super::HELP.into()));
     }
     if let Some(thing) = after(rest, &["about"]).filter(|t| !t.is_empty()) {
@@ -204,6 +298,8 @@ fn what(rest: &[&str]) -> Option<Task> {
     match thing {
         [] => None,
         ["this" | "that" | "it", "thing" | "object"] | ["this" | "that"] => Some(describe(Some(query(&["it"])))),
+        [start @ .., "called" | "named"] if !start.is_empty() => Some(describe(Some(query(start)))),
+        ["its", "name"] => Some(describe(Some(query(&["it"])))),
         ["your", "name"] | ["you"] => Some(Task::Say(super::HELP.into())),
         thing => Some(describe(Some(query(thing)))),
     }
@@ -211,13 +307,35 @@ fn what(rest: &[&str]) -> Option<Task> {
 
 fn how(rest: &[&str]) -> Option<Task> {
     let measured = [
-        "big is", "tall is", "high is", "wide is", "long is", "large is", "thick is", "deep is", "small is", "broad is", "big are", "tall are",
+        "big is",
+        "tall is",
+        "high is",
+        "wide is",
+        "long is",
+        "large is",
+        "thick is",
+        "deep is",
+        "small is",
+        "broad is",
+        "big are",
+        "tall are",
         "large are",
     ];
     if let Some(of) = after(rest, &measured) {
         return (!of.is_empty()).then(|| Task::Call(ToolCall::Measure { target: query(of), to: None }));
     }
-    let far = ["far away is", "far away are", "far apart are", "far is it to", "far is it from", "far off is", "far is", "far are", "distant is", "close is"];
+    let far = [
+        "far away is",
+        "far away are",
+        "far apart are",
+        "far is it to",
+        "far is it from",
+        "far off is",
+        "far is",
+        "far are",
+        "distant is",
+        "close is",
+    ];
     if let Some(of) = after(rest, &far) {
         return distance_of(of);
     }
@@ -233,14 +351,18 @@ fn how(rest: &[&str]) -> Option<Task> {
 /// "The mug from the lamp", "the mug and the lamp", "the lamp".
 fn distance_of(of: &[&str]) -> Option<Task> {
     let of = match of {
-        [start @ .., "away"] | [start @ .., "apart"] | [start @ .., "from", "here"] | [start @ .., "from", "me"] => start,
+        [start @ .., "away"] | [start @ .., "apart"] | [start @ .., "from", "here"] | [start @ .., "from", "me"] => {
+            start
+        }
         all => all,
     };
     let of = match of {
         [start @ .., "away", "from", "me" | "here"] => start,
         all => all,
     };
-    if let Some(at) = of.iter().position(|w| ["from", "to", "and"].contains(w)).filter(|at| *at > 0 && at + 1 < of.len()) {
+    if let Some(at) =
+        of.iter().position(|w| ["from", "to", "and"].contains(w)).filter(|at| *at > 0 && at + 1 < of.len())
+    {
         let first = match &of[..at] {
             [start @ .., "away"] => start,
             all => all,
@@ -259,7 +381,9 @@ pub(super) fn between(of: &[&str]) -> Option<Task> {
 
 /// "Buttons does the red controller have", "mugs are on the table", "mugs are there".
 fn count(rest: &[&str]) -> Option<Task> {
-    let verb = rest.iter().position(|w| ["does", "do", "are", "is", "has", "have", "can", "on", "in", "of", "you"].contains(w));
+    let verb = rest
+        .iter()
+        .position(|w| ["does", "do", "are", "is", "has", "have", "can", "on", "in", "of", "you"].contains(w));
     let verb = verb.unwrap_or(rest.len());
     let (what, rest) = rest.split_at(verb);
     if what.is_empty() {
@@ -277,7 +401,9 @@ fn count(rest: &[&str]) -> Option<Task> {
     {
         return Some(list(LevelWish::Part, Some(query(of)), Relation::PartOf, named));
     }
-    let placed = after(rest, &["are there", "is there", "are", "is", "do you see", "can you see", "can i see", "stand", "lie"]).unwrap_or(rest);
+    let placed =
+        after(rest, &["are there", "is there", "are", "is", "do you see", "can you see", "can i see", "stand", "lie"])
+            .unwrap_or(rest);
     let placed = match placed {
         ["standing" | "lying" | "placed", rest @ ..] => rest,
         all => all,
@@ -285,7 +411,8 @@ fn count(rest: &[&str]) -> Option<Task> {
     if let Some((relation, n)) = relation_at(placed) {
         let of = &placed[n..];
         // "On the controller": its parts, if it has such; the list looks at both.
-        let parts = relation == Relation::On && level != LevelWish::Object && named.as_deref().is_some_and(is_piece_word);
+        let parts =
+            relation == Relation::On && level != LevelWish::Object && named.as_deref().is_some_and(is_piece_word);
         let relation = if parts { Relation::PartOf } else { relation };
         return (!of.is_empty()).then(|| list(level, Some(query(of)), relation, named));
     }
@@ -300,13 +427,20 @@ fn count(rest: &[&str]) -> Option<Task> {
 
 /// Words that mostly name pieces.
 fn is_piece_word(word: &str) -> bool {
-    ["button", "key", "handle", "lid", "knob", "eye", "leg", "wheel", "stick", "spout", "drawer", "switch", "part", "piece"]
-        .contains(&singular(word).as_str())
+    [
+        "button", "key", "handle", "lid", "knob", "eye", "leg", "wheel", "stick", "spout", "drawer", "switch", "part",
+        "piece",
+    ]
+    .contains(&singular(word).as_str())
 }
 
 /// Level and name of what is listed: "objects" are a level, "mugs" a name.
 fn named(what: &[&str]) -> (LevelWish, Option<String>) {
-    let words: Vec<&str> = what.iter().copied().filter(|w| !["the", "all", "different", "other", "of", "every", "named"].contains(w)).collect();
+    let words: Vec<&str> = what
+        .iter()
+        .copied()
+        .filter(|w| !["the", "all", "different", "other", "of", "every", "named"].contains(w))
+        .collect();
     match words.as_slice() {
         ["objects" | "object" | "items"] => (LevelWish::Object, None),
         ["things" | "thing" | "stuff"] => (LevelWish::Object, None),
@@ -325,8 +459,10 @@ fn listed(verb: &str, rest: &[&str]) -> Option<Task> {
     if rest.is_empty() || rest == ["everything"] {
         return (verb != "name").then(|| list(LevelWish::Object, None, Relation::PartOf, None));
     }
-    let generic = |w: &&str| ["objects", "things", "parts", "pieces", "items", "components", "part", "everything", "names"].contains(w);
-    if verb == "name" && !rest.iter().any(|w| generic(&w)) {
+    let generic = |w: &str| {
+        ["objects", "things", "parts", "pieces", "items", "components", "part", "everything", "names"].contains(&w)
+    };
+    if verb == "name" && !rest.iter().any(|w| generic(w)) {
         return None;
     }
     if let Some(of) = rest.iter().position(|w| ["of"].contains(w)).filter(|at| *at > 0 && at + 1 < rest.len()) {
@@ -399,7 +535,8 @@ fn does(rest: &[&str]) -> Option<Task> {
     }
     let at = rest.iter().position(|w| ["have", "has"].contains(w))?;
     let (whole, piece) = (&rest[..at], &rest[at + 1..]);
-    let piece: Vec<&str> = piece.iter().copied().skip_while(|w| ["a", "an", "any", "the", "some"].contains(w)).collect();
+    let piece: Vec<&str> =
+        piece.iter().copied().skip_while(|w| ["a", "an", "any", "the", "some"].contains(w)).collect();
     if whole.is_empty() || piece.is_empty() {
         return None;
     }

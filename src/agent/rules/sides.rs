@@ -38,7 +38,9 @@ fn side_at(words: &[&str]) -> Option<(Side, usize)> {
     while words.get(i).is_some_and(|w| ["to", "around", "on"].contains(w)) {
         i += 1;
     }
-    if words.get(i).is_some_and(|w| ["the", "its", "directly", "right"].contains(w)) && words.get(i + 1).is_some_and(|w| side_of(w).is_some()) {
+    if words.get(i).is_some_and(|w| ["the", "its", "directly", "right"].contains(w))
+        && words.get(i + 1).is_some_and(|w| side_of(w).is_some())
+    {
         i += 1;
     }
     let side = side_of(words.get(i)?)?;
@@ -121,7 +123,10 @@ pub(super) fn looked<'a>(words: &[&'a str]) -> Looked<'a> {
 pub(super) fn is_side_only(words: &[&str]) -> bool {
     let looked = looked(words);
     let said = looked.side.is_some() || looked.closeness != NORMAL;
-    said && looked.rest.iter().all(|w| ["and", "then", "now", "also", "but", "this", "time", "instead", "it", "again"].contains(w))
+    said && looked
+        .rest
+        .iter()
+        .all(|w| ["and", "then", "now", "also", "but", "this", "time", "instead", "it", "again"].contains(w))
 }
 
 #[cfg(test)]
@@ -135,7 +140,10 @@ mod tests {
             let l = looked(&words);
             (l.rest.join(" "), l.side, l.closeness)
         };
-        assert_eq!(read("show me the kettle from the other side"), ("show me the kettle".into(), Some(Side::Other), 1.0));
+        assert_eq!(
+            read("show me the kettle from the other side"),
+            ("show me the kettle".into(), Some(Side::Other), 1.0)
+        );
         assert_eq!(read("from above"), (String::new(), Some(Side::Above), 1.0));
         assert_eq!(read("show me the left side of the mug"), ("show me the mug".into(), Some(Side::Left), 1.0));
         assert_eq!(read("the mug up close"), ("the mug".into(), None, 2.0));
