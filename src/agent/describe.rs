@@ -87,7 +87,8 @@ pub fn place(world: &dyn World, id: IdentityId) -> String {
     said.extend(bearer.map(|id| format!("on {}", the(world, id))));
     let over = |other: &IdentityId| {
         let other = world.facts(*other).and_then(|f| f.bounds);
-        other.is_some_and(|b| fit(Relation::Under, &own, &b, &frame).is_some())
+        // A table is not said to be under its mugs.
+        other.is_some_and(|b| b.radius() > own.radius() && fit(Relation::Under, &own, &b, &frame).is_some())
     };
     let objects = world.identities().iter().filter(|(i, o)| o.parent == NOBODY && *i != object).map(|(i, _)| i);
     let over = objects.filter(|id| world.facts(*id).is_some()).find(over);

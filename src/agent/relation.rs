@@ -121,12 +121,14 @@ pub fn fit(relation: Relation, thing: &Bounds, anchor: &Bounds, frame: &Frame) -
         Relation::On => is_on(thing, anchor, frame),
         Relation::Above => {
             let (t, a) = (span(thing, frame.up), span(anchor, frame.up));
-            is_over(thing, anchor, frame, 0.5) && t.0 >= a.1 - 0.25 * (t.1 - t.0)
+            (is_over(thing, anchor, frame, 0.5) || is_over(anchor, thing, frame, 0.0))
+                && t.0 >= a.1 - 0.25 * (t.1 - t.0)
         }
         Relation::Under => {
             let (t, a) = (span(thing, frame.up), span(anchor, frame.up));
             let lower = t.1 <= a.1 - 0.2 * (a.1 - a.0) && t.0 + t.1 < a.0 + a.1 + 0.2 * (a.1 - a.0);
-            is_over(thing, anchor, frame, 0.0) && (lower || t.1 <= a.0 + 0.25 * (t.1 - t.0))
+            let in_place = is_over(thing, anchor, frame, 0.0) || is_over(anchor, thing, frame, 0.0);
+            in_place && (lower || t.1 <= a.0 + 0.25 * (t.1 - t.0))
         }
         Relation::In => {
             let middle = thing.center();

@@ -69,7 +69,7 @@ pub fn is_mark(word: &str) -> bool {
 }
 
 /// What is said before a request.
-const BEFORE: [&str; 102] = [
+const BEFORE: [&str; 105] = [
     "i would like to know",
     "i'd like to know",
     "i want to know",
@@ -115,6 +115,9 @@ const BEFORE: [&str; 102] = [
     "i mean",
     "i meant",
     "pretty please",
+    "hi there",
+    "hello there",
+    "hey there",
     "would you be so kind as to",
     "would you be so kind and",
     "i would like for you to",
@@ -174,10 +177,12 @@ const BEFORE: [&str; 102] = [
     "um",
 ];
 /// What is said after a request.
-const AFTER: [&str; 23] = [
+const AFTER: [&str; 25] = [
     "if you don't mind",
     "pretty please",
     "of course",
+    "to me",
+    "to us",
     "if you like",
     "as well",
     "would you kindly",
@@ -235,9 +240,9 @@ pub fn verb<'k>(word: &str, known: &[&'k str]) -> Option<&'k str> {
         return None;
     }
     let most = if length >= 8 { 2 } else { 1 };
-    let slips = |k: &&str| if k.len() < 4 { usize::MAX } else { strsim::damerau_levenshtein(word, k) };
-    let best = known.iter().map(|k| (slips(&k), *k)).min_by_key(|(d, _)| *d)?;
-    let rivals = known.iter().filter(|k| slips(*k) == best.0).count();
+    let slips = |k: &str| if k.len() < 4 { usize::MAX } else { strsim::damerau_levenshtein(word, k) };
+    let best = known.iter().map(|k| (slips(k), *k)).min_by_key(|(d, _)| *d)?;
+    let rivals = known.iter().filter(|k| slips(k) == best.0).count();
     (best.0 <= most && rivals == 1).then_some(best.1)
 }
 

@@ -147,8 +147,12 @@ const TRAILING: [&str; 14] = [
     "as well",
     "instead",
 ];
-const PRONOUNS: [&str; 14] = [
+const PRONOUNS: [&str; 18] = [
     "it",
+    "she",
+    "he",
+    "they",
+    "there",
     "that",
     "this",
     "them",

@@ -1,7 +1,7 @@
 //! A request parted into clauses, each of which asks for one thing.
 
 use super::moves;
-use crate::agent::words::{Token, alike, is_mark, low, number, tokens, verb, without_courtesy};
+use crate::agent::words::{Token, alike, is_mark, low, number, singular, tokens, verb, without_courtesy};
 use crate::scene::Identities;
 
 /// Words that begin a request.
@@ -155,6 +155,22 @@ pub(super) fn is_known(word: &str, identities: &Identities) -> bool {
     names.flat_map(|n| n.split(|c: char| !c.is_alphanumeric())).any(|w| alike(&w.to_lowercase(), word) && !w.is_empty())
 }
 
+/// Whether a word is in a name of the scene, letter by letter but for a plural.
+pub(super) fn is_named(word: &str, identities: &Identities) -> bool {
+    let names = identities.iter().flat_map(|(_, i)| &i.names);
+    names
+        .flat_map(|n| n.split(|c: char| !c.is_alphanumeric()))
+        .any(|w| singular(&w.to_lowercase()) == singular(word) && !w.is_empty())
+}
+
+/// "Showing" as "show", "hiding" as "hide", "getting" as "get".
+fn without_ing(word: &str) -> Option<String> {
+    let stem = word.strip_suffix("ing").filter(|s| s.len() >= 2)?;
+    let single = stem.get(..stem.len() - 1).unwrap_or_default();
+    let forms = [stem.to_owned(), format!("{stem}e"), single.to_owned()];
+    forms.into_iter().find(|f| VERBS.contains(&f.as_str()))
+}
+
 /// Whether words begin a request of their own: with a verb, a movement, or a side.
 pub(super) fn starts_request(words: &[&str]) -> bool {
     let words = without_courtesy(words);
@@ -270,6 +286,11 @@ pub(super) fn expand(words: &[&str]) -> Vec<String> {
 /// The words with a slip in the first verb put right; names of the scene are no slips.
 pub(super) fn corrected(words: &[&str], identities: &Identities) -> Vec<String> {
     let mut words: Vec<String> = words.iter().map(|w| (*w).to_owned()).collect();
+    if let Some(first) = words.first_mut()
+        && let Some(plain) = without_ing(first)
+    {
+        *first = plain;
+    }
     if let Some(first) = words.first_mut()
         && !VERBS.contains(&first.as_str())
         && !is_known(first, identities)

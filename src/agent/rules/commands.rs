@@ -1,287 +1,16 @@
 //! Commands: show, find, hide, rename; and what is said without a verb.
 
+use super::beginnings::{Verb, WHOLE, beginning};
 use super::questions::{after, between, plain, query as target};
 use super::sides::looked;
 use super::{HELP, Task, clauses};
 use crate::agent::refusal::RefusalKind;
+use crate::agent::relation::Relation;
+use crate::agent::resolve::relation_at;
 use crate::agent::tool::{Reference, Target, ToolCall};
 use crate::agent::wish::{CLOSER, FARTHER, NORMAL, Side};
 use crate::agent::words::{Token, is_mark};
 use crate::scene::Identities;
-
-/// What a verb does to its target.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Verb {
-    Go,
-    GoCloser,
-    GoFarther,
-    Around,
-    Look,
-    Find,
-    Isolate,
-    Highlight,
-    Hide,
-    HideRest,
-    Unhide,
-    Remove,
-    Describe,
-    Measure,
-    Distance,
-    Export,
-    List,
-}
-
-/// How requests begin. The longest that fits counts.
-const BEGINNINGS: [(&str, Verb); 126] = [
-    ("show me only", Verb::Isolate),
-    ("show only", Verb::Isolate),
-    ("only show me", Verb::Isolate),
-    ("only show", Verb::Isolate),
-    ("only", Verb::Isolate),
-    ("show me just", Verb::Isolate),
-    ("show just", Verb::Isolate),
-    ("isolate", Verb::Isolate),
-    ("segment out", Verb::Isolate),
-    ("segment", Verb::Isolate),
-    ("cut out", Verb::Isolate),
-    ("extract", Verb::Isolate),
-    ("keep only", Verb::Isolate),
-    ("hide everything but", Verb::HideRest),
-    ("hide everything except for", Verb::HideRest),
-    ("hide everything except", Verb::HideRest),
-    ("hide all but", Verb::HideRest),
-    ("hide all except", Verb::HideRest),
-    ("hide everything around", Verb::HideRest),
-    ("hide the rest except", Verb::HideRest),
-    ("show me everything about", Verb::Describe),
-    ("show me", Verb::Go),
-    ("show us", Verb::Go),
-    ("show", Verb::Go),
-    ("display", Verb::Go),
-    ("see", Verb::Go),
-    ("view", Verb::Go),
-    ("visit", Verb::Go),
-    ("approach", Verb::GoCloser),
-    ("inspect", Verb::GoCloser),
-    ("examine", Verb::GoCloser),
-    ("check out", Verb::Go),
-    ("check", Verb::Go),
-    ("go over to", Verb::Go),
-    ("go back to", Verb::Go),
-    ("go up to", Verb::GoCloser),
-    ("go close to", Verb::GoCloser),
-    ("go closer to", Verb::GoCloser),
-    ("go nearer to", Verb::GoCloser),
-    ("go around", Verb::Around),
-    ("walk around", Verb::Around),
-    ("fly around", Verb::Around),
-    ("circle", Verb::Around),
-    ("orbit", Verb::Around),
-    ("go to", Verb::Go),
-    ("go near", Verb::Go),
-    ("fly over to", Verb::Go),
-    ("fly me to", Verb::Go),
-    ("fly to", Verb::Go),
-    ("navigate me to", Verb::Go),
-    ("navigate to", Verb::Go),
-    ("travel to", Verb::Go),
-    ("jump to", Verb::Go),
-    ("head over to", Verb::Go),
-    ("head to", Verb::Go),
-    ("walk over to", Verb::Go),
-    ("walk to", Verb::Go),
-    ("walk up to", Verb::GoCloser),
-    ("move over to", Verb::Go),
-    ("move closer to", Verb::GoCloser),
-    ("move close to", Verb::GoCloser),
-    ("move towards", Verb::Go),
-    ("move to", Verb::Go),
-    ("move away from", Verb::GoFarther),
-    ("move farther from", Verb::GoFarther),
-    ("move further from", Verb::GoFarther),
-    ("come closer to", Verb::GoCloser),
-    ("get closer to", Verb::GoCloser),
-    ("get close to", Verb::GoCloser),
-    ("get nearer to", Verb::GoCloser),
-    ("get me closer to", Verb::GoCloser),
-    ("get me to", Verb::Go),
-    ("get to", Verb::Go),
-    ("closer to", Verb::GoCloser),
-    ("nearer to", Verb::GoCloser),
-    ("take me back to", Verb::Go),
-    ("take me over to", Verb::Go),
-    ("take me closer to", Verb::GoCloser),
-    ("take me to", Verb::Go),
-    ("take us to", Verb::Go),
-    ("bring me closer to", Verb::GoCloser),
-    ("bring me to", Verb::Go),
-    ("bring us to", Verb::Go),
-    ("return to", Verb::Go),
-    ("zoom in on", Verb::GoCloser),
-    ("zoom in to", Verb::GoCloser),
-    ("zoom into", Verb::GoCloser),
-    ("zoom in at", Verb::GoCloser),
-    ("zoom to", Verb::GoCloser),
-    ("zoom on", Verb::GoCloser),
-    ("zoom out from", Verb::GoFarther),
-    ("zoom out of", Verb::GoFarther),
-    ("look at", Verb::Look),
-    ("look towards", Verb::Look),
-    ("look toward", Verb::Look),
-    ("look over at", Verb::Look),
-    ("look over to", Verb::Look),
-    ("look to", Verb::Look),
-    ("turn to face", Verb::Look),
-    ("turn towards", Verb::Look),
-    ("turn toward", Verb::Look),
-    ("turn to", Verb::Look),
-    ("rotate towards", Verb::Look),
-    ("face towards", Verb::Look),
-    ("face", Verb::Look),
-    ("focus on", Verb::Look),
-    ("center on", Verb::Look),
-    ("centre on", Verb::Look),
-    ("center", Verb::Look),
-    ("centre", Verb::Look),
-    ("point the camera at", Verb::Look),
-    ("find me", Verb::Find),
-    ("find", Verb::Find),
-    ("locate", Verb::Find),
-    ("search for", Verb::Find),
-    ("look for", Verb::Find),
-    ("spot", Verb::Find),
-    ("know where", Verb::Find),
-    ("hide", Verb::Hide),
-    ("conceal", Verb::Hide),
-    ("unhide", Verb::Unhide),
-    ("reveal", Verb::Unhide),
-    ("bring back", Verb::Unhide),
-    ("restore", Verb::Unhide),
-    ("describe", Verb::Describe),
-    ("explain", Verb::Describe),
-];
-const MORE_BEGINNINGS: [(&str, Verb); 82] = [
-    ("remove", Verb::Remove),
-    ("delete", Verb::Remove),
-    ("erase", Verb::Remove),
-    ("get rid of", Verb::Remove),
-    ("wipe out", Verb::Remove),
-    ("highlight", Verb::Highlight),
-    ("mark", Verb::Highlight),
-    ("outline", Verb::Highlight),
-    ("select", Verb::Highlight),
-    ("point out", Verb::Highlight),
-    ("point at", Verb::Highlight),
-    ("point to", Verb::Highlight),
-    ("measure the distance between", Verb::Distance),
-    ("measure the distance from", Verb::Distance),
-    ("measure the size of", Verb::Measure),
-    ("measure", Verb::Measure),
-    ("export", Verb::Export),
-    ("save", Verb::Export),
-    ("write", Verb::Export),
-    ("have a closer look at", Verb::GoCloser),
-    ("take a closer look at", Verb::GoCloser),
-    ("give me a closer look at", Verb::GoCloser),
-    ("get a closer look at", Verb::GoCloser),
-    ("a closer look at", Verb::GoCloser),
-    ("look closer at", Verb::GoCloser),
-    ("look closely at", Verb::GoCloser),
-    ("give me a close-up of", Verb::GoCloser),
-    ("have a look at", Verb::Go),
-    ("take a look at", Verb::Go),
-    ("get a look at", Verb::Go),
-    ("give me a look at", Verb::Go),
-    ("give me a view of", Verb::Go),
-    ("get a view of", Verb::Go),
-    ("give me a good view of", Verb::Go),
-    ("distance from", Verb::Distance),
-    ("distance between", Verb::Distance),
-    ("the distance from", Verb::Distance),
-    ("the distance between", Verb::Distance),
-    ("distance to", Verb::Distance),
-    ("the distance to", Verb::Distance),
-    ("peek at", Verb::Go),
-    ("a look at", Verb::Go),
-    ("a view of", Verb::Go),
-    ("a better look at", Verb::GoCloser),
-    ("a better view of", Verb::GoCloser),
-    ("a good look at", Verb::Go),
-    ("a close-up of", Verb::GoCloser),
-    ("a close look at", Verb::GoCloser),
-    ("take a better look at", Verb::GoCloser),
-    ("have a better look at", Verb::GoCloser),
-    ("get a better look at", Verb::GoCloser),
-    ("take a close look at", Verb::GoCloser),
-    ("have a close look at", Verb::GoCloser),
-    ("take a peek at", Verb::Go),
-    ("have a peek at", Verb::Go),
-    ("bring up", Verb::Go),
-    ("pull up", Verb::Go),
-    ("proceed to", Verb::Go),
-    ("enlarge", Verb::GoCloser),
-    ("magnify", Verb::GoCloser),
-    ("rotate around", Verb::Around),
-    ("circle around", Verb::Around),
-    ("orbit around", Verb::Around),
-    ("stop hiding", Verb::Unhide),
-    ("watch", Verb::Go),
-    ("observe", Verb::Go),
-    ("study", Verb::GoCloser),
-    ("size of", Verb::Measure),
-    ("the size of", Verb::Measure),
-    ("dimensions of", Verb::Measure),
-    ("the dimensions of", Verb::Measure),
-    ("identify", Verb::Describe),
-    ("move in on", Verb::GoCloser),
-    ("close in on", Verb::GoCloser),
-    ("home in on", Verb::GoCloser),
-    ("concentrate on", Verb::Look),
-    ("aim at", Verb::Look),
-    ("aim the camera at", Verb::Look),
-    ("turn the camera to", Verb::Look),
-    ("turn the camera towards", Verb::Look),
-    ("point the view at", Verb::Look),
-    ("list", Verb::List),
-];
-
-/// Requests that are complete as they stand.
-const WHOLE: [(&str, fn() -> Task); 34] = [
-    ("undo", || Task::Call(ToolCall::Undo {})),
-    ("undo that", || Task::Call(ToolCall::Undo {})),
-    ("undo it", || Task::Call(ToolCall::Undo {})),
-    ("undo the last change", || Task::Call(ToolCall::Undo {})),
-    ("undo the last one", || Task::Call(ToolCall::Undo {})),
-    ("undo this", || Task::Call(ToolCall::Undo {})),
-    ("take that back", || Task::Call(ToolCall::Undo {})),
-    ("take it back", || Task::Call(ToolCall::Undo {})),
-    ("revert", || Task::Call(ToolCall::Undo {})),
-    ("revert that", || Task::Call(ToolCall::Undo {})),
-    ("reverse that", || Task::Call(ToolCall::Undo {})),
-    ("show everything", || Task::Call(ToolCall::ShowAll {})),
-    ("show me everything", || Task::Call(ToolCall::ShowAll {})),
-    ("show everything again", || Task::Call(ToolCall::ShowAll {})),
-    ("show me everything again", || Task::Call(ToolCall::ShowAll {})),
-    ("show all", || Task::Call(ToolCall::ShowAll {})),
-    ("show all again", || Task::Call(ToolCall::ShowAll {})),
-    ("show me all", || Task::Call(ToolCall::ShowAll {})),
-    ("show all objects", || Task::Call(ToolCall::ShowAll {})),
-    ("show all things again", || Task::Call(ToolCall::ShowAll {})),
-    ("show the whole scene", || Task::Call(ToolCall::ShowAll {})),
-    ("show me the whole scene", || Task::Call(ToolCall::ShowAll {})),
-    ("show the rest", || Task::Call(ToolCall::ShowAll {})),
-    ("show the rest again", || Task::Call(ToolCall::ShowAll {})),
-    ("show everything else again", || Task::Call(ToolCall::ShowAll {})),
-    ("unhide all", || Task::Call(ToolCall::ShowAll {})),
-    ("unhide everything", || Task::Call(ToolCall::ShowAll {})),
-    ("bring everything back", || Task::Call(ToolCall::ShowAll {})),
-    ("bring back everything", || Task::Call(ToolCall::ShowAll {})),
-    ("restore everything", || Task::Call(ToolCall::ShowAll {})),
-    ("reveal everything", || Task::Call(ToolCall::ShowAll {})),
-    ("unhide everything again", || Task::Call(ToolCall::ShowAll {})),
-    ("look around", || Task::Call(ToolCall::Turn { direction: crate::agent::wish::TurnWay::Right, degrees: 360.0 })),
-    ("describe", || Task::Call(ToolCall::Describe { target: None })),
-];
 
 /// Greetings, thanks, help, "no": what asks for nothing in the scene.
 pub(super) fn small_talk(words: &[&str]) -> Option<Vec<Task>> {
@@ -394,11 +123,25 @@ pub(super) fn stated(words: &[&str]) -> Option<Task> {
 /// A command with a verb.
 pub(super) fn read(words: &[&str], clause: &[Token], identities: &Identities) -> Option<Vec<Task>> {
     let text = words.join(" ");
-    if let Some((_, task)) = WHOLE.iter().find(|(whole, _)| *whole == text) {
+    if let Some((task, _)) = WHOLE.iter().find(|(_, whole)| whole.contains(&text.as_str())) {
         return Some(vec![task()]);
     }
     if let Some(task) = rename(words, clause) {
         return Some(vec![task]);
+    }
+    if let ["point", thing @ .., "out"] = words
+        && !thing.is_empty()
+    {
+        return Some(vec![Task::Call(ToolCall::Highlight { target: target(thing) })]);
+    }
+    // "Go behind the lamp", "stand left of the table".
+    if let Some(rest) =
+        after(words, &["go to stand", "go", "fly", "walk", "move", "get", "stand", "step", "take me", "bring me"])
+        && let Some((relation, n)) = relation_at(rest)
+        && rest.len() > n
+        && let Some(side) = side_for(relation)
+    {
+        return Some(vec![Task::Call(ToolCall::GoTo { target: target(&rest[n..]), side, closeness: NORMAL })]);
     }
     if let Some(task) = made(words) {
         return Some(vec![task]);
@@ -441,9 +184,7 @@ pub(super) fn read(words: &[&str], clause: &[Token], identities: &Identities) ->
             .collect();
         return (!rest.is_empty()).then(|| vec![bare(&rest, identities)]);
     }
-    let all = BEGINNINGS.iter().chain(MORE_BEGINNINGS.iter());
-    let fits = all.filter_map(|(begin, verb)| Some((begin.len(), *verb, after(words, &[begin])?)));
-    let Some((_, verb, rest)) = fits.max_by_key(|(n, ..)| *n) else { return unknown_verb(words, identities) };
+    let Some((verb, rest)) = beginning(words) else { return unknown_verb(words, identities) };
     Some(done_to(verb, rest, words, identities))
 }
 
@@ -505,7 +246,7 @@ fn made(words: &[&str]) -> Option<Task> {
 pub(super) fn salvaged(words: &[&str], clause: &[Token], identities: &Identities) -> Option<Vec<Task>> {
     let begins_known = words.first().is_some_and(|w| {
         clauses::VERBS.contains(w)
-            || clauses::is_known(w, identities)
+            || clauses::is_named(w, identities)
             || crate::agent::resolve::is_pick(w)
             || w.starts_with('#')
             || ["the", "a", "an", "it", "its", "one", "this", "that", "my", "both", "all", "thing"].contains(w)
@@ -515,8 +256,7 @@ pub(super) fn salvaged(words: &[&str], clause: &[Token], identities: &Identities
     }
     for start in 1..words.len() {
         let rest = crate::agent::words::without_courtesy(&words[start..]);
-        let all = BEGINNINGS.iter().chain(MORE_BEGINNINGS.iter());
-        let begins = all.map(|(begin, _)| *begin).any(|begin| after(rest, &[begin]).is_some_and(|r| !r.is_empty()));
+        let begins = beginning(rest).is_some_and(|(_, what)| !what.is_empty());
         // What destroys is not guessed from the middle of a sentence.
         let destroys =
             ["remove", "delete", "erase", "get", "wipe", "export", "save", "write", "rename", "call", "name"];
@@ -525,6 +265,20 @@ pub(super) fn salvaged(words: &[&str], clause: &[Token], identities: &Identities
         }
     }
     None
+}
+
+/// The side from which one looks who stands in this relation to a thing.
+fn side_for(relation: Relation) -> Option<Side> {
+    Some(match relation {
+        Relation::Behind => Side::Other,
+        Relation::Above => Side::Above,
+        Relation::Under => Side::Below,
+        Relation::InFrontOf => Side::Front,
+        Relation::LeftOf => Side::Left,
+        Relation::RightOf => Side::Right,
+        Relation::Near => Side::Same,
+        Relation::On | Relation::In | Relation::PartOf => return None,
+    })
 }
 
 fn done_to(verb: Verb, rest: &[&str], words: &[&str], identities: &Identities) -> Vec<Task> {
@@ -632,7 +386,7 @@ fn split_and<'a>(words: &[&'a str], identities: &Identities) -> Vec<Vec<&'a str>
             .all(|p| p.first().is_some_and(|w| ["the", "a", "an", "its", "my", "this", "that"].contains(w)));
     let named = parts.len() > 1
         && parts.iter().all(|p| !p.is_empty() && p.iter().all(|w| clauses::is_known(w, identities) || *w == "the"));
-    let is_name = identities.iter().flat_map(|(_, i)| &i.names).any(|n| n.to_lowercase().contains(&words.join(" ")));
+    let is_name = identities.iter().flat_map(|(_, i)| &i.names).any(|n| n.to_lowercase().contains(&plain(words)));
     if (sound || (named && !is_name)) && !parts[0].is_empty() { parts } else { vec![words.to_vec()] }
 }
 
@@ -655,6 +409,24 @@ fn go(verb: Verb, rest: &[&str], identities: &Identities) -> Vec<Task> {
     // "From the other side and a bit closer" leaves joining words behind.
     while rest.last().is_some_and(|w| ["and", "but", "a", "bit", "me", "around", "to"].contains(w)) {
         rest.pop();
+    }
+    // "The front of the laptop" is a side, unless something is called so.
+    let mut side = side;
+    let sides = ["front", "back", "rear", "top", "bottom", "underside"];
+    let of = rest.iter().position(|w| *w == "of").filter(|at| *at > 0 && at + 1 < rest.len());
+    if let Some(of) = of
+        && sides.contains(&rest[of - 1])
+        && rest[..of - 1].iter().all(|w| ["the", "at", "to", "from"].contains(w))
+        && side.is_none()
+        && !clauses::is_named(rest[of - 1], identities)
+    {
+        side = Some(match rest[of - 1] {
+            "front" => Side::Front,
+            "top" => Side::Above,
+            "bottom" | "underside" => Side::Below,
+            _ => Side::Other,
+        });
+        rest = rest[of + 1..].to_vec();
     }
     let pronoun = rest.is_empty() || ["it", "that", "this", "me it", "me"].contains(&rest.join(" ").as_str());
     match (pronoun, side) {

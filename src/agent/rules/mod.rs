@@ -1,6 +1,7 @@
 //! The planner that is built in: a grammar of English requests. It needs no network, and the same
 //! words always come to the same calls.
 
+mod beginnings;
 mod clauses;
 mod commands;
 mod moves;
@@ -254,6 +255,12 @@ fn add(
         // "The mug, from above, close" is one flight.
         (Task::Side(which), Some(Task::Call(ToolCall::GoTo { side, .. }))) if follows_comma && *side == Side::Same => {
             *side = which
+        }
+        (Task::Side(side), Some(last @ Task::Again(_))) if follows_comma => {
+            if let Task::Again(words) = last {
+                let target = Target::Query(std::mem::take(words));
+                *last = Task::Call(ToolCall::GoTo { target, side, closeness: NORMAL });
+            }
         }
         (Task::Closer(factor), Some(Task::Call(ToolCall::GoTo { closeness, .. }))) if follows_comma => {
             *closeness = (*closeness * factor).clamp(*CLOSENESS.start(), *CLOSENESS.end());

@@ -104,7 +104,7 @@ pub(super) fn read(words: &[&str]) -> Option<Task> {
         "anything" | "something" | "any" | "nothing" => there(words),
         "show" | "give" => {
             let rest = after(rest, &["me a list of", "a list of", "me all the", "me all", "all the", "all"])?;
-            let all = words.iter().any(|w| *w == "all");
+            let all = words.contains(&"all");
             let generic = rest.first().is_some_and(|w| ["objects", "things", "parts", "items"].contains(w));
             (generic || !all).then(|| listed("list", rest)).flatten()
         }
@@ -152,10 +152,15 @@ fn which_is(rest: &[&str]) -> Option<Task> {
     let skip = ["of", "the", "two", "three", "these", "those", "a", "an"];
     let of: Vec<&str> = rest[..at].iter().copied().filter(|w| !skip.contains(w)).collect();
     let how: Vec<&str> = rest[at + 1..].iter().copied().filter(|w| !["the", "one", "more"].contains(w)).collect();
+    let what = if of.is_empty() { "one".to_owned() } else { of.join(" ") };
+    // "Which bottle is closer to the lamp?"
+    if let ["closer" | "nearer" | "closest" | "nearest", "to", anchor @ ..] = how.as_slice()
+        && !anchor.is_empty()
+    {
+        return Some(describe(Some(Target::query(format!("{what} nearest to {}", anchor.join(" "))))));
+    }
     let [how] = how.as_slice() else { return None };
-    crate::agent::resolve::is_pick(how).then(|| {
-        describe(Some(Target::query(format!("{how} {}", if of.is_empty() { "one".into() } else { of.join(" ") }))))
-    })
+    crate::agent::resolve::is_pick(how).then(|| describe(Some(Target::query(format!("{how} {what}")))))
 }
 
 fn what(rest: &[&str]) -> Option<Task> {
@@ -293,6 +298,8 @@ fn what(rest: &[&str]) -> Option<Task> {
     match thing {
         [] => None,
         ["this" | "that" | "it", "thing" | "object"] | ["this" | "that"] => Some(describe(Some(query(&["it"])))),
+        [start @ .., "called" | "named"] if !start.is_empty() => Some(describe(Some(query(start)))),
+        ["its", "name"] => Some(describe(Some(query(&["it"])))),
         ["your", "name"] | ["you"] => Some(Task::Say(super::HELP.into())),
         thing => Some(describe(Some(query(thing)))),
     }
@@ -452,10 +459,10 @@ fn listed(verb: &str, rest: &[&str]) -> Option<Task> {
     if rest.is_empty() || rest == ["everything"] {
         return (verb != "name").then(|| list(LevelWish::Object, None, Relation::PartOf, None));
     }
-    let generic = |w: &&str| {
-        ["objects", "things", "parts", "pieces", "items", "components", "part", "everything", "names"].contains(w)
+    let generic = |w: &str| {
+        ["objects", "things", "parts", "pieces", "items", "components", "part", "everything", "names"].contains(&w)
     };
-    if verb == "name" && !rest.iter().any(|w| generic(&w)) {
+    if verb == "name" && !rest.iter().any(|w| generic(w)) {
         return None;
     }
     if let Some(of) = rest.iter().position(|w| ["of"].contains(w)).filter(|at| *at > 0 && at + 1 < rest.len()) {
