@@ -162,7 +162,7 @@ impl PathKey {
             return Err(("dwell_secs", reason));
         }
         match self.time_secs {
-            Some(t) if !(t >= 0.0 && t <= CameraPath::MAX_SECONDS) => {
+            Some(t) if !(0.0..=CameraPath::MAX_SECONDS).contains(&t) => {
                 Err(("time_secs", format!("= {t} is not between 0 and {}", CameraPath::MAX_SECONDS)))
             }
             Some(t) if t < before => Err(("time_secs", format!("= {t} is before {before}, a time of an earlier key"))),

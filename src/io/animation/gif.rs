@@ -37,8 +37,11 @@ impl Sink for Gif {
     }
 
     fn push(&mut self, rgb: &[u8]) -> Result<()> {
-        // NeuQuant's step through the pixels: 1 looks at all of them, 30 at every thirtieth.
-        let step = 1 + (100 - i32::from(self.settings.quality)) * 29 / 100;
+        // NeuQuant's step through the pixels: 1 looks at all of them, 30 at every thirtieth. It learns
+        // little from fewer than this many.
+        const ENOUGH: u64 = 50_000;
+        let coarsest = (self.settings.frame_bytes() / 3 / ENOUGH).clamp(1, 30) as i32;
+        let step = (1 + (100 - i32::from(self.settings.quality)) * 29 / 100).min(coarsest);
         let mut frame = Frame::from_rgb_speed(self.side_px.0, self.side_px.1, rgb, step);
         let time = |frame| self.settings.time(frame, 100.0);
         frame.delay = u16::try_from(time(self.frames + 1) - time(self.frames)).unwrap_or(u16::MAX);

@@ -135,7 +135,8 @@ fn config(settings: &Settings) -> EncoderConfig {
     let quantiser = settings.quantiser();
     EncoderConfig::new()
         .usage_type(UsageType::CameraVideoRealTime)
-        .rate_control_mode(RateControlMode::Quality)
+        // The mode that never leaves a frame out; with one quantiser there is nothing to control.
+        .rate_control_mode(RateControlMode::Bufferbased)
         .qp(QpRange::new(quantiser, quantiser))
         .skip_frames(false)
         .adaptive_quantization(false)

@@ -19,8 +19,11 @@ pub(super) struct WebP {
     path: PathBuf,
     size_px: (u32, u32),
     draft: Draft,
-    encoder: Option<(Sender<Message>, JoinHandle<std::result::Result<Vec<u8>, Error>>)>,
+    encoder: Option<(Sender<Message>, JoinHandle<Film>)>,
 }
+
+/// The file, or why there is none.
+type Film = std::result::Result<Vec<u8>, Error>;
 
 /// What the encoder's thread is told. Without an end, it throws everything away.
 enum Message {
@@ -77,7 +80,7 @@ impl Sink for WebP {
 }
 
 /// Encodes frames until the end and returns the file.
-fn encode(settings: &Settings, inbox: &Receiver<Message>) -> std::result::Result<Vec<u8>, Error> {
+fn encode(settings: &Settings, inbox: &Receiver<Message>) -> Film {
     let encoding_type = if settings.quality == 100 { EncodingType::Lossless } else { EncodingType::new_lossy() };
     let options = EncoderOptions {
         // Every frame whole: in a flight nothing stays the same from frame to frame.

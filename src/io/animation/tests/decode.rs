@@ -169,18 +169,21 @@ fn colours(unit: &[u8]) -> String {
     let mut b = Bits(&raw, 32);
     b.number(); // seq_parameter_set_id
     b.number(); // log2_max_frame_num
-    match b.number() {
-        0 => drop(b.number()),
-        2 => {}
-        other => panic!("picture order count type {other}"),
+    let order = b.number(); // pic_order_cnt_type
+    assert!(order == 0 || order == 2, "order {order}");
+    if order == 0 {
+        b.number(); // log2_max_pic_order_cnt_lsb
     }
     b.number(); // max_num_ref_frames
     b.bits(1);
-    (b.number(), b.number()); // size in macroblocks
+    b.number(); // width in macroblocks
+    b.number(); // height in macroblocks
     assert_eq!(b.bits(1), 1, "whole frames");
     b.bits(1);
     if b.bits(1) == 1 {
-        (0..4).for_each(|_| assert!(b.number() < 1 << 16)); // cropping
+        for _ in 0..4 {
+            b.number(); // cropping
+        }
     }
     assert_eq!(b.bits(1), 1, "VUI");
     if b.bits(1) == 1 && b.bits(8) == 255 {
