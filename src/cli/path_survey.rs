@@ -9,7 +9,7 @@ use super::opened::DrawableScene;
 use super::path::up_of;
 use super::{CliError, output};
 use crate::navigate::Navigator;
-use crate::navigate::survey::{Sum, Survey, more_cameras, survey};
+use crate::navigate::survey::{Ends, Sum, Survey, more_cameras, survey};
 use crate::scene::Camera;
 
 /// Seed of the pairs of keypoints and of added cameras.
@@ -44,33 +44,37 @@ pub fn run(scene: &DrawableScene, flights: usize, counts: &[usize], frames: usiz
         navigator.graph.look_at_all(&navigator.matter);
         let build_secs = start.elapsed().as_secs_f64();
         let parts = navigator.graph.parts(&navigator.matter).into_iter().max().map_or(0, |p| p + 1);
-        let found = survey(&navigator, flights, frames, SEED);
-        let head = [
-            count.to_string(),
-            navigator.graph.keypoints.len().to_string(),
-            parts.to_string(),
-            format!("{:.0} ms", build_secs * 1e3),
-            format!("{:.2}, {:.2} ms", found.median_secs * 1e3, found.most_secs * 1e3),
-        ];
-        for (name, sum) in [("this", &found.ours), ("paper", &found.paper)] {
-            let w = &sum.worst;
-            let tail = [
-                name.to_owned(),
-                sum.flights.to_string(),
-                sum.flights_too_near.to_string(),
-                sum.poses_too_near.to_string(),
-                format!("{:.4}", w.least_clearance),
-                format!("{:.4}", w.largest_step),
-                format!("{:.2}\u{b0}", w.largest_turn.to_degrees()),
+        for (ends, between) in [(Ends::Keypoints, "keypoints"), (Ends::CloseToMatter, "close to matter")] {
+            let found = survey(&navigator, ends, flights, frames, SEED);
+            let head = [
+                count.to_string(),
+                navigator.graph.keypoints.len().to_string(),
+                parts.to_string(),
+                format!("{:.0} ms", build_secs * 1e3),
+                between.to_owned(),
+                format!("{:.2}, {:.2} ms", found.median_secs * 1e3, found.most_secs * 1e3),
+                found.no_way.to_string(),
             ];
-            rows.push(head.iter().cloned().chain(tail).collect());
+            for (name, sum) in [("this", &found.ours), ("paper", &found.paper)] {
+                let w = &sum.worst;
+                let tail = [
+                    name.to_owned(),
+                    sum.flights.to_string(),
+                    sum.flights_too_near.to_string(),
+                    sum.poses_too_near.to_string(),
+                    format!("{:.4}", w.least_clearance),
+                    format!("{:.4}", w.largest_step),
+                    format!("{:.2}\u{b0}", w.largest_turn.to_degrees()),
+                ];
+                rows.push(head.iter().cloned().chain(tail).collect());
+            }
+            documents.push(told(count, between, &navigator, parts, [matter_secs, build_secs], &found));
         }
-        documents.push(told(count, &navigator, parts, [matter_secs, build_secs], &found));
     }
     if json { output::print_json(&json!(documents)) } else { output::print(&output::table(&rows)) }
 }
 
-fn told(cameras: usize, navigator: &Navigator, parts: usize, secs: [f64; 2], s: &Survey) -> Value {
+fn told(cameras: usize, between: &str, navigator: &Navigator, parts: usize, secs: [f64; 2], s: &Survey) -> Value {
     let sum = |s: &Sum| {
         json!({
             "flights": s.flights,
@@ -81,6 +85,7 @@ fn told(cameras: usize, navigator: &Navigator, parts: usize, secs: [f64; 2], s: 
     };
     json!({
         "cameras": cameras,
+        "between": between,
         "keypoints": navigator.graph.keypoints.len(),
         "keypoints_in_matter": navigator.in_matter,
         "parts": parts,

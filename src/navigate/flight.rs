@@ -3,7 +3,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::curve::{Curve, shortened};
+use super::curve::Curve;
 use super::matter::Matter;
 use super::pose::{Pose, RotationSpline, angle};
 
@@ -72,16 +72,12 @@ impl Flight {
         frames: usize,
         speed: Speed,
     ) -> Option<Self> {
-        let legs = match matter {
-            Some((matter, clearance)) => shortened(legs, matter, clearance),
-            None => legs.to_vec(),
-        };
-        let curve = Curve::new(&legs, matter.map(|m| m.0), matter.map_or(0.0, |m| m.1))?;
+        let curve = Curve::new(legs, matter.map(|m| m.0), matter.map_or(0.0, |m| m.1))?;
         let [from, to] = ends;
         let mut keys = vec![(0.0, from.world_from_camera)];
         if let Some((target, up)) = look_at.filter(|_| curve.length() > 0.0) {
             // It turns to the target first, then keeps it in sight.
-            for share in [0.45, 0.75] {
+            for share in [0.4, 0.6, 0.8] {
                 let here = curve.at(share);
                 let looking = Pose::looking_at(here, target, up, from.fov_y_rad, &to.world_from_camera);
                 keys.push((share, looking.world_from_camera));

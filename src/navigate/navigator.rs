@@ -1,7 +1,8 @@
 //! Goes places in a scene: a way from where the eye is to where it is wanted, or why there is none.
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
+use super::curve::shortened;
 use super::flight::{Flight, Speed};
 use super::graph::Graph;
 use super::keypoints::{keypoints, spacing};
@@ -119,12 +120,39 @@ impl Navigator {
             }
         }
         if let Some((_, legs)) = best {
-            return Ok(legs);
+            return Ok(shortened(&legs, &self.matter, self.clearance.min(0.99 * ends)));
         }
         let parts = self.graph.parts(&self.matter);
         let reached = |i: &usize| starts.iter().any(|s| parts[*s] == parts[*i]);
         let nearest = self.graph.nearest(to).find(reached).unwrap_or(starts[0]);
         Err(NoWay::Parted { nearest, distance: place(nearest).distance(to) })
+    }
+
+    /// A way around a target instead of over it, where there is room for that: it can be kept in sight
+    /// at even speed. `None` if the straight way does not turn much, or there is no room.
+    fn around(&self, from: DVec3, to: DVec3, target: DVec3) -> Option<Vec<DVec3>> {
+        const PIECES: usize = 8;
+        let level = |p: DVec3| (p - target) - self.up * (p - target).dot(self.up);
+        let (a, b) = (level(from), level(to));
+        let (ra, rb) = (a.length(), b.length());
+        let angle = a.angle_between(b);
+        if !(angle > 0.8) || ra <= 0.0 || rb <= 0.0 {
+            return None;
+        }
+        // The shorter way round; for opposite sides, the one to the right.
+        let sign = if a.cross(b).dot(self.up) < 0.0 { -1.0 } else { 1.0 };
+        let start = a / ra;
+        let at = |i: usize| {
+            let u = i as f64 / PIECES as f64;
+            let turned = DQuat::from_axis_angle(self.up, sign * angle * u) * start;
+            let height = (from - target).dot(self.up) * (1.0 - u) + (to - target).dot(self.up) * u;
+            target + turned * (ra + (rb - ra) * u) + self.up * height
+        };
+        let legs: Vec<DVec3> = std::iter::once(from).chain((1..PIECES).map(at)).chain([to]).collect();
+        let ends = self.matter.clearance(from).min(self.matter.clearance(to));
+        let keep = self.clearance.min(0.99 * ends);
+        let free = !self.matter.is_inside(from) && legs.windows(2).all(|w| self.matter.is_free(w[0], w[1], keep));
+        free.then_some(legs)
     }
 
     /// A flight from one pose to another. On the way it looks at `look_at`, if there is such a thing.
@@ -139,7 +167,11 @@ impl Navigator {
         frames: usize,
         speed: Speed,
     ) -> Result<Flight, NoWay> {
-        let legs = self.legs(from.center, to.center)?;
+        let around = look_at.and_then(|target| self.around(from.center, to.center, target));
+        let legs = match around {
+            Some(legs) => legs,
+            None => self.legs(from.center, to.center)?,
+        };
         let ends = self.matter.clearance(from.center).min(self.matter.clearance(to.center));
         let clearance = self.clearance.min(0.99 * ends);
         let look_at = look_at.map(|target| (target, self.up));

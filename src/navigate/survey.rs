@@ -1,10 +1,11 @@
-//! How well flights do in a scene: random ways between keypoints, ours beside the paper's.
+//! How well flights do in a scene: random ways, ours beside the paper's.
 
 use glam::DVec3;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::flight::{Flight, Smoothness, Speed};
+use super::keypoints::Keypoint;
 use super::navigator::Navigator;
 use super::pose::Pose;
 use crate::scene::Camera;
@@ -55,23 +56,51 @@ impl Sum {
     }
 }
 
-/// Flies between `count` random pairs of keypoints.
-pub fn survey(navigator: &Navigator, count: usize, frames: usize, seed: u64) -> Survey {
+/// Between what random flights are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ends {
+    /// Keypoints.
+    Keypoints,
+    /// Places close to matter: from under the table to behind the lamp.
+    CloseToMatter,
+}
+
+/// Poses that flights begin and end with. Places close to matter look as the nearest keypoint does.
+fn ends(navigator: &Navigator, which: Ends, count: usize, rng: &mut Pcg64) -> Vec<Pose> {
+    let points = &navigator.graph.keypoints;
+    let pose = |k: &Keypoint, center: DVec3| Pose { center, world_from_camera: k.world_from_camera, fov_y_rad: 0.8 };
+    if points.is_empty() {
+        return Vec::new();
+    }
+    if which == Ends::Keypoints {
+        return (0..count).map(|_| &points[rng.random_range(0..points.len())]).map(|k| pose(k, k.center)).collect();
+    }
+    let bounds = navigator.matter.bounds();
+    let mut found = Vec::with_capacity(count);
+    for _ in 0..1000 * count {
+        let share = DVec3::from_array([0, 0, 0].map(|_: i32| rng.random::<f64>()));
+        let center = bounds.min + bounds.size() * share;
+        let clearance = navigator.matter.clearance(center);
+        if (navigator.clearance..3.0 * navigator.clearance).contains(&clearance)
+            && let Some(near) = navigator.graph.nearest(center).next()
+        {
+            found.push(pose(&points[near], center));
+            if found.len() == count {
+                break;
+            }
+        }
+    }
+    found
+}
+
+/// Flies between `count` random pairs of places.
+pub fn survey(navigator: &Navigator, which: Ends, count: usize, frames: usize, seed: u64) -> Survey {
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut found = Survey::default();
-    let points = &navigator.graph.keypoints;
+    let places = ends(navigator, which, 2 * count, &mut rng);
     let mut secs = Vec::new();
-    if points.is_empty() {
-        return found;
-    }
-    for _ in 0..count {
-        let [a, b] = [0, 0].map(|_: i32| &points[rng.random_range(0..points.len())]);
-        let pose = |k: &super::keypoints::Keypoint| Pose {
-            center: k.center,
-            world_from_camera: k.world_from_camera,
-            fov_y_rad: 0.8,
-        };
-        let (from, to) = (pose(a), pose(b));
+    for pair in places.chunks_exact(2) {
+        let (from, to) = (pair[0], pair[1]);
         let start = std::time::Instant::now();
         let flight = navigator.fly(&from, &to, None, frames, Speed::Eased);
         secs.push(start.elapsed().as_secs_f64());
@@ -83,6 +112,9 @@ pub fn survey(navigator: &Navigator, count: usize, frames: usize, seed: u64) -> 
             }
             Err(_) => found.no_way += 1,
         }
+    }
+    if secs.is_empty() {
+        return found;
     }
     secs.sort_by(f64::total_cmp);
     (found.least_secs, found.median_secs, found.most_secs) = (secs[0], secs[secs.len() / 2], secs[secs.len() - 1]);
@@ -117,10 +149,12 @@ mod tests {
         let more = more_cameras(&cameras, 40, 0.3, 1);
         assert_eq!(more.len(), 40);
         let navigator = Navigator::new(&wall_with_hole(0.0, 0.6), &more, DVec3::NEG_Y);
-        let survey = survey(&navigator, 30, 60, 7);
+        let survey = survey(&navigator, Ends::Keypoints, 30, 60, 7);
         assert!(survey.ours.flights > 10, "{survey:?}");
         assert_eq!(survey.ours.poses_too_near, 0, "{survey:?}");
         assert!(survey.paper.poses_too_near > 0, "the straight way leads through the wall: {survey:?}");
+        let close = self::survey(&navigator, Ends::CloseToMatter, 10, 60, 7);
+        assert!(close.ours.flights + close.no_way == 10 && close.ours.poses_too_near == 0, "{close:?}");
         assert!(survey.paper.worst.rotation_error >= survey.ours.worst.rotation_error);
     }
 }
