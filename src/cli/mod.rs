@@ -10,6 +10,7 @@ mod demo;
 mod demo_queries;
 mod error;
 mod eval;
+mod eval_depth;
 mod eval_masks;
 mod export;
 mod info;

@@ -148,9 +148,9 @@ fn save(frame: &Frame<f32>, what: What, storage: Storage, out: &Path) -> Result<
             let bytes: Vec<u8> = frame.alpha.iter().map(|a| (a.clamp(0.0, 1.0) * 255.0 + 0.5) as u8).collect();
             output::write_png(out, &bytes, size, ColorType::L8)?;
         }
-        (What::Depth, Storage::Npy) => output::write_npy(out, &expected_depth(frame), size)?,
+        (What::Depth, Storage::Npy) => output::write_npy(out, &frame.expected_depth(), size)?,
         (What::Depth, Storage::Png) => {
-            let depth = expected_depth(frame);
+            let depth = frame.expected_depth();
             let far = depth.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
             let code = |d: &f32| ((d / far * 65535.0 + 0.5) as u16).to_ne_bytes();
             let bytes: Vec<u8> = depth.iter().flat_map(code).collect();
@@ -159,10 +159,4 @@ fn save(frame: &Frame<f32>, what: What, storage: Storage, out: &Path) -> Result<
         }
     }
     Ok(None)
-}
-
-/// Depth divided by alpha; 0 where less than half of the light comes from the scene.
-fn expected_depth(frame: &Frame<f32>) -> Vec<f32> {
-    let one = |(d, a): (&f32, &f32)| if *a >= 0.5 { d / a } else { 0.0 };
-    frame.depth.iter().zip(&frame.alpha).map(one).collect()
 }
