@@ -78,11 +78,7 @@ fn from_trained(scene: TrainedScene) -> DrawableScene {
     let info = scene.info;
     // A later version's settings may not parse; the defaults then only affect sizes and filters.
     let config: TrainConfig = serde_json::from_value(info.config).unwrap_or_default();
-    let settings = RenderSettings {
-        background: info.background.unwrap_or_default(),
-        antialias: config.antialias,
-        ..RenderSettings::default()
-    };
+    let settings = config.render_settings(info.background);
     let named = |c: io::trained::SceneCamera| NamedCamera { name: c.name, camera: c.camera, held_out: c.held_out };
     DrawableScene {
         cloud: scene.cloud,

@@ -107,7 +107,10 @@ impl Args {
 pub fn run(args: Args) -> Result<(), CliError> {
     let job = args.check()?;
     let settings = RenderSettings { depth: args.what == What::Depth, ..job.scene.settings };
-    let mut backend = Backend::choose(args.backend)?;
+    let choice = if settings.surfels && args.backend == BackendChoice::Auto { BackendChoice::Cpu } else { args.backend };
+    let mut backend = Backend::choose(choice)?;
+    // Only the CPU draws surfels as such.
+    let flat = settings.surfels && !matches!(backend, Backend::Cpu(_));
     let cloud = Arc::new(job.scene.cloud);
     let started = Instant::now();
     let frame = backend.render(&cloud, &job.camera, &settings)?;
@@ -125,12 +128,14 @@ pub fn run(args: Args) -> Result<(), CliError> {
             "backend": backend.name(),
             "render_ms": millis,
             "depth_full_scale": far,
+            "surfels_as_flat_gaussians": flat,
         }));
     }
     let scale = far.map_or(String::new(), |far| format!(", value 65535 = {far} scene units"));
     let [width, height] = size;
+    let flat = if flat { ", surfels as flat Gaussians" } else { "" };
     output::print(&format!(
-        "{}: {width} x {height} px, drawn in {millis:.0} ms on {}{scale}",
+        "{}: {width} x {height} px, drawn in {millis:.0} ms on {}{flat}{scale}",
         args.out.display(),
         backend.name()
     ))

@@ -9,6 +9,7 @@ pub mod bin;
 pub mod blend;
 pub mod blend_backward;
 pub mod lanes;
+pub mod normals;
 pub mod project;
 pub mod project_backward;
 pub mod sort;
