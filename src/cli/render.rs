@@ -107,7 +107,8 @@ impl Args {
 pub fn run(args: Args) -> Result<(), CliError> {
     let job = args.check()?;
     let settings = RenderSettings { depth: args.what == What::Depth, ..job.scene.settings };
-    let choice = if settings.surfels && args.backend == BackendChoice::Auto { BackendChoice::Cpu } else { args.backend };
+    let choice =
+        if settings.surfels && args.backend == BackendChoice::Auto { BackendChoice::Cpu } else { args.backend };
     let mut backend = Backend::choose(choice)?;
     // Only the CPU draws surfels as such.
     let flat = settings.surfels && !matches!(backend, Backend::Cpu(_));

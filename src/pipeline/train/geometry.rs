@@ -81,7 +81,8 @@ impl Geometry {
             loss += frame.distortion.iter().map(|d| f64::from(d * share)).sum::<f64>();
         }
         if self.normals_count(step) {
-            let (drawn, weight) = (if self.surfels { &frame.normals[..] } else { &frame.features[..] }, self.normal_weight);
+            let (drawn, weight) =
+                (if self.surfels { &frame.normals[..] } else { &frame.features[..] }, self.normal_weight);
             if let [x, y, z] = drawn {
                 let own = &mut self.d_normals;
                 let depth = if self.surfels { SurfaceDepth::Median } else { SurfaceDepth::Expected };

@@ -17,8 +17,8 @@ use crate::io::trained::{self, History, SceneInfo};
 use crate::math::stats::{mean, median};
 use crate::pipeline::evaluate::evaluate;
 use crate::pipeline::observer::{Evaluation, Level, Observer, Progress, Signal, StepMetrics};
-use crate::render::{BackendChoice, RenderError};
 use crate::render::gpu::GpuError;
+use crate::render::{BackendChoice, RenderError};
 use crate::scene::{Dataset, GaussianCloud};
 
 /// Steps between copies of the cloud to roll back to.

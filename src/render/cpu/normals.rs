@@ -85,11 +85,7 @@ impl<R: Real> Rays<R> {
     fn new(camera: &Camera) -> Self {
         let first = camera.ray(DVec2::splat(0.5));
         let step = |pixel: DVec2| (camera.ray(pixel) - first).to_array().map(R::of);
-        Self {
-            first: first.to_array().map(R::of),
-            right: step(DVec2::new(1.5, 0.5)),
-            down: step(DVec2::new(0.5, 1.5)),
-        }
+        Self { first: first.to_array().map(R::of), right: step(DVec2::new(1.5, 0.5)), down: step(DVec2::new(0.5, 1.5)) }
     }
 
     #[inline(always)]
