@@ -14,9 +14,9 @@ use crate::scene::Camera;
 
 /// Draw a scene from a given camera into a file
 ///
-/// Pictures and alpha are 8-bit PNG. Depth is the expected distance along the camera's axis in
-/// scene units, 0 where nothing is: as f32 in a .npy array, or as 16-bit PNG whose full scale is
-/// printed.
+/// Pictures and alpha are 8-bit PNG. Depth is the median distance along the camera's axis in scene
+/// units, which 'fmlgs eval --depth' finds nearest to the truth, 0 where nothing is: as f32 in a
+/// .npy array, or as 16-bit PNG whose full scale is printed.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs render scene/ --camera 12 --out view.png\n  \
@@ -58,8 +58,10 @@ pub struct Args {
 enum What {
     /// Colours
     Picture,
-    /// Distance along the camera's axis
+    /// Distance along the camera's axis at which half of the light is spent
     Depth,
+    /// The mean of that distance over the light
+    ExpectedDepth,
     /// Accumulated opacity
     Alpha,
 }
@@ -83,7 +85,7 @@ impl Args {
         let extension = self.out.extension().map(|e| e.to_string_lossy().to_lowercase());
         let storage = match (extension.as_deref(), self.what) {
             (Some("png"), _) => Storage::Png,
-            (Some("npy"), What::Depth | What::Alpha) => Storage::Npy,
+            (Some("npy"), What::Depth | What::ExpectedDepth | What::Alpha) => Storage::Npy,
             _ => {
                 let file = self.out.display();
                 return Err(CliError::Usage(format!("'{file}' must end in .png, or in .npy for depth and alpha")));
@@ -106,7 +108,8 @@ impl Args {
 
 pub fn run(args: Args) -> Result<(), CliError> {
     let job = args.check()?;
-    let settings = RenderSettings { depth: args.what == What::Depth, ..job.scene.settings };
+    let settings =
+        RenderSettings { depth: matches!(args.what, What::Depth | What::ExpectedDepth), ..job.scene.settings };
     let choice =
         if settings.surfels && args.backend == BackendChoice::Auto { BackendChoice::Cpu } else { args.backend };
     let mut backend = Backend::choose(choice)?;
@@ -154,9 +157,12 @@ fn save(frame: &Frame<f32>, what: What, storage: Storage, out: &Path) -> Result<
             let bytes: Vec<u8> = frame.alpha.iter().map(|a| (a.clamp(0.0, 1.0) * 255.0 + 0.5) as u8).collect();
             output::write_png(out, &bytes, size, ColorType::L8)?;
         }
-        (What::Depth, Storage::Npy) => output::write_npy(out, &frame.expected_depth(), size)?,
-        (What::Depth, Storage::Png) => {
-            let depth = frame.expected_depth();
+        (What::Depth | What::ExpectedDepth, _) => {
+            let depth = if what == What::Depth { frame.median_depth.clone() } else { frame.expected_depth() };
+            if storage == Storage::Npy {
+                output::write_npy(out, &depth, size)?;
+                return Ok(None);
+            }
             let far = depth.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
             let code = |d: &f32| ((d / far * 65535.0 + 0.5) as u16).to_ne_bytes();
             let bytes: Vec<u8> = depth.iter().flat_map(code).collect();

@@ -260,6 +260,9 @@ mod tests {
         assert_eq!(normals, [0.0, -1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
     }
 
+    /// Disturbs one number of the loss's input.
+    type Change<'a> = dyn Fn(&mut Frame<f64>, &mut [Vec<f64>; 3], f64) + 'a;
+
     #[test]
     fn the_loss_is_zero_on_a_consistent_plane_and_its_gradient_right() {
         let normal = DVec3::new(0.2, -0.9, 0.4).try_normalize().expect("long");
@@ -293,7 +296,7 @@ mod tests {
             let (loss, g, d) = run(&frame, &normals, depth);
             assert!(loss > 1e-3, "{loss}");
             let h = 1e-6;
-            let slope = |change: &dyn Fn(&mut Frame<f64>, &mut [Vec<f64>; 3], f64)| {
+            let slope = |change: &Change<'_>| {
                 let at = |h: f64| {
                     let (mut f, mut v) = (frame.clone(), normals.clone());
                     change(&mut f, &mut v, h);
