@@ -9,12 +9,13 @@ use serde_json::json;
 
 use super::opened::DrawableScene;
 use super::{CliError, opened, output, view};
+use crate::render::cpu::normals;
 use crate::render::{Backend, BackendChoice, Frame, RenderSettings};
 use crate::scene::Camera;
 
 /// Draw a scene from a given camera into a file
 ///
-/// Pictures and alpha are 8-bit PNG. Depth is the median distance along the camera's axis in scene
+/// Pictures, normals and alpha are 8-bit PNG. Depth is the median distance along the camera's axis in scene
 /// units, which 'fmlgs eval --depth' finds nearest to the truth, 0 where nothing is: as f32 in a
 /// .npy array, or as 16-bit PNG whose full scale is printed.
 #[derive(Debug, clap::Args)]
@@ -62,8 +63,17 @@ enum What {
     Depth,
     /// The mean of that distance over the light
     ExpectedDepth,
+    /// Normals of the surface that median depth describes, world axes, -1 to 1 as 0 to 255
+    Normals,
     /// Accumulated opacity
     Alpha,
+}
+
+impl What {
+    /// Whether depth must be drawn for it.
+    fn needs_depth(self) -> bool {
+        matches!(self, Self::Depth | Self::ExpectedDepth | Self::Normals)
+    }
 }
 
 /// How the values are stored, by the file's extension.
@@ -108,8 +118,7 @@ impl Args {
 
 pub fn run(args: Args) -> Result<(), CliError> {
     let job = args.check()?;
-    let settings =
-        RenderSettings { depth: matches!(args.what, What::Depth | What::ExpectedDepth), ..job.scene.settings };
+    let settings = RenderSettings { depth: args.what.needs_depth(), ..job.scene.settings };
     let choice =
         if settings.surfels && args.backend == BackendChoice::Auto { BackendChoice::Cpu } else { args.backend };
     let mut backend = Backend::choose(choice)?;
@@ -121,7 +130,7 @@ pub fn run(args: Args) -> Result<(), CliError> {
     let millis = started.elapsed().as_secs_f64() * 1e3;
 
     output::make_parent(&args.out)?;
-    let far = save(&frame, args.what, job.storage, &args.out)?;
+    let far = save(&frame, &job.camera, args.what, job.storage, &args.out)?;
     let size = [job.camera.width_px, job.camera.height_px];
     if args.json {
         return output::print_json(&json!({
@@ -146,11 +155,23 @@ pub fn run(args: Args) -> Result<(), CliError> {
 }
 
 /// Writes the file; returns the depth that 65535 stands for, where that is how it is stored.
-fn save(frame: &Frame<f32>, what: What, storage: Storage, out: &Path) -> Result<Option<f32>, CliError> {
+fn save(
+    frame: &Frame<f32>,
+    camera: &Camera,
+    what: What,
+    storage: Storage,
+    out: &Path,
+) -> Result<Option<f32>, CliError> {
     let size = [frame.width_px as u32, frame.height_px as u32];
     match (what, storage) {
         (What::Picture, _) => {
             output::write_png(out, frame.to_rgb8().as_flattened(), size, ColorType::Rgb8)?;
+        }
+        (What::Normals, _) => {
+            // Where there is none it is 0, which is the grey in the middle.
+            let code = |n: [f32; 3]| n.map(|c| (c * 127.5 + 128.0) as u8);
+            let rgb: Vec<[u8; 3]> = normals::of_depth(&frame.median_depth, camera).into_iter().map(code).collect();
+            output::write_png(out, rgb.as_flattened(), size, ColorType::Rgb8)?;
         }
         (What::Alpha, Storage::Npy) => output::write_npy(out, &frame.alpha, size)?,
         (What::Alpha, Storage::Png) => {
