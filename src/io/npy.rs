@@ -69,16 +69,22 @@ impl Array<'_> {
 /// # Errors
 /// If the file is not such an array, or a number is negative or not finite.
 pub fn read_map(path: &Path) -> Result<(usize, usize, Vec<f32>), IoError> {
-    let bytes = files::read(path, files::MAX_PICTURE_BYTES)?;
-    let array = open(&bytes, path)?;
+    map(&files::read(path, files::MAX_PICTURE_BYTES)?, path)
+}
+
+/// The same from the file's bytes.
+///
+/// # Errors
+/// As [`read_map`].
+pub fn map(bytes: &[u8], path: &Path) -> Result<(usize, usize, Vec<f32>), IoError> {
+    let array = open(bytes, path)?;
     let &[height, width] = array.shape() else {
         let shape = format!("the array's shape is {:?}, expected [height, width]", array.shape());
         return Err(syntax(path, shape));
     };
-    // The product has been held against the file's size.
-    if width == 0 || height == 0 || width * height > array.possible {
-        let possible = array.possible;
-        return Err(IoError::Count { path: path.into(), what: "pixels".into(), claimed: width * height, possible });
+    let (claimed, possible) = (width.saturating_mul(height), array.possible);
+    if claimed == 0 || claimed > possible {
+        return Err(IoError::Count { path: path.into(), what: "pixels".into(), claimed, possible });
     }
     let values = array.values()?;
     if let Some(index) = values.iter().position(|v| !(*v >= 0.0 && *v <= f64::from(f32::MAX))) {
