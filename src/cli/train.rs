@@ -83,7 +83,7 @@ pub struct Settings {
     /// --surfels 0.05]
     #[arg(long, value_parser = parse_weight)]
     pub normal_weight: Option<f64>,
-    /// Weight of the term that pulls surfels together along rays [default: 1]
+    /// Weight of the term that pulls surfels together along rays [default: 0.1]
     #[arg(long, value_parser = parse_weight, requires = "surfels")]
     pub distortion_weight: Option<f64>,
 }

@@ -4,6 +4,37 @@
 //! axis at pixel centres, found by casting rays. A drawn pixel has a depth where at least half of
 //! its light comes from the scene: the expected depth `sum(w z) / sum(w)`, and the median depth,
 //! at which half of the light is spent.
+//!
+//! # Measured
+//!
+//! The demo scene (53 photos to train on, 7 held out, 256 x 192 px), 1,000 steps, at most 30,000
+//! Gaussians, one seed. Training in seconds of processor time on two slow cores, drawing in ms of
+//! one view with depth, the best of six. Errors in scene units (`abs`; the desk is 2 units away), in
+//! percent of the depth (`rel`), and the percentage of pixels within 1 %; edges are pixels within
+//! [`EDGE_PX`] of a jump, `none` is the percentage of pixels without a depth.
+//!
+//! | trained | depth | PSNR | abs | rel | < 1 % | edges: abs | rel | < 1 % | none | train | draw |
+//! |---|---|---|---|---|---|---|---|---|---|---|---|
+//! | Gaussians | expected | 32.38 | 0.0245 | 1.27 | 75.0 | 0.0741 | 4.05 | 48.1 | 0.2 | 103 | 26 |
+//! | | median | | 0.0166 | 0.87 | 86.9 | 0.0459 | 2.64 | 75.0 | | | |
+//! | Gaussians, normals 0.05 | expected | 32.16 | 0.0219 | 1.13 | 82.0 | 0.0705 | 3.88 | 50.9 | 0.2 | 127 | |
+//! | | median | | 0.0164 | 0.87 | 87.8 | 0.0459 | 2.68 | 75.2 | | | |
+//! | surfels, no losses | expected | 32.22 | 0.0282 | 1.51 | 71.0 | 0.0857 | 4.57 | 41.5 | 0.2 | 157 | |
+//! | | median | | 0.0174 | 0.88 | 87.3 | 0.0488 | 2.56 | 75.4 | | | |
+//! | surfels, normals 0.05 | expected | 32.37 | 0.0253 | 1.37 | 75.2 | 0.0827 | 4.41 | 44.1 | 0.2 | 169 | |
+//! | | median | | 0.0147 | 0.77 | 92.5 | 0.0468 | 2.50 | 79.0 | | | |
+//! | surfels, normals 0.05, distortion 0.1 | expected | 32.41 | 0.0239 | 1.28 | 77.5 | 0.0810 | 4.28 | 44.8 | 0.2 | 179 | 49 |
+//! | | median | | 0.0146 | 0.74 | 92.5 | 0.0459 | 2.40 | 79.1 | | | |
+//! | surfels, normals 0.05, distortion 1 | expected | 32.11 | 0.0212 | 1.10 | 84.2 | 0.0777 | 4.03 | 47.0 | 0.6 | 172 | |
+//! | | median | | 0.0152 | 0.76 | 91.0 | 0.0458 | 2.37 | 78.2 | | | |
+//!
+//! Hence the defaults. Median depth: its mean error is a third less than that of expected depth for
+//! nothing, and nearly two fifths less at edges. (Its root mean squared error is a tenth larger: at
+//! an edge it falls on one side or the other, where the mean falls between.) Gaussians without
+//! further terms: surfels take another 15 % off the error and bring 92 instead of 87 of 100 pixels
+//! within 1 %, at equal PSNR, but train for 1.7 times as long, draw half as fast, and not on a GPU.
+//! Drawn as the flat Gaussians that other programs and a GPU see, those with distortion 1 lose 2.6 dB
+//! at this small size, and their median depth is then no better than that of Gaussians (0.95 %).
 
 mod errors;
 mod truth;
