@@ -140,6 +140,17 @@ fn a_splat_is_drawn_and_exported_again() {
     for (d, c) in depth.iter().zip(&coded) {
         assert!((d / far - f32::from(*c) / 65535.0).abs() < 1e-4);
     }
+    fmlgs(&["render", splat, "--size", "64x48", "--what", "expected-depth", "--out", &at("e.npy")]).ok();
+    let bytes = std::fs::read(at("e.npy")).unwrap();
+    let expected: Vec<f32> = npyz::NpyFile::new(&bytes[..]).unwrap().into_vec().unwrap();
+    // Both have a depth at the same pixels, at nearly the same distance.
+    assert!(depth.iter().zip(&expected).all(|(d, e)| (*d > 0.0) == (*e > 0.0) && (d - e).abs() < 0.5 * far));
+    fmlgs(&["render", splat, "--size", "64x48", "--what", "normals", "--out", &at("n.png")]).ok();
+    let normals = image::open(at("n.png")).unwrap().to_rgb8();
+    let length = |p: &image::Rgb<u8>| p.0.iter().map(|c| (f32::from(*c) / 127.5 - 1.0).powi(2)).sum::<f32>();
+    let turned: Vec<f32> = normals.pixels().map(length).filter(|l| *l > 0.1).collect();
+    assert!(!turned.is_empty() && turned.iter().all(|l| (l - 1.0).abs() < 0.05));
+    fmlgs(&["render", splat, "--size", "64x48", "--what", "normals", "--out", &at("n.npy")]).fails_with(2);
     fmlgs(&["render", splat, "--size", "64x48", "--what", "alpha", "--out", &at("alpha.png")]).ok();
     assert!(image::open(at("alpha.png")).unwrap().to_luma8().pixels().any(|p| p.0[0] > 100));
 

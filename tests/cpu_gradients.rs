@@ -31,6 +31,7 @@ impl Problem {
             features: (0..EXTRA).map(|_| plane()).collect(),
             alpha: plane(),
             depth: plane(),
+            ..FrameGradient::default()
         };
         let settings =
             RenderSettings { background: [0.3, 0.1, 0.8], antialias, depth: true, ..RenderSettings::default() };

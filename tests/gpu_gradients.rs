@@ -35,6 +35,7 @@ impl Problem {
             features: (0..channels).map(|_| plane()).collect(),
             alpha: plane(),
             depth: plane(),
+            ..FrameGradient::default()
         };
         let settings =
             RenderSettings { background: [0.3, 0.1, 0.8], antialias, depth: true, ..RenderSettings::default() };
@@ -59,6 +60,7 @@ impl Problem {
             features: self.weights.features.iter().map(narrow).collect(),
             alpha: narrow(&self.weights.alpha),
             depth: narrow(&self.weights.depth),
+            ..FrameGradient::default()
         };
         renderer.backward(&cloud, features, &weights).unwrap()
     }

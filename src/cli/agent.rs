@@ -52,7 +52,7 @@ pub struct Args {
     /// What may be done: a policy file [default: FMLGS_POLICY, else the built-in one]
     #[arg(long)]
     policy: Option<PathBuf>,
-    /// Length of a scene unit in metres, if that is known
+    /// Length of a scene unit in metres [default: the scene's own, if that is known]
     #[arg(long)]
     metres: Option<f64>,
     /// Write the picture at the end
@@ -112,7 +112,7 @@ pub fn run(args: Args) -> Result<(), CliError> {
         map: Arc::new(map),
         up: super::path::up_of(&cameras),
         cameras,
-        metres: args.metres,
+        metres: args.metres.or(scene.metres_per_unit),
         exports: args.scene.join("exports"),
         explored: None,
     };

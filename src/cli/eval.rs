@@ -9,7 +9,7 @@ use serde_json::json;
 use super::eval_masks::{self, Protocol};
 use super::opened::DrawableScene;
 use super::progress::Console;
-use super::{CliError, opened, output};
+use super::{CliError, eval_depth, opened, output};
 use crate::io;
 use crate::math::stats::mean;
 use crate::pipeline::evaluate::evaluate;
@@ -32,6 +32,7 @@ const DIFFERENCE_GAIN: i32 = 4;
 #[command(after_help = "Examples:\n  \
     fmlgs eval scene/\n  \
     fmlgs eval scene/ --pictures compare/       photo | render | difference x 4, one PNG per view\n  \
+    fmlgs eval scene/ --depth                   depth, on photos made by 'fmlgs synth'\n  \
     fmlgs eval scene/ --masks photos/           objects and parts against labels\n  \
     fmlgs eval scene/ --masks photos/ --protocol part-recall\n  \
     fmlgs eval splat.ply --photos photos/ --max-side 1600 --json")]
@@ -53,6 +54,9 @@ pub struct Args {
     /// What to ask for, where labels do not name it (spin-nerf)
     #[arg(long, requires = "masks")]
     query: Option<String>,
+    /// Compare depth instead, with the true depths that came with synthetic photos
+    #[arg(long, conflicts_with = "masks")]
+    depth: bool,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
@@ -139,7 +143,11 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         let (protocol, query) = (args.protocol, args.query.clone());
         return eval_masks::run(&scene, &masks, protocol, query.as_deref(), args.check()?, json);
     }
+    let depth = args.depth;
     let job = args.check()?;
+    if depth {
+        return eval_depth::run(&scene, &job, json, &mut Console::new(quiet));
+    }
     let scores = measure(&job, &mut Console::new(quiet))?;
     let (psnr, ssim) = means(&scores);
     if json {

@@ -11,6 +11,7 @@ mod demo;
 mod demo_queries;
 mod error;
 mod eval;
+mod eval_depth;
 mod eval_masks;
 mod export;
 mod info;

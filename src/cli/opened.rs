@@ -31,6 +31,8 @@ pub struct DrawableScene {
     pub config: TrainConfig,
     /// Where its photos are, if known.
     pub dataset_path: Option<PathBuf>,
+    /// Length of a scene unit in metres, if known.
+    pub metres_per_unit: Option<f64>,
 }
 
 /// Opens a trained scene or a splat.
@@ -43,6 +45,7 @@ pub fn drawable(path: &Path) -> Result<DrawableScene, CliError> {
             settings: RenderSettings::default(),
             config: TrainConfig::default(),
             dataset_path: None,
+            metres_per_unit: None,
         }),
         Opened::Dataset(_) => Err(CliError::failed(format!(
             "{path} holds photos but no Gaussians yet: train them first, with 'fmlgs train {path} --out SCENE'",
@@ -78,11 +81,7 @@ fn from_trained(scene: TrainedScene) -> DrawableScene {
     let info = scene.info;
     // A later version's settings may not parse; the defaults then only affect sizes and filters.
     let config: TrainConfig = serde_json::from_value(info.config).unwrap_or_default();
-    let settings = RenderSettings {
-        background: info.background.unwrap_or_default(),
-        antialias: config.antialias,
-        ..RenderSettings::default()
-    };
+    let settings = config.render_settings(info.background);
     let named = |c: io::trained::SceneCamera| NamedCamera { name: c.name, camera: c.camera, held_out: c.held_out };
     DrawableScene {
         cloud: scene.cloud,
@@ -90,5 +89,6 @@ fn from_trained(scene: TrainedScene) -> DrawableScene {
         settings,
         config,
         dataset_path,
+        metres_per_unit: info.metres_per_unit.filter(|m| m.is_finite() && *m > 0.0),
     }
 }

@@ -16,14 +16,15 @@ use crate::io::animation::{Encoder, Settings};
 use crate::navigate::{Film, Speed};
 use crate::pipeline::film::{self, FilmError, Marked};
 use crate::pipeline::semantics::grammar::Kind;
+use crate::render::cpu::normals;
 use crate::render::{Backend, BackendChoice, Frame, RenderSettings};
 use crate::scene::Camera;
 
 /// Draw a scene from a given camera into a file
 ///
-/// Pictures and alpha are 8-bit PNG. Depth is the expected distance along the camera's axis in
-/// scene units, 0 where nothing is: as f32 in a .npy array, or as 16-bit PNG whose full scale is
-/// printed.
+/// Pictures, normals and alpha are 8-bit PNG. Depth is the median distance along the camera's axis in scene
+/// units, which 'fmlgs eval --depth' finds nearest to the truth, 0 where nothing is: as f32 in a
+/// .npy array, or as 16-bit PNG whose full scale is printed.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs render scene/ --camera 12 --out view.png\n  \
@@ -81,10 +82,21 @@ pub struct Args {
 enum What {
     /// Colours
     Picture,
-    /// Distance along the camera's axis
+    /// Distance along the camera's axis at which half of the light is spent
     Depth,
+    /// The mean of that distance over the light
+    ExpectedDepth,
+    /// Normals of the surface that median depth describes, world axes, -1 to 1 as 0 to 255
+    Normals,
     /// Accumulated opacity
     Alpha,
+}
+
+impl What {
+    /// Whether depth must be drawn for it.
+    fn needs_depth(self) -> bool {
+        matches!(self, Self::Depth | Self::ExpectedDepth | Self::Normals)
+    }
 }
 
 /// How the values are stored, by the file's extension.
@@ -106,7 +118,7 @@ impl Args {
         let extension = self.out.extension().map(|e| e.to_string_lossy().to_lowercase());
         let storage = match (extension.as_deref(), self.what) {
             (Some("png"), _) => Storage::Png,
-            (Some("npy"), What::Depth | What::Alpha) => Storage::Npy,
+            (Some("npy"), What::Depth | What::ExpectedDepth | What::Alpha) => Storage::Npy,
             _ => {
                 let file = self.out.display();
                 return Err(CliError::Usage(format!("'{file}' must end in .png, or in .npy for depth and alpha")));
@@ -132,15 +144,17 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         return film(&args, &path, quiet);
     }
     let job = args.check()?;
-    let settings = RenderSettings { depth: args.what == What::Depth, ..job.scene.settings };
-    let mut backend = Backend::choose(args.backend)?;
+    let settings = RenderSettings { depth: args.what.needs_depth(), ..job.scene.settings };
+    let mut backend = Backend::choose(choice(args.backend, &settings))?;
+    // Only the CPU draws surfels as such.
+    let flat = settings.surfels && !matches!(backend, Backend::Cpu(_));
     let cloud = Arc::new(job.scene.cloud);
     let started = Instant::now();
     let frame = backend.render(&cloud, &job.camera, &settings)?;
     let millis = started.elapsed().as_secs_f64() * 1e3;
 
     output::make_parent(&args.out)?;
-    let far = save(&frame, args.what, job.storage, &args.out)?;
+    let far = save(&frame, &job.camera, args.what, job.storage, &args.out)?;
     let size = [job.camera.width_px, job.camera.height_px];
     if args.json {
         return output::print_json(&json!({
@@ -151,15 +165,22 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
             "backend": backend.name(),
             "render_ms": millis,
             "depth_full_scale": far,
+            "surfels_as_flat_gaussians": flat,
         }));
     }
     let scale = far.map_or(String::new(), |far| format!(", value 65535 = {far} scene units"));
     let [width, height] = size;
+    let flat = if flat { ", surfels as flat Gaussians" } else { "" };
     output::print(&format!(
-        "{}: {width} x {height} px, drawn in {millis:.0} ms on {}{scale}",
+        "{}: {width} x {height} px, drawn in {millis:.0} ms on {}{flat}{scale}",
         args.out.display(),
         backend.name()
     ))
+}
+
+/// Only the CPU draws surfels as such: it is chosen for them unless a person wants otherwise.
+fn choice(wanted: BackendChoice, settings: &RenderSettings) -> BackendChoice {
+    if settings.surfels && wanted == BackendChoice::Auto { BackendChoice::Cpu } else { wanted }
 }
 
 /// Draws a film along the camera path in `path`.
@@ -193,7 +214,7 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
         }
     }
     let marked = map.as_ref().map(|map| Marked { map, ids: &ids, color: [255, 64, 160] });
-    let mut backend = Backend::choose(args.backend)?;
+    let mut backend = Backend::choose(choice(args.backend, &scene.settings))?;
     let started = Instant::now();
     output::make_parent(&args.out)?;
     let mut console = Console::new(quiet);
@@ -223,20 +244,35 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
 }
 
 /// Writes the file; returns the depth that 65535 stands for, where that is how it is stored.
-fn save(frame: &Frame<f32>, what: What, storage: Storage, out: &Path) -> Result<Option<f32>, CliError> {
+fn save(
+    frame: &Frame<f32>,
+    camera: &Camera,
+    what: What,
+    storage: Storage,
+    out: &Path,
+) -> Result<Option<f32>, CliError> {
     let size = [frame.width_px as u32, frame.height_px as u32];
     match (what, storage) {
         (What::Picture, _) => {
             output::write_png(out, frame.to_rgb8().as_flattened(), size, ColorType::Rgb8)?;
+        }
+        (What::Normals, _) => {
+            // Where there is none it is 0, which is the grey in the middle.
+            let code = |n: [f32; 3]| n.map(|c| (c * 127.5 + 128.0) as u8);
+            let rgb: Vec<[u8; 3]> = normals::of_depth(&frame.median_depth, camera).into_iter().map(code).collect();
+            output::write_png(out, rgb.as_flattened(), size, ColorType::Rgb8)?;
         }
         (What::Alpha, Storage::Npy) => output::write_npy(out, &frame.alpha, size)?,
         (What::Alpha, Storage::Png) => {
             let bytes: Vec<u8> = frame.alpha.iter().map(|a| (a.clamp(0.0, 1.0) * 255.0 + 0.5) as u8).collect();
             output::write_png(out, &bytes, size, ColorType::L8)?;
         }
-        (What::Depth, Storage::Npy) => output::write_npy(out, &expected_depth(frame), size)?,
-        (What::Depth, Storage::Png) => {
-            let depth = expected_depth(frame);
+        (What::Depth | What::ExpectedDepth, _) => {
+            let depth = if what == What::Depth { frame.median_depth.clone() } else { frame.expected_depth() };
+            if storage == Storage::Npy {
+                output::write_npy(out, &depth, size)?;
+                return Ok(None);
+            }
             let far = depth.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
             let code = |d: &f32| ((d / far * 65535.0 + 0.5) as u16).to_ne_bytes();
             let bytes: Vec<u8> = depth.iter().flat_map(code).collect();
@@ -245,10 +281,4 @@ fn save(frame: &Frame<f32>, what: What, storage: Storage, out: &Path) -> Result<
         }
     }
     Ok(None)
-}
-
-/// Depth divided by alpha; 0 where less than half of the light comes from the scene.
-fn expected_depth(frame: &Frame<f32>) -> Vec<f32> {
-    let one = |(d, a): (&f32, &f32)| if *a >= 0.5 { d / a } else { 0.0 };
-    frame.depth.iter().zip(&frame.alpha).map(one).collect()
 }

@@ -144,6 +144,7 @@ mod tests {
             settings: RenderSettings::default(),
             config: TrainConfig::default(),
             dataset_path: None,
+            metres_per_unit: None,
         }
     }
 

@@ -8,18 +8,15 @@ use std::fs;
 use std::path::Path;
 
 use glam::{DMat3, DVec2, DVec3};
-use npyz::NpyFile;
 
 use super::listing::{self, Focal, Lens, Listed, photos};
-use super::{IoError, files};
+use super::{IoError, files, npy};
 use crate::scene::{Camera, Dataset, Distortion};
 
 /// The file with the poses.
 pub const POSES_FILE: &str = "poses_bounds.npy";
 /// Numbers per photo.
 const ROW: usize = 17;
-/// Largest header of an `.npy` file in bytes; that of an array of numbers takes 128.
-const MAX_HEADER_BYTES: usize = 1024;
 /// Endings of photos.
 const ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
 
@@ -47,40 +44,23 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
         photos: photos(listed, root, &file, &mut warnings)?,
         points: Vec::new(),
         background: None,
+        metres_per_unit: None,
         warnings,
     })
 }
 
 /// The rows in the bytes of a `poses_bounds.npy`.
 pub fn poses(bytes: &[u8], path: &Path) -> Result<Vec<[f64; ROW]>, IoError> {
-    let bad = |reason: String| IoError::Syntax { path: path.into(), place: "npy".into(), reason };
-    let header = header_len(bytes).ok_or_else(|| bad("not an .npy file, or its header is cut off".into()))?;
-    // The library that reads the header multiplies sizes and the shape's entries unchecked.
-    let text = String::from_utf8_lossy(&bytes[..header]);
-    let kind = text.split_once("'descr'").and_then(|(_, rest)| rest.split('\'').nth(1)).unwrap_or_default();
-    if !["<f4", ">f4", "<f8", ">f8", "=f4", "=f8"].contains(&kind) {
-        return Err(bad(format!("its numbers are of the kind '{kind}', expected 32- or 64-bit floating point")));
-    }
-    let (claimed, possible) = (values_claimed(&text), (bytes.len() - header) as u64);
-    if claimed > possible {
-        return Err(IoError::Count { path: path.into(), what: "numbers".into(), claimed, possible });
-    }
-    let npy = NpyFile::new(bytes).map_err(|e| bad(e.to_string()))?;
-    let &[n, ROW_U64] = npy.shape() else {
-        return Err(bad(format!("the array's shape is {:?}, expected [photos, {ROW}]", npy.shape())));
+    let array = npy::open(bytes, path)?;
+    let &[n, ROW_U64] = array.shape() else {
+        let reason = format!("the array's shape is {:?}, expected [photos, {ROW}]", array.shape());
+        return Err(IoError::Syntax { path: path.into(), place: "npy".into(), reason });
     };
-    if npy.order() != npyz::Order::C {
-        return Err(bad("the array is stored column by column; save it with order='C'".into()));
-    }
-    let item = npy.dtype().num_bytes().filter(|b| *b > 0).ok_or_else(|| bad("the array holds no numbers".into()))?;
-    let possible = ((bytes.len() - header) / (ROW * item)) as u64;
+    let possible = array.possible / ROW_U64;
     if n > possible {
         return Err(IoError::Count { path: path.into(), what: "photos".into(), claimed: n, possible });
     }
-    let values: Vec<f64> = match item {
-        4 => npy.into_vec::<f32>().map_err(|e| bad(e.to_string()))?.into_iter().map(f64::from).collect(),
-        _ => npy.into_vec::<f64>().map_err(|e| bad(e.to_string()))?,
-    };
+    let values = array.values()?;
     if let Some(at) = values.iter().position(|v| !v.is_finite()) {
         return Err(IoError::NotFinite {
             path: path.into(),
@@ -93,25 +73,6 @@ pub fn poses(bytes: &[u8], path: &Path) -> Result<Vec<[f64; ROW]>, IoError> {
 }
 
 const ROW_U64: u64 = ROW as u64;
-
-/// Bytes before the data of an `.npy` file.
-fn header_len(bytes: &[u8]) -> Option<usize> {
-    let [0x93, b'N', b'U', b'M', b'P', b'Y', major, _, rest @ ..] = bytes else { return None };
-    let (start, length) = match major {
-        1 => (10, usize::from(u16::from_le_bytes(*rest.first_chunk()?))),
-        _ => (12, u32::from_le_bytes(*rest.first_chunk()?) as usize),
-    };
-    let end = start + length;
-    (length <= MAX_HEADER_BYTES && end <= bytes.len()).then_some(end)
-}
-
-/// The product of the shape in an `.npy` header; the largest number if it has none or overflows.
-fn values_claimed(text: &str) -> u64 {
-    let tuple = |text: &str| Some(text.split_once("shape")?.1.split_once('(')?.1.split_once(')')?.0.to_owned());
-    let shape = tuple(text).unwrap_or_else(|| "?".into());
-    let entries = shape.split(',').map(str::trim).filter(|e| !e.is_empty());
-    entries.map(|e| e.parse().unwrap_or(u64::MAX)).fold(1, u64::saturating_mul)
-}
 
 /// Whether this is one of SPIn-NeRF's pictures that are neither photo nor mask.
 pub(super) fn is_helper(name: &str) -> bool {

@@ -49,6 +49,9 @@ pub struct SceneInfo {
     /// The photos' cameras, in the dataset's order.
     #[serde(default)]
     pub cameras: Vec<SceneCamera>,
+    /// Length of a scene unit in metres, if that is known.
+    #[serde(default)]
+    pub metres_per_unit: Option<f64>,
     /// Colour behind everything.
     #[serde(default)]
     pub background: Option<[f32; 3]>,
@@ -112,6 +115,7 @@ impl SceneInfo {
             }),
             cameras: dataset.photos.iter().enumerate().map(camera).collect(),
             background: dataset.background,
+            metres_per_unit: dataset.metres_per_unit,
             ..Self::default()
         }
     }

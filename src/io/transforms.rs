@@ -35,6 +35,8 @@ struct File {
 struct Own {
     /// sRGB colour behind everything, 0 to 1.
     background: Option<[f32; 3]>,
+    /// Length of a unit in metres.
+    metres_per_unit: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -97,6 +99,7 @@ pub fn read(file: &Path) -> Result<Dataset, IoError> {
         photos,
         points,
         background: parsed.fmlgs.background.filter(|b| b.iter().all(|c| (0.0..=1.0).contains(c))),
+        metres_per_unit: parsed.fmlgs.metres_per_unit.filter(|m| m.is_finite() && *m > 0.0),
         warnings,
     })
 }
@@ -131,6 +134,7 @@ pub fn read_blender(root: &Path) -> Result<Dataset, IoError> {
         photos: all,
         points: Vec::new(),
         background: Some(WHITE),
+        metres_per_unit: None,
         warnings,
     })
 }

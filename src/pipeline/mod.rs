@@ -5,6 +5,7 @@ pub mod bench;
 pub mod bench_gpu;
 pub mod bench_query;
 pub mod demo_scene;
+pub mod depth;
 pub mod evaluate;
 pub mod film;
 pub mod metrics;

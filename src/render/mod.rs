@@ -64,13 +64,17 @@ pub struct RenderSettings {
     pub near: f64,
     /// Scale opacities so that [`BLUR_PX2`] keeps a splat's energy (Mip-Splatting's 2-D filter).
     pub antialias: bool,
-    /// Also return expected depth `sum(w z)` and median depth.
+    /// Also return expected depth `sum(w z)` and median depth; of surfels, normals and distortion
+    /// too.
     pub depth: bool,
+    /// Draw surfels: disks across the first two axes, whose third scale is ignored (2D Gaussian
+    /// Splatting). On the CPU only; a GPU draws them as the flat Gaussians that they are stored as.
+    pub surfels: bool,
 }
 
 impl Default for RenderSettings {
     fn default() -> Self {
-        Self { sh_degree: 3, background: [0.0; 3], near: 0.01, antialias: false, depth: false }
+        Self { sh_degree: 3, background: [0.0; 3], near: 0.01, antialias: false, depth: false, surfels: false }
     }
 }
 
@@ -104,8 +108,14 @@ pub struct Frame<R> {
     /// `sum(w z)` in scene units, not divided by alpha; empty unless asked for.
     pub depth: Vec<R>,
     /// Depth at which transmittance first falls to one half, 0 where it never does; empty unless
-    /// asked for. Carries no gradient.
+    /// asked for. Carries a gradient for surfels only.
     pub median_depth: Vec<R>,
+    /// Normals of surfels, towards the camera in world axes, `sum(w n)`; empty for Gaussians and
+    /// without depth.
+    pub normals: [Vec<R>; 3],
+    /// How far surfels along a ray are apart: the sum over pairs of `w_i w_j (1/z_i - 1/z_j)²`;
+    /// empty for Gaussians and without depth.
+    pub distortion: Vec<R>,
 }
 
 impl<R: Real> Frame<R> {
@@ -114,6 +124,13 @@ impl<R: Real> Frame<R> {
         let byte = |v: R| (v.f32().clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
         let [r, g, b] = &self.color;
         r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [byte(r), byte(g), byte(b)]).collect()
+    }
+
+    /// Expected depth `sum(w z) / alpha` in scene units, 0 where less than half of the light comes
+    /// from the scene; empty unless depth was asked for.
+    pub fn expected_depth(&self) -> Vec<R> {
+        let one = |(d, a): (&R, &R)| if *a >= R::HALF { *d / *a } else { R::ZERO };
+        self.depth.iter().zip(&self.alpha).map(one).collect()
     }
 }
 
@@ -128,6 +145,12 @@ pub struct FrameGradient<R> {
     pub alpha: Vec<R>,
     /// With respect to `Frame::depth`.
     pub depth: Vec<R>,
+    /// With respect to `Frame::median_depth`, of surfels.
+    pub median_depth: Vec<R>,
+    /// With respect to `Frame::normals`.
+    pub normals: [Vec<R>; 3],
+    /// With respect to `Frame::distortion`.
+    pub distortion: Vec<R>,
 }
 
 /// Gradient with respect to every parameter of a cloud, laid out like the cloud.

@@ -21,6 +21,8 @@ pub struct Dataset {
     pub points: Vec<SparsePoint>,
     /// The colour behind everything (Blender's renders are composited over it); `None` = unknown.
     pub background: Option<[f32; 3]>,
+    /// Length of a scene unit in metres, if that is known; photos alone do not tell.
+    pub metres_per_unit: Option<f64>,
     /// Things a person should know: photos that are listed but missing, and so on.
     pub warnings: Vec<String>,
 }

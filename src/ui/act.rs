@@ -264,7 +264,7 @@ impl App {
             map,
             cameras: photos.map(|p| p.camera.clone()).collect(),
             up: self.viewport.up(&scene),
-            metres: None,
+            metres: scene.metres_per_unit.or_else(|| scene.dataset.as_ref().and_then(|d| d.metres_per_unit)),
             exports: scene.out.join("exports"),
             explored: self.state.explored.clone(),
         };

@@ -118,12 +118,12 @@ impl PipelineJobs {
             }
         });
         let name = dataset.name.clone();
-        let mut render = render_settings(dataset.background, false);
+        let background = dataset.background;
         let dataset = Some(Arc::new(dataset));
         match before {
             Some(TrainedScene { info, cloud, folder }) => {
                 let semantics = semantics_of(&folder, &cloud, observer);
-                render.antialias = config_of(info.config).antialias;
+                let render = config_of(info.config).render_settings(background);
                 let cloud = Some(Arc::new(cloud));
                 OpenedScene {
                     name,
@@ -133,20 +133,18 @@ impl PipelineJobs {
                     trained: true,
                     out,
                     history: info.history,
+                    metres_per_unit: info.metres_per_unit,
                     render,
                     ..OpenedScene::default()
                 }
             }
             None => {
                 let cloud = dataset.as_deref().and_then(sparse_cloud).map(Arc::new);
+                let render = TrainConfig::default().render_settings(background);
                 OpenedScene { name, dataset, cloud, out, render, ..OpenedScene::default() }
             }
         }
     }
-}
-
-fn render_settings(background: Option<[f32; 3]>, antialias: bool) -> RenderSettings {
-    RenderSettings { background: background.unwrap_or_default(), antialias, ..RenderSettings::default() }
 }
 
 /// The objects and parts stored with a trained scene; broken ones are told and left out.
@@ -188,7 +186,7 @@ fn trained_scene(scene: TrainedScene, observer: &mut dyn Observer) -> OpenedScen
         }
     };
     let TrainedScene { folder, info, cloud } = scene;
-    let render = render_settings(info.background, config_of(info.config).antialias);
+    let render = config_of(info.config).render_settings(info.background);
     let semantics = semantics_of(&folder, &cloud, observer);
     let mut opened = OpenedScene {
         name: info.name,
@@ -258,7 +256,7 @@ fn measure(
     }
     let views = train::load_views(dataset, &held, config, "Loading held-out photos", observer);
     let views = views.map_err(|e| Stop::Failed(Failure::of(&e, "")))?.ok_or(Stop::Cancelled)?;
-    let settings = render_settings(dataset.background, config.antialias);
+    let settings = config.render_settings(dataset.background);
     let evaluation = evaluate(cloud, &views, &settings, 0, 0.0).map_err(|e| Stop::Failed(Failure::of(&e, "")))?;
     Ok(Outcome::Evaluated(evaluation))
 }

@@ -255,6 +255,8 @@ pub struct OpenedScene {
     pub out: PathBuf,
     /// Measurements of earlier training.
     pub history: History,
+    /// Length of a scene unit in metres, if that is known.
+    pub metres_per_unit: Option<f64>,
     /// How to look at it at first.
     pub home: HomeView,
     /// How to draw it: background and filter.

@@ -30,6 +30,7 @@ pub fn all() -> Vec<Seed> {
         ("khr_gltf", "a.gltf", gltf(None)),
         ("khr_gltf", "a.glb", gltf(Some(*b"glTF"))),
         ("llff", "two.npy", npy()),
+        ("depth_map", "a.npy", depth_map()),
         ("transforms", "nerfstudio.json", transforms().to_string().into_bytes()),
         ("transforms", "per_frame.json", per_frame().to_string().into_bytes()),
         ("camera_path", "own.json", camera_path().to_string().into_bytes()),
@@ -187,6 +188,15 @@ fn gltf(magic: Option<[u8; 4]>) -> Vec<u8> {
         out.extend(kind);
         out.extend(data);
     }
+    out
+}
+
+/// A map of 4 x 3 depths.
+fn depth_map() -> Vec<u8> {
+    let mut out = Vec::new();
+    let mut w = npyz::WriteOptions::new().default_dtype().shape(&[3, 4]).writer(&mut out).begin_nd().expect("begin");
+    w.extend((0..12).map(|i| i as f32 * 0.5)).expect("write");
+    w.finish().expect("finish");
     out
 }
 

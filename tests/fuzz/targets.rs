@@ -82,6 +82,7 @@ pub fn all() -> Vec<Target> {
         target("colmap_images_text", |b| io::colmap::check_text_images(&text(b), Path::new(P))),
         target("colmap_points_text", |b| io::colmap::check_text_points(&text(b), Path::new(P))),
         target("llff", |b| io::llff::poses(b, Path::new(P))),
+        target("depth_map", |b| io::npy::map(b, Path::new(P))),
         in_folder("transforms", "transforms.json", picture, |f| io::transforms::read(&f.join("transforms.json"))),
         target("camera_path", |b| {
             io::camera_path::parse(b, Path::new(P)).inspect(|p| p.validate().expect("an accepted path is valid"))

@@ -87,6 +87,7 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
         photos: photos(listed, root, &images_file, &mut warnings)?,
         points,
         background: None,
+        metres_per_unit: None,
         warnings,
     })
 }

@@ -30,6 +30,7 @@ fn cloud(n: usize) -> GaussianCloud {
 
 fn info() -> SceneInfo {
     SceneInfo {
+        metres_per_unit: Some(0.5),
         version: VERSION,
         name: "plush".into(),
         dataset: Some(DatasetReference { path: "../plush".into(), format: "transforms.json".into() }),

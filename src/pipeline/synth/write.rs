@@ -99,7 +99,8 @@ impl Writer {
             "fl_x": c.focal_px.x, "fl_y": c.focal_px.y,
             "cx": c.principal_px.x, "cy": c.principal_px.y,
             "k1": 0.0, "k2": 0.0, "p1": 0.0, "p2": 0.0,
-            "fmlgs": { "background": options.background.map(|b| f32::from(b) / 255.0) },
+            // glTF is in metres.
+            "fmlgs": { "background": options.background.map(|b| f32::from(b) / 255.0), "metres_per_unit": 1.0 },
             "train_filenames": listed(false),
             "val_filenames": listed(true),
             "test_filenames": listed(true),

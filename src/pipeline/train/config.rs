@@ -2,7 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::render::BackendChoice;
+use crate::render::{BackendChoice, RenderSettings};
+
+/// Weight of the normals' term where surfels are trained (2DGS's).
+const SURFEL_NORMALS: f64 = 0.05;
+/// Weight of the distortion term where surfels are trained: of 0, 0.1 and 1 the one with the least
+/// error of median depth on the demo scene, see [`crate::pipeline::depth`].
+const SURFEL_DISTORTION: f64 = 0.1;
 
 /// Settings of a run. Everything that a schedule depends on scales with `steps`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -31,6 +37,39 @@ pub struct TrainConfig {
     pub checkpoint_secs: f64,
     /// Which renderer trains.
     pub backend: BackendChoice,
+    /// Train surfels (2D Gaussian Splatting) instead of Gaussians; on the CPU.
+    #[serde(default)]
+    pub surfels: bool,
+    /// Weight of the term that holds normals and depth together, on the CPU; `None` = 0 for
+    /// Gaussians, 2DGS's for surfels.
+    #[serde(default)]
+    pub normal_weight: Option<f64>,
+    /// Weight of the term that pulls surfels together along rays; `None` = the default.
+    #[serde(default)]
+    pub distortion_weight: Option<f64>,
+}
+
+impl TrainConfig {
+    /// Weights of the terms for normals and distortion.
+    pub fn geometry_weights(&self) -> (f64, f64) {
+        let or = |weight: Option<f64>, surfels: f64| weight.unwrap_or(if self.surfels { surfels } else { 0.0 });
+        (or(self.normal_weight, SURFEL_NORMALS), or(self.distortion_weight, SURFEL_DISTORTION))
+    }
+
+    /// Whether only the CPU can do what is asked.
+    pub fn needs_cpu(&self) -> bool {
+        self.surfels || self.geometry_weights().0 > 0.0
+    }
+
+    /// How what was trained is drawn in front of `background`, black if unknown.
+    pub fn render_settings(&self, background: Option<[f32; 3]>) -> RenderSettings {
+        RenderSettings {
+            background: background.unwrap_or_default(),
+            antialias: self.antialias,
+            surfels: self.surfels,
+            ..RenderSettings::default()
+        }
+    }
 }
 
 impl Default for TrainConfig {
@@ -48,6 +87,9 @@ impl Default for TrainConfig {
             eval_every: 500,
             checkpoint_secs: 60.0,
             backend: BackendChoice::Auto,
+            surfels: false,
+            normal_weight: None,
+            distortion_weight: None,
         }
     }
 }

@@ -131,7 +131,8 @@ fn scatter(cloud: &mut GaussianCloud, i: usize, rng: &mut Pcg64Mcg) {
 }
 
 /// A standard normal sample (Box-Muller).
-fn gaussian(rng: &mut Pcg64Mcg) -> f32 {
+/// A normally distributed number.
+pub(super) fn gaussian(rng: &mut Pcg64Mcg) -> f32 {
     let u: f64 = rng.random_range(f64::MIN_POSITIVE..1.0);
     let v: f64 = rng.random_range(0.0..std::f64::consts::TAU);
     ((-2.0 * u.ln()).sqrt() * v.cos()) as f32

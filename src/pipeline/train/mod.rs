@@ -9,6 +9,7 @@ pub mod checkpoint;
 pub mod config;
 pub mod density;
 mod device;
+pub mod geometry;
 pub mod init;
 mod photos;
 mod run;

@@ -11,14 +11,14 @@ use rand_pcg::Pcg64Mcg;
 use super::checkpoint::{self, CheckpointError, Header};
 use super::photos::{load_views, wait};
 use super::trainer::{REPORT_STEPS, StepError, StepResult, Trainer};
-use super::{TrainConfig, TrainView, init};
+use super::{TrainConfig, TrainView, density, geometry, init};
 use crate::io::IoError;
 use crate::io::trained::{self, History, SceneInfo};
 use crate::math::stats::{mean, median};
 use crate::pipeline::evaluate::evaluate;
 use crate::pipeline::observer::{Evaluation, Level, Observer, Progress, Signal, StepMetrics};
-use crate::render::RenderError;
 use crate::render::gpu::GpuError;
+use crate::render::{BackendChoice, RenderError};
 use crate::scene::{Dataset, GaussianCloud};
 
 /// Steps between copies of the cloud to roll back to.
@@ -106,7 +106,8 @@ pub fn run(
     };
     views.shrink_to_fit();
     let mut job = Job::start(dataset, config, out, &held, views, tests, saved);
-    match config.backend.gpu()? {
+    let context = if config.needs_cpu() { None } else { config.backend.gpu()? };
+    match context {
         Some(context) => {
             observer.note(Level::Info, format!("Training on {}", context.describe()));
             job.trainer.move_to(&context, &job.views)?;
@@ -127,6 +128,13 @@ fn check(config: &TrainConfig) -> Result<(), TrainError> {
     }
     if config.sh_degree > 3 {
         return bad("the spherical-harmonics degree must be 0 to 3");
+    }
+    let (normals, distortion) = config.geometry_weights();
+    if ![normals, distortion].iter().all(|w| w.is_finite() && *w >= 0.0) {
+        return bad("the weights of normals and distortion must be numbers, 0 or more");
+    }
+    if config.needs_cpu() && config.backend == BackendChoice::Gpu {
+        return bad("surfels and the term for normals train on the CPU only: choose --backend cpu");
     }
     Ok(())
 }
@@ -206,7 +214,10 @@ impl<'a> Job<'a> {
                 t
             }
             None => {
-                let cloud = init::initial_cloud(dataset, &views, config.sh_degree, config.random_points, &mut rng);
+                let mut cloud = init::initial_cloud(dataset, &views, config.sh_degree, config.random_points, &mut rng);
+                if config.surfels {
+                    geometry::flatten(&mut cloud, extent, || density::gaussian(&mut rng));
+                }
                 let mut t = Trainer::new(cloud, config, background, extent, rng);
                 if config.max_gaussians.is_none() {
                     let pixels = views.iter().map(|v| v.pixels.len()).max().unwrap_or(0);

@@ -7,16 +7,18 @@ use rayon::prelude::*;
 
 use super::density::{self, DensityReport, DensityStats};
 use super::device::Device;
+use super::geometry::Geometry;
 use super::schedule::Schedule;
 use super::{TrainConfig, TrainView};
 use crate::math::sh;
 use crate::pipeline::metrics;
 use crate::render::cpu::Renderer;
 use crate::render::cpu::adam::{AdamStep, Rates};
+use crate::render::cpu::normals;
 use crate::render::cpu::ssim::{LossParts, PhotoLoss};
 use crate::render::gpu::{Context, GpuError};
-use crate::render::{Features, FrameGradient, RenderError, RenderSettings};
-use crate::scene::{Gaussian, GaussianCloud};
+use crate::render::{FrameGradient, RenderError, RenderSettings};
+use crate::scene::{Camera, Gaussian, GaussianCloud};
 
 /// Weight of D-SSIM in the loss.
 pub const LAMBDA: f64 = 0.2;
@@ -76,6 +78,7 @@ pub struct Trainer {
     renderer: Renderer<f32>,
     losses: [PhotoLoss<f32>; 3],
     gradient: FrameGradient<f32>,
+    geometry: Geometry,
     device: Option<Device>,
 }
 
@@ -92,11 +95,12 @@ impl Trainer {
             step: 0,
             extent,
             budget: config.max_gaussians.unwrap_or(usize::MAX),
-            settings: RenderSettings { background, antialias: config.antialias, ..RenderSettings::default() },
+            settings: config.render_settings(Some(background)),
             densify: config.densify,
             renderer: Renderer::new(),
             losses: Default::default(),
             gradient: FrameGradient::default(),
+            geometry: Geometry::new(config, extent),
             device: None,
             cloud,
         }
@@ -153,11 +157,15 @@ impl Trainer {
             self.step += 1;
             return Ok(if self.step % REPORT_STEPS == 0 { device.results()? } else { Vec::new() });
         }
-        let frame = self.renderer.render(&self.cloud, Features::NONE, &view.camera, &self.settings)?;
+        let settings = RenderSettings { depth: self.geometry.counts(self.step), ..self.settings.clone() };
+        let features = self.geometry.features(&self.cloud, view, self.step);
+        let frame = self.renderer.render(&self.cloud, features, &view.camera, &settings)?;
+        if settings.depth {
+            self.geometry.compare(&frame, view, self.step, &mut self.gradient);
+        }
         let parts = self.compare(frame.color, view);
         self.renderer.backward_tiles(&self.gradient);
-        let longer = view.camera.width_px.max(view.camera.height_px) as f32;
-        let skipped = self.descend(1.0 / longer);
+        let skipped = self.descend(&view.camera);
         self.step += 1;
         Ok(vec![StepResult { loss: parts.total(LAMBDA), psnr: metrics::psnr_of(parts.mse), skipped }])
     }
@@ -230,13 +238,14 @@ impl Trainer {
 
     /// Backward of the projection and Adam, fused per Gaussian: gradients never reach memory, and
     /// Gaussians that were not drawn cost nothing.
-    fn descend(&mut self, radius_scale: f32) -> usize {
+    fn descend(&mut self, camera: &Camera) -> usize {
         let update = Update {
             rates: self.schedule.rates(self.step),
             adam: self.schedule.adam(self.step),
             stride: self.cloud.sh_stride(),
             active: sh::coefficients(self.settings.sh_degree),
-            radius_scale,
+            radius_scale: 1.0 / camera.width_px.max(camera.height_px) as f32,
+            eye: self.geometry.draws_normals(self.step).then(|| normals::eye(camera, &self.cloud)),
         };
         let renderer = &self.renderer;
         let [first, second] = &mut self.moments;
@@ -268,6 +277,9 @@ struct Update {
     stride: usize,
     active: usize,
     radius_scale: f32,
+    /// Centre of the camera relative to the cloud's origin, where Gaussians carry their normals as
+    /// extra channels.
+    eye: Option<[f32; 3]>,
 }
 
 /// The arrays of some consecutive Gaussians.
@@ -325,7 +337,7 @@ fn zeros_like(cloud: &GaussianCloud) -> GaussianCloud {
 /// Updates a block and returns how many of its Gaussians had to be skipped.
 #[multiversion::multiversion(targets("x86_64+avx2+fma"))]
 fn descend_block(renderer: &Renderer<f32>, block: &mut Block<'_>, update: &Update) -> usize {
-    let Update { rates, adam, stride, active, radius_scale } = update;
+    let Update { rates, adam, stride, active, radius_scale, eye } = update;
     let Block { first, p, m, v, gradient, seen, radius } = block;
     let mut skipped = 0;
     for i in 0..p.positions.len() {
@@ -337,7 +349,14 @@ fn descend_block(renderer: &Renderer<f32>, block: &mut Block<'_>, update: &Updat
             opacity_logit: p.opacity_logits[i],
             sh: &p.sh[own.clone()],
         };
-        let Some(g) = renderer.gaussian_gradient(&gaussian, *first + i) else { continue };
+        let Some(mut g) = renderer.gaussian_gradient(&gaussian, *first + i) else { continue };
+        let mut d_normal = [0.0; 3];
+        if let Some(eye) = eye
+            && renderer.feature_gradient(*first + i, &mut d_normal)
+        {
+            let turn = normals::backward(&gaussian, *eye, d_normal);
+            g.quaternion.iter_mut().zip(turn).for_each(|(q, t)| *q += t);
+        }
         let finite = g.position.iter().chain(&g.log_scale).chain(&g.quaternion).chain(&g.color).all(|x| x.is_finite())
             && g.opacity_logit.is_finite();
         if !finite {

@@ -9,10 +9,12 @@ pub mod bin;
 pub mod blend;
 pub mod blend_backward;
 pub mod lanes;
+pub mod normals;
 pub mod project;
 pub mod project_backward;
 pub mod sort;
 pub mod ssim;
+pub mod surfel;
 pub mod weigh;
 
 use std::time::Instant;
@@ -92,6 +94,8 @@ pub struct Renderer<R> {
     records: Vec<R>,
     frame: Option<FrameInfo<R>>,
     stats: RenderStats,
+    /// Draws where surfels are asked for.
+    surfels: Option<Box<surfel::Rasterizer<R>>>,
 }
 
 /// What the backward pass must know of the forward pass.
@@ -134,6 +138,14 @@ impl<R: Real> Renderer<R> {
         if features.values.len() != cloud.len() * extra {
             return Err(RenderError::FeatureLength { have: features.values.len(), want: cloud.len() * extra });
         }
+        if settings.surfels {
+            self.frame = None;
+            let surfels = self.surfels.get_or_insert_default();
+            let frame = surfels.render(cloud, features, camera, settings);
+            self.stats = surfels.stats;
+            return Ok(frame);
+        }
+        self.surfels = None;
         let view = View::new(camera, cloud.origin, settings.near);
         let size = view.size;
         let channels = padded(used);
@@ -196,7 +208,7 @@ impl<R: Real> Renderer<R> {
     }
 
     /// Hands the weight of every Gaussian at every pixel of a view to `counters`, one for each row
-    /// of tiles, which are `height.div_ceil(TILE_PX)`.
+    /// of tiles, which are `height.div_ceil(TILE_PX)`. Surfels count as flat Gaussians.
     ///
     /// # Errors
     /// If the camera is not usable.
@@ -216,6 +228,7 @@ impl<R: Real> Renderer<R> {
         bin::bin(&mut self.tiles, &self.ordered.splats, view.size);
         // The buffers no longer belong to a rendered frame.
         self.frame = None;
+        self.surfels = None;
         let (splats, tiles) = (&self.ordered.splats, &self.tiles);
         counters.par_iter_mut().take(tiles.grid[1]).enumerate().for_each(|(ty, counter)| {
             R::vectorize(WeighRow { splats, tiles, size: view.size, ty, counter });
@@ -226,6 +239,10 @@ impl<R: Real> Renderer<R> {
     /// Backward pass over the tiles of the last frame. Afterwards [`Self::gaussian_gradient`]
     /// answers for each Gaussian. Does nothing before the first frame.
     pub fn backward_tiles(&mut self, gradient: &FrameGradient<R>) {
+        if let Some(surfels) = &mut self.surfels {
+            surfels.backward_tiles(gradient);
+            self.stats = surfels.stats;
+        }
         let Some(info) = &self.frame else { return };
         let clock = Instant::now();
         self.splat_of.clear();
@@ -235,13 +252,7 @@ impl<R: Real> Renderer<R> {
         }
         let size = info.view.size;
         let pixels = size[0] * size[1];
-        let background = info.settings.background;
-        let mut d_transmittance = vec![R::ZERO; pixels];
-        for (plane, level) in gradient.color.iter().zip(background) {
-            let level = R::of(f64::from(level));
-            d_transmittance.iter_mut().zip(plane).for_each(|(t, g)| *t += *g * level);
-        }
-        d_transmittance.iter_mut().zip(&gradient.alpha).for_each(|(t, g)| *t -= *g);
+        let d_transmittance = transmittance_gradient(gradient, info.settings.background, pixels);
 
         let stride = MOMENTS + info.channels[1];
         self.records.resize(self.tiles.entries.len() * stride, R::ZERO);
@@ -300,7 +311,7 @@ impl<R: Real> Renderer<R> {
     /// [`Self::backward_tiles`]; `None` if it was not drawn.
     #[inline(always)]
     pub fn gaussian_gradient(&self, gaussian: &Gaussian<'_, R>, i: usize) -> Option<GaussianGradient<R>> {
-        let info = self.frame.as_ref()?;
+        let Some(info) = &self.frame else { return self.surfels.as_ref()?.gaussian_gradient(gaussian, i) };
         let (s, record) = self.record(i, MOMENTS + info.channels[1])?;
         let splat = &self.ordered.splats[s];
         project_backward(gaussian, splat, &info.view, &info.settings, &record, info.depth_channel)
@@ -346,7 +357,9 @@ impl<R: Real> Renderer<R> {
     /// Gradient with respect to the extra channels of Gaussian `i`, after [`Self::backward_tiles`].
     /// Leaves `out`, one value per channel, alone if the Gaussian was not drawn, and says whether it was.
     pub fn feature_gradient(&self, i: usize, out: &mut [R]) -> bool {
-        let Some(stride) = self.frame.as_ref().map(|f| MOMENTS + f.channels[1]) else { return false };
+        let Some(stride) = self.frame.as_ref().map(|f| MOMENTS + f.channels[1]) else {
+            return self.surfels.as_ref().is_some_and(|s| s.feature_gradient(i, out));
+        };
         let Some((_, record)) = self.record(i, stride) else { return false };
         out.copy_from_slice(&record[MOMENTS + 3..MOMENTS + 3 + out.len()]);
         true
@@ -381,7 +394,19 @@ fn empty_frame<R: Real>(size: [usize; 2], extra: usize, depth: bool) -> Frame<R>
         alpha: plane(),
         depth: optional(),
         median_depth: optional(),
+        ..Frame::default()
     }
+}
+
+/// `dL/dtransmittance`: background times colour gradient, minus the gradient of alpha.
+fn transmittance_gradient<R: Real>(gradient: &FrameGradient<R>, background: [f32; 3], pixels: usize) -> Vec<R> {
+    let mut d_transmittance = vec![R::ZERO; pixels];
+    for (plane, level) in gradient.color.iter().zip(background) {
+        let level = R::of(f64::from(level));
+        d_transmittance.iter_mut().zip(plane).for_each(|(t, g)| *t += *g * level);
+    }
+    d_transmittance.iter_mut().zip(&gradient.alpha).for_each(|(t, g)| *t -= *g);
+    d_transmittance
 }
 
 /// Adds the background and turns transmittance into alpha.

@@ -79,25 +79,10 @@ pub fn project_backward<R: Real>(
         position[k] = view.rows[0][k] * d_local[0] + view.rows[1][k] * d_local[1] + view.rows[2][k] * d_local[2];
     }
 
-    let degree = settings.sh_degree.min(stored_degree(gaussian.sh.len()));
-    let toward = direction(g.relative);
-    let basis = sh::basis(degree, toward);
-    let raw = raw_color(gaussian.sh, &basis, degree);
-    let mut color = [record[MOMENTS], record[MOMENTS + 1], record[MOMENTS + 2]];
-    for (d, r) in color.iter_mut().zip(raw) {
-        if r < R::ZERO {
-            *d = R::ZERO;
-        }
-    }
-    if degree > 0 {
-        let d_toward = direction_gradient(gaussian.sh, degree, toward, color);
-        let length = dot(g.relative, g.relative).sqrt();
-        let radial = dot(toward, d_toward);
-        if length > R::ZERO {
-            for k in 0..3 {
-                position[k] += (d_toward[k] - toward[k] * radial) / length;
-            }
-        }
+    let ColorGradient { color, basis, position: turned } =
+        color_gradient(gaussian, g.relative, settings, [record[MOMENTS], record[MOMENTS + 1], record[MOMENTS + 2]]);
+    for k in 0..3 {
+        position[k] += turned[k];
     }
 
     // m0 is dL/dopacity times opacity; through the sigmoid that leaves 1 - sigmoid.
@@ -117,6 +102,48 @@ pub fn project_backward<R: Real>(
         screen: (on_screen[0] * on_screen[0] + on_screen[1] * on_screen[1]).sqrt(),
         radius_px: R::of(3.0) * (middle + spread).sqrt(),
     })
+}
+
+/// What the gradient of a Gaussian's colour comes to.
+pub(super) struct ColorGradient<R> {
+    /// With respect to the colour before the clamp.
+    pub color: [R; 3],
+    /// SH basis in the viewing direction.
+    pub basis: [R; 16],
+    /// With respect to the position, through the viewing direction.
+    pub position: [R; 3],
+}
+
+/// Backward of the colour: `color` is the gradient with respect to the clamped one, `relative` the
+/// centre relative to the camera in world axes.
+#[inline(always)]
+pub(super) fn color_gradient<R: Real>(
+    gaussian: &Gaussian<'_, R>,
+    relative: [R; 3],
+    settings: &RenderSettings,
+    mut color: [R; 3],
+) -> ColorGradient<R> {
+    let degree = settings.sh_degree.min(stored_degree(gaussian.sh.len()));
+    let toward = direction(relative);
+    let basis = sh::basis(degree, toward);
+    let raw = raw_color(gaussian.sh, &basis, degree);
+    for (d, r) in color.iter_mut().zip(raw) {
+        if r < R::ZERO {
+            *d = R::ZERO;
+        }
+    }
+    let mut position = [R::ZERO; 3];
+    if degree > 0 {
+        let d_toward = direction_gradient(gaussian.sh, degree, toward, color);
+        let length = dot(relative, relative).sqrt();
+        let radial = dot(toward, d_toward);
+        if length > R::ZERO {
+            for k in 0..3 {
+                position[k] = (d_toward[k] - toward[k] * radial) / length;
+            }
+        }
+    }
+    ColorGradient { color, basis, position }
 }
 
 /// Degree of a Gaussian that stores this many coefficients.
@@ -187,7 +214,7 @@ fn direction_gradient<R: Real>(coefficients: &[[R; 3]], degree: u8, toward: [R; 
 
 /// Chain rule through `R(q / |q|)`.
 #[inline(always)]
-fn quaternion_gradient<R: Real>(q: [R; 4], g: &[[R; 3]; 3]) -> Option<[R; 4]> {
+pub fn quaternion_gradient<R: Real>(q: [R; 4], g: &[[R; 3]; 3]) -> Option<[R; 4]> {
     let [w, x, y, z] = unit_quaternion(q)?;
     let two = R::of(2.0);
     let d = [

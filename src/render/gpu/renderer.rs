@@ -182,6 +182,7 @@ impl Renderer {
             alpha: colors.iter().map(|p| 1.0 - p[3]).collect(),
             depth: depths.iter().map(|d| d[0]).collect(),
             median_depth: depths.iter().map(|d| d[1]).collect(),
+            ..Frame::default()
         };
         Ok((frame, counters_of(&bytes[0])))
     }

@@ -1,0 +1,80 @@
+//! `fmlgs eval --depth`: drawn depth against the true depth of a synthetic data set.
+
+use std::path::Path;
+use std::time::Instant;
+
+use serde_json::json;
+
+use super::eval::Job;
+use super::{CliError, output};
+use crate::math::stats::median;
+use crate::pipeline::depth::{self, DepthCounter, DepthErrors};
+use crate::pipeline::observer::{Observer, Progress, Signal};
+use crate::render::cpu::Renderer;
+
+pub fn run(scene: &Path, job: &Job, as_json: bool, observer: &mut dyn Observer) -> Result<(), CliError> {
+    let started = Instant::now();
+    let mut renderer = Renderer::<f32>::new();
+    let mut counter = DepthCounter::default();
+    let mut millis = Vec::with_capacity(job.views.len());
+    for (done, &index) in job.views.iter().enumerate() {
+        if observer.signal() == Signal::Cancel {
+            return Err(CliError::Cancelled(format!("{done} of {} views were measured", job.views.len())));
+        }
+        let photo = &job.dataset.photos[index];
+        let truth = depth::of_photo(&job.dataset.root, photo)?;
+        let camera = photo.camera.limited_to(job.max_side_px);
+        counter.draw(&mut renderer, &job.cloud, &camera, &job.settings, &truth)?;
+        millis.push(renderer.stats().stage_secs.iter().sum::<f64>() * 1e3);
+        let elapsed_secs = started.elapsed().as_secs_f64();
+        observer.progress(Progress {
+            stage: "Measuring depth".into(),
+            done: done as u64 + 1,
+            total: job.views.len() as u64,
+            elapsed_secs,
+            rate: (done + 1) as f64 / elapsed_secs.max(1e-9),
+        });
+    }
+    let scores = counter.scores();
+    if as_json {
+        return output::print_json(&json!({
+            "scene": scene,
+            "gaussians": job.cloud.len(),
+            "surfels": job.settings.surfels,
+            "max_side_px": job.max_side_px,
+            "views": job.views.len(),
+            "edge_px": depth::EDGE_PX,
+            "edge_jump": depth::EDGE_JUMP,
+            "median_render_ms": median(&millis),
+            "scores": scores,
+        }));
+    }
+    let head = ["depth", "pixels", "none %", "mean abs", "median abs", "RMSE", "mean rel %", "< 1 %", "< 2 %", "< 5 %"];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    for (name, split) in [("expected", &scores.expected), ("median", &scores.median)] {
+        rows.push(row(name, &split.all));
+        rows.push(row(&format!("{name}, edges"), &split.edges));
+    }
+    output::print(&format!(
+        "{}\n{} views, longer side {} px; abs and RMSE in scene units, shares in %",
+        output::table(&rows),
+        job.views.len(),
+        job.max_side_px
+    ))
+}
+
+fn row(name: &str, e: &DepthErrors) -> Vec<String> {
+    let percent = |share: f64| format!("{:.2}", 100.0 * share);
+    vec![
+        name.to_owned(),
+        e.pixels.to_string(),
+        percent(e.missing),
+        format!("{:.5}", e.mean_abs),
+        format!("{:.5}", e.median_abs),
+        format!("{:.5}", e.rmse),
+        percent(e.mean_rel),
+        percent(e.within_1),
+        percent(e.within_2),
+        percent(e.within_5),
+    ]
+}

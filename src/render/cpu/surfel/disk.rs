@@ -1,0 +1,99 @@
+//! Where the rays of eight pixels meet a surfel's plane, and what the surfel gives them.
+//!
+//! A point `(u, v)` of the disk has the depth `Z + a u + b v` and lies `(A u + A' v) / depth` px to
+//! the right of the projected centre and `(B u + B' v) / depth` px below it. Solved for the point
+//! that a pixel at offset `(dx, dy)` sees:
+//!
+//! ```text
+//! u = Z p / w,   p = B' dx - A' dy        w = D - a p - b q
+//! v = Z q / w,   q = A dy - B dx          D = A B' - A' B,   depth = Z D / w
+//! ```
+//!
+//! The second coordinate's sign is such that `D` is not negative.
+
+use super::super::project::Splat;
+use super::project::SHAPE;
+use crate::math::Real;
+use crate::math::lanes::Lanes;
+use crate::render::{ALPHA_MAX, ALPHA_MIN};
+
+/// One over the variance, in px², below which no surfel is drawn in the picture.
+pub const INVERSE_BLUR: f64 = 2.0;
+
+/// A surfel's constants in vector registers.
+pub struct Disk<R: Real, L: Lanes<R>> {
+    /// `[A, A'], [B, B']`, px times depth.
+    pub across: [[L::V; 2]; 2],
+    /// `a, b`.
+    pub along: [L::V; 2],
+    /// Depth of the centre.
+    pub z: L::V,
+    /// `D`, not negative.
+    pub determinant: L::V,
+    /// Determinant times depth.
+    depth_factor: L::V,
+    near: L::V,
+    opacity: L::V,
+}
+
+/// What a surfel gives eight pixels.
+pub struct Hit<R: Real, L: Lanes<R>> {
+    /// `p, q`.
+    pub raw: [L::V; 2],
+    /// Coordinates in the disk; 0 where the picture's distance counts.
+    pub at: [L::V; 2],
+    /// `1 / w`; 0 where the picture's distance counts.
+    pub inverse: L::V,
+    /// Where the distance in the plane counts.
+    pub through: L::M,
+    /// Depth along the camera's axis.
+    pub depth: L::V,
+    /// Alpha, 0 where it does not count.
+    pub alpha: L::V,
+}
+
+impl<R: Real, L: Lanes<R>> Disk<R, L> {
+    /// The constants of `s`, whose shape is as `project` laid it out.
+    #[inline(always)]
+    pub fn new(l: L, s: &Splat<R>, shape: &[R; SHAPE], near: R) -> Self {
+        let [ax, ay, bx, by, along_u, along_v, ..] = *shape;
+        let determinant = ax * by - ay * bx;
+        Self {
+            across: [[l.splat(ax), l.splat(ay)], [l.splat(bx), l.splat(by)]],
+            along: [l.splat(along_u), l.splat(along_v)],
+            z: l.splat(s.depth),
+            determinant: l.splat(determinant),
+            depth_factor: l.splat(s.depth * determinant),
+            near: l.splat(near),
+            opacity: l.splat(s.opacity),
+        }
+    }
+
+    /// What pixels at these offsets from the projected centre get.
+    #[inline(always)]
+    pub fn hit(&self, l: L, dx: L::V, dy: L::V) -> Hit<R, L> {
+        let zero = l.splat(R::ZERO);
+        let [[ax, ay], [bx, by]] = self.across;
+        let raw = [l.sub(l.mul(by, dx), l.mul(ay, dy)), l.sub(l.mul(ax, dy), l.mul(bx, dx))];
+        let w = l.sub(l.sub(self.determinant, l.mul(self.along[0], raw[0])), l.mul(self.along[1], raw[1]));
+        let inverse = l.div(l.splat(R::ONE), w);
+        let scale = l.mul(self.z, inverse);
+        let (u, v) = (l.mul(raw[0], scale), l.mul(raw[1], scale));
+        let plane = l.mul_add(u, u, l.mul(v, v));
+        let picture = l.mul(l.splat(R::of(INVERSE_BLUR)), l.mul_add(dx, dx, l.mul(dy, dy)));
+        // In front of the near plane; false for an edge-on disk, whose determinant is 0, and for NaN.
+        let ahead = l.both(l.gt(w, zero), l.ge(self.depth_factor, l.mul(self.near, w)));
+        let through = l.both(ahead, l.ge(picture, plane));
+        let square = l.select(through, plane, picture);
+        let alpha = l.mul(self.opacity, l.exp_neg(l.mul(l.splat(-R::HALF), square)));
+        let alpha = l.min(alpha, l.splat(R::of(ALPHA_MAX)));
+        Hit {
+            raw,
+            at: [l.keep(through, u), l.keep(through, v)],
+            inverse: l.keep(through, inverse),
+            depth: l.select(through, l.mul(self.depth_factor, inverse), self.z),
+            through,
+            alpha: l.keep(l.ge(alpha, l.splat(R::of(ALPHA_MIN))), alpha),
+        }
+    }
+}
