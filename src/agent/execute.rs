@@ -8,7 +8,7 @@ use super::refusal::{Refusal, RefusalKind};
 use super::relation::{Relation, gap};
 use super::resolve::{Resolved, resolve, resolve_all};
 use super::tool::{LevelWish, Reference, Target, ToolCall};
-use super::wish::{GoWish, NORMAL, Side};
+use super::wish::{Distance, GoWish, NORMAL, Side};
 use super::world::{Unreachable, World, WorldError};
 use crate::scene::{IdentityId, NOBODY};
 
@@ -267,16 +267,19 @@ fn act(
             format!("Looking at {it}.")
         }
         ToolCall::Move { direction, distance } => {
-            if matches!(distance, super::wish::Distance::Metres(_)) && world.metres_per_unit().is_none() {
-                let text = "This scene's scale in metres is not known; say it in steps, such as 'two steps back'.";
-                return Err(Refusal::new(RefusalKind::Conflict, text));
-            }
-            let moved = world.move_eye(*direction, *distance).map_err(|e| unreachable(world, "there", &e))?;
+            let (distance, note) = match distance {
+                Distance::Metres(m) if world.metres_per_unit().is_none() => {
+                    let note = " This scene's scale in metres is not known, so I took a step for a metre.";
+                    (Distance::Relative(*m), note)
+                }
+                known => (*known, ""),
+            };
+            let moved = world.move_eye(*direction, distance).map_err(|e| unreachable(world, "there", &e))?;
             let far = length(world, moved.distance_done);
             if moved.stopped_by_matter {
-                format!("Moved {} {far}, and stopped there: something is in the way.", direction.text())
+                format!("Moved {} {far}, and stopped there: something is in the way.{note}", direction.text())
             } else {
-                format!("Moved {} {far}.", direction.text())
+                format!("Moved {} {far}.{note}", direction.text())
             }
         }
         ToolCall::Turn { direction, degrees } => {

@@ -316,7 +316,7 @@ impl World for SceneWorld {
         let step = STEP * explored.navigator.clearance;
         let wanted = match (distance, self.parts.metres) {
             (Distance::Metres(m), Some(metres)) => m / metres.max(1e-9),
-            // Without a scale, a metre is what a step is.
+            // Nobody knows what a metre is here: the agent asks for steps then.
             (Distance::Metres(n), None) | (Distance::Relative(n), _) => n * step,
             (Distance::Default, _) => step,
         };

@@ -157,6 +157,7 @@ pub fn run(args: Args) -> Result<(), CliError> {
             "seconds": flight.seconds,
             "length": flight.length,
             "sharp_corners": flight.sharp,
+            "poses_repaired": flight.repaired,
             "clearance": navigator.clearance,
             "keypoints": navigator.graph.keypoints.len(),
             "keypoints_in_matter": navigator.in_matter,

@@ -101,7 +101,7 @@ impl Film {
         let last = frames.max(2) - 1;
         let poses: Vec<Pose> = (0..=last).map(|i| self.at(self.seconds * i as f64 / last as f64)).collect();
         let length = poses.windows(2).map(|w| w[0].center.distance(w[1].center)).sum();
-        Flight { poses, seconds: self.seconds, length, sharp: 0 }
+        Flight { poses, seconds: self.seconds, length, sharp: 0, repaired: 0 }
     }
 }
 

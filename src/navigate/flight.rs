@@ -42,6 +42,8 @@ pub struct Flight {
     pub length: f64,
     /// Corners that had to stay sharp.
     pub sharp: usize,
+    /// Poses that were moved away from matter.
+    pub repaired: usize,
 }
 
 /// How smooth a flight is, and how near it comes to matter.
@@ -91,10 +93,22 @@ impl Flight {
             let fov = from.fov_y_rad.ln() + share * (to.fov_y_rad.ln() - from.fov_y_rad.ln());
             Pose { center: curve.at(share), world_from_camera: turning.at(share), fov_y_rad: fov.exp() }
         };
-        let poses: Vec<Pose> = (0..=last).map(pose).collect();
+        let mut poses: Vec<Pose> = (0..=last).map(pose).collect();
+        let mut repaired = 0;
+        if let Some((matter, clearance)) = matter {
+            // Both ends are where they were asked to be.
+            for pose in &mut poses[1..last] {
+                if matter.clearance(pose.center) < clearance
+                    && let Some(out) = matter.pushed_out(pose.center, clearance)
+                {
+                    pose.center = out;
+                    repaired += 1;
+                }
+            }
+        }
         let turned = angle(&from.world_from_camera, &to.world_from_camera);
         let seconds = seconds(curve.length(), from.center.distance(to.center), turned);
-        Some(Self { poses, seconds, length: curve.length(), sharp: curve.sharp })
+        Some(Self { poses, seconds, length: curve.length(), sharp: curve.sharp, repaired })
     }
 
     /// The paper's interpolation of the same keypoints, read as it is printed: the sum over the
@@ -112,7 +126,7 @@ impl Flight {
             Pose { center: mix(first.center, last.center), world_from_camera: columns, fov_y_rad: fov }
         };
         let length = first.center.distance(last.center);
-        Some(Self { poses: (0..=m).map(pose).collect(), seconds: 3.0, length, sharp: 0 })
+        Some(Self { poses: (0..=m).map(pose).collect(), seconds: 3.0, length, sharp: 0, repaired: 0 })
     }
 
     /// How smooth it is, and how it keeps `clearance` to matter.

@@ -155,25 +155,35 @@ impl Graph {
 
     /// The shortest way from one keypoint to another (Dijkstra); `None` if they are not connected.
     pub fn route(&self, from: usize, to: usize, matter: &Matter) -> Option<Route> {
-        self.route_to(from, |i| i == to, matter)
+        self.route_between(&[(from, 0.0)], &[(to, 0.0)], matter)
     }
 
-    /// The shortest way from a keypoint to the first that will do.
-    pub fn route_to(&self, from: usize, will_do: impl Fn(usize) -> bool, matter: &Matter) -> Option<Route> {
-        if from >= self.keypoints.len() {
-            return None;
-        }
+    /// The shortest way from any of some keypoints to any of others, when it costs so much (scene
+    /// units) to come to each, and to go on from it. One search, however many there are.
+    pub fn route_between(&self, starts: &[(usize, f64)], goals: &[(usize, f64)], matter: &Matter) -> Option<Route> {
+        const START: usize = usize::MAX;
+        const GOAL: usize = usize::MAX - 1;
         let unit = UNIT * matter.voxel();
-        let next = |&at: &usize| {
+        let cost = |length: f64| (length / unit).round() as u64;
+        let known = |i: &usize| *i < self.keypoints.len();
+        let next = |&at: &usize| -> Vec<(usize, u64)> {
+            if at == START {
+                return starts.iter().filter(|(i, _)| known(i)).map(|(i, length)| (*i, cost(*length))).collect();
+            }
+            if at == GOAL {
+                return Vec::new();
+            }
             let here = self.keypoints[at].center;
             let free = self.of[at].iter().filter(|e| self.is_free(**e as usize, matter));
             let step = |e: &u32| {
                 let other = self.other(*e as usize, at);
-                (other, (here.distance(self.keypoints[other].center) / unit).round() as u64)
+                (other, cost(here.distance(self.keypoints[other].center)))
             };
-            free.map(step).collect::<Vec<_>>()
+            let ends = goals.iter().filter(|(i, _)| *i == at).map(|(_, length)| (GOAL, cost(*length)));
+            free.map(step).chain(ends).collect()
         };
-        let (through, _) = dijkstra(&from, next, |i| will_do(*i))?;
+        let (through, _) = dijkstra(&START, next, |i| *i == GOAL)?;
+        let through: Vec<usize> = through.into_iter().filter(known).collect();
         let length =
             through.windows(2).map(|w| self.keypoints[w[0]].center.distance(self.keypoints[w[1]].center)).sum();
         Some(Route { through, length })

@@ -48,7 +48,8 @@ impl Matter {
         let scene = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i)));
         let both = Bounds::of(eyes.iter().copied().chain(scene.into_iter().flat_map(|b| [b.min, b.max])));
         let around = both.unwrap_or(Bounds { min: DVec3::ZERO, max: DVec3::ZERO });
-        let margin = 0.1 * around.radius().max(1e-6);
+        // One may step back from where the outermost photo was taken.
+        let margin = 0.1 * around.radius().max(1e-6) + free;
         let (min, max) = (around.min - margin, around.max + margin);
         let voxel = (max - min).max_element() / VOXELS as f64;
         let size = ((max - min) / voxel).to_array().map(|n| (n.ceil() as usize).clamp(1, VOXELS));
@@ -122,6 +123,24 @@ impl Matter {
         self.voxel
     }
 
+    /// The nearest place to `p` with this clearance, as far as the field leads there; `None` if it does
+    /// not lead to one.
+    pub fn pushed_out(&self, p: DVec3, clearance: f64) -> Option<DVec3> {
+        const STEPS: usize = 8;
+        let h = 0.5 * self.voxel;
+        let mut at = p;
+        for _ in 0..STEPS {
+            let short = clearance - self.clearance(at);
+            if short <= 0.0 {
+                return Some(at);
+            }
+            let slope = |axis: DVec3| self.clearance(at + axis * h) - self.clearance(at - axis * h);
+            let away = DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z)).try_normalize()?;
+            at += away * (1.1 * short + 1e-3 * self.voxel);
+        }
+        (self.clearance(at) >= clearance).then_some(at)
+    }
+
     /// Whether a point is inside matter, or outside of what is known, as far as voxels can tell.
     pub fn is_inside(&self, p: DVec3) -> bool {
         self.clearance(p) < 0.5 * self.voxel
@@ -192,7 +211,8 @@ impl Matter {
             if gone >= length {
                 return 1.0;
             }
-            gone = (gone + spare.max(shortest)).min(length);
+            // Between voxel centres the field may change a little faster than the way that is gone.
+            gone = (gone + (0.7 * spare).max(shortest)).min(length);
         }
     }
 

@@ -109,17 +109,13 @@ impl Navigator {
             return Err(NoWay::Enclosed);
         }
         let place = |i: usize| self.graph.keypoints[i].center;
-        let mut best: Option<(f64, Vec<DVec3>)> = None;
-        for &start in &starts {
-            let Some(route) = self.graph.route_to(start, |i| goals.contains(&i), &self.matter) else { continue };
+        let with_way = |all: &[usize], end: DVec3| -> Vec<(usize, f64)> {
+            all.iter().map(|i| (*i, place(*i).distance(end))).collect()
+        };
+        let (near_start, near_goal) = (with_way(&starts, from), with_way(&goals, to));
+        if let Some(route) = self.graph.route_between(&near_start, &near_goal, &self.matter) {
             let legs: Vec<DVec3> =
                 std::iter::once(from).chain(route.through.iter().map(|i| place(*i))).chain([to]).collect();
-            let length = legs.windows(2).map(|w| w[0].distance(w[1])).sum();
-            if best.as_ref().is_none_or(|(shortest, _)| length < *shortest) {
-                best = Some((length, legs));
-            }
-        }
-        if let Some((_, legs)) = best {
             return Ok(shortened(&legs, &self.matter, self.clearance.min(0.99 * ends)));
         }
         let parts = self.graph.parts(&self.matter);

@@ -195,6 +195,7 @@ fn trained_scene(scene: TrainedScene, observer: &mut dyn Observer) -> OpenedScen
         trained: true,
         out: folder,
         history: info.history,
+        metres_per_unit: info.metres_per_unit,
         render,
         ..OpenedScene::default()
     };

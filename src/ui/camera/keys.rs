@@ -76,7 +76,8 @@ fn row(ui: &mut Ui, i: usize, key: &mut PathKey, chosen: bool) -> Option<Wish> {
         wish = Some(Wish::Choose);
     }
     let mut name = key.name.clone().unwrap_or_default();
-    ui.add(TextEdit::singleline(&mut name).desired_width(110.0).char_limit(80).hint_text("name"));
+    let edit = TextEdit::singleline(&mut name).desired_width(120.0).char_limit(80).hint_text("name");
+    ui.add_sized(egui::vec2(130.0, 20.0), edit);
     key.name = Some(name).filter(|n| !n.is_empty());
     ui.horizontal(|ui| {
         let mut fixed = key.time_secs.is_some();
@@ -101,9 +102,9 @@ fn row(ui: &mut Ui, i: usize, key: &mut PathKey, chosen: bool) -> Option<Wish> {
         ("Go", "Look from here.", Wish::Go),
         ("Set", "Make the present view this key.", Wish::Update),
         ("Copy", "Another one like it behind it.", Wish::Copy),
-        ("\u{2b06}", "Earlier.", Wish::Up),
-        ("\u{2b07}", "Later.", Wish::Down),
-        ("\u{2716}", "Delete it.", Wish::Delete),
+        ("Earlier", "Swap it with the key before.", Wish::Up),
+        ("Later", "Swap it with the key after.", Wish::Down),
+        ("Delete", "Take it out of the path.", Wish::Delete),
     ];
     for (text, tip, wanted) in buttons {
         if ui.add(Button::new(text).small()).on_hover_text(tip).clicked() {

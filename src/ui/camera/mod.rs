@@ -222,11 +222,11 @@ impl CameraPane {
     fn controls(&mut self, ui: &mut Ui, actions: &mut Vec<Action>) {
         let has_reel = self.player.reel().is_some();
         let tip = |a: &Action| format!("{}  {}", a.tooltip(), super::keys::label(ui.ctx(), a));
-        let symbol = if self.player.playing { "\u{23f8}" } else { "\u{25b6}" };
-        let entries = [("\u{23ee}", Action::StepBack), (symbol, Action::PlayPath), ("\u{23ed}", Action::StepForward)];
+        let play = if self.player.playing { "Hold" } else { "Play" };
+        let entries = [("\u{2039}", Action::StepBack), (play, Action::PlayPath), ("\u{203a}", Action::StepForward)];
         let entries = entries.map(|(symbol, action)| (symbol, tip(&action), action));
         for (symbol, tip, action) in entries {
-            let button = Button::new(symbol).min_size(egui::vec2(30.0, 24.0));
+            let button = Button::new(symbol).min_size(egui::vec2(28.0, 24.0));
             if ui.add_enabled(has_reel, button).on_hover_text(tip).clicked() {
                 actions.push(action);
             }

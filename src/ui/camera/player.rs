@@ -130,7 +130,13 @@ mod tests {
 
     fn reel() -> Reel {
         let pose = |i: usize| Pose { center: DVec3::X * i as f64, world_from_camera: DMat3::IDENTITY, fov_y_rad: 0.8 };
-        Reel::Flight(Box::new(Flight { poses: (0..11).map(pose).collect(), seconds: 2.0, length: 10.0, sharp: 0 }))
+        Reel::Flight(Box::new(Flight {
+            poses: (0..11).map(pose).collect(),
+            seconds: 2.0,
+            length: 10.0,
+            sharp: 0,
+            repaired: 0,
+        }))
     }
 
     #[test]
