@@ -277,7 +277,10 @@ fn act(
             let moved = world.move_eye(*direction, distance).map_err(|e| unreachable(world, "there", &e))?;
             let far = length(world, moved.distance_done);
             if moved.stopped_by_matter {
-                format!("Moved {} {far}, and stopped there: something is in the way.{note}", direction.text())
+                format!(
+                    "Moved {} {far}, and stopped there: something is in the way, or nothing is known beyond.{note}",
+                    direction.text()
+                )
             } else {
                 format!("Moved {} {far}.{note}", direction.text())
             }

@@ -73,10 +73,16 @@ pub struct SceneWorld {
     aspect: f64,
     hidden: Vec<bool>,
     bounds: Vec<Option<Bounds>>,
-    /// Share of the view that each identity covers, with the view that they were counted in.
-    shares: Mutex<Option<(Pose, Vec<bool>, Vec<f64>)>>,
+    shares: Mutex<Option<Counted>>,
     done: Vec<Before>,
     tell: Tell,
+}
+
+/// Share of a view that each identity covers, by number, with the view.
+struct Counted {
+    eye: Pose,
+    hidden: Vec<bool>,
+    shares: Vec<f64>,
 }
 
 /// How it was before something was done.
@@ -143,8 +149,8 @@ impl SceneWorld {
     /// Share of the present view that each identity covers, pieces included, by number.
     fn shares(&self) -> Vec<f64> {
         let mut known = self.shares.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, _, shares)) = known.as_ref().filter(|k| k.0 == self.eye && k.1 == self.hidden) {
-            return shares.clone();
+        if let Some(counted) = known.as_ref().filter(|k| k.eye == self.eye && k.hidden == self.hidden) {
+            return counted.shares.clone();
         }
         let Parts { cloud, settings, map, .. } = &self.parts;
         let (w, h) = if self.aspect >= 1.0 {
@@ -168,7 +174,7 @@ impl SceneWorld {
             identities.line(id).for_each(|i| shares[i as usize] += 1.0);
         }
         shares.iter_mut().for_each(|s| *s /= f64::from(w * h));
-        *known = Some((self.eye, self.hidden.clone(), shares.clone()));
+        *known = Some(Counted { eye: self.eye, hidden: self.hidden.clone(), shares: shares.clone() });
         shares
     }
 

@@ -192,7 +192,7 @@ mod tests {
         let target = DVec3::new(1.0, 0.0, 3.0);
         let look = Some((target, DVec3::NEG_Y));
         let flight = Flight::new(&[a.center, b.center], [&a, &b], look, None, 101, Speed::Constant).expect("a flight");
-        let p = &flight.poses[45];
+        let p = &flight.poses[40];
         assert!(p.forward().angle_between(target - p.center) < 1e-6);
     }
 

@@ -49,7 +49,7 @@ impl Matter {
         let both = Bounds::of(eyes.iter().copied().chain(scene.into_iter().flat_map(|b| [b.min, b.max])));
         let around = both.unwrap_or(Bounds { min: DVec3::ZERO, max: DVec3::ZERO });
         // One may step back from where the outermost photo was taken.
-        let margin = 0.1 * around.radius().max(1e-6) + free;
+        let margin = 0.2 * around.radius().max(1e-6) + free;
         let (min, max) = (around.min - margin, around.max + margin);
         let voxel = (max - min).max_element() / VOXELS as f64;
         let size = ((max - min) / voxel).to_array().map(|n| (n.ceil() as usize).clamp(1, VOXELS));

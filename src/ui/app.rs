@@ -145,7 +145,7 @@ impl App {
         }
         if layout.shows(Pane::Camera) && state.scene.is_some() {
             let eye = viewport.pose();
-            let shown = Panel::bottom("camera").frame(pane).resizable(true).default_size(250.0).min_size(140.0);
+            let shown = Panel::bottom("camera").frame(pane).resizable(true).default_size(260.0).min_size(240.0);
             let wanted = shown.show(ui, |ui| self.camera.show(ui, state, &eye, actions)).inner;
             if let Some(pose) = wanted {
                 viewport.stand(&pose, state, ui.input(|i| i.time));

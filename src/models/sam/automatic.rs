@@ -40,7 +40,7 @@ impl Default for AutomaticOptions {
     fn default() -> Self {
         Self {
             points_per_side: 32,
-            batch: 64,
+            batch: 16,
             predicted_iou: 0.7,
             stability: 0.85,
             box_nms: 0.7,

@@ -5,7 +5,7 @@ pub mod player;
 mod timeline;
 
 use std::collections::VecDeque;
-use std::path::PathBuf;
+use std::path::Path;
 
 use egui::{Button, ComboBox, DragValue, RichText, Slider, Ui};
 use glam::DMat3;
@@ -172,7 +172,7 @@ impl CameraPane {
     }
 
     /// The cameras of a film of what is played, and how it is written; `None` if there is nothing.
-    pub fn film(&self, out: &std::path::Path, aspect: f64) -> Option<(Vec<Camera>, Settings)> {
+    pub fn film(&self, out: &Path, aspect: f64) -> Option<(Vec<Camera>, Settings)> {
         let height = self.film_height;
         let width = (((f64::from(height) * aspect) / 2.0).round().max(1.0) * 2.0) as u32;
         let reel = self.player.reel()?;
@@ -345,12 +345,12 @@ fn pose_of(key: &PathKey) -> Pose {
 }
 
 /// Reads a path's file; the error for people.
-pub fn read(path: &std::path::Path) -> Result<CameraPath, String> {
+pub fn read(path: &Path) -> Result<CameraPath, String> {
     crate::io::camera_path::open(path).map_err(|e| e.to_string())
 }
 
 /// Writes a path's file, in nerfstudio's format if its name says so.
-pub fn write(file: &PathBuf, path: &CameraPath, aspect: f64) -> Result<(), String> {
+pub fn write(file: &Path, path: &CameraPath, aspect: f64) -> Result<(), String> {
     let written = if file.to_string_lossy().ends_with(".nerfstudio.json") {
         let frames: Vec<PathKey> = Film::new(path, Speed::Constant).map_or_else(Vec::new, |film| {
             let count = (film.seconds() * path.fps).round().clamp(1.0, 1e5) as usize;
