@@ -22,5 +22,6 @@ pub mod navigate;
 pub mod pipeline;
 pub mod render;
 pub mod scene;
+pub mod stability;
 pub mod ui;
 pub mod worker;

@@ -7,6 +7,7 @@
 mod agent;
 mod asking;
 mod bench;
+mod check_stability;
 mod demo;
 mod demo_queries;
 mod error;
@@ -96,6 +97,7 @@ enum Command {
     Export(export::Args),
     Bench(bench::Args),
     Report(report::Args),
+    CheckStability(check_stability::Args),
 }
 
 /// Opens the window, does one action if one is given, and returns when the window is closed.
@@ -144,6 +146,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Export(args) => export::run(args),
         Command::Bench(args) => bench::run(args, quiet),
         Command::Report(args) => report::run(args, quiet),
+        Command::CheckStability(args) => check_stability::run(args),
     }
 }
 

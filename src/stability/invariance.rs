@@ -1,0 +1,111 @@
+//! Changes that must not change the picture: the order of Gaussians, the world's place, turn and size,
+//! one Gaussian as two halves, the number of threads.
+
+use glam::{DMat3, DQuat, DVec3};
+use rand::seq::SliceRandom;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+use super::drawing::camera;
+use super::{Case, Finding};
+use crate::render::cpu::Renderer;
+use crate::render::{Features, RenderSettings};
+use crate::scene::{Camera, GaussianCloud};
+
+/// Gaussians of the scene that is changed.
+const COUNT: usize = 400;
+
+fn scene() -> GaussianCloud<f64> {
+    let mut rng = Pcg64Mcg::seed_from_u64(11);
+    let mut cloud = GaussianCloud::default();
+    for _ in 0..COUNT {
+        let mut uniform = |lo: f64, hi: f64| rng.random_range(lo..hi);
+        cloud.positions.push([uniform(-1.0, 1.0), uniform(-0.8, 0.8), uniform(-1.0, 1.0)]);
+        cloud.log_scales.push([uniform(-3.5, -1.5), uniform(-3.5, -1.5), uniform(-3.5, -1.5)]);
+        cloud.quaternions.push([uniform(-1.0, 1.0), uniform(-1.0, 1.0), uniform(-1.0, 1.0), uniform(0.1, 1.0)]);
+        cloud.opacity_logits.push(uniform(-2.0, 3.0));
+        cloud.sh.push([uniform(-1.5, 1.5), uniform(-1.5, 1.5), uniform(-1.5, 1.5)]);
+    }
+    cloud
+}
+
+fn picture(cloud: &GaussianCloud<f64>, camera: &Camera) -> Option<Vec<f32>> {
+    let single = cloud.cast::<f32>();
+    let frame = Renderer::<f32>::new().render(&single, Features::NONE, camera, &RenderSettings::default()).ok()?;
+    Some(frame.color.concat())
+}
+
+/// The changed scene's picture held against the first one's, in single precision.
+fn alike(cloud: &GaussianCloud<f64>, at: &Camera, bound: f64) -> Finding {
+    let Some((a, b)) = picture(&scene(), &camera(96, 64)).zip(picture(cloud, at)) else {
+        return Finding::is("it could not be drawn", false);
+    };
+    let worst = a.iter().zip(&b).map(|(x, y)| f64::from((x - y).abs())).fold(0.0, f64::max);
+    // A picture that shows nothing would be like any other that shows nothing.
+    if a.iter().all(|v| *v == 0.0) {
+        return Finding::is("nothing was drawn", false);
+    }
+    Finding::within("largest change of a colour", worst, bound)
+}
+
+/// The cases of this area.
+pub fn cases() -> Vec<Case> {
+    let case = |name: &'static str, bound: f64, change: fn(&mut GaussianCloud<f64>, &mut Camera)| {
+        Case::new("invariance", name, move || {
+            let (mut cloud, mut at) = (scene(), camera(96, 64));
+            change(&mut cloud, &mut at);
+            alike(&cloud, &at, bound)
+        })
+    };
+    vec![
+        case("the order of Gaussians", 1e-6, |cloud, _| {
+            let mut order: Vec<usize> = (0..cloud.len()).collect();
+            order.shuffle(&mut Pcg64Mcg::seed_from_u64(3));
+            *cloud = cloud.select(&order);
+        }),
+        case("the world moved by a million", 1e-3, |cloud, at| {
+            cloud.origin += DVec3::new(1e6, -1e6, 3e5);
+            at.center += DVec3::new(1e6, -1e6, 3e5);
+        }),
+        case("the world turned", 2e-3, |cloud, at| {
+            let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.7, -1.1, 2.0);
+            for (p, q) in cloud.positions.iter_mut().zip(&mut cloud.quaternions) {
+                *p = (turn * DVec3::from_array(*p)).to_array();
+                let r = turn * DQuat::from_xyzw(q[1], q[2], q[3], q[0]);
+                *q = [r.w, r.x, r.y, r.z];
+            }
+            at.center = turn * at.center;
+            at.world_from_camera = DMat3::from_quat(turn) * at.world_from_camera;
+        }),
+        case("the world a thousand times as large", 2e-3, |cloud, at| {
+            cloud.positions.iter_mut().flatten().for_each(|v| *v *= 1e3);
+            cloud.log_scales.iter_mut().flatten().for_each(|v| *v += 1e3_f64.ln());
+            at.center *= 1e3;
+        }),
+        case("every Gaussian as two halves", 2e-3, |cloud, _| {
+            // Two of opacity 1 - sqrt(1 - a), one behind the other, let through what one of `a` does.
+            // Only in their centres: elsewhere the halves let through a little less. So thin ones.
+            let thin = |logit: f64| {
+                let a = 1.0 / (1.0 + (-logit).exp());
+                let half = 1.0 - (1.0 - a).sqrt();
+                (half / (1.0 - half)).ln()
+            };
+            let faint = -9.0;
+            cloud.opacity_logits.iter_mut().for_each(|l| *l = l.min(faint));
+            let mut double = cloud.clone();
+            double.opacity_logits.iter_mut().for_each(|l| *l = thin(*l));
+            let order: Vec<usize> = (0..2 * double.len()).map(|i| i / 2).collect();
+            *cloud = double.select(&order);
+        }),
+        Case::new("invariance", "the number of threads", || {
+            let draw = |threads: usize| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok()?;
+                pool.install(|| picture(&scene(), &camera(96, 64)))
+            };
+            match (draw(1), draw(5)) {
+                (Some(a), Some(b)) => Finding::is("bit by bit", a == b),
+                _ => Finding::is("it could not be drawn", false),
+            }
+        }),
+    ]
+}

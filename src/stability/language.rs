@@ -1,0 +1,73 @@
+//! Embeddings, relevancy and codes at their limits.
+
+use glam::DVec3;
+
+use super::{Case, Finding};
+use crate::math::vector::unit;
+use crate::pipeline::semantics::codes::{self, TOLERANCE};
+use crate::pipeline::semantics::relevancy::{advantage, deviate, score};
+use crate::scene::{Identities, Level, NOBODY};
+
+/// Identities whose codes are assigned, each an object.
+fn identities(n: usize) -> Identities {
+    let mut all = Identities::default();
+    (0..n).for_each(|_| drop(all.add(Level::Object, NOBODY, Vec::new())));
+    let centers: Vec<DVec3> =
+        (0..n).map(|i| DVec3::new((i % 16) as f64, (i / 16 % 16) as f64, (i / 256) as f64)).collect();
+    codes::assign(&mut all, &centers);
+    all
+}
+
+/// The cases of this area.
+pub fn cases() -> Vec<Case> {
+    let language = |name: &'static str, run: fn() -> Finding| Case::new("language", name, run);
+    vec![
+        language("identical embeddings are no more than anything", || {
+            let v = [0.6, 0.8, 0.0];
+            let s = score(advantage(&v, &v, &[v.to_vec()]), 10.0);
+            Finding::within("score of a phrase that is a canonical one", f64::from((s - 0.5).abs()), 1e-6)
+        }),
+        language("an embedding of zeros has no direction", || Finding::is("it is refused", unit(&[0.0; 8]).is_none())),
+        language("a part opposite to its whole", || {
+            let cancel = deviate(&[1.0, 0.0], &[-1.0, 0.0], 0.5);
+            let kept = deviate(&[1.0, 0.0], &[-1.0, 0.0], 0.7);
+            Finding::is(
+                "half and half cancels out, else it has length one",
+                cancel.is_none() && kept == Some(vec![1.0, 0.0]),
+            )
+        }),
+        language("embeddings of length 1e-30 and 1e30", || {
+            let error = [1e-30_f32, 1e30].map(|s| {
+                let u = unit(&[3.0 * s, 4.0 * s]).unwrap_or_default();
+                u.first().map_or(f64::NAN, |x| f64::from((x - 0.6).abs()))
+            });
+            Finding::within("unit length all the same", error[0].max(error[1]), 1e-6)
+        }),
+        language("logits of +-1e4", || {
+            let (high, low) = (score(1e4, 1.0), score(-1e4, 1.0));
+            Finding::is(format!("scores {high} and {low}"), high == 1.0 && low == 0.0)
+        }),
+        language("temperatures from 1e-6 to 1e6", || {
+            let s = [1e-6, 1.0, 1e6].map(|t| score(0.1, t));
+            Finding::is(format!("{s:?}"), s.iter().all(|s| (0.5..=1.0).contains(s)))
+        }),
+        language("one identity", || {
+            Finding::is("it has a code", identities(1).get(1).is_some_and(|i| i.code != [0.5; 3]))
+        }),
+        language("4,096 identities", || {
+            let all = identities(4_096);
+            let finite = all.iter().all(|(_, i)| i.code.iter().all(|c| (0.0..=1.0).contains(c)));
+            let mut codes: Vec<[u32; 3]> = all.iter().map(|(_, i)| i.code.map(f32::to_bits)).collect();
+            codes.sort_unstable();
+            codes.dedup();
+            Finding::is(format!("{} different codes", codes.len()), finite && codes.len() == 4_096)
+        }),
+        language("codes one tolerance apart", || {
+            let code = [0.5, 0.25, 0.75];
+            let beside = |by: f32| [code[0] + by, code[1], code[2]];
+            let (inside, outside) = (beside(0.99 * TOLERANCE), beside(1.01 * TOLERANCE));
+            let holds = codes::matches(inside, code, TOLERANCE) && !codes::matches(outside, code, TOLERANCE);
+            Finding::is("one within, one beyond", holds)
+        }),
+    ]
+}
