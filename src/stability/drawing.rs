@@ -63,6 +63,18 @@ fn drawn(cloud: &GaussianCloud<f64>, camera: &Camera, bound: f64) -> Finding {
     }
 }
 
+/// What is too large for single precision is left out there, not drawn wrongly.
+fn left_out(cloud: &GaussianCloud<f64>, camera: &Camera) -> Finding {
+    let settings = RenderSettings::default();
+    match Renderer::<f32>::new().render(&cloud.cast::<f32>(), Features::NONE, camera, &settings) {
+        Ok(frame) => {
+            let most = frame.alpha.iter().fold(0.0_f32, |m, a| if a.is_finite() { m.max(*a) } else { f32::NAN });
+            Finding::within("left out; largest opacity", f64::from(most), 0.0)
+        }
+        Err(e) => Finding::is(e.to_string(), false),
+    }
+}
+
 fn case(name: impl Into<String>, make: impl Fn() -> (GaussianCloud<f64>, Camera) + Send + Sync + 'static) -> Case {
     Case::new("drawing", name, move || {
         let (cloud, camera) = make();
@@ -86,9 +98,15 @@ pub fn cases() -> Vec<Case> {
             (one([0.5, 0.5, 0.5 / ratio], TURNED, 2.0), camera(64, 48))
         }));
     }
-    for exponent in [-20, -10, -5, 2, 5, 10, 20] {
+    for exponent in [-20, -10, -5, 2, 5] {
         let scale = 10.0_f64.powi(exponent);
         all.push(case(format!("scale 1e{exponent}"), move || (one([scale; 3], TURNED, 2.0), camera(64, 48))));
+    }
+    for exponent in [10, 20] {
+        let scale = 10.0_f64.powi(exponent);
+        all.push(Case::new("drawing", format!("scale 1e{exponent}"), move || {
+            left_out(&one([scale; 3], TURNED, 2.0), &camera(64, 48))
+        }));
     }
     for (name, z) in [("on", 0.01), ("just before", 0.010_1), ("just behind", 0.009_9), ("far behind", -1.0)] {
         all.push(case(format!("{name} the near plane"), move || {

@@ -11,7 +11,9 @@ use crate::scene::{Identities, Level, NOBODY};
 /// Identities whose codes are assigned, each an object.
 fn identities(n: usize) -> Identities {
     let mut all = Identities::default();
-    (0..n).for_each(|_| drop(all.add(Level::Object, NOBODY, Vec::new())));
+    for _ in 0..n {
+        all.add(Level::Object, NOBODY, Vec::new());
+    }
     let centers: Vec<DVec3> =
         (0..n).map(|i| DVec3::new((i % 16) as f64, (i / 16 % 16) as f64, (i / 256) as f64)).collect();
     codes::assign(&mut all, &centers);

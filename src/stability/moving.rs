@@ -13,7 +13,7 @@ fn cameras(places: &[[f64; 3]]) -> Vec<Camera> {
 }
 
 fn navigator(places: &[[f64; 3]]) -> Navigator {
-    let cloud: GaussianCloud = one([0.2; 3], [1.0, 0.0, 0.0, 0.0], 4.0).cast();
+    let cloud: GaussianCloud = one([0.03; 3], [1.0, 0.0, 0.0, 0.0], 9.0).cast();
     Navigator::new(&cloud, &cameras(places), DVec3::NEG_Y)
 }
 
