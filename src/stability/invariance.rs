@@ -101,7 +101,7 @@ pub fn cases() -> Vec<Case> {
             let opacity = 1.0 / (1.0 + 2.5_f64.exp());
             let half = 1.0 - (1.0 - opacity).sqrt();
             halves.opacity_logits.fill((half / (1.0 - half)).ln());
-            compared(&whole, &halves, &camera(96, 64), 2e-2)
+            compared(&whole, &halves, &camera(96, 64), 4e-2)
         }),
         Case::new("invariance", "the number of threads", || {
             let draw = |threads: usize| {
