@@ -43,9 +43,9 @@ pub fn both(cloud: &GaussianCloud<f64>, camera: &Camera) -> Option<(f64, Frame<f
     let exact = Renderer::<f64>::new().render(cloud, Features::NONE, camera, &settings).ok()?;
     let single = Renderer::<f32>::new().render(&cloud.cast::<f32>(), Features::NONE, camera, &settings).ok()?;
     let planes = |a: &[Vec<f64>], b: &[Vec<f32>]| {
-        a.iter().flatten().zip(b.iter().flatten()).fold(Some(0.0_f64), |worst, (x, y)| {
+        a.iter().flatten().zip(b.iter().flatten()).try_fold(0.0_f64, |worst, (x, y)| {
             let y = f64::from(*y);
-            (x.is_finite() && y.is_finite()).then(|| worst.map(|w| w.max((x - y).abs()))).flatten()
+            (x.is_finite() && y.is_finite()).then(|| worst.max((x - y).abs()))
         })
     };
     let color = planes(&exact.color, &single.color)?;

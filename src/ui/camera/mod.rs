@@ -248,7 +248,7 @@ impl CameraPane {
             None => "nothing to play",
         };
         ui.weak(what);
-        if let Some(rate) = self.player.rate_shown().filter(|_| self.player.playing) {
+        if let Some(rate) = self.player.rate_shown() {
             ui.weak(format!("{rate:.0} pictures/s shown"));
         }
         if let Some(Reel::Flight(flight)) = self.player.reel() {
