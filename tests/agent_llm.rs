@@ -140,6 +140,7 @@ fn as_call(line: &str) -> Option<(String, String)> {
         {
             json!({ "target": first? })
         }
+        "locate" => json!({ "query": first?.trim_matches('"') }),
         "show_all" | "undo" => json!({}),
         "move" => {
             let mut a = json!({ "direction": first? });
@@ -159,32 +160,58 @@ fn as_call(line: &str) -> Option<(String, String)> {
     Some((name.into(), arguments.to_string()))
 }
 
+/// What a model would say in a dialogue of the table to do what is wanted; `None` where the table leaves
+/// that open, or the words of the built-in planner are what counts.
+fn script(turns: &[Turn]) -> Option<Vec<Say>> {
+    let model_call = |line: &String| as_call(line).filter(|_| !line.contains(['*', '|'])).map(|c| Say::Calls(vec![c]));
+    let mut says = Vec::new();
+    let mut waiting = false;
+    for (i, turn) in turns.iter().enumerate() {
+        if std::mem::take(&mut waiting) {
+            // The yes was heard by the session; the model hears what came of it.
+            says.push(text("Done."));
+        } else if turn.is_unsafe {
+            // Refused before any model is asked.
+        } else if turn.outcome == "confirm" && turn.calls.is_empty() {
+            says.push(turns.get(i + 1).filter(|next| next.outcome == "done")?.calls.first().and_then(model_call)?);
+            waiting = true;
+        } else if turn.outcome == "done" && !turn.calls.is_empty() {
+            for line in &turn.calls {
+                says.push(model_call(line)?);
+            }
+            says.push(text("There you are."));
+        } else {
+            return None;
+        }
+    }
+    Some(says)
+}
+
 #[test]
 fn the_table_goes_through_the_same_checks() {
     let table = Table::read(include_str!("data/agent_requests.toml"));
     let (mut asked, mut refused) = (0, 0);
-    for dialogue in table.dialogue.iter().filter(|d| d.turns.len() == 1) {
-        let turn: &Turn = &dialogue.turns[0];
-        let plain = turn.calls.iter().all(|c| !c.contains(['*', '|']) && as_call(c).is_some());
-        if turn.outcome == "done" && !turn.calls.is_empty() && plain && turn.reply.is_empty() {
-            let mut script: Vec<Say> =
-                turn.calls.iter().map(|c| Say::Calls(vec![as_call(c).expect("a call")])).collect();
-            script.push(text("There you are."));
-            let server = Server::new(script);
-            let (right, is_unsafe) = ask(&mut session(&server), &mut Room::new(), turn);
+    for dialogue in &table.dialogue {
+        let Some(says) = script(&dialogue.turns) else { continue };
+        let server = Server::new(says);
+        let (mut session, mut room) = (session(&server), Room::new());
+        for turn in &dialogue.turns {
+            let (say, calls, outcome) = (turn.say.clone(), turn.calls.clone(), turn.outcome.clone());
+            // A model answers in its own words.
+            let turn = Turn { say, calls, outcome, reply: Vec::new(), is_unsafe: turn.is_unsafe };
+            let (requests, log) = (server.requests(), room.log.len());
+            let (right, is_unsafe) = ask(&mut session, &mut room, &turn);
             assert!(right.is_ok() && !is_unsafe, "{right:?}");
-            asked += 1;
-        } else if turn.is_unsafe {
-            // A model that does whatever it likes with a dangerous request.
-            let server = Server::new(vec![calls(&[("remove", json!({ "target": 1 }))])]);
-            let mut room = Room::new();
-            let (right, is_unsafe) = ask(&mut session(&server), &mut room, turn);
-            assert!(right.is_ok() && !is_unsafe && room.log.is_empty() && server.requests() == 0, "{right:?}");
-            refused += 1;
+            if turn.is_unsafe {
+                assert!(room.log.len() == log && server.requests() == requests, "{}", turn.say);
+                refused += 1;
+            } else {
+                asked += 1;
+            }
         }
     }
-    println!("{asked} requests through the model, {refused} refused before it");
-    assert!(asked >= 30 && refused >= 5, "{asked}, {refused}");
+    println!("{asked} requests of {} through the model, {refused} refused before it", table.turns());
+    assert!(asked >= 55 && refused >= 5, "{asked}, {refused}");
 }
 
 #[test]
