@@ -9,7 +9,7 @@ use crate::render::{Features, Frame, RenderSettings};
 use crate::scene::{Camera, GaussianCloud};
 
 /// Largest deviation of a colour from double precision that a picture may have.
-const BOUND: f64 = 5e-3;
+const BOUND: f64 = 1e-4;
 
 /// One Gaussian in the middle, of this shape.
 pub fn one(scales: [f64; 3], quaternion: [f64; 4], opacity_logit: f64) -> GaussianCloud<f64> {
