@@ -85,6 +85,13 @@ struct Counted {
     shares: Vec<f64>,
 }
 
+impl Counted {
+    /// The share of an identity; 0 of one that is not known.
+    fn of(&self, id: IdentityId) -> f64 {
+        self.shares.get(id as usize).copied().unwrap_or(0.0)
+    }
+}
+
 /// How it was before something was done.
 enum Before {
     Hidden(Vec<bool>, String),
@@ -146,11 +153,12 @@ impl SceneWorld {
         !self.parts.map.identities.line(id).any(|i| self.hidden.get(i as usize).copied().unwrap_or(false))
     }
 
-    /// Share of the present view that each identity covers, pieces included, by number.
-    fn shares(&self) -> Vec<f64> {
+    /// Share of the present view that an identity covers, pieces included. All are counted together, once
+    /// per view.
+    fn share_of(&self, id: IdentityId) -> f64 {
         let mut known = self.shares.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(counted) = known.as_ref().filter(|k| k.eye == self.eye && k.hidden == self.hidden) {
-            return counted.shares.clone();
+            return counted.of(id);
         }
         let Parts { cloud, settings, map, .. } = &self.parts;
         let (w, h) = if self.aspect >= 1.0 {
@@ -174,8 +182,7 @@ impl SceneWorld {
             identities.line(id).for_each(|i| shares[i as usize] += 1.0);
         }
         shares.iter_mut().for_each(|s| *s /= f64::from(w * h));
-        *known = Some(Counted { eye: self.eye, hidden: self.hidden.clone(), shares: shares.clone() });
-        shares
+        known.insert(Counted { eye: self.eye, hidden: self.hidden.clone(), shares }).of(id)
     }
 
     fn fly(&mut self, flight: Flight, about: Option<DVec3>, what: String) {
@@ -262,7 +269,7 @@ impl World for SceneWorld {
             level: identity.level,
             parent: identity.parent,
             bounds: self.bounds.get(id as usize).copied().flatten(),
-            in_view: self.shares().get(id as usize).copied().unwrap_or(0.0),
+            in_view: self.share_of(id),
             hidden: !self.drawn(id),
         })
     }
@@ -277,7 +284,7 @@ impl World for SceneWorld {
 
     fn go_to(&mut self, id: IdentityId, wish: GoWish) -> Result<Arrival, Unreachable> {
         let explored = self.explored();
-        let in_view = self.shares().get(id as usize).is_some_and(|s| *s > 0.0);
+        let in_view = self.share_of(id) > 0.0;
         let eye = self.eye;
         let place = Place { cloud: &self.parts.cloud, settings: &self.parts.settings, map: &self.parts.map };
         let distance = NORMAL / wish.closeness.max(0.01);
@@ -314,7 +321,7 @@ impl World for SceneWorld {
         let to = Pose::looking_at(eye.center, center, self.parts.up, eye.fov_y_rad, &eye.world_from_camera);
         let what = format!("looking at {}", self.name(id));
         self.straight(to, what)?;
-        Ok(Arrival { distance: 0.0, in_view: self.shares().get(id as usize).copied().unwrap_or(0.0) })
+        Ok(Arrival { distance: 0.0, in_view: self.share_of(id) })
     }
 
     fn move_eye(&mut self, direction: Direction, distance: Distance) -> Result<Moved, Unreachable> {

@@ -163,7 +163,7 @@ fn circle(dataset: &Dataset) -> Vec<Camera> {
     let radius = median(&offsets.iter().map(|o| o.reject_from(up).length()).collect::<Vec<_>>());
     let side = up.any_orthonormal_vector();
     let (width_px, height_px) = (first.camera.width_px, first.camera.height_px);
-    let fov_y_rad = 2.0 * (0.5 * f64::from(height_px) / first.camera.focal_px.y).atan();
+    let fov_y_rad = first.camera.fov_y_rad();
     let at = |i: usize| {
         let (sin, cos) = (i as f64 / FLIGHT_PICTURES as f64 * std::f64::consts::TAU).sin_cos();
         let eye = focus + up * height + (side * cos + up.cross(side) * sin) * radius;

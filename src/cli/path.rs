@@ -109,10 +109,9 @@ pub fn navigator(scene: &DrawableScene) -> Navigator {
     Navigator::new(&scene.cloud, &cameras, up_of(&cameras))
 }
 
-/// Upwards: against what most cameras call down.
+/// Upwards for the cameras of a scene; as in files of splats where they do not tell.
 pub fn up_of(cameras: &[Camera]) -> DVec3 {
-    let sum: DVec3 = cameras.iter().map(|c| -c.world_from_camera.y_axis).sum();
-    sum.try_normalize().unwrap_or(DVec3::NEG_Y)
+    Camera::up_of(cameras.iter()).unwrap_or(DVec3::NEG_Y)
 }
 
 pub fn run(args: Args) -> Result<(), CliError> {
@@ -215,15 +214,8 @@ fn no_way(why: &NoWay, navigator: &Navigator) -> CliError {
 /// The flight as a path with a key per pose.
 fn as_path(flight: &Flight) -> CameraPath {
     let last = (flight.poses.len() - 1).max(1) as f64;
-    let key = |(i, p): (usize, &Pose)| PathKey {
-        center: p.center,
-        world_from_camera: p.world_from_camera,
-        fov_y_rad: p.fov_y_rad,
-        roll_rad: 0.0,
-        dwell_secs: 0.0,
-        time_secs: Some(flight.seconds * i as f64 / last),
-        name: None,
-    };
+    let time = |i: usize| Some(flight.seconds * i as f64 / last);
+    let key = |(i, p): (usize, &Pose)| PathKey { time_secs: time(i), ..p.key() };
     let keys = flight.poses.iter().enumerate().map(key).collect();
     CameraPath { keys, closed: false, fps: last / flight.seconds.max(1e-3), seconds: flight.seconds }
 }

@@ -13,6 +13,7 @@ use super::progress::Console;
 use super::{CliError, opened, output, view};
 use crate::io;
 use crate::io::animation::{Encoder, Settings};
+use crate::navigate::film::MOST_PICTURES;
 use crate::navigate::{Film, Speed};
 use crate::pipeline::film::{self, FilmError, Marked};
 use crate::pipeline::semantics::grammar::Kind;
@@ -199,8 +200,7 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
     if let Some(program) = &args.ffmpeg {
         settings.encoder = Encoder::Ffmpeg { program: program.clone(), args: Vec::new() };
     }
-    let frames = (film.seconds() * fps).round().clamp(1.0, 1e6) as usize + 1;
-    let cameras: Vec<Camera> = film.flight(frames).poses.iter().map(|p| p.camera(width, height)).collect();
+    let cameras: Vec<Camera> = film.pictures(fps, MOST_PICTURES).iter().map(|p| p.camera(width, height)).collect();
     let map = match &args.mark {
         Some(_) => Some(semantics(&args.scene, &scene.cloud)?),
         None => None,

@@ -92,15 +92,8 @@ fn whole(cloud: &GaussianCloud) -> Option<Camera> {
     let fov_y_rad = 0.8_f64;
     let distance = bounds.radius().max(1e-6) / (0.5 * fov_y_rad).sin();
     let (width_px, height_px) = (640, 480);
-    let focal = 0.5 * f64::from(height_px) / (0.5 * fov_y_rad).tan();
-    Some(Camera {
-        width_px,
-        height_px,
-        focal_px: DVec2::splat(focal),
-        principal_px: DVec2::new(f64::from(width_px), f64::from(height_px)) * 0.5,
-        world_from_camera: DMat3::IDENTITY,
-        center: bounds.center() - glam::DVec3::Z * distance,
-    })
+    let center = bounds.center() - glam::DVec3::Z * distance;
+    Some(Camera::of_pose(center, DMat3::IDENTITY, fov_y_rad, width_px, height_px))
 }
 
 /// The camera with a picture of `width_px` x `height_px`. The vertical field of view stays; where

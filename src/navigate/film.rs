@@ -12,6 +12,9 @@ const PIECES: usize = 32;
 /// Share of the path's mean step that a turn of one radian counts as.
 const TURN: f64 = 0.5;
 
+/// Most steps from picture to picture that a film is made of.
+pub const MOST_PICTURES: f64 = 1e6;
+
 /// A path that can be asked for the pose at any time.
 #[derive(Clone, Debug)]
 pub struct Film {
@@ -56,7 +59,7 @@ impl Film {
         if path.closed && keys.len() > 2 {
             keys.push(&path.keys[0]);
         }
-        let first = keys.first()?;
+        keys.first()?;
         let steps = steps(&keys);
         let times = times(&keys, &steps, path.seconds);
         let seconds = times.last().map_or(0.0, |t| t[1]).max(if keys.len() == 1 { path.seconds } else { 0.0 });
@@ -74,7 +77,6 @@ impl Film {
                 start = end;
             }
         }
-        debug_assert!(first.center.is_finite());
         Some(Self { stretches, times, spline, seconds, speed })
     }
 
@@ -96,6 +98,11 @@ impl Film {
         self.spline.at(knot)
     }
 
+    /// Its poses for a film with so many pictures a second, both ends included; at most `most` and one.
+    pub fn pictures(&self, fps: f64, most: f64) -> Vec<Pose> {
+        self.flight(steps_of(self.seconds, fps, most) + 1).poses
+    }
+
     /// Its poses at even times, as a flight.
     pub fn flight(&self, frames: usize) -> Flight {
         let last = frames.max(2) - 1;
@@ -103,6 +110,11 @@ impl Film {
         let length = poses.windows(2).map(|w| w[0].center.distance(w[1].center)).sum();
         Flight { poses, seconds: self.seconds, length, sharp: 0, repaired: 0 }
     }
+}
+
+/// Steps from picture to picture in so many seconds: at least one, at most `most`.
+pub fn steps_of(seconds: f64, fps: f64, most: f64) -> usize {
+    (seconds * fps).round().clamp(1.0, most) as usize
 }
 
 /// How far apart neighbouring keys are, turns counted in; never 0.

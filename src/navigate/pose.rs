@@ -1,9 +1,9 @@
 //! A place, a direction and a field of view, and how directions are mixed.
 
-use glam::{DMat3, DQuat, DVec2, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 
 use crate::math::rotation::nearest_rotation;
-use crate::scene::Camera;
+use crate::scene::{Camera, PathKey};
 
 /// A viewer's pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,8 +19,17 @@ pub struct Pose {
 impl Pose {
     /// The pose of a camera.
     pub fn of(camera: &Camera) -> Self {
-        let half = 0.5 * f64::from(camera.height_px) / camera.focal_px.y;
-        Self { center: camera.center, world_from_camera: camera.world_from_camera, fov_y_rad: 2.0 * half.atan() }
+        Self { center: camera.center, world_from_camera: camera.world_from_camera, fov_y_rad: camera.fov_y_rad() }
+    }
+
+    /// The pose of a key, its roll in it.
+    pub fn of_key(key: &PathKey) -> Self {
+        Self { center: key.center, world_from_camera: key.rotation(), fov_y_rad: key.fov_y_rad }
+    }
+
+    /// A key here.
+    pub fn key(&self) -> PathKey {
+        PathKey::of_pose(self.center, self.world_from_camera, self.fov_y_rad)
     }
 
     /// At `center`, looking at `target` with `up` upwards. Straight up and down, and at itself, it
@@ -38,15 +47,7 @@ impl Pose {
 
     /// The camera for a picture of this size.
     pub fn camera(&self, width_px: u32, height_px: u32) -> Camera {
-        let size = DVec2::new(f64::from(width_px.max(1)), f64::from(height_px.max(1)));
-        Camera {
-            width_px: width_px.max(1),
-            height_px: height_px.max(1),
-            focal_px: DVec2::splat(0.5 * size.y / (0.5 * self.fov_y_rad).tan()),
-            principal_px: size * 0.5,
-            world_from_camera: self.world_from_camera,
-            center: self.center,
-        }
+        Camera::of_pose(self.center, self.world_from_camera, self.fov_y_rad, width_px.max(1), height_px.max(1))
     }
 
     /// Unit vector of the viewing direction.
@@ -57,18 +58,13 @@ impl Pose {
 
 /// The rotation as a quaternion; rounding errors of the matrix are removed.
 pub fn quaternion(m: &DMat3) -> DQuat {
-    DQuat::from_mat3(&nearest_rotation(m)).normalize_or(DQuat::IDENTITY)
+    unit(DQuat::from_mat3(&nearest_rotation(m)), DQuat::IDENTITY)
 }
 
-trait NormalizeOr {
-    fn normalize_or(self, otherwise: DQuat) -> DQuat;
-}
-
-impl NormalizeOr for DQuat {
-    fn normalize_or(self, otherwise: DQuat) -> DQuat {
-        let length = self.length();
-        if length.is_finite() && length > 1e-9 { self / length } else { otherwise }
-    }
+/// A quaternion of length 1; `otherwise` if it has no usable length.
+fn unit(q: DQuat, otherwise: DQuat) -> DQuat {
+    let length = q.length();
+    if length.is_finite() && length > 1e-9 { q / length } else { otherwise }
 }
 
 /// Rotation vector (axis times angle, at most half a turn) that leads from `a` to `b` in the axes of
@@ -83,7 +79,7 @@ pub fn between(a: DQuat, b: DQuat) -> DVec3 {
 
 /// `a` turned by a rotation vector in its own axes.
 pub fn turned(a: DQuat, by: DVec3) -> DQuat {
-    (a * DQuat::from_scaled_axis(by)).normalize_or(a)
+    unit(a * DQuat::from_scaled_axis(by), a)
 }
 
 /// Angle between two rotations, radians, 0 to pi.

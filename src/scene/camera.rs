@@ -87,15 +87,27 @@ impl Camera {
         let forward = (target - eye).try_normalize()?;
         let right = forward.cross(up).try_normalize()?;
         let down = forward.cross(right);
-        let focal = 0.5 * f64::from(height_px) / (0.5 * fov_y_rad).tan();
-        Some(Self {
-            width_px,
-            height_px,
-            focal_px: DVec2::splat(focal),
-            principal_px: DVec2::new(f64::from(width_px), f64::from(height_px)) * 0.5,
-            world_from_camera: DMat3::from_cols(right, down, forward),
-            center: eye,
-        })
+        Some(Self::of_pose(eye, DMat3::from_cols(right, down, forward), fov_y_rad, width_px, height_px))
+    }
+
+    /// The camera with this pose and vertical field of view: square pixels, principal point in the middle.
+    pub fn of_pose(center: DVec3, world_from_camera: DMat3, fov_y_rad: f64, width_px: u32, height_px: u32) -> Self {
+        let size = DVec2::new(f64::from(width_px), f64::from(height_px));
+        let focal = 0.5 * size.y / (0.5 * fov_y_rad).tan();
+        let (focal_px, principal_px) = (DVec2::splat(focal), size * 0.5);
+        Self { width_px, height_px, focal_px, principal_px, world_from_camera, center }
+    }
+
+    /// Its vertical field of view, radians.
+    pub fn fov_y_rad(&self) -> f64 {
+        2.0 * (0.5 * f64::from(self.height_px) / self.focal_px.y).atan()
+    }
+
+    /// Upwards in the world for most of these cameras: against the mean of their down axes. `None` where
+    /// those cancel.
+    pub fn up_of<'a>(cameras: impl Iterator<Item = &'a Self>) -> Option<DVec3> {
+        let (sum, count) = cameras.fold((DVec3::ZERO, 0), |(sum, n), c| (sum - c.world_from_camera.y_axis, n + 1));
+        if sum.length() > 0.1 * f64::from(count) { sum.try_normalize() } else { None }
     }
 
     /// The same camera with a picture of another size: intrinsics scaled per axis.

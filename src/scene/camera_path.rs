@@ -2,7 +2,7 @@
 //!
 //! Pure data. How a camera moves between two keys is not said here.
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DMat3, DVec3};
 
 use super::Camera;
 use crate::math::rotation::rotation_error;
@@ -110,16 +110,12 @@ impl CameraPath {
 impl PathKey {
     /// A key at a camera: its pose and vertical field of view, no roll, no wait.
     pub fn of_camera(camera: &Camera) -> Self {
-        let fov_y_rad = 2.0 * (0.5 * f64::from(camera.height_px) / camera.focal_px.y).atan();
-        Self {
-            center: camera.center,
-            world_from_camera: camera.world_from_camera,
-            fov_y_rad,
-            roll_rad: 0.0,
-            dwell_secs: 0.0,
-            time_secs: None,
-            name: None,
-        }
+        Self::of_pose(camera.center, camera.world_from_camera, camera.fov_y_rad())
+    }
+
+    /// A key at a pose with this vertical field of view: no roll, no wait, no fixed time.
+    pub fn of_pose(center: DVec3, world_from_camera: DMat3, fov_y_rad: f64) -> Self {
+        Self { center, world_from_camera, fov_y_rad, roll_rad: 0.0, dwell_secs: 0.0, time_secs: None, name: None }
     }
 
     /// The rotation of the pose with the roll in it: columns right, down, forward in the world.
@@ -129,15 +125,7 @@ impl PathKey {
 
     /// The camera that takes a picture of this size here: square pixels, principal point in the middle.
     pub fn camera(&self, width_px: u32, height_px: u32) -> Camera {
-        let focal = 0.5 * f64::from(height_px) / (0.5 * self.fov_y_rad).tan();
-        Camera {
-            width_px,
-            height_px,
-            focal_px: DVec2::splat(focal),
-            principal_px: DVec2::new(f64::from(width_px), f64::from(height_px)) * 0.5,
-            world_from_camera: self.rotation(),
-            center: self.center,
-        }
+        Camera::of_pose(self.center, self.rotation(), self.fov_y_rad, width_px, height_px)
     }
 
     /// The first field that is wrong, and why; `before` is the latest time of the keys before.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 
-use super::{Bounds, Photo};
+use super::{Bounds, Camera, Photo};
 
 /// Posed photos, as read from any of the supported layouts.
 #[derive(Clone, Debug, Default)]
@@ -59,8 +59,7 @@ impl Dataset {
 
     /// Upwards in the world: against the mean of the cameras' down axes, or `+z` if they cancel.
     pub fn up(&self) -> DVec3 {
-        let sum: DVec3 = self.photos.iter().map(|p| -p.camera.world_from_camera.y_axis).sum();
-        if sum.length() > 0.1 * self.photos.len() as f64 { sum.try_normalize().unwrap_or(DVec3::Z) } else { DVec3::Z }
+        Camera::up_of(self.photos.iter().map(|p| &p.camera)).unwrap_or(DVec3::Z)
     }
 
     /// The point nearest to all viewing axes: what the photos look at. Falls back to the mean of

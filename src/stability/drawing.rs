@@ -133,10 +133,7 @@ pub fn cases() -> Vec<Case> {
     }
     all.push(case("colour coefficients that overflow to white and black", || {
         let mut cloud = one([0.3; 3], TURNED, 4.0);
-        cloud.sh[0] = [1e6, -1e6, 0.0];
-        // Far beyond what a picture shows: only that it is finite, and alike after clamping.
-        cloud.sh[0] = cloud.sh[0].map(|v: f64| v.clamp(-1e3, 1e3));
-        cloud.sh[0][0] = 0.5 / sh::SH_C0;
+        cloud.sh[0] = [0.5 / sh::SH_C0, -1e3, 0.0];
         (cloud, camera(64, 48))
     }));
     all.push(case("colour coefficients that cancel", || {

@@ -32,29 +32,23 @@ use super::{CloudGradient, Features, Frame, FrameGradient, MAX_CHANNELS, RenderE
 use crate::math::Real;
 use crate::scene::{Camera, Gaussian, GaussianCloud};
 
-/// Runs `$body` with the constant `$c` set to the number of channels `$n` is padded to.
+/// Runs `$body` with the constant `$c` set to the number of channels `$n` is padded to: one of those
+/// listed, else the most.
 macro_rules! with_channels {
-    ($n:expr, $c:ident => $body:expr) => {
+    ($n:expr, $c:ident in [$($some:literal)*, $most:expr] => $body:expr) => {
         match $n {
-            3 => {
-                const $c: usize = 3;
+            $($some => {
+                const $c: usize = $some;
                 $body
-            }
-            4 => {
-                const $c: usize = 4;
-                $body
-            }
-            10 => {
-                const $c: usize = 10;
-                $body
-            }
+            })*
             _ => {
-                const $c: usize = MAX_CHANNELS;
+                const $c: usize = $most;
                 $body
             }
         }
     };
 }
+use with_channels;
 
 /// Channels that the kernels are compiled for: colour; with depth; with six codes and depth; any.
 fn padded(channels: usize) -> usize {
@@ -202,7 +196,7 @@ impl<R: Real> Renderer<R> {
         rows.par_iter_mut()
             .enumerate()
             .map(|(ty, out)| {
-                with_channels!(channels, C => R::vectorize(BlendRow::<R, C> { splats, values, tiles, size, ty, out }))
+                with_channels!(channels, C in [3 4 10, MAX_CHANNELS] => R::vectorize(BlendRow::<R, C> { splats, values, tiles, size, ty, out }))
             })
             .sum()
     }
@@ -282,7 +276,7 @@ impl<R: Real> Renderer<R> {
         }
         let (splats, values, tiles) = (&self.ordered.splats, &self.ordered.values, &self.tiles);
         tasks.into_par_iter().for_each(|(ty, input, own)| {
-            with_channels!(info.channels[1], C => {
+            with_channels!(info.channels[1], C in [3 4 10, MAX_CHANNELS] => {
                 let input = &input;
                 R::vectorize(BlendRowBackward::<R, C> { splats, values, tiles, size, ty, input, records: own });
             });

@@ -208,10 +208,23 @@ pub fn project<R: Real>(
     settings: &RenderSettings,
     channels: usize,
 ) {
-    let n = cloud.len();
+    in_chunks(parts, cloud.len(), |part, range| {
+        project_chunk(part, cloud, features, view, settings, channels, range);
+    });
+}
+
+/// Has every part filled from its [`CHUNK`] of `n` Gaussians, all at once; parts come empty.
+pub fn in_chunks<R: Real>(
+    parts: &mut Vec<Part<R>>,
+    n: usize,
+    fill: impl Fn(&mut Part<R>, std::ops::Range<usize>) + Sync,
+) {
     parts.resize_with(n.div_ceil(CHUNK), Part::default);
     parts.par_iter_mut().enumerate().for_each(|(c, part)| {
-        project_chunk(part, cloud, features, view, settings, channels, c * CHUNK..((c + 1) * CHUNK).min(n));
+        part.splats.clear();
+        part.values.clear();
+        part.degenerate = 0;
+        fill(part, c * CHUNK..((c + 1) * CHUNK).min(n));
     });
 }
 
@@ -225,9 +238,6 @@ fn project_chunk<R: Real>(
     channels: usize,
     range: std::ops::Range<usize>,
 ) {
-    part.splats.clear();
-    part.values.clear();
-    part.degenerate = 0;
     let degree = settings.sh_degree.min(cloud.sh_degree);
     let alpha_min = R::of(ALPHA_MIN);
     for i in range {

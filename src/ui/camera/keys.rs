@@ -2,7 +2,7 @@
 
 use egui::{Button, DragValue, Grid, ScrollArea, TextEdit, Ui};
 
-use super::{CameraPane, caption, key_of, pose_of};
+use super::{CameraPane, caption};
 use crate::navigate::Pose;
 use crate::scene::PathKey;
 
@@ -42,11 +42,11 @@ pub fn show(ui: &mut Ui, pane: &mut CameraPane, eye: &Pose) -> Option<Pose> {
     pane.selected = Some(i);
     match wish {
         Wish::Choose => {}
-        Wish::Go => return pane.path.keys.get(i).map(pose_of),
+        Wish::Go => return pane.path.keys.get(i).map(Pose::of_key),
         Wish::Update => pane.change(|path| {
             let old = &path.keys[i];
             path.keys[i] =
-                PathKey { name: old.name.clone(), dwell_secs: old.dwell_secs, time_secs: old.time_secs, ..key_of(eye) };
+                PathKey { name: old.name.clone(), dwell_secs: old.dwell_secs, time_secs: old.time_secs, ..eye.key() };
         }),
         Wish::Copy => pane.change(|path| {
             let copy = PathKey { time_secs: None, ..path.keys[i].clone() };

@@ -8,12 +8,12 @@ use std::collections::VecDeque;
 use std::path::Path;
 
 use egui::{Button, ComboBox, DragValue, RichText, Slider, Ui};
-use glam::DMat3;
 
 use self::player::{Player, Reel};
 use super::state::AppState;
 use super::theme;
 use crate::io::animation::Settings;
+use crate::navigate::film::{MOST_PICTURES, steps_of};
 use crate::navigate::{Film, Flight, Pose, Speed};
 use crate::scene::{Camera, CameraPath, PathKey};
 use crate::worker::Action;
@@ -117,7 +117,7 @@ impl CameraPane {
     /// Records the present view as a key behind the chosen one.
     pub fn record(&mut self, pose: &Pose) {
         let place = self.selected.map_or(self.path.keys.len(), |i| (i + 1).min(self.path.keys.len()));
-        self.change(|path| path.keys.insert(place, key_of(pose)));
+        self.change(|path| path.keys.insert(place, pose.key()));
         self.selected = Some(place);
         self.put_path_in();
     }
@@ -176,7 +176,7 @@ impl CameraPane {
         let height = self.film_height;
         let width = (((f64::from(height) * aspect) / 2.0).round().max(1.0) * 2.0) as u32;
         let reel = self.player.reel()?;
-        let frames = (reel.seconds() * self.path.fps).round().clamp(1.0, 1e6) as usize;
+        let frames = steps_of(reel.seconds(), self.path.fps, MOST_PICTURES);
         let time = |i: usize| reel.seconds() * i as f64 / frames as f64;
         let cameras = (0..=frames).filter_map(|i| reel.at(time(i))).map(|p| p.camera(width, height)).collect();
         let mut settings = Settings::new(width, height, self.path.fps);
@@ -270,7 +270,7 @@ impl CameraPane {
         let count = last.min(8);
         let at = |i: usize| flight.poses.get(i * last / count.max(1));
         let time = |i: usize| flight.seconds * (i * last / count.max(1)) as f64 / last.max(1) as f64;
-        let keys = (0..=count).filter_map(|i| Some(PathKey { time_secs: Some(time(i)), ..key_of(at(i)?) })).collect();
+        let keys = (0..=count).filter_map(|i| Some(PathKey { time_secs: Some(time(i)), ..at(i)?.key() })).collect();
         let (closed, fps) = (false, self.path.fps);
         self.change(|path| *path = CameraPath { keys, closed, fps, seconds: flight.seconds });
         self.selected = None;
@@ -325,25 +325,6 @@ impl CameraPane {
     }
 }
 
-/// A key of a pose. What is rolled stays in its rotation.
-fn key_of(pose: &Pose) -> PathKey {
-    PathKey {
-        center: pose.center,
-        world_from_camera: pose.world_from_camera,
-        fov_y_rad: pose.fov_y_rad,
-        roll_rad: 0.0,
-        dwell_secs: 0.0,
-        time_secs: None,
-        name: None,
-    }
-}
-
-/// The pose of a key.
-fn pose_of(key: &PathKey) -> Pose {
-    let world_from_camera: DMat3 = key.rotation();
-    Pose { center: key.center, world_from_camera, fov_y_rad: key.fov_y_rad }
-}
-
 /// Reads a path's file; the error for people.
 pub fn read(path: &Path) -> Result<CameraPath, String> {
     crate::io::camera_path::open(path).map_err(|e| e.to_string())
@@ -352,10 +333,9 @@ pub fn read(path: &Path) -> Result<CameraPath, String> {
 /// Writes a path's file, in nerfstudio's format if its name says so.
 pub fn write(file: &Path, path: &CameraPath, aspect: f64) -> Result<(), String> {
     let written = if file.to_string_lossy().ends_with(".nerfstudio.json") {
-        let frames: Vec<PathKey> = Film::new(path, Speed::Constant).map_or_else(Vec::new, |film| {
-            let count = (film.seconds() * path.fps).round().clamp(1.0, 1e5) as usize;
-            film.flight(count + 1).poses.iter().map(key_of).collect()
-        });
+        let film = Film::new(path, Speed::Constant);
+        let poses = film.map_or_else(Vec::new, |film| film.pictures(path.fps, CameraPath::MAX_KEYS as f64));
+        let frames: Vec<PathKey> = poses.iter().map(Pose::key).collect();
         crate::io::camera_path::nerfstudio::write(file, path, &frames, (1280, (1280.0 / aspect.max(0.01)) as u32))
     } else {
         crate::io::camera_path::write(file, path)

@@ -42,27 +42,18 @@ impl Eye {
 
     /// The eye of a photo's camera, with `pivot` to turn about.
     pub fn of_camera(camera: &Camera, pivot: DVec3, up: DVec3) -> Self {
-        let half = f64::from(camera.height_px) * 0.5 / camera.focal_px.y;
         Self {
             center: camera.center,
             world_from_eye: camera.world_from_camera,
             pivot,
             up,
-            fov_y_rad: 2.0 * half.atan(),
+            fov_y_rad: camera.fov_y_rad(),
         }
     }
 
     /// The camera for a picture of this size.
     pub fn camera(&self, width_px: u32, height_px: u32) -> Camera {
-        let (w, h) = (f64::from(width_px.max(1)), f64::from(height_px.max(1)));
-        Camera {
-            width_px: width_px.max(1),
-            height_px: height_px.max(1),
-            focal_px: DVec2::splat(0.5 * h / (0.5 * self.fov_y_rad).tan()),
-            principal_px: DVec2::new(w, h) * 0.5,
-            world_from_camera: self.world_from_eye,
-            center: self.center,
-        }
+        Camera::of_pose(self.center, self.world_from_eye, self.fov_y_rad, width_px.max(1), height_px.max(1))
     }
 
     /// Unit vector of the viewing direction.

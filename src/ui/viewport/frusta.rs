@@ -25,11 +25,7 @@ impl Viewport {
     ) {
         let Some(dataset) = &scene.dataset else { return };
         let painter = ui.painter_at(rect);
-        // Drawn as the picture saw it, so that lines and picture move together.
-        let eye = match &self.picture {
-            Some(p) => p.camera.resized(rect.width().max(1.0) as u32, rect.height().max(1.0) as u32),
-            None => self.eye.camera(rect.width() as u32, rect.height() as u32),
-        };
+        let eye = self.overlay_camera(rect);
         let size = 0.09 * scene.home.bounds.radius();
         let held_out: std::collections::HashSet<usize> =
             dataset.split(layout.config.holdout_every).1.into_iter().collect();

@@ -212,6 +212,14 @@ impl Viewport {
         self.photo = Some(PhotoView::new(index, photo, worker));
     }
 
+    /// The camera for what is drawn over the picture: the picture's own, so that both move together.
+    fn overlay_camera(&self, rect: Rect) -> Camera {
+        match &self.picture {
+            Some(p) => p.camera.resized(rect.width().max(1.0) as u32, rect.height().max(1.0) as u32),
+            None => self.eye.camera(rect.width() as u32, rect.height() as u32),
+        }
+    }
+
     /// Where the eye is.
     pub fn pose(&self) -> Pose {
         let (center, world_from_camera) = (self.eye.center, self.eye.world_from_eye);

@@ -12,11 +12,7 @@ impl Viewport {
     /// Draws the way that is played, the keys of the path, and the keypoints of the scene.
     pub fn show_route(&self, ui: &Ui, rect: Rect, pane: &CameraPane, explored: Option<&Explored>) {
         let painter = ui.painter_at(rect);
-        // Drawn as the picture saw it, so that lines and picture move together.
-        let eye = match &self.picture {
-            Some(p) => p.camera.resized(rect.width().max(1.0) as u32, rect.height().max(1.0) as u32),
-            None => self.eye.camera(rect.width() as u32, rect.height() as u32),
-        };
+        let eye = self.overlay_camera(rect);
         let place = |p: DVec3| eye.project(p).map(|q| pos2(rect.left() + q.x as f32, rect.top() + q.y as f32));
         if let Some(explored) = explored.filter(|_| !pane.player.playing) {
             for (keypoint, part) in explored.navigator.graph.keypoints.iter().zip(&explored.parts) {

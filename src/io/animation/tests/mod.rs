@@ -203,24 +203,3 @@ fn a_writer_can_move_to_another_thread() {
     fn is_send<T: Send>() {}
     is_send::<AnimationWriter>();
 }
-
-/// Writes films for a look with other players: `FMLGS_FILMS=/tmp/films cargo test films_for_a_look -- --ignored`.
-#[test]
-#[ignore = "writes films into the folder FMLGS_FILMS"]
-fn films_for_a_look() {
-    let folder = std::path::PathBuf::from(std::env::var_os("FMLGS_FILMS").expect("FMLGS_FILMS"));
-    for (name, size, fps, frames) in [
-        ("hd.mp4", (1280, 720), 29.97, 60),
-        ("odd.mp4", (321, 241), 25.0, 50),
-        ("a.webp", (640, 480), 25.0, 25),
-        ("a.gif", (640, 480), 25.0, 25),
-    ] {
-        let settings = Settings { overwrite: true, ..Settings::new(size.0, size.1, fps) };
-        let pictures: Vec<Vec<u8>> = (0..frames).map(|t| picture(t, size)).collect();
-        let started = std::time::Instant::now();
-        let mut writer = AnimationWriter::create(&folder.join(name), &settings).expect("create");
-        pictures.iter().for_each(|p| writer.push(p).expect("push"));
-        let summary = writer.finish().expect("finish");
-        println!("{summary:?}: {:.1} ms a frame", started.elapsed().as_secs_f64() * 1e3 / frames as f64);
-    }
-}

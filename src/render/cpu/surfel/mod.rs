@@ -29,33 +29,13 @@ use super::bin::{self, Tiles};
 use super::project::{Part, View};
 use super::project_backward::GaussianGradient;
 use super::sort::{self, Ordered};
-use super::{Clock, NONE, RenderStats, empty_frame, finish};
+use super::{Clock, NONE, RenderStats, empty_frame, finish, with_channels};
 use crate::math::Real;
 use crate::render::{Features, Frame, FrameGradient, MAX_CHANNELS, RenderSettings, TILE_PX};
 use crate::scene::{Camera, Gaussian, GaussianCloud};
 
 /// Most channels of one pass: those of every renderer, and normals.
 const MOST: usize = MAX_CHANNELS + 3;
-
-/// Runs `$body` with the constant `$c` set to the number of channels `$n` is padded to.
-macro_rules! with_channels {
-    ($n:expr, $c:ident => $body:expr) => {
-        match $n {
-            3 => {
-                const $c: usize = 3;
-                $body
-            }
-            6 => {
-                const $c: usize = 6;
-                $body
-            }
-            _ => {
-                const $c: usize = MOST;
-                $body
-            }
-        }
-    };
-}
 
 /// Channels that the kernels are compiled for: colour; with normals; any.
 fn padded(channels: usize) -> usize {
@@ -171,7 +151,7 @@ impl<R: Real> Rasterizer<R> {
         rows.par_iter_mut()
             .enumerate()
             .map(|(ty, out)| {
-                with_channels!(channels, C => {
+                with_channels!(channels, C in [3 6, MOST] => {
                     R::vectorize(BlendRow::<R, C> { splats, values, tiles, size, ty, near, out })
                 })
             })
@@ -223,7 +203,7 @@ impl<R: Real> Rasterizer<R> {
         let (splats, values, tiles) = (&self.ordered.splats, &self.ordered.values, &self.tiles);
         let near = info.view.near;
         tasks.into_par_iter().for_each(|(ty, input, own)| {
-            with_channels!(info.channels, C => {
+            with_channels!(info.channels, C in [3 6, MOST] => {
                 let input = &input;
                 R::vectorize(BlendRowBackward::<R, C> { splats, values, tiles, size, ty, near, input, records: own });
             });

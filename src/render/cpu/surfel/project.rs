@@ -1,8 +1,6 @@
 //! Projection of surfels: what the compositing needs of each, and an ellipse around what it touches.
 
-use rayon::prelude::*;
-
-use super::super::project::{CHUNK, Part, Splat, View, direction, raw_color};
+use super::super::project::{Part, Splat, View, direction, in_chunks, raw_color};
 use super::disk::INVERSE_BLUR;
 use crate::math::{Real, rotation, sh};
 use crate::render::{ALPHA_MIN, Features, RenderSettings};
@@ -137,10 +135,8 @@ pub fn project<R: Real>(
     settings: &RenderSettings,
     channels: usize,
 ) {
-    let n = cloud.len();
-    parts.resize_with(n.div_ceil(CHUNK), Part::default);
-    parts.par_iter_mut().enumerate().for_each(|(c, part)| {
-        project_chunk(part, cloud, features, view, settings, channels, c * CHUNK..((c + 1) * CHUNK).min(n));
+    in_chunks(parts, cloud.len(), |part, range| {
+        project_chunk(part, cloud, features, view, settings, channels, range);
     });
 }
 
@@ -154,9 +150,6 @@ fn project_chunk<R: Real>(
     channels: usize,
     range: std::ops::Range<usize>,
 ) {
-    part.splats.clear();
-    part.values.clear();
-    part.degenerate = 0;
     let degree = settings.sh_degree.min(cloud.sh_degree);
     let alpha_min = R::of(ALPHA_MIN);
     for i in range {
