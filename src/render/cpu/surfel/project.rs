@@ -125,7 +125,7 @@ pub fn bound<R: Real>(g: &Geometry<R>, reach: R) -> Option<Bound<R>> {
     usable.then_some(Bound { offset, squared, determinant })
 }
 
-/// Projects the whole cloud, in parts of [`CHUNK`] Gaussians: `SHAPE + channels` values per splat,
+/// Projects the whole cloud, in parts of [`CHUNK`](crate::render::cpu::project::CHUNK) Gaussians: `SHAPE + channels` values per splat,
 /// the channels being colour, extra channels, normal if depth is asked for, padding zeros.
 pub fn project<R: Real>(
     parts: &mut Vec<Part<R>>,
