@@ -8,6 +8,7 @@
 //! * [`models`]: neural networks: pictures and phrases as vectors that can be compared;
 //! * [`render`]: the splat renderer, forward and backward, on the CPU and on the GPU;
 //! * [`pipeline`]: training, evaluation, synthetic data; reports to an `Observer` only;
+//! * [`report`]: error against run time, swept, plotted, and what defaults follow from it;
 //! * [`worker`]: the background thread that runs the pipeline for the window;
 //! * [`agent`]: plain sentences become checked calls of a closed set of tools;
 //! * [`cli`]: one file per subcommand;
@@ -21,6 +22,7 @@ pub mod models;
 pub mod navigate;
 pub mod pipeline;
 pub mod render;
+pub mod report;
 pub mod scene;
 pub mod stability;
 pub mod ui;

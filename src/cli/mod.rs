@@ -27,6 +27,7 @@ mod progress;
 mod query;
 mod render;
 mod report;
+mod report_studies;
 mod segment;
 mod synth;
 mod train;

@@ -1,113 +1,191 @@
 //! `fmlgs report`: error against run time.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use super::progress::Console;
-use super::{CliError, opened, output};
-use crate::io::{self, labels::Labels};
-use crate::pipeline::observer::Silent;
-use crate::pipeline::report::{self, FeatureStudy, Report};
-use crate::pipeline::semantics::segmenter::{FileMasks, FoundMask, Segmenter};
-use crate::pipeline::semantics::tracker::labels_of;
-use crate::pipeline::semantics::train_codes::CodeView;
-use crate::scene::{Identities, IdentityId, NOBODY, Photo};
+use super::report_studies::{Options, Subject};
+use super::{CliError, output};
+use crate::io;
+use crate::pipeline::observer::{Level, Observer};
+use crate::report::{End, FILE, Report, ReportError, Stage, StageName, StudyError, VERSION, sweep};
+use crate::report::{computer, defaults, page, plot};
 
-/// Measure quality against run time of ways to do the same
+/// Measure error against run time, knob by knob
 ///
-/// Stage 'features': how Gaussians get their identities from the masks of all training photos: votes
-/// in one pass, or codes trained by gradients as in the paper. Quality is the mean IoU of every
-/// identity's mask in the held-out photos. Writes report.json, report.csv and report.svg.
+/// Goes through the settings of each stage, repeats them, and writes report.json, report.csv,
+/// report.html (one page that needs nothing else) and a plot of each stage as SVG. The window's pane
+/// 'Report' shows the same report.json.
+///
+/// Every setting is measured once before any is measured twice, and everything measured is kept: after
+/// Ctrl-C, a kill or the end of the budget the same command goes on where it stopped.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
-    fmlgs report scene/ --masks photos/ --out report/\n  \
-    fmlgs report scene/ --masks photos/ --steps 300 --steps 1000 --max-side 256 --out report/")]
+    fmlgs report scene/ --out report/                          all stages that the scene allows\n  \
+    fmlgs report scene/ --masks photos/ --budget 600\n  \
+    fmlgs report scene/ --stages render,path --repeats 5\n  \
+    fmlgs report --defaults DEFAULTS.md --from report/ --from other/")]
 pub struct Args {
     /// Trained scene
-    scene: PathBuf,
-    /// Masks of its photos
+    #[arg(required_unless_present = "defaults")]
+    scene: Option<PathBuf>,
+    /// Stages to measure [default: all that the scene allows]
+    #[arg(long, value_enum, value_delimiter = ',')]
+    stages: Vec<StageName>,
+    /// Seconds for everything; what is not measured by then is left out
     #[arg(long)]
-    masks: PathBuf,
-    /// Optimiser steps; may be given several times
-    #[arg(long, default_values_t = [300, 1000, 4000])]
+    budget: Option<f64>,
+    /// How often every setting is measured; trainings take another seed each time
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100))]
+    repeats: u32,
+    /// Labels of the photos, for the stages 'features' and 'query'
+    #[arg(long)]
+    masks: Option<PathBuf>,
+    /// Optimiser steps of the stage 'features'; may be given several times
+    #[arg(long, default_values_t = [300, 1000])]
     steps: Vec<u64>,
-    /// Longer side of the masks in px
+    /// Optimiser steps of the default of the stage 'train'
+    #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u64).range(20..=1_000_000))]
+    train_steps: u64,
+    /// Longer side of the compared pictures in px
     #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u32).range(16..=4096))]
     max_side: u32,
+    /// Most views that are compared
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    views: u32,
     /// Folder for the report
     #[arg(long, default_value = "out/report")]
     out: PathBuf,
+    /// Forget what is in the folder
+    #[arg(long)]
+    fresh: bool,
+    /// Write the table of defaults and their evidence into this Markdown file
+    #[arg(long, requires = "from", conflicts_with = "scene")]
+    defaults: Option<PathBuf>,
+    /// Report (folder or JSON) that the table of defaults is made of; may be given several times
+    #[arg(long)]
+    from: Vec<PathBuf>,
 }
 
 pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
-    let scene = opened::drawable(&args.scene)?;
-    let dataset = match &scene.dataset_path {
-        Some(path) => opened::dataset(path)?,
-        None => return Err(CliError::failed(format!("{}: its photos are not known", args.scene.display()))),
-    };
-    let mut segmenter = FileMasks(Labels::open(&args.masks)?);
-    let (training, held_out) = dataset.split(scene.config.holdout_every);
-    let mut identities = Identities::default();
-    let mut views = |indices: &[usize]| -> Result<Vec<CodeView>, CliError> {
-        let photos = indices.iter().map(|&i| &dataset.photos[i]);
-        let each = photos.map(|p| view(p, &mut segmenter, &mut identities, args.max_side));
-        Ok(each.collect::<Result<Vec<_>, CliError>>()?.into_iter().flatten().collect())
-    };
-    let (training, held_out) = (views(&training)?, views(&held_out)?);
-    if training.is_empty() || held_out.is_empty() {
-        let path = args.masks.display();
-        return Err(CliError::failed(format!("{path}: masks of training photos and of held-out photos are needed")));
+    if let Some(path) = &args.defaults {
+        let reports = args.from.iter().map(|p| Report::read(p)).collect::<Result<Vec<_>, _>>();
+        let text = defaults::markdown(&reports?);
+        return Ok(io::atomic::write(path, |w| w.write_all(text.as_bytes()))?);
     }
-    let input = BTreeMap::from([
-        ("scene".to_owned(), args.scene.display().to_string()),
-        ("size".to_owned(), format!("{} px", args.max_side)),
-        ("views".to_owned(), format!("{} + {} held out", training.len(), held_out.len())),
-        ("identities".to_owned(), format!("{} identities", identities.len())),
-    ]);
-    let study = FeatureStudy {
-        cloud: &scene.cloud,
-        settings: &scene.settings,
-        identities,
-        training: &training,
-        held_out: &held_out,
-        steps: &args.steps,
+    let Some(scene) = args.scene.clone() else { return Err(CliError::Usage("a scene is needed".into())) };
+    if args.budget.is_some_and(|b| !(b > 0.0)) {
+        return Err(CliError::Usage("--budget must be a number of seconds above 0".into()));
+    }
+    let console = &mut Console::new(quiet);
+    let mut report = begun(&args, &scene)?;
+    let options = Options {
+        masks: args.masks.clone(),
+        steps: args.steps.clone(),
+        train_steps: args.train_steps,
+        max_side_px: args.max_side,
+        views: args.views as usize,
+        repeats: args.repeats,
     };
-    let report = report::study_features(study, input, &mut Console::new(quiet))?;
-    write(&args.out, &report)?;
-    output::print(&output::table(&report.table()))
+    let subject = Subject::open(&scene, options)?;
+    let (stages, missing) = subject.stages(&args.stages)?;
+    missing.iter().for_each(|m| console.note(Level::Info, m.clone()));
+    output::make_folder(&args.out)?;
+    let start = Instant::now();
+    let mut stopped = None;
+    for (k, name) in stages.iter().enumerate() {
+        let left = args.budget.map_or(f64::INFINITY, |b| (b - start.elapsed().as_secs_f64()).max(0.0));
+        let share = left / (stages.len() - k) as f64;
+        let end = measure(&subject, *name, &mut report, &args.out, share, console)?;
+        write(&args.out, &report)?;
+        if end != End::Finished {
+            stopped = Some(end);
+        }
+        if end == End::Cancelled {
+            break;
+        }
+    }
+    let tables = report.stages.iter().filter(|s| stages.contains(&s.name)).map(printed);
+    output::print(&tables.collect::<Vec<_>>().join("\n"))?;
+    match stopped {
+        Some(End::Cancelled) => {
+            Err(CliError::Cancelled(format!("{} holds what was measured", args.out.join(FILE).display())))
+        }
+        Some(_) => {
+            console.note(Level::Info, "The budget is used up; the same command goes on with the rest".into());
+            Ok(())
+        }
+        None => Ok(()),
+    }
 }
 
-/// The labels of a photo, its regions matched with known identities by their names; `None` if it has
-/// none.
-fn view(
-    photo: &Photo,
-    segmenter: &mut FileMasks,
-    identities: &mut Identities,
-    max_side_px: u32,
-) -> Result<Option<CodeView>, CliError> {
-    if !segmenter.covers(photo) {
-        return Ok(None);
+/// The report in the folder, if it is one of this scene on this machine, or an empty one.
+fn begun(args: &Args, scene: &Path) -> Result<Report, CliError> {
+    let path = args.out.join(FILE);
+    let (name, computer) = (scene.display().to_string(), computer::look());
+    let empty = || Report {
+        version: VERSION,
+        program: env!("CARGO_PKG_VERSION").into(),
+        scene: name.clone(),
+        computer: computer.clone(),
+        stages: Vec::new(),
+    };
+    if args.fresh || !path.exists() {
+        return Ok(empty());
     }
-    let found: Vec<FoundMask> = segmenter.segment(photo, max_side_px, &mut Silent)?;
-    let mut ids: Vec<IdentityId> = Vec::with_capacity(found.len());
-    for mask in &found {
-        let parent = mask.parent.map_or(NOBODY, |p| ids[p]);
-        let names: Vec<String> = mask.name.iter().cloned().collect();
-        let known = identities.iter().find(|(_, i)| i.level == mask.level && i.parent == parent && i.names == names);
-        let known = known.map(|(id, _)| id);
-        ids.push(known.unwrap_or_else(|| identities.add(mask.level, parent, names)));
+    let before = Report::read(&path)?;
+    let other = |what: &str| {
+        let path = path.display();
+        Err(CliError::failed(format!(
+            "{path} is a report of another {what}; choose another --out, or --fresh to forget it"
+        )))
+    };
+    match before {
+        r if r.scene != name => other("scene"),
+        r if r.computer != computer || r.program != empty().program => other("machine or build"),
+        r => Ok(r),
     }
-    let camera = photo.camera.limited_to(max_side_px);
-    let labels = labels_of(&found, &ids, camera.width_px as usize * camera.height_px as usize);
-    Ok(Some(CodeView { camera, labels }))
 }
 
+/// Sweeps one stage; what is measured is on disk at once.
+fn measure(
+    subject: &Subject,
+    name: StageName,
+    report: &mut Report,
+    out: &Path,
+    budget_secs: f64,
+    console: &mut Console,
+) -> Result<End, CliError> {
+    let path = out.join(FILE);
+    subject.with_study(name, &mut |study| {
+        let fresh = study.stage();
+        let before = report.stage(name).filter(|s| s.input == fresh.input && s.measures == fresh.measures).cloned();
+        let mut keep = |stage: &Stage| {
+            report.put(stage.clone());
+            report.write(&path).map_err(|e: ReportError| StudyError(e.to_string()))
+        };
+        Ok(sweep(study, before, budget_secs, &mut keep, console).map_err(|e| CliError::failed(e.to_string()))?.1)
+    })
+}
+
+fn printed(stage: &Stage) -> String {
+    let head = format!("{}: seconds of {}", stage.name.title(), stage.secs_of);
+    let orders = stage.orders.iter().map(|o| {
+        let agrees = if o.agrees { "agrees" } else { "does NOT agree" };
+        format!("{}: order {:.2} seen, {} expected: {agrees}\n", o.what, o.observed, o.expected)
+    });
+    format!("{head}\n{}\n{}", output::table(&stage.table()), orders.collect::<String>())
+}
+
+/// Everything but the JSON, which is there already.
 fn write(folder: &Path, report: &Report) -> Result<(), CliError> {
-    output::make_folder(folder)?;
-    let text = serde_json::to_string_pretty(report).map_err(|e| CliError::failed(e.to_string()))?;
-    let picture = report::svg(report).map_err(CliError::failed)?;
-    for (name, bytes) in [("report.json", text), ("report.csv", report.csv()), ("report.svg", picture)] {
-        io::atomic::write(&folder.join(name), |w| w.write_all(bytes.as_bytes()))?;
+    let mut files = vec![("report.csv".to_owned(), report.csv()), ("report.html".to_owned(), page::html(report))];
+    for stage in &report.stages {
+        let pictures = stage.measures.first().map(|m| plot::svg(stage, m));
+        files.extend(pictures.and_then(Result::ok).map(|p| (format!("{}.svg", stage.name.name()), p)));
+    }
+    for (name, text) in files {
+        io::atomic::write(&folder.join(name), |w| w.write_all(text.as_bytes()))?;
     }
     Ok(())
 }

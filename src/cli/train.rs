@@ -51,6 +51,12 @@ pub struct Settings {
     /// Highest degree of the spherical harmonics [default: 3]
     #[arg(long, value_parser = clap::value_parser!(u8).range(0..=3))]
     pub sh_degree: Option<u8>,
+    /// Open all bands of colour from the first step on
+    #[arg(long)]
+    pub sh_at_once: bool,
+    /// Share of the steps, from the first on, that see the photos at half their size [default: 0]
+    #[arg(long, value_parser = parse_share)]
+    pub coarse_share: Option<f64>,
     /// Keep the number of Gaussians that training starts with
     #[arg(long)]
     pub no_densify: bool,
@@ -93,6 +99,11 @@ fn parse_secs(text: &str) -> Result<f64, String> {
     secs.ok_or_else(|| "a number of seconds, 0 or more, is needed".into())
 }
 
+fn parse_share(text: &str) -> Result<f64, String> {
+    let share: Option<f64> = text.parse().ok().filter(|s| (0.0..=1.0).contains(s));
+    share.ok_or_else(|| "a share, 0 to 1, is needed".into())
+}
+
 fn parse_weight(text: &str) -> Result<f64, String> {
     let weight: Option<f64> = text.parse().ok().filter(|w: &f64| w.is_finite() && *w >= 0.0);
     weight.ok_or_else(|| "a weight, 0 or more, is needed".into())
@@ -106,6 +117,8 @@ impl Settings {
             max_side_px: self.max_side.unwrap_or(base.max_side_px),
             holdout_every: self.holdout_every.unwrap_or(base.holdout_every),
             sh_degree: self.sh_degree.unwrap_or(base.sh_degree),
+            sh_at_once: base.sh_at_once || self.sh_at_once,
+            coarse_share: self.coarse_share.unwrap_or(base.coarse_share),
             densify: base.densify && !self.no_densify,
             max_gaussians: self.max_gaussians.or(base.max_gaussians),
             random_points: self.random_points.unwrap_or(base.random_points),

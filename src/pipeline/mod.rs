@@ -10,7 +10,6 @@ pub mod evaluate;
 pub mod film;
 pub mod metrics;
 pub mod observer;
-pub mod report;
 pub mod semantics;
 pub mod synth;
 pub mod train;

@@ -14,6 +14,8 @@ pub mod gpu;
 
 pub use backend::{Backend, BackendChoice, Cost, DrawError};
 
+use serde::{Deserialize, Serialize};
+
 use crate::math::Real;
 use crate::scene::CameraError;
 
@@ -43,6 +45,9 @@ pub enum RenderError {
     /// More extra channels than one pass composites.
     #[error("{0} extra channels are too many for one pass (at most {max}); render them in groups", max = MAX_CHANNELS - 4)]
     Channels(usize),
+    /// Cut-offs other than the defaults, on a GPU.
+    #[error("the GPU draws with the default cut-offs only; choose the CPU for others")]
+    Cutoffs,
     /// A feature array of the wrong length.
     #[error("the feature array holds {have} values, expected {want}")]
     FeatureLength {
@@ -53,8 +58,24 @@ pub enum RenderError {
     },
 }
 
+/// What counts as too little to be drawn: the first knob between accuracy and time.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Cutoffs {
+    /// Smallest alpha that counts, above 0.
+    pub alpha: f64,
+    /// A pixel is closed before its transmittance falls under this.
+    pub transmittance: f64,
+}
+
+impl Default for Cutoffs {
+    fn default() -> Self {
+        Self { alpha: ALPHA_MIN, transmittance: TRANSMITTANCE_MIN }
+    }
+}
+
 /// How to draw.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct RenderSettings {
     /// Highest spherical-harmonics degree used; the cloud's own if lower.
     pub sh_degree: u8,
@@ -70,11 +91,26 @@ pub struct RenderSettings {
     /// Draw surfels: disks across the first two axes, whose third scale is ignored (2D Gaussian
     /// Splatting). On the CPU only; a GPU draws them as the flat Gaussians that they are stored as.
     pub surfels: bool,
+    /// Of Gaussians on the CPU. A GPU, whose shaders are made with the defaults, refuses others;
+    /// surfels are always drawn with the defaults.
+    pub cutoffs: Cutoffs,
+    /// Draw in the order of the picture before, as far as it is known, instead of sorting anew: for
+    /// Gaussians on the CPU.
+    pub keep_order: bool,
 }
 
 impl Default for RenderSettings {
     fn default() -> Self {
-        Self { sh_degree: 3, background: [0.0; 3], near: 0.01, antialias: false, depth: false, surfels: false }
+        Self {
+            sh_degree: 3,
+            background: [0.0; 3],
+            near: 0.01,
+            antialias: false,
+            depth: false,
+            surfels: false,
+            cutoffs: Cutoffs::default(),
+            keep_order: false,
+        }
     }
 }
 

@@ -6,7 +6,7 @@ use super::source::{SourceFile, library_code, test_module_files};
 pub type Complaint = String;
 
 /// Each module of the library and the other modules it may use, in the order of the data flow.
-const MODULES: [(&str, &[&str]); 12] = [
+const MODULES: [(&str, &[&str]); 13] = [
     ("math", &[]),
     ("scene", &["math"]),
     ("io", &["math", "scene"]),
@@ -15,10 +15,14 @@ const MODULES: [(&str, &[&str]); 12] = [
     ("pipeline", &["math", "scene", "io", "models", "render"]),
     ("navigate", &["math", "scene", "render"]),
     ("stability", &["math", "scene", "render", "pipeline", "navigate"]),
+    ("report", &["math", "scene", "io", "models", "render", "pipeline", "navigate"]),
     ("worker", &["math", "scene", "io", "models", "render", "pipeline", "navigate"]),
     ("agent", &["math", "scene", "io", "render", "pipeline", "navigate", "worker"]),
-    ("cli", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "stability", "worker", "agent"]),
-    ("ui", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "worker", "agent"]),
+    (
+        "cli",
+        &["math", "scene", "io", "models", "render", "pipeline", "navigate", "stability", "report", "worker", "agent"],
+    ),
+    ("ui", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "report", "worker", "agent"]),
 ];
 
 /// Longest Rust file in lines.

@@ -21,6 +21,12 @@ pub struct TrainConfig {
     pub holdout_every: usize,
     /// Highest spherical-harmonics degree, 0 to 3.
     pub sh_degree: u8,
+    /// Open all bands of colour from the first step on instead of one after the other.
+    #[serde(default)]
+    pub sh_at_once: bool,
+    /// Share of the steps, from the first on, that see the photos at half their size; 0 = none.
+    #[serde(default)]
+    pub coarse_share: f64,
     /// Whether Gaussians are added and removed on the way.
     pub densify: bool,
     /// Upper limit of Gaussians; `None` = from the machine's memory.
@@ -79,6 +85,8 @@ impl Default for TrainConfig {
             max_side_px: 512,
             holdout_every: 8,
             sh_degree: 3,
+            sh_at_once: false,
+            coarse_share: 0.0,
             densify: true,
             max_gaussians: None,
             random_points: 20_000,

@@ -6,6 +6,7 @@
 pub mod border;
 pub mod budget;
 pub mod checkpoint;
+mod coarse;
 pub mod config;
 pub mod density;
 mod device;

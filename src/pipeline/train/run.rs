@@ -11,13 +11,13 @@ use rand_pcg::Pcg64Mcg;
 use super::checkpoint::{self, CheckpointError, Header};
 use super::photos::{load_views, wait};
 use super::trainer::{REPORT_STEPS, StepError, StepResult, Trainer};
-use super::{TrainConfig, TrainView, density, geometry, init};
+use super::{TrainConfig, TrainView, coarse, density, geometry, init};
 use crate::io::IoError;
 use crate::io::trained::{self, History, SceneInfo};
 use crate::math::stats::{mean, median};
 use crate::pipeline::evaluate::evaluate;
 use crate::pipeline::observer::{Evaluation, Level, Observer, Progress, Signal, StepMetrics};
-use crate::render::gpu::GpuError;
+use crate::render::gpu::{Context, GpuError};
 use crate::render::{BackendChoice, RenderError};
 use crate::scene::{Dataset, GaussianCloud};
 
@@ -106,11 +106,11 @@ pub fn run(
     };
     views.shrink_to_fit();
     let mut job = Job::start(dataset, config, out, &held, views, tests, saved);
-    let context = if config.needs_cpu() { None } else { config.backend.gpu()? };
-    match context {
+    job.context = if config.needs_cpu() { None } else { config.backend.gpu()? };
+    match &job.context {
         Some(context) => {
             observer.note(Level::Info, format!("Training on {}", context.describe()));
-            job.trainer.move_to(&context, &job.views)?;
+            job.trainer.move_to(context, job.coarse.as_ref().unwrap_or(&job.views))?;
         }
         None => observer.note(Level::Info, "Training on the CPU".into()),
     }
@@ -126,6 +126,9 @@ fn check(config: &TrainConfig) -> Result<(), TrainError> {
     if config.max_side_px < 16 {
         return bad("the longest side of the training pictures must be at least 16 px");
     }
+    if !(0.0..=1.0).contains(&config.coarse_share) {
+        return bad("the share of steps at half the size must be 0 to 1");
+    }
     if config.sh_degree > 3 {
         return bad("the spherical-harmonics degree must be 0 to 3");
     }
@@ -137,6 +140,11 @@ fn check(config: &TrainConfig) -> Result<(), TrainError> {
         return bad("surfels and the term for normals train on the CPU only: choose --backend cpu");
     }
     Ok(())
+}
+
+/// Steps that see the photos at half their size.
+fn coarse_steps(config: &TrainConfig) -> u64 {
+    (config.coarse_share * config.steps as f64).round() as u64
 }
 
 fn stopped_early() -> TrainOutcome {
@@ -176,7 +184,10 @@ struct Job<'a> {
     info: SceneInfo,
     photos: Vec<String>,
     views: Vec<TrainView>,
+    /// The same at half their size, while those are trained on.
+    coarse: Option<Vec<TrainView>>,
     tests: Vec<TrainView>,
+    context: Option<Context>,
     trainer: Trainer,
     secs: f64,
     history: History,
@@ -230,13 +241,16 @@ impl<'a> Job<'a> {
         info.config = serde_json::to_value(config).unwrap_or_default();
         let photos = views.iter().map(|v| v.name.clone()).collect();
         let safe = trainer.cloud.clone();
+        let coarse = (trainer.step < coarse_steps(config)).then(|| coarse::halved(&views));
         Self {
             config,
             out,
             info,
             photos,
             views,
+            coarse,
             tests,
+            context: None,
             trainer,
             secs,
             history,
@@ -308,7 +322,14 @@ impl<'a> Job<'a> {
     /// One step with its guard against divergence, and density control.
     fn step(&mut self, observer: &mut dyn Observer) -> Result<Vec<StepResult>, TrainError> {
         let name = || self.photos.first().cloned().unwrap_or_default();
-        let results = self.trainer.advance(&self.views).map_err(|e| match e {
+        if self.coarse.is_some() && self.trainer.step >= coarse_steps(self.config) {
+            self.coarse = None;
+            if let Some(context) = &self.context {
+                self.trainer.fetch()?;
+                self.trainer.move_to(context, &self.views)?;
+            }
+        }
+        let results = self.trainer.advance(self.coarse.as_ref().unwrap_or(&self.views)).map_err(|e| match e {
             StepError::Render(e) => TrainError::Render(name(), e),
             StepError::Gpu(e) => TrainError::Gpu(e),
         })?;

@@ -16,7 +16,7 @@ pub struct Schedule {
     extent: f64,
     /// Factor on every rate, lowered after a divergence.
     pub damping: f64,
-    /// Steps between openings of SH bands.
+    /// Steps between openings of SH bands; 0 = all are open.
     pub sh_interval: u64,
     /// First step at which Gaussians may be added.
     pub densify_from: u64,
@@ -38,7 +38,7 @@ impl Schedule {
             sh_degree: config.sh_degree,
             extent,
             damping: 1.0,
-            sh_interval: scaled(2_000.0).clamp(1, 1_000),
+            sh_interval: if config.sh_at_once { 0 } else { scaled(2_000.0).clamp(1, 1_000) },
             densify_from: scaled(1_000.0).clamp(50, 500),
             densify_until: scaled(17_000.0),
             densify_interval: scaled(400.0).clamp(20, 100),
@@ -64,7 +64,7 @@ impl Schedule {
 
     /// SH degree in use at `step`.
     pub fn sh_degree(&self, step: u64) -> u8 {
-        (step / self.sh_interval).min(u64::from(self.sh_degree)) as u8
+        step.checked_div(self.sh_interval).map_or(self.sh_degree, |open| open.min(u64::from(self.sh_degree)) as u8)
     }
 
     /// Whether Gaussians are added and removed after `done` steps.

@@ -7,7 +7,7 @@ use super::lanes::{SLOTS, SplatLanes, Walk, ramp, slots_of_rows};
 use super::project::Splat;
 use crate::math::Real;
 use crate::math::lanes::{LANES, LaneOp, Lanes};
-use crate::render::{TILE_PX, TRANSMITTANCE_MIN};
+use crate::render::{Cutoffs, TILE_PX};
 
 /// Splats between two looks at which pixels are still open.
 const CLOSED_CHECK: usize = 16;
@@ -36,6 +36,8 @@ pub struct BlendRow<'a, 'b, R, const C: usize> {
     pub size: [usize; 2],
     /// Which row of tiles.
     pub ty: usize,
+    /// What is too little to be drawn.
+    pub cutoffs: Cutoffs,
     /// Where to write.
     pub out: &'a mut RowOut<'b, R>,
 }
@@ -64,7 +66,7 @@ impl<R: Real, const C: usize> BlendRow<'_, '_, R, C> {
         let (first, end) = (self.tiles.first[index] as usize, self.tiles.first[index + 1] as usize);
 
         let (zero, one) = (l.splat(R::ZERO), l.splat(R::ONE));
-        let (half, least) = (l.splat(R::HALF), l.splat(R::of(TRANSMITTANCE_MIN)));
+        let (half, least) = (l.splat(R::HALF), l.splat(R::of(self.cutoffs.transmittance)));
         let mut sums = [[zero; C]; SLOTS];
         // Light left at each pixel; negative once the pixel is closed. Selecting between a new value
         // and the one in memory would become a masked store, whose result the next splat would
@@ -86,7 +88,7 @@ impl<R: Real, const C: usize> BlendRow<'_, '_, R, C> {
                 continue;
             }
             groups += u64::from(slots.count_ones());
-            let lanes = SplatLanes::new(l, s);
+            let lanes = SplatLanes::new(l, s, self.cutoffs.alpha);
             let value = values[id].map(|v| l.splat(v));
             let place = l.splat(R::of((k + 1) as f64));
             let dx = walk.dx(l, ramp);

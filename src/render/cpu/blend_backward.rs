@@ -11,7 +11,7 @@ use super::lanes::{SLOTS, SplatLanes, Walk, ramp, slots_of_rows};
 use super::project::Splat;
 use crate::math::Real;
 use crate::math::lanes::{LANES, LaneOp, Lanes};
-use crate::render::{ALPHA_MAX, TILE_PX};
+use crate::render::{ALPHA_MAX, Cutoffs, TILE_PX};
 
 /// Moments in front of the channels in a tile entry's record.
 pub const MOMENTS: usize = 6;
@@ -41,6 +41,8 @@ pub struct BlendRowBackward<'a, 'b, R, const C: usize> {
     pub size: [usize; 2],
     /// Which row of tiles.
     pub ty: usize,
+    /// What is too little to be drawn.
+    pub cutoffs: Cutoffs,
     /// What to read.
     pub input: &'a RowIn<'b, R>,
     /// Where to write.
@@ -111,7 +113,7 @@ impl<R: Real, const C: usize> BlendRowBackward<'_, '_, R, C> {
             let s = &self.splats[id];
             let walk = Walk::new(l, s, corner, ramp);
             let mut slots = walk.slots & all;
-            let lanes = SplatLanes::new(l, s);
+            let lanes = SplatLanes::new(l, s, self.cutoffs.alpha);
             let value = values[id].map(|v| l.splat(v));
             let place = l.splat(R::of((k + 1) as f64));
             let mut moments = [zero; MOMENTS];

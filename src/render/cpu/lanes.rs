@@ -4,7 +4,7 @@
 use super::project::Splat;
 use crate::math::Real;
 use crate::math::lanes::{LANES, Lane, Lanes};
-use crate::render::{ALPHA_MAX, ALPHA_MIN, TILE_PX};
+use crate::render::{ALPHA_MAX, TILE_PX};
 
 /// Lane groups per tile row.
 pub const GROUPS: usize = TILE_PX / LANES;
@@ -100,15 +100,15 @@ pub struct SplatLanes<R: Real, L: Lanes<R>> {
 }
 
 impl<R: Real, L: Lanes<R>> SplatLanes<R, L> {
-    /// The constants of `s`.
+    /// The constants of `s`; an alpha below `alpha_min` does not count.
     #[inline(always)]
-    pub fn new(l: L, s: &Splat<R>) -> Self {
+    pub fn new(l: L, s: &Splat<R>, alpha_min: f64) -> Self {
         Self {
             a: l.splat(s.conic[0]),
             opacity: l.splat(s.opacity),
             minus_half: l.splat(-R::HALF),
             largest: l.splat(R::of(ALPHA_MAX)),
-            smallest: l.splat(R::of(ALPHA_MIN)),
+            smallest: l.splat(R::of(alpha_min)),
         }
     }
 

@@ -28,7 +28,9 @@ use self::project::{Part, View};
 use self::project_backward::{GaussianGradient, project_backward};
 use self::sort::Ordered;
 use self::weigh::{WeighRow, Weighed};
-use super::{CloudGradient, Features, Frame, FrameGradient, MAX_CHANNELS, RenderError, RenderSettings, TILE_PX};
+use super::{
+    CloudGradient, Cutoffs, Features, Frame, FrameGradient, MAX_CHANNELS, RenderError, RenderSettings, TILE_PX,
+};
 use crate::math::Real;
 use crate::scene::{Camera, Gaussian, GaussianCloud};
 
@@ -146,7 +148,7 @@ impl<R: Real> Renderer<R> {
         let mut clock = Clock::start();
         project::project(&mut self.parts, cloud, features, &view, settings, channels);
         let project_secs = clock.lap();
-        sort::sort(&mut self.ordered, &self.parts, channels);
+        sort::sort(&mut self.ordered, &self.parts, channels, settings.keep_order);
         let sort_secs = clock.lap();
         bin::bin(&mut self.tiles, &self.ordered.splats, size);
         let bin_secs = clock.lap();
@@ -155,7 +157,7 @@ impl<R: Real> Renderer<R> {
         self.transmittance.resize(pixels, R::ONE);
         self.last.resize(pixels, 0);
         let mut frame = empty_frame(size, extra, settings.depth);
-        let products = self.blend(&mut frame, channels, size);
+        let products = self.blend(&mut frame, channels, size, settings.cutoffs);
         finish(&mut frame, &self.transmittance, settings.background);
         self.stats = RenderStats {
             visible: self.ordered.splats.len(),
@@ -175,7 +177,7 @@ impl<R: Real> Renderer<R> {
         Ok(frame)
     }
 
-    fn blend(&mut self, frame: &mut Frame<R>, channels: usize, size: [usize; 2]) -> u64 {
+    fn blend(&mut self, frame: &mut Frame<R>, channels: usize, size: [usize; 2], cutoffs: Cutoffs) -> u64 {
         let strip = size[0] * TILE_PX;
         let mut rows: Vec<RowOut<'_, R>> = self
             .transmittance
@@ -196,7 +198,7 @@ impl<R: Real> Renderer<R> {
         rows.par_iter_mut()
             .enumerate()
             .map(|(ty, out)| {
-                with_channels!(channels, C in [3 4 10, MAX_CHANNELS] => R::vectorize(BlendRow::<R, C> { splats, values, tiles, size, ty, out }))
+                with_channels!(channels, C in [3 4 10, MAX_CHANNELS] => R::vectorize(BlendRow::<R, C> { splats, values, tiles, size, ty, cutoffs, out }))
             })
             .sum()
     }
@@ -218,14 +220,14 @@ impl<R: Real> Renderer<R> {
         let settings = RenderSettings { sh_degree: 0, depth: false, ..settings.clone() };
         let channels = padded(3);
         project::project(&mut self.parts, cloud, Features::NONE, &view, &settings, channels);
-        sort::sort(&mut self.ordered, &self.parts, channels);
+        sort::sort(&mut self.ordered, &self.parts, channels, false);
         bin::bin(&mut self.tiles, &self.ordered.splats, view.size);
         // The buffers no longer belong to a rendered frame.
         self.frame = None;
         self.surfels = None;
         let (splats, tiles) = (&self.ordered.splats, &self.tiles);
         counters.par_iter_mut().take(tiles.grid[1]).enumerate().for_each(|(ty, counter)| {
-            R::vectorize(WeighRow { splats, tiles, size: view.size, ty, counter });
+            R::vectorize(WeighRow { splats, tiles, size: view.size, ty, cutoffs: settings.cutoffs, counter });
         });
         Ok(())
     }
@@ -244,7 +246,7 @@ impl<R: Real> Renderer<R> {
         for (s, splat) in self.ordered.splats.iter().enumerate() {
             self.splat_of[splat.gaussian as usize] = s as u32;
         }
-        let size = info.view.size;
+        let (size, cutoffs) = (info.view.size, info.settings.cutoffs);
         let pixels = size[0] * size[1];
         let d_transmittance = transmittance_gradient(gradient, info.settings.background, pixels);
 
@@ -278,7 +280,7 @@ impl<R: Real> Renderer<R> {
         tasks.into_par_iter().for_each(|(ty, input, own)| {
             with_channels!(info.channels[1], C in [3 4 10, MAX_CHANNELS] => {
                 let input = &input;
-                R::vectorize(BlendRowBackward::<R, C> { splats, values, tiles, size, ty, input, records: own });
+                R::vectorize(BlendRowBackward::<R, C> { splats, values, tiles, size, ty, cutoffs, input, records: own });
             });
         });
         self.stats.backward_secs = clock.elapsed().as_secs_f64();

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::math::{Real, rotation, sh};
-use crate::render::{ALPHA_MIN, BLUR_PX2, Features, RenderSettings, TANGENT_CLAMP};
+use crate::render::{BLUR_PX2, Features, RenderSettings, TANGENT_CLAMP};
 use crate::scene::{Camera, Gaussian, GaussianCloud};
 
 /// Gaussians that one task projects.
@@ -64,7 +64,7 @@ pub struct Splat<R> {
     pub conic: [R; 3],
     /// Opacity after the sigmoid and the anti-aliasing compensation.
     pub opacity: R,
-    /// Squared Mahalanobis distance up to which alpha is at least `ALPHA_MIN`.
+    /// Squared Mahalanobis distance up to which alpha is at least the smallest that counts.
     pub reach: R,
     /// Half width and half height of the ellipse at `reach`, px.
     pub half: [R; 2],
@@ -239,7 +239,7 @@ fn project_chunk<R: Real>(
     range: std::ops::Range<usize>,
 ) {
     let degree = settings.sh_degree.min(cloud.sh_degree);
-    let alpha_min = R::of(ALPHA_MIN);
+    let alpha_min = R::of(settings.cutoffs.alpha);
     for i in range {
         // Cheap tests first: most Gaussians of a scene are outside the picture.
         let relative = view.relative(cloud.positions[i]);

@@ -16,19 +16,53 @@ pub struct Ordered<R> {
 }
 
 /// Brings the splats of all parts into order. Everything after this reads them nearly from front
-/// to back, instead of jumping through the cloud.
-pub fn sort<R: Real>(out: &mut Ordered<R>, parts: &[Part<R>], channels: usize) {
+/// to back, instead of jumping through the cloud. With `keep`, the order is that of the frame before;
+/// splats that were not in it come last.
+pub fn sort<R: Real>(out: &mut Ordered<R>, parts: &[Part<R>], channels: usize, keep: bool) {
+    if keep {
+        keep_order(out, parts);
+    } else {
+        by_depth(out, parts);
+    }
+    gather(out, parts, channels);
+}
+
+/// Place of a splat among the parts: the low half of its key.
+fn place(part: usize, i: usize) -> u64 {
+    (part * CHUNK + i) as u64
+}
+
+fn by_depth<R: Real>(out: &mut Ordered<R>, parts: &[Part<R>]) {
     // Depths are positive, so their bit patterns order like the numbers. The low half of a key is
     // the splat's part and its place in there, which makes keys unique and an unstable sort
     // deterministic.
     out.keys.clear();
     out.keys.par_extend(parts.par_iter().enumerate().flat_map_iter(|(p, part)| {
-        let low = (p * CHUNK) as u64;
-        let key = move |(i, s): (usize, &Splat<R>)| (u64::from(s.depth.f32().to_bits()) << 32) | (low + i as u64);
+        let key = move |(i, s): (usize, &Splat<R>)| (u64::from(s.depth.f32().to_bits()) << 32) | place(p, i);
         part.splats.iter().enumerate().map(key)
     }));
     out.keys.par_sort_unstable();
+}
 
+fn keep_order<R: Real>(out: &mut Ordered<R>, parts: &[Part<R>]) {
+    const GONE: u32 = u32::MAX;
+    let largest = parts.iter().flat_map(|p| &p.splats).chain(&out.splats).map(|s| s.gaussian as usize + 1).max();
+    let mut now = vec![GONE; largest.unwrap_or(0)];
+    for (p, part) in parts.iter().enumerate() {
+        for (i, s) in part.splats.iter().enumerate() {
+            now[s.gaussian as usize] = place(p, i) as u32;
+        }
+    }
+    out.keys.clear();
+    for s in &out.splats {
+        let at = std::mem::replace(&mut now[s.gaussian as usize], GONE);
+        out.keys.extend((at != GONE).then_some(u64::from(at)));
+    }
+    out.keys.extend(now.iter().filter(|at| **at != GONE).map(|at| u64::from(*at)));
+}
+
+/// Copies the splats in the order of the keys.
+fn gather<R: Real>(out: &mut Ordered<R>, parts: &[Part<R>], channels: usize) {
     let n = out.keys.len();
     out.splats.resize(n, Splat::default());
     out.values.resize(n * channels, R::ZERO);

@@ -8,7 +8,7 @@ use super::lanes::{SLOTS, SplatLanes, Walk, ramp, slots_of_rows};
 use super::project::Splat;
 use crate::math::Real;
 use crate::math::lanes::{LANES, Lane, LaneOp, Lanes};
-use crate::render::{TILE_PX, TRANSMITTANCE_MIN};
+use crate::render::{Cutoffs, TILE_PX};
 
 /// Someone who counts the weights of one row of tiles.
 pub trait Weighed<R>: Send {
@@ -28,6 +28,8 @@ pub struct WeighRow<'a, R, V> {
     pub size: [usize; 2],
     /// Which row of tiles.
     pub ty: usize,
+    /// What is too little to be drawn.
+    pub cutoffs: Cutoffs,
     /// Who counts.
     pub counter: &'a mut V,
 }
@@ -51,7 +53,7 @@ impl<R: Real, V: Weighed<R>> WeighRow<'_, R, V> {
         let index = self.ty * self.tiles.grid[0] + tx;
         let (first, end) = (self.tiles.first[index] as usize, self.tiles.first[index + 1] as usize);
         let (zero, one) = (l.splat(R::ZERO), l.splat(R::ONE));
-        let least = l.splat(R::of(TRANSMITTANCE_MIN));
+        let least = l.splat(R::of(self.cutoffs.transmittance));
         let ramp = ramp(l);
         // Lanes beyond the picture's right edge start closed.
         let inside = l.ge(l.splat(R::of(width as f64) - R::ONE), ramp);
@@ -68,7 +70,7 @@ impl<R: Real, V: Weighed<R>> WeighRow<'_, R, V> {
             if slots == 0 {
                 continue;
             }
-            let lanes = SplatLanes::new(l, s);
+            let lanes = SplatLanes::new(l, s, self.cutoffs.alpha);
             let dx = walk.dx(l, ramp);
             while slots != 0 {
                 let slot = slots.trailing_zeros() as usize;

@@ -8,7 +8,7 @@ use super::project::{CloudShape, Project, view};
 use super::scratch::{PerGaussian, PerPair, PerPicture, extent};
 use super::sort::Sort;
 use super::{Context, GpuError, Parameters};
-use crate::render::{RenderError, RenderSettings};
+use crate::render::{Cutoffs, RenderError, RenderSettings};
 use crate::scene::Camera;
 
 /// Pairs per Gaussian that are assumed before a frame has told.
@@ -63,6 +63,9 @@ impl Rasterizer {
         channels: usize,
     ) -> Result<(), GpuError> {
         camera.validate().map_err(RenderError::from)?;
+        if settings.cutoffs != Cutoffs::default() {
+            return Err(RenderError::Cutoffs.into());
+        }
         let size_px = [camera.width_px, camera.height_px];
         let [pixels, tiles] = extent(size_px);
         let n = cloud.gaussians as usize;

@@ -97,7 +97,7 @@ impl<R: Real> Rasterizer<R> {
         let mut clock = Clock::start();
         project::project(&mut self.parts, cloud, features, &view, settings, channels);
         let project_secs = clock.lap();
-        sort::sort(&mut self.ordered, &self.parts, SHAPE + channels);
+        sort::sort(&mut self.ordered, &self.parts, SHAPE + channels, false);
         let sort_secs = clock.lap();
         bin::bin(&mut self.tiles, &self.ordered.splats, size);
         let bin_secs = clock.lap();

@@ -1,0 +1,199 @@
+//! What `fmlgs report` sweeps: the studies that a scene allows, each opened when its turn comes.
+
+use std::path::{Path, PathBuf};
+
+use super::CliError;
+use super::opened::{self, DrawableScene};
+use crate::io::labels::Labels;
+use crate::pipeline::observer::Silent;
+use crate::pipeline::semantics::segmenter::{FileMasks, FoundMask, Segmenter};
+use crate::pipeline::semantics::tracker::labels_of;
+use crate::pipeline::semantics::train_codes::CodeView;
+use crate::pipeline::train::TrainConfig;
+use crate::report::studies::Input;
+use crate::report::studies::features::FeatureStudy;
+use crate::report::studies::render::RenderStudy;
+use crate::report::studies::train::TrainStudy;
+use crate::report::{End, StageName, Study};
+use crate::scene::{Camera, Dataset, Identities, IdentityId, NOBODY, Photo};
+
+/// What is asked for.
+pub struct Options {
+    /// Labels of the photos.
+    pub masks: Option<PathBuf>,
+    /// Optimiser steps of codes.
+    pub steps: Vec<u64>,
+    /// Optimiser steps of trainings.
+    pub train_steps: u64,
+    /// Longer side of compared pictures, px.
+    pub max_side_px: u32,
+    /// Most views that are compared.
+    pub views: usize,
+    /// Repeats.
+    pub repeats: u32,
+}
+
+/// A scene and what came with it.
+pub struct Subject {
+    scene: DrawableScene,
+    path: PathBuf,
+    dataset: Option<Dataset>,
+    options: Options,
+}
+
+type Sweep<'a> = &'a mut dyn FnMut(&mut dyn Study) -> Result<End, CliError>;
+
+impl Subject {
+    /// Opens a trained scene and its photos, if they are there.
+    pub fn open(path: &Path, options: Options) -> Result<Self, CliError> {
+        let scene = opened::drawable(path)?;
+        let dataset = scene.dataset_path.as_ref().filter(|p| p.exists()).map(|p| opened::dataset(p)).transpose()?;
+        Ok(Self { scene, path: path.to_owned(), dataset, options })
+    }
+
+    /// The stages that are wanted, and for each that is not possible why.
+    ///
+    /// # Errors
+    /// If one was asked for that is not possible.
+    pub fn stages(&self, wanted: &[StageName]) -> Result<(Vec<StageName>, Vec<String>), CliError> {
+        let (mut stages, mut missing) = (Vec::new(), Vec::new());
+        for name in StageName::ALL {
+            let asked = wanted.contains(&name);
+            match self.lacks(name) {
+                None if asked || wanted.is_empty() => stages.push(name),
+                Some(what) if asked => {
+                    return Err(CliError::failed(format!(
+                        "{}: the stage '{}' needs {what}",
+                        self.path.display(),
+                        name.name()
+                    )));
+                }
+                Some(what) if wanted.is_empty() => {
+                    missing.push(format!("Stage '{}' left out: it needs {what}", name.name()))
+                }
+                _ => {}
+            }
+        }
+        Ok((stages, missing))
+    }
+
+    /// What a stage needs that is not here.
+    fn lacks(&self, name: StageName) -> Option<&'static str> {
+        let photos = self.dataset.is_none().then_some("the scene's photos");
+        let labels = self.options.masks.is_none().then_some("labels of the photos: --masks");
+        match name {
+            StageName::Render => self.scene.cameras.is_empty().then_some("cameras"),
+            StageName::Train => photos,
+            StageName::Features => photos.or(labels),
+            _ => Some("a later version"),
+        }
+    }
+
+    /// Hands the study of a stage to `sweep`.
+    pub fn with_study(&self, name: StageName, sweep: Sweep<'_>) -> Result<End, CliError> {
+        match name {
+            StageName::Render => sweep(&mut self.drawing()?),
+            StageName::Train => self.training(sweep),
+            StageName::Features => self.features(sweep),
+            _ => Err(CliError::failed("not possible")),
+        }
+    }
+
+    /// What is swept on, in words.
+    fn input(&self, more: &[(&str, String)]) -> Input {
+        let mut input = Input::from([
+            ("scene".to_owned(), self.path.display().to_string()),
+            ("Gaussians".to_owned(), self.scene.cloud.len().to_string()),
+            ("longer side".to_owned(), format!("{} px", self.options.max_side_px)),
+        ]);
+        input.extend(more.iter().map(|(k, v)| ((*k).to_owned(), v.clone())));
+        input
+    }
+
+    /// Views to compare, spread over those that training did not see, or over all.
+    fn cameras(&self) -> Vec<Camera> {
+        let all = &self.scene.cameras;
+        let held: Vec<&Camera> = all.iter().filter(|c| c.held_out).map(|c| &c.camera).collect();
+        let from = if held.is_empty() { all.iter().map(|c| &c.camera).collect() } else { held };
+        spread(&from, self.options.views).into_iter().map(|c| c.limited_to(self.options.max_side_px)).collect()
+    }
+
+    fn drawing(&self) -> Result<RenderStudy, CliError> {
+        let cameras = self.cameras();
+        let input = self.input(&[("views", cameras.len().to_string())]);
+        let (cloud, settings) = (self.scene.cloud.clone(), &self.scene.settings);
+        Ok(RenderStudy::new(cloud, settings, &cameras, self.options.repeats, input)?)
+    }
+
+    fn training(&self, sweep: Sweep<'_>) -> Result<End, CliError> {
+        let Some(dataset) = &self.dataset else { return Err(CliError::failed("photos are needed")) };
+        let base = TrainConfig {
+            steps: self.options.train_steps,
+            max_side_px: self.options.max_side_px,
+            holdout_every: self.scene.config.holdout_every,
+            ..TrainConfig::default()
+        };
+        let held = dataset.split(base.holdout_every).1.len();
+        let input = self.input(&[("photos", format!("{} + {held} held out", dataset.photos.len() - held))]);
+        sweep(&mut TrainStudy::new(dataset, base, self.options.repeats, input)?)
+    }
+
+    fn features(&self, sweep: Sweep<'_>) -> Result<End, CliError> {
+        let (Some(dataset), Some(masks)) = (&self.dataset, &self.options.masks) else {
+            return Err(CliError::failed("photos and labels are needed"));
+        };
+        let mut segmenter = FileMasks(Labels::open(masks)?);
+        let mut identities = Identities::default();
+        let mut views = |indices: &[usize]| -> Result<Vec<CodeView>, CliError> {
+            let photos = indices.iter().map(|&i| &dataset.photos[i]);
+            let each = photos.map(|p| view(p, &mut segmenter, &mut identities, self.options.max_side_px));
+            Ok(each.collect::<Result<Vec<_>, CliError>>()?.into_iter().flatten().collect())
+        };
+        let (training, held_out) = dataset.split(self.scene.config.holdout_every);
+        let (training, held_out) = (views(&training)?, views(&spread(&held_out, self.options.views))?);
+        if training.is_empty() || held_out.is_empty() {
+            let path = masks.display();
+            return Err(CliError::failed(format!(
+                "{path}: masks of training photos and of held-out photos are needed"
+            )));
+        }
+        let input = self.input(&[
+            ("views", format!("{} + {} held out", training.len(), held_out.len())),
+            ("identities", identities.len().to_string()),
+        ]);
+        let drawn = (&self.scene.cloud, &self.scene.settings);
+        let (steps, repeats) = (&self.options.steps, self.options.repeats);
+        sweep(&mut FeatureStudy::new(drawn, identities, [&training, &held_out], steps, repeats, input)?)
+    }
+}
+
+/// At most `count` of them, evenly spread.
+fn spread<T: Copy>(all: &[T], count: usize) -> Vec<T> {
+    let count = count.min(all.len());
+    (0..count).map(|k| all[k * all.len() / count]).collect()
+}
+
+/// The labels of a photo, its regions matched with known identities by their names; `None` if it has
+/// none.
+fn view(
+    photo: &Photo,
+    segmenter: &mut FileMasks,
+    identities: &mut Identities,
+    max_side_px: u32,
+) -> Result<Option<CodeView>, CliError> {
+    if !segmenter.covers(photo) {
+        return Ok(None);
+    }
+    let found: Vec<FoundMask> = segmenter.segment(photo, max_side_px, &mut Silent)?;
+    let mut ids: Vec<IdentityId> = Vec::with_capacity(found.len());
+    for mask in &found {
+        let parent = mask.parent.map_or(NOBODY, |p| ids[p]);
+        let names: Vec<String> = mask.name.iter().cloned().collect();
+        let known = identities.iter().find(|(_, i)| i.level == mask.level && i.parent == parent && i.names == names);
+        let known = known.map(|(id, _)| id);
+        ids.push(known.unwrap_or_else(|| identities.add(mask.level, parent, names)));
+    }
+    let camera = photo.camera.limited_to(max_side_px);
+    let labels = labels_of(&found, &ids, camera.width_px as usize * camera.height_px as usize);
+    Ok(Some(CodeView { camera, labels }))
+}

@@ -1,0 +1,86 @@
+//! The table that justifies the program's defaults: for every knob what is chosen, what a rule
+//! applied to the measurements would choose, and the numbers behind both. Written as Markdown by
+//! `fmlgs report --defaults`.
+
+use super::document::{Point, Report, Stage};
+use super::front::{Choice, NOISE};
+use super::table::{number, seconds};
+
+/// The tables of all stages of these reports.
+pub fn markdown(reports: &[Report]) -> String {
+    let mut out = format!(
+        "# Defaults and their evidence\n\n\
+         Written by `fmlgs report --defaults`; do not edit. Each row is one knob of a stage. A rule, stated above \
+         the table, is applied to the measurements of that knob's settings and of the default: *chosen* is what \
+         it picks, *least error* the best setting whatever it costs. The default *holds* if it is good enough by \
+         the rule and not more than {:.0} % slower than what is chosen. Times are medians of repeats on the machine \
+         named; compare them within a table only.\n",
+        100.0 * NOISE
+    );
+    for report in reports {
+        out += &format!(
+            "\n## {}\n\nProgram {}, measured on: {}.\n",
+            report.scene,
+            report.program,
+            report.computer.words()
+        );
+        report.stages.iter().for_each(|s| out += &stage(s));
+    }
+    out
+}
+
+fn stage(stage: &Stage) -> String {
+    let choices = stage.choices();
+    if choices.is_empty() && stage.orders.is_empty() {
+        return String::new();
+    }
+    let input: Vec<String> = stage.input.iter().map(|(k, v)| format!("{k} {v}")).collect();
+    let mut out = format!("\n### {}\n\nSeconds of {}; {}", stage.name.title(), stage.secs_of, stage.reference);
+    out += &format!(" ({}; {} repeats). ", input.join(", "), stage.seeds.len());
+    if !stage.complete() {
+        out += &format!("Stopped early: {} of {} settings. ", stage.points.len(), stage.planned);
+    }
+    if !choices.is_empty() {
+        out += &format!("Chosen is {}.\n\n", stage.rule.words());
+        out += "| knob | default | chosen | least error | holds |\n|---|---|---|---|---|\n";
+        choices.iter().for_each(|c| out += &row(stage, c));
+    }
+    if !stage.orders.is_empty() {
+        out += "\n| convergence | expected order | observed | agrees |\n|---|---|---|---|\n";
+        for o in &stage.orders {
+            let agrees = if o.agrees { "yes" } else { "**no**" };
+            out += &format!("| {} | {} | {:.2} | {agrees} |\n", cell(&o.what), o.expected, o.observed);
+        }
+    }
+    out
+}
+
+fn row(stage: &Stage, choice: &Choice<'_>) -> String {
+    let with = |p: &Point| {
+        let value = p.values.get(&stage.rule.measure).map_or_else(String::new, |v| number(v.median));
+        format!("{}: {value} in {}", cell(&p.setting), seconds(p.secs.median))
+    };
+    let or_default = |p: &Point| if p.default { "the default".to_owned() } else { with(p) };
+    let holds = if choice.holds { "yes" } else { "**no**" };
+    let (chosen, best) = (or_default(choice.chosen), or_default(choice.best));
+    format!("| {} | {} | {chosen} | {best} | {holds} |\n", cell(choice.method), with(choice.default))
+}
+
+fn cell(text: &str) -> String {
+    text.replace('|', "\\|")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::tests::example;
+
+    #[test]
+    fn every_knob_has_its_row() {
+        let text = markdown(&[example()]);
+        let row = text.lines().find(|l| l.starts_with("| cut-off")).expect("a row");
+        assert!(row.contains("1/64: 0.004000 in 10.00 ms") && row.ends_with("| **no** |"), "{row}");
+        assert!(text.contains("| samples | 2 | 2.00 | yes |"));
+        assert!(text.contains("at most 1.0e-2 or 10 % over the least"));
+    }
+}

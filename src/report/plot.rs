@@ -1,0 +1,191 @@
+//! A stage as a picture: error over seconds, both logarithmic, one line per knob, the Pareto front
+//! under them.
+
+use plotters::coord::combinators::LogCoord;
+use plotters::prelude::*;
+
+use super::document::{Measure, Point, Stage};
+
+/// Size of the picture in px.
+const SIZE: (u32, u32) = (860, 520);
+/// Errors below this are drawn at it: a logarithm of 0 has no place.
+pub const LEAST: f64 = 1e-7;
+
+/// Colours of knobs, in turn; to be told apart by the colour-blind (Okabe and Ito).
+pub const COLORS: [[u8; 3]; 7] =
+    [[0, 114, 178], [213, 94, 0], [0, 158, 115], [204, 121, 167], [86, 180, 233], [230, 159, 0], [120, 120, 120]];
+
+/// Where a point is in the plot: seconds and error, both above 0.
+pub fn place(point: &Point, measure: &Measure) -> Option<(f64, f64)> {
+    let secs = point.secs.median;
+    let error = point.error(measure)?;
+    (secs.is_finite() && error.is_finite()).then(|| (secs.max(1e-9), error.max(LEAST)))
+}
+
+/// The stage as SVG, for one of its measures.
+///
+/// # Errors
+/// If there is nothing to draw, in words.
+pub fn svg(stage: &Stage, measure: &Measure) -> Result<String, String> {
+    let mut picture = String::new();
+    draw(stage, measure, &mut picture).map_err(|e| e.to_string())?;
+    Ok(picture)
+}
+
+type Area<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<LogCoord<f64>, LogCoord<f64>>>;
+type Failed = Box<dyn std::error::Error>;
+
+fn draw(stage: &Stage, measure: &Measure, picture: &mut String) -> Result<(), Failed> {
+    let places: Vec<(f64, f64)> = stage.points.iter().filter_map(|p| place(p, measure)).collect();
+    if places.is_empty() {
+        return Err(format!("nothing was measured of {}", measure.name).into());
+    }
+    let range = |axis: fn(&(f64, f64)) -> f64, spare: f64| {
+        let (least, most) = places.iter().map(axis).fold((f64::INFINITY, 0.0_f64), |(l, m), v| (l.min(v), m.max(v)));
+        least / spare..most * spare
+    };
+    let root = SVGBackend::with_string(picture, SIZE).into_drawing_area();
+    root.fill(&WHITE)?;
+    let mut chart = ChartBuilder::on(&root)
+        .caption(format!("{}: error over time", stage.name.title()), ("sans-serif", 18))
+        .margin(14)
+        .x_label_area_size(44)
+        .y_label_area_size(76)
+        .build_cartesian_2d(range(|p| p.0, 1.5).log_scale(), range(|p| p.1, 1.6).log_scale())?;
+    let short = |v: &f64| super::table::number(*v);
+    chart
+        .configure_mesh()
+        .x_desc(format!("seconds of {}", stage.secs_of))
+        .y_desc(measure.error_name())
+        .x_label_formatter(&short)
+        .y_label_formatter(&short)
+        .light_line_style(BLACK.mix(0.05))
+        .draw()?;
+    front(stage, measure, &mut chart)?;
+    for (k, method) in stage.methods().into_iter().enumerate() {
+        series(stage, measure, method, k, &mut chart)?;
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::UpperRight)
+        .background_style(WHITE.mix(0.85))
+        .border_style(BLACK.mix(0.3))
+        .draw()?;
+    root.present()?;
+    Ok(())
+}
+
+/// A wide pale line under everything: nothing is both faster and better than what it joins.
+fn front(stage: &Stage, measure: &Measure, chart: &mut Area<'_, '_>) -> Result<(), Failed> {
+    let front: Vec<(f64, f64)> =
+        stage.front(measure).into_iter().filter_map(|i| place(&stage.points[i], measure)).collect();
+    let style = BLACK.mix(0.14).stroke_width(9);
+    chart
+        .draw_series(LineSeries::new(front, style))?
+        .label("Pareto front")
+        .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 16, y)], style));
+    Ok(())
+}
+
+fn series(stage: &Stage, measure: &Measure, method: &str, k: usize, chart: &mut Area<'_, '_>) -> Result<(), Failed> {
+    let [r, g, b] = COLORS[k % COLORS.len()];
+    let color = RGBColor(r, g, b);
+    let points: Vec<&Point> = stage.points.iter().filter(|p| p.method == method).collect();
+    for curve in points.iter().map(|p| &p.curve).filter(|c| c.len() > 1) {
+        let way = curve.iter().map(|c| (c[0].max(1e-9), measure.error(c[1]).max(LEAST)));
+        chart.draw_series(LineSeries::new(way, color.mix(0.35)))?;
+    }
+    let mut line: Vec<(f64, f64)> = points.iter().filter_map(|p| place(p, measure)).collect();
+    line.sort_by(|a, b| a.0.total_cmp(&b.0));
+    chart.draw_series(LineSeries::new(line.iter().copied(), color.mix(0.6)))?;
+    // How far repeats are apart.
+    for p in &points {
+        let Some((_, error)) = place(p, measure) else { continue };
+        let [from, to] = [p.secs.least, p.secs.most].map(|s| (s.max(1e-9), error));
+        chart.draw_series(LineSeries::new([from, to], color.mix(0.5)))?;
+    }
+    let size = if method == "default" { 7 } else { 4 };
+    let (circles, legend) = (line.into_iter(), color.filled());
+    chart
+        .draw_series(circles.map(|at| Circle::new(at, size, legend)))?
+        .label(method)
+        .legend(move |(x, y)| Circle::new((x + 8, y), size, legend));
+    Ok(())
+}
+
+/// An order of convergence as SVG: error over work, with the slope that theory gives.
+///
+/// # Errors
+/// If there is nothing to draw, in words.
+pub fn order_svg(order: &super::document::Order) -> Result<String, String> {
+    let mut picture = String::new();
+    draw_order(order, &mut picture).map_err(|e| e.to_string())?;
+    Ok(picture)
+}
+
+fn draw_order(order: &super::document::Order, picture: &mut String) -> Result<(), Failed> {
+    let pairs: Vec<(f64, f64)> =
+        order.pairs.iter().filter(|p| p[0] > 0.0 && p[1] > 0.0).map(|p| (p[0], p[1])).collect();
+    let [Some(first), Some(last)] = [pairs.first(), pairs.last()] else { return Err("no error to draw".into()) };
+    let least = pairs.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
+    let most = pairs.iter().map(|p| p.1).fold(0.0_f64, f64::max);
+    let root = SVGBackend::with_string(picture, (420, 300)).into_drawing_area();
+    root.fill(&WHITE)?;
+    let mut chart: ChartContext<'_, SVGBackend<'_>, Cartesian2d<LogCoord<f64>, LogCoord<f64>>> =
+        ChartBuilder::on(&root)
+            .caption(&order.what, ("sans-serif", 15))
+            .margin(10)
+            .x_label_area_size(36)
+            .y_label_area_size(66)
+            .build_cartesian_2d((first.0 / 1.2..last.0 * 1.2).log_scale(), (least / 2.0..most * 2.0).log_scale())?;
+    let short = |v: &f64| super::table::number(*v);
+    chart
+        .configure_mesh()
+        .x_desc("work")
+        .y_desc("error")
+        .x_label_formatter(&short)
+        .y_label_formatter(&short)
+        .light_line_style(BLACK.mix(0.05))
+        .draw()?;
+    let slope = |x: f64| first.1 * (x / first.0).powf(-order.expected);
+    chart.draw_series(LineSeries::new([(first.0, first.1), (last.0, slope(last.0))], BLACK.mix(0.3)))?;
+    let [r, g, b] = COLORS[0];
+    let color = RGBColor(r, g, b);
+    chart.draw_series(LineSeries::new(pairs.iter().copied(), color))?;
+    chart.draw_series(pairs.iter().map(|&at| Circle::new(at, 4, color.filled())))?;
+    root.present()?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::tests::example;
+
+    #[test]
+    fn every_point_is_drawn() {
+        let stage = example().stages.remove(0);
+        let picture = svg(&stage, &stage.measures[0]).expect("drawn");
+        // Four points and two legends.
+        assert_eq!(picture.matches("<circle").count(), 4 + 2);
+        assert!(picture.contains("cut-off") && picture.contains("Pareto front") && picture.ends_with("</svg>\n"));
+        let empty = Stage { points: vec![], ..stage.clone() };
+        assert!(svg(&empty, &stage.measures[0]).is_err());
+    }
+
+    #[test]
+    fn an_error_of_nothing_has_a_place() {
+        let mut stage = example().stages.remove(0);
+        let perfect = stage.points[0].values.get_mut("RMS").expect("measured");
+        *perfect = crate::report::Sample::default();
+        perfect.add(0.0);
+        assert_eq!(place(&stage.points[0], &stage.measures[0]).map(|p| p.1), Some(LEAST));
+        assert!(svg(&stage, &stage.measures[0]).is_ok());
+    }
+
+    #[test]
+    fn an_order_is_drawn_with_its_slope() {
+        let order = &example().stages[0].orders[0];
+        assert_eq!(order_svg(order).expect("drawn").matches("<circle").count(), 2);
+    }
+}

@@ -1,0 +1,55 @@
+//! What is swept, one file per stage of the program.
+
+pub mod features;
+pub mod render;
+pub mod train;
+
+use std::collections::BTreeMap;
+
+use crate::report::document::Form;
+use crate::report::{Case, Measure, Rule, Stage, StageName};
+
+/// What a sweep is run on, in words: name and value.
+pub type Input = BTreeMap<String, String>;
+
+/// A stage that nothing was measured of yet.
+fn stage(
+    name: StageName,
+    secs_of: &str,
+    reference: &str,
+    input: &Input,
+    seeds: u32,
+    rule: Rule,
+    measures: Vec<Measure>,
+) -> Stage {
+    Stage {
+        name,
+        secs_of: secs_of.into(),
+        reference: reference.into(),
+        input: input.clone(),
+        seeds: (0..u64::from(seeds)).collect(),
+        planned: 0,
+        measures,
+        rule,
+        points: Vec::new(),
+        orders: Vec::new(),
+    }
+}
+
+/// Settings with what they mean to the study itself.
+struct Plans<P>(Vec<(Case, P)>);
+
+impl<P> Plans<P> {
+    fn cases(&self) -> Vec<Case> {
+        self.0.iter().map(|(case, _)| case.clone()).collect()
+    }
+
+    fn of(&self, case: &Case) -> Option<&P> {
+        self.0.iter().find(|(c, _)| c == case).map(|(_, plan)| plan)
+    }
+}
+
+/// Mean IoU, of which there are several.
+fn overlap(name: &str, meaning: &str) -> Measure {
+    Measure::new(name, "", Form::Share, meaning)
+}
