@@ -7,6 +7,26 @@ mod cli_support;
 use cli_support::{Done, command, folder, tiny_dataset};
 use serde_json::Value;
 
+#[test]
+fn a_start_at_half_the_size_ends_nearly_as_well() {
+    let folder = folder();
+    let photos = tiny_dataset(folder.path());
+    let photos = photos.to_str().unwrap();
+    let psnr = |name: &str, more: &[&str]| -> f64 {
+        let scene = folder.path().join(name);
+        let scene = scene.to_str().unwrap();
+        let train = ["train", photos, "--out", scene, "--steps", "200", "--backend", "cpu", "--eval-every", "0", "-q"];
+        Done::from(command(&[&train[..], more].concat()).output().unwrap()).ok();
+        Done::from(command(&["eval", scene, "--json"]).output().unwrap()).ok().json()["psnr"].as_f64().unwrap()
+    };
+    let (full, coarse) = (psnr("full", &[]), psnr("coarse", &["--coarse-share", "0.5"]));
+    assert!(coarse > full - 2.0, "{coarse} dB against {full} dB");
+    // Not the same run: the half-size photos were really used.
+    assert!((coarse - full).abs() > 1e-6);
+    let wrong = command(&["train", photos, "--out", "x", "--coarse-share", "1.5"]).output().unwrap();
+    Done::from(wrong).fails_with(2);
+}
+
 /// The points of a stage of a report.
 fn points<'a>(report: &'a Value, stage: &str) -> &'a [Value] {
     let stages = report["stages"].as_array().unwrap();

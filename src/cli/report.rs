@@ -174,7 +174,8 @@ fn printed(stage: &Stage) -> String {
         let agrees = if o.agrees { "agrees" } else { "does NOT agree" };
         format!("{}: order {:.2} seen, {} expected: {agrees}\n", o.what, o.observed, o.expected)
     });
-    format!("{head}\n{}\n{}", output::table(&stage.table()), orders.collect::<String>())
+    let left_out = stage.left_out.iter().map(|text| format!("left out: {text}\n"));
+    format!("{head}\n{}\n{}", output::table(&stage.table()), orders.chain(left_out).collect::<String>())
 }
 
 /// Everything but the JSON, which is there already.

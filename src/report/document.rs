@@ -232,6 +232,9 @@ pub struct Stage {
     /// Orders of convergence.
     #[serde(default)]
     pub orders: Vec<Order>,
+    /// Settings that could not be measured, and why.
+    #[serde(default)]
+    pub left_out: Vec<String>,
 }
 
 impl Stage {

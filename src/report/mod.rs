@@ -60,6 +60,7 @@ mod tests {
                 point("cut-off", "1/1000", 0.03, 0.0009999),
             ],
             orders: vec![Order::fit("samples", "of a pixel", vec![[1.0, 1.0], [2.0, 0.25]], 2.0, 0.1, 0.0)],
+            left_out: vec![],
         };
         Report {
             version: VERSION,

@@ -50,6 +50,9 @@ fn section(stage: &Stage) -> String {
             &format!(" <span class=\"no\">Stopped early: {} of {} settings.</span>", stage.points.len(), stage.planned);
     }
     out += "</p>\n";
+    for text in &stage.left_out {
+        out += &format!("<p class=\"no\">Left out: {}</p>\n", escaped(text));
+    }
     for (i, measure) in stage.measures.iter().enumerate() {
         let Ok(picture) = svg(stage, measure) else { continue };
         // The first is shown, the others on request.

@@ -4,7 +4,7 @@
 use std::time::Instant;
 
 use super::document::{Knobs, Order, Point, Stage};
-use crate::pipeline::observer::{Observer, Progress, Signal};
+use crate::pipeline::observer::{Level, Observer, Progress, Signal};
 
 /// A setting to be measured.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,7 +91,8 @@ pub enum End {
 /// the same sweep earlier; it is gone on with. `keep` is handed the stage after every measurement.
 ///
 /// # Errors
-/// If a setting cannot be measured, or `keep` fails. What was measured before has been kept.
+/// If orders cannot be measured, or `keep` fails. What was measured before has been kept. A setting that
+/// cannot be measured is left out, and the stage says so.
 pub fn sweep(
     study: &mut dyn Study,
     before: Option<Stage>,
@@ -110,6 +111,7 @@ pub fn sweep(
     let total = (cases.len() * stage.seeds.len()) as u64;
     let measured = |stage: &Stage| stage.points.iter().map(|p| p.secs.each.len() as u64).sum::<u64>().min(total);
     let first = measured(&stage);
+    let mut impossible: Vec<&Case> = Vec::new();
     let start = Instant::now();
     if stage.orders.is_empty() {
         stage.orders = study.orders(observer)?;
@@ -117,7 +119,7 @@ pub fn sweep(
     }
     for (repeat, seed) in stage.seeds.clone().into_iter().enumerate() {
         for case in &cases {
-            if stage.points.iter().any(|p| case.is(p) && p.secs.each.len() > repeat) {
+            if impossible.contains(&case) || stage.points.iter().any(|p| case.is(p) && p.secs.each.len() > repeat) {
                 continue;
             }
             if observer.signal() == Signal::Cancel {
@@ -126,8 +128,17 @@ pub fn sweep(
             if start.elapsed().as_secs_f64() >= budget_secs {
                 return Ok((stage, End::OutOfTime));
             }
-            let Some(trial) = study.run(case, seed, observer)? else { return Ok((stage, End::Cancelled)) };
-            stage.add(case, &trial);
+            match study.run(case, seed, observer) {
+                Ok(Some(trial)) => stage.add(case, &trial),
+                Ok(None) => return Ok((stage, End::Cancelled)),
+                // One setting that fails is no reason to give up the others.
+                Err(why) => {
+                    let text = format!("{}, {}: {why}", case.method, case.setting);
+                    observer.note(Level::Warning, format!("Left out: {text}"));
+                    stage.left_out.push(text);
+                    impossible.push(case);
+                }
+            }
             keep(&stage)?;
             let (done, elapsed_secs) = (measured(&stage), start.elapsed().as_secs_f64());
             let rate = (done - first) as f64 / elapsed_secs.max(1e-9);
@@ -178,11 +189,12 @@ mod tests {
     struct Counting {
         ran: Vec<(String, u64)>,
         stop_after: usize,
+        broken: Option<&'static str>,
     }
 
     impl Study for Counting {
         fn stage(&self) -> Stage {
-            Stage { seeds: vec![0, 1, 2], points: vec![], ..example().stages.remove(0) }
+            Stage { seeds: vec![0, 1, 2], points: vec![], orders: vec![], ..example().stages.remove(0) }
         }
         fn cases(&self) -> Vec<Case> {
             vec![Case::default("all"), Case::new("knob", "left", &[]), Case::new("knob", "right", &[])]
@@ -190,6 +202,9 @@ mod tests {
         fn run(&mut self, case: &Case, seed: u64, _: &mut dyn Observer) -> Result<Option<Trial>, StudyError> {
             if self.ran.len() == self.stop_after {
                 return Ok(None);
+            }
+            if self.broken == Some(case.setting.as_str()) {
+                return Err(failed("it is broken"));
             }
             self.ran.push((case.setting.clone(), seed));
             Ok(Some(Trial { secs: 1.0 + seed as f64, values: vec![("RMS", 0.5), ("none", f64::NAN)], curve: vec![] }))
@@ -231,6 +246,14 @@ mod tests {
         let mut nothing = Counting { stop_after: usize::MAX, ..Counting::default() };
         assert_eq!(kept(&mut nothing, Some(stage), f64::INFINITY).1, End::Finished);
         assert!(nothing.ran.is_empty());
+    }
+
+    #[test]
+    fn a_setting_that_fails_is_left_out_and_named() {
+        let mut study = Counting { stop_after: usize::MAX, broken: Some("left"), ..Counting::default() };
+        let (stage, end, _) = kept(&mut study, None, f64::INFINITY);
+        assert_eq!((end, stage.points.len(), study.ran.len(), stage.complete()), (End::Finished, 2, 6, false));
+        assert_eq!(stage.left_out, ["knob, left: it is broken"]);
     }
 
     #[test]

@@ -3,8 +3,8 @@
 use super::TrainView;
 use crate::scene::PhotoPixels;
 
-/// Sides below this are not halved.
-const LEAST_PX: u32 = 32;
+/// Halves have at least this many px along their sides.
+const LEAST_PX: u32 = 16;
 
 /// The views at half their size, each 2 x 2 pixels as their mean; pixels that a photo does not cover do
 /// not count.
@@ -67,7 +67,7 @@ mod tests {
         let half = &halved(&[view(64, 64, Some(coverage))])[0];
         assert_eq!(half.pixels.rgb[0], [0, 0, 100], "only the covered one");
         assert_eq!(half.pixels.coverage.as_ref().expect("kept")[0], 64);
-        let small = view(40, 40, None);
+        let small = view(30, 30, None);
         assert_eq!(halved(std::slice::from_ref(&small))[0].camera, small.camera);
     }
 }

@@ -36,6 +36,7 @@ fn stage(
         rule,
         points: Vec::new(),
         orders: Vec::new(),
+        left_out: Vec::new(),
     }
 }
 

@@ -243,7 +243,8 @@ mod tests {
             trial.values.iter().find(|v| v.0 == name).expect("measured").1
         };
         let (default, once) = (value("default", "", "too near"), value("samples along legs", "1 along", "too near"));
-        assert!(default < 1e-3 && once > 10.0 * default.max(1e-3), "{default} {once}");
+        // Poses in matter are pushed out of it, so what is left is little, but there.
+        assert!(default == 0.0 && once > 0.0, "{default} {once}");
         let (few, many) = (value("frames", "15", "arc-length error"), value("frames", "600", "arc-length error"));
         assert!(few > 4.0 * many, "{few} {many}");
         let paper = value("the paper's interpolation", "150", "too near");
