@@ -15,6 +15,7 @@ pub mod gpu;
 pub use backend::{Backend, BackendChoice, Cost, DrawError};
 
 use crate::math::Real;
+use crate::math::finite::NotFinite;
 use crate::scene::CameraError;
 
 /// Side of a tile in px, on every backend.
@@ -51,6 +52,9 @@ pub enum RenderError {
         /// Gaussians times channels.
         want: usize,
     },
+    /// A stage left a number that is none; looked for under `debug-validation` only.
+    #[error(transparent)]
+    NotFinite(#[from] NotFinite),
 }
 
 /// How to draw.
