@@ -38,6 +38,16 @@ pub fn cases() -> Vec<Case> {
                 cancel.is_none() && kept == Some(vec![1.0, 0.0]),
             )
         }),
+        language("opposite embeddings are least alike", || {
+            let (v, w) = ([0.6, 0.8, 0.0], [-0.6, -0.8, 0.0]);
+            let sideways = [0.8_f32, -0.6, 0.0];
+            let s =
+                [score(advantage(&v, &w, &[sideways.to_vec()]), 10.0), score(advantage(&v, &v, &[w.to_vec()]), 10.0)];
+            Finding::is(
+                format!("score {:.1e} where nothing speaks for it, {} where all does", s[0], s[1]),
+                s[0] < 1e-4 && s[1] > 0.999,
+            )
+        }),
         language("embeddings of length 1e-30 and 1e30", || {
             let error = [1e-30_f32, 1e30].map(|s| {
                 let u = unit(&[3.0 * s, 4.0 * s]).unwrap_or_default();

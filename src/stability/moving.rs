@@ -17,6 +17,16 @@ fn navigator(places: &[[f64; 3]]) -> Navigator {
     Navigator::new(&cloud, &cameras(places), DVec3::NEG_Y)
 }
 
+/// An opaque wall across the axis.
+fn wall() -> GaussianCloud {
+    let one: GaussianCloud = one([0.1, 0.1, 0.01], [1.0, 0.0, 0.0, 0.0], 6.0).cast();
+    let mut wall = one.select(&[0; 81 * 81]);
+    for (i, p) in wall.positions.iter_mut().enumerate() {
+        *p = [(i % 81) as f32 * 0.1 - 4.0, (i / 81) as f32 * 0.1 - 4.0, 0.0];
+    }
+    wall
+}
+
 fn pose(x: f64, turn: f64) -> Pose {
     Pose { center: DVec3::new(x, 0.0, -2.0), world_from_camera: DMat3::from_rotation_y(turn), fov_y_rad: 0.8 }
 }
@@ -45,6 +55,22 @@ pub fn cases() -> Vec<Case> {
         moving("no cameras", || {
             let way = navigator(&[]).legs(DVec3::new(0.0, 0.0, -2.0), DVec3::new(0.0, 0.0, 2.0));
             Finding::is(format!("{:?}", way.as_ref().err()), way.is_err())
+        }),
+        moving("a graph in two parts", || {
+            // Cameras on both sides of a wall that ends nowhere in the known box.
+            let places: Vec<[f64; 3]> = (0..18)
+                .map(|i| {
+                    let side = if i < 9 { -1.0 } else { 1.0 };
+                    [f64::from(i % 3) - 1.0, f64::from(i / 3 % 3) - 1.0, side]
+                })
+                .collect();
+            let n = Navigator::new(&wall(), &cameras(&places), DVec3::NEG_Y);
+            let parts = n.graph.parts(&n.matter);
+            let way = n.legs(DVec3::new(0.0, 0.0, -1.0), DVec3::new(0.0, 0.0, 1.0));
+            let parted = matches!(way, Err(NoWay::Parted { .. }));
+            let same = n.legs(DVec3::new(0.0, 0.0, -1.0), DVec3::new(1.0, 0.0, -1.0));
+            let count = parts.iter().max().map_or(0, |m| m + 1);
+            Finding::is(format!("{count} parts; between them: {:?}", way.err()), parted && same.is_ok() && count >= 2)
         }),
         moving("a goal inside matter", || {
             let way = navigator(&[[0.0, 0.0, -2.0], [1.0, 0.0, -2.0]]).legs(DVec3::new(0.0, 0.0, -2.0), DVec3::ZERO);

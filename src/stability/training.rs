@@ -6,6 +6,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::drawing::{camera, one};
 use super::{Case, Finding};
+use crate::pipeline::train::checkpoint::{self, Header};
 use crate::pipeline::train::trainer::Trainer;
 use crate::pipeline::train::{TrainConfig, TrainView};
 use crate::render::cpu::Renderer;
@@ -18,7 +19,7 @@ use crate::scene::{GaussianCloud, PhotoPixels};
 const STEPS: u64 = 60;
 
 /// A photo of one grey level.
-fn flat(level: u8) -> TrainView {
+pub fn flat(level: u8) -> TrainView {
     let at = camera(48, 32);
     let rgb = vec![[level; 3]; 48 * 32];
     TrainView {
@@ -50,45 +51,61 @@ fn start() -> GaussianCloud {
     cloud
 }
 
-/// Losses of a short training and how many Gaussians were left as they were; `Err` with what ended it.
-fn losses(cloud: GaussianCloud, view: TrainView, change: impl Fn(&mut Trainer)) -> Result<(Vec<f64>, usize), Finding> {
-    let config = TrainConfig { steps: STEPS, densify: false, sh_degree: 0, ..TrainConfig::default() };
-    let mut trainer = Trainer::new(cloud, &config, [0.0; 3], 1.0, Pcg64Mcg::seed_from_u64(5));
-    change(&mut trainer);
+/// A trainer of these Gaussians.
+pub fn trainer(cloud: GaussianCloud, steps: u64, densify: bool, extent: f64) -> Trainer {
+    let config = TrainConfig { steps, densify, sh_degree: 0, ..TrainConfig::default() };
+    Trainer::new(cloud, &config, [0.0; 3], extent, Pcg64Mcg::seed_from_u64(5))
+}
+
+/// What a short training came to.
+struct Trained {
+    trainer: Trainer,
+    losses: Vec<f64>,
+    /// Gaussians left as they were, and gradients cut.
+    left: [usize; 2],
+}
+
+/// Trains for so many steps, and does something before each.
+fn train(
+    mut trainer: Trainer,
+    view: TrainView,
+    steps: u64,
+    mut before: impl FnMut(&mut Trainer),
+) -> Result<Trained, Finding> {
     let views = [view];
-    let (mut losses, mut skipped) = (Vec::new(), 0);
-    for _ in 0..STEPS {
+    let (mut losses, mut left) = (Vec::new(), [0; 2]);
+    for _ in 0..steps {
+        before(&mut trainer);
         let results = trainer.advance(&views);
         let results = results.map_err(|e| Finding::is(format!("it stopped with a reason: {e}"), true))?;
-        losses.extend(results.iter().map(|r| r.loss));
-        skipped += results.iter().map(|r| r.skipped).sum::<usize>();
+        for r in &results {
+            losses.push(r.loss);
+            left = [left[0] + r.skipped, left[1] + r.outliers];
+        }
+        trainer.control_density().map_err(|e| Finding::is(format!("it stopped with a reason: {e}"), true))?;
     }
-    match trainer.cloud.validate() {
-        Ok(()) => Ok((losses, skipped)),
+    let finite = trainer.moments.iter().try_for_each(GaussianCloud::validate);
+    match trainer.cloud.validate().and(finite) {
+        Ok(()) => Ok(Trained { trainer, losses, left }),
         Err(e) => Err(Finding::is(format!("after training: {e}"), false)),
     }
 }
 
-/// Trains for a while; all that comes out is finite. A run under extremes need not improve.
-fn trained(cloud: GaussianCloud, view: TrainView, change: impl Fn(&mut Trainer)) -> Finding {
-    match losses(cloud, view, change) {
-        Ok((losses, skipped)) => {
-            let (first, last) = ends(&losses);
-            let outcome = format!("loss {first:.4} to {last:.4}, {skipped} left as they were");
-            Finding::is(outcome, first.is_finite() && last.is_finite())
-        }
-        Err(finding) => finding,
-    }
+fn short(cloud: GaussianCloud, view: TrainView, change: impl Fn(&mut Trainer)) -> Result<Trained, Finding> {
+    let mut trainer = trainer(cloud, STEPS, false, 1.0);
+    change(&mut trainer);
+    train(trainer, view, STEPS, |_| {})
 }
 
-/// Trains, and the loss has to fall.
+/// Trains, and the loss has to fall, or the training to stop with a reason.
 fn improves(cloud: GaussianCloud, view: TrainView, change: impl Fn(&mut Trainer)) -> Finding {
-    match losses(cloud, view, change) {
-        Ok((losses, _)) => {
+    match short(cloud, view, change) {
+        Ok(Trained { losses, left, .. }) => {
             let (first, last) = ends(&losses);
-            Finding::within(format!("loss {first:.4} to {last:.4}"), last / first, 1.0)
+            let outcome = format!("loss {first:.4} to {last:.4}, {} left as they were, {} cut", left[0], left[1]);
+            Finding { holds: last < first, ..Finding::within(outcome, last / first, 1.0) }
         }
-        Err(finding) => Finding { holds: false, ..finding },
+        Err(finding) => finding,
     }
 }
 
@@ -98,36 +115,187 @@ fn ends(losses: &[f64]) -> (f64, f64) {
     (or_nan(losses.first()), or_nan(losses.last()))
 }
 
+/// The same training, once undisturbed and once with one Gaussian's colour set to 1e15 for one step,
+/// which makes gradients of 1e5 and more for everything around it.
+fn outlier() -> Finding {
+    let run = |hit: bool| {
+        let trainer = trainer(start(), 400, false, 1.0);
+        train(trainer, blob(), 400, move |t| {
+            let flash = [1e15_f32; 3];
+            match t.step {
+                100 if hit => t.cloud.sh[3] = flash,
+                101 if hit => t.cloud.sh[3] = [0.0; 3],
+                _ => {}
+            }
+        })
+    };
+    let (calm, hit) = match (run(false), run(true)) {
+        (Ok(calm), Ok(hit)) => (calm, hit),
+        (Err(f), _) | (_, Err(f)) => return Finding { holds: false, ..f },
+    };
+    let mean = |t: &Trained| t.losses[350..].iter().sum::<f64>() / 50.0;
+    let flash = hit.losses.get(100).copied().unwrap_or(f64::NAN);
+    let outcome = format!(
+        "loss {:.4} to {:.4} ({:.4} undisturbed) past {flash:.0e}; {} left as they were, {} cut",
+        ends(&hit.losses).0,
+        mean(&hit),
+        mean(&calm),
+        hit.left[0],
+        hit.left[1]
+    );
+    let finding = Finding::within(outcome, mean(&hit) / mean(&calm) - 1.0, 0.5);
+    Finding { holds: finding.holds && hit.left[1] > 0 && calm.left == [0, 0], ..finding }
+}
+
+/// A scene 1e-4 units large: the loss is 1e8 times as curved along positions as along log-scales.
+fn stiff() -> Finding {
+    const SIZE: f64 = 1e-4;
+    let mut view = blob();
+    // The same picture from 1e4 times as far with that focal length: nothing is nearer than the near plane.
+    let small = |cloud: &mut GaussianCloud| {
+        cloud.positions.iter_mut().flatten().for_each(|v| *v *= SIZE as f32);
+        cloud.log_scales.iter_mut().flatten().for_each(|v| *v += SIZE.ln() as f32);
+    };
+    view.camera.focal_px *= 1.0 / SIZE;
+    let mut cloud = start();
+    small(&mut cloud);
+    let curved = curvatures(&cloud, &view);
+    let trainer = trainer(cloud, 300, false, SIZE);
+    match train(trainer, view, 300, |_| {}) {
+        Ok(t) => {
+            let (first, last) = ends(&t.losses);
+            let [position, scale, opacity] = curved;
+            let text = format!(
+                "curvatures {position:.1e}, {scale:.1e}, {opacity:.1e}; loss {first:.4} to {last:.4}, {} cut",
+                t.left[1]
+            );
+            let finding = Finding::within(text, last / first, 0.5);
+            Finding { holds: finding.holds && position > 1e7 * scale.max(opacity), ..finding }
+        }
+        Err(finding) => Finding { holds: false, ..finding },
+    }
+}
+
+/// Second derivatives of the mean squared error along a position, a log-scale and an opacity logit, the
+/// largest of all Gaussians: by central differences in double precision.
+fn curvatures(cloud: &GaussianCloud, view: &TrainView) -> [f64; 3] {
+    let wide = cloud.cast::<f64>();
+    let error = |c: &GaussianCloud<f64>| {
+        let frame = Renderer::<f64>::new().render(c, Features::NONE, &view.camera, &RenderSettings::default());
+        let Ok(frame) = frame else { return f64::NAN };
+        let each = frame.color.iter().enumerate().flat_map(|(k, plane)| {
+            plane.iter().zip(&view.pixels.rgb).map(move |(v, p)| (v - f64::from(p[k]) / 255.0).powi(2))
+        });
+        each.sum::<f64>() / (3 * view.pixels.len()) as f64
+    };
+    let middle = error(&wide);
+    type Move = fn(&mut GaussianCloud<f64>, usize, f64);
+    let moves: [(Move, f64); 3] = [
+        (|c, i, h| c.positions[i][0] += h, 1e-6),
+        (|c, i, h| c.log_scales[i][0] += h, 1e-2),
+        (|c, i, h| c.opacity_logits[i] += h, 1e-2),
+    ];
+    moves.map(|(shift, h)| {
+        let at = |i: usize, h: f64| {
+            let mut moved = wide.clone();
+            shift(&mut moved, i, h);
+            error(&moved)
+        };
+        let curvature = |i: usize| ((at(i, h) + at(i, -h) - 2.0 * middle) / (h * h)).abs();
+        (0..wide.len()).map(curvature).fold(0.0, f64::max)
+    })
+}
+
+/// A training stopped and gone on with, through a checkpoint on disk, against one that went through;
+/// density control on the way. Without its moments it goes another way.
+fn resumed() -> Finding {
+    const STEPS: u64 = 120;
+    const STOP: u64 = 55;
+    let config = TrainConfig { steps: STEPS, sh_degree: 0, ..TrainConfig::default() };
+    let fresh = || trainer(start(), STEPS, true, 1.0);
+    let on = |t: Trainer, steps: u64| train(t, blob(), steps, |_| {}).map(|t| t.trainer);
+    let run = || -> Result<[Trainer; 3], Finding> {
+        let broken = |e: String| Finding::is(e, false);
+        let (through, half) = (on(fresh(), STEPS)?, on(fresh(), STOP)?);
+        let folder = tempfile::tempdir().map_err(|e| broken(e.to_string()))?;
+        let path = folder.path().join(checkpoint::FILE);
+        let header = Header {
+            config: config.clone(),
+            photos: Vec::new(),
+            step: half.step,
+            secs: 0.0,
+            count: half.cloud.len(),
+            sh_degree: half.cloud.sh_degree,
+            origin: half.cloud.origin,
+            rng: half.rng.clone(),
+            round: half.round.clone(),
+            budget: half.budget,
+            damping: half.schedule.damping,
+            history: Default::default(),
+        };
+        checkpoint::save(&path, &half, &header).map_err(|e| broken(e.to_string()))?;
+        let loaded = || -> Result<Trainer, Finding> {
+            let saved = checkpoint::load(&path).map_err(|e| broken(e.to_string()))?;
+            let saved = saved.ok_or_else(|| broken("the checkpoint is gone".into()))?;
+            let mut t = fresh();
+            (t.cloud, t.moments, t.stats) = (saved.cloud, saved.moments, saved.stats);
+            (t.rng, t.round, t.step) = (saved.header.rng, saved.header.round, saved.header.step);
+            Ok(t)
+        };
+        let mut forgetful = loaded()?;
+        forgetful.moments[1] = forgetful.moments[0].clone();
+        Ok([through, on(loaded()?, STEPS - STOP)?, on(forgetful, STEPS - STOP)?])
+    };
+    match run() {
+        Ok([through, resumed, forgetful]) => {
+            let same = through.cloud == resumed.cloud && through.moments == resumed.moments;
+            let text = format!(
+                "{} Gaussians after {STEPS} steps, stopped at {STOP}; other moments end elsewhere: {}",
+                through.cloud.len(),
+                through.cloud != forgetful.cloud
+            );
+            Finding::is(text, same && through.cloud != forgetful.cloud && through.cloud.len() > start().len())
+        }
+        Err(finding) => Finding { holds: false, ..finding },
+    }
+}
+
 /// The cases of this area.
 pub fn cases() -> Vec<Case> {
     let training = |name: &'static str, run: fn() -> Finding| Case::new("training", name, run);
     vec![
         training("an ordinary start improves", || improves(start(), blob(), |_| {})),
-        training("a black photo", || trained(start(), flat(0), |_| {})),
-        training("a white photo", || trained(start(), flat(255), |_| {})),
+        training("a black photo", || improves(start(), flat(0), |_| {})),
+        training("a white photo", || improves(start(), flat(255), |_| {})),
         training("Gaussians under and far beyond a pixel", || {
             let mut cloud = start();
             cloud.log_scales[0] = [-40.0; 3];
             cloud.log_scales[1] = [12.0; 3];
             cloud.log_scales[2] = [3.0, -30.0, 0.0];
-            trained(cloud, blob(), |_| {})
+            improves(cloud, blob(), |_| {})
         }),
         training("opacity logits of +-80", || {
             let mut cloud = start();
             (cloud.opacity_logits[0], cloud.opacity_logits[1]) = (80.0, -80.0);
-            trained(cloud, blob(), |_| {})
+            improves(cloud, blob(), |_| {})
         }),
         training("quaternions of length 0 and 1e30", || {
             let mut cloud = start();
             (cloud.quaternions[0], cloud.quaternions[1]) = ([0.0; 4], [1e30, 1e30, 0.0, 0.0]);
-            trained(cloud, blob(), |_| {})
+            improves(cloud, blob(), |_| {})
         }),
         training("all coincident", || {
             let mut cloud = start();
             cloud.positions.fill([0.0; 3]);
-            trained(cloud, blob(), |_| {})
+            improves(cloud, blob(), |_| {})
         }),
-        training("no Gaussian", || trained(GaussianCloud::default(), blob(), |_| {})),
+        training("no Gaussian", || match short(GaussianCloud::default(), blob(), |_| {}) {
+            Ok(t) => {
+                let (first, last) = ends(&t.losses);
+                Finding::within(format!("nothing to train, loss stays {first:.4}"), (last - first).abs(), 0.0)
+            }
+            Err(finding) => Finding { holds: false, ..finding },
+        }),
         training("moments of an outlier gradient", || {
             improves(start(), blob(), |t| {
                 t.moments[0].positions[0] = [1e15; 3];
@@ -141,18 +309,40 @@ pub fn cases() -> Vec<Case> {
             }
             Finding::is(format!("parameter {p:.4}"), p.is_finite() && m >= 0.0 && v >= 0.0)
         }),
-        training("Adam after a gradient of 1e15 rests, and does not jump", || {
-            let (mut p, mut m, mut v) = (0.0_f32, 0.0, 0.0);
-            let mut longest = 0.0_f32;
-            for t in 1..=30_000 {
-                let before = p;
-                let g = if t == 10 { 1e15 } else { p - 1.0 };
-                AdamStep::new(t).update(&mut p, g, &mut m, &mut v, 1e-2);
-                longest = longest.max((p - before).abs());
-            }
-            // What it has seen keeps it still for a long time; it never moves faster than its rate allows.
-            Finding::within(format!("at {p:.3} of 1 after 30,000 steps; longest step"), f64::from(longest), 0.04)
+        training("Adam after a gradient of 1e30 is back within 300 steps", || {
+            let [calm, hit] = [false, true].map(|hit| {
+                let (mut p, mut m, mut v) = (0.0_f32, 0.0, 0.0);
+                let (mut longest, mut cut) = (0.0_f32, 0);
+                for t in 1..=2_300 {
+                    let before = p;
+                    // A target that moves, so that it cannot be reached once and for all.
+                    let g = p - (t as f32 * 0.01).sin();
+                    let g = if hit && t == 2_000 { 1e30 } else { g };
+                    cut += usize::from(AdamStep::new(t).update(&mut p, g, &mut m, &mut v, 1e-2));
+                    longest = longest.max((p - before).abs());
+                }
+                (p, longest, cut)
+            });
+            let outcome = format!("longest step {:.4} of a rate of 0.01, {} cut", hit.1, hit.2);
+            let finding = Finding::within(outcome, f64::from((hit.0 - calm.0).abs()), 0.02);
+            Finding { holds: finding.holds && hit.1 < 0.04 && (calm.2, hit.2) == (0, 1), ..finding }
         }),
+        training("Adam whose gradients grow a million times for good", || {
+            let (mut p, mut m, mut v) = (0.0_f32, 0.0, 0.0);
+            let mut at = [0.0; 2];
+            for t in 1..=1_200 {
+                let g = (p - 1.0).signum() * if t > 1_000 { 1.0 } else { 1e-6 };
+                AdamStep::new(t).update(&mut p, g, &mut m, &mut v, 1e-4);
+                at = if t == 1_000 { [p, p] } else { [at[0], p] };
+            }
+            // It goes on as fast as the rate allows, neither stuck nor jumping.
+            let way = f64::from(at[1] - at[0]) / (200.0 * 1e-4);
+            Finding::is(format!("{way:.2} of the rate over the next 200 steps"), (0.5..4.0).contains(&way))
+        }),
+        training("learning rates times 100", || improves(start(), blob(), |t| t.schedule.damping = 100.0)),
+        training("colours of 1e15 for one step: outlier gradients in a real training", outlier),
+        training("position, scale and opacity on curvatures 1e8 apart", stiff),
+        training("resumed in the middle, bit by bit", resumed),
         training("Adam on curvatures 1e8 apart", || {
             let curvature = [1.0_f32, 1e8];
             let (mut p, mut m, mut v) = ([1.0_f32; 2], [0.0; 2], [0.0; 2]);
