@@ -174,34 +174,44 @@ fn outliers_are_cut_and_counted_as_on_the_cpu() {
         let [r, g, b] = &frame.color;
         let picture: Vec<[f64; 3]> = (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect();
         let gradient = of_planes(&oracle(&picture, &lesson.photo).1);
-        // Moments that have seen next to nothing: every gradient is far above them.
-        let (t, seen) = (2_000, 1e-26);
-        let (want, _, outliers) = lesson.stepped(&settings, &gradient, t + 1, seen);
-        let mut second = lesson.cloud.clone();
-        second.positions.fill([seen; 3]);
-        second.log_scales.fill([seen; 3]);
-        second.quaternions.fill([seen; 4]);
-        second.opacity_logits.fill(seen);
-        second.sh.fill([seen; 3]);
-        let mut first = second.clone();
-        for v in [&mut first.positions, &mut first.log_scales, &mut first.sh] {
-            v.fill([0.0; 3]);
-        }
-        first.quaternions.fill([0.0; 4]);
-        first.opacity_logits.fill(0.0);
-        let mut trainer = Trainer::new(context, &lesson.cloud, TrainerSettings::default()).unwrap();
-        trainer.upload(&lesson.cloud, Some([&first, &second]), t).unwrap();
-        let photo = trainer.photo(&lesson.photo).unwrap();
-        trainer.step(&lesson.camera, &photo, &lesson.rates, 0).unwrap();
-        let told = trainer.metrics().unwrap()[0].sums.outliers as usize;
-        assert!(outliers > 500 && told.abs_diff(outliers) * 50 < outliers, "{told} of {outliers}");
-        let share = strays(&trainer.cloud().unwrap(), &want, &lesson.rates);
+        let photo = &lesson.photo;
+        let t = 2_000;
+        let stepped = |seen: f32| {
+            let mut second = lesson.cloud.clone();
+            second.positions.fill([seen; 3]);
+            second.log_scales.fill([seen; 3]);
+            second.quaternions.fill([seen; 4]);
+            second.opacity_logits.fill(seen);
+            second.sh.fill([seen; 3]);
+            let mut first = second.clone();
+            for v in [&mut first.positions, &mut first.log_scales, &mut first.sh] {
+                v.fill([0.0; 3]);
+            }
+            first.quaternions.fill([0.0; 4]);
+            first.opacity_logits.fill(0.0);
+            let mut trainer = Trainer::new(context, &lesson.cloud, TrainerSettings::default()).unwrap();
+            trainer.upload(&lesson.cloud, Some([&first, &second]), t).unwrap();
+            let photo = trainer.photo(photo).unwrap();
+            trainer.step(&lesson.camera, &photo, &lesson.rates, 0).unwrap();
+            let told = trainer.metrics().unwrap()[0].sums.outliers as usize;
+            (trainer.cloud().unwrap(), told)
+        };
+        // Moments that have seen next to nothing: every gradient is far above them, and is cut.
+        let (want, _, outliers) = lesson.stepped(&settings, &gradient, t + 1, 1e-24);
+        let (got, told) = stepped(1e-24);
+        assert_eq!((told, outliers), (0, 0));
+        let share = strays(&got, &want, &lesson.rates);
         assert!(share < 0.01, "{share} of the parameters went astray");
-        // Negative control: without the rule the step would be longer by far.
+        // Negative control: without anything seen the step is longer by far.
         let (plain, ..) = lesson.stepped(&settings, &gradient, t + 1, 0.0);
         assert!(strays(&plain, &want, &lesson.rates) > 0.5);
+        // So far above that they are counted.
+        let (_, _, outliers) = lesson.stepped(&settings, &gradient, t + 1, 1e-36);
+        let (_, told) = stepped(1e-36);
+        assert!(outliers > 100 && told.abs_diff(outliers) * 20 < outliers, "{told} of {outliers}");
+        let mut trainer = Trainer::new(context, &lesson.cloud, TrainerSettings::default()).unwrap();
+        let photo = trainer.photo(photo).unwrap();
         // Ordinary steps have none.
-        trainer.upload(&lesson.cloud, None, 0).unwrap();
         (0..20).for_each(|_| trainer.step(&lesson.camera, &photo, &lesson.rates, 0).unwrap());
         assert!(trainer.metrics().unwrap().iter().all(|m| m.sums.outliers == 0));
     });

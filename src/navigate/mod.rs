@@ -21,6 +21,17 @@ pub mod target;
 mod testing;
 pub mod visit;
 
+use glam::DVec3;
+
+/// No place has a coordinate as far from 0, scene units: squares of distances must stay numbers, in
+/// single precision too.
+const FARTHEST: f64 = 1e18;
+
+/// Whether one can be there at all: a place with finite coordinates, not absurdly far.
+fn is_place(p: DVec3) -> bool {
+    p.is_finite() && p.abs().max_element() < FARTHEST
+}
+
 pub use film::Film;
 pub use flight::{FRAMES, Flight, Speed};
 pub use matter::Matter;

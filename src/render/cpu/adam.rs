@@ -44,9 +44,9 @@ pub const EPSILON: f32 = 1e-15;
 pub const CLIP: f32 = 1e15;
 /// Square of the largest gradient, in units of the second moment: the one that doubles it.
 pub const GROWTH: f32 = 1.0 / (1.0 - BETA2);
-/// A gradient this many times too large is an outlier, which is counted. Training without outliers
-/// has none.
-pub const OUTLIER: f32 = 1e6;
+/// A gradient this many times too large is an outlier, which is counted. Gradients of Gaussians that
+/// come into sight for the first time may be 1e10 times what was seen of them before.
+pub const OUTLIER: f32 = 1e12;
 
 impl AdamStep {
     /// The constants of step `t`, counted from 1.
