@@ -21,6 +21,12 @@ pub mod target;
 mod testing;
 pub mod visit;
 
+pub use film::Film;
+pub use flight::{FRAMES, Flight, Speed};
+pub use matter::Matter;
+pub use navigator::{Navigator, NoWay};
+pub use pose::Pose;
+
 use glam::DVec3;
 
 /// No place has a coordinate as far from 0, scene units: squares of distances must stay numbers, in
@@ -31,9 +37,3 @@ const FARTHEST: f64 = 1e18;
 fn is_place(p: DVec3) -> bool {
     p.is_finite() && p.abs().max_element() < FARTHEST
 }
-
-pub use film::Film;
-pub use flight::{FRAMES, Flight, Speed};
-pub use matter::Matter;
-pub use navigator::{Navigator, NoWay};
-pub use pose::Pose;

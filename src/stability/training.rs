@@ -366,3 +366,29 @@ pub fn cases() -> Vec<Case> {
         }),
     ]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::finite::CHECKED;
+    use crate::pipeline::train::trainer::StepError;
+
+    #[test]
+    fn poisoned_stages_of_training_are_named_under_the_feature() {
+        let stage = |poison: fn(&mut Trainer)| {
+            let mut t = trainer(start(), STEPS, false, 1.0);
+            poison(&mut t);
+            match t.advance(&[blob()]) {
+                Ok(_) => None,
+                Err(StepError::NotFinite(e)) => Some((e.stage, e.field, e.index)),
+                Err(e) => panic!("{e}"),
+            }
+        };
+        assert_eq!(stage(|_| {}), None);
+        let adam = stage(|t| t.moments[0].positions[3][1] = f32::NAN);
+        assert_eq!(adam, CHECKED.then_some(("Adam", "position", 3)));
+        // What the renderer leaves out is found no later than after the step.
+        let scale = stage(|t| t.cloud.log_scales[2][0] = f32::NAN);
+        assert_eq!(scale, CHECKED.then_some(("Adam", "scale", 2)));
+    }
+}

@@ -67,7 +67,13 @@ pub fn cloud<R: Real>(stage: &'static str, cloud: &GaussianCloud<R>) -> Result<(
 
 #[cfg(test)]
 mod tests {
+    use glam::{DMat3, DVec3};
+
     use super::*;
+    use crate::math::finite::CHECKED;
+    use crate::render::cpu::Renderer;
+    use crate::render::{Features, FrameGradient, RenderError, RenderSettings};
+    use crate::scene::Camera;
 
     fn splat(depth: f64) -> Splat<f64> {
         Splat { conic: [1.0, 0.0, 1.0], opacity: 0.5, reach: 2.0, half: [3.0; 2], depth, ..Splat::default() }
@@ -84,6 +90,40 @@ mod tests {
         let found = projected(&[part([1.0, f64::NAN, 1.0])]);
         let named = NotFinite { stage: "projection", field: "the conic of Gaussian", index: 7 };
         assert_eq!(found, Err(named));
+    }
+
+    #[test]
+    fn poisoned_stages_of_a_renderer_are_named_under_the_feature() {
+        let cloud = GaussianCloud::<f32> {
+            positions: vec![[0.0, 0.0, 3.0]],
+            log_scales: vec![[-1.0; 3]],
+            quaternions: vec![[1.0, 0.0, 0.0, 0.0]],
+            opacity_logits: vec![2.0],
+            sh: vec![[0.5; 3]],
+            ..GaussianCloud::default()
+        };
+        let camera = Camera::of_pose(DVec3::ZERO, DMat3::IDENTITY, 0.8, 20, 20);
+        let stage = |value: f32, background: f32| {
+            let settings = RenderSettings { background: [background; 3], ..RenderSettings::default() };
+            let features = Features { channels: 1, values: &[value] };
+            match Renderer::new().render(&cloud, features, &camera, &settings) {
+                Ok(_) => None,
+                Err(RenderError::NotFinite(e)) => Some(e.stage),
+                Err(e) => panic!("{e}"),
+            }
+        };
+        assert_eq!(stage(0.5, 0.5), None);
+        assert_eq!(stage(f32::NAN, 0.5), CHECKED.then_some("projection"));
+        assert_eq!(stage(0.5, f32::INFINITY), CHECKED.then_some("blending"));
+        let mut renderer = Renderer::new();
+        let backward = |renderer: &mut Renderer<f32>, value: f32| {
+            let gradient = FrameGradient { color: [vec![value; 400], vec![], vec![]], ..FrameGradient::default() };
+            renderer.backward_tiles(&gradient);
+            renderer.check_backward().map_err(|e| e.stage)
+        };
+        renderer.render(&cloud, Features::NONE, &camera, &RenderSettings::default()).expect("drawn");
+        assert_eq!(backward(&mut renderer, 1.0), Ok(()));
+        assert_eq!(backward(&mut renderer, f32::NAN), Err("blending backward"));
     }
 
     #[test]
