@@ -150,13 +150,13 @@ pub fn cases() -> Vec<Case> {
         })
     };
     let mut all = Scenes(Vec::new());
-    shapes(&mut all, false);
+    shapes(&mut all);
     places(&mut all);
     views(&mut all);
     colors(&mut all);
     crowds(&mut all);
     let mut surfels = Scenes(Vec::new());
-    shapes(&mut surfels, true);
+    shapes(&mut surfels);
     places(&mut surfels);
     crowds(&mut surfels);
     let cases = as_cases("drawing", all, false).chain(as_cases("surfels", surfels, true));
@@ -164,7 +164,7 @@ pub fn cases() -> Vec<Case> {
 }
 
 /// Needles, pancakes, sizes, rotations, opacities.
-fn shapes(all: &mut Scenes, surfels: bool) {
+fn shapes(all: &mut Scenes) {
     for k in [1, 2, 3, 4, 5, 6] {
         let ratio = 10.0_f64.powi(k);
         let condition = format!("1e{}", 2 * k);
@@ -177,9 +177,7 @@ fn shapes(all: &mut Scenes, surfels: bool) {
     }
     for exponent in [-20, -15, -10, -5, -3, -1, 0, 2, 5, 8, 10, 15, 20] {
         let scale = 10.0_f64.powi(exponent);
-        // A surfel's products are of half as many factors, so single precision reaches further.
-        let largest = if surfels { 15 } else { 8 };
-        let expected = if exponent <= largest { Expected::Drawn } else { Expected::TooLarge };
+        let expected = if exponent <= 8 { Expected::Drawn } else { Expected::TooLarge };
         all.add(format!("scale 1e{exponent}"), expected, move || (one([scale; 3], TURNED, 2.0), camera(64, 48)));
     }
     for (name, q, expected) in [
