@@ -5,6 +5,8 @@ use glam::DVec3;
 use super::{Case, Finding};
 use crate::math::vector::unit;
 use crate::pipeline::semantics::codes::{self, TOLERANCE};
+use crate::pipeline::semantics::grammar::{Kind, Phrase};
+use crate::pipeline::semantics::localise::{Scorer, localise};
 use crate::pipeline::semantics::relevancy::{advantage, deviate, score};
 use crate::scene::{Identities, Level, NOBODY};
 
@@ -18,6 +20,23 @@ fn identities(n: usize) -> Identities {
         (0..n).map(|i| DVec3::new((i % 16) as f64, (i / 16 % 16) as f64, (i / 256) as f64)).collect();
     codes::assign(&mut all, &centers);
     all
+}
+
+/// The same scores for everything.
+struct Fixed([f32; 4]);
+
+impl Scorer for Fixed {
+    fn scores(&mut self, _: &str, _: Option<&str>) -> Vec<f32> {
+        self.0.to_vec()
+    }
+
+    fn threshold(&self) -> f32 {
+        0.5
+    }
+
+    fn resolution(&self) -> f32 {
+        0.001
+    }
 }
 
 /// The cases of this area.
@@ -73,6 +92,12 @@ pub fn cases() -> Vec<Case> {
             codes.sort_unstable();
             codes.dedup();
             Finding::is(format!("{} different codes", codes.len()), finite && codes.len() == 4_096)
+        }),
+        language("a score that is no number hides nothing", || {
+            let Some(phrase) = Phrase::parse("lamp") else { return Finding::is("no phrase", false) };
+            let answer = localise(&identities(4), &phrase, Kind::Auto, &mut Fixed([f32::NAN, 0.9, f32::NAN, 0.2]));
+            let first = answer.hits().first().map(|h| h.identity);
+            Finding::is(format!("{}, {} answers", answer.verdict(), answer.hits().len()), first == Some(2))
         }),
         language("codes one tolerance apart", || {
             let code = [0.5, 0.25, 0.75];

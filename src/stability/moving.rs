@@ -88,6 +88,18 @@ pub fn cases() -> Vec<Case> {
             let (a, b) = (pose(0.0, 0.0), pose(0.0, std::f64::consts::PI));
             whole(Flight::new(&[a.center, b.center], [&a, &b], None, None, FRAMES, Speed::Constant))
         }),
+        moving("legs over places 1e300 units away", || {
+            let (a, b) = (pose(0.0, 0.0), pose(1.0, 0.5));
+            let legs = [a.center, DVec3::splat(1e300), DVec3::splat(-1e300), b.center];
+            whole(Flight::new(&legs, [&a, &b], None, None, FRAMES, Speed::Eased))
+        }),
+        moving("cameras 1e300 units apart", || {
+            let n = navigator(&[[0.0, 0.0, -2.0], [1.0, 0.0, -2.0], [1e300, 0.0, 0.0], [-1e300, 1e300, 0.0]]);
+            let places = n.graph.keypoints.iter().all(|k| k.center.is_finite());
+            let error = (n.spacing - 1.0).abs();
+            let finding = Finding::within(format!("spacing {} of those that are somewhere", n.spacing), error, 1e-12);
+            Finding { holds: finding.holds && places && n.clearance.is_finite(), ..finding }
+        }),
         moving("10,000 keypoints", || {
             let legs: Vec<DVec3> =
                 (0..10_000).map(|i| DVec3::new(f64::from(i % 100), f64::from(i / 100), 0.0)).collect();

@@ -7,6 +7,7 @@ use rand_pcg::Pcg64Mcg;
 use super::drawing::{camera, one};
 use super::{Case, Finding};
 use crate::pipeline::train::checkpoint::{self, Header};
+use crate::pipeline::train::density;
 use crate::pipeline::train::trainer::Trainer;
 use crate::pipeline::train::{TrainConfig, TrainView};
 use crate::render::cpu::Renderer;
@@ -366,6 +367,18 @@ pub fn cases() -> Vec<Case> {
         training("an outlier gradient of 1e27 in a real training", outlier),
         training("position, scale and opacity on curvatures 1e8 apart", stiff),
         training("resumed in the middle, bit by bit", resumed),
+        training("density control splits what is as large as numbers get", || {
+            let mut cloud = start();
+            cloud.log_scales[0] = [88.7; 3];
+            cloud.log_scales[1] = [f32::MAX; 3];
+            cloud.positions[1] = [f32::MAX; 3];
+            let mut t = trainer(cloud, STEPS, true, 1.0);
+            t.stats.gradient.fill(1.0);
+            let mut rng = Pcg64Mcg::seed_from_u64(1);
+            let done = density::control(&mut t.cloud, &mut t.moments, &t.stats, 1.0, 100, false, &mut rng);
+            let valid = t.cloud.validate();
+            Finding::is(format!("{} split, {:?}", done.split, valid), valid.is_ok() && done.split == 24)
+        }),
         training("Adam on curvatures 1e8 apart", || {
             let curvature = [1.0_f32, 1e8];
             let (mut p, mut m, mut v) = ([1.0_f32; 2], [0.0; 2], [0.0; 2]);
