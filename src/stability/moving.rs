@@ -93,6 +93,15 @@ pub fn cases() -> Vec<Case> {
             let legs = [a.center, DVec3::splat(1e300), DVec3::splat(-1e300), b.center];
             whole(Flight::new(&legs, [&a, &b], None, None, FRAMES, Speed::Eased))
         }),
+        moving("looking at what is 1e30 units away, from outside of the scene", || {
+            let n = navigator(&[[-1.0, 0.0, -2.0], [1.0, 0.0, -2.0]]);
+            let (from, far) = (Pose { center: DVec3::splat(50.0), ..pose(0.0, 0.0) }, DVec3::new(1e30, -3e29, 7.0));
+            let goal = Pose { center: DVec3::new(-60.0, 0.0, 0.0), ..pose(0.0, 0.0) };
+            let way = n.fly(&from, &goal, Some(far), FRAMES, Speed::Eased);
+            let share = n.matter.free_share(DVec3::NEG_Z * 2.0, DVec3::splat(1e30), 0.0);
+            let outcome = format!("{:?}; {share:.0e} of the way is free", way.as_ref().err());
+            Finding::is(outcome, way == Err(NoWay::Inside) && share < 1e-20)
+        }),
         moving("cameras 1e300 units apart", || {
             let n = navigator(&[[0.0, 0.0, -2.0], [1.0, 0.0, -2.0], [1e300, 0.0, 0.0], [-1e300, 1e300, 0.0]]);
             let places = n.graph.keypoints.iter().all(|k| k.center.is_finite());

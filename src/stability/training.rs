@@ -367,6 +367,18 @@ pub fn cases() -> Vec<Case> {
         training("an outlier gradient of 1e27 in a real training", outlier),
         training("position, scale and opacity on curvatures 1e8 apart", stiff),
         training("resumed in the middle, bit by bit", resumed),
+        training("Gaussians of a lower degree than the settings'", || {
+            let config = TrainConfig { steps: STEPS, densify: false, sh_degree: 3, ..TrainConfig::default() };
+            let mut t = Trainer::new(start(), &config, [0.0; 3], 1.0, Pcg64Mcg::seed_from_u64(5));
+            t.step = STEPS;
+            match train(t, blob(), STEPS, |_, _| {}) {
+                Ok(t) => {
+                    let (first, last) = ends(&t.losses);
+                    Finding::within(format!("loss {first:.4} to {last:.4}"), last / first, 1.0)
+                }
+                Err(finding) => Finding { holds: false, ..finding },
+            }
+        }),
         training("density control splits what is as large as numbers get", || {
             let mut cloud = start();
             cloud.log_scales[0] = [88.7; 3];

@@ -269,7 +269,7 @@ impl Trainer {
             rates: self.schedule.rates(self.step),
             adam: self.schedule.adam(self.step),
             stride: self.cloud.sh_stride(),
-            active: sh::coefficients(self.settings.sh_degree),
+            active: sh::coefficients(self.settings.sh_degree.min(self.cloud.sh_degree)),
             radius_scale: 1.0 / camera.width_px.max(camera.height_px) as f32,
             eye: self.geometry.draws_normals(self.step).then(|| normals::eye(camera, &self.cloud)),
         };

@@ -84,7 +84,7 @@ pub fn moving(n: &mut Numbers) -> Verdict {
     let apart = spacing(&cameras);
     promise!(apart.is_finite() && apart >= 0.0, "cameras are {apart} apart");
     // A grid of what is in a scene takes long to make.
-    if n.chance(0.06) {
+    if n.chance(0.02) {
         let mut cloud = GaussianCloud::default();
         for _ in 0..n.below(30) {
             cloud.positions.push(n.several(-1.5, 1.5));
