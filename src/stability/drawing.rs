@@ -121,8 +121,11 @@ fn drawn(cloud: &GaussianCloud<f64>, camera: &Camera, settings: &RenderSettings,
 /// A scene, how it is looked at, and what is to be seen.
 type Scene = (GaussianCloud<f64>, Camera);
 
-/// The scenes of this area.
-struct Scenes(Vec<(String, Expected, Box<dyn Fn() -> Scene + Send + Sync>)>);
+/// Makes one.
+type Make = Box<dyn Fn() -> Scene + Send + Sync>;
+
+/// The scenes of this area, by name.
+struct Scenes(Vec<(String, Expected, Make)>);
 
 impl Scenes {
     fn add(&mut self, name: impl Into<String>, expected: Expected, make: impl Fn() -> Scene + Send + Sync + 'static) {

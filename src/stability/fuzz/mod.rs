@@ -42,8 +42,11 @@ macro_rules! promise {
 }
 use promise;
 
-/// What is fuzzed: a name, and what makes an input and judges it.
-const AREAS: [(&str, fn(&mut Numbers) -> Verdict); 7] = [
+/// Makes an input and judges it.
+type Trial = fn(&mut Numbers) -> Verdict;
+
+/// What is fuzzed.
+const AREAS: [(&str, Trial); 7] = [
     ("drawing", scenes::drawing),
     ("gradients", scenes::gradients),
     ("training", scenes::training),
@@ -93,7 +96,11 @@ pub fn fuzz(seed: u64, limit: Limit, only: Option<&str>) -> Vec<Found> {
     let (sender, results) = channel();
     let worker = areas.clone();
     // A thread of its own, so that one that hangs can be left behind.
-    std::thread::spawn(move || work(seed, limit, &worker, &sender));
+    let thread = std::thread::Builder::new().name("fuzz".into());
+    if let Err(e) = thread.spawn(move || work(seed, limit, &worker, &sender)) {
+        let failed = |f: &mut Found| f.broken.push(Broken { seed, what: e.to_string() });
+        found.first_mut().into_iter().for_each(failed);
+    }
     collect(&results, &mut found, seed, areas.len().max(1) as u64);
     found
 }
