@@ -1,5 +1,6 @@
 // One Adam step over a buffer of parameters, one thread a number. The rate depends on the number's
-// place in its Gaussian's record of `stride` floats.
+// place in its Gaussian's record of `stride` floats. The rule for outliers is that of
+// `render/cpu/adam.rs`: no gradient counts for more than what doubles the second moment.
 #include "shared/counters.wgsl"
 
 struct AdamStep {
@@ -14,8 +15,14 @@ struct AdamStep {
     beta_first: f32,
     beta_second: f32,
     epsilon: f32,
-    // Components of the gradient are cut to this size; 0 = not.
+    // Largest size of a gradient.
     clip: f32,
+    // Square of the largest gradient in units of the second moment.
+    growth: f32,
+    // A gradient this many times too large is counted.
+    outlier: f32,
+    pad0: f32,
+    pad1: f32,
 }
 
 @group(0) @binding(0) var<uniform> adam: AdamStep;
@@ -27,6 +34,7 @@ struct AdamStep {
 // were not drawn keep their moments as they are.
 @group(0) @binding(5) var<storage, read> marks: array<f32>;
 @group(0) @binding(6) var<storage, read> counters: array<u32>;
+@group(0) @binding(7) var<storage, read_write> outliers: array<atomic<u32>>;
 
 // Floats of a record of `marks`, and the place of the mark.
 const MARK_STRIDE: u32 = 12u;
@@ -44,12 +52,14 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workgroup
     if rate == 0.0 || marks[(i / adam.stride) * MARK_STRIDE + MARK] < 0.0 {
         return;
     }
-    var g = gradient[i];
-    if adam.clip > 0.0 {
-        g = clamp(g, -adam.clip, adam.clip);
+    let seen = second[i];
+    let limit = select(adam.clip, min(sqrt(adam.growth * seen), adam.clip), seen > 0.0);
+    if abs(gradient[i]) > adam.outlier * limit {
+        atomicAdd(&outliers[0], 1u);
     }
+    let g = clamp(gradient[i], -limit, limit);
     let m = mix(g, first[i], adam.beta_first);
-    let v = mix(g * g, second[i], adam.beta_second);
+    let v = mix(g * g, seen, adam.beta_second);
     first[i] = m;
     second[i] = v;
     parameters[i] -= rate * (m * adam.unbias_first) / (sqrt(v * adam.unbias_second) + adam.epsilon);

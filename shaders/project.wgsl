@@ -33,7 +33,7 @@ fn color_towards(i: u32, world: vec3<f32>) -> vec3<f32> {
     for (var k = 0u; k < harmonics_count(degree); k++) {
         sum += basis[k] * coefficient(i, k);
     }
-    return max(sum, vec3<f32>(0.0));
+    return clamp(sum, vec3<f32>(0.0), vec3<f32>(COLOR_MAX));
 }
 
 // The splat of Gaussian `i`; radius 0 where it is not drawn.

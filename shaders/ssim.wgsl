@@ -27,9 +27,10 @@ struct Loss {
 @group(0) @binding(4) var<storage, read_write> pixel_gradient: array<vec4<f32>>;
 // [tile]: sums of absolute errors, SSIM, squared errors over pixels and channels.
 @group(0) @binding(5) var<storage, read_write> partials: array<vec4<f32>>;
-// [slot]: those sums over the picture, then overflow, wanted pairs, visible, bad gradients.
+// [slot]: those sums over the picture and outliers, then overflow, wanted pairs, visible, bad gradients.
 @group(0) @binding(6) var<storage, read_write> ring: array<vec4<f32>>;
 @group(0) @binding(7) var<storage, read> counters: array<u32>;
+@group(0) @binding(8) var<storage, read> outliers: array<u32>;
 
 const RADIUS: u32 = 5u;
 const TAPS: u32 = 11u;
@@ -220,7 +221,7 @@ fn reduce(@builtin(local_invocation_index) thread: u32) {
     }
     let total = sum_up(thread, found);
     if thread == 0u {
-        ring[2u * loss.slot] = total;
+        ring[2u * loss.slot] = vec4<f32>(total.xyz, f32(outliers[0]));
         ring[2u * loss.slot + 1u] = vec4<f32>(
             f32(counters[COUNT_OVERFLOW]),
             f32(counters[COUNT_WANTED]),

@@ -104,15 +104,24 @@ impl Lesson {
         Self { cloud, photo, camera, rates }
     }
 
-    /// One Adam step from zero moments, in f64 up to the gradient: parameters, group by group.
-    fn stepped(&self, settings: &RenderSettings, gradient: &FrameGradient<f64>) -> (GaussianCloud, Vec<f32>) {
+    /// Adam step `t` from a first moment of 0 and this second moment, in f64 up to the gradient:
+    /// parameters, group by group; lengths of screen gradients; number of outliers.
+    fn stepped(
+        &self,
+        settings: &RenderSettings,
+        gradient: &FrameGradient<f64>,
+        t: u64,
+        second: f32,
+    ) -> (GaussianCloud, Vec<f32>, usize) {
         let wide = self.cloud.cast::<f64>();
         let mut renderer = cpu::Renderer::new();
         renderer.render(&wide, Features::NONE, &self.camera, settings).unwrap();
         let g = renderer.backward(&wide, Features::NONE, gradient);
-        let adam = AdamStep::new(1);
-        let mut out = self.cloud.clone();
-        let step = |p: &mut f32, g: f64, rate: f32| adam.update(p, g as f32, &mut 0.0, &mut 0.0, rate);
+        let adam = AdamStep::new(t);
+        let (mut out, mut outliers) = (self.cloud.clone(), 0);
+        let mut step = |p: &mut f32, g: f64, rate: f32| {
+            outliers += usize::from(adam.update(p, g as f32, &mut 0.0, &mut { second }, rate));
+        };
         for i in 0..out.len() {
             if g.radius_px[i] == 0.0 {
                 continue;
@@ -128,7 +137,7 @@ impl Lesson {
                 (0..3).for_each(|c| step(&mut out.sh[at][c], g.sh[at][c], rate));
             }
         }
-        (out, g.screen.iter().map(|&s| s as f32).collect())
+        (out, g.screen.iter().map(|&s| s as f32).collect(), outliers)
     }
 }
 
@@ -149,6 +158,65 @@ fn strays(ours: &GaussianCloud, theirs: &GaussianCloud, rates: &Rates) -> f64 {
     f64::from(wrong as u32) / f64::from(all as u32)
 }
 
+/// Interleaved channels as the gradient of a frame.
+fn of_planes(flat: &[f64]) -> FrameGradient<f64> {
+    let plane = |c: usize| flat.iter().skip(c).step_by(3).copied().collect::<Vec<f64>>();
+    FrameGradient { color: [plane(0), plane(1), plane(2)], ..FrameGradient::default() }
+}
+
+#[test]
+fn outliers_are_cut_and_counted_as_on_the_cpu() {
+    with_context(|context| {
+        let lesson = Lesson::new(0);
+        let settings = RenderSettings { sh_degree: 0, ..RenderSettings::default() };
+        let frame =
+            cpu::Renderer::new().render(&lesson.cloud.cast(), Features::NONE, &lesson.camera, &settings).unwrap();
+        let [r, g, b] = &frame.color;
+        let picture: Vec<[f64; 3]> = (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect();
+        let gradient = of_planes(&oracle(&picture, &lesson.photo).1);
+        let photo = &lesson.photo;
+        let t = 2_000;
+        let stepped = |seen: f32| {
+            let mut second = lesson.cloud.clone();
+            second.positions.fill([seen; 3]);
+            second.log_scales.fill([seen; 3]);
+            second.quaternions.fill([seen; 4]);
+            second.opacity_logits.fill(seen);
+            second.sh.fill([seen; 3]);
+            let mut first = second.clone();
+            for v in [&mut first.positions, &mut first.log_scales, &mut first.sh] {
+                v.fill([0.0; 3]);
+            }
+            first.quaternions.fill([0.0; 4]);
+            first.opacity_logits.fill(0.0);
+            let mut trainer = Trainer::new(context, &lesson.cloud, TrainerSettings::default()).unwrap();
+            trainer.upload(&lesson.cloud, Some([&first, &second]), t).unwrap();
+            let photo = trainer.photo(photo).unwrap();
+            trainer.step(&lesson.camera, &photo, &lesson.rates, 0).unwrap();
+            let told = trainer.metrics().unwrap()[0].sums.outliers as usize;
+            (trainer.cloud().unwrap(), told)
+        };
+        // Moments that have seen next to nothing: every gradient is far above them, and is cut.
+        let (want, _, outliers) = lesson.stepped(&settings, &gradient, t + 1, 1e-24);
+        let (got, told) = stepped(1e-24);
+        assert_eq!((told, outliers), (0, 0));
+        let share = strays(&got, &want, &lesson.rates);
+        assert!(share < 0.01, "{share} of the parameters went astray");
+        // Negative control: without anything seen the step is longer by far.
+        let (plain, ..) = lesson.stepped(&settings, &gradient, t + 1, 0.0);
+        assert!(strays(&plain, &want, &lesson.rates) > 0.5);
+        // So far above that they are counted.
+        let (_, _, outliers) = lesson.stepped(&settings, &gradient, t + 1, 1e-36);
+        let (_, told) = stepped(1e-36);
+        assert!(outliers > 100 && told.abs_diff(outliers) * 20 < outliers, "{told} of {outliers}");
+        let mut trainer = Trainer::new(context, &lesson.cloud, TrainerSettings::default()).unwrap();
+        let photo = trainer.photo(photo).unwrap();
+        // Ordinary steps have none.
+        (0..20).for_each(|_| trainer.step(&lesson.camera, &photo, &lesson.rates, 0).unwrap());
+        assert!(trainer.metrics().unwrap().iter().all(|m| m.sums.outliers == 0));
+    });
+}
+
 #[test]
 fn one_step_moves_every_group_as_the_cpu_does() {
     with_context(|context| {
@@ -159,9 +227,8 @@ fn one_step_moves_every_group_as_the_cpu_does() {
         let [r, g, b] = &frame.color;
         let picture: Vec<[f64; 3]> = (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect();
         let (loss, flat) = oracle(&picture, &lesson.photo);
-        let plane = |c: usize| flat.iter().skip(c).step_by(3).copied().collect::<Vec<f64>>();
-        let gradient = FrameGradient { color: [plane(0), plane(1), plane(2)], ..FrameGradient::default() };
-        let (want, screen) = lesson.stepped(&settings, &gradient);
+        let gradient = of_planes(&flat);
+        let (want, screen, _) = lesson.stepped(&settings, &gradient, 1, 0.0);
 
         let mut trainer = Trainer::new(context, &lesson.cloud, TrainerSettings::default()).unwrap();
         let photo = trainer.photo(&lesson.photo).unwrap();

@@ -1,29 +1,46 @@
-//! `fmlgs check-stability`: the catalogue of extreme cases, run here and now.
+//! `fmlgs check-stability`: the catalogue of extreme cases, or a search for new ones, run here and now.
 
 use serde_json::json;
 
 use super::{CliError, output};
+use crate::stability::fuzz::{Limit, fuzz};
 use crate::stability::{Checked, catalogue};
+
+/// Broken promises of random inputs that are printed.
+const SHOWN: usize = 30;
 
 /// Run the catalogue of extreme cases
 ///
 /// Each case says what happened, how far it is from double precision (or from what it should be), and
 /// whether the promise holds: finite numbers in, finite numbers out, or a clear refusal. Exit code 1 if
 /// one is broken.
+///
+/// With --fuzz, random scenes, cameras, settings, embeddings and paths full of nasty numbers are tried
+/// instead, and each broken promise is told with the seed that makes its input again.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs check-stability\n  \
-    fmlgs check-stability --only drawing --json")]
+    fmlgs check-stability --only drawing --json\n  \
+    fmlgs check-stability --fuzz 60 --seed 7")]
 pub struct Args {
     /// Only cases whose area or name contains this
     #[arg(long)]
     only: Option<String>,
+    /// Try random inputs for so many seconds; 0 = one of each kind
+    #[arg(long, value_name = "SECS")]
+    fuzz: Option<f64>,
+    /// First seed of the random inputs; each next one is one higher
+    #[arg(long, requires = "fuzz", default_value_t = 0)]
+    seed: u64,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
 }
 
 pub fn run(args: Args) -> Result<(), CliError> {
+    if let Some(secs) = args.fuzz {
+        return search(&args, secs);
+    }
     let all = catalogue();
     let wanted = |area: &str, name: &str| args.only.as_ref().is_none_or(|o| area.contains(o) || name.contains(o));
     let checked: Vec<Checked> = all.iter().filter(|c| wanted(c.area, &c.name)).map(|c| c.check()).collect();
@@ -42,6 +59,34 @@ pub fn run(args: Args) -> Result<(), CliError> {
             vec![c.area.into(), c.name.clone(), f.outcome.clone(), number(f.error), number(f.bound), holds.into()]
         }));
         output::print(&format!("{}\n{} cases, {broken} broken", output::table(&rows), checked.len()))?;
+    }
+    if broken > 0 { Err(CliError::failed(format!("{broken} promises are broken"))) } else { Ok(()) }
+}
+
+/// Tries random inputs and tells what was found.
+fn search(args: &Args, secs: f64) -> Result<(), CliError> {
+    if !(secs >= 0.0 && secs.is_finite()) {
+        return Err(CliError::Usage("--fuzz takes a number of seconds, 0 or more".into()));
+    }
+    let rounds = if secs > 0.0 { u64::MAX } else { 1 };
+    let found = fuzz(args.seed, Limit { secs, rounds }, args.only.as_deref());
+    if found.is_empty() {
+        return Err(CliError::Usage("no kind of input is called so".into()));
+    }
+    let broken: usize = found.iter().map(|f| f.broken.len()).sum();
+    if args.json {
+        output::print_json(&json!({ "seed": args.seed, "areas": found, "broken": broken }))?;
+    } else {
+        let mut rows = vec![["area", "inputs", "refused", "broken"].map(str::to_owned).to_vec()];
+        let row = |f: &crate::stability::fuzz::Found| {
+            vec![f.area.to_owned(), f.inputs.to_string(), f.refused.to_string(), f.broken.len().to_string()]
+        };
+        rows.extend(found.iter().map(row));
+        let mut text = format!("{}\nseeds from {}, {broken} broken", output::table(&rows), args.seed);
+        for (area, b) in found.iter().flat_map(|f| f.broken.iter().map(|b| (f.area, b))).take(SHOWN) {
+            text += &format!("\n{area}: {}; again: --fuzz 0 --seed {} --only {area}", b.what, b.seed);
+        }
+        output::print(&text)?;
     }
     if broken > 0 { Err(CliError::failed(format!("{broken} promises are broken"))) } else { Ok(()) }
 }

@@ -3,6 +3,7 @@
 
 use glam::DVec3;
 
+use super::is_place;
 use super::matter::Matter;
 
 /// Pieces that a rounded corner is measured in.
@@ -48,9 +49,9 @@ pub fn shortened(legs: &[DVec3], matter: &Matter, clearance: f64) -> Vec<DVec3> 
     out
 }
 
-/// The points without those that repeat the one before, or are not finite.
+/// The points without those that repeat the one before, or are no places.
 fn distinct(points: &[DVec3]) -> Vec<DVec3> {
-    let mut out: Vec<DVec3> = points.iter().copied().filter(|p| p.is_finite()).collect();
+    let mut out: Vec<DVec3> = points.iter().copied().filter(|p| is_place(*p)).collect();
     out.dedup_by(|a, b| a.distance(*b) <= 1e-12 * (1.0 + b.length()));
     out
 }

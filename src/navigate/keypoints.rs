@@ -5,6 +5,7 @@ use glam::{DMat3, DVec3};
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
+use super::is_place;
 use super::matter::Matter;
 use crate::scene::Camera;
 
@@ -40,7 +41,7 @@ pub fn spacing(cameras: &[Camera]) -> f64 {
 
 /// The cameras' places, each once.
 fn distinct(cameras: &[Camera]) -> Vec<DVec3> {
-    let mut places: Vec<DVec3> = cameras.iter().map(|c| c.center).filter(|c| c.is_finite()).collect();
+    let mut places: Vec<DVec3> = cameras.iter().map(|c| c.center).filter(|c| is_place(*c)).collect();
     places.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z)));
     places.dedup();
     places
@@ -51,7 +52,7 @@ fn distinct(cameras: &[Camera]) -> Vec<DVec3> {
 pub fn keypoints(cameras: &[Camera], matter: &Matter, clearance: f64) -> (Vec<Keypoint>, usize) {
     let half = 0.5 * spacing(cameras);
     let mut all = Vec::with_capacity(7 * cameras.len());
-    for (camera, c) in cameras.iter().enumerate() {
+    for (camera, c) in cameras.iter().enumerate().filter(|(_, c)| is_place(c.center)) {
         let axes = [c.world_from_camera.x_axis, c.world_from_camera.y_axis, c.world_from_camera.z_axis];
         let around = axes.into_iter().flat_map(|axis| [axis * half, axis * -half]);
         let offsets = std::iter::once(DVec3::ZERO).chain(around.filter(|_| half > 0.0));

@@ -169,7 +169,12 @@ impl Matter {
     /// Distance from a point to the nearest matter, scene units: 0 inside it, and outside of what is
     /// known, where nobody should fly.
     pub fn clearance(&self, p: DVec3) -> f64 {
-        let Some((base, f)) = self.cell(p) else { return 0.0 };
+        self.known_clearance(p).unwrap_or(0.0)
+    }
+
+    /// The same; `None` outside of what is known.
+    fn known_clearance(&self, p: DVec3) -> Option<f64> {
+        let (base, f) = self.cell(p)?;
         let mut sum = 0.0;
         for corner in 0..8 {
             let bit = [corner & 1, (corner >> 1) & 1, (corner >> 2) & 1];
@@ -179,7 +184,7 @@ impl Matter {
                     weight * f64::from(self.distance[self.index(base[0] + bit[0], base[1] + bit[1], base[2] + bit[2])]);
             }
         }
-        sum
+        Some(sum)
     }
 
     /// The voxel centre below a point, and where between it and the next the point is, 0 to 1.
@@ -199,13 +204,16 @@ impl Matter {
         Some((base, f))
     }
 
-    /// How far one can go from `a` towards `b` with at least `clearance` to all matter, as a share of
-    /// the way, 0 to 1.
+    /// How far one can go from `a` towards `b` with at least `clearance` to all matter, within what is
+    /// known, as a share of the way, 0 to 1.
     ///
     /// Steps are as long as the distance field allows, which changes by no more than the way that is
     /// gone: nothing thicker than a voxel can be stepped over.
     pub fn free_share(&self, a: DVec3, b: DVec3, clearance: f64) -> f64 {
         let length = a.distance(b);
+        if !length.is_finite() {
+            return 0.0;
+        }
         if !(length > 0.0) {
             return if self.clearance(a) >= clearance { 1.0 } else { 0.0 };
         }
@@ -218,7 +226,7 @@ impl Matter {
         let mut gone = 0.0;
         loop {
             let at = (gone / length).min(1.0);
-            let spare = self.clearance(a.lerp(b, at)) - clearance;
+            let spare = self.known_clearance(a.lerp(b, at)).map_or(-1.0, |c| c - clearance);
             if spare < 0.0 {
                 return ((gone - shortest).max(0.0) / length).min(1.0);
             }

@@ -26,3 +26,14 @@ pub use flight::{FRAMES, Flight, Speed};
 pub use matter::Matter;
 pub use navigator::{Navigator, NoWay};
 pub use pose::Pose;
+
+use glam::DVec3;
+
+/// No place has a coordinate as far from 0, scene units: squares of distances must stay numbers, in
+/// single precision too.
+const FARTHEST: f64 = 1e18;
+
+/// Whether one can be there at all: a place with finite coordinates, not absurdly far.
+fn is_place(p: DVec3) -> bool {
+    p.is_finite() && p.abs().max_element() < FARTHEST
+}

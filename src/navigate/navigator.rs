@@ -5,6 +5,7 @@ use glam::{DQuat, DVec3};
 use super::curve::shortened;
 use super::flight::{Flight, Speed};
 use super::graph::Graph;
+use super::is_place;
 use super::keypoints::{keypoints, spacing};
 use super::matter::Matter;
 use super::pose::Pose;
@@ -62,7 +63,7 @@ pub enum NoWay {
 impl Navigator {
     /// Looks at a scene. Takes about a second: once per scene, when somebody first wants to move.
     pub fn new(cloud: &GaussianCloud, cameras: &[Camera], up: DVec3) -> Self {
-        let eyes: Vec<DVec3> = cameras.iter().map(|c| c.center).filter(|c| c.is_finite()).collect();
+        let eyes: Vec<DVec3> = cameras.iter().map(|c| c.center).filter(|c| is_place(*c)).collect();
         let spread = Bounds::of(eyes.iter().copied()).map_or(0.0, |b| b.radius());
         let scene = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i))).map_or(1.0, |b| b.radius());
         let spacing = spacing(cameras);
@@ -96,6 +97,9 @@ impl Navigator {
     pub fn legs(&self, from: DVec3, to: DVec3) -> Result<Vec<DVec3>, NoWay> {
         if self.matter.is_inside(to) {
             return Err(NoWay::Inside);
+        }
+        if !is_place(from) {
+            return Err(NoWay::Enclosed);
         }
         let ends = self.matter.clearance(from).min(self.matter.clearance(to));
         if !self.matter.is_inside(from) && self.matter.is_free(from, to, self.clearance.min(0.99 * ends)) {

@@ -17,6 +17,7 @@ pub use backend::{Backend, BackendChoice, Cost, DrawError};
 use serde::{Deserialize, Serialize};
 
 use crate::math::Real;
+use crate::math::finite::NotFinite;
 use crate::scene::CameraError;
 
 /// Side of a tile in px, on every backend.
@@ -27,6 +28,9 @@ pub const ALPHA_MIN: f64 = 1.0 / 255.0;
 pub const ALPHA_MAX: f64 = 0.999;
 /// A pixel stops before its transmittance falls under this.
 pub const TRANSMITTANCE_MIN: f64 = 1e-4;
+/// Brightest colour of a splat, far above any display. Its fourth power, of which SSIM is made, is
+/// still a number in `f32`.
+pub const COLOR_MAX: f64 = 1e9;
 /// Variance in px² added along both picture axes (3DGS's low-pass filter).
 pub const BLUR_PX2: f64 = 0.3;
 /// Tangents of the viewing angle are clamped to this multiple of the picture's half extent before
@@ -56,6 +60,9 @@ pub enum RenderError {
         /// Gaussians times channels.
         want: usize,
     },
+    /// A stage left a number that is none; looked for under `debug-validation` only.
+    #[error(transparent)]
+    NotFinite(#[from] NotFinite),
 }
 
 /// What counts as too little to be drawn: the first knob between accuracy and time.

@@ -3,9 +3,9 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use super::{Case, Finding};
-use crate::math::sh;
-use crate::render::cpu::Renderer;
-use crate::render::{Features, Frame, RenderSettings};
+use crate::math::{Real, sh};
+use crate::render::cpu::{RenderStats, Renderer};
+use crate::render::{Features, Frame, RenderError, RenderSettings};
 use crate::scene::{Camera, GaussianCloud};
 
 /// Largest deviation of a colour from double precision that a picture may have.
@@ -36,123 +36,197 @@ pub fn camera(width: u32, height: u32) -> Camera {
     }
 }
 
-/// Draws in both precisions; the largest difference of a colour or of alpha. `None` if something is
-/// not finite.
-pub fn both(cloud: &GaussianCloud<f64>, camera: &Camera) -> Option<(f64, Frame<f64>)> {
-    let settings = RenderSettings::default();
-    let exact = Renderer::<f64>::new().render(cloud, Features::NONE, camera, &settings).ok()?;
-    let single = Renderer::<f32>::new().render(&cloud.cast::<f32>(), Features::NONE, camera, &settings).ok()?;
-    let planes = |a: &[Vec<f64>], b: &[Vec<f32>]| {
-        a.iter().flatten().zip(b.iter().flatten()).try_fold(0.0_f64, |worst, (x, y)| {
-            let y = f64::from(*y);
-            (x.is_finite() && y.is_finite()).then(|| worst.max((x - y).abs()))
-        })
+/// Draws in both precisions.
+///
+/// # Errors
+/// What the renderer refuses.
+pub fn pair(
+    cloud: &GaussianCloud<f64>,
+    camera: &Camera,
+    settings: &RenderSettings,
+) -> Result<(Frame<f64>, Frame<f32>, RenderStats), RenderError> {
+    let mut renderer = Renderer::<f64>::new();
+    let exact = renderer.render(cloud, Features::NONE, camera, settings)?;
+    let single = Renderer::<f32>::new().render(&cloud.cast::<f32>(), Features::NONE, camera, settings)?;
+    Ok((exact, single, renderer.stats()))
+}
+
+/// The largest difference of alpha, or of a colour as a share of the largest one. NaN if a number is none.
+pub fn deviation(exact: &Frame<f64>, single: &Frame<f32>) -> f64 {
+    let worst = |a: &[f64], b: &[f32]| {
+        let each = a.iter().zip(b).map(|(x, y)| (x - f64::from(*y)).abs());
+        // `f64::max` would pass over NaN.
+        each.fold(0.0_f64, |w, e| if e.is_nan() || e > w { e } else { w })
     };
-    let color = planes(&exact.color, &single.color)?;
-    let alpha = planes(std::slice::from_ref(&exact.alpha), std::slice::from_ref(&single.alpha))?;
-    Some((color.max(alpha), exact))
+    let brightest = exact.color.iter().flatten().fold(1.0_f64, |m, v| m.max(*v));
+    let color = exact.color.iter().zip(&single.color).map(|(a, b)| worst(a, b) / brightest);
+    color.chain([worst(&exact.alpha, &single.alpha)]).fold(0.0, |w, e| if e.is_nan() || e > w { e } else { w })
 }
 
-fn drawn(cloud: &GaussianCloud<f64>, camera: &Camera, bound: f64) -> Finding {
-    match both(cloud, camera) {
-        Some((error, frame)) => {
-            let covered = frame.alpha.iter().filter(|a| **a > 0.5).count();
-            Finding::within(format!("{covered} px covered"), error, bound)
+/// What a case is about to show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Expected {
+    /// Something is drawn, alike in both precisions.
+    Drawn,
+    /// Nothing is drawn, in either precision.
+    Nothing,
+    /// As `Nothing`, and counted as degenerate.
+    Degenerate,
+    /// Something is drawn, and all of it is finite; single precision cannot know better.
+    Finite,
+    /// Too large for single precision, which leaves it out instead of drawing it wrongly.
+    TooLarge,
+}
+
+/// The largest opacity of a pixel; NaN if one is.
+fn most<R: Real>(alpha: &[R]) -> f64 {
+    alpha.iter().fold(0.0, |m, a| if a.is_finite() { a.f64().max(m) } else { f64::NAN })
+}
+
+fn drawn(cloud: &GaussianCloud<f64>, camera: &Camera, settings: &RenderSettings, expected: Expected) -> Finding {
+    let (exact, single, stats) = match pair(cloud, camera, settings) {
+        Ok(drawn) => drawn,
+        Err(e) => return Finding::is(e.to_string(), false),
+    };
+    let touched = exact.alpha.iter().filter(|a| **a > 0.0).count();
+    let (alpha, alpha32) = (most(&exact.alpha), most(&single.alpha));
+    match expected {
+        Expected::Drawn => {
+            let finding =
+                Finding::within(format!("{touched} px, opacity up to {alpha:.2}"), deviation(&exact, &single), BOUND);
+            // Pictures of nothing are alike whatever happens.
+            Finding { holds: finding.holds && touched > 0, ..finding }
         }
-        None => Finding::is("a pixel is not finite", false),
+        Expected::Finite => {
+            let finite = deviation(&exact, &single).is_finite();
+            Finding::is(format!("{touched} px, opacity up to {alpha32:.2}, finite"), finite && touched > 0)
+        }
+        Expected::Nothing => Finding::within("nothing is drawn", alpha.max(alpha32), 0.0),
+        Expected::Degenerate => {
+            let finding = Finding::within(
+                format!("left out, {} counted as degenerate", stats.degenerate),
+                alpha.max(alpha32),
+                0.0,
+            );
+            Finding { holds: finding.holds && stats.degenerate == 1, ..finding }
+        }
+        Expected::TooLarge => {
+            let finding =
+                Finding::within(format!("left out in single precision; {touched} px in double"), alpha32, 0.0);
+            Finding { holds: finding.holds && touched > 0, ..finding }
+        }
     }
 }
 
-/// What is too large for single precision is left out there, not drawn wrongly.
-fn left_out(cloud: &GaussianCloud<f64>, camera: &Camera) -> Finding {
-    let settings = RenderSettings::default();
-    match Renderer::<f32>::new().render(&cloud.cast::<f32>(), Features::NONE, camera, &settings) {
-        Ok(frame) => {
-            let most = frame.alpha.iter().fold(0.0_f32, |m, a| if a.is_finite() { m.max(*a) } else { f32::NAN });
-            Finding::within("left out; largest opacity", f64::from(most), 0.0)
-        }
-        Err(e) => Finding::is(e.to_string(), false),
-    }
-}
+/// A scene, how it is looked at, and what is to be seen.
+type Scene = (GaussianCloud<f64>, Camera);
 
-fn case(name: impl Into<String>, make: impl Fn() -> (GaussianCloud<f64>, Camera) + Send + Sync + 'static) -> Case {
-    Case::new("drawing", name, move || {
-        let (cloud, camera) = make();
-        drawn(&cloud, &camera, BOUND)
-    })
+/// Makes one.
+type Make = Box<dyn Fn() -> Scene + Send + Sync>;
+
+/// The scenes of this area, by name.
+struct Scenes(Vec<(String, Expected, Make)>);
+
+impl Scenes {
+    fn add(&mut self, name: impl Into<String>, expected: Expected, make: impl Fn() -> Scene + Send + Sync + 'static) {
+        self.0.push((name.into(), expected, Box::new(make)));
+    }
+
+    fn drawn(&mut self, name: impl Into<String>, make: impl Fn() -> Scene + Send + Sync + 'static) {
+        self.add(name, Expected::Drawn, make);
+    }
 }
 
 /// Two axes, neither along the picture's.
 const TURNED: [f64; 4] = [0.8, 0.3, -0.4, 0.33];
 
-/// The cases of this area.
+/// The cases of this area: of Gaussians, then of surfels where those differ.
 pub fn cases() -> Vec<Case> {
-    let mut all = Vec::new();
+    let as_cases = |area: &'static str, scenes: Scenes, surfels: bool| {
+        let settings = RenderSettings { surfels, ..RenderSettings::default() };
+        scenes.0.into_iter().map(move |(name, expected, make)| {
+            let settings = settings.clone();
+            Case::new(area, name, move || {
+                let (cloud, camera) = make();
+                drawn(&cloud, &camera, &settings, expected)
+            })
+        })
+    };
+    let mut all = Scenes(Vec::new());
+    shapes(&mut all);
+    places(&mut all);
+    views(&mut all);
+    colors(&mut all);
+    crowds(&mut all);
+    let mut surfels = Scenes(Vec::new());
+    shapes(&mut surfels);
+    places(&mut surfels);
+    crowds(&mut surfels);
+    let cases = as_cases("drawing", all, false).chain(as_cases("surfels", surfels, true));
+    cases.chain(refused()).collect()
+}
+
+/// Needles, pancakes, sizes, rotations, opacities.
+fn shapes(all: &mut Scenes) {
     for k in [1, 2, 3, 4, 5, 6] {
         let ratio = 10.0_f64.powi(k);
         let condition = format!("1e{}", 2 * k);
-        all.push(case(format!("needle, condition {condition}"), move || {
+        all.drawn(format!("needle, condition {condition}"), move || {
             (one([0.5, 0.5 / ratio, 0.5 / ratio], TURNED, 2.0), camera(64, 48))
-        }));
-        all.push(case(format!("pancake, condition {condition}"), move || {
+        });
+        all.drawn(format!("pancake, condition {condition}"), move || {
             (one([0.5, 0.5, 0.5 / ratio], TURNED, 2.0), camera(64, 48))
-        }));
+        });
     }
-    for exponent in [-20, -10, -5, 2, 5] {
+    for exponent in [-20, -15, -10, -5, -3, -1, 0, 2, 5, 8, 10, 15, 20] {
         let scale = 10.0_f64.powi(exponent);
-        all.push(case(format!("scale 1e{exponent}"), move || (one([scale; 3], TURNED, 2.0), camera(64, 48))));
+        let expected = if exponent <= 8 { Expected::Drawn } else { Expected::TooLarge };
+        all.add(format!("scale 1e{exponent}"), expected, move || (one([scale; 3], TURNED, 2.0), camera(64, 48)));
     }
-    for exponent in [10, 20] {
-        let scale = 10.0_f64.powi(exponent);
-        all.push(Case::new("drawing", format!("scale 1e{exponent}"), move || {
-            left_out(&one([scale; 3], TURNED, 2.0), &camera(64, 48))
-        }));
+    for (name, q, expected) in [
+        ("zero", [0.0; 4], Expected::Degenerate),
+        ("tiny", [1e-30, 2e-30, 0.0, 1e-30], Expected::Drawn),
+        ("huge", [1e30, -1e30, 1e30, 1e30], Expected::Drawn),
+        ("denormal", [1e-40, 1e-41, 0.0, 1e-40], Expected::Drawn),
+    ] {
+        all.add(format!("quaternion {name}"), expected, move || (one([0.4, 0.2, 0.1], q, 2.0), camera(64, 48)));
     }
-    for (name, z) in [("on", 0.01), ("just before", 0.010_1), ("just behind", 0.009_9), ("far behind", -1.0)] {
-        all.push(case(format!("{name} the near plane"), move || {
-            let mut cloud = one([0.05; 3], TURNED, 2.0);
-            cloud.positions[0] = [0.001, 0.0, -3.0 + z];
-            (cloud, camera(64, 48))
-        }));
+    for (logit, expected) in [(-80.0, Expected::Nothing), (80.0, Expected::Drawn)] {
+        all.add(format!("opacity logit {logit}"), expected, move || (one([0.3; 3], TURNED, logit), camera(64, 48)));
     }
-    all.push(case("around the camera", || {
+}
+
+/// Around the near plane, off the origin, of any size.
+fn places(all: &mut Scenes) {
+    for (name, z, expected) in [
+        ("on", 0.01, Expected::Nothing),
+        ("just before", 0.010_1, Expected::Drawn),
+        ("just behind", 0.009_9, Expected::Nothing),
+        ("far behind", -1.0, Expected::Nothing),
+    ] {
+        all.add(format!("{name} the near plane"), expected, move || {
+            // The camera is moved, not the Gaussian: its depth is exact in both precisions.
+            let mut at = camera(64, 48);
+            at.center.z = -z;
+            (one([0.05; 3], TURNED, 2.0), at)
+        });
+    }
+    all.drawn("around the camera", || {
         let mut cloud = one([4.0; 3], TURNED, 2.0);
         cloud.positions[0] = [0.0, 0.0, -2.9];
         (cloud, camera(64, 48))
-    }));
-    for (name, q) in [
-        ("zero", [0.0; 4]),
-        ("tiny", [1e-30, 2e-30, 0.0, 1e-30]),
-        ("huge", [1e30, -1e30, 1e30, 1e30]),
-        ("denormal", [1e-40, 1e-41, 0.0, 1e-40]),
-    ] {
-        all.push(case(format!("quaternion {name}"), move || (one([0.4, 0.2, 0.1], q, 2.0), camera(64, 48))));
-    }
-    for logit in [-80.0, 80.0] {
-        all.push(case(format!("opacity logit {logit}"), move || (one([0.3; 3], TURNED, logit), camera(64, 48))));
-    }
-    all.push(case("colour coefficients that overflow to white and black", || {
-        let mut cloud = one([0.3; 3], TURNED, 4.0);
-        cloud.sh[0] = [0.5 / sh::SH_C0, -1e3, 0.0];
-        (cloud, camera(64, 48))
-    }));
-    all.push(case("colour coefficients that cancel", || {
-        let mut cloud = one([0.3; 3], TURNED, 4.0);
-        cloud.sh_degree = 3;
-        cloud.sh = (0..16).map(|k| [if k % 2 == 0 { 3.0 } else { -3.0 }; 3]).collect();
-        (cloud, camera(64, 48))
-    }));
+    });
     for offset in [1e6, 1e9] {
-        all.push(case(format!("{offset:e} units off the origin"), move || {
+        all.drawn(format!("{offset:e} units off the origin"), move || {
             let mut cloud = one([0.3, 0.2, 0.1], TURNED, 2.0);
             cloud.origin = DVec3::splat(offset);
             let mut at = camera(64, 48);
             at.center += DVec3::splat(offset);
             (cloud, at)
-        }));
+        });
     }
     for size in [1e-6, 1e6] {
-        all.push(case(format!("a scene {size:e} units large"), move || {
+        all.drawn(format!("a scene {size:e} units large"), move || {
             // Nothing nearer than the near plane is drawn, so the small one is looked at from afar.
             let mut cloud = one([0.3 * size, 0.2 * size, 0.1 * size], TURNED, 2.0);
             cloud.positions[0] = [0.1 * size, 0.0, 0.0];
@@ -160,29 +234,61 @@ pub fn cases() -> Vec<Case> {
             at.center *= size.max(1.0);
             at.focal_px *= (1.0 / size).max(1.0);
             (cloud, at)
-        }));
+        });
     }
-    for focal in [1.0, 1e6] {
-        all.push(case(format!("focal length {focal:e} px"), move || {
+}
+
+/// Focal lengths and sizes of pictures.
+fn views(all: &mut Scenes) {
+    for (focal, scale) in [(1.0, 2.0), (1e6, 1e-5)] {
+        all.drawn(format!("focal length {focal:e} px"), move || {
             let mut at = camera(64, 48);
             at.focal_px = DVec2::splat(focal);
-            (one([1e-3, 2e-3, 1e-3], TURNED, 2.0), at)
-        }));
+            (one([scale, 2.0 * scale, scale], TURNED, 2.0), at)
+        });
     }
-    all.push(case("a picture of one pixel", || (one([0.3; 3], TURNED, 2.0), camera(1, 1))));
-    all.push(case("a picture 16,384 px wide", || {
-        let mut at = camera(16_384, 4);
-        at.focal_px = DVec2::splat(5_000.0);
-        (one([0.3; 3], TURNED, 2.0), at)
-    }));
-    all.push(case("no Gaussian", || (GaussianCloud::default(), camera(64, 48))));
-    all.push(case("a million on one pixel", || (many(1_000_000, |_| [0.0; 3], 1e-4, -9.0), camera(8, 8))));
-    all.push(case("all at one depth", || {
+    all.drawn("a picture of one pixel", || (one([0.3; 3], TURNED, 2.0), camera(1, 1)));
+    for (name, width, height) in [("wide", 16_384, 4), ("high", 4, 16_384)] {
+        all.drawn(format!("a picture 16,384 px {name}"), move || {
+            let mut at = camera(width, height);
+            at.focal_px = DVec2::splat(5_000.0);
+            (one([0.3; 3], TURNED, 2.0), at)
+        });
+    }
+}
+
+/// Coefficients of colours.
+fn colors(all: &mut Scenes) {
+    all.drawn("colour coefficients that overflow to white and black", || {
+        let mut cloud = one([0.3; 3], TURNED, 4.0);
+        cloud.sh[0] = [0.5 / sh::SH_C0, -1e3, 0.0];
+        (cloud, camera(64, 48))
+    });
+    for (name, expected, of) in [
+        ("that cancel", Expected::Drawn, (|k| if k % 2 == 0 { 3.0 } else { -3.0 }) as fn(usize) -> f64),
+        ("of 1e30", Expected::Drawn, |_| 1e30),
+        ("whose sum overflows", Expected::Drawn, |_| 3e38),
+        ("that overflow both ways", Expected::Finite, |k| if k % 2 == 0 { 3e38 } else { -3e38 }),
+    ] {
+        all.add(format!("colour coefficients {name}"), expected, move || {
+            let mut cloud = one([0.3; 3], TURNED, 4.0);
+            cloud.sh_degree = 3;
+            cloud.sh = (0..16).map(|k| [of(k); 3]).collect();
+            (cloud, camera(64, 48))
+        });
+    }
+}
+
+/// None, one, and many in one place.
+fn crowds(all: &mut Scenes) {
+    all.add("no Gaussian", Expected::Nothing, || (GaussianCloud::default(), camera(64, 48)));
+    all.drawn("one Gaussian", || (one([0.3, 0.2, 0.1], TURNED, 2.0), camera(64, 48)));
+    // The middle of an odd picture is the middle of a pixel.
+    all.drawn("a million on one pixel", || (many(1_000_000, |_| [0.0; 3], 1e-4, -5.0), camera(9, 9)));
+    all.drawn("all at one depth", || {
         (many(5_000, |i| [(i % 70) as f64 * 0.02 - 0.7, (i / 70) as f64 * 0.02 - 0.7, 0.0], 0.02, 0.0), camera(64, 48))
-    }));
-    all.push(case("all coincident", || (many(5_000, |_| [0.0; 3], 0.2, -3.0), camera(64, 48))));
-    all.extend(refused());
-    all
+    });
+    all.drawn("all coincident", || (many(5_000, |_| [0.0; 3], 0.2, -3.0), camera(64, 48)));
 }
 
 /// Many alike, small and round.
@@ -200,25 +306,45 @@ fn many(n: usize, place: impl Fn(usize) -> [f64; 3], scale: f64, logit: f64) -> 
 /// Values that are no numbers, in every property: refused by name.
 fn refused() -> Vec<Case> {
     type Spoil = fn(&mut GaussianCloud<f64>, f64);
-    let properties: [(&str, Spoil); 5] = [
+    let properties: [(&str, Spoil); 6] = [
         ("position", |c, v| c.positions[0][1] = v),
         ("scale", |c, v| c.log_scales[0][2] = v),
         ("quaternion", |c, v| c.quaternions[0][0] = v),
         ("opacity", |c, v| c.opacity_logits[0] = v),
         ("colour", |c, v| c.sh[0][0] = v),
+        ("origin", |c, v| c.origin.y = v),
     ];
-    let values = [("NaN", f64::NAN), ("infinity", f64::INFINITY)];
+    type Blind = fn(&mut Camera, f64);
+    let views: [(&str, Blind); 4] = [
+        ("focal length", |c, v| c.focal_px.x = v),
+        ("principal point", |c, v| c.principal_px.y = v),
+        ("camera centre", |c, v| c.center.z = v),
+        ("camera rotation", |c, v| c.world_from_camera.x_axis.y = v),
+    ];
+    let finding = |refusal: Option<String>| match refusal {
+        Some(reason) => Finding::is(reason, true),
+        None => Finding::is("it was let through", false),
+    };
+    let values = [("NaN", f64::NAN), ("infinity", f64::INFINITY), ("minus infinity", f64::NEG_INFINITY)];
     let each = |(property, spoil): (&'static str, Spoil)| {
         values.map(|(name, value)| {
             Case::new("drawing", format!("{name} as {property}"), move || {
                 let mut cloud = one([0.3; 3], TURNED, 2.0);
+                let valid = cloud.validate().is_ok();
                 spoil(&mut cloud, value);
-                match cloud.validate() {
-                    Err(e) => Finding::is(e.to_string(), true),
-                    Ok(()) => Finding::is("it was let through", false),
-                }
+                finding(cloud.validate().err().filter(|_| valid).map(|e| e.to_string()))
             })
         })
     };
-    properties.into_iter().flat_map(each).collect()
+    let seen = |(property, spoil): (&'static str, Blind)| {
+        values.map(|(name, value)| {
+            Case::new("drawing", format!("{name} as {property}"), move || {
+                let mut at = camera(8, 8);
+                spoil(&mut at, value);
+                let drawn = pair(&one([0.3; 3], TURNED, 2.0), &at, &RenderSettings::default());
+                finding(drawn.err().map(|e| e.to_string()))
+            })
+        })
+    };
+    properties.into_iter().flat_map(each).chain(views.into_iter().flat_map(seen)).collect()
 }

@@ -1,7 +1,7 @@
 //! Changes that must not change the picture: the order of Gaussians, the world's place, turn and size,
-//! one Gaussian as two halves, the number of threads.
+//! one Gaussian as two halves, where tiles end, the number of threads.
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec2, DVec3};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -9,7 +9,7 @@ use rand_pcg::Pcg64Mcg;
 use super::drawing::camera;
 use super::{Case, Finding};
 use crate::render::cpu::Renderer;
-use crate::render::{Features, RenderSettings};
+use crate::render::{Features, RenderSettings, TILE_PX};
 use crate::scene::{Camera, GaussianCloud};
 
 /// Gaussians of the scene that is changed.
@@ -55,6 +55,38 @@ fn held_against(a: Option<Vec<f32>>, b: Option<Vec<f32>>, bound: f64) -> Finding
         return Finding::is("nothing was drawn", false);
     }
     Finding::within("largest change of a colour", worst, bound)
+}
+
+/// The picture as part of larger ones, in which it begins 1 to 15 px further right and down: tiles then
+/// end at other pixels, as they would if they had another size.
+fn tiles() -> Finding {
+    let (cloud, at) = (scene(), camera(96, 64));
+    let [width, height] = [at.width_px as usize, at.height_px as usize];
+    let whole = picture(&cloud, &at);
+    let mut worst = Finding::is("it could not be drawn", false);
+    for shift in 1..TILE_PX as u32 {
+        let (dx, dy) = (shift, (7 * shift) % TILE_PX as u32);
+        let mut wider = at.clone();
+        (wider.width_px, wider.height_px) = (at.width_px + dx, at.height_px + dy);
+        wider.principal_px += DVec2::new(f64::from(dx), f64::from(dy));
+        let stride = width + dx as usize;
+        let part = picture(&cloud, &wider).map(|all| {
+            let row = |plane: &[f32], y: usize| {
+                let first = (y + dy as usize) * stride + dx as usize;
+                plane[first..first + width].to_vec()
+            };
+            let planes = all.chunks(stride * (height + dy as usize));
+            planes.flat_map(|plane| (0..height).flat_map(move |y| row(plane, y))).collect()
+        });
+        let finding = held_against(whole.clone(), part, 1e-5);
+        if !finding.holds || !(finding.error <= worst.error) {
+            worst = finding;
+        }
+        if !worst.holds {
+            break;
+        }
+    }
+    worst
 }
 
 /// The cases of this area.
@@ -103,6 +135,7 @@ pub fn cases() -> Vec<Case> {
             halves.opacity_logits.fill((half / (1.0 - half)).ln());
             compared(&whole, &halves, &camera(96, 64), 4e-2)
         }),
+        Case::new("invariance", "where tiles end", tiles),
         Case::new("invariance", "the number of threads", || {
             let draw = |threads: usize| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok()?;

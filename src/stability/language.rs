@@ -5,6 +5,8 @@ use glam::DVec3;
 use super::{Case, Finding};
 use crate::math::vector::unit;
 use crate::pipeline::semantics::codes::{self, TOLERANCE};
+use crate::pipeline::semantics::grammar::{Kind, Phrase};
+use crate::pipeline::semantics::localise::{Scorer, localise};
 use crate::pipeline::semantics::relevancy::{advantage, deviate, score};
 use crate::scene::{Identities, Level, NOBODY};
 
@@ -18,6 +20,23 @@ fn identities(n: usize) -> Identities {
         (0..n).map(|i| DVec3::new((i % 16) as f64, (i / 16 % 16) as f64, (i / 256) as f64)).collect();
     codes::assign(&mut all, &centers);
     all
+}
+
+/// The same scores for everything.
+struct Fixed([f32; 4]);
+
+impl Scorer for Fixed {
+    fn scores(&mut self, _: &str, _: Option<&str>) -> Vec<f32> {
+        self.0.to_vec()
+    }
+
+    fn threshold(&self) -> f32 {
+        0.5
+    }
+
+    fn resolution(&self) -> f32 {
+        0.001
+    }
 }
 
 /// The cases of this area.
@@ -36,6 +55,16 @@ pub fn cases() -> Vec<Case> {
             Finding::is(
                 "half and half cancels out, else it has length one",
                 cancel.is_none() && kept == Some(vec![1.0, 0.0]),
+            )
+        }),
+        language("opposite embeddings are least alike", || {
+            let (v, w) = ([0.6, 0.8, 0.0], [-0.6, -0.8, 0.0]);
+            let sideways = [0.8_f32, -0.6, 0.0];
+            let s =
+                [score(advantage(&v, &w, &[sideways.to_vec()]), 10.0), score(advantage(&v, &v, &[w.to_vec()]), 10.0)];
+            Finding::is(
+                format!("score {:.1e} where nothing speaks for it, {} where all does", s[0], s[1]),
+                s[0] < 1e-4 && s[1] > 0.999,
             )
         }),
         language("embeddings of length 1e-30 and 1e30", || {
@@ -63,6 +92,12 @@ pub fn cases() -> Vec<Case> {
             codes.sort_unstable();
             codes.dedup();
             Finding::is(format!("{} different codes", codes.len()), finite && codes.len() == 4_096)
+        }),
+        language("a score that is no number hides nothing", || {
+            let Some(phrase) = Phrase::parse("lamp") else { return Finding::is("no phrase", false) };
+            let answer = localise(&identities(4), &phrase, Kind::Auto, &mut Fixed([f32::NAN, 0.9, f32::NAN, 0.2]));
+            let first = answer.hits().first().map(|h| h.identity);
+            Finding::is(format!("{}, {} answers", answer.verdict(), answer.hits().len()), first == Some(2))
         }),
         language("codes one tolerance apart", || {
             let code = [0.5, 0.25, 0.75];

@@ -1,9 +1,11 @@
 //! The catalogue of extreme cases: what happens in each, how far it is from double precision, and
 //! whether the promise of DESIGN's numerics holds (finite in, finite out, or a clear refusal).
 //!
-//! One file per area: [`drawing`], [`invariance`], [`training`], [`language`], [`moving`].
+//! One file per area: [`drawing`], [`invariance`], [`training`], [`language`], [`moving`]; [`fuzz`] looks
+//! for more.
 
 pub mod drawing;
+pub mod fuzz;
 pub mod invariance;
 pub mod language;
 pub mod moving;

@@ -17,6 +17,16 @@ fn navigator(places: &[[f64; 3]]) -> Navigator {
     Navigator::new(&cloud, &cameras(places), DVec3::NEG_Y)
 }
 
+/// An opaque wall across the axis.
+fn wall() -> GaussianCloud {
+    let one: GaussianCloud = one([0.1, 0.1, 0.01], [1.0, 0.0, 0.0, 0.0], 6.0).cast();
+    let mut wall = one.select(&[0; 81 * 81]);
+    for (i, p) in wall.positions.iter_mut().enumerate() {
+        *p = [(i % 81) as f32 * 0.1 - 4.0, (i / 81) as f32 * 0.1 - 4.0, 0.0];
+    }
+    wall
+}
+
 fn pose(x: f64, turn: f64) -> Pose {
     Pose { center: DVec3::new(x, 0.0, -2.0), world_from_camera: DMat3::from_rotation_y(turn), fov_y_rad: 0.8 }
 }
@@ -46,6 +56,22 @@ pub fn cases() -> Vec<Case> {
             let way = navigator(&[]).legs(DVec3::new(0.0, 0.0, -2.0), DVec3::new(0.0, 0.0, 2.0));
             Finding::is(format!("{:?}", way.as_ref().err()), way.is_err())
         }),
+        moving("a graph in two parts", || {
+            // Cameras on both sides of a wall that ends nowhere in the known box.
+            let places: Vec<[f64; 3]> = (0..18)
+                .map(|i| {
+                    let side = if i < 9 { -1.0 } else { 1.0 };
+                    [f64::from(i % 3) - 1.0, f64::from(i / 3 % 3) - 1.0, side]
+                })
+                .collect();
+            let n = Navigator::new(&wall(), &cameras(&places), DVec3::NEG_Y);
+            let parts = n.graph.parts(&n.matter);
+            let way = n.legs(DVec3::new(0.0, 0.0, -1.0), DVec3::new(0.0, 0.0, 1.0));
+            let parted = matches!(way, Err(NoWay::Parted { .. }));
+            let same = n.legs(DVec3::new(0.0, 0.0, -1.0), DVec3::new(1.0, 0.0, -1.0));
+            let count = parts.iter().max().map_or(0, |m| m + 1);
+            Finding::is(format!("{count} parts; between them: {:?}", way.err()), parted && same.is_ok() && count >= 2)
+        }),
         moving("a goal inside matter", || {
             let way = navigator(&[[0.0, 0.0, -2.0], [1.0, 0.0, -2.0]]).legs(DVec3::new(0.0, 0.0, -2.0), DVec3::ZERO);
             Finding::is("refused", way == Err(NoWay::Inside))
@@ -61,6 +87,27 @@ pub fn cases() -> Vec<Case> {
         moving("a flight of half a turn on the spot", || {
             let (a, b) = (pose(0.0, 0.0), pose(0.0, std::f64::consts::PI));
             whole(Flight::new(&[a.center, b.center], [&a, &b], None, None, FRAMES, Speed::Constant))
+        }),
+        moving("legs over places 1e300 units away", || {
+            let (a, b) = (pose(0.0, 0.0), pose(1.0, 0.5));
+            let legs = [a.center, DVec3::splat(1e300), DVec3::splat(-1e300), b.center];
+            whole(Flight::new(&legs, [&a, &b], None, None, FRAMES, Speed::Eased))
+        }),
+        moving("looking at what is 1e30 units away, from outside of the scene", || {
+            let n = navigator(&[[-1.0, 0.0, -2.0], [1.0, 0.0, -2.0]]);
+            let (from, far) = (Pose { center: DVec3::splat(50.0), ..pose(0.0, 0.0) }, DVec3::new(1e30, -3e29, 7.0));
+            let goal = Pose { center: DVec3::new(-60.0, 0.0, 0.0), ..pose(0.0, 0.0) };
+            let way = n.fly(&from, &goal, Some(far), FRAMES, Speed::Eased);
+            let share = n.matter.free_share(DVec3::NEG_Z * 2.0, DVec3::splat(1e30), 0.0);
+            let outcome = format!("{:?}; {share:.0e} of the way is free", way.as_ref().err());
+            Finding::is(outcome, way == Err(NoWay::Inside) && share < 1e-20)
+        }),
+        moving("cameras 1e300 units apart", || {
+            let n = navigator(&[[0.0, 0.0, -2.0], [1.0, 0.0, -2.0], [1e300, 0.0, 0.0], [-1e300, 1e300, 0.0]]);
+            let places = n.graph.keypoints.iter().all(|k| k.center.is_finite());
+            let error = (n.spacing - 1.0).abs();
+            let finding = Finding::within(format!("spacing {} of those that are somewhere", n.spacing), error, 1e-12);
+            Finding { holds: finding.holds && places && n.clearance.is_finite(), ..finding }
         }),
         moving("10,000 keypoints", || {
             let legs: Vec<DVec3> =

@@ -6,6 +6,8 @@ use rand_pcg::Pcg64Mcg;
 
 use super::drawing::{camera, one};
 use super::{Case, Finding};
+use crate::pipeline::train::checkpoint::{self, Header};
+use crate::pipeline::train::density;
 use crate::pipeline::train::trainer::Trainer;
 use crate::pipeline::train::{TrainConfig, TrainView};
 use crate::render::cpu::Renderer;
@@ -18,7 +20,7 @@ use crate::scene::{GaussianCloud, PhotoPixels};
 const STEPS: u64 = 60;
 
 /// A photo of one grey level.
-fn flat(level: u8) -> TrainView {
+pub fn flat(level: u8) -> TrainView {
     let at = camera(48, 32);
     let rgb = vec![[level; 3]; 48 * 32];
     TrainView {
@@ -50,45 +52,61 @@ fn start() -> GaussianCloud {
     cloud
 }
 
-/// Losses of a short training and how many Gaussians were left as they were; `Err` with what ended it.
-fn losses(cloud: GaussianCloud, view: TrainView, change: impl Fn(&mut Trainer)) -> Result<(Vec<f64>, usize), Finding> {
-    let config = TrainConfig { steps: STEPS, densify: false, sh_degree: 0, ..TrainConfig::default() };
-    let mut trainer = Trainer::new(cloud, &config, [0.0; 3], 1.0, Pcg64Mcg::seed_from_u64(5));
-    change(&mut trainer);
-    let views = [view];
-    let (mut losses, mut skipped) = (Vec::new(), 0);
-    for _ in 0..STEPS {
+/// A trainer of these Gaussians.
+pub fn trainer(cloud: GaussianCloud, steps: u64, densify: bool, extent: f64) -> Trainer {
+    let config = TrainConfig { steps, densify, sh_degree: 0, ..TrainConfig::default() };
+    Trainer::new(cloud, &config, [0.0; 3], extent, Pcg64Mcg::seed_from_u64(5))
+}
+
+/// What a short training came to.
+struct Trained {
+    trainer: Trainer,
+    losses: Vec<f64>,
+    /// Gaussians left as they were, and gradients cut.
+    left: [usize; 2],
+}
+
+/// Trains for so many steps, and does something before each.
+fn train(
+    mut trainer: Trainer,
+    view: TrainView,
+    steps: u64,
+    mut before: impl FnMut(&mut Trainer, &mut TrainView),
+) -> Result<Trained, Finding> {
+    let mut views = [view];
+    let (mut losses, mut left) = (Vec::new(), [0; 2]);
+    for _ in 0..steps {
+        before(&mut trainer, &mut views[0]);
         let results = trainer.advance(&views);
         let results = results.map_err(|e| Finding::is(format!("it stopped with a reason: {e}"), true))?;
-        losses.extend(results.iter().map(|r| r.loss));
-        skipped += results.iter().map(|r| r.skipped).sum::<usize>();
+        for r in &results {
+            losses.push(r.loss);
+            left = [left[0] + r.skipped, left[1] + r.outliers];
+        }
+        trainer.control_density().map_err(|e| Finding::is(format!("it stopped with a reason: {e}"), true))?;
     }
-    match trainer.cloud.validate() {
-        Ok(()) => Ok((losses, skipped)),
+    let finite = trainer.moments.iter().try_for_each(GaussianCloud::validate);
+    match trainer.cloud.validate().and(finite) {
+        Ok(()) => Ok(Trained { trainer, losses, left }),
         Err(e) => Err(Finding::is(format!("after training: {e}"), false)),
     }
 }
 
-/// Trains for a while; all that comes out is finite. A run under extremes need not improve.
-fn trained(cloud: GaussianCloud, view: TrainView, change: impl Fn(&mut Trainer)) -> Finding {
-    match losses(cloud, view, change) {
-        Ok((losses, skipped)) => {
-            let (first, last) = ends(&losses);
-            let outcome = format!("loss {first:.4} to {last:.4}, {skipped} left as they were");
-            Finding::is(outcome, first.is_finite() && last.is_finite())
-        }
-        Err(finding) => finding,
-    }
+fn short(cloud: GaussianCloud, view: TrainView, change: impl Fn(&mut Trainer)) -> Result<Trained, Finding> {
+    let mut trainer = trainer(cloud, STEPS, false, 1.0);
+    change(&mut trainer);
+    train(trainer, view, STEPS, |_, _| {})
 }
 
-/// Trains, and the loss has to fall.
+/// Trains, and the loss has to fall, or the training to stop with a reason.
 fn improves(cloud: GaussianCloud, view: TrainView, change: impl Fn(&mut Trainer)) -> Finding {
-    match losses(cloud, view, change) {
-        Ok((losses, _)) => {
+    match short(cloud, view, change) {
+        Ok(Trained { losses, left, .. }) => {
             let (first, last) = ends(&losses);
-            Finding::within(format!("loss {first:.4} to {last:.4}"), last / first, 1.0)
+            let outcome = format!("loss {first:.4} to {last:.4}, {} left as they were, {} cut", left[0], left[1]);
+            Finding { holds: last < first, ..Finding::within(outcome, last / first, 1.0) }
         }
-        Err(finding) => Finding { holds: false, ..finding },
+        Err(finding) => finding,
     }
 }
 
@@ -98,36 +116,210 @@ fn ends(losses: &[f64]) -> (f64, f64) {
     (or_nan(losses.first()), or_nan(losses.last()))
 }
 
+/// What happens to one Gaussian at one step of a training.
+#[derive(Clone, Copy, PartialEq)]
+enum Hit {
+    Nothing,
+    /// Its position has a gradient of about 1e27.
+    Outlier,
+    /// It has the second moment that plain Adam would keep of that.
+    Frozen,
+}
+
+/// The same training undisturbed, with an outlier gradient, and with what plain Adam would make of one.
+/// For one step the camera has a focal length of 1e30 px, and a Gaussian on its axis is as much smaller.
+fn outlier() -> Finding {
+    const WHICH: usize = 3;
+    let run = |hit: Hit| {
+        let trainer = trainer(start(), 400, false, 1.0);
+        let (mut kept, mut at) = (None, [[0.0_f32; 3]; 2]);
+        let trained = train(trainer, blob(), 400, |t, view| {
+            if t.step == 100 && hit == Hit::Outlier {
+                kept = Some((t.cloud.positions[WHICH], t.cloud.log_scales[WHICH], view.camera.focal_px));
+                t.cloud.positions[WHICH] = [0.0; 3];
+                t.cloud.log_scales[WHICH] = [-69.0; 3];
+                view.camera.focal_px = glam::DVec2::splat(1e30);
+            } else if let Some((position, scale, focal)) = kept.take() {
+                (t.cloud.positions[WHICH], t.cloud.log_scales[WHICH]) = (position, scale);
+                view.camera.focal_px = focal;
+            }
+            if t.step == 101 {
+                at[0] = t.cloud.positions[WHICH];
+                if hit == Hit::Frozen {
+                    t.moments[1].positions[WHICH] = [1e27; 3];
+                }
+            }
+        })?;
+        at[1] = trained.trainer.cloud.positions[WHICH];
+        let way = at[0].iter().zip(at[1]).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>().sqrt();
+        Ok::<_, Finding>((trained, way))
+    };
+    match (run(Hit::Nothing), run(Hit::Outlier), run(Hit::Frozen)) {
+        (Ok((calm, way)), Ok((hit, hit_way)), Ok((_, frozen))) => {
+            let text = format!(
+                "goes {:.2} of its undisturbed way in 300 steps ({:.0e} if frozen); {} left as they were, {} cut",
+                hit_way / way,
+                frozen / way,
+                hit.left[0],
+                hit.left[1]
+            );
+            let finding = Finding::within(text, (hit_way / way - 1.0).abs(), 0.5);
+            let told = hit.left[1] > 0 && calm.left == [0, 0];
+            Finding { holds: finding.holds && told && frozen < 0.01 * way, ..finding }
+        }
+        (Err(f), ..) | (_, Err(f), _) | (.., Err(f)) => Finding { holds: false, ..f },
+    }
+}
+
+/// A scene 1e-4 units large: the loss is 1e8 times as curved along positions as along log-scales.
+fn stiff() -> Finding {
+    const SIZE: f64 = 1e-4;
+    let mut view = blob();
+    // The same picture from 1e4 times as far with that focal length: nothing is nearer than the near plane.
+    let small = |cloud: &mut GaussianCloud| {
+        cloud.positions.iter_mut().flatten().for_each(|v| *v *= SIZE as f32);
+        cloud.log_scales.iter_mut().flatten().for_each(|v| *v += SIZE.ln() as f32);
+    };
+    view.camera.focal_px *= 1.0 / SIZE;
+    let mut cloud = start();
+    small(&mut cloud);
+    let curved = curvatures(&cloud, &view);
+    let trainer = trainer(cloud, 300, false, SIZE);
+    match train(trainer, view, 300, |_, _| {}) {
+        Ok(t) => {
+            let (first, last) = ends(&t.losses);
+            let [position, scale, opacity] = curved;
+            let text = format!(
+                "curvatures {position:.1e}, {scale:.1e}, {opacity:.1e}; loss {first:.4} to {last:.4}, {} cut",
+                t.left[1]
+            );
+            let finding = Finding::within(text, last / first, 0.5);
+            Finding { holds: finding.holds && position > 1e7 * scale.max(opacity), ..finding }
+        }
+        Err(finding) => Finding { holds: false, ..finding },
+    }
+}
+
+/// Second derivatives of the mean squared error along a position, a log-scale and an opacity logit, the
+/// largest of all Gaussians: by central differences in double precision.
+fn curvatures(cloud: &GaussianCloud, view: &TrainView) -> [f64; 3] {
+    let wide = cloud.cast::<f64>();
+    let error = |c: &GaussianCloud<f64>| {
+        let frame = Renderer::<f64>::new().render(c, Features::NONE, &view.camera, &RenderSettings::default());
+        let Ok(frame) = frame else { return f64::NAN };
+        let each = frame.color.iter().enumerate().flat_map(|(k, plane)| {
+            plane.iter().zip(&view.pixels.rgb).map(move |(v, p)| (v - f64::from(p[k]) / 255.0).powi(2))
+        });
+        each.sum::<f64>() / (3 * view.pixels.len()) as f64
+    };
+    let middle = error(&wide);
+    type Move = fn(&mut GaussianCloud<f64>, usize, f64);
+    let moves: [(Move, f64); 3] = [
+        (|c, i, h| c.positions[i][0] += h, 1e-6),
+        (|c, i, h| c.log_scales[i][0] += h, 1e-2),
+        (|c, i, h| c.opacity_logits[i] += h, 1e-2),
+    ];
+    moves.map(|(shift, h)| {
+        let at = |i: usize, h: f64| {
+            let mut moved = wide.clone();
+            shift(&mut moved, i, h);
+            error(&moved)
+        };
+        let curvature = |i: usize| ((at(i, h) + at(i, -h) - 2.0 * middle) / (h * h)).abs();
+        (0..wide.len()).map(curvature).fold(0.0, f64::max)
+    })
+}
+
+/// A training stopped and gone on with, through a checkpoint on disk, against one that went through;
+/// density control on the way. Without its moments it goes another way.
+fn resumed() -> Finding {
+    const STEPS: u64 = 120;
+    const STOP: u64 = 55;
+    let config = TrainConfig { steps: STEPS, sh_degree: 0, ..TrainConfig::default() };
+    let fresh = || trainer(start(), STEPS, true, 1.0);
+    let on = |t: Trainer, steps: u64| train(t, blob(), steps, |_, _| {}).map(|t| t.trainer);
+    let run = || -> Result<[Trainer; 3], Finding> {
+        let broken = |e: String| Finding::is(e, false);
+        let (through, half) = (on(fresh(), STEPS)?, on(fresh(), STOP)?);
+        let folder = tempfile::tempdir().map_err(|e| broken(e.to_string()))?;
+        let path = folder.path().join(checkpoint::FILE);
+        let header = Header {
+            config: config.clone(),
+            photos: Vec::new(),
+            step: half.step,
+            secs: 0.0,
+            count: half.cloud.len(),
+            sh_degree: half.cloud.sh_degree,
+            origin: half.cloud.origin,
+            rng: half.rng.clone(),
+            round: half.round.clone(),
+            budget: half.budget,
+            damping: half.schedule.damping,
+            history: Default::default(),
+        };
+        checkpoint::save(&path, &half, &header).map_err(|e| broken(e.to_string()))?;
+        let loaded = || -> Result<Trainer, Finding> {
+            let saved = checkpoint::load(&path).map_err(|e| broken(e.to_string()))?;
+            let saved = saved.ok_or_else(|| broken("the checkpoint is gone".into()))?;
+            let mut t = fresh();
+            (t.cloud, t.moments, t.stats) = (saved.cloud, saved.moments, saved.stats);
+            (t.rng, t.round, t.step) = (saved.header.rng, saved.header.round, saved.header.step);
+            Ok(t)
+        };
+        let mut forgetful = loaded()?;
+        forgetful.moments[0].positions.fill([0.0; 3]);
+        Ok([through, on(loaded()?, STEPS - STOP)?, on(forgetful, STEPS - STOP)?])
+    };
+    match run() {
+        Ok([through, resumed, forgetful]) => {
+            let same = through.cloud == resumed.cloud && through.moments == resumed.moments;
+            let text = format!(
+                "{} Gaussians after {STEPS} steps, stopped at {STOP}; other moments end elsewhere: {}",
+                through.cloud.len(),
+                through.cloud != forgetful.cloud
+            );
+            Finding::is(text, same && through.cloud != forgetful.cloud && through.cloud.len() > start().len())
+        }
+        Err(finding) => Finding { holds: false, ..finding },
+    }
+}
+
 /// The cases of this area.
 pub fn cases() -> Vec<Case> {
     let training = |name: &'static str, run: fn() -> Finding| Case::new("training", name, run);
     vec![
         training("an ordinary start improves", || improves(start(), blob(), |_| {})),
-        training("a black photo", || trained(start(), flat(0), |_| {})),
-        training("a white photo", || trained(start(), flat(255), |_| {})),
+        training("a black photo", || improves(start(), flat(0), |_| {})),
+        training("a white photo", || improves(start(), flat(255), |_| {})),
         training("Gaussians under and far beyond a pixel", || {
             let mut cloud = start();
             cloud.log_scales[0] = [-40.0; 3];
             cloud.log_scales[1] = [12.0; 3];
             cloud.log_scales[2] = [3.0, -30.0, 0.0];
-            trained(cloud, blob(), |_| {})
+            improves(cloud, blob(), |_| {})
         }),
         training("opacity logits of +-80", || {
             let mut cloud = start();
             (cloud.opacity_logits[0], cloud.opacity_logits[1]) = (80.0, -80.0);
-            trained(cloud, blob(), |_| {})
+            improves(cloud, blob(), |_| {})
         }),
         training("quaternions of length 0 and 1e30", || {
             let mut cloud = start();
             (cloud.quaternions[0], cloud.quaternions[1]) = ([0.0; 4], [1e30, 1e30, 0.0, 0.0]);
-            trained(cloud, blob(), |_| {})
+            improves(cloud, blob(), |_| {})
         }),
         training("all coincident", || {
             let mut cloud = start();
             cloud.positions.fill([0.0; 3]);
-            trained(cloud, blob(), |_| {})
+            improves(cloud, blob(), |_| {})
         }),
-        training("no Gaussian", || trained(GaussianCloud::default(), blob(), |_| {})),
+        training("no Gaussian", || match short(GaussianCloud::default(), blob(), |_| {}) {
+            Ok(t) => {
+                let (first, last) = ends(&t.losses);
+                Finding::within(format!("nothing to train, loss stays {first:.4}"), (last - first).abs(), 0.0)
+            }
+            Err(finding) => Finding { holds: false, ..finding },
+        }),
         training("moments of an outlier gradient", || {
             improves(start(), blob(), |t| {
                 t.moments[0].positions[0] = [1e15; 3];
@@ -136,20 +328,68 @@ pub fn cases() -> Vec<Case> {
         }),
         training("Adam, 100,000 steps of no gradient", || {
             let (mut p, mut m, mut v) = (1.0, 1.0, 1.0);
-            (1..=100_000).for_each(|t| AdamStep::new(t).update(&mut p, 0.0, &mut m, &mut v, 1e-3));
+            for t in 1..=100_000 {
+                AdamStep::new(t).update(&mut p, 0.0, &mut m, &mut v, 1e-3);
+            }
             Finding::is(format!("parameter {p:.4}"), p.is_finite() && m >= 0.0 && v >= 0.0)
         }),
-        training("Adam after a gradient of 1e15 rests, and does not jump", || {
+        training("Adam after a gradient of 1e30 is back within 300 steps", || {
+            let [calm, hit] = [false, true].map(|hit| {
+                let (mut p, mut m, mut v) = (0.0_f32, 0.0, 0.0);
+                let (mut longest, mut cut) = (0.0_f32, 0);
+                for t in 1..=2_300 {
+                    let before = p;
+                    // A target that moves, so that it cannot be reached once and for all.
+                    let g = p - (t as f32 * 0.01).sin();
+                    let g = if hit && t == 2_000 { 1e30 } else { g };
+                    cut += usize::from(AdamStep::new(t).update(&mut p, g, &mut m, &mut v, 1e-2));
+                    longest = longest.max((p - before).abs());
+                }
+                (p, longest, cut)
+            });
+            let outcome = format!("longest step {:.4} of a rate of 0.01, {} cut", hit.1, hit.2);
+            let finding = Finding::within(outcome, f64::from((hit.0 - calm.0).abs()), 0.02);
+            Finding { holds: finding.holds && hit.1 < 0.04 && (calm.2, hit.2) == (0, 1), ..finding }
+        }),
+        training("Adam whose gradients grow a million times for good", || {
             let (mut p, mut m, mut v) = (0.0_f32, 0.0, 0.0);
-            let mut longest = 0.0_f32;
-            for t in 1..=30_000 {
-                let before = p;
-                let g = if t == 10 { 1e15 } else { p - 1.0 };
-                AdamStep::new(t).update(&mut p, g, &mut m, &mut v, 1e-2);
-                longest = longest.max((p - before).abs());
+            let mut at = [0.0; 2];
+            for t in 1..=1_200 {
+                let g = (p - 1.0).signum() * if t > 1_000 { 1.0 } else { 1e-6 };
+                AdamStep::new(t).update(&mut p, g, &mut m, &mut v, 1e-4);
+                at = if t == 1_000 { [p, p] } else { [at[0], p] };
             }
-            // What it has seen keeps it still for a long time; it never moves faster than its rate allows.
-            Finding::within(format!("at {p:.3} of 1 after 30,000 steps; longest step"), f64::from(longest), 0.04)
+            // It goes on as fast as the rate allows, neither stuck nor jumping.
+            let way = f64::from(at[1] - at[0]) / (200.0 * 1e-4);
+            Finding::is(format!("{way:.2} of the rate over the next 200 steps"), (0.5..4.0).contains(&way))
+        }),
+        training("learning rates times 100", || improves(start(), blob(), |t| t.schedule.damping = 100.0)),
+        training("an outlier gradient of 1e27 in a real training", outlier),
+        training("position, scale and opacity on curvatures 1e8 apart", stiff),
+        training("resumed in the middle, bit by bit", resumed),
+        training("Gaussians of a lower degree than the settings'", || {
+            let config = TrainConfig { steps: STEPS, densify: false, sh_degree: 3, ..TrainConfig::default() };
+            let mut t = Trainer::new(start(), &config, [0.0; 3], 1.0, Pcg64Mcg::seed_from_u64(5));
+            t.step = STEPS;
+            match train(t, blob(), STEPS, |_, _| {}) {
+                Ok(t) => {
+                    let (first, last) = ends(&t.losses);
+                    Finding::within(format!("loss {first:.4} to {last:.4}"), last / first, 1.0)
+                }
+                Err(finding) => Finding { holds: false, ..finding },
+            }
+        }),
+        training("density control splits what is as large as numbers get", || {
+            let mut cloud = start();
+            cloud.log_scales[0] = [88.7; 3];
+            cloud.log_scales[1] = [f32::MAX; 3];
+            cloud.positions[1] = [f32::MAX; 3];
+            let mut t = trainer(cloud, STEPS, true, 1.0);
+            t.stats.gradient.fill(1.0);
+            let mut rng = Pcg64Mcg::seed_from_u64(1);
+            let done = density::control(&mut t.cloud, &mut t.moments, &t.stats, 1.0, 100, false, &mut rng);
+            let valid = t.cloud.validate();
+            Finding::is(format!("{} split, {:?}", done.split, valid), valid.is_ok() && done.split == 24)
         }),
         training("Adam on curvatures 1e8 apart", || {
             let curvature = [1.0_f32, 1e8];
@@ -173,4 +413,30 @@ pub fn cases() -> Vec<Case> {
             Finding::is(format!("alike {same:.6}, black and white {apart:.6}"), holds)
         }),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::finite::CHECKED;
+    use crate::pipeline::train::trainer::StepError;
+
+    #[test]
+    fn poisoned_stages_of_training_are_named_under_the_feature() {
+        let stage = |poison: fn(&mut Trainer)| {
+            let mut t = trainer(start(), STEPS, false, 1.0);
+            poison(&mut t);
+            match t.advance(&[blob()]) {
+                Ok(_) => None,
+                Err(StepError::NotFinite(e)) => Some((e.stage, e.field, e.index)),
+                Err(e) => panic!("{e}"),
+            }
+        };
+        assert_eq!(stage(|_| {}), None);
+        let adam = stage(|t| t.moments[0].positions[3][1] = f32::NAN);
+        assert_eq!(adam, CHECKED.then_some(("Adam", "position", 3)));
+        // What the renderer leaves out is found no later than after the step.
+        let scale = stage(|t| t.cloud.log_scales[2][0] = f32::NAN);
+        assert_eq!(scale, CHECKED.then_some(("Adam", "scale", 2)));
+    }
 }

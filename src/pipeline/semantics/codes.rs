@@ -6,6 +6,7 @@
 
 use glam::{DVec3, Vec3};
 
+use crate::math::finite::{all_finite, insist};
 use crate::scene::{Identities, IdentityId};
 
 /// Radius of the sphere.
@@ -69,6 +70,7 @@ pub fn assign(identities: &mut Identities, centers: &[DVec3]) {
         given.push((i, code));
         if let Some(identity) = identities.get_mut(i as IdentityId + 1) {
             identity.code = (code * RADIUS + Vec3::splat(0.5)).to_array();
+            insist(|| all_finite("codes", "channel", &identity.code));
         }
     }
 }

@@ -173,10 +173,10 @@ fn piece_of(identities: &Identities, piece: &str, whole: &str, scorer: &mut dyn 
     judge(identities, hits, scorer)
 }
 
-/// Candidates by falling score; equal ones by number.
+/// Candidates by falling score; equal ones by number. A score that is no number is none.
 fn rank(candidates: impl Iterator<Item = IdentityId>, scores: &[f32]) -> Vec<Hit> {
     let hit = |id: IdentityId| Hit { identity: id, score: scores[id as usize - 1], margin: 0.0 };
-    let mut hits: Vec<Hit> = candidates.map(hit).collect();
+    let mut hits: Vec<Hit> = candidates.map(hit).filter(|h| !h.score.is_nan()).collect();
     hits.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.identity.cmp(&b.identity)));
     for i in 0..hits.len() {
         hits[i].margin = hits[i].score - hits.get(i + 1).map_or(0.0, |next| next.score);

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::localise::{Scorer, Strategy};
 use super::relevancy::{CANONICAL, TEMPERATURE, advantage, score};
+use crate::math::finite::{all_finite, insist};
 use crate::scene::{LanguageFeatures, ViewFeatures};
 
 /// Which features of parts are compared.
@@ -117,6 +118,7 @@ impl Scorer for ByMeaning<'_> {
         }
         let advantages = self.advantages(phrase, against).into_iter();
         let scores: Vec<f32> = advantages.map(|d| score(d, self.options.temperature)).collect();
+        insist(|| all_finite("relevancy", "score", &scores));
         self.known.push((phrase.to_owned(), against.map(str::to_owned), scores.clone()));
         scores
     }

@@ -9,6 +9,7 @@ use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
 use super::votes::UNKNOWN;
+use crate::math::finite::{CHECKED, all_finite};
 use crate::pipeline::observer::{Observer, Progress, Signal};
 use crate::pipeline::train::trainer::LAMBDA;
 use crate::render::cpu::Renderer;
@@ -90,6 +91,9 @@ pub fn train_codes(
                 adam.update(c, g, first, second, rate);
             }
         });
+        if CHECKED {
+            all_finite("Adam on codes", "code", codes.as_flattened())?;
+        }
         if step % 10 == 9 {
             let elapsed_secs = start.elapsed().as_secs_f64();
             observer.progress(Progress {
@@ -130,6 +134,10 @@ fn one_step(
         plane.iter_mut().zip(&target[c]).filter(|(_, t)| t.is_nan()).for_each(|(g, _)| *g = 0.0);
     }
     renderer.backward_tiles(&gradient);
+    if CHECKED {
+        gradient.features.iter().try_for_each(|p| all_finite("the loss of codes", "the gradient of pixel", p))?;
+        renderer.check_backward()?;
+    }
     Ok(total / CODE_CHANNELS as f64)
 }
 

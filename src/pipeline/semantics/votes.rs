@@ -3,6 +3,7 @@
 
 use rayon::prelude::*;
 
+use crate::math::finite::{CHECKED, all_finite};
 use crate::math::lanes::Lane;
 use crate::render::cpu::Renderer;
 use crate::render::cpu::weigh::Weighed;
@@ -75,6 +76,10 @@ impl Votes {
             for (gaussian, identity, weight) in row.found {
                 add(&mut self.of[gaussian as usize], identity, weight);
             }
+        }
+        if CHECKED {
+            let weights = self.of.iter().flatten().map(|v| &v.1);
+            all_finite("voting", "vote", weights)?;
         }
         Ok(())
     }

@@ -137,7 +137,7 @@ pub fn load(path: &Path) -> Result<Option<Checkpoint>, CheckpointError> {
     let mut at = Floats(data);
     let mut cloud = || at.cloud(n, degree, header.origin);
     let (cloud, moments) = (cloud(), [cloud(), cloud()]);
-    cloud.validate().map_err(|e| damaged(&e.to_string()))?;
+    [&cloud].into_iter().chain(&moments).try_for_each(GaussianCloud::validate).map_err(|e| damaged(&e.to_string()))?;
     let gradient = at.take(n);
     let seen = at.take(n).iter().map(|v| v.to_bits()).collect();
     let radius = at.take(n);

@@ -122,8 +122,13 @@ fn forget(m: &mut GaussianCloud, from: usize) {
 fn scatter(cloud: &mut GaussianCloud, i: usize, rng: &mut Pcg64Mcg) {
     let Some(rotation) = crate::math::rotation::matrix_from_quaternion(cloud.quaternions[i]) else { return };
     let local = cloud.log_scales[i].map(|s| s.exp() * gaussian(rng));
-    for (p, row) in cloud.positions[i].iter_mut().zip(rotation) {
+    let mut place = cloud.positions[i];
+    for (p, row) in place.iter_mut().zip(rotation) {
         *p += row[0] * local[0] + row[1] * local[1] + row[2] * local[2];
+    }
+    // One so large that a sample of it is nowhere stays where it is.
+    if place.iter().all(|p| p.is_finite()) {
+        cloud.positions[i] = place;
     }
     for s in &mut cloud.log_scales[i] {
         *s -= SPLIT_SHRINK.ln();
@@ -131,7 +136,6 @@ fn scatter(cloud: &mut GaussianCloud, i: usize, rng: &mut Pcg64Mcg) {
 }
 
 /// A standard normal sample (Box-Muller).
-/// A normally distributed number.
 pub(super) fn gaussian(rng: &mut Pcg64Mcg) -> f32 {
     let u: f64 = rng.random_range(f64::MIN_POSITIVE..1.0);
     let v: f64 = rng.random_range(0.0..std::f64::consts::TAU);

@@ -26,7 +26,7 @@ impl Device {
         render: RenderSettings,
         views: &[TrainView],
     ) -> Result<Self, GpuError> {
-        let settings = TrainerSettings { render, lambda: LAMBDA, ..TrainerSettings::default() };
+        let settings = TrainerSettings { render, lambda: LAMBDA };
         let mut trainer = Trainer::new(context, cloud, settings)?;
         trainer.upload(cloud, Some([&moments[0], &moments[1]]), step)?;
         let photos = views.iter().map(|v| trainer.photo(&v.pixels)).collect::<Result<_, _>>()?;
@@ -54,6 +54,7 @@ impl Device {
             loss: s.loss,
             psnr: s.sums.psnr(),
             skipped: s.sums.bad_gradients as usize,
+            outliers: s.sums.outliers as usize,
         };
         Ok(done.iter().filter(|s| !s.sums.overflow).map(result).collect())
     }

@@ -14,6 +14,7 @@ use super::trainer::{REPORT_STEPS, StepError, StepResult, Trainer};
 use super::{TrainConfig, TrainView, coarse, density, geometry, init};
 use crate::io::IoError;
 use crate::io::trained::{self, History, SceneInfo};
+use crate::math::finite::NotFinite;
 use crate::math::stats::{mean, median};
 use crate::pipeline::evaluate::evaluate;
 use crate::pipeline::observer::{Evaluation, Level, Observer, Progress, Signal, StepMetrics};
@@ -76,6 +77,9 @@ pub enum TrainError {
     /// The loss kept growing.
     #[error("the training diverged {0} times even with lowered rates; the photos' poses may be wrong")]
     Diverged(u32),
+    /// A stage left a number that is none; looked for under `debug-validation` only.
+    #[error(transparent)]
+    NotFinite(#[from] NotFinite),
     /// Settings that make no sense.
     #[error("{0}")]
     Config(String),
@@ -194,6 +198,8 @@ struct Job<'a> {
     safe: GaussianCloud,
     rollbacks: u32,
     recent: VecDeque<f64>,
+    /// Gradients cut since that was last told.
+    outliers: u64,
     /// Whether it was told that the budget is reached.
     full: bool,
 }
@@ -257,6 +263,7 @@ impl<'a> Job<'a> {
             safe,
             rollbacks: 0,
             recent: VecDeque::new(),
+            outliers: 0,
             full: false,
         }
     }
@@ -321,7 +328,6 @@ impl<'a> Job<'a> {
 
     /// One step with its guard against divergence, and density control.
     fn step(&mut self, observer: &mut dyn Observer) -> Result<Vec<StepResult>, TrainError> {
-        let name = || self.photos.first().cloned().unwrap_or_default();
         if self.coarse.is_some() && self.trainer.step >= coarse_steps(self.config) {
             self.coarse = None;
             if let Some(context) = &self.context {
@@ -329,21 +335,24 @@ impl<'a> Job<'a> {
                 self.trainer.move_to(context, &self.views)?;
             }
         }
-        let results = self.trainer.advance(self.coarse.as_ref().unwrap_or(&self.views)).map_err(|e| match e {
-            StepError::Render(e) => TrainError::Render(name(), e),
-            StepError::Gpu(e) => TrainError::Gpu(e),
-        })?;
+        let views = self.coarse.as_ref().unwrap_or(&self.views);
+        let results = self.trainer.advance(views).map_err(|e| self.failed(e))?;
         for result in &results {
             if result.skipped > 0 && self.trainer.step % 100 == 0 {
                 let text = format!("{} Gaussians had a gradient that is not finite", result.skipped);
                 observer.note(Level::Warning, text);
+            }
+            self.outliers += result.outliers as u64;
+            if self.outliers > 0 && self.trainer.step % 100 == 0 {
+                let count = std::mem::take(&mut self.outliers);
+                observer.note(Level::Warning, format!("{count} gradients were far above what is usual, and were cut"));
             }
             if self.diverges(result.loss) {
                 self.roll_back(result.loss, observer)?;
                 return Ok(results);
             }
         }
-        if let Some(report) = self.trainer.control_density()? {
+        if let Some(report) = self.trainer.control_density().map_err(|e| self.failed(e))? {
             if report.refused > 0 && !self.full {
                 self.full = true;
                 observer.note(Level::Info, format!("The budget of {} Gaussians is reached", self.trainer.budget));
@@ -355,6 +364,14 @@ impl<'a> Job<'a> {
             self.safe = self.trainer.cloud.clone();
         }
         Ok(results)
+    }
+
+    fn failed(&self, e: StepError) -> TrainError {
+        match e {
+            StepError::Render(e) => TrainError::Render(self.photos.first().cloned().unwrap_or_default(), e),
+            StepError::Gpu(e) => TrainError::Gpu(e),
+            StepError::NotFinite(e) => TrainError::NotFinite(e),
+        }
     }
 
     /// Whether this loss is not finite or far above what losses were recently.

@@ -10,12 +10,14 @@ use super::device::Device;
 use super::geometry::Geometry;
 use super::schedule::Schedule;
 use super::{TrainConfig, TrainView};
+use crate::math::finite::{CHECKED, NotFinite, all_finite};
 use crate::math::sh;
 use crate::pipeline::metrics;
 use crate::render::cpu::Renderer;
 use crate::render::cpu::adam::{AdamStep, Rates};
 use crate::render::cpu::normals;
 use crate::render::cpu::ssim::{LossParts, PhotoLoss};
+use crate::render::cpu::validate;
 use crate::render::gpu::{Context, GpuError};
 use crate::render::{FrameGradient, RenderError, RenderSettings};
 use crate::scene::{Camera, Gaussian, GaussianCloud};
@@ -26,8 +28,6 @@ pub const LAMBDA: f64 = 0.2;
 pub const REPORT_STEPS: u64 = 10;
 /// Gaussians that one task updates.
 const BLOCK: usize = 512;
-/// Gradients are clipped to this before they are squared, far from overflow.
-const CLIP: f32 = 1e15;
 
 /// What one step measured.
 #[derive(Clone, Copy, Debug, Default)]
@@ -38,6 +38,8 @@ pub struct StepResult {
     pub psnr: f64,
     /// Gaussians whose gradient was not finite and that were left as they are.
     pub skipped: usize,
+    /// Gradients that were cut because they were far above what their parameters had seen.
+    pub outliers: usize,
 }
 
 /// Why a step failed.
@@ -49,6 +51,9 @@ pub enum StepError {
     /// The GPU failed.
     #[error(transparent)]
     Gpu(#[from] GpuError),
+    /// A stage left a number that is none; looked for under `debug-validation` only.
+    #[error(transparent)]
+    NotFinite(#[from] NotFinite),
 }
 
 /// Everything that a step reads and writes. Deterministic on the CPU: the same state and photos
@@ -165,13 +170,24 @@ impl Trainer {
         }
         let parts = self.compare(frame.color, view);
         self.renderer.backward_tiles(&self.gradient);
-        let skipped = self.descend(&view.camera);
+        if CHECKED {
+            all_finite("the loss", "part", &[parts.l1, parts.ssim, parts.mse])?;
+            let mut planes = self.gradient.color.iter();
+            planes.try_for_each(|p| all_finite("the loss", "the gradient of pixel", p))?;
+            self.renderer.check_backward()?;
+        }
+        let Left { skipped, outliers, first } = self.descend(&view.camera);
         self.step += 1;
-        Ok(vec![StepResult { loss: parts.total(LAMBDA), psnr: metrics::psnr_of(parts.mse), skipped }])
+        if CHECKED {
+            let bad = |index| NotFinite { stage: "projection backward", field: "the gradient of Gaussian", index };
+            first.map_or(Ok(()), |i| Err(bad(i)))?;
+            self.check("Adam")?;
+        }
+        Ok(vec![StepResult { loss: parts.total(LAMBDA), psnr: metrics::psnr_of(parts.mse), skipped, outliers }])
     }
 
     /// Density control and opacity reset where they are due. Returns what was done.
-    pub fn control_density(&mut self) -> Result<Option<DensityReport>, GpuError> {
+    pub fn control_density(&mut self) -> Result<Option<DensityReport>, StepError> {
         let (densifies, resets) = (self.schedule.densifies(self.step), self.schedule.resets(self.step));
         if !self.densify || !(densifies || resets) {
             return Ok(None);
@@ -194,8 +210,18 @@ impl Trainer {
         if resets {
             density::reset_opacity(&mut self.cloud, &mut self.moments);
         }
+        self.check("densification")?;
         self.send()?;
         Ok(report)
+    }
+
+    /// Under `debug-validation`: whether cloud and moments are finite after a stage.
+    fn check(&self, stage: &'static str) -> Result<(), NotFinite> {
+        if CHECKED {
+            validate::cloud(stage, &self.cloud)?;
+            self.moments.iter().try_for_each(|m| validate::cloud(stage, m))?;
+        }
+        Ok(())
     }
 
     /// Replaces the cloud by an earlier one and forgets the moments; rates are halved.
@@ -238,12 +264,12 @@ impl Trainer {
 
     /// Backward of the projection and Adam, fused per Gaussian: gradients never reach memory, and
     /// Gaussians that were not drawn cost nothing.
-    fn descend(&mut self, camera: &Camera) -> usize {
+    fn descend(&mut self, camera: &Camera) -> Left {
         let update = Update {
             rates: self.schedule.rates(self.step),
             adam: self.schedule.adam(self.step),
             stride: self.cloud.sh_stride(),
-            active: sh::coefficients(self.settings.sh_degree),
+            active: sh::coefficients(self.settings.sh_degree.min(self.cloud.sh_degree)),
             radius_scale: 1.0 / camera.width_px.max(camera.height_px) as f32,
             eye: self.geometry.draws_normals(self.step).then(|| normals::eye(camera, &self.cloud)),
         };
@@ -266,7 +292,31 @@ impl Trainer {
                 radius,
             })
             .collect();
-        blocks.into_par_iter().map(|mut block| descend_block(renderer, &mut block, &update)).sum()
+        blocks
+            .into_par_iter()
+            .map(|mut block| descend_block(renderer, &mut block, &update))
+            .reduce(Left::default, Left::add)
+    }
+}
+
+/// What a step left out.
+#[derive(Clone, Copy, Default)]
+struct Left {
+    /// Gaussians whose gradient was not finite.
+    skipped: usize,
+    /// The first of them.
+    first: Option<usize>,
+    /// Gradients that were cut as outliers.
+    outliers: usize,
+}
+
+impl Left {
+    fn add(self, other: Self) -> Self {
+        Self {
+            skipped: self.skipped + other.skipped,
+            first: self.first.into_iter().chain(other.first).min(),
+            outliers: self.outliers + other.outliers,
+        }
     }
 }
 
@@ -334,12 +384,12 @@ fn zeros_like(cloud: &GaussianCloud) -> GaussianCloud {
     }
 }
 
-/// Updates a block and returns how many of its Gaussians had to be skipped.
+/// Updates a block and returns what it left out.
 #[multiversion::multiversion(targets("x86_64+avx2+fma"))]
-fn descend_block(renderer: &Renderer<f32>, block: &mut Block<'_>, update: &Update) -> usize {
+fn descend_block(renderer: &Renderer<f32>, block: &mut Block<'_>, update: &Update) -> Left {
     let Update { rates, adam, stride, active, radius_scale, eye } = update;
     let Block { first, p, m, v, gradient, seen, radius } = block;
-    let mut skipped = 0;
+    let mut left = Left::default();
     for i in 0..p.positions.len() {
         let own = i * stride..(i + 1) * stride;
         let gaussian = Gaussian {
@@ -360,15 +410,16 @@ fn descend_block(renderer: &Renderer<f32>, block: &mut Block<'_>, update: &Updat
         let finite = g.position.iter().chain(&g.log_scale).chain(&g.quaternion).chain(&g.color).all(|x| x.is_finite())
             && g.opacity_logit.is_finite();
         if !finite {
-            skipped += 1;
+            left.skipped += 1;
+            left.first = left.first.or(Some(*first + i));
             continue;
         }
         gradient[i] += g.screen;
         seen[i] += 1;
         radius[i] = radius[i].max(g.radius_px * radius_scale);
-        let step = |p: &mut [f32], m: &mut [f32], v: &mut [f32], g: &[f32], rate: f32| {
+        let mut step = |p: &mut [f32], m: &mut [f32], v: &mut [f32], g: &[f32], rate: f32| {
             for (((p, m), v), g) in p.iter_mut().zip(m).zip(v).zip(g) {
-                adam.update(p, g.clamp(-CLIP, CLIP), m, v, rate);
+                left.outliers += usize::from(adam.update(p, *g, m, v, rate));
             }
         };
         step(&mut p.positions[i], &mut m.positions[i], &mut v.positions[i], &g.position, rates.position);
@@ -394,5 +445,5 @@ fn descend_block(renderer: &Renderer<f32>, block: &mut Block<'_>, update: &Updat
         step(p0, m0, v0, &d_sh[..3], rates.sh_constant);
         step(p1, m1, v1, &d_sh[3..3 * active], rates.sh_rest);
     }
-    skipped
+    left
 }

@@ -1,4 +1,11 @@
-//! Adam (Kingma and Ba 2015) on single parameters.
+//! Adam (Kingma and Ba 2015) on single parameters, robust against outlier gradients;
+//! `shaders/adam.wgsl` has the same rule.
+//!
+//! Plain Adam remembers the square of a gradient for some 1,000 steps per power of e: one that is 1e15
+//! times too large would hold its parameter still for 70,000. Here no gradient counts for more than what
+//! doubles its parameter's second moment, so the parameter keeps at least 0.7 of its speed. What grows
+//! for good is caught up with, because doubling is fast. A parameter without a second moment, new or
+//! just reset, has nothing to compare with: its first gradient counts as it is.
 
 /// Learning rates of one step, in units of the parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -33,6 +40,14 @@ pub const BETA2: f32 = 0.999;
 /// Added to the root of the second moment (3DGS's value).
 pub const EPSILON: f32 = 1e-15;
 
+/// Gradients are cut to this before they are squared, far from overflow.
+pub const CLIP: f32 = 1e15;
+/// Square of the largest gradient, in units of the second moment: the one that doubles it.
+pub const GROWTH: f32 = 1.0 / (1.0 - BETA2);
+/// A gradient this many times too large is an outlier, which is counted. Gradients of Gaussians that
+/// come into sight for the first time may be 1e10 times what was seen of them before.
+pub const OUTLIER: f32 = 1e12;
+
 impl AdamStep {
     /// The constants of step `t`, counted from 1.
     pub fn new(t: u64) -> Self {
@@ -40,13 +55,17 @@ impl AdamStep {
         Self { first_correction: correction(BETA1), second_correction: correction(BETA2) }
     }
 
-    /// Moves one parameter against its gradient. `gradient` must be finite.
+    /// Moves one parameter against its gradient, which must be finite. Whether that was an outlier.
     #[inline(always)]
-    pub fn update(&self, parameter: &mut f32, gradient: f32, first: &mut f32, second: &mut f32, rate: f32) {
+    pub fn update(&self, parameter: &mut f32, gradient: f32, first: &mut f32, second: &mut f32, rate: f32) -> bool {
+        let limit = if *second > 0.0 { (GROWTH * *second).sqrt().min(CLIP) } else { CLIP };
+        let outlier = gradient.abs() > OUTLIER * limit;
+        let gradient = gradient.clamp(-limit, limit);
         *first += (1.0 - BETA1) * (gradient - *first);
         *second += (1.0 - BETA2) * (gradient * gradient - *second);
         let step = *first * self.first_correction;
         *parameter -= rate * step / ((*second * self.second_correction).sqrt() + EPSILON);
+        outlier
     }
 }
 

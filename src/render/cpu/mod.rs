@@ -15,6 +15,7 @@ pub mod project_backward;
 pub mod sort;
 pub mod ssim;
 pub mod surfel;
+pub mod validate;
 pub mod weigh;
 
 use std::time::Instant;
@@ -32,6 +33,7 @@ use super::{
     CloudGradient, Cutoffs, Features, Frame, FrameGradient, MAX_CHANNELS, RenderError, RenderSettings, TILE_PX,
 };
 use crate::math::Real;
+use crate::math::finite::{CHECKED, NotFinite, all_finite};
 use crate::scene::{Camera, Gaussian, GaussianCloud};
 
 /// Runs `$body` with the constant `$c` set to the number of channels `$n` is padded to: one of those
@@ -137,7 +139,7 @@ impl<R: Real> Renderer<R> {
         if settings.surfels {
             self.frame = None;
             let surfels = self.surfels.get_or_insert_default();
-            let frame = surfels.render(cloud, features, camera, settings);
+            let frame = surfels.render(cloud, features, camera, settings)?;
             self.stats = surfels.stats;
             return Ok(frame);
         }
@@ -152,6 +154,7 @@ impl<R: Real> Renderer<R> {
         let sort_secs = clock.lap();
         bin::bin(&mut self.tiles, &self.ordered.splats, size);
         let bin_secs = clock.lap();
+        checked(&self.parts, &self.ordered, &self.tiles)?;
 
         let pixels = size[0] * size[1];
         self.transmittance.resize(pixels, R::ONE);
@@ -159,6 +162,9 @@ impl<R: Real> Renderer<R> {
         let mut frame = empty_frame(size, extra, settings.depth);
         let products = self.blend(&mut frame, channels, size, settings.cutoffs);
         finish(&mut frame, &self.transmittance, settings.background);
+        if CHECKED {
+            validate::drawn(&frame)?;
+        }
         self.stats = RenderStats {
             visible: self.ordered.splats.len(),
             degenerate: self.parts.iter().map(|p| p.degenerate).sum(),
@@ -222,6 +228,7 @@ impl<R: Real> Renderer<R> {
         project::project(&mut self.parts, cloud, Features::NONE, &view, &settings, channels);
         sort::sort(&mut self.ordered, &self.parts, channels, false);
         bin::bin(&mut self.tiles, &self.ordered.splats, view.size);
+        checked(&self.parts, &self.ordered, &self.tiles)?;
         // The buffers no longer belong to a rendered frame.
         self.frame = None;
         self.surfels = None;
@@ -284,6 +291,15 @@ impl<R: Real> Renderer<R> {
             });
         });
         self.stats.backward_secs = clock.elapsed().as_secs_f64();
+    }
+
+    /// Whether the backward pass over the tiles left finite numbers.
+    ///
+    /// # Errors
+    /// Names the first that is none.
+    pub fn check_backward(&self) -> Result<(), NotFinite> {
+        let records = self.surfels.as_ref().map_or(&self.records, |s| &s.records);
+        all_finite("blending backward", "record", records)
     }
 
     /// Sum of Gaussian `i`'s tile records, or `None` if it was not drawn.
@@ -360,6 +376,16 @@ impl<R: Real> Renderer<R> {
         out.copy_from_slice(&record[MOMENTS + 3..MOMENTS + 3 + out.len()]);
         true
     }
+}
+
+/// Under `debug-validation`: whether projection, sorting and binning left what they should.
+fn checked<R: Real>(parts: &[Part<R>], ordered: &Ordered<R>, tiles: &Tiles) -> Result<(), NotFinite> {
+    if CHECKED {
+        validate::projected(parts)?;
+        validate::ordered(ordered)?;
+        validate::binned(tiles, ordered.splats.len())?;
+    }
+    Ok(())
 }
 
 /// Seconds between laps.

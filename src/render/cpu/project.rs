@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::math::{Real, rotation, sh};
-use crate::render::{BLUR_PX2, Features, RenderSettings, TANGENT_CLAMP};
+use crate::render::{BLUR_PX2, COLOR_MAX, Features, RenderSettings, TANGENT_CLAMP};
 use crate::scene::{Camera, Gaussian, GaussianCloud};
 
 /// Gaussians that one task projects.
@@ -181,6 +181,13 @@ pub fn raw_color<R: Real>(coefficients: &[[R; 3]], basis: &[R; 16], degree: u8) 
     c
 }
 
+/// The colour as it is composited, between black and `COLOR_MAX`. Coefficients whose sum is no number
+/// give black.
+#[inline(always)]
+pub fn color<R: Real>(coefficients: &[[R; 3]], basis: &[R; 16], degree: u8) -> [R; 3] {
+    raw_color(coefficients, basis, degree).map(|c| c.max(R::ZERO).min(R::of(COLOR_MAX)))
+}
+
 /// Factor on the opacity that keeps a splat's energy under the blur, `sqrt(det / det_blurred)`.
 #[inline(always)]
 pub fn compensation<R: Real>(g: &Geometry<R>) -> R {
@@ -284,7 +291,7 @@ fn project_chunk<R: Real>(
             continue;
         }
         let basis = sh::basis(degree, direction(g.relative));
-        let color = raw_color(gaussian.sh, &basis, degree).map(|c| c.max(R::ZERO));
+        let color = color(gaussian.sh, &basis, degree);
         let first = part.values.len();
         part.values.extend_from_slice(&color);
         part.values.extend_from_slice(&features.values[i * features.channels..(i + 1) * features.channels]);

@@ -128,7 +128,8 @@ pub(super) fn color_gradient<R: Real>(
     let basis = sh::basis(degree, toward);
     let raw = raw_color(gaussian.sh, &basis, degree);
     for (d, r) in color.iter_mut().zip(raw) {
-        if r < R::ZERO {
+        // Above the brightest colour it stays, so that training leads back.
+        if !(r >= R::ZERO) {
             *d = R::ZERO;
         }
     }

@@ -6,7 +6,7 @@ use super::layout::AdamStep;
 use super::shader::Variant;
 use super::{Context, GpuError};
 use crate::math::sh;
-use crate::render::cpu::adam::{AdamStep as Constants, BETA1, BETA2, EPSILON, Rates};
+use crate::render::cpu::adam::{AdamStep as Constants, BETA1, BETA2, CLIP, EPSILON, GROWTH, OUTLIER, Rates};
 
 /// Rates of each float in the records of the three buffers; 0 past degree `active`.
 fn records(rates: &Rates, active: u8) -> [[f32; 28]; 3] {
@@ -29,6 +29,8 @@ fn records(rates: &Rates, active: u8) -> [[f32; 28]; 3] {
 pub struct Adam {
     kernel: Kernel,
     steps: [wgpu::Buffer; 3],
+    /// Gradients cut as outliers since it was last cleared.
+    pub outliers: wgpu::Buffer,
 }
 
 /// What one step works on.
@@ -47,22 +49,18 @@ impl Adam {
     pub fn new(context: &Context) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
         let module = Module::new(context, "adam", Variant::default())?;
-        let slots = [(0, Uniform), (1, Write), (2, Read), (3, Write), (4, Write), (5, Read), (6, Read)];
+        let slots = [(0, Uniform), (1, Write), (2, Read), (3, Write), (4, Write), (5, Read), (6, Read), (7, Write)];
         let step = || context.uniform("Adam step", bytemuck::bytes_of(&AdamStep::default()));
-        Ok(Self { kernel: Kernel::new(context, &module, "main", &slots)?, steps: [step()?, step()?, step()?] })
+        Ok(Self {
+            kernel: Kernel::new(context, &module, "main", &slots)?,
+            steps: [step()?, step()?, step()?],
+            outliers: context.storage("outliers", 16)?,
+        })
     }
 
     /// Sets the constants of step `t`, counted from 1, for `gaussians` Gaussians of which `stored`
-    /// degrees are kept and `active` trained. Gradients are cut to `clip`; 0 = not.
-    pub fn prepare(
-        &self,
-        context: &Context,
-        gaussians: u32,
-        [stored, active]: [u8; 2],
-        rates: &Rates,
-        t: u64,
-        clip: f32,
-    ) {
+    /// degrees are kept and `active` trained.
+    pub fn prepare(&self, context: &Context, gaussians: u32, [stored, active]: [u8; 2], rates: &Rates, t: u64) {
         let constants = Constants::new(t);
         for ((buffer, stride), rates) in self.steps.iter().zip(strides(stored)).zip(records(rates, active)) {
             let mut step = AdamStep {
@@ -73,7 +71,9 @@ impl Adam {
                 beta_first: BETA1,
                 beta_second: BETA2,
                 epsilon: EPSILON,
-                clip,
+                clip: CLIP,
+                growth: GROWTH,
+                outlier: OUTLIER,
                 ..AdamStep::default()
             };
             step.rates.as_flattened_mut().copy_from_slice(&rates);
@@ -105,6 +105,7 @@ impl Adam {
                 &second.buffers[k],
                 marks,
                 counters,
+                &self.outliers,
             ];
             stage.run(&self.kernel, &buffers, [across as u32, down as u32, 1]);
         }

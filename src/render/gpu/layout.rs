@@ -156,8 +156,16 @@ twins! {
         beta_second: f32,
         /// Added to the root of the second moment.
         epsilon: f32,
-        /// Components of the gradient are cut to this size; 0 = not.
+        /// Largest size of a gradient.
         clip: f32,
+        /// Square of the largest gradient in units of the second moment.
+        growth: f32,
+        /// A gradient this many times too large is counted.
+        outlier: f32,
+        /// Unused.
+        pad0: f32,
+        /// Unused.
+        pad1: f32,
     }
 }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use super::GpuError;
-use crate::render::{ALPHA_MAX, ALPHA_MIN, BLUR_PX2, TILE_PX, TRANSMITTANCE_MIN};
+use crate::render::{ALPHA_MAX, ALPHA_MIN, BLUR_PX2, COLOR_MAX, TILE_PX, TRANSMITTANCE_MIN};
 
 macro_rules! files {
     ($($name:literal),* $(,)?) => {
@@ -91,6 +91,7 @@ fn constants(variant: Variant) -> String {
         ("ALPHA_MIN", ALPHA_MIN),
         ("ALPHA_MAX", ALPHA_MAX),
         ("BLUR_PX2", BLUR_PX2),
+        ("COLOR_MAX", COLOR_MAX),
         ("TRANSMITTANCE_MIN", TRANSMITTANCE_MIN),
     ];
     for (name, value) in floats {

@@ -53,6 +53,8 @@ pub struct LossSums {
     pub visible: u32,
     /// Gaussians left alone because their gradient was not finite.
     pub bad_gradients: u32,
+    /// Gradients that were cut as outliers.
+    pub outliers: u32,
 }
 
 impl LossSums {
@@ -89,7 +91,7 @@ impl Ssim {
         Ok(Self {
             moments: kernel("moments", &[(0, Uniform), (1, Read), (2, Read), (3, Write), (5, Write)])?,
             gradient: kernel("gradient", &[(0, Uniform), (1, Read), (2, Read), (3, Write), (4, Write)])?,
-            reduce: kernel("reduce", &[(0, Uniform), (5, Write), (6, Write), (7, Read)])?,
+            reduce: kernel("reduce", &[(0, Uniform), (5, Write), (6, Write), (7, Read), (8, Read)])?,
             loss: context.uniform("loss", bytemuck::bytes_of(&Loss::default()))?,
             maps: context.storage("derivatives of SSIM", 0)?,
             partials: context.storage("sums of the loss", 0)?,
@@ -136,9 +138,10 @@ impl Ssim {
         stage.run(&self.gradient, &[&self.loss, colors, &photo.pixels, &self.maps, pixel_gradient], [w, h, 1]);
     }
 
-    /// Records the last sums into the ring, with the frame's counters as they then are.
-    pub fn encode_sums(&self, stage: &mut Stage<'_>, counters: &wgpu::Buffer) {
-        stage.run(&self.reduce, &[&self.loss, &self.partials, &self.ring, counters], [1, 1, 1]);
+    /// Records the last sums into the ring, with the frame's counters and the optimiser's number of
+    /// outliers as they then are.
+    pub fn encode_sums(&self, stage: &mut Stage<'_>, counters: &wgpu::Buffer, outliers: &wgpu::Buffer) {
+        stage.run(&self.reduce, &[&self.loss, &self.partials, &self.ring, counters, outliers], [1, 1, 1]);
     }
 
     /// Fetches the sums of slots from 0, one for each of `pixels`, the number of pixels compared.
@@ -154,6 +157,7 @@ impl Ssim {
                     l1: mean(s[0]),
                     ssim: mean(s[1]),
                     mse: mean(s[2]),
+                    outliers: s[3] as u32,
                     overflow: s[4] != 0.0,
                     wanted: s[5] as u32,
                     visible: s[6] as u32,
@@ -182,10 +186,10 @@ pub fn photo_loss(
     let wide: Vec<[f32; 4]> = rendered.iter().map(|&[r, g, b]| [r, g, b, 0.0]).collect();
     let colors = context.storage_with("picture", bytemuck::cast_slice(&wide))?;
     let gradient = context.storage("gradient of the picture", pixels as u64 * 16)?;
-    let counters = context.storage("counters", 32)?;
+    let [counters, outliers] = [context.storage("counters", 32)?, context.storage("outliers", 16)?];
     let mut recorder = Recorder::new(context, None);
     recorder.stage("loss", |s| ssim.encode(s, &colors, &target, &gradient));
-    recorder.stage("loss", |s| ssim.encode_sums(s, &counters));
+    recorder.stage("loss", |s| ssim.encode_sums(s, &counters, &outliers));
     recorder.submit();
     let sums = ssim.read(context, &[pixels])?.first().copied().unwrap_or_default();
     let bytes = context.read(&[(&gradient, pixels as u64 * 16)])?;

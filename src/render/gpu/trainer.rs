@@ -23,13 +23,11 @@ pub struct TrainerSettings {
     pub render: RenderSettings,
     /// Share of D-SSIM in the loss.
     pub lambda: f64,
-    /// Components of gradients are cut to this size; 0 = not.
-    pub clip: f32,
 }
 
 impl Default for TrainerSettings {
     fn default() -> Self {
-        Self { render: RenderSettings::default(), lambda: 0.2, clip: 0.0 }
+        Self { render: RenderSettings::default(), lambda: 0.2 }
     }
 }
 
@@ -209,7 +207,7 @@ impl Trainer {
         self.ssim.prepare(&self.context, size_px, self.pending.len(), self.settings.lambda)?;
         let degrees = [self.shape.degree, sh_degree.min(self.shape.degree)];
         let n = self.shape.gaussians;
-        self.adam.prepare(&self.context, n, degrees, rates, self.step + 1, self.settings.clip);
+        self.adam.prepare(&self.context, n, degrees, rates, self.step + 1);
         self.encode_step(photo);
         if let Some(timer) = &mut self.timer {
             self.times = timer.finish(&self.context)?;
@@ -224,6 +222,7 @@ impl Trainer {
         let (shot, splats) = (r.shot(), &r.gaussians.splats);
         let mut recorder = Recorder::new(&self.context, self.timer.as_mut());
         recorder.clear(&self.gradients.splats);
+        recorder.clear(&self.adam.outliers);
         r.encode_count(&mut recorder, &self.cloud);
         r.encode_draw(&mut recorder, &self.features);
         recorder.stage("loss", |s| self.ssim.encode(s, &r.picture.colors, photo, &self.gradients.pixels));
@@ -238,7 +237,7 @@ impl Trainer {
         recorder.stage("adam", |s| {
             let on = AdamBuffers { parameters: &self.cloud, gradient: &self.gradient, moments: &self.moments };
             self.adam.encode(s, on, shot.counters, shot.gaussians, self.shape.degree);
-            self.ssim.encode_sums(s, shot.counters);
+            self.ssim.encode_sums(s, shot.counters, &self.adam.outliers);
         });
         recorder.submit();
     }

@@ -29,8 +29,9 @@ use super::bin::{self, Tiles};
 use super::project::{Part, View};
 use super::project_backward::GaussianGradient;
 use super::sort::{self, Ordered};
-use super::{Clock, NONE, RenderStats, empty_frame, finish, with_channels};
+use super::{Clock, NONE, RenderStats, checked, empty_frame, finish, validate, with_channels};
 use crate::math::Real;
+use crate::math::finite::{CHECKED, NotFinite};
 use crate::render::{Features, Frame, FrameGradient, MAX_CHANNELS, RenderSettings, TILE_PX};
 use crate::scene::{Camera, Gaussian, GaussianCloud};
 
@@ -50,7 +51,7 @@ pub struct Rasterizer<R> {
     splat_of: Vec<u32>,
     tiles: Tiles,
     pixels: Pixels<R>,
-    records: Vec<R>,
+    pub(super) records: Vec<R>,
     frame: Option<FrameInfo<R>>,
     pub(super) stats: RenderStats,
 }
@@ -89,7 +90,7 @@ impl<R: Real> Rasterizer<R> {
         features: Features<'_, R>,
         camera: &Camera,
         settings: &RenderSettings,
-    ) -> Frame<R> {
+    ) -> Result<Frame<R>, NotFinite> {
         let extra = features.channels;
         let channels = padded(3 + extra + if settings.depth { 3 } else { 0 });
         let view = View::new(camera, cloud.origin, settings.near);
@@ -101,6 +102,7 @@ impl<R: Real> Rasterizer<R> {
         let sort_secs = clock.lap();
         bin::bin(&mut self.tiles, &self.ordered.splats, size);
         let bin_secs = clock.lap();
+        checked(&self.parts, &self.ordered, &self.tiles)?;
 
         let n = size[0] * size[1];
         self.pixels.transmittance.resize(n, R::ONE);
@@ -115,6 +117,9 @@ impl<R: Real> Rasterizer<R> {
         let [first, second] = &self.pixels.inverse_depth;
         let spread = |((a, m), s): ((&R, &R), &R)| (*a * *s - *m * *m).max(R::ZERO);
         frame.distortion = frame.alpha.iter().zip(first).zip(second).map(spread).collect();
+        if CHECKED {
+            validate::drawn(&frame)?;
+        }
         self.stats = RenderStats {
             visible: self.ordered.splats.len(),
             degenerate: self.parts.iter().map(|p| p.degenerate).sum(),
@@ -124,7 +129,7 @@ impl<R: Real> Rasterizer<R> {
             backward_secs: 0.0,
         };
         self.frame = Some(FrameInfo { view, settings: settings.clone(), gaussians: cloud.len(), extra, channels });
-        frame
+        Ok(frame)
     }
 
     fn blend(&mut self, frame: &mut Frame<R>, channels: usize, size: [usize; 2], settings: &RenderSettings) -> u64 {

@@ -1,6 +1,6 @@
 //! Projection of surfels: what the compositing needs of each, and an ellipse around what it touches.
 
-use super::super::project::{Part, Splat, View, direction, in_chunks, raw_color};
+use super::super::project::{Part, Splat, View, color, direction, in_chunks};
 use super::disk::INVERSE_BLUR;
 use crate::math::{Real, rotation, sh};
 use crate::render::{ALPHA_MIN, Features, RenderSettings};
@@ -169,7 +169,7 @@ fn project_chunk<R: Real>(
         let reach = R::of(2.0) * (opacity / alpha_min).ln();
         let Some(splat) = splat(&g, opacity, reach, view, i as u32) else { continue };
         let basis = sh::basis(degree, direction(g.relative));
-        let color = raw_color(gaussian.sh, &basis, degree).map(|c| c.max(R::ZERO));
+        let color = color(gaussian.sh, &basis, degree);
         let first = part.values.len();
         let ([[ax, ay], [bx, by]], [u, v]) = (g.across, g.axes);
         part.values.extend_from_slice(&[ax, ay, bx, by, u[2], v[2], g.center[0], g.center[1]]);
