@@ -142,7 +142,6 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         reseed_share: args.unknown / 100.0,
         veto: args.tracker == TrackerKind::Both,
         max_side_px: args.plan.of_scene(&scene).object_side_px,
-        ..TrackOptions::default()
     };
     let lifting = match args.lifting {
         LiftingArg::Votes => Lifting::Votes,
