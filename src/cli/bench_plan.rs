@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::{CliError, output};
+use super::{CliError, memory, output};
 use crate::math::stats::median;
 use crate::models;
 use crate::pipeline::bench;
@@ -101,7 +101,9 @@ pub fn run_child(scene: &Path, variant: Variant, repeats: usize) -> Result<(), C
 fn child(scene: &Path, variant: Variant) -> Result<Cost, CliError> {
     let name = if variant == Variant::Plan { "plan" } else { "everything" };
     let program = std::env::current_exe().map_err(|e| CliError::failed(format!("the program's own path: {e}")))?;
-    let made = Process::new(program).args(["bench", "--variant", name]).arg(scene).output();
+    // As the window has it.
+    let (variable, value) = memory::THRESHOLD;
+    let made = Process::new(program).args(["bench", "--variant", name]).arg(scene).env(variable, value).output();
     let made = made.map_err(|e| CliError::failed(format!("a process for {}: {e}", scene.display())))?;
     if !made.status.success() {
         let why = String::from_utf8_lossy(&made.stderr);

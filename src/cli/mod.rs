@@ -18,6 +18,7 @@ mod eval_masks;
 mod export;
 mod info;
 mod interrupt;
+mod memory;
 mod models;
 mod opened;
 mod output;
@@ -182,6 +183,7 @@ fn window(first: Option<Action>, wishes: Vec<Wish>, open_window: OpenWindow) -> 
              'fmlgs demo --headless' shows what the program does; 'fmlgs --help' lists what works without a window",
         ));
     }
+    memory::settle();
     open_window(first, wishes).map_err(|error| {
         CliError::failed(format!("the window could not be opened: {error}. 'fmlgs demo --headless' works without one"))
     })

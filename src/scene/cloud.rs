@@ -156,6 +156,30 @@ impl<R: Real> GaussianCloud<R> {
         Ok(())
     }
 
+    /// Adds the Gaussians of a cloud with the same origin, degree and extra properties.
+    pub fn append(&mut self, mut other: Self) {
+        self.positions.append(&mut other.positions);
+        self.log_scales.append(&mut other.log_scales);
+        self.quaternions.append(&mut other.quaternions);
+        self.opacity_logits.append(&mut other.opacity_logits);
+        self.sh.append(&mut other.sh);
+        for (own, more) in self.extras.iter_mut().zip(&mut other.extras) {
+            own.values.append(&mut more.values);
+        }
+    }
+
+    /// The same cloud with room for `n` Gaussians in all, so that more can be added in place.
+    pub fn with_room(mut self, n: usize) -> Self {
+        let more = n.saturating_sub(self.len());
+        self.positions.reserve_exact(more);
+        self.log_scales.reserve_exact(more);
+        self.quaternions.reserve_exact(more);
+        self.opacity_logits.reserve_exact(more);
+        self.sh.reserve_exact(more * self.sh_stride());
+        self.extras.iter_mut().for_each(|e| e.values.reserve_exact(more));
+        self
+    }
+
     /// The same cloud without the bands of the spherical harmonics above `degree`, in its own memory.
     pub fn up_to_degree(mut self, degree: u8) -> Self {
         let (from, to) = (self.sh_stride(), sh::coefficients(degree.min(self.sh_degree)));
