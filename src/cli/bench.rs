@@ -85,7 +85,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         return bench_plan::run_child(scene, variant, args.repeats as usize);
     }
     if args.plan {
-        return bench_plan::run(&args.paths, args.runs, args.json);
+        return bench_plan::run(&args.paths, args.runs, args.repeats, args.json);
     }
     let mut console = Console::new(quiet);
     let sizes = if args.size.is_empty() { vec![[640, 480], [1280, 720]] } else { args.size };

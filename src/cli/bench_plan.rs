@@ -73,15 +73,16 @@ struct Row {
     everything: Cost,
 }
 
-/// Measures `scenes` with `runs` processes each way, and prints a table or JSON.
-pub fn run(scenes: &[PathBuf], runs: u32, as_json: bool) -> Result<(), CliError> {
+/// Measures `scenes` with `runs` processes each way, each of which draws every view `repeats` times,
+/// and prints a table or JSON.
+pub fn run(scenes: &[PathBuf], runs: u32, repeats: u32, as_json: bool) -> Result<(), CliError> {
     let mut rows = Vec::new();
     for scene in scenes {
         // In turns, so that what else the machine does meets both alike.
         let (mut plan, mut everything) = (Vec::new(), Vec::new());
         for _ in 0..runs {
-            plan.push(child(scene, Variant::Plan)?);
-            everything.push(child(scene, Variant::Everything)?);
+            plan.push(child(scene, Variant::Plan, repeats)?);
+            everything.push(child(scene, Variant::Everything, repeats)?);
         }
         let (plan, everything) = (middle(plan)?, middle(everything)?);
         rows.push(Row { scene: bench::label(scene), disk: disk(scene), plan, everything });
@@ -98,12 +99,14 @@ pub fn run_child(scene: &Path, variant: Variant, repeats: usize) -> Result<(), C
     output::print_json(&measure(scene, variant, repeats)?)
 }
 
-fn child(scene: &Path, variant: Variant) -> Result<Cost, CliError> {
+fn child(scene: &Path, variant: Variant, repeats: u32) -> Result<Cost, CliError> {
     let name = if variant == Variant::Plan { "plan" } else { "everything" };
     let program = std::env::current_exe().map_err(|e| CliError::failed(format!("the program's own path: {e}")))?;
+    let mut process = Process::new(program);
+    process.args(["bench", "--variant", name, "--repeats", &repeats.to_string()]).arg(scene);
     // As the window has it.
     let (variable, value) = memory::THRESHOLD;
-    let made = Process::new(program).args(["bench", "--variant", name]).arg(scene).env(variable, value).output();
+    let made = process.env(variable, value).output();
     let made = made.map_err(|e| CliError::failed(format!("a process for {}: {e}", scene.display())))?;
     if !made.status.success() {
         let why = String::from_utf8_lossy(&made.stderr);
