@@ -233,7 +233,7 @@ fn training_moves_the_plot_pauses_resumes_and_is_cancelled() {
     let mut w = Window::new(Some(Action::Open(photos())));
     w.until("the photos", |a| a.state.scene.is_some());
     assert!(w.shows("7 train") && w.shows("1 held out"), "the photos pane");
-    assert!(w.shows("Feature buffers"), "the scene plan");
+    assert!(w.shows("Feature maps"), "the scene plan");
     w.harness.state_mut().layout.config.steps = 50_000;
     w.click("Start training");
     w.until("the plot", |a| a.state.history.steps.len() >= 5);

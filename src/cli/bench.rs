@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 use serde_json::json;
 
+use super::bench_plan::{self, Variant};
 use super::progress::Console;
 use super::{CliError, output, view};
 use crate::io::{self, Opened};
@@ -26,6 +27,7 @@ use crate::scene::Dataset;
 #[command(after_help = "Examples:\n  \
     fmlgs bench splat.ply\n  \
     fmlgs bench --queries 100\n  \
+    fmlgs bench --plan scene/ splat.ply\n  \
     fmlgs bench splats/*.ply photos/ --size 640x480 --size 1280x720 --max-side 504 --gpu --json")]
 pub struct Args {
     /// Splats or trained scenes to draw, posed photos to train on
@@ -46,6 +48,15 @@ pub struct Args {
     /// Time this many typed queries too, on a made-up view of 1008 x 567 px with 300 objects and parts
     #[arg(long, value_name = "COUNT")]
     queries: Option<usize>,
+    /// Hold what each scene's plan leaves out against everything on, each in processes of its own
+    #[arg(long, conflicts_with_all = ["queries", "gpu", "size"])]
+    plan: bool,
+    /// Processes for each of the two
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100), requires = "plan")]
+    runs: u32,
+    /// Measure one of the two in this process
+    #[arg(long, value_enum, hide = true, conflicts_with = "plan")]
+    variant: Option<Variant>,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
@@ -70,6 +81,12 @@ const QUERY_IDENTITIES: usize = 300;
 const QUERY_SIZE: [usize; 2] = [1_008, 567];
 
 pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+    if let (Some(variant), Some(scene)) = (args.variant, args.paths.first()) {
+        return bench_plan::run_child(scene, variant, args.repeats as usize);
+    }
+    if args.plan {
+        return bench_plan::run(&args.paths, args.runs, args.repeats, args.json);
+    }
     let mut console = Console::new(quiet);
     let sizes = if args.size.is_empty() { vec![[640, 480], [1280, 720]] } else { args.size };
     let repeats = args.repeats as usize;

@@ -249,7 +249,7 @@ fn labelled(job: &Job, map: &SemanticMap, labels: &mut FileMasks) -> Result<Vec<
         let photo = &photos[index];
         let camera = photo.camera.limited_to(job.max_side_px);
         let exact = ViewMap::render(&mut renderer, &job.cloud, &map.of, &map.identities, &camera, &job.settings)?;
-        let blended = CodeMap::render(&mut renderer, &job.cloud, &map.codes, &camera, &job.settings)?;
+        let blended = CodeMap::render(&mut renderer, &job.cloud, &map.codes, map.has_parts(), &camera, &job.settings)?;
         let categories = categories(&labels.segment(photo, job.max_side_px, &mut Silent)?);
         drawn.push(Drawn { index, name: photo.name.clone(), camera, trained_on, exact, blended, categories });
     }

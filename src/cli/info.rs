@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::opened::named_cameras;
+use super::plan::PlanArgs;
 use super::{CliError, output};
 use crate::io::{self, Opened, trained::TrainedScene};
 use crate::pipeline::train::TrainConfig;
-use crate::scene::{Bounds, Dataset, GaussianCloud, ScenePlan};
+use crate::scene::{Bounds, Camera, Dataset, Facts as PlanFacts, GaussianCloud, ScenePlan};
 use crate::worker::machine;
 
 /// Say what a folder or file holds, and the plan for it
@@ -18,13 +19,16 @@ use crate::worker::machine;
 /// splats and trained scenes. The scene plan lists what the program leaves out for this scene on
 /// this machine, why, and what that saves.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  fmlgs info photos/\n  fmlgs info scene.ply --json | jq .gaussians")]
+#[command(after_help = "Examples:\n  fmlgs info photos/\n  fmlgs info scene.ply --json | jq .gaussians\n  \
+    fmlgs info scene/ --plan colour=full --plan maps=always")]
 pub struct Args {
     /// Dataset folder, transforms.json, splat file or trained scene
     path: PathBuf,
     /// Training pictures are limited to this many px along the longer side; the plan depends on it
     #[arg(long, default_value_t = TrainConfig::default().max_side_px, value_parser = clap::value_parser!(u32).range(1..=16384))]
     max_side: u32,
+    #[command(flatten)]
+    plan: PlanArgs,
     /// Print one JSON document, with every camera
     #[arg(long)]
     json: bool,
@@ -39,20 +43,21 @@ struct Facts {
 
 pub fn run(args: Args) -> Result<(), CliError> {
     let defaults = TrainConfig::default();
-    let (mut facts, plan) = match io::open(&args.path)? {
-        Opened::Dataset(d) => {
-            let plan = ScenePlan::of(Some(&d), None, &machine::look(), args.max_side, defaults.sh_degree);
-            (of_dataset(&d, defaults.holdout_every), plan)
-        }
-        Opened::Cloud(c) => {
-            let plan = ScenePlan::of(None, Some(&c), &machine::look(), args.max_side, c.sh_degree);
-            (of_cloud(&c), plan)
-        }
+    let limits = TrainConfig { max_side_px: args.max_side, ..defaults.clone() }.limits();
+    let machine = PlanFacts::of(machine::look(), limits);
+    let (mut facts, planned) = match io::open(&args.path)? {
+        Opened::Dataset(d) => (of_dataset(&d, defaults.holdout_every), machine.with_photos(&d.cameras())),
+        Opened::Cloud(c) => (of_cloud(&c), machine.with_cloud(&c, c.sh_degree, &[])),
         Opened::Trained(t) => {
-            let plan = ScenePlan::of(None, Some(&t.cloud), &machine::look(), args.max_side, t.cloud.sh_degree);
-            (of_trained(&t), plan)
+            let cameras: Vec<Camera> = t.info.cameras.iter().map(|c| c.camera.clone()).collect();
+            let planned = machine.with_photos(&cameras).with_cloud(&t.cloud, t.cloud.sh_degree, &cameras);
+            let map = io::semantic_map::load(&t.folder, &t.cloud);
+            let mut facts = of_trained(&t);
+            facts.warnings.extend(map.as_ref().err().map(|e| format!("its objects cannot be read: {e}")));
+            (facts, planned.with_semantics(map.ok().flatten().as_ref()))
         }
     };
+    let plan = ScenePlan::new(planned, &args.plan.overrides());
     if args.json {
         facts.json.insert("path".into(), json!(args.path));
         facts.json.insert("warnings".into(), json!(facts.warnings));
@@ -72,8 +77,10 @@ fn text(path: &Path, facts: &Facts, plan: &ScenePlan) -> String {
     }
     out.push_str("\nScene plan\n");
     for line in &plan.lines {
-        let saving = if line.saving.is_empty() { String::new() } else { format!(" (saves {})", line.saving) };
-        out.push_str(&format!("  {:<16} {}: {}{saving}\n", line.subject, line.choice, line.reason));
+        let word = if line.overridden { "costs" } else { "saves" };
+        let saving = if line.saving.is_empty() { String::new() } else { format!(" ({word} {})", line.saving) };
+        let id = line.item.id();
+        out.push_str(&format!("  {:<16} {id:<11} {}: {}{saving}\n", line.subject, line.choice, line.reason));
     }
     out.trim_end().to_owned()
 }

@@ -7,6 +7,7 @@
 mod agent;
 mod asking;
 mod bench;
+mod bench_plan;
 mod check_stability;
 mod demo;
 mod demo_queries;
@@ -17,11 +18,13 @@ mod eval_masks;
 mod export;
 mod info;
 mod interrupt;
+mod memory;
 mod models;
 mod opened;
 mod output;
 mod path;
 mod path_survey;
+mod plan;
 mod preprocess;
 mod progress;
 mod query;
@@ -40,6 +43,9 @@ use clap::{Parser, Subcommand};
 
 pub use error::CliError;
 
+use self::plan::PlanArgs;
+use crate::scene::plan::Wish;
+use crate::scene::trace;
 use crate::worker::Action;
 
 /// What each exit code means; part of `--help`.
@@ -74,6 +80,11 @@ Examples:
 struct Cli {
     /// What to open in the window: a dataset's folder, a splat file or a trained scene
     path: Option<PathBuf>,
+    #[command(flatten)]
+    plan: PlanArgs,
+    /// Print what the window loads and builds, when and why
+    #[arg(long)]
+    trace: bool,
     /// Show warnings and results only
     #[arg(short, long, global = true)]
     quiet: bool,
@@ -101,8 +112,8 @@ enum Command {
     CheckStability(check_stability::Args),
 }
 
-/// Opens the window, does one action if one is given, and returns when the window is closed.
-pub type OpenWindow = fn(Option<Action>) -> Result<(), Box<dyn std::error::Error>>;
+/// Opens the window with what is wanted of plans, does one action if one is given, and returns when the window is closed.
+pub type OpenWindow = fn(Option<Action>, Vec<Wish>) -> Result<(), Box<dyn std::error::Error>>;
 
 /// Runs the command line of this process and returns its exit code. `open_window` stands above this
 /// module, so the caller hands it in.
@@ -123,11 +134,18 @@ pub fn main(open_window: OpenWindow) -> ExitCode {
 
 fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
     let quiet = cli.quiet;
+    let wishes = cli.plan.wishes;
+    if cli.trace {
+        trace::listen(|load| eprintln!("{}", load.line()));
+    }
     let Some(command) = cli.command else {
-        return window(cli.path.map(Action::Open), open_window);
+        return window(cli.path.map(Action::Open), wishes, open_window);
     };
     if let Some(path) = cli.path {
         return Err(CliError::Usage(format!("'{}' before a command means nothing; put it after it", path.display())));
+    }
+    if !wishes.is_empty() && !matches!(command, Command::Demo(_)) {
+        return Err(CliError::Usage("--plan before a command means nothing; put it after it".into()));
     }
     interrupt::listen();
     match command {
@@ -143,7 +161,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Agent(args) => agent::run(args),
         Command::Synth(args) => synth::run(args, quiet),
         Command::Demo(args) if args.headless => demo::run(args, quiet),
-        Command::Demo(_) => window(Some(Action::TryDemo), open_window),
+        Command::Demo(_) => window(Some(Action::TryDemo), wishes, open_window),
         Command::Export(args) => export::run(args),
         Command::Bench(args) => bench::run(args, quiet),
         Command::Report(args) => report::run(args, quiet),
@@ -151,7 +169,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
     }
 }
 
-fn window(first: Option<Action>, open_window: OpenWindow) -> Result<(), CliError> {
+fn window(first: Option<Action>, wishes: Vec<Wish>, open_window: OpenWindow) -> Result<(), CliError> {
     match &first {
         Some(Action::Open(path)) if !path.exists() => {
             let name = path.display();
@@ -166,7 +184,8 @@ fn window(first: Option<Action>, open_window: OpenWindow) -> Result<(), CliError
              'fmlgs demo --headless' shows what the program does; 'fmlgs --help' lists what works without a window",
         ));
     }
-    open_window(first).map_err(|error| {
+    memory::settle();
+    open_window(first, wishes).map_err(|error| {
         CliError::failed(format!("the window could not be opened: {error}. 'fmlgs demo --headless' works without one"))
     })
 }
@@ -201,7 +220,7 @@ mod tests {
         let cli = Cli::try_parse_from(["fmlgs", "info", "photos"]).expect("a subcommand");
         assert!(cli.path.is_none() && matches!(cli.command, Some(Command::Info(_))));
         let cli = Cli::try_parse_from(["fmlgs", "photos", "info", "more"]).expect("words in an order");
-        assert!(matches!(run(cli, |_| Ok(())), Err(CliError::Usage(_))));
+        assert!(matches!(run(cli, |_, _| Ok(())), Err(CliError::Usage(_))));
         let cli = Cli::try_parse_from(["fmlgs", "-q", "info", "photos"]).expect("quiet comes before or after");
         assert!(cli.quiet && cli.path.is_none());
     }

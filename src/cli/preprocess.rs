@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use serde_json::json;
 
+use super::plan::PlanArgs;
 use super::progress::Console;
 use super::{CliError, opened, output};
 use crate::io;
@@ -66,6 +67,8 @@ pub struct Args {
     /// 'fmlgs models', the path of a model's .json, or 'none' [default: the best that is here]
     #[arg(long)]
     encoder: Option<String>,
+    #[command(flatten)]
+    plan: PlanArgs,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
@@ -138,7 +141,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         max_seeds: args.max_seeds.max(1),
         reseed_share: args.unknown / 100.0,
         veto: args.tracker == TrackerKind::Both,
-        ..TrackOptions::default()
+        max_side_px: args.plan.of_scene(&scene).object_side_px,
     };
     let lifting = match args.lifting {
         LiftingArg::Votes => Lifting::Votes,

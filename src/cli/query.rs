@@ -90,7 +90,9 @@ pub fn run(args: Args) -> Result<(), CliError> {
     let mut renderer = Renderer::new();
     let exact = ViewMap::render(&mut renderer, &scene.cloud, &map.of, &map.identities, &camera, &scene.settings)?;
     let blended = match args.blend {
-        true => Some(CodeMap::render(&mut renderer, &scene.cloud, &map.codes, &camera, &scene.settings)?),
+        true => {
+            Some(CodeMap::render(&mut renderer, &scene.cloud, &map.codes, map.has_parts(), &camera, &scene.settings)?)
+        }
         false => None,
     };
     let mut asker = Asker::new(&map)?;

@@ -9,6 +9,7 @@ use serde_json::json;
 
 use super::asking::{Asker, semantics};
 use super::opened::DrawableScene;
+use super::plan::PlanArgs;
 use super::progress::Console;
 use super::{CliError, opened, output, view};
 use crate::io;
@@ -19,7 +20,7 @@ use crate::pipeline::film::{self, FilmError, Marked};
 use crate::pipeline::semantics::grammar::Kind;
 use crate::render::cpu::normals;
 use crate::render::{Backend, BackendChoice, Frame, RenderSettings};
-use crate::scene::Camera;
+use crate::scene::{Camera, ScenePlan};
 
 /// Draw a scene from a given camera into a file
 ///
@@ -74,6 +75,8 @@ pub struct Args {
     /// Which renderer draws: auto takes a GPU if it is a real one
     #[arg(long, value_enum, default_value_t = BackendChoice::Auto)]
     backend: BackendChoice,
+    #[command(flatten)]
+    plan: PlanArgs,
     /// Print one JSON document about what was drawn
     #[arg(long)]
     json: bool,
@@ -145,8 +148,9 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         return film(&args, &path, quiet);
     }
     let job = args.check()?;
-    let settings = RenderSettings { depth: args.what.needs_depth(), ..job.scene.settings };
-    let mut backend = Backend::choose(choice(args.backend, &settings))?;
+    let plan = args.plan.of_scene(&job.scene);
+    let settings = RenderSettings { depth: args.what.needs_depth(), sh_degree: plan.sh_degree, ..job.scene.settings };
+    let mut backend = Backend::choose(choice(args.backend, &settings, &plan))?;
     // Only the CPU draws surfels as such.
     let flat = settings.surfels && !matches!(backend, Backend::Cpu(_));
     let cloud = Arc::new(job.scene.cloud);
@@ -165,6 +169,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
             "gaussians": cloud.len(),
             "backend": backend.name(),
             "render_ms": millis,
+            "sh_degree": settings.sh_degree,
             "depth_full_scale": far,
             "surfels_as_flat_gaussians": flat,
         }));
@@ -180,8 +185,9 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
 }
 
 /// Only the CPU draws surfels as such: it is chosen for them unless a person wants otherwise.
-fn choice(wanted: BackendChoice, settings: &RenderSettings) -> BackendChoice {
-    if settings.surfels && wanted == BackendChoice::Auto { BackendChoice::Cpu } else { wanted }
+fn choice(wanted: BackendChoice, settings: &RenderSettings, plan: &ScenePlan) -> BackendChoice {
+    let cpu = (settings.surfels || plan.on_cpu) && wanted == BackendChoice::Auto;
+    if cpu { BackendChoice::Cpu } else { wanted }
 }
 
 /// Draws a film along the camera path in `path`.
@@ -189,7 +195,9 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
     let keys = io::camera_path::open(path)?;
     let film = Film::new(&keys, Speed::Constant);
     let film = film.ok_or_else(|| CliError::failed(format!("{}: there are no keys in it", path.display())))?;
-    let scene = opened::drawable(&args.scene)?;
+    let mut scene = opened::drawable(&args.scene)?;
+    let plan = args.plan.of_scene(&scene);
+    scene.settings.sh_degree = plan.sh_degree;
     let fps = args.fps.unwrap_or(keys.fps);
     let [width, height] = args.size.unwrap_or_else(|| {
         let limit = args.max_side.unwrap_or(1280);
@@ -214,7 +222,7 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
         }
     }
     let marked = map.as_ref().map(|map| Marked { map, ids: &ids, color: [255, 64, 160] });
-    let mut backend = Backend::choose(choice(args.backend, &scene.settings))?;
+    let mut backend = Backend::choose(choice(args.backend, &scene.settings, &plan))?;
     let started = Instant::now();
     output::make_parent(&args.out)?;
     let mut console = Console::new(quiet);

@@ -4,13 +4,14 @@ use std::path::PathBuf;
 
 use serde_json::json;
 
+use super::plan::PlanArgs;
 use super::progress::{Console, evaluation_line};
 use super::{CliError, opened, output};
 use crate::io::{self, Opened};
 use crate::pipeline::observer::{Level, Observer};
 use crate::pipeline::train::{self, TrainConfig, TrainEnd};
 use crate::render::BackendChoice;
-use crate::scene::Dataset;
+use crate::scene::{Dataset, Facts, Machine, ScenePlan};
 
 /// Train 3D Gaussians from posed photos
 ///
@@ -31,6 +32,8 @@ pub struct Args {
     out: Option<PathBuf>,
     #[command(flatten)]
     settings: Settings,
+    #[command(flatten)]
+    plan: PlanArgs,
     /// Print one JSON document at the end
     #[arg(long)]
     json: bool,
@@ -143,10 +146,16 @@ struct Job {
 
 impl Args {
     fn check(&self) -> Result<Job, CliError> {
+        let planned = |config: TrainConfig, dataset: &Dataset| {
+            let facts = Facts::of(Machine::default(), config.limits()).with_photos(&dataset.cameras());
+            let plan = ScenePlan::new(facts, &self.plan.overrides());
+            let backend = if plan.on_cpu { BackendChoice::Cpu } else { config.backend };
+            TrainConfig { max_side_px: plan.train_side_px, backend, ..config }
+        };
         match io::open(&self.data)? {
             Opened::Dataset(dataset) => {
                 let out = self.out.clone().unwrap_or_else(|| PathBuf::from("out").join(&dataset.name));
-                Ok(Job { config: self.settings.over(TrainConfig::default()), dataset, out })
+                Ok(Job { config: planned(self.settings.over(TrainConfig::default()), &dataset), dataset, out })
             }
             Opened::Trained(scene) => {
                 let Some(photos) = scene.dataset_path() else {
@@ -157,7 +166,8 @@ impl Args {
                 };
                 let trained_with = serde_json::from_value(scene.info.config).unwrap_or_default();
                 let out = self.out.clone().unwrap_or(scene.folder);
-                Ok(Job { dataset: opened::dataset(&photos)?, config: self.settings.over(trained_with), out })
+                let dataset = opened::dataset(&photos)?;
+                Ok(Job { config: planned(self.settings.over(trained_with), &dataset), dataset, out })
             }
             Opened::Cloud(_) => Err(CliError::failed(format!(
                 "{} is a finished splat without photos; a folder of posed photos is needed to train",

@@ -2,7 +2,7 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `scene.json` | [`SceneInfo`]: version, dataset, cameras, settings, plan, history |
+//! | `scene.json` | [`SceneInfo`]: version, dataset, cameras, settings, history |
 //! | `point_cloud.ply` | the Gaussians, see [`splat_ply`] |
 //! | `checkpoint.bin` | the state of the training, if it can be resumed; written by the training |
 //!
@@ -58,9 +58,6 @@ pub struct SceneInfo {
     /// Settings of the training run.
     #[serde(default)]
     pub config: serde_json::Value,
-    /// The scene plan.
-    #[serde(default)]
-    pub plan: serde_json::Value,
     /// Measurements of the training run.
     #[serde(default)]
     pub history: History,
@@ -99,7 +96,7 @@ pub struct History {
 
 impl SceneInfo {
     /// The description of a scene in `folder` trained on `dataset`, whose photos at `held_out`
-    /// were not trained on. Settings, plan and history are empty.
+    /// were not trained on. Settings and history are empty.
     pub fn of(dataset: &Dataset, held_out: &[usize], folder: &Path) -> Self {
         let camera = |(i, p): (usize, &crate::scene::Photo)| SceneCamera {
             name: p.name.clone(),

@@ -18,6 +18,10 @@ use ort::session::builder::GraphOptimizationLevel;
 use super::ModelError;
 use super::network::Network;
 use super::room;
+use crate::scene::trace::{self, Sort};
+
+/// Why networks are loaded, for the trace.
+const MODEL_USE: &str = "it is about to run for the first time";
 
 /// What runs networks in this process.
 pub struct Engine {
@@ -178,6 +182,7 @@ impl Engine {
     /// # Errors
     /// If it is no network, or one that this engine cannot run.
     pub fn load(&self, bytes: &[u8], name: &str) -> Result<Network, ModelError> {
+        trace::record(Sort::Model, format!("network {name}"), MODEL_USE, bytes.len() as u64);
         Ok(Network::new(self.prepare(name, |builder| builder.commit_from_memory(bytes))?, name))
     }
 
@@ -191,7 +196,9 @@ impl Engine {
 
     /// A session of a network in a file, for which room is made.
     pub(super) fn session(&self, path: &Path) -> Result<Session, ModelError> {
-        room::make(std::fs::metadata(path).map_or(0, |m| m.len()));
+        let bytes = std::fs::metadata(path).map_or(0, |m| m.len());
+        trace::record(Sort::Model, format!("network {}", path.display()), MODEL_USE, bytes);
+        room::make(bytes);
         self.prepare(&path.display().to_string(), |builder| builder.commit_from_file(path))
     }
 

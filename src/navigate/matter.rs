@@ -132,6 +132,11 @@ impl Matter {
         self.voxel
     }
 
+    /// Bytes of the grid.
+    pub fn bytes(&self) -> u64 {
+        ((self.depth.len() + self.distance.len()) * size_of::<f32>()) as u64
+    }
+
     /// The nearest place to `p` with this clearance, as far as the field leads there; `None` if it does
     /// not lead to one.
     pub fn pushed_out(&self, p: DVec3, clearance: f64) -> Option<DVec3> {

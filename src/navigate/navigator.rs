@@ -76,6 +76,11 @@ impl Navigator {
         Self { matter, graph, cameras: cameras.to_vec(), spacing, clearance, up, in_matter }
     }
 
+    /// Bytes that its grid of matter takes, by far the largest part.
+    pub fn bytes(&self) -> u64 {
+        self.matter.bytes()
+    }
+
     /// Keypoints that can be gone to straight from a place, nearest first. A place with less
     /// clearance than wanted is left without losing any more of it.
     fn entries(&self, place: DVec3) -> Vec<usize> {

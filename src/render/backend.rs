@@ -31,7 +31,7 @@ impl BackendChoice {
         match self {
             Self::Cpu => Ok(None),
             Self::Gpu => gpu::Context::new().map(Some),
-            Self::Auto => Ok(gpu::Context::new().ok().filter(|context| !context.is_software())),
+            Self::Auto => Ok(gpu::Context::real()),
         }
     }
 }
@@ -69,6 +69,8 @@ pub struct Gpu {
     renderer: gpu::Renderer,
     name: String,
     uploaded: Weak<GaussianCloud>,
+    /// Degree of the harmonics that were sent.
+    degree: u8,
 }
 
 impl Backend {
@@ -95,7 +97,7 @@ impl Backend {
     /// This GPU, whether real or emulated.
     pub fn on_gpu(context: &gpu::Context) -> Result<Self, GpuError> {
         let renderer = gpu::Renderer::new(context)?;
-        Ok(Self::Gpu(Box::new(Gpu { renderer, name: context.info().name.clone(), uploaded: Weak::new() })))
+        Ok(Self::Gpu(Box::new(Gpu { renderer, name: context.info().name.clone(), uploaded: Weak::new(), degree: 0 })))
     }
 
     /// Its name, for people.
@@ -117,14 +119,32 @@ impl Backend {
             Self::Cpu(renderer) => Ok(renderer.render(cloud, Features::NONE, camera, settings)?),
             Self::Gpu(gpu) => {
                 camera.validate().map_err(RenderError::from)?;
-                if gpu.uploaded.as_ptr() != Arc::as_ptr(cloud) {
+                // Bands that are not drawn are not sent.
+                let degree = settings.sh_degree.min(cloud.sh_degree);
+                if gpu.uploaded.as_ptr() != Arc::as_ptr(cloud) || gpu.degree < degree {
                     gpu.uploaded = Weak::new();
-                    gpu.renderer.upload(cloud, Features::NONE)?;
+                    gpu.renderer.upload_bands(cloud, Features::NONE, degree)?;
                     // A weak handle keeps the address from being given to another cloud.
-                    gpu.uploaded = Arc::downgrade(cloud);
+                    (gpu.uploaded, gpu.degree) = (Arc::downgrade(cloud), degree);
                 }
                 Ok(gpu.renderer.draw(camera, settings)?)
             }
+        }
+    }
+
+    /// Gives back working memory that the next picture can make again: on the CPU all of it; a
+    /// device keeps its own, which nobody else needs.
+    pub fn rest(&mut self) {
+        if let Self::Cpu(renderer) = self {
+            **renderer = cpu::Renderer::new();
+        }
+    }
+
+    /// Bytes of buffers on the device; 0 on the CPU.
+    pub fn device_bytes(&self) -> u64 {
+        match self {
+            Self::Cpu(_) => 0,
+            Self::Gpu(gpu) => gpu.renderer.device_bytes(),
         }
     }
 

@@ -99,6 +99,13 @@ impl<R: Real> GaussianCloud<R> {
         }
     }
 
+    /// Bytes of all values.
+    pub fn bytes(&self) -> u64 {
+        let own = (self.len() * 11 + self.sh.len() * 3) * size_of::<R>();
+        let extras: usize = self.extras.iter().map(|e| e.values.len() * size_of::<f32>()).sum();
+        (own + extras) as u64
+    }
+
     /// World position of Gaussian `i`.
     pub fn world_position(&self, i: usize) -> DVec3 {
         self.origin + DVec3::from_array(self.positions[i].map(Real::f64))
@@ -147,6 +154,44 @@ impl<R: Real> GaussianCloud<R> {
             }
         }
         Ok(())
+    }
+
+    /// Adds the Gaussians of a cloud with the same origin, degree and extra properties.
+    pub fn append(&mut self, mut other: Self) {
+        self.positions.append(&mut other.positions);
+        self.log_scales.append(&mut other.log_scales);
+        self.quaternions.append(&mut other.quaternions);
+        self.opacity_logits.append(&mut other.opacity_logits);
+        self.sh.append(&mut other.sh);
+        for (own, more) in self.extras.iter_mut().zip(&mut other.extras) {
+            own.values.append(&mut more.values);
+        }
+    }
+
+    /// The same cloud with room for `n` Gaussians in all, so that more can be added in place.
+    pub fn with_room(mut self, n: usize) -> Self {
+        let more = n.saturating_sub(self.len());
+        self.positions.reserve_exact(more);
+        self.log_scales.reserve_exact(more);
+        self.quaternions.reserve_exact(more);
+        self.opacity_logits.reserve_exact(more);
+        self.sh.reserve_exact(more * self.sh_stride());
+        self.extras.iter_mut().for_each(|e| e.values.reserve_exact(more));
+        self
+    }
+
+    /// The same cloud without the bands of the spherical harmonics above `degree`, in its own memory.
+    pub fn up_to_degree(mut self, degree: u8) -> Self {
+        let (from, to) = (self.sh_stride(), sh::coefficients(degree.min(self.sh_degree)));
+        if to < from {
+            for i in 0..self.len() {
+                self.sh.copy_within(i * from..i * from + to, i * to);
+            }
+            self.sh.truncate(self.len() * to);
+            self.sh.shrink_to_fit();
+            self.sh_degree = degree;
+        }
+        self
     }
 
     /// The same cloud in another precision (extras are kept as they are).
@@ -208,6 +253,19 @@ mod tests {
         let mut c = one();
         c.sh.pop();
         assert_eq!(c.validate(), Err(CloudError::Length("sh", 1, 2)));
+    }
+
+    #[test]
+    fn bands_that_are_left_out_are_those_above_a_degree() {
+        let of = |degree: u8| {
+            let stride = sh::coefficients(degree);
+            let sh = (0..2 * stride).map(|k| [(k / stride * 100 + k % stride) as f32; 3]).collect();
+            GaussianCloud { sh_degree: degree, sh, ..one() }
+        };
+        for (from, to) in [(3, 1), (3, 0), (2, 2), (1, 3)] {
+            assert_eq!(of(from).up_to_degree(to), of(from.min(to)), "{from} to {to}");
+        }
+        assert_ne!(of(3).up_to_degree(2), of(3));
     }
 
     #[test]

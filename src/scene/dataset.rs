@@ -41,11 +41,17 @@ impl Dataset {
     /// test are held out; without such marks it is every `every`-th of the sorted list, starting
     /// with the first (the convention of the 3DGS literature). `every == 0` holds none out.
     pub fn split(&self, every: usize) -> (Vec<usize>, Vec<usize>) {
+        let every = super::plan::holdout(self.photos.len(), every);
         let marked = self.photos.iter().any(|p| p.test_split);
         (0..self.photos.len()).partition(|&i| {
             let held = if marked { self.photos[i].test_split } else { every > 0 && i % every == 0 };
             !held
         })
+    }
+
+    /// The cameras of all photos.
+    pub fn cameras(&self) -> Vec<super::Camera> {
+        self.photos.iter().map(|p| p.camera.clone()).collect()
     }
 
     /// Mean camera centre, and 1.1 times the largest distance from it: the `extent` that

@@ -12,6 +12,7 @@ pub mod mask;
 pub mod photo;
 pub mod plan;
 pub mod semantic_map;
+pub mod trace;
 
 pub use bounds::Bounds;
 pub use camera::{Camera, CameraError};
@@ -23,5 +24,5 @@ pub use identity::{Identities, Identity, IdentityId, Level, NOBODY};
 pub use language::{LanguageFeatures, ViewFeatures};
 pub use mask::{Mask, PixelBox};
 pub use photo::{Distortion, Photo, PhotoPixels};
-pub use plan::{Machine, PlanLine, ScenePlan};
+pub use plan::{Facts, Limits, Machine, Overrides, PlanLine, ScenePlan};
 pub use semantic_map::SemanticMap;

@@ -96,6 +96,20 @@ impl SemanticMap {
         }
     }
 
+    /// Bytes of what is stored by Gaussian and by identity.
+    pub fn bytes(&self) -> u64 {
+        let each = size_of::<IdentityId>() + size_of::<f32>() * (1 + CODE_CHANNELS);
+        let numbers = |l: &LanguageFeatures| {
+            l.dimension * l.of.iter().map(|f| f.raw.len() + f.deviated.len()).sum::<usize>() * size_of::<f32>()
+        };
+        (self.of.len() * each + self.language.as_ref().map_or(0, numbers)) as u64
+    }
+
+    /// Whether any identity is a part.
+    pub fn has_parts(&self) -> bool {
+        self.identities.iter().any(|(_, i)| i.level == super::Level::Part)
+    }
+
     /// Number of Gaussians of each identity, pieces included, by number; those of nobody first.
     pub fn sizes(&self) -> Vec<usize> {
         let mut sizes = vec![0; self.identities.len() + 1];

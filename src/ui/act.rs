@@ -12,7 +12,9 @@ use super::viewport::brush::Brush;
 use crate::agent::scene::{Deed, Parts};
 use crate::navigate::target::Wish;
 use crate::pipeline::semantics::edit::Edit;
+use crate::pipeline::train::TrainConfig;
 use crate::scene::IdentityId;
+use crate::scene::plan::When;
 use crate::worker::{Action, Command, EditRequest, Failure, FilmRequest, JobKind, Pane, VisitRequest, Visited};
 
 impl App {
@@ -152,7 +154,7 @@ impl App {
             self.state.toast(Tone::Warning, text);
             return;
         }
-        let config = self.layout.config.clone();
+        let config = TrainConfig { max_side_px: self.state.plan.train_side_px, ..self.layout.config.clone() };
         self.state.antialias = config.antialias;
         self.submit(Command::Train { dataset, config, out });
     }
@@ -183,7 +185,8 @@ impl App {
                 dataset,
                 cloud,
                 holdout_every: self.layout.config.holdout_every,
-                settings: scene.render.clone(),
+                settings: self.state.drawing(),
+                side_px: self.state.plan.object_side_px,
                 masks,
                 with: self.layout.finding.clone(),
                 out: scene.out.clone(),
@@ -198,6 +201,16 @@ impl App {
         }
     }
 
+    /// Looks at where one can go in a scene, once, where the plan wants that before anybody asks.
+    pub(super) fn explore(&mut self) {
+        let wanted = self.state.plan.navigation == When::Always && self.state.explored.is_none();
+        let (Some(scene), Some(cloud)) = (self.state.scene.clone(), self.viewport.cloud().cloned()) else { return };
+        if wanted && std::mem::replace(&mut self.explored_for, self.state.scene_number) != self.state.scene_number {
+            let cameras = scene.dataset.as_ref().map(|d| d.cameras()).unwrap_or_default();
+            self.submit(Command::Explore { cloud, cameras, up: self.viewport.up(&scene) });
+        }
+    }
+
     /// Looks for the way to an identity; the flight begins when it is found.
     fn visit(&mut self, id: IdentityId, wish: Wish) {
         let (scene, map, cloud) =
@@ -209,7 +222,7 @@ impl App {
             cloud,
             cameras: photos.map(|p| p.camera.clone()).collect(),
             up: self.viewport.up(&scene),
-            settings: scene.render.clone(),
+            settings: self.state.drawing(),
             map,
             id,
             wish,
@@ -237,14 +250,14 @@ impl App {
     /// Makes a film of what is played.
     fn make_film(&mut self, out: PathBuf) {
         let (scene, cloud) = (self.state.scene.clone(), self.viewport.cloud().cloned());
-        let (Some(scene), Some(cloud)) = (scene, cloud) else { return };
+        let (Some(_), Some(cloud)) = (scene, cloud) else { return };
         let Some((cameras, settings)) = self.camera.film(&out, self.viewport.aspect()) else {
             self.state.toast(Tone::Warning, "There is nothing to film: record keys, or go to something first.");
             return;
         };
         let found = self.viewport.questions.found();
         let marked = self.state.semantics.clone().filter(|_| self.camera.mark).map(|map| (map, found));
-        let draw = scene.render.clone();
+        let draw = self.state.drawing();
         self.submit(Command::Film(Box::new(FilmRequest { cloud, draw, cameras, marked, out, settings })));
     }
 
@@ -260,7 +273,7 @@ impl App {
         let photos = scene.dataset.iter().flat_map(|d| &d.photos);
         let parts = Parts {
             cloud,
-            settings: scene.render.clone(),
+            settings: self.state.drawing(),
             map,
             cameras: photos.map(|p| p.camera.clone()).collect(),
             up: self.viewport.up(&scene),
@@ -317,7 +330,7 @@ impl App {
         let (scene, map, cloud) =
             (self.state.scene.clone(), self.state.semantics.clone(), self.viewport.cloud().cloned());
         if let (Some(scene), Some(map), Some(cloud)) = (scene, map, cloud) {
-            let (settings, out) = (scene.render.clone(), scene.out.clone());
+            let (settings, out) = (self.state.drawing(), scene.out.clone());
             self.submit(Command::EditObjects { cloud, map, settings, request, out });
         }
     }

@@ -16,6 +16,8 @@ use super::state::AppState;
 use super::toasts::Toasts;
 use super::viewport::Viewport;
 use super::{keys, theme};
+use crate::scene::plan::Wish;
+use crate::scene::trace::{self, Sort};
 use crate::worker::{Action, Jobs, Pane, Repaint, Worker};
 
 /// The window's application.
@@ -43,6 +45,10 @@ pub struct App {
     actions: Vec<Action>,
     /// Window time of the last frame.
     last_frame: f64,
+    /// Number of the scene that was looked at before anybody wanted to go anywhere.
+    pub(super) explored_for: u64,
+    /// Lines of the trace that are in the log already.
+    traced: usize,
 }
 
 impl App {
@@ -53,6 +59,7 @@ impl App {
         // Pictures answer a person's hand. Progress can be read no faster than it is written, and
         // every frame takes from what it reports on.
         let (repaint, unhurried) = (super::repainter(&cc.egui_ctx, 8), super::repainter(&cc.egui_ctx, 120));
+        trace::record(Sort::Window, "window", "the program was started", 0);
         let layout = Layout::load(cc.storage);
         let mut state = AppState::new(layout.recent.clone());
         state.say(super::state::Tone::Info, format!("FMLGS {}", env!("CARGO_PKG_VERSION")));
@@ -73,6 +80,8 @@ impl App {
             chat: Chat::default(),
             toasts: Toasts::default(),
             last_frame: 0.0,
+            explored_for: 0,
+            traced: 0,
             actions: first.into_iter().collect(),
         })
     }
@@ -82,11 +91,22 @@ impl App {
         self.actions.push(action);
     }
 
+    /// Takes what a person wants of scene plans, for this run and, as it is kept, later ones.
+    pub fn wish(&mut self, wishes: impl IntoIterator<Item = Wish>) {
+        wishes.into_iter().for_each(|wish| self.layout.plan.set(wish));
+    }
+
     /// Takes in everything that happened since.
     fn take_events(&mut self, ctx: &egui::Context) {
         while let Some(event) = self.worker.next_event() {
             self.state.apply(event);
         }
+        self.state.replan(&self.layout.plan, self.layout.config.limits());
+        for load in trace::since(self.traced) {
+            self.traced += 1;
+            self.state.say(super::state::Tone::Info, load.line());
+        }
+        self.explore();
         self.viewport.update(&mut self.state, &self.worker);
         self.camera.on_scene(self.state.scene_number);
         self.visited();
@@ -198,7 +218,7 @@ impl App {
                         if layout.shows(Pane::Plan) {
                             egui::CollapsingHeader::new(Pane::Plan.text())
                                 .default_open(state.history.steps.is_empty())
-                                .show(ui, |ui| plan::show(ui, &state.plan));
+                                .show(ui, |ui| plan::show(ui, &state.plan, &mut layout.plan));
                         }
                         if layout.shows(Pane::Models) {
                             egui::CollapsingHeader::new(Pane::Models.text())

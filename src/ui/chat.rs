@@ -15,6 +15,7 @@ use crate::agent::rules::Rules;
 use crate::agent::scene::{Deed, Parts, SceneWorld};
 use crate::agent::{AgentEvent, Planner, Policy, Refusal, Session};
 use crate::navigate::Pose;
+use crate::scene::trace::{self, Sort};
 use crate::scene::{IdentityId, SemanticMap};
 use crate::worker::{Action, Repaint};
 
@@ -361,6 +362,7 @@ impl Agent {
             } else {
                 Box::new(Rules::default())
             };
+            trace::record(Sort::Agent, "assistant with its policy", "a sentence was sent to it", 0);
             self.session = Some((settings, Session::new(policy, planner)));
         }
         Ok(())

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::chat::ChatSettings;
 use crate::pipeline::semantics::find::Finding;
 use crate::pipeline::train::TrainConfig;
+use crate::scene::Overrides;
 use crate::worker::{Pane, ViewMode};
 
 /// Key of the layout in the storage.
@@ -40,6 +41,8 @@ pub struct Layout {
     pub plot_axis: PlotAxis,
     /// Settings of the next training.
     pub config: TrainConfig,
+    /// What of the scene plan is wanted otherwise.
+    pub plan: Overrides,
     /// Models that find objects.
     pub finding: Finding,
     /// What plans for the assistant.
@@ -58,6 +61,7 @@ impl Default for Layout {
             mode: ViewMode::Picture,
             plot_axis: PlotAxis::default(),
             config: TrainConfig { steps: 3_000, eval_every: 250, ..TrainConfig::default() },
+            plan: Overrides::default(),
             finding: Finding::default(),
             chat: ChatSettings::default(),
             recent: Vec::new(),

@@ -21,12 +21,13 @@ pub mod viewport;
 
 use std::sync::Arc;
 
+use crate::scene::plan::Wish;
 use crate::worker::Action;
 use crate::worker::jobs::PipelineJobs;
 use crate::worker::places::Places;
 
-/// Opens the window, does `first` in it, and returns when it is closed.
-pub fn run(first: Option<Action>) -> eframe::Result {
+/// Opens the window, takes what is wanted of plans, does `first`, and returns when it is closed.
+pub fn run(first: Option<Action>, wishes: Vec<Wish>) -> eframe::Result {
     let viewport = egui::ViewportBuilder::default()
         .with_title("FMLGS")
         .with_app_id("fmlgs")
@@ -36,24 +37,29 @@ pub fn run(first: Option<Action>) -> eframe::Result {
     // An emulated adapter draws the window several times faster through OpenGL: its Vulkan side
     // runs both branches of every condition in the toolkit's shader.
     if crate::worker::real_gpu().is_none() {
-        let first = first.clone();
-        match open(viewport.clone(), eframe::Renderer::Glow, first) {
+        match open(viewport.clone(), eframe::Renderer::Glow, first.clone(), wishes.clone()) {
             // Not every system has it.
             Err(eframe::Error::OpenGL(_) | eframe::Error::Glutin(_) | eframe::Error::NoGlutinConfigs(..)) => {}
             result => return result,
         }
     }
-    open(viewport, eframe::Renderer::Wgpu, first)
+    open(viewport, eframe::Renderer::Wgpu, first, wishes)
 }
 
-fn open(viewport: egui::ViewportBuilder, renderer: eframe::Renderer, first: Option<Action>) -> eframe::Result {
+fn open(
+    viewport: egui::ViewportBuilder,
+    renderer: eframe::Renderer,
+    first: Option<Action>,
+    wishes: Vec<Wish>,
+) -> eframe::Result {
     // Shades that dithering would smooth do not occur in a flat theme.
     let options = eframe::NativeOptions { viewport, renderer, dithering: false, ..eframe::NativeOptions::default() };
     eframe::run_native(
         "fmlgs",
         options,
         Box::new(|cc| {
-            let app = app::App::new(cc, PipelineJobs::new(Places::of_user()), first)?;
+            let mut app = app::App::new(cc, PipelineJobs::new(Places::of_user()), first)?;
+            app.wish(wishes);
             Ok(Box::new(app))
         }),
     )

@@ -6,7 +6,8 @@ use std::sync::Arc;
 
 use crate::pipeline::observer::{Evaluation, Level, Progress, StepMetrics};
 use crate::pipeline::semantics::portraits::Gallery;
-use crate::scene::{PhotoPixels, ScenePlan, SemanticMap};
+use crate::render::RenderSettings;
+use crate::scene::{Facts, Limits, Overrides, PhotoPixels, ScenePlan, SemanticMap};
 use crate::worker::{Event, Explored, Failure, JobId, JobKind, Lane, OpenedScene, Outcome, Visited};
 
 /// Measurements kept for the plots; beyond that every second one is dropped.
@@ -221,6 +222,26 @@ impl AppState {
         self.job.as_ref().is_some_and(|j| j.kind == JobKind::Train)
     }
 
+    /// Follows what a person wants otherwise, and the settings of the next training.
+    pub fn replan(&mut self, overrides: &Overrides, limits: Limits) {
+        if self.plan.overrides != *overrides || self.plan.facts.limits != limits {
+            let dataset = self.scene.as_ref().and_then(|s| s.dataset.as_deref());
+            let facts = self.plan.facts.clone().with_limits(limits, dataset);
+            self.plan = ScenePlan::new(facts, overrides);
+        }
+    }
+
+    /// How the Gaussians on screen are drawn: as they were trained, without what the plan leaves out.
+    pub fn drawing(&self) -> RenderSettings {
+        let scene = self.scene.as_ref().map(|s| s.render.clone()).unwrap_or_default();
+        let sh_degree = if self.is_training() { scene.sh_degree } else { self.plan.sh_degree };
+        RenderSettings { sh_degree, antialias: self.antialias, ..scene }
+    }
+
+    fn set_facts(&mut self, facts: Facts) {
+        self.plan = ScenePlan::new(facts, &self.plan.overrides);
+    }
+
     fn with_job(&mut self, job: JobId, change: impl FnOnce(&mut RunningJob)) {
         if let Some(j) = self.job.as_mut().filter(|j| j.id == job) {
             change(j);
@@ -250,10 +271,10 @@ impl AppState {
         let ended = self.end(job);
         match outcome {
             Outcome::Opened(scene) => self.opened(*scene, ended.is_some_and(|j| j.kind == JobKind::Demo)),
-            Outcome::Trained { evaluations, out, plan } => {
+            Outcome::Trained { evaluations, out, facts } => {
                 if self.training_job == Some(job) {
                     self.history.evaluations = evaluations;
-                    self.plan = plan;
+                    self.set_facts(facts.with_semantics(self.semantics.as_deref()));
                 }
                 let quality = self.history.evaluations.last().map(|e| format!(", held-out PSNR {:.2} dB", e.psnr));
                 self.say(Tone::Info, format!("Saved to {}", out.display()));
@@ -282,6 +303,7 @@ impl AppState {
                 self.explored = Some(explored);
                 self.visited = Some(visited);
             }
+            Outcome::Explored(explored) => self.explored = Some(explored),
             Outcome::Portraits(map, pictures) => self.portraits = Some((map, pictures)),
             Outcome::Written(path) => self.toast(Tone::Good, format!("Wrote {}", path.display())),
             Outcome::Photo { index, max_side_px, pixels } => {
@@ -293,6 +315,7 @@ impl AppState {
     /// Sets objects and parts, with what is counted of them; those that were there before.
     fn set_semantics(&mut self, map: Option<Arc<SemanticMap>>) -> Option<Arc<SemanticMap>> {
         self.sizes = map.as_ref().map_or_else(Vec::new, |m| m.sizes());
+        self.set_facts(self.plan.facts.clone().with_semantics(map.as_deref()));
         std::mem::replace(&mut self.semantics, map)
     }
 
@@ -330,7 +353,7 @@ impl AppState {
             self.remember(scene.path.clone());
         }
         self.scene_number += 1;
-        self.plan = scene.plan.clone();
+        self.set_facts(scene.facts.clone());
         self.antialias = scene.render.antialias;
         self.set_semantics(scene.semantics.clone());
         (self.undo, self.redo) = (Vec::new(), Vec::new());

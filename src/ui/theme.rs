@@ -68,6 +68,8 @@ fn spacing(style: &mut Style) {
 
 fn visuals() -> Visuals {
     let mut v = Visuals::dark();
+    // A blinking one has the whole window drawn twice a second, for as long as a box has the keyboard.
+    v.text_cursor.blink = false;
     v.panel_fill = PANEL;
     v.window_fill = PANEL;
     v.extreme_bg_color = CANVAS;

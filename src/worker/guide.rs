@@ -13,6 +13,7 @@ use crate::navigate::{FRAMES, Navigator, Pose};
 use crate::pipeline::film::{self, FilmError, Marked};
 use crate::pipeline::observer::Observer;
 use crate::render::{Backend, BackendChoice, RenderSettings};
+use crate::scene::trace::{self, Sort};
 use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 
 /// A scene in which one can move about.
@@ -35,6 +36,7 @@ impl Explored {
     /// Looks at a scene.
     pub fn new(cloud: Arc<GaussianCloud>, cameras: &[Camera], up: DVec3) -> Self {
         let navigator = Navigator::new(&cloud, cameras, up);
+        trace::record(Sort::Paths, "grid of matter, graph of keypoints", "the camera is to fly", navigator.bytes());
         let parts = navigator.graph.parts(&navigator.matter);
         Self { navigator, cloud, parts }
     }

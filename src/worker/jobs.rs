@@ -22,7 +22,8 @@ use crate::pipeline::synth::{SynthError, demo};
 use crate::pipeline::train::checkpoint::CheckpointError;
 use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainError};
 use crate::render::RenderSettings;
-use crate::scene::{Dataset, GaussianCloud, Machine, Photo, PhotoPixels, ScenePlan, SemanticMap};
+use crate::scene::trace::{self, Sort};
+use crate::scene::{Dataset, Facts, GaussianCloud, Machine, Photo, PhotoPixels, SemanticMap, plan};
 
 /// Runs commands on the pipeline.
 pub struct PipelineJobs {
@@ -47,7 +48,8 @@ impl PipelineJobs {
             Opened::Dataset(dataset) => self.dataset_scene(dataset, observer),
             Opened::Cloud(cloud) => {
                 let name = path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-                OpenedScene { name, cloud: Some(Arc::new(cloud)), trained: true, ..OpenedScene::default() }
+                let (cloud, sh_stored) = compact(cloud);
+                OpenedScene { name, cloud: Some(cloud), sh_stored, trained: true, ..OpenedScene::default() }
             }
             Opened::Trained(trained) => trained_scene(trained, observer),
         };
@@ -58,7 +60,9 @@ impl PipelineJobs {
         if scene.home.camera.is_none() {
             scene.home = home_view(dataset, cloud);
         }
-        scene.plan = self.plan(dataset, cloud.filter(|_| scene.trained), &TrainConfig::default());
+        let cloud = cloud.filter(|_| scene.trained).map(|c| (c, scene.sh_stored));
+        let facts = self.facts(dataset, cloud, &TrainConfig::default());
+        scene.facts = facts.with_semantics(scene.semantics.as_deref());
         Ok(scene)
     }
 
@@ -99,12 +103,19 @@ impl PipelineJobs {
         if outcome.end == TrainEnd::Cancelled {
             return Err(Stop::Cancelled);
         }
-        let plan = self.plan(Some(dataset), Some(&outcome.cloud), config);
-        Ok(Outcome::Trained { evaluations: outcome.evaluations, out, plan })
+        let cloud = &outcome.cloud;
+        let facts = self.facts(Some(dataset), Some((cloud, cloud.sh_degree)), config);
+        Ok(Outcome::Trained { evaluations: outcome.evaluations, out, facts: Box::new(facts) })
     }
 
-    fn plan(&self, dataset: Option<&Dataset>, cloud: Option<&GaussianCloud>, config: &TrainConfig) -> ScenePlan {
-        ScenePlan::of(dataset, cloud, self.machine(), config.max_side_px, config.sh_degree)
+    /// Facts for a plan; a cloud comes with the degree of the harmonics in its file.
+    fn facts(&self, dataset: Option<&Dataset>, cloud: Option<(&GaussianCloud, u8)>, config: &TrainConfig) -> Facts {
+        let cameras = dataset.map(Dataset::cameras).unwrap_or_default();
+        let facts = Facts::of(self.machine().clone(), config.limits()).with_photos(&cameras);
+        match cloud {
+            Some((cloud, sh_stored)) => facts.with_cloud(cloud, sh_stored, &cameras),
+            None => facts,
+        }
     }
 
     /// Photos, with the Gaussians that were trained on them before, if there are any.
@@ -124,11 +135,12 @@ impl PipelineJobs {
             Some(TrainedScene { info, cloud, folder }) => {
                 let semantics = semantics_of(&folder, &cloud, observer);
                 let render = config_of(info.config).render_settings(background);
-                let cloud = Some(Arc::new(cloud));
+                let (cloud, sh_stored) = compact(cloud);
                 OpenedScene {
                     name,
                     dataset,
-                    cloud,
+                    cloud: Some(cloud),
+                    sh_stored,
                     semantics,
                     trained: true,
                     out,
@@ -150,7 +162,11 @@ impl PipelineJobs {
 /// The objects and parts stored with a trained scene; broken ones are told and left out.
 fn semantics_of(folder: &Path, cloud: &GaussianCloud, observer: &mut dyn Observer) -> Option<Arc<SemanticMap>> {
     match io::semantic_map::load(folder, cloud) {
-        Ok(map) => map.map(Arc::new),
+        Ok(map) => map.map(|map| {
+            let what = format!("{} objects and parts", map.identities.len());
+            trace::record(Sort::Objects, what, "the scene was opened", map.bytes());
+            Arc::new(map)
+        }),
         Err(e) => {
             observer.note(Level::Warning, format!("Its objects cannot be shown: {e}"));
             None
@@ -203,8 +219,18 @@ fn trained_scene(scene: TrainedScene, observer: &mut dyn Observer) -> OpenedScen
     if let Some(first) = info.cameras.into_iter().next() {
         opened.home.camera = Some(first.camera);
     }
-    opened.cloud = Some(Arc::new(cloud));
+    let (cloud, sh_stored) = compact(cloud);
+    (opened.cloud, opened.sh_stored) = (Some(cloud), sh_stored);
     opened
+}
+
+/// The Gaussians without bands of harmonics that are zero, and the degree that they came with.
+fn compact(cloud: GaussianCloud) -> (Arc<GaussianCloud>, u8) {
+    let stored = cloud.sh_degree;
+    let used = plan::used_degree(&cloud);
+    let cloud = cloud.up_to_degree(used);
+    trace::record(Sort::Gaussians, format!("{} Gaussians", cloud.len()), "the scene was opened", cloud.bytes());
+    (Arc::new(cloud), stored)
 }
 
 impl Jobs for PipelineJobs {
@@ -214,10 +240,10 @@ impl Jobs for PipelineJobs {
             Command::Demo => self.demo(observer),
             Command::Train { dataset, config, out } => self.train(&dataset, &config, out, observer),
             Command::Evaluate { dataset, cloud, config } => measure(&dataset, &cloud, &config, observer),
-            Command::FindObjects { dataset, cloud, holdout_every, settings, masks, with, out } => {
+            Command::FindObjects { dataset, cloud, holdout_every, settings, side_px, masks, with, out } => {
                 let (training, _) = dataset.split(holdout_every);
                 let photos: Vec<Photo> = training.iter().map(|&i| dataset.photos[i].clone()).collect();
-                find(&cloud, &photos, &settings, masks.as_deref(), &with, &out, observer)
+                find(&cloud, &photos, (&settings, side_px), masks.as_deref(), &with, &out, observer)
             }
             Command::EditObjects { cloud, map, settings, request, out } => {
                 edit::run(&cloud, &map, &settings, &request, &out)
@@ -230,9 +256,13 @@ impl Jobs for PipelineJobs {
             Command::Picture { pixels, path } => save_picture(&pixels, &path),
             Command::InstallModel { id, brought } => install(&id, brought.as_deref(), observer),
             Command::Visit(request) => guide::visit(*request),
+            Command::Explore { cloud, cameras, up } => {
+                Ok(Outcome::Explored(Arc::new(guide::Explored::new(cloud, &cameras, up))))
+            }
             Command::Film(request) => guide::film(*request, observer),
             Command::Portraits { cloud, map, settings, home } => {
                 let from = home.camera.as_ref().map_or(home.bounds.center() + home.up, |c| c.center);
+                trace::record(Sort::Portraits, "portraits of objects and parts", "a list of them is shown", 0);
                 let drawn = portraits(&cloud, &map, &settings, from, home.up);
                 Ok(Outcome::Portraits(map, drawn.map_err(|e| Stop::Failed(Failure::of(&e, "")))?))
             }
@@ -266,7 +296,7 @@ fn measure(
 fn find(
     cloud: &GaussianCloud,
     photos: &[Photo],
-    settings: &RenderSettings,
+    (settings, side_px): (&RenderSettings, u32),
     masks: Option<&Path>,
     with: &Finding,
     out: &Path,
@@ -295,6 +325,7 @@ fn find(
         .ok();
     let mut options = FindOptions::default();
     options.track.veto = with.carry == Carry::Both;
+    options.track.max_side_px = side_px;
     let found = {
         let (follower, encoder) = (follower.as_mut(), encoder.as_deref_mut());
         let tools = Tools { segmenter: &mut *segmenter, follower, encoder };

@@ -13,7 +13,7 @@ use crate::pipeline::semantics::find::Finding;
 use crate::pipeline::semantics::portraits::Gallery;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
-use crate::scene::{Bounds, Camera, Dataset, GaussianCloud, Photo, PhotoPixels, ScenePlan, SemanticMap};
+use crate::scene::{Bounds, Camera, Dataset, Facts, GaussianCloud, Photo, PhotoPixels, SemanticMap};
 
 /// Names one job of one worker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -42,6 +42,8 @@ pub enum JobKind {
     Picture,
     /// Draws objects and parts alone.
     Portraits,
+    /// Looks at where one can go.
+    Explore,
     /// Puts a model in place.
     Model,
     /// Finds the way to an identity.
@@ -57,7 +59,9 @@ impl JobKind {
             Self::Open | Self::Demo | Self::Train | Self::Evaluate | Self::Objects | Self::Model | Self::Film => {
                 Lane::Long
             }
-            Self::Edit | Self::Export | Self::Photo | Self::Picture | Self::Portraits | Self::Visit => Lane::Short,
+            Self::Edit | Self::Export | Self::Photo | Self::Picture | Self::Portraits | Self::Explore | Self::Visit => {
+                Lane::Short
+            }
         }
     }
 }
@@ -109,6 +113,8 @@ pub enum Command {
         holdout_every: usize,
         /// How the Gaussians are drawn.
         settings: RenderSettings,
+        /// Longer side of the pictures that are looked at, px.
+        side_px: u32,
         /// Where the masks are; `None` = regions of the photos are found.
         masks: Option<PathBuf>,
         /// With which models.
@@ -159,6 +165,15 @@ pub enum Command {
         /// The folder with its files; `None` = its address.
         brought: Option<PathBuf>,
     },
+    /// Look at where one can go, before anybody wants to.
+    Explore {
+        /// The Gaussians.
+        cloud: Arc<GaussianCloud>,
+        /// The photos' cameras.
+        cameras: Vec<Camera>,
+        /// Which way is up.
+        up: DVec3,
+    },
     /// Find the way to where an identity is seen best.
     Visit(Box<VisitRequest>),
     /// Draw a film.
@@ -190,6 +205,7 @@ impl Command {
             Self::Photo { .. } => JobKind::Photo,
             Self::Picture { .. } => JobKind::Picture,
             Self::Portraits { .. } => JobKind::Portraits,
+            Self::Explore { .. } => JobKind::Explore,
             Self::InstallModel { .. } => JobKind::Model,
             Self::Visit(_) => JobKind::Visit,
             Self::Film(_) => JobKind::Film,
@@ -210,6 +226,7 @@ impl Command {
             Self::Export { path, .. } | Self::Picture { path, .. } => format!("Writing {}", name(path)),
             Self::Photo { photo, .. } => format!("Loading {}", photo.name),
             Self::Portraits { .. } => "Drawing objects".into(),
+            Self::Explore { .. } => "Looking at where one can go".into(),
             Self::InstallModel { id, .. } => format!("Fetching the model {id}"),
             Self::Visit(request) => format!("Finding the way to {}", request.map.identities.full_name(request.id)),
             Self::Film(request) => format!("Drawing {}", name(&request.out)),
@@ -261,8 +278,10 @@ pub struct OpenedScene {
     pub home: HomeView,
     /// How to draw it: background and filter.
     pub render: RenderSettings,
-    /// What is left out for it, and why.
-    pub plan: ScenePlan,
+    /// Degree of the harmonics in its file.
+    pub sh_stored: u8,
+    /// What its plan is computed from.
+    pub facts: Facts,
 }
 
 /// What a finished job brings.
@@ -276,8 +295,8 @@ pub enum Outcome {
         evaluations: Vec<Evaluation>,
         /// Folder of the trained scene.
         out: PathBuf,
-        /// What drawing the result can leave out.
-        plan: ScenePlan,
+        /// What the plan of the result is computed from.
+        facts: Box<Facts>,
     },
     /// Held-out quality was measured.
     Evaluated(Evaluation),
@@ -291,6 +310,8 @@ pub enum Outcome {
     Portraits(Arc<SemanticMap>, Gallery),
     /// A model can be used now.
     ModelInstalled(String),
+    /// The scene was looked at.
+    Explored(Arc<Explored>),
     /// The way to an identity, or why there is none; and what was learnt about the scene.
     Visited(Arc<Explored>, Visited),
     /// A photo was loaded.

@@ -4,7 +4,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::action::ViewMode;
 use super::protocol::Failure;
@@ -14,7 +14,12 @@ use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::cpu::Renderer;
 use crate::render::{Backend, BackendChoice, Frame, RenderSettings};
-use crate::scene::{Camera, GaussianCloud, PhotoPixels, SemanticMap};
+use crate::scene::plan::When;
+use crate::scene::trace::{self, Sort};
+use crate::scene::{Camera, GaussianCloud, PhotoPixels, ScenePlan, SemanticMap};
+
+/// How long the eye rests before working memory is given back.
+const REST: Duration = Duration::from_secs(2);
 
 /// How much time a picture may take; decides its resolution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,8 +62,35 @@ pub struct ViewRequest {
     pub semantics: Option<Arc<SemanticMap>>,
     /// Whether blended codes are wanted too.
     pub codes: bool,
+    /// What is left out.
+    pub leave: Leave,
     /// Comes back with the picture.
     pub ticket: u64,
+}
+
+/// What of the drawing a scene's plan leaves out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Leave {
+    /// Depth of pictures from which nobody picks points.
+    pub depth: bool,
+    /// Codes of parts.
+    pub parts: bool,
+    /// The GPU.
+    pub gpu: bool,
+    /// Working memory, while the eye rests.
+    pub buffers: bool,
+}
+
+impl Leave {
+    /// What `plan` leaves out.
+    pub fn of(plan: &ScenePlan) -> Self {
+        Self {
+            depth: plan.depth != When::Always,
+            parts: !plan.parts,
+            gpu: plan.on_cpu,
+            buffers: plan.buffers != When::Always,
+        }
+    }
 }
 
 /// What the pixels of a view belong to.
@@ -103,7 +135,7 @@ pub struct ViewPicture {
 }
 
 /// The result of a request.
-pub type ViewResult = Result<ViewPicture, Failure>;
+pub type ViewResult = Result<Arc<ViewPicture>, Failure>;
 
 #[derive(Default)]
 struct Mailbox {
@@ -124,17 +156,36 @@ impl ViewLane {
         let mailbox = Arc::new((Mutex::new(Mailbox::default()), Condvar::new()));
         let (pictures, maps) = (Arc::new(Slot::default()), Arc::new(Slot::default()));
         let (box_, out, mapped) = (Arc::clone(&mailbox), Arc::clone(&pictures), Arc::clone(&maps));
-        let mut mapper = Renderer::new();
+        let (mut mapper, mut mapped_before) = (Renderer::new(), false);
         let work = move || {
-            // Looking for a GPU takes a moment; here nobody waits for it.
-            let mut painter = Painter::new(Backend::choose(BackendChoice::Auto).unwrap_or_else(|_| Backend::on_cpu()));
-            while let Some(request) = next(&box_) {
+            let mut painter: Option<Painter> = None;
+            let mut patience = None;
+            loop {
+                let request = match next(&box_, patience.take()) {
+                    Waited::Request(request) => request,
+                    Waited::InVain => {
+                        painter.iter_mut().for_each(|p| p.backend.rest());
+                        mapper = Renderer::new();
+                        continue;
+                    }
+                    Waited::Closed => return,
+                };
+                patience = request.leave.buffers.then_some(REST);
+                // Looking for a GPU takes a moment; here nobody waits for it.
+                let painter = match painter.take().filter(|p| p.without_gpu == request.leave.gpu) {
+                    Some(known) => painter.insert(known),
+                    None => painter.insert(Painter::without_gpu(request.leave.gpu)),
+                };
                 out.publish(painter.draw(&request));
                 repaint();
                 // What the pixels belong to comes second, and only if nobody waits for a picture.
                 if lock(&box_.0).request.is_none()
                     && let Some(maps) = maps_of(&mut mapper, &request)
                 {
+                    if !std::mem::replace(&mut mapped_before, true) {
+                        let pixels = maps.identities.identity.len() as u64;
+                        trace::record(Sort::Maps, "maps of the view", "something is asked of it", pixels * 12);
+                    }
                     mapped.publish(MappedView { ticket: request.ticket, maps: Arc::new(maps) });
                     repaint();
                 }
@@ -176,18 +227,32 @@ fn lock(mutex: &Mutex<Mailbox>) -> MutexGuard<'_, Mailbox> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Waits for a request; `None` once the handle is gone.
-fn next(mailbox: &(Mutex<Mailbox>, Condvar)) -> Option<ViewRequest> {
+/// What waiting for a request has come to.
+enum Waited {
+    Request(ViewRequest),
+    /// None came in time.
+    InVain,
+    /// The handle is gone.
+    Closed,
+}
+
+/// Waits for a request, at most for `patience` if there is a limit.
+fn next(mailbox: &(Mutex<Mailbox>, Condvar), patience: Option<Duration>) -> Waited {
     let (mutex, wake) = mailbox;
+    let start = Instant::now();
     let mut guard = lock(mutex);
     loop {
         if guard.closed {
-            return None;
+            return Waited::Closed;
         }
         if let Some(r) = guard.request.take() {
-            return Some(r);
+            return Waited::Request(r);
         }
-        guard = wake.wait(guard).unwrap_or_else(PoisonError::into_inner);
+        guard = match patience.map(|p| p.saturating_sub(start.elapsed())) {
+            None => wake.wait(guard).unwrap_or_else(PoisonError::into_inner),
+            Some(Duration::ZERO) => return Waited::InVain,
+            Some(left) => wake.wait_timeout(guard, left).unwrap_or_else(PoisonError::into_inner).0,
+        };
     }
 }
 
@@ -202,7 +267,7 @@ fn maps_of(renderer: &mut Renderer<f32>, request: &ViewRequest) -> Option<ViewMa
         let identities =
             ViewMap::render(renderer, cloud, &semantics.of, &semantics.identities, camera, settings).ok()?;
         let codes = match request.codes {
-            true => CodeMap::render(renderer, cloud, &semantics.codes, camera, settings).ok(),
+            true => CodeMap::render(renderer, cloud, &semantics.codes, !request.leave.parts, camera, settings).ok(),
             false => None,
         };
         Some(ViewMaps { identities, codes })
@@ -213,6 +278,8 @@ fn maps_of(renderer: &mut Renderer<f32>, request: &ViewRequest) -> Option<ViewMa
 /// Draws requests, and learns how fast it can.
 struct Painter {
     backend: Backend,
+    /// Whether no GPU was to be used.
+    without_gpu: bool,
     /// What pictures cost lately; `None` before the first.
     cost: Option<Speed>,
 }
@@ -225,8 +292,16 @@ struct Speed {
 }
 
 impl Painter {
-    fn new(backend: Backend) -> Self {
-        Self { backend, cost: None }
+    /// Draws with a real GPU if there is one and it is to be used, else with the CPU.
+    fn without_gpu(without_gpu: bool) -> Self {
+        let choice = if without_gpu { BackendChoice::Cpu } else { BackendChoice::Auto };
+        let backend = Backend::choose(choice).unwrap_or_else(|_| Backend::on_cpu());
+        Self { backend, without_gpu, cost: None }
+    }
+
+    /// Goes on with the CPU: a GPU has failed, or buffers may be in any state.
+    fn fall_back(&mut self) {
+        (self.backend, self.cost) = (Backend::on_cpu(), None);
     }
 
     fn draw(&mut self, request: &ViewRequest) -> ViewResult {
@@ -236,7 +311,7 @@ impl Painter {
         let frame = match self.try_render(request, &camera) {
             // A GPU that fails (lost, out of memory) leaves the CPU to draw from then on.
             Err(_) if matches!(self.backend, Backend::Gpu(_)) => {
-                *self = Self::new(Backend::on_cpu());
+                self.fall_back();
                 self.try_render(request, &camera)?
             }
             result => result?,
@@ -245,7 +320,7 @@ impl Painter {
         self.learn(secs, f64::from(camera.width_px * camera.height_px));
         let drawn = paint::paint(&frame, request.mode, request.photo.as_deref());
         let median_depth = (!frame.median_depth.is_empty()).then_some(frame.median_depth);
-        Ok(ViewPicture {
+        Ok(Arc::new(ViewPicture {
             ticket: request.ticket,
             full,
             camera,
@@ -255,17 +330,16 @@ impl Painter {
             psnr: drawn.psnr,
             secs,
             drawn_by: self.backend.name().to_owned(),
-        })
+        }))
     }
 
     fn try_render(&mut self, request: &ViewRequest, camera: &Camera) -> Result<Frame<f32>, Failure> {
-        let depth = request.effort == Effort::Full || request.mode == ViewMode::Depth;
+        let depth = request.effort == Effort::Full || request.mode == ViewMode::Depth || !request.leave.depth;
         let settings = RenderSettings { depth, ..request.settings.clone() };
         match catch_unwind(AssertUnwindSafe(|| self.backend.render(&request.cloud, camera, &settings))) {
             Ok(result) => result.map_err(|e| Failure::of(&e, "Reset the view (Home), or open the scene again.")),
             Err(payload) => {
-                // Its buffers may be in any state.
-                *self = Self::new(Backend::on_cpu());
+                self.fall_back();
                 Err(panic_failure(payload.as_ref()))
             }
         }
@@ -312,6 +386,7 @@ mod tests {
         let camera = Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 1000, 600).expect("valid");
         let of = |fixed_secs, secs_per_px| Painter {
             backend: Backend::on_cpu(),
+            without_gpu: true,
             cost: Some(Speed { fixed_secs, secs_per_px }),
         };
         let slow = of(0.0, 1e-6);

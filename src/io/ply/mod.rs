@@ -37,6 +37,18 @@ impl<'a> Ply<'a> {
         self.elements.iter().find(|e| e.name == name)
     }
 
+    /// Columns and bytes of a row of the element of that name, if it comes first and its rows are of
+    /// one size.
+    pub fn first_rows(&self, name: &str) -> Option<(Vec<Column>, usize)> {
+        let element = self.elements.first().filter(|e| e.name == name)?;
+        self.columns(element).ok()
+    }
+
+    /// Bytes after the header.
+    pub fn body_len(&self) -> usize {
+        self.body.len()
+    }
+
     /// The rows of the element of that name; `None` if the file has no such element.
     ///
     /// # Errors

@@ -10,6 +10,7 @@
 //! `world = x + x_residual` in double precision.
 
 mod read;
+mod stream;
 mod write;
 
 pub use read::{parse, read};

@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{ORIGIN, is_standard};
+use super::{ORIGIN, is_standard, stream};
 use crate::io::ply::{Column, Ply, Scalar, Table};
 use crate::io::{IoError, compressed_ply, files};
 use crate::math::sh::coefficients;
@@ -13,6 +13,9 @@ use crate::scene::{ExtraProperty, GaussianCloud};
 
 /// Reads a splat `.ply`, plain or compressed (PlayCanvas's `.compressed.ply`).
 pub fn read(path: &Path) -> Result<GaussianCloud, IoError> {
+    if let Some(cloud) = stream::read(path)? {
+        return Ok(cloud);
+    }
     parse(&files::read(path, u64::MAX)?, path)
 }
 
@@ -25,16 +28,25 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
     let Some(table) = ply.table("vertex")? else {
         return Err(ply.syntax("vertex", "missing".into()));
     };
-    Reading { ply: &ply, table: &table }.cloud()
+    Reading { ply: &ply, table: &table, first: 0 }.cloud()
 }
 
-struct Reading<'a> {
-    ply: &'a Ply<'a>,
-    table: &'a Table<'a>,
+/// Some rows of a splat.
+pub(super) struct Reading<'a> {
+    pub ply: &'a Ply<'a>,
+    pub table: &'a Table<'a>,
+    /// Number of the first row, for errors.
+    pub first: usize,
 }
 
 impl Reading<'_> {
-    fn cloud(&self) -> Result<GaussianCloud, IoError> {
+    /// Whether positions of any rows alone have the origin that those of all have.
+    pub fn has_one_origin(&self) -> bool {
+        let single = ["x", "y", "z"].iter().all(|n| self.table.column(n).is_some_and(|c| c.scalar != Scalar::F64));
+        self.stated_origin().is_ok_and(|stated| stated.is_some() || single)
+    }
+
+    pub fn cloud(&self) -> Result<GaussianCloud, IoError> {
         let dc = self.columns(["f_dc_0", "f_dc_1", "f_dc_2"])?;
         let (degree, rest) = self.rest_columns()?;
         let (origin, positions) = self.positions()?;
@@ -74,6 +86,7 @@ impl Reading<'_> {
     }
 
     fn not_finite(&self, index: usize, property: &str) -> IoError {
+        let index = self.first + index;
         IoError::NotFinite { path: self.ply.path.into(), element: "vertex", index, property: property.into() }
     }
 

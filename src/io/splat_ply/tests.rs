@@ -129,3 +129,27 @@ fn extra_names_that_would_break_the_file_are_refused() {
         assert!(matches!(write(&folder.path().join("a.ply"), &cloud), Err(IoError::Syntax { .. })), "{name:?}");
     }
 }
+
+#[test]
+fn a_file_read_in_blocks_is_the_file_read_as_a_whole() {
+    let mut cloud = random_cloud(5_000, 3, DVec3::new(1e6, 0.0, 0.0));
+    let values = (0..5_000).map(|i| i as f32).collect();
+    cloud.extras = vec![ExtraProperty { name: "kept".into(), values }];
+    let folder = tempfile::tempdir().expect("folder");
+    let path = folder.path().join("splat.ply");
+    write(&path, &cloud).expect("written");
+    let mut bytes = std::fs::read(&path).expect("bytes");
+    assert!(bytes.len() > 2 * (512 << 10), "several blocks");
+    let whole = parse(&bytes, &path).expect("parsed");
+    assert_eq!(stream::read(&path).expect("read"), Some(whole.clone()));
+    assert_eq!((whole.len(), whole.origin), (cloud.len(), cloud.origin));
+    // What is wrong far behind is told with its own number.
+    let last = bytes.len() - bytes.len() / cloud.len() * 2;
+    bytes[last..last + 8].copy_from_slice(&[0xff; 8]);
+    std::fs::write(&path, &bytes).expect("written");
+    let told = [stream::read(&path).expect_err("bad").to_string(), parse(&bytes, &path).expect_err("bad").to_string()];
+    assert_eq!(told[0], told[1]);
+    // One that is too short is left to the whole to tell.
+    std::fs::write(&path, &bytes[..bytes.len() - 1]).expect("written");
+    assert_eq!(stream::read(&path).expect("not told here"), None);
+}

@@ -37,7 +37,6 @@ fn info() -> SceneInfo {
         cameras: vec![SceneCamera { name: "a.jpg".into(), camera: camera(), held_out: true }],
         background: Some([1.0, 0.5, 0.25]),
         config: serde_json::json!({ "steps": 7000 }),
-        plan: serde_json::json!({ "sh_bands": 2 }),
         history: History {
             steps: vec![StepMetrics { step: 10, secs: 0.1, loss: 0.3, train_psnr: 12.0, gaussians: 5 }],
             evaluations: vec![Evaluation {

@@ -47,6 +47,10 @@ pub fn blend(map: &CodeMap, identities: &Identities, target: IdentityId, toleran
     let mut mask = Mask::empty(map.width_px, map.height_px);
     for (level, code) in codes_of(identities, target) {
         let [a, b, c] = map.level(level) else { continue };
+        // Without parts there are no planes of theirs, and nothing that they could match.
+        if a.is_empty() {
+            continue;
+        }
         let near = |v: f32, code: f32| (v - code).abs() <= tolerance;
         mask.add(&Mask::from_fn(map.width_px, map.height_px, |i| {
             near(a[i], code[0]) & near(b[i], code[1]) & near(c[i], code[2])

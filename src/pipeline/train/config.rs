@@ -2,7 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::render::{BackendChoice, RenderSettings};
+use crate::scene::Limits;
 
 /// Weight of the normals' term where surfels are trained (2DGS's).
 const SURFEL_NORMALS: f64 = 0.05;
@@ -60,6 +62,16 @@ impl TrainConfig {
     pub fn geometry_weights(&self) -> (f64, f64) {
         let or = |weight: Option<f64>, surfels: f64| weight.unwrap_or(if self.surfels { surfels } else { 0.0 });
         (or(self.normal_weight, SURFEL_NORMALS), or(self.distortion_weight, SURFEL_DISTORTION))
+    }
+
+    /// What of these settings a scene's plan starts from.
+    pub fn limits(&self) -> Limits {
+        Limits {
+            train_side_px: self.max_side_px,
+            object_side_px: TrackOptions::default().max_side_px,
+            sh_degree: self.sh_degree,
+            holdout_every: self.holdout_every,
+        }
     }
 
     /// Whether only the CPU can do what is asked.

@@ -114,6 +114,17 @@ impl<R: Real> Renderer<R> {
         Self { ..Self::default() }
     }
 
+    /// Bytes of working memory that it keeps for the next frame, those of surfels left out.
+    pub fn working_bytes(&self) -> usize {
+        fn of<T>(v: &Vec<T>) -> usize {
+            v.capacity() * size_of::<T>()
+        }
+        let parts: usize = self.parts.iter().map(|p| of(&p.splats) + of(&p.values)).sum();
+        let ordered = of(&self.ordered.splats) + of(&self.ordered.values);
+        let tiles = of(&self.tiles.first) + of(&self.tiles.entries) + of(&self.tiles.span) + of(&self.tiles.places);
+        parts + ordered + tiles + of(&self.splat_of) + of(&self.transmittance) + of(&self.last) + of(&self.records)
+    }
+
     /// What the last frame cost.
     pub fn stats(&self) -> RenderStats {
         self.stats

@@ -73,7 +73,13 @@ pub struct Packed {
 impl Packed {
     /// The parameters of `cloud`.
     pub fn of(cloud: &GaussianCloud) -> Self {
-        let [_, low, high] = strides(cloud.sh_degree);
+        Self::up_to(cloud, cloud.sh_degree)
+    }
+
+    /// The parameters of `cloud` without bands above `degree`.
+    pub fn up_to(cloud: &GaussianCloud, degree: u8) -> Self {
+        let degree = degree.min(cloud.sh_degree);
+        let [_, low, high] = strides(degree);
         let n = cloud.len();
         let mut floats =
             [Vec::with_capacity(n * GEOMETRY_STRIDE), Vec::with_capacity(n * low), Vec::with_capacity(n * high)];
@@ -83,11 +89,11 @@ impl Packed {
             floats[0].extend(g.log_scale);
             floats[0].extend(g.quaternion);
             floats[0].extend([g.opacity_logit, 0.0]);
-            for (k, rgb) in g.sh.iter().enumerate() {
+            for (k, rgb) in g.sh.iter().take(sh::coefficients(degree)).enumerate() {
                 floats[if k < LOW { 1 } else { 2 }].extend(rgb);
             }
         }
-        Self { floats, degree: cloud.sh_degree }
+        Self { floats, degree }
     }
 
     /// Number of Gaussians.
@@ -146,6 +152,7 @@ mod tests {
             assert_eq!(packed.len(), 3);
             assert_eq!(packed.to_cloud(), cloud);
             assert_eq!(packed.floats.each_ref().map(Vec::len), strides(degree).map(|s| 3 * s));
+            assert_eq!(Packed::up_to(&cloud, 1).to_cloud(), cloud.up_to_degree(1));
         }
     }
 }

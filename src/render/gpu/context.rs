@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 
 use super::GpuError;
+use crate::scene::trace::{self, Sort};
 
 /// Features that are used where an adapter offers them. Everything works without any of them.
 const WANTED: wgpu::Features =
@@ -18,25 +19,35 @@ pub struct Context {
     fault: Arc<Mutex<Option<GpuError>>>,
 }
 
+/// The fastest adapter, or a software one.
+fn adapter(software: bool) -> Result<wgpu::Adapter, wgpu::RequestAdapterError> {
+    let mut description = wgpu::InstanceDescriptor::new_without_display_handle();
+    description.backends = wgpu::Backends::PRIMARY;
+    let options = wgpu::RequestAdapterOptions {
+        power_preference: wgpu::PowerPreference::HighPerformance,
+        force_fallback_adapter: software,
+        ..wgpu::RequestAdapterOptions::default()
+    };
+    pollster::block_on(wgpu::Instance::new(description.with_env()).request_adapter(&options))
+}
+
 impl Context {
     /// Opens the best adapter: a real GPU before a software one.
     pub fn new() -> Result<Self, GpuError> {
-        let mut description = wgpu::InstanceDescriptor::new_without_display_handle();
-        description.backends = wgpu::Backends::PRIMARY;
-        let instance = wgpu::Instance::new(description.with_env());
-        let options = |software| wgpu::RequestAdapterOptions {
-            power_preference: wgpu::PowerPreference::HighPerformance,
-            force_fallback_adapter: software,
-            ..wgpu::RequestAdapterOptions::default()
-        };
-        let adapter = pollster::block_on(instance.request_adapter(&options(false)))
-            .or_else(|_| pollster::block_on(instance.request_adapter(&options(true))))
-            .map_err(|e| GpuError::NoAdapter(e.to_string()))?;
+        let adapter = adapter(false).or_else(|_| adapter(true)).map_err(|e| GpuError::NoAdapter(e.to_string()))?;
         Self::open(&adapter)
+    }
+
+    /// Opens the best real GPU; `None` where there is none that works. No device of an emulated
+    /// adapter is opened to find that out.
+    pub fn real() -> Option<Self> {
+        let adapter = adapter(false).ok().filter(|a| a.get_info().device_type != wgpu::DeviceType::Cpu)?;
+        Self::open(&adapter).ok()
     }
 
     /// Opens a device on an adapter of the caller's choice.
     pub fn open(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
+        trace::record(Sort::Device, format!("device on {}", adapter.get_info().name), "something is drawn on it", 0);
         let (device, queue) = pollster::block_on(adapter.request_device(&Self::device_descriptor(adapter)))
             .map_err(|e| GpuError::Device { adapter: adapter.get_info().name, reason: e.to_string() })?;
         Ok(Self::from_parts(adapter.get_info(), device, queue))

@@ -128,6 +128,16 @@ impl Rasterizer {
         Ok(())
     }
 
+    /// Bytes of its buffers on the device.
+    pub fn device_bytes(&self) -> u64 {
+        let (g, p) = (&self.gaussians, &self.picture);
+        let own = [&self.view, &self.counters, &g.splats, &g.tile_counts, &g.sums];
+        let picture = [&p.ranges, &p.colors, &p.ends, &p.depths, &p.features];
+        let all = own.into_iter().chain(picture).chain(p.chunks.iter().map(|(_, b)| b));
+        let sorts = g.by_depth.device_bytes() + self.pairs.by_tile.device_bytes();
+        all.map(wgpu::Buffer::size).sum::<u64>() + sorts
+    }
+
     /// Reads the frame's counters.
     pub fn read_counters(&self, context: &Context) -> Result<Counters, GpuError> {
         let bytes = context.read(&[(&self.counters, size_of::<Counters>() as u64)])?;

@@ -90,20 +90,37 @@ impl Renderer {
 
     /// Sends a cloud to the device, with its extra channels.
     pub fn upload(&mut self, cloud: &GaussianCloud, features: Features<'_, f32>) -> Result<(), GpuError> {
+        self.upload_bands(cloud, features, cloud.sh_degree)
+    }
+
+    /// Sends a cloud to the device without the bands of its harmonics above `degree`.
+    pub fn upload_bands(
+        &mut self,
+        cloud: &GaussianCloud,
+        features: Features<'_, f32>,
+        degree: u8,
+    ) -> Result<(), GpuError> {
         let want = cloud.len() * features.channels;
         if features.values.len() != want {
             return Err(RenderError::FeatureLength { have: features.values.len(), want }.into());
         }
         self.drawn = None;
-        let degree = cloud.sh_degree;
+        let degree = degree.min(cloud.sh_degree);
         if self.shape.gaussians as usize != cloud.len() || self.shape.degree != degree {
             self.cloud = Parameters::new(&self.context, "cloud", cloud.len(), degree)?;
         }
-        self.cloud.write(&self.context, &Packed::of(cloud));
+        self.cloud.write(&self.context, &Packed::up_to(cloud, degree));
         self.features = self.context.storage_with("features", bytemuck::cast_slice(features.values))?;
         self.shape = CloudShape { origin: cloud.origin, gaussians: cloud.len() as u32, degree };
         self.channels = features.channels;
         Ok(())
+    }
+
+    /// Bytes of all buffers that it holds on the device.
+    pub fn device_bytes(&self) -> u64 {
+        let sizes = |buffers: &[&wgpu::Buffer]| buffers.iter().map(|b| b.size()).sum::<u64>();
+        let [a, b, c] = &self.cloud.buffers;
+        sizes(&[a, b, c, &self.features]) + self.rasterizer.device_bytes()
     }
 
     /// Uploads `cloud` and draws it as `camera` sees it.

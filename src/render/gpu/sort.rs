@@ -54,6 +54,12 @@ impl SortBuffers {
         })
     }
 
+    /// Bytes of its buffers on the device.
+    pub fn device_bytes(&self) -> u64 {
+        let all = self.keys.iter().chain(&self.values).chain([&self.histogram, &self.totals]).chain(&self.passes);
+        all.map(wgpu::Buffer::size).sum()
+    }
+
     /// Which of the two sets holds the result.
     pub fn result(&self) -> usize {
         self.passes.len() % 2

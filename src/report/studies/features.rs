@@ -88,7 +88,7 @@ impl<'a> FeatureStudy<'a> {
         for view in self.held_out {
             let (w, h) = (view.camera.width_px as usize, view.camera.height_px as usize);
             let exact = ViewMap::render(&mut renderer, self.cloud, of, &self.identities, &view.camera, self.settings)?;
-            let blended = CodeMap::render(&mut renderer, self.cloud, codes, &view.camera, self.settings)?;
+            let blended = CodeMap::render(&mut renderer, self.cloud, codes, true, &view.camera, self.settings)?;
             for (id, identity) in self.identities.iter() {
                 let inside = self.identities.within(id);
                 let truth = Mask::from_fn(w, h, |i| inside.get(view.labels[i] as usize).copied().unwrap_or(false));

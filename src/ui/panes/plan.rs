@@ -1,26 +1,49 @@
-//! What is left out for this scene, why, and what that saves.
+//! What is left out for this scene, why, what that saves, and what a person wants otherwise.
 
-use egui::{RichText, Ui};
+use egui::{ComboBox, RichText, Ui};
 
 use super::super::theme;
-use crate::scene::ScenePlan;
+use crate::scene::plan::{PlanLine, Wish};
+use crate::scene::{Overrides, ScenePlan};
 
-/// Draws the plan, one decision after another.
-pub fn show(ui: &mut Ui, plan: &ScenePlan) {
+/// What stands for the plan's own choice.
+const AUTO: &str = "auto";
+
+/// Draws the plan, one decision after another; choices change `overrides`.
+pub fn show(ui: &mut Ui, plan: &ScenePlan, overrides: &mut Overrides) {
     for line in &plan.lines {
         egui::Frame::new().inner_margin(egui::Margin::symmetric(0, 2)).show(ui, |ui| {
-            ui.spacing_mut().item_spacing.y = 1.0;
+            ui.spacing_mut().item_spacing.y = 2.0;
             ui.horizontal(|ui| {
-                ui.label(RichText::new(&line.subject).color(theme::WEAK));
-                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                    ui.add(egui::Label::new(RichText::new(&line.choice).strong()).truncate());
-                });
+                ui.label(RichText::new(&line.subject).strong());
+                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| choose(ui, line, overrides));
             });
+            if !line.overridden {
+                ui.label(&line.choice);
+            }
             ui.label(RichText::new(&line.reason).small().color(theme::WEAK));
             if !line.saving.is_empty() {
-                ui.label(RichText::new(format!("Saves {}", line.saving)).small().color(theme::GOOD));
+                let (word, color) = if line.overridden { ("Costs", theme::WARNING) } else { ("Saves", theme::GOOD) };
+                ui.label(RichText::new(format!("{word} {}", line.saving)).small().color(color));
             }
         });
         ui.separator();
+    }
+}
+
+/// The choice between what the data suggest and the alternative, where there is one.
+fn choose(ui: &mut Ui, line: &PlanLine, overrides: &mut Overrides) {
+    let Some(alternative) = &line.alternative else { return };
+    let mut instead = line.overridden;
+    let shown = if instead { alternative } else { AUTO };
+    let id = ("plan", line.item.id());
+    let combo = ComboBox::from_id_salt(id).selected_text(shown).width(76.0).show_ui(ui, |ui| {
+        ui.selectable_value(&mut instead, false, AUTO);
+        ui.selectable_value(&mut instead, true, alternative.as_str());
+    });
+    let label = || format!("{}: choice", line.subject);
+    combo.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::ComboBox, true, label()));
+    if instead != line.overridden {
+        overrides.set(Wish { item: line.item, instead });
     }
 }

@@ -1,5 +1,6 @@
 //! The portraits of objects and parts as one texture, asked for when they change.
 
+use std::cell::Cell;
 use std::sync::Arc;
 
 use egui::{ColorImage, Rect, TextureHandle, TextureOptions, Ui, pos2, vec2};
@@ -15,6 +16,8 @@ const COLUMNS: usize = 16;
 /// Portraits of what is on screen.
 #[derive(Default)]
 pub struct Portraits {
+    /// Whether any was to be shown since they were last looked after.
+    used: Cell<bool>,
     /// What they were asked for.
     asked: Option<Arc<SemanticMap>>,
     /// What they are of, and how many rows of them there are.
@@ -34,11 +37,12 @@ impl Portraits {
             *self = Self::default();
             return;
         };
-        if self.asked.as_ref().is_none_or(|a| !Arc::ptr_eq(a, map)) && map.of.len() == cloud.len() {
+        let wanted = state.plan.portraits.now(self.used.take());
+        if wanted && self.asked.as_ref().is_none_or(|a| !Arc::ptr_eq(a, map)) && map.of.len() == cloud.len() {
             let command = Command::Portraits {
                 cloud: Arc::clone(cloud),
                 map: Arc::clone(map),
-                settings: scene.render.clone(),
+                settings: state.drawing(),
                 home: scene.home.clone(),
             };
             // With a full queue the wish comes again with the next event.
@@ -55,6 +59,7 @@ impl Portraits {
 
     /// Draws the portrait of an identity, `side` points wide; an empty place while there is none.
     pub fn show(&self, ui: &mut Ui, id: IdentityId, side: f32) {
+        self.used.set(true);
         let (rect, _) = ui.allocate_exact_size(vec2(side, side), egui::Sense::hover());
         let Some((of, texture, rows)) = &self.shown else { return };
         if of.identities.get(id).is_none() {

@@ -25,9 +25,10 @@ use super::layout::Layout;
 use super::state::AppState;
 use super::theme;
 use crate::navigate::Pose;
-use crate::render::RenderSettings;
+use crate::scene::plan::When;
+use crate::scene::trace::{self, Sort};
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
-use crate::worker::view::{Effort, ViewLane, ViewPicture, ViewRequest};
+use crate::worker::view::{Effort, Leave, ViewLane, ViewPicture, ViewRequest};
 use crate::worker::{Action, CloudSnapshot, OpenedScene, Repaint, ViewMode, Worker};
 
 /// The eye counts as moving until it has rested this long.
@@ -59,7 +60,7 @@ pub struct Viewport {
     shown: u64,
     /// The same, when it was asked for last.
     counted: u64,
-    picture: Option<ViewPicture>,
+    picture: Option<Arc<ViewPicture>>,
     texture: Option<TextureHandle>,
     error: Option<String>,
     /// What was asked, and where the answers are.
@@ -87,6 +88,10 @@ struct Asked {
     semantics: usize,
     /// With blended codes.
     codes: bool,
+    /// Up to which degree of harmonics.
+    sh_degree: u8,
+    /// Without what.
+    leave: Leave,
 }
 
 impl Viewport {
@@ -120,7 +125,7 @@ impl Viewport {
 
     /// The newest picture.
     pub fn picture(&self) -> Option<&ViewPicture> {
-        self.picture.as_ref()
+        self.picture.as_deref()
     }
 
     /// The Gaussians on screen.
@@ -295,7 +300,7 @@ impl Viewport {
             self.moved_at = now;
         }
         let shown = self.photo.as_mut().map_or(rect, |p| p.fit(rect));
-        self.request(ui, shown, &scene, state, layout, now);
+        self.request(ui, shown, state, layout, now);
         // Filling what the picture covers anyway would be a fifth of a frame on an emulated adapter.
         if self.texture.is_none() || shown != rect {
             ui.painter().rect_filled(rect, 0.0, theme::CANVAS);
@@ -305,7 +310,7 @@ impl Viewport {
             ui.painter().image(texture.id(), shown, uv, Color32::WHITE);
         }
         if let Some(semantics) = &state.semantics {
-            self.questions.keep_up(ui.ctx(), semantics);
+            self.questions.keep_up(ui.ctx(), semantics, &state.plan);
             self.questions.paint(ui, shown, semantics);
         }
         if let Some(photo) = self.photo.as_mut().filter(|_| layout.compare) {
@@ -369,7 +374,10 @@ impl Viewport {
                     Some(texture) => texture.set(image, TextureOptions::LINEAR),
                     None => self.texture = Some(ui.ctx().load_texture("viewport", image, TextureOptions::LINEAR)),
                 }
-                self.picture = Some(picture.clone());
+                if self.picture.is_none() {
+                    trace::record(Sort::Picture, "first picture", "the scene is on screen", 0);
+                }
+                self.picture = Some(Arc::clone(picture));
                 self.error = None;
             }
             Err(failure) => self.error = Some(format!("{} {}", failure.message, failure.remedy)),
@@ -377,12 +385,13 @@ impl Viewport {
     }
 
     /// Asks for a new picture if anything changed.
-    fn request(&mut self, ui: &Ui, shown: Rect, scene: &OpenedScene, state: &AppState, layout: &Layout, now: f64) {
+    fn request(&mut self, ui: &Ui, shown: Rect, state: &AppState, layout: &Layout, now: f64) {
         let Some(cloud) = self.cloud.clone() else { return };
+        let plan = &state.plan;
         let (cloud, semantics) = match &state.semantics {
             Some(semantics) => {
                 let (cloud, semantics) = self.visibility.apply(&cloud, semantics);
-                (cloud, Some(semantics))
+                (cloud, Some(semantics).filter(|_| plan.maps.now(self.questions.wanted() || self.brush.is_some())))
             }
             None => (cloud, None),
         };
@@ -411,8 +420,12 @@ impl Viewport {
             with_photo: photo.is_some(),
             semantics: semantics.as_ref().map_or(0, |s| Arc::as_ptr(s) as usize),
             codes: semantics.is_some() && self.questions.wants_codes(),
+            sh_degree: state.drawing().sh_degree,
+            leave: Leave::of(plan),
         };
-        if self.requested.as_ref() == Some(&asked) {
+        if plan.redraw == When::Always {
+            ui.ctx().request_repaint();
+        } else if self.requested.as_ref() == Some(&asked) {
             return;
         }
         self.tickets += 1;
@@ -420,15 +433,12 @@ impl Viewport {
             cloud,
             camera: asked.camera.clone(),
             mode: asked.mode,
-            settings: RenderSettings {
-                sh_degree: if state.is_training() { 3 } else { state.plan.sh_degree },
-                antialias: state.antialias,
-                ..scene.render.clone()
-            },
+            settings: state.drawing(),
             effort,
             photo,
             semantics,
             codes: asked.codes,
+            leave: asked.leave,
             ticket: self.tickets,
         });
         // A change of resolution alone does not move what the pixels belong to.

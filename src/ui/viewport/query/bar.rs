@@ -15,6 +15,8 @@ impl Questions {
         let id = ui.scope_id().with("typed");
         // Taken before the field sees them: it would move its cursor.
         let focused = ui.memory(|m| m.has_focus(id));
+        // Settings are for looking at maps.
+        self.wanted |= focused || self.open;
         if focused {
             self.recall(ui, semantics);
         }

@@ -24,7 +24,7 @@ use crate::pipeline::semantics::grammar::Phrase;
 use crate::pipeline::semantics::matching::{self, MatchMode};
 use crate::pipeline::semantics::meaning::MeaningOptions;
 use crate::pipeline::semantics::names;
-use crate::scene::{GaussianCloud, Identities, IdentityId, Mask, NOBODY, SemanticMap};
+use crate::scene::{GaussianCloud, Identities, IdentityId, Mask, NOBODY, ScenePlan, SemanticMap};
 use crate::worker::{Action, ViewMaps};
 
 /// Colours of questions, in turn.
@@ -71,6 +71,8 @@ pub struct Questions {
     typed: String,
     /// Set while the box is to take the keyboard.
     focus: bool,
+    /// Whether anything was asked in this scene, or begun to be.
+    wanted: bool,
     /// Place in the history while going through it.
     recalled: Option<usize>,
     /// Whether the settings are open.
@@ -121,6 +123,11 @@ impl Questions {
         self.maps.as_ref()
     }
 
+    /// Whether anything was asked in this scene, or begun to be: what questions need is needed now.
+    pub fn wanted(&self) -> bool {
+        self.wanted
+    }
+
     /// Whether blended codes of the view are wanted.
     pub fn wants_codes(&self) -> bool {
         self.look.mode == MatchMode::Blend || self.look.tint == Tint::Difference
@@ -128,14 +135,16 @@ impl Questions {
 
     /// Puts the cursor into the box.
     pub fn start_typing(&mut self) {
-        self.focus = true;
+        (self.focus, self.wanted) = (true, true);
     }
 
     /// Answers anew where objects and parts, or what understands phrases, have changed.
-    pub fn keep_up(&mut self, ctx: &egui::Context, semantics: &Arc<SemanticMap>) {
+    pub fn keep_up(&mut self, ctx: &egui::Context, semantics: &Arc<SemanticMap>, plan: &ScenePlan) {
         let encoder = semantics.language.as_ref().map(|l| l.encoder.as_str());
         let now = Arc::as_ptr(semantics) as usize;
-        if self.speech.keep_up(ctx, encoder) || self.answered_for != now {
+        // One that is of no more use goes at once, one that is new waits for a question.
+        let speaks = (encoder.is_none() || plan.encoder.now(self.wanted)) && self.speech.keep_up(ctx, encoder);
+        if speaks || self.answered_for != now {
             self.answered_for = now;
             self.ask_again(semantics);
         }
@@ -144,12 +153,14 @@ impl Questions {
     /// Asks as if it had been typed.
     pub fn ask(&mut self, text: &str, semantics: &SemanticMap) {
         self.typed = text.to_owned();
+        self.wanted = true;
         self.live = self.asked(text, semantics);
     }
 
     /// Shows the answers to these questions, and no others.
     pub fn mark(&mut self, texts: &[String], semantics: &SemanticMap) {
         self.typed.clear();
+        self.wanted = true;
         self.kept = texts.iter().filter_map(|text| self.asked(text, semantics)).collect();
         self.live = None;
         if let Some(last) = self.kept.pop() {

@@ -1,0 +1,52 @@
+//! Splats read block by block, so that a file is never in memory as a whole beside its Gaussians.
+
+use std::borrow::Cow;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::Path;
+
+use super::read::Reading;
+use crate::io::ply::{Encoding, Ply, Table};
+use crate::io::{IoError, files};
+use crate::scene::GaussianCloud;
+
+/// Bytes in which the header must end.
+const HEADER_BYTES: u64 = 64 << 10;
+/// Bytes of rows that are in memory at once.
+const BLOCK_BYTES: usize = 512 << 10;
+
+/// The Gaussians of a little-endian `.ply` whose first element they are; `None` if it is another
+/// sort of file, which has to be read as a whole.
+pub fn read(path: &Path) -> Result<Option<GaussianCloud>, IoError> {
+    let start = files::read_start(path, HEADER_BYTES)?;
+    // What is wrong with the header is told by reading the whole.
+    let Ok(ply) = Ply::parse(&start, path) else { return Ok(None) };
+    let Some((columns, stride)) = ply.first_rows("vertex") else { return Ok(None) };
+    let rows = ply.elements.first().map_or(0, |e| e.count) as usize;
+    let failed = |cause| IoError::Read { path: path.into(), cause };
+    let mut file = File::open(path).map_err(failed)?;
+    let bytes = file.metadata().map_err(failed)?.len();
+    let header = start.len() - ply.body_len();
+    let end = rows.checked_mul(stride).and_then(|n| n.checked_add(header));
+    let fits = end.is_some_and(|end| end as u64 <= bytes) && bytes <= files::memory_budget();
+    let table = |data: Cow<'static, [u8]>, rows| Table { rows, stride, columns: columns.clone(), data };
+    let empty = table(Cow::default(), 0);
+    let plain = Reading { ply: &ply, table: &empty, first: 0 }.has_one_origin();
+    if ply.encoding != Encoding::LittleEndian || ply.element("chunk").is_some() || !fits || !plain {
+        return Ok(None);
+    }
+    file.seek(SeekFrom::Start(header as u64)).map_err(failed)?;
+    let mut cloud: Option<GaussianCloud> = None;
+    let in_block = (BLOCK_BYTES / stride).max(1);
+    for first in (0..rows).step_by(in_block) {
+        let n = in_block.min(rows - first);
+        let mut block = vec![0; n * stride];
+        file.read_exact(&mut block).map_err(failed)?;
+        let part = Reading { ply: &ply, table: &table(Cow::Owned(block), n), first }.cloud()?;
+        match &mut cloud {
+            Some(cloud) => cloud.append(part),
+            None => cloud = Some(part.with_room(rows)),
+        }
+    }
+    Ok(cloud)
+}

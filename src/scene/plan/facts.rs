@@ -1,0 +1,255 @@
+//! What a plan is computed from: facts about a scene's data and the machine, gathered once.
+
+use glam::{DMat3, DVec3};
+use serde::{Deserialize, Serialize};
+
+use crate::math::rotation::matrix_from_quaternion;
+use crate::math::{Real, sh};
+use crate::scene::{Camera, Dataset, GaussianCloud, LanguageFeatures, Level, SemanticMap};
+
+/// What the machine offers, as far as a plan depends on it.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Machine {
+    /// Memory that programs may still use, in bytes.
+    pub free_memory_bytes: u64,
+    /// Most Gaussians that training may use of it.
+    pub max_gaussians: usize,
+    /// Processor cores.
+    pub cores: usize,
+    /// Name of the graphics adapter if it is a real one; `None` where there is none or it is
+    /// emulated in software.
+    pub gpu: Option<String>,
+}
+
+/// What a person has set that a plan starts from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Limits {
+    /// Longer side of training pictures at most, px.
+    pub train_side_px: u32,
+    /// Longer side of the pictures in which objects are looked for at most, px.
+    pub object_side_px: u32,
+    /// Highest degree of a training's spherical harmonics.
+    pub sh_degree: u8,
+    /// Every how-manieth photo is to be held out.
+    pub holdout_every: usize,
+}
+
+/// The Gaussians of a scene.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CloudFacts {
+    /// How many.
+    pub gaussians: usize,
+    /// Degree of the spherical harmonics in the file.
+    pub sh_stored: u8,
+    /// Degree up to which any coefficient is not zero.
+    pub sh_used: u8,
+    /// Degree up to which they can be seen.
+    pub sh_visible: u8,
+    /// Longer side in px at which the photos show all that the Gaussians resolve; `None` without
+    /// photos.
+    pub resolved_side_px: Option<u32>,
+}
+
+/// The photos of a scene.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PhotoFacts {
+    /// How many.
+    pub photos: usize,
+    /// Width and height of the first, px.
+    pub size_px: [u32; 2],
+    /// Longest side of all of them, px.
+    pub longest_px: u32,
+    /// Pixels of all of them.
+    pub pixels: u64,
+    /// Pixels of all of them once they are limited to the training's size.
+    pub limited_pixels: u64,
+}
+
+/// Objects and parts of a scene.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SemanticFacts {
+    /// Objects.
+    pub objects: usize,
+    /// Parts.
+    pub parts: usize,
+    /// The encoder that looked at them, if one has.
+    pub encoder: Option<String>,
+    /// Numbers in their stored features.
+    pub numbers: usize,
+}
+
+/// All that a plan depends on.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Facts {
+    /// The Gaussians, if they are a result.
+    pub cloud: Option<CloudFacts>,
+    /// The photos, if there are any.
+    pub photos: Option<PhotoFacts>,
+    /// Objects and parts, if they were found.
+    pub semantics: Option<SemanticFacts>,
+    /// The machine.
+    pub machine: Machine,
+    /// What a person has set.
+    pub limits: Limits,
+}
+
+impl Facts {
+    /// Facts of a machine with nothing open.
+    pub fn of(machine: Machine, limits: Limits) -> Self {
+        Self { machine, limits, ..Self::default() }
+    }
+
+    /// With the photos that these cameras took.
+    pub fn with_photos(mut self, cameras: &[Camera]) -> Self {
+        self.photos = PhotoFacts::of(cameras, self.limits.train_side_px);
+        self
+    }
+
+    /// With these Gaussians, whose file had harmonics of degree `sh_stored`, seen by `cameras`.
+    pub fn with_cloud(mut self, cloud: &GaussianCloud, sh_stored: u8, cameras: &[Camera]) -> Self {
+        self.cloud = Some(CloudFacts {
+            gaussians: cloud.len(),
+            sh_stored,
+            sh_used: used_degree(cloud),
+            sh_visible: visible_degree(cloud),
+            resolved_side_px: resolved_side_px(cloud, cameras),
+        });
+        self
+    }
+
+    /// With these objects and parts.
+    pub fn with_semantics(mut self, map: Option<&SemanticMap>) -> Self {
+        self.semantics = map.map(SemanticFacts::of);
+        self
+    }
+
+    /// The same facts for other settings of a person.
+    pub fn with_limits(mut self, limits: Limits, dataset: Option<&Dataset>) -> Self {
+        if let (Some(dataset), true) = (dataset, limits.train_side_px != self.limits.train_side_px) {
+            self.photos = PhotoFacts::of(&dataset.cameras(), limits.train_side_px);
+        }
+        self.limits = limits;
+        self
+    }
+}
+
+impl PhotoFacts {
+    fn of(cameras: &[Camera], limit_px: u32) -> Option<Self> {
+        let first = cameras.first()?;
+        let pixels = |c: &Camera| u64::from(c.width_px) * u64::from(c.height_px);
+        Some(Self {
+            photos: cameras.len(),
+            size_px: [first.width_px, first.height_px],
+            longest_px: cameras.iter().map(|c| c.width_px.max(c.height_px)).max().unwrap_or(0),
+            pixels: cameras.iter().map(pixels).sum(),
+            limited_pixels: cameras.iter().map(|c| pixels(&c.limited_to(limit_px))).sum(),
+        })
+    }
+}
+
+impl SemanticFacts {
+    fn of(map: &SemanticMap) -> Self {
+        let of = |level: Level| map.identities.iter().filter(|(_, i)| i.level == level).count();
+        let vectors = |l: &LanguageFeatures| -> usize { l.of.iter().map(|f| f.raw.len() + f.deviated.len()).sum() };
+        let numbers = map.language.as_ref().map_or(0, |l| l.dimension * vectors(l));
+        let encoder = map.language.as_ref().map(|l| l.encoder.clone());
+        Self { objects: of(Level::Object), parts: of(Level::Part), encoder, numbers }
+    }
+}
+
+/// Half a step of an 8-bit picture: smaller changes cannot be seen.
+pub const NOISE_FLOOR: f64 = 0.5 / 255.0;
+
+/// The lowest degree from which on no band can change any pixel by half an 8-bit step.
+///
+/// A band of degree `l` adds at most `|c| sqrt((2l + 1) / 4 pi)` to a colour, `c` its coefficients
+/// of one channel (Cauchy-Schwarz and the addition theorem). Blending weights sum to at most 1, so
+/// the largest such bound over the Gaussians bounds the change of every pixel.
+pub fn visible_degree<R: Real>(cloud: &GaussianCloud<R>) -> u8 {
+    let bound = band_bounds(cloud);
+    let mut left_out = 0.0;
+    let sum_reaches = |&d: &u8| {
+        left_out += bound[usize::from(d)];
+        left_out >= NOISE_FLOOR
+    };
+    (1..=cloud.sh_degree).rev().find(sum_reaches).unwrap_or(0)
+}
+
+/// The degree above which every coefficient is zero.
+pub fn used_degree<R: Real>(cloud: &GaussianCloud<R>) -> u8 {
+    let bound = band_bounds(cloud);
+    (1..=cloud.sh_degree).rev().find(|&d| bound[usize::from(d)] > 0.0).unwrap_or(0)
+}
+
+/// What each band can change at most, by degree.
+fn band_bounds<R: Real>(cloud: &GaussianCloud<R>) -> [f64; 4] {
+    let mut bound = [0.0_f64; 4];
+    for gaussian in cloud.sh.chunks_exact(cloud.sh_stride().max(1)) {
+        for degree in 1..=cloud.sh_degree {
+            let band = &gaussian[sh::coefficients(degree - 1)..sh::coefficients(degree)];
+            let reach = (f64::from(2 * degree + 1) / (4.0 * std::f64::consts::PI)).sqrt();
+            for channel in 0..3 {
+                let energy: f64 = band.iter().map(|c| c[channel].f64().powi(2)).sum();
+                let b = &mut bound[usize::from(degree)];
+                *b = b.max(energy.sqrt() * reach);
+            }
+        }
+    }
+    bound
+}
+
+/// Cameras and Gaussians that are looked at to tell what is resolved.
+const CAMERAS: usize = 8;
+const GAUSSIANS: usize = 4_000;
+/// Share of the footprints that may be finer than what is resolved.
+const FINER: f64 = 0.05;
+/// Opacity under which a Gaussian draws no detail.
+const FAINT: f64 = 0.1;
+
+/// Longer side in px that the photos need to show all that the Gaussians resolve.
+///
+/// A Gaussian of standard deviation `s` px keeps under 1 % of its contrast beyond the highest
+/// frequency that pixels `s` px apart can carry (`exp(-pi²/2)`). So pixels as far apart as the
+/// finest twentieth of the footprints is wide, along its narrower axis, lose nothing to speak of.
+pub fn resolved_side_px(cloud: &GaussianCloud, cameras: &[Camera]) -> Option<u32> {
+    let longest = cameras.iter().map(|c| c.width_px.max(c.height_px)).max()?;
+    let mut widths: Vec<f64> = Vec::new();
+    for camera in cameras.iter().step_by(cameras.len().div_ceil(CAMERAS)) {
+        let scale = f64::from(longest) / f64::from(camera.width_px.max(camera.height_px));
+        let step = cloud.len().div_ceil(GAUSSIANS).max(1);
+        widths.extend((0..cloud.len()).step_by(step).filter_map(|i| Some(footprint_px(cloud, i, camera)? * scale)));
+    }
+    if widths.is_empty() {
+        return Some(longest);
+    }
+    let at = (widths.len() as f64 * FINER) as usize;
+    let (_, width, _) = widths.select_nth_unstable_by(at, f64::total_cmp);
+    Some((f64::from(longest) / width.max(1.0)).ceil() as u32)
+}
+
+/// Standard deviation of a Gaussian's picture along its narrower axis in px; `None` where it is not
+/// in the picture or too faint to matter.
+fn footprint_px(cloud: &GaussianCloud, i: usize, camera: &Camera) -> Option<f64> {
+    let g = cloud.gaussian(i);
+    if 1.0 / (1.0 + (-f64::from(g.opacity_logit)).exp()) < FAINT {
+        return None;
+    }
+    let world = cloud.world_position(i);
+    let at = camera.project(world)?;
+    let inside = at.x >= 0.0 && at.y >= 0.0 && at.x < f64::from(camera.width_px) && at.y < f64::from(camera.height_px);
+    if !inside {
+        return None;
+    }
+    let camera_from_world = camera.world_from_camera.transpose();
+    let local = camera_from_world * (world - camera.center);
+    let rotation = DMat3::from_cols_array_2d(&matrix_from_quaternion(g.quaternion.map(f64::from))?).transpose();
+    let scales = DVec3::from_array(g.log_scale.map(|s| f64::from(s).exp()));
+    // Rows of this map a standard normal vector to camera space; the projection is linear nearby.
+    let axes = (camera_from_world * rotation * DMat3::from_diagonal(scales)).transpose();
+    let row =
+        |focal: f64, across: DVec3, offset: f64| axes * (across - DVec3::Z * (offset / local.z)) * (focal / local.z);
+    let (u, v) = (row(camera.focal_px.x, DVec3::X, local.x), row(camera.focal_px.y, DVec3::Y, local.y));
+    let (a, b, c) = (u.dot(u), u.dot(v), v.dot(v));
+    let smaller = 0.5 * (a + c) - (0.25 * (a - c).powi(2) + b * b).sqrt();
+    smaller.is_finite().then(|| smaller.max(0.0).sqrt())
+}

@@ -1,0 +1,186 @@
+//! What is decided from which facts, with a scene beside each that needs what is left out.
+
+use glam::DVec3;
+
+use super::*;
+use crate::math::sh;
+use crate::scene::{Camera, GaussianCloud, Identities, LanguageFeatures, Level, NOBODY, SemanticMap, ViewFeatures};
+
+/// One Gaussian whose second and third bands have one coefficient each.
+fn coloured(band_one: f32, band_two: f32) -> GaussianCloud {
+    let mut sh = vec![[0.0; 3]; 16];
+    (sh[1], sh[5]) = ([band_one; 3], [band_two; 3]);
+    GaussianCloud { sh_degree: 3, sh, ..blobs(1, 0.0) }
+}
+
+/// `n` round Gaussians along a line, of this log-scale.
+fn blobs(n: usize, log_scale: f32) -> GaussianCloud {
+    GaussianCloud {
+        positions: (0..n).map(|i| [0.2 * i as f32 - 0.1 * n as f32, 0.0, 0.0]).collect(),
+        log_scales: vec![[log_scale; 3]; n],
+        quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
+        opacity_logits: vec![3.0; n],
+        sh: vec![[0.0; 3]; n],
+        ..GaussianCloud::default()
+    }
+}
+
+fn camera(side_px: u32) -> Camera {
+    Camera::look_at(DVec3::new(0.0, 0.0, -4.0), DVec3::ZERO, DVec3::NEG_Y, 0.8, side_px, side_px / 2).expect("valid")
+}
+
+fn limits() -> Limits {
+    Limits { train_side_px: 500, object_side_px: 1_024, sh_degree: 3, holdout_every: 8 }
+}
+
+fn objects(with_part: bool, with_looks: bool) -> SemanticMap {
+    let mut identities = Identities::default();
+    let doll = identities.add(Level::Object, NOBODY, vec!["doll".into()]);
+    if with_part {
+        identities.add(Level::Part, doll, vec!["eye".into()]);
+    }
+    let looks = ViewFeatures { raw: vec![vec![0.5; 4]], deviated: vec![vec![0.5; 4]] };
+    let of = vec![looks; identities.len()];
+    let language = with_looks.then(|| LanguageFeatures { encoder: "demo".into(), dimension: 4, of });
+    SemanticMap { identities, language, ..SemanticMap::default() }
+}
+
+/// The plan of a scene with everything, of which `change` takes something away.
+fn plan(change: impl FnOnce(Facts) -> Facts) -> ScenePlan {
+    let cameras = vec![camera(1_000); 9];
+    let facts = Facts::of(Machine { max_gaussians: 1_234_567, cores: 2, ..Machine::default() }, limits());
+    let facts = facts.with_photos(&cameras).with_cloud(&coloured(0.2, 0.1), 3, &cameras);
+    ScenePlan::new(change(facts.with_semantics(Some(&objects(true, true)))), &Overrides::default())
+}
+
+#[test]
+fn bands_under_the_noise_floor_are_dropped_and_others_kept() {
+    assert_eq!(visible_degree(&coloured(0.2, 1e-4)), 1);
+    assert_eq!(visible_degree(&coloured(0.2, 0.05)), 2);
+    assert_eq!((visible_degree(&coloured(0.0, 1e-4)), used_degree(&coloured(0.0, 1e-4))), (0, 2));
+    assert_eq!(used_degree(&coloured(0.1, 0.0)), 1);
+}
+
+#[test]
+fn dropped_bands_change_no_colour_by_half_a_step() {
+    let worst = |c: &GaussianCloud, kept: u8| {
+        let change = |i: u32| {
+            let z = 1.0 - (2.0 * f64::from(i) + 1.0) / 500.0;
+            let (phi, r) = (f64::from(i) * 2.4, (1.0 - z * z).sqrt());
+            let b = sh::basis(3, [r * phi.cos(), r * phi.sin(), z]);
+            (sh::coefficients(kept)..16).map(|k| b[k] * f64::from(c.sh[k][0])).sum::<f64>().abs()
+        };
+        (0..500).map(change).fold(0.0, f64::max)
+    };
+    let faint = coloured(0.2, 2.5e-3);
+    assert_eq!(visible_degree(&faint), 1);
+    assert!(worst(&faint, 1) < NOISE_FLOOR);
+    let strong = coloured(0.2, 0.05);
+    assert!(worst(&strong, 1) > NOISE_FLOOR, "a band that is seen is missed");
+}
+
+#[test]
+fn what_the_gaussians_resolve_follows_their_size_and_not_the_photos() {
+    let side =
+        |log_scale: f32, side_px: u32| resolved_side_px(&blobs(40, log_scale), &[camera(side_px)]).expect("a size");
+    let coarse = side(-2.0, 1_600);
+    assert!((100..400).contains(&coarse), "{coarse}");
+    assert!(side(-2.0, 3_200).abs_diff(coarse) <= 2, "photos twice as large show no more");
+    assert_eq!(side(-8.0, 1_600), 1_600, "fine Gaussians need every pixel");
+    // Faint ones draw no detail.
+    let mut mixed = blobs(40, -2.0);
+    for i in 0..20 {
+        (mixed.log_scales[i], mixed.opacity_logits[i]) = ([-8.0; 3], -6.0);
+    }
+    assert!(resolved_side_px(&mixed, &[camera(1_600)]).expect("a size") < 400);
+    assert_eq!(resolved_side_px(&blobs(3, 0.0), &[]), None);
+}
+
+#[test]
+fn a_scene_that_needs_everything_has_everything() {
+    let p = plan(|facts| facts);
+    assert_eq!((p.sh_degree, p.parts, p.holdout_every), (2, true, 8));
+    assert_eq!([p.maps, p.portraits, p.encoder, p.navigation], [When::Used; 4]);
+    assert!(p.lines.iter().all(|l| !l.reason.is_empty() && !l.choice.is_empty()));
+    let line = |item: Item| p.line(item).expect("a line");
+    assert_eq!(line(Item::Photos).choice, "500 x 250 px");
+    assert_eq!(line(Item::Photos).saving, "10 MB");
+    assert_eq!(line(Item::Gaussians).choice, "at most 1,234,567");
+    assert_eq!(p.lines.len(), Item::ALL.len());
+}
+
+#[test]
+fn without_semantics_nothing_is_kept_for_them() {
+    let p = plan(|facts| facts.with_semantics(None));
+    assert_eq!([p.maps, p.portraits, p.encoder, p.navigation], [When::Never; 4]);
+    let all = ScenePlan::new(p.facts, &Overrides::everything());
+    assert_eq!(all.maps, When::Never, "nobody can want maps of nothing");
+    assert!(!all.line(Item::Maps).expect("said").overridden);
+}
+
+#[test]
+fn objects_without_parts_or_looks_have_no_level_and_no_encoder_for_them() {
+    let p = plan(|facts| facts.with_semantics(Some(&objects(false, false))));
+    assert_eq!((p.parts, p.encoder, p.maps), (false, When::Never, When::Used));
+    let p = plan(|facts| facts.with_semantics(Some(&objects(false, true))));
+    assert_eq!((p.parts, p.encoder), (false, When::Used));
+}
+
+#[test]
+fn a_finished_splat_has_nothing_to_train_or_to_fly_between() {
+    let p = plan(|facts| Facts { photos: None, ..facts });
+    assert_eq!((p.navigation, p.holdout_every), (When::Never, 0));
+    assert_eq!(p.line(Item::Photos).expect("said").choice, "none");
+    assert!([Item::Held, Item::Objects, Item::Gaussians].iter().all(|i| p.line(*i).is_none()));
+}
+
+#[test]
+fn a_single_photo_is_trained_on() {
+    let p = plan(|facts| facts.with_photos(&[camera(1_000)]));
+    assert_eq!(p.holdout_every, 0);
+    let dataset = |n: usize| {
+        let photo = |i: usize| crate::scene::Photo {
+            name: i.to_string(),
+            path: "a".into(),
+            camera: camera(64),
+            distortion: None,
+            test_split: false,
+            background: None,
+        };
+        crate::scene::Dataset { photos: (0..n).map(photo).collect(), ..crate::scene::Dataset::default() }
+    };
+    assert_eq!(dataset(1).split(8), (vec![0], vec![]));
+    assert_eq!(dataset(2).split(8), (vec![1], vec![0]), "of two, one is held out");
+}
+
+#[test]
+fn a_person_can_have_it_otherwise_and_is_told_what_it_costs() {
+    let faint = coloured(0.2, 1e-4);
+    let facts = plan(|facts| facts.with_cloud(&faint, 3, &[camera(4_000)])).facts;
+    let auto = ScenePlan::new(facts.clone(), &Overrides::default());
+    let all = ScenePlan::new(facts, &Overrides::everything());
+    assert_eq!((auto.sh_degree, all.sh_degree), (1, 2));
+    assert_eq!((auto.maps, all.maps, all.navigation), (When::Used, When::Always, When::Always));
+    assert!(auto.train_side_px < all.train_side_px && auto.object_side_px < all.object_side_px);
+    for item in [Item::Colour, Item::Maps, Item::Photos, Item::Objects, Item::Redraw] {
+        let (before, after) = (auto.line(item).expect("said"), all.line(item).expect("said"));
+        assert!(!before.overridden && after.overridden, "{item}");
+        assert_eq!(Some(after.choice.as_str()), item.alternative());
+        assert!(!after.saving.is_empty() && after.reason.starts_with("Wanted so"), "{item}");
+    }
+    assert!(all.line(Item::Parts).is_some_and(|l| l.alternative.is_none()), "there are parts anyway");
+}
+
+#[test]
+fn other_settings_of_a_person_change_the_plan() {
+    let p = plan(|facts| facts.with_limits(Limits { object_side_px: 300, ..limits() }, None));
+    assert_eq!(p.object_side_px, 300);
+}
+
+#[test]
+fn numbers_are_readable() {
+    assert_eq!(count(1_234_567), "1,234,567");
+    assert_eq!(count(999), "999");
+    assert_eq!(bytes(1_900), "2 kB");
+    assert_eq!(bytes(3_200_000_000), "3.2 GB");
+}

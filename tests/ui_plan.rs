@@ -1,0 +1,184 @@
+//! The window follows the scene plan: nothing of models, paths or agents is loaded before it is
+//! used, and a window at rest draws nothing. One test, because the trace is the whole process's.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use egui_kittest::Harness;
+
+use fmlgs::navigate::target::Side;
+use fmlgs::pipeline::observer::Silent;
+use fmlgs::pipeline::synth::{self, SynthOptions};
+use fmlgs::scene::IdentityId;
+use fmlgs::scene::plan::Wish;
+use fmlgs::scene::trace::{self, Sort};
+use fmlgs::ui::app::App;
+use fmlgs::worker::jobs::PipelineJobs;
+use fmlgs::worker::places::Places;
+use fmlgs::worker::{Action, Pane};
+
+/// Only a test that hangs takes this long.
+const LONG: Duration = Duration::from_secs(600);
+
+/// A window and what was traced since it was opened.
+struct Window {
+    harness: Harness<'static, App>,
+    traced: usize,
+}
+
+impl Window {
+    /// A window without the panes that list objects, for which `wishes` are made.
+    fn new(data: &Path, first: PathBuf, wishes: &[&str]) -> Self {
+        let traced = trace::since(0).len();
+        let places = Places { data: data.to_path_buf() };
+        let mut harness =
+            Harness::builder().with_size([1200.0, 800.0]).with_max_steps(20).wgpu().build_eframe(|cc| {
+                App::new(cc, PipelineJobs::new(places), Some(Action::Open(first))).expect("threads")
+            });
+        let app = harness.state_mut();
+        app.layout.hidden.extend([Pane::Objects, Pane::Chat]);
+        app.wish(wishes.iter().map(|w| w.parse::<Wish>().expect("a wish")));
+        Self { harness, traced }
+    }
+
+    fn app(&self) -> &App {
+        self.harness.state()
+    }
+
+    fn until(&mut self, what: &str, done: impl Fn(&App) -> bool) {
+        let start = Instant::now();
+        while !done(self.app()) {
+            assert!(start.elapsed() < LONG, "waited too long for: {what}\n{:#?}", self.app().state.log);
+            self.harness.step();
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        self.harness.run_steps(2);
+    }
+
+    fn ask(&mut self, action: Action) {
+        self.harness.state_mut().ask(action);
+        self.harness.run_steps(3);
+    }
+
+    /// Lets time pass with nobody there.
+    fn rest(&mut self) {
+        for _ in 0..10 {
+            self.harness.step();
+            std::thread::sleep(Duration::from_millis(40));
+        }
+    }
+
+    fn loaded(&self, sort: Sort) -> usize {
+        trace::since(self.traced).iter().filter(|l| l.sort == sort).count()
+    }
+
+    fn until_loaded(&mut self, sort: Sort) {
+        let traced = self.traced;
+        self.until("something to be loaded", |_| trace::since(traced).iter().any(|l| l.sort == sort));
+    }
+
+    /// After how long the window wants to be drawn again by itself.
+    fn next_frame(&self) -> Duration {
+        let windows = &self.harness.output().viewport_output;
+        windows.get(&egui::ViewportId::ROOT).map_or(Duration::MAX, |window| window.repaint_delay)
+    }
+
+    /// Waits until the window wants no frame any more: messages and movements are over.
+    fn until_still(&mut self) {
+        let start = Instant::now();
+        while self.next_frame() < Duration::from_secs(60) {
+            assert!(start.elapsed() < LONG, "it goes on wanting frames, the next in {:?}", self.next_frame());
+            self.harness.step();
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    fn ticket(&self) -> u64 {
+        self.app().viewport.picture().expect("drawn").ticket
+    }
+}
+
+/// What is loaded only once it is used.
+const LATER: [Sort; 5] = [Sort::Maps, Sort::Portraits, Sort::Model, Sort::Paths, Sort::Agent];
+
+/// A trained scene with objects and their looks, and its photos.
+fn trained(folder: &Path) -> PathBuf {
+    let (photos, glb) = (folder.join("photos"), folder.join("table.glb"));
+    std::fs::create_dir_all(&photos).expect("folder");
+    std::fs::write(&glb, synth::demo_glb()).expect("write");
+    let size = SynthOptions { views: 8, held_out: 1, width_px: 96, height_px: 72, ..SynthOptions::default() };
+    synth::run(&glb, &SynthOptions { samples: 1, points: 600, ..size }, &photos, &mut Silent).expect("photos");
+    let mut w = Window::new(&folder.join("data"), photos, &[]);
+    w.until("the photos", |a| a.state.scene.is_some());
+    w.harness.state_mut().layout.config.steps = 60;
+    w.ask(Action::StartTraining);
+    w.until("objects after training", |a| a.state.semantics.is_some());
+    assert!(w.loaded(Sort::Model) > 0, "finding objects looks at them");
+    w.app().state.scene.as_ref().expect("open").out.clone()
+}
+
+/// The objects that are found, and the pixels of the first.
+fn answer(w: &mut Window, question: &str) -> (Vec<IdentityId>, usize) {
+    w.ask(Action::Ask(question.into()));
+    w.until("the maps", |a| a.viewport.questions.maps().is_some());
+    let map = w.app().state.semantics.clone().expect("objects");
+    let found = w.app().viewport.questions.found();
+    let maps = w.app().viewport.questions.maps().cloned().expect("maps");
+    let area = found.first().map_or(0, |id| maps.identities.mask(&map.identities, *id).area());
+    (found, area)
+}
+
+#[test]
+fn nothing_is_loaded_or_drawn_before_it_is_used() {
+    let folder = tempfile::tempdir().expect("folder");
+    let scene = trained(folder.path());
+    let data = folder.path().join("data");
+
+    // Viewed, but never queried and never navigated.
+    let mut w = Window::new(&data, scene.clone(), &[]);
+    w.until("a picture at rest", |a| a.viewport.picture().is_some_and(|p| p.full));
+    assert!(w.app().state.semantics.is_some(), "there is something to ask for");
+    w.harness.key_press(egui::Key::CloseBracket);
+    w.until("a photo's view", |a| a.viewport.photo_index() == Some(0));
+    w.harness.key_press(egui::Key::Home);
+    w.until("the first view", |a| a.viewport.photo_index().is_none() && a.viewport.picture().is_some_and(|p| p.full));
+    w.rest();
+    let too_early: Vec<Sort> = LATER.into_iter().filter(|s| w.loaded(*s) > 0).collect();
+    assert!(too_early.is_empty(), "{too_early:?}: {:#?}", trace::since(w.traced));
+    assert_eq!((w.loaded(Sort::Gaussians), w.loaded(Sort::Objects)), (1, 1));
+
+    // An idle window draws nothing.
+    let ticket = w.ticket();
+    w.until_still();
+    w.rest();
+    assert_eq!(w.ticket(), ticket);
+
+    // Each is loaded by what needs it, and by nothing else.
+    let lazy = answer(&mut w, "the table");
+    assert!(w.loaded(Sort::Maps) == 1 && lazy.1 > 0, "{lazy:?}");
+    w.until_loaded(Sort::Model);
+    assert_eq!(w.loaded(Sort::Model), 1, "one network understands phrases");
+    w.ask(Action::TypeQuestion);
+    w.until_still();
+    assert_eq!([Sort::Paths, Sort::Portraits, Sort::Agent].map(|s| w.loaded(s)), [0; 3]);
+    w.ask(Action::TogglePane(Pane::Objects));
+    w.until_loaded(Sort::Portraits);
+    assert_eq!(w.loaded(Sort::Paths), 0);
+    w.ask(Action::GoToTarget(lazy.0[0], Side::default()));
+    w.until("the graph", |a| a.state.explored.is_some());
+    assert_eq!((w.loaded(Sort::Paths), w.loaded(Sort::Agent)), (1, 0));
+    drop(w);
+
+    // Everything on: all of that at opening, and the same answer.
+    let wishes = ["maps=always", "encoder=open", "portraits=open", "navigation=open", "redraw=always"];
+    let mut all = Window::new(&data, scene, &wishes);
+    all.until("a picture at rest", |a| a.viewport.picture().is_some_and(|p| p.full));
+    all.until("the graph", |a| a.state.explored.is_some());
+    [Sort::Maps, Sort::Portraits, Sort::Model].into_iter().for_each(|sort| all.until_loaded(sort));
+    let ticket = all.ticket();
+    all.rest();
+    assert!(all.ticket() > ticket && all.next_frame() < Duration::from_secs(1), "it draws all the time");
+    all.harness.state_mut().wish(["redraw=auto".parse::<Wish>().expect("a wish")]);
+    assert_eq!(answer(&mut all, "the table"), lazy);
+}
