@@ -74,6 +74,9 @@ Examples:
 struct Cli {
     /// What to open in the window: a dataset's folder, a splat file or a trained scene
     path: Option<PathBuf>,
+    /// Report to show in the window: a folder that 'fmlgs report' wrote, or its report.json
+    #[arg(long)]
+    report: Option<PathBuf>,
     /// Show warnings and results only
     #[arg(short, long, global = true)]
     quiet: bool,
@@ -101,8 +104,8 @@ enum Command {
     CheckStability(check_stability::Args),
 }
 
-/// Opens the window, does one action if one is given, and returns when the window is closed.
-pub type OpenWindow = fn(Option<Action>) -> Result<(), Box<dyn std::error::Error>>;
+/// Opens the window, does these actions, and returns when the window is closed.
+pub type OpenWindow = fn(Vec<Action>) -> Result<(), Box<dyn std::error::Error>>;
 
 /// Runs the command line of this process and returns its exit code. `open_window` stands above this
 /// module, so the caller hands it in.
@@ -124,8 +127,12 @@ pub fn main(open_window: OpenWindow) -> ExitCode {
 fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
     let quiet = cli.quiet;
     let Some(command) = cli.command else {
-        return window(cli.path.map(Action::Open), open_window);
+        let report = cli.report.map(Action::OpenReport);
+        return window(cli.path.map(Action::Open).into_iter().chain(report).collect(), open_window);
     };
+    if cli.report.is_some() {
+        return Err(CliError::Usage("--report is for the window; a command has no use for it".into()));
+    }
     if let Some(path) = cli.path {
         return Err(CliError::Usage(format!("'{}' before a command means nothing; put it after it", path.display())));
     }
@@ -143,7 +150,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Agent(args) => agent::run(args),
         Command::Synth(args) => synth::run(args, quiet),
         Command::Demo(args) if args.headless => demo::run(args, quiet),
-        Command::Demo(_) => window(Some(Action::TryDemo), open_window),
+        Command::Demo(_) => window(vec![Action::TryDemo], open_window),
         Command::Export(args) => export::run(args),
         Command::Bench(args) => bench::run(args, quiet),
         Command::Report(args) => report::run(args, quiet),
@@ -151,13 +158,18 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
     }
 }
 
-fn window(first: Option<Action>, open_window: OpenWindow) -> Result<(), CliError> {
-    match &first {
-        Some(Action::Open(path)) if !path.exists() => {
-            let name = path.display();
-            return Err(CliError::Usage(format!("'{name}' is no file, no folder and no subcommand")));
+fn window(first: Vec<Action>, open_window: OpenWindow) -> Result<(), CliError> {
+    for action in &first {
+        match action {
+            Action::Open(path) if !path.exists() => {
+                let name = path.display();
+                return Err(CliError::Usage(format!("'{name}' is no file, no folder and no subcommand")));
+            }
+            Action::OpenReport(path) if !path.exists() => {
+                return Err(CliError::Usage(format!("--report: '{}' is no file and no folder", path.display())));
+            }
+            _ => {}
         }
-        _ => {}
     }
     let has_display = ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|v| std::env::var_os(v).is_some_and(|d| !d.is_empty()));
     if cfg!(all(unix, not(target_os = "macos"))) && !has_display {

@@ -10,7 +10,8 @@ use super::dialogs::{self, FileDialogs, Question};
 use super::layout::Layout;
 use super::palette::{Palette, shortcut_sheet};
 use super::panes::{
-    bars, dataset::Thumbnails, empty, log, models::Models, objects, plan, portraits::Portraits, training,
+    bars, dataset::Thumbnails, empty, log, models::Models, objects, plan, portraits::Portraits, report::ReportPane,
+    training,
 };
 use super::state::AppState;
 use super::toasts::Toasts;
@@ -35,6 +36,8 @@ pub struct App {
     thumbnails: Thumbnails,
     portraits: Portraits,
     models: Models,
+    /// Error against run time.
+    pub report: ReportPane,
     /// The camera's path and its player.
     pub camera: CameraPane,
     /// The talk with the assistant.
@@ -46,9 +49,13 @@ pub struct App {
 }
 
 impl App {
-    /// Starts the worker and does `first`, if given. `jobs` does the work. Fails only if
+    /// Starts the worker and does `first`, one after the other. `jobs` does the work. Fails only if
     /// the system gives no threads.
-    pub fn new(cc: &eframe::CreationContext<'_>, jobs: impl Jobs, first: Option<Action>) -> std::io::Result<Self> {
+    pub fn new(
+        cc: &eframe::CreationContext<'_>,
+        jobs: impl Jobs,
+        first: impl IntoIterator<Item = Action>,
+    ) -> std::io::Result<Self> {
         theme::install(&cc.egui_ctx);
         // Pictures answer a person's hand. Progress can be read no faster than it is written, and
         // every frame takes from what it reports on.
@@ -69,6 +76,7 @@ impl App {
             thumbnails: Thumbnails::default(),
             portraits: Portraits::default(),
             models: Models::default(),
+            report: ReportPane::default(),
             camera: CameraPane::default(),
             chat: Chat::default(),
             toasts: Toasts::default(),
@@ -102,6 +110,11 @@ impl App {
         }
         if std::mem::take(&mut self.state.wants_objects) {
             self.actions.push(Action::FindObjects);
+        }
+        if std::mem::take(&mut self.state.wants_report)
+            && let Some(scene) = &self.state.scene
+        {
+            self.actions.push(Action::OpenReport(scene.report_out.clone()));
         }
         while let Some(answer) = self.dialogs.answer() {
             self.chosen(answer);
@@ -151,6 +164,10 @@ impl App {
                 viewport.stand(&pose, state, ui.input(|i| i.time));
             }
         }
+        if layout.shows(Pane::Report) {
+            let shown = Panel::bottom("report").frame(pane).resizable(true).default_size(400.0).min_size(200.0);
+            shown.show(ui, |ui| self.report.show(ui, state, layout, viewport, actions));
+        }
         let Some(scene) = state.scene.clone() else {
             let canvas = Frame::new().fill(theme::CANVAS);
             CentralPanel::no_frame().frame(canvas).show(ui, |ui| empty::show(ui, state, actions));
@@ -189,7 +206,7 @@ impl App {
                         }
                         if layout.shows(Pane::Training) {
                             ui.heading(Pane::Training.text());
-                            training::show(ui, state, layout, actions);
+                            training::show(ui, state, layout, &self.report.curves(state), actions);
                             ui.add_space(10.0);
                         }
                         if objects && state.semantics.is_none() {

@@ -38,6 +38,8 @@ pub struct Layout {
     pub mode: ViewMode,
     /// What the plots run over.
     pub plot_axis: PlotAxis,
+    /// Whether the times of a picture's stages are shown.
+    pub times: bool,
     /// Settings of the next training.
     pub config: TrainConfig,
     /// Models that find objects.
@@ -51,12 +53,13 @@ pub struct Layout {
 impl Default for Layout {
     fn default() -> Self {
         Self {
-            hidden: vec![Pane::Log, Pane::Camera],
+            hidden: vec![Pane::Log, Pane::Camera, Pane::Report],
             cameras: true,
             compare: false,
             split: 0.5,
             mode: ViewMode::Picture,
             plot_axis: PlotAxis::default(),
+            times: false,
             config: TrainConfig { steps: 3_000, eval_every: 250, ..TrainConfig::default() },
             finding: Finding::default(),
             chat: ChatSettings::default(),

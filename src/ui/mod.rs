@@ -5,6 +5,7 @@
 //! changes the view or becomes a job. Nothing here computes for longer than a redraw may take.
 
 mod act;
+mod act_report;
 pub mod app;
 pub mod camera;
 pub mod chat;
@@ -25,8 +26,8 @@ use crate::worker::Action;
 use crate::worker::jobs::PipelineJobs;
 use crate::worker::places::Places;
 
-/// Opens the window, does `first` in it, and returns when it is closed.
-pub fn run(first: Option<Action>) -> eframe::Result {
+/// Opens the window, does `first` in it one after the other, and returns when it is closed.
+pub fn run(first: Vec<Action>) -> eframe::Result {
     let viewport = egui::ViewportBuilder::default()
         .with_title("FMLGS")
         .with_app_id("fmlgs")
@@ -46,7 +47,7 @@ pub fn run(first: Option<Action>) -> eframe::Result {
     open(viewport, eframe::Renderer::Wgpu, first)
 }
 
-fn open(viewport: egui::ViewportBuilder, renderer: eframe::Renderer, first: Option<Action>) -> eframe::Result {
+fn open(viewport: egui::ViewportBuilder, renderer: eframe::Renderer, first: Vec<Action>) -> eframe::Result {
     // Shades that dithering would smooth do not occur in a flat theme.
     let options = eframe::NativeOptions { viewport, renderer, dithering: false, ..eframe::NativeOptions::default() };
     eframe::run_native(

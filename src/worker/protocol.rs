@@ -7,12 +7,14 @@ use glam::DVec3;
 
 use super::edit::EditRequest;
 use super::guide::{Explored, FilmRequest, VisitRequest, Visited};
+use super::measure::MeasureRequest;
 use crate::io::trained::History;
 use crate::pipeline::observer::{Evaluation, Level, Progress, StepMetrics};
 use crate::pipeline::semantics::find::Finding;
 use crate::pipeline::semantics::portraits::Gallery;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
+use crate::report::Report;
 use crate::scene::{Bounds, Camera, Dataset, GaussianCloud, Photo, PhotoPixels, ScenePlan, SemanticMap};
 
 /// Names one job of one worker.
@@ -48,16 +50,31 @@ pub enum JobKind {
     Visit,
     /// Draws a film.
     Film,
+    /// Measures drawing, knob by knob.
+    Measure,
+    /// Reads a report.
+    Report,
 }
 
 impl JobKind {
     /// Which thread runs it.
     pub fn lane(self) -> Lane {
         match self {
-            Self::Open | Self::Demo | Self::Train | Self::Evaluate | Self::Objects | Self::Model | Self::Film => {
-                Lane::Long
-            }
-            Self::Edit | Self::Export | Self::Photo | Self::Picture | Self::Portraits | Self::Visit => Lane::Short,
+            Self::Open
+            | Self::Demo
+            | Self::Train
+            | Self::Evaluate
+            | Self::Objects
+            | Self::Model
+            | Self::Film
+            | Self::Measure => Lane::Long,
+            Self::Edit
+            | Self::Export
+            | Self::Photo
+            | Self::Picture
+            | Self::Portraits
+            | Self::Visit
+            | Self::Report => Lane::Short,
         }
     }
 }
@@ -163,6 +180,15 @@ pub enum Command {
     Visit(Box<VisitRequest>),
     /// Draw a film.
     Film(Box<FilmRequest>),
+    /// Measure error against run time of drawing, and write it as a report.
+    Measure(Box<MeasureRequest>),
+    /// Read a report.
+    ReadReport {
+        /// Its folder or file.
+        path: PathBuf,
+        /// Whether it is to be compared with the one that is shown.
+        second: bool,
+    },
     /// Draw every object and part alone, small.
     Portraits {
         /// The Gaussians.
@@ -193,6 +219,8 @@ impl Command {
             Self::InstallModel { .. } => JobKind::Model,
             Self::Visit(_) => JobKind::Visit,
             Self::Film(_) => JobKind::Film,
+            Self::Measure(_) => JobKind::Measure,
+            Self::ReadReport { .. } => JobKind::Report,
         }
     }
 
@@ -213,6 +241,8 @@ impl Command {
             Self::InstallModel { id, .. } => format!("Fetching the model {id}"),
             Self::Visit(request) => format!("Finding the way to {}", request.map.identities.full_name(request.id)),
             Self::Film(request) => format!("Drawing {}", name(&request.out)),
+            Self::Measure(_) => "Measuring how this scene is drawn".into(),
+            Self::ReadReport { path, .. } => format!("Opening the report {}", name(path)),
         }
     }
 }
@@ -263,6 +293,10 @@ pub struct OpenedScene {
     pub render: RenderSettings,
     /// What is left out for it, and why.
     pub plan: ScenePlan,
+    /// Reports that may be of it.
+    pub reports: Vec<PathBuf>,
+    /// Folder for a report of it.
+    pub report_out: PathBuf,
 }
 
 /// What a finished job brings.
@@ -287,6 +321,15 @@ pub enum Outcome {
     Edited(Arc<SemanticMap>),
     /// A file was written.
     Written(PathBuf),
+    /// A report was read or measured.
+    Report {
+        /// Where it lies.
+        path: PathBuf,
+        /// What it holds.
+        report: Arc<Report>,
+        /// Whether it is to be compared with the one that is shown.
+        second: bool,
+    },
     /// Portraits of objects and parts by number less one, as `semantics::portraits` draws them.
     Portraits(Arc<SemanticMap>, Gallery),
     /// A model can be used now.

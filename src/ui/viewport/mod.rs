@@ -1,7 +1,9 @@
 //! The viewport: shows what the drawing lane rendered, and moves the eye.
 
 pub mod brush;
+pub mod drawing;
 pub mod eye;
+pub mod frame_times;
 mod frusta;
 mod input;
 mod overlay;
@@ -11,12 +13,15 @@ mod route;
 pub mod visible;
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use egui::{Color32, ColorImage, Rect, Sense, TextureHandle, TextureOptions, Ui};
 use glam::{DVec2, DVec3};
 
 use self::brush::Brush;
+use self::drawing::Drawing;
 use self::eye::Eye;
+use self::frame_times::FrameTimes;
 use self::photo::PhotoView;
 use self::query::Questions;
 use self::visible::Visibility;
@@ -25,7 +30,7 @@ use super::layout::Layout;
 use super::state::AppState;
 use super::theme;
 use crate::navigate::Pose;
-use crate::render::RenderSettings;
+use crate::render::{Backend, RenderSettings};
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
 use crate::worker::view::{Effort, ViewLane, ViewPicture, ViewRequest};
 use crate::worker::{Action, CloudSnapshot, OpenedScene, Repaint, ViewMode, Worker};
@@ -68,6 +73,10 @@ pub struct Viewport {
     pub visibility: Visibility,
     /// What is being marked by hand.
     pub brush: Option<Brush>,
+    /// What is drawn in another way than the scene says.
+    pub drawing: Drawing,
+    /// Times of the newest pictures, while they are shown.
+    times: Option<FrameTimes>,
     /// Generation of the newest map of identities.
     mapped: u64,
     /// World point that the wheel zooms to, while the cursor stays.
@@ -87,6 +96,9 @@ struct Asked {
     semantics: usize,
     /// With blended codes.
     codes: bool,
+    drawing: Drawing,
+    /// With the times of its stages.
+    timed: bool,
 }
 
 impl Viewport {
@@ -113,6 +125,8 @@ impl Viewport {
             questions: Questions::default(),
             visibility: Visibility::default(),
             brush: None,
+            drawing: Drawing::default(),
+            times: None,
             mapped: 0,
             zoom_anchor: None,
         })
@@ -152,6 +166,7 @@ impl Viewport {
             self.questions.clear();
             self.visibility = Visibility::default();
             self.brush = None;
+            self.drawing = Drawing::default();
             self.eye = home_eye(scene, None);
         }
         if let Some((generation, snapshot)) = worker.clouds().newer_than(self.snapshot) {
@@ -230,6 +245,11 @@ impl Viewport {
         Pose { center, world_from_camera, fov_y_rad }
     }
 
+    /// The camera of the newest picture, or one of the eye.
+    pub fn camera(&self) -> Camera {
+        self.picture.as_ref().map_or_else(|| self.eye.camera(640, 480), |p| p.camera.clone())
+    }
+
     /// Width by height of the picture.
     pub fn aspect(&self) -> f64 {
         self.picture.as_ref().map_or(16.0 / 9.0, |p| f64::from(p.camera.width_px) / f64::from(p.camera.height_px))
@@ -287,6 +307,10 @@ impl Viewport {
         let rect = ui.available_rect_before_wrap();
         let response = ui.allocate_rect(rect, Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Viewport"));
+        match layout.times {
+            true => drop(self.times.get_or_insert_default()),
+            false => self.times = None,
+        }
         self.take_picture(ui);
         let now = ui.input(|i| i.time);
         self.use_brush(&response, rect, state);
@@ -353,6 +377,9 @@ impl Viewport {
     fn take_picture(&mut self, ui: &Ui) {
         if let Some((generation, mapped)) = self.lane.maps().newer_than(self.mapped) {
             self.mapped = generation;
+            if let Some(times) = &mut self.times {
+                times.add_maps(mapped.secs);
+            }
             // One of an earlier request is of another view.
             if mapped.ticket == self.tickets {
                 self.questions.set_maps(Some(Arc::clone(&mapped.maps)));
@@ -362,12 +389,16 @@ impl Viewport {
         self.shown = generation;
         match &*result {
             Ok(picture) => {
+                let start = Instant::now();
                 let size = [picture.camera.width_px as usize, picture.camera.height_px as usize];
                 let pixels = picture.rgb.iter().map(|&[r, g, b]| Color32::from_rgb(r, g, b)).collect();
                 let image = ColorImage::new(size, pixels);
                 match &mut self.texture {
                     Some(texture) => texture.set(image, TextureOptions::LINEAR),
                     None => self.texture = Some(ui.ctx().load_texture("viewport", image, TextureOptions::LINEAR)),
+                }
+                if let Some(times) = &mut self.times {
+                    times.add(picture, start.elapsed().as_secs_f64());
                 }
                 self.picture = Some(picture.clone());
                 self.error = None;
@@ -411,6 +442,8 @@ impl Viewport {
             with_photo: photo.is_some(),
             semantics: semantics.as_ref().map_or(0, |s| Arc::as_ptr(s) as usize),
             codes: semantics.is_some() && self.questions.wants_codes(),
+            drawing: self.drawing.clone(),
+            timed: layout.times,
         };
         if self.requested.as_ref() == Some(&asked) {
             return;
@@ -420,15 +453,12 @@ impl Viewport {
             cloud,
             camera: asked.camera.clone(),
             mode: asked.mode,
-            settings: RenderSettings {
-                sh_degree: if state.is_training() { 3 } else { state.plan.sh_degree },
-                antialias: state.antialias,
-                ..scene.render.clone()
-            },
+            settings: self.drawing.over(self.own_settings(state, scene), self.on_gpu()),
             effort,
             photo,
             semantics,
             codes: asked.codes,
+            timed: asked.timed,
             ticket: self.tickets,
         });
         // A change of resolution alone does not move what the pixels belong to.
@@ -438,6 +468,20 @@ impl Viewport {
             self.questions.set_maps(None);
         }
         self.requested = Some(asked);
+    }
+
+    /// How the scene itself says that it is drawn.
+    pub fn own_settings(&self, state: &AppState, scene: &OpenedScene) -> RenderSettings {
+        RenderSettings {
+            sh_degree: if state.is_training() { 3 } else { state.plan.sh_degree },
+            antialias: state.antialias,
+            ..scene.render.clone()
+        }
+    }
+
+    /// Whether a GPU draws the view.
+    pub fn on_gpu(&self) -> bool {
+        self.picture.as_ref().is_some_and(|p| p.drawn_by != Backend::CPU)
     }
 
     /// The world point under a window position: at the drawn depth, else at the pivot's.
