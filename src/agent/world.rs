@@ -4,9 +4,9 @@
 use super::relation::View;
 use super::wish::{Direction, Distance, GoWish, TurnWay};
 use crate::pipeline::semantics::answer::{Answered, by_name};
-use crate::pipeline::semantics::stages::StagesMs;
 use crate::pipeline::semantics::grammar::{Kind, Phrase};
 use crate::pipeline::semantics::localise::Answer;
+use crate::pipeline::semantics::stages::StagesMs;
 use crate::scene::{Bounds, Identities, IdentityId, Level};
 
 /// What is known of one identity.

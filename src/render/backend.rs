@@ -102,7 +102,12 @@ impl Backend {
     /// This GPU, whether real or emulated.
     pub fn on_gpu(context: &gpu::Context) -> Result<Self, GpuError> {
         let renderer = gpu::Renderer::new(context)?;
-        Ok(Self::Gpu(Box::new(Gpu { renderer, name: context.info().name.clone(), uploaded: Weak::new(), timed: false })))
+        Ok(Self::Gpu(Box::new(Gpu {
+            renderer,
+            name: context.info().name.clone(),
+            uploaded: Weak::new(),
+            timed: false,
+        })))
     }
 
     /// Its name, for people.

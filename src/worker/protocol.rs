@@ -68,13 +68,9 @@ impl JobKind {
             | Self::Model
             | Self::Film
             | Self::Measure => Lane::Long,
-            Self::Edit
-            | Self::Export
-            | Self::Photo
-            | Self::Picture
-            | Self::Portraits
-            | Self::Visit
-            | Self::Report => Lane::Short,
+            Self::Edit | Self::Export | Self::Photo | Self::Picture | Self::Portraits | Self::Visit | Self::Report => {
+                Lane::Short
+            }
         }
     }
 }

@@ -76,10 +76,7 @@ mod tests {
 
     #[test]
     fn impossible_settings_are_refused() {
-        let with = |alpha| Drawing {
-            cutoffs: Some(Cutoffs { alpha, transmittance: 1e-4 }),
-            ..Drawing::default()
-        };
+        let with = |alpha| Drawing { cutoffs: Some(Cutoffs { alpha, transmittance: 1e-4 }), ..Drawing::default() };
         assert!(with(0.01).problem().is_none() && Drawing::default().problem().is_none());
         assert!([0.0, -1.0, 1.0, f64::NAN].into_iter().all(|alpha| with(alpha).problem().is_some()));
         assert!(Drawing { sh_degree: Some(9), ..Drawing::default() }.problem().is_some());

@@ -167,7 +167,12 @@ mod tests {
         let blended = CodeMap::default();
         let compare_with = |relevancy: Vec<f32>| {
             let mut ask = |_: &str| {
-                Some(Answered { answer: Answer::NotFound(vec![]), basis: Basis::Meaning, relevancy: relevancy.clone(), stages: StagesMs::default() })
+                Some(Answered {
+                    answer: Answer::NotFound(vec![]),
+                    basis: Basis::Meaning,
+                    relevancy: relevancy.clone(),
+                    stages: StagesMs::default(),
+                })
             };
             let boxes = truth.bounds().into_iter().collect();
             let categories = vec![Category { name: "eye".into(), level: Level::Object, mask: truth.clone(), boxes }];

@@ -131,8 +131,11 @@ fn changes<T: Serialize>(before: &T, after: &T, knobs: &Knobs) -> Vec<Change> {
     let (before, after) = (fields(before), fields(after));
     let differs = |name: &&String| before.get(*name) != after.get(*name);
     let text = |value: Option<&Value>| value.map_or_else(String::new, words);
-    let change =
-        |name: &String| Change { name: name.replace('_', " "), from: text(before.get(name)), to: text(after.get(name)) };
+    let change = |name: &String| Change {
+        name: name.replace('_', " "),
+        from: text(before.get(name)),
+        to: text(after.get(name)),
+    };
     knobs.keys().filter(differs).map(change).collect()
 }
 

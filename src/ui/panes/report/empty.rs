@@ -19,7 +19,10 @@ pub fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
         if let Some(p) = &job.progress {
             let share = p.done as f32 / p.total.max(1) as f32;
             ui.add(egui::ProgressBar::new(share).desired_width(320.0).desired_height(6.0).fill(theme::ACCENT));
-            ui.weak(format!("{} of {} measurements. Leave the view alone: drawing it takes from what is measured.", p.done, p.total));
+            ui.weak(format!(
+                "{} of {} measurements. Leave the view alone: drawing it takes from what is measured.",
+                p.done, p.total
+            ));
         } else {
             ui.weak("Drawing the exact pictures that all others are held against.");
         }

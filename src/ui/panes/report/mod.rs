@@ -26,8 +26,8 @@ pub struct ReportPane {
     measure: Option<String>,
     /// Knob and setting of the chosen point.
     selected: Option<[String; 2]>,
-    /// Set while the chosen point is to be scrolled to in the table.
-    scroll: bool,
+    /// Set once a point was chosen: what can be done with it stands on top.
+    to_top: bool,
 }
 
 impl ReportPane {
@@ -60,45 +60,43 @@ impl ReportPane {
         let other = second_report.and_then(|r| r.stage(stage.name));
         let selected = self.selected_of(stage);
         let own = state.scene.as_ref().map(|s| viewport.own_settings(state, s));
-        let (width, height) = (ui.available_width(), ui.available_height());
+        let now =
+            Now { config: &layout.config, own: own.as_ref(), drawing: &viewport.drawing, on_gpu: viewport.on_gpu() };
+        let size = ui.available_size();
+        // A column of its own where there is room, else on top of the tables.
+        let wide = size.x > 1_100.0;
+        let widths = if wide { [0.46, 0.23, 0.31] } else { [0.54, 0.0, 0.46] }.map(|share: f32| share * size.x - 8.0);
         let mut clicked = None;
         ui.horizontal_top(|ui| {
-            let plot_width = if width < 800.0 { 0.5 * width } else { 0.56 * width };
-            ui.allocate_ui(egui::vec2(plot_width, height), |ui| {
+            ui.allocate_ui(egui::vec2(widths[0], size.y), |ui| {
                 let scatter = Scatter { stage, second: other, measure, selected };
-                clicked = scatter.show(ui, height.max(120.0));
+                clicked = scatter.show(ui, size.y.max(120.0));
             });
-            ui.vertical(|ui| {
-                ScrollArea::vertical().auto_shrink([false, false]).id_salt("beside the plot").show(ui, |ui| {
-                    let now = Now {
-                        config: &layout.config,
-                        own: own.as_ref(),
-                        drawing: &viewport.drawing,
-                        on_gpu: viewport.on_gpu(),
-                    };
+            if wide {
+                column(ui, "chosen", widths[1], false, |ui| chosen(ui, stage, selected, &now, actions));
+            }
+            column(ui, "tables", widths[2], self.to_top && !wide, |ui| {
+                if !wide {
                     chosen(ui, stage, selected, &now, actions);
-                    if let Some(other) = other {
-                        section(ui, "Both reports", true, |ui| {
-                            tables::comparison(ui, &stage.beside(other, measure), measure);
-                        });
-                    }
-                    let title = format!("Measurements ({})", stage.points.len());
-                    let in_table = section(ui, &title, true, |ui| {
-                        tables::points(ui, stage, measure, selected, self.scroll)
+                }
+                if let Some(other) = other {
+                    section(ui, "Both reports", true, |ui| {
+                        tables::comparison(ui, &stage.beside(other, measure), measure);
                     });
-                    clicked = clicked.or(in_table.flatten());
-                    section(ui, "Defaults by the rule", true, |ui| tables::choices(ui, stage));
-                    if !stage.orders.is_empty() {
-                        section(ui, "Orders of convergence", true, |ui| tables::orders(ui, stage));
-                    }
-                    section(ui, "About this report", false, |ui| tables::about(ui, report, stage));
-                });
+                }
+                let title = format!("Measurements ({})", stage.points.len());
+                let in_table = section(ui, &title, true, |ui| tables::points(ui, stage, measure, selected));
+                clicked = clicked.or(in_table.flatten());
+                section(ui, "Defaults by the rule", true, |ui| tables::choices(ui, stage));
+                if !stage.orders.is_empty() {
+                    section(ui, "Orders of convergence", true, |ui| tables::orders(ui, stage));
+                }
+                section(ui, "About this report", false, |ui| tables::about(ui, report, stage));
             });
         });
-        self.scroll = false;
+        self.to_top = clicked.is_some();
         if let Some(point) = clicked {
-            self.scroll = true;
-            self.selected = Some([point.method.clone(), point.setting.clone()]);
+            self.select(&point.method, &point.setting);
         }
     }
 
@@ -195,6 +193,14 @@ fn button(ui: &mut Ui, text: &str, action: &Action, enabled: bool, actions: &mut
     }
 }
 
+fn column(ui: &mut Ui, name: &str, width: f32, to_top: bool, add: impl FnOnce(&mut Ui)) {
+    ui.allocate_ui(egui::vec2(width, ui.available_height()), |ui| {
+        let area = ScrollArea::both().auto_shrink([false, false]).id_salt(name);
+        let area = if to_top { area.vertical_scroll_offset(0.0) } else { area };
+        area.show(ui, |ui| ui.vertical(add));
+    });
+}
+
 fn section<R>(ui: &mut Ui, title: &str, open: bool, add: impl FnOnce(&mut Ui) -> R) -> Option<R> {
     let id = title.split(" (").next().unwrap_or(title);
     let header = CollapsingHeader::new(RichText::new(title).small().strong()).id_salt(id).default_open(open);
@@ -255,4 +261,70 @@ fn chosen(ui: &mut Ui, stage: &Stage, selected: Option<&Point>, now: &Now<'_>, a
             }
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::{Computer, Rule, Sample, VERSION};
+    use std::collections::BTreeMap;
+    use std::sync::Arc;
+
+    fn report() -> Report {
+        let sample = |v: f64| {
+            let mut s = Sample::default();
+            s.add(v);
+            s
+        };
+        let point = |method: &str, setting: &str, secs: f64| Point {
+            method: method.into(),
+            setting: setting.into(),
+            default: method == "default",
+            secs: sample(secs),
+            values: BTreeMap::from([("PSNR".to_owned(), sample(20.0 + secs))]),
+            curve: vec![[0.5 * secs, 15.0], [secs, 20.0 + secs]],
+            ..Point::default()
+        };
+        let stage = Stage {
+            name: StageName::Train,
+            secs_of: "training".into(),
+            reference: String::new(),
+            input: BTreeMap::new(),
+            seeds: vec![0],
+            planned: 3,
+            measures: vec![Measure::new("PSNR", "dB", crate::report::Form::Decibels, "")],
+            rule: Rule { measure: "PSNR".into(), times: 1.0, floor: 0.0 },
+            points: vec![point("default", "all", 2.0), point("steps", "500", 1.0), point("steps", "50", 0.1)],
+            orders: Vec::new(),
+        };
+        let computer = Computer::default();
+        Report { version: VERSION, program: String::new(), scene: String::new(), computer, stages: vec![stage] }
+    }
+
+    #[test]
+    fn curves_of_the_default_and_of_the_chosen_setting_go_beside_a_training() {
+        let mut pane = ReportPane::default();
+        let mut state = AppState::default();
+        assert!(pane.curves(&state).is_empty());
+        state.report = Some(ShownReport { path: "report".into(), report: Arc::new(report()) });
+        let names = |pane: &ReportPane| pane.curves(&state).into_iter().map(|c| c.0).collect::<Vec<_>>();
+        assert_eq!(names(&pane), ["report, default: all"]);
+        pane.select("steps", "500");
+        assert_eq!(names(&pane), ["report, default: all", "report, steps: 500"]);
+        assert_eq!(pane.curves(&state)[1].1, [[0.5, 15.0], [1.0, 21.0]]);
+        let mut other = report();
+        other.stages[0].measures[0].name = "SSIM".into();
+        state.report = Some(ShownReport { path: "report".into(), report: Arc::new(other) });
+        assert!(pane.curves(&state).is_empty(), "curves are of the first measure");
+    }
+
+    #[test]
+    fn what_is_gone_from_a_report_is_looked_at_no_more() {
+        let report = report();
+        let mut pane = ReportPane { stage: Some(StageName::Path), measure: Some("x".into()), ..ReportPane::default() };
+        pane.select("steps", "none");
+        let stage = pane.stage_of(&report).expect("the first");
+        assert_eq!((stage.name, pane.measure_of(stage).map(|m| m.name.as_str())), (StageName::Train, Some("PSNR")));
+        assert!(pane.selected_of(stage).is_none());
+    }
 }

@@ -98,8 +98,7 @@ impl<'a> Scatter<'a> {
 
     fn front(&self) -> Item {
         let points = self.stage.front(self.measure).into_iter();
-        let places: Vec<[f64; 2]> =
-            points.filter_map(|i| scale::place(&self.stage.points[i], self.measure)).collect();
+        let places: Vec<[f64; 2]> = points.filter_map(|i| scale::place(&self.stage.points[i], self.measure)).collect();
         let style = Stroke::new(8.0, theme::TEXT.gamma_multiply(0.16));
         Item::Line(Line::new("Pareto front", PlotPoints::from(places)).stroke(style).allow_hover(false))
     }
@@ -164,16 +163,22 @@ pub fn facts(ui: &mut Ui, point: &Point, measures: &[Measure], whose: &str) {
     let repeats = point.secs.each.len();
     let default = if point.default { "program's default, " } else { "" };
     let whose = if whose.is_empty() { String::new() } else { format!(", {whose}") };
-    ui.weak(format!("{default}measured {}{whose}", if repeats == 1 { "once".into() } else { format!("{repeats} times") }));
-    egui::Grid::new(("facts", &point.method, &point.setting, whose)).num_columns(2).spacing([14.0, 2.0]).show(ui, |ui| {
-        ui.label("time");
-        ui.label(table::spread(&point.secs, table::seconds));
-        ui.end_row();
-        for measure in measures {
-            let Some(value) = point.values.get(&measure.name) else { continue };
-            ui.label(table::title(measure)).on_hover_text(&measure.meaning);
-            ui.label(table::spread(value, table::number));
+    ui.weak(format!(
+        "{default}measured {}{whose}",
+        if repeats == 1 { "once".into() } else { format!("{repeats} times") }
+    ));
+    egui::Grid::new(("facts", &point.method, &point.setting, whose)).num_columns(2).spacing([14.0, 2.0]).show(
+        ui,
+        |ui| {
+            ui.label("time");
+            ui.label(table::spread(&point.secs, table::seconds));
             ui.end_row();
-        }
-    });
+            for measure in measures {
+                let Some(value) = point.values.get(&measure.name) else { continue };
+                ui.label(table::title(measure)).on_hover_text(&measure.meaning);
+                ui.label(table::spread(value, table::number));
+                ui.end_row();
+            }
+        },
+    );
 }

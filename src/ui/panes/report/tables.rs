@@ -7,13 +7,7 @@ use super::scatter;
 use crate::report::{Comparison, Measure, Point, Report, Stage, table};
 
 /// The measured settings; returns the one that was clicked.
-pub fn points<'a>(
-    ui: &mut Ui,
-    stage: &'a Stage,
-    measure: &Measure,
-    selected: Option<&Point>,
-    scroll: bool,
-) -> Option<&'a Point> {
+pub fn points<'a>(ui: &mut Ui, stage: &'a Stage, measure: &Measure, selected: Option<&Point>) -> Option<&'a Point> {
     let methods = stage.methods();
     let front = stage.front(measure);
     let mut clicked = None;
@@ -23,9 +17,6 @@ pub fn points<'a>(
             let k = methods.iter().position(|m| *m == p.method).unwrap_or(0);
             let is_selected = selected.is_some_and(|s| std::ptr::eq(s, p));
             let row = ui.selectable_label(is_selected, RichText::new(title(p)).color(scatter::color(k)));
-            if is_selected && scroll {
-                row.scroll_to_me(None);
-            }
             if row.clicked() {
                 clicked = Some(p);
             }
