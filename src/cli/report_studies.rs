@@ -4,18 +4,24 @@ use std::path::{Path, PathBuf};
 
 use super::CliError;
 use super::opened::{self, DrawableScene};
-use crate::io::labels::Labels;
+use crate::io::{self, labels::Labels};
+use crate::models;
+use crate::pipeline::depth;
 use crate::pipeline::observer::Silent;
+use crate::pipeline::semantics::protocols::categories;
 use crate::pipeline::semantics::segmenter::{FileMasks, FoundMask, Segmenter};
 use crate::pipeline::semantics::tracker::labels_of;
 use crate::pipeline::semantics::train_codes::CodeView;
-use crate::pipeline::train::TrainConfig;
+use crate::pipeline::train::{TrainConfig, load_views};
 use crate::report::studies::Input;
+use crate::report::studies::depth::DepthStudy;
 use crate::report::studies::features::FeatureStudy;
+use crate::report::studies::path::PathStudy;
+use crate::report::studies::query::{Asked, QueryStudy};
 use crate::report::studies::render::RenderStudy;
 use crate::report::studies::train::TrainStudy;
 use crate::report::{End, StageName, Study};
-use crate::scene::{Camera, Dataset, Identities, IdentityId, NOBODY, Photo};
+use crate::scene::{Camera, Dataset, Identities, IdentityId, NOBODY, Photo, PhotoPixels, SemanticMap};
 
 /// What is asked for.
 pub struct Options {
@@ -38,6 +44,8 @@ pub struct Subject {
     scene: DrawableScene,
     path: PathBuf,
     dataset: Option<Dataset>,
+    /// Objects and parts, if an encoder has looked at them.
+    language: Option<SemanticMap>,
     options: Options,
 }
 
@@ -48,7 +56,9 @@ impl Subject {
     pub fn open(path: &Path, options: Options) -> Result<Self, CliError> {
         let scene = opened::drawable(path)?;
         let dataset = scene.dataset_path.as_ref().filter(|p| p.exists()).map(|p| opened::dataset(p)).transpose()?;
-        Ok(Self { scene, path: path.to_owned(), dataset, options })
+        let map = if path.is_dir() { io::semantic_map::load(path, &scene.cloud)? } else { None };
+        let language = map.filter(|m| m.language.is_some());
+        Ok(Self { scene, language, path: path.to_owned(), dataset, options })
     }
 
     /// The stages that are wanted, and for each that is not possible why.
@@ -85,7 +95,16 @@ impl Subject {
             StageName::Render => self.scene.cameras.is_empty().then_some("cameras"),
             StageName::Train => photos,
             StageName::Features => photos.or(labels),
-            _ => Some("a later version"),
+            StageName::Query => {
+                photos.or(labels).or(self.language.is_none().then_some(
+                    "objects that an encoder has looked at: run 'fmlgs preprocess' on it with --encoder demo",
+                ))
+            }
+            StageName::Path => self.scene.cameras.is_empty().then_some("cameras"),
+            StageName::Depth => match &self.dataset {
+                Some(d) => (!d.root.join(depth::FOLDER).is_dir()).then_some("true depths, which synthetic photos have"),
+                None => photos,
+            },
         }
     }
 
@@ -95,7 +114,13 @@ impl Subject {
             StageName::Render => sweep(&mut self.drawing()?),
             StageName::Train => self.training(sweep),
             StageName::Features => self.features(sweep),
-            _ => Err(CliError::failed("not possible")),
+            StageName::Query => self.asking(sweep),
+            StageName::Path => {
+                let cameras: Vec<Camera> = self.scene.cameras.iter().map(|c| c.camera.clone()).collect();
+                let input = self.input(&[("cameras", cameras.len().to_string())]);
+                sweep(&mut PathStudy::new(&self.scene.cloud, &cameras, self.options.repeats, input))
+            }
+            StageName::Depth => self.depth(sweep),
         }
     }
 
@@ -119,10 +144,22 @@ impl Subject {
     }
 
     fn drawing(&self) -> Result<RenderStudy, CliError> {
-        let cameras = self.cameras();
-        let input = self.input(&[("views", cameras.len().to_string())]);
+        let views: Vec<(Camera, Option<PhotoPixels>)> = match &self.dataset {
+            Some(dataset) => {
+                let config = TrainConfig { max_side_px: self.options.max_side_px, ..self.scene.config.clone() };
+                let held = spread(&dataset.split(config.holdout_every).1, self.options.views);
+                let views = load_views(dataset, &held, &config, "Loading photos", &mut Silent)?.unwrap_or_default();
+                views.into_iter().map(|v| (v.camera, Some(v.pixels))).collect()
+            }
+            None => Vec::new(),
+        };
+        let views = match views.is_empty() {
+            true => self.cameras().into_iter().map(|c| (c, None)).collect(),
+            false => views,
+        };
+        let input = self.input(&[("views", views.len().to_string())]);
         let (cloud, settings) = (self.scene.cloud.clone(), &self.scene.settings);
-        Ok(RenderStudy::new(cloud, settings, &cameras, self.options.repeats, input)?)
+        Ok(RenderStudy::new(cloud, settings, views, self.options.repeats, input)?)
     }
 
     fn training(&self, sweep: Sweep<'_>) -> Result<End, CliError> {
@@ -136,6 +173,44 @@ impl Subject {
         let held = dataset.split(base.holdout_every).1.len();
         let input = self.input(&[("photos", format!("{} + {held} held out", dataset.photos.len() - held))]);
         sweep(&mut TrainStudy::new(dataset, base, self.options.repeats, input)?)
+    }
+
+    fn asking(&self, sweep: Sweep<'_>) -> Result<End, CliError> {
+        let (Some(dataset), Some(masks), Some(map)) = (&self.dataset, &self.options.masks, &self.language) else {
+            return Err(CliError::failed("photos, labels and objects are needed"));
+        };
+        let encoder = models::encoder(&map.language.as_ref().map(|l| l.encoder.clone()).unwrap_or_default())?;
+        let mut labels = FileMasks(Labels::open(masks)?);
+        let mut views = Vec::new();
+        for i in spread(&dataset.split(self.scene.config.holdout_every).1, self.options.views) {
+            let photo = &dataset.photos[i];
+            if labels.covers(photo) {
+                let categories = categories(&labels.segment(photo, self.options.max_side_px, &mut Silent)?);
+                let camera = photo.camera.limited_to(self.options.max_side_px);
+                views.push(Asked { name: photo.name.clone(), camera, categories });
+            }
+        }
+        if views.is_empty() {
+            let path = masks.display();
+            return Err(CliError::failed(format!("{path}: labels of held-out photos are needed")));
+        }
+        let drawn = (&self.scene.cloud, &self.scene.settings);
+        let study = QueryStudy::new(drawn, map, encoder, views, self.options.repeats, self.input(&[]));
+        sweep(&mut study.map_err(|e| CliError::failed(e.to_string()))?)
+    }
+
+    fn depth(&self, sweep: Sweep<'_>) -> Result<End, CliError> {
+        let Some(dataset) = &self.dataset else { return Err(CliError::failed("photos are needed")) };
+        let held = dataset.split(self.scene.config.holdout_every).1;
+        let mut views = Vec::new();
+        for i in spread(&held, self.options.views) {
+            let photo = &dataset.photos[i];
+            let camera = photo.camera.limited_to(self.options.max_side_px);
+            views.push((camera, depth::of_photo(&dataset.root, photo)?));
+        }
+        let input = self.input(&[("views", views.len().to_string())]);
+        let (cloud, settings) = (&self.scene.cloud, &self.scene.settings);
+        sweep(&mut DepthStudy::new(cloud, settings, views, self.options.repeats, input))
     }
 
     fn features(&self, sweep: Sweep<'_>) -> Result<End, CliError> {

@@ -6,7 +6,7 @@ use glam::DVec3;
 use super::matter::Matter;
 
 /// Pieces that a rounded corner is measured in.
-const PIECES: usize = 24;
+pub const PIECES: usize = 24;
 /// Halvings of a corner's rounding before the corner is kept sharp.
 const HALVINGS: u32 = 8;
 
@@ -70,15 +70,16 @@ impl Curve {
             let reach = 0.5 * corner.distance(before).min(corner.distance(next));
             let directions = ((before - corner).try_normalize(), (next - corner).try_normalize());
             let (Some(back), Some(on)) = directions else { continue };
+            let sides = [back, on];
             let mut rounding = reach;
-            let mut bend = bend(corner, back, on, rounding);
+            let mut bend = bend(corner, sides, rounding, PIECES);
             for _ in 0..HALVINGS {
                 let free = |m: &Matter| bend.windows(2).all(|w| m.is_free(w[0], w[1], clearance));
                 if matter.is_none_or(free) {
                     break;
                 }
                 rounding *= 0.5;
-                bend = self::bend(corner, back, on, rounding);
+                bend = self::bend(corner, sides, rounding, PIECES);
             }
             curve.sharp += usize::from(rounding < 0.01 * reach);
             bend.into_iter().for_each(|p| curve.push(p));
@@ -116,13 +117,14 @@ impl Curve {
 }
 
 /// A corner cut off by a parabola that touches both legs `rounding` before and after it.
-fn bend(corner: DVec3, back: DVec3, on: DVec3, rounding: f64) -> Vec<DVec3> {
+/// `back` and `on` are unit vectors along them. In `pieces` straight pieces.
+pub fn bend(corner: DVec3, [back, on]: [DVec3; 2], rounding: f64, pieces: usize) -> Vec<DVec3> {
     let (a, b) = (corner + back * rounding, corner + on * rounding);
     let at = |i: usize| {
-        let u = i as f64 / PIECES as f64;
+        let u = i as f64 / pieces as f64;
         a.lerp(corner, u).lerp(corner.lerp(b, u), u)
     };
-    (0..=PIECES).map(at).collect()
+    (0..=pieces).map(at).collect()
 }
 
 #[cfg(test)]

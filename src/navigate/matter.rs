@@ -38,6 +38,9 @@ pub struct Matter {
     depth: Vec<f32>,
     /// Distance from each voxel's centre to the nearest matter, scene units, less half a voxel.
     distance: Vec<f32>,
+    /// Looks at so many places along every way, instead of at as many as the distances demand: to
+    /// measure what that would cost.
+    pub samples: Option<u32>,
 }
 
 impl Matter {
@@ -53,8 +56,14 @@ impl Matter {
         let (min, max) = (around.min - margin, around.max + margin);
         let voxel = (max - min).max_element() / VOXELS as f64;
         let size = ((max - min) / voxel).to_array().map(|n| (n.ceil() as usize).clamp(1, VOXELS));
-        let mut matter =
-            Self { corner: min, voxel, size, depth: vec![0.0; size.iter().product()], distance: Vec::new() };
+        let mut matter = Self {
+            corner: min,
+            voxel,
+            size,
+            depth: vec![0.0; size.iter().product()],
+            distance: Vec::new(),
+            samples: None,
+        };
         matter.spread(cloud);
         matter.clear(eyes, free.max(voxel));
         matter.measure();
@@ -199,6 +208,11 @@ impl Matter {
         let length = a.distance(b);
         if !(length > 0.0) {
             return if self.clearance(a) >= clearance { 1.0 } else { 0.0 };
+        }
+        if let Some(samples) = self.samples {
+            let share = |i: u32| f64::from(i) / f64::from(samples.max(1));
+            let blocked = |i: &u32| self.clearance(a.lerp(b, share(*i))) < clearance;
+            return (0..=samples.max(1)).find(blocked).map_or(1.0, |i| share(i.saturating_sub(1)));
         }
         let shortest = 0.25 * self.voxel;
         let mut gone = 0.0;

@@ -18,7 +18,7 @@ pub mod pose;
 pub mod survey;
 pub mod target;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 pub mod visit;
 
 pub use film::Film;

@@ -9,7 +9,7 @@ use crate::math::stats::{mean, quantile};
 use crate::pipeline::metrics::psnr_of;
 use crate::render::cpu::Renderer;
 use crate::render::{Features, Frame, RenderError, RenderSettings};
-use crate::scene::{Camera, GaussianCloud};
+use crate::scene::{Camera, GaussianCloud, PhotoPixels};
 
 /// PSNR of pictures that are (nearly) the same, dB.
 const MOST_PSNR: f64 = 150.0;
@@ -43,19 +43,19 @@ pub fn averaged(p: &Planes, factor: usize) -> Planes {
     Planes { width, height, color }
 }
 
-/// A picture enlarged linearly, as a graphics adapter shows a smaller one.
-pub fn enlarged(p: &Planes, width: usize, height: usize) -> Planes {
-    let source = |i: usize, to: usize, from: usize| {
-        let at = ((i as f64 + 0.5) * from as f64 / to as f64 - 0.5).clamp(0.0, (from - 1) as f64);
+/// A picture of pixels `factor` times as large enlarged linearly, as a graphics adapter does it.
+pub fn enlarged(p: &Planes, factor: usize, width: usize, height: usize) -> Planes {
+    let source = |i: usize, from: usize| {
+        let at = ((i as f64 + 0.5) / factor as f64 - 0.5).clamp(0.0, from.saturating_sub(1) as f64);
         let low = at.floor() as usize;
         (low, (low + 1).min(from - 1), at - low as f64)
     };
-    let columns: Vec<_> = (0..width).map(|x| source(x, width, p.width)).collect();
+    let columns: Vec<_> = (0..width).map(|x| source(x, p.width)).collect();
     let color = std::array::from_fn(|c| {
         let plane = &p.color[c];
         let mut out = Vec::with_capacity(width * height);
         for y in 0..height {
-            let (top, bottom, v) = source(y, height, p.height);
+            let (top, bottom, v) = source(y, p.height);
             let (top, bottom) = (&plane[top * p.width..], &plane[bottom * p.width..]);
             out.extend(columns.iter().map(|&(l, r, u)| {
                 let across = |row: &[f64]| row[l] + (row[r] - row[l]) * u;
@@ -121,6 +121,16 @@ impl Errors {
             ("FLIP 99 %", self.flip_tail),
         ]
     }
+}
+
+/// PSNR in dB of a picture in a photo of its size; what the photo does not cover does not count.
+pub fn psnr_in_photo(p: &Planes, photo: &PhotoPixels) -> f64 {
+    let covered = |i: &usize| photo.coverage.as_ref().is_none_or(|c| c[*i] > 0);
+    let squared = (0..photo.len())
+        .filter(covered)
+        .flat_map(|i| (0..3).map(move |c| (p.color[c][i] - f64::from(photo.rgb[i][c]) / 255.0).powi(2)));
+    let all: Vec<f64> = squared.collect();
+    psnr_of(mean(&all)).min(MOST_PSNR)
 }
 
 /// Mean and 99th percentile of FLIP.
@@ -207,7 +217,7 @@ mod tests {
         let small = averaged(&ramp, 4);
         assert_eq!((small.width, small.height), (4, 2));
         assert!((small.color[0][0] - 1.5 / 16.0).abs() < 1e-12);
-        let large = enlarged(&small, 16, 8);
+        let large = enlarged(&small, 4, 16, 8);
         // Between the outermost samples a ramp stays the ramp.
         assert!((2..14).all(|x| (large.color[1][x] - ramp.color[1][x]).abs() < 1e-12));
         assert_eq!(large.color[0].len(), 16 * 8);

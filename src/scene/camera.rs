@@ -125,6 +125,19 @@ impl Camera {
         }
     }
 
+    /// The camera of the picture whose `factor` x `factor` pixels are one; rows and columns that do not
+    /// fill one are cut off.
+    pub fn reduced(&self, factor: u32) -> Self {
+        let factor = factor.max(1);
+        Self {
+            width_px: self.width_px / factor,
+            height_px: self.height_px / factor,
+            focal_px: self.focal_px / f64::from(factor),
+            principal_px: self.principal_px / f64::from(factor),
+            ..self.clone()
+        }
+    }
+
     /// The same camera at most `max_side_px` along its longer side, never enlarged.
     pub fn limited_to(&self, max_side_px: u32) -> Self {
         let longer = self.width_px.max(self.height_px);

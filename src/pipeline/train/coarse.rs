@@ -34,12 +34,7 @@ fn half(view: &TrainView) -> TrainView {
     }
     let coverage = p.coverage.is_some().then_some(coverage);
     let pixels = PhotoPixels { width_px: w, height_px: h, rgb, coverage };
-    // An odd last row or column is cut off: the principal point stays where it was, halved.
-    let mut camera = view.camera.clone();
-    (camera.width_px, camera.height_px) = (w, h);
-    camera.focal_px *= 0.5;
-    camera.principal_px *= 0.5;
-    TrainView { name: view.name.clone(), camera, pixels }
+    TrainView { name: view.name.clone(), camera: view.camera.reduced(2), pixels }
 }
 
 #[cfg(test)]

@@ -1,6 +1,9 @@
 //! What is swept, one file per stage of the program.
 
+pub mod depth;
 pub mod features;
+pub mod path;
+pub mod query;
 pub mod render;
 pub mod train;
 

@@ -1,0 +1,252 @@
+//! Knobs of camera paths against matter, and against the length of the way itself.
+
+use std::time::Instant;
+
+use glam::{DMat3, DQuat, DVec3};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use serde_json::json;
+
+use super::{Input, Plans, stage};
+use crate::math::stats::mean;
+use crate::navigate::curve::bend;
+use crate::navigate::graph::Graph;
+use crate::navigate::pose::{RotationSpline, angle};
+use crate::navigate::{FRAMES, Flight, Navigator, Pose, Speed};
+use crate::pipeline::observer::{Observer, Signal};
+use crate::report::document::Form;
+use crate::report::{Case, Measure, Order, Rule, Stage, StageName, Study, StudyError, Trial};
+use crate::scene::{Camera, GaussianCloud};
+
+/// Flights of one measurement.
+const FLIGHTS: usize = 24;
+/// Places between two poses that are looked at.
+const BETWEEN: usize = 16;
+
+/// One way to fly.
+#[derive(Clone, Copy)]
+struct Plan {
+    frames: usize,
+    /// Places that are looked at along every leg; `None` as many as the distances demand.
+    samples: Option<u32>,
+    paper: bool,
+}
+
+/// The sweep of camera paths.
+pub struct PathStudy {
+    navigator: Navigator,
+    input: Input,
+    repeats: u32,
+    plans: Plans<Plan>,
+}
+
+impl PathStudy {
+    /// Through `cloud`, whose photos were taken by these cameras.
+    pub fn new(cloud: &GaussianCloud, cameras: &[Camera], repeats: u32, mut input: Input) -> Self {
+        let up = Camera::up_of(cameras.iter()).unwrap_or(DVec3::NEG_Y);
+        let navigator = Navigator::new(cloud, cameras, up);
+        input.insert("keypoints".into(), navigator.graph.keypoints.len().to_string());
+        input.insert("flights".into(), FLIGHTS.to_string());
+        Self { navigator, input, repeats, plans: plans() }
+    }
+
+    /// A flight from one keypoint to another, if there is a way.
+    fn fly(&self, plan: Plan, ends: [usize; 2]) -> Option<Flight> {
+        let pose = |i: usize| {
+            let k = &self.navigator.graph.keypoints[i];
+            Pose { center: k.center, world_from_camera: k.world_from_camera, fov_y_rad: 0.8 }
+        };
+        let [from, to] = ends.map(pose);
+        match plan.paper {
+            true => Flight::of_paper(&[from, to], plan.frames),
+            false => self.navigator.fly(&from, &to, None, plan.frames, Speed::Eased).ok(),
+        }
+    }
+}
+
+fn plans() -> Plans<Plan> {
+    let plan = |frames, samples, paper| Plan { frames, samples, paper };
+    let mut all = vec![(Case::default(format!("{FRAMES} frames, steps by distance")), plan(FRAMES, None, false))];
+    let mut add = |method: &str, setting: String, knobs: &[(&str, serde_json::Value)], plan: Plan| {
+        all.push((Case::new(method, setting, knobs), plan));
+    };
+    for frames in [15, 30, 75, 300, 600] {
+        add("frames", frames.to_string(), &[("frames", json!(frames))], plan(frames, None, false));
+    }
+    for samples in [1, 2, 4, 8, 16, 64] {
+        let setting = format!("{samples} along a leg");
+        add("samples along legs", setting, &[("samples", json!(samples))], plan(FRAMES, Some(samples), false));
+    }
+    for frames in [30, FRAMES] {
+        add(
+            "the paper's interpolation",
+            format!("{frames} frames"),
+            &[("paper", json!(true))],
+            plan(frames, None, true),
+        );
+    }
+    Plans(all)
+}
+
+/// Of the places along a flight the share that is nearer to matter than wanted, and by how much the
+/// way from pose to pose is shorter than the way itself.
+fn faults(flight: &Flight, navigator: &Navigator) -> (f64, f64) {
+    let (mut near, mut gone, mut looked) = (0, 0.0, 0);
+    for pair in flight.poses.windows(2) {
+        gone += pair[0].center.distance(pair[1].center);
+        for k in 0..BETWEEN {
+            let place = pair[0].center.lerp(pair[1].center, k as f64 / BETWEEN as f64);
+            looked += 1;
+            near += usize::from(navigator.matter.clearance(place) < 0.99 * navigator.clearance);
+        }
+    }
+    let short = if flight.length > 0.0 { (1.0 - gone / flight.length).abs() } else { 0.0 };
+    (near as f64 / looked.max(1) as f64, short)
+}
+
+impl Study for PathStudy {
+    fn stage(&self) -> Stage {
+        let error = |name: &str, meaning: &str| Measure::new(name, "", Form::Error, meaning);
+        let measures = vec![
+            error("arc-length error", "by how much the way from pose to pose is off the length of the way, relative"),
+            error("too near", "share of places along flights that are nearer to matter than wanted"),
+            error("largest turn", "largest turn from one pose to the next, degrees"),
+            error("no way", "share of pairs of keypoints between which none was found"),
+        ];
+        let rule = Rule { measure: "arc-length error".into(), times: 1.1, floor: 1e-3 };
+        let reference = "matter between poses, and the length of the smooth way, are what flights are held against";
+        stage(
+            StageName::Path,
+            "one flight, edges that it asks for included",
+            reference,
+            &self.input,
+            self.repeats,
+            rule,
+            measures,
+        )
+    }
+
+    fn cases(&self) -> Vec<Case> {
+        self.plans.cases()
+    }
+
+    fn run(&mut self, case: &Case, seed: u64, observer: &mut dyn Observer) -> Result<Option<Trial>, StudyError> {
+        let Some(&plan) = self.plans.of(case) else { return Ok(None) };
+        let n = self.navigator.graph.keypoints.len();
+        if n == 0 {
+            return Err(StudyError("all cameras are inside matter: there is nowhere to fly from".into()));
+        }
+        let mut rng = Pcg64::seed_from_u64(seed);
+        let pairs: Vec<[usize; 2]> = (0..FLIGHTS).map(|_| [rng.random_range(0..n), rng.random_range(0..n)]).collect();
+        // Edges are looked at anew, as after opening a scene.
+        self.navigator.graph = Graph::new(self.navigator.graph.keypoints.clone(), self.navigator.graph.clearance);
+        self.navigator.matter.samples = plan.samples;
+        let start = Instant::now();
+        let mut flights = Vec::new();
+        for pair in &pairs {
+            if observer.signal() == Signal::Cancel {
+                return Ok(None);
+            }
+            flights.extend(self.fly(plan, *pair));
+        }
+        let secs = start.elapsed().as_secs_f64() / pairs.len() as f64;
+        self.navigator.matter.samples = None;
+        let found: Vec<(f64, f64)> = flights.iter().map(|f| faults(f, &self.navigator)).collect();
+        let turn = flights
+            .iter()
+            .flat_map(|f| f.poses.windows(2))
+            .map(|w| angle(&w[0].world_from_camera, &w[1].world_from_camera));
+        let values = vec![
+            ("arc-length error", mean(&found.iter().map(|f| f.1).collect::<Vec<_>>())),
+            ("too near", mean(&found.iter().map(|f| f.0).collect::<Vec<_>>())),
+            ("largest turn", turn.fold(0.0, f64::max).to_degrees()),
+            ("no way", 1.0 - flights.len() as f64 / pairs.len() as f64),
+        ];
+        Ok(Some(Trial { secs, values, curve: Vec::new() }))
+    }
+
+    fn orders(&mut self, _observer: &mut dyn Observer) -> Result<Vec<Order>, StudyError> {
+        Ok(vec![length_order(), corner_order(), turning_order()])
+    }
+}
+
+/// How fast the way from sample to sample comes near the length of a curve, here a quarter of a
+/// circle: chords are of second order.
+fn length_order() -> Order {
+    let exact = std::f64::consts::FRAC_PI_2;
+    let pairs = [2_usize, 4, 8, 16, 32, 64].map(|n| {
+        let at = |i: usize| DVec3::new((exact * i as f64 / n as f64).cos(), (exact * i as f64 / n as f64).sin(), 0.0);
+        let chords: f64 = (0..n).map(|i| at(i).distance(at(i + 1))).sum();
+        [n as f64, exact - chords]
+    });
+    let meaning = "Samples along a way against the error of its length.";
+    Order::fit("samples along a way", meaning, pairs.to_vec(), 2.0, 0.1, 1e-13)
+}
+
+/// How fast the pieces of a rounded corner come near the parabola's own length.
+fn corner_order() -> Order {
+    // Of the parabola that touches two legs of length 1 at a right angle.
+    let exact = 1.0 + (1.0 + 2.0_f64.sqrt()).ln() / 2.0_f64.sqrt();
+    let pairs = [1_usize, 2, 4, 8, 16, 32].map(|n| {
+        let points = bend(DVec3::ZERO, [DVec3::NEG_X, DVec3::Y], 1.0, n);
+        let length: f64 = points.windows(2).map(|w| w[0].distance(w[1])).sum();
+        [n as f64, (exact - length).abs()]
+    });
+    let meaning = "Pieces of a rounded corner against the error of its length; 24 pieces are drawn.";
+    Order::fit("pieces of a rounded corner", meaning, pairs.to_vec(), 2.0, 0.2, 1e-13)
+}
+
+/// How fast rotations between keys come near a smooth turn that the keys were taken from.
+fn turning_order() -> Order {
+    let turn = |t: f64| -> DMat3 {
+        DMat3::from_quat(DQuat::from_scaled_axis(DVec3::new(0.9 * t.sin(), 0.7 * t * t, 1.3 * t)))
+    };
+    let pairs = [4_usize, 8, 16, 32, 64].map(|n| {
+        let keys: Vec<(f64, DMat3)> = (0..=n).map(|i| i as f64 / n as f64).map(|t| (t, turn(t))).collect();
+        let spline = RotationSpline::new(&keys, false);
+        // Away from the ends, where a key has neighbours on both sides.
+        let off = |k: usize| {
+            let t = 0.25 + 0.5 * (f64::from(k as u32) + 0.37) / 200.0;
+            spline.as_ref().map_or(f64::NAN, |s| angle(&s.at(t), &turn(t)))
+        };
+        [n as f64, (0..200).map(off).fold(0.0, f64::max)]
+    });
+    let meaning = "Keys of a turn against the largest error between them, in radians.";
+    Order::fit("keys of a smooth turn", meaning, pairs.to_vec(), 3.0, 0.35, 1e-12)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::navigate::testing::{camera_at, wall_with_hole};
+    use crate::pipeline::observer::Silent;
+
+    #[test]
+    fn convergence_is_what_theory_says() {
+        for order in [length_order(), corner_order(), turning_order()] {
+            assert!(order.agrees, "{order:?}");
+        }
+    }
+
+    #[test]
+    fn too_few_looks_fly_through_walls_and_the_default_does_not() {
+        let ring = (0..16).map(|i| {
+            let angle = f64::from(i) / 16.0 * std::f64::consts::TAU;
+            camera_at(DVec3::new(1.3 * angle.cos(), 0.2, 1.3 * angle.sin()))
+        });
+        let cameras: Vec<Camera> = ring.collect();
+        let mut study = PathStudy::new(&wall_with_hole(0.0, 0.6), &cameras, 1, Input::new());
+        let mut value = |method: &str, setting: &str, name: &str| {
+            let cases = study.cases();
+            let case = cases.iter().find(|c| c.method == method && c.setting.contains(setting)).expect("a case");
+            let trial = study.run(case, 3, &mut Silent).expect("runs").expect("not cancelled");
+            trial.values.iter().find(|v| v.0 == name).expect("measured").1
+        };
+        let (default, once) = (value("default", "", "too near"), value("samples along legs", "1 along", "too near"));
+        assert!(default < 1e-3 && once > 10.0 * default.max(1e-3), "{default} {once}");
+        let (few, many) = (value("frames", "15", "arc-length error"), value("frames", "600", "arc-length error"));
+        assert!(few > 4.0 * many, "{few} {many}");
+        let paper = value("the paper's interpolation", "150", "too near");
+        assert!(paper > default, "{paper}");
+    }
+}

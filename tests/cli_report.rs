@@ -1,0 +1,89 @@
+//! The real binary measures error against run time: every stage, stopped and gone on with, refused
+//! where it must be.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod cli_support;
+
+use cli_support::{Done, command, folder, tiny_dataset};
+use serde_json::Value;
+
+/// The points of a stage of a report.
+fn points<'a>(report: &'a Value, stage: &str) -> &'a [Value] {
+    let stages = report["stages"].as_array().unwrap();
+    let found = stages.iter().find(|s| s["name"] == stage).unwrap_or_else(|| panic!("no stage {stage}"));
+    found["points"].as_array().unwrap()
+}
+
+#[test]
+fn every_stage_is_measured_and_gone_on_with() {
+    let folder = folder();
+    let photos = tiny_dataset(folder.path());
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let run = |arguments: &[&str]| -> Done {
+        command(arguments).env("FMLGS_ONNXRUNTIME", "none").env("FMLGS_MODELS", at("models")).output().unwrap().into()
+    };
+    let (photos, scene, out) = (photos.to_str().unwrap(), at("scene"), at("report"));
+    let train = ["train", photos, "--out", &scene, "--steps", "150", "--backend", "cpu", "--eval-every", "0"];
+    run(&[&train[..], &["--max-side", "64", "-q"]].concat()).ok();
+    run(&["preprocess", &scene, "--masks", photos, "--encoder", "demo", "-q"]).ok();
+
+    let wanted = ["report", &scene, "--masks", photos, "--max-side", "64", "--steps", "20", "--train-steps", "20"];
+    let rest = ["--views", "1", "--stages", "render,train,features,query,path", "--out", &out, "-q"];
+    let read = || -> Value { serde_json::from_slice(&std::fs::read(format!("{out}/report.json")).unwrap()).unwrap() };
+
+    // No time at all still leaves a whole report behind, which says that it is not complete.
+    run(&[&wanted[..], &rest, &["--repeats", "1", "--budget", "0.000001"]].concat()).ok();
+    assert_eq!(read()["version"], 2);
+    assert_eq!(points(&read(), "train").len(), 0);
+
+    run(&[&wanted[..], &rest, &["--repeats", "1"]].concat()).ok();
+    let once = read();
+    for stage in ["render", "train", "features", "query", "path"] {
+        let points = points(&once, stage);
+        assert_eq!(points.iter().filter(|p| p["default"] == true).count(), 1, "{stage}");
+        assert!(points.len() > 4 && points.iter().all(|p| p["secs"]["median"].as_f64().unwrap() >= 0.0), "{stage}");
+        let planned =
+            once["stages"].as_array().unwrap().iter().find(|s| s["name"] == stage).unwrap()["planned"].clone();
+        assert_eq!(planned, points.len(), "{stage} is complete");
+    }
+    // What must be: finer cut-offs are nearer to the exact picture, coarser ones farther.
+    let rms = |setting: &str| {
+        let all = points(&once, "render");
+        let p = all.iter().find(|p| p["setting"] == setting || (setting == "default" && p["default"] == true)).unwrap();
+        p["values"]["RMS error"]["median"].as_f64().unwrap()
+    };
+    assert!(rms("1e-4") < rms("default") && rms("default") < rms("1/32"), "cut-offs");
+    for name in ["report.html", "report.csv", "render.svg", "train.svg"] {
+        assert!(std::fs::metadata(format!("{out}/{name}")).unwrap().len() > 100, "{name}");
+    }
+
+    // A second repeat adds to what is there.
+    let again = ["--repeats", "2", "--stages", "path", "--out", &out, "-q"];
+    run(&[&wanted[..], &again].concat()).ok();
+    let twice = read();
+    let times = |r: &Value, stage: &str| points(r, stage)[0]["secs"]["each"].as_array().unwrap().len();
+    assert_eq!((times(&twice, "path"), times(&twice, "render")), (2, 1));
+    assert_eq!(points(&twice, "path")[0]["secs"]["each"][0], points(&once, "path")[0]["secs"]["each"][0]);
+
+    // The table of defaults.
+    let table = at("DEFAULTS.md");
+    run(&["report", "--defaults", &table, "--from", &out]).ok();
+    let text = std::fs::read_to_string(&table).unwrap();
+    assert!(text.contains("| alpha cut-off |") && text.contains("| samples along a way | 2 |"), "{text}");
+
+    // What cannot be: another scene's report, unknown stages, missing labels.
+    let other = at("other");
+    std::fs::create_dir(&other).unwrap();
+    for entry in std::fs::read_dir(&scene).unwrap() {
+        let entry = entry.unwrap();
+        std::fs::copy(entry.path(), std::path::Path::new(&other).join(entry.file_name())).unwrap();
+    }
+    let refused = run(&["report", &other, "--stages", "path", "--out", &out]);
+    assert!(refused.stderr.contains("another scene") && refused.stderr.contains("--fresh"), "{}", refused.stderr);
+    refused.fails_with(1);
+    let no_labels = run(&["report", &scene, "--stages", "query", "--out", &at("none")]);
+    assert!(no_labels.stderr.contains("--masks"), "{}", no_labels.stderr);
+    no_labels.fails_with(1);
+    run(&["report", &scene, "--stages", "nonesuch"]).fails_with(2);
+    run(&["report", "--defaults", &table, "--from", &at("nowhere")]).fails_with(1);
+}
