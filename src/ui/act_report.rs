@@ -6,7 +6,7 @@ use super::app::App;
 use super::panes::report::apply;
 use super::state::Tone;
 use crate::report::{Knobs, StageName};
-use crate::worker::{Command, MeasureRequest, Pane, measure};
+use crate::worker::{Command, MeasureRequest, Pane};
 
 impl App {
     /// Reads a report and shows its pane.
@@ -28,15 +28,13 @@ impl App {
             self.state.toast(Tone::Warning, text);
             return;
         }
-        let mut cameras = measure::cameras(scene.dataset.as_deref(), self.layout.config.holdout_every);
-        if cameras.is_empty() {
-            cameras.push(self.viewport.camera());
-        }
         let request = MeasureRequest {
             scene: scene.path.display().to_string(),
             cloud,
             settings: scene.render.clone(),
-            cameras,
+            dataset: scene.dataset.clone(),
+            holdout_every: self.layout.config.holdout_every,
+            camera: self.viewport.camera(),
             out: scene.report_out.clone(),
         };
         self.layout.hidden.retain(|p| *p != Pane::Report);

@@ -5,11 +5,12 @@ use std::sync::Arc;
 
 use super::protocol::{Failure, Outcome, Stop};
 use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::train::{TrainConfig, load_views};
 use crate::render::RenderSettings;
 use crate::report::studies::Input;
 use crate::report::studies::render::RenderStudy;
 use crate::report::{End, FILE, Report, Stage, StageName, Study, StudyError, computer, is_report, sweep};
-use crate::scene::{Camera, Dataset, GaussianCloud};
+use crate::scene::{Camera, Dataset, GaussianCloud, PhotoPixels};
 
 /// Most views that are compared.
 const VIEWS: usize = 4;
@@ -27,8 +28,12 @@ pub struct MeasureRequest {
     pub cloud: Arc<GaussianCloud>,
     /// How they are drawn.
     pub settings: RenderSettings,
-    /// From where; more than a few are thinned out.
-    pub cameras: Vec<Camera>,
+    /// Its photos; those that are held out are compared with, too.
+    pub dataset: Option<Arc<Dataset>>,
+    /// Every how-manieth photo is held out.
+    pub holdout_every: usize,
+    /// From where it is drawn without held-out photos.
+    pub camera: Camera,
     /// Folder of the report. What is measured there already is gone on with.
     pub out: PathBuf,
 }
@@ -52,30 +57,22 @@ pub fn known(scene: &Path, own: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// Cameras that show how a scene is drawn: of photos that training did not see, else of any.
-pub fn cameras(dataset: Option<&Dataset>, holdout_every: usize) -> Vec<Camera> {
-    let Some(dataset) = dataset else { return Vec::new() };
-    let (training, held_out) = dataset.split(holdout_every);
-    let chosen = if held_out.is_empty() { training } else { held_out };
-    chosen.into_iter().map(|i| dataset.photos[i].camera.clone()).collect()
-}
-
 /// Measures the drawing of a scene and writes the report after every measurement.
 pub fn run(request: MeasureRequest, observer: &mut dyn Observer) -> Result<Outcome, Stop> {
-    let MeasureRequest { scene, cloud, settings, cameras, out } = request;
     let failed = |e: &dyn std::error::Error| Stop::Failed(Failure::of(e, ""));
-    let mut report = Report::begin(&out, &scene, &computer::look()).map_err(|e| failed(&e))?;
-    std::fs::create_dir_all(&out).map_err(|e| {
-        Stop::Failed(Failure { message: format!("{}: {e}", out.display()), remedy: "Is the disk writable?".into() })
-    })?;
-    let cameras: Vec<Camera> = spread(&cameras, VIEWS).map(|c| c.limited_to(MAX_SIDE_PX)).collect();
+    let mut report = Report::begin(&request.out, &request.scene, &computer::look()).map_err(|e| failed(&e))?;
+    let folder = request.out.display().to_string();
+    let unwritable = |e| Failure { message: format!("{folder}: {e}"), remedy: "Is the disk writable?".into() };
+    std::fs::create_dir_all(&request.out).map_err(|e| Stop::Failed(unwritable(e)))?;
+    let views = views(&request, observer)?;
     let input = Input::from([
-        ("scene".to_owned(), scene),
-        ("Gaussians".to_owned(), cloud.len().to_string()),
+        ("scene".to_owned(), request.scene.clone()),
+        ("Gaussians".to_owned(), request.cloud.len().to_string()),
         ("longer side".to_owned(), format!("{MAX_SIDE_PX} px")),
-        ("views".to_owned(), cameras.len().to_string()),
+        ("views".to_owned(), views.len().to_string()),
     ]);
-    let study = RenderStudy::new((*cloud).clone(), &settings, &cameras, REPEATS, input);
+    let MeasureRequest { cloud, settings, out, .. } = request;
+    let study = RenderStudy::new((*cloud).clone(), &settings, views, REPEATS, input);
     let mut study = study.map_err(|e| failed(&e))?;
     let fresh = study.stage();
     let same = |s: &&Stage| s.input == fresh.input && s.measures == fresh.measures;
@@ -93,6 +90,24 @@ pub fn run(request: MeasureRequest, observer: &mut dyn Observer) -> Result<Outco
     Ok(Outcome::Report { path: out, report: Arc::new(report), second: false })
 }
 
+/// A few held-out photos with their cameras, or the one view without a photo.
+fn views(request: &MeasureRequest, observer: &mut dyn Observer) -> Result<Vec<(Camera, Option<PhotoPixels>)>, Stop> {
+    let mut views = Vec::new();
+    if let Some(dataset) = &request.dataset {
+        let (_, held_out) = dataset.split(request.holdout_every);
+        let chosen: Vec<usize> = spread(&held_out, VIEWS).copied().collect();
+        let config =
+            TrainConfig { max_side_px: MAX_SIDE_PX, holdout_every: request.holdout_every, ..TrainConfig::default() };
+        let loaded = load_views(dataset, &chosen, &config, "Loading held-out photos", observer);
+        let loaded = loaded.map_err(|e| Stop::Failed(Failure::of(&e, "")))?.ok_or(Stop::Cancelled)?;
+        views.extend(loaded.into_iter().map(|v| (v.camera, Some(v.pixels))));
+    }
+    if views.is_empty() {
+        views.push((request.camera.limited_to(MAX_SIDE_PX), None));
+    }
+    Ok(views)
+}
+
 /// At most `count` of them, evenly spread.
 fn spread<T>(all: &[T], count: usize) -> impl Iterator<Item = &T> {
     let count = count.min(all.len());
@@ -103,6 +118,7 @@ fn spread<T>(all: &[T], count: usize) -> impl Iterator<Item = &T> {
 mod tests {
     use super::*;
     use crate::pipeline::observer::Silent;
+    use glam::DVec3;
 
     #[test]
     fn few_are_spread_over_many() {
@@ -131,7 +147,9 @@ mod tests {
             scene: "nothing".into(),
             cloud: Arc::default(),
             settings: RenderSettings::default(),
-            cameras: Vec::new(),
+            dataset: None,
+            holdout_every: 8,
+            camera: Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid"),
             out: folder.path().join("report"),
         };
         std::fs::create_dir_all(&request.out).expect("folder");
