@@ -74,9 +74,10 @@ Examples:
 struct Cli {
     /// What to open in the window: a dataset's folder, a splat file or a trained scene
     path: Option<PathBuf>,
-    /// Report to show in the window: a folder that 'fmlgs report' wrote, or its report.json
+    /// Report to show in the window: a folder that 'fmlgs report' wrote, or its report.json; a second
+    /// one is compared with it
     #[arg(long)]
-    report: Option<PathBuf>,
+    report: Vec<PathBuf>,
     /// Show warnings and results only
     #[arg(short, long, global = true)]
     quiet: bool,
@@ -127,10 +128,14 @@ pub fn main(open_window: OpenWindow) -> ExitCode {
 fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
     let quiet = cli.quiet;
     let Some(command) = cli.command else {
-        let report = cli.report.map(Action::OpenReport);
-        return window(cli.path.map(Action::Open).into_iter().chain(report).collect(), open_window);
+        if cli.report.len() > 2 {
+            return Err(CliError::Usage("--report: at most two reports are compared".into()));
+        }
+        let reports = cli.report.into_iter().zip([Action::OpenReport, Action::CompareReport]);
+        let first = cli.path.map(Action::Open).into_iter().chain(reports.map(|(path, action)| action(path)));
+        return window(first.collect(), open_window);
     };
-    if cli.report.is_some() {
+    if !cli.report.is_empty() {
         return Err(CliError::Usage("--report is for the window; a command has no use for it".into()));
     }
     if let Some(path) = cli.path {
@@ -165,7 +170,7 @@ fn window(first: Vec<Action>, open_window: OpenWindow) -> Result<(), CliError> {
                 let name = path.display();
                 return Err(CliError::Usage(format!("'{name}' is no file, no folder and no subcommand")));
             }
-            Action::OpenReport(path) if !path.exists() => {
+            Action::OpenReport(path) | Action::CompareReport(path) if !path.exists() => {
                 return Err(CliError::Usage(format!("--report: '{}' is no file and no folder", path.display())));
             }
             _ => {}
@@ -216,5 +221,10 @@ mod tests {
         assert!(matches!(run(cli, |_| Ok(())), Err(CliError::Usage(_))));
         let cli = Cli::try_parse_from(["fmlgs", "-q", "info", "photos"]).expect("quiet comes before or after");
         assert!(cli.quiet && cli.path.is_none());
+        let cli = Cli::try_parse_from(["fmlgs", "--report", "a", "--report", "b"]).expect("reports alone");
+        assert_eq!(cli.report.len(), 2);
+        assert!(matches!(run(cli, |_| Ok(())), Err(CliError::Usage(e)) if e.contains("--report: 'a'")));
+        let cli = Cli::try_parse_from(["fmlgs", "--report", "a", "info", "b"]).expect("words in an order");
+        assert!(matches!(run(cli, |_| Ok(())), Err(CliError::Usage(_))));
     }
 }

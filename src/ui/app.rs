@@ -1,5 +1,6 @@
 //! The application: takes events in, draws the window, sends commands out.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
@@ -17,6 +18,7 @@ use super::state::AppState;
 use super::toasts::Toasts;
 use super::viewport::Viewport;
 use super::{keys, theme};
+use crate::report::is_report;
 use crate::worker::{Action, Jobs, Pane, Repaint, Worker};
 
 /// The window's application.
@@ -138,8 +140,14 @@ impl App {
         if !self.palette.is_open() && self.state.error.is_none() && self.question.is_none() && !self.sheet {
             self.actions.extend(keys::pressed(ctx));
         }
-        let dropped = ctx.input(|i| i.raw.dropped_files.first().map(|f| f.path().to_path_buf()));
-        self.actions.extend(dropped.map(Action::Open));
+        let dropped: Vec<PathBuf> =
+            ctx.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_path_buf()).take(2).collect());
+        match dropped.as_slice() {
+            [one, other] if is_report(one) && is_report(other) => {
+                self.actions.extend([Action::OpenReport(one.clone()), Action::CompareReport(other.clone())]);
+            }
+            all => self.actions.extend(all.first().cloned().map(Action::Open)),
+        }
     }
 
     fn panes(&mut self, ui: &mut Ui) {

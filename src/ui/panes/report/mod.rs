@@ -243,7 +243,7 @@ fn chosen(ui: &mut Ui, stage: &Stage, selected: Option<&Point>, now: &Now<'_>, a
         match apply::offer(stage, point, now) {
             Offer::Changes(changes, action) => {
                 for c in &changes {
-                    ui.label(format!("{}: {}  \u{2192}  {}", c.name, c.from, c.to));
+                    ui.label(format!("{}: {}, instead of {}", c.name, c.to, c.from));
                 }
                 let what = match stage.name {
                     StageName::Train => "Apply to the next training",

@@ -46,7 +46,9 @@ impl<'a> Scatter<'a> {
             .x_axis_formatter(|mark, range| scale::label(mark, range, scale::short_secs))
             .y_axis_formatter(|mark, range| scale::label(mark, range, scale::short))
             .label_formatter(|_| None)
-            .legend(Legend::default().position(Corner::RightTop).background_alpha(0.75));
+            .legend(
+                Legend::default().position(self.free_corner()).text_style(egui::TextStyle::Small).background_alpha(0.6),
+            );
         let shown = plot.show(ui, |p| self.items().into_iter().for_each(|item| item.add_to(p)));
         let nearest = self.nearest(&shown.response, &shown.transform);
         if let Some(point) = nearest {
@@ -58,6 +60,12 @@ impl<'a> Scatter<'a> {
             shown.response.clone().on_hover_ui_at_pointer(|ui| facts(ui, point, &self.stage.measures, stage));
         }
         nearest.filter(|_| shown.response.clicked())
+    }
+
+    /// The corner of the plot that has the fewest points, for the legend.
+    fn free_corner(&self) -> Corner {
+        let both = self.stage.points.iter().chain(self.second.into_iter().flat_map(|s| &s.points));
+        free_corner(&both.filter_map(|p| scale::place(p, self.measure)).collect::<Vec<_>>())
     }
 
     /// The point under the pointer.
@@ -106,20 +114,21 @@ impl<'a> Scatter<'a> {
     fn series(&self, method: &str, k: usize, items: &mut Vec<Item>) {
         let color = color(k);
         let points: Vec<&Point> = self.stage.points.iter().filter(|p| p.method == method).collect();
-        let line = |places: Vec<[f64; 2]>, width: f32, share: f32| {
-            let style = Stroke::new(width, color.gamma_multiply(share));
-            Item::Line(Line::new(method, PlotPoints::from(places)).stroke(style).allow_hover(false))
+        // What has the series' name has its colour, too: the legend shows one.
+        let line = |name: &str, places: Vec<[f64; 2]>, style: Stroke| {
+            Item::Line(Line::new(name, PlotPoints::from(places)).stroke(style).allow_hover(false))
         };
         // What happened on the way was measured of the first measure only.
         if self.stage.measures.first() == Some(self.measure) {
             let curves = points.iter().filter(|p| p.curve.len() > 1);
-            items.extend(curves.map(|p| line(self.way(&p.curve), 1.0, 0.4)));
+            let faint = Stroke::new(1.0, color.gamma_multiply(0.4));
+            items.extend(curves.map(|p| line("", self.way(&p.curve), faint)));
         }
         let mut places: Vec<[f64; 2]> = points.iter().filter_map(|p| scale::place(p, self.measure)).collect();
         places.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        items.push(line(places.clone(), 1.2, 0.55));
+        items.push(line(method, places.clone(), Stroke::new(0.8, color)));
         let whiskers = points.iter().filter_map(|p| scale::whiskers(p, self.measure)).flatten();
-        items.extend(whiskers.filter(|w| w[0] != w[1]).map(|w| line(w.to_vec(), 1.5, 0.8)));
+        items.extend(whiskers.filter(|w| w[0] != w[1]).map(|w| line(method, w.to_vec(), Stroke::new(1.6, color))));
         let radius = if points.iter().any(|p| p.default) { 6.5 } else { 4.0 };
         let marks = Points::new(method, PlotPoints::from(places)).shape(shape(k)).radius(radius);
         items.push(Item::Points(marks.color(color)));
@@ -130,6 +139,24 @@ impl<'a> Scatter<'a> {
         let at = |c: &[f64; 2]| [c[0].max(1e-9).log10(), self.measure.error(c[1]).max(LEAST).log10()];
         curve.iter().map(at).filter(|p| p.iter().all(|v| v.is_finite())).collect()
     }
+}
+
+/// The quarter of their range that has the fewest places.
+fn free_corner(places: &[[f64; 2]]) -> Corner {
+    let middle = |axis: usize| {
+        let all = places.iter().map(|p| p[axis]);
+        0.5 * (all.clone().fold(f64::INFINITY, f64::min) + all.fold(f64::NEG_INFINITY, f64::max))
+    };
+    let (x, y) = (middle(0), middle(1));
+    let corners = [
+        (Corner::RightTop, true, true),
+        (Corner::RightBottom, true, false),
+        (Corner::LeftBottom, false, false),
+        (Corner::LeftTop, false, true),
+    ];
+    let inside = |right: bool, top: bool| places.iter().filter(|p| (p[0] >= x) == right && (p[1] >= y) == top).count();
+    let free = corners.into_iter().min_by_key(|(_, right, top)| inside(*right, *top));
+    free.map_or(Corner::RightTop, |c| c.0)
 }
 
 /// Something in the plot.
@@ -181,4 +208,24 @@ pub fn facts(ui: &mut Ui, point: &Point, measures: &[Measure], whose: &str) {
             }
         },
     );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_legend_goes_where_nothing_is() {
+        let falling = [[0.0, 1.0], [0.1, 0.9], [0.9, 0.1], [1.0, 0.0]];
+        assert_eq!(free_corner(&falling), Corner::RightTop);
+        let with_slow_and_bad = [falling.as_slice(), &[[1.0, 1.0]]].concat();
+        assert_eq!(free_corner(&with_slow_and_bad), Corner::LeftBottom);
+        assert_eq!(free_corner(&[]), Corner::RightTop);
+    }
+
+    #[test]
+    fn series_differ_in_colour_or_shape() {
+        let looks: Vec<_> = (0..14).map(|k| (color(k), shape(k))).collect();
+        assert!((0..14).all(|i| (0..i).all(|j| looks[i] != looks[j])));
+    }
 }

@@ -2,9 +2,12 @@
 
 use egui::{Color32, Grid, RichText, Ui};
 
-use super::super::super::theme;
+use super::super::super::{format, theme};
 use super::scatter;
 use crate::report::{Comparison, Measure, Point, Report, Stage, table};
+
+/// Letters of a setting that are shown in a table.
+const MOST_LETTERS: usize = 34;
 
 /// The measured settings; returns the one that was clicked.
 pub fn points<'a>(ui: &mut Ui, stage: &'a Stage, measure: &Measure, selected: Option<&Point>) -> Option<&'a Point> {
@@ -16,8 +19,9 @@ pub fn points<'a>(ui: &mut Ui, stage: &'a Stage, measure: &Measure, selected: Op
         for (i, p) in stage.points.iter().enumerate() {
             let k = methods.iter().position(|m| *m == p.method).unwrap_or(0);
             let is_selected = selected.is_some_and(|s| std::ptr::eq(s, p));
-            let row = ui.selectable_label(is_selected, RichText::new(title(p)).color(scatter::color(k)));
-            if row.clicked() {
+            let text = format::shortened(&title(p), MOST_LETTERS);
+            let row = ui.selectable_label(is_selected, RichText::new(text).color(scatter::color(k)));
+            if row.on_hover_text(title(p)).clicked() {
                 clicked = Some(p);
             }
             ui.label(table::seconds(p.secs.median));
@@ -52,7 +56,8 @@ pub fn choices(ui: &mut Ui, stage: &Stage) {
         for c in &choices {
             ui.label(c.method);
             verdict(ui, c.holds, ["holds", "does not hold"]);
-            ui.label(if c.chosen.default { "the default" } else { &c.chosen.setting });
+            let chosen = if c.chosen.default { "the default" } else { &c.chosen.setting };
+            ui.label(format::shortened(chosen, MOST_LETTERS)).on_hover_text(chosen);
             let of = |p: &Point| format!("{}, {}", table::seconds(p.secs.median), error(p, measure));
             ui.label(RichText::new(format!("{}; {}", of(c.default), of(c.chosen))).small());
             ui.end_row();
@@ -86,7 +91,7 @@ pub fn comparison(ui: &mut Ui, comparison: &Comparison<'_>, measure: &Measure) {
     Grid::new("comparison").num_columns(4).striped(true).spacing([12.0, 2.0]).show(ui, |ui| {
         head(ui, &["setting", "times: second / first", "", &format!("{}: second - first", table::title(measure))]);
         for pair in &comparison.pairs {
-            ui.label(title(pair.one));
+            ui.label(format::shortened(&title(pair.one), MOST_LETTERS)).on_hover_text(title(pair.one));
             let color = match pair.times {
                 _ if !pair.differs() => theme::TEXT,
                 t if t < 1.0 => theme::GOOD,
