@@ -173,7 +173,10 @@ impl App {
             }
         }
         if layout.shows(Pane::Report) {
-            let shown = Panel::bottom("report").frame(pane).resizable(true).default_size(400.0).min_size(200.0);
+            // The view stays larger than what is said about it.
+            let most = (0.55 * ui.available_height()).max(200.0);
+            let shown =
+                Panel::bottom("report").frame(pane).resizable(true).default_size(400.0).size_range(200.0..=most);
             shown.show(ui, |ui| self.report.show(ui, state, layout, viewport, actions));
         }
         let Some(scene) = state.scene.clone() else {

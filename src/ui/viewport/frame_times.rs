@@ -67,7 +67,7 @@ impl FrameTimes {
         }
         ui.vertical(|ui| {
             ui.spacing_mut().item_spacing.y = 1.0;
-            Grid::new("frame times").num_columns(3).spacing([14.0, 1.0]).show(ui, |ui| {
+            Grid::new("frame times").num_columns(3).spacing([14.0, 1.0]).min_row_height(13.0).show(ui, |ui| {
                 let head =
                     [format!("ms, {}", self.drawn_by), "last".into(), format!("median of {}", self.frames.len())];
                 head.iter().for_each(|h| drop(ui.label(small(h).color(theme::WEAK))));

@@ -46,7 +46,8 @@ impl Viewport {
                 }
             });
         }
-        if let Some(times) = &self.times {
+        // A small view is for the picture.
+        if let Some(times) = self.times.as_ref().filter(|_| rect.height() > 330.0) {
             card("times", Align2::LEFT_BOTTOM, -46.0, &mut |ui| times.show(ui));
         }
         if let Some(error) = &self.error {

@@ -194,9 +194,11 @@ pub fn facts(ui: &mut Ui, point: &Point, measures: &[Measure], whose: &str) {
         "{default}measured {}{whose}",
         if repeats == 1 { "once".into() } else { format!("{repeats} times") }
     ));
-    egui::Grid::new(("facts", &point.method, &point.setting, whose)).num_columns(2).spacing([14.0, 2.0]).show(
-        ui,
-        |ui| {
+    egui::Grid::new(("facts", &point.method, &point.setting, whose))
+        .num_columns(2)
+        .spacing([14.0, 1.0])
+        .min_row_height(17.0)
+        .show(ui, |ui| {
             ui.label("time");
             ui.label(table::spread(&point.secs, table::seconds));
             ui.end_row();
@@ -206,8 +208,7 @@ pub fn facts(ui: &mut Ui, point: &Point, measures: &[Measure], whose: &str) {
                 ui.label(table::spread(value, table::number));
                 ui.end_row();
             }
-        },
-    );
+        });
 }
 
 #[cfg(test)]

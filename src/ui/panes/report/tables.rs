@@ -14,7 +14,7 @@ pub fn points<'a>(ui: &mut Ui, stage: &'a Stage, measure: &Measure, selected: Op
     let methods = stage.methods();
     let front = stage.front(measure);
     let mut clicked = None;
-    Grid::new("points").num_columns(4).striped(true).spacing([12.0, 2.0]).show(ui, |ui| {
+    Grid::new("points").num_columns(4).striped(true).spacing([12.0, 1.0]).min_row_height(20.0).show(ui, |ui| {
         head(ui, &["setting", "time", &table::title(measure), "front"]);
         for (i, p) in stage.points.iter().enumerate() {
             let k = methods.iter().position(|m| *m == p.method).unwrap_or(0);
@@ -51,7 +51,7 @@ pub fn choices(ui: &mut Ui, stage: &Stage) {
         return;
     }
     let Some(measure) = stage.measure(&stage.rule.measure) else { return };
-    Grid::new("choices").num_columns(4).striped(true).spacing([12.0, 2.0]).show(ui, |ui| {
+    Grid::new("choices").num_columns(4).striped(true).spacing([12.0, 1.0]).min_row_height(20.0).show(ui, |ui| {
         head(ui, &["knob", "default", "by the rule", "time, error of both"]);
         for c in &choices {
             ui.label(c.method);
@@ -71,7 +71,7 @@ fn error(p: &Point, measure: &Measure) -> String {
 
 /// Whether errors fall as fast as theory says.
 pub fn orders(ui: &mut Ui, stage: &Stage) {
-    Grid::new("orders").num_columns(4).striped(true).spacing([12.0, 2.0]).show(ui, |ui| {
+    Grid::new("orders").num_columns(4).striped(true).spacing([12.0, 1.0]).min_row_height(20.0).show(ui, |ui| {
         head(ui, &["refined", "order seen", "expected", "theory"]);
         for o in &stage.orders {
             ui.label(&o.what).on_hover_text(&o.meaning);
@@ -88,7 +88,7 @@ pub fn comparison(ui: &mut Ui, comparison: &Comparison<'_>, measure: &Measure) {
     if comparison.pairs.is_empty() {
         ui.colored_label(theme::WARNING, "The two reports have no setting in common.");
     }
-    Grid::new("comparison").num_columns(4).striped(true).spacing([12.0, 2.0]).show(ui, |ui| {
+    Grid::new("comparison").num_columns(4).striped(true).spacing([12.0, 1.0]).min_row_height(20.0).show(ui, |ui| {
         head(ui, &["setting", "times: second / first", "", &format!("{}: second - first", table::title(measure))]);
         for pair in &comparison.pairs {
             ui.label(format::shortened(&title(pair.one), MOST_LETTERS)).on_hover_text(title(pair.one));
