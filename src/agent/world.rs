@@ -6,6 +6,7 @@ use super::wish::{Direction, Distance, GoWish, TurnWay};
 use crate::pipeline::semantics::answer::{Answered, by_name};
 use crate::pipeline::semantics::grammar::{Kind, Phrase};
 use crate::pipeline::semantics::localise::Answer;
+use crate::pipeline::semantics::stages::StagesMs;
 use crate::scene::{Bounds, Identities, IdentityId, Level};
 
 /// What is known of one identity.
@@ -123,6 +124,7 @@ pub fn locate_by_names(identities: &Identities, query: &str, kind: Kind) -> Answ
             answer: Answer::NotFound(Vec::new()),
             basis: crate::pipeline::semantics::answer::Basis::Names,
             relevancy: vec![0.0; identities.len() + 1],
+            stages: StagesMs::default(),
         },
     }
 }

@@ -159,9 +159,11 @@ fn text(t: &Timings) -> String {
     if let Some(q) = &t.queries {
         let mut rows = vec![["query stage", "p50 ms", "p95 ms"].map(str::to_owned).to_vec()];
         let stages = [
-            ("text encoding", q.encode),
-            ("relevancy, localisation", q.localise),
-            ("mask, heat map", q.mask),
+            ("text encoding", q.stages.encode),
+            ("relevancy", q.stages.relevancy),
+            ("localisation", q.stages.localise),
+            ("mask", q.stages.mask),
+            ("heat map", q.stages.draw),
             ("without text encoding", q.without_encoding),
             ("whole", q.whole),
         ];

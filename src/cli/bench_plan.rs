@@ -96,6 +96,8 @@ pub fn run(scenes: &[PathBuf], runs: u32, repeats: u32, as_json: bool) -> Result
 
 /// Measures one variant in this process and prints it as JSON.
 pub fn run_child(scene: &Path, variant: Variant, repeats: usize) -> Result<(), CliError> {
+    // As the window has it.
+    memory::settle();
     output::print_json(&measure(scene, variant, repeats)?)
 }
 
@@ -104,9 +106,7 @@ fn child(scene: &Path, variant: Variant, repeats: u32) -> Result<Cost, CliError>
     let program = std::env::current_exe().map_err(|e| CliError::failed(format!("the program's own path: {e}")))?;
     let mut process = Process::new(program);
     process.args(["bench", "--variant", name, "--repeats", &repeats.to_string()]).arg(scene);
-    // As the window has it.
-    let (variable, value) = memory::THRESHOLD;
-    let made = process.env(variable, value).output();
+    let made = process.output();
     let made = made.map_err(|e| CliError::failed(format!("a process for {}: {e}", scene.display())))?;
     if !made.status.success() {
         let why = String::from_utf8_lossy(&made.stderr);
@@ -225,6 +225,7 @@ fn view_request(scene: &OpenedScene, plan: &ScenePlan, camera: Camera) -> Option
         codes: semantics.is_some(),
         semantics,
         leave: Leave::of(plan),
+        timed: false,
         ticket: 1,
     })
 }

@@ -85,6 +85,10 @@ struct Cli {
     /// Print what the window loads and builds, when and why
     #[arg(long)]
     trace: bool,
+    /// Report to show in the window: a folder that 'fmlgs report' wrote, or its report.json; a second
+    /// one is compared with it
+    #[arg(long)]
+    report: Vec<PathBuf>,
     /// Show warnings and results only
     #[arg(short, long, global = true)]
     quiet: bool,
@@ -112,8 +116,8 @@ enum Command {
     CheckStability(check_stability::Args),
 }
 
-/// Opens the window with what is wanted of plans, does one action if one is given, and returns when the window is closed.
-pub type OpenWindow = fn(Option<Action>, Vec<Wish>) -> Result<(), Box<dyn std::error::Error>>;
+/// Opens the window with what is wanted of plans, does these actions, and returns when the window is closed.
+pub type OpenWindow = fn(Vec<Action>, Vec<Wish>) -> Result<(), Box<dyn std::error::Error>>;
 
 /// Runs the command line of this process and returns its exit code. `open_window` stands above this
 /// module, so the caller hands it in.
@@ -139,8 +143,16 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         trace::listen(|load| eprintln!("{}", load.line()));
     }
     let Some(command) = cli.command else {
-        return window(cli.path.map(Action::Open), wishes, open_window);
+        if cli.report.len() > 2 {
+            return Err(CliError::Usage("--report: at most two reports are compared".into()));
+        }
+        let reports = cli.report.into_iter().zip([Action::OpenReport, Action::CompareReport]);
+        let first = cli.path.map(Action::Open).into_iter().chain(reports.map(|(path, action)| action(path)));
+        return window(first.collect(), wishes, open_window);
     };
+    if !cli.report.is_empty() {
+        return Err(CliError::Usage("--report is for the window; a command has no use for it".into()));
+    }
     if let Some(path) = cli.path {
         return Err(CliError::Usage(format!("'{}' before a command means nothing; put it after it", path.display())));
     }
@@ -161,7 +173,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Agent(args) => agent::run(args),
         Command::Synth(args) => synth::run(args, quiet),
         Command::Demo(args) if args.headless => demo::run(args, quiet),
-        Command::Demo(_) => window(Some(Action::TryDemo), wishes, open_window),
+        Command::Demo(_) => window(vec![Action::TryDemo], wishes, open_window),
         Command::Export(args) => export::run(args),
         Command::Bench(args) => bench::run(args, quiet),
         Command::Report(args) => report::run(args, quiet),
@@ -169,13 +181,18 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
     }
 }
 
-fn window(first: Option<Action>, wishes: Vec<Wish>, open_window: OpenWindow) -> Result<(), CliError> {
-    match &first {
-        Some(Action::Open(path)) if !path.exists() => {
-            let name = path.display();
-            return Err(CliError::Usage(format!("'{name}' is no file, no folder and no subcommand")));
+fn window(first: Vec<Action>, wishes: Vec<Wish>, open_window: OpenWindow) -> Result<(), CliError> {
+    for action in &first {
+        match action {
+            Action::Open(path) if !path.exists() => {
+                let name = path.display();
+                return Err(CliError::Usage(format!("'{name}' is no file, no folder and no subcommand")));
+            }
+            Action::OpenReport(path) | Action::CompareReport(path) if !path.exists() => {
+                return Err(CliError::Usage(format!("--report: '{}' is no file and no folder", path.display())));
+            }
+            _ => {}
         }
-        _ => {}
     }
     let has_display = ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|v| std::env::var_os(v).is_some_and(|d| !d.is_empty()));
     if cfg!(all(unix, not(target_os = "macos"))) && !has_display {
@@ -223,5 +240,10 @@ mod tests {
         assert!(matches!(run(cli, |_, _| Ok(())), Err(CliError::Usage(_))));
         let cli = Cli::try_parse_from(["fmlgs", "-q", "info", "photos"]).expect("quiet comes before or after");
         assert!(cli.quiet && cli.path.is_none());
+        let cli = Cli::try_parse_from(["fmlgs", "--report", "a", "--report", "b"]).expect("reports alone");
+        assert_eq!(cli.report.len(), 2);
+        assert!(matches!(run(cli, |_, _| Ok(())), Err(CliError::Usage(e)) if e.contains("--report: 'a'")));
+        let cli = Cli::try_parse_from(["fmlgs", "--report", "a", "info", "b"]).expect("words in an order");
+        assert!(matches!(run(cli, |_, _| Ok(())), Err(CliError::Usage(_))));
     }
 }

@@ -15,6 +15,7 @@ use crate::pipeline::semantics::codes::TOLERANCE;
 use crate::pipeline::semantics::grammar::Kind;
 use crate::pipeline::semantics::localise::{Answer, Hit};
 use crate::pipeline::semantics::matching;
+use crate::pipeline::semantics::stages::ms_since;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::cpu::Renderer;
 use crate::render::{Features, RenderSettings};
@@ -98,8 +99,9 @@ pub fn run(args: Args) -> Result<(), CliError> {
     let mut asker = Asker::new(&map)?;
     let start = Instant::now();
     let answered = asker.ask(&args.text, args.kind.into())?;
-    let answered = answered
+    let mut answered = answered
         .ok_or_else(|| CliError::Usage("there is nothing to look for in the query; type an object's name".into()))?;
+    let matching_since = Instant::now();
     let mut mask = Mask::empty(exact.width_px, exact.height_px);
     let tolerance = args.tolerance / 255.0;
     for id in answered.chosen(args.top) {
@@ -108,7 +110,9 @@ pub fn run(args: Args) -> Result<(), CliError> {
             None => matching::exact(&exact, &map.identities, id, tolerance),
         });
     }
-    let query_ms = start.elapsed().as_secs_f64() * 1e3;
+    answered.stages.mask = ms_since(matching_since);
+    let query_ms = ms_since(start);
+    let drawing_since = Instant::now();
     if let Some(path) = &args.mask {
         let pixels: Vec<u8> = (0..exact.identity.len()).map(|i| if mask.contains(i) { 255 } else { 0 }).collect();
         output::make_parent(path)?;
@@ -116,6 +120,9 @@ pub fn run(args: Args) -> Result<(), CliError> {
     }
     if let Some(path) = &args.heat {
         write_heat(path, &scene.cloud, &camera, &scene.settings, &answered.heat(&exact))?;
+    }
+    if args.mask.is_some() || args.heat.is_some() {
+        answered.stages.draw = ms_since(drawing_since);
     }
     tell(&args, &map, &answered, &asker.unknown_words(&args.text), &mask, query_ms)
 }
@@ -163,6 +170,7 @@ fn tell(
             "pixels": mask.area(),
             "unknown_words": unknown,
             "query_ms": query_ms,
+            "stages_ms": answered.stages,
         }))?;
     }
     match answer {

@@ -12,6 +12,7 @@ use super::semantics::codes::{self, TOLERANCE};
 use super::semantics::grammar::{Kind, Phrase};
 use super::semantics::matching;
 use super::semantics::meaning::{MeaningOptions, Phrasebook};
+use super::semantics::stages::{Stages, StagesMs, ms_since};
 use super::semantics::view_map::ViewMap;
 use crate::math::stats::quantile;
 use crate::math::vector::unit;
@@ -39,12 +40,9 @@ pub struct QueryTiming {
     pub size: [usize; 2],
     /// Queries.
     pub queries: usize,
-    /// Encoding the text.
-    pub encode: Percentiles,
-    /// Relevancy and localisation.
-    pub localise: Percentiles,
-    /// Mask and heat map.
-    pub mask: Percentiles,
+    /// Each stage; what is drawn is the heat map.
+    #[serde(flatten)]
+    pub stages: Stages<Percentiles>,
     /// All but the encoding.
     pub without_encoding: Percentiles,
     /// From the text to the mask.
@@ -71,7 +69,7 @@ pub fn time(
     let all = scene(identities);
     let features = features(&mut rng, &all, encoder);
     let map = view(&mut rng, identities, size);
-    let (mut encode, mut localise, mut mask, mut rest, mut whole) = (vec![], vec![], vec![], vec![], vec![]);
+    let mut each: Vec<StagesMs> = Vec::with_capacity(queries);
     // Canonical phrases are encoded when a scene opens, once.
     let mut canonical = Phrasebook::default();
     canonical.learn(&[], |p| encoder.text(p))?;
@@ -86,33 +84,31 @@ pub fn time(
         let start = Instant::now();
         let Some(phrase) = Phrase::parse(&text) else { continue };
         phrases.learn(&phrases_of(&phrase), |p| encoder.text(p))?;
-        let encoded = start.elapsed();
+        let encode = ms_since(start);
         let language = Language { features: &features, phrases: &phrases, options: MeaningOptions::default() };
         let answered = by_meaning(&all, &phrase, Kind::Auto, language);
-        let answer_at = start.elapsed();
         let target = answered.answer.hits().first().map_or(NOBODY, |h| h.identity);
+        let start = Instant::now();
         let pixels = matching::exact(&map, &all, target, TOLERANCE);
+        let mask = ms_since(start);
+        let start = Instant::now();
         let heat = answered.heat(&map);
-        let end = start.elapsed();
+        let draw = ms_since(start);
         std::hint::black_box((pixels, heat));
-        let ms = |d: std::time::Duration| d.as_secs_f64() * 1e3;
-        encode.push(ms(encoded));
-        localise.push(ms(answer_at - encoded));
-        mask.push(ms(end - answer_at));
-        rest.push(ms(end - encoded));
-        whole.push(ms(end));
+        each.push(StagesMs { encode, mask, draw, ..answered.stages });
     }
-    let of = |v: &[f64]| Percentiles { p50_ms: quantile(v, 0.5), p95_ms: quantile(v, 0.95) };
+    let percentiles = |of: &dyn Fn(&StagesMs) -> f64| {
+        let ms: Vec<f64> = each.iter().map(of).collect();
+        Percentiles { p50_ms: quantile(&ms, 0.5), p95_ms: quantile(&ms, 0.95) }
+    };
     Ok(QueryTiming {
         encoder: encoder.name().into(),
         identities,
         size,
-        queries: whole.len(),
-        encode: of(&encode),
-        localise: of(&localise),
-        mask: of(&mask),
-        without_encoding: of(&rest),
-        whole: of(&whole),
+        queries: each.len(),
+        stages: Stages::of(std::array::from_fn(|k| percentiles(&|s| s.values()[k]))),
+        without_encoding: percentiles(&|s| s.whole() - s.encode),
+        whole: percentiles(&StagesMs::whole),
     })
 }
 

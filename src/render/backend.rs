@@ -5,7 +5,7 @@ use std::sync::{Arc, Weak};
 use serde::{Deserialize, Serialize};
 
 use super::gpu::{self, GpuError};
-use super::{Features, Frame, RenderError, RenderSettings, cpu};
+use super::{Features, Frame, RenderError, RenderSettings, StageTimes, cpu};
 use crate::scene::{Camera, GaussianCloud};
 
 /// Which renderer is wanted.
@@ -47,6 +47,9 @@ pub enum DrawError {
     Gpu(#[from] GpuError),
 }
 
+/// Stages of a picture on the CPU, in their order.
+const STAGES: [&str; 4] = ["project", "sort", "bin", "blend"];
+
 /// Seconds of a picture: the part that every Gaussian has at any size, and that of the pixels.
 #[derive(Clone, Copy, Debug)]
 pub struct Cost {
@@ -71,9 +74,13 @@ pub struct Gpu {
     uploaded: Weak<GaussianCloud>,
     /// Degree of the harmonics that were sent.
     degree: u8,
+    timed: bool,
 }
 
 impl Backend {
+    /// Name of the CPU among the names of what draws.
+    pub const CPU: &str = "CPU";
+
     /// The renderer that `choice` asks for.
     ///
     /// # Errors
@@ -97,13 +104,19 @@ impl Backend {
     /// This GPU, whether real or emulated.
     pub fn on_gpu(context: &gpu::Context) -> Result<Self, GpuError> {
         let renderer = gpu::Renderer::new(context)?;
-        Ok(Self::Gpu(Box::new(Gpu { renderer, name: context.info().name.clone(), uploaded: Weak::new(), degree: 0 })))
+        Ok(Self::Gpu(Box::new(Gpu {
+            renderer,
+            name: context.info().name.clone(),
+            uploaded: Weak::new(),
+            degree: 0,
+            timed: false,
+        })))
     }
 
     /// Its name, for people.
     pub fn name(&self) -> &str {
         match self {
-            Self::Cpu(_) => "CPU",
+            Self::Cpu(_) => Self::CPU,
             Self::Gpu(gpu) => &gpu.name,
         }
     }
@@ -145,6 +158,30 @@ impl Backend {
         match self {
             Self::Cpu(_) => 0,
             Self::Gpu(gpu) => gpu.renderer.device_bytes(),
+        }
+    }
+
+    /// Whether the stages of later pictures are timed. The CPU always does; a GPU does it only where
+    /// it is asked to, and can.
+    ///
+    /// # Errors
+    /// If the GPU gives no memory for it.
+    pub fn time_stages(&mut self, timed: bool) -> Result<(), GpuError> {
+        let Self::Gpu(gpu) = self else { return Ok(()) };
+        if std::mem::replace(&mut gpu.timed, timed) != timed {
+            match timed {
+                true => gpu.renderer.measure()?,
+                false => gpu.renderer.stop_measuring(),
+            }
+        }
+        Ok(())
+    }
+
+    /// Seconds of the last picture by stage; empty where that is not known.
+    pub fn stage_times(&self) -> StageTimes {
+        match self {
+            Self::Cpu(renderer) => STAGES.into_iter().zip(renderer.stats().stage_secs).collect(),
+            Self::Gpu(gpu) => gpu.renderer.times().clone(),
         }
     }
 
@@ -197,5 +234,13 @@ mod tests {
         assert!(worst(&one, &one) < 1e-3);
         assert!(worst(&other, &other) < 1e-3, "the other cloud was sent");
         assert!(worst(&other, &one) > 0.1, "another scene must differ");
+        let names: Vec<&str> = cpu.stage_times().iter().map(|s| s.0).collect();
+        assert_eq!(names, ["project", "sort", "bin", "blend"]);
+        assert!(gpu.stage_times().is_empty(), "nobody asked for them");
+        gpu.time_stages(true).expect("has room");
+        gpu.render(&one, &camera, &settings).expect("draws");
+        assert_eq!(gpu.stage_times().is_empty(), !context.has_timestamps());
+        gpu.time_stages(false).expect("stops");
+        assert!(gpu.stage_times().is_empty());
     }
 }

@@ -13,6 +13,7 @@ pub mod cpu;
 pub mod gpu;
 
 pub use backend::{Backend, BackendChoice, Cost, DrawError};
+pub use gpu::timing::StageTimes;
 
 use serde::{Deserialize, Serialize};
 

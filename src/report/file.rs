@@ -1,8 +1,9 @@
 //! Reports on disk: read with clear errors, written without ever losing the one before.
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::document::{Report, VERSION};
+use super::document::{Computer, Report, VERSION};
 use crate::io::{self, IoError};
 
 /// Name of the document in a report's folder.
@@ -35,7 +36,54 @@ pub enum ReportError {
     Write(#[from] IoError),
 }
 
+/// Why a report cannot be gone on with.
+#[derive(Debug, thiserror::Error)]
+pub enum BeginError {
+    /// It cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReportError),
+    /// It is one of something else.
+    #[error("{path}: a report of another {what}; move it away, or write to another folder", path = .0.display(), what = .1)]
+    Other(PathBuf, &'static str),
+}
+
+/// Whether a path is a report's folder or looks like its document: what else it may hold is left to
+/// whoever opens it.
+pub fn is_report(path: &Path) -> bool {
+    let file = if path.is_dir() { path.join(FILE) } else { path.to_owned() };
+    let is_scene = path.is_dir() && path.join(io::trained::SCENE_FILE).exists();
+    if is_scene || file.extension().is_none_or(|e| !e.eq_ignore_ascii_case("json")) {
+        return false;
+    }
+    if file.file_name().is_some_and(|n| n == FILE) {
+        return file.is_file();
+    }
+    let mut head = Vec::new();
+    let read = std::fs::File::open(&file).and_then(|f| f.take(256).read_to_end(&mut head));
+    let head = String::from_utf8_lossy(&head);
+    read.is_ok() && ["\"version\"", "\"program\"", "\"scene\""].iter().all(|word| head.contains(word))
+}
+
 impl Report {
+    /// The report of `scene` in a folder, to go on with, or an empty one.
+    ///
+    /// # Errors
+    /// If the one that is there cannot be read, or is of another scene, machine or program.
+    pub fn begin(folder: &Path, scene: &str, computer: &Computer) -> Result<Self, BeginError> {
+        let path = folder.join(FILE);
+        let program = env!("CARGO_PKG_VERSION");
+        if !path.exists() {
+            let (scene, computer) = (scene.into(), computer.clone());
+            return Ok(Self { version: VERSION, program: program.into(), scene, computer, stages: Vec::new() });
+        }
+        match Self::read(&path)? {
+            before if before.scene != scene => Err(BeginError::Other(path, "scene")),
+            before if before.computer != *computer => Err(BeginError::Other(path, "machine or build")),
+            before if before.program != program => Err(BeginError::Other(path, "version of the program")),
+            before => Ok(before),
+        }
+    }
+
     /// Reads a report: the JSON file, or the folder that it is in.
     ///
     /// # Errors
@@ -79,6 +127,34 @@ mod tests {
         report.write(&folder.path().join(FILE)).expect("written");
         assert_eq!(Report::read(folder.path()).expect("folder"), report);
         assert_eq!(Report::read(&folder.path().join(FILE)).expect("file"), report);
+    }
+
+    #[test]
+    fn a_report_is_known_from_its_name_or_its_head() {
+        let folder = tempfile::tempdir().expect("folder");
+        let at = |name: &str| folder.path().join(name);
+        assert!(!is_report(folder.path()));
+        example().write(&at("mine.json")).expect("written");
+        std::fs::write(at("other.json"), "{\"frames\": []}").expect("written");
+        assert!(is_report(&at("mine.json")) && !is_report(&at("other.json")) && !is_report(&at("none.json")));
+        std::fs::write(at(FILE), "{").expect("written");
+        assert!(is_report(folder.path()) && is_report(&at(FILE)), "one that is broken is told as such");
+        std::fs::write(at(io::trained::SCENE_FILE), "{}").expect("written");
+        assert!(!is_report(folder.path()), "a scene that holds a report is a scene");
+    }
+
+    #[test]
+    fn a_report_is_gone_on_with_where_it_is_the_same_measurement() {
+        let folder = tempfile::tempdir().expect("folder");
+        let report = Report { program: env!("CARGO_PKG_VERSION").into(), ..example() };
+        let here = report.computer.clone();
+        let empty = Report::begin(folder.path(), "x", &here).expect("nothing there yet");
+        assert!(empty.stages.is_empty() && empty.scene == "x");
+        report.write(&folder.path().join(FILE)).expect("written");
+        assert_eq!(Report::begin(folder.path(), &report.scene, &here).expect("the same"), report);
+        assert!(matches!(Report::begin(folder.path(), "x", &here), Err(BeginError::Other(_, "scene"))));
+        let there = Computer { cores: 1 + here.cores, ..here };
+        assert!(matches!(Report::begin(folder.path(), &report.scene, &there), Err(BeginError::Other(..))));
     }
 
     #[test]

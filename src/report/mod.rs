@@ -1,9 +1,10 @@
 //! Error against run time: every knob that trades accuracy for time is measured, not guessed.
 //!
 //! [`document`] is what a report holds; [`studies`] measure the stages of the program, [`sweep`]
-//! goes through their settings; [`front`] says which are worth having, [`order`] how errors
+//! goes through their settings; [`compare`] holds two reports side by side; [`front`] says which are worth having, [`order`] how errors
 //! fall; [`table`], [`plot`] and [`page`] show it, [`defaults`] justifies the program's defaults.
 
+pub mod compare;
 pub mod computer;
 pub mod defaults;
 pub mod document;
@@ -17,8 +18,9 @@ pub mod studies;
 pub mod sweep;
 pub mod table;
 
+pub use compare::{Comparison, Pair};
 pub use document::{Computer, Form, Knobs, Measure, Order, Point, Report, Rule, Sample, Stage, StageName, VERSION};
-pub use file::{FILE, ReportError};
+pub use file::{BeginError, FILE, ReportError, is_report};
 pub use sweep::{Case, End, Study, StudyError, Trial, sweep};
 
 #[cfg(test)]

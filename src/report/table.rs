@@ -26,7 +26,7 @@ pub fn seconds(secs: f64) -> String {
 }
 
 /// The middle, and how far the repeats are apart.
-fn spread(sample: &Sample, show: impl Fn(f64) -> String) -> String {
+pub fn spread(sample: &Sample, show: impl Fn(f64) -> String) -> String {
     match sample.each.len() {
         0 => String::new(),
         1 => show(sample.median),

@@ -9,10 +9,12 @@ use super::chat::Snapshot;
 use super::dialogs::{Chosen, Purpose, Question};
 use super::state::Tone;
 use super::viewport::brush::Brush;
+use super::viewport::drawing::Drawing;
 use crate::agent::scene::{Deed, Parts};
 use crate::navigate::target::Wish;
 use crate::pipeline::semantics::edit::Edit;
 use crate::pipeline::train::TrainConfig;
+use crate::report::is_report;
 use crate::scene::IdentityId;
 use crate::scene::plan::When;
 use crate::worker::{Action, Command, EditRequest, Failure, FilmRequest, JobKind, Pane, VisitRequest, Visited};
@@ -22,6 +24,7 @@ impl App {
     pub(super) fn act(&mut self, action: Action, ctx: &egui::Context) {
         match action {
             Action::TryDemo => self.replace_scene(Action::TryDemo),
+            Action::Open(path) if is_report(&path) => self.read_report(path, false),
             Action::Open(path) => self.replace_scene(Action::Open(path)),
             Action::OpenFolder => self.choose(Purpose::OpenFolder),
             Action::OpenFile => self.choose(Purpose::OpenFile),
@@ -50,6 +53,15 @@ impl App {
                 }
             }
             Action::Show(mode) => self.layout.mode = mode,
+            Action::ChooseReport => self.choose(Purpose::Report),
+            Action::ChooseSecondReport => self.choose(Purpose::SecondReport),
+            Action::OpenReport(path) => self.read_report(path, false),
+            Action::CompareReport(path) => self.read_report(path, true),
+            Action::EndComparison => self.state.second_report = None,
+            Action::MeasureDrawing => self.measure_drawing(),
+            Action::ApplySetting(stage, knobs) => self.apply_setting(stage, &knobs),
+            Action::ResetDrawing => self.viewport.drawing = Drawing::default(),
+            Action::ToggleTimes => self.layout.times = !self.layout.times,
             Action::ToggleCompare => {
                 self.layout.compare = !self.layout.compare;
                 if self.layout.compare && self.viewport.photo_index().is_none() {
@@ -136,7 +148,7 @@ impl App {
         self.submit(command);
     }
 
-    fn submit(&mut self, command: Command) {
+    pub(super) fn submit(&mut self, command: Command) {
         let title = command.title();
         if let Err(e) = self.worker.submit(command) {
             self.state.toast(Tone::Warning, format!("{title}: {e}"));
@@ -359,6 +371,8 @@ impl App {
     pub(super) fn chosen(&mut self, answer: Chosen) {
         match answer {
             Chosen::Path(Purpose::OpenFolder | Purpose::OpenFile, path) => self.ask(Action::Open(path)),
+            Chosen::Path(Purpose::Report, path) => self.read_report(path, false),
+            Chosen::Path(Purpose::SecondReport, path) => self.read_report(path, true),
             Chosen::Path(Purpose::Masks, path) => self.find_objects(Some(path)),
             Chosen::Path(Purpose::Model(id), path) => self.submit(Command::InstallModel { id, brought: Some(path) }),
             Chosen::Path(Purpose::ExportPly, path) => {

@@ -1,5 +1,6 @@
 //! The application: takes events in, draws the window, sends commands out.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
@@ -10,12 +11,14 @@ use super::dialogs::{self, FileDialogs, Question};
 use super::layout::Layout;
 use super::palette::{Palette, shortcut_sheet};
 use super::panes::{
-    bars, dataset::Thumbnails, empty, log, models::Models, objects, plan, portraits::Portraits, training,
+    bars, dataset::Thumbnails, empty, log, models::Models, objects, plan, portraits::Portraits, report::ReportPane,
+    training,
 };
 use super::state::AppState;
 use super::toasts::Toasts;
 use super::viewport::Viewport;
 use super::{keys, theme};
+use crate::report::is_report;
 use crate::scene::plan::Wish;
 use crate::scene::trace::{self, Sort};
 use crate::worker::{Action, Jobs, Pane, Repaint, Worker};
@@ -37,6 +40,8 @@ pub struct App {
     thumbnails: Thumbnails,
     portraits: Portraits,
     models: Models,
+    /// Error against run time.
+    pub report: ReportPane,
     /// The camera's path and its player.
     pub camera: CameraPane,
     /// The talk with the assistant.
@@ -52,9 +57,13 @@ pub struct App {
 }
 
 impl App {
-    /// Starts the worker and does `first`, if given. `jobs` does the work. Fails only if
+    /// Starts the worker and does `first`, one after the other. `jobs` does the work. Fails only if
     /// the system gives no threads.
-    pub fn new(cc: &eframe::CreationContext<'_>, jobs: impl Jobs, first: Option<Action>) -> std::io::Result<Self> {
+    pub fn new(
+        cc: &eframe::CreationContext<'_>,
+        jobs: impl Jobs,
+        first: impl IntoIterator<Item = Action>,
+    ) -> std::io::Result<Self> {
         theme::install(&cc.egui_ctx);
         // Pictures answer a person's hand. Progress can be read no faster than it is written, and
         // every frame takes from what it reports on.
@@ -76,6 +85,7 @@ impl App {
             thumbnails: Thumbnails::default(),
             portraits: Portraits::default(),
             models: Models::default(),
+            report: ReportPane::default(),
             camera: CameraPane::default(),
             chat: Chat::default(),
             toasts: Toasts::default(),
@@ -123,6 +133,11 @@ impl App {
         if std::mem::take(&mut self.state.wants_objects) {
             self.actions.push(Action::FindObjects);
         }
+        if std::mem::take(&mut self.state.wants_report)
+            && let Some(scene) = &self.state.scene
+        {
+            self.actions.push(Action::OpenReport(scene.report_out.clone()));
+        }
         while let Some(answer) = self.dialogs.answer() {
             self.chosen(answer);
         }
@@ -145,8 +160,14 @@ impl App {
         if !self.palette.is_open() && self.state.error.is_none() && self.question.is_none() && !self.sheet {
             self.actions.extend(keys::pressed(ctx));
         }
-        let dropped = ctx.input(|i| i.raw.dropped_files.first().map(|f| f.path().to_path_buf()));
-        self.actions.extend(dropped.map(Action::Open));
+        let dropped: Vec<PathBuf> =
+            ctx.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_path_buf()).take(2).collect());
+        match dropped.as_slice() {
+            [one, other] if is_report(one) && is_report(other) => {
+                self.actions.extend([Action::OpenReport(one.clone()), Action::CompareReport(other.clone())]);
+            }
+            all => self.actions.extend(all.first().cloned().map(Action::Open)),
+        }
     }
 
     fn panes(&mut self, ui: &mut Ui) {
@@ -170,6 +191,13 @@ impl App {
             if let Some(pose) = wanted {
                 viewport.stand(&pose, state, ui.input(|i| i.time));
             }
+        }
+        if layout.shows(Pane::Report) {
+            // The view stays larger than what is said about it.
+            let most = (0.55 * ui.available_height()).max(200.0);
+            let shown =
+                Panel::bottom("report").frame(pane).resizable(true).default_size(400.0).size_range(200.0..=most);
+            shown.show(ui, |ui| self.report.show(ui, state, layout, viewport, actions));
         }
         let Some(scene) = state.scene.clone() else {
             let canvas = Frame::new().fill(theme::CANVAS);
@@ -209,7 +237,7 @@ impl App {
                         }
                         if layout.shows(Pane::Training) {
                             ui.heading(Pane::Training.text());
-                            training::show(ui, state, layout, actions);
+                            training::show(ui, state, layout, &self.report.curves(state), actions);
                             ui.add_space(10.0);
                         }
                         if objects && state.semantics.is_none() {

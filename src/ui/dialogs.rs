@@ -37,6 +37,10 @@ pub enum Purpose {
     SaveFilm,
     /// Write the talk with the assistant there.
     SaveTalk,
+    /// Read a report.
+    Report,
+    /// Read a report to compare with.
+    SecondReport,
 }
 
 /// The system's answer.
@@ -92,6 +96,9 @@ impl FileDialogs {
             }
             Purpose::OpenPath => {
                 Box::pin(dialog.set_title("Open a camera path").add_filter("Camera paths", &["json"]).pick_file())
+            }
+            Purpose::Report | Purpose::SecondReport => {
+                Box::pin(dialog.set_title("Open a report").add_filter("Reports", &["json"]).pick_file())
             }
             Purpose::SavePath => Box::pin(
                 dialog.set_title("Save the camera path").set_file_name(format!("{name}-path.json")).save_file(),

@@ -39,6 +39,8 @@ pub struct Layout {
     pub mode: ViewMode,
     /// What the plots run over.
     pub plot_axis: PlotAxis,
+    /// Whether the times of a picture's stages are shown.
+    pub times: bool,
     /// Settings of the next training.
     pub config: TrainConfig,
     /// What of the scene plan is wanted otherwise.
@@ -54,12 +56,13 @@ pub struct Layout {
 impl Default for Layout {
     fn default() -> Self {
         Self {
-            hidden: vec![Pane::Log, Pane::Camera],
+            hidden: vec![Pane::Log, Pane::Camera, Pane::Report],
             cameras: true,
             compare: false,
             split: 0.5,
             mode: ViewMode::Picture,
             plot_axis: PlotAxis::default(),
+            times: false,
             config: TrainConfig { steps: 3_000, eval_every: 250, ..TrainConfig::default() },
             plan: Overrides::default(),
             finding: Finding::default(),

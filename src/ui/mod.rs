@@ -5,6 +5,7 @@
 //! changes the view or becomes a job. Nothing here computes for longer than a redraw may take.
 
 mod act;
+mod act_report;
 pub mod app;
 pub mod camera;
 pub mod chat;
@@ -26,8 +27,8 @@ use crate::worker::Action;
 use crate::worker::jobs::PipelineJobs;
 use crate::worker::places::Places;
 
-/// Opens the window, takes what is wanted of plans, does `first`, and returns when it is closed.
-pub fn run(first: Option<Action>, wishes: Vec<Wish>) -> eframe::Result {
+/// Opens the window, takes what is wanted of plans, does `first` one after the other, and returns when it is closed.
+pub fn run(first: Vec<Action>, wishes: Vec<Wish>) -> eframe::Result {
     let viewport = egui::ViewportBuilder::default()
         .with_title("FMLGS")
         .with_app_id("fmlgs")
@@ -49,7 +50,7 @@ pub fn run(first: Option<Action>, wishes: Vec<Wish>) -> eframe::Result {
 fn open(
     viewport: egui::ViewportBuilder,
     renderer: eframe::Renderer,
-    first: Option<Action>,
+    first: Vec<Action>,
     wishes: Vec<Wish>,
 ) -> eframe::Result {
     // Shades that dithering would smooth do not occur in a flat theme.

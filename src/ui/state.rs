@@ -7,6 +7,7 @@ use std::sync::Arc;
 use crate::pipeline::observer::{Evaluation, Level, Progress, StepMetrics};
 use crate::pipeline::semantics::portraits::Gallery;
 use crate::render::RenderSettings;
+use crate::report::Report;
 use crate::scene::{Facts, Limits, Overrides, PhotoPixels, ScenePlan, SemanticMap};
 use crate::worker::{Event, Explored, Failure, JobId, JobKind, Lane, OpenedScene, Outcome, Visited};
 
@@ -86,6 +87,15 @@ pub struct ErrorBox {
     pub failure: Failure,
 }
 
+/// A report on screen.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShownReport {
+    /// Where it was read from.
+    pub path: PathBuf,
+    /// What it holds.
+    pub report: Arc<Report>,
+}
+
 /// Everything the window knows of the world.
 #[derive(Clone, Debug, Default)]
 pub struct AppState {
@@ -131,6 +141,12 @@ pub struct AppState {
     pub photos: BTreeMap<(usize, u32), Arc<PhotoPixels>>,
     /// Photos that could not be loaded, by job, for the window to mark; the window takes them out.
     pub failed_photos: Vec<JobId>,
+    /// Error against run time, if a report is open.
+    pub report: Option<ShownReport>,
+    /// The report that it is compared with.
+    pub second_report: Option<ShownReport>,
+    /// Set when a measurement was cancelled: the window is to show what there is of it.
+    pub wants_report: bool,
     /// Set when training has finished on photos with masks: the window is to find their objects.
     pub wants_objects: bool,
     /// Set when a demo was opened: the window is to train it.
@@ -176,6 +192,7 @@ impl AppState {
             Event::Cancelled(job) => {
                 if let Some(ended) = self.end(job) {
                     self.toast(Tone::Info, format!("{}: cancelled", ended.title));
+                    self.wants_report |= ended.kind == JobKind::Measure;
                 }
             }
             Event::Failed(job, failure) => self.failed(job, failure),
@@ -304,6 +321,13 @@ impl AppState {
                 self.visited = Some(visited);
             }
             Outcome::Explored(explored) => self.explored = Some(explored),
+            Outcome::Report { path, report, second } => {
+                let shown = Some(ShownReport { path, report });
+                match second {
+                    true => self.second_report = shown,
+                    false => self.report = shown,
+                }
+            }
             Outcome::Portraits(map, pictures) => self.portraits = Some((map, pictures)),
             Outcome::Written(path) => self.toast(Tone::Good, format!("Wrote {}", path.display())),
             Outcome::Photo { index, max_side_px, pixels } => {

@@ -131,6 +131,30 @@ fn long_histories_are_thinned_and_keep_their_ends() {
 }
 
 #[test]
+fn reports_are_shown_and_compared_and_a_cancelled_measurement_is_read() {
+    use crate::report::{Computer, Report, VERSION};
+    let read = |scene: &str, second| {
+        let computer = Computer::default();
+        let report = Report { version: VERSION, program: String::new(), scene: scene.into(), computer, stages: vec![] };
+        Event::Finished(JOB, Outcome::Report { path: scene.into(), report: Arc::new(report), second })
+    };
+    let mut s = fold([started(JobKind::Report), read("a", false), started(JobKind::Report), read("b", true)]);
+    let scenes = |s: &AppState| [&s.report, &s.second_report].map(|r| r.as_ref().map(|r| r.report.scene.clone()));
+    assert_eq!(scenes(&s), [Some("a".into()), Some("b".into())]);
+    let failure = Failure { message: "c: not a report".into(), remedy: String::new() };
+    s.apply(started(JobKind::Report));
+    s.apply(Event::Failed(JOB, failure));
+    assert!(s.error.is_some() && scenes(&s)[0].is_some(), "what was shown stays");
+    assert!(s.error.take().is_some_and(|e| e.doing == "Doing it"));
+    s.apply(started(JobKind::Train));
+    s.apply(Event::Cancelled(JOB));
+    assert!(!s.wants_report);
+    s.apply(started(JobKind::Measure));
+    s.apply(Event::Cancelled(JOB));
+    assert!(s.wants_report, "what was measured before is worth seeing");
+}
+
+#[test]
 fn the_recent_list_is_short_and_has_no_doubles() {
     let mut s = AppState::default();
     for i in (0..20).chain([19, 15]) {

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::edit::Edit;
+use crate::report::{Knobs, StageName};
 use crate::scene::{IdentityId, NOBODY};
 
 /// What the viewport shows.
@@ -54,6 +55,8 @@ pub enum Pane {
     Models,
     /// The camera's path.
     Camera,
+    /// Error against run time.
+    Report,
     /// The talk with the agent.
     Chat,
     /// Messages.
@@ -62,8 +65,17 @@ pub enum Pane {
 
 impl Pane {
     /// All of them.
-    pub const ALL: [Self; 8] =
-        [Self::Dataset, Self::Chat, Self::Training, Self::Objects, Self::Plan, Self::Models, Self::Camera, Self::Log];
+    pub const ALL: [Self; 9] = [
+        Self::Dataset,
+        Self::Chat,
+        Self::Training,
+        Self::Objects,
+        Self::Plan,
+        Self::Models,
+        Self::Camera,
+        Self::Report,
+        Self::Log,
+    ];
 
     /// Its title.
     pub fn text(self) -> &'static str {
@@ -74,6 +86,7 @@ impl Pane {
             Self::Plan => "Scene plan",
             Self::Models => "Models",
             Self::Camera => "Camera path",
+            Self::Report => "Report",
             Self::Chat => "Assistant",
             Self::Log => "Log",
         }
@@ -226,6 +239,24 @@ pub enum Action {
     ToggleCameras,
     /// Show or hide a pane.
     TogglePane(Pane),
+    /// Choose a report to look at.
+    ChooseReport,
+    /// Choose a second report to compare with.
+    ChooseSecondReport,
+    /// Show the report at this path.
+    OpenReport(PathBuf),
+    /// Compare with the report at this path.
+    CompareReport(PathBuf),
+    /// Stop comparing reports.
+    EndComparison,
+    /// Measure how the scene is drawn, knob by knob.
+    MeasureDrawing,
+    /// Take over a measured setting of a stage.
+    ApplySetting(StageName, Knobs),
+    /// Draw as the scene says again.
+    ResetDrawing,
+    /// Show or hide how long the stages of a picture take.
+    ToggleTimes,
     /// Search all actions.
     Palette,
     /// List all shortcuts.
@@ -236,7 +267,7 @@ pub enum Action {
 
 impl Action {
     /// Every action that needs no further input, in the order of the palette.
-    pub const ALL: [Self; 51] = [
+    pub const ALL: [Self; 58] = [
         Self::TryDemo,
         Self::OpenFolder,
         Self::OpenFile,
@@ -286,6 +317,13 @@ impl Action {
         Self::Talk,
         Self::SaveTalk,
         Self::TogglePane(Pane::Chat),
+        Self::TogglePane(Pane::Report),
+        Self::ChooseReport,
+        Self::ChooseSecondReport,
+        Self::EndComparison,
+        Self::MeasureDrawing,
+        Self::ResetDrawing,
+        Self::ToggleTimes,
         Self::Palette,
         Self::Shortcuts,
     ];
@@ -343,6 +381,15 @@ impl Action {
             Self::ToggleCompare => "Compare with the photo".into(),
             Self::ToggleCameras => "Show or hide cameras".into(),
             Self::TogglePane(pane) => format!("Show or hide the {} pane", pane.text().to_lowercase()),
+            Self::ChooseReport => "Open a report…".into(),
+            Self::ChooseSecondReport => "Compare with another report…".into(),
+            Self::OpenReport(path) => format!("Open the report {}", path.display()),
+            Self::CompareReport(path) => format!("Compare with the report {}", path.display()),
+            Self::EndComparison => "Stop comparing reports".into(),
+            Self::MeasureDrawing => "Measure drawing of this scene".into(),
+            Self::ApplySetting(stage, _) => format!("Apply a setting of {}", stage.title().to_lowercase()),
+            Self::ResetDrawing => "Draw as the scene says again".into(),
+            Self::ToggleTimes => "Show or hide frame times".into(),
             Self::Palette => "Command palette".into(),
             Self::Shortcuts => "Keyboard shortcuts".into(),
             Self::Quit => "Quit".into(),
@@ -407,6 +454,16 @@ impl Action {
             Self::ToggleCompare => "Show the photo beside the picture with a slider between them.",
             Self::ToggleCameras => "Draw the camera of every photo into the view.",
             Self::TogglePane(_) => "Show or hide this part of the window.",
+            Self::ChooseReport => "A report.json of fmlgs report: error against run time of every knob.",
+            Self::ChooseSecondReport => "Its points are drawn hollow, its numbers stand beside.",
+            Self::OpenReport(_) | Self::CompareReport(_) => "Read this report.",
+            Self::EndComparison => "Leave the second report out again.",
+            Self::MeasureDrawing => {
+                "Draws a few views in many ways, and holds them against the exact picture. Takes minutes; can be cancelled and gone on with."
+            }
+            Self::ApplySetting(..) => "Take this setting over.",
+            Self::ResetDrawing => "Forget drawing settings that were taken from a report.",
+            Self::ToggleTimes => "How long each stage of a picture takes: the last, and the median of the last 60.",
             Self::Palette => "Find and run any action by name.",
             Self::Shortcuts => "List every key and mouse gesture.",
             Self::Quit => "Close the window. A running training keeps its last checkpoint.",
@@ -442,6 +499,7 @@ impl Action {
             Self::Show(ViewMode::Alpha) => plain("7"),
             Self::ToggleCompare => plain("C"),
             Self::ToggleCameras => plain("V"),
+            Self::ToggleTimes => plain("F3"),
             Self::Palette => ctrl("P"),
             Self::Shortcuts => plain("F1"),
             Self::Quit => ctrl("Q"),
@@ -466,6 +524,14 @@ impl Action {
             | Self::Paint(_)
             | Self::AddPainted
             | Self::GoToPhoto(_)
+            | Self::ChooseReport
+            | Self::ChooseSecondReport
+            | Self::OpenReport(_)
+            | Self::CompareReport(_)
+            | Self::EndComparison
+            | Self::MeasureDrawing
+            | Self::ApplySetting(..)
+            | Self::ResetDrawing
             | Self::TurnUp(_)
             | Self::TogglePane(_) => None,
         }

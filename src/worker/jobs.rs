@@ -7,7 +7,7 @@ use super::places::Places;
 use super::preview::{home_view, sparse_cloud};
 use super::protocol::{Command, Failure, OpenedScene, Outcome, Stop};
 use super::thread::Jobs;
-use super::{edit, guide, machine};
+use super::{edit, guide, machine, measure as measuring};
 use crate::io::labels::Labels;
 use crate::io::{self, IoError, OpenError, Opened, TrainedScene, trained};
 use crate::models;
@@ -56,6 +56,11 @@ impl PipelineJobs {
         scene.path.clone_from(path);
         let root = scene.dataset.as_ref().map(|d| d.root.clone());
         scene.masks = root.filter(|root| Labels::open(root).is_ok());
+        scene.report_out = match scene.out.as_os_str().is_empty() {
+            true => self.places.report(path),
+            false => scene.out.join("report"),
+        };
+        scene.reports = measuring::known(path, &scene.report_out);
         let (dataset, cloud) = (scene.dataset.as_deref(), scene.cloud.as_deref());
         if scene.home.camera.is_none() {
             scene.home = home_view(dataset, cloud);
@@ -260,6 +265,8 @@ impl Jobs for PipelineJobs {
                 Ok(Outcome::Explored(Arc::new(guide::Explored::new(cloud, &cameras, up))))
             }
             Command::Film(request) => guide::film(*request, observer),
+            Command::Measure(request) => measuring::run(*request, observer),
+            Command::ReadReport { path, second } => measuring::read(path, second),
             Command::Portraits { cloud, map, settings, home } => {
                 let from = home.camera.as_ref().map_or(home.bounds.center() + home.up, |c| c.center);
                 trace::record(Sort::Portraits, "portraits of objects and parts", "a list of them is shown", 0);

@@ -35,14 +35,23 @@ impl Places {
         self.run(root, 1 + (1..).take_while(exists).count())
     }
 
-    /// Folder of the `n`-th training, from 1: the dataset's name and a digest of its path, so that
-    /// two datasets of one name do not share it.
+    /// Folder for a report of the splat at `path`, which has no folder of its own.
+    pub fn report(&self, path: &Path) -> PathBuf {
+        self.data.join("reports").join(Self::unique(path))
+    }
+
+    /// Folder of the `n`-th training, from 1.
     fn run(&self, root: &Path, n: usize) -> PathBuf {
+        self.data.join("trained").join(Self::unique(root)).join(format!("run-{n}"))
+    }
+
+    /// A path's last name and a digest of all of it, so that two of one name do not share a folder.
+    fn unique(root: &Path) -> String {
         let root = std::path::absolute(root).unwrap_or_else(|_| root.to_path_buf());
         let mut hasher = DefaultHasher::new();
         root.hash(&mut hasher);
         let name = root.file_name().map_or_else(|| "scene".into(), |n| n.to_string_lossy().into_owned());
-        self.data.join("trained").join(format!("{name}-{:08x}", hasher.finish() as u32)).join(format!("run-{n}"))
+        format!("{name}-{:08x}", hasher.finish() as u32)
     }
 }
 

@@ -7,12 +7,14 @@ use glam::DVec3;
 
 use super::edit::EditRequest;
 use super::guide::{Explored, FilmRequest, VisitRequest, Visited};
+use super::measure::MeasureRequest;
 use crate::io::trained::History;
 use crate::pipeline::observer::{Evaluation, Level, Progress, StepMetrics};
 use crate::pipeline::semantics::find::Finding;
 use crate::pipeline::semantics::portraits::Gallery;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
+use crate::report::Report;
 use crate::scene::{Bounds, Camera, Dataset, Facts, GaussianCloud, Photo, PhotoPixels, SemanticMap};
 
 /// Names one job of one worker.
@@ -50,18 +52,32 @@ pub enum JobKind {
     Visit,
     /// Draws a film.
     Film,
+    /// Measures drawing, knob by knob.
+    Measure,
+    /// Reads a report.
+    Report,
 }
 
 impl JobKind {
     /// Which thread runs it.
     pub fn lane(self) -> Lane {
         match self {
-            Self::Open | Self::Demo | Self::Train | Self::Evaluate | Self::Objects | Self::Model | Self::Film => {
-                Lane::Long
-            }
-            Self::Edit | Self::Export | Self::Photo | Self::Picture | Self::Portraits | Self::Explore | Self::Visit => {
-                Lane::Short
-            }
+            Self::Open
+            | Self::Demo
+            | Self::Train
+            | Self::Evaluate
+            | Self::Objects
+            | Self::Model
+            | Self::Film
+            | Self::Measure => Lane::Long,
+            Self::Edit
+            | Self::Export
+            | Self::Photo
+            | Self::Picture
+            | Self::Portraits
+            | Self::Explore
+            | Self::Visit
+            | Self::Report => Lane::Short,
         }
     }
 }
@@ -178,6 +194,15 @@ pub enum Command {
     Visit(Box<VisitRequest>),
     /// Draw a film.
     Film(Box<FilmRequest>),
+    /// Measure error against run time of drawing, and write it as a report.
+    Measure(Box<MeasureRequest>),
+    /// Read a report.
+    ReadReport {
+        /// Its folder or file.
+        path: PathBuf,
+        /// Whether it is to be compared with the one that is shown.
+        second: bool,
+    },
     /// Draw every object and part alone, small.
     Portraits {
         /// The Gaussians.
@@ -209,6 +234,8 @@ impl Command {
             Self::InstallModel { .. } => JobKind::Model,
             Self::Visit(_) => JobKind::Visit,
             Self::Film(_) => JobKind::Film,
+            Self::Measure(_) => JobKind::Measure,
+            Self::ReadReport { .. } => JobKind::Report,
         }
     }
 
@@ -230,6 +257,8 @@ impl Command {
             Self::InstallModel { id, .. } => format!("Fetching the model {id}"),
             Self::Visit(request) => format!("Finding the way to {}", request.map.identities.full_name(request.id)),
             Self::Film(request) => format!("Drawing {}", name(&request.out)),
+            Self::Measure(_) => "Measuring how this scene is drawn".into(),
+            Self::ReadReport { path, .. } => format!("Opening the report {}", name(path)),
         }
     }
 }
@@ -282,6 +311,10 @@ pub struct OpenedScene {
     pub sh_stored: u8,
     /// What its plan is computed from.
     pub facts: Facts,
+    /// Reports that may be of it.
+    pub reports: Vec<PathBuf>,
+    /// Folder for a report of it.
+    pub report_out: PathBuf,
 }
 
 /// What a finished job brings.
@@ -306,6 +339,15 @@ pub enum Outcome {
     Edited(Arc<SemanticMap>),
     /// A file was written.
     Written(PathBuf),
+    /// A report was read or measured.
+    Report {
+        /// Where it lies.
+        path: PathBuf,
+        /// What it holds.
+        report: Arc<Report>,
+        /// Whether it is to be compared with the one that is shown.
+        second: bool,
+    },
     /// Portraits of objects and parts by number less one, as `semantics::portraits` draws them.
     Portraits(Arc<SemanticMap>, Gallery),
     /// A model can be used now.

@@ -13,7 +13,7 @@ use super::{Slot, paint};
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::cpu::Renderer;
-use crate::render::{Backend, BackendChoice, Frame, RenderSettings};
+use crate::render::{Backend, BackendChoice, Frame, RenderSettings, StageTimes};
 use crate::scene::plan::When;
 use crate::scene::trace::{self, Sort};
 use crate::scene::{Camera, GaussianCloud, PhotoPixels, ScenePlan, SemanticMap};
@@ -64,6 +64,8 @@ pub struct ViewRequest {
     pub codes: bool,
     /// What is left out.
     pub leave: Leave,
+    /// Whether the stages are to be timed, where that is not free.
+    pub timed: bool,
     /// Comes back with the picture.
     pub ticket: u64,
 }
@@ -100,6 +102,8 @@ pub struct MappedView {
     pub ticket: u64,
     /// The pixels.
     pub maps: Arc<ViewMaps>,
+    /// Seconds that drawing them took.
+    pub secs: f64,
 }
 
 /// What the pixels of a view belong to, drawn once for all questions.
@@ -130,6 +134,10 @@ pub struct ViewPicture {
     pub psnr: Option<f64>,
     /// Seconds that rendering took.
     pub secs: f64,
+    /// The same by stage, where that is known.
+    pub stages: StageTimes,
+    /// Seconds from colours to bytes: depth scales, differences.
+    pub paint_secs: f64,
     /// What drew it: "CPU", or the name of the GPU.
     pub drawn_by: String,
 }
@@ -179,14 +187,16 @@ impl ViewLane {
                 out.publish(painter.draw(&request));
                 repaint();
                 // What the pixels belong to comes second, and only if nobody waits for a picture.
+                let start = Instant::now();
                 if lock(&box_.0).request.is_none()
                     && let Some(maps) = maps_of(&mut mapper, &request)
                 {
+                    let secs = start.elapsed().as_secs_f64();
                     if !std::mem::replace(&mut mapped_before, true) {
                         let pixels = maps.identities.identity.len() as u64;
                         trace::record(Sort::Maps, "maps of the view", "something is asked of it", pixels * 12);
                     }
-                    mapped.publish(MappedView { ticket: request.ticket, maps: Arc::new(maps) });
+                    mapped.publish(MappedView { ticket: request.ticket, maps: Arc::new(maps), secs });
                     repaint();
                 }
             }
@@ -307,6 +317,8 @@ impl Painter {
     fn draw(&mut self, request: &ViewRequest) -> ViewResult {
         let camera = self.fitting_camera(&request.camera, request.effort);
         let full = camera == request.camera;
+        // Without times there is still a picture.
+        let _ = self.backend.time_stages(request.timed);
         let start = Instant::now();
         let frame = match self.try_render(request, &camera) {
             // A GPU that fails (lost, out of memory) leaves the CPU to draw from then on.
@@ -318,7 +330,10 @@ impl Painter {
         };
         let secs = start.elapsed().as_secs_f64();
         self.learn(secs, f64::from(camera.width_px * camera.height_px));
+        let stages = self.backend.stage_times();
+        let start = Instant::now();
         let drawn = paint::paint(&frame, request.mode, request.photo.as_deref());
+        let paint_secs = start.elapsed().as_secs_f64();
         let median_depth = (!frame.median_depth.is_empty()).then_some(frame.median_depth);
         Ok(Arc::new(ViewPicture {
             ticket: request.ticket,
@@ -329,6 +344,8 @@ impl Painter {
             depth_range: drawn.depth_range,
             psnr: drawn.psnr,
             secs,
+            stages,
+            paint_secs,
             drawn_by: self.backend.name().to_owned(),
         }))
     }

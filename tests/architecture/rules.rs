@@ -16,7 +16,7 @@ const MODULES: [(&str, &[&str]); 13] = [
     ("navigate", &["math", "scene", "render"]),
     ("stability", &["math", "scene", "render", "pipeline", "navigate"]),
     ("report", &["math", "scene", "io", "models", "render", "pipeline", "navigate"]),
-    ("worker", &["math", "scene", "io", "models", "render", "pipeline", "navigate"]),
+    ("worker", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "report"]),
     ("agent", &["math", "scene", "io", "render", "pipeline", "navigate", "worker"]),
     (
         "cli",

@@ -1,11 +1,14 @@
 //! One query, answered: by names where the scene's names know the words, else by meaning.
 
+use std::time::Instant;
+
 use rayon::prelude::*;
 
 use super::grammar::{Kind, Phrase};
-use super::localise::{Answer, Scorer, localise};
+use super::localise::{Answer, Scorer, Strategy, localise};
 use super::meaning::{ByMeaning, MeaningOptions, Phrasebook};
 use super::names::{self, ByName};
+use super::stages::{StagesMs, ms_since};
 use super::view_map::ViewMap;
 use crate::scene::{Identities, IdentityId, LanguageFeatures, Mask};
 
@@ -28,6 +31,8 @@ pub struct Answered {
     /// Relevancy of every identity by number, 0 to 1; a piece is at least as relevant as its whole
     /// where names decide.
     pub relevancy: Vec<f32>,
+    /// How long that took: relevancy and localisation here, the other stages by those who go on.
+    pub stages: StagesMs,
 }
 
 /// Features and encoded phrases for answers by meaning.
@@ -55,33 +60,85 @@ pub fn answer(identities: &Identities, phrase: &Phrase, kind: Kind, language: Op
         return named;
     }
     let meant = by_meaning(identities, phrase, kind, language);
+    // Both were looked at, whichever is taken.
+    let stages = named.stages.and(meant.stages);
     let nothing = |a: &Answer| matches!(a, Answer::NotFound(_));
-    if nothing(&meant.answer) && !nothing(&named.answer) { named } else { meant }
+    let taken = if nothing(&meant.answer) && !nothing(&named.answer) { named } else { meant };
+    Answered { stages, ..taken }
+}
+
+/// Counts the time that scores take.
+struct Timed<'a, S> {
+    scorer: &'a mut S,
+    ms: f64,
+}
+
+impl<S: Scorer> Scorer for Timed<'_, S> {
+    fn scores(&mut self, phrase: &str, against: Option<&str>) -> Vec<f32> {
+        let start = Instant::now();
+        let scores = self.scorer.scores(phrase, against);
+        self.ms += ms_since(start);
+        scores
+    }
+
+    fn strategy(&self) -> Strategy {
+        self.scorer.strategy()
+    }
+
+    fn threshold(&self) -> f32 {
+        self.scorer.threshold()
+    }
+
+    fn resolution(&self) -> f32 {
+        self.scorer.resolution()
+    }
+}
+
+/// Localises by `scorer`, then makes the relevancy of every identity by `relevancy`.
+fn judged<S: Scorer>(
+    (identities, phrase, kind): (&Identities, &Phrase, Kind),
+    basis: Basis,
+    scorer: &mut S,
+    relevancy: impl FnOnce(&Answer, &mut S) -> Vec<f32>,
+) -> Answered {
+    let start = Instant::now();
+    let mut timed = Timed { scorer, ms: 0.0 };
+    let answer = localise(identities, phrase, kind, &mut timed);
+    let (scored_ms, localised_ms) = (timed.ms, ms_since(start));
+    let relevancy = relevancy(&answer, scorer);
+    let stages = StagesMs {
+        relevancy: scored_ms + ms_since(start) - localised_ms,
+        localise: localised_ms - scored_ms,
+        ..StagesMs::default()
+    };
+    Answered { answer, basis, relevancy, stages }
 }
 
 /// Answers by names alone.
 pub fn by_name(identities: &Identities, phrase: &Phrase, kind: Kind) -> Answered {
-    let answer = localise(identities, phrase, kind, &mut ByName(identities));
-    let alone = names::scores(identities, &phrase.target);
-    let mut relevancy = vec![0.0; identities.len() + 1];
-    for (id, identity) in identities.iter() {
-        let hit = answer.hits().iter().find(|h| h.identity == id);
-        // What shares the words but not the whole is related, not meant.
-        let own = hit.map_or(0.5 * alone[id as usize - 1], |h| h.score);
-        relevancy[id as usize] = f32::max(own, relevancy[identity.parent as usize]);
-    }
-    Answered { answer, basis: Basis::Names, relevancy }
+    judged((identities, phrase, kind), Basis::Names, &mut ByName(identities), |answer, _| {
+        let alone = names::scores(identities, &phrase.target);
+        let mut relevancy = vec![0.0; identities.len() + 1];
+        for (id, identity) in identities.iter() {
+            let hit = answer.hits().iter().find(|h| h.identity == id);
+            // What shares the words but not the whole is related, not meant.
+            let own = hit.map_or(0.5 * alone[id as usize - 1], |h| h.score);
+            relevancy[id as usize] = f32::max(own, relevancy[identity.parent as usize]);
+        }
+        relevancy
+    })
 }
 
 /// Answers by meaning alone.
 pub fn by_meaning(identities: &Identities, phrase: &Phrase, kind: Kind, language: Language<'_>) -> Answered {
     let Language { features, phrases, options } = language;
     let mut scorer = ByMeaning::new(features, phrases, options);
-    let answer = localise(identities, phrase, kind, &mut scorer);
-    let mut relevancy = vec![0.0];
-    relevancy.extend(scorer.scores(&phrase.text, None));
-    relevancy.resize(identities.len() + 1, 0.0);
-    Answered { answer, basis: Basis::Meaning, relevancy }
+    judged((identities, phrase, kind), Basis::Meaning, &mut scorer, |_, scorer| {
+        let mut relevancy = vec![0.0];
+        relevancy.extend(scorer.scores(&phrase.text, None));
+        relevancy.resize(identities.len() + 1, 0.0);
+        relevancy
+    })
 }
 
 impl Answered {
@@ -173,6 +230,9 @@ mod tests {
         assert!(a.relevancy[3] > 0.9 && a.relevancy[1] < 0.5);
         assert!(ask("cup", false).chosen(1).is_empty());
         assert!(ask("giraffe", true).chosen(3).is_empty());
+        let stages = a.stages;
+        assert!(stages.relevancy >= 0.0 && stages.localise >= 0.0, "{stages:?}");
+        assert_eq!(stages.whole(), stages.relevancy + stages.localise, "nothing else happens here");
         let a = ask("lamp", true);
         assert_eq!(a.chosen(2), [1], "only what fits");
         let map =

@@ -1,10 +1,13 @@
 //! Asks a scene: the encoder that looked at its identities, if one has, and the phrases that it has
 //! read so far.
 
+use std::time::Instant;
+
 use super::answer::{Answered, Language, answer, phrases_of};
 use super::grammar::{Kind, Phrase};
 use super::meaning::{MeaningOptions, Phrasebook};
 use super::names;
+use super::stages::ms_since;
 use crate::models::{self, Encoder, ModelError};
 use crate::scene::{Identities, LanguageFeatures, SemanticMap};
 
@@ -35,6 +38,7 @@ impl Asker {
     /// # Errors
     /// If the encoder fails.
     pub fn ask(&mut self, map: &SemanticMap, text: &str, kind: Kind) -> Result<Option<Answered>, ModelError> {
+        let start = Instant::now();
         let Some(phrase) = Phrase::parse(text) else { return Ok(None) };
         let known = match &mut self.encoder {
             Some(encoder) => match self.phrases.learn(&phrases_of(&phrase), |p| encoder.text(p)) {
@@ -45,9 +49,12 @@ impl Asker {
             },
             None => false,
         };
+        let encode = ms_since(start);
         let language = map.language.as_ref().filter(|_| known);
         let language = language.map(|features| Language { features, phrases: &self.phrases, options: self.options });
-        Ok(Some(answer(&map.identities, &phrase, kind, language)))
+        let mut answered = answer(&map.identities, &phrase, kind, language);
+        answered.stages.encode = encode;
+        Ok(Some(answered))
     }
 
     /// The words of a question that nothing here knows.

@@ -5,7 +5,7 @@
 //! tell objects from parts), [`tracker`] makes them identities over all views, [`votes`] gives every Gaussian its identity, [`codes`] every identity its point in code
 //! space, [`view_map`] draws identities into a view; [`grammar`] takes a query apart, [`names`] and
 //! [`meaning`] score identities for it by words and by looks, [`localise`] picks those that are
-//! meant, and [`answer`] puts it together.
+//! meant, and [`answer`] puts it together, with the time of each of the [`stages`].
 
 pub mod answer;
 pub mod asker;
@@ -29,6 +29,7 @@ pub mod protocols;
 pub mod regions;
 pub mod relevancy;
 pub mod segmenter;
+pub mod stages;
 pub mod tracker;
 pub mod train_codes;
 pub mod view_map;

@@ -78,6 +78,11 @@ impl Renderer {
         Ok(())
     }
 
+    /// Stops timing.
+    pub fn stop_measuring(&mut self) {
+        (self.timer, self.times) = (None, StageTimes::new());
+    }
+
     /// Seconds per stage of the last frame and its backward pass; empty unless measured.
     pub fn times(&self) -> &StageTimes {
         &self.times

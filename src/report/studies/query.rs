@@ -193,7 +193,8 @@ impl Study for QueryStudy<'_> {
                 let (of, all) = (&map.of, &map.identities);
                 let exact = ViewMap::render(renderer, self.cloud, of, all, &small, self.settings).map_err(failed)?;
                 let blended = match plan.blend {
-                    true => CodeMap::render(renderer, self.cloud, &map.codes, true, &small, self.settings).map_err(failed)?,
+                    true => CodeMap::render(renderer, self.cloud, &map.codes, true, &small, self.settings)
+                        .map_err(failed)?,
                     false => CodeMap::default(),
                 };
                 Ok(Maps { exact, blended })

@@ -16,7 +16,7 @@ pub fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut Vec<Act
         let has_photos = state.scene.as_ref().is_some_and(|s| s.dataset.is_some());
         ui.menu_button("File", |ui| {
             ui.set_min_width(260.0);
-            for action in [Action::TryDemo, Action::OpenFolder, Action::OpenFile] {
+            for action in [Action::TryDemo, Action::OpenFolder, Action::OpenFile, Action::ChooseReport] {
                 item(ui, true, None, action, actions);
             }
             ui.menu_button("Open recent", |ui| {
@@ -44,6 +44,7 @@ pub fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut Vec<Act
             ui.separator();
             item(ui, has_photos, Some(layout.cameras), Action::ToggleCameras, actions);
             item(ui, has_photos, Some(layout.compare), Action::ToggleCompare, actions);
+            item(ui, has_scene, Some(layout.times), Action::ToggleTimes, actions);
             ui.separator();
             for action in [Action::FrameScene, Action::ResetView] {
                 item(ui, has_scene, None, action, actions);

@@ -9,4 +9,5 @@ pub mod objects;
 pub mod plan;
 pub mod plots;
 pub mod portraits;
+pub mod report;
 pub mod training;

@@ -8,8 +8,12 @@ use super::super::state::TrainHistory;
 use super::super::theme;
 use crate::pipeline::observer::{Evaluation, StepMetrics};
 
-/// Draws both plots with a common horizontal axis.
-pub fn show(ui: &mut Ui, history: &TrainHistory, axis: &mut PlotAxis) {
+/// PSNR over seconds of another training, with its name.
+pub type Curve = (String, Vec<[f64; 2]>);
+
+/// Draws both plots with a common horizontal axis. The `curves` are of other trainings, and drawn over
+/// seconds only: how many steps they had does not matter to them.
+pub fn show(ui: &mut Ui, history: &TrainHistory, curves: &[Curve], axis: &mut PlotAxis) {
     ui.horizontal(|ui| {
         theme::section(ui, "Quality");
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
@@ -18,6 +22,7 @@ pub fn show(ui: &mut Ui, history: &TrainHistory, axis: &mut PlotAxis) {
             ui.weak("against");
         });
     });
+    let over_secs = *axis == PlotAxis::Seconds;
     let x_step = |m: &StepMetrics| if *axis == PlotAxis::Seconds { m.secs } else { m.step as f64 };
     let x_eval = |e: &Evaluation| if *axis == PlotAxis::Seconds { e.secs } else { e.step as f64 };
     let psnr: Vec<[f64; 2]> = history.steps.iter().map(|m| [x_step(m), m.train_psnr]).filter(finite).collect();
@@ -25,6 +30,10 @@ pub fn show(ui: &mut Ui, history: &TrainHistory, axis: &mut PlotAxis) {
     plot("psnr", "PSNR (dB)", *axis)
         .legend(Legend::default().position(egui_plot::Corner::RightBottom).background_alpha(0.5))
         .show(ui, |p| {
+            let colors = [theme::WARNING, theme::GOOD].into_iter().cycle();
+            for ((name, curve), color) in curves.iter().zip(colors).filter(|_| over_secs) {
+                p.line(Line::new(name.clone(), PlotPoints::from(curve.clone())).color(color).width(1.2));
+            }
             p.line(Line::new("training photos", smooth(&psnr)).color(theme::WEAK).width(1.2));
             p.line(Line::new("held-out photos", PlotPoints::from(held.clone())).color(theme::ACCENT).width(2.0));
             p.points(

@@ -5,12 +5,13 @@ use egui::{DragValue, Grid, RichText, Slider, Ui};
 use super::super::layout::Layout;
 use super::super::state::{AppState, RunningJob};
 use super::super::{format, keys, theme};
-use super::plots;
+use super::plots::{self, Curve};
 use crate::pipeline::train::TrainConfig;
 use crate::worker::{Action, JobKind};
 
 /// Draws the pane.
-pub fn show(ui: &mut Ui, state: &AppState, layout: &mut Layout, actions: &mut Vec<Action>) {
+/// Curves of a report stand beside this training's.
+pub fn show(ui: &mut Ui, state: &AppState, layout: &mut Layout, curves: &[Curve], actions: &mut Vec<Action>) {
     let Some(scene) = &state.scene else { return };
     let Some(dataset) = &scene.dataset else {
         ui.add_space(6.0);
@@ -28,7 +29,7 @@ pub fn show(ui: &mut Ui, state: &AppState, layout: &mut Layout, actions: &mut Ve
     }
     if !state.history.steps.is_empty() || !state.history.evaluations.is_empty() {
         facts(ui, state, job);
-        plots::show(ui, &state.history, &mut layout.plot_axis);
+        plots::show(ui, &state.history, curves, &mut layout.plot_axis);
     } else if job.is_none() {
         ui.add_space(4.0);
         ui.weak("Loss and PSNR appear here once training runs.");

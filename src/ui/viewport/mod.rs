@@ -1,7 +1,9 @@
 //! The viewport: shows what the drawing lane rendered, and moves the eye.
 
 pub mod brush;
+pub mod drawing;
 pub mod eye;
+pub mod frame_times;
 mod frusta;
 mod input;
 mod overlay;
@@ -11,12 +13,15 @@ mod route;
 pub mod visible;
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use egui::{Color32, ColorImage, Rect, Sense, TextureHandle, TextureOptions, Ui};
 use glam::{DVec2, DVec3};
 
 use self::brush::Brush;
+use self::drawing::Drawing;
 use self::eye::Eye;
+use self::frame_times::FrameTimes;
 use self::photo::PhotoView;
 use self::query::Questions;
 use self::visible::Visibility;
@@ -25,6 +30,7 @@ use super::layout::Layout;
 use super::state::AppState;
 use super::theme;
 use crate::navigate::Pose;
+use crate::render::Backend;
 use crate::scene::plan::When;
 use crate::scene::trace::{self, Sort};
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
@@ -69,6 +75,10 @@ pub struct Viewport {
     pub visibility: Visibility,
     /// What is being marked by hand.
     pub brush: Option<Brush>,
+    /// What is drawn in another way than the scene says.
+    pub drawing: Drawing,
+    /// Times of the newest pictures, while they are shown.
+    times: Option<FrameTimes>,
     /// Generation of the newest map of identities.
     mapped: u64,
     /// World point that the wheel zooms to, while the cursor stays.
@@ -92,6 +102,9 @@ struct Asked {
     sh_degree: u8,
     /// Without what.
     leave: Leave,
+    drawing: Drawing,
+    /// With the times of its stages.
+    timed: bool,
 }
 
 impl Viewport {
@@ -118,6 +131,8 @@ impl Viewport {
             questions: Questions::default(),
             visibility: Visibility::default(),
             brush: None,
+            drawing: Drawing::default(),
+            times: None,
             mapped: 0,
             zoom_anchor: None,
         })
@@ -157,6 +172,7 @@ impl Viewport {
             self.questions.clear();
             self.visibility = Visibility::default();
             self.brush = None;
+            self.drawing = Drawing::default();
             self.eye = home_eye(scene, None);
         }
         if let Some((generation, snapshot)) = worker.clouds().newer_than(self.snapshot) {
@@ -235,6 +251,11 @@ impl Viewport {
         Pose { center, world_from_camera, fov_y_rad }
     }
 
+    /// The camera of the newest picture, or one of the eye.
+    pub fn camera(&self) -> Camera {
+        self.picture.as_ref().map_or_else(|| self.eye.camera(640, 480), |p| p.camera.clone())
+    }
+
     /// Width by height of the picture.
     pub fn aspect(&self) -> f64 {
         self.picture.as_ref().map_or(16.0 / 9.0, |p| f64::from(p.camera.width_px) / f64::from(p.camera.height_px))
@@ -292,6 +313,10 @@ impl Viewport {
         let rect = ui.available_rect_before_wrap();
         let response = ui.allocate_rect(rect, Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Viewport"));
+        match layout.times {
+            true => drop(self.times.get_or_insert_default()),
+            false => self.times = None,
+        }
         self.take_picture(ui);
         let now = ui.input(|i| i.time);
         self.use_brush(&response, rect, state);
@@ -358,6 +383,9 @@ impl Viewport {
     fn take_picture(&mut self, ui: &Ui) {
         if let Some((generation, mapped)) = self.lane.maps().newer_than(self.mapped) {
             self.mapped = generation;
+            if let Some(times) = &mut self.times {
+                times.add_maps(mapped.secs);
+            }
             // One of an earlier request is of another view.
             if mapped.ticket == self.tickets {
                 self.questions.set_maps(Some(Arc::clone(&mapped.maps)));
@@ -367,6 +395,7 @@ impl Viewport {
         self.shown = generation;
         match &*result {
             Ok(picture) => {
+                let start = Instant::now();
                 let size = [picture.camera.width_px as usize, picture.camera.height_px as usize];
                 let pixels = picture.rgb.iter().map(|&[r, g, b]| Color32::from_rgb(r, g, b)).collect();
                 let image = ColorImage::new(size, pixels);
@@ -376,6 +405,9 @@ impl Viewport {
                 }
                 if self.picture.is_none() {
                     trace::record(Sort::Picture, "first picture", "the scene is on screen", 0);
+                }
+                if let Some(times) = &mut self.times {
+                    times.add(picture, start.elapsed().as_secs_f64());
                 }
                 self.picture = Some(Arc::clone(picture));
                 self.error = None;
@@ -422,10 +454,17 @@ impl Viewport {
             codes: semantics.is_some() && self.questions.wants_codes(),
             sh_degree: state.drawing().sh_degree,
             leave: Leave::of(plan),
+            drawing: self.drawing.clone(),
+            timed: layout.times,
         };
-        if plan.redraw == When::Always {
+        let again = plan.redraw == When::Always;
+        if again {
             ui.ctx().request_repaint();
-        } else if self.requested.as_ref() == Some(&asked) {
+        }
+        // A newer request would keep what belongs to the last one from ever being drawn.
+        let drawn = self.picture.as_ref().is_some_and(|p| p.ticket == self.tickets)
+            && (semantics.is_none() || self.questions.maps().is_some());
+        if self.requested.as_ref() == Some(&asked) && !(again && drawn) {
             return;
         }
         self.tickets += 1;
@@ -433,12 +472,13 @@ impl Viewport {
             cloud,
             camera: asked.camera.clone(),
             mode: asked.mode,
-            settings: state.drawing(),
+            settings: self.drawing.over(state.drawing(), self.on_gpu()),
             effort,
             photo,
             semantics,
             codes: asked.codes,
             leave: asked.leave,
+            timed: asked.timed,
             ticket: self.tickets,
         });
         // A change of resolution alone does not move what the pixels belong to.
@@ -448,6 +488,11 @@ impl Viewport {
             self.questions.set_maps(None);
         }
         self.requested = Some(asked);
+    }
+
+    /// Whether a GPU draws the view.
+    pub fn on_gpu(&self) -> bool {
+        self.picture.as_ref().is_some_and(|p| p.drawn_by != Backend::CPU)
     }
 
     /// The world point under a window position: at the drawn depth, else at the pivot's.

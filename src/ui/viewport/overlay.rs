@@ -37,7 +37,18 @@ impl Viewport {
         if let Some(facts) = self.facts(layout, state) {
             card("facts", Align2::LEFT_BOTTOM, 0.0, &mut |ui| {
                 ui.label(RichText::new(&facts).small().color(theme::WEAK));
+                if let Some(words) = self.drawing.words() {
+                    ui.label(RichText::new(format!("drawn with {words}")).small().color(theme::WARNING));
+                    let reset = ui.small_button("Reset").on_hover_text(Action::ResetDrawing.tooltip());
+                    if reset.accessible_name(Action::ResetDrawing.text()).clicked() {
+                        actions.push(Action::ResetDrawing);
+                    }
+                }
             });
+        }
+        // A small view is for the picture.
+        if let Some(times) = self.times.as_ref().filter(|_| rect.height() > 330.0) {
+            card("times", Align2::LEFT_BOTTOM, -46.0, &mut |ui| times.show(ui));
         }
         if let Some(error) = &self.error {
             card("view error", Align2::CENTER_CENTER, 0.0, &mut |ui| {

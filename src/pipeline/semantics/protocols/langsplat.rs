@@ -115,6 +115,7 @@ mod tests {
     use crate::pipeline::semantics::answer::Basis;
     use crate::pipeline::semantics::code_map::CodeMap;
     use crate::pipeline::semantics::localise::Answer;
+    use crate::pipeline::semantics::stages::StagesMs;
     use crate::scene::{Camera, NOBODY, SemanticMap};
     use glam::DVec3;
 
@@ -166,7 +167,12 @@ mod tests {
         let blended = CodeMap::default();
         let compare_with = |relevancy: Vec<f32>| {
             let mut ask = |_: &str| {
-                Some(Answered { answer: Answer::NotFound(vec![]), basis: Basis::Meaning, relevancy: relevancy.clone() })
+                Some(Answered {
+                    answer: Answer::NotFound(vec![]),
+                    basis: Basis::Meaning,
+                    relevancy: relevancy.clone(),
+                    stages: StagesMs::default(),
+                })
             };
             let boxes = truth.bounds().into_iter().collect();
             let categories = vec![Category { name: "eye".into(), level: Level::Object, mask: truth.clone(), boxes }];

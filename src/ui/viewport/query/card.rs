@@ -2,7 +2,7 @@
 
 use egui::{RichText, Ui};
 
-use super::{Look, Questions};
+use super::{Look, Questions, times};
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::answer::Basis;
 use crate::pipeline::semantics::localise::Answer;
@@ -48,16 +48,11 @@ impl Questions {
             let facts = self.facts_of(target, semantics, cloud);
             show_target(ui, target, &facts, actions);
         }
-        if self.open {
-            let ms = |d: std::time::Duration| d.as_secs_f64() * 1e3;
-            let basis = match newest.answered.basis {
-                Basis::Names => "by names",
-                Basis::Meaning => "by looks",
-            };
-            let times =
-                format!("answered {basis} in {:.1} ms, drawn in {:.1} ms", ms(newest.time), ms(self.paint_time));
-            ui.label(RichText::new(times).small().color(theme::WEAK));
-        }
+        let basis = match newest.answered.basis {
+            Basis::Names => "by names",
+            Basis::Meaning => "by looks",
+        };
+        times::show(ui, basis, &newest.answered.stages.and(self.paint_ms));
         if newest.answered.answer.hits().iter().all(|h| h.score <= 0.0) {
             let known = names::completions(identities, "", 6).join(", ");
             ui.weak(format!("Known here, for example: {known}"));

@@ -9,10 +9,11 @@ mod card;
 mod look;
 mod overlay;
 mod speech;
+mod times;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use egui::{Align2, Area, Color32, Id, Order, Rect, TextureHandle, TextureOptions, Ui};
 
@@ -24,6 +25,7 @@ use crate::pipeline::semantics::grammar::Phrase;
 use crate::pipeline::semantics::matching::{self, MatchMode};
 use crate::pipeline::semantics::meaning::MeaningOptions;
 use crate::pipeline::semantics::names;
+use crate::pipeline::semantics::stages::{StagesMs, ms_since};
 use crate::scene::{GaussianCloud, Identities, IdentityId, Mask, NOBODY, ScenePlan, SemanticMap};
 use crate::worker::{Action, ViewMaps};
 
@@ -44,8 +46,6 @@ pub struct Asked {
     chosen: Option<IdentityId>,
     /// Words that neither names nor the encoder know.
     unknown: Vec<String>,
-    /// How long answering took.
-    time: Duration,
 }
 
 impl Asked {
@@ -95,8 +95,8 @@ pub struct Questions {
     facts: Option<card::Facts>,
     /// Pixels of identities in the present view, counted as they are listed.
     areas: Areas,
-    /// How long masks and overlay took.
-    paint_time: Duration,
+    /// What finding the pixels and drawing them took, of all questions on screen.
+    paint_ms: StagesMs,
 }
 
 /// Pixels of identities in a view, for one way of matching.
@@ -194,14 +194,15 @@ impl Questions {
         let start = Instant::now();
         let phrase = Phrase::parse(text)?;
         let phrases = self.speech.learn(&phrase);
+        let encode = ms_since(start);
         let language = semantics.language.as_ref().zip(phrases);
         let language =
             language.map(|(features, phrases)| Language { features, phrases, options: MeaningOptions::default() });
-        let answered = answer(&semantics.identities, &phrase, self.look.kind, language);
-        let time = start.elapsed();
+        let mut answered = answer(&semantics.identities, &phrase, self.look.kind, language);
+        answered.stages.encode = encode;
         let to_encoder = self.speech.unknown_words(text);
         let unknown = names::unknown_to_all(&semantics.identities, text, to_encoder.as_deref());
-        Some(Asked { text: text.trim().to_owned(), answered, chosen: None, unknown, time })
+        Some(Asked { text: text.trim().to_owned(), answered, chosen: None, unknown })
     }
 
     /// Keeps the question being typed on screen, and makes room for the next.
@@ -251,6 +252,7 @@ impl Questions {
         let newest = self.all().last().map(|q| q.text.clone());
         let nothing = shown.iter().all(Vec::is_empty) && matches!(self.look.tint, Tint::Masks | Tint::Heat);
         if nothing && (newest.is_none() || self.look.tint == Tint::Masks) && self.look.threshold <= 0.0 {
+            (self.painted, self.paint_ms) = (None, StagesMs::default());
             return;
         }
         let painted = Painted {
@@ -267,7 +269,7 @@ impl Questions {
                 Some(texture) => texture.set(image, TextureOptions::LINEAR),
                 None => self.texture = Some(ui.ctx().load_texture("masks", image, TextureOptions::LINEAR)),
             }
-            self.paint_time = start.elapsed();
+            self.paint_ms.draw = ms_since(start) - self.paint_ms.mask;
             self.painted = Some(painted);
         }
         if let Some(texture) = &self.texture {
@@ -282,8 +284,10 @@ impl Questions {
             ids.iter().for_each(|id| mask.add(&self.mask_of(maps, semantics, *id)));
             mask
         };
+        let start = Instant::now();
         let masks: Vec<([u8; 3], Mask)> =
             shown.iter().enumerate().map(|(k, ids)| (COLORS[k % COLORS.len()], union(ids))).collect();
+        self.paint_ms.mask = ms_since(start);
         let newest = self.all().last();
         let relevancy = newest.map_or_else(Vec::new, |q| q.answered.relevancy.clone());
         let features = match (&semantics.language, self.look.tint) {

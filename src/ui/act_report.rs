@@ -1,0 +1,63 @@
+//! What the actions around reports do.
+
+use std::path::PathBuf;
+
+use super::app::App;
+use super::panes::report::apply;
+use super::state::Tone;
+use crate::report::{Knobs, StageName};
+use crate::worker::{Command, MeasureRequest, Pane};
+
+impl App {
+    /// Reads a report and shows its pane.
+    pub(super) fn read_report(&mut self, path: PathBuf, second: bool) {
+        self.layout.hidden.retain(|p| *p != Pane::Report);
+        self.submit(Command::ReadReport { path, second });
+    }
+
+    /// Measures how the scene is drawn: from photos, or from where the eye is.
+    pub(super) fn measure_drawing(&mut self) {
+        let scene = self.state.scene.clone();
+        let cloud = self.viewport.cloud().cloned().filter(|_| self.state.is_trained());
+        let (Some(scene), Some(cloud)) = (scene, cloud) else {
+            self.state.toast(Tone::Warning, "Open or train a scene first: its Gaussians are what is drawn.");
+            return;
+        };
+        if let Some(job) = &self.state.job {
+            let text = format!("{} is still running; cancel it first (Esc), or it falsifies the times.", job.title);
+            self.state.toast(Tone::Warning, text);
+            return;
+        }
+        let request = MeasureRequest {
+            scene: scene.path.display().to_string(),
+            cloud,
+            settings: scene.render.clone(),
+            dataset: scene.dataset.clone(),
+            holdout_every: self.layout.config.holdout_every,
+            camera: self.viewport.camera(),
+            out: scene.report_out.clone(),
+        };
+        self.layout.hidden.retain(|p| *p != Pane::Report);
+        self.submit(Command::Measure(Box::new(request)));
+    }
+
+    /// Takes a measured setting over: into the next training, or into the view.
+    pub(super) fn apply_setting(&mut self, stage: StageName, knobs: &Knobs) {
+        let done = match stage {
+            StageName::Train => apply::turned(&self.layout.config, knobs).map(|config| {
+                self.layout.config = config;
+                self.layout.hidden.retain(|p| *p != Pane::Training);
+                "The next training will use it (pane Training)"
+            }),
+            StageName::Render => apply::turned(&self.viewport.drawing, knobs).map(|drawing| {
+                self.viewport.drawing = drawing;
+                "The view is drawn with it; films and exports stay as they are"
+            }),
+            _ => Err("the window has no setting for it".into()),
+        };
+        match done {
+            Ok(text) => self.state.toast(Tone::Good, text),
+            Err(text) => self.state.toast(Tone::Warning, format!("This cannot be applied: {text}")),
+        }
+    }
+}

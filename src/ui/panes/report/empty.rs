@@ -1,0 +1,95 @@
+//! The Report pane without a report: what it is for, and how to come by one.
+
+use egui::{RichText, Ui, vec2};
+
+use super::super::super::state::AppState;
+use super::super::super::theme;
+use crate::worker::{Action, JobKind};
+
+/// Draws it.
+pub fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
+    ui.label(RichText::new("Error against run time").strong());
+    ui.label(
+        "Every knob that trades accuracy for time can be measured. A report holds the measurements; here they are \
+         plotted, the settings worth having are marked, and a click takes one over.",
+    );
+    ui.add_space(6.0);
+    if let Some(job) = state.job.as_ref().filter(|j| j.kind == JobKind::Measure) {
+        ui.strong(&job.title);
+        if let Some(p) = &job.progress {
+            let share = p.done as f32 / p.total.max(1) as f32;
+            ui.add(egui::ProgressBar::new(share).desired_width(320.0).desired_height(6.0).fill(theme::ACCENT));
+            ui.weak(format!(
+                "{} of {} measurements. Leave the view alone: drawing it takes from what is measured.",
+                p.done, p.total
+            ));
+        } else {
+            ui.weak("Drawing the exact pictures that all others are held against.");
+        }
+        if ui.add(egui::Button::new("Cancel").min_size(vec2(92.0, 28.0))).clicked() {
+            actions.push(Action::Cancel);
+        }
+        return;
+    }
+    ui.horizontal_wrapped(|ui| {
+        let size = vec2(0.0, 28.0);
+        if state.is_trained() {
+            let button = theme::primary_button("Measure drawing of this scene").min_size(size);
+            let response = ui.add_enabled(state.job.is_none(), button);
+            let disabled = "Another job is running; it would falsify the times.";
+            if response.on_hover_text(Action::MeasureDrawing.tooltip()).on_disabled_hover_text(disabled).clicked() {
+                actions.push(Action::MeasureDrawing);
+            }
+        }
+        let open = ui.add(egui::Button::new("Open a report\u{2026}").min_size(size));
+        if open.on_hover_text(Action::ChooseReport.tooltip()).clicked() {
+            actions.push(Action::ChooseReport);
+        }
+        for path in state.scene.iter().flat_map(|s| &s.reports) {
+            let found = ui.add(egui::Button::new(format!("Open {}", path.display())).min_size(size));
+            if found.on_hover_text("This report was found with the scene.").clicked() {
+                actions.push(Action::OpenReport(path.clone()));
+            }
+        }
+    });
+    ui.add_space(6.0);
+    ui.weak("All stages (training, finding objects, queries, camera paths, depth) are measured on the command line:");
+    ui.horizontal(|ui| {
+        let command = command(state);
+        ui.label(RichText::new(&command).monospace().color(theme::ACCENT));
+        if ui.small_button("Copy").clicked() {
+            ui.ctx().copy_text(command);
+        }
+    });
+    ui.weak("Then drop its folder onto the window.");
+}
+
+/// The command that measures the open scene.
+fn command(state: &AppState) -> String {
+    let trained = state.scene.as_ref().filter(|_| state.is_trained());
+    // A scene that was trained here lies in its own folder; a splat is its own.
+    let scene = trained.map(|s| if s.out.as_os_str().is_empty() { &s.path } else { &s.out });
+    let scene = scene.map_or_else(|| "SCENE".to_owned(), |path| quoted(&path.display().to_string()));
+    format!("fmlgs report {scene} --out report")
+}
+
+/// A word of a shell.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+:,".contains(c);
+    match word.chars().all(plain) {
+        true => word.to_owned(),
+        false => format!("'{}'", word.replace('\'', "'\\''")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_can_be_pasted() {
+        assert_eq!(command(&AppState::default()), "fmlgs report SCENE --out report");
+        assert_eq!(quoted("/a/b-1.ply"), "/a/b-1.ply");
+        assert_eq!(quoted("/my scene/it's"), "'/my scene/it'\\''s'");
+    }
+}

@@ -1,0 +1,331 @@
+//! Error against run time: a report's measurements as a plot, what they say of the defaults, and the
+//! way from a measured setting to one in force.
+
+pub mod apply;
+mod empty;
+mod scale;
+mod scatter;
+mod tables;
+
+use egui::{CollapsingHeader, ComboBox, RichText, ScrollArea, Ui};
+
+use self::apply::{Now, Offer};
+use self::scatter::Scatter;
+use super::super::layout::Layout;
+use super::super::state::{AppState, ShownReport};
+use super::super::viewport::Viewport;
+use super::super::{format, theme};
+use crate::report::{Measure, Point, Report, Stage, StageName, table};
+use crate::worker::Action;
+
+/// What a person looks at in a report.
+#[derive(Default)]
+pub struct ReportPane {
+    stage: Option<StageName>,
+    /// By name.
+    measure: Option<String>,
+    /// Knob and setting of the chosen point.
+    selected: Option<[String; 2]>,
+    /// Set once a point was chosen: what can be done with it stands on top.
+    to_top: bool,
+}
+
+impl ReportPane {
+    /// Draws the pane.
+    pub fn show(
+        &mut self,
+        ui: &mut Ui,
+        state: &AppState,
+        layout: &Layout,
+        viewport: &Viewport,
+        actions: &mut Vec<Action>,
+    ) {
+        let Some(shown) = state.report.clone() else {
+            ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| empty::show(ui, state, actions));
+            return;
+        };
+        let second = state.second_report.clone();
+        let report = &*shown.report;
+        self.header(ui, &shown, second.as_ref(), state, actions);
+        let Some(stage) = self.stage_of(report) else {
+            ui.weak("Nothing was measured yet: the report has no stage. Run the same command again to go on.");
+            return;
+        };
+        let Some(measure) = self.measure_of(stage) else {
+            ui.weak("This stage has no measure.");
+            return;
+        };
+        let second_report = second.as_ref().map(|s| &*s.report);
+        warnings(ui, stage, report, second_report);
+        let other = second_report.and_then(|r| r.stage(stage.name));
+        let selected = self.selected_of(stage);
+        let own = state.scene.as_ref().map(|_| state.drawing());
+        let now =
+            Now { config: &layout.config, own: own.as_ref(), drawing: &viewport.drawing, on_gpu: viewport.on_gpu() };
+        let size = ui.available_size();
+        // A column of its own where there is room, else on top of the tables.
+        let wide = size.x > 1_100.0;
+        let widths = if wide { [0.46, 0.23, 0.31] } else { [0.54, 0.0, 0.46] }.map(|share: f32| share * size.x - 8.0);
+        let mut clicked = None;
+        ui.horizontal_top(|ui| {
+            ui.allocate_ui(egui::vec2(widths[0], size.y), |ui| {
+                let scatter = Scatter { stage, second: other, measure, selected };
+                clicked = scatter.show(ui, size.y.max(120.0));
+            });
+            if wide {
+                column(ui, "chosen", widths[1], false, |ui| chosen(ui, stage, selected, &now, actions));
+            }
+            column(ui, "tables", widths[2], self.to_top && !wide, |ui| {
+                if !wide {
+                    chosen(ui, stage, selected, &now, actions);
+                }
+                if let Some(other) = other {
+                    section(ui, "Both reports", true, |ui| {
+                        tables::comparison(ui, &stage.beside(other, measure), measure);
+                    });
+                }
+                let title = format!("Measurements ({})", stage.points.len());
+                let in_table = section(ui, &title, true, |ui| tables::points(ui, stage, measure, selected));
+                clicked = clicked.or(in_table.flatten());
+                section(ui, "Defaults by the rule", true, |ui| tables::choices(ui, stage));
+                if !stage.orders.is_empty() {
+                    section(ui, "Orders of convergence", true, |ui| tables::orders(ui, stage));
+                }
+                section(ui, "About this report", false, |ui| tables::about(ui, report, stage));
+            });
+        });
+        self.to_top = clicked.is_some();
+        if let Some(point) = clicked {
+            self.select(&point.method, &point.setting);
+        }
+    }
+
+    /// Chooses the setting of a knob, as a click on its point does.
+    pub fn select(&mut self, method: &str, setting: &str) {
+        self.selected = Some([method.to_owned(), setting.to_owned()]);
+    }
+
+    /// PSNR over seconds of trainings in the report: of the default, and of the chosen setting.
+    pub fn curves(&self, state: &AppState) -> Vec<(String, Vec<[f64; 2]>)> {
+        let Some(stage) = state.report.as_ref().and_then(|r| r.report.stage(StageName::Train)) else {
+            return Vec::new();
+        };
+        if stage.measures.first().is_none_or(|m| m.name != "PSNR") {
+            return Vec::new();
+        }
+        let chosen = self.selected_of(stage);
+        let wanted = |p: &&Point| p.curve.len() > 1 && (p.default || chosen.is_some_and(|c| std::ptr::eq(c, *p)));
+        let named = |p: &Point| (format!("report, {}", tables::title(p)), p.curve.clone());
+        stage.points.iter().filter(wanted).map(named).collect()
+    }
+
+    /// The stage that is looked at, or the first.
+    fn stage_of<'a>(&self, report: &'a Report) -> Option<&'a Stage> {
+        self.stage.and_then(|name| report.stage(name)).or_else(|| report.stages.first())
+    }
+
+    fn measure_of<'a>(&self, stage: &'a Stage) -> Option<&'a Measure> {
+        self.measure.as_ref().and_then(|name| stage.measure(name)).or_else(|| stage.measures.first())
+    }
+
+    fn selected_of<'a>(&self, stage: &'a Stage) -> Option<&'a Point> {
+        let [method, setting] = self.selected.as_ref()?;
+        stage.points.iter().find(|p| p.method == *method && p.setting == *setting)
+    }
+
+    /// Which report, stage and measure; where others come from.
+    fn header(
+        &mut self,
+        ui: &mut Ui,
+        shown: &ShownReport,
+        second: Option<&ShownReport>,
+        state: &AppState,
+        actions: &mut Vec<Action>,
+    ) {
+        ui.horizontal_wrapped(|ui| {
+            ui.label(RichText::new("Error against run time").strong());
+            ui.label(RichText::new(name(shown)).color(theme::WEAK)).on_hover_text(shown.path.display().to_string());
+            if let Some(second) = second {
+                ui.label(RichText::new(format!("beside {} (hollow)", name(second))).color(theme::ACCENT))
+                    .on_hover_text(second.path.display().to_string());
+                button(ui, "End comparison", &Action::EndComparison, true, actions);
+            }
+            ui.separator();
+            let stage = self.stage_of(&shown.report);
+            for s in &shown.report.stages {
+                let is_shown = stage.is_some_and(|t| t.name == s.name);
+                if ui.selectable_label(is_shown, s.name.title()).on_hover_text(&s.reference).clicked() {
+                    (self.stage, self.measure) = (Some(s.name), None);
+                }
+            }
+            if let Some((stage, measure)) = stage.and_then(|s| Some((s, self.measure_of(s)?))) {
+                let names = ComboBox::from_id_salt("measure").selected_text(table::title(measure)).show_ui(ui, |ui| {
+                    for m in &stage.measures {
+                        let row = ui.selectable_label(m.name == measure.name, table::title(m));
+                        if row.on_hover_text(&m.meaning).clicked() {
+                            self.measure = Some(m.name.clone());
+                        }
+                    }
+                });
+                names.response.on_hover_text(&measure.meaning).accessible_name("Measure");
+            }
+            ui.separator();
+            button(ui, "Open\u{2026}", &Action::ChooseReport, true, actions);
+            button(ui, "Compare\u{2026}", &Action::ChooseSecondReport, true, actions);
+            let can_measure = state.is_trained() && state.job.is_none();
+            button(ui, "Measure drawing", &Action::MeasureDrawing, can_measure, actions);
+        });
+    }
+}
+
+/// Its folder's name.
+fn name(shown: &ShownReport) -> String {
+    let folder = if shown.path.is_dir() { Some(shown.path.as_path()) } else { shown.path.parent() };
+    let name = folder.and_then(|f| f.file_name()).map(|n| n.to_string_lossy().into_owned());
+    format::shortened(&name.unwrap_or_else(|| shown.path.display().to_string()), 32)
+}
+
+fn button(ui: &mut Ui, text: &str, action: &Action, enabled: bool, actions: &mut Vec<Action>) {
+    let response = ui.add_enabled(enabled, egui::Button::new(text).small());
+    let disabled = "Needs a trained scene, and no other job.";
+    if response.on_hover_text(action.tooltip()).on_disabled_hover_text(disabled).clicked() {
+        actions.push(action.clone());
+    }
+}
+
+fn column(ui: &mut Ui, name: &str, width: f32, to_top: bool, add: impl FnOnce(&mut Ui)) {
+    ui.allocate_ui(egui::vec2(width, ui.available_height()), |ui| {
+        let area = ScrollArea::both().auto_shrink([false, false]).id_salt(name);
+        let area = if to_top { area.vertical_scroll_offset(0.0) } else { area };
+        area.show(ui, |ui| ui.vertical(add));
+    });
+}
+
+fn section<R>(ui: &mut Ui, title: &str, open: bool, add: impl FnOnce(&mut Ui) -> R) -> Option<R> {
+    let id = title.split(" (").next().unwrap_or(title);
+    let header = CollapsingHeader::new(RichText::new(title).small().strong()).id_salt(id).default_open(open);
+    header.show(ui, add).body_returned
+}
+
+/// What must be known before numbers are believed.
+fn warnings(ui: &mut Ui, stage: &Stage, report: &Report, second: Option<&Report>) {
+    let warn = |ui: &mut Ui, text: String| ui.label(RichText::new(text).small().color(theme::WARNING));
+    if !stage.complete() {
+        let done = stage.points.iter().filter(|p| p.secs.each.len() >= stage.seeds.len()).count();
+        let text = format!(
+            "Not complete: {done} of {} settings were measured {} times. The same command goes on with the rest.",
+            stage.planned,
+            stage.seeds.len()
+        );
+        warn(ui, text);
+    }
+    let Some(second) = second else { return };
+    let differs = report.differs_from(second);
+    if !differs.is_empty() {
+        let text = format!("Measured under other conditions, so times do not compare: {}", differs.join("; "));
+        warn(ui, format::shortened(&text, 180)).on_hover_text(differs.join("\n"));
+    }
+    if second.stage(stage.name).is_none() {
+        warn(ui, format!("The second report has nothing about: {}.", stage.name.title().to_lowercase()));
+    }
+}
+
+/// The chosen point, and what can be done with it.
+fn chosen(ui: &mut Ui, stage: &Stage, selected: Option<&Point>, now: &Now<'_>, actions: &mut Vec<Action>) {
+    let Some(point) = selected else {
+        ui.weak("Click on a point, or on a row below, to see what it would change. Drag to move, Ctrl+wheel to zoom.");
+        return;
+    };
+    egui::Frame::new().fill(theme::SURFACE).corner_radius(8).inner_margin(10).show(ui, |ui| {
+        ui.set_width(ui.available_width());
+        scatter::facts(ui, point, &stage.measures, "");
+        ui.add_space(4.0);
+        match apply::offer(stage, point, now) {
+            Offer::Changes(changes, action) => {
+                for c in &changes {
+                    ui.label(format!("{}: {}, instead of {}", c.name, c.to, c.from));
+                }
+                let what = match stage.name {
+                    StageName::Train => "Apply to the next training",
+                    _ => "Apply to the view",
+                };
+                if ui.add(theme::primary_button(what)).on_hover_text(action.tooltip()).clicked() {
+                    actions.push(action);
+                }
+            }
+            Offer::InForce => {
+                ui.colored_label(theme::GOOD, "In force: applying it would change nothing.");
+            }
+            Offer::Not(why) => {
+                ui.label(RichText::new(why).color(theme::WEAK));
+            }
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::{Computer, Rule, Sample, VERSION};
+    use std::collections::BTreeMap;
+    use std::sync::Arc;
+
+    fn report() -> Report {
+        let sample = |v: f64| {
+            let mut s = Sample::default();
+            s.add(v);
+            s
+        };
+        let point = |method: &str, setting: &str, secs: f64| Point {
+            method: method.into(),
+            setting: setting.into(),
+            default: method == "default",
+            secs: sample(secs),
+            values: BTreeMap::from([("PSNR".to_owned(), sample(20.0 + secs))]),
+            curve: vec![[0.5 * secs, 15.0], [secs, 20.0 + secs]],
+            ..Point::default()
+        };
+        let stage = Stage {
+            name: StageName::Train,
+            secs_of: "training".into(),
+            reference: String::new(),
+            input: BTreeMap::new(),
+            seeds: vec![0],
+            planned: 3,
+            measures: vec![Measure::new("PSNR", "dB", crate::report::Form::Decibels, "")],
+            rule: Rule { measure: "PSNR".into(), times: 1.0, floor: 0.0 },
+            points: vec![point("default", "all", 2.0), point("steps", "500", 1.0), point("steps", "50", 0.1)],
+            orders: Vec::new(),
+            left_out: Vec::new(),
+        };
+        let computer = Computer::default();
+        Report { version: VERSION, program: String::new(), scene: String::new(), computer, stages: vec![stage] }
+    }
+
+    #[test]
+    fn curves_of_the_default_and_of_the_chosen_setting_go_beside_a_training() {
+        let mut pane = ReportPane::default();
+        let mut state = AppState::default();
+        assert!(pane.curves(&state).is_empty());
+        state.report = Some(ShownReport { path: "report".into(), report: Arc::new(report()) });
+        let names = |pane: &ReportPane| pane.curves(&state).into_iter().map(|c| c.0).collect::<Vec<_>>();
+        assert_eq!(names(&pane), ["report, default: all"]);
+        pane.select("steps", "500");
+        assert_eq!(names(&pane), ["report, default: all", "report, steps: 500"]);
+        assert_eq!(pane.curves(&state)[1].1, [[0.5, 15.0], [1.0, 21.0]]);
+        let mut other = report();
+        other.stages[0].measures[0].name = "SSIM".into();
+        state.report = Some(ShownReport { path: "report".into(), report: Arc::new(other) });
+        assert!(pane.curves(&state).is_empty(), "curves are of the first measure");
+    }
+
+    #[test]
+    fn what_is_gone_from_a_report_is_looked_at_no_more() {
+        let report = report();
+        let mut pane = ReportPane { stage: Some(StageName::Path), measure: Some("x".into()), ..ReportPane::default() };
+        pane.select("steps", "none");
+        let stage = pane.stage_of(&report).expect("the first");
+        assert_eq!((stage.name, pane.measure_of(stage).map(|m| m.name.as_str())), (StageName::Train, Some("PSNR")));
+        assert!(pane.selected_of(stage).is_none());
+    }
+}

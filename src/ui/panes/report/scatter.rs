@@ -1,0 +1,232 @@
+//! Error over seconds, both logarithmic: one colour per knob, the Pareto front, the repeats' spread.
+
+use egui::{Color32, Response, Stroke, Ui, Vec2b};
+use egui_plot::{Corner, Legend, Line, MarkerShape, Plot, PlotPoint, PlotPoints, PlotTransform, Points};
+
+use super::super::super::theme;
+use super::scale;
+use crate::report::plot::{COLORS, LEAST};
+use crate::report::{Measure, Point, Stage, table};
+
+/// How near the pointer must be to a point, in window points.
+const NEAR: f32 = 14.0;
+/// Shapes of knobs, in turn with each round of colours.
+const SHAPES: [MarkerShape; 3] = [MarkerShape::Circle, MarkerShape::Diamond, MarkerShape::Square];
+
+/// What is drawn.
+pub struct Scatter<'a> {
+    /// The stage.
+    pub stage: &'a Stage,
+    /// The same stage of another report, drawn hollow.
+    pub second: Option<&'a Stage>,
+    /// What is on the vertical axis.
+    pub measure: &'a Measure,
+    /// The point that is chosen.
+    pub selected: Option<&'a Point>,
+}
+
+impl<'a> Scatter<'a> {
+    /// Draws it; returns the point that was clicked.
+    pub fn show(&self, ui: &mut Ui, height: f32) -> Option<&'a Point> {
+        let (stage, measure) = (self.stage, self.measure);
+        let name = (stage.name.name(), measure.name.clone(), self.second.is_some());
+        let plot = Plot::new(name)
+            .height(height)
+            .show_background(false)
+            .show_grid(Vec2b::TRUE)
+            .grid_color(theme::LINE)
+            .allow_scroll(false)
+            .show_crosshair(false)
+            .set_margin_fraction(egui::vec2(0.06, 0.1))
+            .x_axis_label(format!("seconds of {}", stage.secs_of))
+            .y_axis_label(measure.error_name())
+            .y_axis_min_width(46.0)
+            .x_grid_spacer(|input| scale::marks(input.bounds))
+            .y_grid_spacer(|input| scale::marks(input.bounds))
+            .x_axis_formatter(|mark, range| scale::label(mark, range, scale::short_secs))
+            .y_axis_formatter(|mark, range| scale::label(mark, range, scale::short))
+            .label_formatter(|_| None)
+            .legend(
+                Legend::default().position(self.free_corner()).text_style(egui::TextStyle::Small).background_alpha(0.6),
+            );
+        let shown = plot.show(ui, |p| self.items().into_iter().for_each(|item| item.add_to(p)));
+        let nearest = self.nearest(&shown.response, &shown.transform);
+        if let Some(point) = nearest {
+            let stage = if self.second.is_some_and(|s| s.points.iter().any(|p| std::ptr::eq(p, point))) {
+                "in the second report"
+            } else {
+                ""
+            };
+            shown.response.clone().on_hover_ui_at_pointer(|ui| facts(ui, point, &self.stage.measures, stage));
+        }
+        nearest.filter(|_| shown.response.clicked())
+    }
+
+    /// The corner of the plot that has the fewest points, for the legend.
+    fn free_corner(&self) -> Corner {
+        let both = self.stage.points.iter().chain(self.second.into_iter().flat_map(|s| &s.points));
+        free_corner(&both.filter_map(|p| scale::place(p, self.measure)).collect::<Vec<_>>())
+    }
+
+    /// The point under the pointer.
+    fn nearest(&self, response: &Response, transform: &PlotTransform) -> Option<&'a Point> {
+        let pointer = response.hover_pos()?;
+        let all = self.stage.points.iter().chain(self.second.into_iter().flat_map(|s| &s.points));
+        let far = |p: &'a Point| {
+            let [x, y] = scale::place(p, self.measure)?;
+            Some((p, transform.position_from_point(&PlotPoint::new(x, y)).distance(pointer)))
+        };
+        let near = all.filter_map(far).filter(|(_, d)| *d <= NEAR);
+        near.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(p, _)| p)
+    }
+
+    /// Everything in the plot, from back to front.
+    fn items(&self) -> Vec<Item> {
+        let mut items = vec![self.front()];
+        let methods = self.stage.methods();
+        for (k, method) in methods.iter().enumerate() {
+            self.series(method, k, &mut items);
+        }
+        for p in self.second.into_iter().flat_map(|s| &s.points) {
+            // Knobs that only the second has are grey.
+            let k = methods.iter().position(|m| *m == p.method);
+            let color = k.map_or(theme::WEAK, color);
+            let shape = k.map_or(MarkerShape::Circle, shape);
+            if let Some(at) = scale::place(p, self.measure) {
+                let hollow = Points::new("second report", vec![at]).shape(shape).filled(false);
+                items.push(Item::Points(hollow.radius(5.5).color(color)));
+            }
+        }
+        if let Some(at) = self.selected.and_then(|p| scale::place(p, self.measure)) {
+            let ring = Points::new("", vec![at]).radius(10.0).filled(false).color(theme::TEXT);
+            items.push(Item::Points(ring));
+        }
+        items
+    }
+
+    fn front(&self) -> Item {
+        let points = self.stage.front(self.measure).into_iter();
+        let places: Vec<[f64; 2]> = points.filter_map(|i| scale::place(&self.stage.points[i], self.measure)).collect();
+        let style = Stroke::new(8.0, theme::TEXT.gamma_multiply(0.16));
+        Item::Line(Line::new("Pareto front", PlotPoints::from(places)).stroke(style).allow_hover(false))
+    }
+
+    fn series(&self, method: &str, k: usize, items: &mut Vec<Item>) {
+        let color = color(k);
+        let points: Vec<&Point> = self.stage.points.iter().filter(|p| p.method == method).collect();
+        // What has the series' name has its colour, too: the legend shows one.
+        let line = |name: &str, places: Vec<[f64; 2]>, style: Stroke| {
+            Item::Line(Line::new(name, PlotPoints::from(places)).stroke(style).allow_hover(false))
+        };
+        // What happened on the way was measured of the first measure only.
+        if self.stage.measures.first() == Some(self.measure) {
+            let curves = points.iter().filter(|p| p.curve.len() > 1);
+            let faint = Stroke::new(1.0, color.gamma_multiply(0.4));
+            items.extend(curves.map(|p| line("", self.way(&p.curve), faint)));
+        }
+        let mut places: Vec<[f64; 2]> = points.iter().filter_map(|p| scale::place(p, self.measure)).collect();
+        places.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        items.push(line(method, places.clone(), Stroke::new(0.8, color)));
+        let whiskers = points.iter().filter_map(|p| scale::whiskers(p, self.measure)).flatten();
+        items.extend(whiskers.filter(|w| w[0] != w[1]).map(|w| line(method, w.to_vec(), Stroke::new(1.6, color))));
+        let radius = if points.iter().any(|p| p.default) { 6.5 } else { 4.0 };
+        let marks = Points::new(method, PlotPoints::from(places)).shape(shape(k)).radius(radius);
+        items.push(Item::Points(marks.color(color)));
+    }
+
+    /// A training's way as logarithms.
+    fn way(&self, curve: &[[f64; 2]]) -> Vec<[f64; 2]> {
+        let at = |c: &[f64; 2]| [c[0].max(1e-9).log10(), self.measure.error(c[1]).max(LEAST).log10()];
+        curve.iter().map(at).filter(|p| p.iter().all(|v| v.is_finite())).collect()
+    }
+}
+
+/// The quarter of their range that has the fewest places.
+fn free_corner(places: &[[f64; 2]]) -> Corner {
+    let middle = |axis: usize| {
+        let all = places.iter().map(|p| p[axis]);
+        0.5 * (all.clone().fold(f64::INFINITY, f64::min) + all.fold(f64::NEG_INFINITY, f64::max))
+    };
+    let (x, y) = (middle(0), middle(1));
+    let corners = [
+        (Corner::RightTop, true, true),
+        (Corner::RightBottom, true, false),
+        (Corner::LeftBottom, false, false),
+        (Corner::LeftTop, false, true),
+    ];
+    let inside = |right: bool, top: bool| places.iter().filter(|p| (p[0] >= x) == right && (p[1] >= y) == top).count();
+    let free = corners.into_iter().min_by_key(|(_, right, top)| inside(*right, *top));
+    free.map_or(Corner::RightTop, |c| c.0)
+}
+
+/// Something in the plot.
+enum Item {
+    Line(Line<'static>),
+    Points(Points<'static>),
+}
+
+impl Item {
+    fn add_to(self, plot: &mut egui_plot::PlotUi<'_>) {
+        match self {
+            Self::Line(line) => plot.line(line),
+            Self::Points(points) => plot.points(points),
+        }
+    }
+}
+
+/// Colour of the knob with this number: those of the report's own pictures, lighter on dark ground.
+pub fn color(k: usize) -> Color32 {
+    let [r, g, b] = COLORS[k % COLORS.len()].map(|v| v + (255 - v) / 4);
+    Color32::from_rgb(r, g, b)
+}
+
+fn shape(k: usize) -> MarkerShape {
+    SHAPES[k / COLORS.len() % SHAPES.len()]
+}
+
+/// All that was measured of a point.
+pub fn facts(ui: &mut Ui, point: &Point, measures: &[Measure], whose: &str) {
+    ui.strong(format!("{}: {}", point.method, point.setting));
+    let repeats = point.secs.each.len();
+    let default = if point.default { "program's default, " } else { "" };
+    let whose = if whose.is_empty() { String::new() } else { format!(", {whose}") };
+    ui.weak(format!(
+        "{default}measured {}{whose}",
+        if repeats == 1 { "once".into() } else { format!("{repeats} times") }
+    ));
+    egui::Grid::new(("facts", &point.method, &point.setting, whose))
+        .num_columns(2)
+        .spacing([14.0, 1.0])
+        .min_row_height(17.0)
+        .show(ui, |ui| {
+            ui.label("time");
+            ui.label(table::spread(&point.secs, table::seconds));
+            ui.end_row();
+            for measure in measures {
+                let Some(value) = point.values.get(&measure.name) else { continue };
+                ui.label(table::title(measure)).on_hover_text(&measure.meaning);
+                ui.label(table::spread(value, table::number));
+                ui.end_row();
+            }
+        });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_legend_goes_where_nothing_is() {
+        let falling = [[0.0, 1.0], [0.1, 0.9], [0.9, 0.1], [1.0, 0.0]];
+        assert_eq!(free_corner(&falling), Corner::RightTop);
+        let with_slow_and_bad = [falling.as_slice(), &[[1.0, 1.0]]].concat();
+        assert_eq!(free_corner(&with_slow_and_bad), Corner::LeftBottom);
+        assert_eq!(free_corner(&[]), Corner::RightTop);
+    }
+
+    #[test]
+    fn series_differ_in_colour_or_shape() {
+        let looks: Vec<_> = (0..14).map(|k| (color(k), shape(k))).collect();
+        assert!((0..14).all(|i| (0..i).all(|j| looks[i] != looks[j])));
+    }
+}

@@ -1,0 +1,136 @@
+//! How long each stage of a picture takes: the last one, and the median of the last few.
+
+use std::collections::VecDeque;
+
+use egui::{Grid, RichText, Ui};
+
+use super::super::theme;
+use crate::math::stats::median;
+use crate::worker::view::ViewPicture;
+
+/// Pictures that medians are made of.
+const MOST: usize = 60;
+
+/// A stage of a picture.
+type Stage = (&'static str, f64);
+
+/// Times of the newest pictures, kept while they are shown.
+#[derive(Default)]
+pub struct FrameTimes {
+    frames: VecDeque<Vec<Stage>>,
+    /// Of the maps of what pixels belong to, drawn when the eye rests.
+    maps: VecDeque<f64>,
+    /// What draws, and whether it tells its stages.
+    drawn_by: String,
+    has_stages: bool,
+}
+
+impl FrameTimes {
+    /// Takes a picture in, whose pixels took `upload_secs` to become a texture.
+    pub fn add(&mut self, picture: &ViewPicture, upload_secs: f64) {
+        self.drawn_by.clone_from(&picture.drawn_by);
+        self.has_stages = !picture.stages.is_empty();
+        let mut stages = picture.stages.clone();
+        // Waiting for the device and copying are in the whole, but in no stage.
+        let known: f64 = stages.iter().map(|s| s.1).sum();
+        stages.push((if self.has_stages { "rest of drawing" } else { "draw" }, (picture.secs - known).max(0.0)));
+        stages.extend([("to bytes", picture.paint_secs), ("upload", upload_secs)]);
+        stages.push(("whole", picture.secs + picture.paint_secs + upload_secs));
+        push(&mut self.frames, stages);
+    }
+
+    /// Takes in what drawing the maps took.
+    pub fn add_maps(&mut self, secs: f64) {
+        push(&mut self.maps, secs);
+    }
+
+    /// Last and median seconds of each stage of the newest picture.
+    fn rows(&self) -> Vec<(&'static str, f64, f64)> {
+        let Some(last) = self.frames.back() else { return Vec::new() };
+        let of = |name: &str| -> Vec<f64> {
+            self.frames.iter().filter_map(|f| f.iter().find(|s| s.0 == name)).map(|s| s.1).collect()
+        };
+        let mut rows: Vec<_> = last.iter().map(|&(name, secs)| (name, secs, median(&of(name)))).collect();
+        if let Some(&secs) = self.maps.back() {
+            rows.push(("feature maps, at rest", secs, median(&self.maps.iter().copied().collect::<Vec<_>>())));
+        }
+        rows
+    }
+
+    /// Draws the table.
+    pub fn show(&self, ui: &mut Ui) {
+        let small = |text: &str| RichText::new(text).small();
+        let rows = self.rows();
+        if rows.is_empty() {
+            ui.label(small("Frame times appear with the next picture: move the view.").color(theme::WEAK));
+            return;
+        }
+        ui.vertical(|ui| {
+            ui.spacing_mut().item_spacing.y = 1.0;
+            Grid::new("frame times").num_columns(3).spacing([14.0, 1.0]).min_row_height(13.0).show(ui, |ui| {
+                let head =
+                    [format!("ms, {}", self.drawn_by), "last".into(), format!("median of {}", self.frames.len())];
+                head.iter().for_each(|h| drop(ui.label(small(h).color(theme::WEAK))));
+                ui.end_row();
+                for (name, last, median) in rows {
+                    let color = if name == "whole" { theme::ACCENT } else { theme::TEXT };
+                    ui.label(small(name).color(color));
+                    for secs in [last, median] {
+                        ui.label(RichText::new(format!("{:>7.2}", secs * 1e3)).monospace().size(11.0).color(color));
+                    }
+                    ui.end_row();
+                }
+            });
+            if !self.has_stages {
+                ui.label(small("This device tells no stages, only the whole.").color(theme::WARNING));
+            }
+        });
+    }
+}
+
+fn push<T>(list: &mut VecDeque<T>, value: T) {
+    if list.len() == MOST {
+        list.pop_front();
+    }
+    list.push_back(value);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Camera;
+    use glam::DVec3;
+
+    fn picture(blend: f64, stages: bool) -> ViewPicture {
+        ViewPicture {
+            ticket: 0,
+            full: true,
+            camera: Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 4, 4).expect("valid"),
+            rgb: Vec::new(),
+            median_depth: None,
+            depth_range: None,
+            psnr: None,
+            secs: 0.5 + blend,
+            stages: if stages { vec![("project", 0.25), ("blend", blend)] } else { Vec::new() },
+            paint_secs: 0.125,
+            drawn_by: "CPU".into(),
+        }
+    }
+
+    #[test]
+    fn rows_hold_the_last_and_the_median() {
+        let mut times = FrameTimes::default();
+        assert!(times.rows().is_empty());
+        [9.0, 1.0, 2.0].iter().for_each(|b| times.add(&picture(*b, true), 0.25));
+        times.add_maps(0.5);
+        let row = |name: &str| times.rows().into_iter().find(|r| r.0 == name).map(|r| (r.1, r.2));
+        assert_eq!(row("blend"), Some((2.0, 2.0)));
+        assert_eq!(row("rest of drawing"), Some((0.25, 0.25)));
+        assert_eq!(row("whole"), Some((2.875, 2.875)));
+        assert_eq!(row("feature maps, at rest"), Some((0.5, 0.5)));
+        (0..2 * MOST).for_each(|_| times.add(&picture(4.0, false), 0.0));
+        assert_eq!((times.frames.len(), times.has_stages), (MOST, false));
+        let row = |name: &str| times.rows().into_iter().find(|r| r.0 == name).map(|r| (r.1, r.2));
+        assert_eq!((row("draw"), row("blend")), (Some((4.5, 4.5)), None));
+    }
+}

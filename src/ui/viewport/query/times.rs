@@ -1,0 +1,75 @@
+//! Where the time of a query went: a thin bar in the colours of its stages, with their numbers.
+
+use egui::{Color32, Rect, RichText, Sense, Ui, pos2, vec2};
+
+use super::super::super::theme;
+use crate::pipeline::semantics::stages::{STAGES, StagesMs};
+
+/// Colours of the stages, in their order.
+const COLORS: [Color32; 5] = [
+    Color32::from_rgb(0x56, 0xb4, 0xe9),
+    Color32::from_rgb(0xe6, 0x9f, 0x00),
+    Color32::from_rgb(0x00, 0x9e, 0x73),
+    Color32::from_rgb(0xcc, 0x79, 0xa7),
+    Color32::from_rgb(0x9a, 0xa0, 0xac),
+];
+
+/// What each stage is, for people.
+const MEANING: &str = "encode: the words become vectors; nothing to do where they were typed before\n\
+    relevancy: every object and part is scored\n\
+    localise: those that are meant are chosen\n\
+    mask: their pixels in this view are found\n\
+    draw: the pixels become a picture";
+
+/// Draws the bar with its numbers.
+pub fn show(ui: &mut Ui, basis: &str, stages: &StagesMs) {
+    let (rect, bar) = ui.allocate_exact_size(vec2(ui.available_width(), 5.0), Sense::hover());
+    for (color, [from, to]) in COLORS.into_iter().zip(shares(stages)) {
+        let at = |share: f64| rect.left() + rect.width() * share as f32;
+        let part = Rect::from_min_max(pos2(at(from), rect.top()), pos2(at(to), rect.bottom()));
+        ui.painter().rect_filled(part, 1.0, color);
+    }
+    let numbers = ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = vec2(6.0, 0.0);
+        let small = |text: String, color| RichText::new(text).small().color(color);
+        ui.label(small(format!("{basis} in {}", millis(stages.whole())), theme::TEXT));
+        for (name, (color, ms)) in STAGES.into_iter().zip(COLORS.into_iter().zip(stages.values())) {
+            ui.label(small(format!("{name} {}", millis(ms)), color));
+        }
+    });
+    bar.union(numbers.response).on_hover_text(MEANING);
+}
+
+/// Where each stage begins and ends, as shares of the whole; nothing took nothing.
+fn shares(stages: &StagesMs) -> [[f64; 2]; 5] {
+    let (whole, mut end) = (stages.whole().max(f64::MIN_POSITIVE), 0.0);
+    stages.values().map(|ms| {
+        let from = end;
+        end += ms / whole;
+        [from, end]
+    })
+}
+
+/// Milliseconds with the digits that count.
+fn millis(ms: f64) -> String {
+    match ms {
+        v if v < 0.1 => format!("{v:.3} ms"),
+        v if v < 10.0 => format!("{v:.2} ms"),
+        v => format!("{v:.0} ms"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_follow_each_other_and_fill_the_bar() {
+        let parts = shares(&StagesMs::of([6.0, 1.0, 0.0, 2.0, 1.0]));
+        assert_eq!(parts[0], [0.0, 0.6]);
+        assert!(parts.windows(2).all(|p| p[0][1] == p[1][0]), "no gap");
+        assert!((parts[4][1] - 1.0).abs() < 1e-12);
+        assert_eq!(shares(&StagesMs::default()), [[0.0; 2]; 5]);
+        assert_eq!([0.01234, 1.234, 123.4].map(millis), ["0.012 ms", "1.23 ms", "123 ms"]);
+    }
+}

@@ -1,0 +1,160 @@
+//! Jobs around reports: reading one, and measuring how a scene is drawn, knob by knob.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::protocol::{Failure, Outcome, Stop};
+use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::train::{TrainConfig, load_views};
+use crate::render::RenderSettings;
+use crate::report::studies::Input;
+use crate::report::studies::render::RenderStudy;
+use crate::report::{End, FILE, Report, Stage, StageName, Study, StudyError, computer, is_report, sweep};
+use crate::scene::{Camera, Dataset, GaussianCloud, PhotoPixels};
+
+/// Most views that are compared.
+const VIEWS: usize = 4;
+/// Longer side of the compared pictures in px.
+const MAX_SIDE_PX: u32 = 256;
+/// How often every setting is measured.
+const REPEATS: u32 = 3;
+
+/// What is to be drawn in many ways.
+#[derive(Clone, Debug)]
+pub struct MeasureRequest {
+    /// The scene, for people.
+    pub scene: String,
+    /// Its Gaussians.
+    pub cloud: Arc<GaussianCloud>,
+    /// How they are drawn.
+    pub settings: RenderSettings,
+    /// Its photos; those that are held out are compared with, too.
+    pub dataset: Option<Arc<Dataset>>,
+    /// Every how-manieth photo is held out.
+    pub holdout_every: usize,
+    /// From where it is drawn without held-out photos.
+    pub camera: Camera,
+    /// Folder of the report. What is measured there already is gone on with.
+    pub out: PathBuf,
+}
+
+/// Reads a report; the `second` is one to compare with.
+pub fn read(path: PathBuf, second: bool) -> Result<Outcome, Stop> {
+    let report = Report::read(&path).map_err(|e| Stop::Failed(Failure::of(&e, "")))?;
+    Ok(Outcome::Report { path, report: Arc::new(report), second })
+}
+
+/// Where reports of a scene may lie: where this program writes them, beside it, and where the command
+/// line writes them.
+pub fn known(scene: &Path, own: &Path) -> Vec<PathBuf> {
+    let usual = Path::new("out/report");
+    let mut found = Vec::new();
+    for folder in [own.to_owned(), scene.join("report"), usual.to_owned()] {
+        if is_report(&folder) && !found.contains(&folder) {
+            found.push(folder);
+        }
+    }
+    found
+}
+
+/// Measures the drawing of a scene and writes the report after every measurement.
+pub fn run(request: MeasureRequest, observer: &mut dyn Observer) -> Result<Outcome, Stop> {
+    let failed = |e: &dyn std::error::Error| Stop::Failed(Failure::of(e, ""));
+    let mut report = Report::begin(&request.out, &request.scene, &computer::look()).map_err(|e| failed(&e))?;
+    let folder = request.out.display().to_string();
+    let unwritable = |e| Failure { message: format!("{folder}: {e}"), remedy: "Is the disk writable?".into() };
+    std::fs::create_dir_all(&request.out).map_err(|e| Stop::Failed(unwritable(e)))?;
+    let views = views(&request, observer)?;
+    let input = Input::from([
+        ("scene".to_owned(), request.scene.clone()),
+        ("Gaussians".to_owned(), request.cloud.len().to_string()),
+        ("longer side".to_owned(), format!("{MAX_SIDE_PX} px")),
+        ("views".to_owned(), views.len().to_string()),
+    ]);
+    let MeasureRequest { cloud, settings, out, .. } = request;
+    let study = RenderStudy::new((*cloud).clone(), &settings, views, REPEATS, input);
+    let mut study = study.map_err(|e| failed(&e))?;
+    let fresh = study.stage();
+    let same = |s: &&Stage| s.input == fresh.input && s.measures == fresh.measures;
+    let before = report.stage(StageName::Render).filter(same).cloned();
+    let file = out.join(FILE);
+    let mut keep = |stage: &Stage| {
+        report.put(stage.clone());
+        report.write(&file).map_err(|e| StudyError(e.to_string()))
+    };
+    let (_, end) = sweep(&mut study, before, f64::INFINITY, &mut keep, observer).map_err(|e| failed(&e))?;
+    if end == End::Cancelled {
+        observer.note(Level::Info, format!("What was measured so far is kept in {}", file.display()));
+        return Err(Stop::Cancelled);
+    }
+    Ok(Outcome::Report { path: out, report: Arc::new(report), second: false })
+}
+
+/// A few held-out photos with their cameras, or the one view without a photo.
+fn views(request: &MeasureRequest, observer: &mut dyn Observer) -> Result<Vec<(Camera, Option<PhotoPixels>)>, Stop> {
+    let mut views = Vec::new();
+    if let Some(dataset) = &request.dataset {
+        let (_, held_out) = dataset.split(request.holdout_every);
+        let chosen: Vec<usize> = spread(&held_out, VIEWS).copied().collect();
+        let config =
+            TrainConfig { max_side_px: MAX_SIDE_PX, holdout_every: request.holdout_every, ..TrainConfig::default() };
+        let loaded = load_views(dataset, &chosen, &config, "Loading held-out photos", observer);
+        let loaded = loaded.map_err(|e| Stop::Failed(Failure::of(&e, "")))?.ok_or(Stop::Cancelled)?;
+        views.extend(loaded.into_iter().map(|v| (v.camera, Some(v.pixels))));
+    }
+    if views.is_empty() {
+        views.push((request.camera.limited_to(MAX_SIDE_PX), None));
+    }
+    Ok(views)
+}
+
+/// At most `count` of them, evenly spread.
+fn spread<T>(all: &[T], count: usize) -> impl Iterator<Item = &T> {
+    let count = count.min(all.len());
+    (0..count).map(move |k| &all[k * all.len() / count])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::observer::Silent;
+    use glam::DVec3;
+
+    #[test]
+    fn few_are_spread_over_many() {
+        let all: Vec<usize> = (0..10).collect();
+        assert_eq!(spread(&all, 4).copied().collect::<Vec<_>>(), [0, 2, 5, 7]);
+        assert_eq!(spread(&all[..2], 4).count(), 2);
+        assert_eq!(spread::<u8>(&[], 4).count(), 0);
+    }
+
+    #[test]
+    fn a_report_beside_a_scene_is_found() {
+        let folder = tempfile::tempdir().expect("folder");
+        let (scene, out) = (folder.path().join("scene"), folder.path().join("out"));
+        let known_here = || known(&scene, &out).into_iter().filter(|p| p.starts_with(folder.path())).count();
+        assert_eq!(known_here(), 0);
+        std::fs::create_dir_all(scene.join("report")).expect("folder");
+        std::fs::write(scene.join("report").join(FILE), "{}").expect("written");
+        assert_eq!(known_here(), 1);
+    }
+
+    #[test]
+    fn a_missing_report_fails_by_name() {
+        assert!(matches!(read("/no/such".into(), false), Err(Stop::Failed(f)) if f.message.contains("/no/such")));
+        let folder = tempfile::tempdir().expect("folder");
+        let request = MeasureRequest {
+            scene: "nothing".into(),
+            cloud: Arc::default(),
+            settings: RenderSettings::default(),
+            dataset: None,
+            holdout_every: 8,
+            camera: Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid"),
+            out: folder.path().join("report"),
+        };
+        std::fs::create_dir_all(&request.out).expect("folder");
+        std::fs::write(request.out.join(FILE), "{").expect("written");
+        let result = run(request, &mut Silent);
+        assert!(matches!(result, Err(Stop::Failed(f)) if f.message.contains("not a report")), "it is not overwritten");
+    }
+}
