@@ -407,6 +407,7 @@ fn write_report(folder: &Path, times: f64, cores: usize) {
         rule: Rule { measure: "error".into(), times: 1.1, floor: 0.0 },
         points,
         orders: Vec::new(),
+        left_out: Vec::new(),
     };
     let drawing = vec![
         point("default", "as the scene says", &[], 0.02, 0.001),

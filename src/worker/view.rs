@@ -239,7 +239,7 @@ fn lock(mutex: &Mutex<Mailbox>) -> MutexGuard<'_, Mailbox> {
 
 /// What waiting for a request has come to.
 enum Waited {
-    Request(ViewRequest),
+    Request(Box<ViewRequest>),
     /// None came in time.
     InVain,
     /// The handle is gone.
@@ -256,7 +256,7 @@ fn next(mailbox: &(Mutex<Mailbox>, Condvar), patience: Option<Duration>) -> Wait
             return Waited::Closed;
         }
         if let Some(r) = guard.request.take() {
-            return Waited::Request(r);
+            return Waited::Request(Box::new(r));
         }
         guard = match patience.map(|p| p.saturating_sub(start.elapsed())) {
             None => wake.wait(guard).unwrap_or_else(PoisonError::into_inner),
