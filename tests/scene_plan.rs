@@ -174,6 +174,7 @@ fn looked_at(cloud: &GaussianCloud, map: Option<&SemanticMap>, plan: &ScenePlan,
         semantics,
         codes: false,
         leave: Leave::of(plan),
+        timed: false,
         ticket: 1,
     });
     let until = |done: &dyn Fn() -> bool, limit: Duration| {
