@@ -30,10 +30,14 @@ fn color_towards(i: u32, world: vec3<f32>) -> vec3<f32> {
     let degree = min(view.sh_degree, view.sh_stored);
     let basis = harmonics(degree, normalize(world));
     var sum = vec3<f32>(0.5);
+    var sound = true;
     for (var k = 0u; k < harmonics_count(degree); k++) {
-        sum += basis[k] * coefficient(i, k);
+        let c = coefficient(i, k);
+        sound = sound && is_finite3(c);
+        sum += basis[k] * c;
     }
-    return clamp(sum, vec3<f32>(0.0), vec3<f32>(COLOR_MAX));
+    // Sums that overflow are very bright; one of a coefficient that is no number stays none.
+    return select(sum, clamp(sum, vec3<f32>(0.0), vec3<f32>(COLOR_MAX)), sound);
 }
 
 // The splat of Gaussian `i`; radius 0 where it is not drawn.
