@@ -8,7 +8,7 @@ use super::report_studies::{Options, Subject};
 use super::{CliError, output};
 use crate::io;
 use crate::pipeline::observer::{Level, Observer};
-use crate::report::{End, FILE, Report, ReportError, Stage, StageName, StudyError, VERSION, sweep};
+use crate::report::{BeginError, End, FILE, Report, ReportError, Stage, StageName, StudyError, sweep};
 use crate::report::{computer, defaults, page, plot};
 
 /// Measure error against run time, knob by knob
@@ -78,7 +78,14 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         return Err(CliError::Usage("--budget must be a number of seconds above 0".into()));
     }
     let console = &mut Console::new(quiet);
-    let mut report = begun(&args, &scene)?;
+    let (name, computer) = (scene.display().to_string(), computer::look());
+    let mut report = match args.fresh {
+        true => Report::empty(&name, &computer),
+        false => Report::begin(&args.out, &name, &computer).map_err(|e| match e {
+            BeginError::Other(..) => CliError::failed(format!("{e} (--out); --fresh forgets it")),
+            other => other.into(),
+        })?,
+    };
     let options = Options {
         masks: args.masks.clone(),
         steps: args.steps.clone(),
@@ -126,34 +133,6 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     }
 }
 
-/// The report in the folder, if it is one of this scene on this machine, or an empty one.
-fn begun(args: &Args, scene: &Path) -> Result<Report, CliError> {
-    let path = args.out.join(FILE);
-    let (name, computer) = (scene.display().to_string(), computer::look());
-    let empty = || Report {
-        version: VERSION,
-        program: env!("CARGO_PKG_VERSION").into(),
-        scene: name.clone(),
-        computer: computer.clone(),
-        stages: Vec::new(),
-    };
-    if args.fresh || !path.exists() {
-        return Ok(empty());
-    }
-    let before = Report::read(&path)?;
-    let other = |what: &str| {
-        let path = path.display();
-        Err(CliError::failed(format!(
-            "{path} is a report of another {what}; choose another --out, or --fresh to forget it"
-        )))
-    };
-    match before {
-        r if r.scene != name => other("scene"),
-        r if r.computer != computer || r.program != empty().program => other("machine or build"),
-        r => Ok(r),
-    }
-}
-
 /// Sweeps one stage; what is measured is on disk at once.
 fn measure(
     subject: &Subject,
@@ -165,8 +144,7 @@ fn measure(
 ) -> Result<End, CliError> {
     let path = out.join(FILE);
     subject.with_study(name, &mut |study| {
-        let fresh = study.stage();
-        let before = report.stage(name).filter(|s| s.input == fresh.input && s.measures == fresh.measures).cloned();
+        let before = report.earlier(&study.stage());
         let mut keep = |stage: &Stage| {
             report.put(stage.clone());
             report.write(&path).map_err(|e: ReportError| StudyError(e.to_string()))

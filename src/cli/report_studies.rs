@@ -12,7 +12,7 @@ use crate::pipeline::semantics::protocols::categories;
 use crate::pipeline::semantics::segmenter::{FileMasks, FoundMask, Segmenter};
 use crate::pipeline::semantics::tracker::labels_of;
 use crate::pipeline::semantics::train_codes::CodeView;
-use crate::pipeline::train::{TrainConfig, load_views};
+use crate::pipeline::train::TrainConfig;
 use crate::report::studies::Input;
 use crate::report::studies::depth::DepthStudy;
 use crate::report::studies::features::FeatureStudy;
@@ -20,8 +20,9 @@ use crate::report::studies::path::PathStudy;
 use crate::report::studies::query::{Asked, QueryStudy};
 use crate::report::studies::render::RenderStudy;
 use crate::report::studies::train::TrainStudy;
+use crate::report::studies::views::{held_out, spread};
 use crate::report::{End, StageName, Study};
-use crate::scene::{Camera, Dataset, Identities, IdentityId, NOBODY, Photo, PhotoPixels, SemanticMap};
+use crate::scene::{Camera, Dataset, Identities, IdentityId, NOBODY, Photo, SemanticMap};
 
 /// What is asked for.
 pub struct Options {
@@ -144,19 +145,14 @@ impl Subject {
     }
 
     fn drawing(&self) -> Result<RenderStudy, CliError> {
-        let views: Vec<(Camera, Option<PhotoPixels>)> = match &self.dataset {
-            Some(dataset) => {
-                let config = TrainConfig { max_side_px: self.options.max_side_px, ..self.scene.config.clone() };
-                let held = spread(&dataset.split(config.holdout_every).1, self.options.views);
-                let views = load_views(dataset, &held, &config, "Loading photos", &mut Silent)?.unwrap_or_default();
-                views.into_iter().map(|v| (v.camera, Some(v.pixels))).collect()
-            }
+        let (every, side, count) = (self.scene.config.holdout_every, self.options.max_side_px, self.options.views);
+        let mut views = match &self.dataset {
+            Some(dataset) => held_out(dataset, every, side, count, &mut Silent)?.unwrap_or_default(),
             None => Vec::new(),
         };
-        let views = match views.is_empty() {
-            true => self.cameras().into_iter().map(|c| (c, None)).collect(),
-            false => views,
-        };
+        if views.is_empty() {
+            views = self.cameras().into_iter().map(|c| (c, None)).collect();
+        }
         let input = self.input(&[("views", views.len().to_string())]);
         let (cloud, settings) = (self.scene.cloud.clone(), &self.scene.settings);
         Ok(RenderStudy::new(cloud, settings, views, self.options.repeats, input)?)
@@ -240,12 +236,6 @@ impl Subject {
         let (steps, repeats) = (&self.options.steps, self.options.repeats);
         sweep(&mut FeatureStudy::new(drawn, identities, [&training, &held_out], steps, repeats, input)?)
     }
-}
-
-/// At most `count` of them, evenly spread.
-fn spread<T: Copy>(all: &[T], count: usize) -> Vec<T> {
-    let count = count.min(all.len());
-    (0..count).map(|k| all[k * all.len() / count]).collect()
 }
 
 /// The labels of a photo, its regions matched with known identities by their names; `None` if it has

@@ -6,13 +6,11 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::front;
+use super::knobs::Knobs;
 use crate::math::stats::median;
 
 /// Version of the JSON document.
 pub const VERSION: u32 = 2;
-
-/// Fields of a settings structure with the values that a point had, by their JSON names.
-pub type Knobs = BTreeMap<String, serde_json::Value>;
 
 /// A part of the program whose knobs are measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, clap::ValueEnum)]
@@ -302,6 +300,12 @@ impl Report {
     /// The stage of this name.
     pub fn stage(&self, name: StageName) -> Option<&Stage> {
         self.stages.iter().find(|s| s.name == name)
+    }
+
+    /// What was measured of a sweep earlier, if it was the same sweep: on the same input, of the same
+    /// measures.
+    pub fn earlier(&self, fresh: &Stage) -> Option<Stage> {
+        self.stage(fresh.name).filter(|s| s.input == fresh.input && s.measures == fresh.measures).cloned()
     }
 
     /// Puts a stage in, in the place of an older one.

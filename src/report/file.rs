@@ -8,6 +8,8 @@ use crate::io::{self, IoError};
 
 /// Name of the document in a report's folder.
 pub const FILE: &str = "report.json";
+/// Version of this program.
+const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 /// Largest document that is read.
 const MOST_BYTES: u64 = 256 << 20;
 
@@ -71,17 +73,21 @@ impl Report {
     /// If the one that is there cannot be read, or is of another scene, machine or program.
     pub fn begin(folder: &Path, scene: &str, computer: &Computer) -> Result<Self, BeginError> {
         let path = folder.join(FILE);
-        let program = env!("CARGO_PKG_VERSION");
         if !path.exists() {
-            let (scene, computer) = (scene.into(), computer.clone());
-            return Ok(Self { version: VERSION, program: program.into(), scene, computer, stages: Vec::new() });
+            return Ok(Self::empty(scene, computer));
         }
         match Self::read(&path)? {
             before if before.scene != scene => Err(BeginError::Other(path, "scene")),
             before if before.computer != *computer => Err(BeginError::Other(path, "machine or build")),
-            before if before.program != program => Err(BeginError::Other(path, "version of the program")),
+            before if before.program != PROGRAM => Err(BeginError::Other(path, "version of the program")),
             before => Ok(before),
         }
+    }
+
+    /// A report of nothing yet.
+    pub fn empty(scene: &str, computer: &Computer) -> Self {
+        let (scene, computer) = (scene.into(), computer.clone());
+        Self { version: VERSION, program: PROGRAM.into(), scene, computer, stages: Vec::new() }
     }
 
     /// Reads a report: the JSON file, or the folder that it is in.

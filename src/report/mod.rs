@@ -10,6 +10,7 @@ pub mod defaults;
 pub mod document;
 pub mod file;
 pub mod front;
+pub mod knobs;
 pub mod order;
 pub mod page;
 mod picture;
@@ -19,8 +20,9 @@ pub mod sweep;
 pub mod table;
 
 pub use compare::{Comparison, Pair};
-pub use document::{Computer, Form, Knobs, Measure, Order, Point, Report, Rule, Sample, Stage, StageName, VERSION};
+pub use document::{Computer, Form, Measure, Order, Point, Report, Rule, Sample, Stage, StageName, VERSION};
 pub use file::{BeginError, FILE, ReportError, is_report};
+pub use knobs::{Knobs, turned};
 pub use sweep::{Case, End, Study, StudyError, Trial, sweep};
 
 #[cfg(test)]

@@ -3,9 +3,8 @@
 use std::path::PathBuf;
 
 use super::app::App;
-use super::panes::report::apply;
 use super::state::Tone;
-use crate::report::{Knobs, StageName};
+use crate::report::{Knobs, StageName, turned};
 use crate::worker::{Command, MeasureRequest, Pane};
 
 impl App {
@@ -44,12 +43,12 @@ impl App {
     /// Takes a measured setting over: into the next training, or into the view.
     pub(super) fn apply_setting(&mut self, stage: StageName, knobs: &Knobs) {
         let done = match stage {
-            StageName::Train => apply::turned(&self.layout.config, knobs).map(|config| {
+            StageName::Train => turned(&self.layout.config, knobs).map(|config| {
                 self.layout.config = config;
                 self.layout.hidden.retain(|p| *p != Pane::Training);
                 "The next training will use it (pane Training)"
             }),
-            StageName::Render => apply::turned(&self.viewport.drawing, knobs).map(|drawing| {
+            StageName::Render => turned(&self.viewport.drawing, knobs).map(|drawing| {
                 self.viewport.drawing = drawing;
                 "The view is drawn with it; films and exports stay as they are"
             }),

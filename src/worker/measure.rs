@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use super::protocol::{Failure, Outcome, Stop};
 use crate::pipeline::observer::{Level, Observer};
-use crate::pipeline::train::{TrainConfig, load_views};
 use crate::render::RenderSettings;
 use crate::report::studies::Input;
 use crate::report::studies::render::RenderStudy;
+use crate::report::studies::views::{View, held_out};
 use crate::report::{End, FILE, Report, Stage, StageName, Study, StudyError, computer, is_report, sweep};
-use crate::scene::{Camera, Dataset, GaussianCloud, PhotoPixels};
+use crate::scene::{Camera, Dataset, GaussianCloud};
 
 /// Most views that are compared.
 const VIEWS: usize = 4;
@@ -74,9 +74,7 @@ pub fn run(request: MeasureRequest, observer: &mut dyn Observer) -> Result<Outco
     let MeasureRequest { cloud, settings, out, .. } = request;
     let study = RenderStudy::new((*cloud).clone(), &settings, views, REPEATS, input);
     let mut study = study.map_err(|e| failed(&e))?;
-    let fresh = study.stage();
-    let same = |s: &&Stage| s.input == fresh.input && s.measures == fresh.measures;
-    let before = report.stage(StageName::Render).filter(same).cloned();
+    let before = report.earlier(&study.stage());
     let file = out.join(FILE);
     let mut keep = |stage: &Stage| {
         report.put(stage.clone());
@@ -91,27 +89,16 @@ pub fn run(request: MeasureRequest, observer: &mut dyn Observer) -> Result<Outco
 }
 
 /// A few held-out photos with their cameras, or the one view without a photo.
-fn views(request: &MeasureRequest, observer: &mut dyn Observer) -> Result<Vec<(Camera, Option<PhotoPixels>)>, Stop> {
-    let mut views = Vec::new();
-    if let Some(dataset) = &request.dataset {
-        let (_, held_out) = dataset.split(request.holdout_every);
-        let chosen: Vec<usize> = spread(&held_out, VIEWS).copied().collect();
-        let config =
-            TrainConfig { max_side_px: MAX_SIDE_PX, holdout_every: request.holdout_every, ..TrainConfig::default() };
-        let loaded = load_views(dataset, &chosen, &config, "Loading held-out photos", observer);
-        let loaded = loaded.map_err(|e| Stop::Failed(Failure::of(&e, "")))?.ok_or(Stop::Cancelled)?;
-        views.extend(loaded.into_iter().map(|v| (v.camera, Some(v.pixels))));
-    }
+fn views(request: &MeasureRequest, observer: &mut dyn Observer) -> Result<Vec<View>, Stop> {
+    let views = match &request.dataset {
+        Some(dataset) => held_out(dataset, request.holdout_every, MAX_SIDE_PX, VIEWS, observer),
+        None => Ok(Some(Vec::new())),
+    };
+    let mut views = views.map_err(|e| Stop::Failed(Failure::of(&e, "")))?.ok_or(Stop::Cancelled)?;
     if views.is_empty() {
         views.push((request.camera.limited_to(MAX_SIDE_PX), None));
     }
     Ok(views)
-}
-
-/// At most `count` of them, evenly spread.
-fn spread<T>(all: &[T], count: usize) -> impl Iterator<Item = &T> {
-    let count = count.min(all.len());
-    (0..count).map(move |k| &all[k * all.len() / count])
 }
 
 #[cfg(test)]
@@ -119,14 +106,6 @@ mod tests {
     use super::*;
     use crate::pipeline::observer::Silent;
     use glam::DVec3;
-
-    #[test]
-    fn few_are_spread_over_many() {
-        let all: Vec<usize> = (0..10).collect();
-        assert_eq!(spread(&all, 4).copied().collect::<Vec<_>>(), [0, 2, 5, 7]);
-        assert_eq!(spread(&all[..2], 4).count(), 2);
-        assert_eq!(spread::<u8>(&[], 4).count(), 0);
-    }
 
     #[test]
     fn a_report_beside_a_scene_is_found() {

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use crossbeam_channel::{Receiver, Sender, bounded};
 
 use super::observer::JobObserver;
-use super::protocol::{Command, Event, Failure, JobId, Lane, Outcome, Stop};
+use super::protocol::{Command, Event, Failure, JobId, JobKind, Lane, Outcome, Stop};
 use super::{Control, Slot};
 use crate::pipeline::observer::{Observer, Signal};
 use crate::scene::GaussianCloud;
@@ -82,10 +82,12 @@ impl Worker {
                 (Arc::clone(&jobs), event_sender.clone(), Arc::clone(&clouds), Arc::clone(&controls), repaint.clone());
             let work = move || {
                 for queued in queue {
+                    // A scene that is opened is waited for: it yields to nobody.
+                    let yields = queued.command.kind() != JobKind::Open;
                     let run = || run_one(&*jobs, queued, &events, &clouds, &controls, &repaint);
                     match &pool {
-                        Some(pool) => pool.install(run),
-                        None => run(),
+                        Some(pool) if yields => pool.install(run),
+                        _ => run(),
                     }
                 }
             };

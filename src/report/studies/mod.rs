@@ -6,6 +6,7 @@ pub mod path;
 pub mod query;
 pub mod render;
 pub mod train;
+pub mod views;
 
 use std::collections::BTreeMap;
 

@@ -1,14 +1,13 @@
 //! What taking a measured setting over would change, or why it cannot be taken over.
 
 use serde::Serialize;
-use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
 use super::super::super::layout::Layout;
 use super::super::super::viewport::drawing::{Drawing, share};
 use crate::pipeline::train::TrainConfig;
 use crate::render::{Cutoffs, RenderSettings};
-use crate::report::{Knobs, Point, Stage, StageName};
+use crate::report::{Knobs, Point, Stage, StageName, turned};
 use crate::worker::Action;
 
 /// The settings in force.
@@ -43,18 +42,6 @@ pub enum Offer {
     InForce,
     /// It cannot be taken over, because.
     Not(String),
-}
-
-/// `settings` with some fields as a point has them.
-///
-/// # Errors
-/// If a field does not exist, or takes no such value; in words.
-pub fn turned<T: Serialize + DeserializeOwned>(settings: &T, knobs: &Knobs) -> Result<T, String> {
-    let mut fields = fields(settings);
-    for (name, value) in knobs {
-        *fields.get_mut(name).ok_or_else(|| format!("there is no setting '{name}'"))? = value.clone();
-    }
-    serde_json::from_value(Value::Object(fields)).map_err(|e| e.to_string())
 }
 
 /// What applying a point of a stage would do.
