@@ -1,6 +1,6 @@
 //! Error against run time: every knob that trades accuracy for time is measured, not guessed.
 //!
-//! [`document`] is what a report holds; [`studies`] measure the stages of the program, [`sweep`]
+//! [`document`] is what a report holds; [`studies`] measure the stages of the program, [`mod@sweep`]
 //! goes through their settings; [`compare`] holds two reports side by side; [`front`] says which are worth having, [`order`] how errors
 //! fall; [`table`], [`plot`] and [`page`] show it, [`defaults`] justifies the program's defaults.
 

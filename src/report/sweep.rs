@@ -3,7 +3,8 @@
 
 use std::time::Instant;
 
-use super::document::{Knobs, Order, Point, Stage};
+use super::document::{Order, Point, Stage};
+use super::knobs::Knobs;
 use crate::pipeline::observer::{Level, Observer, Progress, Signal};
 
 /// A setting to be measured.

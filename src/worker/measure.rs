@@ -9,7 +9,7 @@ use crate::render::RenderSettings;
 use crate::report::studies::Input;
 use crate::report::studies::render::RenderStudy;
 use crate::report::studies::views::{View, held_out};
-use crate::report::{End, FILE, Report, Stage, StageName, Study, StudyError, computer, is_report, sweep};
+use crate::report::{End, FILE, Report, Stage, Study, StudyError, computer, is_report, sweep};
 use crate::scene::{Camera, Dataset, GaussianCloud};
 
 /// Most views that are compared.
