@@ -404,7 +404,7 @@ fn write_report(folder: &Path, times: f64, cores: usize) {
         seeds: vec![0, 1, 2],
         planned: 4,
         measures: vec![Measure::new("error", "", Form::Error, "how wrong it is")],
-        rule: Rule { measure: "error".into(), times: 1.1, floor: 0.0 },
+        rule: Rule { measure: "error".into(), times: 1.1, floor: 0.0, spare_secs: 0.0 },
         points,
         orders: Vec::new(),
         left_out: Vec::new(),

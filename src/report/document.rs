@@ -190,19 +190,33 @@ pub struct Rule {
     pub times: f64,
     /// So is any error below this.
     pub floor: f64,
+    /// Times that are no further apart than this, in seconds, are the same time to a person.
+    #[serde(default)]
+    pub spare_secs: f64,
 }
 
 impl Rule {
     /// In words.
     pub fn words(&self) -> String {
         let times = 100.0 * (self.times - 1.0);
-        match self.floor > 0.0 {
-            true => format!(
-                "the fastest whose {} error is at most {:.1e} or {times:.0} % over the least",
-                self.measure, self.floor
-            ),
-            false => format!("the fastest whose {} error is at most {times:.0} % over the least", self.measure),
-        }
+        let same = match self.spare_secs > 0.0 {
+            true => format!("; {} more or less do not count", super::table::seconds(self.spare_secs)),
+            false => String::new(),
+        };
+        // "RMS error" is one by its name; "PSNR" stands for one.
+        let what = match self.measure.contains("error") || self.measure == "faults" {
+            true => self.measure.clone(),
+            false => format!("error in {}", self.measure),
+        };
+        let least = match times > 0.0 {
+            true => format!("{times:.0} % over the least"),
+            false => "the least".to_owned(),
+        };
+        let words = match self.floor > 0.0 {
+            true => format!("the fastest whose {what} is at most {:.1e} or {least}", self.floor),
+            false => format!("the fastest whose {what} is at most {least}"),
+        };
+        words + &same
     }
 }
 

@@ -52,7 +52,7 @@ impl Stage {
             let enough = self.rule.enough(least);
             let good = all.iter().filter(|p| p.1 <= enough);
             let (chosen, _) = *good.min_by(|a, b| a.0.secs.median.total_cmp(&b.0.secs.median))?;
-            let as_fast = default.secs.median <= (1.0 + NOISE) * chosen.secs.median;
+            let as_fast = default.secs.median <= (1.0 + NOISE) * chosen.secs.median + self.rule.spare_secs;
             Some(Choice { method, default, chosen, best, holds: default_error <= enough && as_fast })
         };
         methods.filter_map(choice).collect()
@@ -99,5 +99,9 @@ mod tests {
         stage.rule.floor = 0.0;
         let choices = stage.choices();
         assert!(choices[0].holds && choices[0].chosen.default);
+        // Ten milliseconds that nobody notices are no reason to change a default.
+        stage.rule = Rule { times: 1.1, floor: 0.01, spare_secs: 0.02, ..stage.rule.clone() };
+        let choices = stage.choices();
+        assert!(choices[0].holds && !choices[0].chosen.default);
     }
 }

@@ -56,7 +56,7 @@ mod tests {
                 Measure::new("RMS", "", Form::Error, "root mean square"),
                 Measure::new("IoU", "", Form::Share, "overlap"),
             ],
-            rule: Rule { measure: "RMS".into(), times: 1.1, floor: 0.01 },
+            rule: Rule { measure: "RMS".into(), times: 1.1, floor: 0.01, spare_secs: 0.0 },
             points: vec![
                 point("default", "1/255 <&> \"quoted\"", 0.02, 0.001),
                 point("cut-off", "1/64", 0.01, 0.004),

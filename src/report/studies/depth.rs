@@ -88,7 +88,7 @@ impl Study for DepthStudy<'_> {
             error("median error", "units", "median of |drawn - true| in scene units"),
             error("missing", "", "share of pixels that show something and have no depth"),
         ];
-        let rule = Rule { measure: "relative error".into(), times: 1.05, floor: 0.0 };
+        let rule = Rule { measure: "relative error".into(), times: 1.05, floor: 0.0, spare_secs: 0.0 };
         let reference = "depths found by casting rays at the scene's triangles";
         stage(StageName::Depth, "one view, drawn with depth", reference, &self.input, self.repeats, rule, measures)
     }

@@ -212,7 +212,7 @@ impl Study for RenderStudy {
             error("RMS error from afar", "as RMS error, of a picture a quarter as wide, against the mean of 4 x 4 px"),
         ];
         // One step of an 8-bit picture.
-        let rule = Rule { measure: "RMS error".into(), times: 1.1, floor: 1.0 / 255.0 };
+        let rule = Rule { measure: "RMS error".into(), times: 1.1, floor: 1.0 / 255.0, spare_secs: 0.0 };
         let reference = "pictures are held against the same in double precision without cut-offs";
         stage(StageName::Render, "one picture", reference, &self.input, self.repeats, rule, measures)
     }

@@ -88,7 +88,7 @@ impl Study for TrainStudy<'_> {
             Measure::new("Gaussians", "", Form::Error, "how many there are in the end"),
         ];
         // 2 % of the error are 0.17 dB.
-        let rule = Rule { measure: "PSNR".into(), times: 1.02, floor: 0.0 };
+        let rule = Rule { measure: "PSNR".into(), times: 1.02, floor: 0.0, spare_secs: 0.0 };
         let reference = "photos that training did not see, at the default's size";
         stage(StageName::Train, "training, evaluation left out", reference, &self.input, self.repeats, rule, measures)
     }

@@ -168,7 +168,7 @@ mod tests {
             seeds: vec![0],
             planned: points.len(),
             measures: Vec::new(),
-            rule: crate::report::Rule { measure: String::new(), times: 1.0, floor: 0.0 },
+            rule: crate::report::Rule { measure: String::new(), times: 1.0, floor: 0.0, spare_secs: 0.0 },
             points,
             orders: Vec::new(),
             left_out: Vec::new(),

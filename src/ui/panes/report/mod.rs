@@ -293,7 +293,7 @@ mod tests {
             seeds: vec![0],
             planned: 3,
             measures: vec![Measure::new("PSNR", "dB", crate::report::Form::Decibels, "")],
-            rule: Rule { measure: "PSNR".into(), times: 1.0, floor: 0.0 },
+            rule: Rule { measure: "PSNR".into(), times: 1.0, floor: 0.0, spare_secs: 0.0 },
             points: vec![point("default", "all", 2.0), point("steps", "500", 1.0), point("steps", "50", 0.1)],
             orders: Vec::new(),
             left_out: Vec::new(),
