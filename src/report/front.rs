@@ -48,6 +48,10 @@ impl Stage {
         let choice = |method| {
             let of_method = self.points.iter().filter(move |p| p.method == method).chain([default]);
             let all: Vec<(&Point, f64)> = of_method.filter_map(|p| Some((p, p.error(measure)?))).collect();
+            // A knob whose settings were measured by other measures alone has no choice here.
+            if all.iter().all(|(p, _)| p.default) {
+                return None;
+            }
             let (best, least) = *all.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
             let enough = self.rule.enough(least);
             let good = all.iter().filter(|p| p.1 <= enough);
