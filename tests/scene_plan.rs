@@ -229,7 +229,7 @@ fn without_a_gpu_no_device_is_opened() {
     let devices = || trace::since(0).iter().filter(|l| l.sort == Sort::Device).count();
     let before = devices();
     let mut chosen = Backend::choose(BackendChoice::Auto).expect("one that works");
-    let real = fmlgs::worker::real_gpu().is_some();
+    let real = fmlgs::render::gpu::real_gpu().is_some();
     assert_eq!(devices() > before, real, "a device for a real adapter only");
     assert_eq!(matches!(chosen, Backend::Gpu(_)), real);
     let (cloud, view) = (Arc::new(ball(300, -2.5, 0.1)), camera(96));

@@ -2,8 +2,10 @@
 //! used, and a window at rest draws nothing. One test, because the trace is the whole process's.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod ui_common;
+
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use egui_kittest::Harness;
 
@@ -14,12 +16,8 @@ use fmlgs::scene::IdentityId;
 use fmlgs::scene::plan::Wish;
 use fmlgs::scene::trace::{self, Sort};
 use fmlgs::ui::app::App;
-use fmlgs::worker::jobs::PipelineJobs;
 use fmlgs::worker::places::Places;
 use fmlgs::worker::{Action, Pane};
-
-/// Only a test that hangs takes this long.
-const LONG: Duration = Duration::from_secs(600);
 
 /// A window and what was traced since it was opened.
 struct Window {
@@ -31,11 +29,7 @@ impl Window {
     /// A window without the panes that list objects, for which `wishes` are made.
     fn new(data: &Path, first: PathBuf, wishes: &[&str]) -> Self {
         let traced = trace::since(0).len();
-        let places = Places { data: data.to_path_buf() };
-        let mut harness =
-            Harness::builder().with_size([1200.0, 800.0]).with_max_steps(20).wgpu().build_eframe(|cc| {
-                App::new(cc, PipelineJobs::new(places), Some(Action::Open(first))).expect("threads")
-            });
+        let mut harness = ui_common::window(Places { data: data.to_path_buf() }, Some(Action::Open(first)));
         let app = harness.state_mut();
         app.layout.hidden.extend([Pane::Objects, Pane::Chat]);
         app.wish(wishes.iter().map(|w| w.parse::<Wish>().expect("a wish")));
@@ -47,18 +41,11 @@ impl Window {
     }
 
     fn until(&mut self, what: &str, done: impl Fn(&App) -> bool) {
-        let start = Instant::now();
-        while !done(self.app()) {
-            assert!(start.elapsed() < LONG, "waited too long for: {what}\n{:#?}", self.app().state.log);
-            self.harness.step();
-            std::thread::sleep(Duration::from_millis(10));
-        }
-        self.harness.run_steps(2);
+        ui_common::until(&mut self.harness, what, done);
     }
 
     fn ask(&mut self, action: Action) {
-        self.harness.state_mut().ask(action);
-        self.harness.run_steps(3);
+        ui_common::ask(&mut self.harness, action);
     }
 
     /// Lets time pass with nobody there.

@@ -1,9 +1,11 @@
 //! The whole window, headless: what a person sees and does, with the software adapter.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod ui_common;
+
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
@@ -13,12 +15,8 @@ use fmlgs::pipeline::semantics::edit::Edit;
 use fmlgs::pipeline::synth::{self, SynthOptions};
 use fmlgs::report::{self, Form, Knobs, Measure, Point, Report, Rule, Sample, Stage, StageName};
 use fmlgs::ui::app::App;
-use fmlgs::worker::jobs::PipelineJobs;
 use fmlgs::worker::places::Places;
 use fmlgs::worker::{Action, Pane, ViewMode};
-
-/// Only a test that hangs takes this long: making the demo's photos is the longest step.
-const LONG: Duration = Duration::from_secs(600);
 
 struct Window {
     harness: Harness<'static, App>,
@@ -35,12 +33,7 @@ impl Window {
 
     /// A window that keeps what it makes in `data`.
     fn keeping(data: PathBuf, first: Option<Action>) -> Self {
-        let places = Places { data };
-        let harness = Harness::builder()
-            .with_size([1200.0, 800.0])
-            .with_max_steps(20)
-            .wgpu()
-            .build_eframe(|cc| App::new(cc, PipelineJobs::new(places), first).expect("threads"));
+        let harness = ui_common::window(Places { data }, first);
         Self { harness, _folder: None }
     }
 
@@ -50,18 +43,11 @@ impl Window {
 
     /// Lets the window run until `done`, as the worker gets on.
     fn until(&mut self, what: &str, done: impl Fn(&App) -> bool) {
-        let start = Instant::now();
-        while !done(self.app()) {
-            assert!(start.elapsed() < LONG, "waited too long for: {what}\n{:#?}", self.app().state.log);
-            self.harness.step();
-            std::thread::sleep(Duration::from_millis(10));
-        }
-        self.harness.run_steps(2);
+        ui_common::until(&mut self.harness, what, done);
     }
 
     fn ask(&mut self, action: Action) {
-        self.harness.state_mut().ask(action);
-        self.harness.run_steps(3);
+        ui_common::ask(&mut self.harness, action);
     }
 
     fn click(&mut self, label: &str) {

@@ -21,7 +21,7 @@ use crate::scene::{Camera, trace};
 use crate::worker::jobs::PipelineJobs;
 use crate::worker::places::Places;
 use crate::worker::view::{Effort, Leave, ViewLane, ViewRequest};
-use crate::worker::{Command, Jobs, OpenedScene, Outcome, Stop, ViewMode, real_gpu};
+use crate::worker::{Command, Jobs, OpenedScene, Outcome, Stop, ViewMode};
 
 /// Size of the pictures, px.
 const SIZE: [u32; 2] = [1_008, 567];
@@ -136,7 +136,7 @@ fn measure(path: &Path, variant: Variant, repeats: usize) -> Result<Cost, CliErr
     let overrides = if variant == Variant::Plan { Overrides::default() } else { Overrides::everything() };
     let jobs = PipelineJobs::new(Places::of_user());
     // The window has looked for a GPU before it opens anything, and keeps the driver that it found.
-    let _ = real_gpu();
+    let _ = crate::render::gpu::real_gpu();
     let before = resident();
     let start = Instant::now();
     let Outcome::Opened(scene) = job(&jobs, Command::Open { path: path.to_path_buf() })? else {

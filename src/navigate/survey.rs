@@ -137,15 +137,11 @@ pub fn more_cameras(cameras: &[Camera], count: usize, spread: f64, seed: u64) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::navigate::testing::{camera_at, wall_with_hole};
+    use crate::navigate::testing::{ring_of_cameras, wall_with_hole};
 
     #[test]
     fn ours_keep_clear_where_the_papers_do_not() {
-        let ring = (0..16).map(|i| {
-            let angle = f64::from(i) / 16.0 * std::f64::consts::TAU;
-            camera_at(DVec3::new(1.3 * angle.cos(), 0.2, 1.3 * angle.sin()))
-        });
-        let cameras: Vec<Camera> = ring.collect();
+        let cameras = ring_of_cameras();
         let more = more_cameras(&cameras, 40, 0.3, 1);
         assert_eq!(more.len(), 40);
         let navigator = Navigator::new(&wall_with_hole(0.0, 0.6), &more, DVec3::NEG_Y);

@@ -50,3 +50,12 @@ pub fn camera_at(center: DVec3) -> Camera {
         center,
     }
 }
+
+/// Sixteen cameras in a circle.
+pub fn ring_of_cameras() -> Vec<Camera> {
+    let place = |i: i32| {
+        let angle = f64::from(i) / 16.0 * std::f64::consts::TAU;
+        camera_at(DVec3::new(1.3 * angle.cos(), 0.2, 1.3 * angle.sin()))
+    };
+    (0..16).map(place).collect()
+}

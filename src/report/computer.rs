@@ -1,7 +1,7 @@
 //! The machine that a report was measured on: times of different machines do not compare.
 
 use super::document::Computer;
-use crate::render::gpu;
+use crate::render::gpu::real_gpu;
 
 /// Looks at this machine.
 pub fn look() -> Computer {
@@ -12,12 +12,11 @@ pub fn look() -> Computer {
         processor = system.cpus().first().map_or("", |c| c.brand()).trim().to_owned();
         memory_bytes = system.total_memory();
     }
-    let gpu = gpu::Context::new().ok().filter(|c| !c.is_software()).map(|c| c.info().name.clone());
     Computer {
         processor: if processor.is_empty() { "unknown".into() } else { processor },
         cores: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
         memory_bytes,
-        gpu,
+        gpu: real_gpu(),
         system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
         build: if cfg!(debug_assertions) { "for development" } else { "optimised" }.into(),
     }

@@ -1,5 +1,7 @@
 //! A report as one HTML page that needs nothing but itself: plots, fronts, tables, orders, defaults.
 
+use htmlize::escape_all_quotes;
+
 use super::document::{Report, Stage};
 use super::plot::{order_svg, svg};
 use super::table::{number, seconds, title};
@@ -19,9 +21,9 @@ pub fn html(report: &Report) -> String {
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" \
          content=\"width=device-width\"><title>{0}</title><style>{STYLE}</style></head><body>\n<h1>{0}</h1>\n\
          <p class=\"small\">FMLGS {1}. Measured on: {2}. Times are medians; compare them within a page only.</p>\n<nav>",
-        escaped(&title),
-        escaped(&report.program),
-        escaped(&report.computer.words())
+        escape_all_quotes(&title),
+        escape_all_quotes(&report.program),
+        escape_all_quotes(report.computer.words())
     );
     for stage in &report.stages {
         out += &format!("<a href=\"#{}\">{}</a>", stage.name.name(), stage.name.title());
@@ -35,13 +37,14 @@ pub fn html(report: &Report) -> String {
 }
 
 fn section(stage: &Stage) -> String {
-    let input: Vec<String> = stage.input.iter().map(|(k, v)| format!("{}: {}", escaped(k), escaped(v))).collect();
+    let input: Vec<String> =
+        stage.input.iter().map(|(k, v)| format!("{}: {}", escape_all_quotes(k), escape_all_quotes(v))).collect();
     let mut out = format!(
         "<h2 id=\"{}\">{}</h2>\n<p>Seconds of {}; {}.</p><p class=\"small\">{}; {} repeats.",
         stage.name.name(),
         stage.name.title(),
-        escaped(&stage.secs_of),
-        escaped(&stage.reference),
+        escape_all_quotes(&stage.secs_of),
+        escape_all_quotes(&stage.reference),
         input.join("; "),
         stage.seeds.len()
     );
@@ -51,7 +54,7 @@ fn section(stage: &Stage) -> String {
     }
     out += "</p>\n";
     for text in &stage.left_out {
-        out += &format!("<p class=\"no\">Left out: {}</p>\n", escaped(text));
+        out += &format!("<p class=\"no\">Left out: {}</p>\n", escape_all_quotes(text));
     }
     for (i, measure) in stage.measures.iter().enumerate() {
         let Ok(picture) = svg(stage, measure) else { continue };
@@ -60,8 +63,8 @@ fn section(stage: &Stage) -> String {
             0 => picture,
             _ => format!(
                 "<details><summary>{}: {}</summary>{picture}</details>\n",
-                escaped(&title(measure)),
-                escaped(&measure.meaning)
+                escape_all_quotes(title(measure)),
+                escape_all_quotes(&measure.meaning)
             ),
         };
     }
@@ -72,7 +75,7 @@ fn table(stage: &Stage) -> String {
     let head: Vec<String> = stage
         .measures
         .iter()
-        .map(|m| format!("<th title=\"{}\">{}</th>", escaped(&m.meaning), escaped(&title(m))))
+        .map(|m| format!("<th title=\"{}\">{}</th>", escape_all_quotes(&m.meaning), escape_all_quotes(title(m))))
         .collect();
     let mut out =
         format!("<table><thead><tr><th>knob</th><th>setting</th><th>time</th>{}</tr></thead><tbody>\n", head.concat());
@@ -88,9 +91,9 @@ fn table(stage: &Stage) -> String {
         let spread = format!("{} to {}", seconds(p.secs.least), seconds(p.secs.most));
         out += &format!(
             "<tr class=\"{class}\"><td>{}</td><td title=\"{}\">{}</td><td title=\"{spread}\">{}</td>",
-            escaped(&p.method),
-            escaped(&knobs),
-            escaped(&p.setting),
+            escape_all_quotes(&p.method),
+            escape_all_quotes(&knobs),
+            escape_all_quotes(&p.setting),
             seconds(p.secs.median)
         );
         for m in &stage.measures {
@@ -114,15 +117,15 @@ fn choices(stage: &Stage) -> String {
     }
     let mut out = format!(
         "<p>By the rule \u{201c}{}\u{201d}:</p>\n<table><thead><tr><th>knob</th><th>chosen</th><th>default holds</th></tr></thead><tbody>\n",
-        escaped(&stage.rule.words())
+        escape_all_quotes(stage.rule.words())
     );
     for c in choices {
         let chosen = if c.chosen.default { "the default" } else { &c.chosen.setting };
         let (class, holds) = if c.holds { ("", "yes") } else { ("no", "no") };
         out += &format!(
             "<tr><td>{}</td><td>{}</td><td class=\"{class}\">{holds}</td></tr>\n",
-            escaped(c.method),
-            escaped(chosen)
+            escape_all_quotes(c.method),
+            escape_all_quotes(chosen)
         );
     }
     out + "</tbody></table>\n"
@@ -138,18 +141,13 @@ fn orders(stage: &Stage) -> String {
         out += &format!(
             "<figure>{}<figcaption>{}: order {:.2} seen, {} expected: <span class=\"{class}\">{word}</span>. {}</figcaption></figure>\n",
             order_svg(o).unwrap_or_default(),
-            escaped(&o.what),
+            escape_all_quotes(&o.what),
             o.observed,
             o.expected,
-            escaped(&o.meaning)
+            escape_all_quotes(&o.meaning)
         );
     }
     out + "</div>\n"
-}
-
-/// Text between tags, or in an attribute.
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! What this machine offers.
 
 use crate::pipeline::train::budget;
+use crate::render::gpu::real_gpu;
 use crate::scene::Machine;
 
 /// Looks at memory, cores and the graphics adapter. Takes some milliseconds: not for the window's
@@ -16,20 +17,4 @@ fn free_memory_bytes() -> u64 {
         system.refresh_memory();
         system.available_memory()
     })
-}
-
-/// Name of the first adapter that is not emulated.
-pub fn real_gpu() -> Option<String> {
-    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
-    let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
-    adapters
-        .iter()
-        .map(wgpu::Adapter::get_info)
-        .find(|i| {
-            matches!(
-                i.device_type,
-                wgpu::DeviceType::DiscreteGpu | wgpu::DeviceType::IntegratedGpu | wgpu::DeviceType::VirtualGpu
-            )
-        })
-        .map(|i| i.name)
 }

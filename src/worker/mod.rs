@@ -24,7 +24,6 @@ pub use action::{Action, Axis, Pane, Shortcut, ViewMode};
 pub use control::Control;
 pub use edit::EditRequest;
 pub use guide::{Explored, FilmRequest, VisitRequest, Visited};
-pub use machine::real_gpu;
 pub use measure::MeasureRequest;
 pub use protocol::{Command, Event, Failure, HomeView, JobId, JobKind, Lane, OpenedScene, Outcome, Stop};
 pub use slot::Slot;

@@ -269,3 +269,19 @@ fn told(error: wgpu::Error, what: &str, bytes: u64) -> GpuError {
         }
     }
 }
+
+/// Name of the first adapter that is not emulated. Opens no device.
+pub fn real_gpu() -> Option<String> {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
+    adapters
+        .iter()
+        .map(wgpu::Adapter::get_info)
+        .find(|i| {
+            matches!(
+                i.device_type,
+                wgpu::DeviceType::DiscreteGpu | wgpu::DeviceType::IntegratedGpu | wgpu::DeviceType::VirtualGpu
+            )
+        })
+        .map(|i| i.name)
+}

@@ -27,7 +27,7 @@ pub mod timing;
 pub mod trainer;
 
 pub use cloud::Parameters;
-pub use context::Context;
+pub use context::{Context, real_gpu};
 pub use error::GpuError;
 pub use renderer::Renderer;
 pub use ssim::DevicePhoto;

@@ -1,10 +1,8 @@
 //! Knobs of drawn depth against the true depth of synthetic photos.
 
-use std::time::Instant;
-
 use serde_json::json;
 
-use super::{Input, Plans, stage};
+use super::{Input, Plans, stage, timed};
 use crate::math::stats::mean;
 use crate::pipeline::depth::{Samples, TrueDepth};
 use crate::pipeline::observer::{Observer, Signal};
@@ -107,10 +105,9 @@ impl Study for DepthStudy<'_> {
             }
             let size = [camera.width_px / plan.smaller, camera.height_px / plan.smaller];
             let small = camera.resized(size[0].max(1), size[1].max(1));
-            renderer.render(self.cloud, Features::NONE, &small, &plan.settings).map_err(failed)?;
-            let start = Instant::now();
-            let frame = renderer.render(self.cloud, Features::NONE, &small, &plan.settings).map_err(failed)?;
-            secs.push(start.elapsed().as_secs_f64());
+            let draw = || renderer.render(self.cloud, Features::NONE, &small, &plan.settings).map_err(failed);
+            let (frame, took) = timed(draw)?;
+            secs.push(took);
             // Compared at the size of the default, whatever size was drawn.
             let truth = truth.resampled(camera.width_px as usize, camera.height_px as usize);
             let drawn = match plan.kind {

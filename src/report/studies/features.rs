@@ -32,6 +32,12 @@ enum Read {
     Blend,
 }
 
+/// What is drawn of a view to be read.
+enum Map {
+    Exact(ViewMap),
+    Blend(CodeMap),
+}
+
 /// One way.
 #[derive(Clone, Copy)]
 struct Plan {
@@ -87,17 +93,22 @@ impl<'a> FeatureStudy<'a> {
         let mut ious: BTreeMap<Level, Vec<f64>> = BTreeMap::new();
         for view in self.held_out {
             let (w, h) = (view.camera.width_px as usize, view.camera.height_px as usize);
-            let exact = ViewMap::render(&mut renderer, self.cloud, of, &self.identities, &view.camera, self.settings)?;
-            let blended = CodeMap::render(&mut renderer, self.cloud, codes, true, &view.camera, self.settings)?;
+            let (all, camera) = (&self.identities, &view.camera);
+            let map = match read {
+                Read::Exact => Map::Exact(ViewMap::render(&mut renderer, self.cloud, of, all, camera, self.settings)?),
+                Read::Blend => {
+                    Map::Blend(CodeMap::render(&mut renderer, self.cloud, codes, true, camera, self.settings)?)
+                }
+            };
             for (id, identity) in self.identities.iter() {
                 let inside = self.identities.within(id);
                 let truth = Mask::from_fn(w, h, |i| inside.get(view.labels[i] as usize).copied().unwrap_or(false));
                 if truth.is_empty() {
                     continue;
                 }
-                let found = match read {
-                    Read::Exact => matching::exact(&exact, &self.identities, id, TOLERANCE),
-                    Read::Blend => matching::blend(&blended, &self.identities, id, TOLERANCE),
+                let found = match &map {
+                    Map::Exact(map) => matching::exact(map, all, id, TOLERANCE),
+                    Map::Blend(map) => matching::blend(map, all, id, TOLERANCE),
                 };
                 ious.entry(identity.level).or_default().push(found.iou(&truth));
             }

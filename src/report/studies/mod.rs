@@ -9,9 +9,10 @@ pub mod train;
 pub mod views;
 
 use std::collections::BTreeMap;
+use std::time::Instant;
 
 use crate::report::document::Form;
-use crate::report::{Case, Measure, Rule, Stage, StageName};
+use crate::report::{Case, Measure, Rule, Stage, StageName, StudyError};
 
 /// What a sweep is run on, in words: name and value.
 pub type Input = BTreeMap<String, String>;
@@ -52,6 +53,15 @@ impl<P> Plans<P> {
     fn of(&self, case: &Case) -> Option<&P> {
         self.0.iter().find(|(c, _)| c == case).map(|(_, plan)| plan)
     }
+}
+
+/// What is drawn, and the seconds that took: the second time, as buffers are kept from picture to
+/// picture.
+fn timed<F>(mut draw: impl FnMut() -> Result<F, StudyError>) -> Result<(F, f64), StudyError> {
+    draw()?;
+    let start = Instant::now();
+    let drawn = draw()?;
+    Ok((drawn, start.elapsed().as_secs_f64()))
 }
 
 /// Mean IoU, of which there are several.

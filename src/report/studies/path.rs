@@ -242,7 +242,7 @@ fn turning_order() -> Order {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::navigate::testing::{camera_at, wall_with_hole};
+    use crate::navigate::testing::{ring_of_cameras, wall_with_hole};
     use crate::pipeline::observer::Silent;
 
     #[test]
@@ -254,11 +254,7 @@ mod tests {
 
     #[test]
     fn too_few_looks_fly_through_walls_and_the_default_does_not() {
-        let ring = (0..16).map(|i| {
-            let angle = f64::from(i) / 16.0 * std::f64::consts::TAU;
-            camera_at(DVec3::new(1.3 * angle.cos(), 0.2, 1.3 * angle.sin()))
-        });
-        let cameras: Vec<Camera> = ring.collect();
+        let cameras = ring_of_cameras();
         let mut study = PathStudy::new(&wall_with_hole(0.0, 0.6), &cameras, 1, Input::new());
         let mut value = |method: &str, setting: &str, name: &str| {
             let cases = study.cases();

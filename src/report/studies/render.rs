@@ -5,7 +5,8 @@ use std::time::Instant;
 
 use serde_json::json;
 
-use super::{Input, Plans, stage};
+use super::{Input, Plans, stage, timed};
+use crate::math::Real;
 use crate::math::stats::mean;
 use crate::pipeline::observer::{Observer, Signal};
 use crate::render::cpu::Renderer;
@@ -90,15 +91,11 @@ impl RenderStudy {
     /// Draws one view; returns it with the seconds that took.
     fn draw(&mut self, plan: &Plan, camera: &Camera) -> Result<(Planes, f64), StudyError> {
         let mut renderer = Renderer::<f32>::new();
-        let timed = |frame: &mut dyn FnMut() -> Result<Frame<f32>, StudyError>| {
-            // Once without the clock: buffers are kept from frame to frame.
-            frame()?;
-            let start = Instant::now();
-            let frame = frame()?;
-            Ok((planes(&frame), start.elapsed().as_secs_f64()))
-        };
+        fn shown<R: Real>((frame, secs): (Frame<R>, f64)) -> (Planes, f64) {
+            (planes(&frame), secs)
+        }
         let mut cpu = |cloud: &GaussianCloud, camera: &Camera, settings: &RenderSettings| {
-            timed(&mut || renderer.render(cloud, Features::NONE, camera, settings).map_err(failed))
+            timed(|| renderer.render(cloud, Features::NONE, camera, settings).map_err(failed)).map(shown)
         };
         match plan {
             Plan::Cpu(settings) => cpu(&self.cloud, camera, settings),
@@ -112,15 +109,12 @@ impl RenderStudy {
             }
             Plan::Double(settings) => {
                 let mut renderer = Renderer::<f64>::new();
-                let mut frame = || renderer.render(&self.double, Features::NONE, camera, settings).map_err(failed);
-                frame()?;
-                let start = Instant::now();
-                let frame = frame()?;
-                Ok((planes(&frame), start.elapsed().as_secs_f64()))
+                let draw = || renderer.render(&self.double, Features::NONE, camera, settings).map_err(failed);
+                timed(draw).map(shown)
             }
             Plan::Gpu(settings) => {
                 let Some(gpu) = &mut self.gpu else { return Err(failed("there is no graphics adapter")) };
-                timed(&mut || gpu.render(&self.cloud, camera, settings).map_err(failed))
+                timed(|| gpu.render(&self.cloud, camera, settings).map_err(failed)).map(shown)
             }
             Plan::Kept(degrees, settings) => {
                 let turn = glam::DMat3::from_rotation_y(degrees.to_radians());
