@@ -50,6 +50,9 @@ pub struct Subject {
     options: Options,
 }
 
+/// Of labelled photos that training saw, every so many are left out of a lifting where no others are there.
+const EVERY: usize = 8;
+
 type Sweep<'a> = &'a mut dyn FnMut(&mut dyn Study) -> Result<End, CliError>;
 
 impl Subject {
@@ -177,22 +180,29 @@ impl Subject {
         };
         let encoder = models::encoder(&map.language.as_ref().map(|l| l.encoder.clone()).unwrap_or_default())?;
         let mut labels = FileMasks(Labels::open(masks)?);
+        let [seen, held_out] = self.labelled(dataset, &labels);
+        // Labels of few photos are rarely of held-out ones.
+        let (asked, which) = if held_out.is_empty() { (seen, "trained on") } else { (held_out, "held out") };
         let mut views = Vec::new();
-        for i in spread(&dataset.split(self.scene.config.holdout_every).1, self.options.views) {
+        for i in spread(&asked, self.options.views) {
             let photo = &dataset.photos[i];
-            if labels.covers(photo) {
-                let categories = categories(&labels.segment(photo, self.options.max_side_px, &mut Silent)?);
-                let camera = photo.camera.limited_to(self.options.max_side_px);
-                views.push(Asked { name: photo.name.clone(), camera, categories });
-            }
+            let categories = categories(&labels.segment(photo, self.options.max_side_px, &mut Silent)?);
+            let camera = photo.camera.limited_to(self.options.max_side_px);
+            views.push(Asked { name: photo.name.clone(), camera, categories });
         }
         if views.is_empty() {
-            let path = masks.display();
-            return Err(CliError::failed(format!("{path}: labels of held-out photos are needed")));
+            return Err(CliError::failed(format!("{}: there are no labels of this scene's photos", masks.display())));
         }
         let drawn = (&self.scene.cloud, &self.scene.settings);
-        let study = QueryStudy::new(drawn, map, encoder, views, self.options.repeats, self.input(&[]));
+        let input = self.input(&[("photos", which.into())]);
+        let study = QueryStudy::new(drawn, map, encoder, views, self.options.repeats, input);
         sweep(&mut study.map_err(|e| CliError::failed(e.to_string()))?)
+    }
+
+    /// Indices of the labelled photos that training saw, and of those that it did not see.
+    fn labelled(&self, dataset: &Dataset, labels: &FileMasks) -> [Vec<usize>; 2] {
+        let (seen, held_out) = dataset.split(self.scene.config.holdout_every);
+        [seen, held_out].map(|of| of.into_iter().filter(|&i| labels.covers(&dataset.photos[i])).collect())
     }
 
     fn depth(&self, sweep: Sweep<'_>) -> Result<End, CliError> {
@@ -214,19 +224,22 @@ impl Subject {
             return Err(CliError::failed("photos and labels are needed"));
         };
         let mut segmenter = FileMasks(Labels::open(masks)?);
+        let [mut training, mut held_out] = self.labelled(dataset, &segmenter);
+        // Few labels may all be of photos that the Gaussians were trained on; the lifting does without some.
+        if held_out.is_empty() {
+            held_out = training.iter().copied().step_by(EVERY).collect();
+            training.retain(|i| !held_out.contains(i));
+        }
         let mut identities = Identities::default();
         let mut views = |indices: &[usize]| -> Result<Vec<CodeView>, CliError> {
             let photos = indices.iter().map(|&i| &dataset.photos[i]);
             let each = photos.map(|p| view(p, &mut segmenter, &mut identities, self.options.max_side_px));
-            Ok(each.collect::<Result<Vec<_>, CliError>>()?.into_iter().flatten().collect())
+            each.collect()
         };
-        let (training, held_out) = dataset.split(self.scene.config.holdout_every);
         let (training, held_out) = (views(&training)?, views(&spread(&held_out, self.options.views))?);
         if training.is_empty() || held_out.is_empty() {
             let path = masks.display();
-            return Err(CliError::failed(format!(
-                "{path}: masks of training photos and of held-out photos are needed"
-            )));
+            return Err(CliError::failed(format!("{path}: masks of two photos of the scene are needed at least")));
         }
         let input = self.input(&[
             ("views", format!("{} + {} held out", training.len(), held_out.len())),
@@ -238,17 +251,13 @@ impl Subject {
     }
 }
 
-/// The labels of a photo, its regions matched with known identities by their names; `None` if it has
-/// none.
+/// The labels of a photo that has some, its regions matched with known identities by their names.
 fn view(
     photo: &Photo,
     segmenter: &mut FileMasks,
     identities: &mut Identities,
     max_side_px: u32,
-) -> Result<Option<CodeView>, CliError> {
-    if !segmenter.covers(photo) {
-        return Ok(None);
-    }
+) -> Result<CodeView, CliError> {
     let found: Vec<FoundMask> = segmenter.segment(photo, max_side_px, &mut Silent)?;
     let mut ids: Vec<IdentityId> = Vec::with_capacity(found.len());
     for mask in &found {
@@ -260,5 +269,5 @@ fn view(
     }
     let camera = photo.camera.limited_to(max_side_px);
     let labels = labels_of(&found, &ids, camera.width_px as usize * camera.height_px as usize);
-    Ok(Some(CodeView { camera, labels }))
+    Ok(CodeView { camera, labels })
 }

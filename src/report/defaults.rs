@@ -13,8 +13,8 @@ pub fn markdown(reports: &[Report]) -> String {
          Written by `fmlgs report --defaults`; do not edit. Each row is one knob of a stage. A rule, stated above \
          the table, is applied to the measurements of that knob's settings and of the default: *chosen* is what \
          it picks, *least error* the best setting whatever it costs. The default *holds* if it is good enough by \
-         the rule and not more than {:.0} % slower than what is chosen. Times are medians of repeats on the machine \
-         named; compare them within a table only.\n",
+         the rule and not more than {:.0} % slower than what is chosen, or slower by less than repeats \
+         differ. Times are medians of repeats on the machine named; compare them within a table only.\n",
         100.0 * NOISE
     );
     for report in reports {

@@ -30,7 +30,8 @@ pub struct Choice<'a> {
     pub chosen: &'a Point,
     /// The one with the least error.
     pub best: &'a Point,
-    /// Whether the default is good enough, and within noise as fast as the chosen one.
+    /// Whether the default is good enough, and as fast as the chosen one: within noise, or in one repeat or
+    /// another.
     pub holds: bool,
 }
 
@@ -56,7 +57,8 @@ impl Stage {
             let enough = self.rule.enough(least);
             let good = all.iter().filter(|p| p.1 <= enough);
             let (chosen, _) = *good.min_by(|a, b| a.0.secs.median.total_cmp(&b.0.secs.median))?;
-            let as_fast = default.secs.median <= (1.0 + NOISE) * chosen.secs.median + self.rule.spare_secs;
+            let as_fast = default.secs.median <= (1.0 + NOISE) * chosen.secs.median + self.rule.spare_secs
+                || default.secs.least < chosen.secs.most;
             Some(Choice { method, default, chosen, best, holds: default_error <= enough && as_fast })
         };
         methods.filter_map(choice).collect()
@@ -105,6 +107,13 @@ mod tests {
         assert!(choices[0].holds && choices[0].chosen.default);
         // Ten milliseconds that nobody notices are no reason to change a default.
         stage.rule = Rule { times: 1.1, floor: 0.01, spare_secs: 0.02, ..stage.rule.clone() };
+        let choices = stage.choices();
+        assert!(choices[0].holds && !choices[0].chosen.default);
+        // Neither are times whose repeats overlap.
+        stage.rule.spare_secs = 0.0;
+        assert!(!stage.choices()[0].holds);
+        let slow = stage.points.iter().position(|p| p.setting == "1/64").expect("there");
+        stage.points[slow].secs.add(0.03);
         let choices = stage.choices();
         assert!(choices[0].holds && !choices[0].chosen.default);
     }

@@ -5,7 +5,7 @@ use glam::{DMat3, DVec2, DVec3};
 use super::{Case, Finding};
 use crate::math::{Real, sh};
 use crate::render::cpu::{RenderStats, Renderer};
-use crate::render::{Features, Frame, RenderError, RenderSettings};
+use crate::render::{Features, Frame, FrameGradient, RenderError, RenderSettings};
 use crate::scene::{Camera, GaussianCloud};
 
 /// Largest deviation of a colour from double precision that a picture may have.
@@ -163,7 +163,7 @@ pub fn cases() -> Vec<Case> {
     places(&mut surfels);
     crowds(&mut surfels);
     let cases = as_cases("drawing", all, false).chain(as_cases("surfels", surfels, true));
-    cases.chain(refused()).collect()
+    cases.chain(gradients()).chain(refused()).collect()
 }
 
 /// Needles, pancakes, sizes, rotations, opacities.
@@ -225,6 +225,13 @@ fn places(all: &mut Scenes) {
             (cloud, at)
         });
     }
+    all.add("a depth that overflows", Expected::TooLarge, || {
+        let mut at = camera(64, 48);
+        let (x, y) = (DVec3::new(1.0, -1.0, 0.0).normalize(), DVec3::new(1.0, 1.0, -2.0).normalize());
+        at.world_from_camera = DMat3::from_cols(x, y, x.cross(y));
+        at.center = -2.5e38 * x.cross(y).signum();
+        (one([0.3; 3], TURNED, 2.0), at)
+    });
     for size in [1e-6, 1e6] {
         all.drawn(format!("a scene {size:e} units large"), move || {
             // Nothing nearer than the near plane is drawn, so the small one is looked at from afar.
@@ -264,6 +271,13 @@ fn colors(all: &mut Scenes) {
         cloud.sh[0] = [0.5 / sh::SH_C0, -1e3, 0.0];
         (cloud, camera(64, 48))
     });
+    all.drawn("colour of what is 3e38 units away", || {
+        let mut cloud = one([0.3; 3], TURNED, 4.0);
+        cloud.positions[0][2] = 3e38;
+        cloud.sh_degree = 1;
+        cloud.sh = vec![[0.1, 0.2, 0.3], [0.0; 3], [0.9, -0.8, 0.7], [0.0; 3]];
+        (cloud, camera(65, 49))
+    });
     for (name, expected, of) in [
         ("that cancel", Expected::Drawn, (|k| if k % 2 == 0 { 3.0 } else { -3.0 }) as fn(usize) -> f64),
         ("of 1e30", Expected::Drawn, |_| 1e30),
@@ -301,6 +315,32 @@ fn many(n: usize, place: impl Fn(usize) -> [f64; 3], scale: f64, logit: f64) -> 
         sh: vec![[0.5, 0.1, -0.2]; n],
         ..GaussianCloud::default()
     }
+}
+
+/// Gradients where the product of three covariances overflows, but no covariance does.
+fn gradients() -> Vec<Case> {
+    let length = |antialias: bool| {
+        let (cloud, at) = (one([0.3, 5e13, 0.2], TURNED, 2.0).cast::<f32>(), camera(64, 48));
+        let settings = RenderSettings { antialias, ..RenderSettings::default() };
+        let mut renderer = Renderer::<f32>::new();
+        let frame = renderer.render(&cloud, Features::NONE, &at, &settings).map_err(|e| e.to_string())?;
+        let up = FrameGradient { color: frame.color, ..FrameGradient::default() };
+        let g = renderer.backward(&cloud, Features::NONE, &up);
+        let shape = g.log_scales.as_flattened().iter().chain(g.quaternions.as_flattened());
+        let all = shape.chain(g.positions.as_flattened()).chain(&g.opacity_logits).chain(g.sh.as_flattened());
+        Ok::<f64, String>(all.map(|v| f64::from(*v).powi(2)).sum::<f64>().sqrt())
+    };
+    let finding = |antialias| match length(antialias) {
+        Ok(length) => Finding::is(format!("of length {length:.1e}"), length.is_finite() && length > 0.0),
+        Err(e) => Finding::is(e, false),
+    };
+    let name = |antialias| if antialias { ", anti-aliased" } else { "" };
+    let case = |antialias| {
+        Case::new("drawing", format!("gradients of a needle 5e13 units long{}", name(antialias)), move || {
+            finding(antialias)
+        })
+    };
+    [false, true].map(case).into()
 }
 
 /// Values that are no numbers, in every property: refused by name.

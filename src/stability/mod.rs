@@ -1,14 +1,15 @@
 //! The catalogue of extreme cases: what happens in each, how far it is from double precision, and
 //! whether the promise of DESIGN's numerics holds (finite in, finite out, or a clear refusal).
 //!
-//! One file per area: [`drawing`], [`invariance`], [`training`], [`language`], [`moving`]; [`fuzz`] looks
-//! for more.
+//! One file per area: [`drawing`], [`invariance`], [`training`], [`optimiser`], [`language`],
+//! [`moving`]; [`fuzz`] looks for more.
 
 pub mod drawing;
 pub mod fuzz;
 pub mod invariance;
 pub mod language;
 pub mod moving;
+pub mod optimiser;
 pub mod training;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -83,6 +84,7 @@ pub fn catalogue() -> Vec<Case> {
     let mut all = drawing::cases();
     all.extend(invariance::cases());
     all.extend(training::cases());
+    all.extend(optimiser::cases());
     all.extend(language::cases());
     all.extend(moving::cases());
     all

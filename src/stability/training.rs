@@ -11,7 +11,6 @@ use crate::pipeline::train::density;
 use crate::pipeline::train::trainer::Trainer;
 use crate::pipeline::train::{TrainConfig, TrainView};
 use crate::render::cpu::Renderer;
-use crate::render::cpu::adam::AdamStep;
 use crate::render::cpu::ssim::ssim;
 use crate::render::{Features, RenderSettings};
 use crate::scene::{GaussianCloud, PhotoPixels};
@@ -31,7 +30,7 @@ pub fn flat(level: u8) -> TrainView {
 }
 
 /// A photo of a coloured blob.
-fn blob() -> TrainView {
+pub(super) fn blob() -> TrainView {
     let mut view = flat(0);
     let cloud = one([0.5, 0.3, 0.4], [0.9, 0.1, 0.2, 0.0], 3.0).cast::<f32>();
     let frame = Renderer::new().render(&cloud, Features::NONE, &view.camera, &RenderSettings::default());
@@ -42,7 +41,7 @@ fn blob() -> TrainView {
 }
 
 /// Some Gaussians around the middle.
-fn start() -> GaussianCloud {
+pub(super) fn start() -> GaussianCloud {
     let mut cloud = one([0.2; 3], [1.0, 0.0, 0.0, 0.0], -1.0).cast::<f32>();
     cloud = cloud.select(&[0; 24]);
     for (i, p) in cloud.positions.iter_mut().enumerate() {
@@ -59,15 +58,15 @@ pub fn trainer(cloud: GaussianCloud, steps: u64, densify: bool, extent: f64) -> 
 }
 
 /// What a short training came to.
-struct Trained {
-    trainer: Trainer,
-    losses: Vec<f64>,
+pub(super) struct Trained {
+    pub(super) trainer: Trainer,
+    pub(super) losses: Vec<f64>,
     /// Gaussians left as they were, and gradients cut.
-    left: [usize; 2],
+    pub(super) left: [usize; 2],
 }
 
 /// Trains for so many steps, and does something before each.
-fn train(
+pub(super) fn train(
     mut trainer: Trainer,
     view: TrainView,
     steps: u64,
@@ -111,123 +110,9 @@ fn improves(cloud: GaussianCloud, view: TrainView, change: impl Fn(&mut Trainer)
 }
 
 /// The first and the last loss; NaN for none.
-fn ends(losses: &[f64]) -> (f64, f64) {
+pub(super) fn ends(losses: &[f64]) -> (f64, f64) {
     let or_nan = |loss: Option<&f64>| loss.copied().unwrap_or(f64::NAN);
     (or_nan(losses.first()), or_nan(losses.last()))
-}
-
-/// What happens to one Gaussian at one step of a training.
-#[derive(Clone, Copy, PartialEq)]
-enum Hit {
-    Nothing,
-    /// Its position has a gradient of about 1e27.
-    Outlier,
-    /// It has the second moment that plain Adam would keep of that.
-    Frozen,
-}
-
-/// The same training undisturbed, with an outlier gradient, and with what plain Adam would make of one.
-/// For one step the camera has a focal length of 1e30 px, and a Gaussian on its axis is as much smaller.
-fn outlier() -> Finding {
-    const WHICH: usize = 3;
-    let run = |hit: Hit| {
-        let trainer = trainer(start(), 400, false, 1.0);
-        let (mut kept, mut at) = (None, [[0.0_f32; 3]; 2]);
-        let trained = train(trainer, blob(), 400, |t, view| {
-            if t.step == 100 && hit == Hit::Outlier {
-                kept = Some((t.cloud.positions[WHICH], t.cloud.log_scales[WHICH], view.camera.focal_px));
-                t.cloud.positions[WHICH] = [0.0; 3];
-                t.cloud.log_scales[WHICH] = [-69.0; 3];
-                view.camera.focal_px = glam::DVec2::splat(1e30);
-            } else if let Some((position, scale, focal)) = kept.take() {
-                (t.cloud.positions[WHICH], t.cloud.log_scales[WHICH]) = (position, scale);
-                view.camera.focal_px = focal;
-            }
-            if t.step == 101 {
-                at[0] = t.cloud.positions[WHICH];
-                if hit == Hit::Frozen {
-                    t.moments[1].positions[WHICH] = [1e27; 3];
-                }
-            }
-        })?;
-        at[1] = trained.trainer.cloud.positions[WHICH];
-        let way = at[0].iter().zip(at[1]).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>().sqrt();
-        Ok::<_, Finding>((trained, way))
-    };
-    match (run(Hit::Nothing), run(Hit::Outlier), run(Hit::Frozen)) {
-        (Ok((calm, way)), Ok((hit, hit_way)), Ok((_, frozen))) => {
-            let text = format!(
-                "goes {:.2} of its undisturbed way in 300 steps ({:.0e} if frozen); {} left as they were, {} cut",
-                hit_way / way,
-                frozen / way,
-                hit.left[0],
-                hit.left[1]
-            );
-            let finding = Finding::within(text, (hit_way / way - 1.0).abs(), 0.5);
-            let told = hit.left[1] > 0 && calm.left == [0, 0];
-            Finding { holds: finding.holds && told && frozen < 0.01 * way, ..finding }
-        }
-        (Err(f), ..) | (_, Err(f), _) | (.., Err(f)) => Finding { holds: false, ..f },
-    }
-}
-
-/// A scene 1e-4 units large: the loss is 1e8 times as curved along positions as along log-scales.
-fn stiff() -> Finding {
-    const SIZE: f64 = 1e-4;
-    let mut view = blob();
-    // The same picture from 1e4 times as far with that focal length: nothing is nearer than the near plane.
-    let small = |cloud: &mut GaussianCloud| {
-        cloud.positions.iter_mut().flatten().for_each(|v| *v *= SIZE as f32);
-        cloud.log_scales.iter_mut().flatten().for_each(|v| *v += SIZE.ln() as f32);
-    };
-    view.camera.focal_px *= 1.0 / SIZE;
-    let mut cloud = start();
-    small(&mut cloud);
-    let curved = curvatures(&cloud, &view);
-    let trainer = trainer(cloud, 300, false, SIZE);
-    match train(trainer, view, 300, |_, _| {}) {
-        Ok(t) => {
-            let (first, last) = ends(&t.losses);
-            let [position, scale, opacity] = curved;
-            let text = format!(
-                "curvatures {position:.1e}, {scale:.1e}, {opacity:.1e}; loss {first:.4} to {last:.4}, {} cut",
-                t.left[1]
-            );
-            let finding = Finding::within(text, last / first, 0.5);
-            Finding { holds: finding.holds && position > 1e7 * scale.max(opacity), ..finding }
-        }
-        Err(finding) => Finding { holds: false, ..finding },
-    }
-}
-
-/// Second derivatives of the mean squared error along a position, a log-scale and an opacity logit, the
-/// largest of all Gaussians: by central differences in double precision.
-fn curvatures(cloud: &GaussianCloud, view: &TrainView) -> [f64; 3] {
-    let wide = cloud.cast::<f64>();
-    let error = |c: &GaussianCloud<f64>| {
-        let frame = Renderer::<f64>::new().render(c, Features::NONE, &view.camera, &RenderSettings::default());
-        let Ok(frame) = frame else { return f64::NAN };
-        let each = frame.color.iter().enumerate().flat_map(|(k, plane)| {
-            plane.iter().zip(&view.pixels.rgb).map(move |(v, p)| (v - f64::from(p[k]) / 255.0).powi(2))
-        });
-        each.sum::<f64>() / (3 * view.pixels.len()) as f64
-    };
-    let middle = error(&wide);
-    type Move = fn(&mut GaussianCloud<f64>, usize, f64);
-    let moves: [(Move, f64); 3] = [
-        (|c, i, h| c.positions[i][0] += h, 1e-6),
-        (|c, i, h| c.log_scales[i][0] += h, 1e-2),
-        (|c, i, h| c.opacity_logits[i] += h, 1e-2),
-    ];
-    moves.map(|(shift, h)| {
-        let at = |i: usize, h: f64| {
-            let mut moved = wide.clone();
-            shift(&mut moved, i, h);
-            error(&moved)
-        };
-        let curvature = |i: usize| ((at(i, h) + at(i, -h) - 2.0 * middle) / (h * h)).abs();
-        (0..wide.len()).map(curvature).fold(0.0, f64::max)
-    })
 }
 
 /// A training stopped and gone on with, through a checkpoint on disk, against one that went through;
@@ -326,46 +211,7 @@ pub fn cases() -> Vec<Case> {
                 t.moments[1].positions[0] = [1e30; 3];
             })
         }),
-        training("Adam, 100,000 steps of no gradient", || {
-            let (mut p, mut m, mut v) = (1.0, 1.0, 1.0);
-            for t in 1..=100_000 {
-                AdamStep::new(t).update(&mut p, 0.0, &mut m, &mut v, 1e-3);
-            }
-            Finding::is(format!("parameter {p:.4}"), p.is_finite() && m >= 0.0 && v >= 0.0)
-        }),
-        training("Adam after a gradient of 1e30 is back within 300 steps", || {
-            let [calm, hit] = [false, true].map(|hit| {
-                let (mut p, mut m, mut v) = (0.0_f32, 0.0, 0.0);
-                let (mut longest, mut cut) = (0.0_f32, 0);
-                for t in 1..=2_300 {
-                    let before = p;
-                    // A target that moves, so that it cannot be reached once and for all.
-                    let g = p - (t as f32 * 0.01).sin();
-                    let g = if hit && t == 2_000 { 1e30 } else { g };
-                    cut += usize::from(AdamStep::new(t).update(&mut p, g, &mut m, &mut v, 1e-2));
-                    longest = longest.max((p - before).abs());
-                }
-                (p, longest, cut)
-            });
-            let outcome = format!("longest step {:.4} of a rate of 0.01, {} cut", hit.1, hit.2);
-            let finding = Finding::within(outcome, f64::from((hit.0 - calm.0).abs()), 0.02);
-            Finding { holds: finding.holds && hit.1 < 0.04 && (calm.2, hit.2) == (0, 1), ..finding }
-        }),
-        training("Adam whose gradients grow a million times for good", || {
-            let (mut p, mut m, mut v) = (0.0_f32, 0.0, 0.0);
-            let mut at = [0.0; 2];
-            for t in 1..=1_200 {
-                let g = (p - 1.0).signum() * if t > 1_000 { 1.0 } else { 1e-6 };
-                AdamStep::new(t).update(&mut p, g, &mut m, &mut v, 1e-4);
-                at = if t == 1_000 { [p, p] } else { [at[0], p] };
-            }
-            // It goes on as fast as the rate allows, neither stuck nor jumping.
-            let way = f64::from(at[1] - at[0]) / (200.0 * 1e-4);
-            Finding::is(format!("{way:.2} of the rate over the next 200 steps"), (0.5..4.0).contains(&way))
-        }),
         training("learning rates times 100", || improves(start(), blob(), |t| t.schedule.damping = 100.0)),
-        training("an outlier gradient of 1e27 in a real training", outlier),
-        training("position, scale and opacity on curvatures 1e8 apart", stiff),
         training("resumed in the middle, bit by bit", resumed),
         training("Gaussians of a lower degree than the settings'", || {
             let config = TrainConfig { steps: STEPS, densify: false, sh_degree: 3, ..TrainConfig::default() };
@@ -390,19 +236,6 @@ pub fn cases() -> Vec<Case> {
             let done = density::control(&mut t.cloud, &mut t.moments, &t.stats, 1.0, 100, false, &mut rng);
             let valid = t.cloud.validate();
             Finding::is(format!("{} split, {:?}", done.split, valid), valid.is_ok() && done.split == 24)
-        }),
-        training("Adam on curvatures 1e8 apart", || {
-            let curvature = [1.0_f32, 1e8];
-            let (mut p, mut m, mut v) = ([1.0_f32; 2], [0.0; 2], [0.0; 2]);
-            for t in 1..=4_000 {
-                let rate = 1e-2 * 0.999_f32.powi(t);
-                for k in 0..2 {
-                    let gradient = curvature[k] * p[k];
-                    AdamStep::new(t as u64).update(&mut p[k], gradient, &mut m[k], &mut v[k], rate);
-                }
-            }
-            let worst = f64::from(p[0].abs().max(p[1].abs()));
-            Finding::within("distance from the minimum, stiff and soft alike", worst, 1e-2)
         }),
         training("SSIM of constant pictures", || {
             let plane = |v: f64| vec![vec![v; 32 * 24]; 3];

@@ -125,6 +125,12 @@ impl<R: Real> Renderer<R> {
         parts + ordered + tiles + of(&self.splat_of) + of(&self.transmittance) + of(&self.last) + of(&self.records)
     }
 
+    /// The Gaussians of the last frame, front to back, and their depths.
+    pub fn drawn(&self) -> impl Iterator<Item = (usize, R)> {
+        let splats = self.surfels.as_ref().map_or(&self.ordered.splats, |s| &s.ordered.splats);
+        splats.iter().map(|s| (s.gaussian as usize, s.depth))
+    }
+
     /// What the last frame cost.
     pub fn stats(&self) -> RenderStats {
         self.stats
@@ -165,7 +171,7 @@ impl<R: Real> Renderer<R> {
         let sort_secs = clock.lap();
         bin::bin(&mut self.tiles, &self.ordered.splats, size);
         let bin_secs = clock.lap();
-        checked(&self.parts, &self.ordered, &self.tiles)?;
+        checked(&self.parts, &self.ordered, &self.tiles, !settings.keep_order)?;
 
         let pixels = size[0] * size[1];
         self.transmittance.resize(pixels, R::ONE);
@@ -239,7 +245,7 @@ impl<R: Real> Renderer<R> {
         project::project(&mut self.parts, cloud, Features::NONE, &view, &settings, channels);
         sort::sort(&mut self.ordered, &self.parts, channels, false);
         bin::bin(&mut self.tiles, &self.ordered.splats, view.size);
-        checked(&self.parts, &self.ordered, &self.tiles)?;
+        checked(&self.parts, &self.ordered, &self.tiles, true)?;
         // The buffers no longer belong to a rendered frame.
         self.frame = None;
         self.surfels = None;
@@ -389,11 +395,11 @@ impl<R: Real> Renderer<R> {
     }
 }
 
-/// Under `debug-validation`: whether projection, sorting and binning left what they should.
-fn checked<R: Real>(parts: &[Part<R>], ordered: &Ordered<R>, tiles: &Tiles) -> Result<(), NotFinite> {
+/// Under `debug-validation`: whether projection, sorting (if `by_depth`) and binning left what they should.
+fn checked<R: Real>(parts: &[Part<R>], ordered: &Ordered<R>, tiles: &Tiles, by_depth: bool) -> Result<(), NotFinite> {
     if CHECKED {
         validate::projected(parts)?;
-        validate::ordered(ordered)?;
+        validate::ordered(ordered, by_depth)?;
         validate::binned(tiles, ordered.splats.len())?;
     }
     Ok(())

@@ -104,13 +104,13 @@ fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
 }
 
 /// Projects the ellipsoid; `None` behind the near plane, for a degenerate quaternion, or where the
-/// covariance over- or underflows.
+/// depth or the covariance overflows.
 #[inline(always)]
 pub fn geometry<R: Real>(gaussian: &Gaussian<'_, R>, view: &View<R>) -> Option<Geometry<R>> {
     let relative = view.relative(gaussian.position);
     let local = [dot(view.rows[0], relative), dot(view.rows[1], relative), dot(view.rows[2], relative)];
     let z = local[2];
-    if !(z > view.near) {
+    if !(z > view.near && z.is_finite()) {
         return None;
     }
     let mut tangent = [local[0] / z, local[1] / z];
@@ -165,8 +165,14 @@ pub fn geometry<R: Real>(gaussian: &Gaussian<'_, R>, view: &View<R>) -> Option<G
 /// Unit viewing direction of a centre relative to the camera; forward if they coincide.
 #[inline(always)]
 pub fn direction<R: Real>(relative: [R; 3]) -> [R; 3] {
-    let length = dot(relative, relative).sqrt();
-    if length > R::ZERO { relative.map(|c| c / length) } else { [R::ZERO, R::ZERO, R::ONE] }
+    let largest = relative.iter().fold(R::ZERO, |m, c| m.max(c.abs()));
+    if !(largest > R::ZERO) {
+        return [R::ZERO, R::ZERO, R::ONE];
+    }
+    // Scaled first: the square of what is far away overflows.
+    let scaled = relative.map(|c| c / largest);
+    let length = dot(scaled, scaled).sqrt();
+    scaled.map(|c| c / length)
 }
 
 /// Colour before the clamp at zero: `0.5 + sum(basis * sh)`.

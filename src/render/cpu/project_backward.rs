@@ -89,9 +89,6 @@ pub fn project_backward<R: Real>(
     let opacity_logit = m0 * (-gaussian.opacity_logit).sigmoid();
     let half = [R::of(view.size[0] as f64 * 0.5), R::of(view.size[1] as f64 * 0.5)];
     let on_screen = [d_mean[0] * half[0], d_mean[1] * half[1]];
-    let [xx, xy, yy] = g.covariance;
-    let middle = R::HALF * (xx + yy);
-    let spread = (R::of(0.25) * (xx - yy) * (xx - yy) + xy * xy).sqrt();
     Some(GaussianGradient {
         position,
         log_scale,
@@ -100,8 +97,17 @@ pub fn project_backward<R: Real>(
         color,
         basis,
         screen: (on_screen[0] * on_screen[0] + on_screen[1] * on_screen[1]).sqrt(),
-        radius_px: R::of(3.0) * (middle + spread).sqrt(),
+        radius_px: radius(g.covariance),
     })
+}
+
+/// Three standard deviations along the longer axis of a covariance `[xx, xy, yy]`.
+#[inline(always)]
+pub(super) fn radius<R: Real>([xx, xy, yy]: [R; 3]) -> R {
+    // In units of the larger variance, whose square may overflow.
+    let unit = xx.max(yy);
+    let (apart, across) = (R::HALF * (xx - yy) / unit, xy / unit);
+    R::of(3.0) * (R::HALF * (xx + yy) + unit * (apart * apart + across * across).sqrt()).sqrt()
 }
 
 /// What the gradient of a Gaussian's colour comes to.
@@ -187,13 +193,14 @@ fn factor_gradient<R: Real>(
         d[1][k] = two * yy * v[k] + xy * u[k];
     }
     if let Some(m0) = compensated {
-        let [sharp, blurred] = g.determinants;
-        let (uu, uv, vv) = (dot(u, u), g.covariance[1], dot(v, v));
-        let d_sharp = if sharp > R::ZERO { m0 / (two * sharp) } else { R::ZERO };
-        let d_blurred = -m0 / (two * blurred);
+        // The logarithm of the compensation changes by the inverse of the unblurred covariance less that of
+        // the blurred one; inverses, as a product of three covariances may overflow.
+        let sharp = g.determinants[0];
+        let inverse =
+            if sharp > R::ZERO { [dot(v, v), -g.covariance[1], dot(u, u)].map(|s| s / sharp) } else { [R::ZERO; 3] };
         for k in 0..3 {
-            d[0][k] += two * (d_sharp * (u[k] * vv - uv * v[k]) + d_blurred * (u[k] * g.covariance[2] - uv * v[k]));
-            d[1][k] += two * (d_sharp * (v[k] * uu - uv * u[k]) + d_blurred * (v[k] * g.covariance[0] - uv * u[k]));
+            d[0][k] += m0 * ((inverse[0] * u[k] + inverse[1] * v[k]) - (a * u[k] + b * v[k]));
+            d[1][k] += m0 * ((inverse[2] * v[k] + inverse[1] * u[k]) - (c * v[k] + b * u[k]));
         }
     }
     d

@@ -16,6 +16,10 @@ use crate::scene::{Camera, GaussianCloud, PhotoPixels};
 const MOVED: usize = 24;
 /// Size of these moves, in units of a value: four roundings of single precision.
 const ROUNDING: f64 = 2.4e-7;
+/// One rounding of single precision.
+const SINGLE: f64 = f32::EPSILON as f64;
+/// Roundings in a sum of spherical harmonics, and in what turns a covariance into a footprint.
+const TERMS: f64 = 32.0;
 /// Largest deviation of a pixel that needs no excuse, as a share of the brightest.
 const BOUND: f64 = 2e-3;
 /// Share of pixels that may deviate by more, for what a cut-off decides one way or the other.
@@ -128,6 +132,24 @@ impl Drawn {
         let (a, b) = (self.single.stats(), self.double.stats());
         (a.visible, a.degenerate) == (b.visible, b.degenerate)
     }
+
+    /// By how much a colour may deviate: a sum of spherical harmonics is as exact as its largest term, of
+    /// those that are drawn.
+    fn color_slack(&self, cloud: &GaussianCloud) -> f64 {
+        let stride = crate::math::sh::coefficients(cloud.sh_degree);
+        let terms = |i: usize| cloud.sh[i * stride..(i + 1) * stride].iter().flatten();
+        let largest = self.double.drawn().flat_map(|(i, _)| terms(i)).fold(0.0_f64, |m, v| m.max(f64::from(v.abs())));
+        (TERMS * SINGLE * largest).min(COLOR_MAX)
+    }
+
+    /// By how much a gradient may deviate per unit of brightness: what a change of a covariance does to
+    /// axes and turn grows with the longest axis on the picture, squared.
+    fn shape_slack(&self, camera: &Camera) -> f64 {
+        let focal = camera.focal_px.max_element();
+        let longest = |i: usize| self.wide.log_scales[i].iter().fold(f64::MIN, |m, v| m.max(*v)).exp();
+        let reach = self.double.drawn().map(|(i, depth)| 1.0 + longest(i) * focal / depth);
+        TERMS * SINGLE * reach.map(|r| r * r).sum::<f64>()
+    }
 }
 
 /// Pictures are finite, opacities between 0 and 1, and single precision is where double precision is.
@@ -143,10 +165,10 @@ pub fn drawing(n: &mut Numbers) -> Verdict {
     if !drawn.comparable() {
         return Verdict::Held;
     }
-    let scale = brightness(&cloud, exact);
+    let (scale, slack) = (brightness(exact), drawn.color_slack(&cloud));
     let mut spread: Vec<[f64; 4]> = vec![[0.0; 4]; exact.alpha.len()];
     let allowed = 3 + (EDGE * spread.len() as f64) as usize;
-    let mut off = off(&drawn.frames, &spread, scale);
+    let mut off = off(&drawn.frames, &spread, scale, slack);
     for _ in 0..MOVED {
         if off.0 <= allowed {
             break;
@@ -157,25 +179,24 @@ pub fn drawing(n: &mut Numbers) -> Verdict {
         for (c, (a, b)) in planes.enumerate() {
             spread.iter_mut().zip(a.iter().zip(b)).for_each(|(s, (a, b))| s[c] = s[c].max((a - b).abs()));
         }
-        off = self::off(&drawn.frames, &spread, scale);
+        off = self::off(&drawn.frames, &spread, scale, slack);
     }
     let (wrong, worst) = off;
     promise!(wrong <= allowed, "{wrong} of {} pixels are off, up to {worst:.1} times the bound", spread.len());
     Verdict::Held
 }
 
-/// The brightest that a splat of these may be, at least 1.
-fn brightness(cloud: &GaussianCloud, exact: &Frame<f64>) -> f64 {
-    let strongest = cloud.sh.iter().flatten().fold(1.0_f64, |m, v| m.max(f64::from(v.abs())));
-    exact.color.iter().flatten().fold(strongest.min(COLOR_MAX), |m, v| m.max(*v))
+/// The brightest pixel, at least 1.
+fn brightness(exact: &Frame<f64>) -> f64 {
+    exact.color.iter().flatten().fold(1.0, |m, v| m.max(*v))
 }
 
 /// How many pixels deviate by more than their bound, and the largest deviation in units of it.
-fn off((frame, exact): &(Frame<f32>, Frame<f64>), spread: &[[f64; 4]], scale: f64) -> (usize, f64) {
+fn off((frame, exact): &(Frame<f32>, Frame<f64>), spread: &[[f64; 4]], scale: f64, slack: f64) -> (usize, f64) {
     let each = spread.iter().enumerate().map(|(i, spread)| {
         let one = |c: usize| match c {
             3 => (f64::from(frame.alpha[i]) - exact.alpha[i]).abs() / (BOUND + 8.0 * spread[3]),
-            c => (f64::from(frame.color[c][i]) - exact.color[c][i]).abs() / (BOUND * scale + 8.0 * spread[c]),
+            c => (f64::from(frame.color[c][i]) - exact.color[c][i]).abs() / (BOUND * scale + slack + 8.0 * spread[c]),
         };
         (0..4).map(one).fold(0.0, f64::max)
     });
@@ -214,7 +235,8 @@ pub fn gradients(n: &mut Numbers) -> Verdict {
     promise!(single.iter().all(|v| v.is_finite()), "a gradient is not finite though double precision's is ordinary");
     let off = length(single.iter().zip(&double).map(|(a, b)| a - b));
     // One splat more or less at a pixel, as a cut-off decides it, is 1/255 of what the pixel can give.
-    let edge = ALPHA_MIN * cloud.len() as f64 * brightness(&cloud, &drawn.frames.1);
+    let scale = brightness(&drawn.frames.1);
+    let edge = (ALPHA_MIN * cloud.len() as f64 + drawn.shape_slack(&camera)) * scale + drawn.color_slack(&cloud);
     let size = length(double.iter().copied());
     let mut bound = 0.05 * size + edge;
     for _ in 0..MOVED {

@@ -47,7 +47,7 @@ fn padded(channels: usize) -> usize {
 #[derive(Debug, Default)]
 pub struct Rasterizer<R> {
     parts: Vec<Part<R>>,
-    ordered: Ordered<R>,
+    pub(super) ordered: Ordered<R>,
     splat_of: Vec<u32>,
     tiles: Tiles,
     pixels: Pixels<R>,
@@ -102,7 +102,7 @@ impl<R: Real> Rasterizer<R> {
         let sort_secs = clock.lap();
         bin::bin(&mut self.tiles, &self.ordered.splats, size);
         let bin_secs = clock.lap();
-        checked(&self.parts, &self.ordered, &self.tiles)?;
+        checked(&self.parts, &self.ordered, &self.tiles, true)?;
 
         let n = size[0] * size[1];
         self.pixels.transmittance.resize(n, R::ONE);

@@ -45,7 +45,7 @@ pub fn geometry<R: Real>(gaussian: &Gaussian<'_, R>, view: &View<R>) -> Option<G
     let relative = view.relative(gaussian.position);
     let local: [R; 3] = std::array::from_fn(|k| dot(view.rows[k], relative));
     let z = local[2];
-    if !(z > view.near) {
+    if !(z > view.near && z.is_finite()) {
         return None;
     }
     let rotation = rotation::matrix_from_quaternion(gaussian.quaternion)?;

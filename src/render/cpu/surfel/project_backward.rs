@@ -1,7 +1,7 @@
 //! From the sums of a surfel's tile records back to the raw parameters of its Gaussian.
 
 use super::super::project::View;
-use super::super::project_backward::{ColorGradient, GaussianGradient, color_gradient, quaternion_gradient};
+use super::super::project_backward::{ColorGradient, GaussianGradient, color_gradient, quaternion_gradient, radius};
 use super::blend_backward::RECORD;
 use super::project::{bound, geometry};
 use crate::math::Real;
@@ -61,12 +61,6 @@ pub fn project_backward<R: Real>(
     // gradient came through.
     let half = [R::of(view.size[0] as f64 * 0.5), R::of(view.size[1] as f64 * 0.5)];
     let on_screen = [d_local[0] * z / focal[0] * half[0], d_local[1] * z / focal[1] * half[1]];
-    let radius = bound(&g, R::ONE).map_or(half[0] + half[1], |b| {
-        let [xx, xy, yy] = b.squared;
-        let middle = R::HALF * (xx + yy);
-        let spread = (R::of(0.25) * (xx - yy) * (xx - yy) + xy * xy).sqrt();
-        R::of(3.0) * (middle + spread).sqrt()
-    });
     Some(GaussianGradient {
         position,
         log_scale,
@@ -76,6 +70,6 @@ pub fn project_backward<R: Real>(
         color,
         basis,
         screen: (on_screen[0] * on_screen[0] + on_screen[1] * on_screen[1]).sqrt(),
-        radius_px: radius,
+        radius_px: bound(&g, R::ONE).map_or(half[0] + half[1], |b| radius(b.squared)),
     })
 }
