@@ -330,7 +330,7 @@ fn gradients() -> Vec<Case> {
         let all = shape.chain(g.positions.as_flattened()).chain(&g.opacity_logits).chain(g.sh.as_flattened());
         Ok::<f64, String>(all.map(|v| f64::from(*v).powi(2)).sum::<f64>().sqrt())
     };
-    let finding = |antialias| match length(antialias) {
+    let finding = move |antialias| match length(antialias) {
         Ok(length) => Finding::is(format!("of length {length:.1e}"), length.is_finite() && length > 0.0),
         Err(e) => Finding::is(e, false),
     };
