@@ -227,7 +227,7 @@ fn places(all: &mut Scenes) {
     }
     all.add("a depth that overflows", Expected::TooLarge, || {
         let mut at = camera(64, 48);
-        let (x, y) = (DVec3::new(1.0, -1.0, 0.0).normalize(), DVec3::new(1.0, 1.0, -2.0).normalize());
+        let (x, y) = (DVec3::new(1.0, -1.0, 0.0) / 2.0_f64.sqrt(), DVec3::new(1.0, 1.0, -2.0) / 6.0_f64.sqrt());
         at.world_from_camera = DMat3::from_cols(x, y, x.cross(y));
         at.center = -2.5e38 * x.cross(y).signum();
         (one([0.3; 3], TURNED, 2.0), at)
