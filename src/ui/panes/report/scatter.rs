@@ -30,7 +30,10 @@ impl<'a> Scatter<'a> {
     pub fn show(&self, ui: &mut Ui, height: f32) -> Option<&'a Point> {
         let (stage, measure) = (self.stage, self.measure);
         let name = (stage.name.name(), measure.name.clone(), self.second.is_some());
+        let places = self.places();
+        let corner = free_corner(&places);
         let plot = Plot::new(name)
+            .include_x(beside_legend(&places, corner, self.legend_width() / ui.available_width()))
             .height(height)
             .show_background(false)
             .show_grid(Vec2b::TRUE)
@@ -46,9 +49,7 @@ impl<'a> Scatter<'a> {
             .x_axis_formatter(|mark, range| scale::label(mark, range, scale::short_secs))
             .y_axis_formatter(|mark, range| scale::label(mark, range, scale::short))
             .label_formatter(|_| None)
-            .legend(
-                Legend::default().position(self.free_corner()).text_style(egui::TextStyle::Small).background_alpha(0.6),
-            );
+            .legend(Legend::default().position(corner).text_style(egui::TextStyle::Small).background_alpha(0.6));
         let shown = plot.show(ui, |p| self.items().into_iter().for_each(|item| item.add_to(p)));
         let nearest = self.nearest(&shown.response, &shown.transform);
         if let Some(point) = nearest {
@@ -62,10 +63,16 @@ impl<'a> Scatter<'a> {
         nearest.filter(|_| shown.response.clicked())
     }
 
-    /// The corner of the plot that has the fewest points, for the legend.
-    fn free_corner(&self) -> Corner {
+    /// Where the points are.
+    fn places(&self) -> Vec<[f64; 2]> {
         let both = self.stage.points.iter().chain(self.second.into_iter().flat_map(|s| &s.points));
-        free_corner(&both.filter_map(|p| scale::place(p, self.measure)).collect::<Vec<_>>())
+        both.filter_map(|p| scale::place(p, self.measure)).collect()
+    }
+
+    /// About how wide the legend is, points of the screen.
+    fn legend_width(&self) -> f32 {
+        let longest = self.stage.methods().iter().map(|m| m.chars().count()).max().unwrap_or(0);
+        30.0 + 6.0 * longest as f32
     }
 
     /// The point under the pointer.
@@ -141,6 +148,18 @@ impl<'a> Scatter<'a> {
     }
 }
 
+/// What the plot has to reach to along x, so that a legend in `corner`, as wide as this share of it, hides
+/// no place.
+fn beside_legend(places: &[[f64; 2]], corner: Corner, share: f32) -> f64 {
+    let (least, most) = places.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), p| (l.min(p[0]), m.max(p[0])));
+    if !(least < most) {
+        return if least.is_finite() { least } else { 0.0 };
+    }
+    let share = f64::from(share).clamp(0.0, 0.5);
+    let room = (most - least) * share / (1.0 - share);
+    if matches!(corner, Corner::LeftTop | Corner::LeftBottom) { least - room } else { most + room }
+}
+
 /// The quarter of their range that has the fewest places.
 fn free_corner(places: &[[f64; 2]]) -> Corner {
     let middle = |axis: usize| {
@@ -214,6 +233,19 @@ pub fn facts(ui: &mut Ui, point: &Point, measures: &[Measure], whose: &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_plot_reaches_beside_its_legend() {
+        let places = [[1.0, 0.0], [4.0, 2.0], [2.0, 1.0]];
+        assert!((beside_legend(&places, Corner::RightTop, 0.25) - 5.0).abs() < 1e-6);
+        assert!((beside_legend(&places, Corner::LeftBottom, 0.25) - 0.0).abs() < 1e-6);
+        // A narrow plot is half legend at most.
+        assert!((beside_legend(&places, Corner::RightTop, 3.0) - 7.0).abs() < 1e-6);
+        assert_eq!(
+            (beside_legend(&places[..1], Corner::RightTop, 0.5), beside_legend(&[], Corner::LeftTop, 0.5)),
+            (1.0, 0.0)
+        );
+    }
 
     #[test]
     fn the_legend_goes_where_nothing_is() {
