@@ -10,7 +10,7 @@ const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;color:#1b1b1f;backg
 margin:2em auto;padding:0 1em}h1{margin-bottom:0}h2{margin-top:2.2em;border-top:1px solid #ccc;padding-top:.6em}\
 table{border-collapse:collapse;font-size:13px;margin:.6em 0}th,td{padding:.25em .7em;border-bottom:1px solid #ddd;\
 text-align:right;font-variant-numeric:tabular-nums}th:first-child,td:first-child,th:nth-child(2),td:nth-child(2)\
-{text-align:left}tr.front{background:#eef5e9}tr.default{font-weight:600}.no{color:#a40000;font-weight:600}\
+{text-align:left}td:nth-child(n+3){white-space:nowrap}tr.front{background:#eef5e9}tr.default{font-weight:600}.no{color:#a40000;font-weight:600}\
 p.small,details{color:#555;font-size:13px}svg{max-width:100%;height:auto}.orders{display:flex;flex-wrap:wrap;gap:1em}\
 nav a{margin-right:1.2em}summary{cursor:pointer}";
 

@@ -8,6 +8,8 @@ use super::document::{Measure, Point, Stage};
 
 /// Size of the picture in px.
 const SIZE: (u32, u32) = (860, 520);
+/// How much further than its points a plot reaches to the right, where the legend is, as a share.
+const LEGEND: f64 = 0.4;
 /// Errors below this are drawn at it: a logarithm of 0 has no place.
 pub const LEAST: f64 = 1e-7;
 
@@ -40,9 +42,10 @@ fn draw(stage: &Stage, measure: &Measure, picture: &mut String) -> Result<(), Fa
     if places.is_empty() {
         return Err(format!("nothing was measured of {}", measure.name).into());
     }
-    let range = |axis: fn(&(f64, f64)) -> f64, spare: f64| {
+    // `beside` is what the range reaches further up, as a power of itself.
+    let range = |axis: fn(&(f64, f64)) -> f64, spare: f64, beside: f64| {
         let (least, most) = places.iter().map(axis).fold((f64::INFINITY, 0.0_f64), |(l, m), v| (l.min(v), m.max(v)));
-        least / spare..most * spare
+        least / spare..most * spare * (spare * spare * most / least).powf(beside)
     };
     let root = SVGBackend::with_string(picture, SIZE).into_drawing_area();
     root.fill(&WHITE)?;
@@ -51,16 +54,8 @@ fn draw(stage: &Stage, measure: &Measure, picture: &mut String) -> Result<(), Fa
         .margin(14)
         .x_label_area_size(44)
         .y_label_area_size(76)
-        .build_cartesian_2d(range(|p| p.0, 1.5).log_scale(), range(|p| p.1, 1.6).log_scale())?;
-    let short = |v: &f64| super::table::number(*v);
-    chart
-        .configure_mesh()
-        .x_desc(format!("seconds of {}", stage.secs_of))
-        .y_desc(measure.error_name())
-        .x_label_formatter(&short)
-        .y_label_formatter(&short)
-        .light_line_style(BLACK.mix(0.05))
-        .draw()?;
+        .build_cartesian_2d(range(|p| p.0, 1.5, LEGEND).log_scale(), range(|p| p.1, 1.6, 0.0).log_scale())?;
+    mesh(&mut chart, &format!("seconds of {}", stage.secs_of), &measure.error_name())?;
     front(stage, measure, &mut chart)?;
     for (k, method) in stage.methods().into_iter().enumerate() {
         series(stage, measure, method, k, &mut chart)?;
@@ -72,6 +67,24 @@ fn draw(stage: &Stage, measure: &Measure, picture: &mut String) -> Result<(), Fa
         .border_style(BLACK.mix(0.3))
         .draw()?;
     root.present()?;
+    Ok(())
+}
+
+/// Grid and axes. Numbers stand at 1, 2 and 5 of each power of ten; others would run into each other.
+fn mesh(chart: &mut Area<'_, '_>, x: &str, y: &str) -> Result<(), Failed> {
+    let label = |v: &f64| {
+        let leading = v / 10.0_f64.powf(v.log10().floor());
+        let round = [1.0, 2.0, 5.0, 10.0].iter().any(|r| (leading - r).abs() < 1e-6);
+        if round { super::table::number(*v) } else { String::new() }
+    };
+    chart
+        .configure_mesh()
+        .x_desc(x)
+        .y_desc(y)
+        .x_label_formatter(&label)
+        .y_label_formatter(&label)
+        .light_line_style(BLACK.mix(0.05))
+        .draw()?;
     Ok(())
 }
 
@@ -131,22 +144,13 @@ fn draw_order(order: &super::document::Order, picture: &mut String) -> Result<()
     let most = pairs.iter().map(|p| p.1).fold(0.0_f64, f64::max);
     let root = SVGBackend::with_string(picture, (420, 300)).into_drawing_area();
     root.fill(&WHITE)?;
-    let mut chart: ChartContext<'_, SVGBackend<'_>, Cartesian2d<LogCoord<f64>, LogCoord<f64>>> =
-        ChartBuilder::on(&root)
-            .caption(&order.what, ("sans-serif", 15))
-            .margin(10)
-            .x_label_area_size(36)
-            .y_label_area_size(66)
-            .build_cartesian_2d((first.0 / 1.2..last.0 * 1.2).log_scale(), (least / 2.0..most * 2.0).log_scale())?;
-    let short = |v: &f64| super::table::number(*v);
-    chart
-        .configure_mesh()
-        .x_desc("work")
-        .y_desc("error")
-        .x_label_formatter(&short)
-        .y_label_formatter(&short)
-        .light_line_style(BLACK.mix(0.05))
-        .draw()?;
+    let mut chart = ChartBuilder::on(&root)
+        .caption(&order.what, ("sans-serif", 15))
+        .margin(10)
+        .x_label_area_size(36)
+        .y_label_area_size(66)
+        .build_cartesian_2d((first.0 / 1.2..last.0 * 1.2).log_scale(), (least / 2.0..most * 2.0).log_scale())?;
+    mesh(&mut chart, "work", "error")?;
     let slope = |x: f64| first.1 * (x / first.0).powf(-order.expected);
     chart.draw_series(LineSeries::new([(first.0, first.1), (last.0, slope(last.0))], BLACK.mix(0.3)))?;
     let [r, g, b] = COLORS[0];
