@@ -170,7 +170,10 @@ impl Subject {
             ..TrainConfig::default()
         };
         let held = dataset.split(base.holdout_every).1.len();
-        let input = self.input(&[("photos", format!("{} + {held} held out", dataset.photos.len() - held))]);
+        let input = self.input(&[
+            ("photos", format!("{} + {held} held out", dataset.photos.len() - held)),
+            ("steps of the default", base.steps.to_string()),
+        ]);
         sweep(&mut TrainStudy::new(dataset, base, self.options.repeats, input)?)
     }
 

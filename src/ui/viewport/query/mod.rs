@@ -34,6 +34,10 @@ const COLORS: [[u8; 3]; 6] =
     [[255, 179, 0], [0, 200, 215], [233, 84, 150], [128, 215, 70], [160, 130, 255], [255, 120, 70]];
 /// Questions that are kept on screen.
 const MOST: usize = COLORS.len();
+/// Views narrower than this have no room for the question beside the view's own buttons, points.
+const BESIDE: f32 = 700.0;
+/// How far it is below them then: both rows of them.
+const BELOW: f32 = 92.0;
 
 /// A question with its answer.
 #[derive(Clone, Debug, PartialEq)]
@@ -321,7 +325,10 @@ impl Questions {
         actions: &mut Vec<Action>,
     ) {
         // In the corner: what is looked for is mostly in the middle.
-        let at = Align2::RIGHT_TOP.pos_in_rect(&rect.shrink(12.0));
+        let mut at = Align2::RIGHT_TOP.pos_in_rect(&rect.shrink(12.0));
+        if rect.width() < BESIDE {
+            at.y += BELOW;
+        }
         let area = Area::new(Id::unique("question")).order(Order::Middle).pivot(Align2::RIGHT_TOP).fixed_pos(at);
         area.constrain_to(rect).show(ui.ctx(), |ui| {
             theme::overlay().show(ui, |ui| {
