@@ -50,9 +50,6 @@ pub struct Subject {
     options: Options,
 }
 
-/// Of labelled photos that training saw, every so many are left out of a lifting where no others are there.
-const EVERY: usize = 8;
-
 type Sweep<'a> = &'a mut dyn FnMut(&mut dyn Study) -> Result<End, CliError>;
 
 impl Subject {
@@ -230,7 +227,7 @@ impl Subject {
         let [mut training, mut held_out] = self.labelled(dataset, &segmenter);
         // Few labels may all be of photos that the Gaussians were trained on; the lifting does without some.
         if held_out.is_empty() {
-            held_out = training.iter().copied().step_by(EVERY).collect();
+            held_out = training.iter().copied().step_by(TrainConfig::default().holdout_every).collect();
             training.retain(|i| !held_out.contains(i));
         }
         let mut identities = Identities::default();

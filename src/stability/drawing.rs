@@ -5,7 +5,7 @@ use glam::{DMat3, DVec2, DVec3};
 use super::{Case, Finding};
 use crate::math::{Real, sh};
 use crate::render::cpu::{RenderStats, Renderer};
-use crate::render::{Features, Frame, FrameGradient, RenderError, RenderSettings};
+use crate::render::{CloudGradient, Features, Frame, FrameGradient, RenderError, RenderSettings};
 use crate::scene::{Camera, GaussianCloud};
 
 /// Largest deviation of a colour from double precision that a picture may have.
@@ -61,6 +61,17 @@ pub fn deviation(exact: &Frame<f64>, single: &Frame<f32>) -> f64 {
     let brightest = exact.color.iter().flatten().fold(1.0_f64, |m, v| m.max(*v));
     let color = exact.color.iter().zip(&single.color).map(|(a, b)| worst(a, b) / brightest);
     color.chain([worst(&exact.alpha, &single.alpha)]).fold(0.0, |w, e| if e.is_nan() || e > w { e } else { w })
+}
+
+/// All numbers of a gradient, kind by kind.
+pub fn all_numbers<R: Real>(g: &CloudGradient<R>) -> Vec<f64> {
+    let all = g.positions.as_flattened().iter().chain(g.log_scales.as_flattened()).chain(g.quaternions.as_flattened());
+    all.chain(&g.opacity_logits).chain(g.sh.as_flattened()).map(|v| v.f64()).collect()
+}
+
+/// Root of the sum of squares.
+pub fn norm(v: impl Iterator<Item = f64>) -> f64 {
+    v.map(|x| x * x).sum::<f64>().sqrt()
 }
 
 /// What a case is about to show.
@@ -326,9 +337,7 @@ fn gradients() -> Vec<Case> {
         let frame = renderer.render(&cloud, Features::NONE, &at, &settings).map_err(|e| e.to_string())?;
         let up = FrameGradient { color: frame.color, ..FrameGradient::default() };
         let g = renderer.backward(&cloud, Features::NONE, &up);
-        let shape = g.log_scales.as_flattened().iter().chain(g.quaternions.as_flattened());
-        let all = shape.chain(g.positions.as_flattened()).chain(&g.opacity_logits).chain(g.sh.as_flattened());
-        Ok::<f64, String>(all.map(|v| f64::from(*v).powi(2)).sum::<f64>().sqrt())
+        Ok::<f64, String>(norm(all_numbers(&g).into_iter()))
     };
     let finding = move |antialias| match length(antialias) {
         Ok(length) => Finding::is(format!("of length {length:.1e}"), length.is_finite() && length > 0.0),

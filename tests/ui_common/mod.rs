@@ -1,5 +1,4 @@
 //! The window without a screen, run until something has happened.
-#![allow(dead_code)]
 
 use std::time::{Duration, Instant};
 
@@ -11,7 +10,7 @@ use fmlgs::worker::jobs::PipelineJobs;
 use fmlgs::worker::places::Places;
 
 /// Only a test that hangs takes this long: making the demo's photos is the longest step.
-pub const LONG: Duration = Duration::from_secs(600);
+const LONG: Duration = Duration::from_secs(600);
 
 /// A window that keeps what it makes in the folder of `places`.
 pub fn window(places: Places, first: Option<Action>) -> Harness<'static, App> {

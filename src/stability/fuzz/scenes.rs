@@ -8,8 +8,9 @@ use crate::math::rotation::unit_quaternion;
 use crate::pipeline::train::density::{self, DensityStats};
 use crate::pipeline::train::{TrainConfig, TrainView, trainer::Trainer};
 use crate::render::cpu::Renderer;
-use crate::render::{ALPHA_MIN, COLOR_MAX, CloudGradient, Features, Frame, FrameGradient, RenderSettings};
+use crate::render::{ALPHA_MIN, COLOR_MAX, Features, Frame, FrameGradient, RenderSettings};
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
+use crate::stability::drawing::{all_numbers, norm};
 
 /// Inputs moved by a few roundings, at most, whose spread says what single precision can be held to. So
 /// many, because each has an even chance only of exchanging two Gaussians that are equally far.
@@ -203,16 +204,6 @@ fn off((frame, exact): &(Frame<f32>, Frame<f64>), spread: &[[f64; 4]], scale: f6
     each.fold((0, 0.0), |(wrong, worst), e| (wrong + usize::from(e > 1.0), e.max(worst)))
 }
 
-/// All numbers of a gradient, Gaussian by Gaussian, in single precision's reach.
-fn flat<R: crate::math::Real>(g: &CloudGradient<R>) -> Vec<f64> {
-    let all = g.positions.as_flattened().iter().chain(g.log_scales.as_flattened()).chain(g.quaternions.as_flattened());
-    all.chain(&g.opacity_logits).chain(g.sh.as_flattened()).map(|v| v.f64()).collect()
-}
-
-fn length(v: impl Iterator<Item = f64>) -> f64 {
-    v.map(|x| x * x).sum::<f64>().sqrt()
-}
-
 /// Gradients of single and double precision agree where both are ordinary.
 pub fn gradients(n: &mut Numbers) -> Verdict {
     let (cloud, settings) = (cloud(n), settings(n));
@@ -226,18 +217,18 @@ pub fn gradients(n: &mut Numbers) -> Verdict {
         color: up.color.each_ref().map(|p| p.iter().map(|v| f64::from(*v)).collect()),
         ..FrameGradient::default()
     };
-    let single = flat(&drawn.single.backward(&cloud, Features::NONE, &up));
-    let double = flat(&drawn.double.backward(&drawn.wide, Features::NONE, &up64));
+    let single = all_numbers(&drawn.single.backward(&cloud, Features::NONE, &up));
+    let double = all_numbers(&drawn.double.backward(&drawn.wide, Features::NONE, &up64));
     let ordinary = |v: &[f64]| v.iter().all(|x| x.abs() < 1e3);
     if !drawn.comparable() || !ordinary(&double) {
         return Verdict::Held;
     }
     promise!(single.iter().all(|v| v.is_finite()), "a gradient is not finite though double precision's is ordinary");
-    let off = length(single.iter().zip(&double).map(|(a, b)| a - b));
+    let off = norm(single.iter().zip(&double).map(|(a, b)| a - b));
     // One splat more or less at a pixel, as a cut-off decides it, is 1/255 of what the pixel can give.
     let scale = brightness(&drawn.frames.1);
     let edge = (ALPHA_MIN * cloud.len() as f64 + drawn.shape_slack(&camera)) * scale + drawn.color_slack(&cloud);
-    let size = length(double.iter().copied());
+    let size = norm(double.iter().copied());
     let mut bound = 0.05 * size + edge;
     for _ in 0..MOVED {
         if off <= bound {
@@ -246,8 +237,8 @@ pub fn gradients(n: &mut Numbers) -> Verdict {
         let near = moved(&drawn.wide, &camera, n);
         let mut renderer = Renderer::<f64>::new();
         if renderer.render(&near, Features::NONE, &camera, &settings).is_ok() {
-            let g = flat(&renderer.backward(&near, Features::NONE, &up64));
-            let spread = length(g.iter().zip(&double).map(|(a, b)| a - b));
+            let g = all_numbers(&renderer.backward(&near, Features::NONE, &up64));
+            let spread = norm(g.iter().zip(&double).map(|(a, b)| a - b));
             bound = bound.max(0.05 * size + edge + 8.0 * spread);
         }
     }
