@@ -28,9 +28,7 @@ var<workgroup> degenerate_here: atomic<u32>;
 
 fn color_towards(i: u32, world: vec3<f32>) -> vec3<f32> {
     let degree = min(view.sh_degree, view.sh_stored);
-    // Scaled first: the square of what is far away overflows.
-    let far = max(abs(world.x), max(abs(world.y), abs(world.z)));
-    let basis = harmonics(degree, normalize(world / far));
+    let basis = harmonics(degree, towards(world));
     var sum = vec3<f32>(0.5);
     var sound = true;
     for (var k = 0u; k < harmonics_count(degree); k++) {

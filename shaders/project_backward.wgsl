@@ -50,7 +50,7 @@ fn color_backward(i: u32, world: vec3<f32>, color: vec3<f32>, to_color: vec3<f32
     let g = select(vec3<f32>(0.0), to_color, color > vec3<f32>(0.0));
     let degree = min(view.sh_degree, view.sh_stored);
     let away = length(world);
-    let direction = world / away;
+    let direction = towards(world);
     let basis = harmonics(degree, direction);
     let slopes = harmonics_gradient(degree, direction);
     var to_direction = vec3<f32>(0.0);
