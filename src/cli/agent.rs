@@ -2,7 +2,6 @@
 
 use std::io::BufRead;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::json;
@@ -182,21 +181,13 @@ impl Talk {
         text: &str,
         deeds: &Mutex<Vec<String>>,
     ) -> Result<(), CliError> {
-        let cancel = AtomicBool::new(false);
         let mut calls = Vec::new();
-        let reply = session.say(
-            world,
-            text,
-            &mut |event| {
-                if interrupt::asked_to_stop() {
-                    cancel.store(true, Ordering::Relaxed);
-                }
-                if let AgentEvent::Call { line, .. } = event {
-                    calls.push(line);
-                }
-            },
-            &cancel,
-        );
+        let mut on = |event| {
+            if let AgentEvent::Call { line, .. } = event {
+                calls.push(line);
+            }
+        };
+        let reply = session.say(world, text, &mut on, interrupt::flag());
         if interrupt::asked_to_stop() {
             return Err(CliError::Cancelled("the talk ends here".into()));
         }

@@ -23,6 +23,11 @@ pub fn listen() {
     }
 }
 
+/// Set once the work should stop, for what looks at it by itself.
+pub fn flag() -> &'static AtomicBool {
+    &ASKED_TO_STOP
+}
+
 /// Whether the work should stop. Says so the first time that it should.
 pub fn asked_to_stop() -> bool {
     let asked = ASKED_TO_STOP.load(Ordering::SeqCst);

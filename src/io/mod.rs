@@ -13,6 +13,7 @@ pub mod data_folder;
 mod error;
 pub mod files;
 pub mod gltf_mesh;
+pub mod http;
 pub mod khr_gltf;
 pub mod labels;
 mod listing;
