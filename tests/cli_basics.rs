@@ -77,7 +77,7 @@ fn foreign_text_does_not_act_on_the_terminal() {
         (&["info", missing.to_str().unwrap()][..], "2Jgnp"),
         (&["info", header], "2Jgnp"),
         (&["train", missing.to_str().unwrap(), "--out", "o"], "2Jgnp"),
-        (&["info", header, "--\u{1b}[31m\u{202e}x"], "31mx"),
+        (&["info", header, "--\u{1b}[31m\u{202e}x"], "--x"),
     ] {
         let done = fmlgs(arguments);
         assert!(done.code == Some(1) || done.code == Some(2), "{arguments:?}: {:?}", done.code);

@@ -55,7 +55,7 @@ pub fn line(text: &str) -> Cow<'_, str> {
 
 /// [`lines()`], with every line after the first set in, so that none can pass for a message of its own.
 pub fn message(text: &str) -> String {
-    lines(text).trim_end().replace('\n', "\n  ")
+    lines(text).trim_end().replace('\n', "\n  ").replace("\n  \n", "\n\n")
 }
 
 /// At most `most` letters of a text, the last an ellipsis if some are left out.
@@ -144,7 +144,7 @@ mod tests {
         assert_eq!(line("\u{1b}[31mred\u{1b}]0;title\u{7}"), "\u{fffd}[31mred\u{fffd}]0;title\u{fffd}");
         assert_eq!(line("photo\u{202e}gpj.exe\r\nb"), "photogpj.exe  b");
         assert_eq!(lines("a\r\n\tb\u{2028}c"), "a\n\tb\nc");
-        assert_eq!(message("bad name\nerror: all is lost\n"), "bad name\n  error: all is lost");
+        assert_eq!(message("bad name\n\nerror: all is lost\n"), "bad name\n\n  error: all is lost");
     }
 
     #[test]

@@ -283,6 +283,7 @@ fn choose_planner(ui: &mut Ui, settings: &mut ChatSettings) {
                 ui.label(RichText::new(label).small().color(theme::WEAK));
                 ui.add(TextEdit::singleline(value).hint_text(hint).desired_width(f32::INFINITY));
             }
+            ui.label(RichText::new(SENT).small().color(theme::WEAK));
         });
     }
 }
