@@ -4,13 +4,13 @@
 
 mod cli_support;
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use cli_support::{Done, command, fmlgs, folder, tiny_dataset};
+use cli_support::{Done, Server, command, fmlgs, folder, tiny_dataset};
 
 /// Training that saves at every opportunity and takes long enough to be interrupted.
 fn train_arguments<'a>(photos: &'a str, out: &'a str, steps: &'a str) -> Vec<&'a str> {
@@ -101,6 +101,87 @@ fn ctrl_c_saves_and_exits_with_130() {
         assert!(done.json()["steps"].as_u64().unwrap() > 0);
         // What was trained so far can be looked at.
         assert_eq!(fmlgs(&["info", out.to_str().unwrap(), "--json"]).ok().json()["kind"], "trained");
+    }
+}
+
+/// Generous: an end takes milliseconds, what it must not wait for takes minutes.
+const SOON: Duration = Duration::from_secs(10);
+
+/// Ends a child and returns what it said, and how long it took.
+fn end(child: Child, signal: &str) -> (Done, Duration) {
+    let begin = Instant::now();
+    send(&child, signal);
+    let done = child.wait_with_output().unwrap().into();
+    let took = begin.elapsed();
+    println!("{signal}: ended after {:.0} ms", took.as_secs_f64() * 1e3);
+    (done, took)
+}
+
+fn wait_until(child: &mut Child, ready: impl Fn() -> bool) {
+    let deadline = Instant::now() + Duration::from_secs(60);
+    while !ready() {
+        assert!(Instant::now() < deadline && child.try_wait().unwrap().is_none(), "it did not come so far");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn a_download_that_stalls_ends_when_asked_and_is_gone_on_with() {
+    const FIRST: usize = 70_000;
+    let content: Vec<u8> = (0..200_000_u32).map(|i| (i % 251) as u8).collect();
+    let folder = folder();
+    let whole = folder.path().join("whole");
+    std::fs::write(&whole, &content).unwrap();
+    let graph = serde_json::json!({ "file": "g.onnx", "bytes": content.len(),
+        "sha256": fmlgs::models::fetch::sha256(&whole).unwrap() });
+    let description = serde_json::json!({ "version": 1, "kind": "sam2", "graphs": { "a": graph } }).to_string();
+    let served = content.clone();
+    let server = Server::new(move |stream, head| {
+        let range =
+            head.lines().find_map(|l| l.to_lowercase().strip_prefix("range: bytes=")?.strip_suffix('-')?.parse().ok());
+        let (line, body): (String, &[u8]) = match range {
+            _ if head.contains(".json") => ("200 OK".into(), description.as_bytes()),
+            Some(start) => (format!("206 Rest\r\nContent-Range: bytes {start}-199999/200000"), &served[start..]),
+            None => ("200 OK".into(), &served),
+        };
+        let head =
+            format!("HTTP/1.1 {line}\r\nETag: \"1\"\r\nContent-Length: {}\r\nConnection: close\r\n\r\n", body.len());
+        let stalls = range.is_none() && body.len() > FIRST;
+        // Whoever asked may have gone.
+        let _ = stream.write_all(head.as_bytes());
+        let _ = stream.write_all(if stalls { &body[..FIRST] } else { body });
+        std::thread::sleep(if stalls { Duration::from_secs(300) } else { Duration::ZERO });
+    });
+    let silent = Server::new(|_, _| std::thread::sleep(Duration::from_secs(300)));
+    let fetch = |at: &str, models: &Path| {
+        let mut fetch = command(&["models", "fetch", "sam2.1-tiny", "--from", &format!("http://{at}")]);
+        fetch.env("FMLGS_MODELS", models).stdout(Stdio::piped()).stderr(Stdio::piped());
+        fetch
+    };
+    let names = |models: &Path| contents(models).into_iter().map(|(name, _)| name).collect::<Vec<_>>();
+    for signal in ["-INT", "-TERM", "-KILL"] {
+        let models = folder.path().join(signal);
+        if signal != "-KILL" {
+            let mut child = fetch(&silent.at, &models).spawn().unwrap();
+            let before = silent.requests();
+            wait_until(&mut child, || silent.requests() > before);
+            let (done, took) = end(child, signal);
+            done.fails_with(130);
+            assert!(took < SOON && names(&models).is_empty(), "{took:?}");
+        }
+        let part = models.join("g.onnx.part");
+        let mut child = fetch(&server.at, &models).spawn().unwrap();
+        wait_until(&mut child, || std::fs::metadata(&part).is_ok_and(|m| m.len() as usize == FIRST));
+        let (done, took) = end(child, signal);
+        if signal != "-KILL" {
+            assert!(done.fails_with(130).stderr.contains("what arrived is kept"));
+            assert!(took < SOON, "{took:?}");
+        }
+        assert_eq!(names(&models), ["g.onnx.part", "g.onnx.part.tag", "sam2.1-tiny.json"]);
+        Done::from(fetch(&server.at, &models).output().unwrap()).ok();
+        assert!(server.seen.lock().unwrap().last().unwrap().to_lowercase().contains(&format!("bytes={FIRST}-")));
+        assert_eq!(names(&models), ["g.onnx", "sam2.1-tiny.json"]);
+        assert!(std::fs::read(models.join("g.onnx")).unwrap() == content);
     }
 }
 
