@@ -28,7 +28,7 @@ pub enum IoError {
         cause: io::Error,
     },
     /// A folder, pipe or device where a file is expected.
-    #[error("{path} is not a regular file")]
+    #[error("{path} is not a regular file but a folder, a pipe or a device; give the path of a file")]
     NotAFile {
         /// The path.
         path: PathBuf,

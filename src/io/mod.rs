@@ -17,6 +17,7 @@ pub mod khr_gltf;
 pub mod labels;
 mod listing;
 pub mod llff;
+pub mod memory;
 pub mod npy;
 mod open;
 pub mod photo;

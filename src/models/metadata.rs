@@ -50,7 +50,11 @@ impl Graph {
     pub fn check_size(&self, folder: &Path) -> Result<(), ModelError> {
         let path = folder.join(&self.file);
         let refused = |problem: String| ModelError::Metadata { path: path.clone(), problem };
-        let bytes = std::fs::metadata(&path).map_err(|e| refused(e.to_string()))?.len();
+        let about = std::fs::metadata(&path).map_err(|e| refused(e.to_string()))?;
+        if !about.is_file() {
+            return Err(refused("it is not a regular file".into()));
+        }
+        let bytes = about.len();
         if bytes != self.bytes {
             let wanted = self.bytes;
             return Err(refused(format!("{bytes} bytes, its description says {wanted}; it is broken or another file")));
