@@ -162,6 +162,12 @@ pub enum IoError {
         /// Its height.
         height_px: u32,
     },
+    /// A photo without a pixel that counts.
+    #[error("{path} shows nothing: every pixel is transparent or outside of its lens; take it out of the data set")]
+    NothingShown {
+        /// The picture file.
+        path: PathBuf,
+    },
     /// A picture that does not decode.
     #[error("{path} cannot be decoded: {reason}")]
     Picture {

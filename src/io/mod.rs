@@ -6,6 +6,7 @@
 
 pub mod animation;
 pub mod atomic;
+pub mod camera_file;
 pub mod camera_path;
 pub mod colmap;
 mod compressed_ply;

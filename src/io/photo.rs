@@ -26,7 +26,12 @@ pub fn load(photo: &Photo, max_side_px: u32) -> Result<PhotoPixels, IoError> {
     if let Some(background) = photo.background {
         pixels = over(pixels, background);
     }
-    Ok(resample(&pixels, &photo.camera, photo.distortion.as_ref(), &photo.camera.limited_to(max_side_px)))
+    let seen = resample(&pixels, &photo.camera, photo.distortion.as_ref(), &photo.camera.limited_to(max_side_px));
+    // Compared with nothing, any drawing would be perfect.
+    match seen.coverage.as_ref().is_some_and(|c| c.iter().all(|c| *c == 0)) {
+        true => Err(IoError::NothingShown { path: photo.path.clone() }),
+        false => Ok(seen),
+    }
 }
 
 /// Width and height in px of a picture file, from its header.

@@ -180,8 +180,12 @@ fn write(path: &Path, frame: &Frame) -> std::io::Result<()> {
 
 /// A frame that was kept; `None` if there is none, or it is damaged.
 fn read(path: &Path) -> Option<Frame> {
-    let bytes = files::read(path, files::MAX_PICTURE_BYTES).ok()?;
-    let mut rest = bytes.as_slice();
+    parse(&files::read(path, files::MAX_PICTURE_BYTES).ok()?)
+}
+
+/// The frame in the bytes of a kept file; `None` if they are damaged.
+pub fn parse(bytes: &[u8]) -> Option<Frame> {
+    let mut rest = bytes;
     let mut array = || -> Option<Array> {
         let mut number = || {
             let (head, tail) = rest.split_first_chunk::<8>()?;
