@@ -32,11 +32,13 @@ impl Mutator {
         Self { random: Pcg64Mcg::seed_from_u64(seed) }
     }
 
-    /// One to six mutations of one of the seeds: of its bytes or, where it is JSON, mostly of its
-    /// values. Where there are checksums, they are mostly put right afterwards.
-    pub fn next(&mut self, seeds: &[Vec<u8>]) -> Vec<u8> {
+    /// One to six mutations, mostly few, of a seed out of one of these heaps: of its bytes or, where it
+    /// is JSON, mostly of its values. Where there are checksums, they are mostly put right afterwards.
+    pub fn next(&mut self, heaps: [&Vec<Vec<u8>>; 4]) -> Vec<u8> {
+        let chosen = *self.pick(&heaps);
+        let seeds = if chosen.is_empty() { heaps[0] } else { chosen };
         let mut input = self.pick(seeds).clone();
-        let times = self.random.random_range(1..=6);
+        let times = 1 + self.random.next_u32().trailing_zeros().min(5);
         match serde_json::from_slice::<Value>(&input) {
             Ok(mut value) if !self.random.random_ratio(1, 3) => {
                 (0..times).for_each(|_| self.mutate_json(&mut value));

@@ -13,11 +13,11 @@ use super::{memory, watch};
 const FREE_BYTES: usize = 48 << 20;
 const BYTES_PER_BYTE: usize = 64;
 /// Longest time for one input; generous, for slow machines under load.
-pub const LONGEST: Duration = Duration::from_secs(5);
-/// Inputs that join the seeds, because the reader said something new about them, at most.
-const MOST_NEW: usize = 250;
-/// Longest input that joins.
-const LONGEST_NEW: usize = 4096;
+const LONGEST: Duration = Duration::from_secs(5);
+/// Inputs of a kind that are kept to mutate further, at most.
+const MOST_KEPT: usize = 200;
+/// Longest of them.
+const LONGEST_KEPT: usize = 4096;
 /// One input of so many is held against the front door.
 const SAMPLED: u64 = 16;
 /// Different finds that are kept of a reader.
@@ -36,8 +36,10 @@ pub struct Search {
     pub target: Target,
     mutator: Mutator,
     seeds: Vec<Vec<u8>>,
-    /// How many of the seeds are from the corpus.
-    own: usize,
+    /// Mutations that it accepted.
+    good: Vec<Vec<u8>>,
+    /// Mutations that it refused for a reason of their own.
+    odd: Vec<Vec<u8>>,
     said: HashSet<u64>,
     pub finds: Vec<Find>,
     /// Mutated inputs so far.
@@ -48,6 +50,8 @@ pub struct Search {
     slowest: Duration,
     most_bytes: usize,
     secs: f64,
+    /// Longest time for one input.
+    pub longest: Duration,
 }
 
 impl Search {
@@ -55,8 +59,9 @@ impl Search {
         let hash = target.name.bytes().fold(random, |h, b| h.wrapping_mul(31).wrapping_add(u64::from(b)));
         Self {
             mutator: Mutator::new(hash),
-            own: seeds.len(),
             seeds,
+            good: Vec::new(),
+            odd: Vec::new(),
             target,
             said: HashSet::new(),
             finds: Vec::new(),
@@ -67,13 +72,14 @@ impl Search {
             slowest: Duration::ZERO,
             most_bytes: 0,
             secs: 0.0,
+            longest: LONGEST,
         }
     }
 
     /// Tries the seeds unchanged.
     pub fn try_seeds(&mut self) {
         watch::quietly(|| {
-            for i in 0..self.own {
+            for i in 0..self.seeds.len() {
                 let input = self.seeds[i].clone();
                 self.try_one(&input);
             }
@@ -84,7 +90,7 @@ impl Search {
     pub fn run(&mut self, iterations: u64) {
         watch::quietly(|| {
             for _ in 0..iterations {
-                let input = self.mutator.next(&self.seeds);
+                let input = self.mutator.next([&self.seeds, &self.seeds, &self.good, &self.odd]);
                 if self.inputs.is_multiple_of(SAMPLED) {
                     self.sampled += 1;
                     self.let_in += u64::from(self.target.door.lets_in(&input));
@@ -112,7 +118,7 @@ impl Search {
         let what = match &outcome {
             Err(_) => format!("panics: {}", watch::last_panic()),
             _ if used > limit => format!("takes {used} bytes of memory, over {limit}"),
-            _ if took > LONGEST => format!("takes {took:?}"),
+            _ if took > self.longest => format!("takes {took:?}"),
             _ => return outcome.ok(),
         };
         let is_new = !self.finds.iter().any(|f| shape(&f.what) == shape(&what));
@@ -122,19 +128,17 @@ impl Search {
         None
     }
 
-    /// An input about which the reader says something new went where none went before: it joins the
-    /// seeds. So do some of those that it accepts, in the place of earlier ones.
+    /// Keeps inputs that are worth another mutation: some that the reader accepts, the latest, and those
+    /// about which it says something new, which got further than others.
     fn learn(&mut self, outcome: &Outcome, input: Vec<u8>) {
-        if input.len() > LONGEST_NEW {
+        if input.len() > LONGEST_KEPT {
             return;
         }
-        let said = shape(outcome.as_ref().err().map_or("", |e| e));
-        let learned = self.seeds.len() - self.own;
-        if learned < MOST_NEW && self.said.insert(said) {
-            self.seeds.push(input);
-        } else if outcome.is_ok() && learned > 0 && self.inputs.is_multiple_of(64) {
-            let at = self.own + (self.inputs / 64) as usize % learned;
-            self.seeds[at] = input;
+        match outcome {
+            Ok(()) if self.good.len() < MOST_KEPT => self.good.push(input),
+            Ok(()) => self.good[self.accepted as usize % MOST_KEPT] = input,
+            Err(e) if self.odd.len() < MOST_KEPT && self.said.insert(shape(e)) => self.odd.push(input),
+            Err(_) => {}
         }
     }
 

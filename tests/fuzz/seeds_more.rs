@@ -193,7 +193,7 @@ reason = "water and electricity"
 fn answer() -> Value {
     let call = |name: &str, arguments: Value| json!({ "id": "a", "type": "function", "function": { "name": name, "arguments": arguments.to_string() } });
     json!({ "choices": [{ "message": { "role": "assistant", "content": "On it.", "tool_calls": [
-        call("go_to", json!({ "target": { "query": "mug" }, "closeness": 1.5 })),
+        call("go_to", json!({ "target": "the mug", "side": "other", "closeness": 1.5 })),
         call("undo", json!({})),
     ] }, "finish_reason": "tool_calls" }], "usage": { "total_tokens": 7 } })
 }

@@ -72,7 +72,7 @@ pub fn all() -> Vec<Target> {
         Target::new("gltf_mesh", Door::StartsOrJson(b"glTF"), |b| io::gltf_mesh::read_slice(b, "fuzz")),
         Target::in_folder("gltf_mesh_folder", Door::Json, "a.gltf", gltf, |f| io::gltf_mesh::read(&f.join("a.gltf"))),
         Target::in_folder("camera_file", Door::Json, "a.json", |_| {}, |f| io::camera_file::read(&f.join("a.json"))),
-        Target::in_folder("model_metadata", Door::Json, "a.json", |_| {}, |f| model(&f.join("a.json"))),
+        Target::in_folder("model_metadata", Door::Json, "a.json", |_| {}, |f| model(&f.join("a.json"))).slow(64),
         Target::new("agent_policy", Door::Toml, |b| Policy::parse(&text(b), "fuzz")),
         Target::new("agent_answer", Door::Json, |b| answer(b, false)),
         Target::new("agent_answer_stream", Door::Any, |b| answer(b, true)),
