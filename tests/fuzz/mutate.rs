@@ -52,25 +52,25 @@ impl Mutator {
 
     /// Another value somewhere, one less, or one more.
     fn mutate_json(&mut self, whole: &mut Value) {
-        let other = self.spot(whole).clone();
         let word = *self.pick(&TEXTS);
-        let values = [
-            other,
-            Value::Null,
-            json!([]),
-            json!({}),
-            json!(true),
-            json!(word),
-            json!("a".repeat(self.random.random_range(1..2000))),
-            (0..self.random.random_range(1..300)).fold(json!(0), |inner, _| json!([inner])),
-        ];
+        let size = self.random.random_range(1..300);
+        let value = match self.random.random_range(0..9) {
+            0 | 1 => self.spot(whole).clone(),
+            2 => Value::Null,
+            3 => json!([]),
+            4 => json!({}),
+            5 => json!(true),
+            6 => json!("a".repeat(7 * size)),
+            7 if size < 50 => (0..6 * size).fold(json!(0), |inner, _| Value::Array(vec![inner])),
+            _ => json!(word),
+        };
         let kind = self.random.random_range(0..12);
         let at = self.random.next_u32() as usize;
         let number = json!(*self.pick(&NUMBERS));
         let whole_number = json!(*self.pick(&EDGES));
         let place = self.spot(whole);
         match (kind, place) {
-            (0..4, place) => *place = values[at % values.len()].clone(),
+            (0..4, place) => *place = value,
             (4 | 5, place) => *place = number,
             (6, place) => *place = whole_number,
             (7 | 8, Value::Array(items)) if !items.is_empty() => drop(items.remove(at % items.len())),

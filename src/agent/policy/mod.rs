@@ -233,6 +233,7 @@ mod tests {
         let path = folder.path().join("policy.toml");
         assert!(matches!(Policy::load(&path), Err(PolicyError::File { .. })));
         std::fs::write(&path, "#".repeat(MAX_BYTES as usize + 1)).expect("written");
-        assert!(matches!(Policy::load(&path), Err(PolicyError::TooLong(_))));
+        assert!(matches!(Policy::load(&path), Err(PolicyError::File(IoError::OverBudget { .. }))));
+        assert!(matches!(Policy::load(folder.path()), Err(PolicyError::File(IoError::NotAFile { .. }))));
     }
 }
