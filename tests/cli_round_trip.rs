@@ -1,6 +1,8 @@
 //! The real binary from a glTF scene to a trained, measured, drawn and exported splat.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+#[path = "gpu_common/adapter.rs"]
+mod adapter;
 mod cli_support;
 
 use cli_support::{fmlgs, folder, tiny_dataset};
@@ -61,8 +63,7 @@ fn synth_train_eval_render_export() {
 
 #[test]
 fn a_run_on_the_gpu_follows_the_one_on_the_cpu() {
-    if fmlgs::render::gpu::Context::new().is_err() {
-        println!("skipped: no GPU adapter, not even a software one");
+    if adapter::context().is_none() {
         return;
     }
     let folder = folder();

@@ -4,6 +4,7 @@
 mod common;
 
 use common::{camera, random_cloud};
+use fmlgs::math::stats;
 use fmlgs::render::cpu::Renderer;
 use fmlgs::render::cpu::normals::{self, SurfaceDepth};
 use fmlgs::render::{CloudGradient, Features, FrameGradient, RenderSettings};
@@ -50,7 +51,7 @@ impl Problem {
     }
 
     fn check(&mut self, name: &str, analytic: &[f64], at: fn(&mut Self, usize) -> &mut f64) {
-        let scale = analytic.iter().fold(0.0_f64, |m, g| m.max(g.abs()));
+        let scale = stats::worst(analytic.iter().map(|g| g.abs()));
         assert!(scale > 1e-3, "{name}: the gradient is all but zero, which proves nothing");
         let mut left_out = 0;
         for (i, g) in analytic.iter().enumerate() {

@@ -4,7 +4,7 @@
 mod common;
 
 use common::{camera, random_cloud, rng};
-use fmlgs::math::{Real, rotation};
+use fmlgs::math::{Real, rotation, stats};
 use fmlgs::render::cpu::Renderer;
 use fmlgs::render::{
     ALPHA_MAX, ALPHA_MIN, CloudGradient, Features, Frame, FrameGradient, RenderSettings, TRANSMITTANCE_MIN,
@@ -92,7 +92,7 @@ fn cast(cloud: &GaussianCloud<f64>, camera: &Camera, settings: &RenderSettings, 
 
 /// Largest deviation of a frame from cast rays.
 fn deviation<R: Real>(frame: &Frame<R>, cloud: &GaussianCloud<f64>, camera: &Camera, s: &RenderSettings) -> f64 {
-    let mut worst = 0.0_f64;
+    let mut errors = Vec::new();
     for y in 0..frame.height_px {
         for x in 0..frame.width_px {
             let p = cast(cloud, camera, s, DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
@@ -107,11 +107,11 @@ fn deviation<R: Real>(frame: &Frame<R>, cloud: &GaussianCloud<f64>, camera: &Cam
             pairs.extend((0..3).map(|c| (frame.normals[c][i], p.normal[c])));
             for (have, want) in pairs {
                 assert!(have.is_finite(), "pixel {x}, {y}");
-                worst = worst.max((have.f64() - want).abs());
+                errors.push((have.f64() - want).abs());
             }
         }
     }
-    worst
+    stats::worst(errors)
 }
 
 fn draw(cloud: &GaussianCloud<f64>, camera: &Camera, s: &RenderSettings) -> Frame<f64> {
@@ -205,9 +205,8 @@ fn the_fast_path_agrees_with_the_oracle() {
         let s = RenderSettings { sh_degree: 2, ..settings() };
         let fast = Renderer::<f32>::new().render(&cloud, Features::NONE, &camera, &s).expect("renders");
         let exact = draw(&cloud.cast(), &camera, &s);
-        let worst = |a: &[f32], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a.f64() - b).abs()).fold(0.0, f64::max);
         for c in 0..3 {
-            assert!(worst(&fast.color[c], &exact.color[c]) < 2e-3);
+            assert!(stats::worst_difference(&fast.color[c], &exact.color[c]) < 2e-3);
         }
         // Alpha next to the least that counts may fall on either side: most pixels, not all.
         let close = fast.depth.iter().zip(&exact.depth).filter(|(a, b)| (a.f64() - **b).abs() < 1e-4).count();
@@ -268,7 +267,7 @@ impl Problem {
     /// Largest error of a group, relative to the group's largest entry; entries at which central
     /// differences of two widths disagree, because something jumps, are left out and counted.
     fn check(&mut self, name: &str, analytic: &[f64], at: fn(&mut Self, usize) -> &mut f64) -> f64 {
-        let scale = analytic.iter().fold(0.0_f64, |m, g| m.max(g.abs()));
+        let scale = stats::worst(analytic.iter().map(|g| g.abs()));
         assert!(scale > 1e-3, "{name}: the gradient is all but zero, which proves nothing");
         let (mut worst, mut left_out) = (0.0_f64, 0);
         for (i, g) in analytic.iter().enumerate() {

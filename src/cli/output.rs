@@ -20,6 +20,12 @@ pub fn print(text: &str) -> Result<(), CliError> {
     }
 }
 
+/// Tells on standard error what is not as it was meant, but no reason to stop. Where nobody listens, that is none
+/// either.
+pub fn warn(text: String) {
+    let _ = writeln!(std::io::stderr(), "warning: {text}");
+}
+
 /// Prints `value` as indented JSON.
 pub fn print_json(value: &impl Serialize) -> Result<(), CliError> {
     print(&serde_json::to_string_pretty(value)?)

@@ -6,6 +6,7 @@ use glam::{DMat3, DVec3};
 use super::curve::Curve;
 use super::matter::Matter;
 use super::pose::{Pose, RotationSpline, angle};
+use crate::math::stats::worst;
 
 /// Poses of a flight (the paper's M).
 pub const FRAMES: usize = 150;
@@ -135,19 +136,19 @@ impl Flight {
         for pose in &self.poses {
             let c = matter.clearance(pose.center);
             s.least_clearance = s.least_clearance.min(c);
-            s.violations += usize::from(c < clearance);
+            s.violations += usize::from(!(c >= clearance));
             let m = &pose.world_from_camera;
             let off = *m * m.transpose() - DMat3::IDENTITY;
-            s.rotation_error = off.to_cols_array().iter().fold(s.rotation_error, |w, e| w.max(e.abs()));
+            s.rotation_error = worst([s.rotation_error, worst(off.abs().to_cols_array())]);
         }
         for pair in self.poses.windows(2) {
-            s.largest_step = s.largest_step.max(pair[0].center.distance(pair[1].center));
+            s.largest_step = worst([s.largest_step, pair[0].center.distance(pair[1].center)]);
             let turn = angle(&pair[0].world_from_camera, &pair[1].world_from_camera);
             s.largest_turn = s.largest_turn.max(if turn.is_finite() { turn } else { std::f64::consts::PI });
         }
         for w in self.poses.windows(3) {
             let jolt = (w[2].center - w[1].center) - (w[1].center - w[0].center);
-            s.largest_jolt = s.largest_jolt.max(jolt.length());
+            s.largest_jolt = worst([s.largest_jolt, jolt.length()]);
         }
         s
     }

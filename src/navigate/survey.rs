@@ -8,6 +8,7 @@ use super::flight::{Flight, Smoothness, Speed};
 use super::keypoints::Keypoint;
 use super::navigator::Navigator;
 use super::pose::Pose;
+use crate::math::stats::worst;
 use crate::scene::Camera;
 
 /// Flights of one kind, taken together.
@@ -46,10 +47,10 @@ impl Sum {
         self.flights_too_near += usize::from(s.violations > 0);
         self.poses_too_near += s.violations;
         let w = &mut self.worst;
-        w.largest_step = w.largest_step.max(s.largest_step);
-        w.largest_turn = w.largest_turn.max(s.largest_turn);
-        w.largest_jolt = w.largest_jolt.max(s.largest_jolt);
-        w.rotation_error = w.rotation_error.max(s.rotation_error);
+        w.largest_step = worst([w.largest_step, s.largest_step]);
+        w.largest_turn = worst([w.largest_turn, s.largest_turn]);
+        w.largest_jolt = worst([w.largest_jolt, s.largest_jolt]);
+        w.rotation_error = worst([w.rotation_error, s.rotation_error]);
         w.violations = w.violations.max(s.violations);
         w.least_clearance =
             if self.flights == 1 { s.least_clearance } else { w.least_clearance.min(s.least_clearance) };

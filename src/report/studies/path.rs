@@ -8,7 +8,7 @@ use rand_pcg::Pcg64;
 use serde_json::json;
 
 use super::{Input, Plans, stage};
-use crate::math::stats::mean;
+use crate::math::stats::{mean, worst};
 use crate::navigate::curve::bend;
 use crate::navigate::graph::Graph;
 use crate::navigate::pose::{RotationSpline, angle};
@@ -183,7 +183,7 @@ impl Study for PathStudy {
             ("faults", of(|f| f.steps)),
             ("arc-length error", of(|f| f.short)),
             ("too near", of(|f| f.near)),
-            ("largest turn", found.iter().map(|f| f.turn).fold(0.0, f64::max).to_degrees()),
+            ("largest turn", worst(found.iter().map(|f| f.turn)).to_degrees()),
             ("no way", 1.0 - flights.len() as f64 / pairs.len() as f64),
         ];
         Ok(Some(Trial { secs, values, curve: Vec::new() }))
@@ -233,7 +233,7 @@ fn turning_order() -> Order {
             let t = 0.25 + 0.5 * (f64::from(k as u32) + 0.37) / 200.0;
             spline.as_ref().map_or(f64::NAN, |s| angle(&s.at(t), &turn(t)))
         };
-        [n as f64, (0..200).map(off).fold(0.0, f64::max)]
+        [n as f64, worst((0..200).map(off))]
     });
     let meaning = "Keys of a turn against the largest error between them, in radians.";
     Order::fit("keys of a smooth turn", meaning, pairs.to_vec(), 3.0, 0.35, 1e-12)
