@@ -116,17 +116,20 @@ impl Flight {
     /// steps telescopes, so pose `i` lies on the straight line from the first to the last, and the
     /// rotation matrices are mixed entry by entry.
     pub fn of_paper(keys: &[Pose], frames: usize) -> Option<Self> {
-        let (first, last) = (keys.first()?, keys.last()?);
+        Self::of_paper_through(&[*keys.first()?, *keys.last()?], frames)
+    }
+
+    /// The same in the reading that makes sense: from keypoint to keypoint of the route, as many poses for
+    /// each step, the rotation matrices mixed entry by entry all the same.
+    pub fn of_paper_through(keys: &[Pose], frames: usize) -> Option<Self> {
+        let steps = keys.len().checked_sub(1)?;
         let m = frames.max(2) - 1;
         let pose = |i: usize| {
-            let share = i as f64 / m as f64;
-            let mix = |a: DVec3, b: DVec3| a + (b - a) * share;
-            let [a, b] = [&first.world_from_camera, &last.world_from_camera];
-            let columns = DMat3::from_cols(mix(a.x_axis, b.x_axis), mix(a.y_axis, b.y_axis), mix(a.z_axis, b.z_axis));
-            let fov = first.fov_y_rad + (last.fov_y_rad - first.fov_y_rad) * share;
-            Pose { center: mix(first.center, last.center), world_from_camera: columns, fov_y_rad: fov }
+            let at = i as f64 / m as f64 * steps as f64;
+            let step = (at as usize).min(steps.saturating_sub(1));
+            mixed(&keys[step], &keys[(step + 1).min(steps)], at - step as f64)
         };
-        let length = first.center.distance(last.center);
+        let length = keys.windows(2).map(|k| k[0].center.distance(k[1].center)).sum();
         Some(Self { poses: (0..=m).map(pose).collect(), seconds: 3.0, length, sharp: 0, repaired: 0 })
     }
 
@@ -152,6 +155,15 @@ impl Flight {
         }
         s
     }
+}
+
+/// Every number of two poses in this proportion.
+fn mixed(from: &Pose, to: &Pose, share: f64) -> Pose {
+    let mix = |a: DVec3, b: DVec3| a + (b - a) * share;
+    let [a, b] = [&from.world_from_camera, &to.world_from_camera];
+    let columns = DMat3::from_cols(mix(a.x_axis, b.x_axis), mix(a.y_axis, b.y_axis), mix(a.z_axis, b.z_axis));
+    let fov_y_rad = from.fov_y_rad + (to.fov_y_rad - from.fov_y_rad) * share;
+    Pose { center: mix(from.center, to.center), world_from_camera: columns, fov_y_rad }
 }
 
 /// Two to four seconds: longer for detours and for turning round.
@@ -208,6 +220,17 @@ mod tests {
         assert!(flight.poses.iter().all(|p| p.center.y == 0.0), "the keypoint in between is passed by");
         assert!(rotation_error(&flight.poses[75].world_from_camera) > 0.5);
         assert!(Flight::of_paper(&[], 150).is_none());
+        // From keypoint to keypoint it passes the one in between, and turns on the second step only.
+        let through = Flight::of_paper_through(&keys, 151).expect("a flight");
+        assert!(through.poses[75].center.distance(keys[1].center) < 1e-12);
+        assert!(through.poses[50].center.distance(DVec3::new(2.0, 10.0, 0.0) / 3.0) < 1e-12);
+        assert!(rotation_error(&through.poses[60].world_from_camera) < 1e-12);
+        assert!(rotation_error(&through.poses[112].world_from_camera) > 0.5);
+        let ends = [&through.poses[0], &through.poses[150]].map(|p| p.center);
+        assert!(ends == [keys[0].center, keys[2].center] && (through.length - 2.0 * 26.0_f64.sqrt()).abs() < 1e-12);
+        assert!(Flight::of_paper_through(&[], 150).is_none());
+        let still = Flight::of_paper_through(&keys[..1], 3).expect("it stays");
+        assert!(still.length == 0.0 && still.poses.iter().all(|p| *p == keys[0]));
     }
 
     #[test]

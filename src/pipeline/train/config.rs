@@ -71,11 +71,13 @@ impl TrainConfig {
     /// # Errors
     /// If they cannot be read.
     pub fn stored(folder: &Path, config: serde_json::Value) -> Result<Self, UnreadableConfig> {
-        if config.is_null() {
-            return Ok(Self::default());
-        }
-        let path = || folder.join(SCENE_FILE).display().to_string();
-        serde_json::from_value(config).map_err(|cause| UnreadableConfig { path: path(), cause })
+        let read = match config {
+            serde_json::Value::Null => Ok(Self::default()),
+            named @ serde_json::Value::Object(_) => serde_json::from_value(named),
+            // A list would be taken for the settings in their order.
+            _ => Err(serde::de::Error::custom("they have no names")),
+        };
+        read.map_err(|cause| UnreadableConfig { path: folder.join(SCENE_FILE).display().to_string(), cause })
     }
 
     /// Weights of the terms for normals and distortion.
