@@ -51,11 +51,12 @@ pub fn camera_at(center: DVec3) -> Camera {
     }
 }
 
-/// Sixteen cameras in a circle.
+/// Sixteen cameras in a circle, each turned as far as it is along it.
 pub fn ring_of_cameras() -> Vec<Camera> {
     let place = |i: i32| {
         let angle = f64::from(i) / 16.0 * std::f64::consts::TAU;
-        camera_at(DVec3::new(1.3 * angle.cos(), 0.2, 1.3 * angle.sin()))
+        let camera = camera_at(DVec3::new(1.3 * angle.cos(), 0.2, 1.3 * angle.sin()));
+        Camera { world_from_camera: DMat3::from_rotation_y(angle), ..camera }
     };
     (0..16).map(place).collect()
 }

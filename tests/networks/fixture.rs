@@ -94,3 +94,11 @@ pub fn agrees(what: &str, got: &[f32], wrong: &[f32], expected: &[f32]) {
     assert!(right < TOLERANCE, "{what}: {right:e}");
     assert!(control > 10.0 * TOLERANCE, "{what}: the negative control passes ({control:e})");
 }
+
+#[test]
+fn what_is_no_number_agrees_with_nothing() {
+    let expected = [1.0, -2.0];
+    assert!(error(&[1.0, -2.001], &expected) < TOLERANCE);
+    assert!(error(&[f32::NAN, -2.0], &expected).is_nan() && error(&[1.0, f32::NAN], &expected).is_nan());
+    assert!(error(&[1.0, f32::NEG_INFINITY], &expected).is_infinite());
+}
