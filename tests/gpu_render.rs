@@ -205,8 +205,9 @@ fn a_scene_far_from_zero_renders_like_one_at_zero() {
         scene.cloud.origin += away;
         scene.camera.center += away;
         let there = scene.gpu(&mut renderer);
-        let worst =
-            |a: &Frame<f32>, b: &Frame<f32>| stats::worst((0..3).map(|c| stats::worst_difference(&a.color[c], &b.color[c])));
+        let worst = |a: &Frame<f32>, b: &Frame<f32>| {
+            stats::worst((0..3).map(|c| stats::worst_difference(&a.color[c], &b.color[c])))
+        };
         assert!(worst(&here, &there) < 1e-3, "{}", worst(&here, &there));
         scene.camera.center.x += 0.01;
         assert!(worst(&here, &scene.gpu(&mut renderer)) > 1e-2, "a moved camera shows");

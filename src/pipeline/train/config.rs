@@ -58,7 +58,9 @@ pub struct TrainConfig {
 
 /// Stored settings that cannot be read: defaults in their place would train or draw something else.
 #[derive(Debug, thiserror::Error)]
-#[error("{path}: the settings of the training ('config') cannot be read: {cause}; mend them, or take the entry out to go on with the defaults")]
+#[error(
+    "{path}: the settings of the training ('config') cannot be read: {cause}; mend them, or take the entry out to go on with the defaults"
+)]
 pub struct UnreadableConfig {
     path: String,
     cause: serde_json::Error,

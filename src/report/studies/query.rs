@@ -20,8 +20,8 @@ use crate::pipeline::semantics::protocols::{AskedScene, Category, LabelledView, 
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::RenderSettings;
 use crate::render::cpu::Renderer;
-use crate::report::sweep::failed;
 use crate::report::document::Form;
+use crate::report::sweep::failed;
 use crate::report::{Case, Measure, Rule, Stage, StageName, Study, StudyError, Trial};
 use crate::scene::{Camera, GaussianCloud, IdentityId, LanguageFeatures, Level, Mask, SemanticMap};
 

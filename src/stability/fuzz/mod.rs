@@ -103,8 +103,7 @@ pub struct Limit {
 /// is told, and ends the search.
 pub fn fuzz(seed: u64, limit: Limit, only: Option<&str>) -> Vec<Found> {
     let areas: Vec<usize> = (0..AREAS.len()).filter(|a| only.is_none_or(|o| AREAS[*a].0.contains(o))).collect();
-    let mut found: Vec<Found> =
-        areas.iter().map(|a| Found::of(AREAS[*a].0)).collect();
+    let mut found: Vec<Found> = areas.iter().map(|a| Found::of(AREAS[*a].0)).collect();
     let (sender, results) = channel();
     let worker = areas.clone();
     // A thread of its own, so that one that hangs can be left behind.
