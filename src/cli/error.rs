@@ -3,6 +3,8 @@
 use std::error::Error;
 use std::process::ExitCode;
 
+use super::output::say;
+
 /// Why a subcommand did not do what was asked.
 #[derive(Debug)]
 pub enum CliError {
@@ -24,15 +26,15 @@ impl CliError {
     pub fn report(&self) -> ExitCode {
         match self {
             Self::Usage(text) => {
-                eprintln!("error: {text}\n\nFor more information, try 'fmlgs --help'.");
+                say(&format!("error: {text}\n\nFor more information, try 'fmlgs --help'."));
                 ExitCode::from(2)
             }
             Self::Failed(error) => {
-                eprintln!("error: {}", chain(error.as_ref()));
+                say(&format!("error: {}", chain(error.as_ref())));
                 ExitCode::FAILURE
             }
             Self::Cancelled(text) => {
-                eprintln!("cancelled: {text}");
+                say(&format!("cancelled: {text}"));
                 ExitCode::from(130)
             }
         }

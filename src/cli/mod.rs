@@ -54,7 +54,7 @@ Exit codes:
   0    done
   1    failed; the message names the file, the place in it and what can be done
   2    the arguments make no sense
-  130  cancelled (Ctrl-C, SIGTERM); what was done so far is saved where the command saves anything";
+  130  cancelled (Ctrl-C, SIGTERM, SIGHUP); what was done so far is saved where the command saves anything";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -140,7 +140,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
     let quiet = cli.quiet;
     let wishes = cli.plan.wishes;
     if cli.trace {
-        trace::listen(|load| eprintln!("{}", load.line()));
+        trace::listen(|load| output::say(&load.line()));
     }
     let Some(command) = cli.command else {
         if cli.report.len() > 2 {

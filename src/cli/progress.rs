@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use indicatif::{HumanCount, HumanDuration, ProgressBar, ProgressStyle};
 
 use super::interrupt;
+use super::output::say;
 use crate::pipeline::observer::{Evaluation, Level, Observer, Progress, Signal, StepMetrics};
 
 /// Time between lines where standard error is no terminal.
@@ -31,8 +32,8 @@ impl Console {
     /// Prints a line without disturbing the bar.
     fn line(&self, text: &str) {
         match &self.bar {
-            Some((_, bar)) => bar.suspend(|| eprintln!("{text}")),
-            None => eprintln!("{text}"),
+            Some((_, bar)) => bar.suspend(|| say(text)),
+            None => say(text),
         }
     }
 
@@ -78,7 +79,7 @@ impl Observer for Console {
         if self.last_line.elapsed() >= LINE_INTERVAL {
             self.last_line = Instant::now();
             let (done, total) = (HumanCount(progress.done), HumanCount(progress.total));
-            eprintln!("{} {done}/{total} {} {}", progress.stage, rate_and_times(&progress), self.metrics);
+            say(&format!("{} {done}/{total} {} {}", progress.stage, rate_and_times(&progress), self.metrics));
         }
     }
 
