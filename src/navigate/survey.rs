@@ -143,11 +143,11 @@ pub fn more_cameras(cameras: &[Camera], count: usize, spread: f64, seed: u64) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::navigate::testing::{ring_of_cameras, wall_with_hole};
+    use crate::navigate::testing::{turning_ring, wall_with_hole};
 
     #[test]
     fn ours_keep_clear_where_the_papers_do_not() {
-        let cameras = ring_of_cameras();
+        let cameras = turning_ring();
         let more = more_cameras(&cameras, 40, 0.3, 1);
         assert_eq!(more.len(), 40);
         let navigator = Navigator::new(&wall_with_hole(0.0, 0.6), &more, DVec3::NEG_Y);
@@ -161,7 +161,7 @@ mod tests {
         assert_eq!(survey.paper_through.poses_too_near, 0, "{survey:?}");
         let [ours, paper, through] = [survey.ours, survey.paper, survey.paper_through].map(|s| s.worst);
         assert!(ours.rotation_error < 1e-9, "{ours:?}");
-        assert!(paper.rotation_error > 0.1 && through.rotation_error > 0.1, "{paper:?} {through:?}");
+        assert!(paper.rotation_error > 0.1 && through.rotation_error > 1e-3, "{paper:?} {through:?}");
         assert!(through.largest_turn > 1.5 * ours.largest_turn, "{through:?} {ours:?}");
         let close = self::survey(&navigator, Ends::CloseToMatter, 10, 60, 7);
         assert!(close.ours.flights + close.no_way == 10 && close.ours.poses_too_near == 0, "{close:?}");

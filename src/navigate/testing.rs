@@ -51,12 +51,20 @@ pub fn camera_at(center: DVec3) -> Camera {
     }
 }
 
-/// Sixteen cameras in a circle, each turned as far as it is along it.
+/// Sixteen cameras in a circle.
 pub fn ring_of_cameras() -> Vec<Camera> {
     let place = |i: i32| {
         let angle = f64::from(i) / 16.0 * std::f64::consts::TAU;
-        let camera = camera_at(DVec3::new(1.3 * angle.cos(), 0.2, 1.3 * angle.sin()));
-        Camera { world_from_camera: DMat3::from_rotation_y(angle), ..camera }
+        camera_at(DVec3::new(1.3 * angle.cos(), 0.2, 1.3 * angle.sin()))
     };
     (0..16).map(place).collect()
+}
+
+/// The same, each turned as far as it is along the circle.
+pub fn turning_ring() -> Vec<Camera> {
+    let turned = |(i, c): (i32, Camera)| {
+        let angle = f64::from(i) / 16.0 * std::f64::consts::TAU;
+        Camera { world_from_camera: DMat3::from_rotation_y(angle), ..c }
+    };
+    (0..).zip(ring_of_cameras()).map(turned).collect()
 }

@@ -261,7 +261,7 @@ fn turning_order() -> Order {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::navigate::testing::{ring_of_cameras, wall_with_hole};
+    use crate::navigate::testing::{ring_of_cameras, turning_ring, wall_with_hole};
     use crate::pipeline::observer::Silent;
 
     #[test]
@@ -273,14 +273,15 @@ mod tests {
 
     #[test]
     fn too_few_looks_fly_through_walls_and_the_default_does_not() {
-        let cameras = ring_of_cameras();
-        let mut study = PathStudy::new(&wall_with_hole(0.0, 0.6), &cameras, 1, Input::new());
-        let mut value = |method: &str, setting: &str, name: &str| {
+        let study = |cameras: &[Camera]| PathStudy::new(&wall_with_hole(0.0, 0.6), cameras, 1, Input::new());
+        let measured = |study: &mut PathStudy, method: &str, setting: &str, name: &str| {
             let cases = study.cases();
             let case = cases.iter().find(|c| c.method == method && c.setting.contains(setting)).expect("a case");
             let trial = study.run(case, 3, &mut Silent).expect("runs").expect("not cancelled");
             trial.values.iter().find(|v| v.0 == name).expect("measured").1
         };
+        let mut ring = study(&ring_of_cameras());
+        let mut value = |method: &str, setting: &str, name: &str| measured(&mut ring, method, setting, name);
         let (default, once) = (value("default", "", "too near"), value("samples along legs", "1 along", "too near"));
         // Poses in matter are pushed out of it, so what is left is little, but there.
         assert!(default == 0.0 && once > 0.0, "{default} {once}");
@@ -288,8 +289,12 @@ mod tests {
         assert!(few > 4.0 * many, "{few} {many}");
         let paper = value("the paper's interpolation", "150", "too near");
         assert!(paper > default, "{paper}");
-        // Along the edges of the graph the paper's formula keeps clear, and turns by jerks.
-        let [near, faults] = ["too near", "faults"].map(|n| value("the paper's interpolation", "keypoints, 150", n));
-        assert!(near == 0.0 && faults > value("default", "", "faults"), "{near} {faults}");
+        // Along the edges of the graph the paper's formula keeps clear; where cameras turn, it does so by jerks.
+        let paper = "the paper's interpolation";
+        assert_eq!(value(paper, "keypoints, 150", "too near"), 0.0);
+        let mut turning = study(&turning_ring());
+        let [own, through] =
+            [("default", ""), (paper, "keypoints, 150")].map(|(m, s)| measured(&mut turning, m, s, "largest turn"));
+        assert!(own < 3.0 && through > own, "{own} {through} degrees");
     }
 }
