@@ -49,6 +49,23 @@ fn every_stage_is_measured_and_gone_on_with() {
     run(&[&train[..], &["--max-side", "64", "-q"]].concat()).ok();
     run(&["preprocess", &scene, "--masks", photos, "--encoder", "demo", "-q"]).ok();
 
+    // What is found but cannot be seen from a camera is told so; here one that looks the other way.
+    let mut away = run(&["info", photos, "--json"]).ok().json()["cameras"][0].clone();
+    let away = {
+        let turn = away["world_from_camera"].as_array_mut().unwrap();
+        for k in [0, 1, 2, 6, 7, 8] {
+            turn[k] = (-turn[k].as_f64().unwrap()).into();
+        }
+        std::fs::write(at("away.json"), away.to_string()).unwrap();
+        at("away.json")
+    };
+    let asked = |camera: &str| run(&["query", &scene, "box 1", "--camera", camera, "--json"]).ok().json();
+    let (here, there) = (asked("0"), asked(&away));
+    assert_eq!((&here["answer"], &here["in_view"]), (&"found".into(), &true.into()), "{here}");
+    assert_eq!((&there["answer"], &there["in_view"], &there["pixels"]), (&"found".into(), &false.into(), &0.into()));
+    let told = run(&["query", &scene, "box 1", "--camera", &away]).ok().stdout;
+    assert!(told.contains("not in this view") && told.contains("--camera"), "{told}");
+
     let wanted = ["report", &scene, "--masks", photos, "--max-side", "64", "--steps", "20", "--train-steps", "20"];
     let rest = ["--views", "1", "--stages", "render,train,features,query,path", "--out", &out, "-q"];
     let read = || -> Value { serde_json::from_slice(&std::fs::read(format!("{out}/report.json")).unwrap()).unwrap() };

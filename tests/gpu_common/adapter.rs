@@ -16,7 +16,7 @@ pub fn context() -> Option<&'static Context> {
         }
         Err(e) => {
             assert!(!required, "REQUIRE_GPU=1: {e}");
-            println!("skipped: no GPU adapter, not even a software one ({e})");
+            println!("skipped: {e}");
             None
         }
     }
