@@ -25,6 +25,25 @@ pub struct Outcome {
     pub refused: Option<RefusalKind>,
 }
 
+impl Outcome {
+    /// Whether the text may name files of this machine: it is for the user alone.
+    pub fn is_private(&self) -> bool {
+        match self.refused {
+            Some(kind) => kind == RefusalKind::Failed,
+            None => matches!(self.call, ToolCall::Export { .. }),
+        }
+    }
+
+    /// What a planner elsewhere hears of it.
+    pub fn heard(&self) -> &str {
+        match self.refused {
+            _ if !self.is_private() => &self.text,
+            None => "It is written to a file; the user is told which.",
+            Some(_) => "It failed on the user's machine; the user is told why.",
+        }
+    }
+}
+
 /// A call after its checks.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Checked {

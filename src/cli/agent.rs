@@ -2,15 +2,14 @@
 
 use std::io::BufRead;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::json;
 
 use super::asking::semantics;
 use super::{CliError, interrupt, opened, output, view};
-use crate::agent::llm::Llm;
 use crate::agent::llm::settings::LlmSettings;
+use crate::agent::llm::{Llm, SENT};
 use crate::agent::rules::Rules;
 use crate::agent::scene::{Deed, Parts, SceneWorld};
 use crate::agent::{AgentEvent, Planner, Policy, Session};
@@ -18,17 +17,19 @@ use crate::io;
 use crate::navigate::Pose;
 use crate::scene::Camera;
 
+const EXAMPLES: &str = "Examples:\n  \
+    fmlgs agent scene/ \"show me the handle of the kettle from the other side\" \"step back half a metre\"\n  \
+    fmlgs agent scene/ \"what is on the table?\" --json\n  \
+    fmlgs agent scene/ \"go to the lamp\" --view lamp.png --transcript talk.md\n  \
+    fmlgs agent scene/ --planner llm --url http://127.0.0.1:11434/v1 --model qwen3 \"find something to cut with\"";
+
 /// Talk to a scene: it shows, goes there, tells, hides, measures
 ///
 /// Each TEXT is one request of the same talk; without any, requests are read from standard input, one
 /// a line. The planner 'rules' is built in; 'llm' asks a chat model behind an OpenAI-compatible
-/// address, and sends it the names of the scene's objects. Exit code 1 if the last request was refused.
+/// address. Exit code 1 if the last request was refused.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  \
-    fmlgs agent scene/ \"show me the handle of the kettle from the other side\" \"step back half a metre\"\n  \
-    fmlgs agent scene/ \"what is on the table?\" --json\n  \
-    fmlgs agent scene/ \"go to the lamp\" --view lamp.png --transcript talk.md\n  \
-    fmlgs agent scene/ --planner llm --url http://127.0.0.1:11434/v1 --model qwen3 \"find something to cut with\"")]
+#[command(after_help = format!("{EXAMPLES}\n\n{SENT}"))]
 pub struct Args {
     /// Trained scene with objects and parts ('fmlgs preprocess')
     scene: PathBuf,
@@ -188,21 +189,13 @@ impl Talk {
         text: &str,
         deeds: &Mutex<Vec<String>>,
     ) -> Result<(), CliError> {
-        let cancel = AtomicBool::new(false);
         let mut calls = Vec::new();
-        let reply = session.say(
-            world,
-            text,
-            &mut |event| {
-                if interrupt::asked_to_stop() {
-                    cancel.store(true, Ordering::Relaxed);
-                }
-                if let AgentEvent::Call { line, .. } = event {
-                    calls.push(line);
-                }
-            },
-            &cancel,
-        );
+        let mut on = |event| {
+            if let AgentEvent::Call { line, .. } = event {
+                calls.push(line);
+            }
+        };
+        let reply = session.say(world, text, &mut on, interrupt::flag());
         if interrupt::asked_to_stop() {
             return Err(CliError::Cancelled("the talk ends here".into()));
         }

@@ -45,7 +45,7 @@ pub use error::CliError;
 
 use self::plan::PlanArgs;
 use crate::scene::plan::Wish;
-use crate::scene::trace;
+use crate::scene::{text, trace};
 use crate::worker::Action;
 
 /// What each exit code means; part of `--help`.
@@ -126,7 +126,13 @@ pub fn main(open_window: OpenWindow) -> ExitCode {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version are "errors" for clap, with exit code 0. A closed pipe is no failure.
-            let _ = error.print();
+            let plain = error.render().to_string();
+            if text::lines(&plain) == plain {
+                let _ = error.print();
+            } else {
+                // What it quotes may be a file's name.
+                output::note(&plain);
+            }
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
     };
@@ -140,7 +146,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
     let quiet = cli.quiet;
     let wishes = cli.plan.wishes;
     if cli.trace {
-        trace::listen(|load| output::say(&load.line()));
+        trace::listen(|load| output::note(&load.line()));
     }
     let Some(command) = cli.command else {
         if cli.report.len() > 2 {

@@ -1,4 +1,5 @@
-//! What the subcommands write: results on standard output, pictures and arrays in files.
+//! What the subcommands write: results on standard output, notes on standard error, pictures and arrays in
+//! files. All text for a terminal goes through here, so that nothing foreign in it acts on one.
 
 use std::io::{ErrorKind, Write};
 use std::path::Path;
@@ -9,12 +10,13 @@ use serde::Serialize;
 
 use super::CliError;
 use crate::io::{atomic, scene_folder, trained};
+use crate::scene::text;
 
 /// Prints `text` and a line break to standard output. A reader that has closed its end (`| head`)
 /// has seen enough, which is no failure.
 pub fn print(text: &str) -> Result<(), CliError> {
     let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush()) {
+    match out.write_all(text::lines(text).as_bytes()).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error.into()),
         _ => Ok(()),
     }
@@ -22,22 +24,24 @@ pub fn print(text: &str) -> Result<(), CliError> {
 
 /// Tells on standard error what is not as it was meant, but no reason to stop.
 pub fn warn(text: String) {
-    say(&format!("warning: {text}"));
-}
-
-/// Prints a line to standard error. Where that cannot be written (a closed pipe, a lost terminal), the
-/// line is lost: nobody's work ends for it.
-pub fn say(text: &str) {
-    let _ = writeln!(std::io::stderr().lock(), "{text}");
+    note(&format!("warning: {text}"));
 }
 
 /// Prints `value` as indented JSON.
 pub fn print_json(value: &impl Serialize) -> Result<(), CliError> {
-    print(&serde_json::to_string_pretty(value)?)
+    print(&text::json(&serde_json::to_string_pretty(value)?))
+}
+
+/// Prints a message to standard error. One that nobody can read any more ends no work.
+pub fn note(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{}", text::message(text));
 }
 
 /// Rows of cells as aligned columns: the first to the left, the others to the right.
 pub fn table(rows: &[Vec<String>]) -> String {
+    // A cell is one line, and no wider than a name: formatting takes no width over 65,535.
+    let cell = |s: &String| text::shortened(&text::line(s), text::LONGEST_NAME).into_owned();
+    let rows: Vec<Vec<String>> = rows.iter().map(|row| row.iter().map(cell).collect()).collect();
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..columns).map(width).collect();
@@ -123,6 +127,14 @@ mod tests {
     fn columns_line_up() {
         let rows = [vec!["view".into(), "PSNR".into()], vec!["a long name".into(), "9.1".into()]];
         assert_eq!(table(&rows), "view         PSNR\na long name   9.1");
+    }
+
+    #[test]
+    fn cells_are_one_line_of_bounded_width() {
+        let rows = [vec!["é".repeat(70_000), "1".into()], vec!["a\nb\u{1b}[2J".into(), "2".into()]];
+        let lines = table(&rows);
+        assert_eq!(lines.lines().count(), 2);
+        assert!(lines.chars().count() < 3 * text::LONGEST_NAME && !lines.contains('\u{1b}'), "{lines}");
     }
 
     #[test]

@@ -138,7 +138,9 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let network = match args.segmenter.as_deref() {
         Some("files" | REGIONS) => None,
         Some(name) => Some(name.to_owned()),
-        None => catalogue::usable(Role::Segmenter).into_iter().next(),
+        None => {
+            catalogue::usable(Role::Segmenter, &mut |text| observer.note(Severity::Warning, text))?.into_iter().next()
+        }
     };
     let mut segmenter = segmenter(args.masks.as_deref(), &scene.cloud, &scene.settings, network.as_deref())?;
     let track = TrackOptions {
@@ -156,7 +158,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let mut encoder = match args.encoder.as_deref() {
         Some("none") => None,
         Some(name) => Some(models::encoder(name)?),
-        None => Some(models::best_encoder()?),
+        None => Some(models::best_encoder(&mut |text| observer.note(Severity::Warning, text))?),
     };
     let mut follower = match args.tracker {
         TrackerKind::Geometry => None,

@@ -15,6 +15,7 @@ mod error;
 pub mod files;
 pub mod folder_lock;
 pub mod gltf_mesh;
+pub mod http;
 pub mod khr_gltf;
 pub mod labels;
 mod listing;

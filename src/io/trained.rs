@@ -17,7 +17,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use super::{IoError, SceneFolder, commit, files, splat_ply};
-use crate::scene::{Camera, Dataset, Evaluation, GaussianCloud, SemanticMap, StepMetrics};
+use crate::scene::{Camera, Dataset, Evaluation, GaussianCloud, SemanticMap, StepMetrics, text};
 
 /// The file that makes a folder a trained scene.
 pub const SCENE_FILE: &str = "scene.json";
@@ -46,7 +46,7 @@ pub struct SceneInfo {
     /// Version of the format.
     pub version: u64,
     /// Short name for titles.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "text::read_name")]
     pub name: String,
     /// The photos that it was trained on, if known.
     #[serde(default)]
@@ -202,6 +202,7 @@ pub fn load_info(folder: &Path) -> Result<SceneInfo, IoError> {
     }
     let info: SceneInfo = serde_json::from_slice(&bytes).map_err(|e| files::json_error(&path, &e))?;
     for c in &info.cameras {
+        files::photo_name(&c.name, &path)?;
         c.camera.validate().map_err(|cause| IoError::Camera { path: path.clone(), photo: c.name.clone(), cause })?;
     }
     Ok(info)

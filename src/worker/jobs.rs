@@ -183,7 +183,10 @@ impl PipelineJobs {
         let network = match with.segmenter.as_deref() {
             Some(REGIONS) => None,
             Some(name) => Some(name.to_owned()),
-            None => catalogue::usable(Role::Segmenter).into_iter().next(),
+            None => {
+                let usable = catalogue::usable(Role::Segmenter, &mut |text| observer.note(Level::Warning, text));
+                usable.map_err(|e| Stop::Failed(Failure::of(&e, "")))?.into_iter().next()
+            }
         };
         let found = segmenter(masks, cloud, settings, network.as_deref());
         let mut segmenter = found.map_err(|e| Stop::Failed(Failure::of(&e, "")))?;
@@ -195,10 +198,11 @@ impl PipelineJobs {
             }
         };
         // Without the encoder, names alone are understood.
-        let mut encoder = with
-            .encoder
-            .as_deref()
-            .map_or_else(models::best_encoder, models::encoder)
+        let encoder = match with.encoder.as_deref() {
+            Some(name) => models::encoder(name),
+            None => models::best_encoder(&mut |text| observer.note(Level::Warning, text)),
+        };
+        let mut encoder = encoder
             .inspect_err(|e| observer.note(Level::Warning, format!("Objects are found without their looks: {e}")))
             .ok();
         let mut options = FindOptions::default();

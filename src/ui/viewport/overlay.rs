@@ -92,7 +92,7 @@ impl Viewport {
         step(ui, "‹", Action::PreviousPhoto, actions);
         match &self.photo {
             Some(p) => {
-                ui.label(RichText::new(format::shortened(p.name(), 28)).strong()).on_hover_text(p.name());
+                ui.label(RichText::new(format::shortened(&p.name(), 28)).strong()).on_hover_text(&*p.name());
                 ui.weak(format!("{} of {total}", p.index() + 1));
                 if let Some(psnr) = self.picture.as_ref().and_then(|p| p.psnr) {
                     ui.label(RichText::new(format::decibel(psnr)).color(theme::ACCENT))
