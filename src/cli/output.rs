@@ -22,6 +22,11 @@ pub fn print(text: &str) -> Result<(), CliError> {
     }
 }
 
+/// Tells on standard error what is not as it was meant, but no reason to stop.
+pub fn warn(text: String) {
+    note(&format!("warning: {text}"));
+}
+
 /// Prints `value` as indented JSON.
 pub fn print_json(value: &impl Serialize) -> Result<(), CliError> {
     print(&text::json(&serde_json::to_string_pretty(value)?))

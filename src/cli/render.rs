@@ -151,7 +151,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let job = args.check()?;
     let plan = args.plan.of_scene(&job.scene);
     let settings = RenderSettings { depth: args.what.needs_depth(), sh_degree: plan.sh_degree, ..job.scene.settings };
-    let mut backend = Backend::choose(choice(args.backend, &settings, &plan))?;
+    let mut backend = Backend::choose(choice(args.backend, &settings, &plan), output::warn)?;
     // Only the CPU draws surfels as such.
     let flat = settings.surfels && !matches!(backend, Backend::Cpu(_));
     let cloud = Arc::new(job.scene.cloud);
@@ -229,7 +229,7 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
         }
     }
     let marked = map.as_ref().map(|map| Marked { map, ids: &ids, color: [255, 64, 160] });
-    let mut backend = Backend::choose(choice(args.backend, &scene.settings, &plan))?;
+    let mut backend = Backend::choose(choice(args.backend, &scene.settings, &plan), output::warn)?;
     let started = Instant::now();
     output::make_parent(&args.out)?;
     let mut console = Console::new(quiet);
