@@ -25,19 +25,25 @@ use crate::pipeline::train::{self, TrainConfig};
 use crate::render::cpu::Renderer;
 use crate::render::{BackendChoice, RenderSettings};
 use crate::scene::{
-    Camera, Dataset, GaussianCloud, Identities, IdentityId, LanguageFeatures, Level, Photo, SemanticMap,
+    Camera, GaussianCloud, Identities, IdentityId, LanguageFeatures, Level, Photo, SemanticMap,
 };
 
 /// What is measured on.
 const SCENES: [&str; 2] = ["desk", "kitchen"];
-/// Photos of a scene, and how many of them are held out.
-const [VIEWS, HELD_OUT]: [usize; 2] = [24, 4];
+/// Photos of a scene.
+const VIEWS: usize = 24;
+/// How many of them are held out.
+const HELD_OUT: usize = 4;
 /// Their size, px; the encoder looks at that.
 const SIZE_PX: [u32; 2] = [400, 300];
-/// Longer side of the pictures that Gaussians are trained on, and of the masks that are compared, px.
-const [TRAIN_PX, COMPARE_PX]: [u32; 2] = [160, 200];
-/// Steps of training, and of training codes.
-const [STEPS, CODE_STEPS]: [u64; 2] = [150, 100];
+/// Longer side of the pictures that Gaussians are trained on, px.
+const TRAIN_PX: u32 = 160;
+/// Longer side of the masks that are compared, px.
+const COMPARE_PX: u32 = 200;
+/// Steps of training.
+const STEPS: u64 = 150;
+/// Steps of training codes.
+const CODE_STEPS: u64 = 100;
 /// Sparse points, each of which becomes a Gaussian.
 const POINTS: usize = 16_000;
 /// Colours that things of these scenes may have.
@@ -83,6 +89,8 @@ struct Figures {
     answered: f64,
     /// The same of what is not there, and of things in a wrong colour.
     false_finds: [f64; 2],
+    /// The same by names.
+    false_names: [f64; 2],
 }
 
 /// What is done to a scene before it is asked.
@@ -131,16 +139,12 @@ fn open(name: &str, seed: u64, folder: &Path) -> Scene {
         (photo.name.clone(), photo.camera.limited_to(COMPARE_PX), categories(&found))
     };
     Scene {
-        settings: config.render_settings(dataset_background(&dataset)),
+        settings: config.render_settings(dataset.background),
         training: training.iter().map(of).collect(),
         held: held.iter().map(of).map(&mut labelled).collect(),
         masks,
         cloud: std::sync::Arc::unwrap_or_clone(trained.cloud),
     }
-}
-
-fn dataset_background(dataset: &Dataset) -> Option<[f32; 3]> {
-    dataset.background
 }
 
 impl Scene {
@@ -278,6 +282,7 @@ fn over_scenes(each: &[Figures]) -> Figures {
         objects: of(&|f| f.objects),
         answered: of(&|f| f.answered),
         false_finds: std::array::from_fn(|k| of(&|f| f.false_finds[k])),
+        false_names: std::array::from_fn(|k| of(&|f| f.false_names[k])),
     }
 }
 
@@ -310,12 +315,12 @@ fn figures(scene: &Scene, map: &SemanticMap, trained: &SemanticMap, encoder: &mu
         }
     }
     let share = |list: &[bool]| list.iter().filter(|found| **found).count() as f64 / list.len() as f64;
-    let mut found = |names: Vec<String>| -> f64 {
-        let mut is_answered = |name: &String| {
-            let answered = by_looks(map, features, &mut book, encoder, name).expect("its words are known");
-            !matches!(answered.answer, Answer::NotFound(_))
-        };
-        share(&names.iter().map(&mut is_answered).collect::<Vec<_>>())
+    let not_there = [ABSENT.map(str::to_owned).to_vec(), wrong_colors(&map.identities)];
+    let is_found = |answered: Answered| !matches!(answered.answer, Answer::NotFound(_));
+    let mut seen = |name: &String| by_looks(map, features, &mut book, encoder, name).map(is_found);
+    let named = |name: &String| Phrase::parse(name).map(|p| is_found(by_name(&map.identities, &p, Kind::Auto)));
+    let found = |list: &Vec<String>, ask: &mut dyn FnMut(&String) -> Option<bool>| {
+        share(&list.iter().map(|name| ask(name).expect("its words are known")).collect::<Vec<_>>())
     };
     Figures {
         votes: by_names(scene, map),
@@ -323,7 +328,8 @@ fn figures(scene: &Scene, map: &SemanticMap, trained: &SemanticMap, encoder: &mu
         recall,
         objects: mean(&objects),
         answered: share(&present),
-        false_finds: [found(ABSENT.map(str::to_owned).to_vec()), found(wrong_colors(&map.identities))],
+        false_finds: not_there.each_ref().map(|list| found(list, &mut seen)),
+        false_names: not_there.each_ref().map(|list| found(list, &mut { named })),
     }
 }
 

@@ -250,8 +250,14 @@ fn classes_have_their_own_masks_or_compete_for_pixels() {
     close(&ious(&winner), &[0.0, 0.4]);
 }
 
-/// Unit vectors: two things, three kinds of parts, something that means anything, and something else.
-const [MUG, PAN, HANDLE, LID, KNOB, ANYTHING, ELSE]: [usize; 7] = [0, 1, 2, 3, 4, 5, 6];
+// Unit vectors: two things, three kinds of parts, what means anything, and something else.
+const MUG: usize = 0;
+const PAN: usize = 1;
+const HANDLE: usize = 2;
+const LID: usize = 3;
+const KNOB: usize = 4;
+const ANYTHING: usize = 5;
+const ELSE: usize = 6;
 
 fn mixed(of: &[(usize, f32)]) -> Vec<f32> {
     let mut v = vec![0.0; 7];
