@@ -59,7 +59,7 @@ pub struct Args {
     /// Write the picture at the end
     #[arg(long)]
     view: Option<PathBuf>,
-    /// Write everything that was said and done: .json, else Markdown
+    /// Write everything that was said and done: .json, or .md for people
     #[arg(long)]
     transcript: Option<PathBuf>,
     /// Print one JSON document
@@ -104,7 +104,13 @@ pub fn run(args: Args) -> Result<(), CliError> {
         return Err(CliError::Usage("--metres has to be over 0".into()));
     }
     let scene = opened::drawable(&args.scene)?;
-    let map = semantics(&args.scene, &scene.cloud)?;
+    if let Some(view) = &args.view {
+        output::check(view, &[".png"], &scene.reads(&args.scene))?;
+    }
+    if let Some(transcript) = &args.transcript {
+        output::check(transcript, &[".json", ".md"], &scene.reads(&args.scene))?;
+    }
+    let map = semantics(&args.scene, scene.state.as_deref(), &scene.cloud)?;
     let camera = view::choose(args.from.as_deref(), &scene)?;
     let cameras: Vec<Camera> = scene.cameras.iter().map(|c| c.camera.clone()).collect();
     let parts = Parts {

@@ -9,7 +9,8 @@ use super::asking::Asker;
 use super::eval::Job;
 use super::progress::Console;
 use super::{CliError, output, query};
-use crate::io::{self, labels::Labels};
+use crate::io::SceneFolder;
+use crate::io::labels::Labels;
 use crate::models;
 use crate::pipeline::observer::{Level, Observer, Silent};
 use crate::pipeline::semantics::code_map::CodeMap;
@@ -94,7 +95,10 @@ pub fn run(
         other => other.into(),
     })?;
     let find_secs = start.elapsed().as_secs_f64();
-    io::semantic_map::save(scene, &map, &job.cloud)?;
+    let (kept, _) = SceneFolder::hold(scene, "storing objects")?.replace_map(job.state.as_deref(), &map, &job.cloud)?;
+    if let Some(kept) = kept {
+        console.note(Level::Info, format!("The objects and parts before are kept in {}", kept.display()));
+    }
     console.note(Level::Info, format!("{} objects and parts found", map.identities.len()));
 
     output::make_folder(pictures)?;

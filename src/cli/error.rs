@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::process::ExitCode;
 
-use super::output;
+use super::output::say;
 
 /// Why a subcommand did not do what was asked.
 #[derive(Debug)]
@@ -26,17 +26,17 @@ impl CliError {
     pub fn report(&self) -> ExitCode {
         match self {
             Self::Usage(text) => {
-                output::note(&format!("error: {text}"));
-                output::note("");
-                output::note("For more information, try 'fmlgs --help'.");
+                say(&format!("error: {text}"));
+                say("");
+                say("For more information, try 'fmlgs --help'.");
                 ExitCode::from(2)
             }
             Self::Failed(error) => {
-                output::note(&format!("error: {}", chain(error.as_ref())));
+                say(&format!("error: {}", chain(error.as_ref())));
                 ExitCode::FAILURE
             }
             Self::Cancelled(text) => {
-                output::note(&format!("cancelled: {text}"));
+                say(&format!("cancelled: {text}"));
                 ExitCode::from(130)
             }
         }

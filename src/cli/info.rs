@@ -51,7 +51,7 @@ pub fn run(args: Args) -> Result<(), CliError> {
         Opened::Trained(t) => {
             let cameras: Vec<Camera> = t.info.cameras.iter().map(|c| c.camera.clone()).collect();
             let planned = machine.with_photos(&cameras).with_cloud(&t.cloud, t.cloud.sh_degree, &cameras);
-            let map = io::semantic_map::load(&t.folder, &t.cloud);
+            let map = io::semantic_map::load(&t.folder, t.state.as_deref(), &t.cloud);
             let mut facts = of_trained(&t);
             facts.warnings.extend(map.as_ref().err().map(|e| format!("its objects cannot be read: {e}")));
             (facts, planned.with_semantics(map.ok().flatten().as_ref()))

@@ -54,7 +54,7 @@ Exit codes:
   0    done
   1    failed; the message names the file, the place in it and what can be done
   2    the arguments make no sense
-  130  cancelled (Ctrl-C, SIGTERM); what was done so far is saved where the command saves anything";
+  130  cancelled (Ctrl-C, SIGTERM, SIGHUP); what was done so far is saved where the command saves anything";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -131,7 +131,7 @@ pub fn main(open_window: OpenWindow) -> ExitCode {
                 let _ = error.print();
             } else {
                 // What it quotes may be a file's name.
-                output::note(&plain);
+                output::say(&plain);
             }
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
@@ -146,7 +146,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
     let quiet = cli.quiet;
     let wishes = cli.plan.wishes;
     if cli.trace {
-        trace::listen(|load| output::note(&load.line()));
+        trace::listen(|load| output::say(&load.line()));
     }
     let Some(command) = cli.command else {
         if cli.report.len() > 2 {

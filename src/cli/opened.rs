@@ -33,6 +33,15 @@ pub struct DrawableScene {
     pub dataset_path: Option<PathBuf>,
     /// Length of a scene unit in metres, if known.
     pub metres_per_unit: Option<f64>,
+    /// Id of the save that its files are of, if it has one.
+    pub state: Option<String>,
+}
+
+impl DrawableScene {
+    /// What was read to open it from `path`, which no result may replace.
+    pub fn reads<'a>(&'a self, path: &'a Path) -> Vec<&'a Path> {
+        std::iter::once(path).chain(self.dataset_path.as_deref()).collect()
+    }
 }
 
 /// Opens a trained scene or a splat.
@@ -46,6 +55,7 @@ pub fn drawable(path: &Path) -> Result<DrawableScene, CliError> {
             config: TrainConfig::default(),
             dataset_path: None,
             metres_per_unit: None,
+            state: None,
         }),
         Opened::Dataset(_) => Err(CliError::failed(format!(
             "{path} holds photos but no Gaussians yet: train them first, with 'fmlgs train {path} --out SCENE'",
@@ -90,5 +100,6 @@ fn from_trained(scene: TrainedScene) -> DrawableScene {
         config,
         dataset_path,
         metres_per_unit: info.metres_per_unit.filter(|m| m.is_finite() && *m > 0.0),
+        state: scene.state,
     }
 }

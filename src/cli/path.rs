@@ -116,6 +116,9 @@ pub fn up_of(cameras: &[Camera]) -> DVec3 {
 
 pub fn run(args: Args) -> Result<(), CliError> {
     let scene = opened::drawable(&args.scene)?;
+    if let Some(out) = &args.out {
+        output::check(out, &[".json"], &scene.reads(&args.scene))?;
+    }
     if let Some(flights) = args.survey {
         let counts: Vec<usize> = args.cameras.iter().map(|n| *n as usize).collect();
         return path_survey::run(&scene, flights, &counts, args.frames as usize, args.json);
@@ -187,7 +190,7 @@ fn to_target(
     navigator: &Navigator,
     from: &Pose,
 ) -> Result<(Flight, String), CliError> {
-    let map = semantics(&args.scene, &scene.cloud)?;
+    let map = semantics(&args.scene, scene.state.as_deref(), &scene.cloud)?;
     let answered = Asker::new(&map)?.ask(query, Kind::Auto)?;
     let id = answered.as_ref().and_then(|a| a.chosen(1).first().copied());
     let id = id.ok_or_else(|| CliError::failed(format!("nothing here fits '{query}'; see 'fmlgs query'")))?;

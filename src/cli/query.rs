@@ -86,7 +86,10 @@ impl From<KindArg> for Kind {
 
 pub fn run(args: Args) -> Result<(), CliError> {
     let scene = opened::drawable(&args.scene)?;
-    let map = semantics(&args.scene, &scene.cloud)?;
+    for out in args.mask.iter().chain(&args.heat) {
+        output::check(out, &[".png"], &scene.reads(&args.scene))?;
+    }
+    let map = semantics(&args.scene, scene.state.as_deref(), &scene.cloud)?;
     let camera = view::choose(args.camera.as_deref(), &scene)?.limited_to(args.max_side);
     let mut renderer = Renderer::new();
     let exact = ViewMap::render(&mut renderer, &scene.cloud, &map.of, &map.identities, &camera, &scene.settings)?;

@@ -6,6 +6,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::drawing::{camera, one};
 use super::{Case, Finding};
+use crate::io::SceneFolder;
 use crate::pipeline::train::checkpoint::{self, Header};
 use crate::pipeline::train::density;
 use crate::pipeline::train::trainer::Trainer;
@@ -127,6 +128,7 @@ fn resumed() -> Finding {
         let broken = |e: String| Finding::is(e, false);
         let (through, half) = (on(fresh(), STEPS)?, on(fresh(), STOP)?);
         let folder = tempfile::tempdir().map_err(|e| broken(e.to_string()))?;
+        let scene = SceneFolder::hold(folder.path(), "stability").map_err(|e| broken(e.to_string()))?;
         let path = folder.path().join(checkpoint::FILE);
         let header = Header {
             config: config.clone(),
@@ -142,7 +144,7 @@ fn resumed() -> Finding {
             damping: half.schedule.damping,
             history: Default::default(),
         };
-        checkpoint::save(&path, &half, &header).map_err(|e| broken(e.to_string()))?;
+        checkpoint::save(&scene, &half, &header).map_err(|e| broken(e.to_string()))?;
         let loaded = || -> Result<Trainer, Finding> {
             let saved = checkpoint::load(&path).map_err(|e| broken(e.to_string()))?;
             let saved = saved.ok_or_else(|| broken("the checkpoint is gone".into()))?;

@@ -294,15 +294,19 @@ impl AppState {
         let ended = self.end(job);
         match outcome {
             Outcome::Opened(scene) => self.opened(*scene, ended.is_some_and(|j| j.kind == JobKind::Demo)),
-            Outcome::Trained { evaluations, out, facts } => {
+            Outcome::Trained { evaluations, out, semantics, facts } => {
+                let carried = semantics.is_some();
                 if self.training_job == Some(job) {
                     self.history.evaluations = evaluations;
-                    self.set_facts(facts.with_semantics(self.semantics.as_deref()));
+                    self.set_facts(*facts);
+                    self.set_semantics(semantics);
+                    // Other settings are another training, in a folder of its own.
+                    self.scene = self.scene.take().map(|s| Arc::new(OpenedScene { out: out.clone(), ..(*s).clone() }));
                 }
                 let quality = self.history.evaluations.last().map(|e| format!(", held-out PSNR {:.2} dB", e.psnr));
                 self.say(Tone::Info, format!("Saved to {}", out.display()));
                 self.toast(Tone::Good, format!("Training finished{}", quality.unwrap_or_default()));
-                self.wants_objects = self.scene.as_ref().is_some_and(|s| s.masks.is_some());
+                self.wants_objects = !carried && self.scene.as_ref().is_some_and(|s| s.masks.is_some());
             }
             Outcome::Evaluated(mut e) => {
                 if let Some(last) = self.history.steps.last() {
