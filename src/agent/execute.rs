@@ -204,7 +204,9 @@ fn question(world: &dyn World, call: &ToolCall, policy: &Policy, id: Option<Iden
             Some(format!("Exporting {it} would replace {path}. Shall I? (yes or no)"))
         }
         (Permission::ConfirmOverwrite | Permission::Free | Permission::Never, _) => None,
-        (Permission::Confirm, ToolCall::Remove { .. }) => Some(format!("Remove {it} from the scene? (yes or no)")),
+        (Permission::Confirm, ToolCall::Remove { .. }) => {
+            Some(format!("I can only hide {it}: it stays in the scene's files. Shall I? (yes or no)"))
+        }
         (Permission::Confirm, ToolCall::Rename { name, .. }) => Some(format!("Rename {it} to '{name}'? (yes or no)")),
         (Permission::Confirm, ToolCall::AskUser { .. }) => None,
         (Permission::Confirm, other) => Some(format!("{}: shall I? (yes or no)", other.line(world.identities()))),
@@ -326,7 +328,7 @@ fn act(
         }
         ToolCall::Remove { .. } => {
             world.remove(id).map_err(failed)?;
-            format!("{} is removed from the scene; 'undo' brings it back.", capital(&it))
+            format!("{} is hidden; it stays in the scene's files. 'undo' brings it back.", capital(&it))
         }
         ToolCall::Rename { name, .. } => {
             world.rename(id, name).map_err(failed)?;

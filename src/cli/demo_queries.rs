@@ -116,9 +116,17 @@ pub fn run(
             blended: &CodeMap::default(),
             categories: categories(&segmenter.segment(photo, job.max_side_px, &mut Silent)?),
         };
-        // Names need no encoder, so asking for them does not fail.
-        let mut by_name = |text: &str| asker.ask(text, Kind::Auto).ok().flatten();
+        let mut failed = None;
+        let mut by_name = |text: &str| {
+            asker.ask(text, Kind::Auto).unwrap_or_else(|e| {
+                failed.get_or_insert(e);
+                None
+            })
+        };
         units.extend(masks::compare(&mut AskedScene { map: &map, ask: &mut by_name }, &labelled));
+        if let Some(error) = failed {
+            return Err(error);
+        }
         for (n, question) in QUESTIONS.iter().enumerate().filter(|_| k == 0) {
             let start = Instant::now();
             let Some(answered) = asker.ask(question, Kind::Auto)? else { continue };

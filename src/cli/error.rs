@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::process::ExitCode;
 
-use super::output::say;
+use super::output;
 
 /// Why a subcommand did not do what was asked.
 #[derive(Debug)]
@@ -26,17 +26,17 @@ impl CliError {
     pub fn report(&self) -> ExitCode {
         match self {
             Self::Usage(text) => {
-                say(&format!("error: {text}"));
-                say("");
-                say("For more information, try 'fmlgs --help'.");
+                output::note(&format!("error: {text}"));
+                output::note("");
+                output::note("For more information, try 'fmlgs --help'.");
                 ExitCode::from(2)
             }
             Self::Failed(error) => {
-                say(&format!("error: {}", chain(error.as_ref())));
+                output::note(&format!("error: {}", chain(error.as_ref())));
                 ExitCode::FAILURE
             }
             Self::Cancelled(text) => {
-                say(&format!("cancelled: {text}"));
+                output::note(&format!("cancelled: {text}"));
                 ExitCode::from(130)
             }
         }

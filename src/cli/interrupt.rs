@@ -6,7 +6,7 @@ use std::sync::{Arc, LazyLock};
 
 use signal_hook::{consts::TERM_SIGNALS, flag};
 
-use super::output::say;
+use super::output;
 
 static ASKED_TO_STOP: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 static TOLD: AtomicBool = AtomicBool::new(false);
@@ -20,14 +20,9 @@ pub fn listen() {
         let listening = flag::register_conditional_shutdown(signal, 130, Arc::clone(&ASKED_TO_STOP))
             .and_then(|_| flag::register(signal, Arc::clone(&ASKED_TO_STOP)));
         if let Err(error) = listening {
-            say(&format!("warning: signal {signal} will end the program at once: {error}"));
+            output::note(&format!("warning: signal {signal} will end the program at once: {error}"));
         }
     }
-}
-
-/// Set once the work should stop, for what looks at it by itself.
-pub fn flag() -> &'static AtomicBool {
-    &ASKED_TO_STOP
 }
 
 /// The signal of a lost terminal, unless the program was started to outlive it (`nohup`).
@@ -48,12 +43,17 @@ fn hang_up() -> Option<i32> {
     None
 }
 
+/// Set once the work should stop, for what looks at it by itself.
+pub fn flag() -> &'static AtomicBool {
+    &ASKED_TO_STOP
+}
+
 /// Whether the work should stop. Says so the first time that it should.
 pub fn asked_to_stop() -> bool {
     let asked = ASKED_TO_STOP.load(Ordering::SeqCst);
     if asked && !TOLD.swap(true, Ordering::SeqCst) {
-        say("");
-        say("Stopping at the next safe point (press Ctrl-C again to stop at once) ...");
+        output::note("");
+        output::note("Stopping at the next safe point (press Ctrl-C again to stop at once) ...");
     }
     asked
 }

@@ -20,6 +20,7 @@ mod info;
 mod interrupt;
 mod memory;
 mod models;
+mod number;
 mod opened;
 mod output;
 mod path;
@@ -131,7 +132,7 @@ pub fn main(open_window: OpenWindow) -> ExitCode {
                 let _ = error.print();
             } else {
                 // What it quotes may be a file's name.
-                output::say(&plain);
+                output::note(&plain);
             }
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
@@ -146,7 +147,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
     let quiet = cli.quiet;
     let wishes = cli.plan.wishes;
     if cli.trace {
-        trace::listen(|load| output::say(&load.line()));
+        trace::listen(|load| output::note(&load.line()));
     }
     let Some(command) = cli.command else {
         if cli.report.len() > 2 {

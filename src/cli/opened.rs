@@ -47,7 +47,7 @@ impl DrawableScene {
 /// Opens a trained scene or a splat.
 pub fn drawable(path: &Path) -> Result<DrawableScene, CliError> {
     match io::open(path)? {
-        Opened::Trained(scene) => Ok(from_trained(scene)),
+        Opened::Trained(scene) => from_trained(scene),
         Opened::Cloud(cloud) => Ok(DrawableScene {
             cloud,
             cameras: Vec::new(),
@@ -86,14 +86,13 @@ pub fn named_cameras(dataset: &Dataset, every: usize) -> Vec<NamedCamera> {
     dataset.photos.iter().enumerate().map(named).collect()
 }
 
-fn from_trained(scene: TrainedScene) -> DrawableScene {
+fn from_trained(scene: TrainedScene) -> Result<DrawableScene, CliError> {
     let dataset_path = scene.dataset_path();
     let info = scene.info;
-    // A later version's settings may not parse; the defaults then only affect sizes and filters.
-    let config: TrainConfig = serde_json::from_value(info.config).unwrap_or_default();
+    let config = TrainConfig::stored(&scene.folder, info.config)?;
     let settings = config.render_settings(info.background);
     let named = |c: io::trained::SceneCamera| NamedCamera { name: c.name, camera: c.camera, held_out: c.held_out };
-    DrawableScene {
+    Ok(DrawableScene {
         cloud: scene.cloud,
         cameras: info.cameras.into_iter().map(named).collect(),
         settings,
@@ -101,5 +100,5 @@ fn from_trained(scene: TrainedScene) -> DrawableScene {
         dataset_path,
         metres_per_unit: info.metres_per_unit.filter(|m| m.is_finite() && *m > 0.0),
         state: scene.state,
-    }
+    })
 }

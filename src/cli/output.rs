@@ -22,15 +22,19 @@ pub fn print(text: &str) -> Result<(), CliError> {
     }
 }
 
-/// Prints a message to standard error. Where that cannot be written (a closed pipe, a lost terminal), the
-/// line is lost: nobody's work ends for it.
-pub fn say(text: &str) {
-    let _ = writeln!(std::io::stderr().lock(), "{}", text::message(text));
+/// Tells on standard error what is not as it was meant, but no reason to stop.
+pub fn warn(text: String) {
+    note(&format!("warning: {text}"));
 }
 
 /// Prints `value` as indented JSON.
 pub fn print_json(value: &impl Serialize) -> Result<(), CliError> {
     print(&text::json(&serde_json::to_string_pretty(value)?))
+}
+
+/// Prints a message to standard error. One that nobody can read any more ends no work.
+pub fn note(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{}", text::message(text));
 }
 
 /// Rows of cells as aligned columns: the first to the left, the others to the right.

@@ -6,8 +6,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{HumanCount, HumanDuration, ProgressBar, ProgressStyle};
 
-use super::interrupt;
-use super::output::say;
+use super::{interrupt, output};
 use crate::pipeline::observer::{Evaluation, Level, Observer, Progress, Signal, StepMetrics};
 use crate::scene::text;
 
@@ -33,8 +32,8 @@ impl Console {
     /// Prints a line without disturbing the bar.
     fn line(&self, text: &str) {
         match &self.bar {
-            Some((_, bar)) => bar.suspend(|| say(text)),
-            None => say(text),
+            Some((_, bar)) => bar.suspend(|| output::note(text)),
+            None => output::note(text),
         }
     }
 
@@ -80,7 +79,8 @@ impl Observer for Console {
         if self.last_line.elapsed() >= LINE_INTERVAL {
             self.last_line = Instant::now();
             let (done, total) = (HumanCount(progress.done), HumanCount(progress.total));
-            say(&format!("{} {done}/{total} {} {}", progress.stage, rate_and_times(&progress), self.metrics));
+            let times = rate_and_times(&progress);
+            output::note(&format!("{} {done}/{total} {times} {}", progress.stage, self.metrics));
         }
     }
 

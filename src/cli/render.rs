@@ -11,7 +11,7 @@ use super::asking::{Asker, semantics};
 use super::opened::DrawableScene;
 use super::plan::PlanArgs;
 use super::progress::Console;
-use super::{CliError, opened, output, view};
+use super::{CliError, number, opened, output, view};
 use crate::io;
 use crate::io::animation::{Encoder, Settings};
 use crate::navigate::film::MOST_PICTURES;
@@ -20,7 +20,7 @@ use crate::pipeline::film::{self, FilmError, Marked};
 use crate::pipeline::semantics::grammar::Kind;
 use crate::render::cpu::normals;
 use crate::render::{Backend, BackendChoice, Frame, RenderSettings};
-use crate::scene::{Camera, ScenePlan};
+use crate::scene::{Camera, CameraPath, ScenePlan};
 
 /// Draw a scene from a given camera into a file
 ///
@@ -61,7 +61,7 @@ pub struct Args {
     #[arg(long, conflicts_with_all = ["camera", "what"])]
     path: Option<PathBuf>,
     /// Pictures per second of the film [default: the path's own]
-    #[arg(long, requires = "path")]
+    #[arg(long, requires = "path", value_parser = number::within(0.01..=CameraPath::MAX_FPS))]
     fps: Option<f64>,
     /// Quality of the film, 0 to 100
     #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u8).range(0..=100))]
@@ -151,7 +151,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let job = args.check()?;
     let plan = args.plan.of_scene(&job.scene);
     let settings = RenderSettings { depth: args.what.needs_depth(), sh_degree: plan.sh_degree, ..job.scene.settings };
-    let mut backend = Backend::choose(choice(args.backend, &settings, &plan))?;
+    let mut backend = Backend::choose(choice(args.backend, &settings, &plan), output::warn)?;
     // Only the CPU draws surfels as such.
     let flat = settings.surfels && !matches!(backend, Backend::Cpu(_));
     let cloud = Arc::new(job.scene.cloud);
@@ -229,7 +229,7 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
         }
     }
     let marked = map.as_ref().map(|map| Marked { map, ids: &ids, color: [255, 64, 160] });
-    let mut backend = Backend::choose(choice(args.backend, &scene.settings, &plan))?;
+    let mut backend = Backend::choose(choice(args.backend, &scene.settings, &plan), output::warn)?;
     let started = Instant::now();
     output::make_parent(&args.out)?;
     let mut console = Console::new(quiet);

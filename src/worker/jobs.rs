@@ -173,8 +173,7 @@ impl PipelineJobs {
         cloud: &GaussianCloud,
         photos: &[Photo],
         (settings, side_px): (&RenderSettings, u32),
-        masks: Option<&Path>,
-        with: &Finding,
+        (masks, with): (Option<&Path>, &Finding),
         out: &Path,
         observer: &mut dyn Observer,
     ) -> Result<Outcome, Stop> {
@@ -242,8 +241,8 @@ impl PipelineJobs {
         match before {
             Some(scene) => {
                 let semantics = self.semantics_of(&scene, observer);
-                let TrainedScene { info, cloud, .. } = scene;
-                let render = config_of(info.config).render_settings(background);
+                let TrainedScene { info, cloud, folder, .. } = scene;
+                let render = config_of(&folder, info.config, observer).render_settings(background);
                 let (cloud, sh_stored) = compact(cloud);
                 OpenedScene {
                     name,
@@ -268,10 +267,13 @@ impl PipelineJobs {
     }
 }
 
-/// The settings of a training; those of a later version of the program may not parse, and only the
-/// filter is needed here.
-fn config_of(config: serde_json::Value) -> TrainConfig {
-    serde_json::from_value(config).unwrap_or_default()
+/// The settings of a training; where they cannot be read this is told, and the scene is drawn with the
+/// defaults.
+fn config_of(folder: &Path, config: serde_json::Value, observer: &mut dyn Observer) -> TrainConfig {
+    TrainConfig::stored(folder, config).unwrap_or_else(|e| {
+        observer.note(Level::Warning, format!("It may not look as it was trained: {e}"));
+        TrainConfig::default()
+    })
 }
 
 /// A trained scene, with its photos if they are still where they were.
@@ -296,7 +298,7 @@ fn trained_scene(scene: TrainedScene, observer: &mut dyn Observer) -> OpenedScen
         }
     };
     let TrainedScene { folder, info, cloud, .. } = scene;
-    let render = config_of(info.config).render_settings(info.background);
+    let render = config_of(&folder, info.config, observer).render_settings(info.background);
     let mut opened = OpenedScene {
         name: info.name,
         dataset,
@@ -335,7 +337,7 @@ impl Jobs for PipelineJobs {
             Command::FindObjects { dataset, cloud, holdout_every, settings, side_px, masks, with, out } => {
                 let (training, _) = dataset.split(holdout_every);
                 let photos: Vec<Photo> = training.iter().map(|&i| dataset.photos[i].clone()).collect();
-                self.find(&cloud, &photos, (&settings, side_px), masks.as_deref(), &with, &out, observer)
+                self.find(&cloud, &photos, (&settings, side_px), (masks.as_deref(), &with), &out, observer)
             }
             Command::EditObjects { cloud, map, settings, request, out } => {
                 let new = edit::run(&cloud, &map, &settings, &request)?;

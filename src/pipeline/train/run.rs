@@ -124,7 +124,8 @@ pub fn run(
     };
     views.shrink_to_fit();
     let mut job = Job::start(dataset, config, scene, &held, views, tests, saved);
-    job.context = if config.needs_cpu() { None } else { config.backend.gpu()? };
+    let told = |why| observer.note(Level::Warning, why);
+    job.context = if config.needs_cpu() { None } else { config.backend.gpu(told)? };
     match &job.context {
         Some(context) => {
             observer.note(Level::Info, format!("Training on {}", context.describe()));

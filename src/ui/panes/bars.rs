@@ -136,7 +136,11 @@ pub fn status(
                 actions.push(Action::TogglePane(Pane::Log));
             }
             if let Some(p) = picture {
-                ui.label(RichText::new(format!("Drawn by the {}", p.drawn_by)).small().color(theme::WEAK));
+                let text = RichText::new(format!("Drawn by the {}", p.drawn_by)).small();
+                match &p.instead_of_gpu {
+                    Some(why) => ui.label(text.color(theme::WARNING)).on_hover_text(why),
+                    None => ui.label(text.color(theme::WEAK)),
+                };
             }
         });
     });
