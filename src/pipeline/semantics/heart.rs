@@ -24,9 +24,7 @@ use crate::pipeline::synth::{self, Rig, SynthOptions};
 use crate::pipeline::train::{self, TrainConfig};
 use crate::render::cpu::Renderer;
 use crate::render::{BackendChoice, RenderSettings};
-use crate::scene::{
-    Camera, GaussianCloud, Identities, IdentityId, LanguageFeatures, Level, Photo, SemanticMap,
-};
+use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, LanguageFeatures, Level, Photo, SemanticMap};
 
 /// What is measured on.
 const SCENES: [&str; 2] = ["desk", "kitchen"];
@@ -300,8 +298,8 @@ fn figures(scene: &Scene, map: &SemanticMap, trained: &SemanticMap, encoder: &mu
         known.insert(p.into(), v.clone());
         Ok(v)
     };
-    let recall = Components::ROWS
-        .map(|row| part_recall::row(row, map, features, &views, &mut encode).expect("encodes").recall);
+    let recall =
+        Components::ROWS.map(|row| part_recall::row(row, map, features, &views, &mut encode).expect("encodes").recall);
     let mut book = Phrasebook::default();
     let (mut objects, mut present) = (Vec::new(), Vec::new());
     for view in &views {
