@@ -99,7 +99,10 @@ pub fn check_pictures(path: &Path, side_px: usize, mean: [f32; 3], std: [f32; 3]
 pub fn check_length(path: &Path, name: &str, length: usize, most: usize) -> Result<(), ModelError> {
     match (1..=most).contains(&length) {
         true => Ok(()),
-        false => Err(ModelError::Metadata { path: path.into(), problem: format!("{name} is {length}; 1 to {most} is possible") }),
+        false => Err(ModelError::Metadata {
+            path: path.into(),
+            problem: format!("{name} is {length}; 1 to {most} is possible"),
+        }),
     }
 }
 
