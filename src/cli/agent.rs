@@ -2,15 +2,14 @@
 
 use std::io::{BufRead, Read};
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::json;
 
 use super::asking::semantics;
 use super::{CliError, interrupt, number, opened, output, view};
-use crate::agent::llm::Llm;
 use crate::agent::llm::settings::LlmSettings;
+use crate::agent::llm::{Llm, SENT};
 use crate::agent::rules::Rules;
 use crate::agent::scene::{Deed, Parts, SceneWorld};
 use crate::agent::{AgentEvent, Planner, Policy, Session};
@@ -18,17 +17,19 @@ use crate::io;
 use crate::navigate::Pose;
 use crate::scene::Camera;
 
+const EXAMPLES: &str = "Examples:\n  \
+    fmlgs agent scene/ \"show me the handle of the kettle from the other side\" \"step back half a metre\"\n  \
+    fmlgs agent scene/ \"what is on the table?\" --json\n  \
+    fmlgs agent scene/ \"go to the lamp\" --view lamp.png --transcript talk.md\n  \
+    fmlgs agent scene/ --planner llm --url http://127.0.0.1:11434/v1 --model qwen3 \"find something to cut with\"";
+
 /// Talk to a scene: it shows, goes there, tells, hides, measures
 ///
 /// Each TEXT is one request of the same talk; without any, requests are read from standard input, one
 /// a line. The planner 'rules' is built in; 'llm' asks a chat model behind an OpenAI-compatible
-/// address, and sends it the names of the scene's objects. Exit code 1 if the last request was refused.
+/// address. Exit code 1 if the last request was refused.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  \
-    fmlgs agent scene/ \"show me the handle of the kettle from the other side\" \"step back half a metre\"\n  \
-    fmlgs agent scene/ \"what is on the table?\" --json\n  \
-    fmlgs agent scene/ \"go to the lamp\" --view lamp.png --transcript talk.md\n  \
-    fmlgs agent scene/ --planner llm --url http://127.0.0.1:11434/v1 --model qwen3 \"find something to cut with\"")]
+#[command(after_help = format!("{EXAMPLES}\n\n{SENT}"))]
 pub struct Args {
     /// Trained scene with objects and parts ('fmlgs preprocess')
     scene: PathBuf,
@@ -58,7 +59,7 @@ pub struct Args {
     /// Write the picture at the end
     #[arg(long)]
     view: Option<PathBuf>,
-    /// Write everything that was said and done: .json, else Markdown
+    /// Write everything that was said and done: .json, or .md for people
     #[arg(long)]
     transcript: Option<PathBuf>,
     /// Print one JSON document
@@ -100,7 +101,13 @@ impl Args {
 pub fn run(args: Args) -> Result<(), CliError> {
     let (planner, policy) = (args.planner()?, args.policy()?);
     let scene = opened::drawable(&args.scene)?;
-    let map = semantics(&args.scene, &scene.cloud)?;
+    if let Some(view) = &args.view {
+        output::check(view, &[".png"], &scene.reads(&args.scene))?;
+    }
+    if let Some(transcript) = &args.transcript {
+        output::check(transcript, &[".json", ".md"], &scene.reads(&args.scene))?;
+    }
+    let map = semantics(&args.scene, scene.state.as_deref(), &scene.cloud)?;
     let camera = view::choose(args.from.as_deref(), &scene)?;
     let cameras: Vec<Camera> = scene.cameras.iter().map(|c| c.camera.clone()).collect();
     let parts = Parts {
@@ -209,21 +216,13 @@ impl Talk {
         text: &str,
         deeds: &Mutex<Vec<String>>,
     ) -> Result<(), CliError> {
-        let cancel = AtomicBool::new(false);
         let mut calls = Vec::new();
-        let reply = session.say(
-            world,
-            text,
-            &mut |event| {
-                if interrupt::asked_to_stop() {
-                    cancel.store(true, Ordering::Relaxed);
-                }
-                if let AgentEvent::Call { line, .. } = event {
-                    calls.push(line);
-                }
-            },
-            &cancel,
-        );
+        let mut on = |event| {
+            if let AgentEvent::Call { line, .. } = event {
+                calls.push(line);
+            }
+        };
+        let reply = session.say(world, text, &mut on, interrupt::flag());
         if interrupt::asked_to_stop() {
             return Err(CliError::Cancelled("the talk ends here".into()));
         }

@@ -255,7 +255,7 @@ fn at_opening(jobs: &PipelineJobs, scene: &OpenedScene, plan: &ScenePlan) -> Res
 fn frame(scene: &OpenedScene, plan: &ScenePlan, repeats: usize) -> Result<f64, CliError> {
     let Some(cloud) = scene.cloud.clone() else { return Ok(0.0) };
     let choice = if plan.on_cpu { BackendChoice::Cpu } else { BackendChoice::Auto };
-    let mut backend = Backend::choose(choice)?;
+    let mut backend = Backend::choose(choice, output::warn)?;
     let settings = RenderSettings { depth: plan.depth == When::Always, ..settings(scene, plan) };
     let mut times = Vec::new();
     for camera in bench::views_of(&cloud, SIZE[0], SIZE[1]) {

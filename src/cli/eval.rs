@@ -95,6 +95,8 @@ pub struct Job {
     pub borders: Option<Borders>,
     /// Folder for pictures.
     pub pictures: Option<PathBuf>,
+    /// Id of the save that the scene's files are of.
+    pub state: Option<String>,
 }
 
 impl Args {
@@ -104,6 +106,9 @@ impl Args {
             let path = self.scene.display();
             CliError::failed(format!("{path}: its photos are not known or no longer there; give them with --photos"))
         })?;
+        if let Some(folder) = &self.options.pictures {
+            output::check_folder(folder, &[&photos])?;
+        }
         job(scene, &photos, self.options)
     }
 }
@@ -133,7 +138,8 @@ pub fn job(scene: DrawableScene, photos: &Path, options: Options) -> Result<Job,
     let max_side_px = max_side.unwrap_or(scene.config.max_side_px);
     let (training, _) = dataset.split(holdout_every.unwrap_or(scene.config.holdout_every));
     let borders = if keep_borders { None } else { Some(Borders::of(&dataset, &training, max_side_px)?) };
-    Ok(Job { cloud: scene.cloud, settings: scene.settings, dataset, views, max_side_px, borders, pictures })
+    let DrawableScene { cloud, settings, state, .. } = scene;
+    Ok(Job { cloud, settings, dataset, views, max_side_px, borders, pictures, state })
 }
 
 pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {

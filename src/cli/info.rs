@@ -51,7 +51,7 @@ pub fn run(args: Args) -> Result<(), CliError> {
         Opened::Trained(t) => {
             let cameras: Vec<Camera> = t.info.cameras.iter().map(|c| c.camera.clone()).collect();
             let planned = machine.with_photos(&cameras).with_cloud(&t.cloud, t.cloud.sh_degree, &cameras);
-            let map = io::semantic_map::load(&t.folder, &t.cloud);
+            let map = io::semantic_map::load(&t.folder, t.state.as_deref(), &t.cloud);
             let mut facts = of_trained(&t);
             let of_others = matches!(map, Ok(None)) && t.folder.join(io::semantic_map::FILE).exists();
             facts.warnings.extend(match &map {

@@ -86,7 +86,10 @@ impl From<KindArg> for Kind {
 
 pub fn run(args: Args) -> Result<(), CliError> {
     let scene = opened::drawable(&args.scene)?;
-    let map = semantics(&args.scene, &scene.cloud)?;
+    for out in args.mask.iter().chain(&args.heat) {
+        output::check(out, &[".png"], &scene.reads(&args.scene))?;
+    }
+    let map = semantics(&args.scene, scene.state.as_deref(), &scene.cloud)?;
     let camera = view::choose(args.camera.as_deref(), &scene)?.limited_to(args.max_side);
     view::check_room(camera.width_px, camera.height_px)?;
     let mut renderer = Renderer::new();
@@ -169,6 +172,7 @@ fn tell(
             "basis": basis,
             "hits": hits.iter().map(hit).collect::<Vec<_>>(),
             "pixels": mask.area(),
+            "in_view": !mask.is_empty(),
             "unknown_words": unknown,
             "query_ms": query_ms,
             "stages_ms": answered.stages,
@@ -190,11 +194,11 @@ fn tell(
             rows.extend(hits.iter().map(|h| vec![full_name(h), format!("{:.3}", h.score), format!("{:.3}", h.margin)]));
             let ambiguous = matches!(answer, Answer::Ambiguous(_));
             let note = if ambiguous { " (ambiguous: the first two fit alike)" } else { "" };
-            output::print(&format!(
-                "{}\n{} px in this view, answered by {basis} in {query_ms:.2} ms{note}",
-                output::table(&rows),
-                mask.area()
-            ))
+            let seen = match mask.area() {
+                0 => "not in this view (--camera looks from another photo)".to_owned(),
+                n => format!("{n} px in this view"),
+            };
+            output::print(&format!("{}\n{seen}, answered by {basis} in {query_ms:.2} ms{note}", output::table(&rows)))
         }
     }
 }

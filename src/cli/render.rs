@@ -132,6 +132,7 @@ impl Args {
         if let Some(photos) = &self.photos {
             scene.cameras = opened::named_cameras(&opened::dataset(photos)?, scene.config.holdout_every);
         }
+        output::check(&self.out, &[], &scene.reads(&self.scene))?;
         let mut camera = view::choose(self.camera.as_deref(), &scene)?;
         if let Some([width, height]) = self.size {
             camera = view::with_size(&camera, width, height);
@@ -151,7 +152,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let job = args.check()?;
     let plan = args.plan.of_scene(&job.scene);
     let settings = RenderSettings { depth: args.what.needs_depth(), sh_degree: plan.sh_degree, ..job.scene.settings };
-    let mut backend = Backend::choose(choice(args.backend, &settings, &plan))?;
+    let mut backend = Backend::choose(choice(args.backend, &settings, &plan), output::warn)?;
     // Only the CPU draws surfels as such.
     let flat = settings.surfels && !matches!(backend, Backend::Cpu(_));
     let cloud = Arc::new(job.scene.cloud);
@@ -197,6 +198,12 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
     let film = Film::new(&keys, Speed::Constant);
     let film = film.ok_or_else(|| CliError::failed(format!("{}: there are no keys in it", path.display())))?;
     let mut scene = opened::drawable(&args.scene)?;
+    let reads: Vec<&Path> = scene.reads(&args.scene).into_iter().chain([path]).collect();
+    if args.out.is_dir() {
+        output::check_folder(&args.out, &reads)?
+    } else {
+        output::check(&args.out, &[], &reads)?
+    }
     let plan = args.plan.of_scene(&scene);
     scene.settings.sh_degree = plan.sh_degree;
     let fps = args.fps.unwrap_or(keys.fps);
@@ -212,7 +219,7 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
     }
     let cameras: Vec<Camera> = film.pictures(fps, MOST_PICTURES).iter().map(|p| p.camera(width, height)).collect();
     let map = match &args.mark {
-        Some(_) => Some(semantics(&args.scene, &scene.cloud)?),
+        Some(_) => Some(semantics(&args.scene, scene.state.as_deref(), &scene.cloud)?),
         None => None,
     };
     let mut ids = Vec::new();
@@ -224,7 +231,7 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
         }
     }
     let marked = map.as_ref().map(|map| Marked { map, ids: &ids, color: [255, 64, 160] });
-    let mut backend = Backend::choose(choice(args.backend, &scene.settings, &plan))?;
+    let mut backend = Backend::choose(choice(args.backend, &scene.settings, &plan), output::warn)?;
     let started = Instant::now();
     output::make_parent(&args.out)?;
     let mut console = Console::new(quiet);

@@ -45,7 +45,8 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<(), CliError> {
     let scene = opened::drawable(&args.scene)?;
-    let map = semantics(&args.scene, &scene.cloud)?;
+    output::check(&args.out, &[".ply"], &scene.reads(&args.scene))?;
+    let map = semantics(&args.scene, scene.state.as_deref(), &scene.cloud)?;
     let answered = Asker::new(&map)?.ask(&args.text, args.kind.into())?;
     let targets = answered.map(|a| a.chosen(args.top)).unwrap_or_default();
     if targets.is_empty() {

@@ -149,7 +149,7 @@ impl Args {
                         self.data.display()
                     )));
                 };
-                let trained_with = serde_json::from_value(scene.info.config).unwrap_or_default();
+                let trained_with = TrainConfig::stored(&scene.folder, scene.info.config)?;
                 let out = self.out.clone().unwrap_or(scene.folder);
                 let dataset = opened::dataset(&photos)?;
                 Ok(Job { config: planned(self.settings.over(trained_with), &dataset), dataset, out })

@@ -123,6 +123,7 @@ mod tests {
             config: TrainConfig::default(),
             dataset_path: None,
             metres_per_unit: None,
+            state: None,
         }
     }
 

@@ -5,6 +5,7 @@ use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
 use super::{IoError, memory};
+use crate::scene::text;
 
 /// Largest text file (JSON, COLMAP text) in bytes.
 pub const MAX_TEXT_BYTES: u64 = 512 << 20;
@@ -136,10 +137,23 @@ pub fn inside(root: &Path, entry: &str, source: &Path) -> Result<Option<PathBuf>
     Ok(Some(path))
 }
 
+/// Refuses the name of a photo that no file can have. `source` lists it.
+pub fn photo_name(name: &str, source: &Path) -> Result<(), IoError> {
+    let most = text::LONGEST_PHOTO_NAME;
+    match name.chars().count() {
+        length if length > most => Err(IoError::Syntax {
+            path: source.into(),
+            place: format!("photo '{}'", text::shortened(name, 40)),
+            reason: format!("its name has {length} letters, at most {most} are read; rename the photo"),
+        }),
+        _ => Ok(()),
+    }
+}
+
 /// The name of a folder for people, also where its path ends in `.` or `..`.
 pub fn folder_name(folder: &Path) -> String {
     let real = fs::canonicalize(folder).unwrap_or_else(|_| folder.into());
-    real.file_name().map_or_else(|| real.display().to_string(), |n| n.to_string_lossy().into_owned())
+    text::name(&real.file_name().unwrap_or(real.as_os_str()).to_string_lossy())
 }
 
 #[cfg(test)]

@@ -22,6 +22,8 @@ use std::path::{Path, PathBuf};
 use glam::{DMat4, DQuat, DVec3};
 use gltf::json::{self, Root};
 
+use crate::scene::text;
+
 pub use model::{AlphaMode, Material, Mesh, MeshNode, MeshScene, Primitive, TextureImage, TextureUse, Wrap};
 
 /// Largest file that is read, in bytes.
@@ -220,7 +222,7 @@ impl File<'_> {
             if let Some(m) = mesh {
                 self.item(&root.meshes, m, "meshes", &place)?;
             }
-            let name = node.name.as_deref().map(str::trim).filter(|n| !n.is_empty()).map(str::to_owned);
+            let name = node.name.as_deref().map(str::trim).filter(|n| !n.is_empty()).map(text::name);
             nodes.push(MeshNode { name, parent, children: Vec::new(), mesh, world_from_node: world });
             stack.extend(node.children.iter().flatten().rev().map(|c| (c.value(), Some(own))));
         }

@@ -70,6 +70,7 @@ pub(super) fn photos(
     source: &Path,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Photo>, IoError> {
+    listed.iter().try_for_each(|l| files::photo_name(&l.name, source))?;
     let mut names = HashSet::new();
     if let Some(twice) = listed.iter().find(|l| !names.insert(l.name.as_str())) {
         return Err(IoError::Duplicate { path: source.into(), photo: twice.name.clone() });

@@ -112,7 +112,7 @@ fn wheel_folders(environment: &Path) -> Vec<PathBuf> {
 }
 
 /// The library in a folder: by its plain name, or with a version as in wheels.
-fn library_in(folder: &Path) -> Option<PathBuf> {
+pub(super) fn library_in(folder: &Path) -> Option<PathBuf> {
     let plain = format!("{}onnxruntime{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
     let exact = folder.join(&plain);
     if exact.is_file() {

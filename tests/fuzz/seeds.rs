@@ -69,7 +69,7 @@ fn splat(sh_degree: u8, origin: DVec3) -> Vec<u8> {
         extras: vec![ExtraProperty { name: "label".into(), values: vec![3.0; 2] }],
     };
     let mut out = Vec::new();
-    splat_ply::encode(&mut out, &cloud).expect("encode");
+    splat_ply::encode(&mut out, &cloud, None).expect("encode");
     out
 }
 

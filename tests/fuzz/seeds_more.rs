@@ -20,7 +20,7 @@ pub fn all() -> Vec<Seed> {
     let map_file = saved_map();
     let text = map_header(&map_file);
     let mut cloud = Vec::new();
-    splat_ply::encode(&mut cloud, &mapped_cloud()).expect("encode");
+    splat_ply::encode(&mut cloud, &mapped_cloud(), None).expect("encode");
     let camera = Camera::look_at(DVec3::new(0.0, -3.0, 1.0), DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid");
     let webp = encode(&RgbaImage::from_fn(2, 2, |x, y| Rgba([x as u8, y as u8, 3, 255])), ImageFormat::WebP);
     let mut seeds = vec![
@@ -81,10 +81,8 @@ pub fn map() -> SemanticMap {
     map
 }
 
-fn saved_map() -> Vec<u8> {
-    let folder = super::targets::folder();
-    semantic_map::save(folder.path(), &map(), &mapped_cloud()).expect("save");
-    std::fs::read(folder.path().join(semantic_map::FILE)).expect("read")
+pub fn saved_map() -> Vec<u8> {
+    semantic_map::encode(&map(), None, Path::new(semantic_map::FILE)).expect("encode")
 }
 
 /// The header that a map's file carries as text.

@@ -14,7 +14,6 @@ use fmlgs::pipeline::semantics::follow;
 use fmlgs::pipeline::semantics::grammar::Phrase;
 use fmlgs::pipeline::train::checkpoint;
 use fmlgs::report::{self, Report};
-use fmlgs::scene::GaussianCloud;
 
 use super::seeds_more as seeds;
 use super::targets::{Door, Target, picture, sound, text, valid};
@@ -67,7 +66,7 @@ pub fn all() -> Vec<Target> {
             },
         ),
         Target::in_folder("scene_cloud", Door::Starts(b"ply"), io::trained::CLOUD_FILE, whole_scene, |f| {
-            io::trained::load(f).and_then(|t| io::semantic_map::load(f, &t.cloud))
+            io::trained::load(f).and_then(|t| io::semantic_map::load(f, t.state.as_deref(), &t.cloud))
         }),
         Target::new("gltf_mesh", Door::StartsOrJson(b"glTF"), |b| io::gltf_mesh::read_slice(b, "fuzz")),
         Target::in_folder("gltf_mesh_folder", Door::Json, "a.gltf", gltf, |f| io::gltf_mesh::read(&f.join("a.gltf"))),
@@ -127,13 +126,12 @@ fn sog(folder: &Path) {
 }
 
 fn map(folder: &Path) -> Result<Option<fmlgs::scene::SemanticMap>, IoError> {
-    io::semantic_map::load(folder, &seeds::mapped_cloud())
+    io::semantic_map::load(folder, None, &seeds::mapped_cloud())
 }
 
 fn whole_scene(folder: &Path) {
     fs::write(folder.join(io::trained::SCENE_FILE), super::seeds::scene()).expect("write");
-    let cloud: GaussianCloud = seeds::mapped_cloud();
-    io::semantic_map::save(folder, &seeds::map(), &cloud).expect("save");
+    fs::write(folder.join(io::semantic_map::FILE), seeds::saved_map()).expect("write");
 }
 
 fn gltf(folder: &Path) {

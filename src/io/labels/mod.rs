@@ -28,7 +28,7 @@ use std::path::{Path, PathBuf};
 
 use super::resample::{Pixels, resample};
 use super::{IoError, files, listing, memory};
-use crate::scene::{Camera, Level, Mask, Photo};
+use crate::scene::{Camera, Level, Mask, Photo, text};
 
 /// How many times longer than the photo's the sides of a mask may be.
 const MOST_LARGER: f64 = 8.0;
@@ -142,7 +142,7 @@ impl Labels {
             let parent = region.parent.and_then(|p| place.get(p).copied().flatten());
             place.push((!mask.is_empty()).then_some(kept.len()));
             if !mask.is_empty() {
-                kept.push(Region { mask, parent, ..region });
+                kept.push(Region { name: text::name(&region.name), mask, parent, ..region });
             }
         }
         Ok(kept)

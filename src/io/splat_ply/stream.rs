@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
+use super::STATE;
 use super::read::Reading;
 use crate::io::ply::{Encoding, Ply, Table};
 use crate::io::{IoError, files, memory};
@@ -13,6 +14,13 @@ use crate::scene::GaussianCloud;
 const HEADER_BYTES: u64 = 64 << 10;
 /// Bytes of rows that are in memory at once.
 const BLOCK_BYTES: usize = 512 << 10;
+
+/// The id of the scene's state that a `.ply` belongs to, if it says.
+pub fn state(path: &Path) -> Result<Option<String>, IoError> {
+    let start = files::read_start(path, HEADER_BYTES)?;
+    let ply = Ply::parse(&start, path).ok();
+    Ok(ply.and_then(|ply| ply.comments.iter().find_map(|c| c.strip_prefix(STATE)).map(str::to_owned)))
+}
 
 /// The Gaussians of a little-endian `.ply` whose first element they are; `None` if it is another
 /// sort of file, which has to be read as a whole.

@@ -9,6 +9,7 @@
 
 pub mod answer;
 pub mod asker;
+pub mod carry;
 pub mod code_map;
 pub mod codes;
 pub mod edit;
@@ -19,6 +20,8 @@ pub mod filters;
 pub mod find;
 pub mod follow;
 pub mod grammar;
+#[cfg(test)]
+mod heart;
 mod link;
 pub mod localise;
 pub mod matching;

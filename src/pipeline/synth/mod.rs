@@ -45,6 +45,7 @@ pub use demo::demo_glb;
 pub use levels::Identity;
 pub use options::{Levels, Rig, SynthOptions};
 
+use crate::io::IoError;
 use crate::io::gltf_mesh::{self, GltfError, MeshScene};
 use crate::io::memory;
 use crate::pipeline::observer::{self, Observer, Progress, Signal};
@@ -94,6 +95,9 @@ pub enum SynthError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// The folder is not for this.
+    #[error(transparent)]
+    Folder(#[from] IoError),
     /// The observer asked to stop.
     #[error("cancelled")]
     Cancelled,
