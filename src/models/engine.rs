@@ -16,7 +16,7 @@ use ort::session::Session;
 use ort::session::builder::GraphOptimizationLevel;
 
 use super::ModelError;
-use super::network::Network;
+use super::network::{Network, guarded};
 use super::room;
 use crate::scene::trace::{self, Sort};
 
@@ -217,12 +217,12 @@ impl Engine {
             commit(&mut builder)
         };
         // A device that refuses a network is no reason to do without it.
-        let session = match self.device {
+        let session = guarded(name, || match self.device {
             Some(device) => load(Some(device)).or_else(|_| load(None)),
             None => load(None),
-        };
+        });
         let engine = if self.name.starts_with("tract") { "built-in" } else { "ONNX Runtime" };
-        session.map_err(|e| ModelError::Load { model: name.into(), engine, problem: e.to_string() })
+        session.map_err(|problem| ModelError::Load { model: name.into(), engine, problem })
     }
 }
 

@@ -38,7 +38,7 @@ pub enum CameraError {
     Focal(f64, f64),
     /// A focal length that no lens has.
     #[error(
-        "focal length {focal_px} px along a side of {side_px} px is no lens's; between {} and {:e} sides are believed",
+        "focal length {focal_px:e} px along a side of {side_px} px is no lens's; between {} and {:e} sides are believed",
         Camera::FOCAL_SIDES.start(),
         Camera::FOCAL_SIDES.end()
     )]
@@ -49,10 +49,10 @@ pub enum CameraError {
         side_px: u32,
     },
     /// A principal point far outside of the picture.
-    #[error("principal point ({0}, {1}) px is over {max:e} picture sides away from the picture", max = Camera::PRINCIPAL_SIDES)]
+    #[error("principal point ({0:e}, {1:e}) px is over {max:e} picture sides away from the picture", max = Camera::PRINCIPAL_SIDES)]
     Off(f64, f64),
     /// A camera centre so far out that distances lose their meaning.
-    #[error("the camera centre ({0}, {1}, {2}) is farther than {max:e} units from the origin", max = Camera::FARTHEST)]
+    #[error("the camera centre ({0:e}, {1:e}, {2:e}) is farther than {max:e} units from the origin", max = Camera::FARTHEST)]
     Far(f64, f64, f64),
     /// A principal point that is not finite.
     #[error("principal point ({0}, {1}) px is not finite")]
