@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use serde_json::json;
 
 use super::asking::semantics;
-use super::{CliError, interrupt, opened, output, view};
+use super::{CliError, interrupt, number, opened, output, view};
 use crate::agent::llm::settings::LlmSettings;
 use crate::agent::llm::{Llm, SENT};
 use crate::agent::rules::Rules;
@@ -54,7 +54,7 @@ pub struct Args {
     #[arg(long)]
     policy: Option<PathBuf>,
     /// Length of a scene unit in metres [default: the scene's own, if that is known]
-    #[arg(long)]
+    #[arg(long, value_parser = number::within(1e-9..=1e9))]
     metres: Option<f64>,
     /// Write the picture at the end
     #[arg(long)]
@@ -100,9 +100,6 @@ impl Args {
 
 pub fn run(args: Args) -> Result<(), CliError> {
     let (planner, policy) = (args.planner()?, args.policy()?);
-    if args.metres.is_some_and(|m| !(m.is_finite() && m > 0.0)) {
-        return Err(CliError::Usage("--metres has to be over 0".into()));
-    }
     let scene = opened::drawable(&args.scene)?;
     if let Some(view) = &args.view {
         output::check(view, &[".png"], &scene.reads(&args.scene))?;

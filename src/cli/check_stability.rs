@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use super::{CliError, output};
+use super::{CliError, number, output};
 use crate::stability::fuzz::{Found, Limit, fuzz};
 use crate::stability::{Checked, Verdict, catalogue};
 
@@ -27,7 +27,7 @@ pub struct Args {
     #[arg(long)]
     only: Option<String>,
     /// Try random inputs for so many seconds; 0 = one of each kind
-    #[arg(long, value_name = "SECS")]
+    #[arg(long, value_name = "SECS", value_parser = number::within(0.0..=1e7))]
     fuzz: Option<f64>,
     /// First seed of the random inputs; each next one is one higher
     #[arg(long, requires = "fuzz", default_value_t = 0)]
@@ -72,9 +72,6 @@ fn share(not_compared: u64, all: u64) -> String {
 
 /// Tries random inputs and tells what was found.
 fn search(args: &Args, secs: f64) -> Result<(), CliError> {
-    if !(secs >= 0.0 && secs.is_finite()) {
-        return Err(CliError::Usage("--fuzz takes a number of seconds, 0 or more".into()));
-    }
     let rounds = if secs > 0.0 { u64::MAX } else { 1 };
     let found = fuzz(args.seed, Limit { secs, rounds }, args.only.as_deref());
     if found.is_empty() {

@@ -9,7 +9,7 @@ use serde_json::json;
 use super::eval_masks::{self, Protocol};
 use super::opened::DrawableScene;
 use super::progress::Console;
-use super::{CliError, eval_depth, opened, output};
+use super::{CliError, eval_depth, number, opened, output};
 use crate::io;
 use crate::math::stats::mean;
 use crate::pipeline::evaluate::evaluate;
@@ -69,7 +69,7 @@ pub struct Options {
     #[arg(long, value_parser = clap::value_parser!(u32).range(16..=16384))]
     pub max_side: Option<u32>,
     /// Which photos count as held out: every n-th, 0 = all photos [default: as in training, else 8]
-    #[arg(long)]
+    #[arg(long, value_parser = number::within(0..=1_000_000_usize))]
     pub holdout_every: Option<usize>,
     /// Compare the black borders of photos that were undistorted elsewhere, too
     #[arg(long)]

@@ -20,6 +20,7 @@ mod info;
 mod interrupt;
 mod memory;
 mod models;
+mod number;
 mod opened;
 mod output;
 mod path;

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::asking::{Asker, semantics};
 use super::opened::DrawableScene;
-use super::{CliError, opened, output, path_survey, view};
+use super::{CliError, number, opened, output, path_survey, view};
 use crate::io;
 use crate::navigate::flight::Smoothness;
 use crate::navigate::target::{Side, Wish};
@@ -43,19 +43,20 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = SideArg::Best)]
     side: SideArg,
     /// Distance to the target as a multiple of the usual one
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long, default_value_t = 1.0, value_parser = number::within(0.01..=100.0))]
     distance: f64,
     /// Width by height of the picture
-    #[arg(long, default_value_t = 16.0 / 9.0)]
+    #[arg(long, default_value_t = 16.0 / 9.0, value_parser = number::within(0.05..=20.0))]
     aspect: f64,
     /// Poses of the flight
     #[arg(long, default_value_t = FRAMES as u32, value_parser = clap::value_parser!(u32).range(2..=100_000))]
     frames: u32,
     /// Fly between this many random pairs of keypoints instead, and sum up how that went
-    #[arg(long, value_name = "FLIGHTS", conflicts_with_all = ["to", "to_photo", "out", "compare"])]
+    #[arg(long, value_name = "FLIGHTS", conflicts_with_all = ["to", "to_photo", "out", "compare"],
+        value_parser = number::within(1..=10_000_usize))]
     survey: Option<usize>,
     /// With this many cameras: some left out, or more added nearby; may be given several times
-    #[arg(long, requires = "survey", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, requires = "survey", value_parser = number::within(1..=10_000_u32))]
     cameras: Vec<u32>,
     /// Hold the paper's interpolation beside it, as it is printed and through all keypoints of the route
     #[arg(long)]

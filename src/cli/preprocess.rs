@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::plan::PlanArgs;
 use super::progress::Console;
-use super::{CliError, opened, output};
+use super::{CliError, number, opened, output};
 use crate::io::{self, SceneFolder};
 use crate::models;
 use crate::models::catalogue::{self, Role};
@@ -53,16 +53,16 @@ pub struct Args {
     #[arg(long)]
     seed: Option<String>,
     /// Most photos whose masks are used
-    #[arg(long, default_value_t = TrackOptions::default().max_seeds)]
+    #[arg(long, default_value_t = TrackOptions::default().max_seeds, value_parser = number::within(1..=100_000_usize))]
     max_seeds: usize,
     /// Share of a photo that may stay unknown before its masks are used too, in percent
-    #[arg(long, default_value_t = 100.0 * TrackOptions::default().reseed_share)]
+    #[arg(long, default_value_t = 100.0 * TrackOptions::default().reseed_share, value_parser = number::within(0.0..=100.0))]
     unknown: f64,
     /// How Gaussians get their codes
     #[arg(long, value_enum, default_value_t = LiftingArg::Votes)]
     lifting: LiftingArg,
     /// Steps of training codes
-    #[arg(long, default_value_t = 1_000)]
+    #[arg(long, default_value_t = 1_000, value_parser = number::within(0..=10_000_000_u64))]
     code_steps: u64,
     /// What looks at the objects, so that they are found by what they look like: 'demo', a model of
     /// 'fmlgs models', the path of a model's .json, or 'none' [default: the best that is here]

@@ -7,7 +7,7 @@ use image::ColorType;
 use serde_json::{Value, json};
 
 use super::asking::{Asker, semantics};
-use super::{CliError, opened, output, view};
+use super::{CliError, number, opened, output, view};
 use crate::math::colormap::Colormap;
 use crate::pipeline::semantics::answer::{Answered, Basis};
 use crate::pipeline::semantics::code_map::CodeMap;
@@ -45,13 +45,13 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = KindArg::Auto)]
     kind: KindArg,
     /// Answers whose pixels go into the mask at most
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = number::within(1..=100_000_usize))]
     top: usize,
     /// Match alpha-blended codes, as the paper does, instead of identities
     #[arg(long)]
     blend: bool,
     /// Largest difference per channel of a match, in 255ths
-    #[arg(long, default_value_t = 255.0 * TOLERANCE)]
+    #[arg(long, default_value_t = 255.0 * TOLERANCE, value_parser = number::within(0.0..=255.0_f32))]
     tolerance: f32,
     /// Write the mask of the answer: white on black
     #[arg(long)]

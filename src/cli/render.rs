@@ -11,7 +11,7 @@ use super::asking::{Asker, semantics};
 use super::opened::DrawableScene;
 use super::plan::PlanArgs;
 use super::progress::Console;
-use super::{CliError, opened, output, view};
+use super::{CliError, number, opened, output, view};
 use crate::io;
 use crate::io::animation::{Encoder, Settings};
 use crate::navigate::film::MOST_PICTURES;
@@ -20,7 +20,7 @@ use crate::pipeline::film::{self, FilmError, Marked};
 use crate::pipeline::semantics::grammar::Kind;
 use crate::render::cpu::normals;
 use crate::render::{Backend, BackendChoice, Frame, RenderSettings};
-use crate::scene::{Camera, ScenePlan};
+use crate::scene::{Camera, CameraPath, ScenePlan};
 
 /// Draw a scene from a given camera into a file
 ///
@@ -61,7 +61,7 @@ pub struct Args {
     #[arg(long, conflicts_with_all = ["camera", "what"])]
     path: Option<PathBuf>,
     /// Pictures per second of the film [default: the path's own]
-    #[arg(long, requires = "path")]
+    #[arg(long, requires = "path", value_parser = number::within(0.01..=CameraPath::MAX_FPS))]
     fps: Option<f64>,
     /// Quality of the film, 0 to 100
     #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u8).range(0..=100))]

@@ -68,7 +68,7 @@ pub enum IoError {
         what: &'static str,
     },
     /// A folder, pipe or device where a file is expected.
-    #[error("{path} is not a regular file")]
+    #[error("{path} is not a regular file but a folder, a pipe or a device; give the path of a file")]
     NotAFile {
         /// The path.
         path: PathBuf,
@@ -201,6 +201,12 @@ pub enum IoError {
         width_px: u32,
         /// Its height.
         height_px: u32,
+    },
+    /// A photo without a pixel that counts.
+    #[error("{path} shows nothing: every pixel is transparent or outside of its lens; take it out of the data set")]
+    NothingShown {
+        /// The picture file.
+        path: PathBuf,
     },
     /// A picture that does not decode.
     #[error("{path} cannot be decoded: {reason}")]

@@ -38,7 +38,10 @@ const MAX_ITEMS: usize = 1 << 20;
 /// Why a glTF scene could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum GltfError {
-    /// A file could not be opened or read.
+    /// A file could not be read, or is larger than the reader takes.
+    #[error(transparent)]
+    Read(#[from] super::IoError),
+    /// A file that the scene names could not be found.
     #[error("{path}: {source}", path = path.display())]
     Io {
         /// The file.

@@ -6,6 +6,7 @@
 
 pub mod animation;
 pub mod atomic;
+pub mod camera_file;
 pub mod camera_path;
 pub mod colmap;
 mod commit;
@@ -20,6 +21,7 @@ pub mod khr_gltf;
 pub mod labels;
 mod listing;
 pub mod llff;
+pub mod memory;
 pub mod npy;
 mod open;
 pub mod photo;

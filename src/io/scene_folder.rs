@@ -70,7 +70,7 @@ impl SceneFolder {
         commit.add(CLOUD_FILE, |w| splat_ply::encode(w, cloud, Some(&state)))?;
         match map {
             Some(map) => {
-                let bytes = semantic_map::encode(map, &state, &self.path().join(semantic_map::FILE))?;
+                let bytes = semantic_map::encode(map, Some(&state), &self.path().join(semantic_map::FILE))?;
                 commit.add(semantic_map::FILE, |w| w.write_all(&bytes))?;
             }
             None => commit.remove(semantic_map::FILE),
@@ -122,7 +122,7 @@ impl SceneFolder {
         let stored = semantic_map::load(self.path(), Some(&state), &scene.cloud).ok().flatten();
         let gaussians = |m: &SemanticMap| (m.of.clone(), m.margin.clone(), m.codes.clone());
         let same = stored.is_some_and(|s| gaussians(&s) == gaussians(map));
-        Ok((same && semantic_map::encode(map, &state, &path)? == bytes).then_some(state))
+        Ok((same && semantic_map::encode(map, Some(&state), &path)? == bytes).then_some(state))
     }
 
     /// Replaces the checkpoint.

@@ -45,11 +45,14 @@ struct Header {
 }
 
 /// The bytes of a map that belongs to a scene's state; `path` is for errors.
-pub(super) fn encode(map: &SemanticMap, state: &str, path: &Path) -> Result<Vec<u8>, IoError> {
+///
+/// # Errors
+/// If it is too large for the format.
+pub fn encode(map: &SemanticMap, state: Option<&str>, path: &Path) -> Result<Vec<u8>, IoError> {
     let language = map.language.as_ref();
     let header = Header {
         version: VERSION,
-        state: Some(state.into()),
+        state: state.map(Into::into),
         seeds: map.seeds.clone(),
         encoder: language.map(|l| l.encoder.clone()),
         identities: map.identities.clone(),

@@ -203,7 +203,7 @@ pub fn load_info(folder: &Path) -> Result<SceneInfo, IoError> {
     let info: SceneInfo = serde_json::from_slice(&bytes).map_err(|e| files::json_error(&path, &e))?;
     for c in &info.cameras {
         files::photo_name(&c.name, &path)?;
-        c.camera.validate().map_err(|cause| IoError::Camera { path: path.clone(), photo: c.name.clone(), cause })?;
+        c.camera.believe().map_err(|cause| IoError::Camera { path: path.clone(), photo: c.name.clone(), cause })?;
     }
     Ok(info)
 }

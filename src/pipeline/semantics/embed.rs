@@ -170,8 +170,115 @@ fn to_float(pixels: &PhotoPixels) -> Vec<[f32; 3]> {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
-    use crate::scene::NOBODY;
+    use crate::pipeline::observer::Silent;
+    use crate::scene::{Camera, NOBODY};
+
+    /// Sees whether there is red in a picture, and nothing else.
+    struct Reddish {
+        side_px: Option<usize>,
+        tiles: Vec<usize>,
+    }
+
+    impl Encoder for Reddish {
+        fn name(&self) -> &str {
+            "reddish"
+        }
+
+        fn dimension(&self) -> usize {
+            2
+        }
+
+        fn tile_side_px(&self) -> Option<usize> {
+            self.side_px
+        }
+
+        fn images(&mut self, tiles: &[Tile]) -> Result<Vec<Vec<f32>>, ModelError> {
+            self.tiles.extend(tiles.iter().map(|t| t.side_px));
+            let red = |t: &Tile| t.rgb.iter().any(|c| c[0] > 0.5);
+            Ok(tiles.iter().map(|t| if red(t) { vec![1.0, 0.0] } else { vec![0.0, 1.0] }).collect())
+        }
+
+        fn text(&mut self, phrase: &str) -> Result<Vec<f32>, ModelError> {
+            Err(ModelError::NoKnownWord { unknown: vec![phrase.into()] })
+        }
+
+        fn unknown_words(&self, _: &str) -> Vec<String> {
+            Vec::new()
+        }
+    }
+
+    /// A doll on the left whose eye is on the right, photographed from six distances. Red is the far end
+    /// of the doll alone.
+    fn doll(folder: &std::path::Path) -> (GaussianCloud, SemanticMap, Vec<Photo>) {
+        let mut all = Identities::default();
+        let doll = all.add(Level::Object, NOBODY, vec![]);
+        let eye = all.add(Level::Part, doll, vec![]);
+        let nowhere = all.add(Level::Object, NOBODY, vec![]);
+        assert_eq!((doll, eye, nowhere), (1, 2, 3));
+        let cloud = GaussianCloud {
+            positions: vec![[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]],
+            log_scales: vec![[-1.4; 3]; 2],
+            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 2],
+            opacity_logits: vec![4.0; 2],
+            sh: vec![[0.0; 3]; 2],
+            ..GaussianCloud::default()
+        };
+        let photo = |k: usize, eye: DVec3| {
+            let camera = Camera::look_at(eye, DVec3::ZERO, DVec3::NEG_Y, 0.8, 96, 64).expect("valid");
+            let left = camera.project(DVec3::new(-0.5, 0.0, 0.0)).expect("in front").x;
+            let mirrored = left > 48.0;
+            let red = |x: u32| if mirrored { f64::from(x) > left } else { f64::from(x) < left };
+            let pixel = |x: u32, _: u32| image::Rgb(if red(x) { [255, 0, 0] } else { [0, 0, 255] });
+            let path = folder.join(format!("{k}.png"));
+            image::RgbImage::from_fn(96, 64, pixel).save(&path).expect("written");
+            Photo { name: k.to_string(), path, camera, distortion: None, test_split: false, background: None }
+        };
+        let photos = (0..MAX_VIEWS + 2).map(|k| photo(k, DVec3::new(0.0, 0.0, -3.0 - 0.2 * k as f64))).collect();
+        let map = SemanticMap::of_identities(all, vec![doll, eye], vec![1.0; 2], vec![]);
+        (cloud, map, photos)
+    }
+
+    #[test]
+    fn a_part_keeps_most_of_its_own_look_and_takes_some_of_its_wholes() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (cloud, map, photos) = doll(folder.path());
+        let mut encoder = Reddish { side_px: None, tiles: vec![] };
+        let settings = RenderSettings::default();
+        let language = embed(&cloud, &map, &photos, &settings, &mut encoder, &mut Silent).expect("looks");
+        assert_eq!((language.encoder.as_str(), language.dimension), ("reddish", 2));
+        assert!(language.is_valid(&map.identities));
+        let [doll, eye, nowhere] = &language.of[..] else { panic!("{language:?}") };
+        // The doll is partly red, its eye is not: 0.3 of the doll and 0.7 of the eye, of unit length.
+        let length = 0.3_f32.hypot(0.7);
+        assert_eq!((doll.raw.len(), eye.raw.len(), nowhere.raw.len()), (MAX_VIEWS, MAX_VIEWS, 0));
+        assert!(doll.raw.iter().chain(&doll.deviated).all(|v| *v == [1.0, 0.0]), "{doll:?}");
+        assert!(eye.raw.iter().all(|v| *v == [0.0, 1.0]), "{eye:?}");
+        let far = |v: &Vec<f32>| (v[0] - 0.3 / length).abs().max((v[1] - 0.7 / length).abs());
+        assert!(eye.deviated.iter().all(|v| far(v) < 1e-6), "{eye:?}");
+        // Tiles as large as what is seen, unless the encoder wants them otherwise.
+        assert!(encoder.tiles.iter().all(|side| (10..=96).contains(side)), "{:?}", encoder.tiles);
+        let mut encoder = Reddish { side_px: Some(7), tiles: vec![] };
+        embed(&cloud, &map, &photos, &settings, &mut encoder, &mut Silent).expect("looks");
+        assert_eq!(encoder.tiles, [7; 2 * MAX_VIEWS], "one tile of each identity in each of the best views");
+    }
+
+    #[test]
+    fn looking_can_be_stopped() {
+        struct Stop;
+        impl Observer for Stop {
+            fn signal(&self) -> Signal {
+                Signal::Cancel
+            }
+        }
+        let folder = tempfile::tempdir().expect("a folder");
+        let (cloud, map, photos) = doll(folder.path());
+        let mut encoder = Reddish { side_px: None, tiles: vec![] };
+        let stopped = embed(&cloud, &map, &photos, &RenderSettings::default(), &mut encoder, &mut Stop);
+        assert!(matches!(stopped, Err(EmbedError::Cancelled)), "{stopped:?}");
+    }
 
     #[test]
     fn a_whole_counts_its_pieces_and_a_cut_one_counts_less() {

@@ -20,6 +20,8 @@ pub mod filters;
 pub mod find;
 pub mod follow;
 pub mod grammar;
+#[cfg(test)]
+mod heart;
 mod link;
 pub mod localise;
 pub mod matching;

@@ -3,6 +3,8 @@
 //! Every protocol asks a scene for the categories of labelled views and compares. Views are matched
 //! with labels by name, never by index.
 
+#[cfg(test)]
+mod by_hand;
 pub mod fastlgs_ex;
 pub mod langsplat;
 pub mod masks;
