@@ -229,10 +229,8 @@ fn classes_have_their_own_masks_or_compete_for_pixels() {
     let map = scene(vec![]);
     let view = exact(10, vec![1, 1, 1, 1, 2, 2, 3, 3, 3, 3]);
     let (camera, blended) = (camera(10, 1), CodeMap::default());
-    let categories = vec![
-        label("cat", Level::Object, [10, 1], |i| i >= 6),
-        label("toy", Level::Object, [10, 1], |i| i < 6),
-    ];
+    let categories =
+        vec![label("cat", Level::Object, [10, 1], |i| i >= 6), label("toy", Level::Object, [10, 1], |i| i < 6)];
     let view = LabelledView { name: "a", camera: &camera, exact: &view, blended: &blended, categories };
     // "cat" is most relevant for the cat, 0.9, where "toy" has 0.95; "toy" is most relevant for the
     // doll, 0.97, but for its eye "cat" has 0.6 against 0.5.
