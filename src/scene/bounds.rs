@@ -80,4 +80,10 @@ mod tests {
         assert_eq!((line.min.x, line.max.y), (2.0, 98.0));
         assert_eq!(Bounds::robust([DVec3::ONE]).map(|b| b.size()), Some(DVec3::ZERO));
     }
+
+    #[test]
+    fn the_radius_is_half_the_diagonal() {
+        let b = Bounds { min: DVec3::new(-1.0, -1.0, 0.0), max: DVec3::new(1.0, 2.0, 6.0) };
+        assert_eq!(b.radius(), 3.5);
+    }
 }

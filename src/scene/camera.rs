@@ -254,4 +254,23 @@ mod tests {
         assert!(Camera::up_of([&c, &turned].into_iter()).is_none(), "they cancel");
         assert!(Camera::up_of([&c, &c, &turned].into_iter()).is_some(), "two of three");
     }
+
+    #[test]
+    fn every_field_of_a_camera_is_checked_at_its_limit() {
+        let with = |change: &dyn Fn(&mut Camera)| {
+            let mut c = camera();
+            change(&mut c);
+            c.validate()
+        };
+        assert!(with(&|c| (c.width_px, c.height_px) = (Camera::MAX_SIDE_PX, 1)).is_ok());
+        for size in [(0, 9), (9, 0), (Camera::MAX_SIDE_PX + 1, 9), (9, Camera::MAX_SIDE_PX + 1)] {
+            assert_eq!(with(&|c| (c.width_px, c.height_px) = size), Err(CameraError::Size(size.0, size.1)));
+        }
+        for focal in [DVec2::new(0.0, 1.0), DVec2::new(1.0, 0.0), DVec2::new(f64::INFINITY, 1.0)] {
+            assert!(matches!(with(&|c| c.focal_px = focal), Err(CameraError::Focal(..))), "{focal}");
+        }
+        assert!(matches!(with(&|c| c.principal_px.x = f64::NAN), Err(CameraError::Principal(..))));
+        assert!(with(&|c| c.world_from_camera.x_axis *= 1.0004).is_ok(), "8e-4 off");
+        assert!(matches!(with(&|c| c.world_from_camera.x_axis *= 1.0006), Err(CameraError::Rotation(_))));
+    }
 }
