@@ -100,6 +100,8 @@ fn trainings() {
         steps = saved;
         assert!(!trained::is_scene(&out) || trained::load(&out).is_ok());
     });
+    drop(SceneFolder::hold(&out, "test").unwrap());
+    assert_tidy(folder.path());
     // A run that ends by itself, killed around its end as well.
     let out = folder.path().join("short");
     let scene = out.to_str().unwrap();

@@ -149,6 +149,10 @@ impl PipelineJobs {
             false => None,
         };
         if outcome.end == TrainEnd::Cancelled {
+            if semantics.is_some() {
+                let text = "Its objects are stored with the Gaussians as they are now; open the scene again to see them";
+                observer.note(Level::Info, text.into());
+            }
             return Err(Stop::Cancelled);
         }
         let cloud = &outcome.cloud;
