@@ -21,10 +21,9 @@ fn a_start_at_half_the_size_ends_nearly_as_well() {
     };
     let of = |share: &str| psnr(share, &["--coarse-share", share]);
     let (full, coarse, small) = (of("0"), of("0.5"), of("1"));
-    println!("{full} dB, {coarse} dB from half the size, {small} dB at half the size throughout");
-    assert!(coarse > full - 2.0, "{coarse} dB against {full} dB");
+    assert!(coarse > full - 0.5, "{coarse} dB against {full} dB");
     // The control: half the size throughout shows.
-    assert!(small < coarse - 0.1, "{small} dB against {coarse} dB");
+    assert!(small < coarse - 1.0, "{small} dB against {coarse} dB");
     let wrong = command(&["train", photos, "--out", "x", "--coarse-share", "1.5"]).output().unwrap();
     Done::from(wrong).fails_with(2);
 }
@@ -52,7 +51,7 @@ fn every_stage_is_measured_and_gone_on_with() {
     // What is found but cannot be seen from a camera is told so; here one that looks the other way.
     let mut away = run(&["info", photos, "--json"]).ok().json()["cameras"][0].clone();
     let away = {
-        let turn = away["world_from_camera"].as_array_mut().unwrap();
+        let turn = away["camera"]["world_from_camera"].as_array_mut().unwrap();
         for k in [0, 1, 2, 6, 7, 8] {
             turn[k] = (-turn[k].as_f64().unwrap()).into();
         }

@@ -216,9 +216,14 @@ impl Engine {
             }
             commit(&mut builder)
         };
-        // A device that refuses a network is no reason to do without it.
+        // A device that refuses a network is no reason to do without it, but is told among what was loaded.
+        let refused = |device: Device, e: ort::Error| {
+            let what = format!("network {name}, on the processor, because {} refused it: {e}", device.text());
+            trace::record(Sort::Model, what, MODEL_USE, 0);
+            load(None)
+        };
         let session = guarded(name, || match self.device {
-            Some(device) => load(Some(device)).or_else(|_| load(None)),
+            Some(device) => load(Some(device)).or_else(|e| refused(device, e)),
             None => load(None),
         });
         let engine = if self.name.starts_with("tract") { "built-in" } else { "ONNX Runtime" };

@@ -179,9 +179,9 @@ fn embeddings() -> Vec<Vec<f32>> {
 
 /// An ONNX Runtime library: the one that is named, or that of the wheel which `tools/setup.sh test` fetches.
 fn runtime_library() -> Option<PathBuf> {
-    let named = ["FMLGS_ONNXRUNTIME", "ORT_DYLIB_PATH"].into_iter().filter_map(std::env::var_os).map(PathBuf::from);
+    let mut named = ["FMLGS_ONNXRUNTIME", "ORT_DYLIB_PATH"].into_iter().filter_map(std::env::var_os).map(PathBuf::from);
     let fetched = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/onnxruntime/onnxruntime/capi");
-    named.filter(|p| p.is_file()).next().or_else(|| library_in(&fetched))
+    named.find(|p| p.is_file()).or_else(|| library_in(&fetched))
 }
 
 /// A process has one engine, so each runs in one of its own: this test again, told to print.

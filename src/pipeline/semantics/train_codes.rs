@@ -223,12 +223,10 @@ mod tests {
         assert_eq!(of, [1, 2], "{codes:?}");
         for (code, wanted) in codes.iter().zip([[0.9, 0.2, 0.5, 0.5, 0.5, 0.5], [0.9, 0.2, 0.5, 0.1, 0.3, 0.8]]) {
             // Not nearer: a disc ends at once, a Gaussian fades.
-            println!("{code:?} {wanted:?}");
-            assert!(worst_difference(code, &wanted) < 0.15, "{code:?} {wanted:?}");
+            assert!(worst_difference(code, &wanted) < 0.11, "{code:?} {wanted:?}");
         }
         let (_, _, first) = train(1, |l| l);
-        println!("{loss} {first}");
-        assert!(loss < 0.9 * first, "{loss} {first}");
+        assert!(loss < 0.8 * first, "{loss} {first}");
         // Without masks nothing is learnt; with the wrong ones, the wrong thing.
         let (codes, of, _) = train(100, |_| UNKNOWN);
         assert_eq!((codes[0], of), ([0.5; 6], vec![NOBODY; 2]));
