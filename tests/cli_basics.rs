@@ -32,6 +32,12 @@ fn arguments_that_make_no_sense_exit_with_2() {
         &["render", splat, "--what", "picture", "--out", "a.npy"],
         &["export", splat, "--out", "a.obj"],
         &["synth", "a.glb", "--out", "x", "--views", "2", "--held-out", "2"],
+        &["query", splat, "x", "--tolerance", "nan"],
+        &["query", splat, "x", "--top", "0"],
+        &["path", splat, "--survey", "18446744073709551615"],
+        &["path", splat, "--to", "x", "--distance", "inf"],
+        &["report", splat, "--budget", "nan"],
+        &["agent", splat, "--metres", "0"],
         &["no-such-command"],
         &["--no-such-option"],
     ] {
@@ -39,6 +45,29 @@ fn arguments_that_make_no_sense_exit_with_2() {
         assert_eq!(done.code, Some(2), "{arguments:?}: {}", done.stderr);
         assert!(done.stdout.is_empty(), "{arguments:?} printed a result");
     }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn limits_of_the_system_and_files_without_an_end_are_told() {
+    let folder = folder();
+    let splat = tiny_splat(&folder.path().join("a.ply"));
+    let out = folder.path().join("a.png");
+    let (splat, out) = (splat.to_str().unwrap(), out.to_str().unwrap());
+    for endless in [&["agent", splat, "closer", "--policy", "/dev/zero"][..], &["info", "/dev/zero"]] {
+        let done = fmlgs(endless).fails_with(1);
+        assert!(done.stderr.contains("/dev/zero"), "{endless:?}: {}", done.stderr);
+    }
+    let mut crowded = cli_support::command(&["render", splat, "--size", "64x48", "--out", out]);
+    let crowded = crowded.env("RAYON_NUM_THREADS", "100000").output().unwrap();
+    assert!(crowded.status.success(), "{}", String::from_utf8_lossy(&crowded.stderr));
+    let words = format!(
+        "ulimit -v 3000000; exec '{}' render '{splat}' --size 16384x16384 --out '{out}'",
+        env!("CARGO_BIN_EXE_fmlgs")
+    );
+    let limited = std::process::Command::new("sh").args(["-c", &words]).output().unwrap();
+    let told = String::from_utf8_lossy(&limited.stderr);
+    assert!(limited.status.code() == Some(1) && told.contains("drawing 16384 x 16384 px takes about"), "{told}");
 }
 
 #[test]

@@ -55,7 +55,7 @@ pub fn run(args: Args) -> Result<(), CliError> {
             let mut facts = of_trained(&t);
             let of_others = matches!(map, Ok(None)) && t.folder.join(io::semantic_map::FILE).exists();
             facts.warnings.extend(match &map {
-                Err(e) => Some(format!("its objects cannot be read: {e}; 'fmlgs preprocess' finds them anew")),
+                Err(e) => Some(format!("its objects cannot be read ('fmlgs preprocess' finds them anew): {e}")),
                 Ok(None) if of_others => Some(format!(
                     "{} is of other Gaussians than {}, so no objects are known; 'fmlgs preprocess' finds them anew",
                     io::semantic_map::FILE,

@@ -94,7 +94,7 @@ fn map_header(file: &[u8]) -> String {
 
 /// A map's file with this header and the tensors of two identities.
 pub fn map_with(header: &str) -> Vec<u8> {
-    let zeros = vec![0; 2 * 4 * 2 * 2];
+    let zeros = [0; 2 * 4 * 2 * 2];
     let ones = [2_u32.to_le_bytes(), 2_u32.to_le_bytes()].concat();
     let unit: Vec<u8> = (0..8).flat_map(|_| [0x00, 0x3C, 0, 0]).collect();
     let view = |dtype, shape: &[usize], data| TensorView::new(dtype, shape.to_vec(), data).expect("a tensor");

@@ -12,6 +12,9 @@ use image::{GrayImage, RgbImage};
 /// What a reader says about an input: nothing, or why it refuses it.
 pub type Outcome = Result<(), String>;
 
+/// Reads bytes.
+pub type Read = Box<dyn Fn(&[u8]) -> Outcome>;
+
 /// What an input must be for a reader to look any further.
 #[derive(Clone, Copy)]
 pub enum Door {
@@ -55,7 +58,7 @@ pub struct Target {
     /// How many times slower it is than a quick reader: it gets so many times fewer inputs.
     pub cost: u64,
     /// Reads bytes.
-    pub read: Box<dyn Fn(&[u8]) -> Outcome>,
+    pub read: Read,
 }
 
 impl Target {

@@ -21,7 +21,7 @@ static PANIC: Mutex<String> = Mutex::new(String::new());
 pub fn begin(target: &'static str, input: &[u8]) {
     static START: Once = Once::new();
     START.call_once(|| {
-        std::thread::spawn(watch);
+        std::thread::Builder::new().name("fuzz-watch".into()).spawn(watch).expect("a thread");
     });
     let mut watched = WATCHED.lock().unwrap_or_else(PoisonError::into_inner);
     watched.since = Some(Instant::now());

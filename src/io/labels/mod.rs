@@ -33,6 +33,8 @@ use crate::scene::{Camera, Level, Mask, Photo, text};
 /// How many times longer than the photo's the sides of a mask may be.
 const MOST_LARGER: f64 = 8.0;
 
+/// Most masks of one photo: what finds objects compares each with each.
+const MOST_MASKS: usize = 4096;
 /// Most memory that the masks of one photo take, bytes: a thousand of eight million pixels.
 const MOST_BYTES: u64 = 1 << 30;
 
@@ -165,6 +167,10 @@ impl Sheet<'_> {
         let larger = f64::from(w.max(h)) / f64::from(expected.0.max(expected.1));
         if !listing::is_scaled(expected, size_px) || larger > MOST_LARGER {
             return Err(IoError::PhotoSize { path: path.into(), found: size_px, expected });
+        }
+        if masks > MOST_MASKS {
+            let reason = format!("{masks} regions of one photo; at most {MOST_MASKS} are taken");
+            return Err(IoError::Syntax { path: path.into(), place: "masks".into(), reason });
         }
         let pixels = (u64::from(w) * u64::from(h)).max(u64::from(expected.0) * u64::from(expected.1));
         let (bytes, limit) = (pixels.div_ceil(8).saturating_mul(masks as u64), memory::budget().min(MOST_BYTES));

@@ -194,3 +194,19 @@ fn masklets_belong_to_numbered_photos() {
     fs::write(&at, video("[3]")).expect("write");
     assert!(matches!(Labels::open(&at), Err(IoError::Syntax { .. })));
 }
+
+#[test]
+fn label_files_of_thirty_thousand_polygons_are_bounded() {
+    let folder = tempfile::tempdir().expect("folder");
+    let with = |names: usize| {
+        let square = [[1, 1], [5, 1], [5, 4], [1, 4]];
+        let object = |i| serde_json::json!({ "category": format!("c{}", i % names), "segmentation": square });
+        let objects: Vec<_> = (0..30_000).map(object).collect();
+        let file = serde_json::json!({ "info": { "name": "0.png", "width": 8, "height": 6 }, "objects": objects });
+        fs::write(folder.path().join("a.json"), file.to_string()).expect("write");
+        Labels::open(folder.path()).expect("labels").of(&photo("0.png", 8, 6), 99).map(|regions| regions.len())
+    };
+    assert_eq!(with(20).expect("few things, many polygons"), 20);
+    let e = with(30_000).expect_err("too many").to_string();
+    assert!(e.contains("a.json, masks: 30000 regions"), "{e}");
+}
