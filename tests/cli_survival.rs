@@ -268,7 +268,8 @@ fn a_full_disk_is_named_and_ends_nothing() {
 fn lines_of(child: &mut Child) -> Receiver<String> {
     let (told, lines) = channel();
     let stderr = BufReader::new(child.stderr.take().unwrap());
-    std::thread::spawn(move || stderr.lines().map_while(Result::ok).try_for_each(|line| told.send(line)));
+    let read = move || stderr.lines().map_while(Result::ok).try_for_each(|line| told.send(line));
+    std::thread::Builder::new().name("lines".into()).spawn(read).unwrap();
     lines
 }
 

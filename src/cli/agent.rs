@@ -1,6 +1,6 @@
 //! `fmlgs agent`: plain sentences to what is shown.
 
-use std::io::BufRead;
+use std::io::{BufRead, Read};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -135,8 +135,8 @@ pub fn run(args: Args) -> Result<(), CliError> {
     let mut session = Session::new(policy, planner);
     let mut talk = Talk { json: args.json, ..Talk::default() };
     if args.text.is_empty() {
-        for text in std::io::stdin().lock().lines() {
-            let text = text.map_err(|e| CliError::failed(format!("standard input: {e}")))?;
+        let mut requests = Requests { input: std::io::stdin().lock(), line: 0 };
+        while let Some(text) = requests.next()? {
             if !text.trim().is_empty() {
                 talk.say(&mut session, &mut world, &text, &deeds)?;
             }
@@ -166,6 +166,36 @@ pub fn run(args: Args) -> Result<(), CliError> {
         Some(text) if !args.json => Err(CliError::failed(format!("the last request was not carried out: {text}"))),
         Some(_) => Err(CliError::failed("the last request was not carried out".to_owned())),
         None => Ok(()),
+    }
+}
+
+/// Longest request in bytes, and most requests of one talk: beyond them is no person but an endless file.
+const MAX_REQUEST_BYTES: u64 = 16 << 10;
+const MAX_REQUESTS: usize = 10_000;
+
+/// Requests, one a line.
+struct Requests<R> {
+    input: R,
+    line: usize,
+}
+
+impl<R: BufRead> Requests<R> {
+    /// The next line; `None` at the end.
+    fn next(&mut self) -> Result<Option<String>, CliError> {
+        self.line += 1;
+        let bad = |what: String| CliError::failed(format!("standard input, line {}: {what}", self.line));
+        let mut bytes = Vec::new();
+        let read = self.input.by_ref().take(MAX_REQUEST_BYTES + 1).read_until(b'\n', &mut bytes);
+        if read.map_err(|e| bad(e.to_string()))? == 0 {
+            return Ok(None);
+        }
+        if bytes.len() as u64 > MAX_REQUEST_BYTES {
+            return Err(bad(format!("a request has at most {MAX_REQUEST_BYTES} bytes")));
+        }
+        if self.line > MAX_REQUESTS {
+            return Err(bad(format!("a talk has at most {MAX_REQUESTS} requests; go on with another")));
+        }
+        String::from_utf8(bytes).map(Some).map_err(|_| bad("it is not UTF-8 text".into()))
     }
 }
 
@@ -233,5 +263,33 @@ fn line(deed: &Deed) -> Option<String> {
         Deed::Hidden(ids) => Some(format!("leaves {} out of the picture", ids.len())),
         Deed::Renamed(id, name) => Some(format!("calls #{id} {name}")),
         Deed::Explored(_) => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn requests_are_lines_of_bounded_length_and_number() {
+        let all = |input: &[u8]| {
+            let mut requests = Requests { input, line: 0 };
+            let mut lines = Vec::new();
+            loop {
+                match requests.next() {
+                    Ok(Some(line)) => lines.push(line),
+                    Ok(None) => return Ok(lines),
+                    Err(CliError::Failed(e)) => return Err(e.to_string()),
+                    Err(other) => panic!("{other:?}"),
+                }
+            }
+        };
+        assert_eq!(all(b"closer\n\nback"), Ok(vec!["closer\n".to_owned(), "\n".into(), "back".into()]));
+        let endless = vec![0; 2 * MAX_REQUEST_BYTES as usize];
+        assert!(all(&endless).expect_err("no end").contains("line 1: a request has at most"));
+        let most = "y\n".repeat(MAX_REQUESTS);
+        assert_eq!(all(most.as_bytes()).map(|l| l.len()), Ok(MAX_REQUESTS));
+        assert!(all((most + "y\n").as_bytes()).expect_err("too many").contains("at most 10000 requests"));
+        assert!(all(b"\xff\n").expect_err("bytes").contains("not UTF-8"));
     }
 }

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::{CliError, memory, output};
+use super::{CliError, output, process};
 use crate::math::stats::median;
 use crate::models;
 use crate::pipeline::bench;
@@ -97,7 +97,7 @@ pub fn run(scenes: &[PathBuf], runs: u32, repeats: u32, as_json: bool) -> Result
 /// Measures one variant in this process and prints it as JSON.
 pub fn run_child(scene: &Path, variant: Variant, repeats: usize) -> Result<(), CliError> {
     // As the window has it.
-    memory::settle();
+    process::settle();
     output::print_json(&measure(scene, variant, repeats)?)
 }
 

@@ -52,7 +52,8 @@ pub fn flag() -> &'static AtomicBool {
 pub fn asked_to_stop() -> bool {
     let asked = ASKED_TO_STOP.load(Ordering::SeqCst);
     if asked && !TOLD.swap(true, Ordering::SeqCst) {
-        output::note("\nStopping at the next safe point (press Ctrl-C again to stop at once) ...");
+        output::note("");
+        output::note("Stopping at the next safe point (press Ctrl-C again to stop at once) ...");
     }
     asked
 }

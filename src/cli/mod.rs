@@ -18,7 +18,6 @@ mod eval_masks;
 mod export;
 mod info;
 mod interrupt;
-mod memory;
 mod models;
 mod number;
 mod opened;
@@ -27,6 +26,7 @@ mod path;
 mod path_survey;
 mod plan;
 mod preprocess;
+mod process;
 mod progress;
 mod query;
 mod render;
@@ -137,7 +137,7 @@ pub fn main(open_window: OpenWindow) -> ExitCode {
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
     };
-    match run(cli, open_window) {
+    match process::start_threads().map_err(CliError::failed).and_then(|()| run(cli, open_window)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => error.report(),
     }
@@ -208,7 +208,7 @@ fn window(first: Vec<Action>, wishes: Vec<Wish>, open_window: OpenWindow) -> Res
              'fmlgs demo --headless' shows what the program does; 'fmlgs --help' lists what works without a window",
         ));
     }
-    memory::settle();
+    process::settle();
     open_window(first, wishes).map_err(|error| {
         CliError::failed(format!("the window could not be opened: {error}. 'fmlgs demo --headless' works without one"))
     })

@@ -91,6 +91,7 @@ pub fn run(args: Args) -> Result<(), CliError> {
     }
     let map = semantics(&args.scene, scene.state.as_deref(), &scene.cloud)?;
     let camera = view::choose(args.camera.as_deref(), &scene)?.limited_to(args.max_side);
+    view::check_room(camera.width_px, camera.height_px)?;
     let mut renderer = Renderer::new();
     let exact = ViewMap::render(&mut renderer, &scene.cloud, &map.of, &map.identities, &camera, &scene.settings)?;
     let blended = match args.blend {

@@ -140,6 +140,7 @@ impl Args {
         if let Some(side) = self.max_side {
             camera = camera.limited_to(side);
         }
+        view::check_room(camera.width_px, camera.height_px)?;
         Ok(Job { scene, camera, storage })
     }
 }
@@ -210,6 +211,7 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
         let limit = args.max_side.unwrap_or(1280);
         [limit, (f64::from(limit) * 9.0 / 16.0).round().max(1.0) as u32]
     });
+    view::check_room(width, height)?;
     let mut settings = Settings::new(width, height, fps);
     (settings.quality, settings.overwrite) = (args.quality, true);
     if let Some(program) = &args.ffmpeg {

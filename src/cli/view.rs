@@ -84,6 +84,17 @@ pub fn with_size(camera: &Camera, width_px: u32, height_px: u32) -> Camera {
     }
 }
 
+/// Bytes that drawing a pixel takes: colour, depth and opacity, their copies on the way to the file.
+const BYTES_PER_PX: u64 = 64;
+
+/// Whether a picture of this size can be drawn in the memory that is free.
+pub fn check_room(width_px: u32, height_px: u32) -> Result<(), CliError> {
+    let bytes = u64::from(width_px) * u64::from(height_px) * BYTES_PER_PX;
+    let what = format!("drawing {width_px} x {height_px} px");
+    io::memory::room(what, bytes, "make it smaller with --size or --max-side")
+        .map_err(|e| CliError::failed(e.to_string()))
+}
+
 /// Parses `640x480`.
 pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
     let side = |s: &str| s.trim().parse::<u32>().ok().filter(|v| (1..=Camera::MAX_SIDE_PX).contains(v));

@@ -122,7 +122,7 @@ fn resolve(l: &Listed, root: &Path, source: &Path) -> Result<Option<Photo>, IoEr
             path: source.into(),
             place: format!("photo '{}'", l.name),
             reason: format!(
-                "its lens distortion (k1 {}, k2 {}, p1 {}, p2 {}) leaves nothing of the picture; calibrate the camera \
+                "its lens distortion (k1 {:e}, k2 {:e}, p1 {:e}, p2 {:e}) leaves nothing of the picture; calibrate the camera \
                  anew or undistort the photo",
                 d.k1, d.k2, d.p1, d.p2
             ),

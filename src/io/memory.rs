@@ -24,6 +24,25 @@ pub fn free() -> u64 {
     }
 }
 
+/// Something that does not fit into the memory that is free.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{what} takes about {} MB of memory, and {} MB are free; {remedy}", bytes.div_ceil(1_000_000), free / 1_000_000)]
+pub struct NoRoom {
+    what: String,
+    bytes: u64,
+    free: u64,
+    remedy: &'static str,
+}
+
+/// Whether `what` fits, which takes about so many bytes. To be asked before it is begun.
+///
+/// # Errors
+/// If it does not.
+pub fn room(what: impl Into<String>, bytes: u64, remedy: &'static str) -> Result<(), NoRoom> {
+    let free = free();
+    if bytes <= free { Ok(()) } else { Err(NoRoom { what: what.into(), bytes, free, remedy }) }
+}
+
 /// What the control group leaves, the file cache not counted: the system gives that back.
 fn of_group(system: &mut System) -> u64 {
     let Ok(own) = sysinfo::get_current_pid() else { return u64::MAX };
@@ -71,6 +90,13 @@ mod tests {
         assert_eq!(within(&limits("3072000", "4096000"), status), 2_048_000);
         assert_eq!(within(&limits("1024000", "4096000"), status), 0);
         assert_eq!(within("", ""), u64::MAX);
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused_with_its_size() {
+        assert_eq!(room("a thumbnail", 1000, ""), Ok(()));
+        let e = room("a wall", u64::MAX, "make it smaller").expect_err("no machine has that").to_string();
+        assert!(e.starts_with("a wall takes about 18446744073710 MB") && e.ends_with("make it smaller"), "{e}");
     }
 
     #[test]

@@ -100,4 +100,26 @@ mod tests {
         assert!(near(Colormap::Viridis.color(1.0), [0xfd, 0xe7, 0x25]), "{:?}", Colormap::Viridis.color(1.0));
         assert_eq!(Colormap::Viridis.color(f32::NAN), [0; 3]);
     }
+
+    #[test]
+    fn ends_and_middle_are_those_of_the_fits() {
+        assert_eq!(Colormap::ALL.map(Colormap::text), ["turbo", "viridis", "grey"]);
+        // The polynomials by hand: their first coefficients at 0, their sums at 1, both within a rounding.
+        for (map, t, expected) in [
+            (Colormap::Turbo, 0.0, [35, 23, 27]),
+            (Colormap::Turbo, 0.4, [78, 249, 131]),
+            (Colormap::Turbo, 1.0, [144, 13, 0]),
+            (Colormap::Viridis, 0.0, [71, 1, 85]),
+            (Colormap::Viridis, 0.4, [40, 120, 142]),
+            (Colormap::Viridis, 1.0, [252, 231, 33]),
+            (Colormap::Grey, 0.0, [0; 3]),
+            (Colormap::Grey, 0.4, [102; 3]),
+            (Colormap::Grey, 1.0, [255; 3]),
+            (Colormap::Grey, 0.25, [64; 3]),
+        ] {
+            let found = map.color(t);
+            assert!(found.iter().zip(expected).all(|(a, b)| a.abs_diff(b) <= 1), "{map:?} {t}: {found:?}");
+        }
+        assert_eq!((Colormap::Grey.color(0.25), Colormap::Grey.color(0.0)), ([64; 3], [0; 3]));
+    }
 }

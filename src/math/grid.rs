@@ -63,4 +63,16 @@ mod tests {
         assert_eq!((label[0], label[6], label[10], label[3], label[9], label[1]), (1, 1, 1, 2, 2, 0));
         assert_eq!(regions(1, 0, |_| true).1.len(), 0);
     }
+
+    #[test]
+    fn diagonals_join_in_both_directions() {
+        let picture = b".#.\
+                        #.#\
+                        .#.";
+        let (label, areas) = regions(3, 9, |i| picture[i] == b'#');
+        assert_eq!((areas, label), (vec![4], vec![0, 1, 0, 1, 0, 1, 0, 1, 0]));
+        // One column: left and right are nothing, above and below are near.
+        assert_eq!(regions(1, 4, |i| i != 1), (vec![1, 0, 2, 2], vec![1, 2]));
+        assert_eq!(neighbours(1, 1, 3).collect::<Vec<_>>(), [0, 2]);
+    }
 }

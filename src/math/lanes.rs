@@ -345,4 +345,47 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn arrays_do_what_each_number_does() {
+        let a: Lane<f32> = [-2.0, -0.5, 0.0, 1.0, 1.5, 4.0, f32::NAN, 9.0];
+        let b: Lane<f32> = [1.0, -0.5, 2.0, 0.25, 3.0, -4.0, 1.0, 9.0];
+        let p = Plain;
+        let same = |found: Lane<f32>, one: &dyn Fn(f32, f32) -> f32| {
+            for l in 0..LANES {
+                let expected = one(a[l], b[l]);
+                assert!(found[l] == expected || found[l].is_nan() && expected.is_nan(), "lane {l}: {found:?}");
+            }
+        };
+        same(p.add(a, b), &|a, b| a + b);
+        same(p.sub(a, b), &|a, b| a - b);
+        same(p.mul(a, b), &|a, b| a * b);
+        same(p.div(a, b), &|a, b| a / b);
+        same(p.mul_add(a, b, p.splat(0.5)), &|a, b| a * b + 0.5);
+        // The second of the two where they cannot be compared, as the instructions have it.
+        same(p.min(a, b), &|a, b| if a.is_nan() { b } else { a.min(b) });
+        same(p.max(a, b), &|a, b| if a.is_nan() { b } else { a.max(b) });
+        same(p.sqrt(b), &|_, b| b.sqrt());
+        assert_eq!(p.ge(a, b), [false, true, false, true, false, true, false, true]);
+        assert_eq!(p.gt(a, b), [false, false, false, true, false, true, false, false]);
+        let bits = |mask| <Plain as Lanes<f32>>::bits(p, mask);
+        assert_eq!(bits(p.ge(a, b)), 0b1010_1010);
+        let some = <Plain as Lanes<f32>>::both(p, p.ge(a, b), p.gt(b, p.splat(0.0)));
+        assert_eq!(bits(some), 0b1000_1000);
+        assert_eq!(p.keep(some, b), [0.0, 0.0, 0.0, 0.25, 0.0, 0.0, 0.0, 9.0]);
+        assert_eq!(p.select(some, b, p.splat(7.0)), [7.0, 7.0, 7.0, 0.25, 7.0, 7.0, 7.0, 9.0]);
+        assert_eq!(p.sum([1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0]), 255.0);
+        assert_eq!(p.exp_neg(p.splat(-1.0)), [Real::exp_neg(-1.0_f32); LANES]);
+        // Vectors choose the same where a number is equal or none.
+        struct Compared(Lane<f32>, Lane<f32>);
+        impl LaneOp<f32> for Compared {
+            type Output = [u32; 2];
+            #[inline(always)]
+            fn run<L: Lanes<f32>>(self, l: L) -> [u32; 2] {
+                let (a, b) = (l.load(&self.0), l.load(&self.1));
+                [l.bits(l.ge(a, b)), l.bits(l.gt(a, b))]
+            }
+        }
+        assert_eq!(f32::vectorize(Compared(a, b)), [0b1010_1010, 0b0010_1000]);
+    }
 }

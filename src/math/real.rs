@@ -229,4 +229,42 @@ mod tests {
             assert!((0.0..=1.0).contains(&Real::sigmoid(x)));
         }
     }
+
+    /// Every operation of a type against the standard library in double precision.
+    fn operations<R: Real>(near: f64) {
+        let close = |found: R, expected: f64, what: &str| {
+            assert!((found.f64() - expected).abs() <= near * expected.abs().max(1e-3), "{what}: {found:?} {expected}");
+        };
+        for x in [-3.25, -1.0, -0.125, 0.0, 0.5, 1.0, 2.75] {
+            let r = R::of(x);
+            close(r, x, "of");
+            assert_eq!((r.f64(), r.f32()), (x, x as f32));
+            close(r.exp(), x.exp(), "exp");
+            close((-r.abs()).exp_neg(), (-x.abs()).exp(), "exp_neg");
+            close(r.abs(), x.abs(), "abs");
+            close(r.abs().sqrt(), x.abs().sqrt(), "sqrt");
+            close((r.abs() + R::ONE).ln(), (x.abs() + 1.0).ln(), "ln");
+            close(r.mul_add(R::of(1.5), R::of(-0.25)), x * 1.5 - 0.25, "mul_add");
+            close(Real::sigmoid(r), 1.0 / (1.0 + (-x).exp()), "sigmoid");
+            for y in [-2.0, 0.25] {
+                close(r.min(R::of(y)), x.min(y), "min");
+                close(r.max(R::of(y)), x.max(y), "max");
+            }
+            assert!(r.is_finite());
+        }
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            assert!(!R::of(bad).is_finite());
+        }
+        // Over the range of the fast form, and under it.
+        close(R::of(88.0).exp(), 88.0_f64.exp(), "exp");
+        assert!(R::of(-100.0).exp().f64() < 1e-38 && R::of(-100.0).exp().f64() >= 0.0);
+    }
+
+    #[test]
+    fn both_precisions_do_what_the_standard_library_does() {
+        operations::<f32>(1e-6);
+        operations::<f64>(1e-15);
+        assert!(Real::exp(-1e4_f32) == 0.0, "what is too small for the fast form is nothing");
+        assert_eq!(Real::exp(87.5_f32), f32::exp(87.5), "what is too large for it is the library's");
+    }
 }

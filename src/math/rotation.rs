@@ -87,4 +87,29 @@ mod tests {
         assert!((fixed - r).to_cols_array().iter().all(|e| e.abs() < 3e-4));
         assert!((nearest_rotation(&r) - r).to_cols_array().iter().all(|e| e.abs() < 1e-15));
     }
+
+    #[test]
+    fn matrices_are_those_of_the_quaternion() {
+        for q in [[0.3, -0.2, 0.7, 0.1], [-0.9, 0.4, 0.2, -0.6], [0.1, 0.8, -0.3, 0.5], [2.0, 0.0, 0.0, 0.0]] {
+            let [w, x, y, z] = q;
+            let unit = glam::DQuat::from_xyzw(x, y, z, w).normalize();
+            let expected = DMat3::from_quat(unit).transpose().to_cols_array();
+            let rows = matrix_from_quaternion(q).expect("valid");
+            assert!(rows.iter().flatten().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15), "{rows:?} {expected:?}");
+            let u = unit_quaternion(q).expect("valid");
+            assert!(u.iter().zip([unit.w, unit.x, unit.y, unit.z]).all(|(a, b)| (a - b).abs() < 1e-15), "{u:?}");
+        }
+        assert!(unit_quaternion([1e-310_f64, 0.0, 0.0, 0.0]).is_some_and(|u| u == [1.0, 0.0, 0.0, 0.0]));
+    }
+
+    #[test]
+    fn the_error_of_a_rotation_is_its_largest_entry() {
+        // (1.1)² - 1 = 0.21 on the diagonal; 0.1 in a corner is 0.1 beside it and 0.01 on it.
+        let stretched = DMat3::from_diagonal(glam::DVec3::new(1.0, 1.1, 1.0));
+        assert!((rotation_error(&stretched) - 0.21).abs() < 1e-12);
+        let skew = DMat3::from_cols_array(&[1.0, 0.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0, 1.0]);
+        assert!((rotation_error(&skew) - 0.1).abs() < 1e-12);
+        assert!(rotation_error(&DMat3::ZERO).is_infinite());
+        assert!(rotation_error(&(DMat3::IDENTITY * f64::NAN)).is_infinite());
+    }
 }

@@ -39,4 +39,17 @@ mod tests {
             assert!((slope - difference).abs() < 2e-3 * slope, "{x}: {slope} {difference}");
         }
     }
+
+    #[test]
+    fn the_curve_is_the_standards() {
+        // IEC 61966-2-1: linear below, 2.4th power above; 0.5 is 0.214 041 14 in light.
+        for (srgb, light) in
+            [(0.0, 0.0), (0.02, 0.02 / 12.92), (0.040_45, 0.003_130_805), (0.5, 0.214_041_14), (1.0, 1.0)]
+        {
+            assert!((linear(srgb) - light).abs() < 1e-6, "{srgb}: {}", linear(srgb));
+            assert!((encode(light).0 - srgb).abs() < 1e-5, "{light}: {}", encode(light).0);
+        }
+        assert_eq!([0.0, 0.001, 0.2, 0.7, 1.0].map(byte), [0, 3, 124, 218, 255]);
+        assert!((encode(0.001).1 - 12.92).abs() < 1e-6);
+    }
 }

@@ -16,7 +16,7 @@ use ort::session::Session;
 use ort::session::builder::GraphOptimizationLevel;
 
 use super::ModelError;
-use super::network::Network;
+use super::network::{Network, guarded};
 use super::room;
 use crate::scene::trace::{self, Sort};
 
@@ -222,12 +222,12 @@ impl Engine {
             trace::record(Sort::Model, what, MODEL_USE, 0);
             load(None)
         };
-        let session = match self.device {
+        let session = guarded(name, || match self.device {
             Some(device) => load(Some(device)).or_else(|e| refused(device, e)),
             None => load(None),
-        };
+        });
         let engine = if self.name.starts_with("tract") { "built-in" } else { "ONNX Runtime" };
-        session.map_err(|e| ModelError::Load { model: name.into(), engine, problem: e.to_string() })
+        session.map_err(|problem| ModelError::Load { model: name.into(), engine, problem })
     }
 }
 

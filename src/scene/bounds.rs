@@ -67,4 +67,23 @@ mod tests {
         assert!(b.max.x < 1.0 && b.min.x < 0.03);
         assert!(Bounds::of([DVec3::NAN]).is_none());
     }
+
+    #[test]
+    fn boxes_hold_their_points() {
+        let points = [DVec3::new(1.0, -2.0, 3.0), DVec3::new(-1.0, 4.0, 3.0), DVec3::splat(f64::NAN)];
+        let b = Bounds::of(points).expect("some");
+        assert_eq!((b.min, b.max), (DVec3::new(-1.0, -2.0, 3.0), DVec3::new(1.0, 4.0, 3.0)));
+        assert_eq!((b.center(), b.size()), (DVec3::new(0.0, 1.0, 3.0), DVec3::new(2.0, 6.0, 0.0)));
+        assert_eq!((Bounds::of([DVec3::NAN]), Bounds::robust([DVec3::NAN])), (None, None));
+        // 0 to 100: from the second to the 98th of a hundred steps.
+        let line = Bounds::robust((0..=100).map(|i| DVec3::splat(f64::from(i)))).expect("some");
+        assert_eq!((line.min.x, line.max.y), (2.0, 98.0));
+        assert_eq!(Bounds::robust([DVec3::ONE]).map(|b| b.size()), Some(DVec3::ZERO));
+    }
+
+    #[test]
+    fn the_radius_is_half_the_diagonal() {
+        let b = Bounds { min: DVec3::new(-1.0, -1.0, 0.0), max: DVec3::new(1.0, 2.0, 6.0) };
+        assert_eq!(b.radius(), 3.5);
+    }
 }

@@ -38,7 +38,7 @@ pub enum CameraError {
     Focal(f64, f64),
     /// A focal length that no lens has.
     #[error(
-        "focal length {focal_px} px along a side of {side_px} px is no lens's; between {} and {:e} sides are believed",
+        "focal length {focal_px:e} px along a side of {side_px} px is no lens's; between {} and {:e} sides are believed",
         Camera::FOCAL_SIDES.start(),
         Camera::FOCAL_SIDES.end()
     )]
@@ -49,10 +49,10 @@ pub enum CameraError {
         side_px: u32,
     },
     /// A principal point far outside of the picture.
-    #[error("principal point ({0}, {1}) px is over {max:e} picture sides away from the picture", max = Camera::PRINCIPAL_SIDES)]
+    #[error("principal point ({0:e}, {1:e}) px is over {max:e} picture sides away from the picture", max = Camera::PRINCIPAL_SIDES)]
     Off(f64, f64),
     /// A camera centre so far out that distances lose their meaning.
-    #[error("the camera centre ({0}, {1}, {2}) is farther than {max:e} units from the origin", max = Camera::FARTHEST)]
+    #[error("the camera centre ({0:e}, {1:e}, {2:e}) is farther than {max:e} units from the origin", max = Camera::FARTHEST)]
     Far(f64, f64, f64),
     /// A principal point that is not finite.
     #[error("principal point ({0}, {1}) px is not finite")]
@@ -284,5 +284,62 @@ mod tests {
         assert!(matches!(change(|c| c.focal_px.x = 1e30), Err(CameraError::Lens { side_px: 640, .. })));
         assert!(matches!(change(|c| c.principal_px.x = -1e9), Err(CameraError::Off(..))));
         assert!(matches!(change(|c| c.center.z = -1e308), Err(CameraError::Far(..))));
+    }
+
+    #[test]
+    fn pictures_of_other_sizes_show_the_same() {
+        let c = Camera { principal_px: DVec2::new(300.0, 250.0), ..camera() };
+        let p = c.center + c.ray(DVec2::new(100.0, 400.0)) * 2.0;
+        let at = |c: &Camera| c.project(p).expect("in front");
+        // Half as wide, a quarter as high.
+        let other = c.resized(320, 120);
+        assert_eq!((other.width_px, other.height_px), (320, 120));
+        assert!((at(&other) - DVec2::new(50.0, 100.0)).length() < 1e-9, "{}", at(&other));
+        let third = c.reduced(3);
+        assert_eq!((third.width_px, third.height_px), (213, 160));
+        assert!((at(&third) - DVec2::new(100.0, 400.0) / 3.0).length() < 1e-9, "{}", at(&third));
+        assert_eq!(c.reduced(0), c);
+        assert_eq!((c.limited_to(640), c.limited_to(9_000)), (c.clone(), c.clone()));
+        let small = c.limited_to(321);
+        assert_eq!((small.width_px, small.height_px), (321, 241));
+        assert!((at(&small).x - 100.0 * 321.0 / 640.0).abs() < 1e-9);
+        assert_eq!(c.limited_to(1).height_px, 1);
+        assert!((camera().fov_y_rad() - 0.8).abs() < 1e-12);
+        assert_eq!(camera().principal_px, DVec2::new(320.0, 240.0));
+    }
+
+    #[test]
+    fn what_is_beside_or_behind_is_not_projected() {
+        let c = camera();
+        assert_eq!((c.project(c.center), c.project(c.center - c.forward())), (None, None));
+        assert!(c.project(c.center + c.world_from_camera.x_axis).is_none(), "depth 0");
+        assert!(Camera::look_at(DVec3::ZERO, DVec3::ZERO, DVec3::Z, 0.8, 9, 9).is_none());
+        assert!(Camera::look_at(DVec3::ZERO, DVec3::Z, DVec3::Z, 0.8, 9, 9).is_none());
+        let up = Camera::up_of([&c].into_iter()).expect("one");
+        assert!((up + c.world_from_camera.y_axis).length() < 1e-12);
+        let mut turned = c.clone();
+        turned.world_from_camera =
+            glam::DMat3::from_cols(-c.world_from_camera.x_axis, -c.world_from_camera.y_axis, c.forward());
+        assert!(Camera::up_of([&c, &turned].into_iter()).is_none(), "they cancel");
+        assert!(Camera::up_of([&c, &c, &turned].into_iter()).is_some(), "two of three");
+    }
+
+    #[test]
+    fn every_field_of_a_camera_is_checked_at_its_limit() {
+        let with = |change: &dyn Fn(&mut Camera)| {
+            let mut c = camera();
+            change(&mut c);
+            c.validate()
+        };
+        assert!(with(&|c| (c.width_px, c.height_px) = (Camera::MAX_SIDE_PX, 1)).is_ok());
+        for size in [(0, 9), (9, 0), (Camera::MAX_SIDE_PX + 1, 9), (9, Camera::MAX_SIDE_PX + 1)] {
+            assert_eq!(with(&|c| (c.width_px, c.height_px) = size), Err(CameraError::Size(size.0, size.1)));
+        }
+        for focal in [DVec2::new(0.0, 1.0), DVec2::new(1.0, 0.0), DVec2::new(f64::INFINITY, 1.0)] {
+            assert!(matches!(with(&|c| c.focal_px = focal), Err(CameraError::Focal(..))), "{focal}");
+        }
+        assert!(matches!(with(&|c| c.principal_px.x = f64::NAN), Err(CameraError::Principal(..))));
+        assert!(with(&|c| c.world_from_camera.x_axis *= 1.0004).is_ok(), "8e-4 off");
+        assert!(matches!(with(&|c| c.world_from_camera.x_axis *= 1.0006), Err(CameraError::Rotation(_))));
     }
 }

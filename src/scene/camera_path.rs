@@ -135,7 +135,8 @@ impl PathKey {
             return Err(("center", format!("= ({}, {}, {}) is not finite", c.x, c.y, c.z)));
         }
         if !(c.abs().max_element() <= Camera::FARTHEST) {
-            let reason = format!("= ({}, {}, {}) is farther than {:e} units out", c.x, c.y, c.z, Camera::FARTHEST);
+            let reason =
+                format!("= ({:e}, {:e}, {:e}) is farther than {:e} units out", c.x, c.y, c.z, Camera::FARTHEST);
             return Err(("center", reason));
         }
         let error = rotation_error(&self.world_from_camera);

@@ -277,4 +277,63 @@ mod tests {
         assert_eq!(s.positions[0], [1.0, 2.0, 3.0]);
         s.validate().expect("valid");
     }
+
+    #[test]
+    fn every_field_is_validated_by_name() {
+        let spoilt = |spoil: &dyn Fn(&mut GaussianCloud)| {
+            let mut c = one();
+            spoil(&mut c);
+            c.validate().map_err(|e| e.to_string())
+        };
+        type Spoil = Box<dyn Fn(&mut GaussianCloud)>;
+        let cases: [(Spoil, &str); 11] = [
+            (Box::new(|c| c.origin.z = f64::INFINITY), "Gaussian 0: origin is not finite"),
+            (Box::new(|c| c.positions[0][1] = f32::NAN), "Gaussian 0: position is not finite"),
+            (Box::new(|c| c.log_scales[1][0] = f32::INFINITY), "Gaussian 1: scale is not finite"),
+            (Box::new(|c| c.quaternions[1][3] = f32::NAN), "Gaussian 1: rotation is not finite"),
+            (Box::new(|c| c.opacity_logits[0] = f32::NAN), "Gaussian 0: opacity is not finite"),
+            (Box::new(|c| c.sh[1][2] = f32::NAN), "Gaussian 1: spherical harmonics is not finite"),
+            (Box::new(|c| c.sh_degree = 4), "spherical-harmonics degree 4 is over 3"),
+            (Box::new(|c| c.quaternions.truncate(1)), "array 'quaternions' holds 1 entries, expected 2"),
+            (Box::new(|c| c.opacity_logits.truncate(1)), "array 'opacity_logits' holds 1 entries, expected 2"),
+            (Box::new(|c| c.sh_degree = 1), "array 'sh' holds 2 entries, expected 8"),
+            (
+                Box::new(|c| c.extras.push(ExtraProperty { name: "x".into(), values: vec![0.0] })),
+                "array 'extras' holds 1 entries, expected 2",
+            ),
+        ];
+        for (spoil, expected) in cases {
+            assert_eq!(spoilt(&*spoil), Err(expected.to_owned()));
+        }
+    }
+
+    #[test]
+    fn clouds_are_counted_joined_and_cast() {
+        let extra = |values: [f32; 2]| ExtraProperty { name: "x".into(), values: values.to_vec() };
+        let mut c = GaussianCloud { extras: vec![extra([1.0, 2.0])], origin: DVec3::X, ..one() };
+        c.positions[1] = [1.0, 2.0, 3.0];
+        assert_eq!(c.world_position(1), DVec3::new(2.0, 2.0, 3.0));
+        assert_eq!(c.gaussian(1).position, [1.0, 2.0, 3.0]);
+        // 11 numbers and 3 of a color each, and one more: 2 x 15 x 4 bytes.
+        assert_eq!((c.len(), c.is_empty(), c.bytes()), (2, false, 120));
+        assert!(GaussianCloud::<f32>::default().is_empty());
+        let wide: GaussianCloud<f64> = c.cast();
+        assert_eq!((wide.positions[1], wide.origin, wide.extras.len()), ([1.0, 2.0, 3.0], DVec3::X, 1));
+        assert_eq!(wide.cast::<f32>(), c);
+        assert_eq!(wide.bytes(), 2 * 14 * 8 + 2 * 4);
+        let mut both = c.clone().with_room(9);
+        assert!(both.positions.capacity() >= 9 && both.sh.capacity() >= 9 && both.extras[0].values.capacity() >= 9);
+        both.append(GaussianCloud { extras: vec![extra([3.0, 4.0])], ..c.clone() });
+        both.validate().expect("valid");
+        assert_eq!((both.len(), both.extras[0].values.clone()), (4, vec![1.0, 2.0, 3.0, 4.0]));
+        assert_eq!(both.select(&[2, 3]).positions, c.positions);
+        assert_eq!(both.select(&[3, 0]).extras[0].values, [4.0, 1.0]);
+        let of_degree = |d: u8| {
+            let stride = sh::coefficients(d);
+            GaussianCloud { sh_degree: d, sh: (0..2 * stride).map(|k| [k as f32; 3]).collect(), ..one() }
+        };
+        let second = of_degree(1).select(&[1]);
+        assert_eq!(second.sh, [[4.0; 3], [5.0; 3], [6.0; 3], [7.0; 3]]);
+        assert_eq!((of_degree(1).gaussian(1).sh, of_degree(2).sh_stride()), (&second.sh[..], 9));
+    }
 }

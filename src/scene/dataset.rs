@@ -130,4 +130,21 @@ mod tests {
         let (mean, extent) = d.camera_extent();
         assert!((mean - DVec3::Z).length() < 1e-9 && (extent - 3.3).abs() < 1e-9);
     }
+
+    #[test]
+    fn the_focus_is_what_is_looked_at_and_parallel_views_have_that_of_their_points() {
+        let mut d = ring(7);
+        let shift = DVec3::new(2.0, -1.0, 0.5);
+        d.photos.iter_mut().for_each(|p| p.camera.center += shift);
+        assert!((d.focus() - shift).length() < 1e-9, "{}", d.focus());
+        assert_eq!(d.cameras(), d.photos.iter().map(|p| p.camera.clone()).collect::<Vec<_>>());
+        // Side by side, all looking the same way: no point is nearest to all axes.
+        let first = d.photos[0].camera.clone();
+        for (i, p) in d.photos.iter_mut().enumerate() {
+            p.camera = Camera { center: first.center + first.world_from_camera.x_axis * i as f64, ..first.clone() };
+        }
+        assert!((d.focus() - (first.center + first.forward())).length() < 1e-9);
+        assert_eq!(Dataset::default().focus(), DVec3::ZERO);
+        assert_eq!(Dataset::default().camera_extent(), (DVec3::ZERO, 1.0));
+    }
 }

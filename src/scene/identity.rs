@@ -152,4 +152,23 @@ mod tests {
         assert_eq!(all.add(Level::Part, 77, vec![]), 5);
         assert_eq!(all.get(5).map(|i| i.parent), Some(NOBODY));
     }
+
+    #[test]
+    fn names_are_those_of_the_whole_line() {
+        let mut all = Identities::default();
+        assert!(all.is_empty() && all.len() == 0);
+        let doll = all.add(Level::Object, NOBODY, vec!["red doll".into(), "rosa".into()]);
+        let face = all.add(Level::Part, doll, vec![]);
+        let eye = all.add(Level::Part, face, vec!["eye".into()]);
+        assert!(!all.is_empty() && all.len() == 3);
+        assert_eq!(all.full_name(eye), "eye of the #2 of the red doll");
+        assert_eq!((all.pieces(NOBODY).count(), all.line(NOBODY).count(), all.line(9).count()), (0, 0, 0));
+        // An object's own code and none of a part; a part's both.
+        all.get_mut(doll).expect("there").code = [0.1; 3];
+        all.get_mut(eye).expect("there").code = [0.9; 3];
+        assert_eq!(all.codes(doll), [0.1, 0.1, 0.1, 0.5, 0.5, 0.5]);
+        assert_eq!(all.codes(eye), [0.1, 0.1, 0.1, 0.9, 0.9, 0.9]);
+        assert_eq!(all.codes(NOBODY), [0.5; 6]);
+        assert!(all.get_mut(NOBODY).is_none() && all.get_mut(4).is_none());
+    }
 }

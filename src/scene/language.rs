@@ -41,3 +41,40 @@ impl LanguageFeatures {
             })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Level, NOBODY};
+
+    #[test]
+    fn features_fit_their_identities_or_are_refused() {
+        let mut all = Identities::default();
+        (0..2).for_each(|_| {
+            all.add(Level::Object, NOBODY, vec![]);
+        });
+        let seen = |views: usize, dimension: usize| ViewFeatures {
+            raw: vec![vec![0.5; dimension]; views],
+            deviated: vec![vec![0.5; dimension]; views],
+        };
+        let of = |of: Vec<ViewFeatures>| LanguageFeatures { encoder: "t".into(), dimension: 3, of };
+        let good = of(vec![seen(MAX_VIEWS, 3), seen(0, 3)]);
+        assert!(good.is_valid(&all));
+        assert_eq!(
+            (good.get(1).map(|f| f.raw.len()), good.get(2), good.get(0), good.get(3)),
+            (Some(4), None, None, None)
+        );
+        assert!(!of(vec![seen(1, 3)]).is_valid(&all), "one is missing");
+        assert!(!of(vec![seen(1, 3), seen(1, 2)]).is_valid(&all), "too short");
+        assert!(!of(vec![seen(1, 3), seen(MAX_VIEWS + 1, 3)]).is_valid(&all), "too many");
+        let mut odd = good.clone();
+        odd.of[0].deviated.pop();
+        assert!(!odd.is_valid(&all), "raw and deviated are pairs");
+        for (k, bad) in [f32::NAN, f32::INFINITY].into_iter().enumerate() {
+            let mut poisoned = good.clone();
+            let of = &mut poisoned.of[0];
+            (if k == 0 { &mut of.raw } else { &mut of.deviated })[2][1] = bad;
+            assert!(!poisoned.is_valid(&all), "{bad}");
+        }
+    }
+}

@@ -208,4 +208,28 @@ mod tests {
         assert_eq!(small, Mask::from_fn(10, 5, |i| i % 10 >= 5));
         assert_eq!(small.resized(40, 20), mask);
     }
+
+    #[test]
+    fn boxes_polygons_and_sizes_of_odd_numbers() {
+        // 70 x 3: rows begin within words.
+        let mask = Mask::from_fn(70, 3, |i| i == 69 || i == 71 || i == 3 * 70 - 1);
+        assert_eq!(mask.pixels().collect::<Vec<_>>(), [69, 71, 209]);
+        assert_eq!(mask.bounds(), Some(PixelBox { x: 1..70, y: 0..3 }));
+        assert_eq!((mask.width_px(), mask.height_px(), mask.area()), (70, 3, 3));
+        assert!(PixelBox { x: 1..3, y: 4..5 }.contains(2, 4) && !PixelBox { x: 1..3, y: 4..5 }.contains(3, 4));
+        // A triangle, by hand: rows 0 to 4, from column 0 to the row's number.
+        let triangle = Mask::from_polygon(9, 9, &[[0.0, 0.0], [4.0, 4.0], [0.0, 4.0]]);
+        let rows = |m: &Mask| (0..9).map(|y| (0..9).filter(|x| m.contains(y * 9 + x)).count()).collect::<Vec<_>>();
+        assert!(
+            rows(&triangle)[..4].iter().zip([1, 2, 3, 4]).all(|(a, b)| a.abs_diff(b) <= 1),
+            "{:?}",
+            rows(&triangle)
+        );
+        assert_eq!(rows(&triangle)[5..], [0; 4]);
+        // 3 pixels of 2: the centres are at 1/3, 1 and 5/3, that is pixels 0, 1 and 1.
+        let two = Mask::from_fn(2, 2, |i| i == 0);
+        assert_eq!(two.resized(3, 3), Mask::from_fn(3, 3, |i| i == 0));
+        assert_eq!(two.resized(4, 2), Mask::from_fn(4, 2, |i| i < 2));
+        assert_eq!(Mask::from_fn(5, 1, |i| i == 2).resized(1, 1).area(), 1);
+    }
 }

@@ -71,3 +71,14 @@ impl PhotoPixels {
         self.rgb.is_empty()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_are_counted() {
+        let photo = |n: usize| PhotoPixels { width_px: n as u32, height_px: 1, rgb: vec![[0; 3]; n], coverage: None };
+        assert_eq!((photo(3).len(), photo(3).is_empty(), photo(0).is_empty()), (3, false, true));
+    }
+}

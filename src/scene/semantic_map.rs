@@ -155,4 +155,24 @@ mod tests {
         }
         assert_eq!(SemanticMap::restore(identities, vec![], &GaussianCloud::default()), None);
     }
+
+    #[test]
+    fn maps_are_counted_and_codes_are_those_of_object_and_part() {
+        let mut all = Identities::default();
+        let doll = all.add(Level::Object, NOBODY, vec![]);
+        assert!(!SemanticMap { identities: all.clone(), ..SemanticMap::default() }.has_parts());
+        let eye = all.add(Level::Part, doll, vec![]);
+        all.get_mut(doll).expect("there").code = [0.1, 0.2, 0.3];
+        all.get_mut(eye).expect("there").code = [0.7, 0.8, 0.9];
+        let mut map = SemanticMap::of_identities(all, vec![doll, eye, NOBODY, 99], vec![1.0; 4], vec![]);
+        assert!(map.has_parts());
+        let codes = [[0.1, 0.2, 0.3, 0.5, 0.5, 0.5], [0.1, 0.2, 0.3, 0.7, 0.8, 0.9], [0.5; 6], [0.5; 6]];
+        assert_eq!(map.codes, codes);
+        // Eight numbers of 4 bytes a Gaussian; two views of three numbers, raw and deviated.
+        assert_eq!(map.bytes(), 4 * 32);
+        let seen = crate::scene::ViewFeatures { raw: vec![vec![0.0; 3]; 2], deviated: vec![vec![0.0; 3]; 2] };
+        map.language = Some(LanguageFeatures { encoder: "t".into(), dimension: 3, of: vec![seen] });
+        assert_eq!(map.bytes(), 4 * 32 + 4 * 3 * 4);
+        assert_eq!(map.sizes(), [1, 2, 1]);
+    }
 }

@@ -223,7 +223,7 @@ impl AppState {
     pub fn fail(&mut self, doing: impl Into<String>, failure: Failure) {
         let doing = text::line(&doing.into()).into_owned();
         let [message, remedy] = [&failure.message, &failure.remedy].map(|t| text::lines(t).into_owned());
-        let failure = Failure { message, remedy, ..failure };
+        let failure = Failure { message, remedy };
         self.say(Tone::Error, format!("{doing}: {}", failure.message));
         self.error = Some(ErrorBox { doing, failure });
     }

@@ -173,8 +173,7 @@ impl PipelineJobs {
         cloud: &GaussianCloud,
         photos: &[Photo],
         (settings, side_px): (&RenderSettings, u32),
-        masks: Option<&Path>,
-        with: &Finding,
+        (masks, with): (Option<&Path>, &Finding),
         out: &Path,
         observer: &mut dyn Observer,
     ) -> Result<Outcome, Stop> {
@@ -338,7 +337,7 @@ impl Jobs for PipelineJobs {
             Command::FindObjects { dataset, cloud, holdout_every, settings, side_px, masks, with, out } => {
                 let (training, _) = dataset.split(holdout_every);
                 let photos: Vec<Photo> = training.iter().map(|&i| dataset.photos[i].clone()).collect();
-                self.find(&cloud, &photos, (&settings, side_px), masks.as_deref(), &with, &out, observer)
+                self.find(&cloud, &photos, (&settings, side_px), (masks.as_deref(), &with), &out, observer)
             }
             Command::EditObjects { cloud, map, settings, request, out } => {
                 let new = edit::run(&cloud, &map, &settings, &request)?;

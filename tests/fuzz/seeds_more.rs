@@ -46,6 +46,7 @@ pub fn all() -> Vec<Seed> {
         ("report", "one.json", report().to_string().into_bytes()),
         ("checkpoint", "none.bin", checkpoint(&header(0, 0))),
         ("checkpoint", "two.bin", checkpoint(&header(2, 1))),
+        ("checkpoint", "two_summed.bin", summed(checkpoint(&header(2, 1)))),
         ("followed_frame", "small.frame", frame()),
     ];
     let networks = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/networks");
@@ -246,6 +247,13 @@ fn checkpoint(header: &Header) -> Vec<u8> {
     out.extend(text);
     out.extend(vec![0; header.count * per_gaussian]);
     out
+}
+
+/// The same as it is written today: with a checksum at its end.
+fn summed(mut checkpoint: Vec<u8>) -> Vec<u8> {
+    checkpoint[7] = b'2';
+    checkpoint.extend([0; 32]);
+    super::repair::repaired(checkpoint)
 }
 
 /// Three arrays, as they are kept of a followed frame.

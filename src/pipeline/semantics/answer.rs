@@ -189,6 +189,7 @@ impl Answered {
 
 #[cfg(test)]
 mod tests {
+    use super::super::localise::Hit;
     use super::*;
     use crate::scene::{Level, NOBODY, ViewFeatures};
 
@@ -240,5 +241,50 @@ mod tests {
         let (all, _) = scene();
         assert_eq!(a.mask(&map, &all, 1).area(), 2, "a piece belongs to its whole");
         assert_eq!(a.heat(&map)[2], 0.0);
+    }
+
+    #[test]
+    fn meaning_comes_first_where_a_word_is_unknown_and_names_where_it_finds_nothing() {
+        let (all, features) = scene();
+        let ask = |text: &str, to: [f32; 3]| {
+            let phrase = Phrase::parse(text).expect("a phrase");
+            let mut phrases = Phrasebook::default();
+            let encode = |p: &str| Ok::<_, ()>(if p == text { to.to_vec() } else { vec![0.0, 0.0, -1.0] });
+            phrases.learn(&phrases_of(&phrase), encode).expect("encodes");
+            let language = Language { features: &features, phrases: &phrases, options: MeaningOptions::default() };
+            answer(&all, &phrase, Kind::Auto, Some(language))
+        };
+        let a = ask("beige lamp", [1.0, 0.0, 0.0]);
+        assert_eq!((a.basis, a.chosen(1)), (Basis::Meaning, vec![3]), "by name it would be the lamp");
+        let a = ask("beige lamp", [0.0, 0.0, -1.0]);
+        assert_eq!((a.basis, a.chosen(1)), (Basis::Names, vec![1]));
+        let a = ask("mug", [0.0, 1.0, 0.0]);
+        assert_eq!((a.basis, a.chosen(1)), (Basis::Names, vec![3]), "a known name is not asked of the encoder");
+        assert_eq!((a.threshold(), ask("cup", [1.0, 0.0, 0.0]).threshold()), (names::THRESHOLD, 0.5));
+    }
+
+    #[test]
+    fn those_that_fit_alike_are_all_chosen_and_top_is_a_limit() {
+        let answered = |answer: fn(Vec<Hit>) -> Answer, scores: &[f32]| Answered {
+            answer: answer(
+                scores
+                    .iter()
+                    .enumerate()
+                    .map(|(i, s)| Hit { identity: i as IdentityId + 1, score: *s, margin: 0.0 })
+                    .collect(),
+            ),
+            basis: Basis::Names,
+            relevancy: vec![0.0, 0.25, 0.5],
+            stages: StagesMs::default(),
+        };
+        let hits = [0.9, 0.89, 0.6, 0.3];
+        assert_eq!(answered(Answer::Ambiguous, &hits).chosen(1), [1, 2], "0.01 apart, under 0.02");
+        assert_eq!(answered(Answer::Ambiguous, &hits).chosen(3), [1, 2, 3]);
+        assert_eq!(answered(Answer::Found, &hits).chosen(0), [1]);
+        assert_eq!(answered(Answer::Found, &hits).chosen(9), [1, 2, 3], "0.3 is under the threshold");
+        assert_eq!(answered(Answer::Found, &[0.45]).chosen(1), [1], "on it is enough");
+        assert!(answered(Answer::NotFound, &hits).chosen(9).is_empty());
+        let view = ViewMap { width_px: 4, height_px: 1, identity: vec![0, 2, 1, 77], share: vec![], alpha: vec![] };
+        assert_eq!(answered(Answer::Found, &hits).heat(&view), [0.0, 0.5, 0.25, 0.0]);
     }
 }

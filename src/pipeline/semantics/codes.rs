@@ -152,4 +152,42 @@ mod tests {
         let far: f32 = (1..31).map(|i| code(i).distance(code(i + 30))).sum::<f32>() / 30.0;
         assert!(next > far && next > 0.7, "{next} {far}");
     }
+
+    #[test]
+    fn the_first_directions_are_where_they_repel_each_other_to() {
+        // Two are opposite, four a tetrahedron, six an octahedron: least cosines known by hand.
+        for (n, cosine) in [(2, -1.0), (4, -1.0 / 3.0), (6, 0.0)] {
+            let points = sphere(n);
+            let pairs = (0..n).flat_map(|i| (0..i).map(move |j| (i, j)));
+            let nearest = pairs.map(|(i, j)| points[i].dot(points[j])).fold(-1.0, f32::max);
+            assert!((nearest - cosine).abs() < 0.2, "{n}: {nearest}");
+        }
+        // Of many, none is much nearer to another than they are on average.
+        let points = sphere(120);
+        let next = |i: usize| (0..120).filter(|j| *j != i).map(|j| points[i].distance(points[j])).fold(9.0, f32::min);
+        let spacing = (4.0 * std::f32::consts::PI / 120.0_f32).sqrt();
+        let (least, mean) = (0..120).map(next).fold((9.0_f32, 0.0), |(l, m), d| (l.min(d), m + d / 120.0));
+        assert!(least > 0.85 * spacing && mean > 0.92 * spacing, "{least} {mean} of {spacing}");
+    }
+
+    #[test]
+    fn of_three_the_near_pair_is_farther_apart_in_code_space() {
+        for (place, near, far) in [(1.0, [1, 2], [1, 3]), (9.0, [2, 3], [1, 2])] {
+            let mut all = Identities::default();
+            (0..8).for_each(|_| {
+                all.add(Level::Object, NOBODY, vec![]);
+            });
+            let mut centers: Vec<DVec3> = (0..8).map(|i| DVec3::new(0.0, 100.0 * f64::from(i), 0.0)).collect();
+            (centers[0], centers[1], centers[2]) =
+                (DVec3::ZERO, DVec3::new(place, 0.0, 0.0), DVec3::new(10.0, 0.0, 0.0));
+            assign(&mut all, &centers);
+            let apart = |pair: [u32; 2]| {
+                let code = |i: u32| Vec3::from(all.get(i).expect("there").code);
+                code(pair[0]).distance(code(pair[1]))
+            };
+            assert!(apart(near) > apart(far) - 0.05 && apart(near) > 0.7, "{place}: {} {}", apart(near), apart(far));
+            let on_sphere = |c: [f32; 3]| ((Vec3::from(c) - Vec3::splat(0.5)).length() - RADIUS).abs() < 1e-5;
+            assert!(all.iter().all(|(_, i)| on_sphere(i.code)));
+        }
+    }
 }

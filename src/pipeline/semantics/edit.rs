@@ -311,4 +311,46 @@ mod tests {
         assert!(matches!(add(1, 40..50), Err(EditError::Nothing(_))));
         assert!(matches!(add(NOBODY, 0..5), Err(EditError::Nothing(_))), "all of it is somebody's");
     }
+
+    #[test]
+    fn a_new_code_is_far_from_all_others() {
+        let (map, cloud) = scene();
+        let new =
+            apply(&map, &cloud, &Edit::AddPiece { of: 1, name: " ".into(), gaussians: vec![0, 1] }).expect("added");
+        let code = |id: u32| Vec3::from(new.identities.get(id).expect("there").code);
+        assert!(((code(5) - Vec3::splat(0.5)).length() - RADIUS).abs() < 1e-5, "on the sphere");
+        // Four codes are taken; a fifth can be a right angle from the nearest, nearly: 0.7 x 0.5 x 1.4.
+        let nearest = (1..5).map(|id| code(id).distance(code(5))).fold(9.0, f32::min);
+        assert!(nearest > 0.45, "{nearest}");
+        assert!(new.identities.get(5).is_some_and(|i| i.names.is_empty()), "no name is none");
+    }
+
+    #[test]
+    fn crumbs_stay_with_the_largest_and_halves_are_cut_across_the_longest_axis() {
+        // 20 here, 10 there, 3 elsewhere.
+        let place = |i: usize| match i {
+            0..20 => [0.01 * i as f32, 0.0, 0.0],
+            20..30 => [5.0, 0.01 * i as f32, 0.0],
+            _ => [0.0, 9.0, 0.01 * i as f32],
+        };
+        let cloud = |n: usize, place: &dyn Fn(usize) -> [f32; 3]| GaussianCloud {
+            positions: (0..n).map(place).collect(),
+            ..GaussianCloud::default()
+        };
+        let own: Vec<usize> = (0..33).collect();
+        let found = pieces(&cloud(33, &place), &own).expect("enough");
+        let mut sizes: Vec<usize> = found.iter().map(Vec::len).collect();
+        assert_eq!((sizes.as_slice(), found[1].iter().min()), (&[23, 10][..], Some(&20)));
+        // Eight are a piece, seven are not.
+        for (small, expected) in [(8, vec![20, 8]), (7, vec![14, 13])] {
+            let all: Vec<usize> = (0..20 + small).collect();
+            sizes = pieces(&cloud(20 + small, &place), &all).expect("enough").iter().map(Vec::len).collect();
+            assert_eq!(sizes, expected);
+        }
+        assert!(pieces(&cloud(33, &place), &own[..15]).is_none());
+        // Longest along y, although farther off along x.
+        let long = |i: usize| [100.0, 0.1 * (i % 16) as f32, 0.01 * i as f32];
+        let halves = pieces(&cloud(16, &long), &(0..16).collect::<Vec<_>>()).expect("enough");
+        assert_eq!(halves, [(0..8).collect::<Vec<_>>(), (8..16).collect()]);
+    }
 }

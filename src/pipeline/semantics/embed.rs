@@ -296,4 +296,20 @@ mod tests {
         assert_eq!(c[..2], [2.0, 1.0]);
         assert!(c[2] < 1.0, "{c:?}");
     }
+
+    #[test]
+    fn every_edge_of_the_picture_cuts() {
+        let mut all = Identities::default();
+        (0..5).for_each(|_| {
+            all.add(Level::Object, NOBODY, vec![]);
+        });
+        // Left, right, upper and lower edge: four pixels each, two of them at the edge; one in the middle.
+        let places = [[20, 21, 30, 31], [28, 29, 38, 39], [4, 5, 14, 15], [84, 85, 94, 95], [44, 45, 54, 55]];
+        let mut identity = vec![NOBODY; 100];
+        places.iter().enumerate().for_each(|(k, p)| p.iter().for_each(|i| identity[*i] = k as IdentityId + 1));
+        let view = ViewMap { width_px: 10, height_px: 10, identity, share: vec![1.0; 100], alpha: vec![1.0; 100] };
+        // 4 / (1 + 4 x 2 / sqrt(4)) = 0.8.
+        let c = counts(&view, &all);
+        assert!(c[..4].iter().all(|c| (c - 0.8).abs() < 1e-12) && c[4] == 4.0, "{c:?}");
+    }
 }

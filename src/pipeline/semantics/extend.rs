@@ -118,4 +118,20 @@ mod tests {
         assert_eq!((b[3].margin, b[4].margin), (0.5, 0.0));
         extend(&GaussianCloud::default(), &mut []);
     }
+
+    #[test]
+    fn inheritance_ends_after_forty_steps_and_a_change_of_color_costs_some() {
+        // One step a Gaussian; half of red more costs six.
+        for (jump, reach) in [(0.0, 40), (0.5, 34)] {
+            let mut cloud = row(60, 60);
+            cloud.sh[5..].iter_mut().for_each(|c| c[0] += (jump / SH_C0) as f32);
+            let mut b = vec![Belonging { identity: UNKNOWN, margin: 0.0 }; 60];
+            b[0].identity = 3;
+            extend(&cloud, &mut b);
+            let reached = b.iter().filter(|b| b.identity == 3).count();
+            // Half a step either way for rounding; the first one counts.
+            assert!((reach..=reach + 1).contains(&reached), "{jump}: {reached}");
+            assert!(b[..reached].iter().all(|b| b.identity == 3) && b[reached..].iter().all(|b| b.identity == NOBODY));
+        }
+    }
 }

@@ -239,3 +239,191 @@ pub fn centers(cloud: &GaussianCloud, of: &[IdentityId], identities: &Identities
     }
     sums.iter().map(|(sum, n)| if *n > 0.0 { *sum / *n } else { DVec3::ZERO }).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use super::*;
+    use crate::pipeline::observer::Silent;
+    use crate::pipeline::semantics::segmenter::FoundMask;
+    use crate::scene::{Camera, Level as Of, Mask, NOBODY};
+
+    /// A doll with an eye on the left, a cat on the right: whose the Gaussians are.
+    const TRUTH: [IdentityId; 15] = [1, 1, 1, 1, 1, 1, 2, 2, 2, 3, 3, 3, 3, 3, 3];
+
+    fn cloud() -> GaussianCloud {
+        let place = |i: usize| {
+            let (x, of) = if i < 6 {
+                (-0.8, 0)
+            } else if i < 9 {
+                (-0.45, 6)
+            } else {
+                (0.5, 9)
+            };
+            [x + 0.02 * (i % 2) as f32, 0.1 * (i - of) as f32 - 0.2, 0.0]
+        };
+        let color = |i: usize| if i < 9 { [1.0, 0.0, 0.0] } else { [0.0, 0.0, 1.0] };
+        GaussianCloud {
+            positions: (0..15).map(place).collect(),
+            log_scales: vec![[-2.4; 3]; 15],
+            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 15],
+            opacity_logits: vec![5.0; 15],
+            sh: (0..15).map(color).collect(),
+            ..GaussianCloud::default()
+        }
+    }
+
+    /// The first photo shows the doll alone, the second everything.
+    fn photos() -> Vec<Photo> {
+        let photo = |name: &str, x: f64, away: f64| Photo {
+            name: name.into(),
+            path: PathBuf::new(),
+            camera: Camera::look_at(DVec3::new(x, 0.0, -away), DVec3::new(x, 0.0, 0.0), DVec3::NEG_Y, 0.7, 96, 64)
+                .expect("valid"),
+            distortion: None,
+            test_split: false,
+            background: None,
+        };
+        vec![photo("near", -0.75, 1.6), photo("far", 0.0, 3.2)]
+    }
+
+    /// Knows the truth, and says it with names or without.
+    struct Told {
+        named: bool,
+        covers: bool,
+    }
+
+    impl Segmenter for Told {
+        fn name(&self) -> &str {
+            "told"
+        }
+
+        fn covers(&self, _: &Photo) -> bool {
+            self.covers
+        }
+
+        fn segment(
+            &mut self,
+            photo: &Photo,
+            max_side_px: u32,
+            _: &mut dyn Observer,
+        ) -> Result<Vec<FoundMask>, SegmentError> {
+            let mut all = Identities::default();
+            let doll = all.add(Of::Object, NOBODY, vec![]);
+            all.add(Of::Part, doll, vec![]);
+            all.add(Of::Object, NOBODY, vec![]);
+            let camera = photo.camera.limited_to(max_side_px);
+            let settings = RenderSettings::default();
+            let view = ViewMap::render(&mut Renderer::new(), &cloud(), &TRUTH, &all, &camera, &settings);
+            let view = view.expect("drawn");
+            let mask = |id: IdentityId| -> Mask { view.mask(&all, id) };
+            let list = [("doll", 1, Of::Object, None), ("eye", 2, Of::Part, Some(0)), ("cat", 3, Of::Object, None)];
+            let told = list.map(|(name, id, level, parent)| FoundMask {
+                level,
+                parent,
+                name: self.named.then(|| name.to_owned()),
+                mask: mask(id),
+            });
+            Ok(told.into_iter().filter(|m| !m.mask.is_empty()).collect())
+        }
+    }
+
+    fn find(told: Told, lifting: Lifting, max_seeds: usize, observer: &mut dyn Observer) -> Result<Found, FindError> {
+        let mut told = told;
+        let tools = Tools { segmenter: &mut told, follower: None, encoder: None };
+        let track = TrackOptions { max_seeds, ..TrackOptions::default() };
+        let options = FindOptions { track, lifting };
+        find_objects(&cloud(), &photos(), &RenderSettings::default(), tools, &options, observer)
+    }
+
+    #[test]
+    fn what_a_second_photo_shows_is_found_too() {
+        for named in [true, false] {
+            let found = find(Told { named, covers: true }, Lifting::Votes, 12, &mut Silent).expect("found");
+            let map = &found.map;
+            assert_eq!((map.of.as_slice(), map.seeds.as_slice()), (&TRUTH[..], &["near".into(), "far".to_owned()][..]));
+            let list: Vec<_> = map.identities.iter().map(|(_, i)| (i.level, i.parent, i.names.clone())).collect();
+            let names = |name: &str| if named { vec![name.to_owned()] } else { vec![] };
+            let expected = [(Of::Object, 0, names("doll")), (Of::Part, 1, names("eye")), (Of::Object, 0, names("cat"))];
+            assert_eq!(list, expected);
+            assert!(found.disagreements.is_empty(), "{:?}", found.disagreements);
+            assert!(map.margin.iter().all(|m| *m > 0.5), "{:?}", map.margin);
+            let codes: Vec<_> = map.of.iter().map(|id| map.identities.codes(*id)).collect();
+            assert_eq!(map.codes, codes);
+            let seen = |k: usize| found.views[k].seen.iter().map(|s| s.identity).collect::<Vec<_>>();
+            assert_eq!((seen(0), seen(1)), (vec![1, 2], vec![1, 2, 3]));
+            assert!(found.views.iter().all(|v| v.unknown == 0.0), "{:?}", found.views);
+            let stages: Vec<&str> = found.secs.iter().map(|s| s.0).collect();
+            assert_eq!(stages, ["segment", "encode frames", "follow masks", "carry by Gaussians", "train codes"]);
+        }
+    }
+
+    #[test]
+    fn what_no_mask_reached_is_nobodys_and_told() {
+        struct Notes(Vec<String>);
+        impl Observer for Notes {
+            fn note(&mut self, _: Level, text: String) {
+                self.0.push(text);
+            }
+        }
+        let mut notes = Notes(vec![]);
+        let found = find(Told { named: true, covers: true }, Lifting::Votes, 1, &mut notes).expect("found");
+        assert_eq!(found.map.identities.len(), 2);
+        assert_eq!((&found.map.of[..9], &found.map.of[9..]), (&TRUTH[..9], &[NOBODY; 6][..]));
+        // The far photo shows the cat, which is about as large as the doll.
+        assert!((0.01..0.3).contains(&found.views[1].unknown) && found.views[0].unknown == 0.0);
+        assert!(
+            notes.0.iter().any(|n| n.starts_with("1 of 2 photos show more than 0%") && n.contains("far")),
+            "{:?}",
+            notes.0
+        );
+        let views = [0.2, 0.004, 0.5].map(|unknown| ViewReport { photo: 0, unknown, seen: vec![] });
+        let text = unknown(&views, &photos(), 0.1).expect("two");
+        assert!(text.starts_with("2 of 3 photos show more than 10%") && text.contains("most: near, 50%"), "{text}");
+        assert_eq!(unknown(&views, &photos(), 0.5), None, "as much is not more");
+    }
+
+    #[test]
+    fn every_way_of_lifting_ends_at_the_same_identities() {
+        let told = || Told { named: true, covers: true };
+        let votes = find(told(), Lifting::Votes, 12, &mut Silent).expect("found").map;
+        for lifting in [Lifting::Refined(40), Lifting::Paper(160)] {
+            let map = find(told(), lifting, 12, &mut Silent).expect("found").map;
+            assert_eq!(map.of, TRUTH, "{lifting:?}");
+            assert_ne!(map.codes, votes.codes, "{lifting:?} trains");
+            let far = |a: &[f32; 6], b: &[f32; 6]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            let worst = map.codes.iter().zip(&votes.codes).map(|(a, b)| far(a, b)).fold(0.0, f32::max);
+            assert!(worst < 0.25, "{lifting:?}: {worst}");
+        }
+    }
+
+    #[test]
+    fn nothing_to_begin_with_and_a_stop_are_told() {
+        struct Stop;
+        impl Observer for Stop {
+            fn signal(&self) -> Signal {
+                Signal::Cancel
+            }
+        }
+        let nothing = find(Told { named: true, covers: false }, Lifting::Votes, 12, &mut Silent).expect_err("no masks");
+        assert!(!nothing.is_cancelled() && nothing.to_string().contains("'told'"), "{nothing}");
+        let stopped = find(Told { named: true, covers: true }, Lifting::Votes, 12, &mut Stop).expect_err("stopped");
+        assert!(stopped.is_cancelled(), "{stopped}");
+    }
+
+    #[test]
+    fn centers_are_means_and_wholes_count_their_pieces() {
+        let mut all = Identities::default();
+        let doll = all.add(Of::Object, NOBODY, vec![]);
+        let eye = all.add(Of::Part, doll, vec![]);
+        all.add(Of::Object, NOBODY, vec![]);
+        let cloud = GaussianCloud {
+            origin: DVec3::new(10.0, 0.0, 0.0),
+            positions: vec![[1.0, 0.0, 0.0], [3.0, 6.0, 0.0], [5.0, 0.0, 3.0], [9.0; 3]],
+            ..GaussianCloud::default()
+        };
+        let found = centers(&cloud, &[doll, eye, eye, NOBODY], &all);
+        assert_eq!(found, [DVec3::new(13.0, 2.0, 1.0), DVec3::new(14.0, 3.0, 1.5), DVec3::ZERO]);
+    }
+}

@@ -238,4 +238,32 @@ mod tests {
         // The cup is where the pot was; the jug there is new, and says nothing about the pot.
         assert_eq!(disagreements(&masks, &links, &map, &all), [Disagreement::Switch(cup, pot)]);
     }
+
+    #[test]
+    fn half_of_both_is_needed_and_a_dozen_pixels() {
+        let mut all = Identities::default();
+        let cup = all.add(Level::Object, NOBODY, vec![]);
+        let view = |from: usize, to: usize| {
+            let identity = (0..100).map(|i| if (from..to).contains(&i) { cup } else { NOBODY }).collect();
+            ViewMap { width_px: 100, height_px: 1, identity, share: vec![1.0; 100], alpha: vec![1.0; 100] }
+        };
+        let one = |known: (usize, usize), seen: (usize, usize)| {
+            link(&[found(Level::Object, None, mask(seen.0, seen.1))], Some(&view(known.0, known.1)), &all)[0]
+        };
+        assert_eq!(one((0, 40), (20, 60)), Link::Known(cup), "half of what is known, half of the mask");
+        assert_eq!(one((0, 40), (21, 60)), Link::New, "less of what is known");
+        assert_eq!(one((0, 40), (20, 61)), Link::New, "less of the mask");
+        assert_eq!(one((0, 12), (0, 12)), Link::Known(cup));
+        assert_eq!(one((0, 11), (0, 11)), Link::New, "too small to say");
+        // Where nothing is known, the mask may be larger.
+        let mut map = view(0, 20);
+        map.identity[20..].fill(UNKNOWN);
+        assert_eq!(link(&[found(Level::Object, None, mask(0, 90))], Some(&map), &all), [Link::Known(cup)]);
+        // A part is no object, and a lone part fits parts only.
+        assert_eq!(link(&[found(Level::Part, None, mask(0, 20))], Some(&map), &all), [Link::New]);
+        let handle = all.add(Level::Part, cup, vec![]);
+        map.identity[..20].fill(handle);
+        assert_eq!(link(&[found(Level::Part, None, mask(0, 20))], Some(&map), &all), [Link::Known(handle)]);
+        assert_eq!(link(&[found(Level::Part, None, mask(0, 20))], None, &all), [Link::New]);
+    }
 }

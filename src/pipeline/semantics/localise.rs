@@ -323,4 +323,73 @@ mod tests {
         assert!(matches!(&answer, Answer::Found(hits) if hits[0].identity == 2), "{answer:?}");
         assert!(matches!(ask([0.4; 7], [0.4; 7]), Answer::NotFound(_)));
     }
+
+    #[test]
+    fn one_usable_piece_is_enough_and_the_threshold_itself_counts() {
+        let all = scene();
+        let phrase = Phrase::parse("a button of the red controller").expect("a phrase");
+        let text = "button of the red controller";
+        // Identities: 1 red (2 button, 3 stick), 4 blue (5, 6), 7 lamp.
+        let paper = |step1: [f32; 7], step2: [f32; 7]| {
+            let rows = vec![(text, None, step1.to_vec()), (text, Some("red controller"), step2.to_vec())];
+            localise(&all, &phrase, Kind::Auto, &mut Table(Strategy::Paper, rows))
+        };
+        // The object wins with just the threshold; of its pieces only the first reaches it.
+        let answer = paper([0.5, 0.3, 0.4, 0.2, 0.1, 0.1, 0.1], [0.9, 0.5, 0.4, 0.9, 0.9, 0.9, 0.9]);
+        assert_eq!((answer.verdict(), answer.hits()[0].identity, answer.hits().len()), ("found", 2, 2));
+        assert!((answer.hits()[0].margin - 0.1).abs() < 1e-6 && answer.hits()[1].margin == 0.4);
+        // None reaches it: the order of step 1, in which none does either.
+        let answer = paper([0.5, 0.3, 0.4, 0.2, 0.1, 0.1, 0.1], [0.9, 0.49, 0.4, 0.9, 0.9, 0.9, 0.9]);
+        assert_eq!((answer.verdict(), answer.hits()[0].identity), ("not found", 3));
+        // An object without parts has no piece.
+        assert_eq!(paper([0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.9], [0.9; 7]).verdict(), "not found");
+    }
+
+    #[test]
+    fn the_whole_by_its_phrase_then_its_pieces_by_theirs() {
+        let all = scene();
+        let phrase = Phrase::parse("a button of the red controller").expect("a phrase");
+        let first = |whole: [f32; 7], plain: [f32; 7], against: [f32; 7]| {
+            let rows = vec![
+                ("red controller", None, whole.to_vec()),
+                ("button", None, plain.to_vec()),
+                ("button", Some("red controller"), against.to_vec()),
+            ];
+            localise(&all, &phrase, Kind::Auto, &mut Table(Strategy::WholeFirst, rows))
+        };
+        let pieces = |answer: &Answer| answer.hits().iter().map(|h| h.identity).collect::<Vec<_>>();
+        let whole = [0.9, 0.1, 0.1, 0.8, 0.1, 0.1, 0.95];
+        // The lamp fits best but has no pieces; the red one's compete, by the second step.
+        let answer = first(whole, [0.1, 0.6, 0.9, 0.1, 0.9, 0.9, 0.1], [0.1, 0.7, 0.5, 0.1, 0.9, 0.9, 0.1]);
+        assert_eq!((pieces(&answer), answer.verdict()), (vec![2, 3], "found"));
+        // Pushed below the threshold, all of them: the first order.
+        let answer = first(whole, [0.1, 0.6, 0.9, 0.1, 0.9, 0.9, 0.1], [0.1, 0.4, 0.3, 0.1, 0.9, 0.9, 0.1]);
+        assert_eq!(pieces(&answer), [3, 2]);
+        // Wholes that cannot be told apart both take part; those just told apart do not.
+        let alike = [0.9, 0.1, 0.1, 0.8995, 0.1, 0.1, 0.1];
+        let scores = [0.1, 0.6, 0.5, 0.1, 0.7, 0.5, 0.1];
+        assert_eq!(pieces(&first(alike, scores, scores)), [5, 2, 3, 6]);
+        let apart = [0.9, 0.1, 0.1, 0.899, 0.1, 0.1, 0.1];
+        assert_eq!(pieces(&first(apart, scores, scores)), [2, 3]);
+        let low = [0.4; 7];
+        assert_eq!(first(low, scores, scores).verdict(), "not found");
+    }
+
+    #[test]
+    fn two_that_are_nearly_alike_are_ambiguous_unless_one_is_in_the_other() {
+        let all = scene();
+        let phrase = Phrase::parse("thing").expect("a phrase");
+        let ask = |scores: [f32; 7]| {
+            let mut table = Table(Strategy::OneStep, vec![("thing", None, scores.to_vec())]);
+            localise(&all, &phrase, Kind::Auto, &mut table)
+        };
+        assert_eq!(ask([0.9, 0.1, 0.1, 0.8995, 0.1, 0.1, 0.1]).verdict(), "ambiguous");
+        assert_eq!(ask([0.9, 0.1, 0.1, 0.898, 0.1, 0.1, 0.1]).verdict(), "found");
+        assert_eq!(ask([0.9, 0.8995, 0.1, 0.1, 0.1, 0.1, 0.1]).verdict(), "found", "a piece of it");
+        assert_eq!(ask([0.8995, 0.9, 0.1, 0.1, 0.1, 0.1, 0.1]).verdict(), "found", "its whole");
+        let answer = ask([f32::NAN, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6]);
+        let order: Vec<_> = answer.hits().iter().map(|h| h.identity).collect();
+        assert_eq!(order, [7, 6, 5, 4, 3, 2], "what is no number is none");
+        assert!(answer.hits().iter().take(5).all(|h| (h.margin - 0.1).abs() < 1e-6), "{answer:?}");
+    }
 }

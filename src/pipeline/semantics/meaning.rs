@@ -195,4 +195,34 @@ mod tests {
         assert_eq!(book.learn(&["pot"], |_| Err("no")), Err("no"));
         assert!(book.get("pot").is_none());
     }
+
+    #[test]
+    fn scores_are_kept_by_phrase_and_whole() {
+        let (features, phrases) = (features(), book());
+        let fresh = |phrase: &str, whole: Option<&str>| {
+            ByMeaning::new(&features, &phrases, MeaningOptions::default()).scores(phrase, whole)
+        };
+        let asked = [("lid", None), ("pot", None), ("lid", Some("pot")), ("pot", Some("lid")), ("lid", None)];
+        let mut by = ByMeaning::new(&features, &phrases, MeaningOptions::default());
+        for (phrase, whole) in asked {
+            assert_eq!(by.scores(phrase, whole), fresh(phrase, whole), "{phrase} {whole:?}");
+        }
+        assert_ne!(fresh("lid", None), fresh("pot", None));
+        assert_ne!(fresh("pot", None), fresh("pot", Some("pot")));
+        // The slope of the logistic curve at its middle is a quarter.
+        assert!((resolution(TEMPERATURE) - 0.005 * TEMPERATURE / 4.0).abs() < 1e-5);
+        assert_eq!((by.strategy(), by.threshold()), (Strategy::Joint, THRESHOLD));
+        assert!((by.resolution() - resolution(TEMPERATURE)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_full_book_begins_anew() {
+        let mut book = Phrasebook::default();
+        let many: Vec<String> = (0..=Phrasebook::MOST).map(|i| i.to_string()).collect();
+        let encode = |_: &str| Ok::<_, ()>(vec![1.0]);
+        book.learn(&many.iter().map(String::as_str).collect::<Vec<_>>(), encode).expect("encodes");
+        assert!(book.get("7").is_some());
+        book.learn(&["lid"], encode).expect("encodes");
+        assert!(book.get("7").is_none() && book.get("lid").is_some() && book.get("texture").is_some());
+    }
 }

@@ -158,4 +158,37 @@ mod tests {
         assert_eq!(completions(&all, "button", 5), ["button a of the red controller"]);
         assert!(completions(&all, "zebra", 5).is_empty());
     }
+
+    #[test]
+    fn words_are_alike_by_their_letters() {
+        let plural = ["lamps", "glass", "virus", "taxis", "bus", "gas", "s", "keys"];
+        assert_eq!(plural.map(singular), ["lamp", "glass", "virus", "taxis", "bus", "gas", "s", "key"]);
+        assert_eq!((alike("cup", "cup"), alike("cup", "cap"), alike("lamp", "mug")), (1.0, 0.0, 0.0));
+        assert_eq!((alike("bolt", "bow"), alike("car", "cart")), (0.0, 0.0), "the shorter has three letters");
+        let slip = alike("controller", "contoller");
+        assert!(
+            (0.9..1.0).contains(&slip)
+                && (slip - strsim::jaro_winkler("controller", "contoller").powi(2)).abs() < 1e-12
+        );
+        // One of two words of the phrase, all of the name: 2 x 1/2 x 1 / (1/2 + 1).
+        let words = |text: &str| words(text);
+        assert!((similarity(&words("red lamp"), &words("lamp")) - 2.0 / 3.0).abs() < 1e-12);
+        assert_eq!(similarity(&words("red"), &words("lamp")), 0.0);
+        assert_eq!((similarity(&[], &[]), similarity(&words("lamp"), &[])), (0.0, 0.0));
+    }
+
+    #[test]
+    fn unknown_is_what_neither_names_nor_encoder_know() {
+        let all = scene();
+        let of = |to_encoder: Option<&[&str]>| {
+            let list = to_encoder.map(|l| l.iter().map(|w| (*w).to_owned()).collect::<Vec<_>>());
+            unknown_to_all(&all, "the green button of a zebra", list.as_deref())
+        };
+        assert_eq!(of(None), ["green", "zebra"]);
+        assert_eq!(of(Some(&["zebra", "button"])), ["zebra"]);
+        assert!(of(Some(&[])).is_empty());
+        let by = ByName(&all);
+        assert_eq!((by.threshold(), by.resolution()), (THRESHOLD, RESOLUTION));
+        assert_eq!(unknown_words(&all, "#4 #5"), ["5"], "a number is known, where nothing has a name");
+    }
 }

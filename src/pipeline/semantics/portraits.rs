@@ -84,12 +84,32 @@ mod tests {
         for from in [DVec3::new(5.0, 1.0, 0.0), DVec3::new(0.0, 0.0, 9.0)] {
             let list = portraits(&cloud, &map, &settings, from, DVec3::Z).expect("drawn");
             assert_eq!(list.len(), 3);
-            assert!(list[2].is_none(), "nothing to draw");
+            assert!(list[0].is_some() && list[1].is_some() && list[2].is_none(), "nothing to draw");
             for picture in list.iter().flatten() {
                 assert_eq!(picture.len(), SIDE_PX * SIDE_PX);
                 let bright = picture.iter().filter(|p| p[0] > 128).count();
                 assert!(bright > SIDE_PX * SIDE_PX / 8 && bright < SIDE_PX * SIDE_PX * 19 / 20, "{bright}");
             }
         }
+    }
+
+    #[test]
+    fn a_portrait_is_taken_from_where_one_stands() {
+        let corners = [[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]];
+        let cloud =
+            GaussianCloud { positions: corners.to_vec(), origin: DVec3::splat(5.0), ..GaussianCloud::default() };
+        let from = DVec3::new(9.0, 5.0, 5.0);
+        let c = camera(&cloud, from, DVec3::Z).expect("something");
+        // Half of the diagonal is sqrt(3); it fills half of the field of view.
+        assert!((c.center.distance(DVec3::splat(5.0)) - 3.0_f64.sqrt() / 0.25_f64.sin()).abs() < 1e-9);
+        assert!((c.forward() + DVec3::X).length() < 1e-12 && (c.world_from_camera.y_axis + DVec3::Z).length() < 1e-12);
+        assert_eq!((c.width_px, c.height_px), (64, 64));
+        assert!((c.fov_y_rad() - FOV_RAD).abs() < 1e-12);
+        // From straight above there is another up; from its very middle, it is looked at from above.
+        for from in [DVec3::new(5.0, 5.0, 50.0), DVec3::splat(5.0)] {
+            let c = camera(&cloud, from, DVec3::Z).expect("something");
+            assert!((c.forward() + DVec3::Z).length() < 1e-9, "{}", c.forward());
+        }
+        assert_eq!(camera(&GaussianCloud::default(), from, DVec3::Z), None);
     }
 }

@@ -67,4 +67,11 @@ mod tests {
         let json = serde_json::to_value(stages).expect("json");
         assert_eq!(STAGES.map(|name| json[name].as_f64()), stages.values().map(Some));
     }
+
+    #[test]
+    fn time_is_in_milliseconds() {
+        let start = Instant::now();
+        std::thread::sleep(std::time::Duration::from_millis(3));
+        assert!(ms_since(start) >= 3.0);
+    }
 }

@@ -173,4 +173,39 @@ mod tests {
         let map = ViewMap::render(&mut renderer, &cloud, &[front, behind], &all, &back, &settings).expect("drawn");
         assert!(map.mask(&all, front).is_empty());
     }
+
+    #[test]
+    fn of_two_that_are_equal_the_first_wins() {
+        let objects = [0, 1, 2];
+        let mut slots = [(NOBODY, 0.0); SLOTS];
+        slots[..2].copy_from_slice(&[(2, 0.25), (1, 0.25)]);
+        assert_eq!(winner(&slots, &objects), (2, 0.5, 0.5), "half of the light is enough");
+        slots[1].1 = 0.24;
+        assert_eq!(winner(&slots, &objects).0, NOBODY);
+        slots[..2].copy_from_slice(&[(99, 0.6), (1, 0.3)]);
+        let (identity, share, _) = winner(&slots, &objects);
+        assert!(identity == 99 && (share - 0.6 / 0.9).abs() < 1e-6, "a number that nobody has is nobody's");
+        assert_eq!(winner(&[(NOBODY, 0.0); SLOTS], &objects), (NOBODY, 0.0, 0.0));
+    }
+
+    #[test]
+    fn a_pixel_keeps_the_heaviest_of_many() {
+        let of: Vec<IdentityId> = (1..=10).collect();
+        let mut row = Row { of: &of, width: 12, top: 4, slots: vec![[(NOBODY, 0.0); SLOTS]; 24] };
+        let only = |lane: usize, w: f32| -> Lane<f32> { std::array::from_fn(|l| if l == lane { w } else { 0.0 }) };
+        // Ten identities, ever heavier, for the pixel at column 9 of row 5; the first twice.
+        (0..10).for_each(|g| row.add(g, 8, 5, &only(1, 0.01 * (g + 1) as f32)));
+        row.add(9, 8, 5, &only(1, 0.5));
+        row.add(0, 8, 5, &only(1, 0.005));
+        let at = row.slots[12 + 9];
+        assert!(at.iter().any(|s| s.0 == 10 && (s.1 - 0.6).abs() < 1e-6), "{at:?}");
+        let mut ids: Vec<IdentityId> = at.iter().map(|s| s.0).collect();
+        ids.sort_unstable();
+        assert_eq!(ids, [3, 4, 5, 6, 7, 8, 9, 10], "the two lightest were dropped, and do not come back");
+        assert!(row.slots.iter().enumerate().all(|(i, s)| i == 21 || s.iter().all(|s| s.1 == 0.0)));
+        // What lies beyond the right edge is not the next row's.
+        row.add(0, 8, 4, &[1.0; 8]);
+        let reached: Vec<usize> = (0..24).filter(|i| row.slots[*i].iter().any(|s| s.0 == 1)).collect();
+        assert_eq!(reached, [8, 9, 10, 11]);
+    }
 }

@@ -214,4 +214,47 @@ mod tests {
         let voted = votes.weight(0) + votes.weight(1);
         assert!((voted - known).abs() < 1e-3 * known, "{voted} {known}");
     }
+
+    #[test]
+    fn the_lightest_vote_of_many_gives_way() {
+        let mut votes = Vec::new();
+        (1..=KEPT as IdentityId).for_each(|id| add(&mut votes, id, id as f32));
+        add(&mut votes, 3, 0.5);
+        assert_eq!(votes[2], (3, 3.5), "the same identity is added up");
+        add(&mut votes, 50, 0.9);
+        assert!(votes.iter().all(|v| v.0 != 50), "lighter than all");
+        add(&mut votes, 51, 1.0);
+        assert!(votes.iter().all(|v| v.0 != 51), "as light as the lightest");
+        add(&mut votes, 52, 1.5);
+        assert!(votes.contains(&(52, 1.5)) && votes.iter().all(|v| v.0 != 1) && votes.len() == KEPT);
+        let all = Votes { of: vec![votes, vec![]] };
+        assert_eq!((all.len(), all.is_empty(), Votes::new(0).is_empty(), all.weight(1)), (2, false, true, 0.0));
+        assert_eq!(all.weight(0), 2.0 + 3.5 + 4.0 + 5.0 + 6.0 + 7.0 + 8.0 + 1.5);
+    }
+
+    #[test]
+    fn votes_are_decided_by_weight_and_ties_by_number() {
+        let mut all = Identities::default();
+        (0..3).for_each(|_| {
+            all.add(Level::Object, NOBODY, vec![]);
+        });
+        let votes = Votes { of: vec![vec![(3, 1.0), (2, 1.0), (1, 0.5)], vec![(2, 0.05)], vec![(1, 0.0)]] };
+        let b = votes.decide(&all, 0.05);
+        assert_eq!(
+            (b[0], b[1].identity),
+            (Belonging { identity: 2, margin: 0.0 }, 2),
+            "as much as is needed is enough"
+        );
+        assert_eq!(b[2], Belonging { identity: UNKNOWN, margin: 0.0 });
+        assert_eq!(b[1].margin, 1.0);
+        // A row of tiles that ends within a vector: what hangs over is nobody's.
+        let labels = [1, 1, 2, UNKNOWN];
+        let mut row = Row { labels: &labels, width: 4, gaussian: u32::MAX, sums: vec![], found: vec![] };
+        row.add(7, 2, 0, &[0.5; 8]);
+        row.add(7, 0, 0, &[0.25, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        row.add(8, 0, 0, &[1.0; 8]);
+        row.finish();
+        row.found.retain(|f| f.2 > 0.0);
+        assert_eq!(row.found, [(7, 2, 0.5), (7, 1, 0.25), (8, 1, 2.0), (8, 2, 1.0)]);
+    }
 }

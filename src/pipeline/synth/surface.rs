@@ -16,7 +16,9 @@ use crate::scene::Bounds;
 /// Most triangles that are drawn, before splitting.
 const MAX_TRIANGLES: usize = 8_000_000;
 /// Most triangles that splitting adds.
-const MOST_PIECES: usize = 1_000_000;
+const MOST_PIECES: usize = 400_000;
+/// Least height of a triangle that is split, in the frame.
+const THIN: f64 = 2e-5;
 /// Flat faces are split to about this many squares over the whole scene.
 const LIGHT_CELLS: f64 = 24_000.0;
 
@@ -194,6 +196,10 @@ impl Surface {
             if done.len() + pending.len() >= most {
                 return false;
             }
+            if self.is_thin(&t) {
+                done.push(t);
+                continue;
+            }
             let [a, b, c] = t.vertices;
             let mut middle = |i: u32, j: u32| {
                 let (p, q) = (self.vertices[i as usize], self.vertices[j as usize]);
@@ -221,6 +227,14 @@ impl Surface {
         }
         self.triangles = done;
         true
+    }
+
+    /// Whether a triangle is so thin that nobody sees how light changes along it. Its neighbours' new
+    /// corners lie on its edges, so no gap opens.
+    fn is_thin(&self, t: &Triangle) -> bool {
+        let [a, b, c] = self.corners(t);
+        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+        2.0 * self.area(t) < f64::from(longest) * THIN
     }
 
     /// Area of a triangle in the frame.

@@ -63,7 +63,7 @@ pub enum CheckpointError {
     #[error(transparent)]
     Io(#[from] IoError),
     /// It is not a checkpoint, or a damaged one.
-    #[error("{path} is damaged or no checkpoint ({reason}); move it away to start the training anew")]
+    #[error("{path} is damaged or no checkpoint ({reason}); choose another folder to train anew")]
     Damaged {
         /// The file.
         path: std::path::PathBuf,

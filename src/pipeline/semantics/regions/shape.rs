@@ -95,4 +95,46 @@ mod tests {
         assert_eq!(found(|_| f32::NAN, 0..W), 0.0);
         assert!(ends(&[], 0, 1.0).is_empty());
     }
+
+    #[test]
+    fn the_value_of_a_jump_is_that_of_its_slope() {
+        // A jump from depth 1 to depth r, far wider than the blur: ln r over twice the tangent of the
+        // reach, scaled from 12 to 37.
+        let focal = 820.0;
+        let step = (focal * REACH).clamp(1.0, 16.0).round();
+        for r in [1.6_f64, 1.9] {
+            let slope = r.ln() / (2.0 * step / focal);
+            let expected = ((slope - 12.0) / 25.0).clamp(0.0, 1.0) as f32;
+            let seen = found(|x| if x < 0.0 { 1.0 } else { r as f32 }, 58..62);
+            assert!((seen - expected).abs() < 0.25, "{r}: {seen} {expected}");
+        }
+        // Rows as columns: the picture turned gives the same.
+        let turned: Vec<f32> = (0..20 * W).map(|i| if i / 20 < 60 { 1.0 } else { 2.0 }).collect();
+        let ends = ends(&turned, 20, focal);
+        assert!(ends[60 * 20 + 10] > 0.9 && ends[20 * 20 + 10] < 0.01);
+    }
+
+    #[test]
+    fn a_drawn_scene_ends_where_its_surfaces_do() {
+        let cloud = GaussianCloud {
+            positions: vec![[0.0; 3]],
+            log_scales: vec![[-1.0; 3]],
+            quaternions: vec![[1.0, 0.0, 0.0, 0.0]],
+            opacity_logits: vec![6.0],
+            sh: vec![[0.0; 3]],
+            ..GaussianCloud::default()
+        };
+        let camera =
+            Camera::look_at(glam::DVec3::new(0.0, 0.0, -4.0), glam::DVec3::ZERO, glam::DVec3::NEG_Y, 0.8, 90, 60)
+                .expect("valid");
+        let ends = ends_of(&cloud, &RenderSettings::default(), &camera).expect("drawn");
+        let frame =
+            Renderer::<f32>::new().render(&cloud, Features::NONE, &camera, &RenderSettings::default()).expect("drawn");
+        let last = (0..90).rfind(|x| frame.alpha[30 * 90 + x] >= SOLID).expect("seen");
+        assert!((50..80).contains(&last), "{last}");
+        assert!(ends[30 * 90 + last] > 0.9 && ends[30 * 90 + 45] < 0.05 && ends[30 * 90 + 88] < 0.05);
+        let mut broken = camera;
+        broken.width_px = 0;
+        assert_eq!(ends_of(&cloud, &RenderSettings::default(), &broken), None);
+    }
 }
