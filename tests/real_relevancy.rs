@@ -201,7 +201,8 @@ fn an_identity_counts_by_its_best_view() {
     let Some(scene) = load() else { return };
     let mut phrases = Phrasebook::default();
     phrases.learn(&QUERIES, |p| Ok::<_, ()>(scene.text(p))).expect("known");
-    let language = |views: &dyn Fn(&[Vec<f32>]) -> Vec<Vec<f32>>| {
+    type Views = Vec<Vec<f32>>;
+    let language = |views: &dyn Fn(&[Vec<f32>]) -> Views| {
         let of = scene.many.iter().map(|all| views(&all[..all.len().min(4)]));
         let of = of.map(|raw| ViewFeatures { deviated: raw.clone(), raw }).collect();
         LanguageFeatures { encoder: "clip".into(), dimension: 512, of }
