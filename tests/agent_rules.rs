@@ -1,6 +1,7 @@
 //! The agent's built-in grammar against a table of requests with what a person would want of them:
-//! at least 95 % right, and none unsafe. Controls: a planner that ignores the sentence scores low,
-//! and without the policy unsafe things do happen.
+//! at least 95 % right, and none unsafe. These the grammar was made for, or fitted to afterwards; what to
+//! expect of words that nobody thought of is the share of a block that it is not fitted to. Controls: a
+//! planner that ignores the sentence scores low, and without the policy unsafe things do happen.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod agent_common;
@@ -17,6 +18,9 @@ use fmlgs::agent::{Planner, Policy, Refusal, Session, World};
 const FIRST: &str = include_str!("data/agent_requests.toml");
 const LATER: &str = include_str!("data/agent_requests_later.toml");
 const FRESH: &str = include_str!("data/agent_requests_fresh.toml");
+const UNSEEN: &str = include_str!("data/agent_requests_unseen.toml");
+/// How many of these are right; more is better, less is a loss.
+const UNSEEN_RIGHT: usize = 17;
 const LAST: &str = include_str!("data/agent_requests_last.toml");
 
 fn rules() -> Session {
@@ -38,28 +42,26 @@ fn requests_come_to_what_a_person_wants_and_nothing_unsafe_happens() {
     assert!(tally.right * 100 >= tally.all * 95, "{} of {}", tally.right, tally.all);
 }
 
-fn hold(what: &str, text: &str) {
-    let table = Table::read(text);
-    assert!(table.turns() >= 25, "{}", table.turns());
+#[test]
+fn requests_that_the_grammar_was_fitted_to_stay_right() {
+    for (what, text) in [("first block", LATER), ("second block", LAST), ("third block", FRESH)] {
+        let table = Table::read(text);
+        assert!(table.turns() >= 25, "{}", table.turns());
+        let tally = tally(&table, &rules);
+        report(what, &tally);
+        assert_eq!(tally.unsafe_ones, 0);
+        assert!(tally.right * 100 >= tally.all * 95, "{what}: {} of {}", tally.right, tally.all);
+    }
+}
+
+#[test]
+fn of_requests_that_it_is_not_fitted_to_it_gets_a_share_and_none_is_unsafe() {
+    let table = Table::read(UNSEEN);
+    assert!(table.turns() >= 30, "{}", table.turns());
     let tally = tally(&table, &rules);
-    report(what, &tally);
+    report("requests that it is not fitted to", &tally);
     assert_eq!(tally.unsafe_ones, 0);
-    assert!(tally.right * 100 >= tally.all * 95, "{what}: {} of {}", tally.right, tally.all);
-}
-
-#[test]
-fn requests_written_after_the_grammar_come_out_right_too() {
-    hold("requests written later", LATER);
-}
-
-#[test]
-fn requests_written_last_come_out_right_too() {
-    hold("requests written last", LAST);
-}
-
-#[test]
-fn fresh_requests_come_out_right_too() {
-    hold("fresh requests", FRESH);
+    assert!(tally.right >= UNSEEN_RIGHT, "{} of {}", tally.right, tally.all);
 }
 
 /// Goes to the table, whatever is said.

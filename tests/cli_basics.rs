@@ -3,7 +3,7 @@
 
 mod cli_support;
 
-use cli_support::{fmlgs, folder, tiny_splat};
+use cli_support::{acts, fmlgs, folder, tiny_splat};
 
 #[test]
 fn help_and_version_are_no_failures() {
@@ -64,6 +64,30 @@ fn failures_exit_with_1_and_name_the_file() {
         assert!(done.stderr.starts_with("error: ") && done.stderr.contains(named), "{arguments:?}: {}", done.stderr);
         assert!(!done.stderr.contains("panicked"), "{}", done.stderr);
     }
+}
+
+#[test]
+fn foreign_text_does_not_act_on_the_terminal() {
+    let folder = folder();
+    let evil = "\u{1b}]0;owned\u{7}\u{1b}[2J\u{9b}2J\u{202e}gnp\nerror: all is lost";
+    let header = folder.path().join("header.ply");
+    std::fs::write(&header, format!("ply\nformat {} 1.0\nend_header\n", evil.replace('\n', ""))).unwrap();
+    let (missing, header) = (folder.path().join(evil), header.to_str().unwrap());
+    for (arguments, shown) in [
+        (&["info", missing.to_str().unwrap()][..], "2Jgnp"),
+        (&["info", header], "2Jgnp"),
+        (&["train", missing.to_str().unwrap(), "--out", "o"], "2Jgnp"),
+        (&["info", header, "--\u{1b}[31m\u{202e}x"], "--x"),
+    ] {
+        let done = fmlgs(arguments);
+        assert!(done.code == Some(1) || done.code == Some(2), "{arguments:?}: {:?}", done.code);
+        assert!(done.stderr.contains(shown), "{:?}", done.stderr);
+        assert!(!acts(&done.stderr) && !acts(&done.stdout), "{arguments:?}: {:?}", done.stderr);
+        let forged = |line: &str| line.starts_with("error: all");
+        assert!(!done.stderr.lines().any(forged), "{:?}", done.stderr);
+    }
+    // The control: the text that went in does act.
+    assert!(acts(evil) && !acts("a\tb\n手柄"));
 }
 
 #[test]

@@ -19,10 +19,11 @@ fn a_start_at_half_the_size_ends_nearly_as_well() {
         Done::from(command(&[&train[..], more].concat()).output().unwrap()).ok();
         Done::from(command(&["eval", scene, "--json"]).output().unwrap()).ok().json()["psnr"].as_f64().unwrap()
     };
-    let (full, coarse) = (psnr("full", &[]), psnr("coarse", &["--coarse-share", "0.5"]));
-    assert!(coarse > full - 2.0, "{coarse} dB against {full} dB");
-    // Not the same run: the half-size photos were really used.
-    assert!((coarse - full).abs() > 1e-6);
+    let of = |share: &str| psnr(share, &["--coarse-share", share]);
+    let (full, coarse, small) = (of("0"), of("0.5"), of("1"));
+    assert!(coarse > full - 0.5, "{coarse} dB against {full} dB");
+    // The control: half the size throughout shows.
+    assert!(small < coarse - 1.0, "{small} dB against {coarse} dB");
     let wrong = command(&["train", photos, "--out", "x", "--coarse-share", "1.5"]).output().unwrap();
     Done::from(wrong).fails_with(2);
 }
@@ -46,6 +47,23 @@ fn every_stage_is_measured_and_gone_on_with() {
     let train = ["train", photos, "--out", &scene, "--steps", "150", "--backend", "cpu", "--eval-every", "0"];
     run(&[&train[..], &["--max-side", "64", "-q"]].concat()).ok();
     run(&["preprocess", &scene, "--masks", photos, "--encoder", "demo", "-q"]).ok();
+
+    // What is found but cannot be seen from a camera is told so; here one that looks the other way.
+    let mut away = run(&["info", photos, "--json"]).ok().json()["cameras"][0].clone();
+    let away = {
+        let turn = away["camera"]["world_from_camera"].as_array_mut().unwrap();
+        for k in [0, 1, 2, 6, 7, 8] {
+            turn[k] = (-turn[k].as_f64().unwrap()).into();
+        }
+        std::fs::write(at("away.json"), away.to_string()).unwrap();
+        at("away.json")
+    };
+    let asked = |camera: &str| run(&["query", &scene, "box 1", "--camera", camera, "--json"]).ok().json();
+    let (here, there) = (asked("0"), asked(&away));
+    assert_eq!((&here["answer"], &here["in_view"]), (&"found".into(), &true.into()), "{here}");
+    assert_eq!((&there["answer"], &there["in_view"], &there["pixels"]), (&"found".into(), &false.into(), &0.into()));
+    let told = run(&["query", &scene, "box 1", "--camera", &away]).ok().stdout;
+    assert!(told.contains("not in this view") && told.contains("--camera"), "{told}");
 
     let wanted = ["report", &scene, "--masks", photos, "--max-side", "64", "--steps", "20", "--train-steps", "20"];
     let rest = ["--views", "1", "--stages", "render,train,features,query,path", "--out", &out, "-q"];

@@ -1,6 +1,8 @@
 //! The real binary from a glTF scene to a trained, measured, drawn and exported splat.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+#[path = "gpu_common/adapter.rs"]
+mod adapter;
 mod cli_support;
 
 use cli_support::{fmlgs, folder, tiny_dataset};
@@ -57,12 +59,22 @@ fn synth_train_eval_render_export() {
     let repeated = train(&at("scene"), "150");
     assert_eq!(repeated["steps"], 150);
     assert!((psnr(&repeated) - psnr(&long)).abs() < 1e-6);
+
+    // Settings that cannot be read are not replaced by others: the picture would be another one.
+    let file = at("scene/scene.json");
+    let mut stored: serde_json::Value = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
+    stored["config"]["steps"] = "many".into();
+    std::fs::write(&file, stored.to_string()).unwrap();
+    for arguments in [&["render", &at("scene"), "--out", &at("5.png")][..], &["train", &at("scene"), "-q"]] {
+        let refused = fmlgs(arguments).fails_with(1).stderr;
+        assert!(refused.contains("scene.json") && refused.contains("'config'"), "{refused}");
+    }
+    assert!(!std::path::Path::new(&at("5.png")).exists());
 }
 
 #[test]
 fn a_run_on_the_gpu_follows_the_one_on_the_cpu() {
-    if fmlgs::render::gpu::Context::new().is_err() {
-        println!("skipped: no GPU adapter, not even a software one");
+    if adapter::context().is_none() {
         return;
     }
     let folder = folder();

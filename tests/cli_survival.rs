@@ -4,11 +4,13 @@
 
 mod cli_support;
 
-use std::path::Path;
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use cli_support::{Done, command, fmlgs, folder, tiny_dataset};
+use cli_support::{Done, Server, command, fmlgs, folder, tiny_dataset};
 
 /// Training that saves at every opportunity and takes long enough to be interrupted.
 fn train_arguments<'a>(photos: &'a str, out: &'a str, steps: &'a str) -> Vec<&'a str> {
@@ -102,6 +104,87 @@ fn ctrl_c_saves_and_exits_with_130() {
     }
 }
 
+/// Generous: an end takes milliseconds, what it must not wait for takes minutes.
+const SOON: Duration = Duration::from_secs(10);
+
+/// Ends a child and returns what it said, and how long it took.
+fn end(child: Child, signal: &str) -> (Done, Duration) {
+    let begin = Instant::now();
+    send(&child, signal);
+    let done = child.wait_with_output().unwrap().into();
+    let took = begin.elapsed();
+    println!("{signal}: ended after {:.0} ms", took.as_secs_f64() * 1e3);
+    (done, took)
+}
+
+fn wait_until(child: &mut Child, ready: impl Fn() -> bool) {
+    let deadline = Instant::now() + Duration::from_secs(60);
+    while !ready() {
+        assert!(Instant::now() < deadline && child.try_wait().unwrap().is_none(), "it did not come so far");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn a_download_that_stalls_ends_when_asked_and_is_gone_on_with() {
+    const FIRST: usize = 70_000;
+    let content: Vec<u8> = (0..200_000_u32).map(|i| (i % 251) as u8).collect();
+    let folder = folder();
+    let whole = folder.path().join("whole");
+    std::fs::write(&whole, &content).unwrap();
+    let graph = serde_json::json!({ "file": "g.onnx", "bytes": content.len(),
+        "sha256": fmlgs::models::fetch::sha256(&whole).unwrap() });
+    let description = serde_json::json!({ "version": 1, "kind": "sam2", "graphs": { "a": graph } }).to_string();
+    let served = content.clone();
+    let server = Server::new(move |stream, head| {
+        let range =
+            head.lines().find_map(|l| l.to_lowercase().strip_prefix("range: bytes=")?.strip_suffix('-')?.parse().ok());
+        let (line, body): (String, &[u8]) = match range {
+            _ if head.contains(".json") => ("200 OK".into(), description.as_bytes()),
+            Some(start) => (format!("206 Rest\r\nContent-Range: bytes {start}-199999/200000"), &served[start..]),
+            None => ("200 OK".into(), &served),
+        };
+        let head =
+            format!("HTTP/1.1 {line}\r\nETag: \"1\"\r\nContent-Length: {}\r\nConnection: close\r\n\r\n", body.len());
+        let stalls = range.is_none() && body.len() > FIRST;
+        // Whoever asked may have gone.
+        let _ = stream.write_all(head.as_bytes());
+        let _ = stream.write_all(if stalls { &body[..FIRST] } else { body });
+        std::thread::sleep(if stalls { Duration::from_secs(300) } else { Duration::ZERO });
+    });
+    let silent = Server::new(|_, _| std::thread::sleep(Duration::from_secs(300)));
+    let fetch = |at: &str, models: &Path| {
+        let mut fetch = command(&["models", "fetch", "sam2.1-tiny", "--from", &format!("http://{at}")]);
+        fetch.env("FMLGS_MODELS", models).stdout(Stdio::piped()).stderr(Stdio::piped());
+        fetch
+    };
+    let names = |models: &Path| contents(models).into_iter().map(|(name, _)| name).collect::<Vec<_>>();
+    for signal in ["-INT", "-TERM", "-KILL"] {
+        let models = folder.path().join(signal);
+        if signal != "-KILL" {
+            let mut child = fetch(&silent.at, &models).spawn().unwrap();
+            let before = silent.requests();
+            wait_until(&mut child, || silent.requests() > before);
+            let (done, took) = end(child, signal);
+            done.fails_with(130);
+            assert!(took < SOON && names(&models).is_empty(), "{took:?}");
+        }
+        let part = models.join("g.onnx.part");
+        let mut child = fetch(&server.at, &models).spawn().unwrap();
+        wait_until(&mut child, || std::fs::metadata(&part).is_ok_and(|m| m.len() as usize == FIRST));
+        let (done, took) = end(child, signal);
+        if signal != "-KILL" {
+            assert!(done.fails_with(130).stderr.contains("what arrived is kept"));
+            assert!(took < SOON, "{took:?}");
+        }
+        assert_eq!(names(&models), ["g.onnx.part", "g.onnx.part.tag", "sam2.1-tiny.json"]);
+        Done::from(fetch(&server.at, &models).output().unwrap()).ok();
+        assert!(server.seen.lock().unwrap().last().unwrap().to_lowercase().contains(&format!("bytes={FIRST}-")));
+        assert_eq!(names(&models), ["g.onnx", "sam2.1-tiny.json"]);
+        assert!(std::fs::read(models.join("g.onnx")).unwrap() == content);
+    }
+}
+
 #[test]
 fn a_read_only_folder_is_named_and_left_alone() {
     use std::os::unix::fs::PermissionsExt;
@@ -136,7 +219,7 @@ fn refused(photos: &Path, out: &Path, reason: &str) {
 }
 
 #[test]
-fn a_full_disk_is_named_and_the_checkpoint_survives() {
+fn a_full_disk_is_named_and_ends_nothing() {
     let folder = folder();
     let photos = tiny_dataset(folder.path());
     let small = folder.path().join("small");
@@ -145,25 +228,176 @@ fn a_full_disk_is_named_and_the_checkpoint_survives() {
     let out = small.join("scene");
     let checkpoint = out.join("checkpoint.bin");
     let arguments = train_arguments(photos.to_str().unwrap(), out.to_str().unwrap(), "1000000");
-
     let mut child = start(&arguments);
+    let told = lines_of(&mut child);
     wait_for_checkpoints(&mut child, &checkpoint, 2);
     let filler = small.join("filler");
     fill(&filler);
-    let done: Done = child.wait_with_output().unwrap().into();
-    let done = done.fails_with(1);
-    let named = done.stderr.contains("checkpoint.bin") && done.stderr.contains("the disk is full");
-    assert!(named && !done.stderr.contains("panicked"), "{}", done.stderr);
-    let names: Vec<String> = contents(&out).into_iter().map(|(name, _)| name).collect();
-    assert!(names.iter().all(|n| !n.ends_with(".tmp")), "left behind: {names:?}");
+    let line = wait_for_line(&told, "No checkpoint was saved, the training goes on");
+    assert!(line.contains("checkpoint.bin") && line.contains("the disk is full"), "{line}");
+    // The checkpoint before is whole, and with space again there are new ones.
+    let before = std::fs::read(&checkpoint).unwrap();
+    assert!(child.try_wait().unwrap().is_none(), "the training ended");
+    std::fs::remove_file(&filler).unwrap();
+    wait_for_line(&told, "Checkpoints are saved again");
+    assert!(std::fs::read(&checkpoint).unwrap() != before, "no new checkpoint");
+    send(&child, "-KILL");
+    child.wait().unwrap();
 
-    // With space again the run goes on from the checkpoint that was there before.
+    // A run that ends on a full disk says so; the one after it goes on.
+    let mut child = start(&arguments);
+    let told = lines_of(&mut child);
+    wait_for_line(&told, "Continuing at step");
+    wait_for_checkpoints(&mut child, &checkpoint, 2);
+    fill(&filler);
+    wait_for_line(&told, "No checkpoint was saved");
+    send(&child, "-TERM");
+    assert_eq!(child.wait().unwrap().code(), Some(1));
+    let error = wait_for_line(&told, "error: ");
+    assert!(error.contains("the disk is full"), "{error}");
+    let names: Vec<String> = contents(&out).into_iter().map(|(name, _)| name).collect();
+    assert!(names.iter().all(|n| !n.starts_with('.')), "left behind: {names:?}");
     std::fs::remove_file(&filler).unwrap();
     let mut child = start(&arguments);
-    wait_for_checkpoints(&mut child, &checkpoint, 2);
+    wait_for_line(&lines_of(&mut child), "Continuing at step");
     send(&child, "-KILL");
-    let done: Done = child.wait_with_output().unwrap().into();
-    assert!(done.stderr.contains("Continuing at step"), "{}", done.stderr);
+    child.wait().unwrap();
+}
+
+/// What a process tells on standard error, line by line.
+fn lines_of(child: &mut Child) -> Receiver<String> {
+    let (told, lines) = channel();
+    let stderr = BufReader::new(child.stderr.take().unwrap());
+    let read = move || stderr.lines().map_while(Result::ok).try_for_each(|line| told.send(line));
+    std::thread::Builder::new().name("lines".into()).spawn(read).unwrap();
+    lines
+}
+
+fn wait_for_line(lines: &Receiver<String>, what: &str) -> String {
+    let mut told = Vec::new();
+    loop {
+        match lines.recv_timeout(Duration::from_secs(120)) {
+            Ok(line) if line.contains(what) => return line,
+            Ok(line) => told.push(line),
+            Err(e) => panic!("'{what}' was not told ({e}): {told:?}"),
+        }
+    }
+}
+
+#[test]
+fn a_finished_training_is_left_alone_and_objects_survive_one_that_goes_on() {
+    let folder = folder();
+    let photos = tiny_dataset(folder.path());
+    let (photos, out) = (photos.to_str().unwrap(), folder.path().join("scene"));
+    let scene = out.to_str().unwrap();
+    let train = |steps: &str| fmlgs(&train_arguments(photos, scene, steps));
+    let find = || fmlgs(&["preprocess", scene, "--masks", photos, "--encoder", "none", "--max-seeds", "1"]);
+    let names = || fmlgs(&["info", scene, "--json"]).ok().json()["identities"].clone();
+
+    // Stopped, labelled, gone on with: the objects are carried over, and kept as they were.
+    let mut child = start(&train_arguments(photos, scene, "600"));
+    wait_for_checkpoints(&mut child, &out.join("checkpoint.bin"), 2);
+    send(&child, "-INT");
+    child.wait().unwrap();
+    find().ok();
+    let query = |name: &str| fmlgs(&["query", scene, name, "--json"]).ok().json()["pixels"].as_u64().unwrap();
+    let (known, before) = (names(), query("box 1"));
+    assert!(before > 20, "{before}");
+    let gone_on = train("600").ok();
+    assert!(gone_on.stderr.contains("carried over") && gone_on.stderr.contains("earlier"), "{}", gone_on.stderr);
+    assert_eq!(names(), known);
+    let after = query("box 1");
+    assert!(after > before / 2 && after < 2 * before, "{before} px, then {after}");
+    let kept = out.join("earlier/1");
+    assert_eq!(fmlgs(&["info", kept.to_str().unwrap(), "--json"]).ok().json()["identities"], known);
+
+    // Again: nothing to do, nothing touched.
+    let files = files_in(&out);
+    let again = train("600").ok();
+    assert!(again.stderr.contains("nothing has changed"), "{}", again.stderr);
+    assert_eq!(again.json()["end"], "finished");
+    assert!(files_in(&out) == files, "a training with nothing to do changed files");
+    // The same objects found again change nothing either.
+    find().ok();
+    let files = files_in(&out);
+    find().ok();
+    assert!(files_in(&out) == files, "finding the same objects changed files");
+    // Other settings, or no checkpoint: refused, with the way out.
+    assert!(train("700").fails_with(1).stderr.contains("choose another folder"));
+    std::fs::remove_file(out.join("checkpoint.bin")).unwrap();
+    assert!(train("600").fails_with(1).stderr.contains("no checkpoint to go on from"));
+    assert!(fmlgs(&train_arguments(photos, photos, "5")).fails_with(1).stderr.contains("holds the photos"));
+}
+
+/// All files below `folder`, with their contents.
+fn files_in(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut all = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            all.extend(files_in(&path));
+        } else {
+            all.push((path.clone(), std::fs::read(&path).unwrap()));
+        }
+    }
+    all.sort();
+    all
+}
+
+#[test]
+fn a_second_writer_is_refused_by_name() {
+    let folder = folder();
+    let photos = tiny_dataset(folder.path());
+    let (photos, out) = (photos.to_str().unwrap(), folder.path().join("scene"));
+    let scene = out.to_str().unwrap();
+    let mut child = start(&train_arguments(photos, scene, "1000000"));
+    wait_for_checkpoints(&mut child, &out.join("checkpoint.bin"), 1);
+    let second = fmlgs(&train_arguments(photos, scene, "1000000")).fails_with(1);
+    let named = second.stderr.contains(&format!("process {} (training)", child.id()));
+    assert!(named && second.stderr.contains("wait until that is done"), "{}", second.stderr);
+    send(&child, "-INT");
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    // While it is held in another way, objects cannot be looked for either.
+    let lock = std::fs::File::create(out.join(".fmlgs.lock")).unwrap();
+    lock.lock().unwrap();
+    let refused = fmlgs(&["preprocess", scene, "--masks", photos]).fails_with(1);
+    assert!(refused.stderr.contains("is being written by"), "{}", refused.stderr);
+    assert_eq!(fmlgs(&["info", scene, "--json"]).ok().json()["kind"], "trained", "reading is allowed");
+    drop(lock);
+    fmlgs(&["preprocess", scene, "--masks", photos, "--encoder", "none"]).ok();
+}
+
+/// A closed pipe, a full disk behind standard error, a lost terminal: the training ends well.
+#[test]
+fn what_cannot_be_told_ends_nothing() {
+    let folder = folder();
+    let photos = tiny_dataset(folder.path());
+    let photos = photos.to_str().unwrap();
+    for (name, told) in [("full", "2>/dev/full"), ("closed", "2>&1 >/dev/null | head -n 1"), ("none", "2>&-")] {
+        let out = folder.path().join(name);
+        let arguments = train_arguments(photos, out.to_str().unwrap(), "60").join(" ");
+        let line = format!("{} {arguments} {told}", env!("CARGO_BIN_EXE_fmlgs"));
+        // Standard output as JSON goes where it can be read only without the pipe.
+        Command::new("sh").args(["-c", &line]).stdin(Stdio::null()).stdout(Stdio::null()).status().unwrap();
+        assert_eq!(fmlgs(&["info", out.to_str().unwrap(), "--json"]).ok().json()["kind"], "trained", "{told}");
+    }
+    // A lost terminal saves as SIGTERM does; a program that was told to outlive it does.
+    let out = folder.path().join("hung up");
+    let arguments = train_arguments(photos, out.to_str().unwrap(), "1000000");
+    let mut child = start(&arguments);
+    wait_for_checkpoints(&mut child, &out.join("checkpoint.bin"), 2);
+    send(&child, "-HUP");
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert_eq!(fmlgs(&["info", out.to_str().unwrap(), "--json"]).ok().json()["kind"], "trained");
+    let mut nohup = Command::new("nohup");
+    let mut child = nohup.arg(env!("CARGO_BIN_EXE_fmlgs")).args(&arguments).env_remove("DISPLAY");
+    child = child.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut child = child.spawn().unwrap();
+    wait_for_line(&lines_of(&mut child), "Continuing at step");
+    send(&child, "-HUP");
+    wait_for_checkpoints(&mut child, &out.join("checkpoint.bin"), 3);
+    send(&child, "-KILL");
+    child.wait().unwrap();
 }
 
 /// Writes to `path` until not one byte more fits.

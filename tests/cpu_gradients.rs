@@ -4,6 +4,7 @@
 mod common;
 
 use common::{camera, random_cloud, rng};
+use fmlgs::math::stats;
 use fmlgs::render::cpu::Renderer;
 use fmlgs::render::{CloudGradient, Features, Frame, FrameGradient, RenderSettings};
 use fmlgs::scene::{Camera, GaussianCloud};
@@ -63,9 +64,9 @@ impl Problem {
 
     /// Largest error of a group, relative to the group's largest entry.
     fn check(&mut self, name: &str, analytic: &[f64], at: fn(&mut Self, usize) -> &mut f64) -> f64 {
-        let scale = analytic.iter().fold(0.0_f64, |m, g| m.max(g.abs()));
+        let scale = stats::worst(analytic.iter().map(|g| g.abs()));
         assert!(scale > 1e-3, "{name}: the gradient is all but zero, which proves nothing");
-        let mut worst = 0.0_f64;
+        let mut errors = Vec::new();
         for (i, g) in analytic.iter().enumerate() {
             let h = 1e-6;
             let start = *at(self, i);
@@ -74,8 +75,9 @@ impl Problem {
             *at(self, i) = start - h;
             let down = self.loss();
             *at(self, i) = start;
-            worst = worst.max(((up - down) / (2.0 * h) - g).abs() / scale);
+            errors.push(((up - down) / (2.0 * h) - g).abs() / scale);
         }
+        let worst = stats::worst(errors);
         println!("{name}: relative error {worst:.1e}");
         worst
     }

@@ -4,7 +4,7 @@
 mod common;
 
 use common::{camera, psnr, random_cloud};
-use fmlgs::math::{rotation, sh};
+use fmlgs::math::{rotation, sh, stats};
 use fmlgs::render::cpu::Renderer;
 use fmlgs::render::{ALPHA_MAX, ALPHA_MIN, BLUR_PX2, Features, RenderSettings, TRANSMITTANCE_MIN};
 use fmlgs::scene::{Camera, GaussianCloud};
@@ -102,13 +102,8 @@ fn worst_difference(
     let want = brute_force(other, camera, s);
     let frame = Renderer::new().render(cloud, Features::NONE, camera, s).expect("renders");
     let planes = [&frame.color[0], &frame.color[1], &frame.color[2], &frame.alpha, &frame.depth, &frame.median_depth];
-    let mut worst = 0.0_f64;
-    for (i, w) in want.iter().enumerate() {
-        for (plane, w) in planes.iter().zip(w) {
-            worst = worst.max((plane[i] - w).abs());
-        }
-    }
-    worst
+    let pixels = want.iter().enumerate();
+    stats::worst(pixels.flat_map(|(i, w)| planes.iter().zip(w).map(move |(plane, w)| (plane[i] - w).abs())))
 }
 
 #[test]

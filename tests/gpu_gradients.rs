@@ -81,7 +81,7 @@ impl Problem {
         let check = |(name, a, b, each): (&str, &[f32], &[f64], usize)| {
             agree_in_bands(name, a, b, &spread(&boundary, each)).err()
         };
-        let mut out: Vec<String> = groups.into_iter().filter_map(check).collect();
+        let mut out: Vec<String> = groups.into_iter().filter(|g| g.3 > 0).filter_map(check).collect();
         let radii: Vec<f64> = oracle.radius_px.iter().map(|&r| f64::from(r)).collect();
         out.extend(agree_in_bands("radius", &ours.radius_px, &radii, &boundary).err());
         assert!(boundary.iter().filter(|b| !**b).count() * 4 > boundary.len(), "too few Gaussians are interior");
@@ -174,6 +174,8 @@ fn the_comparison_catches_bias_turning_and_outliers() {
     assert!(check(&ours(&|_, v| v * 1.01)).is_err(), "scale");
     assert!(check(&ours(&|i, v| if i < 3 { v + 0.1 } else { v })).is_err(), "outliers");
     assert!(check(&ours(&|i, v| if i == 9 { f64::NAN } else { v })).is_err(), "NaN");
+    let nothing = agree("x", &ours(&|_, v| v), &oracle, &vec![false; 1_000], INTERIOR);
+    assert!(nothing.is_err_and(|e| e.contains("nothing was compared")));
     let masked: Vec<bool> = (0..1_000).map(|i| i >= 3).collect();
     agree("x", &ours(&|i, v| if i < 3 { 9.0 } else { v }), &oracle, &masked, INTERIOR).unwrap();
 }

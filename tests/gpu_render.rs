@@ -5,15 +5,16 @@ mod common;
 mod gpu_common;
 
 use common::{camera, random_cloud, rng};
-use fmlgs::math::Real;
+use fmlgs::math::{Real, stats};
 use fmlgs::render::cpu::project::{View, compensation, direction, geometry, raw_color};
 use fmlgs::render::gpu::{GpuError, Renderer};
-use fmlgs::render::{ALPHA_MIN, Features, Frame, RenderError, RenderSettings, TILE_PX, cpu};
+use fmlgs::render::{ALPHA_MIN, Backend, Features, Frame, RenderError, RenderSettings, TILE_PX, cpu};
 use fmlgs::scene::{Camera, GaussianCloud};
 use glam::DVec3;
 use gpu_common::compare::{agree_in_bands, bands};
 use gpu_common::with_context;
 use rand::RngExt;
+use std::sync::Arc;
 
 struct Scene {
     cloud: GaussianCloud<f64>,
@@ -71,7 +72,7 @@ fn projection_matches_the_oracle() {
             scene.gpu(&mut renderer);
             let found = renderer.inspect().unwrap().unwrap();
             let mut drawn = 0;
-            let mut worst = 0.0_f64;
+            let mut errors = Vec::new();
             let view = View::<f64>::new(&scene.camera, scene.cloud.origin, scene.settings.near);
             for (i, splat) in found.splats.iter().enumerate().filter(|(_, s)| s.radius > 0.0) {
                 drawn += 1;
@@ -97,11 +98,10 @@ fn projection_matches_the_oracle() {
                     (f64::from(splat.color[1]), color[1]),
                     (f64::from(splat.color[2]), color[2]),
                 ];
-                for (a, b) in pairs {
-                    worst = worst.max((a - b).abs() / (1.0 + b.abs()));
-                }
+                errors.extend(pairs.map(|(a, b)| (a - b).abs() / (1.0 + b.abs())));
             }
             assert!(drawn > 300, "{drawn} drawn");
+            let worst = stats::worst(errors);
             assert!(worst < 2e-4, "antialias {antialias}: worst deviation {worst:e}");
         }
     });
@@ -206,7 +206,7 @@ fn a_scene_far_from_zero_renders_like_one_at_zero() {
         scene.camera.center += away;
         let there = scene.gpu(&mut renderer);
         let worst = |a: &Frame<f32>, b: &Frame<f32>| {
-            (0..3).flat_map(|c| a.color[c].iter().zip(&b.color[c])).fold(0.0_f32, |w, (x, y)| w.max((x - y).abs()))
+            stats::worst((0..3).map(|c| stats::worst_difference(&a.color[c], &b.color[c])))
         };
         assert!(worst(&here, &there) < 1e-3, "{}", worst(&here, &there));
         scene.camera.center.x += 0.01;
@@ -283,5 +283,45 @@ fn unusable_input_is_refused_by_name() {
         let short = Features { channels: 2, values: &[0.0; 3] };
         let refused = renderer.render(&cloud, short, &scene.camera, &scene.settings);
         assert!(matches!(refused, Err(GpuError::Render(RenderError::FeatureLength { have: 3, want: 10 }))));
+    });
+}
+
+/// A grid of dots.
+fn dots(shift: f32) -> Arc<GaussianCloud> {
+    let n = 60;
+    Arc::new(GaussianCloud {
+        positions: (0..n).map(|i| [(i % 8) as f32 * 0.1 - 0.4 + shift, (i / 8) as f32 * 0.1 - 0.4, 0.0]).collect(),
+        log_scales: vec![[-3.0; 3]; n],
+        quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
+        opacity_logits: vec![1.0; n],
+        sh: (0..n).map(|i| [(i % 3) as f32 * 0.5, 0.2, 0.4]).collect(),
+        ..GaussianCloud::default()
+    })
+}
+
+#[test]
+fn both_backends_draw_the_same_view_and_follow_the_cloud() {
+    with_context(|context| {
+        let mut gpu = Backend::on_gpu(context).unwrap();
+        let mut cpu = Backend::on_cpu();
+        let camera = Camera::look_at(DVec3::new(0.2, 0.1, -2.0), DVec3::ZERO, DVec3::NEG_Y, 0.8, 64, 48).unwrap();
+        let settings = RenderSettings { depth: true, ..RenderSettings::default() };
+        let mut worst = |cloud: &Arc<GaussianCloud>, on_cpu: &Arc<GaussianCloud>| {
+            let a = gpu.render(cloud, &camera, &settings).unwrap();
+            let b = cpu.render(on_cpu, &camera, &settings).unwrap();
+            stats::worst_difference(&a.color.concat(), &b.color.concat())
+        };
+        let (one, other) = (dots(0.0), dots(0.07));
+        assert!(worst(&one, &one) < 1e-3);
+        assert!(worst(&other, &other) < 1e-3, "the other cloud was sent");
+        assert!(worst(&other, &one) > 0.1, "another scene must differ");
+        let names: Vec<&str> = cpu.stage_times().iter().map(|s| s.0).collect();
+        assert_eq!(names, ["project", "sort", "bin", "blend"]);
+        assert!(gpu.stage_times().is_empty(), "nobody asked for them");
+        gpu.time_stages(true).unwrap();
+        gpu.render(&one, &camera, &settings).unwrap();
+        assert_eq!(gpu.stage_times().is_empty(), !context.has_timestamps());
+        gpu.time_stages(false).unwrap();
+        assert!(gpu.stage_times().is_empty());
     });
 }

@@ -7,10 +7,11 @@ use std::fs;
 use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use fmlgs::models::fetch::{FetchError, Patience, Wanted, fetch, sha256};
+use fmlgs::models::fetch::{FetchError, MOST_UNPROMISED, Patience, Wanted, fetch, sha256};
 
 /// What the server does with one request.
 #[derive(Clone, Copy, Debug)]
@@ -33,7 +34,20 @@ enum Turn {
     IgnoreRange,
     /// A range that was not asked for.
     WrongRange,
+    /// Says a range, and sends it from the start of the file.
+    Restart,
+    /// Accepts, and says nothing at all.
+    Silent,
+    /// So many bytes, then one now and then.
+    DribbleAfter(usize),
+    /// Never ends, in chunks of unknown number.
+    Endless,
+    /// Never ends, without a length.
+    Unbounded,
 }
+
+/// Bytes that endless servers have sent.
+static ENDLESS: AtomicUsize = AtomicUsize::new(0);
 
 /// The requests that came, by their Range.
 type Log = Arc<Mutex<Vec<Option<String>>>>;
@@ -93,6 +107,14 @@ fn answer(stream: &mut TcpStream, turn: Turn, version: u8, log: &Log) -> std::io
     let start = start.filter(|_| if_range.as_ref().is_none_or(|t| *t == tag));
     let start = start.filter(|_| !matches!(turn, Turn::IgnoreRange));
     let body = &all[start.unwrap_or(0).min(all.len())..];
+    if matches!(turn, Turn::Silent) {
+        std::thread::sleep(Duration::from_secs(20));
+        return Ok(());
+    }
+    if matches!(turn, Turn::Endless | Turn::Unbounded) {
+        return pour(stream, matches!(turn, Turn::Endless));
+    }
+    let body = if matches!(turn, Turn::Restart) { &all[..body.len()] } else { body };
     let mut head = match (turn, start) {
         (Turn::Page, _) => "HTTP/1.1 200 OK\r\nContent-Type: text/html; charset=utf-8\r\n".to_owned(),
         (Turn::Status(status), _) => format!("HTTP/1.1 {status} No\r\n"),
@@ -116,8 +138,33 @@ fn answer(stream: &mut TcpStream, turn: Turn, version: u8, log: &Log) -> std::io
             std::thread::sleep(Duration::from_secs(20));
             Ok(())
         }
+        Turn::DribbleAfter(n) => {
+            stream.write_all(&body[..n.min(body.len())])?;
+            for byte in &body[n.min(body.len())..] {
+                stream.write_all(&[*byte])?;
+                std::thread::sleep(Duration::from_millis(10));
+            }
+            Ok(())
+        }
         Turn::Status(_) => Ok(()),
         _ => stream.write_all(body),
+    }
+}
+
+/// Sends until nobody takes any more.
+fn pour(stream: &mut TcpStream, chunked: bool) -> std::io::Result<()> {
+    let coding = if chunked { "Transfer-Encoding: chunked\r\n" } else { "" };
+    stream.write_all(format!("HTTP/1.1 200 OK\r\n{coding}Connection: close\r\n\r\n").as_bytes())?;
+    let piece = [7; 1 << 16];
+    loop {
+        if chunked {
+            stream.write_all(b"10000\r\n")?;
+        }
+        stream.write_all(&piece)?;
+        if chunked {
+            stream.write_all(b"\r\n")?;
+        }
+        ENDLESS.fetch_add(piece.len(), Ordering::Relaxed);
     }
 }
 
@@ -271,5 +318,89 @@ fn cancelling_keeps_what_arrived() {
     assert!((60_000..200_000).contains(&got));
     get(&s, &p.to, None, None).expect("fetched");
     assert_eq!(s.log.lock().expect("log")[1], Some(format!("bytes={got}-")));
+    assert!(is_right(&p.to, 0));
+}
+
+#[test]
+fn downloads_stop_at_the_size_that_was_promised() {
+    for turn in [Turn::Endless, Turn::Unbounded] {
+        let (s, p) = (server(&[turn]), place());
+        let before = ENDLESS.load(Ordering::Relaxed);
+        let error = get(&s, &p.to, Some(20_000), Some(&digest(0))).expect_err("too much");
+        assert!(matches!(error, FetchError::OtherSize { expected: 20_000, .. }), "{turn:?}: {error}");
+        // What a socket holds is sent before anybody sees that nobody takes it.
+        assert!(ENDLESS.load(Ordering::Relaxed) - before < 32 << 20, "{turn:?}");
+        assert_eq!(fs::read_dir(p.to.parent().expect("folder")).expect("listed").count(), 0, "nothing is left");
+    }
+    // Whose size nobody knows is a description.
+    let (s, p) = (server(&[Turn::Endless]), place());
+    let error = get(&s, &p.to, None, None).expect_err("too much");
+    assert!(matches!(error, FetchError::TooLarge { most: MOST_UNPROMISED, .. }), "{error}");
+    assert_eq!(fs::read_dir(p.to.parent().expect("folder")).expect("listed").count(), 0);
+    let (s, p) = (server(&[Turn::Claim(1 << 30)]), place());
+    let error = get(&s, &p.to, None, None).expect_err("too much");
+    assert!(matches!(error, FetchError::TooLarge { .. }) && s.log.lock().expect("log").len() == 1, "{error}");
+}
+
+#[test]
+fn a_range_that_begins_anew_is_no_rest() {
+    let (s, p) = (server(&[Turn::BreakAfter(70_000), Turn::Restart, Turn::Serve]), place());
+    let error = get(&s, &p.to, Some(200_000), Some(&digest(0))).expect_err("its start twice");
+    assert!(matches!(error, FetchError::Checksum { .. }), "{error}");
+    assert_eq!(fs::read_dir(p.to.parent().expect("folder")).expect("listed").count(), 0);
+    get(&s, &p.to, Some(200_000), Some(&digest(0))).expect("fetched anew");
+    assert!(is_right(&p.to, 0));
+}
+
+#[test]
+fn what_dribbles_is_as_good_as_silent() {
+    let (s, p) = (server(&[Turn::DribbleAfter(50_000)]), place());
+    let error = get(&s, &p.to, Some(200_000), Some(&digest(0))).expect_err("a byte now and then");
+    let FetchError::Stalled { got, .. } = error else { panic!("{error}") };
+    assert!((50_000..200_000).contains(&got) && s.log.lock().expect("log").len() == 3);
+}
+
+#[test]
+fn a_silent_download_ends_when_somebody_asks() {
+    // Generous, yet shorter than the server's silence and the download's patience.
+    const SOON: Duration = Duration::from_secs(10);
+    let patient = Patience { stall: Duration::from_secs(60), ..impatient() };
+    for (turn, kept) in [(Turn::Silent, 0), (Turn::StallAfter(10_000), 10_000), (Turn::DribbleAfter(10_000), 10_000)] {
+        let (s, p) = (server(&[turn]), place());
+        let wanted = Wanted { url: &s.url, to: &p.to, bytes: Some(200_000), sha256: None };
+        let mut asked: Option<Instant> = None;
+        let error = fetch(&wanted, patient, &mut |there, _| {
+            let is_asked = !s.log.lock().expect("log").is_empty();
+            if asked.is_none() && is_asked && there >= kept {
+                asked = Some(Instant::now());
+            }
+            asked.is_none_or(|at| at.elapsed() < Duration::from_millis(50))
+        });
+        let error = error.expect_err("ended");
+        assert!(matches!(error, FetchError::Cancelled { got } if got >= kept), "{turn:?}: {error}");
+        let took = asked.expect("asked").elapsed();
+        println!("{turn:?}: ended {:.0} ms after it was asked to, 50 ms of them waited here", took.as_secs_f64() * 1e3);
+        assert!(took < SOON, "{turn:?}: {took:?}");
+    }
+    // The pause before another attempt, too.
+    let (s, p) = (server(&[Turn::Status(503)]), place());
+    let slow = Patience { pause: Duration::from_secs(60), ..impatient() };
+    let begin = Instant::now();
+    let wanted = Wanted { url: &s.url, to: &p.to, bytes: None, sha256: None };
+    let error = fetch(&wanted, slow, &mut |_, _| s.log.lock().expect("log").is_empty()).expect_err("ended");
+    assert!(matches!(error, FetchError::Cancelled { .. }) && begin.elapsed() < SOON, "{error}");
+}
+
+#[test]
+fn one_file_is_fetched_by_one_program_at_a_time() {
+    let (s, p) = (server(&[Turn::BreakAfter(70_000), Turn::Serve]), place());
+    let part = p.to.with_file_name("model.onnx.part");
+    fs::create_dir_all(part.parent().expect("folder")).expect("made");
+    let other = fs::File::create(&part).expect("made");
+    other.lock().expect("locked");
+    let error = get(&s, &p.to, None, None).expect_err("busy");
+    assert!(matches!(error, FetchError::File { .. }) && error.to_string().contains("another program"), "{error}");
+    drop(other);
+    get(&s, &p.to, None, None).expect("fetched");
     assert!(is_right(&p.to, 0));
 }

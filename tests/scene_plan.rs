@@ -2,11 +2,15 @@
 //! everything on, and what is saved is counted; beside it a scene that needs what was left out.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+#[path = "gpu_common/adapter.rs"]
+mod adapter;
+
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use glam::DVec3;
 
+use fmlgs::math::stats;
 use fmlgs::pipeline::semantics::code_map::CodeMap;
 use fmlgs::pipeline::semantics::matching;
 use fmlgs::pipeline::semantics::view_map::ViewMap;
@@ -79,9 +83,7 @@ fn draw(cloud: &GaussianCloud, camera: &Camera, sh_degree: u8) -> Frame<f32> {
 
 /// The largest difference of two pictures in any channel.
 fn worst(a: &Frame<f32>, b: &Frame<f32>) -> f64 {
-    let channels = a.color.iter().zip(&b.color);
-    let apart = channels.flat_map(|(a, b)| a.iter().zip(b).map(|(a, b)| f64::from((a - b).abs())));
-    apart.fold(0.0, f64::max)
+    stats::worst(a.color.iter().zip(&b.color).map(|(a, b)| stats::worst_difference(a, b)))
 }
 
 #[test]
@@ -228,7 +230,7 @@ fn working_memory_is_given_back_and_the_next_picture_is_the_same() {
 fn without_a_gpu_no_device_is_opened() {
     let devices = || trace::since(0).iter().filter(|l| l.sort == Sort::Device).count();
     let before = devices();
-    let mut chosen = Backend::choose(BackendChoice::Auto).expect("one that works");
+    let mut chosen = Backend::choose(BackendChoice::Auto, |why| panic!("{why}")).expect("one that works");
     let real = fmlgs::render::gpu::real_gpu().is_some();
     assert_eq!(devices() > before, real, "a device for a real adapter only");
     assert_eq!(matches!(chosen, Backend::Gpu(_)), real);
@@ -236,10 +238,11 @@ fn without_a_gpu_no_device_is_opened() {
     let settings = RenderSettings::default();
     let drawn = chosen.render(&cloud, &view, &settings).expect("drawn");
     // Everything on is the GPU, emulated if it must be; its buffers are what is saved.
-    let Ok(mut gpu) = Backend::choose(BackendChoice::Gpu) else {
-        println!("skipped: no GPU adapter, not even a software one");
+    if adapter::context().is_none() {
         return;
-    };
+    }
+    let before = devices();
+    let mut gpu = Backend::choose(BackendChoice::Gpu, drop).expect("there is an adapter");
     assert!(devices() > before, "the control: asked for, it is opened");
     let other = gpu.render(&cloud, &view, &settings).expect("drawn");
     assert!(worst(&drawn, &other) < 1e-3, "{}", worst(&drawn, &other));
@@ -276,7 +279,7 @@ fn rounding_stored_features_keeps_cosines() {
     let worst = |bits: u32| {
         let pairs = (0..40).flat_map(|a| (0..40).map(move |b| (a, b)));
         let change = |(a, b)| (cosine(&vector(a), &vector(b)) - cosine(&rounded(&vector(a), bits), &vector(b))).abs();
-        pairs.map(change).fold(0.0, f64::max)
+        stats::worst(pairs.map(change))
     };
     assert!(worst(0) < 1e-3, "{}", worst(0));
     assert!(worst(4) > 1e-3, "the control: four bits are too few");

@@ -361,8 +361,9 @@ fn objects_are_found_asked_for_renamed_hidden_and_undone() {
     w.until("the new name again", |a| name(a).as_deref() == Some("Rosa"));
     // It is stored: opened again, it has the new name.
     let out = w.app().state.scene.as_ref().expect("open").out.clone();
-    let cloud = fmlgs::io::splat_ply::read(&out.join("point_cloud.ply")).expect("stored");
-    let stored = fmlgs::io::semantic_map::load(&out, &cloud).expect("readable").expect("there");
+    let scene = fmlgs::io::trained::load(&out).expect("stored");
+    let stored = fmlgs::io::semantic_map::load(&out, scene.state.as_deref(), &scene.cloud);
+    let stored = stored.expect("readable").expect("there");
     assert_eq!(stored.identities.name(red[0]), "Rosa");
 }
 

@@ -2,7 +2,7 @@
 # Installs the system packages that are missing; does nothing, and needs no rights, where all
 # are there.
 #
-# usage: tools/setup.sh run|test     (test adds what only the tests need)
+# usage: tools/setup.sh run|test     (test adds what only the tests need, into target/ where it can)
 set -euo pipefail
 
 mode=${1:?usage: tools/setup.sh run|test}
@@ -48,6 +48,28 @@ need libwayland-client0 has_library libwayland-client.so.0
 if [ "$mode" = test ]; then
     # A virtual display for the test that opens a real window.
     need xvfb has_command Xvfb
+fi
+
+# The library of ONNX Runtime, which the built-in engine is held against: out of its wheel, where there is
+# pip. Without it one test is skipped, and counted.
+fetch_onnxruntime() {
+    local folder wheel
+    folder=$(dirname "$0")/../target/onnxruntime
+    [ -z "$(compgen -G "$folder/onnxruntime/capi/libonnxruntime.*")" ] || return 0
+    has_command python3 && python3 -m pip --version >/dev/null 2>&1 || return 0
+    say "fetching the wheel of ONNX Runtime into target/"
+    mkdir -p "$folder"
+    if python3 -m pip download --quiet --disable-pip-version-check --no-deps --only-binary=:all: \
+        --dest "$folder" 'onnxruntime>=1.24' 2>/dev/null &&
+        wheel=$(compgen -G "$folder/onnxruntime-*.whl" | head -n 1) &&
+        python3 -m zipfile -e "$wheel" "$folder"; then
+        rm -f "$wheel"
+    else
+        say "it cannot be had here; the test that needs it is skipped"
+    fi
+}
+if [ "$mode" = test ]; then
+    fetch_onnxruntime
 fi
 
 [ ${#missing[@]} -gt 0 ] || exit 0

@@ -25,6 +25,25 @@ pub struct Outcome {
     pub refused: Option<RefusalKind>,
 }
 
+impl Outcome {
+    /// Whether the text may name files of this machine: it is for the user alone.
+    pub fn is_private(&self) -> bool {
+        match self.refused {
+            Some(kind) => kind == RefusalKind::Failed,
+            None => matches!(self.call, ToolCall::Export { .. }),
+        }
+    }
+
+    /// What a planner elsewhere hears of it.
+    pub fn heard(&self) -> &str {
+        match self.refused {
+            _ if !self.is_private() => &self.text,
+            None => "It is written to a file; the user is told which.",
+            Some(_) => "It failed on the user's machine; the user is told why.",
+        }
+    }
+}
+
 /// A call after its checks.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Checked {
@@ -185,7 +204,9 @@ fn question(world: &dyn World, call: &ToolCall, policy: &Policy, id: Option<Iden
             Some(format!("Exporting {it} would replace {path}. Shall I? (yes or no)"))
         }
         (Permission::ConfirmOverwrite | Permission::Free | Permission::Never, _) => None,
-        (Permission::Confirm, ToolCall::Remove { .. }) => Some(format!("Remove {it} from the scene? (yes or no)")),
+        (Permission::Confirm, ToolCall::Remove { .. }) => {
+            Some(format!("I can only hide {it}: it stays in the scene's files. Shall I? (yes or no)"))
+        }
         (Permission::Confirm, ToolCall::Rename { name, .. }) => Some(format!("Rename {it} to '{name}'? (yes or no)")),
         (Permission::Confirm, ToolCall::AskUser { .. }) => None,
         (Permission::Confirm, other) => Some(format!("{}: shall I? (yes or no)", other.line(world.identities()))),
@@ -307,7 +328,7 @@ fn act(
         }
         ToolCall::Remove { .. } => {
             world.remove(id).map_err(failed)?;
-            format!("{} is removed from the scene; 'undo' brings it back.", capital(&it))
+            format!("{} is hidden; it stays in the scene's files. 'undo' brings it back.", capital(&it))
         }
         ToolCall::Rename { name, .. } => {
             world.rename(id, name).map_err(failed)?;

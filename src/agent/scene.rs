@@ -19,7 +19,7 @@ use crate::pipeline::semantics::grammar::Kind;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::RenderSettings;
 use crate::render::cpu::Renderer;
-use crate::scene::{Bounds, Camera, GaussianCloud, Identities, IdentityId, SemanticMap};
+use crate::scene::{Bounds, Camera, GaussianCloud, Identities, IdentityId, SemanticMap, text};
 use crate::worker::Explored;
 
 /// Longer side of the picture in which pixels of identities are counted, px.
@@ -399,13 +399,14 @@ impl World for SceneWorld {
         let before = Arc::clone(&self.parts.map);
         let map = Arc::make_mut(&mut self.parts.map);
         let identity = map.identities.get_mut(id).ok_or_else(|| WorldError(format!("there is no #{id}")))?;
+        let name = text::name(name);
         let old = identity.names.first().cloned().unwrap_or_default();
         match identity.names.first_mut() {
-            Some(first) => name.clone_into(first),
-            None => identity.names.push(name.to_owned()),
+            Some(first) => first.clone_from(&name),
+            None => identity.names.push(name.clone()),
         }
         self.done.push(Before::Named(before, id, old));
-        (self.tell)(Deed::Renamed(id, name.to_owned()));
+        (self.tell)(Deed::Renamed(id, name));
         Ok(())
     }
 

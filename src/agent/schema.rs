@@ -108,7 +108,7 @@ pub fn tools() -> Vec<Value> {
         on_target("hide", "Leave a thing out of the picture."),
         on_target("unhide", "Draw a hidden thing again."),
         tool("show_all", "Draw everything again.", json!({}), &[]),
-        on_target("remove", "Take a thing out of the scene. The program asks the user first."),
+        on_target("remove", "Hide a thing that the user wants gone; files keep it. The program asks the user first."),
         tool(
             "rename",
             "Give a thing another name. The program asks the user first.",

@@ -329,11 +329,10 @@ impl Session {
             let last = outcomes.last().filter(|o| o.refused.is_some())?;
             Some(Refusal::new(last.refused?, last.text.clone()))
         });
-        let mut said: Vec<&str> = if self.planner.speaks() && !text.is_empty() {
-            Vec::new()
-        } else {
-            outcomes.iter().map(|o| o.text.as_str()).collect()
-        };
+        // A planner that speaks for itself has not heard what is for the user alone.
+        let speaks = self.planner.speaks() && !text.is_empty();
+        let mut said: Vec<&str> =
+            outcomes.iter().filter(|o| !speaks || o.is_private()).map(|o| o.text.as_str()).collect();
         if let Some(refusal) = refused.as_ref().filter(|r| said.last() != Some(&r.text.as_str()) && text != r.text) {
             said.push(&refusal.text);
         }

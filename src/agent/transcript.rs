@@ -5,6 +5,7 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 
 use super::tool::ToolCall;
+use crate::scene::text;
 
 /// Entries that are kept; the oldest go first.
 const MOST: usize = 4000;
@@ -130,9 +131,8 @@ impl Transcript {
 /// On one line, with nothing that Markdown would take for markup.
 fn flat(text: &str) -> String {
     let mut flat = String::with_capacity(text.len());
-    for c in text.chars() {
+    for c in text::line(text).chars() {
         match c {
-            '\n' | '\r' => flat.push(' '),
             '*' | '_' | '`' | '#' | '[' | ']' | '<' | '>' | '|' | '\\' => flat.extend(['\\', c]),
             c => flat.push(c),
         }
@@ -142,7 +142,7 @@ fn flat(text: &str) -> String {
 
 /// For between backticks.
 fn code(text: &str) -> String {
-    text.replace('`', "'").replace(['\n', '\r'], " ")
+    text::line(text).replace('`', "'")
 }
 
 #[cfg(test)]

@@ -100,7 +100,8 @@ pub trait World {
     /// Draws everything again.
     fn show_all(&mut self) -> Result<(), WorldError>;
 
-    /// Takes an identity out of the scene, so that [`Self::undo`] can bring it back.
+    /// Leaves an identity out for a person who wants it gone, so that [`Self::undo`] can bring it back. What is
+    /// said of it is that it is hidden: files keep it.
     fn remove(&mut self, id: IdentityId) -> Result<(), WorldError>;
 
     /// Gives an identity another first name.

@@ -1,16 +1,15 @@
 //! `fmlgs agent`: plain sentences to what is shown.
 
-use std::io::BufRead;
+use std::io::{BufRead, Read};
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::json;
 
 use super::asking::semantics;
-use super::{CliError, interrupt, opened, output, view};
-use crate::agent::llm::Llm;
+use super::{CliError, interrupt, number, opened, output, view};
 use crate::agent::llm::settings::LlmSettings;
+use crate::agent::llm::{Llm, SENT};
 use crate::agent::rules::Rules;
 use crate::agent::scene::{Deed, Parts, SceneWorld};
 use crate::agent::{AgentEvent, Planner, Policy, Session};
@@ -18,17 +17,19 @@ use crate::io;
 use crate::navigate::Pose;
 use crate::scene::Camera;
 
+const EXAMPLES: &str = "Examples:\n  \
+    fmlgs agent scene/ \"show me the handle of the kettle from the other side\" \"step back half a metre\"\n  \
+    fmlgs agent scene/ \"what is on the table?\" --json\n  \
+    fmlgs agent scene/ \"go to the lamp\" --view lamp.png --transcript talk.md\n  \
+    fmlgs agent scene/ --planner llm --url http://127.0.0.1:11434/v1 --model qwen3 \"find something to cut with\"";
+
 /// Talk to a scene: it shows, goes there, tells, hides, measures
 ///
 /// Each TEXT is one request of the same talk; without any, requests are read from standard input, one
 /// a line. The planner 'rules' is built in; 'llm' asks a chat model behind an OpenAI-compatible
-/// address, and sends it the names of the scene's objects. Exit code 1 if the last request was refused.
+/// address. Exit code 1 if the last request was refused.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  \
-    fmlgs agent scene/ \"show me the handle of the kettle from the other side\" \"step back half a metre\"\n  \
-    fmlgs agent scene/ \"what is on the table?\" --json\n  \
-    fmlgs agent scene/ \"go to the lamp\" --view lamp.png --transcript talk.md\n  \
-    fmlgs agent scene/ --planner llm --url http://127.0.0.1:11434/v1 --model qwen3 \"find something to cut with\"")]
+#[command(after_help = format!("{EXAMPLES}\n\n{SENT}"))]
 pub struct Args {
     /// Trained scene with objects and parts ('fmlgs preprocess')
     scene: PathBuf,
@@ -53,12 +54,12 @@ pub struct Args {
     #[arg(long)]
     policy: Option<PathBuf>,
     /// Length of a scene unit in metres [default: the scene's own, if that is known]
-    #[arg(long)]
+    #[arg(long, value_parser = number::within(1e-9..=1e9))]
     metres: Option<f64>,
     /// Write the picture at the end
     #[arg(long)]
     view: Option<PathBuf>,
-    /// Write everything that was said and done: .json, else Markdown
+    /// Write everything that was said and done: .json, or .md for people
     #[arg(long)]
     transcript: Option<PathBuf>,
     /// Print one JSON document
@@ -99,11 +100,14 @@ impl Args {
 
 pub fn run(args: Args) -> Result<(), CliError> {
     let (planner, policy) = (args.planner()?, args.policy()?);
-    if args.metres.is_some_and(|m| !(m.is_finite() && m > 0.0)) {
-        return Err(CliError::Usage("--metres has to be over 0".into()));
-    }
     let scene = opened::drawable(&args.scene)?;
-    let map = semantics(&args.scene, &scene.cloud)?;
+    if let Some(view) = &args.view {
+        output::check(view, &[".png"], &scene.reads(&args.scene))?;
+    }
+    if let Some(transcript) = &args.transcript {
+        output::check(transcript, &[".json", ".md"], &scene.reads(&args.scene))?;
+    }
+    let map = semantics(&args.scene, scene.state.as_deref(), &scene.cloud)?;
     let camera = view::choose(args.from.as_deref(), &scene)?;
     let cameras: Vec<Camera> = scene.cameras.iter().map(|c| c.camera.clone()).collect();
     let parts = Parts {
@@ -131,8 +135,8 @@ pub fn run(args: Args) -> Result<(), CliError> {
     let mut session = Session::new(policy, planner);
     let mut talk = Talk { json: args.json, ..Talk::default() };
     if args.text.is_empty() {
-        for text in std::io::stdin().lock().lines() {
-            let text = text.map_err(|e| CliError::failed(format!("standard input: {e}")))?;
+        let mut requests = Requests { input: std::io::stdin().lock(), line: 0 };
+        while let Some(text) = requests.next()? {
             if !text.trim().is_empty() {
                 talk.say(&mut session, &mut world, &text, &deeds)?;
             }
@@ -165,6 +169,36 @@ pub fn run(args: Args) -> Result<(), CliError> {
     }
 }
 
+/// Longest request in bytes, and most requests of one talk: beyond them is no person but an endless file.
+const MAX_REQUEST_BYTES: u64 = 16 << 10;
+const MAX_REQUESTS: usize = 10_000;
+
+/// Requests, one a line.
+struct Requests<R> {
+    input: R,
+    line: usize,
+}
+
+impl<R: BufRead> Requests<R> {
+    /// The next line; `None` at the end.
+    fn next(&mut self) -> Result<Option<String>, CliError> {
+        self.line += 1;
+        let bad = |what: String| CliError::failed(format!("standard input, line {}: {what}", self.line));
+        let mut bytes = Vec::new();
+        let read = self.input.by_ref().take(MAX_REQUEST_BYTES + 1).read_until(b'\n', &mut bytes);
+        if read.map_err(|e| bad(e.to_string()))? == 0 {
+            return Ok(None);
+        }
+        if bytes.len() as u64 > MAX_REQUEST_BYTES {
+            return Err(bad(format!("a request has at most {MAX_REQUEST_BYTES} bytes")));
+        }
+        if self.line > MAX_REQUESTS {
+            return Err(bad(format!("a talk has at most {MAX_REQUESTS} requests; go on with another")));
+        }
+        String::from_utf8(bytes).map(Some).map_err(|_| bad("it is not UTF-8 text".into()))
+    }
+}
+
 /// What was said so far.
 #[derive(Default)]
 struct Talk {
@@ -182,21 +216,13 @@ impl Talk {
         text: &str,
         deeds: &Mutex<Vec<String>>,
     ) -> Result<(), CliError> {
-        let cancel = AtomicBool::new(false);
         let mut calls = Vec::new();
-        let reply = session.say(
-            world,
-            text,
-            &mut |event| {
-                if interrupt::asked_to_stop() {
-                    cancel.store(true, Ordering::Relaxed);
-                }
-                if let AgentEvent::Call { line, .. } = event {
-                    calls.push(line);
-                }
-            },
-            &cancel,
-        );
+        let mut on = |event| {
+            if let AgentEvent::Call { line, .. } = event {
+                calls.push(line);
+            }
+        };
+        let reply = session.say(world, text, &mut on, interrupt::flag());
         if interrupt::asked_to_stop() {
             return Err(CliError::Cancelled("the talk ends here".into()));
         }
@@ -237,5 +263,33 @@ fn line(deed: &Deed) -> Option<String> {
         Deed::Hidden(ids) => Some(format!("leaves {} out of the picture", ids.len())),
         Deed::Renamed(id, name) => Some(format!("calls #{id} {name}")),
         Deed::Explored(_) => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn requests_are_lines_of_bounded_length_and_number() {
+        let all = |input: &[u8]| {
+            let mut requests = Requests { input, line: 0 };
+            let mut lines = Vec::new();
+            loop {
+                match requests.next() {
+                    Ok(Some(line)) => lines.push(line),
+                    Ok(None) => return Ok(lines),
+                    Err(CliError::Failed(e)) => return Err(e.to_string()),
+                    Err(other) => panic!("{other:?}"),
+                }
+            }
+        };
+        assert_eq!(all(b"closer\n\nback"), Ok(vec!["closer\n".to_owned(), "\n".into(), "back".into()]));
+        let endless = vec![0; 2 * MAX_REQUEST_BYTES as usize];
+        assert!(all(&endless).expect_err("no end").contains("line 1: a request has at most"));
+        let most = "y\n".repeat(MAX_REQUESTS);
+        assert_eq!(all(most.as_bytes()).map(|l| l.len()), Ok(MAX_REQUESTS));
+        assert!(all((most + "y\n").as_bytes()).expect_err("too many").contains("at most 10000 requests"));
+        assert!(all(b"\xff\n").expect_err("bytes").contains("not UTF-8"));
     }
 }

@@ -9,9 +9,9 @@ use crate::pipeline::semantics::asker;
 use crate::pipeline::semantics::grammar::Kind;
 use crate::scene::{GaussianCloud, SemanticMap};
 
-/// The objects of the scene in the folder `scene`, whose Gaussians are `cloud`.
-pub fn semantics(scene: &Path, cloud: &GaussianCloud) -> Result<SemanticMap, CliError> {
-    io::semantic_map::load(scene, cloud)?.ok_or_else(|| {
+/// The objects of the scene in the folder `scene`, whose Gaussians `cloud` are of the save `state`.
+pub fn semantics(scene: &Path, state: Option<&str>, cloud: &GaussianCloud) -> Result<SemanticMap, CliError> {
+    io::semantic_map::load(scene, state, cloud)?.ok_or_else(|| {
         let path = scene.display();
         CliError::failed(format!("{path} knows no objects yet; find them with 'fmlgs preprocess {path}'"))
     })

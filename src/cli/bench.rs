@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::bench_plan::{self, Variant};
 use super::progress::Console;
-use super::{CliError, output, view};
+use super::{CliError, number, output, view};
 use crate::io::{self, Opened};
 use crate::models;
 use crate::pipeline::bench::{self, RenderTiming, StepTiming};
@@ -46,7 +46,7 @@ pub struct Args {
     #[arg(long)]
     gpu: bool,
     /// Time this many typed queries too, on a made-up view of 1008 x 567 px with 300 objects and parts
-    #[arg(long, value_name = "COUNT")]
+    #[arg(long, value_name = "COUNT", value_parser = number::within(1..=100_000_000_usize))]
     queries: Option<usize>,
     /// Hold what each scene's plan leaves out against everything on, each in processes of its own
     #[arg(long, conflicts_with_all = ["queries", "gpu", "size"])]

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::{CliError, memory, output};
+use super::{CliError, output, process};
 use crate::math::stats::median;
 use crate::models;
 use crate::pipeline::bench;
@@ -97,7 +97,7 @@ pub fn run(scenes: &[PathBuf], runs: u32, repeats: u32, as_json: bool) -> Result
 /// Measures one variant in this process and prints it as JSON.
 pub fn run_child(scene: &Path, variant: Variant, repeats: usize) -> Result<(), CliError> {
     // As the window has it.
-    memory::settle();
+    process::settle();
     output::print_json(&measure(scene, variant, repeats)?)
 }
 
@@ -255,7 +255,7 @@ fn at_opening(jobs: &PipelineJobs, scene: &OpenedScene, plan: &ScenePlan) -> Res
 fn frame(scene: &OpenedScene, plan: &ScenePlan, repeats: usize) -> Result<f64, CliError> {
     let Some(cloud) = scene.cloud.clone() else { return Ok(0.0) };
     let choice = if plan.on_cpu { BackendChoice::Cpu } else { BackendChoice::Auto };
-    let mut backend = Backend::choose(choice)?;
+    let mut backend = Backend::choose(choice, output::warn)?;
     let settings = RenderSettings { depth: plan.depth == When::Always, ..settings(scene, plan) };
     let mut times = Vec::new();
     for camera in bench::views_of(&cloud, SIZE[0], SIZE[1]) {

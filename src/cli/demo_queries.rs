@@ -9,7 +9,8 @@ use super::asking::Asker;
 use super::eval::Job;
 use super::progress::Console;
 use super::{CliError, output, query};
-use crate::io::{self, labels::Labels};
+use crate::io::SceneFolder;
+use crate::io::labels::Labels;
 use crate::models;
 use crate::pipeline::observer::{Level, Observer, Silent};
 use crate::pipeline::semantics::code_map::CodeMap;
@@ -94,7 +95,10 @@ pub fn run(
         other => other.into(),
     })?;
     let find_secs = start.elapsed().as_secs_f64();
-    io::semantic_map::save(scene, &map, &job.cloud)?;
+    let (kept, _) = SceneFolder::hold(scene, "storing objects")?.replace_map(job.state.as_deref(), &map, &job.cloud)?;
+    if let Some(kept) = kept {
+        console.note(Level::Info, format!("The objects and parts before are kept in {}", kept.display()));
+    }
     console.note(Level::Info, format!("{} objects and parts found", map.identities.len()));
 
     output::make_folder(pictures)?;
@@ -112,9 +116,17 @@ pub fn run(
             blended: &CodeMap::default(),
             categories: categories(&segmenter.segment(photo, job.max_side_px, &mut Silent)?),
         };
-        // Names need no encoder, so asking for them does not fail.
-        let mut by_name = |text: &str| asker.ask(text, Kind::Auto).ok().flatten();
+        let mut failed = None;
+        let mut by_name = |text: &str| {
+            asker.ask(text, Kind::Auto).unwrap_or_else(|e| {
+                failed.get_or_insert(e);
+                None
+            })
+        };
         units.extend(masks::compare(&mut AskedScene { map: &map, ask: &mut by_name }, &labelled));
+        if let Some(error) = failed {
+            return Err(error);
+        }
         for (n, question) in QUESTIONS.iter().enumerate().filter(|_| k == 0) {
             let start = Instant::now();
             let Some(answered) = asker.ask(question, Kind::Auto)? else { continue };

@@ -3,6 +3,8 @@
 use std::error::Error;
 use std::process::ExitCode;
 
+use super::output;
+
 /// Why a subcommand did not do what was asked.
 #[derive(Debug)]
 pub enum CliError {
@@ -24,15 +26,17 @@ impl CliError {
     pub fn report(&self) -> ExitCode {
         match self {
             Self::Usage(text) => {
-                eprintln!("error: {text}\n\nFor more information, try 'fmlgs --help'.");
+                output::note(&format!("error: {text}"));
+                output::note("");
+                output::note("For more information, try 'fmlgs --help'.");
                 ExitCode::from(2)
             }
             Self::Failed(error) => {
-                eprintln!("error: {}", chain(error.as_ref()));
+                output::note(&format!("error: {}", chain(error.as_ref())));
                 ExitCode::FAILURE
             }
             Self::Cancelled(text) => {
-                eprintln!("cancelled: {text}");
+                output::note(&format!("cancelled: {text}"));
                 ExitCode::from(130)
             }
         }

@@ -9,7 +9,7 @@ use serde_json::json;
 use super::eval_masks::{self, Protocol};
 use super::opened::DrawableScene;
 use super::progress::Console;
-use super::{CliError, eval_depth, opened, output};
+use super::{CliError, eval_depth, number, opened, output};
 use crate::io;
 use crate::math::stats::mean;
 use crate::pipeline::evaluate::evaluate;
@@ -69,7 +69,7 @@ pub struct Options {
     #[arg(long, value_parser = clap::value_parser!(u32).range(16..=16384))]
     pub max_side: Option<u32>,
     /// Which photos count as held out: every n-th, 0 = all photos [default: as in training, else 8]
-    #[arg(long)]
+    #[arg(long, value_parser = number::within(0..=1_000_000_usize))]
     pub holdout_every: Option<usize>,
     /// Compare the black borders of photos that were undistorted elsewhere, too
     #[arg(long)]
@@ -95,6 +95,8 @@ pub struct Job {
     pub borders: Option<Borders>,
     /// Folder for pictures.
     pub pictures: Option<PathBuf>,
+    /// Id of the save that the scene's files are of.
+    pub state: Option<String>,
 }
 
 impl Args {
@@ -104,6 +106,9 @@ impl Args {
             let path = self.scene.display();
             CliError::failed(format!("{path}: its photos are not known or no longer there; give them with --photos"))
         })?;
+        if let Some(folder) = &self.options.pictures {
+            output::check_folder(folder, &[&photos])?;
+        }
         job(scene, &photos, self.options)
     }
 }
@@ -133,7 +138,8 @@ pub fn job(scene: DrawableScene, photos: &Path, options: Options) -> Result<Job,
     let max_side_px = max_side.unwrap_or(scene.config.max_side_px);
     let (training, _) = dataset.split(holdout_every.unwrap_or(scene.config.holdout_every));
     let borders = if keep_borders { None } else { Some(Borders::of(&dataset, &training, max_side_px)?) };
-    Ok(Job { cloud: scene.cloud, settings: scene.settings, dataset, views, max_side_px, borders, pictures })
+    let DrawableScene { cloud, settings, state, .. } = scene;
+    Ok(Job { cloud, settings, dataset, views, max_side_px, borders, pictures, state })
 }
 
 pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {

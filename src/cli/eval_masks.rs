@@ -63,7 +63,7 @@ pub fn run(
     job: Job,
     as_json: bool,
 ) -> Result<(), CliError> {
-    let map = semantics(scene, &job.cloud)?;
+    let map = semantics(scene, job.state.as_deref(), &job.cloud)?;
     let mut known = FileMasks(Labels::open(labels)?);
     let views = labelled(&job, &map, &mut known)?;
     if views.is_empty() {

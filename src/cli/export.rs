@@ -28,10 +28,9 @@ pub struct Args {
 }
 
 pub fn run(args: Args) -> Result<(), CliError> {
-    if args.out.extension().is_none_or(|e| !e.eq_ignore_ascii_case("ply")) {
-        return Err(CliError::Usage(format!("'{}' must end in .ply", args.out.display())));
-    }
-    let mut cloud = opened::drawable(&args.scene)?.cloud;
+    let scene = opened::drawable(&args.scene)?;
+    output::check(&args.out, &[".ply"], &scene.reads(&args.scene))?;
+    let mut cloud = scene.cloud;
     if let Some(degree) = args.sh_degree {
         limit_degree(&mut cloud, degree);
     }

@@ -51,9 +51,21 @@ pub fn run(args: Args) -> Result<(), CliError> {
         Opened::Trained(t) => {
             let cameras: Vec<Camera> = t.info.cameras.iter().map(|c| c.camera.clone()).collect();
             let planned = machine.with_photos(&cameras).with_cloud(&t.cloud, t.cloud.sh_degree, &cameras);
-            let map = io::semantic_map::load(&t.folder, &t.cloud);
+            let map = io::semantic_map::load(&t.folder, t.state.as_deref(), &t.cloud);
             let mut facts = of_trained(&t);
-            facts.warnings.extend(map.as_ref().err().map(|e| format!("its objects cannot be read: {e}")));
+            let of_others = matches!(map, Ok(None)) && t.folder.join(io::semantic_map::FILE).exists();
+            facts.warnings.extend(match &map {
+                Err(e) => Some(format!("its objects cannot be read: {e}; 'fmlgs preprocess' finds them anew")),
+                Ok(None) if of_others => Some(format!(
+                    "{} is of other Gaussians than {}, so no objects are known; 'fmlgs preprocess' finds them anew",
+                    io::semantic_map::FILE,
+                    io::trained::CLOUD_FILE
+                )),
+                Ok(_) => None,
+            });
+            let known = map.as_ref().ok().and_then(Option::as_ref).map(|m| m.identities.len());
+            facts.lines.push(("objects and parts", known.map_or_else(|| "none known".into(), |n| n.to_string())));
+            facts.json.insert("identities".into(), json!(known));
             (facts, planned.with_semantics(map.ok().flatten().as_ref()))
         }
     };

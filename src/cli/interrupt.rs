@@ -1,4 +1,4 @@
-//! Ctrl-C and SIGTERM: the first asks the work to stop at a consistent state, the second does
+//! Ctrl-C, SIGTERM and a lost terminal (SIGHUP): the first asks the work to stop at a consistent state, the second does
 //! not wait for that.
 
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -6,28 +6,54 @@ use std::sync::{Arc, LazyLock};
 
 use signal_hook::{consts::TERM_SIGNALS, flag};
 
+use super::output;
+
 static ASKED_TO_STOP: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 static TOLD: AtomicBool = AtomicBool::new(false);
 
 /// Starts listening. Where that is not possible, Ctrl-C ends the process at once, which loses at
 /// most the time since the last checkpoint.
 pub fn listen() {
-    for &signal in TERM_SIGNALS {
+    for signal in TERM_SIGNALS.iter().copied().chain(hang_up()) {
         // The shutdown is looked at first, so it only acts on a signal after the first. Files are
         // written under a temporary name and renamed, so it leaves none half-written.
         let listening = flag::register_conditional_shutdown(signal, 130, Arc::clone(&ASKED_TO_STOP))
             .and_then(|_| flag::register(signal, Arc::clone(&ASKED_TO_STOP)));
         if let Err(error) = listening {
-            eprintln!("warning: signal {signal} will end the program at once: {error}");
+            output::note(&format!("warning: signal {signal} will end the program at once: {error}"));
         }
     }
+}
+
+/// The signal of a lost terminal, unless the program was started to outlive it (`nohup`).
+#[cfg(unix)]
+fn hang_up() -> Option<i32> {
+    let signal = libc::SIGHUP;
+    // SAFETY: asks for the current action and changes nothing; `action` is plain data for the call to fill.
+    #[allow(unsafe_code)]
+    let ignored = unsafe {
+        let mut action: libc::sigaction = std::mem::zeroed();
+        libc::sigaction(signal, std::ptr::null(), &raw mut action) == 0 && action.sa_sigaction == libc::SIG_IGN
+    };
+    (!ignored).then_some(signal)
+}
+
+#[cfg(not(unix))]
+fn hang_up() -> Option<i32> {
+    None
+}
+
+/// Set once the work should stop, for what looks at it by itself.
+pub fn flag() -> &'static AtomicBool {
+    &ASKED_TO_STOP
 }
 
 /// Whether the work should stop. Says so the first time that it should.
 pub fn asked_to_stop() -> bool {
     let asked = ASKED_TO_STOP.load(Ordering::SeqCst);
     if asked && !TOLD.swap(true, Ordering::SeqCst) {
-        eprintln!("\nStopping at the next safe point (press Ctrl-C again to stop at once) ...");
+        output::note("");
+        output::note("Stopping at the next safe point (press Ctrl-C again to stop at once) ...");
     }
     asked
 }

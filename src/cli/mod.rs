@@ -18,14 +18,15 @@ mod eval_masks;
 mod export;
 mod info;
 mod interrupt;
-mod memory;
 mod models;
+mod number;
 mod opened;
 mod output;
 mod path;
 mod path_survey;
 mod plan;
 mod preprocess;
+mod process;
 mod progress;
 mod query;
 mod render;
@@ -45,7 +46,7 @@ pub use error::CliError;
 
 use self::plan::PlanArgs;
 use crate::scene::plan::Wish;
-use crate::scene::trace;
+use crate::scene::{text, trace};
 use crate::worker::Action;
 
 /// What each exit code means; part of `--help`.
@@ -54,7 +55,7 @@ Exit codes:
   0    done
   1    failed; the message names the file, the place in it and what can be done
   2    the arguments make no sense
-  130  cancelled (Ctrl-C, SIGTERM); what was done so far is saved where the command saves anything";
+  130  cancelled (Ctrl-C, SIGTERM, SIGHUP); what was done so far is saved where the command saves anything";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -126,11 +127,17 @@ pub fn main(open_window: OpenWindow) -> ExitCode {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version are "errors" for clap, with exit code 0. A closed pipe is no failure.
-            let _ = error.print();
+            let plain = error.render().to_string();
+            if text::lines(&plain) == plain {
+                let _ = error.print();
+            } else {
+                // What it quotes may be a file's name.
+                output::note(&plain);
+            }
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
     };
-    match run(cli, open_window) {
+    match process::start_threads().map_err(CliError::failed).and_then(|()| run(cli, open_window)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => error.report(),
     }
@@ -140,7 +147,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
     let quiet = cli.quiet;
     let wishes = cli.plan.wishes;
     if cli.trace {
-        trace::listen(|load| eprintln!("{}", load.line()));
+        trace::listen(|load| output::note(&load.line()));
     }
     let Some(command) = cli.command else {
         if cli.report.len() > 2 {
@@ -201,7 +208,7 @@ fn window(first: Vec<Action>, wishes: Vec<Wish>, open_window: OpenWindow) -> Res
              'fmlgs demo --headless' shows what the program does; 'fmlgs --help' lists what works without a window",
         ));
     }
-    memory::settle();
+    process::settle();
     open_window(first, wishes).map_err(|error| {
         CliError::failed(format!("the window could not be opened: {error}. 'fmlgs demo --headless' works without one"))
     })

@@ -177,7 +177,7 @@ fn bench(as_json: bool) -> Result<(), CliError> {
     let engine = engine()?;
     let mut rows = vec![["model", "load ms", "picture ms", "phrase ms"].map(str::to_owned).to_vec()];
     let mut list = Vec::new();
-    for id in catalogue::usable(models::Role::Encoder) {
+    for id in catalogue::usable(models::Role::Encoder, &mut output::warn)? {
         let start = Instant::now();
         let mut encoder = models::encoder(&id)?;
         let side_px = encoder.tile_side_px().unwrap_or(224);

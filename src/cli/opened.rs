@@ -33,12 +33,21 @@ pub struct DrawableScene {
     pub dataset_path: Option<PathBuf>,
     /// Length of a scene unit in metres, if known.
     pub metres_per_unit: Option<f64>,
+    /// Id of the save that its files are of, if it has one.
+    pub state: Option<String>,
+}
+
+impl DrawableScene {
+    /// What was read to open it from `path`, which no result may replace.
+    pub fn reads<'a>(&'a self, path: &'a Path) -> Vec<&'a Path> {
+        std::iter::once(path).chain(self.dataset_path.as_deref()).collect()
+    }
 }
 
 /// Opens a trained scene or a splat.
 pub fn drawable(path: &Path) -> Result<DrawableScene, CliError> {
     match io::open(path)? {
-        Opened::Trained(scene) => Ok(from_trained(scene)),
+        Opened::Trained(scene) => from_trained(scene),
         Opened::Cloud(cloud) => Ok(DrawableScene {
             cloud,
             cameras: Vec::new(),
@@ -46,6 +55,7 @@ pub fn drawable(path: &Path) -> Result<DrawableScene, CliError> {
             config: TrainConfig::default(),
             dataset_path: None,
             metres_per_unit: None,
+            state: None,
         }),
         Opened::Dataset(_) => Err(CliError::failed(format!(
             "{path} holds photos but no Gaussians yet: train them first, with 'fmlgs train {path} --out SCENE'",
@@ -76,19 +86,19 @@ pub fn named_cameras(dataset: &Dataset, every: usize) -> Vec<NamedCamera> {
     dataset.photos.iter().enumerate().map(named).collect()
 }
 
-fn from_trained(scene: TrainedScene) -> DrawableScene {
+fn from_trained(scene: TrainedScene) -> Result<DrawableScene, CliError> {
     let dataset_path = scene.dataset_path();
     let info = scene.info;
-    // A later version's settings may not parse; the defaults then only affect sizes and filters.
-    let config: TrainConfig = serde_json::from_value(info.config).unwrap_or_default();
+    let config = TrainConfig::stored(&scene.folder, info.config)?;
     let settings = config.render_settings(info.background);
     let named = |c: io::trained::SceneCamera| NamedCamera { name: c.name, camera: c.camera, held_out: c.held_out };
-    DrawableScene {
+    Ok(DrawableScene {
         cloud: scene.cloud,
         cameras: info.cameras.into_iter().map(named).collect(),
         settings,
         config,
         dataset_path,
         metres_per_unit: info.metres_per_unit.filter(|m| m.is_finite() && *m > 0.0),
-    }
+        state: scene.state,
+    })
 }

@@ -1,4 +1,5 @@
-//! What the subcommands write: results on standard output, pictures and arrays in files.
+//! What the subcommands write: results on standard output, notes on standard error, pictures and arrays in
+//! files. All text for a terminal goes through here, so that nothing foreign in it acts on one.
 
 use std::io::{ErrorKind, Write};
 use std::path::Path;
@@ -8,25 +9,39 @@ use npyz::WriterBuilder;
 use serde::Serialize;
 
 use super::CliError;
-use crate::io::atomic;
+use crate::io::{atomic, scene_folder, trained};
+use crate::scene::text;
 
 /// Prints `text` and a line break to standard output. A reader that has closed its end (`| head`)
 /// has seen enough, which is no failure.
 pub fn print(text: &str) -> Result<(), CliError> {
     let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush()) {
+    match out.write_all(text::lines(text).as_bytes()).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error.into()),
         _ => Ok(()),
     }
 }
 
+/// Tells on standard error what is not as it was meant, but no reason to stop.
+pub fn warn(text: String) {
+    note(&format!("warning: {text}"));
+}
+
 /// Prints `value` as indented JSON.
 pub fn print_json(value: &impl Serialize) -> Result<(), CliError> {
-    print(&serde_json::to_string_pretty(value)?)
+    print(&text::json(&serde_json::to_string_pretty(value)?))
+}
+
+/// Prints a message to standard error. One that nobody can read any more ends no work.
+pub fn note(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{}", text::message(text));
 }
 
 /// Rows of cells as aligned columns: the first to the left, the others to the right.
 pub fn table(rows: &[Vec<String>]) -> String {
+    // A cell is one line, and no wider than a name: formatting takes no width over 65,535.
+    let cell = |s: &String| text::shortened(&text::line(s), text::LONGEST_NAME).into_owned();
+    let rows: Vec<Vec<String>> = rows.iter().map(|row| row.iter().map(cell).collect()).collect();
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..columns).map(width).collect();
@@ -38,6 +53,36 @@ pub fn table(rows: &[Vec<String>]) -> String {
         row.iter().enumerate().map(cell).collect::<Vec<_>>().join("  ").trim_end().to_owned()
     };
     rows.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+/// Refuses a file for a result, before any work is done, that does not end as it should (`endings`, any
+/// if there are none) or is one of those that the command reads: `reads` are files and folders.
+/// Devices and pipes may be written into whatever they are called.
+pub fn check(path: &Path, endings: &[&str], reads: &[&Path]) -> Result<(), CliError> {
+    if atomic::is_stream(path) {
+        return Ok(());
+    }
+    let name = path.to_string_lossy().to_lowercase();
+    if !endings.is_empty() && !endings.iter().any(|e| name.ends_with(e)) {
+        return Err(CliError::Usage(format!("'{}' must end in {}", path.display(), endings.join(" or "))));
+    }
+    scene_folder::refuse_scene_file(path)?;
+    let Ok(real) = path.canonicalize() else { return Ok(()) };
+    for read in reads {
+        let within = read.canonicalize().is_ok_and(|read| real.starts_with(read));
+        // Results may lie in a scene's folder; its own files are told above.
+        if within && !trained::is_scene(read) {
+            let (path, read) = (path.display(), read.display());
+            return Err(CliError::Usage(format!("'{path}' is read by this command ('{read}'); choose another name")));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a folder for pictures that holds what the command reads, as [`check`] does files.
+pub fn check_folder(folder: &Path, reads: &[&Path]) -> Result<(), CliError> {
+    // Where it does not exist yet, nothing in it is read.
+    if folder.exists() { check(folder, &[], reads) } else { Ok(()) }
 }
 
 /// Makes the folder that `path` lies in.
@@ -82,6 +127,14 @@ mod tests {
     fn columns_line_up() {
         let rows = [vec!["view".into(), "PSNR".into()], vec!["a long name".into(), "9.1".into()]];
         assert_eq!(table(&rows), "view         PSNR\na long name   9.1");
+    }
+
+    #[test]
+    fn cells_are_one_line_of_bounded_width() {
+        let rows = [vec!["é".repeat(70_000), "1".into()], vec!["a\nb\u{1b}[2J".into(), "2".into()]];
+        let lines = table(&rows);
+        assert_eq!(lines.lines().count(), 2);
+        assert!(lines.chars().count() < 3 * text::LONGEST_NAME && !lines.contains('\u{1b}'), "{lines}");
     }
 
     #[test]

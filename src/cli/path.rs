@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::asking::{Asker, semantics};
 use super::opened::DrawableScene;
-use super::{CliError, opened, output, path_survey, view};
+use super::{CliError, number, opened, output, path_survey, view};
 use crate::io;
 use crate::navigate::flight::Smoothness;
 use crate::navigate::target::{Side, Wish};
@@ -43,21 +43,22 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = SideArg::Best)]
     side: SideArg,
     /// Distance to the target as a multiple of the usual one
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long, default_value_t = 1.0, value_parser = number::within(0.01..=100.0))]
     distance: f64,
     /// Width by height of the picture
-    #[arg(long, default_value_t = 16.0 / 9.0)]
+    #[arg(long, default_value_t = 16.0 / 9.0, value_parser = number::within(0.05..=20.0))]
     aspect: f64,
     /// Poses of the flight
     #[arg(long, default_value_t = FRAMES as u32, value_parser = clap::value_parser!(u32).range(2..=100_000))]
     frames: u32,
     /// Fly between this many random pairs of keypoints instead, and sum up how that went
-    #[arg(long, value_name = "FLIGHTS", conflicts_with_all = ["to", "to_photo", "out", "compare"])]
+    #[arg(long, value_name = "FLIGHTS", conflicts_with_all = ["to", "to_photo", "out", "compare"],
+        value_parser = number::within(1..=10_000_usize))]
     survey: Option<usize>,
     /// With this many cameras: some left out, or more added nearby; may be given several times
-    #[arg(long, requires = "survey", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, requires = "survey", value_parser = number::within(1..=10_000_u32))]
     cameras: Vec<u32>,
-    /// Hold the paper's interpolation of the same keypoints beside it
+    /// Hold the paper's interpolation beside it, as it is printed and through all keypoints of the route
     #[arg(long)]
     compare: bool,
     /// Write the flight as a camera path: .json of this program, or .nerfstudio.json
@@ -116,6 +117,9 @@ pub fn up_of(cameras: &[Camera]) -> DVec3 {
 
 pub fn run(args: Args) -> Result<(), CliError> {
     let scene = opened::drawable(&args.scene)?;
+    if let Some(out) = &args.out {
+        output::check(out, &[".json"], &scene.reads(&args.scene))?;
+    }
     if let Some(flights) = args.survey {
         let counts: Vec<usize> = args.cameras.iter().map(|n| *n as usize).collect();
         return path_survey::run(&scene, flights, &counts, args.frames as usize, args.json);
@@ -144,10 +148,14 @@ pub fn run(args: Args) -> Result<(), CliError> {
         }
     }
     let ours = flight.smoothness(&navigator.matter, navigator.clearance);
-    let paper = match args.compare {
-        true => Flight::of_paper(&keys(&flight), args.frames as usize)
-            .map(|p| p.smoothness(&navigator.matter, navigator.clearance)),
-        false => None,
+    let [paper, through] = match (args.compare, flight.poses.as_slice()) {
+        (true, [first, .., last]) => {
+            let frames = args.frames as usize;
+            let keys = navigator.keys(first, last).unwrap_or_default();
+            [Flight::of_paper(&[*first, *last], frames), Flight::of_paper_through(&keys, frames)]
+                .map(|p| p.map(|p| p.smoothness(&navigator.matter, navigator.clearance)))
+        }
+        _ => [None, None],
     };
     if args.json {
         return output::print_json(&json!({
@@ -162,6 +170,7 @@ pub fn run(args: Args) -> Result<(), CliError> {
             "keypoints_in_matter": navigator.in_matter,
             "smoothness": told(&ours),
             "paper": paper.as_ref().map(told),
+            "paper_through_keypoints": through.as_ref().map(told),
             "build_ms": build_ms,
             "route_ms": route_ms,
             "out": args.out,
@@ -171,6 +180,7 @@ pub fn run(args: Args) -> Result<(), CliError> {
         vec![["way", "largest step", "largest turn", "least clearance", "poses too near"].map(str::to_owned).to_vec()];
     rows.push(row("this", &ours));
     rows.extend(paper.as_ref().map(|p| row("paper", p)));
+    rows.extend(through.as_ref().map(|p| row("paper, through keypoints", p)));
     output::print(&format!(
         "to {what}: {:.2} units in {:.1} s, {} poses\n{}\nscene looked at in {build_ms:.0} ms, way found in {route_ms:.0} ms",
         flight.length,
@@ -187,7 +197,7 @@ fn to_target(
     navigator: &Navigator,
     from: &Pose,
 ) -> Result<(Flight, String), CliError> {
-    let map = semantics(&args.scene, &scene.cloud)?;
+    let map = semantics(&args.scene, scene.state.as_deref(), &scene.cloud)?;
     let answered = Asker::new(&map)?.ask(query, Kind::Auto)?;
     let id = answered.as_ref().and_then(|a| a.chosen(1).first().copied());
     let id = id.ok_or_else(|| CliError::failed(format!("nothing here fits '{query}'; see 'fmlgs query'")))?;
@@ -218,11 +228,6 @@ fn as_path(flight: &Flight) -> CameraPath {
     let key = |(i, p): (usize, &Pose)| PathKey { time_secs: time(i), ..p.key() };
     let keys = flight.poses.iter().enumerate().map(key).collect();
     CameraPath { keys, closed: false, fps: last / flight.seconds.max(1e-3), seconds: flight.seconds }
-}
-
-/// The poses that the paper's interpolation starts from: both ends.
-fn keys(flight: &Flight) -> Vec<Pose> {
-    [flight.poses.first(), flight.poses.last()].into_iter().flatten().copied().collect()
 }
 
 pub fn told(s: &Smoothness) -> Value {

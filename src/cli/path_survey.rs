@@ -55,7 +55,9 @@ pub fn run(scene: &DrawableScene, flights: usize, counts: &[usize], frames: usiz
                 format!("{:.2}, {:.2} ms", found.median_secs * 1e3, found.most_secs * 1e3),
                 found.no_way.to_string(),
             ];
-            for (name, sum) in [("this", &found.ours), ("paper", &found.paper)] {
+            let kinds =
+                [("this", &found.ours), ("paper", &found.paper), ("paper, through keypoints", &found.paper_through)];
+            for (name, sum) in kinds {
                 let w = &sum.worst;
                 let tail = [
                     name.to_owned(),
@@ -98,5 +100,6 @@ fn told(cameras: usize, between: &str, navigator: &Navigator, parts: usize, secs
         "no_way": s.no_way,
         "ours": sum(&s.ours),
         "paper": sum(&s.paper),
+        "paper_through_keypoints": sum(&s.paper_through),
     })
 }

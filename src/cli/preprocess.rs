@@ -7,10 +7,11 @@ use serde_json::json;
 
 use super::plan::PlanArgs;
 use super::progress::Console;
-use super::{CliError, opened, output};
-use crate::io;
+use super::{CliError, number, opened, output};
+use crate::io::{self, SceneFolder};
 use crate::models;
 use crate::models::catalogue::{self, Role};
+use crate::pipeline::observer::{Level as Severity, Observer};
 use crate::pipeline::semantics::find::{FindOptions, Found, Lifting, REGIONS, Tools, find_objects, segmenter};
 use crate::pipeline::semantics::follow::Follower;
 use crate::pipeline::semantics::tracker::TrackOptions;
@@ -52,16 +53,16 @@ pub struct Args {
     #[arg(long)]
     seed: Option<String>,
     /// Most photos whose masks are used
-    #[arg(long, default_value_t = TrackOptions::default().max_seeds)]
+    #[arg(long, default_value_t = TrackOptions::default().max_seeds, value_parser = number::within(1..=100_000_usize))]
     max_seeds: usize,
     /// Share of a photo that may stay unknown before its masks are used too, in percent
-    #[arg(long, default_value_t = 100.0 * TrackOptions::default().reseed_share)]
+    #[arg(long, default_value_t = 100.0 * TrackOptions::default().reseed_share, value_parser = number::within(0.0..=100.0))]
     unknown: f64,
     /// How Gaussians get their codes
     #[arg(long, value_enum, default_value_t = LiftingArg::Votes)]
     lifting: LiftingArg,
     /// Steps of training codes
-    #[arg(long, default_value_t = 1_000)]
+    #[arg(long, default_value_t = 1_000, value_parser = number::within(0..=10_000_000_u64))]
     code_steps: u64,
     /// What looks at the objects, so that they are found by what they look like: 'demo', a model of
     /// 'fmlgs models', the path of a model's .json, or 'none' [default: the best that is here]
@@ -109,11 +110,15 @@ fn check_segmenter(args: &Args) -> Result<(), CliError> {
 pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let mut observer = Console::new(quiet);
     check_segmenter(&args)?;
-    let scene = opened::drawable(&args.scene)?;
     if !io::trained::is_scene(&args.scene) {
+        // What it is instead is told by opening it.
+        opened::drawable(&args.scene)?;
         let path = args.scene.display();
         return Err(CliError::failed(format!("{path} is no trained scene; the result is stored in its folder")));
     }
+    // Held from the beginning: nobody waits for objects that cannot be stored.
+    let folder = SceneFolder::hold(&args.scene, "finding objects")?;
+    let scene = opened::drawable(&args.scene)?;
     let photos_path = args.photos.clone().or_else(|| scene.dataset_path.clone()).ok_or_else(|| {
         let path = args.scene.display();
         CliError::failed(format!("{path}: its photos are not known or no longer there; give them with --photos"))
@@ -133,7 +138,9 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let network = match args.segmenter.as_deref() {
         Some("files" | REGIONS) => None,
         Some(name) => Some(name.to_owned()),
-        None => catalogue::usable(Role::Segmenter).into_iter().next(),
+        None => {
+            catalogue::usable(Role::Segmenter, &mut |text| observer.note(Severity::Warning, text))?.into_iter().next()
+        }
     };
     let mut segmenter = segmenter(args.masks.as_deref(), &scene.cloud, &scene.settings, network.as_deref())?;
     let track = TrackOptions {
@@ -151,7 +158,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let mut encoder = match args.encoder.as_deref() {
         Some("none") => None,
         Some(name) => Some(models::encoder(name)?),
-        None => Some(models::best_encoder()?),
+        None => Some(models::best_encoder(&mut |text| observer.note(Severity::Warning, text))?),
     };
     let mut follower = match args.tracker {
         TrackerKind::Geometry => None,
@@ -166,7 +173,10 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         e if e.is_cancelled() => CliError::Cancelled("nothing was stored".into()),
         other => other.into(),
     })?;
-    io::semantic_map::save(&args.scene, &map, &scene.cloud)?;
+    let (kept, _) = folder.replace_map(scene.state.as_deref(), &map, &scene.cloud)?;
+    if let Some(kept) = kept {
+        observer.note(Severity::Info, format!("The objects and parts before are kept in {}", kept.display()));
+    }
     let secs = start.elapsed().as_secs_f64();
     let count = |level: Level| map.identities.iter().filter(|(_, i)| i.level == level).count();
     if args.json {

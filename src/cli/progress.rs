@@ -6,8 +6,9 @@ use std::time::{Duration, Instant};
 
 use indicatif::{HumanCount, HumanDuration, ProgressBar, ProgressStyle};
 
-use super::interrupt;
+use super::{interrupt, output};
 use crate::pipeline::observer::{Evaluation, Level, Observer, Progress, Signal, StepMetrics};
+use crate::scene::text;
 
 /// Time between lines where standard error is no terminal.
 const LINE_INTERVAL: Duration = Duration::from_secs(5);
@@ -31,8 +32,8 @@ impl Console {
     /// Prints a line without disturbing the bar.
     fn line(&self, text: &str) {
         match &self.bar {
-            Some((_, bar)) => bar.suspend(|| eprintln!("{text}")),
-            None => eprintln!("{text}"),
+            Some((_, bar)) => bar.suspend(|| output::note(text)),
+            None => output::note(text),
         }
     }
 
@@ -48,7 +49,7 @@ impl Console {
             if let Ok(style) = style {
                 bar.set_style(style.progress_chars("=> "));
             }
-            bar.set_prefix(stage.to_owned());
+            bar.set_prefix(text::line(stage).into_owned());
             return &self.bar.insert((stage.to_owned(), bar)).1;
         }
         &self.bar.get_or_insert_with(|| (stage.to_owned(), ProgressBar::hidden())).1
@@ -78,7 +79,8 @@ impl Observer for Console {
         if self.last_line.elapsed() >= LINE_INTERVAL {
             self.last_line = Instant::now();
             let (done, total) = (HumanCount(progress.done), HumanCount(progress.total));
-            eprintln!("{} {done}/{total} {} {}", progress.stage, rate_and_times(&progress), self.metrics);
+            let times = rate_and_times(&progress);
+            output::note(&format!("{} {done}/{total} {times} {}", progress.stage, self.metrics));
         }
     }
 

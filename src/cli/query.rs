@@ -7,7 +7,7 @@ use image::ColorType;
 use serde_json::{Value, json};
 
 use super::asking::{Asker, semantics};
-use super::{CliError, opened, output, view};
+use super::{CliError, number, opened, output, view};
 use crate::math::colormap::Colormap;
 use crate::pipeline::semantics::answer::{Answered, Basis};
 use crate::pipeline::semantics::code_map::CodeMap;
@@ -45,13 +45,13 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = KindArg::Auto)]
     kind: KindArg,
     /// Answers whose pixels go into the mask at most
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = number::within(1..=100_000_usize))]
     top: usize,
     /// Match alpha-blended codes, as the paper does, instead of identities
     #[arg(long)]
     blend: bool,
     /// Largest difference per channel of a match, in 255ths
-    #[arg(long, default_value_t = 255.0 * TOLERANCE)]
+    #[arg(long, default_value_t = 255.0 * TOLERANCE, value_parser = number::within(0.0..=255.0_f32))]
     tolerance: f32,
     /// Write the mask of the answer: white on black
     #[arg(long)]
@@ -86,8 +86,12 @@ impl From<KindArg> for Kind {
 
 pub fn run(args: Args) -> Result<(), CliError> {
     let scene = opened::drawable(&args.scene)?;
-    let map = semantics(&args.scene, &scene.cloud)?;
+    for out in args.mask.iter().chain(&args.heat) {
+        output::check(out, &[".png"], &scene.reads(&args.scene))?;
+    }
+    let map = semantics(&args.scene, scene.state.as_deref(), &scene.cloud)?;
     let camera = view::choose(args.camera.as_deref(), &scene)?.limited_to(args.max_side);
+    view::check_room(camera.width_px, camera.height_px)?;
     let mut renderer = Renderer::new();
     let exact = ViewMap::render(&mut renderer, &scene.cloud, &map.of, &map.identities, &camera, &scene.settings)?;
     let blended = match args.blend {
@@ -168,6 +172,7 @@ fn tell(
             "basis": basis,
             "hits": hits.iter().map(hit).collect::<Vec<_>>(),
             "pixels": mask.area(),
+            "in_view": !mask.is_empty(),
             "unknown_words": unknown,
             "query_ms": query_ms,
             "stages_ms": answered.stages,
@@ -189,11 +194,11 @@ fn tell(
             rows.extend(hits.iter().map(|h| vec![full_name(h), format!("{:.3}", h.score), format!("{:.3}", h.margin)]));
             let ambiguous = matches!(answer, Answer::Ambiguous(_));
             let note = if ambiguous { " (ambiguous: the first two fit alike)" } else { "" };
-            output::print(&format!(
-                "{}\n{} px in this view, answered by {basis} in {query_ms:.2} ms{note}",
-                output::table(&rows),
-                mask.area()
-            ))
+            let seen = match mask.area() {
+                0 => "not in this view (--camera looks from another photo)".to_owned(),
+                n => format!("{n} px in this view"),
+            };
+            output::print(&format!("{}\n{seen}, answered by {basis} in {query_ms:.2} ms{note}", output::table(&rows)))
         }
     }
 }

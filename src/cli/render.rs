@@ -11,7 +11,7 @@ use super::asking::{Asker, semantics};
 use super::opened::DrawableScene;
 use super::plan::PlanArgs;
 use super::progress::Console;
-use super::{CliError, opened, output, view};
+use super::{CliError, number, opened, output, view};
 use crate::io;
 use crate::io::animation::{Encoder, Settings};
 use crate::navigate::film::MOST_PICTURES;
@@ -20,7 +20,7 @@ use crate::pipeline::film::{self, FilmError, Marked};
 use crate::pipeline::semantics::grammar::Kind;
 use crate::render::cpu::normals;
 use crate::render::{Backend, BackendChoice, Frame, RenderSettings};
-use crate::scene::{Camera, ScenePlan};
+use crate::scene::{Camera, CameraPath, ScenePlan};
 
 /// Draw a scene from a given camera into a file
 ///
@@ -61,7 +61,7 @@ pub struct Args {
     #[arg(long, conflicts_with_all = ["camera", "what"])]
     path: Option<PathBuf>,
     /// Pictures per second of the film [default: the path's own]
-    #[arg(long, requires = "path")]
+    #[arg(long, requires = "path", value_parser = number::within(0.01..=CameraPath::MAX_FPS))]
     fps: Option<f64>,
     /// Quality of the film, 0 to 100
     #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u8).range(0..=100))]
@@ -132,6 +132,7 @@ impl Args {
         if let Some(photos) = &self.photos {
             scene.cameras = opened::named_cameras(&opened::dataset(photos)?, scene.config.holdout_every);
         }
+        output::check(&self.out, &[], &scene.reads(&self.scene))?;
         let mut camera = view::choose(self.camera.as_deref(), &scene)?;
         if let Some([width, height]) = self.size {
             camera = view::with_size(&camera, width, height);
@@ -139,6 +140,7 @@ impl Args {
         if let Some(side) = self.max_side {
             camera = camera.limited_to(side);
         }
+        view::check_room(camera.width_px, camera.height_px)?;
         Ok(Job { scene, camera, storage })
     }
 }
@@ -150,7 +152,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let job = args.check()?;
     let plan = args.plan.of_scene(&job.scene);
     let settings = RenderSettings { depth: args.what.needs_depth(), sh_degree: plan.sh_degree, ..job.scene.settings };
-    let mut backend = Backend::choose(choice(args.backend, &settings, &plan))?;
+    let mut backend = Backend::choose(choice(args.backend, &settings, &plan), output::warn)?;
     // Only the CPU draws surfels as such.
     let flat = settings.surfels && !matches!(backend, Backend::Cpu(_));
     let cloud = Arc::new(job.scene.cloud);
@@ -196,6 +198,12 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
     let film = Film::new(&keys, Speed::Constant);
     let film = film.ok_or_else(|| CliError::failed(format!("{}: there are no keys in it", path.display())))?;
     let mut scene = opened::drawable(&args.scene)?;
+    let reads: Vec<&Path> = scene.reads(&args.scene).into_iter().chain([path]).collect();
+    if args.out.is_dir() {
+        output::check_folder(&args.out, &reads)?
+    } else {
+        output::check(&args.out, &[], &reads)?
+    }
     let plan = args.plan.of_scene(&scene);
     scene.settings.sh_degree = plan.sh_degree;
     let fps = args.fps.unwrap_or(keys.fps);
@@ -203,6 +211,7 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
         let limit = args.max_side.unwrap_or(1280);
         [limit, (f64::from(limit) * 9.0 / 16.0).round().max(1.0) as u32]
     });
+    view::check_room(width, height)?;
     let mut settings = Settings::new(width, height, fps);
     (settings.quality, settings.overwrite) = (args.quality, true);
     if let Some(program) = &args.ffmpeg {
@@ -210,7 +219,7 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
     }
     let cameras: Vec<Camera> = film.pictures(fps, MOST_PICTURES).iter().map(|p| p.camera(width, height)).collect();
     let map = match &args.mark {
-        Some(_) => Some(semantics(&args.scene, &scene.cloud)?),
+        Some(_) => Some(semantics(&args.scene, scene.state.as_deref(), &scene.cloud)?),
         None => None,
     };
     let mut ids = Vec::new();
@@ -222,7 +231,7 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
         }
     }
     let marked = map.as_ref().map(|map| Marked { map, ids: &ids, color: [255, 64, 160] });
-    let mut backend = Backend::choose(choice(args.backend, &scene.settings, &plan))?;
+    let mut backend = Backend::choose(choice(args.backend, &scene.settings, &plan), output::warn)?;
     let started = Instant::now();
     output::make_parent(&args.out)?;
     let mut console = Console::new(quiet);

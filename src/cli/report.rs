@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::progress::Console;
 use super::report_studies::{Options, Subject};
-use super::{CliError, output};
+use super::{CliError, number, output};
 use crate::io;
 use crate::pipeline::observer::{Level, Observer};
 use crate::report::{BeginError, End, FILE, Report, ReportError, Stage, StageName, StudyError, sweep};
@@ -33,7 +33,7 @@ pub struct Args {
     #[arg(long, value_enum, value_delimiter = ',')]
     stages: Vec<StageName>,
     /// Seconds for everything; what is not measured by then is left out
-    #[arg(long)]
+    #[arg(long, value_parser = number::within(1e-3..=1e9))]
     budget: Option<f64>,
     /// How often every setting is measured; trainings take another seed each time
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100))]
@@ -42,7 +42,7 @@ pub struct Args {
     #[arg(long)]
     masks: Option<PathBuf>,
     /// Optimiser steps of the stage 'features'; may be given several times
-    #[arg(long, default_values_t = [300, 1000])]
+    #[arg(long, default_values_t = [300, 1000], value_parser = number::within(1..=100_000_000_u64))]
     steps: Vec<u64>,
     /// Optimiser steps of the default of the stage 'train'
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u64).range(20..=1_000_000))]
@@ -74,9 +74,6 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         return Ok(io::atomic::write(path, |w| w.write_all(text.as_bytes()))?);
     }
     let Some(scene) = args.scene.clone() else { return Err(CliError::Usage("a scene is needed".into())) };
-    if args.budget.is_some_and(|b| !(b > 0.0)) {
-        return Err(CliError::Usage("--budget must be a number of seconds above 0".into()));
-    }
     let console = &mut Console::new(quiet);
     let (name, computer) = (scene.display().to_string(), computer::look());
     let mut report = match args.fresh {

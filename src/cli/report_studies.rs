@@ -57,7 +57,8 @@ impl Subject {
     pub fn open(path: &Path, options: Options) -> Result<Self, CliError> {
         let scene = opened::drawable(path)?;
         let dataset = scene.dataset_path.as_ref().filter(|p| p.exists()).map(|p| opened::dataset(p)).transpose()?;
-        let map = if path.is_dir() { io::semantic_map::load(path, &scene.cloud)? } else { None };
+        let map =
+            if path.is_dir() { io::semantic_map::load(path, scene.state.as_deref(), &scene.cloud)? } else { None };
         let language = map.filter(|m| m.language.is_some());
         Ok(Self { scene, language, path: path.to_owned(), dataset, options })
     }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::asking::{Asker, semantics};
 use super::query::KindArg;
-use super::{CliError, opened, output};
+use super::{CliError, number, opened, output};
 use crate::io;
 use crate::pipeline::semantics::codes::TOLERANCE;
 use crate::pipeline::semantics::matching::{MatchMode, gaussians};
@@ -30,7 +30,7 @@ pub struct Args {
     #[arg(long)]
     rest: bool,
     /// Answers that are written at most
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = number::within(1..=100_000_usize))]
     top: usize,
     /// Whether an object or a part is meant
     #[arg(long, value_enum, default_value_t = KindArg::Auto)]
@@ -39,13 +39,14 @@ pub struct Args {
     #[arg(long)]
     blend: bool,
     /// Largest difference per channel of a match, in 255ths
-    #[arg(long, default_value_t = 255.0 * TOLERANCE)]
+    #[arg(long, default_value_t = 255.0 * TOLERANCE, value_parser = number::within(0.0..=255.0_f32))]
     tolerance: f32,
 }
 
 pub fn run(args: Args) -> Result<(), CliError> {
     let scene = opened::drawable(&args.scene)?;
-    let map = semantics(&args.scene, &scene.cloud)?;
+    output::check(&args.out, &[".ply"], &scene.reads(&args.scene))?;
+    let map = semantics(&args.scene, scene.state.as_deref(), &scene.cloud)?;
     let answered = Asker::new(&map)?.ask(&args.text, args.kind.into())?;
     let targets = answered.map(|a| a.chosen(args.top)).unwrap_or_default();
     if targets.is_empty() {

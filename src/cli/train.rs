@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::plan::PlanArgs;
 use super::progress::{Console, evaluation_line};
-use super::{CliError, opened, output};
+use super::{CliError, number, opened, output};
 use crate::io::{self, Opened};
 use crate::pipeline::observer::{Level, Observer};
 use crate::pipeline::train::{self, TrainConfig, TrainEnd};
@@ -43,13 +43,13 @@ pub struct Args {
 #[derive(Debug, Default, clap::Args)]
 pub struct Settings {
     /// Optimiser steps in all; every schedule scales with it [default: 7000]
-    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_parser = number::within(1..=1_000_000_000_u64))]
     pub steps: Option<u64>,
     /// Longer side of the training pictures in px; photos are never enlarged [default: 512]
     #[arg(long, value_parser = clap::value_parser!(u32).range(16..=16384))]
     pub max_side: Option<u32>,
     /// Hold out every n-th photo, 0 = none [default: 8]
-    #[arg(long)]
+    #[arg(long, value_parser = number::within(0..=1_000_000_usize))]
     pub holdout_every: Option<usize>,
     /// Highest degree of the spherical harmonics [default: 3]
     #[arg(long, value_parser = clap::value_parser!(u8).range(0..=3))]
@@ -58,16 +58,16 @@ pub struct Settings {
     #[arg(long)]
     pub sh_at_once: bool,
     /// Share of the steps, from the first on, that see the photos at half their size [default: 0]
-    #[arg(long, value_parser = parse_share)]
+    #[arg(long, value_parser = number::within(0.0..=1.0))]
     pub coarse_share: Option<f64>,
     /// Keep the number of Gaussians that training starts with
     #[arg(long)]
     pub no_densify: bool,
     /// Upper limit of Gaussians [default: what the memory holds]
-    #[arg(long)]
+    #[arg(long, value_parser = number::within(1..=100_000_000_usize))]
     pub max_gaussians: Option<usize>,
     /// Gaussians to start from where the dataset has no sparse points [default: 20000]
-    #[arg(long)]
+    #[arg(long, value_parser = number::within(1..=10_000_000_usize))]
     pub random_points: Option<usize>,
     /// Antialias (the 2-D filter of Mip-Splatting)
     #[arg(long)]
@@ -79,7 +79,7 @@ pub struct Settings {
     #[arg(long)]
     pub eval_every: Option<u64>,
     /// Seconds between checkpoints, 0 = only at the end [default: 60]
-    #[arg(long, value_parser = parse_secs)]
+    #[arg(long, value_parser = number::within(0.0..=1e9))]
     pub checkpoint_secs: Option<f64>,
     /// Which renderer trains [default: auto]
     #[arg(long, value_enum)]
@@ -90,26 +90,11 @@ pub struct Settings {
     pub surfels: bool,
     /// Weight of the term that holds normals and depth together; on the CPU only [default: 0, with
     /// --surfels 0.05]
-    #[arg(long, value_parser = parse_weight)]
+    #[arg(long, value_parser = number::within(0.0..=1e6))]
     pub normal_weight: Option<f64>,
     /// Weight of the term that pulls surfels together along rays [default: 0.1]
-    #[arg(long, value_parser = parse_weight, requires = "surfels")]
+    #[arg(long, value_parser = number::within(0.0..=1e6), requires = "surfels")]
     pub distortion_weight: Option<f64>,
-}
-
-fn parse_secs(text: &str) -> Result<f64, String> {
-    let secs: Option<f64> = text.parse().ok().filter(|s: &f64| s.is_finite() && *s >= 0.0);
-    secs.ok_or_else(|| "a number of seconds, 0 or more, is needed".into())
-}
-
-fn parse_share(text: &str) -> Result<f64, String> {
-    let share: Option<f64> = text.parse().ok().filter(|s| (0.0..=1.0).contains(s));
-    share.ok_or_else(|| "a share, 0 to 1, is needed".into())
-}
-
-fn parse_weight(text: &str) -> Result<f64, String> {
-    let weight: Option<f64> = text.parse().ok().filter(|w: &f64| w.is_finite() && *w >= 0.0);
-    weight.ok_or_else(|| "a weight, 0 or more, is needed".into())
 }
 
 impl Settings {
@@ -164,7 +149,7 @@ impl Args {
                         self.data.display()
                     )));
                 };
-                let trained_with = serde_json::from_value(scene.info.config).unwrap_or_default();
+                let trained_with = TrainConfig::stored(&scene.folder, scene.info.config)?;
                 let out = self.out.clone().unwrap_or(scene.folder);
                 let dataset = opened::dataset(&photos)?;
                 Ok(Job { config: planned(self.settings.over(trained_with), &dataset), dataset, out })
@@ -239,13 +224,5 @@ mod tests {
         assert_eq!(stated("seed"), d.seed.to_string());
         assert_eq!(stated("eval_every"), d.eval_every.to_string());
         assert_eq!(stated("checkpoint_secs"), d.checkpoint_secs.to_string());
-    }
-
-    #[test]
-    fn seconds_are_checked() {
-        assert_eq!(parse_secs("1.5"), Ok(1.5));
-        for bad in ["-1", "nan", "inf", "soon"] {
-            assert!(parse_secs(bad).is_err() && parse_weight(bad).is_err(), "{bad}");
-        }
     }
 }

@@ -3,20 +3,11 @@
 use std::path::Path;
 
 use glam::{DMat3, DVec2};
-use serde::Deserialize;
 
 use super::CliError;
 use super::opened::{DrawableScene, NamedCamera};
-use crate::io::files;
+use crate::io;
 use crate::scene::{Bounds, Camera, GaussianCloud};
-
-/// A camera file: a camera alone, or an entry of the cameras in `scene.json` or `info --json`.
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum CameraFile {
-    Entry { camera: Camera },
-    Alone(Camera),
-}
 
 /// The camera that `wanted` names: an index from 0, a photo's name (its end is enough where that
 /// is unambiguous), or a JSON file. Without a wish it is the first photo's, or a view of the whole
@@ -34,7 +25,7 @@ pub fn choose(wanted: Option<&str>, scene: &DrawableScene) -> Result<Camera, Cli
     }
     let path = Path::new(wanted);
     if path.is_file() {
-        return from_file(path);
+        return Ok(io::camera_file::read(path)?);
     }
     let known = match scene.cameras.as_slice() {
         [] => "The scene has no photos: give a JSON camera file, or --photos with their dataset".to_owned(),
@@ -68,23 +59,6 @@ fn ends_with_path(name: &str, wanted: &str) -> bool {
     [name, stem].iter().any(|n| *n == wanted || n.strip_suffix(wanted).is_some_and(|front| front.ends_with('/')))
 }
 
-fn from_file(path: &Path) -> Result<Camera, CliError> {
-    let text = files::read_text(path)?;
-    let camera = match serde_json::from_str(&text) {
-        Ok(CameraFile::Entry { camera } | CameraFile::Alone(camera)) => camera,
-        Err(_) => {
-            return Err(CliError::failed(format!(
-                "{} is no camera: width_px, height_px, focal_px [x, y], principal_px [x, y], world_from_camera \
-                 (9 numbers, the right, down and forward axes) and center [x, y, z] are needed, as in the output of \
-                 'fmlgs info --json'",
-                path.display()
-            )));
-        }
-    };
-    camera.validate().map_err(|error| CliError::failed(format!("{}: {error}", path.display())))?;
-    Ok(camera)
-}
-
 /// A 640 x 480 view of the cloud from its front, as splats are usually oriented: x right, y down,
 /// z away. `None` for an empty cloud.
 fn whole(cloud: &GaussianCloud) -> Option<Camera> {
@@ -108,6 +82,17 @@ pub fn with_size(camera: &Camera, width_px: u32, height_px: u32) -> Camera {
         principal_px: camera.principal_px * scale + DVec2::new(shift, 0.0),
         ..camera.clone()
     }
+}
+
+/// Bytes that drawing a pixel takes: colour, depth and opacity, their copies on the way to the file.
+const BYTES_PER_PX: u64 = 64;
+
+/// Whether a picture of this size can be drawn in the memory that is free.
+pub fn check_room(width_px: u32, height_px: u32) -> Result<(), CliError> {
+    let bytes = u64::from(width_px) * u64::from(height_px) * BYTES_PER_PX;
+    let what = format!("drawing {width_px} x {height_px} px");
+    io::memory::room(what, bytes, "make it smaller with --size or --max-side")
+        .map_err(|e| CliError::failed(e.to_string()))
 }
 
 /// Parses `640x480`.
@@ -138,6 +123,7 @@ mod tests {
             config: TrainConfig::default(),
             dataset_path: None,
             metres_per_unit: None,
+            state: None,
         }
     }
 
@@ -166,15 +152,15 @@ mod tests {
         let camera = scene(&["a"]).cameras[0].camera.clone();
         let path = folder.path().join("camera.json");
         std::fs::write(&path, serde_json::to_string(&camera).expect("json")).expect("write");
-        assert_eq!(from_file(&path).expect("alone"), camera);
+        assert_eq!(io::camera_file::read(&path).expect("alone"), camera);
         let entry = serde_json::json!({ "name": "a", "camera": camera, "held_out": false });
         std::fs::write(&path, entry.to_string()).expect("write");
-        assert_eq!(from_file(&path).expect("entry"), camera);
+        assert_eq!(io::camera_file::read(&path).expect("entry"), camera);
         let bad = Camera { width_px: 0, ..camera };
         std::fs::write(&path, serde_json::to_string(&bad).expect("json")).expect("write");
-        assert!(from_file(&path).is_err());
+        assert!(io::camera_file::read(&path).is_err());
         std::fs::write(&path, "[]").expect("write");
-        assert!(from_file(&path).is_err());
+        assert!(io::camera_file::read(&path).is_err());
     }
 
     #[test]

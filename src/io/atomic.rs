@@ -1,18 +1,22 @@
 //! Files that are either the old one or the new one, whatever happens in between.
 
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
-use super::IoError;
+use super::temporary::temporary_file;
+use super::{IoError, scene_folder};
 
 /// Replaces `path` by what `fill` writes: a temporary file in the same folder is filled, synced
 /// and renamed over it, and the folder is synced. On any failure the temporary file is removed
-/// and what was at `path` before stays as it was.
+/// and what was at `path` before stays as it was. Links are followed; what is no regular file (a
+/// device, a pipe) is written into.
 ///
 /// # Errors
 /// [`IoError::Write`] with the system's reason and a remedy; errors of `fill` arrive the same way.
+/// [`IoError::Protected`] where `path` is a file of a trained scene.
 pub fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), IoError> {
     let mut draft = Draft::create(path)?;
     fill(&mut draft).map_err(|cause| write_error(path, cause))?;
@@ -23,17 +27,37 @@ pub fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -
 /// in its place. Dropped before that, it leaves nothing behind.
 pub struct Draft {
     path: PathBuf,
-    file: BufWriter<NamedTempFile>,
+    into: Into,
+}
+
+enum Into {
+    /// A new file beside the old one.
+    New(BufWriter<NamedTempFile>),
+    /// A device or a pipe, which cannot be replaced.
+    Stream(BufWriter<File>),
 }
 
 impl Draft {
     /// Starts a file at `path`; what is there stays until [`Draft::commit`].
     ///
     /// # Errors
-    /// [`IoError::Write`] where the folder is missing or not writable, or `path` is a folder.
+    /// [`IoError::Write`] where the folder is missing or not writable, or `path` is a folder;
+    /// [`IoError::Protected`] where it is a file of a trained scene.
     pub fn create(path: &Path) -> Result<Self, IoError> {
+        let failed = |cause| write_error(path, cause);
+        let real = behind_links(path).map_err(failed)?;
+        scene_folder::refuse_scene_file(&real)?;
+        if is_stream(&real) {
+            let file = OpenOptions::new().write(true).open(&real).map_err(failed)?;
+            return Ok(Self { path: path.into(), into: Into::Stream(BufWriter::with_capacity(1 << 20, file)) });
+        }
+        Self::beside(&real)
+    }
+
+    /// A new file at `path`, which may be a file of a scene: for those who hold the scene's folder.
+    pub(super) fn beside(path: &Path) -> Result<Self, IoError> {
         let file = temporary_file(path, "tmp").map_err(|cause| write_error(path, cause))?;
-        Ok(Self { path: path.into(), file: BufWriter::with_capacity(1 << 20, file) })
+        Ok(Self { path: path.into(), into: Into::New(BufWriter::with_capacity(1 << 20, file)) })
     }
 
     /// Puts the file in its place and returns its size in bytes.
@@ -41,12 +65,18 @@ impl Draft {
     /// # Errors
     /// [`IoError::Write`]; what was at the path before is then unchanged.
     pub fn commit(self) -> Result<u64, IoError> {
-        let Self { path, file } = self;
-        let end = || {
-            let file = file.into_inner().map_err(io::IntoInnerError::into_error)?;
-            let bytes = file.as_file().metadata()?.len();
-            put(file, &path)?;
-            Ok(bytes)
+        let Self { path, into } = self;
+        let end = || match into {
+            Into::New(file) => {
+                let file = file.into_inner().map_err(io::IntoInnerError::into_error)?;
+                let bytes = file.as_file().metadata()?.len();
+                put(file, &path)?;
+                Ok(bytes)
+            }
+            Into::Stream(mut file) => {
+                file.flush()?;
+                Ok(0)
+            }
         };
         end().map_err(|cause| write_error(&path, cause))
     }
@@ -54,40 +84,54 @@ impl Draft {
 
 impl Write for Draft {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.file.write(bytes)
+        match &mut self.into {
+            Into::New(file) => file.write(bytes),
+            Into::Stream(file) => file.write(bytes),
+        }
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.file.flush()
+        match &mut self.into {
+            Into::New(file) => file.flush(),
+            Into::Stream(file) => file.flush(),
+        }
     }
 }
 
 impl Seek for Draft {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.file.seek(to)
+        match &mut self.into {
+            Into::New(file) => file.seek(to),
+            Into::Stream(file) => file.seek(to),
+        }
     }
 }
 
-/// An empty temporary file beside `path`, its name ending in `.extension`.
-pub(super) fn temporary_file(path: &Path, extension: &str) -> io::Result<NamedTempFile> {
-    let name = path.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "not a file name"))?;
-    if path.is_dir() {
-        return Err(io::Error::new(io::ErrorKind::IsADirectory, "a folder of that name exists"));
-    }
-    let mut prefix = std::ffi::OsString::from(".");
-    prefix.push(name);
-    prefix.push(".");
-    let suffix = format!(".{extension}");
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(&prefix).suffix(&suffix);
-    // Temporary files are private by default; the finished one has the usual permissions.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(folder_of(path))
+/// Whether something is at `path` that is neither file nor folder: it is written into.
+pub fn is_stream(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir())
 }
 
-/// Syncs a temporary file, renames it to `path` and syncs the folder.
+/// Where `path` leads, also where the last link's end does not exist yet.
+fn behind_links(path: &Path) -> io::Result<PathBuf> {
+    /// As many as Linux follows.
+    const MOST_LINKS: usize = 40;
+    let mut path = path.to_path_buf();
+    for _ in 0..MOST_LINKS {
+        match fs::read_link(&path) {
+            Ok(to) => path = folder_of(&path).join(to),
+            Err(_) => return Ok(path),
+        }
+    }
+    Err(io::Error::other("too many links that lead to one another"))
+}
+
+/// Syncs a temporary file, renames it to `path` and syncs the folder. It gets the permissions of the
+/// file that it replaces.
 pub(super) fn put(file: NamedTempFile, path: &Path) -> io::Result<()> {
+    if let Ok(before) = fs::metadata(path).map(|m| m.permissions()) {
+        file.as_file().set_permissions(before)?;
+    }
     file.as_file().sync_all()?;
     file.persist(path).map_err(|e| e.error)?;
     sync_folder(folder_of(path))
@@ -126,7 +170,6 @@ fn remedy(kind: io::ErrorKind) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::fs;
 
     fn entries(folder: &Path) -> Vec<String> {
         let mut names: Vec<String> = fs::read_dir(folder)
@@ -190,6 +233,31 @@ mod tests {
         fs::create_dir(folder.path().join("b.bin")).expect("create");
         let e = write(&folder.path().join("b.bin"), |w| w.write_all(b"x")).expect_err("in the way");
         assert!(matches!(&e, IoError::Write { cause, .. } if cause.kind() == io::ErrorKind::IsADirectory));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_are_followed_and_devices_written_into() {
+        use std::os::unix::fs::{FileTypeExt, PermissionsExt, symlink};
+        let folder = tempfile::tempdir().expect("folder");
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir(at("deep")).expect("create");
+        symlink("deep/real.bin", at("b.bin")).expect("link");
+        symlink("b.bin", at("a.bin")).expect("link");
+        for text in [b"one", b"two"] {
+            write(&at("a.bin"), |w| w.write_all(text)).expect("written");
+            assert_eq!(fs::read(at("deep/real.bin")).expect("read"), text);
+        }
+        assert!(at("a.bin").is_symlink() && at("b.bin").is_symlink());
+        fs::set_permissions(at("deep/real.bin"), PermissionsExt::from_mode(0o600)).expect("permissions");
+        write(&at("a.bin"), |w| w.write_all(b"private")).expect("written");
+        assert_eq!(fs::metadata(at("deep/real.bin")).expect("there").permissions().mode() & 0o777, 0o600);
+
+        write(Path::new("/dev/null"), |w| w.write_all(b"x")).expect("written into");
+        assert!(fs::metadata("/dev/null").expect("there").file_type().is_char_device());
+        symlink("d.bin", at("c.bin")).expect("link");
+        symlink("c.bin", at("d.bin")).expect("link");
+        assert!(write(&at("c.bin"), |w| w.write_all(b"x")).is_err(), "links without an end");
     }
 
     #[cfg(unix)]

@@ -27,8 +27,48 @@ pub enum IoError {
         /// What the system says.
         cause: io::Error,
     },
+    /// A file that a scene consists of, as the place for something else.
+    #[error("{path} is a file of the trained scene in {folder} and is not replaced; choose another name")]
+    Protected {
+        /// The file.
+        path: PathBuf,
+        /// The scene's folder.
+        folder: PathBuf,
+    },
+    /// Somebody else writes there.
+    #[error("{folder} is being written by {holder}; wait until that is done, or choose another folder")]
+    Busy {
+        /// The folder.
+        folder: PathBuf,
+        /// Who.
+        holder: String,
+    },
+    /// A scene that somebody else has saved in the meantime.
+    #[error("the scene in {folder} was saved by somebody else since it was opened; open it again")]
+    Changed {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// Files of a scene that were not saved together.
+    #[error("{path} was not saved together with {with}: {remedy}")]
+    Torn {
+        /// The file that does not fit.
+        path: PathBuf,
+        /// The file that it should fit.
+        with: &'static str,
+        /// The way back.
+        remedy: &'static str,
+    },
+    /// A folder for a result that holds something else.
+    #[error("{folder} {what}; choose another folder")]
+    Occupied {
+        /// The folder.
+        folder: PathBuf,
+        /// What it holds.
+        what: &'static str,
+    },
     /// A folder, pipe or device where a file is expected.
-    #[error("{path} is not a regular file")]
+    #[error("{path} is not a regular file but a folder, a pipe or a device; give the path of a file")]
     NotAFile {
         /// The path.
         path: PathBuf,
@@ -161,6 +201,12 @@ pub enum IoError {
         width_px: u32,
         /// Its height.
         height_px: u32,
+    },
+    /// A photo without a pixel that counts.
+    #[error("{path} shows nothing: every pixel is transparent or outside of its lens; take it out of the data set")]
+    NothingShown {
+        /// The picture file.
+        path: PathBuf,
     },
     /// A picture that does not decode.
     #[error("{path} cannot be decoded: {reason}")]

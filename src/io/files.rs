@@ -3,42 +3,37 @@
 use std::fs::{self, File};
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
-use std::sync::OnceLock;
 
-use super::IoError;
+use super::{IoError, memory};
+use crate::scene::text;
 
 /// Largest text file (JSON, COLMAP text) in bytes.
 pub const MAX_TEXT_BYTES: u64 = 512 << 20;
 /// Largest picture file in bytes.
 pub const MAX_PICTURE_BYTES: u64 = 256 << 20;
 
-/// Bytes that one reader may use: half of the memory that is free when the program first asks.
-pub fn memory_budget() -> u64 {
-    static BUDGET: OnceLock<u64> = OnceLock::new();
-    *BUDGET.get_or_init(|| free_memory() / 2)
-}
-
-/// Bytes of memory that programs may still use, limits of their group included.
-pub fn free_memory() -> u64 {
-    // Systems that do not say get what any of them can spare.
-    const UNKNOWN: u64 = 2 << 30;
-    let Ok(mut system) = sysinfo::System::new() else { return UNKNOWN };
-    system.refresh_memory();
-    let group = system.cgroup_limits().map_or(u64::MAX, |g| g.free_memory);
-    match system.available_memory().min(group) {
-        0 => UNKNOWN,
-        free => free,
-    }
-}
-
-/// The whole file, if it is a regular file of at most `limit` bytes.
-pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
+/// Opens a file to be read, if it is a regular one. A pipe would keep the program waiting and a
+/// device has no end, so both are refused before they are opened; every read of a file that a
+/// person or another file names goes through here.
+///
+/// # Errors
+/// [`IoError::NotAFile`] for folders, pipes and devices; [`IoError::Read`] with the system's reason.
+pub fn open(path: &Path) -> Result<File, IoError> {
     let failed = |cause| IoError::Read { path: path.into(), cause };
-    let meta = fs::metadata(path).map_err(failed)?;
-    if !meta.is_file() {
+    if !fs::metadata(path).map_err(failed)?.is_file() {
         return Err(IoError::NotAFile { path: path.into() });
     }
-    let limit = limit.min(memory_budget());
+    File::open(path).map_err(failed)
+}
+
+/// The whole file, if it is a regular one of at most `limit` bytes that [`memory::budget`] allows.
+///
+/// # Errors
+/// As [`open`]; and [`IoError::OverBudget`] for one that is larger.
+pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
+    let failed = |cause| IoError::Read { path: path.into(), cause };
+    let file = open(path)?;
+    let limit = limit.min(memory::budget());
     let over = |bytes| IoError::OverBudget {
         path: path.into(),
         what: "the file",
@@ -46,26 +41,38 @@ pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
         limit,
         remedy: "free some memory or use a smaller file",
     };
-    if meta.len() > limit {
-        return Err(over(meta.len()));
+    let length = file.metadata().map_err(failed)?.len();
+    if length > limit {
+        return Err(over(length));
     }
-    let mut bytes = Vec::with_capacity(meta.len() as usize);
+    let mut bytes = Vec::with_capacity(length as usize);
     // The file may grow between the check and the read.
-    File::open(path).map_err(failed)?.take(limit + 1).read_to_end(&mut bytes).map_err(failed)?;
+    file.take(limit + 1).read_to_end(&mut bytes).map_err(failed)?;
     if bytes.len() as u64 > limit {
         return Err(over(bytes.len() as u64));
     }
     Ok(bytes)
 }
 
-/// The first `limit` bytes of a file, or all of it if it is shorter.
-pub fn read_start(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
-    let failed = |cause| IoError::Read { path: path.into(), cause };
-    if !fs::metadata(path).map_err(failed)?.is_file() {
-        return Err(IoError::NotAFile { path: path.into() });
+/// The whole file as [`read`] gives it, or `None` if there is none.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_if_there(path: &Path, limit: u64) -> Result<Option<Vec<u8>>, IoError> {
+    match read(path, limit) {
+        Err(IoError::Read { cause, .. }) if cause.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        other => other.map(Some),
     }
+}
+
+/// The first `limit` bytes of a file, or all of it if it is shorter.
+///
+/// # Errors
+/// As [`open`].
+pub fn read_start(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
     let mut bytes = Vec::new();
-    File::open(path).map_err(failed)?.take(limit).read_to_end(&mut bytes).map_err(failed)?;
+    let read = open(path)?.take(limit).read_to_end(&mut bytes);
+    read.map_err(|cause| IoError::Read { path: path.into(), cause })?;
     Ok(bytes)
 }
 
@@ -130,10 +137,23 @@ pub fn inside(root: &Path, entry: &str, source: &Path) -> Result<Option<PathBuf>
     Ok(Some(path))
 }
 
+/// Refuses the name of a photo that no file can have. `source` lists it.
+pub fn photo_name(name: &str, source: &Path) -> Result<(), IoError> {
+    let most = text::LONGEST_PHOTO_NAME;
+    match name.chars().count() {
+        length if length > most => Err(IoError::Syntax {
+            path: source.into(),
+            place: format!("photo '{}'", text::shortened(name, 40)),
+            reason: format!("its name has {length} letters, at most {most} are read; rename the photo"),
+        }),
+        _ => Ok(()),
+    }
+}
+
 /// The name of a folder for people, also where its path ends in `.` or `..`.
 pub fn folder_name(folder: &Path) -> String {
     let real = fs::canonicalize(folder).unwrap_or_else(|_| folder.into());
-    real.file_name().map_or_else(|| real.display().to_string(), |n| n.to_string_lossy().into_owned())
+    text::name(&real.file_name().unwrap_or(real.as_os_str()).to_string_lossy())
 }
 
 #[cfg(test)]
@@ -175,7 +195,18 @@ mod tests {
         assert!(matches!(read(&file, 99), Err(IoError::OverBudget { bytes: 100, limit: 99, .. })));
         assert_eq!(read(&file, 100).expect("fits").len(), 100);
         assert!(matches!(read(folder.path(), 100), Err(IoError::NotAFile { .. })));
+        assert!(matches!(read_if_there(&folder.path().join("b"), 100), Ok(None)));
+        assert!(read_if_there(&file, 100).expect("fits").is_some());
         #[cfg(unix)]
-        assert!(matches!(read(Path::new("/dev/zero"), 100), Err(IoError::NotAFile { .. })));
+        {
+            let pipe = folder.path().join("pipe");
+            let made = std::process::Command::new("mkfifo").arg(&pipe).status().expect("mkfifo");
+            assert!(made.success());
+            for special in [Path::new("/dev/zero"), &pipe] {
+                assert!(matches!(read(special, 100), Err(IoError::NotAFile { .. })), "{}", special.display());
+                assert!(matches!(read_start(special, 100), Err(IoError::NotAFile { .. })));
+                assert!(matches!(read_if_there(special, 100), Err(IoError::NotAFile { .. })));
+            }
+        }
     }
 }

@@ -22,6 +22,8 @@ use std::path::{Path, PathBuf};
 use glam::{DMat4, DQuat, DVec3};
 use gltf::json::{self, Root};
 
+use crate::scene::text;
+
 pub use model::{AlphaMode, Material, Mesh, MeshNode, MeshScene, Primitive, TextureImage, TextureUse, Wrap};
 
 /// Largest file that is read, in bytes.
@@ -36,7 +38,10 @@ const MAX_ITEMS: usize = 1 << 20;
 /// Why a glTF scene could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum GltfError {
-    /// A file could not be opened or read.
+    /// A file could not be read, or is larger than the reader takes.
+    #[error(transparent)]
+    Read(#[from] super::IoError),
+    /// A file that the scene names could not be found.
     #[error("{path}: {source}", path = path.display())]
     Io {
         /// The file.
@@ -217,7 +222,7 @@ impl File<'_> {
             if let Some(m) = mesh {
                 self.item(&root.meshes, m, "meshes", &place)?;
             }
-            let name = node.name.as_deref().map(str::trim).filter(|n| !n.is_empty()).map(str::to_owned);
+            let name = node.name.as_deref().map(str::trim).filter(|n| !n.is_empty()).map(text::name);
             nodes.push(MeshNode { name, parent, children: Vec::new(), mesh, world_from_node: world });
             stack.extend(node.children.iter().flatten().rev().map(|c| (c.value(), Some(own))));
         }

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::resample::covers;
 use super::{IoError, files, photo};
 use crate::math::rotation::{nearest_rotation, rotation_error};
 use crate::scene::{Camera, CameraError, Distortion, Photo};
@@ -69,6 +70,7 @@ pub(super) fn photos(
     source: &Path,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Photo>, IoError> {
+    listed.iter().try_for_each(|l| files::photo_name(&l.name, source))?;
     let mut names = HashSet::new();
     if let Some(twice) = listed.iter().find(|l| !names.insert(l.name.as_str())) {
         return Err(IoError::Duplicate { path: source.into(), photo: twice.name.clone() });
@@ -114,7 +116,18 @@ fn resolve(l: &Listed, root: &Path, source: &Path) -> Result<Option<Photo>, IoEr
     let Some(path) = find(root, &l.entry, source)? else { return Ok(None) };
     let found = photo::size(&path)?;
     let declared = l.lens.camera(found, rotation, l.center);
-    declared.validate().map_err(bad)?;
+    declared.believe().map_err(bad)?;
+    if d != Distortion::default() && !covers(&declared, &d) {
+        return Err(IoError::Syntax {
+            path: source.into(),
+            place: format!("photo '{}'", l.name),
+            reason: format!(
+                "its lens distortion (k1 {:e}, k2 {:e}, p1 {:e}, p2 {:e}) leaves nothing of the picture; calibrate the camera \
+                 anew or undistort the photo",
+                d.k1, d.k2, d.p1, d.p2
+            ),
+        });
+    }
     let expected = (declared.width_px, declared.height_px);
     if !is_scaled(expected, found) {
         return Err(IoError::PhotoSize { path, found, expected });
@@ -129,6 +142,20 @@ fn resolve(l: &Listed, root: &Path, source: &Path) -> Result<Option<Photo>, IoEr
         test_split: l.test_split,
         background: l.background,
     }))
+}
+
+/// The place of a point, if it is one: the error names the file, the kind of thing, its index and the axis.
+pub(super) fn place(p: DVec3, element: &'static str, index: usize, path: &Path) -> Result<DVec3, IoError> {
+    let Some(axis) = p.to_array().iter().position(|v| !(v.abs() <= Camera::FARTHEST)) else { return Ok(p) };
+    let (property, value) = (["x", "y", "z"][axis], p[axis]);
+    if !value.is_finite() {
+        return Err(IoError::NotFinite { path: path.into(), element, index, property: property.into() });
+    }
+    Err(IoError::Syntax {
+        path: path.into(),
+        place: format!("{element} {index}"),
+        reason: format!("{property} = {value:e} is farther than {:e} units from the origin", Camera::FARTHEST),
+    })
 }
 
 /// The listed file, with one of the usual endings if it has none.

@@ -6,17 +6,22 @@
 
 pub mod animation;
 pub mod atomic;
+pub mod camera_file;
 pub mod camera_path;
 pub mod colmap;
+mod commit;
 mod compressed_ply;
 pub mod data_folder;
 mod error;
 pub mod files;
+pub mod folder_lock;
 pub mod gltf_mesh;
+pub mod http;
 pub mod khr_gltf;
 pub mod labels;
 mod listing;
 pub mod llff;
+pub mod memory;
 pub mod npy;
 mod open;
 pub mod photo;
@@ -25,12 +30,15 @@ pub mod points_ply;
 mod quantised;
 mod reader;
 mod resample;
+pub mod scene_folder;
 pub mod semantic_map;
 pub mod sog;
 pub mod splat_ply;
+mod temporary;
 pub mod trained;
 pub mod transforms;
 
 pub use error::{IoError, OpenError};
 pub use open::{Opened, open};
+pub use scene_folder::SceneFolder;
 pub use trained::TrainedScene;

@@ -8,7 +8,7 @@ use std::path::Path;
 use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageError, ImageReader, Limits, Luma, RgbaImage};
 
 use super::resample::{Pixels, resample};
-use super::{IoError, files};
+use super::{IoError, files, memory};
 use crate::scene::{Camera, Photo, PhotoPixels};
 
 /// Bytes at the start of a picture file that hold its size in all but rare cases.
@@ -26,7 +26,12 @@ pub fn load(photo: &Photo, max_side_px: u32) -> Result<PhotoPixels, IoError> {
     if let Some(background) = photo.background {
         pixels = over(pixels, background);
     }
-    Ok(resample(&pixels, &photo.camera, photo.distortion.as_ref(), &photo.camera.limited_to(max_side_px)))
+    let seen = resample(&pixels, &photo.camera, photo.distortion.as_ref(), &photo.camera.limited_to(max_side_px));
+    // Compared with nothing, any drawing would be perfect.
+    match seen.coverage.as_ref().is_some_and(|c| c.iter().all(|c| *c == 0)) {
+        true => Err(IoError::NothingShown { path: photo.path.clone() }),
+        false => Ok(seen),
+    }
 }
 
 /// Width and height in px of a picture file, from its header.
@@ -122,7 +127,7 @@ fn decoder<'a>(bytes: &'a [u8], path: &Path) -> Result<impl ImageDecoder + 'a, I
     let mut limits = Limits::default();
     limits.max_image_width = Some(Camera::MAX_SIDE_PX);
     limits.max_image_height = Some(Camera::MAX_SIDE_PX);
-    limits.max_alloc = Some(files::memory_budget());
+    limits.max_alloc = Some(memory::budget());
     reader.limits(limits);
     let decoder = reader.into_decoder().map_err(|e| failed(path, &e))?;
     let (width_px, height_px) = decoder.dimensions();

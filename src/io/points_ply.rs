@@ -6,8 +6,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::ply::{Ply, Scalar, Table};
-use super::{IoError, files};
-use crate::scene::SparsePoint;
+use super::{IoError, files, listing};
+use crate::scene::{Camera, SparsePoint};
 
 /// Colour of points that have none.
 const GREY: u8 = 128;
@@ -52,13 +52,10 @@ fn byte(scalar: Scalar, value: f64) -> u8 {
 
 fn first_bad(points: &[SparsePoint], table: &Table<'_>, path: &Path) -> Result<(), IoError> {
     debug_assert_eq!(points.len(), table.rows);
-    match points.par_iter().position_first(|p| !p.position.is_finite()) {
+    let is_bad = |p: &SparsePoint| p.position.to_array().iter().any(|v| !(v.abs() <= Camera::FARTHEST));
+    match points.par_iter().position_first(is_bad) {
         None => Ok(()),
-        Some(index) => {
-            let axis = points[index].position.to_array().iter().position(|v| !v.is_finite()).unwrap_or(0);
-            let property = ["x", "y", "z"][axis].into();
-            Err(IoError::NotFinite { path: path.into(), element: "vertex", index, property })
-        }
+        Some(index) => listing::place(points[index].position, "vertex", index, path).map(drop),
     }
 }
 
@@ -129,6 +126,8 @@ mod tests {
         let text = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n1 NaN 3\n";
         let e = parse_bytes(text.as_bytes()).expect_err("NaN");
         assert!(matches!(&e, IoError::NotFinite { index: 1, property, .. } if property == "y"), "{e}");
+        let e = parse_bytes(text.replace("NaN", "-1e30").as_bytes()).expect_err("far");
+        assert!(e.to_string().contains("vertex 1: y = -1e30 is farther"), "{e}");
         assert_eq!(parse_bytes(text.replace("NaN", "2").as_bytes()).expect("finite")[1].rgb, [GREY; 3]);
     }
 

@@ -97,6 +97,18 @@ fn overlaps(from: usize, to: usize, i: usize) -> impl Iterator<Item = (usize, f3
     })
 }
 
+/// Whether anything of the picture is left once it is undistorted: one of the places of a grid, at least.
+pub(super) fn covers(camera: &Camera, distortion: &Distortion) -> bool {
+    const ACROSS: usize = 32;
+    let size = Vec2::new(camera.width_px as f32, camera.height_px as f32);
+    let lens = Lens::new(camera, distortion);
+    let mut row = [Vec2::ZERO; ACROSS];
+    (0..ACROSS).any(|y| {
+        lens.source_row((y as f32 + 0.5) / ACROSS as f32 * size.y, size.x / ACROSS as f32, &mut row);
+        row.iter().any(|p| p.x >= 0.0 && p.x <= size.x && p.y >= 0.0 && p.y <= size.y)
+    })
+}
+
 /// A distorting lens in single precision (a few 1e-4 px at 10,000 px).
 struct Lens {
     focal: Vec2,

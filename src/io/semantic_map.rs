@@ -18,7 +18,7 @@ use half::f16;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 
-use super::{IoError, atomic, files, splat_ply};
+use super::{IoError, files};
 use crate::scene::language::MAX_VIEWS;
 use crate::scene::{GaussianCloud, Identities, LanguageFeatures, SemanticMap, ViewFeatures};
 
@@ -34,6 +34,9 @@ const MAX_BYTES: u64 = 256 << 20;
 #[derive(Serialize, Deserialize)]
 struct Header {
     version: u64,
+    /// Of the scene that it was saved with.
+    #[serde(default)]
+    state: Option<String>,
     #[serde(default)]
     seeds: Vec<String>,
     #[serde(default)]
@@ -41,21 +44,21 @@ struct Header {
     identities: Identities,
 }
 
-/// Writes the map into a trained scene's folder, and the Gaussians `cloud` with what they belong to.
+/// The bytes of a map that belongs to a scene's state; `path` is for errors.
 ///
 /// # Errors
-/// If a file cannot be written.
-pub fn save(folder: &Path, map: &SemanticMap, cloud: &GaussianCloud) -> Result<(), IoError> {
+/// If it is too large for the format.
+pub fn encode(map: &SemanticMap, state: Option<&str>, path: &Path) -> Result<Vec<u8>, IoError> {
     let language = map.language.as_ref();
     let header = Header {
         version: VERSION,
+        state: state.map(Into::into),
         seeds: map.seeds.clone(),
         encoder: language.map(|l| l.encoder.clone()),
         identities: map.identities.clone(),
     };
-    let path = folder.join(FILE);
     let broken = |e: &dyn std::fmt::Display| IoError::Syntax {
-        path: path.clone(),
+        path: path.into(),
         place: "semantic map".into(),
         reason: e.to_string(),
     };
@@ -78,30 +81,34 @@ pub fn save(folder: &Path, map: &SemanticMap, cloud: &GaussianCloud) -> Result<(
         tensors.push(("deviated", view(Dtype::F16, shape, cast_slice(&deviated))?));
     }
     let metadata = HashMap::from([(KEY.to_owned(), text)]);
-    let bytes = safetensors::serialize(tensors, Some(metadata)).map_err(|e| broken(&e))?;
-    let mut stored = cloud.clone();
-    map.store(&mut stored);
-    splat_ply::write(&folder.join(super::trained::CLOUD_FILE), &stored)?;
-    atomic::write(&path, |w| w.write_all(&bytes))
+    safetensors::serialize(tensors, Some(metadata)).map_err(|e| broken(&e))
 }
 
-/// The map of a trained scene; `None` if it has none, or one of other Gaussians.
+/// The map of the scene in `folder`, whose Gaussians `cloud` are of the save `state`; `None` if it has none.
 ///
 /// # Errors
-/// If its file is broken.
-pub fn load(folder: &Path, cloud: &GaussianCloud) -> Result<Option<SemanticMap>, IoError> {
+/// If its file is broken, or [`IoError::Torn`] if it is of other Gaussians.
+pub fn load(folder: &Path, state: Option<&str>, cloud: &GaussianCloud) -> Result<Option<SemanticMap>, IoError> {
     let path = folder.join(FILE);
-    if !path.is_file() {
+    if !path.exists() {
         return Ok(None);
     }
+    let torn = || IoError::Torn {
+        path: path.clone(),
+        with: super::trained::CLOUD_FILE,
+        remedy: "put back the file that was, or find the objects anew with 'fmlgs preprocess'",
+    };
     let bytes = files::read(&path, MAX_BYTES)?;
     let header = header(&path, &bytes)?;
+    if header.state.as_deref() != state {
+        return Err(torn());
+    }
     let language = match header.encoder {
         None => None,
         Some(encoder) => Some(features(&path, &bytes, encoder, &header.identities)?),
     };
-    let map = SemanticMap::restore(header.identities, header.seeds, cloud);
-    Ok(map.map(|map| SemanticMap { language, ..map }))
+    let map = SemanticMap::restore(header.identities, header.seeds, cloud).ok_or_else(torn)?;
+    Ok(Some(SemanticMap { language, ..map }))
 }
 
 /// Features of all identities, those of the views that are missing as zeros.
@@ -167,6 +174,7 @@ fn header(path: &Path, bytes: &[u8]) -> Result<Header, IoError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::trained::{self, SceneInfo};
     use crate::scene::{Level, NOBODY};
 
     fn map() -> (SemanticMap, GaussianCloud) {
@@ -195,26 +203,29 @@ mod tests {
     fn a_map_reads_back() {
         let folder = tempfile::tempdir().expect("folder");
         let (map, cloud) = map();
-        assert_eq!(load(folder.path(), &cloud).expect("none"), None);
-        save(folder.path(), &map, &cloud).expect("save");
-        let again = splat_ply::read(&folder.path().join(super::super::trained::CLOUD_FILE)).expect("read");
-        assert_eq!(load(folder.path(), &again).expect("load"), Some(map));
-        assert_eq!(load(folder.path(), &GaussianCloud::default()).expect("load"), None, "other Gaussians");
+        assert_eq!(load(folder.path(), None, &cloud).expect("none"), None);
+        let state = trained::save(folder.path(), &SceneInfo::default(), &cloud, Some(&map)).expect("save");
+        let again = trained::load(folder.path()).expect("load").cloud;
+        assert_eq!(load(folder.path(), Some(&state), &again).expect("load"), Some(map));
+        let torn = |found| matches!(found, Err(IoError::Torn { .. }));
+        assert!(torn(load(folder.path(), Some(&state), &GaussianCloud::default())), "other Gaussians");
+        assert!(torn(load(folder.path(), Some("another save"), &again)) && torn(load(folder.path(), None, &again)));
     }
 
     #[test]
     fn broken_maps_are_named() {
         let folder = tempfile::tempdir().expect("folder");
         let (map, cloud) = map();
-        save(folder.path(), &map, &cloud).expect("save");
+        let state = trained::save(folder.path(), &SceneInfo::default(), &cloud, Some(&map)).expect("save");
+        let state = Some(state.as_str());
         let path = folder.path().join(FILE);
         let good = std::fs::read(&path).expect("read");
         for bytes in [&good[..good.len() / 2], &[0xff; 64][..], &[][..]] {
             std::fs::write(&path, bytes).expect("write");
-            assert!(matches!(load(folder.path(), &cloud), Err(IoError::Syntax { .. })));
+            assert!(matches!(load(folder.path(), state, &cloud), Err(IoError::Syntax { .. })));
         }
         let newer = String::from_utf8_lossy(&good).replace("version\\\":1", "version\\\":9");
         std::fs::write(&path, newer.as_bytes()).expect("write");
-        assert!(load(folder.path(), &cloud).is_err());
+        assert!(load(folder.path(), state, &cloud).is_err());
     }
 }

@@ -4,17 +4,20 @@
 //! |---|---|
 //! | `scene.json` | [`SceneInfo`]: version, dataset, cameras, settings, history |
 //! | `point_cloud.ply` | the Gaussians, see [`splat_ply`] |
+//! | `semantic_map.safetensors` | objects and parts, see [`semantic_map`](super::semantic_map) |
 //! | `checkpoint.bin` | the state of the training, if it can be resumed; written by the training |
+//! | `earlier/` | scenes with objects that later commands replaced |
 //!
-//! `scene.json` makes the folder a scene and is written last, so a folder that has one is whole.
+//! `scene.json` makes the folder a scene. [`SceneFolder`] writes it.
 
 use std::fs;
 use std::path::{Component, Path, PathBuf};
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use super::{IoError, atomic, files, splat_ply};
-use crate::scene::{Camera, Dataset, Evaluation, GaussianCloud, StepMetrics};
+use super::{IoError, SceneFolder, commit, files, splat_ply};
+use crate::scene::{Camera, Dataset, Evaluation, GaussianCloud, SemanticMap, StepMetrics, text};
 
 /// The file that makes a folder a trained scene.
 pub const SCENE_FILE: &str = "scene.json";
@@ -32,6 +35,8 @@ pub struct TrainedScene {
     pub info: SceneInfo,
     /// The Gaussians.
     pub cloud: GaussianCloud,
+    /// Id of the save that its files are of; `None` in folders of the first versions.
+    pub state: Option<String>,
 }
 
 /// The contents of `scene.json`. Fields that a later version adds are left out when this version
@@ -41,7 +46,7 @@ pub struct SceneInfo {
     /// Version of the format.
     pub version: u64,
     /// Short name for titles.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "text::read_name")]
     pub name: String,
     /// The photos that it was trained on, if known.
     #[serde(default)]
@@ -61,6 +66,9 @@ pub struct SceneInfo {
     /// Measurements of the training run.
     #[serde(default)]
     pub history: History,
+    /// Id of the save that wrote it, which the files that belong to it carry too.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub state: Option<String>,
 }
 
 /// Where the photos of a trained scene are.
@@ -131,32 +139,52 @@ pub fn is_scene(folder: &Path) -> bool {
     folder.join(SCENE_FILE).is_file()
 }
 
-/// Writes a scene into `folder`, which is created if need be. Each file is replaced atomically;
-/// the one with the Gaussians first.
-pub fn save(folder: &Path, info: &SceneInfo, cloud: &GaussianCloud) -> Result<(), IoError> {
-    fs::create_dir_all(folder).map_err(|cause| IoError::Write {
-        path: folder.into(),
-        remedy: "the folder cannot be created: choose another place",
-        cause,
-    })?;
-    splat_ply::write(&folder.join(CLOUD_FILE), cloud)?;
-    save_info(folder, info)
+/// Writes a scene into `folder`, which is created if need be. All of its files change, or none.
+///
+/// # Errors
+/// As [`SceneFolder::hold`] and [`SceneFolder::save`].
+pub fn save(
+    folder: &Path,
+    info: &SceneInfo,
+    cloud: &GaussianCloud,
+    map: Option<&SemanticMap>,
+) -> Result<String, IoError> {
+    SceneFolder::hold(folder, "saving")?.save(info, cloud, map)
 }
 
-/// Writes `scene.json` alone.
-pub fn save_info(folder: &Path, info: &SceneInfo) -> Result<(), IoError> {
-    let info = SceneInfo { version: VERSION, ..info.clone() };
-    atomic::write(&folder.join(SCENE_FILE), |w| {
-        serde_json::to_writer_pretty(&mut *w, &info)?;
-        w.write_all(b"\n")
-    })
-}
-
-/// Reads a scene.
+/// Reads a scene. A save that was interrupted is finished first.
+///
+/// # Errors
+/// If a file is broken, or [`IoError::Torn`] if its files were not saved together.
 pub fn load(folder: &Path) -> Result<TrainedScene, IoError> {
+    // Somebody may be saving at this moment, which takes milliseconds once the files are written.
+    const TRIES: u32 = 20;
+    const PAUSE: Duration = Duration::from_millis(25);
+    let mut tries = 0;
+    loop {
+        tries += 1;
+        let result = match commit::is_pending(folder) {
+            true => SceneFolder::hold(folder, "finishing a save").and_then(|_| load_once(folder)),
+            false => load_once(folder),
+        };
+        match result {
+            Err(IoError::Torn { .. } | IoError::Busy { .. }) if tries < TRIES => std::thread::sleep(PAUSE),
+            result => return result,
+        }
+    }
+}
+
+fn load_once(folder: &Path) -> Result<TrainedScene, IoError> {
     let info = load_info(folder)?;
-    let cloud = splat_ply::read(&folder.join(CLOUD_FILE))?;
-    Ok(TrainedScene { folder: folder.into(), info, cloud })
+    let path = folder.join(CLOUD_FILE);
+    let cloud = splat_ply::read(&path)?;
+    let state = splat_ply::state(&path)?;
+    if info.state.is_some() && info.state != state {
+        let remedy = "put back the file that was; or open it by itself; or, to go on with it as it is, delete the \
+                      line \"state\" from scene.json";
+        return Err(IoError::Torn { path, with: SCENE_FILE, remedy });
+    }
+    Ok(TrainedScene { folder: folder.into(), info, cloud, state })
 }
 
 /// Reads `scene.json` alone.
@@ -174,13 +202,14 @@ pub fn load_info(folder: &Path) -> Result<SceneInfo, IoError> {
     }
     let info: SceneInfo = serde_json::from_slice(&bytes).map_err(|e| files::json_error(&path, &e))?;
     for c in &info.cameras {
-        c.camera.validate().map_err(|cause| IoError::Camera { path: path.clone(), photo: c.name.clone(), cause })?;
+        files::photo_name(&c.name, &path)?;
+        c.camera.believe().map_err(|cause| IoError::Camera { path: path.clone(), photo: c.name.clone(), cause })?;
     }
     Ok(info)
 }
 
 /// `path` as seen from `folder`; absolute where they have no common root or do not exist.
-fn relative_to(path: &Path, folder: &Path) -> PathBuf {
+pub(super) fn relative_to(path: &Path, folder: &Path) -> PathBuf {
     // The scene's folder may not exist yet; its parents do not matter then beyond their names.
     let real = |p: &Path| fs::canonicalize(p).or_else(|_| std::path::absolute(p));
     let (Ok(path), Ok(folder)) = (real(path), real(folder)) else { return path.into() };

@@ -1,4 +1,6 @@
-//! Order statistics of small samples.
+//! Order statistics of small samples, and the largest of errors.
+
+use super::Real;
 
 /// The `q`-quantile (0 to 1) of `values` by linear interpolation; NaN for an empty sample.
 pub fn quantile(values: &[f64], q: f64) -> f64 {
@@ -22,9 +24,39 @@ pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
+/// The largest of some errors, for judging them: NaN if one is NaN, which `max` would pass over, and for
+/// none at all. A bound, held as `worst(..) < bound`, then holds for neither.
+pub fn worst<R: Real>(errors: impl IntoIterator<Item = R>) -> f64 {
+    let errors = errors.into_iter().map(Real::f64);
+    errors.reduce(|w, e| if w.is_nan() || e.is_nan() { f64::NAN } else { w.max(e) }).unwrap_or(f64::NAN)
+}
+
+/// The [`worst`] difference of two lists, place by place; NaN if they are of different lengths.
+pub fn worst_difference<A: Real, B: Real>(a: &[A], b: &[B]) -> f64 {
+    if a.len() != b.len() {
+        return f64::NAN;
+    }
+    worst(a.iter().zip(b).map(|(a, b)| (a.f64() - b.f64()).abs()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn nothing_hides_from_the_worst() {
+        assert_eq!(worst([0.5, 2.0, 1.0]), 2.0);
+        assert_eq!(worst([1.0_f32, f32::INFINITY]), f64::INFINITY);
+        for bad in [[f64::NAN, 1.0, 2.0], [1.0, f64::NAN, 2.0], [1.0, 2.0, f64::NAN]] {
+            assert!(worst(bad).is_nan(), "{bad:?}");
+        }
+        assert!(worst([0.0_f64; 0]).is_nan(), "nothing was compared");
+        assert_eq!(worst_difference(&[1.0_f32, 2.0], &[1.0_f64, 4.5]), 2.5);
+        assert!(worst_difference(&[1.0_f32, 2.0], &[1.0_f32]).is_nan(), "one list is shorter");
+        assert!(worst_difference(&[1.0, f64::NAN], &[1.0, 1.0]).is_nan());
+        // Equal infinities are no agreement.
+        assert!(worst_difference(&[f64::INFINITY], &[f64::INFINITY]).is_nan());
+    }
 
     #[test]
     fn quantiles_interpolate() {

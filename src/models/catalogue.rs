@@ -291,11 +291,52 @@ pub fn find(name: &str, role: Role) -> Result<PathBuf, ModelError> {
     }
 }
 
-/// Names of the models of a role that can be used now, best first; the built-in ones last.
-pub fn usable(role: Role) -> Vec<String> {
-    let folder = folder();
-    let all = entries().unwrap_or_default();
-    let of_role = || all.iter().filter(|e| e.role == role);
-    let here = of_role().filter(|e| e.state(&folder) == State::Here);
-    here.chain(of_role().filter(|e| e.built_in)).map(|e| e.id.clone()).collect()
+/// Names of the models of a role that can be used now, best first; the built-in ones last. `told` hears of
+/// each that is here and cannot be used.
+///
+/// # Errors
+/// If the list that came with the program is damaged.
+pub fn usable(role: Role, told: &mut dyn FnMut(String)) -> Result<Vec<String>, ModelError> {
+    Ok(usable_of(&entries()?, role, &folder(), told))
+}
+
+fn usable_of(all: &[Entry], role: Role, folder: &Path, told: &mut dyn FnMut(String)) -> Vec<String> {
+    let (mut here, mut built_in) = (Vec::new(), Vec::new());
+    for entry in all.iter().filter(|e| e.role == role) {
+        match entry.state(folder) {
+            State::BuiltIn => built_in.push(entry.id.clone()),
+            State::Here => here.push(entry.id.clone()),
+            State::Missing(_) => {}
+            State::Broken(problem) => {
+                let id = &entry.id;
+                told(format!("the model '{id}' is here but broken and is not used: {problem}; fetch or add it again"));
+            }
+        }
+    }
+    here.append(&mut built_in);
+    here
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_broken_model_is_told() {
+        let folder = tempfile::tempdir().expect("folder");
+        let all = entries().expect("the list");
+        let listed = all.iter().find(|e| e.role == Role::Encoder && !e.built_in).expect("an encoder");
+        let told = |folder: &Path| {
+            let mut told = Vec::new();
+            let usable = usable_of(&all, Role::Encoder, folder, &mut |text| told.push(text));
+            assert_eq!(usable, ["demo"]);
+            told
+        };
+        assert!(told(folder.path()).is_empty(), "what is not here is no trouble");
+        for name in listed.files() {
+            fs::write(folder.path().join(name), "{").expect("written");
+        }
+        let told = told(folder.path());
+        assert!(told.len() == 1 && told[0].contains(&listed.id) && told[0].contains("broken"), "{told:?}");
+    }
 }

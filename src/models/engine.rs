@@ -16,7 +16,7 @@ use ort::session::Session;
 use ort::session::builder::GraphOptimizationLevel;
 
 use super::ModelError;
-use super::network::Network;
+use super::network::{Network, guarded};
 use super::room;
 use crate::scene::trace::{self, Sort};
 
@@ -112,7 +112,7 @@ fn wheel_folders(environment: &Path) -> Vec<PathBuf> {
 }
 
 /// The library in a folder: by its plain name, or with a version as in wheels.
-fn library_in(folder: &Path) -> Option<PathBuf> {
+pub(super) fn library_in(folder: &Path) -> Option<PathBuf> {
     let plain = format!("{}onnxruntime{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
     let exact = folder.join(&plain);
     if exact.is_file() {
@@ -216,13 +216,18 @@ impl Engine {
             }
             commit(&mut builder)
         };
-        // A device that refuses a network is no reason to do without it.
-        let session = match self.device {
-            Some(device) => load(Some(device)).or_else(|_| load(None)),
-            None => load(None),
+        // A device that refuses a network is no reason to do without it, but is told among what was loaded.
+        let refused = |device: Device, e: ort::Error| {
+            let what = format!("network {name}, on the processor, because {} refused it: {e}", device.text());
+            trace::record(Sort::Model, what, MODEL_USE, 0);
+            load(None)
         };
+        let session = guarded(name, || match self.device {
+            Some(device) => load(Some(device)).or_else(|e| refused(device, e)),
+            None => load(None),
+        });
         let engine = if self.name.starts_with("tract") { "built-in" } else { "ONNX Runtime" };
-        session.map_err(|e| ModelError::Load { model: name.into(), engine, problem: e.to_string() })
+        session.map_err(|problem| ModelError::Load { model: name.into(), engine, problem })
     }
 }
 

@@ -1,15 +1,24 @@
 //! Downloads of model files: resumed, checked, cancellable. Nothing is fetched that a person has not
 //! asked for.
 
-use std::fs::{self, File, OpenOptions};
-use std::io::{self, Read, Write};
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use crossbeam_channel::{RecvTimeoutError, bounded};
+use crossbeam_channel::{Receiver, RecvTimeoutError};
 use sha2::{Digest, Sha256};
-use ureq::http::{Response, StatusCode};
-use ureq::{Agent, Body};
+use ureq::Agent;
+use ureq::http::StatusCode;
+
+use crate::io::http::{self, Piece, TICK};
+
+/// Least that has to arrive within the patience for a stall: a server that sends a byte now and then is
+/// as good as silent.
+const LEAST_BYTES: u64 = 1024;
+
+/// Largest file whose size nobody has promised: a description.
+pub const MOST_UNPROMISED: u64 = super::metadata::MAX_BYTES;
 
 /// A file to fetch.
 #[derive(Clone, Copy, Debug)]
@@ -18,7 +27,7 @@ pub struct Wanted<'a> {
     pub url: &'a str,
     /// The file that it becomes, once it is complete and right.
     pub to: &'a Path,
-    /// Its size, if that is known.
+    /// Its size, if that is known; else it is at most [`MOST_UNPROMISED`].
     pub bytes: Option<u64>,
     /// Its SHA-256 in hexadecimal digits, if that is known.
     pub sha256: Option<&'a str>,
@@ -91,6 +100,14 @@ pub enum FetchError {
         /// Bytes that it should have.
         expected: u64,
     },
+    /// More than a file without a promised size may have.
+    #[error("{url} is larger than the {most} bytes that a description may have; it is another file, and was not taken")]
+    TooLarge {
+        /// From where.
+        url: String,
+        /// Most bytes.
+        most: u64,
+    },
     /// A page for people in place of the file.
     #[error("{url} is a web page, not a file (a sign-in, or an error page?)")]
     WebPage {
@@ -147,19 +164,21 @@ pub fn fetch(
     if let Some(folder) = wanted.to.parent() {
         fs::create_dir_all(folder).map_err(|source| FetchError::File { path: folder.into(), source })?;
     }
-    let config = Agent::config_builder()
-        .http_status_as_error(false)
-        .timeout_connect(Some(patience.stall))
-        .timeout_recv_response(Some(patience.stall))
-        .build();
-    let agent: Agent = config.into();
+    let agent = Agent::from(http::config(wanted.url, 2 * patience.stall).build());
     let part = Part::of(wanted);
     let mut pause = patience.pause;
     for attempt in 1.. {
         match receive(&agent, wanted, &part, patience.stall, progress) {
             Ok(()) => break,
             Err(e) if e.is_passing() && attempt < patience.attempts => {
-                std::thread::sleep(pause);
+                let begin = Instant::now();
+                while begin.elapsed() < pause {
+                    let (there, _) = part.there();
+                    if !progress(there, wanted.bytes) {
+                        return Err(FetchError::Cancelled { got: there });
+                    }
+                    std::thread::sleep(TICK.min(pause));
+                }
                 pause *= 2;
             }
             Err(e) => return Err(e),
@@ -172,9 +191,9 @@ pub fn fetch(
         }
         checked?;
     }
-    fs::rename(&part.path, wanted.to).map_err(|source| FetchError::File { path: wanted.to.into(), source })?;
-    part.forget();
-    Ok(())
+    // The tag first: ended between the two, nothing is left beside a whole file.
+    let _ = fs::remove_file(&part.tag);
+    fs::rename(&part.path, wanted.to).map_err(|source| FetchError::File { path: wanted.to.into(), source })
 }
 
 /// Compares a file with its SHA-256.
@@ -232,6 +251,23 @@ impl Part {
         if tag.is_some() || self.is_checked { (bytes, tag) } else { (0, None) }
     }
 
+    /// The file with the first `there` bytes of it, to be gone on with, for this process alone.
+    fn open(&self, there: u64) -> Result<File, FetchError> {
+        let mut file =
+            OpenOptions::new().create(true).write(true).truncate(false).open(&self.path).map_err(|e| self.failed(e))?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                let busy = "another program is fetching it; wait for that, or end it";
+                return Err(self.failed(io::Error::other(busy)));
+            }
+            // Some file systems know no locks.
+            Err(TryLockError::Error(_)) => {}
+        }
+        file.set_len(there).and_then(|()| file.seek(SeekFrom::End(0))).map_err(|e| self.failed(e))?;
+        Ok(file)
+    }
+
     fn forget(&self) {
         // That they are gone already is as good.
         let _ = fs::remove_file(&self.path);
@@ -252,8 +288,13 @@ fn receive(
     progress: &mut dyn FnMut(u64, Option<u64>) -> bool,
 ) -> Result<(), FetchError> {
     let url = wanted.url.to_owned();
+    let most = wanted.bytes.unwrap_or(MOST_UNPROMISED);
+    let too_large = |offered| match wanted.bytes {
+        Some(expected) => FetchError::OtherSize { url: url.clone(), offered, expected },
+        None => FetchError::TooLarge { url: url.clone(), most },
+    };
     let (mut there, tag) = part.there();
-    if wanted.bytes.is_some_and(|bytes| there > bytes) {
+    if there > most {
         part.forget();
         there = 0;
     }
@@ -264,9 +305,16 @@ fn receive(
             request = request.header("If-Range", tag);
         }
     }
-    let response = request.call().map_err(|e| FetchError::Unreachable { url: url.clone(), problem: e.to_string() })?;
-    let header = |name: &str| response.headers().get(name).and_then(|v| v.to_str().ok()).map(str::to_owned);
-    let total = match response.status() {
+    let pieces = http::ask(move || request.call()).map_err(|e| part.failed(e))?;
+    let mut wait = Wait { pieces, stall, since: Instant::now(), got: 0 };
+    let (status, headers) = match wait.next(there, wanted.bytes, progress) {
+        Ok(Some(Piece::Head(status, headers))) => (status, headers),
+        Ok(Some(Piece::Failed(problem))) => return Err(FetchError::Unreachable { url, problem }),
+        Ok(_) => return Err(FetchError::Unreachable { url, problem: "the connection ended".into() }),
+        Err(ended) => return Err(ended.error(url, stall, there)),
+    };
+    let header = |name: &str| headers.get(name).and_then(|v| v.to_str().ok()).map(str::to_owned);
+    let total = match status {
         StatusCode::PARTIAL_CONTENT => {
             let (start, total) = header("content-range").as_deref().and_then(content_range).unwrap_or((u64::MAX, None));
             if start != there {
@@ -290,44 +338,96 @@ fn receive(
     if header("content-type").is_some_and(|t| t.starts_with("text/html")) {
         return Err(FetchError::WebPage { url });
     }
-    if let (Some(offered), Some(expected)) = (total, wanted.bytes)
-        && offered != expected
-    {
-        return Err(FetchError::OtherSize { url, offered, expected });
+    match (total, wanted.bytes) {
+        (Some(offered), Some(expected)) if offered != expected => return Err(too_large(offered)),
+        (Some(offered), None) if offered > most => return Err(too_large(offered)),
+        _ => {}
     }
+    let mut file = part.open(there)?;
     // Weak tags do not promise the same bytes.
     let tag = header("etag").filter(|t| !t.starts_with("W/")).or_else(|| header("last-modified")).unwrap_or_default();
     fs::write(&part.tag, tag).map_err(|e| part.failed(e))?;
-    let mut file = OpenOptions::new()
-        .create(true)
-        .append(there > 0)
-        .write(true)
-        .truncate(there == 0)
-        .open(&part.path)
-        .map_err(|e| part.failed(e))?;
-    let pieces = pieces(response).map_err(|e| part.failed(e))?;
     let expected = wanted.bytes.or(total);
     loop {
-        if !progress(there, expected) {
-            return Err(FetchError::Cancelled { got: there });
-        }
-        match pieces.recv_timeout(stall) {
-            Ok(Ok(piece)) => {
+        match wait.next(there, expected, progress) {
+            Ok(Some(Piece::Bytes(piece))) => {
+                if there + piece.len() as u64 > most {
+                    // What is longer than it should be is another file from its start.
+                    part.forget();
+                    return Err(too_large(there + piece.len() as u64));
+                }
                 there += piece.len() as u64;
                 file.write_all(&piece).map_err(|e| part.failed(e))?;
             }
-            // The reader ends by itself, or with the program: a blocked read cannot be called off.
-            Err(RecvTimeoutError::Timeout) => {
-                return Err(FetchError::Stalled { url, secs: stall.as_secs(), got: there });
+            // Where no size is known, only a whole answer is a whole file.
+            Ok(Some(Piece::Failed(problem))) if expected.is_none() => {
+                return Err(FetchError::Unreachable { url, problem });
             }
-            Ok(Err(_)) | Err(RecvTimeoutError::Disconnected) => break,
+            Ok(_) => break,
+            Err(ended) => return Err(ended.error(url, stall, there)),
         }
     }
     file.sync_all().map_err(|e| part.failed(e))?;
     match expected {
         Some(expected) if there < expected => Err(FetchError::Truncated { url, got: there, expected }),
-        Some(expected) if there > expected => Err(FetchError::OtherSize { url, offered: there, expected }),
         _ => Ok(()),
+    }
+}
+
+/// Why a wait ended without a piece.
+enum Ended {
+    Stalled,
+    Cancelled,
+}
+
+impl Ended {
+    fn error(self, url: String, stall: Duration, got: u64) -> FetchError {
+        match self {
+            Self::Stalled => FetchError::Stalled { url, secs: stall.as_secs(), got },
+            Self::Cancelled => FetchError::Cancelled { got },
+        }
+    }
+}
+
+/// Waits for pieces, for as long as enough of them come and nobody wants it to end.
+struct Wait {
+    pieces: Receiver<Piece>,
+    stall: Duration,
+    /// When enough came last.
+    since: Instant,
+    /// Bytes that came after.
+    got: u64,
+}
+
+impl Wait {
+    /// The next piece; `None` at the end.
+    fn next(
+        &mut self,
+        there: u64,
+        expected: Option<u64>,
+        progress: &mut dyn FnMut(u64, Option<u64>) -> bool,
+    ) -> Result<Option<Piece>, Ended> {
+        loop {
+            if !progress(there, expected) {
+                return Err(Ended::Cancelled);
+            }
+            let piece = match self.pieces.recv_timeout(TICK) {
+                Ok(piece) => piece,
+                Err(RecvTimeoutError::Disconnected) => return Ok(None),
+                Err(RecvTimeoutError::Timeout) if self.since.elapsed() > self.stall => return Err(Ended::Stalled),
+                Err(RecvTimeoutError::Timeout) => continue,
+            };
+            self.got += match &piece {
+                Piece::Bytes(bytes) => bytes.len() as u64,
+                _ => LEAST_BYTES,
+            };
+            if self.got >= LEAST_BYTES {
+                (self.since, self.got) = (Instant::now(), 0);
+            } else if self.since.elapsed() > self.stall {
+                return Err(Ended::Stalled);
+            }
+            return Ok(Some(piece));
+        }
     }
 }
 
@@ -335,31 +435,6 @@ fn receive(
 fn content_range(value: &str) -> Option<(u64, Option<u64>)> {
     let (range, total) = value.strip_prefix("bytes ")?.split_once('/')?;
     Some((range.split_once('-')?.0.parse().ok()?, total.parse().ok()))
-}
-
-/// The body, read by a thread of its own, so that a silent server can be told from a slow one.
-fn pieces(response: Response<Body>) -> io::Result<crossbeam_channel::Receiver<io::Result<Vec<u8>>>> {
-    let (send, receive) = bounded(4);
-    let read = move || {
-        let mut reader = response.into_body().into_reader();
-        loop {
-            let mut piece = vec![0; 1 << 16];
-            let read = reader.read(&mut piece).map(|n| {
-                piece.truncate(n);
-                piece
-            });
-            // The end: whoever receives sees that nobody sends any more.
-            if read.as_ref().is_ok_and(Vec::is_empty) {
-                return;
-            }
-            let failed = read.is_err();
-            if send.send(read).is_err() || failed {
-                return;
-            }
-        }
-    };
-    std::thread::Builder::new().name("download".into()).spawn(read)?;
-    Ok(receive)
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use super::network::Network;
 /// Version of the file that this program reads.
 const VERSION: u64 = 1;
 /// Largest file that is read, bytes.
-const MAX_BYTES: u64 = 16 << 20;
+pub const MAX_BYTES: u64 = 16 << 20;
 
 /// A graph of a model.
 #[derive(Clone, Debug, Deserialize)]
@@ -50,7 +50,11 @@ impl Graph {
     pub fn check_size(&self, folder: &Path) -> Result<(), ModelError> {
         let path = folder.join(&self.file);
         let refused = |problem: String| ModelError::Metadata { path: path.clone(), problem };
-        let bytes = std::fs::metadata(&path).map_err(|e| refused(e.to_string()))?.len();
+        let about = std::fs::metadata(&path).map_err(|e| refused(e.to_string()))?;
+        if !about.is_file() {
+            return Err(refused("it is not a regular file".into()));
+        }
+        let bytes = about.len();
         if bytes != self.bytes {
             let wanted = self.bytes;
             return Err(refused(format!("{bytes} bytes, its description says {wanted}; it is broken or another file")));
@@ -67,6 +71,38 @@ impl Graph {
         let path = folder.join(&self.file);
         let wrong = |e: super::fetch::FetchError| ModelError::Metadata { path: path.clone(), problem: e.to_string() };
         super::fetch::check(&path, &self.sha256).map_err(wrong)
+    }
+}
+
+/// Largest side of a picture that a network takes, px: four times that of the largest there are.
+const MAX_SIDE_PX: usize = 4096;
+
+/// Checks what a description says of the pictures that a network takes.
+///
+/// # Errors
+/// If their side is none, or a colour would be divided by nothing.
+pub fn check_pictures(path: &Path, side_px: usize, mean: [f32; 3], std: [f32; 3]) -> Result<(), ModelError> {
+    let refused = |problem: String| Err(ModelError::Metadata { path: path.into(), problem });
+    if !(1..=MAX_SIDE_PX).contains(&side_px) {
+        return refused(format!("image_size is {side_px} px; networks take 1 to {MAX_SIDE_PX}"));
+    }
+    if !mean.iter().all(|v| v.abs() < 1e6) || !std.iter().all(|v| (1e-6..1e6).contains(v)) {
+        return refused(format!("mean {mean:?} and std {std:?} do not turn colours into numbers"));
+    }
+    Ok(())
+}
+
+/// Checks a length that a description gives.
+///
+/// # Errors
+/// If it is 0, or over `most`.
+pub fn check_length(path: &Path, name: &str, length: usize, most: usize) -> Result<(), ModelError> {
+    match (1..=most).contains(&length) {
+        true => Ok(()),
+        false => Err(ModelError::Metadata {
+            path: path.into(),
+            problem: format!("{name} is {length}; 1 to {most} is possible"),
+        }),
     }
 }
 

@@ -65,12 +65,12 @@ pub trait Encoder: Send {
 /// Name of the encoder that comes with the program.
 pub const DEMO: &str = "demo";
 
-/// The best encoder that can be used on this machine.
+/// The best encoder that can be used on this machine. `told` hears of better ones that are broken.
 ///
 /// # Errors
 /// If it cannot be loaded.
-pub fn best_encoder() -> Result<Box<dyn Encoder>, ModelError> {
-    let best = catalogue::usable(Role::Encoder).into_iter().next();
+pub fn best_encoder(told: &mut dyn FnMut(String)) -> Result<Box<dyn Encoder>, ModelError> {
+    let best = catalogue::usable(Role::Encoder, told)?.into_iter().next();
     encoder(best.as_deref().unwrap_or(DEMO))
 }
 

@@ -1,6 +1,7 @@
 //! A network: named arrays in, named arrays out.
 
 use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
@@ -152,7 +153,20 @@ impl Network {
             };
             given.push((input, value));
         }
-        let outputs = session.run(given).map_err(failed)?;
+        for (input, value) in &given {
+            let shape = value.shape();
+            let wanted = session.inputs().iter().find(|i| i.name() == *input).and_then(|i| i.dtype().tensor_shape());
+            // Lengths that are left open are below 0. An engine may do worse than fail on another shape.
+            let differs = |w: &&ort::value::Shape| {
+                w.len() != shape.len() || w.iter().zip(shape.iter()).any(|(w, got)| *w >= 0 && w != got)
+            };
+            if let Some(wanted) = wanted.filter(differs) {
+                let problem = format!("it takes {wanted:?} as '{input}', not {shape:?}; its description does not fit");
+                return Err(ModelError::Run { model: name.clone(), problem });
+            }
+        }
+        let outputs = guarded(&name, || session.run(given))
+            .map_err(|problem| ModelError::Run { model: name.clone(), problem })?;
         let mut arrays = BTreeMap::new();
         for (output, value) in outputs.iter() {
             let (shape, values) = value.try_extract_tensor::<f32>().map_err(failed)?;
@@ -190,6 +204,14 @@ where
 {
     let shape: Vec<i64> = array.shape.iter().map(|n| *n as i64).collect();
     Ok(SessionInputValue::from(Tensor::from_array((shape, array.values))?))
+}
+
+/// What an engine makes of a model; a panic in it is an error as any other.
+pub(super) fn guarded<T>(name: &str, work: impl FnOnce() -> ort::Result<T>) -> Result<T, String> {
+    match catch_unwind(AssertUnwindSafe(work)) {
+        Ok(done) => done.map_err(|e| e.to_string()),
+        Err(_) => Err(format!("the engine gave up on {name}; its file is damaged, or made for another engine")),
+    }
 }
 
 /// A row scaled to unit length, if it has a direction.

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use ort::session::Session;
 
-use crate::io::files::free_memory;
+use crate::io::memory;
 
 /// Memory that an open network takes, as a multiple of its file's size: weights, their packed copies,
 /// and what lies between the layers.
@@ -43,7 +43,7 @@ pub(super) fn register(place: &Arc<Mutex<Place>>) {
 /// How many were closed.
 pub(super) fn make(bytes: u64) -> usize {
     let wanted = bytes.saturating_mul(PER_FILE_BYTE).saturating_add(SPARE);
-    close_until(|| free_memory() >= wanted)
+    close_until(|| memory::free() >= wanted)
 }
 
 /// Closes networks, the one that was idle longest first, until there is room or none is left.

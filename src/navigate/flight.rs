@@ -6,6 +6,7 @@ use glam::{DMat3, DVec3};
 use super::curve::Curve;
 use super::matter::Matter;
 use super::pose::{Pose, RotationSpline, angle};
+use crate::math::stats::worst;
 
 /// Poses of a flight (the paper's M).
 pub const FRAMES: usize = 150;
@@ -115,17 +116,20 @@ impl Flight {
     /// steps telescopes, so pose `i` lies on the straight line from the first to the last, and the
     /// rotation matrices are mixed entry by entry.
     pub fn of_paper(keys: &[Pose], frames: usize) -> Option<Self> {
-        let (first, last) = (keys.first()?, keys.last()?);
+        Self::of_paper_through(&[*keys.first()?, *keys.last()?], frames)
+    }
+
+    /// The same in the reading that makes sense: from keypoint to keypoint of the route, as many poses for
+    /// each step, the rotation matrices mixed entry by entry all the same.
+    pub fn of_paper_through(keys: &[Pose], frames: usize) -> Option<Self> {
+        let steps = keys.len().checked_sub(1)?;
         let m = frames.max(2) - 1;
         let pose = |i: usize| {
-            let share = i as f64 / m as f64;
-            let mix = |a: DVec3, b: DVec3| a + (b - a) * share;
-            let [a, b] = [&first.world_from_camera, &last.world_from_camera];
-            let columns = DMat3::from_cols(mix(a.x_axis, b.x_axis), mix(a.y_axis, b.y_axis), mix(a.z_axis, b.z_axis));
-            let fov = first.fov_y_rad + (last.fov_y_rad - first.fov_y_rad) * share;
-            Pose { center: mix(first.center, last.center), world_from_camera: columns, fov_y_rad: fov }
+            let at = i as f64 / m as f64 * steps as f64;
+            let step = (at as usize).min(steps.saturating_sub(1));
+            mixed(&keys[step], &keys[(step + 1).min(steps)], at - step as f64)
         };
-        let length = first.center.distance(last.center);
+        let length = keys.windows(2).map(|k| k[0].center.distance(k[1].center)).sum();
         Some(Self { poses: (0..=m).map(pose).collect(), seconds: 3.0, length, sharp: 0, repaired: 0 })
     }
 
@@ -135,22 +139,31 @@ impl Flight {
         for pose in &self.poses {
             let c = matter.clearance(pose.center);
             s.least_clearance = s.least_clearance.min(c);
-            s.violations += usize::from(c < clearance);
+            s.violations += usize::from(!(c >= clearance));
             let m = &pose.world_from_camera;
             let off = *m * m.transpose() - DMat3::IDENTITY;
-            s.rotation_error = off.to_cols_array().iter().fold(s.rotation_error, |w, e| w.max(e.abs()));
+            s.rotation_error = worst([s.rotation_error, worst(off.abs().to_cols_array())]);
         }
         for pair in self.poses.windows(2) {
-            s.largest_step = s.largest_step.max(pair[0].center.distance(pair[1].center));
+            s.largest_step = worst([s.largest_step, pair[0].center.distance(pair[1].center)]);
             let turn = angle(&pair[0].world_from_camera, &pair[1].world_from_camera);
             s.largest_turn = s.largest_turn.max(if turn.is_finite() { turn } else { std::f64::consts::PI });
         }
         for w in self.poses.windows(3) {
             let jolt = (w[2].center - w[1].center) - (w[1].center - w[0].center);
-            s.largest_jolt = s.largest_jolt.max(jolt.length());
+            s.largest_jolt = worst([s.largest_jolt, jolt.length()]);
         }
         s
     }
+}
+
+/// Every number of two poses in this proportion.
+fn mixed(from: &Pose, to: &Pose, share: f64) -> Pose {
+    let mix = |a: DVec3, b: DVec3| a + (b - a) * share;
+    let [a, b] = [&from.world_from_camera, &to.world_from_camera];
+    let columns = DMat3::from_cols(mix(a.x_axis, b.x_axis), mix(a.y_axis, b.y_axis), mix(a.z_axis, b.z_axis));
+    let fov_y_rad = from.fov_y_rad + (to.fov_y_rad - from.fov_y_rad) * share;
+    Pose { center: mix(from.center, to.center), world_from_camera: columns, fov_y_rad }
 }
 
 /// Two to four seconds: longer for detours and for turning round.
@@ -207,6 +220,17 @@ mod tests {
         assert!(flight.poses.iter().all(|p| p.center.y == 0.0), "the keypoint in between is passed by");
         assert!(rotation_error(&flight.poses[75].world_from_camera) > 0.5);
         assert!(Flight::of_paper(&[], 150).is_none());
+        // From keypoint to keypoint it passes the one in between, and turns on the second step only.
+        let through = Flight::of_paper_through(&keys, 151).expect("a flight");
+        assert!(through.poses[75].center.distance(keys[1].center) < 1e-12);
+        assert!(through.poses[50].center.distance(DVec3::new(2.0, 10.0, 0.0) / 3.0) < 1e-12);
+        assert!(rotation_error(&through.poses[60].world_from_camera) < 1e-12);
+        assert!(rotation_error(&through.poses[112].world_from_camera) > 0.5);
+        let ends = [&through.poses[0], &through.poses[150]].map(|p| p.center);
+        assert!(ends == [keys[0].center, keys[2].center] && (through.length - 2.0 * 26.0_f64.sqrt()).abs() < 1e-12);
+        assert!(Flight::of_paper_through(&[], 150).is_none());
+        let still = Flight::of_paper_through(&keys[..1], 3).expect("it stays");
+        assert!(still.length == 0.0 && still.poses.iter().all(|p| *p == keys[0]));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use glam::{DQuat, DVec3};
 
 use super::curve::shortened;
 use super::flight::{Flight, Speed};
-use super::graph::Graph;
+use super::graph::{Graph, Route};
 use super::is_place;
 use super::keypoints::{keypoints, spacing};
 use super::matter::Matter;
@@ -95,6 +95,29 @@ impl Navigator {
         all.filter(|i| self.matter.is_free(place, self.graph.keypoints[*i].center, keep)).take(8).collect()
     }
 
+    /// The keypoints of the shortest way through the graph from one pose to another, both ends with it: what
+    /// the paper's interpolation is given. `None` if there is none.
+    pub fn keys(&self, from: &Pose, to: &Pose) -> Option<Vec<Pose>> {
+        let route = self.route([from.center, to.center], [&self.entries(from.center), &self.entries(to.center)])?;
+        let keys = route.through.iter().map(|i| &self.graph.keypoints[*i]);
+        let on_the_way =
+            keys.map(|k| Pose { center: k.center, world_from_camera: k.world_from_camera, fov_y_rad: to.fov_y_rad });
+        // An end that is a keypoint is not gone to twice.
+        let mut all: Vec<Pose> = std::iter::once(*from).chain(on_the_way).chain([*to]).collect();
+        all.dedup_by(|a, b| a.center == b.center);
+        Some(all)
+    }
+
+    /// The shortest way between two places through keypoints that each of them can go to.
+    fn route(&self, ends: [DVec3; 2], entries: [&[usize]; 2]) -> Option<Route> {
+        let place = |i: usize| self.graph.keypoints[i].center;
+        let with_way = |all: &[usize], end: DVec3| -> Vec<(usize, f64)> {
+            all.iter().map(|i| (*i, place(*i).distance(end))).collect()
+        };
+        let (near_start, near_goal) = (with_way(entries[0], ends[0]), with_way(entries[1], ends[1]));
+        self.graph.route_between(&near_start, &near_goal, &self.matter)
+    }
+
     /// The straight legs of the shortest way from one place to another that keeps clear of matter.
     ///
     /// # Errors
@@ -118,11 +141,7 @@ impl Navigator {
             return Err(NoWay::Enclosed);
         }
         let place = |i: usize| self.graph.keypoints[i].center;
-        let with_way = |all: &[usize], end: DVec3| -> Vec<(usize, f64)> {
-            all.iter().map(|i| (*i, place(*i).distance(end))).collect()
-        };
-        let (near_start, near_goal) = (with_way(&starts, from), with_way(&goals, to));
-        if let Some(route) = self.graph.route_between(&near_start, &near_goal, &self.matter) {
+        if let Some(route) = self.route([from, to], [&starts, &goals]) {
             let legs: Vec<DVec3> =
                 std::iter::once(from).chain(route.through.iter().map(|i| place(*i))).chain([to]).collect();
             return Ok(shortened(&legs, &self.matter, self.clearance.min(0.99 * ends)));
@@ -270,8 +289,11 @@ mod tests {
     #[test]
     fn scenes_without_cameras_say_so() {
         let n = Navigator::new(&cloud_of_wall(0.0), &[], DVec3::ZERO);
-        let way = n.legs(DVec3::new(0.0, 0.0, -0.1), DVec3::new(0.0, 0.0, 0.1));
-        assert!(matches!(way, Err(NoWay::NoKeypoints | NoWay::Inside)), "{way:?}");
+        // On either side of the wall, and both where nothing is.
+        let ends = [-0.5, 0.5].map(|z| DVec3::new(0.0, 0.0, z));
+        assert!(ends.iter().all(|p| !n.matter.is_inside(*p)), "{:?}", ends.map(|p| n.matter.clearance(p)));
+        assert_eq!(n.legs(ends[0], ends[1]), Err(NoWay::NoKeypoints));
+        assert_eq!(n.legs(ends[0], DVec3::ZERO), Err(NoWay::Inside));
         let one = Navigator::new(&cloud_of_wall(0.0), &[camera_at(DVec3::Z)], DVec3::Y);
         assert_eq!(one.graph.keypoints.len(), 1);
     }

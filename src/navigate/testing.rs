@@ -59,3 +59,12 @@ pub fn ring_of_cameras() -> Vec<Camera> {
     };
     (0..16).map(place).collect()
 }
+
+/// The same, each turned as far as it is along the circle.
+pub fn turning_ring() -> Vec<Camera> {
+    let turned = |(i, c): (i32, Camera)| {
+        let angle = f64::from(i) / 16.0 * std::f64::consts::TAU;
+        Camera { world_from_camera: DMat3::from_rotation_y(angle), ..c }
+    };
+    (0..).zip(ring_of_cameras()).map(turned).collect()
+}

@@ -128,7 +128,7 @@ mod tests {
         cloud.opacity_logits.push(3.0);
         cloud.sh.push([1.0; 3]);
         let cloud = Arc::new(cloud);
-        let mut backend = Backend::choose(BackendChoice::Cpu).expect("the processor");
+        let mut backend = Backend::choose(BackendChoice::Cpu, |_| {}).expect("the processor");
         let mut film = |name: &str, observer: &mut dyn Observer| {
             let path = folder.path().join(name);
             let settings = Settings::new(32, 16, 10.0);

@@ -23,17 +23,27 @@ pub enum BackendChoice {
 
 impl BackendChoice {
     /// The GPU to use; `None` = the CPU. `Auto` takes a GPU only if it is a real one: the CPU
-    /// renderer is faster than an emulated GPU.
+    /// renderer is faster than an emulated GPU. `told` hears why one that is there is not used.
     ///
     /// # Errors
     /// If a GPU is demanded and there is none.
-    pub fn gpu(self) -> Result<Option<gpu::Context>, GpuError> {
+    pub fn gpu(self, told: impl FnOnce(String)) -> Result<Option<gpu::Context>, GpuError> {
         match self {
             Self::Cpu => Ok(None),
             Self::Gpu => gpu::Context::new().map(Some),
-            Self::Auto => Ok(gpu::Context::real()),
+            Self::Auto => Ok(or_told(gpu::Context::real(), told).flatten()),
         }
     }
+}
+
+/// What a GPU gave, or `None` and a word on why the CPU does its work.
+fn or_told<T>(given: Result<T, GpuError>, told: impl FnOnce(String)) -> Option<T> {
+    given.map_err(|e| told(instead_of_gpu(&e))).ok()
+}
+
+/// That the CPU does a GPU's work, and why.
+pub fn instead_of_gpu(why: &impl std::fmt::Display) -> String {
+    format!("The CPU does the work of the GPU, which failed: {why}")
 }
 
 /// Why a view could not be drawn.
@@ -81,18 +91,17 @@ impl Backend {
     /// Name of the CPU among the names of what draws.
     pub const CPU: &str = "CPU";
 
-    /// The renderer that `choice` asks for.
+    /// The renderer that `choice` asks for. `told` hears why a GPU that is there is not used.
     ///
     /// # Errors
     /// If a GPU is demanded and there is none that works.
-    pub fn choose(choice: BackendChoice) -> Result<Self, GpuError> {
-        match choice.gpu() {
-            Ok(None) => Ok(Self::on_cpu()),
-            Ok(Some(context)) if choice == BackendChoice::Auto => {
-                Ok(Self::on_gpu(&context).unwrap_or_else(|_| Self::on_cpu()))
+    pub fn choose(choice: BackendChoice, mut told: impl FnMut(String)) -> Result<Self, GpuError> {
+        match choice.gpu(&mut told)? {
+            None => Ok(Self::on_cpu()),
+            Some(context) if choice == BackendChoice::Auto => {
+                Ok(or_told(Self::on_gpu(&context), told).unwrap_or_else(Self::on_cpu))
             }
-            Ok(Some(context)) => Self::on_gpu(&context),
-            Err(e) => Err(e),
+            Some(context) => Self::on_gpu(&context),
         }
     }
 
@@ -200,47 +209,14 @@ impl Backend {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::DVec3;
-
-    fn dots(shift: f32) -> Arc<GaussianCloud> {
-        let n = 60;
-        Arc::new(GaussianCloud {
-            positions: (0..n).map(|i| [(i % 8) as f32 * 0.1 - 0.4 + shift, (i / 8) as f32 * 0.1 - 0.4, 0.0]).collect(),
-            log_scales: vec![[-3.0; 3]; n],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
-            opacity_logits: vec![1.0; n],
-            sh: (0..n).map(|i| [(i % 3) as f32 * 0.5, 0.2, 0.4]).collect(),
-            ..GaussianCloud::default()
-        })
-    }
 
     #[test]
-    fn gpu_and_cpu_draw_the_same_view_and_follow_the_cloud() {
-        let Ok(context) = gpu::Context::new() else {
-            println!("skipped: no GPU adapter, not even a software one");
-            return;
-        };
-        let mut gpu = Backend::on_gpu(&context).expect("opens");
-        let mut cpu = Backend::on_cpu();
-        let camera =
-            Camera::look_at(DVec3::new(0.2, 0.1, -2.0), DVec3::ZERO, DVec3::NEG_Y, 0.8, 64, 48).expect("valid");
-        let settings = RenderSettings { depth: true, ..RenderSettings::default() };
-        let mut worst = |cloud: &Arc<GaussianCloud>, on_cpu: &Arc<GaussianCloud>| {
-            let a = gpu.render(cloud, &camera, &settings).expect("draws");
-            let b = cpu.render(on_cpu, &camera, &settings).expect("draws");
-            a.color.iter().flatten().zip(b.color.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
-        };
-        let (one, other) = (dots(0.0), dots(0.07));
-        assert!(worst(&one, &one) < 1e-3);
-        assert!(worst(&other, &other) < 1e-3, "the other cloud was sent");
-        assert!(worst(&other, &one) > 0.1, "another scene must differ");
-        let names: Vec<&str> = cpu.stage_times().iter().map(|s| s.0).collect();
-        assert_eq!(names, ["project", "sort", "bin", "blend"]);
-        assert!(gpu.stage_times().is_empty(), "nobody asked for them");
-        gpu.time_stages(true).expect("has room");
-        gpu.render(&one, &camera, &settings).expect("draws");
-        assert_eq!(gpu.stage_times().is_empty(), !context.has_timestamps());
-        gpu.time_stages(false).expect("stops");
-        assert!(gpu.stage_times().is_empty());
+    fn a_gpu_that_fails_is_told() {
+        let mut heard = Vec::new();
+        let lost: Result<(), GpuError> = Err(GpuError::Lost("unplugged".into()));
+        assert_eq!(or_told(lost, |why| heard.push(why)), None);
+        assert!(heard[0].contains("CPU") && heard[0].contains("unplugged"), "{heard:?}");
+        assert_eq!(or_told(Ok(3), |why| heard.push(why)), Some(3));
+        assert_eq!(heard.len(), 1);
     }
 }

@@ -12,7 +12,7 @@ mod backend;
 pub mod cpu;
 pub mod gpu;
 
-pub use backend::{Backend, BackendChoice, Cost, DrawError};
+pub use backend::{Backend, BackendChoice, Cost, DrawError, instead_of_gpu};
 pub use gpu::timing::StageTimes;
 
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,5 @@
 //! Reports on disk: read with clear errors, written without ever losing the one before.
 
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::document::{Computer, Report, VERSION};
@@ -16,12 +15,6 @@ const MOST_BYTES: u64 = 256 << 20;
 /// Why a report cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// It cannot be read or written.
-    #[error("{path}: {cause}", path = .0.display(), cause = .1)]
-    File(PathBuf, std::io::Error),
-    /// It is too large to be one.
-    #[error("{path}: {size} bytes are too many for a report", path = .0.display(), size = .1)]
-    Large(PathBuf, u64),
     /// It is not one.
     #[error("{path}: not a report: {cause}", path = .0.display(), cause = .1)]
     Json(PathBuf, serde_json::Error),
@@ -33,9 +26,9 @@ pub enum ReportError {
         /// Its version.
         found: u64,
     },
-    /// It cannot be written.
+    /// It cannot be read or written, or is too large to be one.
     #[error(transparent)]
-    Write(#[from] IoError),
+    File(#[from] IoError),
 }
 
 /// Why a report cannot be gone on with.
@@ -60,10 +53,9 @@ pub fn is_report(path: &Path) -> bool {
     if file.file_name().is_some_and(|n| n == FILE) {
         return file.is_file();
     }
-    let mut head = Vec::new();
-    let read = std::fs::File::open(&file).and_then(|f| f.take(256).read_to_end(&mut head));
+    let Ok(head) = io::files::read_start(&file, 256) else { return false };
     let head = String::from_utf8_lossy(&head);
-    read.is_ok() && ["\"version\"", "\"program\"", "\"scene\""].iter().all(|word| head.contains(word))
+    ["\"version\"", "\"program\"", "\"scene\""].iter().all(|word| head.contains(word))
 }
 
 impl Report {
@@ -96,12 +88,7 @@ impl Report {
     /// If there is none, or it is damaged, or of another version.
     pub fn read(path: &Path) -> Result<Self, ReportError> {
         let path = if path.is_dir() { path.join(FILE) } else { path.to_owned() };
-        let file = |e| ReportError::File(path.clone(), e);
-        let size = std::fs::metadata(&path).map_err(file)?.len();
-        if size > MOST_BYTES {
-            return Err(ReportError::Large(path, size));
-        }
-        let text = std::fs::read(&path).map_err(file)?;
+        let text = io::files::read(&path, MOST_BYTES)?;
         let json = |e| ReportError::Json(path.clone(), e);
         let value: serde_json::Value = serde_json::from_slice(&text).map_err(json)?;
         match value.get("version").and_then(serde_json::Value::as_u64) {

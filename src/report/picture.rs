@@ -5,7 +5,7 @@ use nv_flip::{DEFAULT_PIXELS_PER_DEGREE, FlipImageRgb8};
 
 use super::document::Order;
 use crate::math::Real;
-use crate::math::stats::{mean, quantile};
+use crate::math::stats::{mean, quantile, worst};
 use crate::pipeline::metrics::psnr_of;
 use crate::render::cpu::Renderer;
 use crate::render::{Features, Frame, RenderError, RenderSettings};
@@ -90,7 +90,7 @@ impl Errors {
         let (flip, flip_tail) = flip(a, b);
         Self {
             rms: mean(&off.iter().map(|e| e * e).collect::<Vec<_>>()).sqrt(),
-            largest: off.iter().copied().fold(0.0, f64::max),
+            largest: worst(off.iter().copied()),
             tail: quantile(&off, 0.999),
             flip,
             flip_tail,

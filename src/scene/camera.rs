@@ -3,6 +3,8 @@
 //! Camera axes: x right, y down, z forward (COLMAP's). Pixel `(i, j)` covers
 //! `[i, i+1) x [j, j+1)`, so its centre is at `(i + 0.5, j + 0.5)` px.
 
+use std::ops::RangeInclusive;
+
 use glam::{DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -34,6 +36,24 @@ pub enum CameraError {
     /// A focal length that is not positive and finite.
     #[error("focal length ({0}, {1}) px is not positive and finite")]
     Focal(f64, f64),
+    /// A focal length that no lens has.
+    #[error(
+        "focal length {focal_px:e} px along a side of {side_px} px is no lens's; between {} and {:e} sides are believed",
+        Camera::FOCAL_SIDES.start(),
+        Camera::FOCAL_SIDES.end()
+    )]
+    Lens {
+        /// The focal length, px.
+        focal_px: f64,
+        /// The picture's side along the same axis, px.
+        side_px: u32,
+    },
+    /// A principal point far outside of the picture.
+    #[error("principal point ({0:e}, {1:e}) px is over {max:e} picture sides away from the picture", max = Camera::PRINCIPAL_SIDES)]
+    Off(f64, f64),
+    /// A camera centre so far out that distances lose their meaning.
+    #[error("the camera centre ({0:e}, {1:e}, {2:e}) is farther than {max:e} units from the origin", max = Camera::FARTHEST)]
+    Far(f64, f64, f64),
     /// A principal point that is not finite.
     #[error("principal point ({0}, {1}) px is not finite")]
     Principal(f64, f64),
@@ -48,6 +68,39 @@ pub enum CameraError {
 impl Camera {
     /// Largest side of a picture that any part of the program accepts.
     pub const MAX_SIDE_PX: u32 = 16_384;
+
+    /// Focal lengths that are believed on reading, in sides of the picture along the same axis: from a
+    /// view that is a tenth of a degree short of half a turn to one of a few seconds of arc.
+    pub const FOCAL_SIDES: RangeInclusive<f64> = 1e-3..=1e5;
+    /// How many picture sides the principal point may be away on reading: pictures are cut out of larger ones.
+    pub const PRINCIPAL_SIDES: f64 = 1e4;
+    /// Farthest from the origin that a camera or a point may be on reading, scene units.
+    pub const FARTHEST: f64 = 1e12;
+
+    /// Whether a camera that a file describes can be one: all of [`Self::validate`], and no number
+    /// beyond what lenses and places are. Drawing takes any camera that is valid; what is read is
+    /// refused here, because a training would find out only when it is over.
+    pub fn believe(&self) -> Result<(), CameraError> {
+        self.validate()?;
+        let sides = [
+            (self.width_px, self.focal_px.x, self.principal_px.x),
+            (self.height_px, self.focal_px.y, self.principal_px.y),
+        ];
+        for (side_px, focal_px, principal_px) in sides {
+            let side = f64::from(side_px);
+            if !Self::FOCAL_SIDES.contains(&(focal_px / side)) {
+                return Err(CameraError::Lens { focal_px, side_px });
+            }
+            if !(principal_px.abs() <= Self::PRINCIPAL_SIDES * side) {
+                return Err(CameraError::Off(self.principal_px.x, self.principal_px.y));
+            }
+        }
+        let c = self.center;
+        if !(c.abs().max_element() <= Self::FARTHEST) {
+            return Err(CameraError::Far(c.x, c.y, c.z));
+        }
+        Ok(())
+    }
 
     /// Checks every field; see [`CameraError`].
     pub fn validate(&self) -> Result<(), CameraError> {
@@ -215,6 +268,22 @@ mod tests {
         let mut c = camera();
         c.focal_px.y = -1.0;
         assert!(matches!(c.validate(), Err(CameraError::Focal(..))));
+    }
+
+    #[test]
+    fn cameras_that_can_be_drawn_but_not_be_are_not_believed() {
+        let change = |change: fn(&mut Camera)| {
+            let mut c = camera();
+            change(&mut c);
+            c.validate().expect("drawn");
+            c.believe()
+        };
+        assert_eq!(change(|_| {}), Ok(()));
+        assert_eq!(change(|c| c.focal_px *= 1e3), Ok(()), "a telescope");
+        assert!(matches!(change(|c| c.focal_px.y = 1e-30), Err(CameraError::Lens { side_px: 480, .. })));
+        assert!(matches!(change(|c| c.focal_px.x = 1e30), Err(CameraError::Lens { side_px: 640, .. })));
+        assert!(matches!(change(|c| c.principal_px.x = -1e9), Err(CameraError::Off(..))));
+        assert!(matches!(change(|c| c.center.z = -1e308), Err(CameraError::Far(..))));
     }
 
     #[test]

@@ -134,6 +134,11 @@ impl PathKey {
         if !c.is_finite() {
             return Err(("center", format!("= ({}, {}, {}) is not finite", c.x, c.y, c.z)));
         }
+        if !(c.abs().max_element() <= Camera::FARTHEST) {
+            let reason =
+                format!("= ({:e}, {:e}, {:e}) is farther than {:e} units out", c.x, c.y, c.z, Camera::FARTHEST);
+            return Err(("center", reason));
+        }
         let error = rotation_error(&self.world_from_camera);
         if !(error <= 1e-3) {
             let reason = format!("is not a rotation (deviation {error:.2e}; scale, shear, reflection or NaN)");

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::semantic_map::{BACKGROUND_CODE, CODE_CHANNELS};
+use super::text;
 
 /// Object or part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -27,7 +28,8 @@ pub struct Identity {
     pub level: Level,
     /// What it is a piece of; `NOBODY` for objects.
     pub parent: IdentityId,
-    /// What people or a label file call it; the first is shown.
+    /// What people or a label file call it, bounded by [`text::name`]; the first is shown.
+    #[serde(deserialize_with = "text::read_names")]
     pub names: Vec<String>,
     /// Its point in code space, each coordinate in 0..1.
     pub code: [f32; 3],
@@ -43,6 +45,7 @@ impl Identities {
     /// Adds an identity. A parent that does not exist yet is nobody.
     pub fn add(&mut self, level: Level, parent: IdentityId, names: Vec<String>) -> IdentityId {
         let parent = if self.get(parent).is_some() { parent } else { NOBODY };
+        let names = names.iter().map(|name| text::name(name)).collect();
         self.list.push(Identity { level, parent, names, code: [0.5; 3] });
         self.list.len() as IdentityId
     }
@@ -70,6 +73,15 @@ impl Identities {
     /// All of them with their numbers.
     pub fn iter(&self) -> impl Iterator<Item = (IdentityId, &Identity)> {
         self.list.iter().enumerate().map(|(i, identity)| (i as IdentityId + 1, identity))
+    }
+
+    /// Gives an identity another first name, bounded by [`text::name`].
+    pub fn rename(&mut self, id: IdentityId, name: &str) {
+        if let Some(identity) = self.get_mut(id) {
+            let name = text::name(name);
+            identity.names.retain(|n| *n != name);
+            identity.names.insert(0, name);
+        }
     }
 
     /// The name to show: its first, or its number.

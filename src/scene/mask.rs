@@ -49,8 +49,19 @@ impl Mask {
     /// on whole numbers, as in label files, a pixel centre is at its whole coordinates.
     pub fn from_polygon(width_px: usize, height_px: usize, vertices: &[[f64; 2]]) -> Self {
         let mut mask = Self::empty(width_px, height_px);
+        mask.add_polygon(vertices);
+        mask
+    }
+
+    /// Adds the pixels whose centres are inside a polygon, as [`Self::from_polygon`] has them.
+    pub fn add_polygon(&mut self, vertices: &[[f64; 2]]) {
+        let rows = |end: fn(f64, f64) -> f64, none: f64| vertices.iter().map(|v| v[1]).fold(none, end);
+        let (top, bottom) = (rows(f64::min, f64::INFINITY), rows(f64::max, f64::NEG_INFINITY));
+        let (width_px, height_px) = (self.width_px, self.height_px);
         let mut crossings = Vec::new();
-        for y in 0..height_px {
+        // The crossings of a row at a vertex count downwards only, so none lie on the last.
+        let end = bottom.ceil().clamp(0.0, height_px as f64) as usize;
+        for y in top.ceil().clamp(0.0, height_px as f64) as usize..end {
             let row = y as f64;
             crossings.clear();
             for (i, a) in vertices.iter().enumerate() {
@@ -63,10 +74,9 @@ impl Mask {
             for pair in crossings.chunks_exact(2) {
                 let from = pair[0].ceil().max(0.0) as usize;
                 let to = (pair[1].floor() + 1.0).clamp(0.0, width_px as f64) as usize;
-                (from..to).for_each(|x| mask.insert(y * width_px + x));
+                (from..to).for_each(|x| self.insert(y * width_px + x));
             }
         }
-        mask
     }
 
     /// Width of the picture, px.

@@ -12,6 +12,7 @@ pub mod mask;
 pub mod photo;
 pub mod plan;
 pub mod semantic_map;
+pub mod text;
 pub mod trace;
 
 pub use bounds::Bounds;

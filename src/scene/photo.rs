@@ -1,10 +1,11 @@
 //! Photos: where they are, how their lens bends, and their pixels once loaded.
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::Camera;
+use super::{Camera, text};
 
 /// A posed photo of a dataset. Its pixels are loaded by `io`, undistorted.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +23,13 @@ pub struct Photo {
     /// Colour that the file's transparent pixels are composited over; `None` = they count for
     /// nothing (coverage 0).
     pub background: Option<[f32; 3]>,
+}
+
+impl Photo {
+    /// Its name as it may be shown.
+    pub fn title(&self) -> Cow<'_, str> {
+        text::line(&self.name)
+    }
 }
 
 /// OpenCV's radial-tangential lens model: `x' = x (1 + k1 r² + k2 r⁴) + 2 p1 x y + p2 (r² + 2 x²)`,

@@ -9,14 +9,14 @@ use egui::{Button, ComboBox, Key, RichText, ScrollArea, TextEdit, Ui};
 
 use super::panes::portraits::Portraits;
 use super::theme;
-use crate::agent::llm::Llm;
 use crate::agent::llm::settings::LlmSettings;
+use crate::agent::llm::{Llm, SENT};
 use crate::agent::rules::Rules;
 use crate::agent::scene::{Deed, Parts, SceneWorld};
 use crate::agent::{AgentEvent, Planner, Policy, Refusal, Session};
 use crate::navigate::Pose;
 use crate::scene::trace::{self, Sort};
-use crate::scene::{IdentityId, SemanticMap};
+use crate::scene::{IdentityId, SemanticMap, text};
 use crate::worker::{Action, Repaint};
 
 /// Lines that are kept.
@@ -93,11 +93,12 @@ impl Chat {
         for news in news.try_iter() {
             match news {
                 News::Deed(deed) => deeds.push(deed),
-                News::Event(AgentEvent::Call { line, .. }) => self.lines.push(Line::Did(line, None)),
-                News::Event(AgentEvent::Result { text, done }) => self.lines.push(Line::Did(text, Some(done))),
-                News::Event(AgentEvent::Note(text)) => self.lines.push(Line::Did(text, None)),
+                News::Event(AgentEvent::Call { line, .. }) => self.lines.push(did(&line, None)),
+                News::Event(AgentEvent::Result { text, done }) => self.lines.push(did(&text, Some(done))),
+                News::Event(AgentEvent::Note(text)) => self.lines.push(did(&text, None)),
                 News::Event(AgentEvent::Thinking | AgentEvent::Piece(_)) => {}
                 News::Reply { text, candidates, refused, transcript } => {
+                    let text = text::lines(&text).into_owned();
                     self.lines.push(Line::Answer { text, candidates, refused });
                     self.transcript = Some(transcript);
                     self.cancel = None;
@@ -137,7 +138,8 @@ impl Chat {
 
     /// An answer of the window's own.
     pub fn answer(&mut self, text: &str) {
-        self.lines.push(Line::Answer { text: text.into(), candidates: Vec::new(), refused: None });
+        let text = text::lines(text).into_owned();
+        self.lines.push(Line::Answer { text, candidates: Vec::new(), refused: None });
     }
 
     /// Makes the box take the keyboard.
@@ -222,6 +224,11 @@ impl Chat {
     }
 }
 
+/// A step of the agent, in words that may be a model's.
+fn did(line: &str, done: Option<bool>) -> Line {
+    Line::Did(text::line(line).into_owned(), done)
+}
+
 /// One line; a candidate that was clicked.
 fn show_line(ui: &mut Ui, line: &Line, portraits: &Portraits) -> Option<String> {
     let mut clicked = None;
@@ -262,8 +269,7 @@ fn choose_planner(ui: &mut Ui, settings: &mut ChatSettings) {
     ComboBox::from_id_salt("planner").selected_text(text).width(90.0).show_ui(ui, |ui| {
         ui.selectable_value(&mut settings.use_model, false, "Built-in")
             .on_hover_text("A grammar of English; no network.");
-        ui.selectable_value(&mut settings.use_model, true, "Chat model")
-            .on_hover_text("Sends your words and the names of the scene's objects to the address below.");
+        ui.selectable_value(&mut settings.use_model, true, "Chat model").on_hover_text(SENT);
     });
     if settings.use_model {
         ui.menu_button("Address\u{2026}", |ui| {
@@ -277,6 +283,7 @@ fn choose_planner(ui: &mut Ui, settings: &mut ChatSettings) {
                 ui.label(RichText::new(label).small().color(theme::WEAK));
                 ui.add(TextEdit::singleline(value).hint_text(hint).desired_width(f32::INFINITY));
             }
+            ui.label(RichText::new(SENT).small().color(theme::WEAK));
         });
     }
 }

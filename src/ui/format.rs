@@ -1,5 +1,9 @@
 //! Numbers for people: one form per quantity, everywhere.
 
+use std::path::Path;
+
+use crate::scene::text;
+
 pub use crate::scene::plan::{bytes, count};
 
 /// A duration: "8 s", "2:05", "1:02:05".
@@ -35,8 +39,14 @@ pub fn millis(secs: f64) -> String {
     if secs < 0.01 { format!("{:.1} ms", secs * 1e3) } else { format!("{:.0} ms", secs * 1e3) }
 }
 
-/// A text cut in the middle so that it has at most `limit` characters.
+/// A path as it may be shown.
+pub fn path(path: &Path) -> String {
+    text::line(&path.to_string_lossy()).into_owned()
+}
+
+/// A text on one line, cut in the middle so that it has at most `limit` characters.
 pub fn shortened(text: &str, limit: usize) -> String {
+    let text = &*text::line(text);
     let n = text.chars().count();
     if n <= limit {
         return text.to_owned();

@@ -8,7 +8,7 @@ use crate::pipeline::observer::{Evaluation, Level, Progress, StepMetrics};
 use crate::pipeline::semantics::portraits::Gallery;
 use crate::render::RenderSettings;
 use crate::report::Report;
-use crate::scene::{Facts, Limits, Overrides, PhotoPixels, ScenePlan, SemanticMap};
+use crate::scene::{Facts, Limits, Overrides, PhotoPixels, ScenePlan, SemanticMap, text};
 use crate::worker::{Event, Explored, Failure, JobId, JobKind, Lane, OpenedScene, Outcome, Visited};
 
 /// Measurements kept for the plots; beyond that every second one is dropped.
@@ -166,9 +166,10 @@ impl AppState {
     pub fn apply(&mut self, event: Event) {
         match event {
             Event::Started { job, kind, title } if kind.lane() == Lane::Short => {
-                self.short_jobs.insert(job, (kind, title));
+                self.short_jobs.insert(job, (kind, text::line(&title).into_owned()));
             }
             Event::Started { job, kind, title } => {
+                let title = text::line(&title).into_owned();
                 if kind == JobKind::Train {
                     // They belong to Gaussians that are about to change.
                     self.set_semantics(None);
@@ -178,7 +179,10 @@ impl AppState {
                 self.say(Tone::Info, title.clone());
                 self.job = Some(RunningJob { id: job, kind, title, progress: None, paused: false });
             }
-            Event::Progress(job, progress) => self.with_job(job, |j| j.progress = Some(progress)),
+            Event::Progress(job, progress) => {
+                let stage = text::line(&progress.stage).into_owned();
+                self.with_job(job, |j| j.progress = Some(Progress { stage, ..progress }));
+            }
             Event::Paused(job, paused) => self.with_job(job, |j| j.paused = paused),
             Event::Step(job, metrics) => {
                 if self.training_job == Some(job) {
@@ -204,12 +208,12 @@ impl AppState {
         if self.log.len() == MAX_LOG {
             self.log.pop_front();
         }
-        self.log.push_back(LogLine { tone, text: text.into() });
+        self.log.push_back(LogLine { tone, text: text::line(&text.into()).into_owned() });
     }
 
     /// Shows a message that goes away by itself, and logs it.
     pub fn toast(&mut self, tone: Tone, text: impl Into<String>) {
-        let text = text.into();
+        let text = text::lines(&text.into()).into_owned();
         self.say(tone, text.clone());
         self.toasts.push(Toast { id: self.next_toast, tone, text });
         self.next_toast += 1;
@@ -217,7 +221,9 @@ impl AppState {
 
     /// Shows an error until it is dismissed, and logs it.
     pub fn fail(&mut self, doing: impl Into<String>, failure: Failure) {
-        let doing = doing.into();
+        let doing = text::line(&doing.into()).into_owned();
+        let [message, remedy] = [&failure.message, &failure.remedy].map(|t| text::lines(t).into_owned());
+        let failure = Failure { message, remedy };
         self.say(Tone::Error, format!("{doing}: {}", failure.message));
         self.error = Some(ErrorBox { doing, failure });
     }
@@ -288,15 +294,19 @@ impl AppState {
         let ended = self.end(job);
         match outcome {
             Outcome::Opened(scene) => self.opened(*scene, ended.is_some_and(|j| j.kind == JobKind::Demo)),
-            Outcome::Trained { evaluations, out, facts } => {
+            Outcome::Trained { evaluations, out, semantics, facts } => {
+                let carried = semantics.is_some();
                 if self.training_job == Some(job) {
                     self.history.evaluations = evaluations;
-                    self.set_facts(facts.with_semantics(self.semantics.as_deref()));
+                    self.set_facts(*facts);
+                    self.set_semantics(semantics);
+                    // Other settings are another training, in a folder of its own.
+                    self.scene = self.scene.take().map(|s| Arc::new(OpenedScene { out: out.clone(), ..(*s).clone() }));
                 }
                 let quality = self.history.evaluations.last().map(|e| format!(", held-out PSNR {:.2} dB", e.psnr));
                 self.say(Tone::Info, format!("Saved to {}", out.display()));
                 self.toast(Tone::Good, format!("Training finished{}", quality.unwrap_or_default()));
-                self.wants_objects = self.scene.as_ref().is_some_and(|s| s.masks.is_some());
+                self.wants_objects = !carried && self.scene.as_ref().is_some_and(|s| s.masks.is_some());
             }
             Outcome::Evaluated(mut e) => {
                 if let Some(last) = self.history.steps.last() {

@@ -163,3 +163,25 @@ fn the_recent_list_is_short_and_has_no_doubles() {
     assert_eq!(s.recent.len(), MAX_RECENT);
     assert_eq!(s.recent[..2], [PathBuf::from("15"), PathBuf::from("19")]);
 }
+
+#[test]
+fn foreign_text_is_cleaned_on_its_way_to_the_window() {
+    let evil = "a\u{1b}[31m\u{202e}b\u{9b}\nc";
+    let progress = Progress { stage: evil.into(), done: 1, total: 2, elapsed_secs: 1.0, rate: 1.0 };
+    let mut s = fold([
+        Event::Started { job: JOB, kind: JobKind::Train, title: evil.into() },
+        Event::Progress(JOB, progress),
+        Event::Note(JOB, Level::Warning, evil.into()),
+    ]);
+    s.toast(Tone::Info, evil);
+    s.fail(evil, Failure { message: evil.into(), remedy: evil.into() });
+    let job = s.job.as_ref().expect("a job");
+    let error = s.error.as_ref().expect("an error");
+    let one_line = s.log.iter().map(|l| &l.text).chain([&job.title, &error.doing]);
+    let one_line: Vec<&String> = one_line.chain(job.progress.as_ref().map(|p| &p.stage)).collect();
+    let more = [&s.toasts[0].text, &error.failure.message, &error.failure.remedy];
+    assert!(one_line.len() > 5 && one_line.iter().all(|t| !t.contains('\n')), "{one_line:?}");
+    for text in one_line.into_iter().chain(more) {
+        assert!(!text.contains(['\u{1b}', '\u{202e}', '\u{9b}']) && text.contains("31mb"), "{text:?}");
+    }
+}

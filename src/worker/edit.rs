@@ -1,10 +1,8 @@
-//! Edits of objects and parts, off the window's thread: applied, stored, handed back.
+//! Edits of objects and parts, off the window's thread.
 
-use std::path::Path;
 use std::sync::Arc;
 
-use super::protocol::{Failure, Outcome, Stop};
-use crate::io;
+use super::protocol::{Failure, Stop};
 use crate::pipeline::semantics::edit::{Edit, apply};
 use crate::pipeline::semantics::extend::extend;
 use crate::pipeline::semantics::votes::Votes;
@@ -32,29 +30,23 @@ pub enum EditRequest {
     Restore(Arc<SemanticMap>),
 }
 
-/// Changes `map` and stores it with the trained scene in `out`, if there is one.
+/// The map after the change.
 pub fn run(
     cloud: &GaussianCloud,
     map: &SemanticMap,
     settings: &RenderSettings,
     request: &EditRequest,
-    out: &Path,
-) -> Result<Outcome, Stop> {
+) -> Result<Arc<SemanticMap>, Stop> {
     let failed = |e: &dyn std::error::Error| Stop::Failed(Failure::of(e, "Nothing has changed."));
-    let new = match request {
-        EditRequest::Restore(map) => Arc::clone(map),
-        EditRequest::Apply(edit) => Arc::new(apply(map, cloud, edit).map_err(|e| failed(&e))?),
+    match request {
+        EditRequest::Restore(map) => Ok(Arc::clone(map)),
+        EditRequest::Apply(edit) => Ok(Arc::new(apply(map, cloud, edit).map_err(|e| failed(&e))?)),
         EditRequest::Paint { of, name, camera, mask } => {
             let gaussians = painted(cloud, camera, settings, mask).map_err(|e| failed(&e))?;
             let edit = Edit::AddPiece { of: *of, name: name.clone(), gaussians };
-            Arc::new(apply(map, cloud, &edit).map_err(|e| failed(&e))?)
+            Ok(Arc::new(apply(map, cloud, &edit).map_err(|e| failed(&e))?))
         }
-    };
-    if io::trained::is_scene(out) {
-        io::semantic_map::save(out, &new, cloud)
-            .map_err(|e| Stop::Failed(Failure::of(&e, "The change is not stored.")))?;
     }
-    Ok(Outcome::Edited(new))
 }
 
 /// Gaussians that the painted pixels show more than the others do, and those behind them that hang
@@ -100,14 +92,13 @@ mod tests {
         assert_eq!(found.len(), n / 2, "{found:?}");
         assert!(painted(&cloud, &camera, &settings, &Mask::empty(64, 64)).expect("drawn").is_empty());
 
-        let folder = tempfile::tempdir().expect("folder");
         let map = SemanticMap::of_identities(Identities::default(), vec![NOBODY; n], vec![1.0; n], vec![]);
         let request = EditRequest::Paint { of: NOBODY, name: "left".into(), camera: Box::new(camera), mask: left };
-        let Ok(Outcome::Edited(new)) = run(&cloud, &map, &settings, &request, folder.path()) else {
+        let Ok(new) = run(&cloud, &map, &settings, &request) else {
             panic!("not edited");
         };
         assert_eq!((new.identities.name(1), new.sizes()[1]), ("left".into(), n / 2));
         let wrong = EditRequest::Apply(Edit::Split(7));
-        assert!(matches!(run(&cloud, &map, &settings, &wrong, folder.path()), Err(Stop::Failed(_))));
+        assert!(matches!(run(&cloud, &map, &settings, &wrong), Err(Stop::Failed(_))));
     }
 }

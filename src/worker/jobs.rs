@@ -1,7 +1,8 @@
 //! What each command does: the only implementation of [`Jobs`] that ships.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::places::Places;
 use super::preview::{home_view, sparse_cloud};
@@ -9,7 +10,7 @@ use super::protocol::{Command, Failure, OpenedScene, Outcome, Stop};
 use super::thread::Jobs;
 use super::{edit, guide, machine, measure as measuring};
 use crate::io::labels::Labels;
-use crate::io::{self, IoError, OpenError, Opened, TrainedScene, trained};
+use crate::io::{self, IoError, OpenError, Opened, SceneFolder, TrainedScene, splat_ply, trained};
 use crate::models;
 use crate::models::catalogue::{self, InstallError, Role, SAM2};
 use crate::models::fetch::{FetchError, Patience};
@@ -29,12 +30,41 @@ use crate::scene::{Dataset, Facts, GaussianCloud, Machine, Photo, PhotoPixels, S
 pub struct PipelineJobs {
     places: Places,
     machine: OnceLock<Machine>,
+    /// In which state the window knows the scene in a folder: what somebody else saved there since is
+    /// not written over.
+    known: Mutex<HashMap<PathBuf, Option<String>>>,
 }
 
 impl PipelineJobs {
     /// Keeps what it makes in `places`.
     pub fn new(places: Places) -> Self {
-        Self { places, machine: OnceLock::new() }
+        Self { places, machine: OnceLock::new(), known: Mutex::default() }
+    }
+
+    /// From now on the window knows the scene in `folder` in the state `state`.
+    fn knows(&self, folder: &Path, state: Option<String>) {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner).insert(folder.into(), state);
+    }
+
+    /// The state in which the window knows a scene.
+    fn known(&self, scene: &SceneFolder) -> Option<String> {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner).get(scene.path()).cloned().flatten()
+    }
+
+    /// The objects and parts stored with a trained scene; broken ones are told and left out.
+    fn semantics_of(&self, scene: &TrainedScene, observer: &mut dyn Observer) -> Option<Arc<SemanticMap>> {
+        self.knows(&scene.folder, scene.state.clone());
+        match io::semantic_map::load(&scene.folder, scene.state.as_deref(), &scene.cloud) {
+            Ok(map) => map.map(|map| {
+                let what = format!("{} objects and parts", map.identities.len());
+                trace::record(Sort::Objects, what, "the scene was opened", map.bytes());
+                Arc::new(map)
+            }),
+            Err(e) => {
+                observer.note(Level::Warning, format!("Its objects cannot be shown: {e}"));
+                None
+            }
+        }
     }
 
     /// What the machine offers, looked up once.
@@ -51,7 +81,10 @@ impl PipelineJobs {
                 let (cloud, sh_stored) = compact(cloud);
                 OpenedScene { name, cloud: Some(cloud), sh_stored, trained: true, ..OpenedScene::default() }
             }
-            Opened::Trained(trained) => trained_scene(trained, observer),
+            Opened::Trained(trained) => {
+                let semantics = self.semantics_of(&trained, observer);
+                OpenedScene { semantics, ..trained_scene(trained, observer) }
+            }
         };
         scene.path.clone_from(path);
         let root = scene.dataset.as_ref().map(|d| d.root.clone());
@@ -91,7 +124,7 @@ impl PipelineJobs {
     ) -> Result<Outcome, Stop> {
         let (result, out) = match train::run(dataset, config, Some(&out), observer) {
             // Other settings are another training: it gets its own folder, the earlier one stays.
-            Err(TrainError::Checkpoint(CheckpointError::OtherRun { .. })) => {
+            Err(TrainError::Checkpoint(CheckpointError::OtherRun { .. } | CheckpointError::Missing { .. })) => {
                 let fresh = self.places.fresh(&dataset.root);
                 observer.note(
                     Level::Info,
@@ -105,12 +138,23 @@ impl PipelineJobs {
             result => (result, out),
         };
         let outcome = result.map_err(|e| Stop::Failed(Failure::of(&e, "")))?;
+        // Its objects are carried over to Gaussians that went on, and have to be read with their state.
+        let semantics = match trained::is_scene(&out) {
+            true => {
+                let state = splat_ply::state(&out.join(trained::CLOUD_FILE)).map_err(|e| io_failure(&e))?;
+                let (folder, info) = (out.clone(), trained::SceneInfo::default());
+                let scene = TrainedScene { folder, info, cloud: (*outcome.cloud).clone(), state };
+                self.semantics_of(&scene, observer)
+            }
+            false => None,
+        };
         if outcome.end == TrainEnd::Cancelled {
             return Err(Stop::Cancelled);
         }
         let cloud = &outcome.cloud;
         let facts = self.facts(Some(dataset), Some((cloud, cloud.sh_degree)), config);
-        Ok(Outcome::Trained { evaluations: outcome.evaluations, out, facts: Box::new(facts) })
+        let facts = Box::new(facts.with_semantics(semantics.as_deref()));
+        Ok(Outcome::Trained { evaluations: outcome.evaluations, out, semantics, facts })
     }
 
     /// Facts for a plan; a cloud comes with the degree of the harmonics in its file.
@@ -121,6 +165,64 @@ impl PipelineJobs {
             Some((cloud, sh_stored)) => facts.with_cloud(cloud, sh_stored, &cameras),
             None => facts,
         }
+    }
+
+    /// Objects and parts of `cloud`, stored in the trained scene `out`.
+    fn find(
+        &self,
+        cloud: &GaussianCloud,
+        photos: &[Photo],
+        (settings, side_px): (&RenderSettings, u32),
+        (masks, with): (Option<&Path>, &Finding),
+        out: &Path,
+        observer: &mut dyn Observer,
+    ) -> Result<Outcome, Stop> {
+        // Held from the beginning: nobody waits for masks that cannot be stored.
+        let scene = SceneFolder::hold(out, "finding objects").map_err(|e| io_failure(&e))?;
+        let network = match with.segmenter.as_deref() {
+            Some(REGIONS) => None,
+            Some(name) => Some(name.to_owned()),
+            None => {
+                let usable = catalogue::usable(Role::Segmenter, &mut |text| observer.note(Level::Warning, text));
+                usable.map_err(|e| Stop::Failed(Failure::of(&e, "")))?.into_iter().next()
+            }
+        };
+        let found = segmenter(masks, cloud, settings, network.as_deref());
+        let mut segmenter = found.map_err(|e| Stop::Failed(Failure::of(&e, "")))?;
+        let mut follower = match with.carry {
+            Carry::Gaussians => None,
+            _ => {
+                let opened = Follower::open(SAM2, Some(out.join("cache")));
+                Some(opened.map_err(|e| Stop::Failed(Failure::of(&e, "")))?)
+            }
+        };
+        // Without the encoder, names alone are understood.
+        let encoder = match with.encoder.as_deref() {
+            Some(name) => models::encoder(name),
+            None => models::best_encoder(&mut |text| observer.note(Level::Warning, text)),
+        };
+        let mut encoder = encoder
+            .inspect_err(|e| observer.note(Level::Warning, format!("Objects are found without their looks: {e}")))
+            .ok();
+        let mut options = FindOptions::default();
+        options.track.veto = with.carry == Carry::Both;
+        options.track.max_side_px = side_px;
+        let found = {
+            let (follower, encoder) = (follower.as_mut(), encoder.as_deref_mut());
+            let tools = Tools { segmenter: &mut *segmenter, follower, encoder };
+            find_objects(cloud, photos, settings, tools, &options, observer)
+        };
+        let Found { map, .. } = found.map_err(|e| match e {
+            e if e.is_cancelled() => Stop::Cancelled,
+            e => Stop::Failed(Failure::of(&e, "")),
+        })?;
+        let (kept, state) =
+            scene.replace_map(self.known(&scene).as_deref(), &map, cloud).map_err(|e| io_failure(&e))?;
+        self.knows(out, Some(state));
+        if let Some(kept) = kept {
+            observer.note(Level::Info, format!("The objects and parts before are kept in {}", kept.display()));
+        }
+        Ok(Outcome::Objects(Arc::new(map)))
     }
 
     /// Photos, with the Gaussians that were trained on them before, if there are any.
@@ -137,9 +239,10 @@ impl PipelineJobs {
         let background = dataset.background;
         let dataset = Some(Arc::new(dataset));
         match before {
-            Some(TrainedScene { info, cloud, folder }) => {
-                let semantics = semantics_of(&folder, &cloud, observer);
-                let render = config_of(info.config).render_settings(background);
+            Some(scene) => {
+                let semantics = self.semantics_of(&scene, observer);
+                let TrainedScene { info, cloud, folder, .. } = scene;
+                let render = config_of(&folder, info.config, observer).render_settings(background);
                 let (cloud, sh_stored) = compact(cloud);
                 OpenedScene {
                     name,
@@ -164,25 +267,13 @@ impl PipelineJobs {
     }
 }
 
-/// The objects and parts stored with a trained scene; broken ones are told and left out.
-fn semantics_of(folder: &Path, cloud: &GaussianCloud, observer: &mut dyn Observer) -> Option<Arc<SemanticMap>> {
-    match io::semantic_map::load(folder, cloud) {
-        Ok(map) => map.map(|map| {
-            let what = format!("{} objects and parts", map.identities.len());
-            trace::record(Sort::Objects, what, "the scene was opened", map.bytes());
-            Arc::new(map)
-        }),
-        Err(e) => {
-            observer.note(Level::Warning, format!("Its objects cannot be shown: {e}"));
-            None
-        }
-    }
-}
-
-/// The settings of a training; those of a later version of the program may not parse, and only the
-/// filter is needed here.
-fn config_of(config: serde_json::Value) -> TrainConfig {
-    serde_json::from_value(config).unwrap_or_default()
+/// The settings of a training; where they cannot be read this is told, and the scene is drawn with the
+/// defaults.
+fn config_of(folder: &Path, config: serde_json::Value, observer: &mut dyn Observer) -> TrainConfig {
+    TrainConfig::stored(folder, config).unwrap_or_else(|e| {
+        observer.note(Level::Warning, format!("It may not look as it was trained: {e}"));
+        TrainConfig::default()
+    })
 }
 
 /// A trained scene, with its photos if they are still where they were.
@@ -206,13 +297,11 @@ fn trained_scene(scene: TrainedScene, observer: &mut dyn Observer) -> OpenedScen
             None
         }
     };
-    let TrainedScene { folder, info, cloud } = scene;
-    let render = config_of(info.config).render_settings(info.background);
-    let semantics = semantics_of(&folder, &cloud, observer);
+    let TrainedScene { folder, info, cloud, .. } = scene;
+    let render = config_of(&folder, info.config, observer).render_settings(info.background);
     let mut opened = OpenedScene {
         name: info.name,
         dataset,
-        semantics,
         trained: true,
         out: folder,
         history: info.history,
@@ -248,10 +337,17 @@ impl Jobs for PipelineJobs {
             Command::FindObjects { dataset, cloud, holdout_every, settings, side_px, masks, with, out } => {
                 let (training, _) = dataset.split(holdout_every);
                 let photos: Vec<Photo> = training.iter().map(|&i| dataset.photos[i].clone()).collect();
-                find(&cloud, &photos, (&settings, side_px), masks.as_deref(), &with, &out, observer)
+                self.find(&cloud, &photos, (&settings, side_px), (masks.as_deref(), &with), &out, observer)
             }
             Command::EditObjects { cloud, map, settings, request, out } => {
-                edit::run(&cloud, &map, &settings, &request, &out)
+                let new = edit::run(&cloud, &map, &settings, &request)?;
+                if trained::is_scene(&out) {
+                    let state = SceneFolder::hold(&out, "storing an edit")
+                        .and_then(|scene| scene.save_map(self.known(&scene).as_deref(), &new, &cloud))
+                        .map_err(|e| Stop::Failed(Failure::of(&e, "The change is not stored.")))?;
+                    self.knows(&out, Some(state));
+                }
+                Ok(Outcome::Edited(new))
             }
             Command::Export { cloud, path } => export(&cloud, &path),
             Command::Photo { index, photo, max_side_px } => {
@@ -297,53 +393,6 @@ fn measure(
     let settings = config.render_settings(dataset.background);
     let evaluation = evaluate(cloud, &views, &settings, 0, 0.0).map_err(|e| Stop::Failed(Failure::of(&e, "")))?;
     Ok(Outcome::Evaluated(evaluation))
-}
-
-/// Objects and parts of `cloud`, stored in the trained scene `out`.
-fn find(
-    cloud: &GaussianCloud,
-    photos: &[Photo],
-    (settings, side_px): (&RenderSettings, u32),
-    masks: Option<&Path>,
-    with: &Finding,
-    out: &Path,
-    observer: &mut dyn Observer,
-) -> Result<Outcome, Stop> {
-    let network = match with.segmenter.as_deref() {
-        Some(REGIONS) => None,
-        Some(name) => Some(name.to_owned()),
-        None => catalogue::usable(Role::Segmenter).into_iter().next(),
-    };
-    let found = segmenter(masks, cloud, settings, network.as_deref());
-    let mut segmenter = found.map_err(|e| Stop::Failed(Failure::of(&e, "")))?;
-    let mut follower = match with.carry {
-        Carry::Gaussians => None,
-        _ => {
-            let opened = Follower::open(SAM2, Some(out.join("cache")));
-            Some(opened.map_err(|e| Stop::Failed(Failure::of(&e, "")))?)
-        }
-    };
-    // Without the encoder, names alone are understood.
-    let mut encoder = with
-        .encoder
-        .as_deref()
-        .map_or_else(models::best_encoder, models::encoder)
-        .inspect_err(|e| observer.note(Level::Warning, format!("Objects are found without their looks: {e}")))
-        .ok();
-    let mut options = FindOptions::default();
-    options.track.veto = with.carry == Carry::Both;
-    options.track.max_side_px = side_px;
-    let found = {
-        let (follower, encoder) = (follower.as_mut(), encoder.as_deref_mut());
-        let tools = Tools { segmenter: &mut *segmenter, follower, encoder };
-        find_objects(cloud, photos, settings, tools, &options, observer)
-    };
-    let Found { map, .. } = found.map_err(|e| match e {
-        e if e.is_cancelled() => Stop::Cancelled,
-        e => Stop::Failed(Failure::of(&e, "")),
-    })?;
-    io::semantic_map::save(out, &map, cloud).map_err(|e| io_failure(&e))?;
-    Ok(Outcome::Objects(Arc::new(map)))
 }
 
 /// Puts a model in place.

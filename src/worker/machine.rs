@@ -1,5 +1,6 @@
 //! What this machine offers.
 
+use crate::io::memory;
 use crate::pipeline::train::budget;
 use crate::render::gpu::real_gpu;
 use crate::scene::Machine;
@@ -8,13 +9,5 @@ use crate::scene::Machine;
 /// thread.
 pub fn look() -> Machine {
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    Machine { free_memory_bytes: free_memory_bytes(), max_gaussians: budget::gaussians(), cores, gpu: real_gpu() }
-}
-
-/// Memory that programs may still use; 0 where the system does not say.
-fn free_memory_bytes() -> u64 {
-    sysinfo::System::new().map_or(0, |mut system| {
-        system.refresh_memory();
-        system.available_memory()
-    })
+    Machine { free_memory_bytes: memory::free(), max_gaussians: budget::gaussians(), cores, gpu: real_gpu() }
 }

@@ -328,6 +328,8 @@ pub enum Outcome {
         evaluations: Vec<Evaluation>,
         /// Folder of the trained scene.
         out: PathBuf,
+        /// Objects and parts that were carried over from the scene before.
+        semantics: Option<Arc<SemanticMap>>,
         /// What the plan of the result is computed from.
         facts: Box<Facts>,
     },

@@ -13,7 +13,7 @@ use super::{Slot, paint};
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::cpu::Renderer;
-use crate::render::{Backend, BackendChoice, Frame, RenderSettings, StageTimes};
+use crate::render::{self, Backend, BackendChoice, Frame, RenderError, RenderSettings, StageTimes};
 use crate::scene::plan::When;
 use crate::scene::trace::{self, Sort};
 use crate::scene::{Camera, GaussianCloud, PhotoPixels, ScenePlan, SemanticMap};
@@ -100,8 +100,8 @@ impl Leave {
 pub struct MappedView {
     /// The request's.
     pub ticket: u64,
-    /// The pixels.
-    pub maps: Arc<ViewMaps>,
+    /// The pixels, or why they could not be drawn.
+    pub maps: Result<Arc<ViewMaps>, Failure>,
     /// Seconds that drawing them took.
     pub secs: f64,
 }
@@ -140,6 +140,8 @@ pub struct ViewPicture {
     pub paint_secs: f64,
     /// What drew it: "CPU", or the name of the GPU.
     pub drawn_by: String,
+    /// Why the CPU drew it though there is a GPU.
+    pub instead_of_gpu: Option<String>,
 }
 
 /// The result of a request.
@@ -192,11 +194,17 @@ impl ViewLane {
                     && let Some(maps) = maps_of(&mut mapper, &request)
                 {
                     let secs = start.elapsed().as_secs_f64();
-                    if !std::mem::replace(&mut mapped_before, true) {
+                    if let Ok(maps) = &maps
+                        && !std::mem::replace(&mut mapped_before, true)
+                    {
                         let pixels = maps.identities.identity.len() as u64;
                         trace::record(Sort::Maps, "maps of the view", "something is asked of it", pixels * 12);
                     }
-                    mapped.publish(MappedView { ticket: request.ticket, maps: Arc::new(maps), secs });
+                    if maps.is_err() {
+                        // Buffers may be in any state.
+                        mapper = Renderer::new();
+                    }
+                    mapped.publish(MappedView { ticket: request.ticket, maps: maps.map(Arc::new), secs });
                     repaint();
                 }
             }
@@ -266,23 +274,29 @@ fn next(mailbox: &(Mutex<Mailbox>, Condvar), patience: Option<Duration>) -> Wait
     }
 }
 
-/// What the pixels of a resting view belong to.
-fn maps_of(renderer: &mut Renderer<f32>, request: &ViewRequest) -> Option<ViewMaps> {
+/// What the pixels of a resting view belong to; `None` if nobody wants to know.
+fn maps_of(renderer: &mut Renderer<f32>, request: &ViewRequest) -> Option<Result<ViewMaps, Failure>> {
     let semantics = request.semantics.as_ref().filter(|s| s.of.len() == request.cloud.len())?;
     if request.effort != Effort::Full {
         return None;
     }
     let (cloud, camera, settings) = (&request.cloud, &request.camera, &request.settings);
     let draw = AssertUnwindSafe(|| {
-        let identities =
-            ViewMap::render(renderer, cloud, &semantics.of, &semantics.identities, camera, settings).ok()?;
+        let identities = ViewMap::render(renderer, cloud, &semantics.of, &semantics.identities, camera, settings)?;
         let codes = match request.codes {
-            true => CodeMap::render(renderer, cloud, &semantics.codes, !request.leave.parts, camera, settings).ok(),
+            true => Some(CodeMap::render(renderer, cloud, &semantics.codes, !request.leave.parts, camera, settings)?),
             false => None,
         };
-        Some(ViewMaps { identities, codes })
+        Ok(ViewMaps { identities, codes })
     });
-    catch_unwind(draw).unwrap_or_default()
+    let told = |e: RenderError| {
+        let failure = Failure::of(&e, "Reset the view (Home), or find the objects again.");
+        Failure { message: format!("What the pixels belong to cannot be drawn: {}", failure.message), ..failure }
+    };
+    Some(match catch_unwind(draw) {
+        Ok(drawn) => drawn.map_err(told),
+        Err(payload) => Err(panic_failure(payload.as_ref())),
+    })
 }
 
 /// Draws requests, and learns how fast it can.
@@ -290,6 +304,8 @@ struct Painter {
     backend: Backend,
     /// Whether no GPU was to be used.
     without_gpu: bool,
+    /// Why the CPU draws though there is a GPU.
+    instead_of_gpu: Option<String>,
     /// What pictures cost lately; `None` before the first.
     cost: Option<Speed>,
 }
@@ -305,12 +321,16 @@ impl Painter {
     /// Draws with a real GPU if there is one and it is to be used, else with the CPU.
     fn without_gpu(without_gpu: bool) -> Self {
         let choice = if without_gpu { BackendChoice::Cpu } else { BackendChoice::Auto };
-        let backend = Backend::choose(choice).unwrap_or_else(|_| Backend::on_cpu());
-        Self { backend, without_gpu, cost: None }
+        let mut instead_of_gpu = None;
+        let backend = Backend::choose(choice, |why| instead_of_gpu = Some(why)).unwrap_or_else(|_| Backend::on_cpu());
+        Self { backend, without_gpu, instead_of_gpu, cost: None }
     }
 
     /// Goes on with the CPU: a GPU has failed, or buffers may be in any state.
-    fn fall_back(&mut self) {
+    fn fall_back(&mut self, why: &str) {
+        if matches!(self.backend, Backend::Gpu(_)) {
+            self.instead_of_gpu = Some(render::instead_of_gpu(&why));
+        }
         (self.backend, self.cost) = (Backend::on_cpu(), None);
     }
 
@@ -322,8 +342,8 @@ impl Painter {
         let start = Instant::now();
         let frame = match self.try_render(request, &camera) {
             // A GPU that fails (lost, out of memory) leaves the CPU to draw from then on.
-            Err(_) if matches!(self.backend, Backend::Gpu(_)) => {
-                self.fall_back();
+            Err(failure) if matches!(self.backend, Backend::Gpu(_)) => {
+                self.fall_back(&failure.message);
                 self.try_render(request, &camera)?
             }
             result => result?,
@@ -347,6 +367,7 @@ impl Painter {
             stages,
             paint_secs,
             drawn_by: self.backend.name().to_owned(),
+            instead_of_gpu: self.instead_of_gpu.clone(),
         }))
     }
 
@@ -356,8 +377,9 @@ impl Painter {
         match catch_unwind(AssertUnwindSafe(|| self.backend.render(&request.cloud, camera, &settings))) {
             Ok(result) => result.map_err(|e| Failure::of(&e, "Reset the view (Home), or open the scene again.")),
             Err(payload) => {
-                self.fall_back();
-                Err(panic_failure(payload.as_ref()))
+                let failure = panic_failure(payload.as_ref());
+                self.fall_back(&failure.message);
+                Err(failure)
             }
         }
     }
@@ -396,7 +418,56 @@ impl Painter {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::{Identities, Level, NOBODY};
     use glam::DVec3;
+
+    #[test]
+    fn maps_that_cannot_be_drawn_are_told() {
+        let cloud = GaussianCloud {
+            positions: vec![[0.0; 3]],
+            log_scales: vec![[-1.0; 3]],
+            quaternions: vec![[1.0, 0.0, 0.0, 0.0]],
+            opacity_logits: vec![2.0],
+            sh: vec![[0.5; 3]],
+            ..GaussianCloud::default()
+        };
+        let mut all = Identities::default();
+        all.add(Level::Object, NOBODY, Vec::new());
+        let mut map = SemanticMap::of_identities(all, vec![1], vec![1.0], vec![]);
+        let lane = ViewLane::start(Arc::new(|| {})).expect("a thread");
+        let mapped = |ticket: u64, map: &SemanticMap| {
+            lane.request(ViewRequest {
+                cloud: Arc::new(cloud.clone()),
+                camera: Camera::look_at(DVec3::new(0.0, 0.0, -3.0), DVec3::ZERO, DVec3::NEG_Y, 0.8, 32, 24)
+                    .expect("valid"),
+                mode: ViewMode::Picture,
+                settings: RenderSettings::default(),
+                effort: Effort::Full,
+                photo: None,
+                semantics: Some(Arc::new(map.clone())),
+                codes: true,
+                leave: Leave { depth: false, parts: false, gpu: true, buffers: false },
+                timed: false,
+                ticket,
+            });
+            let start = Instant::now();
+            loop {
+                assert!(start.elapsed() < Duration::from_secs(60), "maps, or why there are none");
+                if let Some((_, found)) = lane.maps().newer_than(ticket - 1) {
+                    return found;
+                }
+                std::thread::sleep(Duration::from_millis(2));
+            }
+        };
+        assert!(mapped(1, &map).maps.is_ok(), "the control");
+        // One code is missing.
+        map.codes.pop();
+        let failure = mapped(2, &map).maps.clone().expect_err("told");
+        assert!(failure.message.contains("cannot be drawn") && !failure.remedy.is_empty(), "{failure:?}");
+        // The lane goes on.
+        map.codes.push(Default::default());
+        assert!(mapped(3, &map).maps.is_ok());
+    }
 
     #[test]
     fn a_slow_machine_draws_smaller_while_the_eye_moves() {
@@ -404,6 +475,7 @@ mod tests {
         let of = |fixed_secs, secs_per_px| Painter {
             backend: Backend::on_cpu(),
             without_gpu: true,
+            instead_of_gpu: None,
             cost: Some(Speed { fixed_secs, secs_per_px }),
         };
         let slow = of(0.0, 1e-6);

@@ -41,6 +41,8 @@ pub enum Say {
 /// A request that came.
 #[derive(Clone, Debug)]
 pub struct Seen {
+    /// The request's line and its headers, as they came.
+    pub head: Vec<String>,
     pub authorization: Option<String>,
     pub body: String,
 }
@@ -107,7 +109,7 @@ impl Server {
 
 fn answer(stream: &mut TcpStream, say: &Say, n: usize, log: &Mutex<Vec<Seen>>) -> std::io::Result<()> {
     let mut reader = BufReader::new(stream.try_clone()?);
-    let (mut authorization, mut length) = (None, 0);
+    let (mut head, mut authorization, mut length) = (Vec::new(), None, 0);
     loop {
         let mut line = String::new();
         if reader.read_line(&mut line)? == 0 {
@@ -117,6 +119,7 @@ fn answer(stream: &mut TcpStream, say: &Say, n: usize, log: &Mutex<Vec<Seen>>) -
         if line.is_empty() {
             break;
         }
+        head.push(line.to_owned());
         if let Some((name, value)) = line.split_once(": ") {
             match name.to_ascii_lowercase().as_str() {
                 "authorization" => authorization = Some(value.to_owned()),
@@ -130,7 +133,7 @@ fn answer(stream: &mut TcpStream, say: &Say, n: usize, log: &Mutex<Vec<Seen>>) -
     let body = String::from_utf8_lossy(&body).into_owned();
     let wants_stream = serde_json::from_str::<Value>(&body).is_ok_and(|b| b["stream"] == true);
     let key = authorization.as_deref().and_then(|a| a.strip_prefix("Bearer ")).unwrap_or("none").to_owned();
-    log.lock().expect("log").push(Seen { authorization, body });
+    log.lock().expect("log").push(Seen { head, authorization, body });
     let head = |status: u16, kind: &str, more: &str| {
         format!("HTTP/1.1 {status} X\r\nContent-Type: {kind}\r\n{more}Connection: close\r\n\r\n")
     };

@@ -14,7 +14,7 @@ const MODULES: [(&str, &[&str]); 13] = [
     ("render", &["math", "scene"]),
     ("pipeline", &["math", "scene", "io", "models", "render"]),
     ("navigate", &["math", "scene", "render"]),
-    ("stability", &["math", "scene", "render", "pipeline", "navigate"]),
+    ("stability", &["math", "scene", "io", "render", "pipeline", "navigate"]),
     ("report", &["math", "scene", "io", "models", "render", "pipeline", "navigate"]),
     ("worker", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "report"]),
     ("agent", &["math", "scene", "io", "render", "pipeline", "navigate", "worker"]),

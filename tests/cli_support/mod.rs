@@ -1,8 +1,11 @@
 //! Runs the real binary, and makes small inputs for it.
 #![allow(dead_code)]
 
+use std::io::{BufRead, BufReader};
+use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
+use std::sync::{Arc, Mutex};
 
 /// A finished run of `fmlgs`.
 pub struct Done {
@@ -136,4 +139,48 @@ pub fn tiny_dataset(folder: &Path) -> PathBuf {
     fmlgs(&["synth", glb, "--out", out, "--views", "16", "--size", "64x48", "--samples", "1", "--points", "500", "-q"])
         .ok();
     photos
+}
+
+/// A server on this machine.
+pub struct Server {
+    /// Host and port.
+    pub at: String,
+    /// The heads of the requests that came.
+    pub seen: Arc<Mutex<Vec<String>>>,
+}
+
+impl Server {
+    /// `answer` gets each connection with the head of its request.
+    pub fn new(answer: impl Fn(&mut TcpStream, &str) + Send + Sync + 'static) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+        let at = listener.local_addr().expect("bound").to_string();
+        let (seen, answer) = (Arc::<Mutex<Vec<String>>>::default(), Arc::new(answer));
+        let log = Arc::clone(&seen);
+        let serve = move || {
+            for mut stream in listener.incoming().flatten() {
+                let (answer, log) = (Arc::clone(&answer), Arc::clone(&log));
+                let talk = move || {
+                    let lines = BufReader::new(stream.try_clone().expect("a copy")).lines();
+                    let head: Vec<String> = lines.map_while(Result::ok).take_while(|l| !l.is_empty()).collect();
+                    let head = head.join("\n");
+                    log.lock().expect("log").push(head.clone());
+                    answer(&mut stream, &head);
+                };
+                std::thread::Builder::new().name("connection".into()).spawn(talk).expect("a thread");
+            }
+        };
+        std::thread::Builder::new().name("server".into()).spawn(serve).expect("a thread");
+        Self { at, seen }
+    }
+
+    /// How many requests came.
+    pub fn requests(&self) -> usize {
+        self.seen.lock().expect("log").len()
+    }
+}
+
+/// Whether a text holds a character that acts on a terminal, or on the order of letters.
+pub fn acts(text: &str) -> bool {
+    let of_direction = |c| matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    text.chars().any(|c| (c.is_control() && c != '\n' && c != '\t') || of_direction(c))
 }

@@ -12,7 +12,7 @@ use image::{ImageFormat, Rgba, RgbaImage};
 use npyz::WriterBuilder;
 use serde_json::json;
 
-type Seed = (&'static str, &'static str, Vec<u8>);
+pub type Seed = (&'static str, &'static str, Vec<u8>);
 
 /// Folder, file name and bytes of every seed.
 pub fn all() -> Vec<Seed> {
@@ -51,7 +51,7 @@ pub fn all() -> Vec<Seed> {
     seeds
 }
 
-fn encode(picture: &RgbaImage, format: ImageFormat) -> Vec<u8> {
+pub fn encode(picture: &RgbaImage, format: ImageFormat) -> Vec<u8> {
     let mut out = Cursor::new(Vec::new());
     picture.write_to(&mut out, format).expect("encode");
     out.into_inner()
@@ -69,7 +69,7 @@ fn splat(sh_degree: u8, origin: DVec3) -> Vec<u8> {
         extras: vec![ExtraProperty { name: "label".into(), values: vec![3.0; 2] }],
     };
     let mut out = Vec::new();
-    splat_ply::encode(&mut out, &cloud).expect("encode");
+    splat_ply::encode(&mut out, &cloud, None).expect("encode");
     out
 }
 
@@ -127,7 +127,7 @@ pub fn sog_pictures() -> Vec<(&'static str, Vec<u8>)> {
     files
 }
 
-fn sog_meta(version: u64) -> serde_json::Value {
+pub fn sog_meta(version: u64) -> serde_json::Value {
     let rest = ["shN_centroids.webp", "shN_labels.webp"];
     let means =
         json!({ "shape": [2, 3], "mins": [-1, 0, 0], "maxs": [1, 1, 2], "files": ["means_l.webp", "means_u.webp"] });
@@ -250,7 +250,7 @@ fn camera_path() -> serde_json::Value {
     json!({ "format": "fmlgs-camera-path", "version": 1, "closed": true, "fps": 30, "seconds": 4, "keys": [key, key] })
 }
 
-fn scene() -> Vec<u8> {
+pub fn scene() -> Vec<u8> {
     let camera = Camera::look_at(DVec3::new(0.0, -3.0, 1.0), DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid");
     let mut info = SceneInfo { version: 1, name: "seed".into(), ..SceneInfo::default() };
     info.cameras.push(SceneCamera { name: "a.png".into(), camera, held_out: true });
@@ -318,11 +318,12 @@ fn colmap() -> Vec<Seed> {
         let head = [words(&[id]), le(&[1.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0]), words(&[1]), b"a.png\0".to_vec()];
         [head.concat(), longs(&[1]), le(&[1.0, 2.0, 0.0])].concat()
     };
-    let point = [longs(&[9]), le(&[1.0, 2.0, 3.0]), vec![1, 2, 3], le(&[0.5]), longs(&[1]), words(&[1, 0])].concat();
+    let point =
+        |id: u64| [longs(&[id]), le(&[1.0, 2.0, 3.0]), vec![1, 2, 3], le(&[0.5]), longs(&[1]), words(&[1, 0])].concat();
     vec![
         ("colmap_cameras", "two.bin", cameras.concat()),
         ("colmap_images", "two.bin", [longs(&[2]), image(1), image(2)].concat()),
-        ("colmap_points", "two.bin", [longs(&[2]), point.clone(), point].concat()),
+        ("colmap_points", "two.bin", [longs(&[2]), point(9), point(10)].concat()),
         (
             "colmap_cameras_text",
             "two.txt",

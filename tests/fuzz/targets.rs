@@ -1,96 +1,155 @@
-//! The parsers that are fuzzed, each as a function of bytes.
+//! The readers that are fuzzed, each as a function of bytes: data sets, splats, pictures, labels.
 
+use std::fmt::Display;
 use std::fs;
 use std::path::Path;
 
 use fmlgs::io::{self, IoError};
-use fmlgs::scene::{Camera, GaussianCloud, Photo};
+use fmlgs::scene::{Camera, Dataset, GaussianCloud, Photo};
 use glam::{DMat3, DVec2, DVec3};
 use image::{GrayImage, RgbImage};
 
-/// Feeds bytes to a parser.
-type Parse = Box<dyn Fn(&[u8])>;
-/// Asks a parser whether it accepts bytes.
-type Accepts = Box<dyn Fn(&[u8]) -> bool>;
+/// What a reader says about an input: nothing, or why it refuses it.
+pub type Outcome = Result<(), String>;
 
-/// A parser.
-pub struct Target {
-    /// Its folder in `tests/corpus`.
-    pub name: &'static str,
-    /// Parses; what it returns does not matter.
-    pub parse: Parse,
-    /// Whether it accepts an input.
-    pub accepts: Accepts,
+/// What an input must be for a reader to look any further.
+#[derive(Clone, Copy)]
+pub enum Door {
+    /// Anything.
+    Any,
+    /// JSON.
+    Json,
+    /// A picture by its first bytes.
+    Picture,
+    /// These first bytes.
+    Starts(&'static [u8]),
+    /// These first bytes, or JSON.
+    StartsOrJson(&'static [u8]),
+    /// TOML.
+    Toml,
 }
 
-fn target<T>(name: &'static str, parse: impl Fn(&[u8]) -> Result<T, IoError> + Clone + 'static) -> Target {
-    let accepts = parse.clone();
-    Target { name, parse: Box::new(move |b| drop(parse(b))), accepts: Box::new(move |b| accepts(b).is_ok()) }
+impl Door {
+    /// Whether a reader looks any further.
+    pub fn lets_in(self, input: &[u8]) -> bool {
+        let json = || serde_json::from_slice::<serde::de::IgnoredAny>(input).is_ok();
+        match self {
+            Self::Any => true,
+            Self::Json => json(),
+            Self::Picture => image::guess_format(input).is_ok(),
+            Self::Starts(magic) => input.starts_with(magic),
+            Self::StartsOrJson(magic) => input.starts_with(magic) || json(),
+            Self::Toml => std::str::from_utf8(input).is_ok_and(|t| toml::from_str::<toml::Table>(t).is_ok()),
+        }
+    }
+}
+
+/// A reader.
+pub struct Target {
+    /// Its name.
+    pub name: &'static str,
+    /// What it looks at first.
+    pub door: Door,
+    /// Its folders in `tests/corpus`.
+    pub corpora: Vec<&'static str>,
+    /// How many times slower it is than a quick reader: it gets so many times fewer inputs.
+    pub cost: u64,
+    /// Reads bytes.
+    pub read: Box<dyn Fn(&[u8]) -> Outcome>,
+}
+
+impl Target {
+    pub fn new<T, E: Display>(name: &'static str, door: Door, read: impl Fn(&[u8]) -> Result<T, E> + 'static) -> Self {
+        let read = move |bytes: &[u8]| read(bytes).map(drop).map_err(|e| e.to_string());
+        Self { name, door, corpora: vec![name], cost: 1, read: Box::new(read) }
+    }
+
+    /// A reader that reads `file` in a folder of its own, which `prepare` fills.
+    pub fn in_folder<T, E: Display>(
+        name: &'static str,
+        door: Door,
+        file: &'static str,
+        prepare: impl Fn(&Path),
+        read: impl Fn(&Path) -> Result<T, E> + 'static,
+    ) -> Self {
+        let folder = folder();
+        if let Some(parent) = folder.path().join(file).parent() {
+            fs::create_dir_all(parent).expect("create");
+        }
+        prepare(folder.path());
+        Self::new(name, door, move |bytes| {
+            fs::write(folder.path().join(file), bytes).expect("write");
+            read(folder.path())
+        })
+    }
+
+    /// The same with other folders of seeds.
+    pub fn fed(self, corpora: &[&'static str]) -> Self {
+        Self { corpora: corpora.to_vec(), ..self }
+    }
+
+    /// The same with so many times fewer inputs.
+    pub fn slow(self, cost: u64) -> Self {
+        Self { cost, ..self }
+    }
+}
+
+/// A folder in memory where there is one: files are written there for every input.
+pub fn folder() -> tempfile::TempDir {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix("fmlgs-fuzz");
+    builder.tempdir_in("/dev/shm").or_else(|_| builder.tempdir()).expect("folder")
 }
 
 /// What is read must keep its own invariants.
-fn valid(cloud: Result<GaussianCloud, IoError>) -> Result<GaussianCloud, IoError> {
+pub fn valid(cloud: Result<GaussianCloud, IoError>) -> Result<GaussianCloud, IoError> {
     cloud.inspect(|c| c.validate().expect("an accepted cloud is valid"))
 }
 
-/// A parser that reads `file` in a folder of its own, which `prepare` fills.
-fn in_folder<T>(
-    name: &'static str,
-    file: &'static str,
-    prepare: impl Fn(&Path),
-    read: impl Fn(&Path) -> Result<T, IoError> + Clone + 'static,
-) -> Target {
-    let folder = std::sync::Arc::new(tempfile::tempdir().expect("folder"));
-    prepare(folder.path());
-    target(name, move |bytes| {
-        fs::write(folder.path().join(file), bytes).expect("write");
-        read(folder.path())
-    })
-}
-
-fn picture(folder: &Path) {
+pub fn picture(folder: &Path) {
     RgbImage::new(16, 12).save(folder.join("a.png")).expect("save");
 }
 
-fn text(bytes: &[u8]) -> String {
+pub fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// Every parser of the program.
+/// Every reader of the program.
 pub fn all() -> Vec<Target> {
     const P: &str = "fuzz";
-    vec![
-        target("splat_ply", |b| valid(io::splat_ply::parse(b, Path::new(P)))),
-        target("compressed_ply", |b| valid(io::splat_ply::parse(b, Path::new(P)))),
-        target("points_ply", |b| io::points_ply::parse(b, Path::new(P))),
-        target("sog", |b| valid(io::sog::parse_archive(b, Path::new(P)))),
-        in_folder(
-            "sog_meta",
-            "meta.json",
-            |folder| {
-                for (name, bytes) in super::seeds::sog_pictures() {
-                    fs::write(folder.join(name), bytes).expect("write");
-                }
-            },
-            |folder| valid(io::sog::read_folder(&folder.join("meta.json"))),
-        ),
-        target("khr_gltf", |b| valid(io::khr_gltf::parse(b, Path::new(P)))),
-        target("colmap_cameras", |b| io::colmap::check_cameras(b, Path::new(P))),
-        target("colmap_images", |b| io::colmap::check_images(b, Path::new(P))),
-        target("colmap_points", |b| io::colmap::check_points(b, Path::new(P))),
-        target("colmap_cameras_text", |b| io::colmap::check_text_cameras(&text(b), Path::new(P))),
-        target("colmap_images_text", |b| io::colmap::check_text_images(&text(b), Path::new(P))),
-        target("colmap_points_text", |b| io::colmap::check_text_points(&text(b), Path::new(P))),
-        target("llff", |b| io::llff::poses(b, Path::new(P))),
-        target("depth_map", |b| io::npy::map(b, Path::new(P))),
-        in_folder("transforms", "transforms.json", picture, |f| io::transforms::read(&f.join("transforms.json"))),
-        target("camera_path", |b| {
+    const PLY: Door = Door::Starts(b"ply");
+    const NPY: Door = Door::Starts(b"\x93NUMPY");
+    let mut all = vec![
+        Target::new("splat_ply", PLY, |b| valid(io::splat_ply::parse(b, Path::new(P)))),
+        Target::new("compressed_ply", PLY, |b| valid(io::splat_ply::parse(b, Path::new(P)))),
+        Target::new("points_ply", PLY, |b| io::points_ply::parse(b, Path::new(P))),
+        Target::new("sog", Door::Starts(b"PK"), |b| valid(io::sog::parse_archive(b, Path::new(P)))).slow(4),
+        Target::in_folder("sog_meta", Door::Json, "meta.json", sog_pictures, |folder| {
+            valid(io::sog::read_folder(&folder.join("meta.json")))
+        })
+        .slow(4),
+        Target::new("khr_gltf", Door::StartsOrJson(b"glTF"), |b| valid(io::khr_gltf::parse(b, Path::new(P)))),
+        Target::new("colmap_cameras", Door::Any, |b| io::colmap::check_cameras(b, Path::new(P))),
+        Target::new("colmap_images", Door::Any, |b| io::colmap::check_images(b, Path::new(P))),
+        Target::new("colmap_points", Door::Any, |b| io::colmap::check_points(b, Path::new(P))),
+        Target::new("colmap_cameras_text", Door::Any, |b| io::colmap::check_text_cameras(&text(b), Path::new(P))),
+        Target::new("colmap_images_text", Door::Any, |b| io::colmap::check_text_images(&text(b), Path::new(P))),
+        Target::new("colmap_points_text", Door::Any, |b| io::colmap::check_text_points(&text(b), Path::new(P))),
+        Target::new("llff", NPY, |b| io::llff::poses(b, Path::new(P))),
+        Target::new("depth_map", NPY, |b| io::npy::map(b, Path::new(P))),
+        Target::in_folder("transforms", Door::Json, "transforms.json", picture, |f| {
+            sound(io::transforms::read(&f.join("transforms.json")))
+        }),
+        Target::new("camera_path", Door::Json, |b| {
             io::camera_path::parse(b, Path::new(P)).inspect(|p| p.validate().expect("an accepted path is valid"))
         }),
-        in_folder("blender", "transforms_train.json", picture, io::transforms::read_blender),
-        in_folder("scene", "scene.json", |_| {}, io::trained::load_info),
-        in_folder(
+        Target::in_folder("blender", Door::Json, "transforms_train.json", picture, |f| {
+            sound(io::transforms::read_blender(f))
+        }),
+        Target::in_folder("scene", Door::Json, "scene.json", |_| {}, io::trained::load_info),
+        Target::in_folder(
             "photo",
+            Door::Picture,
             "photo",
             |_| {},
             |folder| {
@@ -98,13 +157,32 @@ pub fn all() -> Vec<Target> {
                 io::photo::load(&photo(folder), 10)
             },
         ),
-        in_folder("label_polygons", "a.json", |_| {}, labels),
-        in_folder("label_masklets", "a.json", |_| {}, labels),
-        in_folder("label_ids", "identities.json", id_maps, labels),
-        in_folder("label_id_map", "object_ids/photo.png", id_maps, labels),
-        in_folder("label_classes", "segmentations/classes.txt", classes, labels),
-        in_folder("label_picture", "test_mask/photo/a.png", |f| grey(f, "test_mask/photo"), labels),
-    ]
+        Target::in_folder("label_polygons", Door::Json, "a.json", |_| {}, labels),
+        Target::in_folder("label_masklets", Door::Json, "a.json", |_| {}, labels),
+        Target::in_folder("label_ids", Door::Json, "identities.json", id_maps, labels),
+        Target::in_folder("label_id_map", Door::Picture, "object_ids/photo.png", id_maps, labels),
+        Target::in_folder("label_classes", Door::Any, "segmentations/classes.txt", classes, labels),
+        Target::in_folder(
+            "label_picture",
+            Door::Picture,
+            "test_mask/photo/a.png",
+            |f| grey(f, "test_mask/photo"),
+            labels,
+        ),
+    ];
+    all.extend(super::targets_more::all());
+    all
+}
+
+/// Photos that are read have cameras that can be.
+pub fn sound(dataset: Result<Dataset, IoError>) -> Result<Dataset, IoError> {
+    dataset.inspect(|d| d.cameras().iter().for_each(|c| c.validate().expect("an accepted camera is valid")))
+}
+
+pub fn sog_pictures(folder: &Path) {
+    for (name, bytes) in super::seeds::sog_pictures() {
+        fs::write(folder.join(name), bytes).expect("write");
+    }
 }
 
 /// Masks of the photo, in whatever layout the folder has.

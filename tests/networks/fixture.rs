@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use fmlgs::math::stats;
 use fmlgs::models::network::Array;
 use fmlgs::scene::PhotoPixels;
 use safetensors::{Dtype, SafeTensors};
@@ -78,9 +79,9 @@ impl Tensors {
 /// The largest difference, relative to the largest expected magnitude.
 pub fn error(got: &[f32], expected: &[f32]) -> f64 {
     assert_eq!(got.len(), expected.len(), "another number of values");
-    let most = |v: &mut dyn Iterator<Item = f64>| v.fold(0.0, f64::max);
-    let difference = most(&mut got.iter().zip(expected).map(|(a, b)| f64::from((a - b).abs())));
-    difference / most(&mut expected.iter().map(|v| f64::from(v.abs()))).max(1e-12)
+    let largest = stats::worst(expected.iter().map(|v| v.abs()));
+    assert!(largest > 0.0, "nothing to compare with");
+    stats::worst_difference(got, expected) / largest
 }
 
 /// Bound on [`error`].
@@ -92,4 +93,12 @@ pub fn agrees(what: &str, got: &[f32], wrong: &[f32], expected: &[f32]) {
     println!("{what}: relative error {right:.1e}, negative control {control:.1e}");
     assert!(right < TOLERANCE, "{what}: {right:e}");
     assert!(control > 10.0 * TOLERANCE, "{what}: the negative control passes ({control:e})");
+}
+
+#[test]
+fn what_is_no_number_agrees_with_nothing() {
+    let expected = [1.0, -2.0];
+    assert!(error(&[1.0, -2.001], &expected) < TOLERANCE);
+    assert!(error(&[f32::NAN, -2.0], &expected).is_nan() && error(&[1.0, f32::NAN], &expected).is_nan());
+    assert!(error(&[1.0, f32::NEG_INFINITY], &expected).is_infinite());
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use fmlgs::math::stats;
 use fmlgs::models::network::Array;
 use fmlgs::models::sam2::Sam2;
 use fmlgs::models::sam2::track::{Frames, InMemory, ObjectId, Output, Prompt, Track, mask_of};
@@ -77,7 +78,7 @@ fn run(model: &mut Sam2, frames: &mut dyn Frames, described: &Value, t: &Tensors
 fn compare(t: &Tensors, track: &str, name: &str, order: &Value, pass: &Pass) -> (f64, f64, usize) {
     let (shape, bits) = t.bytes(&format!("{track}.{name}.full"));
     let (pointers, scores) = (t.floats(&format!("{track}.{name}.pointer")), t.floats(&format!("{track}.{name}.score")));
-    let (mut least, mut worst, mut identical) = (1.0_f64, 0.0_f64, 0);
+    let (mut least, mut errors, mut identical) = (1.0_f64, Vec::new(), 0);
     let order: Vec<usize> =
         order.as_array().expect("frames").iter().map(|v| v.as_u64().expect("frame") as usize).collect();
     assert_eq!(pass.keys().copied().collect::<std::collections::BTreeSet<_>>(), order.iter().copied().collect());
@@ -97,11 +98,11 @@ fn compare(t: &Tensors, track: &str, name: &str, order: &Value, pass: &Pass) -> 
             };
             identical += usize::from((0..3).all(|k| k == o || other(k) <= iou));
             let c = pointers.shape[2];
-            worst = worst.max(error(&out.pointer.values, &pointers.values[row * c..(row + 1) * c]));
-            worst = worst.max(error(&[out.score], &[scores.values[row]]));
+            errors.push(error(&out.pointer.values, &pointers.values[row * c..(row + 1) * c]));
+            errors.push(error(&[out.score], &[scores.values[row]]));
         }
     }
-    (least, worst, identical)
+    (least, stats::worst(errors), identical)
 }
 
 #[test]

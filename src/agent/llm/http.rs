@@ -1,18 +1,15 @@
 //! One question to a server and its answer: pieces as they arrive, stalls told from slowness, ended
 //! when the user wants.
 
-use std::io::Read;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use crossbeam_channel::{Receiver, RecvTimeoutError, bounded};
+use crossbeam_channel::{Receiver, RecvTimeoutError};
 use ureq::Agent;
 
 use super::secret::Secret;
 use super::settings::Patience;
-
-/// How often a wait looks whether it is to end.
-const TICK: Duration = Duration::from_millis(20);
+use crate::io::http::{self, Piece, TICK};
 
 /// Why there is no answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -45,12 +42,6 @@ impl Broken {
             Self::TooLong | Self::Cancelled => false,
         }
     }
-}
-
-enum Piece {
-    Head { code: u16, retry_after: Option<Duration>, is_stream: bool },
-    Bytes(Vec<u8>),
-    Failed(String),
 }
 
 /// What arrived: whether it is a stream of events.
@@ -89,9 +80,13 @@ pub fn post(
             Err(RecvTimeoutError::Timeout) => continue,
             Err(RecvTimeoutError::Disconnected) => break,
             Ok(Piece::Failed(problem)) => return Err(Broken::Connection(problem)),
-            Ok(Piece::Head { code, retry_after, is_stream }) => {
+            Ok(Piece::Head(status, headers)) => {
                 heard = Instant::now();
-                head = Some((Head { is_stream }, code, retry_after));
+                let header = |name: &str| headers.get(name).and_then(|v| v.to_str().ok());
+                let retry_after = header("retry-after").and_then(|v| v.trim().parse::<f64>().ok());
+                let retry_after = retry_after.filter(|s| (0.0..1e6).contains(s)).map(Duration::from_secs_f64);
+                let is_stream = header("content-type").is_some_and(|t| t.starts_with("text/event-stream"));
+                head = Some((Head { is_stream }, status.as_u16(), retry_after));
             }
             Ok(Piece::Bytes(piece)) => {
                 heard = Instant::now();
@@ -119,61 +114,19 @@ pub fn post(
     }
 }
 
-/// Asks on a thread of its own, which ends by itself: its own time limits are those of `patience`,
-/// and it stops at the first piece that nobody takes.
+/// Starts to ask.
 fn ask(url: &str, key: Option<&Secret>, body: String, patience: &Patience) -> std::io::Result<Receiver<Piece>> {
-    let config = Agent::config_builder()
-        .http_status_as_error(false)
+    let config = http::config(url, 2 * patience.stall)
         // Neither the key nor the user's words follow a server elsewhere.
         .max_redirects(0)
         .max_redirects_will_error(false)
         .timeout_global(Some(patience.answer + patience.stall))
-        .timeout_connect(Some(patience.stall))
-        .timeout_recv_response(Some(patience.stall + TICK))
         .build();
-    let agent: Agent = config.into();
-    let mut request = agent.post(url).header("Content-Type", "application/json");
+    let mut request = Agent::from(config).post(url).header("Content-Type", "application/json");
     if let Some(key) = key {
         request = request.header("Authorization", key.bearer());
     }
-    let (send, receive) = bounded(4);
-    let talk = move || {
-        let response = match request.send(body) {
-            Ok(response) => response,
-            Err(e) => {
-                // Whoever asked may have gone.
-                let _ = send.send(Piece::Failed(e.to_string()));
-                return;
-            }
-        };
-        let header = |name: &str| response.headers().get(name).and_then(|v| v.to_str().ok()).map(str::to_owned);
-        let retry_after = header("retry-after").and_then(|v| v.trim().parse::<f64>().ok());
-        let retry_after = retry_after.filter(|s| (0.0..1e6).contains(s)).map(Duration::from_secs_f64);
-        let is_stream = header("content-type").is_some_and(|t| t.starts_with("text/event-stream"));
-        let code = response.status().as_u16();
-        if send.send(Piece::Head { code, retry_after, is_stream }).is_err() {
-            return;
-        }
-        let mut reader = response.into_body().into_reader();
-        loop {
-            let mut piece = vec![0; 1 << 14];
-            match reader.read(&mut piece) {
-                Ok(0) => return,
-                Ok(n) => {
-                    piece.truncate(n);
-                    if send.send(Piece::Bytes(piece)).is_err() {
-                        return;
-                    }
-                }
-                Err(e) => {
-                    let _ = send.send(Piece::Failed(e.to_string()));
-                    return;
-                }
-            }
-        }
-    };
-    std::thread::Builder::new().name("chat model".into()).spawn(talk)?;
-    Ok(receive)
+    http::ask(move || request.send(body))
 }
 
 /// Waits, unless the user wants it to end; says whether the wait was over.

@@ -9,6 +9,8 @@ pub mod settings;
 pub mod sse;
 pub mod wire;
 
+pub use prompt::SENT;
+
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
@@ -24,6 +26,7 @@ use super::planner::{Desk, Planner, Step};
 use super::refusal::{Refusal, RefusalKind};
 use super::schema;
 use super::tool::ToolCall;
+use crate::scene::text;
 
 /// How often the same call may be asked for in one request.
 const MOST_ALIKE: usize = 3;
@@ -292,7 +295,7 @@ impl Llm {
             Broken::Stall => format!("it said nothing for {:.0} s", self.patience.stall.as_secs_f64().ceil()),
             Broken::Status { code, body, .. } => {
                 let body = self.clean(body);
-                let said: String = body.chars().filter(|c| !c.is_control()).take(LONGEST_ERROR).collect();
+                let said: String = text::line(&body).trim().chars().take(LONGEST_ERROR).collect();
                 if said.is_empty() { format!("it answered {code}") } else { format!("it answered {code}: {said}") }
             }
             Broken::TooLong | Broken::Cancelled => "it was ended".to_owned(),
@@ -354,7 +357,7 @@ impl Planner for Llm {
 
     fn next(&mut self, last: Option<&Outcome>, desk: &mut Desk<'_>) -> Result<Step, Refusal> {
         if let (Some(call), Some(outcome)) = (self.current.take(), last) {
-            let result = json!({ "done": outcome.refused.is_none(), "result": outcome.text, "ids": outcome.ids });
+            let result = json!({ "done": outcome.refused.is_none(), "result": outcome.heard(), "ids": outcome.ids });
             self.tell(&call, &result);
         }
         loop {

@@ -13,6 +13,13 @@ const MOST: usize = 250;
 /// Longest name in characters.
 const LONGEST_NAME: usize = 80;
 
+/// What goes to a chat model and what does not, for whoever chooses one. The README says the same.
+pub const SENT: &str = "Sent to the chat model: what you write; of the scene's objects and parts their numbers, names, \
+    wholes, and whether they are hidden or in view, which of them was spoken of last, and whether the length of a metre \
+    is known; what came of each step, with the sizes and distances that were asked for; the talk so far; the \
+    tools that the policy permits; the model's name. Not sent: pictures, Gaussians, cameras, paths and names of files, \
+    why something failed on this machine. The key goes into one header of the request and nowhere else.";
+
 /// The task.
 pub const TASK: &str = "You help a person look around in a 3D scene in a viewer, by calling the tools. Rules: \
     Call tools for everything you do; never claim to have done what no tool result confirms. \
@@ -49,7 +56,7 @@ pub fn scene(world: &dyn World, focus: &Focus) -> Value {
             entry["hidden"] = json!(true);
         }
         if facts.in_view > SEEN {
-            entry["in_view"] = json!((facts.in_view * 1000.0).round() / 1000.0);
+            entry["in_view"] = json!(true);
         }
         list.push(entry);
     }

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use ureq::http::Uri;
 
 use super::secret::Secret;
+use crate::io::http::is_loopback;
 
 /// A chat model behind an OpenAI-compatible address. The key itself is never part of settings: only
 /// the name of the environment variable that holds it.
@@ -119,10 +120,10 @@ impl LlmSettings {
         let uri: Uri = base.parse().map_err(|_| wrong())?;
         let host = uri.host().filter(|h| !h.is_empty()).ok_or_else(wrong)?;
         // A name and password in an address would end in logs.
-        if uri.authority().is_none_or(|a| a.as_str().contains('@')) || uri.query().is_some() {
-            return Err(LlmError::Address(format!("{host} (with a name, password or question mark)")));
+        if uri.authority().is_none_or(|a| a.as_str().contains('@')) || base.contains(['?', '#']) {
+            return Err(LlmError::Address(format!("{host} (with a name, password, question mark or number sign)")));
         }
-        let is_local = host == "localhost" || host.starts_with("127.") || host == "[::1]";
+        let is_local = is_loopback(host);
         match uri.scheme_str() {
             Some("https") => {}
             Some("http") if is_local || !has_key => {}
@@ -149,7 +150,12 @@ mod tests {
         assert_eq!(at("https://host/v1/", true).as_deref(), Ok("https://host/v1/chat/completions"));
         assert_eq!(at("http://127.0.0.1:80/v1", true).as_deref(), Ok("http://127.0.0.1:80/v1/chat/completions"));
         assert!(at("http://host/v1", false).is_ok());
-        assert_eq!(at("http://host/v1", true), Err(LlmError::Unencrypted("host".into())));
+        assert_eq!(at("http://LOCALHOST:1/v1", true).as_deref(), Ok("http://LOCALHOST:1/v1/chat/completions"));
+        // The key does not travel in the open, whatever a host's name begins with.
+        for host in ["host", "127.evil.example", "127.0.0.1.evil.example", "localhost.evil.example", "2130706433"] {
+            assert_eq!(at(&format!("http://{host}/v1"), true), Err(LlmError::Unencrypted(host.into())));
+            assert!(at(&format!("http://{host}/v1"), false).is_ok(), "the control: without a key it may");
+        }
         for bad in [
             "",
             "host",
@@ -158,6 +164,9 @@ mod tests {
             "file:///etc/passwd",
             "https://me:secret@host/v1",
             "https://h/v1?key=1",
+            "https://h/v1#x",
+            "http://127.0.0.1@evil.example/v1",
+            "http://127.0.0.1#@evil.example/v1",
         ] {
             let error = at(bad, false).expect_err(bad);
             assert!(matches!(error, LlmError::Address(_)) && !error.to_string().contains("secret"), "{bad}: {error}");

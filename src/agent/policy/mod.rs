@@ -4,14 +4,13 @@ mod physical;
 
 pub use physical::Judgement;
 
-use std::fs::File;
-use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::Deserialize;
 
 use super::refusal::{Refusal, RefusalKind};
 use super::tool::{NAMES, ToolCall};
+use crate::io::{IoError, files};
 
 /// The environment variable with the path of a policy that takes the place of the built-in one.
 pub const VARIABLE: &str = "FMLGS_POLICY";
@@ -86,17 +85,9 @@ fn yes() -> bool {
 /// Why a policy cannot be used. Without one nothing may be done, so the agent does not start.
 #[derive(Debug, thiserror::Error)]
 pub enum PolicyError {
-    /// The file cannot be read.
-    #[error("{path}: {source}; set {VARIABLE} to a policy file, or to nothing for the built-in one")]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// It is too long.
-    #[error("{0}: a policy has at most {MAX_BYTES} bytes")]
-    TooLong(PathBuf),
+    /// The file cannot be read, or is too long for a policy.
+    #[error("{0}; set {VARIABLE} to a policy file, or to nothing for the built-in one")]
+    File(#[from] IoError),
     /// It is no policy.
     #[error("{place}: {problem}")]
     Wrong {
@@ -145,13 +136,11 @@ impl Policy {
     /// # Errors
     /// If it cannot be read or is no policy.
     pub fn load(path: &Path) -> Result<Self, PolicyError> {
-        let failed = |source| PolicyError::File { path: path.into(), source };
-        let mut text = String::new();
-        let read = File::open(path).map_err(failed)?.take(MAX_BYTES + 1).read_to_string(&mut text).map_err(failed)?;
-        if read as u64 > MAX_BYTES {
-            return Err(PolicyError::TooLong(path.into()));
-        }
-        Self::parse(&text, &path.display().to_string())
+        let place = path.display().to_string();
+        let bytes = files::read(path, MAX_BYTES)?;
+        let text = std::str::from_utf8(&bytes)
+            .map_err(|e| PolicyError::Wrong { place: place.clone(), problem: format!("not UTF-8 text: {e}") })?;
+        Self::parse(text, &place)
     }
 
     /// Reads a policy; `place` is named in errors.
@@ -244,6 +233,7 @@ mod tests {
         let path = folder.path().join("policy.toml");
         assert!(matches!(Policy::load(&path), Err(PolicyError::File { .. })));
         std::fs::write(&path, "#".repeat(MAX_BYTES as usize + 1)).expect("written");
-        assert!(matches!(Policy::load(&path), Err(PolicyError::TooLong(_))));
+        assert!(matches!(Policy::load(&path), Err(PolicyError::File(IoError::OverBudget { .. }))));
+        assert!(matches!(Policy::load(folder.path()), Err(PolicyError::File(IoError::NotAFile { .. }))));
     }
 }

@@ -9,17 +9,17 @@ use std::path::{Path, PathBuf};
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder, ImageError};
-use tempfile::TempDir;
 
 use super::{AnimationError, Result, Settings, Sink};
 use crate::io::atomic::{folder_of, sync_folder, write_error};
+use crate::io::temporary::{TemporaryFolder, temporary_folder};
 
 /// See the module.
 pub(super) struct Frames {
     folder: PathBuf,
     /// Whether `folder` was there before.
     existed: bool,
-    draft: TempDir,
+    draft: TemporaryFolder,
     size_px: (u32, u32),
     overwrite: bool,
     frames: u64,
@@ -37,12 +37,8 @@ impl Frames {
         {
             return Err(AnimationError::Exists { path: taken });
         }
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".frames.").suffix(".tmp");
-        #[cfg(unix)]
-        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
         // Beside the frames' final place, so that they can be renamed.
-        let draft = builder.tempdir_in(if existed { folder } else { folder_of(folder) }).map_err(failed)?;
+        let draft = temporary_folder(if existed { folder } else { folder_of(folder) }, "frames").map_err(failed)?;
         let size_px = (settings.width_px, settings.height_px);
         let (folder, overwrite) = (folder.to_owned(), settings.overwrite);
         Ok(Self { folder, existed, draft, size_px, overwrite, frames: 0, bytes: 0 })
@@ -52,9 +48,9 @@ impl Frames {
     fn put(self) -> io::Result<Option<PathBuf>> {
         if !self.existed {
             // `rename` replaces an empty folder and refuses a full one.
-            fs::rename(self.draft.path(), &self.folder)?;
+            fs::rename(self.draft.folder.path(), &self.folder)?;
             // There is nothing left to remove.
-            let _ = self.draft.keep();
+            let _ = self.draft.folder.keep();
             return sync_folder(folder_of(&self.folder)).map(|()| None);
         }
         let before = numbered(&self.folder)?;
@@ -62,7 +58,7 @@ impl Frames {
             return Ok(Some(taken.clone()));
         }
         for frame in 0..self.frames {
-            fs::rename(self.draft.path().join(name(frame)), self.folder.join(name(frame)))?;
+            fs::rename(self.draft.folder.path().join(name(frame)), self.folder.join(name(frame)))?;
         }
         // Frames of a longer film before would follow this film's last one.
         for stale in before.iter().filter(|p| number(p).is_some_and(|n| n >= self.frames)) {
@@ -78,7 +74,7 @@ impl Sink for Frames {
     }
 
     fn push(&mut self, rgb: &[u8]) -> Result<()> {
-        let path = self.draft.path().join(name(self.frames));
+        let path = self.draft.folder.path().join(name(self.frames));
         let mut file = Vec::new();
         let encoder = PngEncoder::new_with_quality(&mut file, CompressionType::Fast, FilterType::Adaptive);
         let encoded = encoder.write_image(rgb, self.size_px.0, self.size_px.1, ExtendedColorType::Rgb8);

@@ -40,9 +40,15 @@ impl Sink for Gif {
         // NeuQuant's step through the pixels: 1 looks at all of them, 30 at every thirtieth. It learns
         // little from fewer than this many.
         const ENOUGH: u64 = 50_000;
-        let coarsest = (self.settings.frame_bytes() / 3 / ENOUGH).clamp(1, 30) as i32;
+        let pixels = self.settings.frame_bytes() / 3;
+        let coarsest = (pixels / ENOUGH).clamp(1, 30) as i32;
         let step = (1 + (100 - i32::from(self.settings.quality)) * 29 / 100).min(coarsest);
-        let mut frame = Frame::from_rgb_speed(self.side_px.0, self.side_px.1, rgb, step);
+        // A small picture is shown to it several times, one below the other.
+        let (width, height) = self.side_px;
+        let times = ENOUGH.div_ceil(pixels.max(1)).clamp(1, u64::from(u16::MAX / height.max(1))) as u16;
+        let mut frame = Frame::from_rgb_speed(width, height * times, &rgb.repeat(usize::from(times)), step);
+        frame.height = height;
+        frame.buffer.to_mut().truncate(usize::from(width) * usize::from(height));
         let time = |frame| self.settings.time(frame, 100.0);
         frame.delay = u16::try_from(time(self.frames + 1) - time(self.frames)).unwrap_or(u16::MAX);
         frame.dispose = DisposalMethod::Keep;

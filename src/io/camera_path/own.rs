@@ -9,7 +9,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::{error, members};
 use crate::io::{IoError, atomic, files};
-use crate::scene::{CameraPath, PathKey};
+use crate::scene::{CameraPath, PathKey, text};
 
 /// What `format` says in a file.
 pub const FORMAT: &str = "fmlgs-camera-path";
@@ -31,7 +31,7 @@ struct File {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Key {
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "text::read_optional_name")]
     name: Option<String>,
     center: [f64; 3],
     world_from_camera: [[f64; 3]; 3],

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::{Cameras, Image, lens, point};
+use super::{Cameras, Image, distinct, lens, point};
 use crate::io::IoError;
 use crate::io::reader::Reader;
 use crate::scene::SparsePoint;
@@ -25,9 +25,11 @@ pub(super) fn cameras(bytes: &[u8], path: &Path) -> Result<Cameras, IoError> {
     let mut r = Reader::new(bytes, path);
     let n = r.count("cameras", CAMERA_BYTES)?;
     let mut cameras = Cameras::new();
+    let mut ids = Vec::new();
     for i in 0..n {
         let place = format!("camera {i}");
         let id = r.u32(&place)?;
+        ids.push(u64::from(id));
         let number = r.u32(&place)?;
         let size = (r.u64(&place)?, r.u64(&place)?);
         let Some((model, count)) = lens::by_number(number) else {
@@ -40,6 +42,7 @@ pub(super) fn cameras(bytes: &[u8], path: &Path) -> Result<Cameras, IoError> {
         let params = (0..count).map(|_| r.f64(&place)).collect::<Result<Vec<_>, _>>()?;
         cameras.insert(id, lens::lens(model, size, &params, id, path)?);
     }
+    distinct(ids, "camera", path)?;
     Ok(cameras)
 }
 
@@ -48,9 +51,10 @@ pub(super) fn images(bytes: &[u8], path: &Path) -> Result<Vec<Image>, IoError> {
     let mut r = Reader::new(bytes, path);
     let n = r.count("images", IMAGE_BYTES)?;
     let mut images = Vec::new();
+    let mut ids = Vec::new();
     for i in 0..n {
         let place = format!("image {i}");
-        r.u32(&place)?;
+        ids.push(u64::from(r.u32(&place)?));
         let mut q = [0.0; 4];
         for v in &mut q {
             *v = r.f64(&place)?;
@@ -66,6 +70,7 @@ pub(super) fn images(bytes: &[u8], path: &Path) -> Result<Vec<Image>, IoError> {
         r.take(observations * OBSERVATION_BYTES, &place)?;
         images.push(Image { name: name.into(), camera, quaternion: q, translation });
     }
+    distinct(ids, "image", path)?;
     Ok(images)
 }
 
@@ -74,8 +79,9 @@ pub(super) fn points(bytes: &[u8], path: &Path) -> Result<Vec<SparsePoint>, IoEr
     let mut r = Reader::new(bytes, path);
     let n = r.count("points", POINT_BYTES)?;
     let mut points = Vec::with_capacity(n);
+    let mut ids = Vec::with_capacity(n);
     for i in 0..n {
-        r.u64("a point")?;
+        ids.push(r.u64("a point")?);
         let position = DVec3::new(r.f64("a point")?, r.f64("a point")?, r.f64("a point")?);
         let rgb = r.array("a point")?;
         r.f64("a point")?;
@@ -83,6 +89,7 @@ pub(super) fn points(bytes: &[u8], path: &Path) -> Result<Vec<SparsePoint>, IoEr
         r.take(track * TRACK_BYTES, "a point's track")?;
         points.push(point(position, rgb, i, path)?);
     }
+    distinct(ids, "point", path)?;
     Ok(points)
 }
 

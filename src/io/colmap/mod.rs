@@ -118,13 +118,18 @@ fn listed(image: &Image, cameras: &Cameras, root: &Path, folder: &str, source: &
 
 /// A point, checked.
 fn point(position: DVec3, rgb: [u8; 3], index: usize, path: &Path) -> Result<SparsePoint, IoError> {
-    match position.to_array().iter().position(|v| !v.is_finite()) {
-        None => Ok(SparsePoint { position, rgb }),
-        Some(axis) => Err(IoError::NotFinite {
+    listing::place(position, "point", index, path).map(|position| SparsePoint { position, rgb })
+}
+
+/// An error where a number that names one thing names two.
+fn distinct(mut ids: Vec<u64>, what: &str, path: &Path) -> Result<(), IoError> {
+    ids.sort_unstable();
+    match ids.windows(2).find(|w| w[0] == w[1]) {
+        None => Ok(()),
+        Some(w) => Err(IoError::Syntax {
             path: path.into(),
-            element: "point",
-            index,
-            property: ["x", "y", "z"][axis].into(),
+            place: format!("{what} {}", w[0]),
+            reason: "its number is given twice; which of the two is meant cannot be told".into(),
         }),
     }
 }

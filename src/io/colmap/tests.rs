@@ -49,8 +49,9 @@ fn images_bin(names: &[&str]) -> Vec<u8> {
     let (q, t) = pose();
     names
         .iter()
-        .fold(Bin(vec![]).u64(names.len() as u64), |b, name| {
-            let b = b.u32(1).f64(&q).f64(&t.to_array()).u32(7).bytes(name.as_bytes()).bytes(&[0]);
+        .zip(1..)
+        .fold(Bin(vec![]).u64(names.len() as u64), |b, (name, id)| {
+            let b = b.u32(id).f64(&q).f64(&t.to_array()).u32(7).bytes(name.as_bytes()).bytes(&[0]);
             // Two observations, which are skipped.
             b.u64(2).f64(&[1.0; 3]).f64(&[2.0; 3])
         })
@@ -241,6 +242,61 @@ fn hostile_values_are_named() {
     nan[32 + 32..32 + 40].copy_from_slice(&f64::NAN.to_le_bytes());
     let e = replaced(&images_bin(&["b.png"]), &nan);
     assert!(matches!(&e, IoError::Syntax { reason, .. } if reason.contains("k1")), "{e}");
+}
+
+#[test]
+fn photos_without_lines_of_points_are_told_not_dropped() {
+    let t = text();
+    let file = t.path().join("sparse/images.txt");
+    let full = fs::read_to_string(&file).expect("read");
+    let e = read_changed(&t, &full.replace("\n\n", "\n"));
+    assert!(e.contains("images.txt, line 3") && e.contains("two lines for each photo"), "{e}");
+    // Control: the same with its lines; and the last photo may end the file.
+    fs::write(&file, full.trim_end()).expect("write");
+    assert_eq!(read(t.path()).expect("whole").photos.len(), 2);
+}
+
+/// The error of a reconstruction with another `images.txt`.
+fn read_changed(folder: &tempfile::TempDir, images: &str) -> String {
+    fs::write(folder.path().join("sparse/images.txt"), images).expect("write");
+    read(folder.path()).expect_err("changed").to_string()
+}
+
+#[test]
+fn numbers_that_are_given_twice_are_named() {
+    let path = Path::new("x");
+    let says =
+        |e: IoError, what: &str| assert!(e.to_string().contains(&format!("{what}: its number is given twice")), "{e}");
+    let twice = |bytes: Vec<u8>| [&2_u64.to_le_bytes(), &bytes[8..], &bytes[8..]].concat();
+    says(check_cameras(&twice(cameras_bin(4, &OPENCV)), path).expect_err("cameras"), "camera 7");
+    says(check_images(&twice(images_bin(&["a.png"])), path).expect_err("images"), "image 1");
+    says(check_points(&twice(points_bin([0.0; 3])), path).expect_err("points"), "point 99");
+    let lines = |text: &str| format!("{text}{text}");
+    says(check_text_cameras(&lines("7 PINHOLE 64 48 1 2 3 4\n"), path).expect_err("cameras"), "camera 7");
+    says(check_text_images(&lines("1 1 0 0 0 1 2 3 7 a.png\n\n"), path).expect_err("images"), "image 1");
+    says(check_text_points(&lines("99 1 2 3 1 2 3 0.5\n"), path).expect_err("points"), "point 99");
+}
+
+#[test]
+fn lenses_and_places_that_cannot_be_are_refused_on_reading() {
+    let with = |file: &str, from: &str, to: &str| {
+        let t = text();
+        let path = t.path().join("sparse").join(file);
+        let full = fs::read_to_string(&path).expect("read");
+        assert!(full.contains(from), "{full}");
+        fs::write(&path, full.replacen(from, to, 1)).expect("write");
+        read(t.path()).map(|d| d.photos.len()).map_err(|e| e.to_string())
+    };
+    assert_eq!(with("cameras.txt", "50.0", "70.0"), Ok(2), "control");
+    for (file, from, to, what) in [
+        ("cameras.txt", "50.0", "1e-30", "focal length"),
+        ("cameras.txt", " 0.1 ", " 1e10 ", "leaves nothing"),
+        ("images.txt", "-1.0 ", "1e308 ", "camera centre"),
+        ("points3D.txt", "3.5", "1e308", "z = 1e308"),
+    ] {
+        let e = with(file, from, to).expect_err(what);
+        assert!(e.contains(what) && e.contains(file) | e.contains("photo"), "{e}");
+    }
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::str::{FromStr, SplitAsciiWhitespace};
 
 use glam::DVec3;
 
-use super::{Cameras, Image, lens, point};
+use super::{Cameras, Image, distinct, lens, point};
 use crate::io::IoError;
 use crate::scene::SparsePoint;
 
@@ -51,8 +51,10 @@ fn lines<'a>(text: &'a str, path: &'a Path) -> impl Iterator<Item = Line<'a>> {
 /// `cameras.txt`: `id model width height params...`.
 pub(super) fn cameras(text: &str, path: &Path) -> Result<Cameras, IoError> {
     let mut cameras = Cameras::new();
+    let mut ids = Vec::new();
     for mut l in lines(text, path) {
         let id = l.next("camera id")?;
+        ids.push(u64::from(id));
         let model = l.word("model")?;
         let size = (l.next("width")?, l.next("height")?);
         let mut params = Vec::new();
@@ -64,19 +66,21 @@ pub(super) fn cameras(text: &str, path: &Path) -> Result<Cameras, IoError> {
         }
         cameras.insert(id, lens::lens(model, size, &params, id, path)?);
     }
+    distinct(ids, "camera", path)?;
     Ok(cameras)
 }
 
 /// `images.txt`: `id qw qx qy qz tx ty tz camera name`, then a line of 2-D points, maybe empty.
 pub(super) fn images(text: &str, path: &Path) -> Result<Vec<Image>, IoError> {
     let mut images = Vec::new();
+    let mut ids = Vec::new();
     let mut rest = text.lines().enumerate();
     while let Some((i, line)) = rest.next() {
         if line.trim().is_empty() || line.starts_with('#') {
             continue;
         }
         let mut l = Line::new(line, i + 1, path);
-        l.next::<u32>("image id")?;
+        ids.push(u64::from(l.next::<u32>("image id")?));
         let mut quaternion = [0.0; 4];
         for v in &mut quaternion {
             *v = l.next("rotation")?;
@@ -87,20 +91,37 @@ pub(super) fn images(text: &str, path: &Path) -> Result<Vec<Image>, IoError> {
         let first = l.word("name")?;
         let name = line.get(first.as_ptr() as usize - line.as_ptr() as usize..).unwrap_or(first).trim_end();
         images.push(Image { name: name.into(), camera, quaternion, translation });
-        rest.next();
+        if let Some((i, line)) = rest.next().filter(|(_, line)| !is_observations(line)) {
+            let shown: String = line.chars().take(40).collect();
+            return Err(Line::new(line, i + 1, path).bad(format!(
+                "the 2-D points of photo '{name}' are expected here (x, y and point id each, or an empty line), not \
+                 '{shown}'; images.txt has two lines for each photo"
+            )));
+        }
     }
+    distinct(ids, "image", path)?;
     Ok(images)
+}
+
+/// Whether a line is a photo's 2-D points: nothing, or `x y id` again and again.
+fn is_observations(line: &str) -> bool {
+    let words: Vec<&str> = line.split_ascii_whitespace().collect();
+    let is_point =
+        |p: &[&str]| p[0].parse::<f64>().is_ok() && p[1].parse::<f64>().is_ok() && p[2].parse::<i64>().is_ok();
+    words.len() % 3 == 0 && words.chunks_exact(3).all(is_point)
 }
 
 /// `points3D.txt`: `id x y z r g b error track...`.
 pub(super) fn points(text: &str, path: &Path) -> Result<Vec<SparsePoint>, IoError> {
     let mut points = Vec::new();
+    let mut ids = Vec::new();
     for mut l in lines(text, path) {
-        l.next::<u64>("point id")?;
+        ids.push(l.next::<u64>("point id")?);
         let position = l.vector("position")?;
         let rgb = [l.next("red")?, l.next("green")?, l.next("blue")?];
         points.push(point(position, rgb, points.len(), path)?);
     }
+    distinct(ids, "point", path)?;
     Ok(points)
 }
 

@@ -5,6 +5,7 @@ use gltf::json::mesh::{Mode, Primitive as JsonPrimitive, Semantic};
 use gltf::json::validation::Checked;
 
 use super::{File, GltfError, MAX_ITEMS, Material, Mesh, MeshNode, Primitive};
+use crate::scene::text;
 
 /// Highest texture coordinate set that is read.
 const MAX_UV_SETS: u32 = 8;
@@ -24,7 +25,7 @@ impl File<'_> {
         }
         let mut meshes = Vec::with_capacity(root.meshes.len());
         for (m, mesh) in root.meshes.iter().enumerate() {
-            let mut out = Mesh { name: mesh.name.clone(), primitives: Vec::new() };
+            let mut out = Mesh { name: mesh.name.as_deref().map(text::name), primitives: Vec::new() };
             for (p, primitive) in mesh.primitives.iter().enumerate().filter(|_| used[m]) {
                 let place = format!("meshes[{m}].primitives[{p}]");
                 out.primitives.extend(self.primitive(primitive, &place, materials)?);

@@ -126,8 +126,8 @@ impl File<'_> {
                     loaded = bytes;
                     &loaded
                 }
-                Err(GltfError::Io { path, source }) => {
-                    self.warnings.push(format!("{place}: {}: {source}; drawn without it", path.display()));
+                Err(e @ (GltfError::Io { .. } | GltfError::Read(_))) => {
+                    self.warnings.push(format!("{place}: {e}; drawn without it"));
                     images.known[index] = Some(None);
                     return Ok(None);
                 }

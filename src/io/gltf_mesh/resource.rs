@@ -1,27 +1,16 @@
 //! Bytes behind a scene: the container, its buffers and its encoded images.
 
 use std::borrow::Cow;
-use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
 use gltf::json::Root;
 
 use super::{GltfError, MAX_FILE_BYTES};
+use crate::io::files;
 
 /// Reads a regular file of bounded size.
 pub fn read_file(path: &Path) -> Result<Vec<u8>, GltfError> {
-    let io = |source| GltfError::Io { path: path.to_owned(), source };
-    let file = std::fs::File::open(path).map_err(io)?;
-    if !file.metadata().map_err(io)?.is_file() {
-        return Err(io(std::io::Error::other("is not a regular file")));
-    }
-    let mut bytes = Vec::new();
-    file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(io)?;
-    if bytes.len() as u64 > MAX_FILE_BYTES {
-        let limit = format!("{} GiB", MAX_FILE_BYTES >> 30);
-        return Err(GltfError::TooLarge { path: path.to_owned(), what: "the file".into(), limit });
-    }
-    Ok(bytes)
+    Ok(files::read(path, MAX_FILE_BYTES)?)
 }
 
 /// The JSON text and the binary chunk of a `.glb`, or the whole of a `.gltf`.

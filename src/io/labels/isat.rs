@@ -2,6 +2,7 @@
 //! one region. Two fields more are understood: `level` ("object" or "part") and `parent` (the
 //! category that it is a piece of).
 
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use serde::Deserialize;
@@ -44,38 +45,41 @@ pub fn photo_of(file: &serde_json::Value) -> Option<&str> {
 pub fn read(path: &Path, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
     let file: File = files::read_json(path)?;
     let Info { width, height, .. } = file.info;
-    sheet.check(path, (width, height), file.objects.len())?;
+    let names: HashSet<&str> = file.objects.iter().map(|p| p.category.as_str()).collect();
+    sheet.check(path, (width, height), names.len())?;
     let bad = |place: String, reason: &str| IoError::Syntax { path: path.into(), place, reason: reason.into() };
     if file.objects.iter().map(|p| p.segmentation.len()).sum::<usize>() > MAX_VERTICES {
         return Err(bad("objects".into(), "more vertices than a label file can need"));
     }
     let mut regions: Vec<(Option<String>, Region)> = Vec::new();
+    let mut place: HashMap<String, usize> = HashMap::new();
     for (i, polygon) in file.objects.into_iter().enumerate() {
         if polygon.segmentation.iter().flatten().any(|v| !v.is_finite()) {
             return Err(bad(format!("objects[{i}].segmentation"), "a vertex that is not a number"));
         }
+        let at = *place.entry(polygon.category).or_insert_with_key(|name| {
+            let mask = Mask::empty(width as usize, height as usize);
+            let region = Region { name: name.clone(), level: polygon.level, parent: None, mask };
+            regions.push((polygon.parent, region));
+            regions.len() - 1
+        });
         // The convention of the LERF evaluations: vertices are cut to whole pixels.
         let whole: Vec<[f64; 2]> = polygon.segmentation.iter().map(|v| v.map(f64::trunc)).collect();
-        let mask = Mask::from_polygon(width as usize, height as usize, &whole);
-        match regions.iter_mut().find(|(_, r)| r.name == polygon.category) {
-            Some((_, region)) => region.mask.add(&mask),
-            None => {
-                let region = Region { name: polygon.category, level: polygon.level, parent: None, mask };
-                regions.push((polygon.parent, region));
-            }
-        }
+        regions[at].1.mask.add_polygon(&whole);
     }
     // Whole before piece, as deep as pieces of pieces go.
     let mut ordered: Vec<Region> = Vec::with_capacity(regions.len());
+    let mut placed: HashMap<String, usize> = HashMap::new();
     while !regions.is_empty() {
         let before = regions.len();
         let mut waiting = Vec::new();
         for (parent, mut region) in regions {
-            let at = parent.as_ref().and_then(|p| ordered.iter().position(|r| r.name == *p));
+            let at = parent.as_ref().and_then(|p| placed.get(p).copied());
             match parent {
                 Some(_) if at.is_none() => waiting.push((parent, region)),
                 _ => {
                     region.parent = at;
+                    placed.insert(region.name.clone(), ordered.len());
                     ordered.push(region);
                 }
             }

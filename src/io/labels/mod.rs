@@ -27,11 +27,14 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::resample::{Pixels, resample};
-use super::{IoError, files, listing};
-use crate::scene::{Camera, Level, Mask, Photo};
+use super::{IoError, files, listing, memory};
+use crate::scene::{Camera, Level, Mask, Photo, text};
 
 /// How many times longer than the photo's the sides of a mask may be.
 const MOST_LARGER: f64 = 8.0;
+
+/// Most memory that the masks of one photo take, bytes: a thousand of eight million pixels.
+const MOST_BYTES: u64 = 1 << 30;
 
 /// A labelled region of one photo.
 #[derive(Clone, Debug, PartialEq)]
@@ -139,7 +142,7 @@ impl Labels {
             let parent = region.parent.and_then(|p| place.get(p).copied().flatten());
             place.push((!mask.is_empty()).then_some(kept.len()));
             if !mask.is_empty() {
-                kept.push(Region { mask, parent, ..region });
+                kept.push(Region { name: text::name(&region.name), mask, parent, ..region });
             }
         }
         Ok(kept)
@@ -164,7 +167,7 @@ impl Sheet<'_> {
             return Err(IoError::PhotoSize { path: path.into(), found: size_px, expected });
         }
         let pixels = (u64::from(w) * u64::from(h)).max(u64::from(expected.0) * u64::from(expected.1));
-        let (bytes, limit) = (pixels.div_ceil(8).saturating_mul(masks as u64), files::memory_budget());
+        let (bytes, limit) = (pixels.div_ceil(8).saturating_mul(masks as u64), memory::budget().min(MOST_BYTES));
         if bytes > limit {
             let remedy = "label fewer regions, or smaller photos";
             return Err(IoError::OverBudget { path: path.into(), what: "its masks", bytes, limit, remedy });

@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use super::{Region, Sheet, read_ids};
 use crate::io::{IoError, files};
-use crate::scene::{Level, Mask};
+use crate::scene::{Level, Mask, text};
 
 /// The list of identities.
 pub const LIST_FILE: &str = "identities.json";
@@ -22,6 +22,7 @@ pub struct Listed {
     /// Value in the id maps.
     pub id: u16,
     /// The node's name.
+    #[serde(deserialize_with = "text::read_name")]
     pub name: String,
     /// Object or part.
     pub level: Level,

@@ -44,7 +44,7 @@ fn splats_and_scenes_are_told_apart() {
     splat_ply::write(&path.join("any.name"), &cloud).expect("write");
     assert!(matches!(open(&path.join("any.name")), Ok(Opened::Cloud(c)) if c == cloud));
     let scene = path.join("scene");
-    trained::save(&scene, &trained::SceneInfo::default(), &cloud).expect("save");
+    trained::save(&scene, &trained::SceneInfo::default(), &cloud, None).expect("save");
     assert!(matches!(open(&scene), Ok(Opened::Trained(t)) if t.cloud == cloud));
     assert!(matches!(open(&scene.join("scene.json")), Ok(Opened::Trained(_))));
 }

@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use super::*;
+use crate::math::stats;
 
 fn camera(width_px: u32, height_px: u32, focal: f64) -> Camera {
     Camera {
@@ -56,7 +57,7 @@ fn straighten(c: &Camera, d: &Distortion, bent: DVec2) -> DVec2 {
 
 /// Largest channel error of `out` against the smooth picture over fully covered pixels.
 fn worst(out: &PhotoPixels, scale: f64) -> f64 {
-    let mut worst = 0.0_f64;
+    let mut errors = Vec::new();
     let mut seen = 0;
     for (i, rgb) in out.rgb.iter().enumerate() {
         if out.coverage.as_ref().is_some_and(|c| c[i] != 255) {
@@ -65,12 +66,10 @@ fn worst(out: &PhotoPixels, scale: f64) -> f64 {
         seen += 1;
         let (x, y) = (i % out.width_px as usize, i / out.width_px as usize);
         let want = smooth((x as f64 + 0.5) * scale, (y as f64 + 0.5) * scale);
-        for (c, w) in rgb.iter().zip(want) {
-            worst = worst.max((f64::from(*c) - w).abs());
-        }
+        errors.extend(rgb.iter().zip(want).map(|(c, w)| (f64::from(*c) - w).abs()));
     }
     assert!(seen * 10 > out.rgb.len() * 8, "only {seen} pixels are covered");
-    worst
+    stats::worst(errors)
 }
 
 #[test]

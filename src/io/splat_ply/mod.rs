@@ -14,7 +14,8 @@ mod stream;
 mod write;
 
 pub use read::{parse, read};
-pub use write::{encode, write};
+pub use stream::state;
+pub use write::{check, encode, write};
 
 /// Properties that carry Gaussians, besides `f_rest_*`.
 const STANDARD: [&str; 20] = [
@@ -42,6 +43,9 @@ const STANDARD: [&str; 20] = [
 
 /// Start of the comment that holds the cloud's origin.
 const ORIGIN: &str = "fmlgs origin ";
+
+/// Start of the comment that says to which state of a scene the file belongs.
+const STATE: &str = "fmlgs state ";
 
 /// Whether a property is one that this module writes itself.
 fn is_standard(name: &str) -> bool {

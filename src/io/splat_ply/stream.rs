@@ -1,19 +1,26 @@
 //! Splats read block by block, so that a file is never in memory as a whole beside its Gaussians.
 
 use std::borrow::Cow;
-use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
+use super::STATE;
 use super::read::Reading;
 use crate::io::ply::{Encoding, Ply, Table};
-use crate::io::{IoError, files};
+use crate::io::{IoError, files, memory};
 use crate::scene::GaussianCloud;
 
 /// Bytes in which the header must end.
 const HEADER_BYTES: u64 = 64 << 10;
 /// Bytes of rows that are in memory at once.
 const BLOCK_BYTES: usize = 512 << 10;
+
+/// The id of the scene's state that a `.ply` belongs to, if it says.
+pub fn state(path: &Path) -> Result<Option<String>, IoError> {
+    let start = files::read_start(path, HEADER_BYTES)?;
+    let ply = Ply::parse(&start, path).ok();
+    Ok(ply.and_then(|ply| ply.comments.iter().find_map(|c| c.strip_prefix(STATE)).map(str::to_owned)))
+}
 
 /// The Gaussians of a little-endian `.ply` whose first element they are; `None` if it is another
 /// sort of file, which has to be read as a whole.
@@ -24,11 +31,11 @@ pub fn read(path: &Path) -> Result<Option<GaussianCloud>, IoError> {
     let Some((columns, stride)) = ply.first_rows("vertex") else { return Ok(None) };
     let rows = ply.elements.first().map_or(0, |e| e.count) as usize;
     let failed = |cause| IoError::Read { path: path.into(), cause };
-    let mut file = File::open(path).map_err(failed)?;
+    let mut file = files::open(path)?;
     let bytes = file.metadata().map_err(failed)?.len();
     let header = start.len() - ply.body_len();
     let end = rows.checked_mul(stride).and_then(|n| n.checked_add(header));
-    let fits = end.is_some_and(|end| end as u64 <= bytes) && bytes <= files::memory_budget();
+    let fits = end.is_some_and(|end| end as u64 <= bytes) && bytes <= memory::budget();
     let table = |data: Cow<'static, [u8]>, rows| Table { rows, stride, columns: columns.clone(), data };
     let empty = table(Cow::default(), 0);
     let plain = Reading { ply: &ply, table: &empty, first: 0 }.has_one_origin();

@@ -27,7 +27,7 @@ fn random_cloud(n: usize, sh_degree: u8, origin: DVec3) -> GaussianCloud {
 
 fn bytes(cloud: &GaussianCloud) -> Vec<u8> {
     let mut out = Vec::new();
-    encode(&mut out, cloud).expect("encode");
+    encode(&mut out, cloud, None).expect("encode");
     out
 }
 

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::{ORIGIN, is_standard};
+use super::{ORIGIN, STATE, is_standard};
 use crate::io::{IoError, atomic};
 use crate::scene::GaussianCloud;
 
@@ -15,6 +15,12 @@ const BLOCK: usize = 4096;
 
 /// Writes a splat `.ply` (binary, little-endian), replacing the file atomically.
 pub fn write(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
+    check(path, cloud)?;
+    atomic::write(path, |w| encode(w, cloud, None))
+}
+
+/// Refuses a cloud that a `.ply` cannot hold; `path` is for the error.
+pub fn check(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
     cloud.validate().map_err(|cause| IoError::Cloud { path: path.into(), cause })?;
     if let Some(e) = cloud.extras.iter().find(|e| is_standard(&e.name) || !is_word(&e.name)) {
         return Err(IoError::Syntax {
@@ -23,7 +29,7 @@ pub fn write(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
             reason: "its name is taken or is not one printable word; rename it".into(),
         });
     }
-    atomic::write(path, |w| encode(w, cloud))
+    Ok(())
 }
 
 /// A name that a PLY header can hold.
@@ -31,10 +37,10 @@ fn is_word(name: &str) -> bool {
     !name.is_empty() && name.bytes().all(|b| b.is_ascii_graphic())
 }
 
-/// The bytes of a splat `.ply` of a valid cloud.
-pub fn encode(out: &mut dyn Write, cloud: &GaussianCloud) -> io::Result<()> {
+/// The bytes of a splat `.ply` of a valid cloud, with the id of the scene's state that it belongs to.
+pub fn encode(out: &mut dyn Write, cloud: &GaussianCloud, state: Option<&str>) -> io::Result<()> {
     let shifted = cloud.origin != DVec3::ZERO;
-    out.write_all(header(cloud, shifted).as_bytes())?;
+    out.write_all(header(cloud, shifted, state).as_bytes())?;
     let stride = cloud.sh_stride();
     let mut block = Vec::new();
     for i in 0..cloud.len() {
@@ -63,11 +69,14 @@ pub fn encode(out: &mut dyn Write, cloud: &GaussianCloud) -> io::Result<()> {
     out.write_all(&block)
 }
 
-fn header(cloud: &GaussianCloud, shifted: bool) -> String {
+fn header(cloud: &GaussianCloud, shifted: bool, state: Option<&str>) -> String {
     let mut text = String::from("ply\nformat binary_little_endian 1.0\n");
     if shifted {
         let DVec3 { x, y, z } = cloud.origin;
         let _ = writeln!(text, "comment {ORIGIN}{x:?} {y:?} {z:?}");
+    }
+    if let Some(state) = state {
+        let _ = writeln!(text, "comment {STATE}{state}");
     }
     let _ = writeln!(text, "element vertex {}", cloud.len());
     let mut property = |name: &str| {

@@ -31,6 +31,7 @@ fn cloud(n: usize) -> GaussianCloud {
 fn info() -> SceneInfo {
     SceneInfo {
         metres_per_unit: Some(0.5),
+        state: None,
         version: VERSION,
         name: "plush".into(),
         dataset: Some(DatasetReference { path: "../plush".into(), format: "transforms.json".into() }),
@@ -55,11 +56,14 @@ fn info() -> SceneInfo {
 fn a_scene_survives_a_round_trip_and_a_second_save() {
     let folder = tempfile::tempdir().expect("folder");
     let folder = folder.path().join("new/scene");
-    save(&folder, &info(), &cloud(5)).expect("save");
+    save(&folder, &info(), &cloud(5), None).expect("save");
     assert!(is_scene(&folder));
     let back = load(&folder).expect("load");
-    assert_eq!(back, TrainedScene { folder: folder.clone(), info: info(), cloud: cloud(5) });
-    save(&folder, &info(), &cloud(9)).expect("save again");
+    let state = back.state.clone();
+    assert!(state.is_some());
+    let info_there = SceneInfo { state: state.clone(), ..info() };
+    assert_eq!(back, TrainedScene { folder: folder.clone(), info: info_there, cloud: cloud(5), state });
+    save(&folder, &info(), &cloud(9), None).expect("save again");
     assert_eq!(load(&folder).expect("load").cloud.len(), 9);
     assert_eq!(fs::read_dir(&folder).expect("list").count(), 2, "temporary files are left");
 }
@@ -67,10 +71,10 @@ fn a_scene_survives_a_round_trip_and_a_second_save() {
 #[test]
 fn a_failed_save_keeps_the_scene_that_was_there() {
     let folder = tempfile::tempdir().expect("folder");
-    save(folder.path(), &info(), &cloud(5)).expect("save");
+    save(folder.path(), &info(), &cloud(5), None).expect("save");
     let mut broken = cloud(6);
     broken.positions[3][1] = f32::NAN;
-    assert!(matches!(save(folder.path(), &info(), &broken), Err(IoError::Cloud { .. })));
+    assert!(matches!(save(folder.path(), &info(), &broken, None), Err(IoError::Cloud { .. })));
     assert_eq!(load(folder.path()).expect("load").cloud.len(), 5);
 }
 
@@ -93,7 +97,7 @@ fn datasets_are_referred_to_relatively() {
     let info = SceneInfo::of(&dataset, &[1], &scene);
     assert_eq!(info.dataset.as_ref().expect("known").path, Path::new("../../data/plush"));
     assert_eq!(info.cameras.iter().map(|c| c.held_out).collect::<Vec<_>>(), [false, true]);
-    let trained = TrainedScene { folder: scene, info, cloud: cloud(1) };
+    let trained = TrainedScene { folder: scene, info, cloud: cloud(1), state: None };
     let found = trained.dataset_path().expect("exists");
     assert_eq!(fs::canonicalize(found).expect("real"), fs::canonicalize(&root).expect("real"));
     fs::remove_dir(&root).expect("remove");
@@ -103,7 +107,7 @@ fn datasets_are_referred_to_relatively() {
 #[test]
 fn other_versions_and_broken_files_are_named() {
     let folder = tempfile::tempdir().expect("folder");
-    save(folder.path(), &info(), &cloud(1)).expect("save");
+    save(folder.path(), &info(), &cloud(1), None).expect("save");
     let path = folder.path().join(SCENE_FILE);
     let text = fs::read_to_string(&path).expect("read");
     let load_with = |from: &str, to: &str| {
@@ -126,8 +130,8 @@ fn other_versions_and_broken_files_are_named() {
 #[ignore = "needs a disk of 64 to 512 KiB mounted at $FMLGS_SMALL_DISK"]
 fn a_full_disk_keeps_the_scene_that_was_there() {
     let folder = PathBuf::from(std::env::var_os("FMLGS_SMALL_DISK").expect("FMLGS_SMALL_DISK is set")).join("scene");
-    save(&folder, &info(), &cloud(100)).expect("save");
-    let e = save(&folder, &info(), &cloud(100_000)).expect_err("full");
+    save(&folder, &info(), &cloud(100), None).expect("save");
+    let e = save(&folder, &info(), &cloud(100_000), None).expect_err("full");
     assert!(matches!(&e, IoError::Write { cause, .. } if cause.kind() == std::io::ErrorKind::StorageFull), "{e}");
     assert!(e.to_string().contains("free some space"), "{e}");
     assert_eq!(load(&folder).expect("load").cloud.len(), 100);
@@ -140,7 +144,7 @@ fn a_full_disk_keeps_the_scene_that_was_there() {
 #[ignore = "needs a read-only disk with a scene at $FMLGS_READ_ONLY_DISK"]
 fn a_read_only_disk_keeps_the_scene_that_was_there() {
     let folder = PathBuf::from(std::env::var_os("FMLGS_READ_ONLY_DISK").expect("it is set")).join("scene");
-    let e = save(&folder, &info(), &cloud(9)).expect_err("read-only");
+    let e = save(&folder, &info(), &cloud(9), None).expect_err("read-only");
     assert!(
         matches!(&e, IoError::Write { cause, .. } if cause.kind() == std::io::ErrorKind::ReadOnlyFilesystem),
         "{e}"

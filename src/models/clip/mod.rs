@@ -65,6 +65,9 @@ impl ClipEncoder {
         let about: Metadata = metadata::read(path, "clip")?;
         let refused = |problem: String| ModelError::Metadata { path: path.into(), problem };
         let [height, width] = about.image_size;
+        metadata::check_pictures(path, width, about.mean, about.std)?;
+        metadata::check_length(path, "embed_dim", about.embed_dim, 1 << 16)?;
+        metadata::check_length(path, "context_length", about.context_length, 1 << 12)?;
         if height != width {
             return Err(refused(format!("pictures of {width} x {height} px; only square ones are supported")));
         }

@@ -82,6 +82,7 @@ impl Sam {
     pub fn open(path: &Path) -> Result<Self, ModelError> {
         let about: Metadata = metadata::read(path, "sam")?;
         let Metadata { image_size, mean, std, .. } = about;
+        metadata::check_pictures(path, image_size, mean, std)?;
         let prepare = Prepare { side_px: image_size, filter: Filter::Bilinear, side: Side::Longer, mean, std };
         let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
         Ok(Self { folder, about, prepare, encoder: None, decoder: None, embeddings: None })

@@ -117,7 +117,10 @@ impl Sam2 {
     pub fn open(path: &Path) -> Result<Self, ModelError> {
         let about: Metadata = metadata::read(path, "sam2")?;
         let Metadata { image_size, mean, std, .. } = about;
-        if image_size == 0 || image_size % 16 != 0 || about.memories < 2 {
+        metadata::check_pictures(path, image_size, mean, std)?;
+        metadata::check_length(path, "memories", about.memories, 1 << 10)?;
+        metadata::check_length(path, "pointers", about.pointers, 1 << 16)?;
+        if image_size % 16 != 0 || about.memories < 2 {
             let problem = format!("a side of {image_size} px and {} memories make no sense", about.memories);
             return Err(ModelError::Metadata { path: path.into(), problem });
         }

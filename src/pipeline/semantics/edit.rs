@@ -64,10 +64,7 @@ pub fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Result<Se
             if !name.chars().any(char::is_alphanumeric) {
                 return Err(EditError::NoName);
             }
-            if let Some(identity) = new.identities.get_mut(known(*id)?) {
-                identity.names.retain(|n| n != name);
-                identity.names.insert(0, name.to_owned());
-            }
+            new.identities.rename(known(*id)?, name);
         }
         Edit::Merge(from, into) => {
             let (from, into) = (known(*from)?, known(*into)?);

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::segmenter::FoundMask;
 use super::votes::UNKNOWN;
-use crate::io::{self, atomic};
+use crate::io::{self, atomic, files};
 use crate::models::ModelError;
 use crate::models::catalogue::{self, Role};
 use crate::models::network::Array;
@@ -180,8 +180,12 @@ fn write(path: &Path, frame: &Frame) -> std::io::Result<()> {
 
 /// A frame that was kept; `None` if there is none, or it is damaged.
 fn read(path: &Path) -> Option<Frame> {
-    let bytes = std::fs::read(path).ok()?;
-    let mut rest = bytes.as_slice();
+    parse(&files::read(path, files::MAX_PICTURE_BYTES).ok()?)
+}
+
+/// The frame in the bytes of a kept file; `None` if they are damaged.
+pub fn parse(bytes: &[u8]) -> Option<Frame> {
+    let mut rest = bytes;
     let mut array = || -> Option<Array> {
         let mut number = || {
             let (head, tail) = rest.split_first_chunk::<8>()?;

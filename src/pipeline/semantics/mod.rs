@@ -9,6 +9,7 @@
 
 pub mod answer;
 pub mod asker;
+pub mod carry;
 pub mod code_map;
 pub mod codes;
 pub mod edit;

@@ -168,10 +168,12 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
+    use crate::math::stats::worst_difference;
     use crate::pipeline::observer::Silent;
     use crate::scene::{Level, NOBODY};
 
-    /// Two Gaussians side by side, one of them a part, labelled as they are.
+    /// Two Gaussians side by side, one of them a part, with the masks that a person would draw: a disc of 4 px
+    /// around where each is seen, half a length to either side at 51.7 px a length and three lengths away.
     fn scene() -> (GaussianCloud, Identities, Vec<CodeView>) {
         let mut all = Identities::default();
         let doll = all.add(Level::Object, NOBODY, vec![]);
@@ -189,17 +191,18 @@ mod tests {
         };
         let camera =
             Camera::look_at(DVec3::new(0.0, 0.0, -3.0), DVec3::ZERO, DVec3::NEG_Y, 0.6, 48, 32).expect("valid");
-        let mut renderer = Renderer::new();
-        let map = super::super::view_map::ViewMap::render(
-            &mut renderer,
-            &cloud,
-            &[doll, eye],
-            &all,
-            &camera,
-            &RenderSettings::default(),
-        )
-        .expect("drawn");
-        let views = vec![CodeView { camera, labels: map.identity }];
+        let label = |i: usize| {
+            let (x, y) = ((i % 48) as f64 + 0.5 - 24.0, (i / 48) as f64 + 0.5 - 16.0);
+            let near = |middle: f64| (x - middle).hypot(y) < 4.0;
+            if near(-8.62) {
+                doll
+            } else if near(8.62) {
+                eye
+            } else {
+                NOBODY
+            }
+        };
+        let views = vec![CodeView { camera, labels: (0..48 * 32).map(label).collect() }];
         (cloud, all, views)
     }
 
@@ -219,10 +222,11 @@ mod tests {
         let (codes, of, loss) = train(400, |l| l);
         assert_eq!(of, [1, 2], "{codes:?}");
         for (code, wanted) in codes.iter().zip([[0.9, 0.2, 0.5, 0.5, 0.5, 0.5], [0.9, 0.2, 0.5, 0.1, 0.3, 0.8]]) {
-            assert!(code.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 0.15), "{code:?} {wanted:?}");
+            // Not nearer: a disc ends at once, a Gaussian fades.
+            assert!(worst_difference(code, &wanted) < 0.11, "{code:?} {wanted:?}");
         }
         let (_, _, first) = train(1, |l| l);
-        assert!(loss < first, "{loss} {first}");
+        assert!(loss < 0.8 * first, "{loss} {first}");
         // Without masks nothing is learnt; with the wrong ones, the wrong thing.
         let (codes, of, _) = train(100, |_| UNKNOWN);
         assert_eq!((codes[0], of), ([0.5; 6], vec![NOBODY; 2]));

@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::options::{Rig, SynthOptions};
 use super::write::{SETTINGS, TRANSFORMS};
 use super::{SynthError, SynthReport, render_scene};
-use crate::io::gltf_mesh;
+use crate::io::{files, gltf_mesh};
 use crate::pipeline::observer::Observer;
 
 /// The demo scene: a table-top of things with parts, written by [`crate::pipeline::demo_scene`].
@@ -34,7 +34,7 @@ pub fn demo_options() -> SynthOptions {
 /// Whether `out` already holds the photos that [`write_demo`] would write.
 pub fn demo_is_written(out: &Path) -> bool {
     let expected = serde_json::json!({ "version": 1, "scene": fingerprint(), "options": demo_options() });
-    let settings = std::fs::read(out.join(SETTINGS)).ok();
+    let settings = files::read(&out.join(SETTINGS), files::MAX_TEXT_BYTES).ok();
     let found: Option<serde_json::Value> = settings.and_then(|bytes| serde_json::from_slice(&bytes).ok());
     found == Some(expected) && out.join(TRANSFORMS).is_file()
 }

@@ -45,9 +45,15 @@ pub use demo::demo_glb;
 pub use levels::Identity;
 pub use options::{Levels, Rig, SynthOptions};
 
+use crate::io::IoError;
 use crate::io::gltf_mesh::{self, GltfError, MeshScene};
+use crate::io::memory;
 use crate::pipeline::observer::{self, Observer, Progress, Signal};
 use crate::scene::Camera;
+
+/// Bytes that a pixel of a photo takes while it is rendered and written: colour, depth and ids, and
+/// their copies in files' formats.
+const BYTES_PER_PX: u64 = 48;
 
 /// Why no data set was made.
 #[derive(Debug, thiserror::Error)]
@@ -75,6 +81,9 @@ pub enum SynthError {
         /// The limit.
         limit: usize,
     },
+    /// Photos that do not fit into memory.
+    #[error(transparent)]
+    NoRoom(#[from] memory::NoRoom),
     /// More identities than a 16-bit id map holds.
     #[error("the scene has more than 65535 objects and parts; name fewer nodes")]
     TooManyIdentities,
@@ -86,6 +95,9 @@ pub enum SynthError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// The folder is not for this.
+    #[error(transparent)]
+    Folder(#[from] IoError),
     /// The observer asked to stop.
     #[error("cancelled")]
     Cancelled,
@@ -153,8 +165,12 @@ fn render_scene(
     let writer = write::Writer::new(out, cameras.len())?;
     let per_view = options.points.div_ceil((options.views - options.held_out).max(1));
     let mut cloud = Vec::new();
-    // A few photos at once, so that encoding one overlaps with tracing the next.
-    let batch = 2 * rayon::current_num_threads();
+    // A few photos at once, so that encoding one overlaps with tracing the next; fewer of them where
+    // memory is short.
+    let photo_bytes = u64::from(options.width_px) * u64::from(options.height_px) * BYTES_PER_PX;
+    let what = format!("a photo of {} x {} px", options.width_px, options.height_px);
+    memory::room(what, photo_bytes, "make photos smaller with --size")?;
+    let batch = (2 * rayon::current_num_threads()).min((memory::free() / photo_bytes) as usize).max(1);
     for first in (0..cameras.len()).step_by(batch) {
         wait_or_cancel(observer)?;
         let last = (first + batch).min(cameras.len());

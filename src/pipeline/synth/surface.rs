@@ -13,8 +13,12 @@ use super::levels::{Identities, NodeIds};
 use crate::io::gltf_mesh::{Material, MeshScene, Primitive};
 use crate::scene::Bounds;
 
-/// Most triangles that are drawn, after splitting.
+/// Most triangles that are drawn, before splitting.
 const MAX_TRIANGLES: usize = 8_000_000;
+/// Most triangles that splitting adds.
+const MOST_PIECES: usize = 400_000;
+/// Least height of a triangle that is split, in the frame.
+const THIN: f64 = 2e-5;
 /// Flat faces are split to about this many squares over the whole scene.
 const LIGHT_CELLS: f64 = 24_000.0;
 
@@ -171,18 +175,35 @@ impl Surface {
     /// split depends on the edge alone, so neighbours agree and no gaps open.
     fn split_for_light(&mut self) {
         let area: f64 = self.triangles.iter().map(|t| self.area(t)).sum();
-        let longest = (2.0 * area / LIGHT_CELLS).sqrt() as f32;
+        // An edge of length 2 becomes shorter than any useful limit in 14 halvings.
+        let mut longest = ((2.0 * area / LIGHT_CELLS).sqrt() as f32).max(2e-4);
+        let (whole, corners) = (self.triangles.clone(), self.vertices.len());
+        // Slivers fall into far more pieces than their area asks for: then coarser ones have to do.
+        while !self.split(longest, whole.len() + MOST_PIECES) {
+            self.triangles.clone_from(&whole);
+            self.vertices.truncate(corners);
+            longest *= 2.0;
+        }
+    }
+
+    /// Splits edges that are longer than `longest`; whether that made no more than `most` triangles. If
+    /// not, it is left undone half way.
+    fn split(&mut self, longest: f32, most: usize) -> bool {
         let mut middles: HashMap<(u32, u32), u32> = HashMap::new();
         let mut pending = std::mem::take(&mut self.triangles);
         let mut done = Vec::with_capacity(pending.len());
         while let Some(t) = pending.pop() {
+            if done.len() + pending.len() >= most {
+                return false;
+            }
+            if self.is_thin(&t) {
+                done.push(t);
+                continue;
+            }
             let [a, b, c] = t.vertices;
-            let room = done.len() + pending.len() + 4 <= MAX_TRIANGLES;
             let mut middle = |i: u32, j: u32| {
                 let (p, q) = (self.vertices[i as usize], self.vertices[j as usize]);
-                // A cap on the number of halvings: an edge of length 2 becomes shorter than any
-                // useful limit in 16.
-                (room && p.position.distance(q.position) > longest.max(2e-4)).then(|| {
+                (p.position.distance(q.position) > longest).then(|| {
                     *middles.entry((i.min(j), i.max(j))).or_insert_with(|| {
                         self.vertices.push(between(&p, &q));
                         self.vertices.len() as u32 - 1
@@ -205,6 +226,15 @@ impl Surface {
             pending.extend(split.into_iter().map(|vertices| Triangle { vertices, ..t }));
         }
         self.triangles = done;
+        true
+    }
+
+    /// Whether a triangle is so thin that nobody sees how light changes along it. Its neighbours' new
+    /// corners lie on its edges, so no gap opens.
+    fn is_thin(&self, t: &Triangle) -> bool {
+        let [a, b, c] = self.corners(t);
+        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+        2.0 * self.area(t) < f64::from(longest) * THIN
     }
 
     /// Area of a triangle in the frame.

@@ -557,3 +557,14 @@ fn render_to_look_at() {
     };
     println!("{:.2} s, {} triangles, {} points", report.secs, report.triangles, report.points);
 }
+
+#[test]
+fn slivers_do_not_fall_into_pieces_without_end() {
+    let triangles = |scale: f64| {
+        let (root, bin) = cubes(json!([{ "name": "bar", "mesh": 0, "scale": [scale, 1, 1] }]), json!([0]), json!([]));
+        stage_of(&gltf_mesh::read_slice(&glb(&root, &bin), "bar.glb").unwrap()).surface.triangles.len()
+    };
+    assert_eq!(triangles(1e6), 2 * 6, "nobody sees how light changes along it");
+    let (cube, bar) = (triangles(1.0), triangles(100.0));
+    assert!(cube > 10_000 && bar > 10_000 && bar < 400_000, "control: {cube}, {bar}");
+}

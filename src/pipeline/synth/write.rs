@@ -12,6 +12,8 @@ use super::levels::Identity;
 use super::options::SynthOptions;
 use super::view::View;
 use super::{SynthError, opengl_pose};
+use crate::io::folder_lock::FolderLock;
+use crate::io::{IoError, atomic};
 use crate::scene::{Camera, SparsePoint};
 
 /// The file whose presence makes the folder a data set; written last.
@@ -22,27 +24,39 @@ pub const SETTINGS: &str = "synth.json";
 /// Writes into one folder.
 pub struct Writer {
     out: PathBuf,
+    _lock: FolderLock,
     /// Digits of a photo's number.
     digits: usize,
 }
 
 impl Writer {
-    /// Makes the folders. Takes away what marks an earlier data set as complete.
+    /// Makes the folders. Takes away what marks an earlier data set as complete, if this program has
+    /// written that; refuses a folder that holds anything else.
     pub fn new(out: &Path, views: usize) -> Result<Self, SynthError> {
+        fs::create_dir_all(out).map_err(|source| SynthError::Write { path: out.into(), source })?;
+        let lock = FolderLock::take(out, "making photos")?;
+        let hidden = |e: &fs::DirEntry| e.file_name().to_string_lossy().starts_with('.');
+        let holds_something = fs::read_dir(out).is_ok_and(|all| all.flatten().any(|e| !hidden(&e)));
+        if holds_something && !out.join(SETTINGS).is_file() {
+            let what = "holds something that 'fmlgs synth' has not written, which would be replaced";
+            return Err(IoError::Occupied { folder: out.into(), what }.into());
+        }
         for folder in ["images", "object_ids", "part_ids", "depth"] {
             let path = out.join(folder);
             fs::create_dir_all(&path).map_err(|source| SynthError::Write { path, source })?;
         }
-        for marker in [TRANSFORMS, SETTINGS] {
-            let path = out.join(marker);
-            match fs::remove_file(&path) {
-                Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
-                    return Err(SynthError::Write { path, source });
-                }
-                _ => {}
+        let path = out.join(TRANSFORMS);
+        match fs::remove_file(&path) {
+            Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+                return Err(SynthError::Write { path, source });
             }
+            _ => {}
         }
-        Ok(Self { out: out.to_owned(), digits: views.saturating_sub(1).to_string().len().max(4) })
+        let digits = views.saturating_sub(1).to_string().len().max(4);
+        let writer = Self { out: out.to_owned(), _lock: lock, digits };
+        // Says whose folder it is, also where this does not come to its end.
+        writer.json(SETTINGS, &json!({ "version": 1, "complete": false }))?;
+        Ok(writer)
     }
 
     /// Writes the files of photo `index`.
@@ -117,7 +131,7 @@ impl Writer {
     }
 
     fn json(&self, name: &str, value: &serde_json::Value) -> Result<(), SynthError> {
-        self.file(name, |f| serde_json::to_writer_pretty(f, value).map_err(Into::into))
+        Ok(atomic::write(&self.out.join(name), |w| serde_json::to_writer_pretty(w, value).map_err(Into::into))?)
     }
 
     fn file(

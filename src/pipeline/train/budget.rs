@@ -1,5 +1,7 @@
 //! How many Gaussians this machine can train.
 
+use crate::io::memory;
+
 /// Bytes that one trained Gaussian takes: parameters, two moments, a snapshot and a copy to roll
 /// back to (59 floats each), its statistics, and the renderer's records of about four tiles.
 pub const BYTES_PER_GAUSSIAN: u64 = 59 * 4 * 5 + 12 + 64 + 4 * 60;
@@ -15,11 +17,7 @@ pub fn worthwhile(pixels: usize, start: usize) -> usize {
 
 /// Most Gaussians that the memory holds, between ten thousand and ten million.
 pub fn gaussians() -> usize {
-    let system = sysinfo::System::new_with_specifics(
-        sysinfo::RefreshKind::nothing().with_memory(sysinfo::MemoryRefreshKind::nothing().with_ram()),
-    );
-    // Where the system does not tell, a machine with a gigabyte free is assumed.
-    fitting(system.map_or(1 << 30, |s| s.available_memory()))
+    fitting(memory::free())
 }
 
 fn fitting(bytes: u64) -> usize {

@@ -2,27 +2,30 @@
 //!
 //! Layout: the magic bytes, the header's length (u64), a JSON header, then little-endian f32
 //! arrays: the cloud, both moments (positions, log-scales, quaternions, opacity logits, SH each)
-//! and the density statistics.
+//! and the density statistics; at the end the SHA-256 of all that.
 
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::Path;
 
 use bytemuck::cast_slice;
 use glam::DVec3;
 use rand_pcg::Pcg64Mcg;
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 
 use super::TrainConfig;
 use super::density::DensityStats;
 use super::trainer::Trainer;
-use crate::io::IoError;
 use crate::io::trained::History;
+use crate::io::{IoError, SceneFolder, files};
 use crate::math::sh::coefficients;
 use crate::scene::GaussianCloud;
 
-/// The file's name in a trained scene's folder.
-pub const FILE: &str = "checkpoint.bin";
-const MAGIC: &[u8; 8] = b"FMLGSCP1";
+pub use crate::io::scene_folder::CHECKPOINT_FILE as FILE;
+
+const MAGIC: &[u8; 8] = b"FMLGSCP2";
+/// How files of the first version begin, which end without a checksum.
+const MAGIC_1: &[u8; 8] = b"FMLGSCP1";
 
 /// Everything about a run but its arrays.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -60,18 +63,21 @@ pub enum CheckpointError {
     #[error(transparent)]
     Io(#[from] IoError),
     /// It is not a checkpoint, or a damaged one.
-    #[error("{path} is damaged or no checkpoint ({reason}); move it away to start the training anew")]
+    #[error("{path} is damaged or no checkpoint ({reason}); choose another folder to train anew")]
     Damaged {
         /// The file.
         path: std::path::PathBuf,
         /// What is wrong.
         reason: String,
     },
+    /// There is a scene, but nothing to go on from.
+    #[error("{folder} holds a trained scene, but no checkpoint to go on from; choose another folder for the result")]
+    Missing {
+        /// The scene's folder.
+        folder: std::path::PathBuf,
+    },
     /// It belongs to another run.
-    #[error(
-        "{path} belongs to a run with other {what}; choose another folder for the result, or move the file away to \
-         start anew"
-    )]
+    #[error("{path} belongs to a run with other {what}; choose another folder for the result")]
     OtherRun {
         /// The file.
         path: std::path::PathBuf,
@@ -81,22 +87,46 @@ pub enum CheckpointError {
 }
 
 /// Writes the state atomically.
-pub fn save(path: &Path, trainer: &Trainer, header: &Header) -> Result<(), IoError> {
-    crate::io::atomic::write(path, |w| {
+///
+/// # Errors
+/// If it cannot be written; the checkpoint before is then unchanged.
+pub fn save(scene: &SceneFolder, trainer: &Trainer, header: &Header) -> Result<(), IoError> {
+    scene.save_checkpoint(|w| {
+        let mut w = Summed { to: w, sum: Sha256::new() };
         let text = serde_json::to_vec(header)?;
         w.write_all(MAGIC)?;
         w.write_all(&(text.len() as u64).to_le_bytes())?;
         w.write_all(&text)?;
         for cloud in [&trainer.cloud, &trainer.moments[0], &trainer.moments[1]] {
-            write_cloud(w, cloud)?;
+            write_cloud(&mut w, cloud)?;
         }
         w.write_all(cast_slice(&trainer.stats.gradient))?;
         w.write_all(cast_slice(&trainer.stats.seen))?;
-        w.write_all(cast_slice(&trainer.stats.radius))
+        w.write_all(cast_slice(&trainer.stats.radius))?;
+        let sum = w.sum.finalize();
+        w.to.write_all(&sum)
     })
 }
 
-fn write_cloud(w: &mut dyn Write, c: &GaussianCloud) -> std::io::Result<()> {
+/// Passes bytes on and sums them up.
+struct Summed<'a> {
+    to: &'a mut dyn Write,
+    sum: Sha256,
+}
+
+impl Write for Summed<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let n = self.to.write(bytes)?;
+        self.sum.update(&bytes[..n]);
+        Ok(n)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.to.flush()
+    }
+}
+
+fn write_cloud(w: &mut dyn Write, c: &GaussianCloud) -> io::Result<()> {
     w.write_all(cast_slice(&c.positions))?;
     w.write_all(cast_slice(&c.log_scales))?;
     w.write_all(cast_slice(&c.quaternions))?;
@@ -119,12 +149,22 @@ pub struct Checkpoint {
 /// Reads a checkpoint, or `None` if there is no such file.
 pub fn load(path: &Path) -> Result<Option<Checkpoint>, CheckpointError> {
     let damaged = |reason: &str| CheckpointError::Damaged { path: path.into(), reason: reason.into() };
-    let bytes = match std::fs::read(path) {
+    let bytes = match files::read(path, u64::MAX) {
         Ok(bytes) => bytes,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        Err(cause) => return Err(IoError::Read { path: path.into(), cause }.into()),
+        Err(IoError::Read { cause, .. }) if cause.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(e) => return Err(e.into()),
     };
-    let rest = bytes.strip_prefix(MAGIC).ok_or_else(|| damaged("it does not begin like one"))?;
+    let body = match bytes.split_last_chunk::<32>() {
+        Some((body, sum)) if bytes.starts_with(MAGIC) => {
+            if Sha256::digest(body).as_slice() != sum {
+                return Err(damaged("its checksum is another"));
+            }
+            body
+        }
+        _ => &bytes,
+    };
+    let rest = body.strip_prefix(MAGIC).or_else(|| body.strip_prefix(MAGIC_1));
+    let rest = rest.ok_or_else(|| damaged("it does not begin like one"))?;
     let (length, rest) = rest.split_first_chunk::<8>().ok_or_else(|| damaged("it ends in the header"))?;
     let length = usize::try_from(u64::from_le_bytes(*length)).ok().filter(|&l| l <= rest.len());
     let (text, data) = rest.split_at(length.ok_or_else(|| damaged("it ends in the header"))?);

@@ -1,7 +1,10 @@
 //! What a training run is asked to do.
 
+use std::path::Path;
+
 use serde::{Deserialize, Serialize};
 
+use crate::io::trained::SCENE_FILE;
 use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::render::{BackendChoice, RenderSettings};
 use crate::scene::Limits;
@@ -14,6 +17,7 @@ const SURFEL_DISTORTION: f64 = 0.1;
 
 /// Settings of a run. Everything that a schedule depends on scales with `steps`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct TrainConfig {
     /// Optimiser steps in all.
     pub steps: u64,
@@ -24,10 +28,8 @@ pub struct TrainConfig {
     /// Highest spherical-harmonics degree, 0 to 3.
     pub sh_degree: u8,
     /// Open all bands of colour from the first step on instead of one after the other.
-    #[serde(default)]
     pub sh_at_once: bool,
     /// Share of the steps, from the first on, that see the photos at half their size; 0 = none.
-    #[serde(default)]
     pub coarse_share: f64,
     /// Whether Gaussians are added and removed on the way.
     pub densify: bool,
@@ -46,18 +48,40 @@ pub struct TrainConfig {
     /// Which renderer trains.
     pub backend: BackendChoice,
     /// Train surfels (2D Gaussian Splatting) instead of Gaussians; on the CPU.
-    #[serde(default)]
     pub surfels: bool,
     /// Weight of the term that holds normals and depth together, on the CPU; `None` = 0 for
     /// Gaussians, 2DGS's for surfels.
-    #[serde(default)]
     pub normal_weight: Option<f64>,
     /// Weight of the term that pulls surfels together along rays; `None` = the default.
-    #[serde(default)]
     pub distortion_weight: Option<f64>,
 }
 
+/// Stored settings that cannot be read: defaults in their place would train or draw something else.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "{path}: the settings of the training ('config') cannot be read: {cause}; mend them, or take the entry out to go on with the defaults"
+)]
+pub struct UnreadableConfig {
+    path: String,
+    cause: serde_json::Error,
+}
+
 impl TrainConfig {
+    /// The settings that the scene in `folder` stores; the defaults for what it does not say, or if it says
+    /// nothing.
+    ///
+    /// # Errors
+    /// If they cannot be read.
+    pub fn stored(folder: &Path, config: serde_json::Value) -> Result<Self, UnreadableConfig> {
+        let read = match config {
+            serde_json::Value::Null => Ok(Self::default()),
+            named @ serde_json::Value::Object(_) => serde_json::from_value(named),
+            // A list would be taken for the settings in their order.
+            _ => Err(serde::de::Error::custom("they have no names")),
+        };
+        read.map_err(|cause| UnreadableConfig { path: folder.join(SCENE_FILE).display().to_string(), cause })
+    }
+
     /// Weights of the terms for normals and distortion.
     pub fn geometry_weights(&self) -> (f64, f64) {
         let or = |weight: Option<f64>, surfels: f64| weight.unwrap_or(if self.surfels { surfels } else { 0.0 });
@@ -110,6 +134,28 @@ impl Default for TrainConfig {
             surfels: false,
             normal_weight: None,
             distortion_weight: None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::*;
+
+    #[test]
+    fn stored_settings_are_read_or_refused_but_never_guessed() {
+        let stored = |config: Value| TrainConfig::stored(Path::new("desk"), config);
+        assert_eq!(stored(Value::Null).expect("none"), TrainConfig::default());
+        let own = TrainConfig { steps: 77, antialias: true, normal_weight: Some(0.5), ..TrainConfig::default() };
+        assert_eq!(stored(serde_json::to_value(&own).expect("JSON")).expect("its own"), own);
+        // Of an earlier version, and of a later one.
+        let partial = stored(json!({ "steps": 9, "surfels": true, "new": {} })).expect("what it knows");
+        assert_eq!(partial, TrainConfig { steps: 9, surfels: true, ..TrainConfig::default() });
+        for broken in [json!({ "steps": "many" }), json!({ "antialias": 3 }), json!([1, 2]), json!("x")] {
+            let text = stored(broken.clone()).expect_err("unreadable").to_string();
+            assert!(text.contains("desk/scene.json") && text.contains("'config'"), "{broken}: {text}");
         }
     }
 }

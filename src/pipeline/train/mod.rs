@@ -10,6 +10,7 @@ mod coarse;
 pub mod config;
 pub mod density;
 mod device;
+mod folder;
 pub mod geometry;
 pub mod init;
 mod photos;

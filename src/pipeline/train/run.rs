@@ -8,12 +8,13 @@ use std::time::Instant;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
-use super::checkpoint::{self, CheckpointError, Header};
+use super::checkpoint::{self, Checkpoint, CheckpointError, Header};
+use super::folder::{claim, finished, objects_for, resumable};
 use super::photos::{load_views, wait};
 use super::trainer::{REPORT_STEPS, StepError, StepResult, Trainer};
 use super::{TrainConfig, TrainView, coarse, density, geometry, init};
-use crate::io::IoError;
-use crate::io::trained::{self, History, SceneInfo};
+use crate::io::trained::{History, SceneInfo};
+use crate::io::{IoError, SceneFolder};
 use crate::math::finite::NotFinite;
 use crate::math::stats::{mean, median};
 use crate::pipeline::evaluate::evaluate;
@@ -86,7 +87,12 @@ pub enum TrainError {
 }
 
 /// Trains on `dataset` and saves into the folder `out`, if given. A checkpoint of the same run in
-/// that folder is continued. Blocks until done; all contact is through `observer`.
+/// that folder is continued; where that run is finished, nothing is done. Objects and parts that the
+/// scene there has are carried over, and kept as they were beside it. Blocks until done; all contact
+/// is through `observer`.
+///
+/// # Errors
+/// See [`TrainError`]. A checkpoint that cannot be saved on the way ends nothing; at the end it does.
 pub fn run(
     dataset: &Dataset,
     config: &TrainConfig,
@@ -98,10 +104,18 @@ pub fn run(
     if train.is_empty() {
         return Err(TrainError::NoPhotos(dataset.name.clone(), dataset.photos.len()));
     }
+    let scene = out.map(|folder| claim(folder, dataset)).transpose()?;
     let saved = match out {
         Some(folder) => resumable(folder, dataset, config, &train)?,
         None => None,
     };
+    if let (Some(folder), Some(saved)) = (out, &saved)
+        && let Some(done) = finished(folder, saved, config)?
+    {
+        observer.note(Level::Info, format!("All {} steps were done before; nothing has changed", config.steps));
+        observer.cloud(Arc::clone(&done.cloud), done.steps);
+        return Ok(done);
+    }
     let Some(mut views) = load_views(dataset, &train, config, "Loading photos", observer)? else {
         return Ok(stopped_early());
     };
@@ -109,8 +123,9 @@ pub fn run(
         return Ok(stopped_early());
     };
     views.shrink_to_fit();
-    let mut job = Job::start(dataset, config, out, &held, views, tests, saved);
-    job.context = if config.needs_cpu() { None } else { config.backend.gpu()? };
+    let mut job = Job::start(dataset, config, scene, &held, views, tests, saved);
+    let told = |why| observer.note(Level::Warning, why);
+    job.context = if config.needs_cpu() { None } else { config.backend.gpu(told)? };
     match &job.context {
         Some(context) => {
             observer.note(Level::Info, format!("Training on {}", context.describe()));
@@ -155,36 +170,10 @@ fn stopped_early() -> TrainOutcome {
     TrainOutcome { cloud: Arc::default(), evaluations: Vec::new(), end: TrainEnd::Cancelled, steps: 0, secs: 0.0 }
 }
 
-fn photo_names(dataset: &Dataset, indices: &[usize]) -> Vec<String> {
-    indices.iter().map(|&i| dataset.photos[i].name.clone()).collect()
-}
-
-/// The checkpoint in `folder`, if there is one and it is of this run.
-fn resumable(
-    folder: &Path,
-    dataset: &Dataset,
-    config: &TrainConfig,
-    train: &[usize],
-) -> Result<Option<checkpoint::Checkpoint>, CheckpointError> {
-    let path = folder.join(checkpoint::FILE);
-    let Some(saved) = checkpoint::load(&path)? else { return Ok(None) };
-    let h = &saved.header;
-    // How often to look and save does not change the trajectory.
-    let theirs =
-        TrainConfig { eval_every: config.eval_every, checkpoint_secs: config.checkpoint_secs, ..h.config.clone() };
-    if theirs != *config {
-        return Err(CheckpointError::OtherRun { path, what: "settings" });
-    }
-    if h.photos != photo_names(dataset, train) {
-        return Err(CheckpointError::OtherRun { path, what: "photos" });
-    }
-    Ok(Some(saved))
-}
-
 /// A running job.
 struct Job<'a> {
     config: &'a TrainConfig,
-    out: Option<&'a Path>,
+    scene: Option<SceneFolder>,
     info: SceneInfo,
     photos: Vec<String>,
     views: Vec<TrainView>,
@@ -202,17 +191,19 @@ struct Job<'a> {
     outliers: u64,
     /// Whether it was told that the budget is reached.
     full: bool,
+    /// Whether the last checkpoint could not be saved.
+    unsaved: bool,
 }
 
 impl<'a> Job<'a> {
     fn start(
         dataset: &Dataset,
         config: &'a TrainConfig,
-        out: Option<&'a Path>,
+        scene: Option<SceneFolder>,
         held: &[usize],
         views: Vec<TrainView>,
         tests: Vec<TrainView>,
-        saved: Option<checkpoint::Checkpoint>,
+        saved: Option<Checkpoint>,
     ) -> Self {
         let (_, extent) = dataset.camera_extent();
         let background = dataset.background.unwrap_or([0.0; 3]);
@@ -243,14 +234,14 @@ impl<'a> Job<'a> {
                 t
             }
         };
-        let mut info = SceneInfo::of(dataset, held, out.unwrap_or(Path::new(".")));
+        let mut info = SceneInfo::of(dataset, held, scene.as_ref().map_or(Path::new("."), SceneFolder::path));
         info.config = serde_json::to_value(config).unwrap_or_default();
         let photos = views.iter().map(|v| v.name.clone()).collect();
         let safe = trainer.cloud.clone();
         let coarse = (trainer.step < coarse_steps(config)).then(|| coarse::halved(&views));
         Self {
             config,
-            out,
+            scene,
             info,
             photos,
             views,
@@ -265,6 +256,7 @@ impl<'a> Job<'a> {
             recent: VecDeque::new(),
             outliers: 0,
             full: false,
+            unsaved: false,
         }
     }
 
@@ -319,7 +311,18 @@ impl<'a> Job<'a> {
             }
             let due = self.config.checkpoint_secs;
             if due > 0.0 && saved_at.elapsed().as_secs_f64() >= due {
-                self.checkpoint()?;
+                match self.checkpoint() {
+                    // A full disk now is no reason to lose what is in memory.
+                    Err(TrainError::Save(e)) if !std::mem::replace(&mut self.unsaved, true) => {
+                        observer.note(Level::Warning, format!("No checkpoint was saved, the training goes on: {e}"));
+                    }
+                    Err(TrainError::Save(_)) => {}
+                    Err(e) => return Err(e),
+                    Ok(()) if std::mem::take(&mut self.unsaved) => {
+                        observer.note(Level::Info, "Checkpoints are saved again".into());
+                    }
+                    Ok(()) => {}
+                }
                 saved_at = Instant::now();
             }
         }
@@ -417,7 +420,7 @@ impl<'a> Job<'a> {
     }
 
     fn checkpoint(&mut self) -> Result<(), TrainError> {
-        let Some(folder) = self.out else { return Ok(()) };
+        let Some(scene) = &self.scene else { return Ok(()) };
         self.trainer.fetch()?;
         let t = &self.trainer;
         let header = Header {
@@ -434,28 +437,23 @@ impl<'a> Job<'a> {
             damping: t.schedule.damping,
             history: self.history.clone(),
         };
-        std::fs::create_dir_all(folder).map_err(|cause| {
-            TrainError::Save(IoError::Write {
-                path: folder.into(),
-                remedy: "choose another folder for the result",
-                cause,
-            })
-        })?;
-        checkpoint::save(&folder.join(checkpoint::FILE), t, &header).map_err(TrainError::Save)
+        checkpoint::save(scene, t, &header).map_err(TrainError::Save)
     }
 
     /// Scores and saves the final state.
     fn finish(mut self, end: TrainEnd, observer: &mut dyn Observer) -> Result<TrainOutcome, TrainError> {
         self.trainer.fetch_cloud()?;
-        self.checkpoint()?;
+        let checkpoint = self.checkpoint();
         let scored = self.history.evaluations.last().is_some_and(|e| e.step == self.trainer.step);
         if end == TrainEnd::Finished && !scored {
             self.evaluate(observer)?;
         }
-        if let Some(folder) = self.out {
+        if let Some(scene) = &self.scene {
             self.info.history = self.history.clone();
-            trained::save(folder, &self.info, &self.trainer.cloud).map_err(TrainError::Save)?;
+            let map = objects_for(scene, &self.trainer.cloud, observer).map_err(TrainError::Save)?;
+            scene.save(&self.info, &self.trainer.cloud, map.as_ref()).map_err(TrainError::Save)?;
         }
+        checkpoint?;
         let cloud = Arc::new(self.trainer.cloud);
         observer.cloud(Arc::clone(&cloud), self.trainer.step);
         Ok(TrainOutcome {

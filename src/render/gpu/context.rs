@@ -38,11 +38,14 @@ impl Context {
         Self::open(&adapter)
     }
 
-    /// Opens the best real GPU; `None` where there is none that works. No device of an emulated
-    /// adapter is opened to find that out.
-    pub fn real() -> Option<Self> {
-        let adapter = adapter(false).ok().filter(|a| a.get_info().device_type != wgpu::DeviceType::Cpu)?;
-        Self::open(&adapter).ok()
+    /// Opens the best real GPU; `None` where there is none. No device of an emulated adapter is opened
+    /// to find that out.
+    ///
+    /// # Errors
+    /// If there is one that does not open.
+    pub fn real() -> Result<Option<Self>, GpuError> {
+        let adapter = adapter(false).ok().filter(|a| a.get_info().device_type != wgpu::DeviceType::Cpu);
+        adapter.map(|a| Self::open(&a)).transpose()
     }
 
     /// Opens a device on an adapter of the caller's choice.

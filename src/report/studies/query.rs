@@ -20,8 +20,9 @@ use crate::pipeline::semantics::protocols::{AskedScene, Category, LabelledView, 
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::RenderSettings;
 use crate::render::cpu::Renderer;
+use crate::report::document::Form;
 use crate::report::sweep::failed;
-use crate::report::{Case, Rule, Stage, StageName, Study, StudyError, Trial};
+use crate::report::{Case, Measure, Rule, Stage, StageName, Study, StudyError, Trial};
 use crate::scene::{Camera, GaussianCloud, IdentityId, LanguageFeatures, Level, Mask, SemanticMap};
 
 /// A labelled photo.
@@ -165,6 +166,12 @@ impl Study for QueryStudy<'_> {
             ),
             overlap("object mIoU", "mean overlap of objects"),
             overlap("part mIoU", "mean overlap of parts"),
+            Measure::new(
+                "not understood",
+                "",
+                Form::Error,
+                "share of names of which the encoder knows no word; they count as an overlap of 0",
+            ),
         ];
         let rule = Rule { measure: "mIoU".into(), times: 1.02, floor: 0.0, spare_secs: 5e-3 };
         let reference =
@@ -184,6 +191,7 @@ impl Study for QueryStudy<'_> {
         canonical.learn(&[], |p| self.encoder.text(p)).map_err(failed)?;
         let (map, mut renderer) = (self.map, Renderer::new());
         let (mut secs, mut ious, mut hits) = (Vec::new(), [Vec::new(), Vec::new()], Vec::new());
+        let (mut not_understood, mut broken) = (Vec::new(), None);
         for view in &self.views {
             if observer.signal() == Signal::Cancel {
                 return Ok(None);
@@ -207,12 +215,19 @@ impl Study for QueryStudy<'_> {
                 let answered = ask(&category.name, map, &features, &plan, &mut phrases, &mut *self.encoder)?;
                 let mask = answered.map(|a| found(&a, &maps, map, &plan));
                 secs.push(start.elapsed().as_secs_f64());
+                not_understood.push(f64::from(u8::from(mask.is_none())));
                 let iou = mask.map_or(0.0, |m| enlarged(&m, w as usize, h as usize).iou(&category.mask));
                 ious[usize::from(category.level == Level::Part)].push(iou);
             }
             let encoder = &mut *self.encoder;
-            let mut again =
-                |text: &str| ask(text, map, &features, &plan, &mut canonical.clone(), encoder).ok().flatten();
+            // An encoder that fails is no answer that misses.
+            let mut again = |text: &str| {
+                let answered = ask(text, map, &features, &plan, &mut canonical.clone(), encoder);
+                answered.unwrap_or_else(|e| {
+                    broken.get_or_insert(e);
+                    None
+                })
+            };
             let full =
                 ViewMap::render(&mut renderer, self.cloud, &map.of, &map.identities, &view.camera, self.settings)
                     .map_err(failed)?;
@@ -225,6 +240,9 @@ impl Study for QueryStudy<'_> {
             };
             let units = langsplat::compare(&mut AskedScene { map, ask: &mut again }, &labelled);
             hits.extend(units.into_iter().map(|u| f64::from(u8::from(u.hit == Some(true)))));
+            if let Some(e) = broken.take() {
+                return Err(e);
+            }
         }
         let all: Vec<f64> = ious.iter().flatten().copied().collect();
         let recalled = ious[1].iter().map(|iou| f64::from(u8::from(*iou >= HIT_IOU))).collect::<Vec<_>>();
@@ -234,6 +252,7 @@ impl Study for QueryStudy<'_> {
             ("localisation", mean(&hits)),
             ("object mIoU", mean(&ious[0])),
             ("part mIoU", mean(&ious[1])),
+            ("not understood", mean(&not_understood)),
         ];
         Ok(Some(Trial { secs: mean(&secs), values, curve: Vec::new() }))
     }
@@ -281,6 +300,7 @@ fn enlarged(mask: &Mask, w: usize, h: usize) -> Mask {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::stats::worst_difference;
 
     #[test]
     fn masks_grow_by_nearest_pixels() {
@@ -296,7 +316,7 @@ mod tests {
         let off = |p: Precision| {
             let mut r = v.clone();
             round(&mut r, p);
-            v.iter().zip(&r).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+            worst_difference(&v, &r)
         };
         assert_eq!(off(Precision::Stored), 0.0);
         assert!(off(Precision::Half) < 1e-4 && off(Precision::Byte) < 1e-3 && off(Precision::Byte) > 1e-5);

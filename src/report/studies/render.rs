@@ -10,6 +10,7 @@ use crate::math::Real;
 use crate::math::stats::mean;
 use crate::pipeline::observer::{Observer, Signal};
 use crate::render::cpu::Renderer;
+use crate::render::gpu::GpuError;
 use crate::render::{Backend, BackendChoice, Cutoffs, Features, Frame, RenderError, RenderSettings};
 use crate::report::document::Form;
 use crate::report::picture::{Errors, Planes, averaged, enlarged, footprint_order, planes, psnr_in_photo};
@@ -70,11 +71,12 @@ impl RenderStudy {
         settings: &RenderSettings,
         views: Vec<(Camera, Option<PhotoPixels>)>,
         repeats: u32,
-        input: Input,
+        mut input: Input,
     ) -> Result<Self, RenderError> {
         let (cameras, photos): (Vec<Camera>, Vec<Option<PhotoPixels>>) = views.into_iter().unzip();
         let settings = RenderSettings { depth: false, ..settings.clone() };
-        let gpu = Backend::choose(BackendChoice::Gpu).ok();
+        let why = |e: GpuError| drop(input.insert("GPU".into(), format!("not measured: {e}")));
+        let gpu = Backend::choose(BackendChoice::Gpu, drop).map_err(why).ok();
         let double = cloud.cast::<f64>();
         let exactly = RenderSettings { cutoffs: EXACT, ..settings.clone() };
         let mut renderer = Renderer::<f64>::new();

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::*;
-use crate::math::sh;
+use crate::math::{sh, stats};
 use crate::scene::{Camera, GaussianCloud, Identities, LanguageFeatures, Level, NOBODY, SemanticMap, ViewFeatures};
 
 /// One Gaussian whose second and third bands have one coefficient each.
@@ -70,7 +70,7 @@ fn dropped_bands_change_no_colour_by_half_a_step() {
             let b = sh::basis(3, [r * phi.cos(), r * phi.sin(), z]);
             (sh::coefficients(kept)..16).map(|k| b[k] * f64::from(c.sh[k][0])).sum::<f64>().abs()
         };
-        (0..500).map(change).fold(0.0, f64::max)
+        stats::worst((0..500).map(change))
     };
     let faint = coloured(0.2, 2.5e-3);
     assert_eq!(visible_degree(&faint), 1);

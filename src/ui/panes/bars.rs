@@ -24,7 +24,7 @@ pub fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut Vec<Act
                     ui.weak("Nothing yet");
                 }
                 for path in &state.recent {
-                    let text = format::shortened(&path.display().to_string(), 60);
+                    let text = format::shortened(&path.to_string_lossy(), 60);
                     if ui.button(text).clicked() {
                         actions.push(Action::Open(path.clone()));
                     }
@@ -76,7 +76,7 @@ pub fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut Vec<Act
         });
         if let Some(scene) = &state.scene {
             ui.separator();
-            ui.label(RichText::new(&scene.name).strong()).on_hover_text(scene.path.display().to_string());
+            ui.label(RichText::new(&scene.name).strong()).on_hover_text(format::path(&scene.path));
         }
         ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
             let search = Button::new(RichText::new("Search actions").color(theme::WEAK))
@@ -136,7 +136,11 @@ pub fn status(
                 actions.push(Action::TogglePane(Pane::Log));
             }
             if let Some(p) = picture {
-                ui.label(RichText::new(format!("Drawn by the {}", p.drawn_by)).small().color(theme::WEAK));
+                let text = RichText::new(format!("Drawn by the {}", p.drawn_by)).small();
+                match &p.instead_of_gpu {
+                    Some(why) => ui.label(text.color(theme::WARNING)).on_hover_text(why),
+                    None => ui.label(text.color(theme::WEAK)),
+                };
             }
         });
     });

@@ -9,7 +9,7 @@ use egui::{
 use super::super::layout::Layout;
 use super::super::state::AppState;
 use super::super::{format, theme};
-use crate::scene::{Dataset, PhotoPixels};
+use crate::scene::{Dataset, PhotoPixels, text};
 use crate::worker::{Action, Command, JobId, Worker};
 
 /// Longest side of a thumbnail in px.
@@ -113,9 +113,9 @@ impl Thumbnails {
                     ui.spacing_mut().item_spacing.x = gap;
                     for index in (row * columns..(row + 1) * columns).take_while(|i| *i < dataset.photos.len()) {
                         self.wish(index, dataset, worker);
-                        let name = dataset.photos[index].name.as_str();
-                        let held = test.contains(&index);
-                        let caption = Caption { name, held, psnr: scores.get(name).copied() };
+                        let photo = &dataset.photos[index];
+                        let (name, held) = (&*photo.title(), test.contains(&index));
+                        let caption = Caption { name, held, psnr: scores.get(photo.name.as_str()).copied() };
                         if self.cell(ui, cell, index, &caption, current == Some(index)) {
                             actions.push(Action::GoToPhoto(index));
                         }
@@ -178,7 +178,7 @@ fn text(ui: &Ui, at: egui::Pos2, align: egui::Align2, text: &str, color: Color32
 
 fn facts(ui: &mut Ui, dataset: &Dataset, train: usize, test: usize) {
     ui.spacing_mut().item_spacing.y = 3.0;
-    ui.label(RichText::new(&dataset.name).heading()).on_hover_text(dataset.root.display().to_string());
+    ui.label(RichText::new(&dataset.name).heading()).on_hover_text(format::path(&dataset.root));
     let size = dataset.photos.first().map(|p| format!("{} x {} px", p.camera.width_px, p.camera.height_px));
     let parts = [Some(dataset.format.clone()), size];
     ui.label(RichText::new(parts.into_iter().flatten().collect::<Vec<_>>().join("  ·  ")).color(theme::WEAK));
@@ -191,7 +191,7 @@ fn facts(ui: &mut Ui, dataset: &Dataset, train: usize, test: usize) {
     });
     if !dataset.warnings.is_empty() {
         let text = format!("{} warning{}", dataset.warnings.len(), if dataset.warnings.len() == 1 { "" } else { "s" });
-        ui.label(RichText::new(text).color(theme::WARNING)).on_hover_text(dataset.warnings.join("\n"));
+        ui.label(RichText::new(text).color(theme::WARNING)).on_hover_text(text::lines(&dataset.warnings.join("\n")));
     }
 }
 

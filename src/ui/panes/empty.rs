@@ -1,5 +1,7 @@
 //! What the window shows before anything is open.
 
+use std::path::Path;
+
 use egui::{Button, ProgressBar, RichText, Ui, vec2};
 
 use super::super::state::{AppState, RunningJob};
@@ -40,14 +42,13 @@ pub fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
             ui.add_space(22.0);
             ui.label(RichText::new("Recent").small().strong().color(theme::WEAK));
             for path in state.recent.iter().take(recent) {
-                let name =
-                    path.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned());
-                let parent = path.parent().map(|p| format::shortened(&p.display().to_string(), 36)).unwrap_or_default();
+                let name = format::path(path.file_name().map_or(path.as_path(), Path::new));
+                let parent = path.parent().map(|p| format::shortened(&p.to_string_lossy(), 36)).unwrap_or_default();
                 let row = Button::new(RichText::new(name).strong())
                     .right_text(RichText::new(parent).small().color(theme::WEAK))
                     .frame_when_inactive(false)
                     .min_size(vec2(420.0, 26.0));
-                if ui.add(row).on_hover_text(path.display().to_string()).clicked() {
+                if ui.add(row).on_hover_text(format::path(path)).clicked() {
                     actions.push(Action::Open(path.clone()));
                 }
             }

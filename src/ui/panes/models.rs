@@ -28,12 +28,15 @@ struct Known {
 
 impl Known {
     fn look() -> Self {
-        let (engine, note) = match engine() {
+        let (engine, mut note) = match engine() {
             Ok(engine) => (format!("{}, {}", engine.name(), engine.device()), engine.note().map(str::to_owned)),
             Err(e) => ("none".to_owned(), Some(e.to_string())),
         };
         let folder = catalogue::folder();
-        let models = catalogue::entries().unwrap_or_default();
+        let models = catalogue::entries().unwrap_or_else(|e| {
+            note = Some(e.to_string());
+            Vec::new()
+        });
         Self { engine, note, models: models.into_iter().map(|e| (e.clone(), e.state(&folder))).collect() }
     }
 }

@@ -114,6 +114,7 @@ mod tests {
             stages: if stages { vec![("project", 0.25), ("blend", blend)] } else { Vec::new() },
             paint_secs: 0.125,
             drawn_by: "CPU".into(),
+            instead_of_gpu: None,
         }
     }
 

@@ -55,7 +55,7 @@ impl Viewport {
             }
         }
         if let Some((i, at)) = nearest {
-            label(&painter, at, &format!("{}  (click to look through)", dataset.photos[i].name));
+            label(&painter, at, &format!("{}  (click to look through)", dataset.photos[i].title()));
             if response.clicked() {
                 actions.push(Action::GoToPhoto(i));
             }

@@ -27,13 +27,14 @@ use self::query::Questions;
 use self::visible::Visibility;
 use super::camera::CameraPane;
 use super::layout::Layout;
-use super::state::AppState;
+use super::state::{AppState, Tone};
 use super::theme;
 use crate::navigate::Pose;
 use crate::render::Backend;
 use crate::scene::plan::When;
 use crate::scene::trace::{self, Sort};
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
+use crate::worker::protocol::Failure;
 use crate::worker::view::{Effort, Leave, ViewLane, ViewPicture, ViewRequest};
 use crate::worker::{Action, CloudSnapshot, OpenedScene, Repaint, ViewMode, Worker};
 
@@ -69,6 +70,10 @@ pub struct Viewport {
     picture: Option<Arc<ViewPicture>>,
     texture: Option<TextureHandle>,
     error: Option<String>,
+    /// Why nobody knows what the pixels of this view belong to.
+    unmapped: Option<String>,
+    /// Why the CPU draws though there is a GPU, once that was told.
+    instead_of_gpu: Option<String>,
     /// What was asked, and where the answers are.
     pub questions: Questions,
     /// What is left out of the picture.
@@ -128,6 +133,8 @@ impl Viewport {
             picture: None,
             texture: None,
             error: None,
+            unmapped: None,
+            instead_of_gpu: None,
             questions: Questions::default(),
             visibility: Visibility::default(),
             brush: None,
@@ -166,7 +173,7 @@ impl Viewport {
             self.scene = state.scene_number;
             self.photo = None;
             self.requested = None;
-            (self.picture, self.texture, self.error) = (None, None, None);
+            (self.picture, self.texture, self.error, self.unmapped) = (None, None, None, None);
             self.set_cloud(scene.cloud.clone());
             self.up = None;
             self.questions.clear();
@@ -181,6 +188,11 @@ impl Viewport {
             if state.training_job == Some(*job) {
                 self.set_cloud(Some(Arc::clone(cloud)));
             }
+        }
+        let instead_of_gpu = self.picture.as_ref().and_then(|p| p.instead_of_gpu.as_ref());
+        if let Some(why) = instead_of_gpu.filter(|why| self.instead_of_gpu.as_ref() != Some(why)) {
+            state.toast(Tone::Warning, why);
+            self.instead_of_gpu = Some(why.clone());
         }
         if let Some(photo) = &mut self.photo {
             photo.take_loaded(state, worker);
@@ -388,7 +400,10 @@ impl Viewport {
             }
             // One of an earlier request is of another view.
             if mapped.ticket == self.tickets {
-                self.questions.set_maps(Some(Arc::clone(&mapped.maps)));
+                match &mapped.maps {
+                    Ok(maps) => self.questions.set_maps(Some(Arc::clone(maps))),
+                    Err(failure) => self.unmapped = Some(told(failure)),
+                }
             }
         }
         let Some((generation, result)) = self.lane.pictures().newer_than(self.shown) else { return };
@@ -412,7 +427,7 @@ impl Viewport {
                 self.picture = Some(Arc::clone(picture));
                 self.error = None;
             }
-            Err(failure) => self.error = Some(format!("{} {}", failure.message, failure.remedy)),
+            Err(failure) => self.error = Some(told(failure)),
         }
     }
 
@@ -486,6 +501,7 @@ impl Viewport {
             |r: &Asked| r.camera == asked.camera && r.cloud == asked.cloud && r.semantics == asked.semantics;
         if !self.requested.as_ref().is_some_and(same_view) {
             self.questions.set_maps(None);
+            self.unmapped = None;
         }
         self.requested = Some(asked);
     }
@@ -523,6 +539,11 @@ impl Viewport {
         let depth = f64::from(*picture.median_depth.as_ref()?.get(index)?);
         (depth > 0.0).then(|| picture.camera.center + picture.camera.ray(at * size) * depth)
     }
+}
+
+/// What went wrong and what can be done, in one line.
+fn told(failure: &Failure) -> String {
+    format!("{} {}", failure.message, failure.remedy)
 }
 
 /// The first view of a scene: from its first camera if it has one, else framed as a whole; upright

@@ -50,9 +50,11 @@ impl Viewport {
         if let Some(times) = self.times.as_ref().filter(|_| rect.height() > 330.0) {
             card("times", Align2::LEFT_BOTTOM, -46.0, &mut |ui| times.show(ui));
         }
-        if let Some(error) = &self.error {
+        if self.error.is_some() || self.unmapped.is_some() {
             card("view error", Align2::CENTER_CENTER, 0.0, &mut |ui| {
-                ui.colored_label(theme::ERROR, error);
+                for error in self.error.iter().chain(&self.unmapped) {
+                    ui.colored_label(theme::ERROR, error);
+                }
             });
         }
     }
@@ -90,7 +92,7 @@ impl Viewport {
         step(ui, "‹", Action::PreviousPhoto, actions);
         match &self.photo {
             Some(p) => {
-                ui.label(RichText::new(format::shortened(p.name(), 28)).strong()).on_hover_text(p.name());
+                ui.label(RichText::new(format::shortened(&p.name(), 28)).strong()).on_hover_text(&*p.name());
                 ui.weak(format!("{} of {total}", p.index() + 1));
                 if let Some(psnr) = self.picture.as_ref().and_then(|p| p.psnr) {
                     ui.label(RichText::new(format::decibel(psnr)).color(theme::ACCENT))

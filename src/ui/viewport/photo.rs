@@ -1,5 +1,6 @@
 //! Looking through a photo's camera, and the photo beside the picture.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use egui::{Color32, ColorImage, CursorIcon, Rect, Sense, Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2};
@@ -36,8 +37,8 @@ impl PhotoView {
         self.index
     }
 
-    pub(super) fn name(&self) -> &str {
-        &self.photo.name
+    pub(super) fn name(&self) -> Cow<'_, str> {
+        self.photo.title()
     }
 
     pub(super) fn camera(&self) -> &Camera {

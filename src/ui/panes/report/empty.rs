@@ -3,7 +3,7 @@
 use egui::{RichText, Ui, vec2};
 
 use super::super::super::state::AppState;
-use super::super::super::theme;
+use super::super::super::{format, theme};
 use crate::worker::{Action, JobKind};
 
 /// Draws it.
@@ -46,7 +46,7 @@ pub fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
             actions.push(Action::ChooseReport);
         }
         for path in state.scene.iter().flat_map(|s| &s.reports) {
-            let found = ui.add(egui::Button::new(format!("Open {}", path.display())).min_size(size));
+            let found = ui.add(egui::Button::new(format!("Open {}", format::path(path))).min_size(size));
             if found.on_hover_text("This report was found with the scene.").clicked() {
                 actions.push(Action::OpenReport(path.clone()));
             }

@@ -144,10 +144,10 @@ impl ReportPane {
     ) {
         ui.horizontal_wrapped(|ui| {
             ui.label(RichText::new("Error against run time").strong());
-            ui.label(RichText::new(name(shown)).color(theme::WEAK)).on_hover_text(shown.path.display().to_string());
+            ui.label(RichText::new(name(shown)).color(theme::WEAK)).on_hover_text(format::path(&shown.path));
             if let Some(second) = second {
                 ui.label(RichText::new(format!("beside {} (hollow)", name(second))).color(theme::ACCENT))
-                    .on_hover_text(second.path.display().to_string());
+                    .on_hover_text(format::path(&second.path));
                 button(ui, "End comparison", &Action::EndComparison, true, actions);
             }
             ui.separator();

@@ -8,7 +8,7 @@ use crate::pipeline::semantics::answer::Basis;
 use crate::pipeline::semantics::localise::Answer;
 use crate::pipeline::semantics::matching::{self, MatchMode};
 use crate::pipeline::semantics::names;
-use crate::scene::{Bounds, GaussianCloud, IdentityId, SemanticMap};
+use crate::scene::{Bounds, GaussianCloud, IdentityId, SemanticMap, text};
 use crate::ui::theme;
 use crate::worker::Action;
 
@@ -110,7 +110,8 @@ impl Questions {
             }
         }
         if let Some(trouble) = self.speech.trouble() {
-            ui.label(RichText::new(format!("Only names are understood: {trouble}")).small().color(theme::WEAK));
+            let text = format!("Only names are understood: {}", text::line(trouble));
+            ui.label(RichText::new(text).small().color(theme::WARNING));
         }
     }
 }

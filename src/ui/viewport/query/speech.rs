@@ -3,7 +3,7 @@
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use crate::models::{self, Encoder};
+use crate::models::{self, Encoder, ModelError};
 use crate::pipeline::semantics::answer::phrases_of;
 use crate::pipeline::semantics::grammar::Phrase;
 use crate::pipeline::semantics::meaning::Phrasebook;
@@ -20,6 +20,8 @@ pub struct Speech {
     /// Whether it has been noticed that it is there.
     noticed: bool,
     phrases: Phrasebook,
+    /// Why the encoder could not read the last question, if it could not.
+    failed: Option<String>,
 }
 
 impl Speech {
@@ -47,7 +49,7 @@ impl Speech {
 
     /// Why phrases are not understood by looks, if they are not.
     pub fn trouble(&self) -> Option<&str> {
-        self.loaded.get().and_then(|l| l.as_ref().err()).map(String::as_str)
+        self.loaded.get().and_then(|l| l.as_ref().err()).or(self.failed.as_ref()).map(String::as_str)
     }
 
     /// The words of a phrase that it does not know; `None` without an encoder.
@@ -61,7 +63,64 @@ impl Speech {
     pub fn learn(&mut self, phrase: &Phrase) -> Option<&Phrasebook> {
         let encoder = self.loaded.get()?.as_ref().ok()?;
         let mut encoder = encoder.lock().unwrap_or_else(PoisonError::into_inner);
-        self.phrases.learn(&phrases_of(phrase), |p| encoder.text(p)).ok()?;
-        Some(&self.phrases)
+        let learnt = self.phrases.learn(&phrases_of(phrase), |p| encoder.text(p));
+        self.failed = match &learnt {
+            Ok(()) | Err(ModelError::NoKnownWord { .. }) => None,
+            Err(e) => Some(e.to_string()),
+        };
+        learnt.ok().map(|()| &self.phrases)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::models::Tile;
+
+    /// Fails as a damaged network does, or knows no word.
+    struct Failing {
+        knows: bool,
+    }
+
+    impl Encoder for Failing {
+        fn name(&self) -> &str {
+            "failing"
+        }
+
+        fn dimension(&self) -> usize {
+            2
+        }
+
+        fn tile_side_px(&self) -> Option<usize> {
+            None
+        }
+
+        fn images(&mut self, _tiles: &[Tile]) -> Result<Vec<Vec<f32>>, ModelError> {
+            Ok(Vec::new())
+        }
+
+        fn text(&mut self, _phrase: &str) -> Result<Vec<f32>, ModelError> {
+            Err(match self.knows {
+                true => ModelError::Run { model: "text.onnx".into(), problem: "out of memory".into() },
+                false => ModelError::NoKnownWord { unknown: vec!["giraffe".into()] },
+            })
+        }
+
+        fn unknown_words(&self, _phrase: &str) -> Vec<String> {
+            Vec::new()
+        }
+    }
+
+    #[test]
+    fn an_encoder_that_fails_at_a_question_is_told() {
+        let phrase = Phrase::parse("the giraffe").expect("a phrase");
+        for knows in [true, false] {
+            let mut speech = Speech::default();
+            let encoder: Box<dyn Encoder> = Box::new(Failing { knows });
+            assert!(speech.loaded.set(Ok(Mutex::new(encoder))).is_ok());
+            assert!(speech.learn(&phrase).is_none());
+            // A word that nobody knows is no failure.
+            assert_eq!(speech.trouble().is_some_and(|t| t.contains("out of memory")), knows);
+        }
     }
 }

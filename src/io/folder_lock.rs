@@ -1,0 +1,106 @@
+//! One writer a folder: a file in it that is locked for as long as somebody writes there.
+//!
+//! The system frees the lock of a process that ends, however it ends.
+
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, Read, Seek, Write};
+use std::path::{Path, PathBuf};
+
+use super::IoError;
+use super::atomic::write_error;
+
+/// The locked file's name.
+const FILE: &str = ".fmlgs.lock";
+/// Longest description of a writer that is read.
+const MAX_BYTES: u64 = 200;
+
+/// A folder that nobody else writes into.
+#[derive(Debug)]
+pub struct FolderLock {
+    folder: PathBuf,
+    /// Locked until it is closed.
+    _file: File,
+}
+
+impl FolderLock {
+    /// Locks `folder`, which exists, for `what` ("training").
+    ///
+    /// # Errors
+    /// [`IoError::Busy`] if somebody else does something there, [`IoError::Write`] if nobody may.
+    pub fn take(folder: &Path, what: &str) -> Result<Self, IoError> {
+        let path = folder.join(FILE);
+        let failed = |cause| write_error(&path, cause);
+        loop {
+            let options = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path);
+            let mut file = options.map_err(failed)?;
+            match file.try_lock() {
+                Err(TryLockError::WouldBlock) => {
+                    let mut holder = String::new();
+                    let _ = file.take(MAX_BYTES).read_to_string(&mut holder);
+                    let holder = if holder.is_empty() { "another process".into() } else { holder };
+                    return Err(IoError::Busy { folder: folder.into(), holder });
+                }
+                // Some network file systems have no locks; a person there has to take care.
+                Err(TryLockError::Error(e)) if e.kind() != io::ErrorKind::Unsupported => return Err(failed(e)),
+                _ => {}
+            }
+            // The one before may have removed the file between opening and locking.
+            if !is_at(&file, &path) {
+                continue;
+            }
+            let told = format!("process {} ({what})", std::process::id());
+            // For people only, so a full disk does not matter.
+            let _ = file.set_len(0).and_then(|()| file.rewind()).and_then(|()| file.write_all(told.as_bytes()));
+            return Ok(Self { folder: folder.into(), _file: file });
+        }
+    }
+
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+}
+
+impl Drop for FolderLock {
+    fn drop(&mut self) {
+        // While it is still locked, so that it is nobody else's.
+        if cfg!(unix) {
+            let _ = fs::remove_file(self.folder.join(FILE));
+        }
+    }
+}
+
+/// Whether `file` is what is at `path`.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let id = |m: fs::Metadata| (m.dev(), m.ino());
+    matches!((file.metadata().map(id), fs::metadata(path).map(id)), (Ok(a), Ok(b)) if a == b)
+}
+
+/// Elsewhere the file is never removed.
+#[cfg(not(unix))]
+fn is_at(_: &File, _: &Path) -> bool {
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_second_writer_is_told_of_the_first() {
+        let folder = tempfile::tempdir().expect("folder");
+        let first = FolderLock::take(folder.path(), "training").expect("free");
+        let e = FolderLock::take(folder.path(), "finding objects").expect_err("taken");
+        let text = e.to_string();
+        assert!(text.contains("training") && text.contains(&std::process::id().to_string()), "{text}");
+        drop(first);
+        drop(FolderLock::take(folder.path(), "finding objects").expect("free again"));
+        assert_eq!(fs::read_dir(folder.path()).expect("list").count(), usize::from(!cfg!(unix)));
+        // What a killed process left is in nobody's way.
+        fs::write(folder.path().join(FILE), "process 1 (training)").expect("written");
+        drop(FolderLock::take(folder.path(), "training").expect("free"));
+        assert!(FolderLock::take(&folder.path().join("missing"), "x").is_err());
+    }
+}

@@ -1,0 +1,106 @@
+//! How much memory the program may still take: one answer for every stage that plans by it.
+
+use std::sync::OnceLock;
+
+use sysinfo::{MemoryRefreshKind, ProcessRefreshKind, ProcessesToUpdate, System};
+
+/// What is assumed where the system does not say: what any machine can spare.
+const UNKNOWN: u64 = 2 << 30;
+
+/// Bytes that one reader may use: half of the memory that is free when the program first asks.
+pub fn budget() -> u64 {
+    static BUDGET: OnceLock<u64> = OnceLock::new();
+    *BUDGET.get_or_init(|| free() / 2)
+}
+
+/// Bytes that the program may still take: what the machine has left, and no more than the limits of
+/// its control group (a container's) and of the process itself (`ulimit -v`, `ulimit -d`) allow.
+pub fn free() -> u64 {
+    let Ok(mut system) = System::new() else { return UNKNOWN };
+    system.refresh_memory_specifics(MemoryRefreshKind::nothing().with_ram());
+    match system.available_memory() {
+        0 => UNKNOWN,
+        machine => machine.min(of_group(&mut system)).min(of_process()),
+    }
+}
+
+/// Something that does not fit into the memory that is free.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{what} takes about {} MB of memory, and {} MB are free; {remedy}", bytes.div_ceil(1_000_000), free / 1_000_000)]
+pub struct NoRoom {
+    what: String,
+    bytes: u64,
+    free: u64,
+    remedy: &'static str,
+}
+
+/// Whether `what` fits, which takes about so many bytes. To be asked before it is begun.
+///
+/// # Errors
+/// If it does not.
+pub fn room(what: impl Into<String>, bytes: u64, remedy: &'static str) -> Result<(), NoRoom> {
+    let free = free();
+    if bytes <= free { Ok(()) } else { Err(NoRoom { what: what.into(), bytes, free, remedy }) }
+}
+
+/// What the control group leaves, the file cache not counted: the system gives that back.
+fn of_group(system: &mut System) -> u64 {
+    let Ok(own) = sysinfo::get_current_pid() else { return u64::MAX };
+    system.refresh_processes_specifics(ProcessesToUpdate::Some(&[own]), false, ProcessRefreshKind::nothing());
+    let limits = system.process(own).and_then(sysinfo::Process::cgroup_limits);
+    limits.map_or(u64::MAX, |l| l.total_memory.saturating_sub(l.rss))
+}
+
+/// What the limits on the process leave, where the system tells them in `/proc`.
+fn of_process() -> u64 {
+    let text = |name: &str| std::fs::read_to_string(format!("/proc/self/{name}")).unwrap_or_default();
+    within(&text("limits"), &text("status"))
+}
+
+/// What is left under the limits in `/proc/self/limits` of what `/proc/self/status` says is used.
+fn within(limits: &str, status: &str) -> u64 {
+    let number = |text: &str, line: &str| -> Option<u64> {
+        text.lines().find_map(|l| l.strip_prefix(line))?.split_whitespace().next()?.parse().ok()
+    };
+    let left = |(limit, used)| {
+        let limit: u64 = number(limits, limit)?;
+        Some(limit.saturating_sub(1024 * number(status, used).unwrap_or(0)))
+    };
+    [("Max address space", "VmSize:"), ("Max data size", "VmData:")]
+        .into_iter()
+        .filter_map(left)
+        .min()
+        .unwrap_or(u64::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_on_the_process_count() {
+        let limits = |data: &str, space: &str| {
+            format!(
+                "Limit  Soft Limit  Hard Limit  Units\nMax data size  {data}  unlimited  bytes\nMax address space  {space}  unlimited  bytes\n"
+            )
+        };
+        let status = "VmPeak:\t 9000 kB\nVmSize:\t  2000 kB\nVmData:\t  1000 kB\n";
+        assert_eq!(within(&limits("unlimited", "unlimited"), status), u64::MAX);
+        assert_eq!(within(&limits("unlimited", "4096000"), status), 2_048_000);
+        assert_eq!(within(&limits("3072000", "4096000"), status), 2_048_000);
+        assert_eq!(within(&limits("1024000", "4096000"), status), 0);
+        assert_eq!(within("", ""), u64::MAX);
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused_with_its_size() {
+        assert_eq!(room("a thumbnail", 1000, ""), Ok(()));
+        let e = room("a wall", u64::MAX, "make it smaller").expect_err("no machine has that").to_string();
+        assert!(e.starts_with("a wall takes about 18446744073710 MB") && e.ends_with("make it smaller"), "{e}");
+    }
+
+    #[test]
+    fn something_is_free_and_half_of_it_is_a_readers() {
+        assert!(free() > 0 && budget() <= UNKNOWN.max(free().saturating_mul(2)));
+    }
+}

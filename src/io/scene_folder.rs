@@ -1,0 +1,293 @@
+//! Writing into the folder of a trained scene: by one process at a time, and all files or none.
+//!
+//! The files of a scene that belong together carry the id of the save that wrote them: `scene.json`
+//! as `state`, `point_cloud.ply` in a comment, `semantic_map.safetensors` in its header.
+
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use super::atomic::{Draft, folder_of, write_error};
+use super::commit::{self, Commit};
+use super::folder_lock::FolderLock;
+use super::temporary::{sweep, temporary_folder};
+use super::trained::{self, CLOUD_FILE, SCENE_FILE, SceneInfo};
+use super::{IoError, semantic_map, splat_ply};
+use crate::scene::{GaussianCloud, SemanticMap};
+
+/// The state of a training, if it can go on.
+pub const CHECKPOINT_FILE: &str = "checkpoint.bin";
+/// Folder of what was replaced: `earlier/1`, `earlier/2`, each a scene of its own.
+const EARLIER: &str = "earlier";
+/// The files of a scene, which nothing else may replace.
+const FILES: [&str; 4] = [SCENE_FILE, CLOUD_FILE, semantic_map::FILE, CHECKPOINT_FILE];
+
+/// A scene's folder, held for writing.
+#[derive(Debug)]
+pub struct SceneFolder {
+    lock: FolderLock,
+}
+
+impl SceneFolder {
+    /// Holds `folder`, which is created if need be, for `what` ("training"). A save that was
+    /// interrupted there is finished first, and what dead processes left is removed.
+    ///
+    /// # Errors
+    /// [`IoError::Busy`] if somebody else writes there, [`IoError::Write`] if nobody may.
+    pub fn hold(folder: &Path, what: &str) -> Result<Self, IoError> {
+        fs::create_dir_all(folder).map_err(|cause| IoError::Write {
+            path: folder.into(),
+            remedy: "the folder cannot be created: choose another place",
+            cause,
+        })?;
+        let lock = FolderLock::take(folder, what)?;
+        commit::carry_out(folder)?;
+        sweep(folder);
+        Ok(Self { lock })
+    }
+
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        self.lock.folder()
+    }
+
+    /// Saves the scene: all of its files change, or none. Without a map, the folder has none afterwards.
+    /// Returns the id of this state.
+    ///
+    /// # Errors
+    /// If a file cannot be written, or the Gaussians are not valid.
+    pub fn save(&self, info: &SceneInfo, cloud: &GaussianCloud, map: Option<&SemanticMap>) -> Result<String, IoError> {
+        let state = format!("{:032x}", rand::random::<u128>());
+        let info = SceneInfo { version: trained::VERSION, state: Some(state.clone()), ..info.clone() };
+        let stored = map.map(|map| {
+            let mut stored = cloud.clone();
+            map.store(&mut stored);
+            stored
+        });
+        let cloud = stored.as_ref().unwrap_or(cloud);
+        splat_ply::check(&self.path().join(CLOUD_FILE), cloud)?;
+        let mut commit = Commit::new(self.path());
+        commit.add(CLOUD_FILE, |w| splat_ply::encode(w, cloud, Some(&state)))?;
+        match map {
+            Some(map) => {
+                let bytes = semantic_map::encode(map, Some(&state), &self.path().join(semantic_map::FILE))?;
+                commit.add(semantic_map::FILE, |w| w.write_all(&bytes))?;
+            }
+            None => commit.remove(semantic_map::FILE),
+        }
+        commit.add(SCENE_FILE, |w| {
+            serde_json::to_writer_pretty(&mut *w, &info)?;
+            w.write_all(b"\n")
+        })?;
+        commit.finish()?;
+        Ok(state)
+    }
+
+    /// Saves another map of the Gaussians `cloud`, which are those of the scene in the state `known`.
+    /// Returns the id of the new state.
+    ///
+    /// # Errors
+    /// As [`Self::save`]; [`IoError::Changed`] if the scene has another state by now.
+    pub fn save_map(&self, known: Option<&str>, map: &SemanticMap, cloud: &GaussianCloud) -> Result<String, IoError> {
+        let info = trained::load_info(self.path())?;
+        if splat_ply::state(&self.path().join(CLOUD_FILE))?.as_deref() != known {
+            return Err(IoError::Changed { folder: self.path().into() });
+        }
+        self.save(&info, cloud, Some(map))
+    }
+
+    /// As [`Self::save_map`], but what was there before is kept (see [`Self::keep_earlier`]): where, and the
+    /// id of the new state. The map that is there already changes nothing.
+    ///
+    /// # Errors
+    /// As [`Self::save_map`].
+    pub fn replace_map(
+        &self,
+        known: Option<&str>,
+        map: &SemanticMap,
+        cloud: &GaussianCloud,
+    ) -> Result<(Option<PathBuf>, String), IoError> {
+        if let Some(state) = self.has(map)? {
+            return Ok((None, state));
+        }
+        let kept = self.keep_earlier()?;
+        Ok((kept, self.save_map(known, map, cloud)?))
+    }
+
+    /// The scene's state, if `map` is what is stored in it.
+    fn has(&self, map: &SemanticMap) -> Result<Option<String>, IoError> {
+        let path = self.path().join(semantic_map::FILE);
+        let (Ok(bytes), Ok(scene)) = (fs::read(&path), trained::load(self.path())) else { return Ok(None) };
+        let Some(state) = scene.state else { return Ok(None) };
+        let stored = semantic_map::load(self.path(), Some(&state), &scene.cloud).ok().flatten();
+        let gaussians = |m: &SemanticMap| (m.of.clone(), m.margin.clone(), m.codes.clone());
+        let same = stored.is_some_and(|s| gaussians(&s) == gaussians(map));
+        Ok((same && semantic_map::encode(map, Some(&state), &path)? == bytes).then_some(state))
+    }
+
+    /// Replaces the checkpoint.
+    ///
+    /// # Errors
+    /// If it cannot be written; the one before is then unchanged.
+    pub fn save_checkpoint(&self, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), IoError> {
+        let path = self.path().join(CHECKPOINT_FILE);
+        let mut draft = Draft::beside(&path)?;
+        fill(&mut draft).map_err(|cause| write_error(&path, cause))?;
+        draft.commit().map(drop)
+    }
+
+    /// Keeps the scene as it is now beside what will replace it, as a scene of its own; `None` if it
+    /// has no objects and parts, which are what took somebody time. Returns where.
+    ///
+    /// # Errors
+    /// If that cannot be written.
+    pub fn keep_earlier(&self) -> Result<Option<PathBuf>, IoError> {
+        if !self.path().join(semantic_map::FILE).exists() || !trained::is_scene(self.path()) {
+            return Ok(None);
+        }
+        let mut info = trained::load_info(self.path())?;
+        let all = self.path().join(EARLIER);
+        let place = (1..).map(|n: u32| all.join(n.to_string())).find(|p| !p.exists()).unwrap_or_else(|| all.clone());
+        if let Some(dataset) = &mut info.dataset {
+            dataset.path = trained::relative_to(&self.path().join(&dataset.path), &place);
+        }
+        let keep = || {
+            fs::create_dir_all(&all)?;
+            let draft = temporary_folder(&all, "kept")?;
+            for name in [CLOUD_FILE, semantic_map::FILE] {
+                let (from, to) = (self.path().join(name), draft.folder.path().join(name));
+                // Files of a scene are replaced, never written into, so a second name keeps the content.
+                fs::hard_link(&from, &to).or_else(|_| fs::copy(&from, &to).map(drop))?;
+            }
+            let file = fs::File::create(draft.folder.path().join(SCENE_FILE))?;
+            serde_json::to_writer_pretty(&file, &info)?;
+            file.sync_all()?;
+            fs::rename(draft.folder.path(), &place)?;
+            let _ = draft.folder.keep();
+            Ok(())
+        };
+        keep().map_err(|cause| write_error(&place, cause))?;
+        Ok(Some(place))
+    }
+}
+
+/// Refuses `path` if it is a file of a trained scene.
+///
+/// # Errors
+/// [`IoError::Protected`].
+pub fn refuse_scene_file(path: &Path) -> Result<(), IoError> {
+    let folder = folder_of(path);
+    let named = path.file_name().is_some_and(|n| FILES.iter().any(|f| n.eq_ignore_ascii_case(f)));
+    if named && trained::is_scene(folder) {
+        return Err(IoError::Protected { path: path.into(), folder: folder.into() });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::atomic;
+    use crate::scene::{Identities, Level, NOBODY};
+
+    fn cloud(x: f32) -> GaussianCloud {
+        GaussianCloud {
+            positions: vec![[x; 3]],
+            log_scales: vec![[0.0; 3]],
+            quaternions: vec![[1.0, 0.0, 0.0, 0.0]],
+            opacity_logits: vec![0.0],
+            sh: vec![[0.0; 3]],
+            ..GaussianCloud::default()
+        }
+    }
+
+    fn named(name: &str) -> SemanticMap {
+        let mut identities = Identities::default();
+        let id = identities.add(Level::Object, NOBODY, vec![name.into()]);
+        SemanticMap::of_identities(identities, vec![id], vec![1.0], vec![])
+    }
+
+    /// The name of the only object of the scene in `folder`.
+    fn stored(folder: &Path) -> Result<String, IoError> {
+        let scene = trained::load(folder)?;
+        let map = semantic_map::load(folder, scene.state.as_deref(), &scene.cloud)?;
+        Ok(map.map(|m| m.identities.name(1)).unwrap_or_default())
+    }
+
+    #[test]
+    fn files_of_different_saves_are_refused() {
+        let folder = tempfile::tempdir().expect("folder");
+        let (a, b) = (folder.path().join("a"), folder.path().join("b"));
+        trained::save(&a, &SceneInfo::default(), &cloud(0.0), Some(&named("lamp"))).expect("saved");
+        trained::save(&b, &SceneInfo::default(), &cloud(0.0), Some(&named("kettle"))).expect("saved");
+        assert_eq!((stored(&a).expect("a"), stored(&b).expect("b")), ("lamp".into(), "kettle".into()));
+        for name in [CLOUD_FILE, semantic_map::FILE, SCENE_FILE] {
+            let own = fs::read(a.join(name)).expect("read");
+            fs::copy(b.join(name), a.join(name)).expect("swapped");
+            let e = stored(&a).expect_err(name);
+            assert!(matches!(e, IoError::Torn { .. }), "{name}: {e}");
+            assert!(e.to_string().contains("put back"), "{e}");
+            fs::write(a.join(name), own).expect("put back");
+            assert_eq!(stored(&a).expect(name), "lamp");
+        }
+        // Folders of the first versions have no ids, and are still read.
+        let text = fs::read_to_string(a.join(SCENE_FILE)).expect("read");
+        let state = trained::load(&a).expect("loaded").state.expect("a state");
+        fs::write(a.join(SCENE_FILE), text.replace(&format!(",\n  \"state\": \"{state}\""), "")).expect("written");
+        assert_eq!(trained::load_info(&a).expect("read").state, None);
+        assert_eq!(stored(&a).expect("without the line"), "lamp");
+    }
+
+    #[test]
+    fn what_others_saved_is_not_written_over() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path();
+        let first = trained::save(path, &SceneInfo::default(), &cloud(0.0), Some(&named("lamp"))).expect("saved");
+        let other = |name: &str, known: &str| {
+            SceneFolder::hold(path, "test").expect("held").save_map(Some(known), &named(name), &cloud(0.0))
+        };
+        let second = other("kettle", &first).expect("saved");
+        assert!(matches!(other("mug", &first), Err(IoError::Changed { .. })));
+        assert_eq!(stored(path).expect("read"), "kettle");
+        other("mug", &second).expect("saved");
+    }
+
+    #[test]
+    fn what_is_replaced_is_kept_and_the_same_changes_nothing() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("scene");
+        let photos = folder.path().join("photos");
+        fs::create_dir(&photos).expect("created");
+        let dataset = trained::DatasetReference { path: "../photos".into(), format: "x".into() };
+        let info = SceneInfo { dataset: Some(dataset), ..SceneInfo::default() };
+        let state = trained::save(&path, &info, &cloud(0.0), Some(&named("lamp"))).expect("saved");
+        let scene = SceneFolder::hold(&path, "test").expect("held");
+        let same = scene.replace_map(Some(&state), &named("lamp"), &cloud(0.0)).expect("the same");
+        assert_eq!(same, (None, state.clone()));
+        let (kept, _) = scene.replace_map(Some(&state), &named("kettle"), &cloud(0.0)).expect("replaced");
+        let kept = kept.expect("kept");
+        assert_eq!((stored(&path).expect("new"), stored(&kept).expect("old")), ("kettle".into(), "lamp".into()));
+        let found = trained::load(&kept).expect("loaded").dataset_path().expect("its photos");
+        assert_eq!(fs::canonicalize(found).expect("real"), fs::canonicalize(photos).expect("real"));
+    }
+
+    #[test]
+    fn the_files_of_a_scene_are_no_place_for_anything_else() {
+        let folder = tempfile::tempdir().expect("folder");
+        let at = |name: &str| folder.path().join(name);
+        atomic::write(&at(CLOUD_FILE), |w| w.write_all(b"x")).expect("no scene yet");
+        fs::remove_file(at(CLOUD_FILE)).expect("removed");
+        trained::save(folder.path(), &SceneInfo::default(), &cloud(0.0), None).expect("saved");
+        for name in FILES {
+            let e = atomic::write(&at(name), |w| w.write_all(b"x")).expect_err(name);
+            assert!(matches!(e, IoError::Protected { .. }), "{e}");
+        }
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink(at(SCENE_FILE), at("link.json")).expect("link");
+            assert!(atomic::write(&at("link.json"), |w| w.write_all(b"x")).is_err(), "through a link");
+        }
+        atomic::write(&at("path.json"), |w| w.write_all(b"x")).expect("another file");
+        assert!(trained::load(folder.path()).is_ok());
+    }
+}

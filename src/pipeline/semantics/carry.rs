@@ -1,0 +1,78 @@
+//! Objects and parts carried from some Gaussians to others of the same scene, by place.
+//!
+//! For a training that goes on: its Gaussians have moved a little, some are gone, some are new.
+
+use rayon::prelude::*;
+use rstar::RTree;
+use rstar::primitives::GeomWithData;
+
+use crate::scene::{GaussianCloud, NOBODY, SemanticMap};
+
+/// How far a Gaussian reaches, in standard deviations along its longest axis: what lies farther from its
+/// center takes nothing from it.
+const REACH: f64 = 2.0;
+
+/// The map of `from` for the Gaussians `to`, each of which takes identity and codes of the nearest one
+/// that reaches it, and the share of `to` that one does.
+pub fn carry(map: &SemanticMap, from: &GaussianCloud, to: &GaussianCloud) -> (SemanticMap, f64) {
+    let points = (0..from.len()).map(|i| GeomWithData::new(from.world_position(i).to_array(), i)).collect();
+    let tree = RTree::bulk_load(points);
+    let nearest = |i: usize| -> Option<usize> {
+        let at = to.world_position(i).to_array();
+        let (near, distance_2) = tree.nearest_neighbor_iter_with_distance_2(at).next()?;
+        let longest = from.log_scales[near.data].iter().fold(f32::NEG_INFINITY, |m, s| m.max(*s));
+        (distance_2.sqrt() <= REACH * f64::from(longest).exp()).then_some(near.data)
+    };
+    let nearest: Vec<Option<usize>> = (0..to.len()).into_par_iter().map(nearest).collect();
+    let of = nearest.iter().map(|n| n.map_or(NOBODY, |i| map.of[i])).collect();
+    let margin = nearest.iter().map(|n| n.map_or(0.0, |i| map.margin[i])).collect();
+    let mut carried = SemanticMap::of_identities(map.identities.clone(), of, margin, map.seeds.clone());
+    // Codes may have been trained, so that they are not those of the identities.
+    for (codes, near) in carried.codes.iter_mut().zip(&nearest) {
+        *codes = near.map_or(*codes, |i| map.codes[i]);
+    }
+    carried.language.clone_from(&map.language);
+    let reached = nearest.iter().flatten().count();
+    (carried, reached as f64 / to.len().max(1) as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Identities, Level};
+    use glam::DVec3;
+
+    fn cloud(xs: &[f32], origin: DVec3) -> GaussianCloud {
+        GaussianCloud {
+            origin,
+            positions: xs.iter().map(|x| [*x, 0.0, 0.0]).collect(),
+            log_scales: vec![[0.1_f32.ln(), -9.0, -9.0]; xs.len()],
+            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; xs.len()],
+            opacity_logits: vec![0.0; xs.len()],
+            sh: vec![[0.0; 3]; xs.len()],
+            ..GaussianCloud::default()
+        }
+    }
+
+    #[test]
+    fn gaussians_take_what_reaches_them() {
+        let mut identities = Identities::default();
+        let (a, b) = (identities.add(Level::Object, NOBODY, vec![]), identities.add(Level::Object, NOBODY, vec![]));
+        let mut map = SemanticMap::of_identities(identities, vec![a, b], vec![0.5, 1.0], vec!["photo".into()]);
+        map.codes[1][0] = 0.125;
+        let from = cloud(&[0.0, 1.0], DVec3::ZERO);
+        // Moved, cloned, exchanged, in another frame, and one that is nobody's: 0.3 off, three deviations.
+        let to = cloud(&[-8.95, -9.99, -10.19, -8.7], DVec3::X * 10.0);
+        let (carried, share) = carry(&map, &from, &to);
+        assert_eq!(carried.of, [b, a, a, NOBODY]);
+        assert_eq!(carried.margin, [1.0, 0.5, 0.5, 0.0]);
+        assert_eq!((carried.codes[0], carried.codes[1]), (map.codes[1], map.codes[0]));
+        assert_eq!(
+            carried.codes[3],
+            SemanticMap::of_identities(Identities::default(), vec![0], vec![0.0], vec![]).codes[0]
+        );
+        assert_eq!((share, carried.seeds), (0.75, map.seeds.clone()));
+        assert_eq!(carry(&map, &from, &from).0, map, "the same Gaussians keep everything");
+        assert!(carry(&map, &from, &GaussianCloud::default()).0.of.is_empty());
+    }
+}

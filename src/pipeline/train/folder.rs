@@ -1,0 +1,113 @@
+//! The folder for a training's result: what is there already is gone on with, carried over or left alone.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::TrainConfig;
+use super::checkpoint::{self, Checkpoint, CheckpointError};
+use super::run::{TrainEnd, TrainError, TrainOutcome};
+use crate::io::trained::{self, CLOUD_FILE};
+use crate::io::{IoError, SceneFolder, semantic_map};
+use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::semantics::carry;
+use crate::scene::{Dataset, GaussianCloud, SemanticMap};
+
+/// Holds the folder for the result, which must not hold anything that would be lost.
+pub(super) fn claim(folder: &Path, dataset: &Dataset) -> Result<SceneFolder, TrainError> {
+    let occupied = |what| Err(TrainError::Save(IoError::Occupied { folder: folder.into(), what }));
+    let real = |p: &Path| std::fs::canonicalize(p).ok();
+    if real(folder).is_some_and(|f| Some(f) == real(&dataset.root)) {
+        return occupied("holds the photos");
+    }
+    let there = |name: &str| folder.join(name).exists();
+    if !there(checkpoint::FILE) {
+        if trained::is_scene(folder) {
+            return Err(CheckpointError::Missing { folder: folder.into() }.into());
+        }
+        if there(CLOUD_FILE) || there(semantic_map::FILE) {
+            return occupied("holds Gaussians or objects that are no part of a trained scene");
+        }
+    }
+    SceneFolder::hold(folder, "training").map_err(TrainError::Save)
+}
+
+/// The result of a run that was finished and saved before.
+pub(super) fn finished(
+    folder: &Path,
+    saved: &Checkpoint,
+    config: &TrainConfig,
+) -> Result<Option<TrainOutcome>, TrainError> {
+    if saved.header.step < config.steps || !trained::is_scene(folder) {
+        return Ok(None);
+    }
+    let scene = trained::load(folder).map_err(TrainError::Save)?;
+    // A kill between the last checkpoint and the scene leaves the scene of an earlier stop.
+    let same = scene.info.history.steps == saved.header.history.steps;
+    Ok(same.then(|| TrainOutcome {
+        cloud: Arc::new(scene.cloud),
+        evaluations: scene.info.history.evaluations,
+        end: TrainEnd::Finished,
+        steps: saved.header.step,
+        secs: saved.header.secs,
+    }))
+}
+
+/// The checkpoint in `folder`, if there is one and it is of this run.
+pub(super) fn resumable(
+    folder: &Path,
+    dataset: &Dataset,
+    config: &TrainConfig,
+    train: &[usize],
+) -> Result<Option<Checkpoint>, CheckpointError> {
+    let path = folder.join(checkpoint::FILE);
+    let Some(saved) = checkpoint::load(&path)? else { return Ok(None) };
+    let h = &saved.header;
+    // How often to look and save does not change the trajectory.
+    let theirs =
+        TrainConfig { eval_every: config.eval_every, checkpoint_secs: config.checkpoint_secs, ..h.config.clone() };
+    if theirs != *config {
+        return Err(CheckpointError::OtherRun { path, what: "settings" });
+    }
+    if h.photos != photo_names(dataset, train) {
+        return Err(CheckpointError::OtherRun { path, what: "photos" });
+    }
+    Ok(Some(saved))
+}
+
+/// The objects and parts of the scene that is about to be replaced, for the Gaussians as they are now.
+pub(super) fn objects_for(
+    scene: &SceneFolder,
+    cloud: &GaussianCloud,
+    observer: &mut dyn Observer,
+) -> Result<Option<SemanticMap>, IoError> {
+    let folder = scene.path();
+    if !folder.join(semantic_map::FILE).exists() || !trained::is_scene(folder) {
+        return Ok(None);
+    }
+    let before = trained::load(folder)
+        .and_then(|s| Ok((semantic_map::load(folder, s.state.as_deref(), &s.cloud)?, s.cloud)))
+        .inspect_err(|e| observer.note(Level::Warning, format!("Its objects and parts cannot be carried over: {e}")));
+    let before = before.ok().and_then(|(map, cloud)| Some((map?, cloud)));
+    if let Some((map, old)) = &before
+        && (old.origin, &old.positions) == (cloud.origin, &cloud.positions)
+    {
+        return Ok(Some(map.clone()));
+    }
+    if let Some(kept) = scene.keep_earlier()? {
+        observer.note(Level::Info, format!("The scene as it was before is kept in {}", kept.display()));
+    }
+    Ok(before.map(|(map, old)| {
+        let (map, share) = carry::carry(&map, &old, cloud);
+        let text = format!(
+            "Its objects and parts were carried over to {:.1} % of the Gaussians, by place; 'fmlgs preprocess' finds \
+             them anew",
+            100.0 * share
+        );
+        observer.note(Level::Info, text);
+        map
+    }))
+}
+
+fn photo_names(dataset: &Dataset, indices: &[usize]) -> Vec<String> {
+    indices.iter().map(|&i| dataset.photos[i].name.clone()).collect()
+}
