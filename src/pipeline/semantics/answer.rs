@@ -249,7 +249,7 @@ mod tests {
         let ask = |text: &str, to: [f32; 3]| {
             let phrase = Phrase::parse(text).expect("a phrase");
             let mut phrases = Phrasebook::default();
-            let encode = |p: &str| Ok::<_, ()>(if p == text { to.to_vec() } else { vec![0.0, 0.0, -1.0] });
+            let encode = |p: &str| Ok::<_, ()>(if p == text { to.to_vec() } else { vec![0.5, 0.5, 0.5] });
             phrases.learn(&phrases_of(&phrase), encode).expect("encodes");
             let language = Language { features: &features, phrases: &phrases, options: MeaningOptions::default() };
             answer(&all, &phrase, Kind::Auto, Some(language))

@@ -165,11 +165,12 @@ mod tests {
         assert_eq!(plural.map(singular), ["lamp", "glass", "virus", "taxis", "bus", "gas", "s", "key"]);
         assert_eq!((alike("cup", "cup"), alike("cup", "cap"), alike("lamp", "mug")), (1.0, 0.0, 0.0));
         assert_eq!((alike("bolt", "bow"), alike("car", "cart")), (0.0, 0.0), "the shorter has three letters");
-        let slip = alike("controller", "contoller");
-        assert!(
-            (0.9..1.0).contains(&slip)
-                && (slip - strsim::jaro_winkler("controller", "contoller").powi(2)).abs() < 1e-12
-        );
+        // Three of four letters, three at the beginning: (3/4 + 3/4 + 1) / 3, and 0.3 of the rest, squared.
+        // Five of six and of five, three at the beginning: (5/6 + 1 + 1) / 3, and 0.3 of the rest.
+        for (a, b, jaro) in [("lamp", "lamb", 2.5 / 3.0), ("kettle", "ketle", 17.0 / 18.0)] {
+            let expected = f64::powi(jaro + 0.3 * (1.0 - jaro), 2);
+            assert!((alike(a, b) - expected).abs() < 1e-9, "{a} {b}: {} {expected}", alike(a, b));
+        }
         // One of two words of the phrase, all of the name: 2 x 1/2 x 1 / (1/2 + 1).
         let words = |text: &str| words(text);
         assert!((similarity(&words("red lamp"), &words("lamp")) - 2.0 / 3.0).abs() < 1e-12);

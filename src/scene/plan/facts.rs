@@ -253,3 +253,52 @@ fn footprint_px(cloud: &GaussianCloud, i: usize, camera: &Camera) -> Option<f64>
     let smaller = 0.5 * (a + c) - (0.25 * (a - c).powi(2) + b * b).sqrt();
     smaller.is_finite().then(|| smaller.max(0.0).sqrt())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_footprint_is_the_narrower_side_of_the_picture() {
+        let cloud = GaussianCloud {
+            origin: DVec3::new(0.3, -0.2, 0.1),
+            positions: vec![[0.4, 0.3, -0.2]],
+            log_scales: vec![[-3.0, -4.5, -2.5]],
+            quaternions: vec![[0.7, -0.2, 0.4, 0.5]],
+            opacity_logits: vec![2.0],
+            sh: vec![[0.0; 3]],
+            ..GaussianCloud::default()
+        };
+        let mut camera =
+            Camera::look_at(DVec3::new(1.0, -0.5, -4.0), DVec3::ZERO, DVec3::NEG_Y, 0.8, 640, 480).expect("valid");
+        camera.focal_px.x *= 1.3;
+        // How the picture moves along each axis of the Gaussian, by differences; the narrower side is the
+        // least over all directions in the picture.
+        let [w, x, y, z] = [0.7, -0.2, 0.4, 0.5];
+        let turn = glam::DQuat::from_xyzw(x, y, z, w).normalize();
+        let at = cloud.world_position(0);
+        let moves = [(DVec3::X, -3.0), (DVec3::Y, -4.5), (DVec3::Z, -2.5)].map(|(axis, log): (DVec3, f64)| {
+            let step = turn * axis * log.exp() * 1e-4;
+            (camera.project(at + step).expect("in front") - camera.project(at - step).expect("in front")) / 2e-4
+        });
+        let along = |angle: f64| {
+            let direction = glam::DVec2::from_angle(angle);
+            moves.iter().map(|m| m.dot(direction).powi(2)).sum::<f64>().sqrt()
+        };
+        let expected =
+            (0..20_000).map(|k| along(f64::from(k) * 1e-4 * std::f64::consts::FRAC_PI_2)).fold(f64::MAX, f64::min);
+        let found = footprint_px(&cloud, 0, &camera).expect("seen");
+        assert!((found / expected - 1.0).abs() < 1e-4, "{found} {expected}");
+        // Too faint, behind, and beyond each edge.
+        let seen = |change: &dyn Fn(&mut GaussianCloud, &mut Camera)| {
+            let (mut cloud, mut camera) = (cloud.clone(), camera.clone());
+            change(&mut cloud, &mut camera);
+            footprint_px(&cloud, 0, &camera).is_some()
+        };
+        assert!(seen(&|_, _| {}) && !seen(&|c, _| c.opacity_logits[0] = -30.0));
+        assert!(!seen(&|_, v| v.center += v.forward() * 30.0));
+        for (dx, dy) in [(-400.0, 0.0), (400.0, 0.0), (0.0, -400.0), (0.0, 400.0)] {
+            assert!(!seen(&|_, v| v.principal_px += glam::DVec2::new(dx, dy)), "{dx} {dy}");
+        }
+    }
+}

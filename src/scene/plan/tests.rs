@@ -185,3 +185,40 @@ fn numbers_are_readable() {
     assert_eq!(bytes(1_900), "2 kB");
     assert_eq!(bytes(3_200_000_000), "3.2 GB");
 }
+
+#[test]
+fn lines_say_what_is_left_out_and_how_much_that_is() {
+    let p = plan(|facts| facts.with_cloud(&coloured(0.2, 1e-4), 3, &[camera(4_000)]));
+    let line = |p: &ScenePlan, item: Item| {
+        let l = p.line(item).expect("said").clone();
+        (l.choice, l.reason, l.saving)
+    };
+    // Three bands are stored, the third is zero, the second too faint: 9 - 4 coefficients of 12 bytes are read.
+    let (choice, _, saving) = line(&p, Item::Colour);
+    assert_eq!((choice.as_str(), saving), ("SH degree 1 of 3", format!("{} read for every picture", bytes(60))));
+    // Only zero bands: they leave memory, 16 - 9 coefficients.
+    let zero = plan(|facts| facts.with_cloud(&coloured(0.2, 0.1), 3, &[camera(4_000)]));
+    assert_eq!(line(&zero, Item::Colour).2, format!("{} of memory", bytes(84)));
+    let training = plan(|facts| Facts { cloud: None, ..facts });
+    assert_eq!(line(&training, Item::Colour).2, "15 of 16 coefficients at the start");
+    // What was wanted otherwise goes on in lower case.
+    let all = ScenePlan::new(p.facts.clone(), &Overrides::everything());
+    let (auto, wanted) = (line(&p, Item::Photos).1, line(&all, Item::Photos).1);
+    assert!(auto.starts_with("Training is"), "{auto}");
+    assert_eq!(wanted, format!("Wanted so; else t{}", &auto[1..]));
+    let none = plan(|facts| facts.with_semantics(Some(&objects(false, false))));
+    assert_eq!(line(&none, Item::Parts).0, "off");
+    assert_eq!(line(&none, Item::Parts).2, "3 of 6 channels of blended codes");
+    assert_eq!(line(&p, Item::Parts).0, "on");
+    assert_eq!(line(&p, Item::Portraits).2, "2 drawings at opening");
+    let lost = plan(|facts| Facts { photos: None, ..facts });
+    assert!(line(&lost, Item::Navigation).1.contains("nowhere to stand"));
+    // The narrower Gaussians resolve a share of the pixels; the rest is saved.
+    let coarse = plan(|facts| facts.with_cloud(&blobs(40, -2.0), 3, &[camera(1_000)]));
+    let share = 1.0 - (f64::from(coarse.object_side_px) / 1_000.0).powi(2);
+    assert_eq!(line(&coarse, Item::Objects).2, format!("{:.0} % of the pixels of every view", 100.0 * share));
+    assert_eq!(
+        [When::Never, When::Used, When::Always].map(|w| [w.now(false), w.now(true)]),
+        [[false, false], [false, true], [true, true]]
+    );
+}
