@@ -156,7 +156,8 @@ mod tests {
     #[test]
     fn names_are_those_of_the_whole_line() {
         let mut all = Identities::default();
-        assert!(all.is_empty() && all.len() == 0);
+        assert!(all.is_empty());
+        assert_eq!(all.len(), 0);
         let doll = all.add(Level::Object, NOBODY, vec!["red doll".into(), "rosa".into()]);
         let face = all.add(Level::Part, doll, vec![]);
         let eye = all.add(Level::Part, face, vec!["eye".into()]);

@@ -150,7 +150,8 @@ impl PipelineJobs {
         };
         if outcome.end == TrainEnd::Cancelled {
             if semantics.is_some() {
-                let text = "Its objects are stored with the Gaussians as they are now; open the scene again to see them";
+                let text =
+                    "Its objects are stored with the Gaussians as they are now; open the scene again to see them";
                 observer.note(Level::Info, text.into());
             }
             return Err(Stop::Cancelled);

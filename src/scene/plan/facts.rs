@@ -275,7 +275,7 @@ mod tests {
         // How the picture moves along each axis of the Gaussian, by differences; the narrower side is the
         // least over all directions in the picture.
         let [w, x, y, z] = [0.7, -0.2, 0.4, 0.5];
-        let turn = glam::DQuat::from_xyzw(x, y, z, w).normalize();
+        let turn = glam::DQuat::from_vec4(glam::DVec4::new(x, y, z, w).try_normalize().expect("turns"));
         let at = cloud.world_position(0);
         let moves = [(DVec3::X, -3.0), (DVec3::Y, -4.5), (DVec3::Z, -2.5)].map(|(axis, log): (DVec3, f64)| {
             let step = turn * axis * log.exp() * 1e-4;
