@@ -127,8 +127,8 @@ mod tests {
         let e = parse_bytes(text.as_bytes()).expect_err("NaN");
         assert!(matches!(&e, IoError::NotFinite { index: 1, property, .. } if property == "y"), "{e}");
         let e = parse_bytes(text.replace("NaN", "-1e30").as_bytes()).expect_err("far");
-        let text = e.to_string();
-        assert!(text.contains("vertex 1: y = -1") && text.contains("is farther than 1e12 units"), "{e}");
+        let told = e.to_string();
+        assert!(told.contains("vertex 1: y = -1") && told.contains("is farther than 1e12 units"), "{e}");
         assert_eq!(parse_bytes(text.replace("NaN", "2").as_bytes()).expect("finite")[1].rgb, [GREY; 3]);
     }
 
