@@ -76,7 +76,7 @@ fn a_killed_training_goes_on_from_its_last_checkpoint_to_the_same_result() {
 
     // The CPU backend is deterministic, so the interrupted run ends where a straight one does.
     fmlgs(&train_arguments(photos, &straight, steps)).ok();
-    let cloud = |scene: &str| std::fs::read(Path::new(scene).join("point_cloud.ply")).unwrap();
+    let cloud = |scene: &str| fmlgs::io::trained::load(Path::new(scene)).unwrap().cloud;
     assert!(cloud(&out) == cloud(&straight), "the resumed run ended elsewhere than the straight one");
     // Negative control: another seed must end elsewhere.
     let other = at("other");
