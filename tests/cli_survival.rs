@@ -329,6 +329,60 @@ fn a_finished_training_is_left_alone_and_objects_survive_one_that_goes_on() {
     assert!(fmlgs(&train_arguments(photos, photos, "5")).fails_with(1).stderr.contains("holds the photos"));
 }
 
+#[test]
+fn no_result_replaces_what_was_read_or_what_somebody_else_made() {
+    let folder = folder();
+    let photos = tiny_dataset(folder.path());
+    let (photos, out) = (photos.to_str().unwrap(), folder.path().join("scene"));
+    let scene = out.to_str().unwrap();
+    fmlgs(&train_arguments(photos, scene, "20")).ok();
+    fmlgs(&["preprocess", scene, "--masks", photos, "--encoder", "none"]).ok();
+    let (photo, cloud, info) =
+        (format!("{photos}/images/0001.png"), format!("{scene}/point_cloud.ply"), format!("{scene}/scene.json"));
+    let before = (files_in(Path::new(photos)), files_in(&out));
+    for refused in [
+        &["segment", scene, "box 1", "--out", &cloud][..],
+        &["export", scene, "--out", &cloud],
+        &["query", scene, "box 1", "--mask", &info],
+        &["query", scene, "box 1", "--heat", &photo],
+        &["agent", scene, "show me box 1", "--view", &photo],
+        &["agent", scene, "show me box 1", "--transcript", &info],
+        &["path", scene, "--to-photo", "3", "--out", &info],
+        &["render", scene, "--camera", "1", "--out", &photo],
+        &["eval", scene, "--pictures", &format!("{photos}/images")],
+    ] {
+        let done = fmlgs(refused);
+        let told = done.stderr.contains("choose another name") || done.stderr.contains("must end in");
+        assert!(matches!(done.code, Some(1 | 2)) && told, "{refused:?}: {}", done.stderr);
+        assert!((files_in(Path::new(photos)), files_in(&out)) == before, "{refused:?} changed files");
+    }
+    // Beside them is room for results, again and again.
+    let path = format!("{scene}/path.json");
+    for _ in 0..2 {
+        fmlgs(&["path", scene, "--to-photo", "3", "--out", &path]).ok();
+    }
+    std::fs::remove_file(path).unwrap();
+
+    // A folder that somebody else filled is no place for synthetic photos.
+    let mine = folder.path().join("mine");
+    std::fs::create_dir(&mine).unwrap();
+    std::fs::write(mine.join("transforms.json"), "{}").unwrap();
+    let glb = folder.path().join("boxes.glb");
+    let synth = ["synth", glb.to_str().unwrap(), "--views", "2", "--size", "16x16", "-q", "--out"];
+    let done = fmlgs(&[&synth[..], &[mine.to_str().unwrap()]].concat()).fails_with(1);
+    assert!(done.stderr.contains("choose another folder"), "{}", done.stderr);
+    assert_eq!(std::fs::read_dir(&mine).unwrap().count(), 1);
+
+    // One wrong bit in a checkpoint is seen.
+    let checkpoint = out.join("checkpoint.bin");
+    let mut bytes = std::fs::read(&checkpoint).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 4;
+    std::fs::write(&checkpoint, bytes).unwrap();
+    let done = fmlgs(&train_arguments(photos, scene, "20")).fails_with(1);
+    assert!(done.stderr.contains("checkpoint.bin") && done.stderr.contains("checksum"), "{}", done.stderr);
+}
+
 /// All files below `folder`, with their contents.
 fn files_in(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     let mut all = Vec::new();

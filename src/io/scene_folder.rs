@@ -42,7 +42,7 @@ impl SceneFolder {
         })?;
         let lock = FolderLock::take(folder, what)?;
         commit::carry_out(folder)?;
-        sweep(folder);
+        [folder, &folder.join(EARLIER), &folder.join("cache")].into_iter().for_each(sweep);
         Ok(Self { lock })
     }
 
