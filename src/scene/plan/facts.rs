@@ -297,7 +297,7 @@ mod tests {
         };
         assert!(seen(&|_, _| {}) && !seen(&|c, _| c.opacity_logits[0] = -30.0));
         assert!(!seen(&|_, v| v.center += v.forward() * 30.0));
-        for (dx, dy) in [(-400.0, 0.0), (400.0, 0.0), (0.0, -400.0), (0.0, 400.0)] {
+        for (dx, dy) in [(-640.0, 0.0), (640.0, 0.0), (0.0, -480.0), (0.0, 480.0)] {
             assert!(!seen(&|_, v| v.principal_px += glam::DVec2::new(dx, dy)), "{dx} {dy}");
         }
     }
