@@ -253,8 +253,16 @@ mod tests {
         write(&at("a.bin"), |w| w.write_all(b"private")).expect("written");
         assert_eq!(fs::metadata(at("deep/real.bin")).expect("there").permissions().mode() & 0o777, 0o600);
 
-        write(Path::new("/dev/null"), |w| w.write_all(b"x")).expect("written into");
-        assert!(fs::metadata("/dev/null").expect("there").file_type().is_char_device());
+        // A pipe of its own: a fault here, run as root, must not replace a device of the system.
+        let pipe = at("pipe");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().expect("mkfifo").success());
+        let reader = std::thread::spawn({
+            let pipe = pipe.clone();
+            move || fs::read(pipe).expect("read")
+        });
+        write(&pipe, |w| w.write_all(b"x")).expect("written into");
+        assert!(fs::metadata(&pipe).expect("there").file_type().is_fifo());
+        assert_eq!(reader.join().expect("reader"), b"x");
         symlink("d.bin", at("c.bin")).expect("link");
         symlink("c.bin", at("d.bin")).expect("link");
         assert!(write(&at("c.bin"), |w| w.write_all(b"x")).is_err(), "links without an end");
