@@ -256,10 +256,9 @@ mod tests {
         // A pipe of its own: a fault here, run as root, must not replace a device of the system.
         let pipe = at("pipe");
         assert!(std::process::Command::new("mkfifo").arg(&pipe).status().expect("mkfifo").success());
-        let reader = std::thread::spawn({
-            let pipe = pipe.clone();
-            move || fs::read(pipe).expect("read")
-        });
+        let source = pipe.clone();
+        let reader = std::thread::Builder::new().name("reader".into());
+        let reader = reader.spawn(move || fs::read(source).expect("read")).expect("thread");
         write(&pipe, |w| w.write_all(b"x")).expect("written into");
         assert!(fs::metadata(&pipe).expect("there").file_type().is_fifo());
         assert_eq!(reader.join().expect("reader"), b"x");
