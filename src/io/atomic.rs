@@ -287,4 +287,12 @@ mod tests {
             Ok(()) => assert_eq!(fs::read(&path).expect("read"), b"new"),
         }
     }
+
+    #[test]
+    fn folders_and_remedies() {
+        assert_eq!(folder_of(Path::new("a.bin")), Path::new("."));
+        assert_eq!(folder_of(Path::new("b/a.bin")), Path::new("b"));
+        assert!(remedy(io::ErrorKind::FileTooLarge).contains("files of this size"));
+        assert!(remedy(io::ErrorKind::QuotaExceeded).contains("disk is full"));
+    }
 }

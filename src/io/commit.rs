@@ -222,4 +222,19 @@ mod tests {
         }
         assert!(folder.path().join("precious").exists());
     }
+
+    #[test]
+    fn what_cannot_be_carried_out_stays_decided() {
+        let journals = [(vec![(".a.fmlgs-1.tmp".into(), "a".into())], vec![]), (vec![], vec!["a".into()])];
+        for (put, remove) in journals {
+            let folder = tempfile::tempdir().expect("folder");
+            let at = |name: &str| folder.path().join(name);
+            // A folder that is not empty: nothing is renamed over it, and it is not removed as a file.
+            fs::create_dir_all(at("a/full")).expect("created");
+            fs::write(at(".a.fmlgs-1.tmp"), "new").expect("written");
+            fs::write(at(JOURNAL), serde_json::to_vec(&Journal { put, remove }).expect("json")).expect("written");
+            carry_out(folder.path()).expect_err("in the way");
+            assert!(at(".a.fmlgs-1.tmp").exists() && is_pending(folder.path()));
+        }
+    }
 }

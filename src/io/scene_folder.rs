@@ -290,4 +290,18 @@ mod tests {
         atomic::write(&at("path.json"), |w| w.write_all(b"x")).expect("another file");
         assert!(trained::load(folder.path()).is_ok());
     }
+
+    #[test]
+    fn a_checkpoint_is_replaced_and_a_scene_without_objects_is_not_kept() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path();
+        trained::save(path, &SceneInfo::default(), &cloud(0.0), None).expect("saved");
+        let scene = SceneFolder::hold(path, "test").expect("held");
+        for content in [b"one", b"two"] {
+            scene.save_checkpoint(|w| w.write_all(content)).expect("saved");
+            assert_eq!(fs::read(path.join(CHECKPOINT_FILE)).expect("read"), content);
+        }
+        assert_eq!(scene.keep_earlier().expect("nothing to keep"), None);
+        assert!(!path.join(EARLIER).exists());
+    }
 }

@@ -135,4 +135,18 @@ mod tests {
         drop((held, held_folder));
         assert_eq!(fs::read_dir(folder.path()).expect("list").count(), others.len());
     }
+
+    #[test]
+    fn the_first_write_into_a_folder_clears_what_a_killed_process_left() {
+        let folder = tempfile::tempdir().expect("folder");
+        for make in
+            [|f: &Path| drop(temporary_file(&f.join("a.bin"), "tmp")), |f: &Path| drop(temporary_folder(f, "b"))]
+        {
+            let here = tempfile::tempdir_in(folder.path()).expect("folder");
+            let dead = here.path().join(".a.bin.fmlgs-1.tmp");
+            fs::write(&dead, "x").expect("written");
+            make(here.path());
+            assert!(!dead.exists());
+        }
+    }
 }
