@@ -11,7 +11,7 @@ use crate::models::catalogue::{self, Entry, InstallError, State};
 use crate::models::engine::engine;
 use crate::models::fetch::{FetchError, Patience};
 use crate::models::{self, Tile};
-use crate::pipeline::observer::{Observer, Progress};
+use crate::pipeline::observer::Ticker;
 
 /// List, fetch and check the neural networks
 ///
@@ -126,17 +126,10 @@ fn state_text(entry: &Entry, state: &State) -> (String, String) {
 fn fetch(id: &str, from: Option<&str>, quiet: bool) -> Result<(), CliError> {
     let entry = catalogue::entry(id)?;
     let mut console = Console::new(quiet);
-    let start = Instant::now();
+    let mut ticker = Ticker::new("", 0);
     let result = entry.fetch(&catalogue::folder(), from, Patience::default(), &mut |name, there, all| {
-        let elapsed_secs = start.elapsed().as_secs_f64();
-        console.progress(Progress {
-            stage: format!("Fetching {name} (kB)"),
-            done: there / 1000,
-            total: all.unwrap_or(there) / 1000,
-            elapsed_secs,
-            rate: there as f64 / 1000.0 / elapsed_secs.max(1e-9),
-        });
-        !interrupt::asked_to_stop()
+        ticker.enter(format!("Fetching {name} (kB)"), all.unwrap_or(there) / 1000);
+        ticker.tick((there / 1000) as usize, &mut console).is_ok()
     });
     drop(console);
     match result {
@@ -178,7 +171,6 @@ fn bench(as_json: bool) -> Result<(), CliError> {
     let mut rows = vec![["model", "load ms", "picture ms", "phrase ms"].map(str::to_owned).to_vec()];
     let mut list = Vec::new();
     for id in catalogue::usable(models::Role::Encoder, &mut output::warn)? {
-        let start = Instant::now();
         let mut encoder = models::encoder(&id)?;
         let side_px = encoder.tile_side_px().unwrap_or(224);
         let color = |i: usize| {
@@ -192,7 +184,6 @@ fn bench(as_json: bool) -> Result<(), CliError> {
         let median = |run: &mut dyn FnMut() -> Result<(), CliError>| -> Result<f64, CliError> {
             let mut ms = Vec::with_capacity(RUNS);
             for _ in 0..RUNS {
-                let start = Instant::now();
                 run()?;
                 ms.push(start.elapsed().as_secs_f64() * 1e3);
             }

@@ -238,10 +238,7 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
     let cloud = Arc::new(scene.cloud);
     let out = (args.out.as_path(), &settings);
     let made = film::write(&cloud, &scene.settings, &cameras, marked, &mut backend, out, &mut console);
-    let summary = made.map_err(|e| match e {
-        FilmError::Cancelled => CliError::Cancelled("no film was written".into()),
-        other => CliError::failed(other.to_string()),
-    })?;
+    let summary = made.map_err(|e| CliError::of_work(e, "no video was written"))?;
     let secs = started.elapsed().as_secs_f64();
     let (w, h) = summary.size_px;
     if args.json {

@@ -9,7 +9,7 @@ use crossbeam_channel::Sender;
 use super::protocol::{Event, JobId};
 use super::thread::{CloudSnapshot, Repaint};
 use super::{Control, Slot};
-use crate::pipeline::observer::{Evaluation, Level, Observer, Progress, Signal, StepMetrics};
+use crate::pipeline::observer::{Evaluation, Observer, Progress, Signal, StepMetrics};
 use crate::scene::GaussianCloud;
 
 /// Least time between two copies of the cloud: three a second keep the picture alive and cost

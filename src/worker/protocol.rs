@@ -9,7 +9,7 @@ use super::edit::EditRequest;
 use super::guide::{Explored, FilmRequest, VisitRequest, Visited};
 use super::measure::MeasureRequest;
 use crate::io::trained::History;
-use crate::pipeline::observer::{Evaluation, Level, Progress, StepMetrics};
+use crate::pipeline::observer::{Evaluation, Interrupted, Progress, StepMetrics};
 use crate::pipeline::semantics::find::Finding;
 use crate::pipeline::semantics::portraits::Gallery;
 use crate::pipeline::train::TrainConfig;
@@ -402,6 +402,12 @@ pub enum Stop {
     Cancelled,
     /// Something went wrong.
     Failed(Failure),
+}
+
+impl<E: std::error::Error + 'static> From<E> for Stop {
+    fn from(error: E) -> Self {
+        if Interrupted::is_cause_of(&error) { Self::Cancelled } else { Self::Failed(Failure::of(&error, "")) }
+    }
 }
 
 /// What happened. For each job: first `Started`, then any of the middle ones, at last exactly one of

@@ -18,7 +18,7 @@ use super::train_codes::{CodeTraining, CodeView, decode, train_codes};
 use super::view_map::ViewMap;
 use crate::io::labels::Labels;
 use crate::models::Encoder;
-use crate::pipeline::observer::{Level, Observer, Signal};
+use crate::pipeline::observer::{Observer, Severity, Signal};
 use crate::render::cpu::Renderer;
 use crate::render::{RenderError, RenderSettings};
 use crate::scene::semantic_map::{BACKGROUND_CODE, CODE_CHANNELS};
@@ -104,13 +104,6 @@ pub enum FindError {
     Embed(#[from] EmbedError),
 }
 
-impl FindError {
-    /// Whether the observer asked to stop.
-    pub fn is_cancelled(&self) -> bool {
-        matches!(self, Self::Track(TrackError::Cancelled) | Self::Embed(EmbedError::Cancelled))
-    }
-}
-
 /// What finds the masks of photos that `cloud` was trained on: files, where there are any, else the
 /// network of this name, else regions of the photos.
 ///
@@ -156,7 +149,7 @@ pub fn find_objects(
     let Tools { segmenter, follower, encoder } = tools;
     let tracked = track(cloud, photos, settings, segmenter, follower, &options.track, observer)?;
     if let Some(text) = unknown(&tracked.views, photos, options.track.reseed_share) {
-        observer.note(Level::Info, text);
+        observer.note(Severity::Info, text);
     }
     let mut identities = tracked.identities.clone();
     let of: Vec<IdentityId> = tracked.belongings.iter().map(|b| b.identity).collect();
@@ -204,9 +197,7 @@ fn lift(
     }
     let training = CodeTraining { steps, seed: SEED };
     train_codes(cloud, &mut map.codes, &views, &map.identities, settings, training, observer)?;
-    if observer.signal() == Signal::Cancel {
-        return Err(TrackError::Cancelled.into());
-    }
+    observer.proceed().map_err(TrackError::from)?;
     if matches!(lifting, Lifting::Paper(_)) {
         map.of = decode(&map.codes, &map.identities);
     }

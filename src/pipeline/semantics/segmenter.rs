@@ -51,7 +51,7 @@ pub enum SegmentError {
     Model(#[from] ModelError),
     /// The observer asked to stop.
     #[error("cancelled")]
-    Cancelled,
+    Interrupted(#[from] Interrupted),
 }
 
 /// Masks that come with the dataset. Regions that do not say what they are count as objects where

@@ -373,7 +373,7 @@ fn cancelling_leaves_no_data_set() {
     let (out, _) = write(&small());
     assert!(out.path().join("transforms.json").is_file());
     let result = render_scene(&two_cubes(), "two", None, &small(), out.path(), &mut Stop);
-    assert!(matches!(result, Err(SynthError::Cancelled)));
+    assert!(matches!(result, Err(SynthError::Interrupted(_))));
     assert!(!out.path().join("transforms.json").exists());
 }
 
