@@ -13,7 +13,7 @@ use crate::models;
 use crate::pipeline::bench::{self, RenderTiming, StepTiming};
 use crate::pipeline::bench_gpu::{self, GpuTiming};
 use crate::pipeline::bench_query::{self, QueryTiming};
-use crate::pipeline::observer::{Severity, Signal};
+use crate::pipeline::observer::{Observer, Severity, Signal};
 use crate::pipeline::train::{TrainConfig, TrainView, load_views};
 use crate::render::gpu::Context;
 use crate::scene::Dataset;

@@ -13,7 +13,7 @@ use super::train::Settings;
 use super::{CliError, eval, interrupt, opened, output, synth};
 use crate::io;
 use crate::math::stats::median;
-use crate::pipeline::observer::{Evaluation, Severity, ViewScore};
+use crate::pipeline::observer::{Evaluation, Observer, Severity, ViewScore};
 use crate::pipeline::synth::demo;
 use crate::pipeline::train::{self, TrainConfig, TrainEnd};
 use crate::render::cpu::Renderer;

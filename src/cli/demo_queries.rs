@@ -12,7 +12,7 @@ use super::{CliError, output, query};
 use crate::io::SceneFolder;
 use crate::io::labels::Labels;
 use crate::models;
-use crate::pipeline::observer::{Severity, Silent};
+use crate::pipeline::observer::{Observer, Severity, Silent};
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::find::{FindOptions, Found, Tools, find_objects};
 use crate::pipeline::semantics::grammar::Kind;

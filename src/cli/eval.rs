@@ -1,7 +1,6 @@
 //! `fmlgs eval`: PSNR and SSIM on held-out photos, with pictures side by side.
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use image::ColorType;
 use serde_json::json;

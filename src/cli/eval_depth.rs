@@ -1,7 +1,6 @@
 //! `fmlgs eval --depth`: drawn depth against the true depth of a synthetic data set.
 
 use std::path::Path;
-use std::time::Instant;
 
 use serde_json::json;
 

@@ -6,7 +6,7 @@ use std::time::Instant;
 use serde_json::json;
 
 use super::progress::Console;
-use super::{CliError, interrupt, output};
+use super::{CliError, output};
 use crate::models::catalogue::{self, Entry, InstallError, State};
 use crate::models::engine::engine;
 use crate::models::fetch::{FetchError, Patience};
@@ -171,6 +171,7 @@ fn bench(as_json: bool) -> Result<(), CliError> {
     let mut rows = vec![["model", "load ms", "picture ms", "phrase ms"].map(str::to_owned).to_vec()];
     let mut list = Vec::new();
     for id in catalogue::usable(models::Role::Encoder, &mut output::warn)? {
+        let start = Instant::now();
         let mut encoder = models::encoder(&id)?;
         let side_px = encoder.tile_side_px().unwrap_or(224);
         let color = |i: usize| {
@@ -184,6 +185,7 @@ fn bench(as_json: bool) -> Result<(), CliError> {
         let median = |run: &mut dyn FnMut() -> Result<(), CliError>| -> Result<f64, CliError> {
             let mut ms = Vec::with_capacity(RUNS);
             for _ in 0..RUNS {
+                let start = Instant::now();
                 run()?;
                 ms.push(start.elapsed().as_secs_f64() * 1e3);
             }

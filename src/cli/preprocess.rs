@@ -11,7 +11,7 @@ use super::{CliError, number, opened, output};
 use crate::io::{self, SceneFolder};
 use crate::models;
 use crate::models::catalogue::{self, Role};
-use crate::pipeline::observer::Severity;
+use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::semantics::find::{FindOptions, Found, Lifting, REGIONS, Tools, find_objects, segmenter};
 use crate::pipeline::semantics::follow::Follower;
 use crate::pipeline::semantics::tracker::TrackOptions;

@@ -95,8 +95,8 @@ impl Observer for Console {
         }
     }
 
-    fn note(&mut self, level: Level, text: String) {
-        match level {
+    fn note(&mut self, severity: Severity, text: String) {
+        match severity {
             Severity::Warning => self.line(&format!("warning: {text}")),
             Severity::Info if !self.quiet => self.line(&text),
             Severity::Info => {}

@@ -16,7 +16,7 @@ use crate::io;
 use crate::io::animation::{Encoder, Settings};
 use crate::navigate::film::MOST_PICTURES;
 use crate::navigate::{Film, Speed};
-use crate::pipeline::film::{self, FilmError, Marked};
+use crate::pipeline::film::{self, Marked};
 use crate::pipeline::semantics::grammar::Kind;
 use crate::render::cpu::normals;
 use crate::render::{Backend, BackendChoice, Frame, RenderSettings};

@@ -7,7 +7,7 @@ use super::progress::Console;
 use super::report_studies::{Options, Subject};
 use super::{CliError, number, output};
 use crate::io;
-use crate::pipeline::observer::Severity;
+use crate::pipeline::observer::{Observer, Severity};
 use crate::report::{BeginError, End, FILE, Report, ReportError, Stage, StageName, StudyError, sweep};
 use crate::report::{computer, defaults, page, plot};
 

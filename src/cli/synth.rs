@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::progress::Console;
 use super::{CliError, output, view};
-use crate::pipeline::observer::Severity;
+use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::synth::{self, Levels, Rig, SynthError, SynthOptions, SynthReport};
 
 /// Render a glTF scene into posed photos with object and part ids

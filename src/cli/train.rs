@@ -8,7 +8,7 @@ use super::plan::PlanArgs;
 use super::progress::{Console, evaluation_line};
 use super::{CliError, number, opened, output};
 use crate::io::{self, Opened};
-use crate::pipeline::observer::Severity;
+use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::train::{self, TrainConfig, TrainEnd};
 use crate::render::BackendChoice;
 use crate::scene::{Dataset, Facts, Machine, ScenePlan};

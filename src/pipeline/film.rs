@@ -2,9 +2,8 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
 
-use super::observer::{Interrupted, Observer, Signal, Ticker};
+use super::observer::{Interrupted, Observer, Ticker};
 use super::semantics::view_map::ViewMap;
 use crate::io::animation::{AnimationError, AnimationWriter, Settings, Summary};
 
@@ -97,7 +96,7 @@ fn mark(pixels: &mut [[u8; 3]], width: usize, inside: impl Fn(usize) -> bool, co
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::observer::Silent;
+    use crate::pipeline::observer::{Signal, Silent};
     use crate::render::BackendChoice;
 
     #[test]

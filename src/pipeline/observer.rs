@@ -44,7 +44,7 @@ pub struct Interrupted;
 impl Interrupted {
     /// Whether `error`, or what caused it, is that the observer asked to stop.
     pub fn is_cause_of(error: &(dyn Error + 'static)) -> bool {
-        std::iter::successors(Some(error), |e| e.source()).any(|e| e.is::<Self>())
+        error.is::<Self>() || error.source().is_some_and(Self::is_cause_of)
     }
 }
 

@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::protocol::{Failure, Outcome, Stop};
+use super::protocol::{Outcome, Stop};
 use crate::io::animation::Settings;
 use crate::navigate::target::Wish;
 use crate::navigate::visit::{NoVisit, Place, Visit};
 use crate::navigate::{FRAMES, Navigator, Pose};
-use crate::pipeline::film::{self, FilmError, Marked};
+use crate::pipeline::film::{self, Marked};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::render::{Backend, BackendChoice, RenderSettings};
 use crate::scene::trace::{self, Sort};

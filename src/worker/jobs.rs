@@ -19,7 +19,7 @@ use crate::pipeline::observer::{Observer, Severity, Ticker};
 use crate::pipeline::semantics::find::{Carry, FindOptions, Finding, Found, REGIONS, Tools, find_objects, segmenter};
 use crate::pipeline::semantics::follow::Follower;
 use crate::pipeline::semantics::portraits::portraits;
-use crate::pipeline::synth::{SynthError, demo};
+use crate::pipeline::synth::demo;
 use crate::pipeline::train::checkpoint::CheckpointError;
 use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainError};
 use crate::render::RenderSettings;

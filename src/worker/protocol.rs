@@ -9,7 +9,7 @@ use super::edit::EditRequest;
 use super::guide::{Explored, FilmRequest, VisitRequest, Visited};
 use super::measure::MeasureRequest;
 use crate::io::trained::History;
-use crate::pipeline::observer::{Evaluation, Interrupted, Progress, StepMetrics};
+use crate::pipeline::observer::{Evaluation, Interrupted, Progress, Severity, StepMetrics};
 use crate::pipeline::semantics::find::Finding;
 use crate::pipeline::semantics::portraits::Gallery;
 use crate::pipeline::train::TrainConfig;
@@ -430,7 +430,7 @@ pub enum Event {
     /// A held-out evaluation.
     Evaluation(JobId, Evaluation),
     /// A line for the log.
-    Note(JobId, Level, String),
+    Note(JobId, Severity, String),
     /// The job now waits (`true`) or goes on (`false`).
     Paused(JobId, bool),
     /// It did what it was to do.

@@ -1,13 +1,12 @@
 //! Language features of identities: an encoder looks at each in the photos that show it best.
 
 use std::collections::{BTreeSet, HashMap};
-use std::time::Instant;
 
 use super::relevancy::{PART_WEIGHT, deviate};
 use super::view_map::ViewMap;
 use crate::io::{self, IoError};
 use crate::models::{Encoder, ModelError, Tile};
-use crate::pipeline::observer::{Interrupted, Observer, Signal, Ticker};
+use crate::pipeline::observer::{Interrupted, Observer, Ticker};
 use crate::render::cpu::Renderer;
 use crate::render::{RenderError, RenderSettings};
 use crate::scene::language::MAX_VIEWS;
@@ -167,7 +166,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::pipeline::observer::Silent;
+    use crate::pipeline::observer::{Signal, Silent};
     use crate::scene::{Camera, NOBODY};
 
     /// Sees whether there is red in a picture, and nothing else.

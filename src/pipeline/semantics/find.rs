@@ -18,7 +18,7 @@ use super::train_codes::{CodeTraining, CodeView, decode, train_codes};
 use super::view_map::ViewMap;
 use crate::io::labels::Labels;
 use crate::models::Encoder;
-use crate::pipeline::observer::{Observer, Severity, Signal};
+use crate::pipeline::observer::{Observer, Severity};
 use crate::render::cpu::Renderer;
 use crate::render::{RenderError, RenderSettings};
 use crate::scene::semantic_map::{BACKGROUND_CODE, CODE_CHANNELS};
@@ -236,7 +236,7 @@ mod tests {
     use std::path::PathBuf;
 
     use super::*;
-    use crate::pipeline::observer::Silent;
+    use crate::pipeline::observer::{Interrupted, Signal, Silent};
     use crate::pipeline::semantics::segmenter::FoundMask;
     use crate::scene::{Camera, Level as Of, Mask, NOBODY};
 
@@ -354,7 +354,7 @@ mod tests {
     fn what_no_mask_reached_is_nobodys_and_told() {
         struct Notes(Vec<String>);
         impl Observer for Notes {
-            fn note(&mut self, _: Level, text: String) {
+            fn note(&mut self, _: Severity, text: String) {
                 self.0.push(text);
             }
         }
@@ -398,9 +398,9 @@ mod tests {
             }
         }
         let nothing = find(Told { named: true, covers: false }, Lifting::Votes, 12, &mut Silent).expect_err("no masks");
-        assert!(!nothing.is_cancelled() && nothing.to_string().contains("'told'"), "{nothing}");
+        assert!(!Interrupted::is_cause_of(&nothing) && nothing.to_string().contains("'told'"), "{nothing}");
         let stopped = find(Told { named: true, covers: true }, Lifting::Votes, 12, &mut Stop).expect_err("stopped");
-        assert!(stopped.is_cancelled(), "{stopped}");
+        assert!(Interrupted::is_cause_of(&stopped), "{stopped}");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use crate::io::IoError;
 use crate::io::labels::{Labels, Region};
 use crate::models::ModelError;
-use crate::pipeline::observer::Observer;
+use crate::pipeline::observer::{Interrupted, Observer};
 use crate::scene::{Level, Mask, Photo};
 
 /// A mask that a segmenter found in one photo.

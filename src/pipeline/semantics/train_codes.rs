@@ -1,8 +1,6 @@
 //! The paper's lifting: codes of the Gaussians, both levels in one pass, trained until the rendered
 //! codes look like the masks' (L1 + 0.2 D-SSIM). The Gaussians themselves do not change.
 
-use std::time::Instant;
-
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_pcg::Pcg64Mcg;

@@ -35,7 +35,7 @@ mod view;
 mod write;
 
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg32;
@@ -151,7 +151,7 @@ fn render_scene(
     for warning in &scene.warnings {
         observer.note(observer::Severity::Warning, warning.clone());
     }
-    Ticker::new("Building the scene", options.views).tick(0, observer)?;
+    Ticker::new("Building the scene", options.views).report(0, observer);
     let mut identities = levels::identities(scene, options.levels, name)?;
     let stage = stage(scene, &identities)?;
     let cameras = rig::cameras(&stage.surface, &stage.tracer, options);

@@ -1,7 +1,5 @@
 //! Photos ready for comparison: loaded, undistorted, scaled, without borders.
 
-use std::time::{Duration, Instant};
-
 use rayon::prelude::*;
 
 use super::border::Borders;

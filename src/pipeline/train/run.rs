@@ -10,7 +10,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::checkpoint::{self, Checkpoint, CheckpointError, Header};
 use super::folder::{claim, finished, objects_for, resumable};
-use super::photos::{load_views, wait};
+use super::photos::load_views;
 use super::trainer::{REPORT_STEPS, StepError, StepResult, Trainer};
 use super::{TrainConfig, TrainView, coarse, density, geometry, init};
 use crate::io::trained::{History, SceneInfo};
