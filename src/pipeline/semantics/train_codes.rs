@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::votes::UNKNOWN;
 use crate::math::finite::{CHECKED, all_finite};
 use crate::pipeline::observer::{Observer, Ticker};
-use crate::pipeline::train::trainer::LAMBDA;
+use crate::pipeline::train::device::LAMBDA;
 use crate::render::cpu::Renderer;
 use crate::render::cpu::adam::AdamStep;
 use crate::render::cpu::ssim::PhotoLoss;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::TrainConfig;
 use super::checkpoint::{self, Checkpoint, CheckpointError};
-use super::run::{TrainEnd, TrainError, TrainOutcome};
+use super::outcome::{TrainEnd, TrainError, TrainOutcome};
 use crate::io::trained::{self, CLOUD_FILE};
 use crate::io::{IoError, SceneFolder, semantic_map};
 use crate::pipeline::observer::{Observer, Severity};

@@ -8,19 +8,20 @@ use std::time::Instant;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
-use super::checkpoint::{self, Checkpoint, CheckpointError, Header};
+use super::checkpoint::{self, Checkpoint, Header};
+use super::device::StepResult;
 use super::folder::{claim, finished, objects_for, resumable};
+use super::outcome::{TrainEnd, TrainError, TrainOutcome};
 use super::photos::load_views;
-use super::trainer::{REPORT_STEPS, StepError, StepResult, Trainer};
+use super::trainer::{REPORT_STEPS, StepError, Trainer};
 use super::{TrainConfig, TrainView, coarse, density, geometry, init};
+use crate::io::SceneFolder;
 use crate::io::trained::{History, SceneInfo};
-use crate::io::{IoError, SceneFolder};
-use crate::math::finite::NotFinite;
 use crate::math::stats::{mean, median};
 use crate::pipeline::evaluate::evaluate;
-use crate::pipeline::observer::{Evaluation, Observer, Severity, StepMetrics, Ticker};
-use crate::render::gpu::{Context, GpuError};
-use crate::render::{BackendChoice, RenderError};
+use crate::pipeline::observer::{Observer, Severity, StepMetrics, Ticker};
+use crate::render::BackendChoice;
+use crate::render::gpu::Context;
 use crate::scene::{Dataset, GaussianCloud};
 
 /// Steps between copies of the cloud to roll back to.
@@ -29,62 +30,6 @@ const SAFE_STEPS: u64 = 500;
 const DIVERGED: f64 = 10.0;
 /// How often a run may diverge before it gives up.
 const MAX_ROLLBACKS: u32 = 4;
-
-/// How a run ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TrainEnd {
-    /// All steps were done.
-    Finished,
-    /// The observer asked to stop; the state is saved.
-    Cancelled,
-}
-
-/// What a run leaves behind.
-#[derive(Clone, Debug)]
-pub struct TrainOutcome {
-    /// The Gaussians.
-    pub cloud: Arc<GaussianCloud>,
-    /// Held-out evaluations, the last one of the final state.
-    pub evaluations: Vec<Evaluation>,
-    /// How it ended.
-    pub end: TrainEnd,
-    /// Steps done.
-    pub steps: u64,
-    /// Seconds of training.
-    pub secs: f64,
-}
-
-/// Why a run failed.
-#[derive(Debug, thiserror::Error)]
-pub enum TrainError {
-    /// No photo to train on.
-    #[error("{0} has no photo to train on: {1} photos, all held out; lower --holdout or add photos")]
-    NoPhotos(String, usize),
-    /// A photo could not be read.
-    #[error(transparent)]
-    Photo(IoError),
-    /// A view could not be drawn.
-    #[error("photo {0}: {1}")]
-    Render(String, RenderError),
-    /// The GPU failed. The last checkpoint is intact.
-    #[error("the GPU failed: {0}; --backend cpu does without")]
-    Gpu(#[from] GpuError),
-    /// The checkpoint in the result's folder cannot be used.
-    #[error(transparent)]
-    Checkpoint(#[from] CheckpointError),
-    /// The result could not be saved.
-    #[error(transparent)]
-    Save(IoError),
-    /// The loss kept growing.
-    #[error("the training diverged {0} times even with lowered rates; the photos' poses may be wrong")]
-    Diverged(u32),
-    /// A stage left a number that is none; looked for under `debug-validation` only.
-    #[error(transparent)]
-    NotFinite(#[from] NotFinite),
-    /// Settings that make no sense.
-    #[error("{0}")]
-    Config(String),
-}
 
 /// Trains on `dataset` and saves into the folder `out`, if given. A checkpoint of the same run in
 /// that folder is continued; where that run is finished, nothing is done. Objects and parts that the
