@@ -348,7 +348,7 @@ fn a_lost_device_is_an_error_and_no_panic() {
 
 #[test]
 fn stages_are_measured() {
-    use fmlgs::render::gpu::measure;
+    use fmlgs::measure::bench::gpu as measure;
     with_context(|context| {
         let lesson = Lesson::new(0);
         let settings = RenderSettings::default();

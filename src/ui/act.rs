@@ -14,7 +14,7 @@ use crate::agent::scene::{Deed, Parts};
 use crate::navigate::target::Wish;
 use crate::pipeline::semantics::edit::Edit;
 use crate::pipeline::train::TrainConfig;
-use crate::report::is_report;
+use crate::measure::is_report;
 use crate::scene::IdentityId;
 use crate::scene::plan::When;
 use crate::worker::{Action, Command, EditRequest, Failure, FilmRequest, JobKind, Pane, VisitRequest, Visited};

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::app::App;
 use super::state::Tone;
-use crate::report::{Knobs, StageName, turned};
+use crate::measure::{Knobs, StageName, turned};
 use crate::worker::{Command, MeasureRequest, Pane};
 
 impl App {

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use crate::pipeline::observer::{Evaluation, Level, Progress, StepMetrics};
 use crate::pipeline::semantics::portraits::Gallery;
 use crate::render::RenderSettings;
-use crate::report::Report;
+use crate::measure::Report;
 use crate::scene::{Facts, Limits, Overrides, PhotoPixels, ScenePlan, SemanticMap, text};
 use crate::worker::{Event, Explored, Failure, JobId, JobKind, Lane, OpenedScene, Outcome, Visited};
 

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::edit::Edit;
-use crate::report::{Knobs, StageName};
+use crate::measure::{Knobs, StageName};
 use crate::scene::{IdentityId, NOBODY};
 
 /// What the viewport shows.

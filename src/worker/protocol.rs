@@ -14,7 +14,7 @@ use crate::pipeline::semantics::find::Finding;
 use crate::pipeline::semantics::portraits::Gallery;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
-use crate::report::Report;
+use crate::measure::Report;
 use crate::scene::{Bounds, Camera, Dataset, Facts, GaussianCloud, Photo, PhotoPixels, SemanticMap};
 
 /// Names one job of one worker.

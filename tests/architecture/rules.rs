@@ -6,7 +6,7 @@ use super::source::{SourceFile, library_code, test_module_files};
 pub type Complaint = String;
 
 /// Each module of the library and the other modules it may use, in the order of the data flow.
-const MODULES: [(&str, &[&str]); 13] = [
+const MODULES: [(&str, &[&str]); 12] = [
     ("math", &[]),
     ("scene", &["math"]),
     ("io", &["math", "scene"]),
@@ -14,15 +14,14 @@ const MODULES: [(&str, &[&str]); 13] = [
     ("render", &["math", "scene"]),
     ("pipeline", &["math", "scene", "io", "models", "render"]),
     ("navigate", &["math", "scene", "render"]),
-    ("stability", &["math", "scene", "io", "render", "pipeline", "navigate"]),
-    ("report", &["math", "scene", "io", "models", "render", "pipeline", "navigate"]),
-    ("worker", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "report"]),
+    ("measure", &["math", "scene", "io", "models", "render", "pipeline", "navigate"]),
+    ("worker", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "measure"]),
     ("agent", &["math", "scene", "io", "render", "pipeline", "navigate", "worker"]),
     (
         "cli",
-        &["math", "scene", "io", "models", "render", "pipeline", "navigate", "stability", "report", "worker", "agent"],
+        &["math", "scene", "io", "models", "render", "pipeline", "navigate", "measure", "worker", "agent"],
     ),
-    ("ui", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "report", "worker", "agent"]),
+    ("ui", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "measure", "worker", "agent"]),
 ];
 
 /// Longest Rust file in lines.

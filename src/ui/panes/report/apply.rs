@@ -7,7 +7,7 @@ use super::super::super::layout::Layout;
 use super::super::super::viewport::drawing::{Drawing, share};
 use crate::pipeline::train::TrainConfig;
 use crate::render::{Cutoffs, RenderSettings};
-use crate::report::{Knobs, Point, Stage, StageName, turned};
+use crate::measure::{Knobs, Point, Stage, StageName, turned};
 use crate::worker::Action;
 
 /// The settings in force.
@@ -168,7 +168,7 @@ mod tests {
             seeds: vec![0],
             planned: points.len(),
             measures: Vec::new(),
-            rule: crate::report::Rule { measure: String::new(), times: 1.0, floor: 0.0, spare_secs: 0.0 },
+            rule: crate::measure::Rule { measure: String::new(), times: 1.0, floor: 0.0, spare_secs: 0.0 },
             points,
             orders: Vec::new(),
             left_out: Vec::new(),

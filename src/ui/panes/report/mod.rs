@@ -15,7 +15,7 @@ use super::super::layout::Layout;
 use super::super::state::{AppState, ShownReport};
 use super::super::viewport::Viewport;
 use super::super::{format, theme};
-use crate::report::{Measure, Point, Report, Stage, StageName, table};
+use crate::measure::{Measure, Point, Report, Stage, StageName, table};
 use crate::worker::Action;
 
 /// What a person looks at in a report.
@@ -266,7 +266,7 @@ fn chosen(ui: &mut Ui, stage: &Stage, selected: Option<&Point>, now: &Now<'_>, a
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::{Computer, Rule, Sample, VERSION};
+    use crate::measure::{Computer, Rule, Sample, VERSION};
     use std::collections::BTreeMap;
     use std::sync::Arc;
 
@@ -292,7 +292,7 @@ mod tests {
             input: BTreeMap::new(),
             seeds: vec![0],
             planned: 3,
-            measures: vec![Measure::new("PSNR", "dB", crate::report::Form::Decibels, "")],
+            measures: vec![Measure::new("PSNR", "dB", crate::measure::ErrorKind::Decibels, "")],
             rule: Rule { measure: "PSNR".into(), times: 1.0, floor: 0.0, spare_secs: 0.0 },
             points: vec![point("default", "all", 2.0), point("steps", "500", 1.0), point("steps", "50", 0.1)],
             orders: Vec::new(),

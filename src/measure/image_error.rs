@@ -1,0 +1,225 @@
+//! Images as numbers: errors between two, changes of size, and the integral over a pixel's
+//! footprint, which an image samples at one point.
+
+use nv_flip::{DEFAULT_PIXELS_PER_DEGREE, FlipImageRgb8};
+
+use super::document::Order;
+use crate::math::Real;
+use crate::math::stats::{mean, quantile, worst};
+use crate::pipeline::metrics::psnr_of;
+use crate::render::cpu::Renderer;
+use crate::render::{Features, Frame, RenderError, RenderSettings};
+use crate::scene::{Camera, GaussianCloud, PhotoPixels};
+
+/// PSNR of images that are (nearly) the same, dB.
+const MOST_PSNR: f64 = 150.0;
+
+/// Red, green and blue as they are shown, 0 to 1.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Planes {
+    /// Width in px.
+    pub width: usize,
+    /// Height in px.
+    pub height: usize,
+    /// Row by row.
+    pub color: [Vec<f64>; 3],
+}
+
+/// The colors of a frame, clamped to what a screen shows.
+pub fn planes<R: Real>(frame: &Frame<R>) -> Planes {
+    let color = std::array::from_fn(|c| frame.color[c].iter().map(|v| v.f64().clamp(0.0, 1.0)).collect());
+    Planes { width: frame.width_px, height: frame.height_px, color }
+}
+
+/// Each `factor` x `factor` pixels as their mean.
+pub fn averaged(p: &Planes, factor: usize) -> Planes {
+    let (width, height) = (p.width / factor, p.height / factor);
+    let at = |plane: &[f64], i: usize| {
+        let (x, y) = (i % width * factor, i / width * factor);
+        let rows = (y..y + factor).map(|row| plane[row * p.width + x..][..factor].iter().sum::<f64>());
+        rows.sum::<f64>() / (factor * factor) as f64
+    };
+    let color = std::array::from_fn(|c| (0..width * height).map(|i| at(&p.color[c], i)).collect());
+    Planes { width, height, color }
+}
+
+/// An image of pixels `factor` times as large enlarged linearly, as a graphics adapter does it.
+pub fn enlarged(p: &Planes, factor: usize, width: usize, height: usize) -> Planes {
+    let source = |i: usize, from: usize| {
+        let at = ((i as f64 + 0.5) / factor as f64 - 0.5).clamp(0.0, from.saturating_sub(1) as f64);
+        let low = at.floor() as usize;
+        (low, (low + 1).min(from - 1), at - low as f64)
+    };
+    let columns: Vec<_> = (0..width).map(|x| source(x, p.width)).collect();
+    let color = std::array::from_fn(|c| {
+        let plane = &p.color[c];
+        let mut out = Vec::with_capacity(width * height);
+        for y in 0..height {
+            let (top, bottom, v) = source(y, p.height);
+            let (top, bottom) = (&plane[top * p.width..], &plane[bottom * p.width..]);
+            out.extend(columns.iter().map(|&(l, r, u)| {
+                let across = |row: &[f64]| row[l] + (row[r] - row[l]) * u;
+                across(top) + (across(bottom) - across(top)) * v
+            }));
+        }
+        out
+    });
+    Planes { width, height, color }
+}
+
+/// How far an image is from another.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Errors {
+    /// Root mean square.
+    pub rms: f64,
+    /// Largest.
+    pub largest: f64,
+    /// What one value in a thousand exceeds.
+    pub tail: f64,
+    /// Mean of FLIP.
+    pub flip: f64,
+    /// What FLIP of one pixel in a hundred exceeds.
+    pub flip_tail: f64,
+}
+
+impl Errors {
+    /// Errors of `b` against `a`, of the same size.
+    pub fn between(a: &Planes, b: &Planes) -> Self {
+        let pairs = a.color.iter().flatten().zip(b.color.iter().flatten());
+        let off: Vec<f64> = pairs.map(|(a, b)| (a - b).abs()).collect();
+        let (flip, flip_tail) = flip(a, b);
+        Self {
+            rms: mean(&off.iter().map(|e| e * e).collect::<Vec<_>>()).sqrt(),
+            largest: worst(off.iter().copied()),
+            tail: quantile(&off, 0.999),
+            flip,
+            flip_tail,
+        }
+    }
+
+    /// The mean over views.
+    pub fn mean(all: &[Self]) -> Self {
+        let of = |f: fn(&Self) -> f64| mean(&all.iter().map(f).collect::<Vec<_>>());
+        Self {
+            rms: of(|e| e.rms),
+            largest: of(|e| e.largest),
+            tail: of(|e| e.tail),
+            flip: of(|e| e.flip),
+            flip_tail: of(|e| e.flip_tail),
+        }
+    }
+
+    /// By the names of measures.
+    pub fn named(&self) -> Vec<(&'static str, f64)> {
+        let psnr = psnr_of(self.rms * self.rms).min(MOST_PSNR);
+        vec![
+            ("RMS error", self.rms),
+            ("PSNR", psnr),
+            ("largest error", self.largest),
+            ("99.9 % error", self.tail),
+            ("FLIP", self.flip),
+            ("FLIP 99 %", self.flip_tail),
+        ]
+    }
+}
+
+/// PSNR in dB of an image in a photo of its size; what the photo does not cover does not count.
+pub fn psnr_in_photo(p: &Planes, photo: &PhotoPixels) -> f64 {
+    let covered = |i: &usize| photo.coverage.as_ref().is_none_or(|c| c[*i] > 0);
+    let squared = (0..photo.len())
+        .filter(covered)
+        .flat_map(|i| (0..3).map(move |c| (p.color[c][i] - f64::from(photo.rgb[i][c]) / 255.0).powi(2)));
+    let all: Vec<f64> = squared.collect();
+    psnr_of(mean(&all)).min(MOST_PSNR)
+}
+
+/// Mean and 99th percentile of FLIP.
+fn flip(a: &Planes, b: &Planes) -> (f64, f64) {
+    let (w, h) = (a.width as u32, a.height as u32);
+    let bytes = |p: &Planes| -> Vec<u8> {
+        let [r, g, b] = &p.color;
+        r.iter().zip(g).zip(b).flat_map(|((r, g), b)| [*r, *g, *b].map(|v| (v * 255.0).round() as u8)).collect()
+    };
+    if w == 0 || h == 0 {
+        return (0.0, 0.0);
+    }
+    let [a, b] = [a, b].map(|p| FlipImageRgb8::with_data(w, h, &bytes(p)));
+    let errors = nv_flip::flip(a, b, DEFAULT_PIXELS_PER_DEGREE).to_vec();
+    let errors: Vec<f64> = errors.into_iter().map(f64::from).collect();
+    (mean(&errors), quantile(&errors, 0.99))
+}
+
+/// How fast the mean of `n` x `n` samples inside each pixel comes near the integral over the pixel:
+/// the midpoint rule is of second order where the image is smooth. The blur of a splat does not
+/// change with the samples, as their cameras differ by parts of a pixel only.
+///
+/// # Errors
+/// If the camera is not usable.
+pub fn footprint_order(
+    cloud: &GaussianCloud<f64>,
+    camera: &Camera,
+    settings: &RenderSettings,
+) -> Result<Order, RenderError> {
+    let mut renderer = Renderer::<f64>::new();
+    let mut sampled = |n: usize| -> Result<[Vec<f64>; 3], RenderError> {
+        let mut sums: [Vec<f64>; 3] = Default::default();
+        for k in 0..n * n {
+            let shift = |i: usize| (i as f64 + 0.5) / n as f64 - 0.5;
+            let mut shifted = camera.clone();
+            shifted.principal_px -= glam::DVec2::new(shift(k % n), shift(k / n));
+            let frame = renderer.render(cloud, Features::NONE, &shifted, settings)?;
+            for (sum, plane) in sums.iter_mut().zip(&frame.color) {
+                sum.resize(plane.len(), 0.0);
+                sum.iter_mut().zip(plane).for_each(|(s, v)| *s += v / (n * n) as f64);
+            }
+        }
+        Ok(sums)
+    };
+    let best = sampled(16)?;
+    let mut pairs = Vec::new();
+    for n in [1, 2, 4, 8] {
+        let rough = sampled(n)?;
+        let squared = best.iter().flatten().zip(rough.iter().flatten()).map(|(a, b)| (a - b) * (a - b));
+        let count = (3 * best[0].len()).max(1) as f64;
+        pairs.push([n as f64, (squared.sum::<f64>() / count).sqrt()]);
+    }
+    let meaning = "Samples along each side of a pixel against the RMS error of the pixel's mean; one sample is what \
+                   is drawn.";
+    Ok(Order::fit("quadrature of the pixel footprint", meaning, pairs, 2.0, 0.35, 1e-12))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(width: usize, height: usize, f: impl Fn(usize, usize) -> f64) -> Planes {
+        let plane: Vec<f64> = (0..width * height).map(|i| f(i % width, i / width)).collect();
+        Planes { width, height, color: std::array::from_fn(|_| plane.clone()) }
+    }
+
+    #[test]
+    fn an_image_against_itself_is_without_error_and_others_are_not() {
+        let a = image(32, 24, |x, y| ((x * 7 + y * 3) % 11) as f64 / 11.0);
+        let same = Errors::between(&a, &a);
+        assert_eq!((same.rms, same.largest, same.tail, same.flip), (0.0, 0.0, 0.0, 0.0));
+        assert_eq!(same.named()[1].1, MOST_PSNR);
+        let off = image(32, 24, |x, y| ((x * 7 + y * 3) % 11) as f64 / 11.0 * 0.9);
+        let e = Errors::between(&a, &off);
+        assert!(
+            e.rms > 0.01 && (e.largest - 1.0 / 11.0).abs() < 1e-9 && e.flip > 0.005 && e.flip_tail >= e.flip,
+            "{e:?}"
+        );
+    }
+
+    #[test]
+    fn sizes_change_as_they_should() {
+        let ramp = image(16, 8, |x, _| x as f64 / 16.0);
+        let small = averaged(&ramp, 4);
+        assert_eq!((small.width, small.height), (4, 2));
+        assert!((small.color[0][0] - 1.5 / 16.0).abs() < 1e-12);
+        let large = enlarged(&small, 4, 16, 8);
+        // Between the outermost samples a ramp stays the ramp.
+        assert!((2..14).all(|x| (large.color[1][x] - ramp.color[1][x]).abs() < 1e-12));
+        assert_eq!(large.color[0].len(), 16 * 8);
+    }
+}
