@@ -10,10 +10,10 @@ use std::time::Duration;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
+use fmlgs::measure::{self, ErrorKind, Knobs, Measure, Point, Report, Rule, Sample, Stage, StageName};
 use fmlgs::pipeline::observer::Silent;
 use fmlgs::pipeline::semantics::edit::Edit;
 use fmlgs::pipeline::synth::{self, SynthOptions};
-use fmlgs::measure::{self, ErrorKind, Knobs, Measure, Point, Report, Rule, Sample, Stage, StageName};
 use fmlgs::ui::app::App;
 use fmlgs::worker::places::Places;
 use fmlgs::worker::{Action, Pane, ViewMode};

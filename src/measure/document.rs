@@ -356,7 +356,8 @@ impl Report {
     /// What was measured of a sweep earlier, if it was the same sweep: on the same input, of the same
     /// measures.
     pub fn earlier(&self, fresh: &Stage) -> Option<Stage> {
-        let measures = |s: &Stage| s.measures.iter().map(|m| (m.name.clone(), m.unit.clone(), m.kind)).collect::<Vec<_>>();
+        let measures =
+            |s: &Stage| s.measures.iter().map(|m| (m.name.clone(), m.unit.clone(), m.kind)).collect::<Vec<_>>();
         self.stage(fresh.name).filter(|s| s.input == fresh.input && measures(s) == measures(fresh)).cloned()
     }
 

@@ -22,9 +22,7 @@ pub fn pareto(points: &[(f64, f64)]) -> Vec<usize> {
 /// What a rule makes of one knob.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice<'a> {
-    /// The knob.
     pub method: &'a str,
-    /// The program's default.
     pub default: &'a Point,
     /// The fastest that is good enough.
     pub chosen: &'a Point,

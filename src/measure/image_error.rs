@@ -21,7 +21,6 @@ pub struct Planes {
     pub width: usize,
     /// Height in px.
     pub height: usize,
-    /// Row by row.
     pub color: [Vec<f64>; 3],
 }
 
@@ -70,13 +69,10 @@ pub fn enlarged(p: &Planes, factor: usize, width: usize, height: usize) -> Plane
 /// How far an image is from another.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Errors {
-    /// Root mean square.
     pub rms: f64,
-    /// Largest.
     pub largest: f64,
     /// What one value in a thousand exceeds.
     pub tail: f64,
-    /// Mean of FLIP.
     pub flip: f64,
     /// What FLIP of one pixel in a hundred exceeds.
     pub flip_tail: f64,
@@ -97,7 +93,6 @@ impl Errors {
         }
     }
 
-    /// The mean over views.
     pub fn mean(all: &[Self]) -> Self {
         let of = |f: fn(&Self) -> f64| mean(&all.iter().map(f).collect::<Vec<_>>());
         Self {
@@ -109,7 +104,6 @@ impl Errors {
         }
     }
 
-    /// By the names of measures.
     pub fn named(&self) -> Vec<(&'static str, f64)> {
         let psnr = psnr_of(self.rms * self.rms).min(MOST_PSNR);
         vec![
@@ -152,9 +146,6 @@ fn flip(a: &Planes, b: &Planes) -> (f64, f64) {
 /// How fast the mean of `n` x `n` samples inside each pixel comes near the integral over the pixel:
 /// the midpoint rule is of second order where the image is smooth. The blur of a splat does not
 /// change with the samples, as their cameras differ by parts of a pixel only.
-///
-/// # Errors
-/// If the camera is not usable.
 pub fn footprint_order(
     cloud: &GaussianCloud<f64>,
     camera: &Camera,

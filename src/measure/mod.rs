@@ -1,34 +1,39 @@
-//! Error against run time: every knob that trades accuracy for time is measured, not guessed.
+//! Measuring: error against run time (every knob that trades accuracy for time is measured, not guessed), speed, and
+//! extreme cases.
 //!
-//! [`document`] is what a report holds; [`studies`] measure the stages of the program, [`mod@sweep`]
-//! goes through their settings; [`compare`] holds two reports side by side; [`front`] says which are worth having, [`order`] how errors
-//! fall; [`table`], [`plot`] and [`page`] show it, [`defaults`] justifies the program's defaults.
+//! [`document`] is what a report holds, [`file`] reads and writes it; [`studies`] measure the stages of the program,
+//! [`subject`] opens those that a scene allows, [`sweep`] goes through their settings; [`front`] says which are worth
+//! having, [`order`] how errors fall, [`compare`] what another report has of the same. [`bench`] times drawing,
+//! training and queries, [`plan`] what a scene's plan saves, [`survey`] how well flights do; [`stability`] is the
+//! catalogue of extreme cases. [`table`], [`plot`] and [`page`] show all of it, [`defaults`] justifies the program's
+//! defaults.
 
 pub mod bench;
-pub mod compare;
-pub mod computer;
+pub(crate) mod compare;
+pub(crate) mod computer;
 pub mod defaults;
-pub mod document;
-pub mod file;
-pub mod front;
+pub(crate) mod document;
+pub(crate) mod file;
+pub(crate) mod front;
 mod image_error;
-pub mod knobs;
-pub mod order;
+pub(crate) mod knobs;
+mod order;
 pub mod page;
-pub mod plan;
-pub mod plot;
-pub mod stability;
-pub mod studies;
-pub mod subject;
-pub mod survey;
-pub mod sweep;
-pub mod table;
+pub(crate) mod plan;
+pub(crate) mod plot;
+pub(crate) mod stability;
+pub(crate) mod studies;
+pub(crate) mod subject;
+pub(crate) mod survey;
+pub(crate) mod sweep;
+pub(crate) mod table;
 
-pub use compare::{Comparison, Pair};
+pub(crate) use compare::Comparison;
 pub use document::{Computer, ErrorKind, Measure, Order, Point, Report, Rule, Sample, Stage, StageName, VERSION};
 pub use file::{BeginError, FILE, ReportError, is_report};
-pub use knobs::{Knobs, turned};
-pub use sweep::{Case, End, Study, StudyError, Trial, sweep};
+pub use knobs::Knobs;
+pub(crate) use knobs::turned;
+pub(crate) use sweep::{Case, End, Study, StudyError, Trial};
 
 #[cfg(test)]
 mod tests {

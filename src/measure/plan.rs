@@ -27,23 +27,16 @@ pub const SIZE: [u32; 2] = [1_008, 567];
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Variant {
-    /// The scene's own.
     Plan,
-    /// Everything on.
     Everything,
 }
 
 /// A scene that was opened.
 pub struct OpenScene {
-    /// Its Gaussians.
     pub cloud: Arc<GaussianCloud>,
-    /// How they are drawn.
     pub settings: RenderSettings,
-    /// Its objects and parts.
     pub map: Option<Arc<SemanticMap>>,
-    /// Its photos' cameras.
     pub cameras: Vec<Camera>,
-    /// Which way is up.
     pub up: glam::DVec3,
     /// The first view, of [`SIZE`].
     pub first: Camera,
@@ -94,9 +87,6 @@ impl Cost {
 
 /// Opens a scene, draws its first view with what belongs to it, and builds what the plan wants at opening, one
 /// after the other. Nothing else may run in this process.
-///
-/// # Errors
-/// If it cannot be opened or drawn.
 pub fn cost(
     open: impl FnOnce() -> Result<OpenScene, StudyError>,
     variant: Variant,
@@ -237,7 +227,6 @@ pub struct Saving {
 }
 
 impl Saving {
-    /// Of the scene at `path`.
     pub fn new(path: &Path, plan: Cost, everything: Cost) -> Self {
         Self { scene: super::bench::label(path), disk: disk(path), plan, everything }
     }
@@ -253,17 +242,19 @@ impl Saving {
 pub fn table(all: &[Saving]) -> Rows {
     let head =
         ["scene", "", "open s", "picture s", "ready s", "at rest", "peak", "GPU", "frame ms", "view ms", "loaded"];
-    let both = |s: &Saving| {
-        [(s.scene.clone(), "plan", s.plan.clone()), (String::new(), "everything", s.everything.clone())]
-    };
-    rows(&head, all.iter().flat_map(both).map(|(scene, variant, cost)| {
-        let mut cells = vec![scene, variant.to_owned()];
-        cells.extend([cost.open_secs, cost.first_picture_secs, cost.ready_secs].map(|s| format!("{s:.2}")));
-        cells.extend([cost.resident_bytes, cost.peak_bytes, cost.device_bytes].map(|b| bytes(b as u64)));
-        cells.extend([cost.frame_ms, cost.view_ms].map(|ms| format!("{ms:.1}")));
-        cells.push(cost.loaded.len().to_string());
-        cells
-    }))
+    let both =
+        |s: &Saving| [(s.scene.clone(), "plan", s.plan.clone()), (String::new(), "everything", s.everything.clone())];
+    rows(
+        &head,
+        all.iter().flat_map(both).map(|(scene, variant, cost)| {
+            let mut cells = vec![scene, variant.to_owned()];
+            cells.extend([cost.open_secs, cost.first_picture_secs, cost.ready_secs].map(|s| format!("{s:.2}")));
+            cells.extend([cost.resident_bytes, cost.peak_bytes, cost.device_bytes].map(|b| bytes(b as u64)));
+            cells.extend([cost.frame_ms, cost.view_ms].map(|ms| format!("{ms:.1}")));
+            cells.push(cost.loaded.len().to_string());
+            cells
+        }),
+    )
 }
 
 /// Bytes of a scene's files by what they serve, largest first.

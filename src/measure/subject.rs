@@ -19,19 +19,14 @@ use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::{Camera, Dataset, GaussianCloud, Identities, IdentityId, NOBODY, Photo, SemanticMap};
 
-/// What is asked for.
 pub struct Options {
-    /// Labels of the photos.
     pub masks: Option<PathBuf>,
-    /// Optimizer steps of codes.
     pub steps: Vec<u64>,
-    /// Optimizer steps of trainings.
     pub train_steps: u64,
     /// Longer side of compared images, px.
     pub max_side_px: u32,
     /// Most views that are compared.
     pub views: usize,
-    /// Repeats.
     pub repeats: u32,
 }
 
@@ -39,9 +34,7 @@ pub struct Options {
 pub struct Subject {
     /// Its name in the report.
     pub name: String,
-    /// Its Gaussians.
     pub cloud: Arc<GaussianCloud>,
-    /// How they are drawn.
     pub settings: RenderSettings,
     /// Cameras of its photos, and whether training did not see them.
     pub cameras: Vec<(Camera, bool)>,
@@ -49,9 +42,7 @@ pub struct Subject {
     pub holdout_every: usize,
     /// Its photos, if they are there.
     pub dataset: Option<Dataset>,
-    /// Objects and parts.
     pub map: Option<SemanticMap>,
-    /// What is asked for.
     pub options: Options,
 }
 
@@ -67,11 +58,7 @@ impl Subject {
             match self.lacks(name) {
                 None if asked || wanted.is_empty() => stages.push(name),
                 Some(what) if asked => {
-                    return Err(failed(format!(
-                        "{}: the stage '{}' needs {what}",
-                        self.name,
-                        name.name()
-                    )));
+                    return Err(failed(format!("{}: the stage '{}' needs {what}", self.name, name.name())));
                 }
                 Some(what) if wanted.is_empty() => {
                     missing.push(format!("Stage '{}' left out: it needs {what}", name.name()))
@@ -97,16 +84,15 @@ impl Subject {
             }
             StageName::Path => self.cameras.is_empty().then_some("cameras"),
             StageName::Depth => match &self.dataset {
-                Some(d) => (!d.root.join(true_depth::FOLDER).is_dir()).then_some("true depths, which synthetic photos have"),
+                Some(d) => {
+                    (!d.root.join(true_depth::FOLDER).is_dir()).then_some("true depths, which synthetic photos have")
+                }
                 None => photos,
             },
         }
     }
 
     /// The study of a stage.
-    ///
-    /// # Errors
-    /// If it is not possible.
     pub fn study(&self, name: StageName) -> Result<Study<'_>, StudyError> {
         match name {
             StageName::Render => self.drawing(),

@@ -22,11 +22,9 @@ const SEED: u64 = 1;
 /// Flights of one kind, taken together.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sum {
-    /// Flights.
     pub flights: usize,
     /// Flights of which a pose has less distance to matter than wanted.
     pub flights_too_near: usize,
-    /// Poses that have.
     pub poses_too_near: usize,
     /// The worst of each over all flights.
     pub worst: Smoothness,
@@ -35,7 +33,6 @@ pub struct Sum {
 /// What a survey found.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Survey {
-    /// Ours.
     pub ours: Sum,
     /// The paper's as it is printed, between the same ends.
     pub paper: Sum,
@@ -66,7 +63,6 @@ impl Sum {
 /// Between what random flights are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ends {
-    /// Keypoints.
     Keypoints,
     /// Places close to matter: from under the table to behind the lamp.
     CloseToMatter,

@@ -12,9 +12,7 @@ use crate::pipeline::observer::{Level, Observer, Progress, Signal};
 /// A setting to be measured.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
-    /// The knob.
     pub method: String,
-    /// Its setting, as shown.
     pub setting: String,
     /// Its setting, for the program.
     pub knobs: Knobs,
@@ -23,7 +21,6 @@ pub struct Case {
 }
 
 impl Case {
-    /// A setting of one knob.
     pub fn new(method: &str, setting: impl Into<String>, knobs: &[(&str, serde_json::Value)]) -> Self {
         let knobs = knobs.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();
         Self { method: method.into(), setting: setting.into(), knobs, default: false }
@@ -38,7 +35,6 @@ impl Case {
 /// What one measurement gave.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trial {
-    /// Seconds.
     pub secs: f64,
     /// Values by name of the measure; those that are NaN or infinite are left out.
     pub values: Vec<(&'static str, f64)>,
@@ -99,9 +95,7 @@ impl<'a> Study<'a> {
 /// How a sweep ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// Everything was measured.
     Finished,
-    /// The time was up.
     OutOfTime,
     /// The observer asked to stop.
     Cancelled,
@@ -173,9 +167,6 @@ pub fn sweep(
 
 impl Report {
     /// Measures `study` as [`sweep`] does, and writes the report into `folder` after every measurement.
-    ///
-    /// # Errors
-    /// As of [`sweep`].
     pub fn measure(
         &mut self,
         study: &mut Study<'_>,

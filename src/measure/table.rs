@@ -76,12 +76,15 @@ impl Stage {
         let titles = titles.iter().map(String::as_str);
         let head: Vec<&str> = ["knob", "setting", "time"].into_iter().chain(titles).chain(["front"]).collect();
         let front = self.measures.first().map(|m| self.front(m)).unwrap_or_default();
-        rows(&head, self.points.iter().enumerate().map(|(i, p)| {
-            let of = |m: &Measure| p.values.get(&m.name).map_or_else(String::new, |s| spread(s, number));
-            let fixed = [p.method.clone(), p.setting.clone(), spread(&p.secs, seconds)];
-            let mark = if front.contains(&i) { "*" } else { "" };
-            fixed.into_iter().chain(self.measures.iter().map(of)).chain([mark.to_owned()]).collect()
-        }))
+        rows(
+            &head,
+            self.points.iter().enumerate().map(|(i, p)| {
+                let of = |m: &Measure| p.values.get(&m.name).map_or_else(String::new, |s| spread(s, number));
+                let fixed = [p.method.clone(), p.setting.clone(), spread(&p.secs, seconds)];
+                let mark = if front.contains(&i) { "*" } else { "" };
+                fixed.into_iter().chain(self.measures.iter().map(of)).chain([mark.to_owned()]).collect()
+            }),
+        )
     }
 
     /// What the rule says of each knob's default.
@@ -91,10 +94,13 @@ impl Stage {
             format!("{}: {value} in {}", p.setting, seconds(p.secs.median))
         };
         let or_default = |p: &Point| if p.default { "the default".to_owned() } else { with(p) };
-        rows(&["knob", "default", "chosen", "least error", "holds"], self.choices().into_iter().map(|c| {
-            let (chosen, best) = (or_default(c.chosen), or_default(c.best));
-            vec![c.method.to_owned(), with(c.default), chosen, best, yes(c.holds)]
-        }))
+        rows(
+            &["knob", "default", "chosen", "least error", "holds"],
+            self.choices().into_iter().map(|c| {
+                let (chosen, best) = (or_default(c.chosen), or_default(c.best));
+                vec![c.method.to_owned(), with(c.default), chosen, best, yes(c.holds)]
+            }),
+        )
     }
 
     /// Whether errors fall as fast as theory says.

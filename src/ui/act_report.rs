@@ -50,7 +50,7 @@ impl App {
             }),
             StageName::Render => turned(&self.viewport.drawing, knobs).map(|drawing| {
                 self.viewport.drawing = drawing;
-                "The view is drawn with it; films and exports stay as they are"
+                "The view is drawn with it; exported videos and images stay as they are"
             }),
             _ => Err("the window has no setting for it".into()),
         };

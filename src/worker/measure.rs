@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::protocol::{Failure, Outcome, Stop};
-use crate::pipeline::observer::{Level, Observer};
-use crate::render::RenderSettings;
 use crate::measure::studies::Input;
 use crate::measure::studies::render;
 use crate::measure::studies::views::{View, held_out};
 use crate::measure::{End, FILE, Report, computer, is_report};
+use crate::pipeline::observer::{Level, Observer};
+use crate::render::RenderSettings;
 use crate::scene::{Camera, Dataset, GaussianCloud};
 
 /// Most views that are compared.

@@ -17,10 +17,7 @@ const MODULES: [(&str, &[&str]); 12] = [
     ("measure", &["math", "scene", "io", "models", "render", "pipeline", "navigate"]),
     ("worker", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "measure"]),
     ("agent", &["math", "scene", "io", "render", "pipeline", "navigate", "worker"]),
-    (
-        "cli",
-        &["math", "scene", "io", "models", "render", "pipeline", "navigate", "measure", "worker", "agent"],
-    ),
+    ("cli", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "measure", "worker", "agent"]),
     ("ui", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "measure", "worker", "agent"]),
 ];
 

@@ -7,13 +7,13 @@ use std::path::Path;
 use fmlgs::agent::llm::wire::Collector;
 use fmlgs::agent::{Policy, ToolCall};
 use fmlgs::io::{self, IoError};
+use fmlgs::measure::{self, Report};
 use fmlgs::models::sam::Sam;
 use fmlgs::models::sam2::Sam2;
 use fmlgs::models::{ClipEncoder, ModelError, metadata};
 use fmlgs::pipeline::semantics::follow;
 use fmlgs::pipeline::semantics::grammar::Phrase;
 use fmlgs::pipeline::train::checkpoint;
-use fmlgs::measure::{self, Report};
 
 use super::seeds_more as seeds;
 use super::targets::{Door, Target, picture, sound, text, valid};

@@ -7,7 +7,10 @@ use super::*;
 fn the_shipped_scene_is_the_built_one() {
     let built = build().unwrap();
     let remedy = "cargo test --test architecture write_the_demo_scene -- --ignored";
-    assert!(built == include_bytes!("../../assets/demo.glb"), "assets/demo.glb is out of date; write it anew: {remedy}");
+    assert!(
+        built == include_bytes!("../../assets/demo.glb"),
+        "assets/demo.glb is out of date; write it anew: {remedy}"
+    );
     assert!(built.len() < 2_000_000, "{} bytes", built.len());
 }
 

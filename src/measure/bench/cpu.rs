@@ -24,9 +24,7 @@ use crate::scene::{Bounds, Camera, Dataset, GaussianCloud};
 /// Timing of one scene at one size.
 #[derive(Clone, Debug, Serialize)]
 pub struct RenderTiming {
-    /// The scene.
     pub name: String,
-    /// Gaussians in it.
     pub gaussians: usize,
     /// Width and height, px.
     pub size: [u32; 2],
@@ -43,9 +41,7 @@ pub struct RenderTiming {
 /// Timing of training steps.
 #[derive(Clone, Debug, Serialize)]
 pub struct StepTiming {
-    /// The dataset.
     pub name: String,
-    /// Gaussians at the start.
     pub gaussians: usize,
     /// Width and height of the first photo, px.
     pub size: [u32; 2],

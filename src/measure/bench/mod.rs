@@ -1,9 +1,9 @@
 //! Timings of drawing, training and queries, stage by stage: what `fmlgs bench` prints. Every number is a median
 //! over repeats in one process; compare only numbers of one run.
 
-pub mod cpu;
+pub(crate) mod cpu;
 pub mod gpu;
-pub mod query;
+pub(crate) mod query;
 
 pub use cpu::{label, one_core_limit, views_of};
 

@@ -33,18 +33,14 @@ pub struct Percentiles {
 /// Times of the stages of a query.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct QueryTiming {
-    /// The encoder.
     pub encoder: String,
-    /// Objects and parts.
     pub identities: usize,
     /// Size of the view, px.
     pub size: [usize; 2],
-    /// Queries.
     pub queries: usize,
     /// Each stage; what is drawn is the heat map.
     #[serde(flatten)]
     pub stages: Stages<Percentiles>,
-    /// All but the encoding.
     pub without_encoding: Percentiles,
     /// From the text to the mask.
     pub whole: Percentiles,
@@ -62,7 +58,8 @@ impl QueryTiming {
             ("without text encoding", self.without_encoding),
             ("whole", self.whole),
         ];
-        let row = |(name, p): (&str, Percentiles)| vec![name.into(), format!("{:.3}", p.p50_ms), format!("{:.3}", p.p95_ms)];
+        let row =
+            |(name, p): (&str, Percentiles)| vec![name.into(), format!("{:.3}", p.p50_ms), format!("{:.3}", p.p95_ms)];
         let [w, h] = self.size;
         let what = format!(
             "{} queries, {} identities, {w} x {h} px, encoder '{}'",
@@ -79,9 +76,6 @@ const PARTS: [&str; 6] = ["button", "handle", "lid", "shade", "lens", "wheel"];
 
 /// Asks `queries` questions of a view of `size` px with `identities` objects and parts. Every text is
 /// another one, so none is encoded already.
-///
-/// # Errors
-/// If the encoder fails.
 pub fn time(
     encoder: &mut dyn Encoder,
     identities: usize,

@@ -3,10 +3,10 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use super::{Case, Finding, Verdict};
+use crate::math::sh;
 use crate::math::stats::{worst, worst_difference};
-use crate::math::{Real, sh};
 use crate::render::cpu::{RenderStats, Renderer};
-use crate::render::{CloudGradient, Features, Frame, FrameGradient, RenderError, RenderSettings};
+use crate::render::{Features, Frame, FrameGradient, RenderError, RenderSettings};
 use crate::scene::{Camera, GaussianCloud};
 
 /// Largest deviation of a color from double precision that an image may have.
@@ -38,9 +38,6 @@ pub fn camera(width: u32, height: u32) -> Camera {
 }
 
 /// Draws in both precisions.
-///
-/// # Errors
-/// What the renderer refuses.
 pub fn pair(
     cloud: &GaussianCloud<f64>,
     camera: &Camera,
@@ -57,17 +54,6 @@ pub fn deviation(exact: &Frame<f64>, single: &Frame<f32>) -> f64 {
     let brightest = worst(exact.color.iter().flatten().copied().chain([1.0]));
     let color = exact.color.iter().zip(&single.color).map(|(a, b)| worst_difference(a, b) / brightest);
     worst(color.chain([worst_difference(&exact.alpha, &single.alpha)]))
-}
-
-/// All numbers of a gradient, kind by kind.
-pub fn all_numbers<R: Real>(g: &CloudGradient<R>) -> Vec<f64> {
-    let all = g.positions.as_flattened().iter().chain(g.log_scales.as_flattened()).chain(g.quaternions.as_flattened());
-    all.chain(&g.opacity_logits).chain(g.sh.as_flattened()).map(|v| v.f64()).collect()
-}
-
-/// Root of the sum of squares.
-pub fn norm(v: impl Iterator<Item = f64>) -> f64 {
-    v.map(|x| x * x).sum::<f64>().sqrt()
 }
 
 /// What a case is about to show.
@@ -148,7 +134,6 @@ fn drawn(
 /// A scene, how it is looked at, and what is to be seen.
 type Scene = (GaussianCloud<f64>, Camera);
 
-/// Makes one.
 type Make = Box<dyn Fn() -> Scene + Send + Sync>;
 
 /// The scenes of this area, by name.
@@ -356,7 +341,9 @@ fn gradients() -> Vec<Case> {
             up.color[0].fill(f32::INFINITY);
         }
         let g = renderer.backward(&cloud, Features::NONE, &up);
-        Ok::<f64, String>(norm(all_numbers(&g).into_iter()))
+        let all = g.positions.as_flattened().iter().chain(g.log_scales.as_flattened()).chain(&g.opacity_logits);
+        let all = all.chain(g.quaternions.as_flattened()).chain(g.sh.as_flattened());
+        Ok::<f64, String>(all.map(|v| f64::from(*v).powi(2)).sum::<f64>().sqrt())
     };
     let finding = move |antialias, faulty| match length(antialias, faulty) {
         Ok(length) => Finding::is(format!("of length {length:.1e}"), length.is_finite() && length > 0.0),

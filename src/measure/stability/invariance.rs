@@ -92,7 +92,6 @@ fn tiles(faulty: bool) -> Finding {
     worst
 }
 
-/// The cases of this area.
 pub fn cases() -> Vec<Case> {
     let case = |name: &'static str, bound: f64, change: fn(&mut GaussianCloud<f64>, &mut Camera)| {
         Case::new("invariance", name, move |faulty| {

@@ -40,7 +40,6 @@ impl Scorer for Fixed {
     }
 }
 
-/// The cases of this area.
 pub fn cases() -> Vec<Case> {
     let language = |name: &'static str, run: fn(bool) -> Finding| Case::new("language", name, run);
     vec![

@@ -7,12 +7,12 @@
 //! One file per area: [`drawing`], [`invariance`], [`training`], [`optimizer`], [`language`],
 //! [`moving`]. Random numbers look for more in `tests/fuzz/numbers`.
 
-pub mod drawing;
-pub mod invariance;
-pub mod language;
-pub mod moving;
-pub mod optimizer;
-pub mod training;
+mod drawing;
+mod invariance;
+mod language;
+mod moving;
+mod optimizer;
+mod training;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
@@ -25,16 +25,13 @@ use super::table::{Rows, rows};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// It does.
     Holds,
     /// What came out is finite, but there is nothing to hold it against: no precision knows better.
     NotCompared,
-    /// It does not.
     Broken,
 }
 
 impl Verdict {
-    /// A yes or no.
     pub fn of(holds: bool) -> Self {
         if holds { Self::Holds } else { Self::Broken }
     }
@@ -52,13 +49,11 @@ impl Verdict {
 /// What happened in a case.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
-    /// In a few words.
     pub outcome: String,
     /// Deviation from what it should be; NaN if there is nothing to compare.
     pub error: f64,
     /// The largest deviation that is allowed.
     pub bound: f64,
-    /// Whether the promise holds.
     pub verdict: Verdict,
 }
 
@@ -68,7 +63,6 @@ impl Finding {
         Self { outcome: outcome.into(), error, bound, verdict: Verdict::of(error <= bound) }
     }
 
-    /// A yes or no.
     pub fn is(outcome: impl Into<String>, holds: bool) -> Self {
         Self { outcome: outcome.into(), error: f64::NAN, bound: f64::NAN, verdict: Verdict::of(holds) }
     }
@@ -88,9 +82,7 @@ impl Finding {
 
 /// A named case.
 pub struct Case {
-    /// Where it belongs.
     pub area: &'static str,
-    /// Its name.
     pub name: String,
     /// Runs it, with a fault planted if told so.
     run: Box<dyn Fn(bool) -> Finding + Send + Sync>,
@@ -99,13 +91,10 @@ pub struct Case {
 /// A case and what was found.
 #[derive(Clone, Debug, Serialize)]
 pub struct Checked {
-    /// Where it belongs.
     pub area: &'static str,
-    /// Its name.
     pub name: String,
     /// How long it took, seconds.
     pub secs: f64,
-    /// What happened.
     pub finding: Finding,
 }
 
@@ -136,11 +125,14 @@ impl Case {
 /// What was found, a row for each case.
 pub fn table(checked: &[Checked]) -> Rows {
     let number = |v: f64| if v.is_nan() { String::new() } else { format!("{v:.1e}") };
-    rows(&["area", "case", "what happened", "error", "bound", "holds"], checked.iter().map(|c| {
-        let f = &c.finding;
-        let holds = f.verdict.text().to_owned();
-        vec![c.area.into(), c.name.clone(), f.outcome.clone(), number(f.error), number(f.bound), holds]
-    }))
+    rows(
+        &["area", "case", "what happened", "error", "bound", "holds"],
+        checked.iter().map(|c| {
+            let f = &c.finding;
+            let holds = f.verdict.text().to_owned();
+            vec![c.area.into(), c.name.clone(), f.outcome.clone(), number(f.error), number(f.bound), holds]
+        }),
+    )
 }
 
 /// All cases, in the order of the areas.

@@ -45,7 +45,6 @@ fn whole(flight: Option<Flight>, faulty: bool) -> Finding {
     Finding::within(format!("{} poses", flight.poses.len()), if finite { worst } else { f64::NAN }, 1e-9)
 }
 
-/// The cases of this area.
 pub fn cases() -> Vec<Case> {
     let moving = |name: &'static str, run: fn(bool) -> Finding| Case::new("moving", name, run);
     vec![

@@ -129,7 +129,6 @@ fn curvatures(cloud: &GaussianCloud, view: &TrainView) -> [f64; 3] {
     })
 }
 
-/// The cases of this area.
 pub fn cases() -> Vec<Case> {
     let training = |name: &'static str, run: fn(bool) -> Finding| Case::new("training", name, run);
     vec![

@@ -179,7 +179,6 @@ fn resumed(faulty: bool) -> Finding {
     }
 }
 
-/// The cases of this area.
 pub fn cases() -> Vec<Case> {
     let training = |name: &'static str, run: fn(bool) -> Finding| Case::new("training", name, run);
     vec![

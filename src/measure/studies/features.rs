@@ -35,9 +35,6 @@ struct Variant {
 
 /// The sweep of the features of the trained Gaussians `cloud`, whose labeled views `training` are learned from and
 /// `held_out` compared with. Gradients are given these numbers of `steps`.
-///
-/// # Errors
-/// If a camera is not usable.
 pub fn study<'a>(
     drawn: (&'a GaussianCloud, &'a RenderSettings),
     mut identities: Identities,
@@ -119,8 +116,7 @@ fn score(
 }
 
 fn variants(views: usize, steps: &[u64]) -> Variants<Variant> {
-    let mut all =
-        Variants::new(format!("votes of {views} views, exact"), Variant { views, steps: 0, blend: false });
+    let mut all = Variants::new(format!("votes of {views} views, exact"), Variant { views, steps: 0, blend: false });
     let mut add = |method: &str, setting: String, views: usize, steps: u64, blend: bool| {
         let read = if blend { "blend" } else { "exact" };
         let knobs = [("views", json!(views)), ("steps", json!(steps)), ("read", json!(read))];

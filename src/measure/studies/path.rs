@@ -123,7 +123,8 @@ fn variants() -> Variants<Variant> {
         all.add("samples along legs", setting, &knobs, variant(FRAMES, Some(samples), Way::Ours));
     }
     for frames in [30, FRAMES] {
-        for (way, words, name) in [(Way::Printed, "", "printed"), (Way::Through, "through all keypoints, ", "through")] {
+        for (way, words, name) in [(Way::Printed, "", "printed"), (Way::Through, "through all keypoints, ", "through")]
+        {
             let (setting, knobs) = (format!("{words}{frames} frames"), [("paper", json!(name))]);
             all.add("the paper's interpolation", setting, &knobs, variant(frames, None, way));
         }

@@ -24,13 +24,10 @@ use crate::render::RenderSettings;
 use crate::render::cpu::Renderer;
 use crate::scene::{Camera, GaussianCloud, IdentityId, LanguageFeatures, Level, Mask, SemanticMap};
 
-/// A labeled photo.
 pub struct Asked {
-    /// Its name.
     pub name: String,
     /// Its camera, of the labels' size.
     pub camera: Camera,
-    /// What is asked for.
     pub categories: Vec<Category>,
 }
 
@@ -55,9 +52,6 @@ struct Variant {
 }
 
 /// The sweep of queries to a scene that `encoder` has embedded, asked for what labeled views show.
-///
-/// # Errors
-/// If no encoder has embedded it.
 pub fn study<'a>(
     (cloud, settings): (&'a GaussianCloud, &'a RenderSettings),
     map: &'a SemanticMap,
@@ -122,8 +116,7 @@ pub fn study<'a>(
                     None
                 })
             };
-            let full =
-                ViewMap::render(&mut renderer, cloud, of, all, &view.camera, settings).map_err(failed)?;
+            let full = ViewMap::render(&mut renderer, cloud, of, all, &view.camera, settings).map_err(failed)?;
             let labeled = LabelledView {
                 name: &view.name,
                 camera: &view.camera,

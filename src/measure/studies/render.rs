@@ -30,7 +30,6 @@ const TURNS: [f64; 3] = [0.5, 2.0, 8.0];
 enum Way {
     /// In single precision on the CPU.
     Cpu,
-    /// In double precision.
     Double,
     /// On the graphics adapter, emulated or not.
     Gpu,
@@ -56,9 +55,6 @@ struct Drawing {
 }
 
 /// The sweep of drawing `cloud` by `settings` from these views.
-///
-/// # Errors
-/// If a camera is not usable.
 pub fn study(
     cloud: Arc<GaussianCloud>,
     settings: &RenderSettings,

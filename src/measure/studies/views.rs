@@ -9,9 +9,6 @@ pub type View = (Camera, Option<PhotoPixels>);
 
 /// At most `count` held-out photos, their longer side at most `max_side_px`; `None` if the observer
 /// cancels.
-///
-/// # Errors
-/// If one cannot be read.
 pub fn held_out(
     dataset: &Dataset,
     holdout_every: usize,

@@ -4,14 +4,14 @@ use glam::{DMat3, DQuat, DVec2, DVec3};
 
 use super::source::Numbers;
 use super::{Verdict, promise};
+use fmlgs::math::Real;
 use fmlgs::math::rotation::unit_quaternion;
 use fmlgs::math::stats::worst;
 use fmlgs::pipeline::train::density::{self, DensityStats};
 use fmlgs::pipeline::train::{TrainConfig, TrainView, trainer::Trainer};
 use fmlgs::render::cpu::Renderer;
-use fmlgs::render::{ALPHA_MIN, COLOR_MAX, Features, Frame, FrameGradient, RenderSettings};
+use fmlgs::render::{ALPHA_MIN, COLOR_MAX, CloudGradient, Features, Frame, FrameGradient, RenderSettings};
 use fmlgs::scene::{Camera, GaussianCloud, PhotoPixels};
-use fmlgs::measure::stability::drawing::{all_numbers, norm};
 
 /// Inputs moved by a few roundings, at most, whose spread says what single precision can be held to. So
 /// many, because each has an even chance only of exchanging two Gaussians that are equally far.
@@ -26,6 +26,17 @@ const TERMS: f64 = 32.0;
 const BOUND: f64 = 2e-3;
 /// Share of pixels that may deviate by more, for what a cut-off decides one way or the other.
 const EDGE: f64 = 0.05;
+
+/// All numbers of a gradient, kind by kind.
+fn all_numbers<R: Real>(g: &CloudGradient<R>) -> Vec<f64> {
+    let all = g.positions.as_flattened().iter().chain(g.log_scales.as_flattened()).chain(g.quaternions.as_flattened());
+    all.chain(&g.opacity_logits).chain(g.sh.as_flattened()).map(|v| v.f64()).collect()
+}
+
+/// Root of the sum of squares.
+fn norm(v: impl Iterator<Item = f64>) -> f64 {
+    v.map(|x| x * x).sum::<f64>().sqrt()
+}
 
 fn cloud(n: &mut Numbers) -> GaussianCloud {
     let count = n.pick(&[0, 1, 1, 2, 3, 8, 40]);

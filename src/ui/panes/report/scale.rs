@@ -1,5 +1,5 @@
-//! Logarithmic axes for a plot that has none: places are decimal logarithms, marks are where people
-//! expect them.
+//! Logarithmic axes for a plot that has none: places are decimal logarithms, marks are where they are
+//! expected.
 
 use std::ops::RangeInclusive;
 
