@@ -9,7 +9,7 @@ use fmlgs::render::cpu::adam::AdamStep;
 use fmlgs::render::cpu::adam::Rates;
 use fmlgs::render::cpu::ssim::PhotoLoss;
 use fmlgs::render::gpu::ssim::photo_loss;
-use fmlgs::render::gpu::{Context, GpuError, Parameters, Trainer, TrainerSettings};
+use fmlgs::render::gpu::{Device, GpuError, Parameters, Trainer, TrainerSettings};
 use fmlgs::render::{Features, FrameGradient, RenderSettings, cpu};
 use fmlgs::scene::{Camera, GaussianCloud, PhotoPixels};
 use gpu_common::compare::{INTERIOR, agree};
@@ -332,13 +332,13 @@ fn more_than_a_binding_holds_is_refused_with_the_numbers() {
 #[test]
 fn a_lost_device_is_an_error_and_no_panic() {
     with_context(|_| {
-        let own = Context::new().unwrap();
+        let own = Device::new().unwrap();
         let lesson = Lesson::new(0);
         let mut trainer = Trainer::new(&own, &lesson.cloud, TrainerSettings::default()).unwrap();
         let photo = trainer.photo(&lesson.photo).unwrap();
         trainer.step(&lesson.camera, &photo, &lesson.rates, 0).unwrap();
         trainer.metrics().unwrap();
-        own.device().destroy();
+        own.wgpu().destroy();
         let stepped = trainer.step(&lesson.camera, &photo, &lesson.rates, 0);
         let told = trainer.metrics();
         assert!(stepped.is_err() || told.is_err(), "{stepped:?} {told:?}");

@@ -15,7 +15,7 @@ use crate::pipeline::bench_gpu::{self, GpuTiming};
 use crate::pipeline::bench_query::{self, QueryTiming};
 use crate::pipeline::observer::{Level, Observer, Signal};
 use crate::pipeline::train::{TrainConfig, TrainView, load_views};
-use crate::render::gpu::Context;
+use crate::render::Device;
 use crate::scene::Dataset;
 
 /// Time drawing and training on this machine, stage by stage
@@ -90,11 +90,11 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let mut console = Console::new(quiet);
     let sizes = if args.size.is_empty() { vec![[640, 480], [1280, 720]] } else { args.size };
     let repeats = args.repeats as usize;
-    let gpu = args.gpu.then(Context::new).transpose()?;
+    let gpu = args.gpu.then(Device::new).transpose()?;
     let mut timings = Timings {
         render: Vec::new(),
         train: Vec::new(),
-        gpu: gpu.as_ref().map(Context::describe),
+        gpu: gpu.as_ref().map(Device::describe),
         gpu_render: Vec::new(),
         gpu_train: Vec::new(),
         one_core_products_per_sec: bench::one_core_limit(),
@@ -110,8 +110,8 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
             Opened::Dataset(dataset) => {
                 let (config, views) = photos(&dataset, args.max_side, &mut console)?;
                 timings.train.push(bench::train_steps(&dataset, &views, &config, repeats)?);
-                if let Some(context) = &gpu {
-                    timings.gpu_train.push(bench_gpu::train_steps(context, &dataset, &views, &config, repeats)?);
+                if let Some(device) = &gpu {
+                    timings.gpu_train.push(bench_gpu::train_steps(device, &dataset, &views, &config, repeats)?);
                 }
                 continue;
             }
@@ -124,8 +124,8 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
             }
             console.note(Level::Info, format!("Drawing {name} at {} x {}", size[0], size[1]));
             timings.render.push(bench::render(&name, &cloud, size, repeats)?);
-            if let Some(context) = &gpu {
-                timings.gpu_render.push(bench_gpu::render(context, &name, &cloud, size, repeats)?);
+            if let Some(device) = &gpu {
+                timings.gpu_render.push(bench_gpu::render(device, &name, &cloud, size, repeats)?);
             }
         }
     }

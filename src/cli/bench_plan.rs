@@ -15,7 +15,7 @@ use crate::math::stats::median;
 use crate::models;
 use crate::pipeline::bench;
 use crate::pipeline::observer::Silent;
-use crate::render::{Backend, BackendChoice, Features, RenderSettings, gpu};
+use crate::render::{BackendChoice, Device, RenderSettings, Renderer};
 use crate::scene::plan::{Overrides, ScenePlan, When, bytes};
 use crate::scene::{Camera, trace};
 use crate::worker::jobs::PipelineJobs;
@@ -87,7 +87,7 @@ pub fn run(scenes: &[PathBuf], runs: u32, repeats: u32, as_json: bool) -> Result
         let (plan, everything) = (middle(plan)?, middle(everything)?);
         rows.push(Row { scene: bench::label(scene), disk: disk(scene), plan, everything });
     }
-    let adapter = gpu::Context::new().ok().map(|c| c.describe());
+    let adapter = Device::new().ok().map(|d| d.describe());
     if as_json {
         return output::print_json(&json!({ "size_px": SIZE, "runs": runs, "adapter": adapter, "scenes": rows }));
     }
@@ -136,7 +136,7 @@ fn measure(path: &Path, variant: Variant, repeats: usize) -> Result<Cost, CliErr
     let overrides = if variant == Variant::Plan { Overrides::default() } else { Overrides::everything() };
     let jobs = PipelineJobs::new(Places::of_user());
     // The window has looked for a GPU before it opens anything, and keeps the driver that it found.
-    let _ = crate::render::gpu::real_gpu();
+    let _ = crate::render::real_gpu();
     let before = resident();
     let start = Instant::now();
     let Outcome::Opened(scene) = job(&jobs, Command::Open { path: path.to_path_buf() })? else {
@@ -255,14 +255,14 @@ fn at_opening(jobs: &PipelineJobs, scene: &OpenedScene, plan: &ScenePlan) -> Res
 fn frame(scene: &OpenedScene, plan: &ScenePlan, repeats: usize) -> Result<f64, CliError> {
     let Some(cloud) = scene.cloud.clone() else { return Ok(0.0) };
     let choice = if plan.on_cpu { BackendChoice::Cpu } else { BackendChoice::Auto };
-    let mut backend = Backend::choose(choice, output::warn)?;
+    let mut renderer = Renderer::choose(choice, output::warn)?;
     let settings = RenderSettings { depth: plan.depth == When::Always, ..settings(scene, plan) };
     let mut times = Vec::new();
     for camera in bench::views_of(&cloud, SIZE[0], SIZE[1]) {
-        backend.render(&cloud, &camera, &settings)?;
+        renderer.draw(&cloud, &camera, &settings)?;
         for _ in 0..repeats {
             let start = Instant::now();
-            backend.render(&cloud, &camera, &settings)?;
+            renderer.draw(&cloud, &camera, &settings)?;
             times.push(start.elapsed().as_secs_f64() * 1e3);
         }
     }
@@ -272,10 +272,9 @@ fn frame(scene: &OpenedScene, plan: &ScenePlan, repeats: usize) -> Result<f64, C
 /// Bytes of the buffers that the GPU renderer allocates for the first view, on whatever adapter
 /// there is; 0 without any.
 fn device_bytes(scene: &OpenedScene, plan: &ScenePlan, camera: &Camera) -> Result<u64, CliError> {
-    let (Some(cloud), Ok(context)) = (&scene.cloud, gpu::Context::new()) else { return Ok(0) };
-    let mut renderer = gpu::Renderer::new(&context)?;
-    renderer.upload_bands(cloud, Features::NONE, plan.sh_degree)?;
-    renderer.draw(camera, &settings(scene, plan))?;
+    let (Some(cloud), Ok(device)) = (&scene.cloud, Device::new()) else { return Ok(0) };
+    let mut renderer = Renderer::on_gpu(&device)?;
+    renderer.draw(cloud, camera, &settings(scene, plan))?;
     Ok(renderer.device_bytes())
 }
 

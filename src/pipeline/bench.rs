@@ -17,8 +17,7 @@ use super::train::{TrainConfig, TrainView};
 use crate::math::lanes::{LANES, LaneOp, Lanes};
 use crate::math::stats::median;
 use crate::math::{Real, lanes::Lane};
-use crate::render::cpu::{RenderStats, Renderer};
-use crate::render::{Features, RenderError, RenderSettings};
+use crate::render::{Features, RenderError, RenderSettings, RenderStats, Renderer};
 use crate::scene::{Bounds, Camera, Dataset, GaussianCloud};
 
 /// Timing of one scene at one size.
@@ -71,7 +70,7 @@ pub fn views_of<R: Real>(cloud: &GaussianCloud<R>, width: u32, height: u32) -> V
 /// Times the CPU renderer on a cloud.
 pub fn render(name: &str, cloud: &GaussianCloud, size: [u32; 2], repeats: usize) -> Result<RenderTiming, RenderError> {
     let settings = RenderSettings::default();
-    let mut renderer = Renderer::<f32>::new();
+    let mut renderer = Renderer::new();
     let mut totals = Vec::new();
     let mut stats: Vec<RenderStats> = Vec::new();
     for camera in views_of(cloud, size[0], size[1]) {

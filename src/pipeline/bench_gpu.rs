@@ -7,9 +7,8 @@ use serde::Serialize;
 use super::bench::views_of;
 use super::train::{TrainConfig, TrainView, init};
 use crate::math::stats::median;
-use crate::render::RenderSettings;
-use crate::render::gpu::measure::{self, Measurement};
-use crate::render::gpu::{Context, GpuError};
+use crate::render::measure::{self, Measurement};
+use crate::render::{Device, GpuError, RenderSettings};
 use crate::scene::{Dataset, GaussianCloud};
 
 /// Timing of a frame or a training step.
@@ -29,21 +28,21 @@ pub struct GpuTiming {
 
 /// Times the GPU renderer on a cloud, from the same views as [`super::bench::render`].
 pub fn render(
-    context: &Context,
+    device: &Device,
     name: &str,
     cloud: &GaussianCloud,
     size: [u32; 2],
     repeats: usize,
 ) -> Result<GpuTiming, GpuError> {
     let settings = RenderSettings::default();
-    let frame = |camera| measure::frame(context, cloud, camera, &settings, repeats);
+    let frame = |camera| measure::frame(device, cloud, camera, &settings, repeats);
     let views = views_of(cloud, size[0], size[1]).iter().map(frame).collect::<Result<Vec<_>, _>>()?;
     Ok(timing(name, cloud.len(), size, &views))
 }
 
 /// Times GPU training steps from the dataset's own starting cloud, on a few of its photos.
 pub fn train_steps(
-    context: &Context,
+    device: &Device,
     dataset: &Dataset,
     views: &[TrainView],
     config: &TrainConfig,
@@ -51,7 +50,7 @@ pub fn train_steps(
 ) -> Result<GpuTiming, GpuError> {
     let mut rng = Pcg64Mcg::seed_from_u64(config.seed);
     let cloud = init::initial_cloud(dataset, views, config.sh_degree, config.random_points, &mut rng);
-    let step = |v: &TrainView| measure::training_step(context, &cloud, &v.camera, &v.pixels, repeats);
+    let step = |v: &TrainView| measure::training_step(device, &cloud, &v.camera, &v.pixels, repeats);
     let every = (views.len() / 3).max(1);
     let runs = views.iter().step_by(every).take(3).map(step).collect::<Result<Vec<_>, _>>()?;
     let size = views.first().map_or([0, 0], |v| [v.camera.width_px, v.camera.height_px]);

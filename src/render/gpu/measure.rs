@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use super::ssim::DevicePhoto;
 use super::timing::StageTimes;
-use super::{Context, GpuError, Renderer, Trainer, TrainerSettings};
+use super::{Device, GpuError, Renderer, Trainer, TrainerSettings};
 use crate::math::stats::median;
 use crate::render::cpu::adam::Rates;
 use crate::render::{Features, RenderSettings};
@@ -26,13 +26,13 @@ pub struct Measurement {
 /// Draws an uploaded cloud `repeats` times, after one that does not count. The whole includes the
 /// copy of the picture to the host.
 pub fn frame(
-    context: &Context,
+    device: &Device,
     cloud: &GaussianCloud,
     camera: &Camera,
     settings: &RenderSettings,
     repeats: usize,
 ) -> Result<Measurement, GpuError> {
-    let mut renderer = Renderer::new(context)?;
+    let mut renderer = Renderer::new(device)?;
     renderer.upload(cloud, Features::NONE)?;
     renderer.draw(camera, settings)?;
     let whole_secs = timed(repeats, || renderer.draw(camera, settings).map(|_| ()))?;
@@ -49,13 +49,13 @@ pub fn frame(
 /// Makes `repeats` training steps on one photo, after one that does not count. The whole is the
 /// mean over steps that follow each other without waiting.
 pub fn training_step(
-    context: &Context,
+    device: &Device,
     cloud: &GaussianCloud,
     camera: &Camera,
     photo: &PhotoPixels,
     repeats: usize,
 ) -> Result<Measurement, GpuError> {
-    let mut trainer = Trainer::new(context, cloud, TrainerSettings::default())?;
+    let mut trainer = Trainer::new(device, cloud, TrainerSettings::default())?;
     let photo: DevicePhoto = trainer.photo(photo)?;
     // Steps of no length, so that every repetition does the same work.
     let still = 1e-30;
@@ -74,7 +74,7 @@ pub fn training_step(
     for _ in 0..repeats {
         trainer.step(camera, &photo, &rates, degree)?;
     }
-    context.wait()?;
+    device.wait()?;
     let whole_secs = start.elapsed().as_secs_f64() / repeats.max(1) as f64;
     trainer.measure()?;
     let mut runs = Vec::with_capacity(repeats);

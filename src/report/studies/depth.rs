@@ -6,8 +6,7 @@ use super::{Input, Plans, stage, timed};
 use crate::math::stats::mean;
 use crate::pipeline::depth::{Samples, TrueDepth};
 use crate::pipeline::observer::{Observer, Signal};
-use crate::render::cpu::Renderer;
-use crate::render::{Cutoffs, Features, RenderSettings};
+use crate::render::{Cutoffs, Features, RenderSettings, Renderer};
 use crate::report::document::Form;
 use crate::report::sweep::failed;
 use crate::report::{Case, Measure, Rule, Stage, StageName, Study, StudyError, Trial};
@@ -98,7 +97,7 @@ impl Study for DepthStudy<'_> {
     fn run(&mut self, case: &Case, _seed: u64, observer: &mut dyn Observer) -> Result<Option<Trial>, StudyError> {
         let Some(plan) = self.plans.of(case) else { return Ok(None) };
         let (mut all, mut edges, mut secs) = (Samples::default(), Samples::default(), Vec::new());
-        let mut renderer = Renderer::<f32>::new();
+        let mut renderer = Renderer::new();
         for (camera, truth) in &self.views {
             if observer.signal() == Signal::Cancel {
                 return Ok(None);

@@ -7,13 +7,13 @@ use serde_json::json;
 
 use super::{Input, Plans, stage, timed};
 use crate::math::Real;
+use crate::math::resize::Filter;
 use crate::math::stats::mean;
 use crate::pipeline::observer::{Observer, Signal};
-use crate::render::cpu::Renderer;
-use crate::render::gpu::GpuError;
-use crate::render::{Backend, BackendChoice, Cutoffs, Features, Frame, RenderError, RenderSettings};
+use crate::render::GpuError;
+use crate::render::{BackendChoice, Cutoffs, Features, Frame, RenderError, RenderSettings, Renderer, cpu};
 use crate::report::document::Form;
-use crate::report::picture::{Errors, Planes, averaged, enlarged, footprint_order, planes, psnr_in_photo};
+use crate::report::picture::{Errors, Planes, footprint_order, planes, psnr_in_photo, resized};
 use crate::report::sweep::failed;
 use crate::report::{Case, Measure, Order, Rule, Stage, StageName, Study, StudyError, Trial};
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
@@ -55,7 +55,7 @@ pub struct RenderStudy {
     exact: Vec<Planes>,
     afar: Vec<Planes>,
     settings: RenderSettings,
-    gpu: Option<Backend>,
+    gpu: Option<Renderer>,
     input: Input,
     repeats: u32,
     plans: Plans<Plan>,
@@ -76,15 +76,15 @@ impl RenderStudy {
         let (cameras, photos): (Vec<Camera>, Vec<Option<PhotoPixels>>) = views.into_iter().unzip();
         let settings = RenderSettings { depth: false, ..settings.clone() };
         let why = |e: GpuError| drop(input.insert("GPU".into(), format!("not measured: {e}")));
-        let gpu = Backend::choose(BackendChoice::Gpu, drop).map_err(why).ok();
+        let gpu = Renderer::choose(BackendChoice::Gpu, drop).map_err(why).ok();
         let double = cloud.cast::<f64>();
         let exactly = RenderSettings { cutoffs: EXACT, ..settings.clone() };
-        let mut renderer = Renderer::<f64>::new();
+        let mut renderer = cpu::Renderer::<f64>::new();
         let mut exact = Vec::with_capacity(cameras.len());
         for camera in &cameras {
             exact.push(planes(&renderer.render(&double, Features::NONE, camera, &exactly)?));
         }
-        let afar = exact.iter().map(|p| averaged(p, AFAR as usize)).collect();
+        let afar = exact.iter().zip(&cameras).map(|(p, c)| resized(p, &c.reduced(AFAR), Filter::Area)).collect();
         let plans = plans(&cloud, &settings, gpu.as_ref());
         let (cloud, half) = (Arc::new(cloud.clone()), Arc::new(in_half(&cloud)));
         Ok(Self { cloud, double, half, cameras, photos, exact, afar, settings, gpu, input, repeats, plans })
@@ -92,7 +92,7 @@ impl RenderStudy {
 
     /// Draws one view; returns it with the seconds that took.
     fn draw(&mut self, plan: &Plan, camera: &Camera) -> Result<(Planes, f64), StudyError> {
-        let mut renderer = Renderer::<f32>::new();
+        let mut renderer = Renderer::new();
         fn shown<R: Real>((frame, secs): (Frame<R>, f64)) -> (Planes, f64) {
             (planes(&frame), secs)
         }
@@ -106,17 +106,17 @@ impl RenderStudy {
             Plan::Smaller(factor, settings) => {
                 let (small, secs) = cpu(&self.cloud, &camera.reduced(*factor), settings)?;
                 let start = Instant::now();
-                let large = enlarged(&small, *factor as usize, camera.width_px as usize, camera.height_px as usize);
+                let large = resized(&small, camera, Filter::Linear);
                 Ok((large, secs + start.elapsed().as_secs_f64()))
             }
             Plan::Double(settings) => {
-                let mut renderer = Renderer::<f64>::new();
+                let mut renderer = cpu::Renderer::<f64>::new();
                 let draw = || renderer.render(&self.double, Features::NONE, camera, settings).map_err(failed);
                 timed(draw).map(shown)
             }
             Plan::Gpu(settings) => {
                 let Some(gpu) = &mut self.gpu else { return Err(failed("there is no graphics adapter")) };
-                timed(|| gpu.render(&self.cloud, camera, settings).map_err(failed)).map(shown)
+                timed(|| gpu.draw(&self.cloud, camera, settings).map_err(failed)).map(shown)
             }
             Plan::Kept(degrees, settings) => {
                 let turn = glam::DMat3::from_rotation_y(degrees.to_radians());
@@ -147,7 +147,7 @@ fn in_half(cloud: &GaussianCloud) -> GaussianCloud {
     }
 }
 
-fn plans(cloud: &GaussianCloud, settings: &RenderSettings, gpu: Option<&Backend>) -> Plans<Plan> {
+fn plans(cloud: &GaussianCloud, settings: &RenderSettings, gpu: Option<&Renderer>) -> Plans<Plan> {
     let s = settings;
     let degree = s.sh_degree.min(cloud.sh_degree);
     let default = format!("CPU, f32, SH {degree}, alpha 1/255, transmittance 1e-4");
