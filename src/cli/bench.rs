@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command as Process;
+use std::sync::Arc;
 
 use serde_json::json;
 
@@ -14,7 +15,7 @@ use crate::measure::plan::{self, Cost, OpenScene, SIZE, Saving, Variant};
 use crate::models;
 use crate::pipeline::observer::{Level, Observer, Signal, Silent};
 use crate::pipeline::train::{TrainConfig, TrainView, load_views};
-use crate::render::gpu::Context;
+use crate::render::Device;
 use crate::scene::{Camera, Dataset};
 use crate::worker::jobs::PipelineJobs;
 use crate::worker::places::Places;
@@ -81,8 +82,8 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let mut console = Console::new(quiet);
     let sizes = if args.size.is_empty() { vec![[640, 480], [1280, 720]] } else { args.size };
     let repeats = args.repeats as usize;
-    let device = args.gpu.then(Context::new).transpose()?;
-    let gpu_name = device.as_ref().map(Context::describe);
+    let device = args.gpu.then(Device::new).transpose()?;
+    let gpu_name = device.as_ref().map(Device::describe);
     let one_core_products_per_sec = bench::one_core_limit();
     let mut timings = Timings { gpu: gpu_name, one_core_products_per_sec, ..Timings::default() };
     if let Some(count) = args.queries {
@@ -100,8 +101,8 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
                 }
                 continue;
             }
-            Opened::Cloud(cloud) => cloud,
-            Opened::Trained(scene) => scene.cloud,
+            Opened::Cloud(cloud) => Arc::new(cloud),
+            Opened::Trained(scene) => Arc::new(scene.cloud),
         };
         for &size in &sizes {
             if console.signal() == Signal::Cancel {
@@ -158,7 +159,7 @@ fn savings(args: &Args) -> Result<(), CliError> {
             scenes.push(Saving::new(scene, plan, everything));
         }
     }
-    let adapter = Context::new().ok().map(|c| c.describe());
+    let adapter = Device::new().ok().map(|c| c.describe());
     if args.json {
         let document = json!({ "size_px": SIZE, "runs": args.runs, "adapter": adapter, "scenes": scenes });
         return output::print_json(&document);

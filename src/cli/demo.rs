@@ -19,8 +19,7 @@ use crate::measure::{Case, ErrorKind, Measure, Report, Rule, Stage, StageName, T
 use crate::pipeline::observer::{Evaluation, Level, Observer, ViewScore};
 use crate::pipeline::synth::demo;
 use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainOutcome};
-use crate::render::cpu::Renderer;
-use crate::render::{Features, RenderSettings};
+use crate::render::{Features, RenderSettings, Renderer};
 use crate::scene::{Camera, Dataset, GaussianCloud, Machine};
 use crate::worker::machine;
 
@@ -169,7 +168,7 @@ fn make_photos(folder: &Path, console: &mut Console) -> Result<Option<f64>, CliE
 /// Draws a circle around what the photos look at; returns the median milliseconds per picture.
 fn fly(cloud: &GaussianCloud, settings: &RenderSettings, dataset: &Dataset, folder: &Path) -> Result<f64, CliError> {
     output::make_folder(folder)?;
-    let mut renderer = Renderer::<f32>::new();
+    let mut renderer = Renderer::new();
     let mut millis = Vec::with_capacity(FLIGHT_PICTURES);
     for (i, camera) in circle(dataset).iter().enumerate() {
         if interrupt::asked_to_stop() {

@@ -1,7 +1,7 @@
 //! The machine that a report was measured on: times of different machines do not compare.
 
 use super::document::Computer;
-use crate::render::gpu::real_gpu;
+use crate::render::real_gpu;
 
 /// Looks at this machine.
 pub fn look() -> Computer {

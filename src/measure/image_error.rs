@@ -5,8 +5,9 @@ use nv_flip::{DEFAULT_PIXELS_PER_DEGREE, FlipImageRgb8};
 
 use super::document::Order;
 use crate::math::Real;
-use crate::math::stats::{mean, quantile, worst};
-use crate::pipeline::metrics::psnr_of;
+use crate::math::resize::{Filter, resize};
+use crate::math::stats::{mean, psnr_of, quantile, worst};
+use crate::pipeline::metrics::psnr;
 use crate::render::cpu::Renderer;
 use crate::render::{Features, Frame, RenderError, RenderSettings};
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
@@ -30,39 +31,10 @@ pub fn planes<R: Real>(frame: &Frame<R>) -> Planes {
     Planes { width: frame.width_px, height: frame.height_px, color }
 }
 
-/// Each `factor` x `factor` pixels as their mean.
-pub fn averaged(p: &Planes, factor: usize) -> Planes {
-    let (width, height) = (p.width / factor, p.height / factor);
-    let at = |plane: &[f64], i: usize| {
-        let (x, y) = (i % width * factor, i / width * factor);
-        let rows = (y..y + factor).map(|row| plane[row * p.width + x..][..factor].iter().sum::<f64>());
-        rows.sum::<f64>() / (factor * factor) as f64
-    };
-    let color = std::array::from_fn(|c| (0..width * height).map(|i| at(&p.color[c], i)).collect());
-    Planes { width, height, color }
-}
-
-/// An image of pixels `factor` times as large enlarged linearly, as a graphics adapter does it.
-pub fn enlarged(p: &Planes, factor: usize, width: usize, height: usize) -> Planes {
-    let source = |i: usize, from: usize| {
-        let at = ((i as f64 + 0.5) / factor as f64 - 0.5).clamp(0.0, from.saturating_sub(1) as f64);
-        let low = at.floor() as usize;
-        (low, (low + 1).min(from - 1), at - low as f64)
-    };
-    let columns: Vec<_> = (0..width).map(|x| source(x, p.width)).collect();
-    let color = std::array::from_fn(|c| {
-        let plane = &p.color[c];
-        let mut out = Vec::with_capacity(width * height);
-        for y in 0..height {
-            let (top, bottom, v) = source(y, p.height);
-            let (top, bottom) = (&plane[top * p.width..], &plane[bottom * p.width..]);
-            out.extend(columns.iter().map(|&(l, r, u)| {
-                let across = |row: &[f64]| row[l] + (row[r] - row[l]) * u;
-                across(top) + (across(bottom) - across(top)) * v
-            }));
-        }
-        out
-    });
+/// A picture at the size of a camera's.
+pub fn resized(p: &Planes, camera: &Camera, filter: Filter) -> Planes {
+    let (width, height) = (camera.width_px as usize, camera.height_px as usize);
+    let color = p.color.each_ref().map(|plane| resize(plane, (p.width, p.height), (width, height), filter));
     Planes { width, height, color }
 }
 
@@ -119,12 +91,7 @@ impl Errors {
 
 /// PSNR in dB of an image in a photo of its size; what the photo does not cover does not count.
 pub fn psnr_in_photo(p: &Planes, photo: &PhotoPixels) -> f64 {
-    let covered = |i: &usize| photo.coverage.as_ref().is_none_or(|c| c[*i] > 0);
-    let squared = (0..photo.len())
-        .filter(covered)
-        .flat_map(|i| (0..3).map(move |c| (p.color[c][i] - f64::from(photo.rgb[i][c]) / 255.0).powi(2)));
-    let all: Vec<f64> = squared.collect();
-    psnr_of(mean(&all)).min(MOST_PSNR)
+    psnr(&p.color, (p.width, p.height), photo).min(MOST_PSNR)
 }
 
 /// Mean and 99th percentile of FLIP.
@@ -200,17 +167,5 @@ mod tests {
             e.rms > 0.01 && (e.largest - 1.0 / 11.0).abs() < 1e-9 && e.flip > 0.005 && e.flip_tail >= e.flip,
             "{e:?}"
         );
-    }
-
-    #[test]
-    fn sizes_change_as_they_should() {
-        let ramp = image(16, 8, |x, _| x as f64 / 16.0);
-        let small = averaged(&ramp, 4);
-        assert_eq!((small.width, small.height), (4, 2));
-        assert!((small.color[0][0] - 1.5 / 16.0).abs() < 1e-12);
-        let large = enlarged(&small, 4, 16, 8);
-        // Between the outermost samples a ramp stays the ramp.
-        assert!((2..14).all(|x| (large.color[1][x] - ramp.color[1][x]).abs() < 1e-12));
-        assert_eq!(large.color[0].len(), 16 * 8);
     }
 }

@@ -16,7 +16,7 @@ use crate::navigate::Navigator;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::portraits::portraits;
 use crate::pipeline::semantics::view_map::ViewMap;
-use crate::render::{Backend, BackendChoice, Features, RenderSettings, cpu, gpu};
+use crate::render::{BackendChoice, Device, RenderSettings, Renderer, real_gpu};
 use crate::scene::plan::{Overrides, ScenePlan, When, bytes};
 use crate::scene::{Camera, Facts, GaussianCloud, SemanticMap, trace};
 
@@ -94,7 +94,7 @@ pub fn cost(
 ) -> Result<Cost, StudyError> {
     let overrides = if variant == Variant::Plan { Overrides::default() } else { Overrides::everything() };
     // The program has looked for a GPU before it opens anything, and keeps the driver that it found.
-    let _ = gpu::real_gpu();
+    let _ = real_gpu();
     let before = resident();
     let start = Instant::now();
     let scene = open()?;
@@ -102,20 +102,20 @@ pub fn cost(
     let plan = ScenePlan::new(scene.facts.clone(), &overrides);
     let settings = RenderSettings { sh_degree: plan.sh_degree, ..scene.settings.clone() };
     let choice = if plan.on_cpu { BackendChoice::Cpu } else { BackendChoice::Auto };
-    let mut backend = Backend::choose(choice, drop).map_err(failed)?;
+    let mut renderer = Renderer::choose(choice, drop).map_err(failed)?;
 
     let drawn = RenderSettings { depth: plan.depth == When::Always, ..settings.clone() };
-    let image = backend.render(&scene.cloud, &scene.first, &drawn).map_err(failed)?;
+    let image = renderer.draw(&scene.cloud, &scene.first, &drawn).map_err(failed)?;
     let first_picture_secs = start.elapsed().as_secs_f64();
-    let mut mapper = cpu::Renderer::new();
+    let mut mapper = Renderer::new();
     let asked = scene.map.as_deref().filter(|_| plan.maps.now(false));
     let maps = asked.map(|map| maps(&mut mapper, &scene, map, &plan, &settings)).transpose()?;
     let view_ms = (start.elapsed().as_secs_f64() - open_secs) * 1e3;
     let kept = at_opening(&scene, &plan, &settings)?;
     let ready_secs = start.elapsed().as_secs_f64();
     if plan.buffers != When::Always {
-        backend.rest();
-        mapper = cpu::Renderer::new();
+        renderer.rest();
+        mapper = Renderer::new();
     }
     let resident_bytes = resident().saturating_sub(before) as f64;
     let peak_bytes = peak().saturating_sub(before) as f64;
@@ -127,15 +127,15 @@ pub fn cost(
 
     let mut times = Vec::new();
     for camera in views_of(&scene.cloud, SIZE[0], SIZE[1]) {
-        backend.render(&scene.cloud, &camera, &drawn).map_err(failed)?;
+        renderer.draw(&scene.cloud, &camera, &drawn).map_err(failed)?;
         for _ in 0..repeats {
             let start = Instant::now();
-            backend.render(&scene.cloud, &camera, &drawn).map_err(failed)?;
+            renderer.draw(&scene.cloud, &camera, &drawn).map_err(failed)?;
             times.push(start.elapsed().as_secs_f64() * 1e3);
         }
     }
     let frame_ms = times.into_iter().collect::<Sample>().median;
-    let device_bytes = device_bytes(&scene, &plan, &settings)? as f64;
+    let device_bytes = device_bytes(&scene, &settings)? as f64;
     Ok(Cost {
         open_secs,
         first_picture_secs,
@@ -151,7 +151,7 @@ pub fn cost(
 
 /// What the pixels of the first view belong to.
 fn maps(
-    renderer: &mut cpu::Renderer<f32>,
+    renderer: &mut Renderer,
     scene: &OpenScene,
     map: &SemanticMap,
     plan: &ScenePlan,
@@ -193,11 +193,10 @@ fn at_opening(scene: &OpenScene, plan: &ScenePlan, settings: &RenderSettings) ->
 
 /// Bytes of the buffers that the GPU renderer allocates for the first view, on whatever adapter there is; 0
 /// without any.
-fn device_bytes(scene: &OpenScene, plan: &ScenePlan, settings: &RenderSettings) -> Result<u64, StudyError> {
-    let Ok(context) = gpu::Context::new() else { return Ok(0) };
-    let mut renderer = gpu::Renderer::new(&context).map_err(failed)?;
-    renderer.upload_bands(&scene.cloud, Features::NONE, plan.sh_degree).map_err(failed)?;
-    renderer.draw(&scene.first, settings).map_err(failed)?;
+fn device_bytes(scene: &OpenScene, settings: &RenderSettings) -> Result<u64, StudyError> {
+    let Ok(device) = Device::new() else { return Ok(0) };
+    let mut renderer = Renderer::on_gpu(&device).map_err(failed)?;
+    renderer.draw(&scene.cloud, &scene.first, settings).map_err(failed)?;
     Ok(renderer.device_bytes())
 }
 

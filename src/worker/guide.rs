@@ -12,7 +12,7 @@ use crate::navigate::visit::{NoVisit, Place, Visit};
 use crate::navigate::{FRAMES, Navigator, Pose};
 use crate::pipeline::film::{self, FilmError, Marked};
 use crate::pipeline::observer::{Level, Observer};
-use crate::render::{Backend, BackendChoice, RenderSettings};
+use crate::render::{BackendChoice, RenderSettings, Renderer};
 use crate::scene::trace::{self, Sort};
 use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 
@@ -115,9 +115,9 @@ pub fn film(request: FilmRequest, observer: &mut dyn Observer) -> Result<Outcome
     let FilmRequest { cloud, draw, cameras, marked, out, settings } = request;
     let marked = marked.as_ref().map(|(map, ids)| Marked { map, ids, color: [255, 64, 160] });
     let told = |why| observer.note(Level::Warning, why);
-    let mut backend = Backend::choose(BackendChoice::Auto, told).unwrap_or_else(|_| Backend::on_cpu());
+    let mut renderer = Renderer::choose(BackendChoice::Auto, told).unwrap_or_default();
     let out: (&Path, &Settings) = (&out, &settings);
-    match film::write(&cloud, &draw, &cameras, marked, &mut backend, out, observer) {
+    match film::write(&cloud, &draw, &cameras, marked, &mut renderer, out, observer) {
         Ok(summary) => Ok(Outcome::Written(summary.path)),
         Err(FilmError::Cancelled) => Err(Stop::Cancelled),
         Err(e) => Err(Stop::Failed(Failure::of(&e, ""))),

@@ -1,9 +1,7 @@
-//! Timings of rendering and training, stage by stage, with the work they did.
-//!
-//! `fmlgs bench` and `benches/speed.rs` print what this measures. Every number is a median over
-//! repeats in one process; compare only numbers of one run.
+//! Timings of drawing and training on the CPU, with the work they did, and what one core could do at most.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DVec3;
@@ -11,14 +9,14 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
 
+use super::gpu::{Measurement, Timing, frame, timing};
 use crate::math::lanes::{LANES, LaneOp, Lanes};
-use crate::math::stats::median;
+use crate::math::stats::{mean, median};
 use crate::math::{Real, lanes::Lane};
 use crate::pipeline::train::init;
 use crate::pipeline::train::trainer::{StepError, Trainer};
 use crate::pipeline::train::{TrainConfig, TrainView};
-use crate::render::cpu::{RenderStats, Renderer};
-use crate::render::{Features, RenderError, RenderSettings};
+use crate::render::{DrawError, RenderSettings, Renderer};
 use crate::scene::{Bounds, Camera, Dataset, GaussianCloud};
 
 /// Timing of one scene at one size.
@@ -65,31 +63,29 @@ pub fn views_of<R: Real>(cloud: &GaussianCloud<R>, width: u32, height: u32) -> V
 }
 
 /// Times the CPU renderer on a cloud.
-pub fn render(name: &str, cloud: &GaussianCloud, size: [u32; 2], repeats: usize) -> Result<RenderTiming, RenderError> {
-    let settings = RenderSettings::default();
-    let mut renderer = Renderer::<f32>::new();
-    let mut totals = Vec::new();
-    let mut stats: Vec<RenderStats> = Vec::new();
+pub fn render(
+    name: &str,
+    cloud: &Arc<GaussianCloud>,
+    size: [u32; 2],
+    repeats: usize,
+) -> Result<RenderTiming, DrawError> {
+    let mut renderer = Renderer::new();
+    let (mut views, mut products) = (Vec::new(), Vec::new());
     for camera in views_of(cloud, size[0], size[1]) {
-        renderer.render(cloud, Features::NONE, &camera, &settings)?;
-        for _ in 0..repeats {
-            let start = Instant::now();
-            renderer.render(cloud, Features::NONE, &camera, &settings)?;
-            totals.push(start.elapsed().as_secs_f64() * 1e3);
-            stats.push(renderer.stats());
-        }
+        views.push(frame(&mut renderer, cloud, &camera, &RenderSettings::default(), repeats)?);
+        products.push(renderer.stats().products as f64);
     }
-    let of = |f: &dyn Fn(&RenderStats) -> f64| median(&stats.iter().map(f).collect::<Vec<_>>());
-    let stages_ms = std::array::from_fn(|s| of(&|r| r.stage_secs[s] * 1e3));
-    let products = stats.iter().map(|s| s.products as f64).sum::<f64>() / stats.len().max(1) as f64;
+    let blend_secs = |m: &Measurement| m.stages.last().map_or(0.0, |s| s.1).max(1e-9);
+    let rates: Vec<f64> = products.iter().zip(&views).map(|(n, m)| n / blend_secs(m)).collect();
+    let Timing { total_ms, stages_ms, .. } = timing(name, cloud.len(), size, &views);
     Ok(RenderTiming {
         name: name.into(),
         gaussians: cloud.len(),
         size,
-        total_ms: median(&totals),
-        stages_ms,
-        products,
-        products_per_sec: of(&|r| r.products as f64 / r.stage_secs[3].max(1e-9)),
+        total_ms,
+        stages_ms: std::array::from_fn(|k| stages_ms.get(k).map_or(0.0, |s| s.1)),
+        products: mean(&products),
+        products_per_sec: median(&rates),
     })
 }
 

@@ -1,16 +1,18 @@
-//! The same timings as [`super::cpu`], on a GPU: a frame and a training step, stage by stage.
+//! Times of a frame on whatever draws it, and of a training step on a GPU, stage by stage.
+
+use std::sync::Arc;
+use std::time::Instant;
 
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
-use std::time::Instant;
 
 use super::cpu::views_of;
 use crate::math::stats::median;
 use crate::pipeline::train::{TrainConfig, TrainView, init};
-use crate::render::cpu::adam::Rates;
-use crate::render::gpu::{Context, GpuError, Renderer, Trainer, TrainerSettings};
-use crate::render::{Features, RenderSettings, StageTimes};
+use crate::render::{
+    Device, DeviceTrainer, DrawError, GpuError, Rates, RenderSettings, Renderer, StageTimes, TrainerSettings,
+};
 use crate::scene::{Camera, Dataset, GaussianCloud, PhotoPixels};
 
 /// Medians over the repetitions.
@@ -20,42 +22,37 @@ pub struct Measurement {
     pub stages: StageTimes,
     /// Seconds from the call to the finished result, on the host's clock.
     pub whole_secs: f64,
-    /// Gaussians drawn.
-    pub visible: u32,
-    /// (Splat, tile) pairs blended.
-    pub pairs: u32,
 }
 
-/// Draws a cloud `repeats` times, after one that does not count. The whole includes the copy of the image to the
-/// host.
+/// Draws a cloud `repeats` times, after one that does not count; the copy of the image to the host is included. On a
+/// GPU, where timing the stages is not free, they are timed in as many runs of their own.
 ///
 /// # Errors
 /// If the device fails.
 pub fn frame(
-    context: &Context,
-    cloud: &GaussianCloud,
+    renderer: &mut Renderer,
+    cloud: &Arc<GaussianCloud>,
     camera: &Camera,
     settings: &RenderSettings,
     repeats: usize,
-) -> Result<Measurement, GpuError> {
-    let mut renderer = Renderer::new(context)?;
-    renderer.upload(cloud, Features::NONE)?;
-    renderer.draw(camera, settings)?;
-    let mut secs = Vec::with_capacity(repeats);
-    for _ in 0..repeats {
-        let start = Instant::now();
-        renderer.draw(camera, settings)?;
-        secs.push(start.elapsed().as_secs_f64());
+) -> Result<Measurement, DrawError> {
+    let (mut secs, mut stages) = (Vec::with_capacity(repeats), Vec::with_capacity(repeats));
+    renderer.draw(cloud, camera, settings)?;
+    for timed in if renderer.is_gpu() { &[false, true][..] } else { &[false] } {
+        renderer.time_stages(*timed)?;
+        for _ in 0..repeats {
+            let start = Instant::now();
+            renderer.draw(cloud, camera, settings)?;
+            if *timed || !renderer.is_gpu() {
+                stages.push(renderer.stage_times());
+            }
+            if !timed {
+                secs.push(start.elapsed().as_secs_f64());
+            }
+        }
     }
-    renderer.measure()?;
-    let mut runs = Vec::with_capacity(repeats);
-    for _ in 0..repeats {
-        renderer.draw(camera, settings)?;
-        runs.push(renderer.times().clone());
-    }
-    let counters = renderer.counters().unwrap_or_default();
-    let (visible, pairs) = (counters.visible, counters.pairs);
-    Ok(Measurement { stages: medians(&runs), whole_secs: median(&secs), visible, pairs })
+    renderer.time_stages(false)?;
+    Ok(Measurement { stages: medians(&stages), whole_secs: median(&secs) })
 }
 
 /// Makes `repeats` training steps on one photo, after one that does not count. The whole is the mean over steps
@@ -64,13 +61,13 @@ pub fn frame(
 /// # Errors
 /// If the device fails.
 pub fn training_step(
-    context: &Context,
+    device: &Device,
     cloud: &GaussianCloud,
     camera: &Camera,
     photo: &PhotoPixels,
     repeats: usize,
 ) -> Result<Measurement, GpuError> {
-    let mut trainer = Trainer::new(context, cloud, TrainerSettings::default())?;
+    let mut trainer = DeviceTrainer::new(device, cloud, TrainerSettings::default())?;
     let photo = trainer.photo(photo)?;
     // Steps of no length, so that every repetition does the same work.
     let still = 1e-30;
@@ -89,7 +86,7 @@ pub fn training_step(
     for _ in 0..repeats {
         trainer.step(camera, &photo, &rates, degree)?;
     }
-    context.wait()?;
+    device.wait()?;
     let whole_secs = start.elapsed().as_secs_f64() / repeats.max(1) as f64;
     trainer.measure()?;
     let mut runs = Vec::with_capacity(repeats);
@@ -97,8 +94,7 @@ pub fn training_step(
         trainer.step(camera, &photo, &rates, degree)?;
         runs.push(trainer.times().clone());
     }
-    let last = trainer.metrics()?.last().map(|m| m.sums).unwrap_or_default();
-    Ok(Measurement { stages: medians(&runs), whole_secs, visible: last.visible, pairs: last.wanted })
+    Ok(Measurement { stages: medians(&runs), whole_secs })
 }
 
 /// Medians over runs that had the same stages.
@@ -107,9 +103,9 @@ fn medians(runs: &[StageTimes]) -> StageTimes {
     runs.first().into_iter().flatten().enumerate().map(|(k, (name, _))| (*name, stage(k))).collect()
 }
 
-/// Timing of a frame or a training step.
+/// Timing of frames or training steps.
 #[derive(Clone, Debug, Serialize)]
-pub struct GpuTiming {
+pub struct Timing {
     /// The scene or dataset.
     pub name: String,
     /// Gaussians in it.
@@ -127,15 +123,15 @@ pub struct GpuTiming {
 /// # Errors
 /// If the device fails.
 pub fn render(
-    context: &Context,
+    device: &Device,
     name: &str,
-    cloud: &GaussianCloud,
+    cloud: &Arc<GaussianCloud>,
     size: [u32; 2],
     repeats: usize,
-) -> Result<GpuTiming, GpuError> {
-    let settings = RenderSettings::default();
-    let frame = |camera| frame(context, cloud, camera, &settings, repeats);
-    let views = views_of(cloud, size[0], size[1]).iter().map(frame).collect::<Result<Vec<_>, _>>()?;
+) -> Result<Timing, DrawError> {
+    let mut renderer = Renderer::on_gpu(device)?;
+    let mut frame = |camera| frame(&mut renderer, cloud, camera, &RenderSettings::default(), repeats);
+    let views = views_of(cloud, size[0], size[1]).iter().map(&mut frame).collect::<Result<Vec<_>, _>>()?;
     Ok(timing(name, cloud.len(), size, &views))
 }
 
@@ -144,15 +140,15 @@ pub fn render(
 /// # Errors
 /// If the device fails.
 pub fn train_steps(
-    context: &Context,
+    device: &Device,
     dataset: &Dataset,
     views: &[TrainView],
     config: &TrainConfig,
     repeats: usize,
-) -> Result<GpuTiming, GpuError> {
+) -> Result<Timing, GpuError> {
     let mut rng = Pcg64Mcg::seed_from_u64(config.seed);
     let cloud = init::initial_cloud(dataset, views, config.sh_degree, config.random_points, &mut rng);
-    let step = |v: &TrainView| training_step(context, &cloud, &v.camera, &v.pixels, repeats);
+    let step = |v: &TrainView| training_step(device, &cloud, &v.camera, &v.pixels, repeats);
     let every = (views.len() / 3).max(1);
     let runs = views.iter().step_by(every).take(3).map(step).collect::<Result<Vec<_>, _>>()?;
     let size = views.first().map_or([0, 0], |v| [v.camera.width_px, v.camera.height_px]);
@@ -160,11 +156,11 @@ pub fn train_steps(
 }
 
 /// Medians over views that went through the same stages.
-fn timing(name: &str, gaussians: usize, size: [u32; 2], views: &[Measurement]) -> GpuTiming {
+pub(super) fn timing(name: &str, gaussians: usize, size: [u32; 2], views: &[Measurement]) -> Timing {
     let stages: Vec<StageTimes> = views.iter().map(|v| v.stages.clone()).collect();
     let total_ms = median(&views.iter().map(|v| v.whole_secs).collect::<Vec<_>>()) * 1e3;
     let stages_ms = medians(&stages).into_iter().map(|(stage, secs)| (stage, secs * 1e3)).collect();
-    GpuTiming { name: name.into(), gaussians, size, total_ms, stages_ms }
+    Timing { name: name.into(), gaussians, size, total_ms, stages_ms }
 }
 
 #[cfg(test)]
@@ -175,7 +171,7 @@ mod tests {
     fn medians_are_taken_stage_by_stage_in_milliseconds() {
         let run = |whole_secs: f64, a: f64, b: f64| {
             let stages = vec![("a", a), ("b", b)];
-            Measurement { stages, whole_secs, visible: 1, pairs: 1 }
+            Measurement { stages, whole_secs }
         };
         let t = timing("x", 5, [4, 3], &[run(0.002, 0.5, 9.0), run(0.004, 0.1, 7.0), run(0.003, 0.2, 8.0)]);
         assert_eq!((t.total_ms, t.stages_ms), (3.0, vec![("a", 200.0), ("b", 8000.0)]));

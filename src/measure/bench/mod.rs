@@ -10,7 +10,7 @@ pub use cpu::{label, one_core_limit, views_of};
 use serde::Serialize;
 
 use self::cpu::{RenderTiming, StepTiming};
-use self::gpu::GpuTiming;
+use self::gpu::Timing;
 use self::query::QueryTiming;
 use super::table::{Rows, rows};
 
@@ -24,9 +24,9 @@ pub struct Timings {
     /// Name and features of the GPU, if it was asked for.
     pub gpu: Option<String>,
     /// Drawing on the GPU.
-    pub gpu_render: Vec<GpuTiming>,
+    pub gpu_render: Vec<Timing>,
     /// Training on the GPU.
-    pub gpu_train: Vec<GpuTiming>,
+    pub gpu_train: Vec<Timing>,
     /// What one core could do at most (see [`one_core_limit`]).
     pub one_core_products_per_sec: f64,
     /// Typed queries, if they were asked for.

@@ -117,6 +117,7 @@ impl Case {
     }
 
     /// The control: what is found with a fault planted, which must be a broken promise.
+    #[cfg(test)]
     pub fn control(&self) -> Finding {
         (self.run)(true)
     }

@@ -8,8 +8,7 @@ use crate::measure::sweep::failed;
 use crate::measure::{ErrorKind, Measure, Rule, Stage, StageName, Study, Trial};
 use crate::pipeline::depth::{Samples, TrueDepth};
 use crate::pipeline::observer::Signal;
-use crate::render::cpu::Renderer;
-use crate::render::{Cutoffs, Features, RenderSettings};
+use crate::render::{Cutoffs, Features, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud};
 
 struct Variant {
@@ -37,7 +36,7 @@ pub fn study<'a>(
     let rule = Rule::new("relative error", 1.05, 0.0, 0.0);
     let words = ["one view, drawn with depth", "depths found by casting rays at the scene's triangles"];
     let stage = Stage::new(StageName::Depth, words, (input, repeats), rule, measures);
-    let mut renderer = Renderer::<f32>::new();
+    let mut renderer = Renderer::new();
     Study::new(stage, variants(settings).0, move |variant: &Variant, _seed, observer| {
         let (mut all, mut edges, mut secs) = (Samples::default(), Samples::default(), Vec::new());
         for (camera, truth) in &views {

@@ -18,8 +18,7 @@ use crate::pipeline::semantics::matching;
 use crate::pipeline::semantics::train_codes::{CodeTraining, CodeView, decode, train_codes};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::pipeline::semantics::votes::{UNKNOWN, Votes};
-use crate::render::cpu::Renderer;
-use crate::render::{RenderError, RenderSettings};
+use crate::render::{RenderError, RenderSettings, Renderer};
 use crate::scene::semantic_map::CODE_CHANNELS;
 use crate::scene::{GaussianCloud, Identities, IdentityId, Level, Mask, NOBODY};
 

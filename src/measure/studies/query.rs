@@ -20,8 +20,7 @@ use crate::pipeline::semantics::meaning::{MeaningOptions, PartFeatures, Phrasebo
 use crate::pipeline::semantics::protocols::part_recall::HIT_IOU;
 use crate::pipeline::semantics::protocols::{AskedScene, Category, LabelledView, langsplat};
 use crate::pipeline::semantics::view_map::ViewMap;
-use crate::render::RenderSettings;
-use crate::render::cpu::Renderer;
+use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, IdentityId, LanguageFeatures, Level, Mask, SemanticMap};
 
 pub struct Asked {
@@ -105,7 +104,7 @@ pub fn study<'a>(
                 let mask = answered.map(|a| found(&a, &exact, &blended, map, variant));
                 secs.push(start.elapsed().as_secs_f64());
                 not_understood.push(f64::from(u8::from(mask.is_none())));
-                let iou = mask.map_or(0.0, |m| enlarged(&m, w as usize, h as usize).iou(&category.mask));
+                let iou = mask.map_or(0.0, |m| m.resized(w as usize, h as usize).iou(&category.mask));
                 ious[usize::from(category.level == Level::Part)].push(iou);
             }
             // An encoder that fails is no answer that misses.
@@ -232,27 +231,10 @@ fn found(answered: &Answered, exact: &ViewMap, blended: &CodeMap, map: &Semantic
     }
 }
 
-/// A mask of a smaller image at full size: the nearest pixel.
-fn enlarged(mask: &Mask, w: usize, h: usize) -> Mask {
-    let (sw, sh) = (mask.width_px(), mask.height_px());
-    if (sw, sh) == (w, h) {
-        return mask.clone();
-    }
-    Mask::from_fn(w, h, |i| mask.contains(i / w * sh / h * sw + i % w * sw / w))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::math::stats::worst_difference;
-
-    #[test]
-    fn masks_grow_by_nearest_pixels() {
-        let small = Mask::from_fn(4, 2, |i| i == 1 || i == 6);
-        let large = enlarged(&small, 8, 4);
-        assert_eq!(large.area(), 8);
-        assert!(large.contains(2) && large.contains(8 + 3) && large.contains(2 * 8 + 4) && !large.contains(0));
-    }
 
     #[test]
     fn rounding_keeps_as_much_as_it_says() {

@@ -8,14 +8,13 @@ use serde_json::{Value, json};
 use super::views::View;
 use super::{Input, Variants, error, timed};
 use crate::math::Real;
+use crate::math::resize::Filter;
 use crate::math::stats::mean;
-use crate::measure::image_error::{Errors, Planes, averaged, enlarged, footprint_order, planes, psnr_in_photo};
+use crate::measure::image_error::{Errors, Planes, footprint_order, planes, psnr_in_photo, resized};
 use crate::measure::sweep::failed;
 use crate::measure::{ErrorKind, Measure, Rule, Stage, StageName, Study, StudyError, Trial};
 use crate::pipeline::observer::Signal;
-use crate::render::cpu::Renderer;
-use crate::render::gpu::GpuError;
-use crate::render::{Backend, BackendChoice, Cutoffs, Features, Frame, RenderError, RenderSettings};
+use crate::render::{BackendChoice, Cutoffs, Features, Frame, GpuError, RenderError, RenderSettings, Renderer, cpu};
 use crate::scene::{Camera, GaussianCloud};
 
 /// Cut-offs of the exact image.
@@ -51,7 +50,7 @@ struct Drawing {
     cloud: Arc<GaussianCloud>,
     double: GaussianCloud<f64>,
     half: GaussianCloud,
-    gpu: Option<Backend>,
+    gpu: Option<Renderer>,
 }
 
 /// The sweep of drawing `cloud` by `settings` from these views.
@@ -64,7 +63,7 @@ pub fn study(
 ) -> Result<Study<'static>, RenderError> {
     let settings = RenderSettings { depth: false, ..settings.clone() };
     let why = |e: GpuError| drop(input.insert("GPU".into(), format!("not measured: {e}")));
-    let gpu = Backend::choose(BackendChoice::Gpu, drop).map_err(why).ok();
+    let gpu = Renderer::choose(BackendChoice::Gpu, drop).map_err(why).ok();
     let measures = vec![
         error("RMS error", "root mean square difference of colors, which go from 0 to 1"),
         Measure::new("PSNR", "dB", ErrorKind::Decibels, "peak signal to noise ratio, at most 150 dB"),
@@ -82,12 +81,13 @@ pub fn study(
 
     let double = cloud.cast::<f64>();
     let exactly = RenderSettings { cutoffs: EXACT, ..settings.clone() };
-    let mut renderer = Renderer::<f64>::new();
+    let mut renderer = cpu::Renderer::<f64>::new();
     let mut exact = Vec::with_capacity(views.len());
     for (camera, _) in &views {
         exact.push(planes(&renderer.render(&double, Features::NONE, camera, &exactly)?));
     }
-    let afar: Vec<Planes> = exact.iter().map(|p| averaged(p, AFAR as usize)).collect();
+    let afar: Vec<Planes> =
+        exact.iter().zip(&views).map(|(p, v)| resized(p, &v.0.reduced(AFAR), Filter::Area)).collect();
     let variants = variants(&cloud, &settings, gpu.as_ref());
     let first = views.first().map(|v| v.0.limited_to(96));
     let order_of = double.clone();
@@ -122,7 +122,7 @@ pub fn study(
 impl Drawing {
     /// Draws one view; returns it with the seconds that took.
     fn draw(&mut self, (way, settings): &Variant, camera: &Camera) -> Result<(Planes, f64), StudyError> {
-        let mut renderer = Renderer::<f32>::new();
+        let mut renderer = Renderer::new();
         fn shown<R: Real>((frame, secs): (Frame<R>, f64)) -> (Planes, f64) {
             (planes(&frame), secs)
         }
@@ -136,17 +136,17 @@ impl Drawing {
             Way::Smaller(factor) => {
                 let (small, secs) = cpu(&self.cloud, &camera.reduced(factor))?;
                 let start = Instant::now();
-                let large = enlarged(&small, factor as usize, camera.width_px as usize, camera.height_px as usize);
+                let large = resized(&small, camera, Filter::Linear);
                 Ok((large, secs + start.elapsed().as_secs_f64()))
             }
             Way::Double => {
-                let mut renderer = Renderer::<f64>::new();
+                let mut renderer = cpu::Renderer::<f64>::new();
                 let draw = || renderer.render(&self.double, Features::NONE, camera, settings).map_err(failed);
                 timed(draw).map(shown)
             }
             Way::Gpu => {
                 let Some(gpu) = &mut self.gpu else { return Err(failed("there is no graphics adapter")) };
-                timed(|| gpu.render(&self.cloud, camera, settings).map_err(failed)).map(shown)
+                timed(|| gpu.draw(&self.cloud, camera, settings).map_err(failed)).map(shown)
             }
             Way::Kept(degrees) => {
                 let turn = glam::DMat3::from_rotation_y(degrees.to_radians());
@@ -177,7 +177,7 @@ fn in_half(cloud: &GaussianCloud) -> GaussianCloud {
     }
 }
 
-fn variants(cloud: &GaussianCloud, s: &RenderSettings, gpu: Option<&Backend>) -> Variants<Variant> {
+fn variants(cloud: &GaussianCloud, s: &RenderSettings, gpu: Option<&Renderer>) -> Variants<Variant> {
     let degree = s.sh_degree.min(cloud.sh_degree);
     let default = format!("CPU, f32, SH {degree}, alpha 1/255, transmittance 1e-4");
     let mut all = Variants::new(default, (Way::Cpu, s.clone()));

@@ -10,7 +10,7 @@ pub mod bin;
 pub mod blend;
 pub mod blend_backward;
 pub mod cloud;
-pub mod context;
+pub mod device;
 pub mod error;
 pub mod kernel;
 pub mod layout;
@@ -26,7 +26,7 @@ pub mod timing;
 pub mod trainer;
 
 pub use cloud::Parameters;
-pub use context::{Context, real_gpu};
+pub use device::{Device, real_gpu};
 pub use error::GpuError;
 pub use renderer::Renderer;
 pub use ssim::DevicePhoto;

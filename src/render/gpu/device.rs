@@ -11,7 +11,7 @@ const WANTED: wgpu::Features =
 
 /// A GPU device with its queue. Cheap to clone; clones are the same device.
 #[derive(Clone, Debug)]
-pub struct Context {
+pub struct Device {
     device: wgpu::Device,
     queue: wgpu::Queue,
     info: wgpu::AdapterInfo,
@@ -31,7 +31,7 @@ fn adapter(software: bool) -> Result<wgpu::Adapter, wgpu::RequestAdapterError> {
     pollster::block_on(wgpu::Instance::new(description.with_env()).request_adapter(&options))
 }
 
-impl Context {
+impl Device {
     /// Opens the best adapter: a real GPU before a software one.
     pub fn new() -> Result<Self, GpuError> {
         let adapter = adapter(false).or_else(|_| adapter(true)).map_err(|e| GpuError::NoAdapter(e.to_string()))?;
@@ -84,7 +84,7 @@ impl Context {
     }
 
     /// The device.
-    pub fn device(&self) -> &wgpu::Device {
+    pub fn wgpu(&self) -> &wgpu::Device {
         &self.device
     }
 

@@ -10,8 +10,8 @@ use crate::math::Real;
 use crate::math::lanes::{LANES, Lane, LaneOp, Lanes};
 use crate::render::{Cutoffs, TILE_PX};
 
-/// Someone who counts the weights of one row of tiles.
-pub trait Weighed<R>: Send {
+/// Takes the weights of one row of tiles.
+pub trait ContributionSink<R>: Send {
     /// `gaussian` contributes `weights` to the pixels of row `y` from column `x` on; zeros where it
     /// does not, also beyond the picture's right edge. Calls come tile after tile, front to back
     /// in each, all of a Gaussian in a tile together.
@@ -19,7 +19,7 @@ pub trait Weighed<R>: Send {
 }
 
 /// Walks the tiles of row `ty`.
-pub struct WeighRow<'a, R, V> {
+pub struct ContributionRow<'a, R, V> {
     /// The frame's splats.
     pub splats: &'a [Splat<R>],
     /// Their tile lists.
@@ -30,11 +30,11 @@ pub struct WeighRow<'a, R, V> {
     pub ty: usize,
     /// What is too little to be drawn.
     pub cutoffs: Cutoffs,
-    /// Who counts.
-    pub counter: &'a mut V,
+    /// Who takes them.
+    pub sink: &'a mut V,
 }
 
-impl<R: Real, V: Weighed<R>> LaneOp<R> for WeighRow<'_, R, V> {
+impl<R: Real, V: ContributionSink<R>> LaneOp<R> for ContributionRow<'_, R, V> {
     type Output = ();
     #[inline(always)]
     fn run<L: Lanes<R>>(mut self, l: L) {
@@ -44,7 +44,7 @@ impl<R: Real, V: Weighed<R>> LaneOp<R> for WeighRow<'_, R, V> {
     }
 }
 
-impl<R: Real, V: Weighed<R>> WeighRow<'_, R, V> {
+impl<R: Real, V: ContributionSink<R>> ContributionRow<'_, R, V> {
     #[inline(always)]
     fn tile<L: Lanes<R>>(&mut self, l: L, tx: usize) {
         let corner = [tx * TILE_PX, self.ty * TILE_PX];
@@ -85,7 +85,7 @@ impl<R: Real, V: Weighed<R>> WeighRow<'_, R, V> {
                 }
                 if l.bits(l.gt(weight, zero)) != 0 {
                     let (x, y) = (corner[0] + slot / TILE_PX * LANES, corner[1] + slot % TILE_PX);
-                    self.counter.add(s.gaussian, x, y, &l.store(weight));
+                    self.sink.add(s.gaussian, x, y, &l.store(weight));
                 }
             }
             if alive == 0 {
