@@ -38,55 +38,29 @@ pub fn resized(p: &Planes, camera: &Camera, filter: Filter) -> Planes {
     Planes { width, height, color }
 }
 
-/// How far an image is from another.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Errors {
-    pub rms: f64,
-    pub largest: f64,
-    /// What one value in a thousand exceeds.
-    pub tail: f64,
-    pub flip: f64,
-    /// What FLIP of one pixel in a hundred exceeds.
-    pub flip_tail: f64,
+/// How far an image is from another: root mean square, largest, what one value in a thousand exceeds, mean of FLIP,
+/// what FLIP of one pixel in a hundred exceeds.
+pub type Errors = [f64; 5];
+
+/// Errors of `b` against `a`, of the same size.
+pub fn errors(a: &Planes, b: &Planes) -> Errors {
+    let pairs = a.color.iter().flatten().zip(b.color.iter().flatten());
+    let off: Vec<f64> = pairs.map(|(a, b)| (a - b).abs()).collect();
+    let rms = mean(&off.iter().map(|e| e * e).collect::<Vec<_>>()).sqrt();
+    let (flip, flip_tail) = flip(a, b);
+    [rms, worst(off.iter().copied()), quantile(&off, 0.999), flip, flip_tail]
 }
 
-impl Errors {
-    /// Errors of `b` against `a`, of the same size.
-    pub fn between(a: &Planes, b: &Planes) -> Self {
-        let pairs = a.color.iter().flatten().zip(b.color.iter().flatten());
-        let off: Vec<f64> = pairs.map(|(a, b)| (a - b).abs()).collect();
-        let (flip, flip_tail) = flip(a, b);
-        Self {
-            rms: mean(&off.iter().map(|e| e * e).collect::<Vec<_>>()).sqrt(),
-            largest: worst(off.iter().copied()),
-            tail: quantile(&off, 0.999),
-            flip,
-            flip_tail,
-        }
-    }
-
-    pub fn mean(all: &[Self]) -> Self {
-        let of = |f: fn(&Self) -> f64| mean(&all.iter().map(f).collect::<Vec<_>>());
-        Self {
-            rms: of(|e| e.rms),
-            largest: of(|e| e.largest),
-            tail: of(|e| e.tail),
-            flip: of(|e| e.flip),
-            flip_tail: of(|e| e.flip_tail),
-        }
-    }
-
-    pub fn named(&self) -> Vec<(&'static str, f64)> {
-        let psnr = psnr_of(self.rms * self.rms).min(MOST_PSNR);
-        vec![
-            ("RMS error", self.rms),
-            ("PSNR", psnr),
-            ("largest error", self.largest),
-            ("99.9 % error", self.tail),
-            ("FLIP", self.flip),
-            ("FLIP 99 %", self.flip_tail),
-        ]
-    }
+/// By the names of measures.
+pub fn named([rms, largest, tail, flip, flip_tail]: Errors) -> Vec<(&'static str, f64)> {
+    vec![
+        ("RMS error", rms),
+        ("PSNR", psnr_of(rms * rms).min(MOST_PSNR)),
+        ("largest error", largest),
+        ("99.9 % error", tail),
+        ("FLIP", flip),
+        ("FLIP 99 %", flip_tail),
+    ]
 }
 
 /// PSNR in dB of an image in a photo of its size; what the photo does not cover does not count.
@@ -158,14 +132,10 @@ mod tests {
     #[test]
     fn an_image_against_itself_is_without_error_and_others_are_not() {
         let a = image(32, 24, |x, y| ((x * 7 + y * 3) % 11) as f64 / 11.0);
-        let same = Errors::between(&a, &a);
-        assert_eq!((same.rms, same.largest, same.tail, same.flip), (0.0, 0.0, 0.0, 0.0));
-        assert_eq!(same.named()[1].1, MOST_PSNR);
+        let same = errors(&a, &a);
+        assert_eq!((same, named(same)[1].1), ([0.0; 5], MOST_PSNR));
         let off = image(32, 24, |x, y| ((x * 7 + y * 3) % 11) as f64 / 11.0 * 0.9);
-        let e = Errors::between(&a, &off);
-        assert!(
-            e.rms > 0.01 && (e.largest - 1.0 / 11.0).abs() < 1e-9 && e.flip > 0.005 && e.flip_tail >= e.flip,
-            "{e:?}"
-        );
+        let [rms, largest, _, flip, flip_tail] = errors(&a, &off);
+        assert!(rms > 0.01 && (largest - 1.0 / 11.0).abs() < 1e-9 && flip > 0.005 && flip_tail >= flip);
     }
 }

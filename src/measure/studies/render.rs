@@ -10,7 +10,7 @@ use super::{Input, Variants, error, timed};
 use crate::math::Real;
 use crate::math::resize::Filter;
 use crate::math::stats::mean;
-use crate::measure::image_error::{Errors, Planes, footprint_order, planes, psnr_in_photo, resized};
+use crate::measure::image_error::{Errors, Planes, errors, footprint_order, named, planes, psnr_in_photo, resized};
 use crate::measure::sweep::failed;
 use crate::measure::{ErrorKind, Measure, Rule, Stage, StageName, Study, StudyError, Trial};
 use crate::pipeline::observer::Signal;
@@ -94,20 +94,21 @@ pub fn study(
     let mut drawing = Drawing { half: in_half(&cloud), cloud, double, gpu };
     let study = Study::new(stage, variants.0, move |variant: &Variant, _seed, observer| {
         let from_afar = matches!(variant.0, Way::Afar(_));
-        let (mut secs, mut errors, mut photos) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut secs, mut off, mut photos) = (Vec::new(), Vec::new(), Vec::new());
         for ((camera, photo), exact) in views.iter().zip(if from_afar { &afar } else { &exact }) {
             if observer.signal() == Signal::Cancel {
                 return Ok(None);
             }
             let (drawn, took) = drawing.draw(variant, camera)?;
-            errors.push(Errors::between(exact, &drawn));
+            off.push(errors(exact, &drawn));
             if let Some(photo) = photo.as_ref().filter(|p| p.width_px as usize == drawn.width) {
                 photos.push(psnr_in_photo(&drawn, photo));
             }
             secs.push(took);
         }
-        let errors = Errors::mean(&errors);
-        let mut values = if from_afar { vec![("RMS error from afar", errors.rms)] } else { errors.named() };
+        let of = |k: usize| mean(&off.iter().map(|e: &Errors| e[k]).collect::<Vec<_>>());
+        let errors: Errors = std::array::from_fn(of);
+        let mut values = if from_afar { vec![("RMS error from afar", errors[0])] } else { named(errors) };
         if !photos.is_empty() {
             values.push(("PSNR in photos", mean(&photos)));
         }
