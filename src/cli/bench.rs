@@ -13,7 +13,7 @@ use crate::measure::StudyError;
 use crate::measure::bench::{self, Timings, cpu, gpu, query};
 use crate::measure::plan::{self, Cost, OpenScene, SIZE, Saving, Variant};
 use crate::models;
-use crate::pipeline::observer::{Level, Observer, Signal, Silent};
+use crate::pipeline::observer::{Observer, Severity, Signal, Silent};
 use crate::pipeline::train::{TrainConfig, TrainView, load_views};
 use crate::render::Device;
 use crate::scene::{Camera, Dataset};
@@ -108,7 +108,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
             if console.signal() == Signal::Cancel {
                 return Err(CliError::Cancelled("nothing was printed".into()));
             }
-            console.note(Level::Info, format!("Drawing {name} at {} x {}", size[0], size[1]));
+            console.note(Severity::Info, format!("Drawing {name} at {} x {}", size[0], size[1]));
             timings.render.push(cpu::render(&name, &cloud, size, repeats)?);
             if let Some(context) = &device {
                 timings.gpu_render.push(gpu::render(context, &name, &cloud, size, repeats)?);
@@ -140,7 +140,7 @@ fn photos(
     if views.is_empty() {
         return Err(CliError::failed(format!("{} has no photo to train on", dataset.root.display())));
     }
-    console.note(Level::Info, format!("Training on {}", dataset.name));
+    console.note(Severity::Info, format!("Training on {}", dataset.name));
     Ok((config, views))
 }
 

@@ -16,7 +16,7 @@ use crate::math::stats::median;
 use crate::measure::studies::Input;
 use crate::measure::table::{markdown, rows};
 use crate::measure::{Case, ErrorKind, Measure, Report, Rule, Stage, StageName, Trial, computer};
-use crate::pipeline::observer::{Evaluation, Level, Observer, ViewScore};
+use crate::pipeline::observer::{Evaluation, Observer, Severity, ViewScore};
 use crate::pipeline::synth::demo;
 use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainOutcome};
 use crate::render::{Features, RenderSettings, Renderer};
@@ -157,11 +157,11 @@ fn document(out: &Path, outcome: &TrainOutcome, [psnr, ssim]: [f64; 2], queries:
 /// Renders the photos unless they are there; returns the seconds it took.
 fn make_photos(folder: &Path, console: &mut Console) -> Result<Option<f64>, CliError> {
     if demo::demo_is_written(folder) {
-        console.note(Level::Info, format!("Using the photos in {}", folder.display()));
+        console.note(Severity::Info, format!("Using the photos in {}", folder.display()));
         return Ok(None);
     }
     let report = demo::write_demo(folder, console).map_err(synth::failure)?;
-    console.note(Level::Info, synth::summary(&report));
+    console.note(Severity::Info, synth::summary(&report));
     Ok(Some(report.secs))
 }
 

@@ -9,7 +9,7 @@ use super::{CliError, number, opened, output};
 use crate::io;
 use crate::measure::subject::{Options, Subject};
 use crate::measure::{BeginError, End, FILE, Report, Stage, StageName, computer, defaults, page, plot};
-use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::observer::{Observer, Severity};
 
 /// Measure error against run time, knob by knob
 ///
@@ -93,7 +93,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     };
     let subject = subject(&scene, options)?;
     let (stages, missing) = subject.stages(&args.stages)?;
-    missing.iter().for_each(|m| console.note(Level::Info, m.clone()));
+    missing.iter().for_each(|m| console.note(Severity::Info, m.clone()));
     output::make_folder(&args.out)?;
     let start = Instant::now();
     let mut stopped = None;
@@ -104,7 +104,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         let end = match study.and_then(|mut study| report.measure(&mut study, &args.out, share, console)) {
             // A stage that nobody named may turn out impossible; the others go on.
             Err(why) if args.stages.is_empty() => {
-                console.note(Level::Warning, format!("Stage '{}' left out: {why}", name.name()));
+                console.note(Severity::Warning, format!("Stage '{}' left out: {why}", name.name()));
                 continue;
             }
             other => other?,
@@ -124,7 +124,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
             Err(CliError::Cancelled(format!("{} holds what was measured", args.out.join(FILE).display())))
         }
         Some(_) => {
-            console.note(Level::Info, "The budget is used up; the same command resumes with the rest".into());
+            console.note(Severity::Info, "The budget is used up; the same command resumes with the rest".into());
             Ok(())
         }
         None => Ok(()),

@@ -8,7 +8,7 @@ use crate::measure::studies::Input;
 use crate::measure::studies::render;
 use crate::measure::studies::views::{View, held_out};
 use crate::measure::{End, FILE, Report, computer, is_report};
-use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::observer::{Observer, Severity};
 use crate::render::RenderSettings;
 use crate::scene::{Camera, Dataset, GaussianCloud};
 
@@ -40,7 +40,7 @@ pub struct MeasureRequest {
 
 /// Reads a report; the `second` is one to compare with.
 pub fn read(path: PathBuf, second: bool) -> Result<Outcome, Stop> {
-    let report = Report::read(&path).map_err(|e| Stop::Failed(Failure::of(&e, "")))?;
+    let report = Report::read(&path)?;
     Ok(Outcome::Report { path, report: Arc::new(report), second })
 }
 
@@ -75,7 +75,7 @@ pub fn run(request: MeasureRequest, observer: &mut dyn Observer) -> Result<Outco
     let mut study = render::study(cloud, &settings, views, REPEATS, input).map_err(|e| failed(&e))?;
     let end = report.measure(&mut study, &out, f64::INFINITY, observer).map_err(|e| failed(&e))?;
     if end == End::Cancelled {
-        observer.note(Level::Info, format!("What was measured so far is kept in {}", out.join(FILE).display()));
+        observer.note(Severity::Info, format!("What was measured so far is kept in {}", out.join(FILE).display()));
         return Err(Stop::Cancelled);
     }
     Ok(Outcome::Report { path: out, report: Arc::new(report), second: false })
@@ -87,7 +87,7 @@ fn views(request: &MeasureRequest, observer: &mut dyn Observer) -> Result<Vec<Vi
         Some(dataset) => held_out(dataset, request.holdout_every, MAX_SIDE_PX, VIEWS, observer),
         None => Ok(Some(Vec::new())),
     };
-    let mut views = views.map_err(|e| Stop::Failed(Failure::of(&e, "")))?.ok_or(Stop::Cancelled)?;
+    let mut views = views?.ok_or(Stop::Cancelled)?;
     if views.is_empty() {
         views.push((request.camera.limited_to(MAX_SIDE_PX), None));
     }

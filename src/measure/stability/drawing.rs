@@ -380,7 +380,8 @@ fn refused() -> Vec<Case> {
                     spoil(&mut cloud, &mut at, value);
                 }
                 let drawn = || pair(&cloud, &at, &RenderSettings::default());
-                let refusal = cloud.validate().map_err(|e| e.to_string()).and_then(|()| drawn().map_err(|e| e.to_string()));
+                let refusal =
+                    cloud.validate().map_err(|e| e.to_string()).and_then(|()| drawn().map_err(|e| e.to_string()));
                 match refusal {
                     Err(reason) => Finding::is(reason, true),
                     Ok(_) => Finding::is("it was let through", false),

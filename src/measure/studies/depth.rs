@@ -7,7 +7,6 @@ use crate::math::stats::mean;
 use crate::measure::sweep::failed;
 use crate::measure::{ErrorKind, Measure, Rule, Stage, StageName, Study, Trial};
 use crate::pipeline::depth::{Samples, TrueDepth};
-use crate::pipeline::observer::Signal;
 use crate::render::{Cutoffs, Features, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud};
 
@@ -40,7 +39,7 @@ pub fn study<'a>(
     Study::new(stage, variants(settings).0, move |variant: &Variant, _seed, observer| {
         let (mut all, mut edges, mut secs) = (Samples::default(), Samples::default(), Vec::new());
         for (camera, truth) in &views {
-            if observer.signal() == Signal::Cancel {
+            if observer.proceed().is_err() {
                 return Ok(None);
             }
             let [width, height] = [camera.width_px, camera.height_px].map(|side| (side / variant.smaller).max(1));

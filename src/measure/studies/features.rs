@@ -10,7 +10,6 @@ use super::{Input, Variants, overlap};
 use crate::math::stats::mean;
 use crate::measure::sweep::failed;
 use crate::measure::{Rule, Stage, StageName, Study, Trial};
-use crate::pipeline::observer::Signal;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::codes::{self, TOLERANCE};
 use crate::pipeline::semantics::find::centers;
@@ -67,7 +66,7 @@ pub fn study<'a>(
         if variant.steps > 0 {
             let steps = CodeTraining { steps: variant.steps, seed };
             train_codes(drawn.0, &mut codes, &training, &identities, drawn.1, steps, observer).map_err(failed)?;
-            if observer.signal() == Signal::Cancel {
+            if observer.proceed().is_err() {
                 return Ok(None);
             }
             of = decode(&codes, &identities);

@@ -15,7 +15,6 @@ use crate::navigate::curve::{Curve, bend};
 use crate::navigate::graph::Graph;
 use crate::navigate::pose::{RotationSpline, angle};
 use crate::navigate::{FRAMES, Flight, Navigator, Pose, Speed};
-use crate::pipeline::observer::Signal;
 use crate::scene::{Camera, GaussianCloud};
 
 /// Flights of one measurement.
@@ -76,7 +75,7 @@ pub fn study(cloud: &GaussianCloud, cameras: &[Camera], repeats: u32, mut input:
         let start = Instant::now();
         let mut flights = Vec::new();
         for pair in &pairs {
-            if observer.signal() == Signal::Cancel {
+            if observer.proceed().is_err() {
                 return Ok(None);
             }
             flights.extend(fly(&navigator, *variant, *pair));

@@ -9,7 +9,6 @@ use crate::math::stats::mean;
 use crate::measure::sweep::failed;
 use crate::measure::{Rule, Stage, StageName, Study, StudyError, Trial};
 use crate::models::{Encoder, ModelError};
-use crate::pipeline::observer::Signal;
 use crate::pipeline::semantics::answer::{Answered, Language, by_meaning, by_name, phrases_of};
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::codes::TOLERANCE;
@@ -87,7 +86,7 @@ pub fn study<'a>(
         let (mut secs, mut ious, mut hits) = (Vec::new(), [Vec::new(), Vec::new()], Vec::new());
         let (mut not_understood, mut broken) = (Vec::new(), None);
         for view in &views {
-            if observer.signal() == Signal::Cancel {
+            if observer.proceed().is_err() {
                 return Ok(None);
             }
             let (w, h) = (view.camera.width_px, view.camera.height_px);

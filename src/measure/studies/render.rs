@@ -13,7 +13,6 @@ use crate::math::stats::mean;
 use crate::measure::image_error::{Errors, Planes, errors, footprint_order, named, planes, psnr_in_photo, resized};
 use crate::measure::sweep::failed;
 use crate::measure::{ErrorKind, Measure, Rule, Stage, StageName, Study, StudyError, Trial};
-use crate::pipeline::observer::Signal;
 use crate::render::{BackendChoice, Cutoffs, Features, Frame, GpuError, RenderError, RenderSettings, Renderer, cpu};
 use crate::scene::{Camera, GaussianCloud};
 
@@ -96,7 +95,7 @@ pub fn study(
         let from_afar = matches!(variant.0, Way::Afar(_));
         let (mut secs, mut off, mut photos) = (Vec::new(), Vec::new(), Vec::new());
         for ((camera, photo), exact) in views.iter().zip(if from_afar { &afar } else { &exact }) {
-            if observer.signal() == Signal::Cancel {
+            if observer.proceed().is_err() {
                 return Ok(None);
             }
             let (drawn, took) = drawing.draw(variant, camera)?;
