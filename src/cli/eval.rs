@@ -15,8 +15,7 @@ use crate::pipeline::evaluate::evaluate;
 use crate::pipeline::observer::{Observer, Severity, Ticker, ViewScore};
 use crate::pipeline::train::TrainView;
 use crate::pipeline::train::border::Borders;
-use crate::render::cpu::Renderer;
-use crate::render::{Features, RenderSettings};
+use crate::render::{Features, RenderSettings, Renderer};
 use crate::scene::{Dataset, GaussianCloud};
 
 /// The difference picture shows errors this many times larger.
@@ -222,7 +221,7 @@ fn write_comparison(
     view: &TrainView,
     path: &Path,
 ) -> Result<(), CliError> {
-    let frame = Renderer::<f32>::new().render(cloud, Features::NONE, &view.camera, settings)?;
+    let frame = Renderer::new().render(cloud, Features::NONE, &view.camera, settings)?;
     let mut render = frame.to_rgb8();
     let width = frame.width_px;
     let difference = |(a, b): (&[u8; 3], &[u8; 3])| {

@@ -9,11 +9,11 @@ use super::{CliError, output};
 use crate::math::stats::median;
 use crate::pipeline::depth::{self, DepthCounter, DepthErrors};
 use crate::pipeline::observer::{Observer, Ticker};
-use crate::render::cpu::Renderer;
+use crate::render::Renderer;
 
 pub fn run(scene: &Path, job: &Job, as_json: bool, observer: &mut dyn Observer) -> Result<(), CliError> {
     let mut ticker = Ticker::new("Measuring depth", job.views.len());
-    let mut renderer = Renderer::<f32>::new();
+    let mut renderer = Renderer::new();
     let mut counter = DepthCounter::default();
     let mut millis = Vec::with_capacity(job.views.len());
     for (done, &index) in job.views.iter().enumerate() {

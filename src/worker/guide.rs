@@ -12,7 +12,7 @@ use crate::navigate::visit::{NoVisit, Place, Visit};
 use crate::navigate::{FRAMES, Navigator, Pose};
 use crate::pipeline::film::{self, Marked};
 use crate::pipeline::observer::{Observer, Severity};
-use crate::render::{Backend, BackendChoice, RenderSettings};
+use crate::render::{BackendChoice, RenderSettings, Renderer};
 use crate::scene::trace::{self, Sort};
 use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 
@@ -115,7 +115,7 @@ pub fn film(request: FilmRequest, observer: &mut dyn Observer) -> Result<Outcome
     let FilmRequest { cloud, draw, cameras, marked, out, settings } = request;
     let marked = marked.as_ref().map(|(map, ids)| Marked { map, ids, color: [255, 64, 160] });
     let told = |why| observer.note(Severity::Warning, why);
-    let mut backend = Backend::choose(BackendChoice::Auto, told).unwrap_or_else(|_| Backend::on_cpu());
+    let mut renderer = Renderer::choose(BackendChoice::Auto, told).unwrap_or_default();
     let out: (&Path, &Settings) = (&out, &settings);
-    Ok(Outcome::Written(film::write(&cloud, &draw, &cameras, marked, &mut backend, out, observer)?.path))
+    Ok(Outcome::Written(film::write(&cloud, &draw, &cameras, marked, &mut renderer, out, observer)?.path))
 }

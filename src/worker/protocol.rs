@@ -9,12 +9,12 @@ use super::edit::EditRequest;
 use super::guide::{Explored, FilmRequest, VisitRequest, Visited};
 use super::measure::MeasureRequest;
 use crate::io::trained::History;
+use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Interrupted, Progress, Severity, StepMetrics};
 use crate::pipeline::semantics::find::Finding;
 use crate::pipeline::semantics::portraits::Gallery;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
-use crate::report::Report;
 use crate::scene::{Bounds, Camera, Dataset, Facts, GaussianCloud, Photo, PhotoPixels, SemanticMap};
 
 /// Names one job of one worker.
