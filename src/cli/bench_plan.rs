@@ -11,16 +11,17 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::{CliError, output, process};
+use crate::math::format::bytes;
 use crate::math::stats::median;
 use crate::models;
 use crate::pipeline::bench;
 use crate::pipeline::observer::Silent;
 use crate::render::{Backend, BackendChoice, Features, RenderSettings, gpu};
-use crate::scene::plan::{Overrides, ScenePlan, When, bytes};
+use crate::scene::plan::{Overrides, ScenePlan, When};
 use crate::scene::{Camera, trace};
 use crate::worker::jobs::PipelineJobs;
 use crate::worker::places::Places;
-use crate::worker::view::{Effort, Leave, ViewLane, ViewRequest};
+use crate::worker::view::{QualityBudget, SkipPasses, ViewLane, ViewRequest};
 use crate::worker::{Command, Jobs, OpenedScene, Outcome, Stop, ViewMode};
 
 /// Size of the pictures, px.
@@ -218,13 +219,13 @@ fn view_request(scene: &OpenedScene, plan: &ScenePlan, camera: Camera) -> Option
     Some(ViewRequest {
         cloud: scene.cloud.clone()?,
         camera,
-        mode: ViewMode::Picture,
+        mode: ViewMode::Rgb,
         settings: settings(scene, plan),
-        effort: Effort::Full,
+        budget: QualityBudget::Full,
         photo: None,
         codes: semantics.is_some(),
         semantics,
-        leave: Leave::of(plan),
+        skip: SkipPasses::of(plan),
         timed: false,
         ticket: 1,
     })
@@ -239,7 +240,7 @@ fn at_opening(jobs: &PipelineJobs, scene: &OpenedScene, plan: &ScenePlan) -> Res
         let command = Command::Explore { cloud: Arc::clone(&cloud), cameras, up: scene.home.up };
         outcomes.push(job(jobs, command)?);
     }
-    if let (Some(map), When::Always) = (&map, plan.portraits) {
+    if let (Some(map), When::Always) = (&map, plan.thumbnails) {
         let (settings, home) = (settings(scene, plan), scene.home.clone());
         outcomes.push(job(jobs, Command::Portraits { cloud, map: Arc::clone(map), settings, home })?);
     }

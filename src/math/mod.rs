@@ -2,6 +2,7 @@
 
 pub mod colormap;
 pub mod finite;
+pub mod format;
 pub mod grid;
 pub mod lanes;
 pub mod real;

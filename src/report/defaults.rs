@@ -4,7 +4,7 @@
 
 use super::document::{Point, Report, Stage};
 use super::front::{Choice, NOISE};
-use super::table::{number, seconds};
+use crate::math::format::{number, seconds};
 
 /// The tables of all stages of these reports.
 pub fn markdown(reports: &[Report]) -> String {

@@ -1,4 +1,4 @@
-//! The portraits of objects and parts as one texture, asked for when they change.
+//! The thumbnails of objects and parts as one texture, asked for when they change.
 
 use std::cell::Cell;
 use std::sync::Arc;
@@ -37,12 +37,12 @@ impl Portraits {
             *self = Self::default();
             return;
         };
-        let wanted = state.plan.portraits.now(self.used.take());
+        let wanted = state.plan.thumbnails.now(self.used.take());
         if wanted && self.asked.as_ref().is_none_or(|a| !Arc::ptr_eq(a, map)) && map.of.len() == cloud.len() {
             let command = Command::Portraits {
                 cloud: Arc::clone(cloud),
                 map: Arc::clone(map),
-                settings: state.drawing(),
+                settings: state.render_settings(),
                 home: scene.home.clone(),
             };
             // With a full queue the wish comes again with the next event.
@@ -57,7 +57,7 @@ impl Portraits {
         }
     }
 
-    /// Draws the portrait of an identity, `side` points wide; an empty place while there is none.
+    /// Draws the thumbnail of an identity, `side` points wide; an empty place while there is none.
     pub fn show(&self, ui: &mut Ui, id: IdentityId, side: f32) {
         self.used.set(true);
         let (rect, _) = ui.allocate_exact_size(vec2(side, side), egui::Sense::hover());

@@ -1,16 +1,17 @@
-//! Error over seconds, both logarithmic: one colour per knob, the Pareto front, the repeats' spread.
+//! Error over seconds, both logarithmic: one color per knob, the Pareto front, the repeats' spread.
 
 use egui::{Color32, Response, Stroke, Ui, Vec2b};
 use egui_plot::{Corner, Legend, Line, MarkerShape, Plot, PlotPoint, PlotPoints, PlotTransform, Points};
 
 use super::super::super::theme;
 use super::scale;
+use crate::math::format;
 use crate::report::plot::{COLORS, LEAST};
 use crate::report::{Measure, Point, Stage, table};
 
 /// How near the pointer must be to a point, in window points.
 const NEAR: f32 = 14.0;
-/// Shapes of knobs, in turn with each round of colours.
+/// Shapes of knobs, in turn with each round of colors.
 const SHAPES: [MarkerShape; 3] = [MarkerShape::Circle, MarkerShape::Diamond, MarkerShape::Square];
 
 /// What is drawn.
@@ -46,8 +47,8 @@ impl<'a> Scatter<'a> {
             .y_axis_min_width(46.0)
             .x_grid_spacer(|input| scale::marks(input.bounds))
             .y_grid_spacer(|input| scale::marks(input.bounds))
-            .x_axis_formatter(|mark, range| scale::label(mark, range, scale::short_secs))
-            .y_axis_formatter(|mark, range| scale::label(mark, range, scale::short))
+            .x_axis_formatter(|mark, range| scale::label(mark, range, format::tick_secs))
+            .y_axis_formatter(|mark, range| scale::label(mark, range, format::tick))
             .label_formatter(|_| None)
             .legend(Legend::default().position(corner).text_style(egui::TextStyle::Small).background_alpha(0.6));
         let shown = plot.show(ui, |p| self.items().into_iter().for_each(|item| item.add_to(p)));
@@ -95,7 +96,7 @@ impl<'a> Scatter<'a> {
             self.series(method, k, &mut items);
         }
         for p in self.second.into_iter().flat_map(|s| &s.points) {
-            // Knobs that only the second has are grey.
+            // Knobs that only the second has are gray.
             let k = methods.iter().position(|m| *m == p.method);
             let color = k.map_or(theme::WEAK, color);
             let shape = k.map_or(MarkerShape::Circle, shape);
@@ -121,7 +122,7 @@ impl<'a> Scatter<'a> {
     fn series(&self, method: &str, k: usize, items: &mut Vec<Item>) {
         let color = color(k);
         let points: Vec<&Point> = self.stage.points.iter().filter(|p| p.method == method).collect();
-        // What has the series' name has its colour, too: the legend shows one.
+        // What has the series' name has its color, too: the legend shows one.
         let line = |name: &str, places: Vec<[f64; 2]>, style: Stroke| {
             Item::Line(Line::new(name, PlotPoints::from(places)).stroke(style).allow_hover(false))
         };
@@ -193,7 +194,7 @@ impl Item {
     }
 }
 
-/// Colour of the knob with this number: those of the report's own pictures, lighter on dark ground.
+/// Color of the knob with this number: those of the report's own frames, lighter on dark ground.
 pub fn color(k: usize) -> Color32 {
     let [r, g, b] = COLORS[k % COLORS.len()].map(|v| v + (255 - v) / 4);
     Color32::from_rgb(r, g, b)
@@ -219,12 +220,12 @@ pub fn facts(ui: &mut Ui, point: &Point, measures: &[Measure], whose: &str) {
         .min_row_height(17.0)
         .show(ui, |ui| {
             ui.label("time");
-            ui.label(table::spread(&point.secs, table::seconds));
+            ui.label(table::spread(&point.secs, format::seconds));
             ui.end_row();
             for measure in measures {
                 let Some(value) = point.values.get(&measure.name) else { continue };
                 ui.label(table::title(measure)).on_hover_text(&measure.meaning);
-                ui.label(table::spread(value, table::number));
+                ui.label(table::spread(value, format::number));
                 ui.end_row();
             }
         });
@@ -257,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn series_differ_in_colour_or_shape() {
+    fn series_differ_in_color_or_shape() {
         let looks: Vec<_> = (0..14).map(|k| (color(k), shape(k))).collect();
         assert!((0..14).all(|i| (0..i).all(|j| looks[i] != looks[j])));
     }
