@@ -1,13 +1,12 @@
 //! What each action does.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::app::App;
-use super::camera;
 use super::chat::Snapshot;
 use super::context::SceneContext;
-use super::dialogs::{Chosen, Purpose, Question};
+use super::dialogs::{Purpose, Question};
 use super::edits::EditStep;
 use super::state::Tone;
 use super::viewport::brush::Brush;
@@ -20,7 +19,7 @@ use crate::report::is_report;
 use crate::scene::IdentityId;
 use crate::scene::plan::When;
 use crate::ui::actions::{Action, Pane};
-use crate::worker::{Command, EditRequest, Failure, FilmRequest, JobId, JobKind, VisitRequest, Visited};
+use crate::worker::{Command, EditRequest, JobId, JobKind, VisitRequest, Visited};
 
 impl App {
     /// Does what a user asked for.
@@ -159,7 +158,7 @@ impl App {
         job.map_err(|e| self.state.toast(Tone::Warning, format!("{title}: {e}"))).ok()
     }
 
-    fn install_model(&mut self, id: String, brought: Option<PathBuf>) {
+    pub(super) fn install_model(&mut self, id: String, brought: Option<PathBuf>) {
         self.submit(Command::InstallModel { id, brought });
     }
 
@@ -194,7 +193,7 @@ impl App {
     }
 
     /// Finds objects and parts with these masks, those that came with the photos, or none.
-    fn find_objects(&mut self, masks: Option<PathBuf>) {
+    pub(super) fn find_objects(&mut self, masks: Option<PathBuf>) {
         let scene = self.state.scene.clone();
         let Some((scene, dataset)) = scene.as_ref().and_then(|s| Some((s, s.dataset.clone()?))) else {
             self.state.toast(Tone::Warning, "Open a folder of posed photos first: masks belong to photos.");
@@ -264,19 +263,6 @@ impl App {
         }
     }
 
-    /// Exports a video of what is played.
-    fn export_video(&mut self, out: PathBuf) {
-        let Some(SceneContext { cloud, map, settings: draw, aspect, .. }) = self.context() else { return };
-        let Some((cameras, settings)) = self.camera.film(&out, aspect) else {
-            self.state.toast(Tone::Warning, "There is nothing to export: add keyframes, or go to something first.");
-            return;
-        };
-        let found = self.viewport.queries.found();
-        let marked = map.filter(|_| self.camera.mark).map(|map| (Arc::clone(&map), found));
-        let cloud = Arc::clone(&cloud);
-        self.submit(Command::Film(Box::new(FilmRequest { cloud, draw, cameras, marked, out, settings })));
-    }
-
     /// Sends what was typed to the agent, with the scene as it is.
     pub(super) fn send_chat(&mut self) {
         let Some(text) = self.chat.wants() else { return };
@@ -328,15 +314,6 @@ impl App {
         }
     }
 
-    fn save_talk(&mut self, path: &Path) {
-        let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-        let Some(text) = self.chat.transcript(json).map(str::to_owned) else { return };
-        match crate::io::atomic::write(path, |w| w.write_all(text.as_bytes())) {
-            Ok(()) => self.state.toast(Tone::Good, format!("Wrote {}", path.display())),
-            Err(e) => self.state.fail("Saving the conversation", Failure::of(&e, "")),
-        }
-    }
-
     /// Changes objects and parts, after the changes that were asked for before.
     fn edit(&mut self, step: EditStep) {
         self.edits.push_back(step);
@@ -366,69 +343,6 @@ impl App {
             self.viewport.queries.start_typing();
         } else {
             self.state.toast(Tone::Warning, "There is nothing to query yet: find the objects first (Objects pane).");
-        }
-    }
-
-    fn choose(&mut self, purpose: Purpose) {
-        let writes = matches!(purpose, Purpose::ExportPly | Purpose::ExportTarget(_) | Purpose::Screenshot);
-        if writes && self.viewport.picture().is_none() {
-            self.state.toast(Tone::Warning, "There is nothing to save yet: open a scene first.");
-            return;
-        }
-        let name = self.state.scene.as_ref().map_or_else(|| "scene".to_owned(), |s| s.name.clone());
-        if let Err(e) = self.dialogs.ask(purpose, &name, Arc::clone(&self.repaint)) {
-            self.state.fail("Opening the file dialog", Failure::of(&e, "Close other programs and try again."));
-        }
-    }
-
-    /// Goes on with what the file dialog brought.
-    pub(super) fn chosen(&mut self, answer: Chosen) {
-        match answer {
-            Chosen::Path(Purpose::OpenFolder | Purpose::OpenFile, path) => self.ask(Action::Open(path)),
-            Chosen::Path(Purpose::Report, path) => self.read_report(path, false),
-            Chosen::Path(Purpose::SecondReport, path) => self.read_report(path, true),
-            Chosen::Path(Purpose::Masks, path) => self.find_objects(Some(path)),
-            Chosen::Path(Purpose::Model(id), path) => self.install_model(id, Some(path)),
-            Chosen::Path(Purpose::ExportPly, path) => {
-                if let Some(cloud) = self.viewport.cloud() {
-                    self.submit(Command::Export { cloud: Arc::clone(cloud), path });
-                }
-            }
-            Chosen::Path(Purpose::ExportTarget(id), path) => {
-                if let (Some(cloud), Some(map)) = (self.viewport.cloud(), &self.state.semantics) {
-                    let cloud = Arc::new(cloud.select(&map.members(id)));
-                    self.submit(Command::Export { cloud, path });
-                }
-            }
-            Chosen::Path(Purpose::OpenPath, path) => match camera::read(&path) {
-                Ok(read) => {
-                    self.camera.open(read);
-                    self.layout.hidden.retain(|p| *p != Pane::Camera);
-                }
-                Err(message) => {
-                    self.state.fail("Opening the camera path", Failure { message, remedy: String::new() });
-                }
-            },
-            Chosen::Path(Purpose::SavePath, path) => {
-                match camera::write(&path, &self.camera.path, self.viewport.aspect()) {
-                    Ok(()) => self.state.toast(Tone::Good, format!("Wrote {}", path.display())),
-                    Err(message) => {
-                        self.state.fail("Saving the camera path", Failure { message, remedy: String::new() });
-                    }
-                }
-            }
-            Chosen::Path(Purpose::ExportVideo, path) => self.export_video(path),
-            Chosen::Path(Purpose::SaveChat, path) => self.save_talk(&path),
-            Chosen::Path(Purpose::Screenshot, path) => {
-                if let Some(pixels) = self.viewport.pixels() {
-                    self.submit(Command::Picture { pixels: Arc::new(pixels), path });
-                }
-            }
-            Chosen::Nothing => {}
-            Chosen::NoDialog => self.state.toast(
-                Tone::Warning,
-                "No file dialog appeared on this system. Drop the file onto the window, or press Ctrl+P and type its path.",
-            ),
         }
     }
 }

@@ -13,8 +13,8 @@ use super::edits::EditStep;
 use super::layout::Layout;
 use super::palette::{Palette, shortcut_sheet};
 use super::panes::{
-    bars, dataset::Thumbnails, empty, log, models::Models, objects, plan, portraits::Portraits, report::ReportPane,
-    training,
+    bars, dataset::PhotoThumbnails, empty, log, models::Models, object_thumbnails::ObjectThumbnails, objects, plan,
+    report::ReportPane, training,
 };
 use super::state::AppState;
 use super::toasts::Toasts;
@@ -40,8 +40,8 @@ pub struct App {
     pub(super) question: Option<Question>,
     pub(super) palette: Palette,
     pub(super) sheet: bool,
-    thumbnails: Thumbnails,
-    portraits: Portraits,
+    photo_thumbnails: PhotoThumbnails,
+    object_thumbnails: ObjectThumbnails,
     models: Models,
     /// Error against run time.
     pub report: ReportPane,
@@ -89,8 +89,8 @@ impl App {
             question: None,
             palette: Palette::default(),
             sheet: false,
-            thumbnails: Thumbnails::default(),
-            portraits: Portraits::default(),
+            photo_thumbnails: PhotoThumbnails::default(),
+            object_thumbnails: ObjectThumbnails::default(),
             models: Models::default(),
             report: ReportPane::default(),
             camera: CameraPane::default(),
@@ -136,8 +136,8 @@ impl App {
         self.next_edit();
         self.send_chat();
         self.play(ctx);
-        self.thumbnails.update(ctx, &mut self.state);
-        self.portraits.update(ctx, &mut self.state, self.viewport.cloud().map(|c| &**c), &self.worker);
+        self.photo_thumbnails.update(ctx, &mut self.state);
+        self.object_thumbnails.update(ctx, &mut self.state, self.viewport.cloud().map(|c| &**c), &self.worker);
         while let Some(answer) = self.dialogs.answer() {
             self.chosen(answer);
         }
@@ -208,7 +208,7 @@ impl App {
             Panel::left("photos").frame(pane).resizable(true).default_size(270.0).size_range(180.0..=600.0).show(
                 ui,
                 |ui| {
-                    self.thumbnails.show(ui, state, layout, viewport.photo_index(), &self.worker, actions);
+                    self.photo_thumbnails.show(ui, state, layout, viewport.photo_index(), &self.worker, actions);
                 },
             );
         }
@@ -220,14 +220,14 @@ impl App {
                         let objects = layout.shows(Pane::Objects) && scene.dataset.is_some();
                         let show_objects = |ui: &mut Ui, actions: &mut Vec<Action>| {
                             egui::CollapsingHeader::new(Pane::Objects.text()).default_open(true).show(ui, |ui| {
-                                objects::show(ui, state, &self.portraits, &viewport.visibility, actions)
+                                objects::show(ui, state, &self.object_thumbnails, &viewport.visibility, actions)
                             });
                             ui.add_space(10.0);
                         };
                         if layout.shows(Pane::Chat) {
                             let ready = state.semantics.is_some();
                             egui::CollapsingHeader::new(Pane::Chat.text()).default_open(ready).show(ui, |ui| {
-                                self.chat.show(ui, &mut layout.chat, &self.portraits, ready, actions);
+                                self.chat.show(ui, &mut layout.chat, &self.object_thumbnails, ready, actions);
                             });
                             ui.add_space(8.0);
                         }

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use egui::{Button, ComboBox, Key, RichText, ScrollArea, TextEdit, Ui};
 
-use super::panes::portraits::Portraits;
+use super::panes::object_thumbnails::ObjectThumbnails;
 use super::theme;
 use crate::agent::llm::settings::LlmSettings;
 use crate::agent::llm::{Llm, SENT};
@@ -25,7 +25,7 @@ const NEWS: usize = 1024;
 /// Lines that are kept.
 const MAX_LINES: usize = 400;
 /// Side of a candidate's thumbnail, points.
-const PORTRAIT: f32 = 34.0;
+const THUMBNAIL_PX: f32 = 34.0;
 
 /// Which planner is used; kept from one run to the next.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -157,7 +157,7 @@ impl Chat {
         &mut self,
         ui: &mut Ui,
         settings: &mut ChatSettings,
-        portraits: &Portraits,
+        object_thumbnails: &ObjectThumbnails,
         ready: bool,
         actions: &mut Vec<Action>,
     ) {
@@ -179,7 +179,7 @@ impl Chat {
         } else {
             ScrollArea::vertical().id_salt("talk").max_height(280.0).stick_to_bottom(true).show(ui, |ui| {
                 for line in &self.lines {
-                    say = show_line(ui, line, portraits).or(say.take());
+                    say = show_line(ui, line, object_thumbnails).or(say.take());
                 }
                 if self.cancel.is_some() {
                     ui.horizontal(|ui| {
@@ -237,7 +237,7 @@ fn did(line: &str, done: Option<bool>) -> Line {
 }
 
 /// One line; a candidate that was clicked.
-fn show_line(ui: &mut Ui, line: &Line, portraits: &Portraits) -> Option<String> {
+fn show_line(ui: &mut Ui, line: &Line, object_thumbnails: &ObjectThumbnails) -> Option<String> {
     let mut clicked = None;
     match line {
         Line::Said(text) => {
@@ -260,7 +260,7 @@ fn show_line(ui: &mut Ui, line: &Line, portraits: &Portraits) -> Option<String> 
             };
             ui.horizontal_wrapped(|ui| {
                 for (id, name) in candidates.iter().take(8) {
-                    portraits.show(ui, *id, PORTRAIT);
+                    object_thumbnails.show(ui, *id, THUMBNAIL_PX);
                     if ui.add(Button::new(name).small()).clicked() {
                         clicked = Some(name.clone());
                     }

@@ -5,6 +5,7 @@
 //! changes the view or becomes a job. Nothing here computes for longer than a redraw may take.
 
 mod act;
+mod act_file;
 mod act_report;
 pub mod actions;
 pub mod app;
@@ -20,6 +21,7 @@ pub mod panes;
 pub mod state;
 pub mod theme;
 pub mod toasts;
+mod train_history;
 pub mod viewport;
 
 use std::sync::Arc;

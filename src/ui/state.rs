@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::actions::Action;
-use crate::pipeline::observer::{Evaluation, Level, Progress, StepMetrics};
+pub use super::train_history::TrainHistory;
+use crate::pipeline::observer::{Evaluation, Level, Progress};
 use crate::pipeline::semantics::portraits::Gallery;
 use crate::render::RenderSettings;
 use crate::report::Report;
@@ -14,8 +15,6 @@ use crate::scene::{Facts, Limits, Overrides, PhotoPixels, ScenePlan, SemanticMap
 use crate::worker::models::ModelList;
 use crate::worker::{Event, Explored, Failure, JobId, JobKind, Lane, OpenedScene, Outcome, Versioned, Visited};
 
-/// Measurements kept for the plots; beyond that every second one is dropped.
-const MAX_STEPS: usize = 4_000;
 /// Lines kept in the log.
 const MAX_LOG: usize = 1_000;
 /// Files and folders kept in the recent list.
@@ -69,15 +68,6 @@ pub struct RunningJob {
     pub paused: bool,
 }
 
-/// What training has shown so far.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct TrainHistory {
-    /// Measurements, oldest first, thinned out when there are many.
-    pub steps: Vec<StepMetrics>,
-    /// Held-out evaluations, oldest first.
-    pub evaluations: Vec<Evaluation>,
-}
-
 /// An error that is shown until a user has read it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ErrorBox {
@@ -112,7 +102,7 @@ pub struct AppState {
     /// Gaussians of each of them by number, pieces included.
     pub sizes: Vec<usize>,
     /// New thumbnails of objects and parts, until they are taken over.
-    pub portraits: Option<(Arc<SemanticMap>, Gallery)>,
+    pub thumbnails: Option<(Arc<SemanticMap>, Gallery)>,
     /// What is known of moving about in the scene.
     pub explored: Option<Arc<Explored>>,
     /// The way that was looked for last, until the window takes it.
@@ -351,7 +341,7 @@ impl AppState {
                     false => self.report = shown,
                 }
             }
-            Outcome::Portraits(map, pictures) => self.portraits = Some((map, pictures)),
+            Outcome::Portraits(map, pictures) => self.thumbnails = Some((map, pictures)),
             Outcome::Written(path) => self.toast(Tone::Good, format!("Wrote {}", path.display())),
             Outcome::Photo { index, max_side_px, pixels } => {
                 self.photos.insert((index, max_side_px), pixels);
@@ -407,22 +397,6 @@ impl AppState {
             None => self.end(job).map_or_else(|| "Working".to_owned(), |j| j.title),
         };
         self.fail(doing, failure);
-    }
-}
-
-impl TrainHistory {
-    fn push(&mut self, metrics: StepMetrics) {
-        // A resumed run goes on from what was measured before; a new one starts over.
-        self.steps.retain(|s| s.step < metrics.step);
-        self.evaluations.retain(|e| e.step <= metrics.step);
-        if self.steps.len() >= MAX_STEPS {
-            let mut keep = false;
-            self.steps.retain(|_| {
-                keep = !keep;
-                keep
-            });
-        }
-        self.steps.push(metrics);
     }
 }
 

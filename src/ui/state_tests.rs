@@ -1,7 +1,9 @@
 //! Tests of the fold.
 
 use super::*;
+use crate::pipeline::observer::StepMetrics;
 use crate::scene::Dataset;
+use crate::ui::train_history::MAX_STEPS;
 
 const JOB: JobId = JobId(7);
 

@@ -16,23 +16,23 @@ use crate::worker::{Command, JobId, Worker};
 
 /// Longest side of a thumbnail in px.
 const SIDE_PX: u32 = 224;
-/// Thumbnails that are loaded at once; more would keep a photo that is looked at waiting.
+/// PhotoThumbnails that are loaded at once; more would keep a photo that is looked at waiting.
 const AT_ONCE: usize = 2;
-/// Thumbnails kept.
+/// PhotoThumbnails kept.
 const KEPT: usize = 400;
 /// Height of the text under a thumbnail.
 const CAPTION: f32 = 18.0;
 
 /// The thumbnails of one scene.
 #[derive(Default)]
-pub struct Thumbnails {
+pub struct PhotoThumbnails {
     scene: u64,
     loaded: BTreeMap<usize, TextureHandle>,
     waiting: HashMap<JobId, usize>,
     failed: BTreeSet<usize>,
 }
 
-impl Thumbnails {
+impl PhotoThumbnails {
     /// Takes over what was loaded since.
     pub fn update(&mut self, ctx: &egui::Context, state: &mut AppState) {
         if self.scene != state.scene_number {
@@ -50,7 +50,7 @@ impl Thumbnails {
         state.failed_photos.retain(|job| waiting.remove(job).map(|i| failed.insert(i)).is_none());
     }
 
-    fn wish(&mut self, index: usize, dataset: &Dataset, worker: &Worker) {
+    fn request(&mut self, index: usize, dataset: &Dataset, worker: &Worker) {
         let known = self.loaded.contains_key(&index)
             || self.failed.contains(&index)
             || self.waiting.values().any(|i| *i == index);
@@ -59,7 +59,7 @@ impl Thumbnails {
         }
         let Some(photo) = dataset.photos.get(index) else { return };
         let command = Command::Photo { index, photo: Box::new(photo.clone()), max_side_px: SIDE_PX };
-        // With a full queue the wish comes again with the next redraw.
+        // With a full queue the request comes again with the next redraw.
         if let Ok(job) = worker.submit(command) {
             self.waiting.insert(job, index);
         }
@@ -114,7 +114,7 @@ impl Thumbnails {
                 ui.horizontal(|ui| {
                     ui.spacing_mut().item_spacing.x = gap;
                     for index in (row * columns..(row + 1) * columns).take_while(|i| *i < dataset.photos.len()) {
-                        self.wish(index, dataset, worker);
+                        self.request(index, dataset, worker);
                         let photo = &dataset.photos[index];
                         let (name, held) = (&*photo.title(), test.contains(&index));
                         let caption = Caption { name, held, psnr: scores.get(photo.name.as_str()).copied() };

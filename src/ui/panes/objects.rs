@@ -6,17 +6,23 @@ use egui::{Button, Color32, Id, Key, RichText, ScrollArea, TextEdit, Ui, vec2};
 use super::super::state::AppState;
 use super::super::theme;
 use super::super::viewport::visible::Visibility;
-use super::portraits::Portraits;
+use super::object_thumbnails::ObjectThumbnails;
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::edit::Edit;
 use crate::scene::{Identities, IdentityId, Level, NOBODY};
 use crate::ui::actions::Action;
 
 /// Side of a thumbnail, points.
-const PORTRAIT: f32 = 30.0;
+const THUMBNAIL_PX: f32 = 30.0;
 
 /// Draws the pane.
-pub fn show(ui: &mut Ui, state: &AppState, portraits: &Portraits, visibility: &Visibility, actions: &mut Vec<Action>) {
+pub fn show(
+    ui: &mut Ui,
+    state: &AppState,
+    object_thumbnails: &ObjectThumbnails,
+    visibility: &Visibility,
+    actions: &mut Vec<Action>,
+) {
     let Some(map) = &state.semantics else {
         return show_how_to_begin(ui, state, actions);
     };
@@ -43,7 +49,7 @@ pub fn show(ui: &mut Ui, state: &AppState, portraits: &Portraits, visibility: &V
             }
         }
     });
-    let tree = Tree { identities, sizes: &state.sizes, portraits, visibility };
+    let tree = Tree { identities, sizes: &state.sizes, object_thumbnails, visibility };
     for (id, _) in identities.iter().filter(|(_, i)| i.parent == NOBODY) {
         tree.branch(ui, id, actions);
     }
@@ -53,7 +59,7 @@ struct Tree<'a> {
     identities: &'a Identities,
     /// Gaussians by number.
     sizes: &'a [usize],
-    portraits: &'a Portraits,
+    object_thumbnails: &'a ObjectThumbnails,
     visibility: &'a Visibility,
 }
 
@@ -69,13 +75,13 @@ impl Tree<'_> {
     }
 
     fn leaf(&self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
-        let Self { identities, sizes, portraits, visibility } = self;
+        let Self { identities, sizes, object_thumbnails, visibility } = self;
         ui.horizontal(|ui| {
             let mut drawn = !visibility.is_hidden(id);
             if ui.checkbox(&mut drawn, "").on_hover_text("Visible").changed() {
                 actions.push(Action::Hide(id));
             }
-            portraits.show(ui, id, PORTRAIT);
+            object_thumbnails.show(ui, id, THUMBNAIL_PX);
             let code = identities.get(id).map_or([0.5; 3], |i| i.code).map(|c| (c * 255.0) as u8);
             let (rect, _) = ui.allocate_exact_size(vec2(11.0, 11.0), egui::Sense::hover());
             ui.painter().rect_filled(rect, 3.0, Color32::from_rgb(code[0], code[1], code[2]));

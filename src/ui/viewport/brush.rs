@@ -2,7 +2,9 @@
 
 use egui::{Align2, Area, Color32, ColorImage, Id, Order, Rect, Slider, TextEdit, TextureHandle, TextureOptions, Ui};
 
+use super::super::state::AppState;
 use super::super::theme;
+use super::Viewport;
 use crate::math::grid::neighbours;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::{Camera, Identities, IdentityId, Mask, NOBODY};
@@ -154,6 +156,30 @@ impl Brush {
         let camera = self.camera.clone().filter(|_| !self.mask.is_empty())?;
         let (of, name, mask) = (self.of, self.name.trim().to_owned(), self.mask.clone());
         Some(EditRequest::Paint { of, name, camera: Box::new(camera), mask })
+    }
+}
+
+impl Viewport {
+    /// Paints where the pointer drags, floods where it clicks.
+    pub(super) fn use_brush(&mut self, response: &egui::Response, rect: Rect, state: &AppState) {
+        let (Some(brush), Some(picture)) = (&mut self.brush, self.display.picture()) else { return };
+        let shown = self.photo.as_mut().map_or(rect, |p| p.fit(rect));
+        // Only a full frame has the pixels that the maps have.
+        if !picture.full {
+            return;
+        }
+        brush.on_view(&picture.camera);
+        let Some(pos) = response.interact_pointer_pos() else { return };
+        let scale = picture.camera.width_px as f32 / shown.width();
+        let at = [(pos.x - shown.left()) * scale, (pos.y - shown.top()) * scale];
+        if response.dragged_by(egui::PointerButton::Primary) {
+            brush.dab(at, scale);
+        } else if response.clicked()
+            && let (Some(maps), Some(semantics)) = (self.queries.maps(), &state.semantics)
+            && at.iter().all(|v| *v >= 0.0)
+        {
+            brush.flood([at[0] as usize, at[1] as usize], &picture.rgb, &maps.identities, &semantics.identities);
+        }
     }
 }
 

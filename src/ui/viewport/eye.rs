@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::scene::{Bounds, Camera};
+use crate::worker::HomeView;
 
 /// Vertical field of view of a fresh eye, in radians.
 const FOV_Y_RAD: f64 = 0.85;
@@ -109,6 +110,23 @@ impl Eye {
         let radius = bounds.radius().max(1e-6);
         self.pivot = bounds.center();
         self.center = self.pivot - self.forward() * (1.15 * radius / (0.5 * self.fov_y_rad).sin());
+    }
+
+    /// The first view of a scene: from its first camera if it has one, else framed as a whole; upright if the user
+    /// chose what is up.
+    pub fn home(home: &HomeView, up: Option<DVec3>) -> Self {
+        let mut eye = match &home.camera {
+            Some(c) => {
+                let mut eye = Self::of_camera(c, home.bounds.center(), home.up);
+                eye.fov_y_rad = eye.fov_y_rad.clamp(0.5, 1.2);
+                eye
+            }
+            None => Self::framing(&home.bounds, up.unwrap_or(home.up)),
+        };
+        if let Some(up) = up {
+            eye.set_up(up);
+        }
+        eye
     }
 
     /// The point at a relative position of a view of this height by width, as far away as the pivot.

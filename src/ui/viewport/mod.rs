@@ -131,7 +131,7 @@ impl Viewport {
             self.visibility = Visibility::default();
             self.brush = None;
             self.overrides = RenderOverrides::default();
-            self.eye = home_eye(scene, None);
+            self.eye = Eye::home(&scene.home, None);
         }
         if let Some((generation, snapshot)) = worker.clouds().newer_than(self.snapshot) {
             self.snapshot = generation;
@@ -163,7 +163,7 @@ impl Viewport {
             Action::Hide(id) => self.visibility.toggle(*id),
             Action::ResetView => {
                 self.photo = None;
-                self.eye = home_eye(&scene, self.up);
+                self.eye = Eye::home(&scene.home, self.up);
             }
             Action::TurnUp(axis) => {
                 self.leave_photo();
@@ -307,28 +307,6 @@ impl Viewport {
         }
     }
 
-    /// Paints where the pointer drags, floods where it clicks.
-    fn use_brush(&mut self, response: &egui::Response, rect: Rect, state: &AppState) {
-        let (Some(brush), Some(picture)) = (&mut self.brush, self.display.picture()) else { return };
-        let shown = self.photo.as_mut().map_or(rect, |p| p.fit(rect));
-        // Only a full frame has the pixels that the maps have.
-        if !picture.full {
-            return;
-        }
-        brush.on_view(&picture.camera);
-        let Some(pos) = response.interact_pointer_pos() else { return };
-        let scale = picture.camera.width_px as f32 / shown.width();
-        let at = [(pos.x - shown.left()) * scale, (pos.y - shown.top()) * scale];
-        if response.dragged_by(egui::PointerButton::Primary) {
-            brush.dab(at, scale);
-        } else if response.clicked()
-            && let (Some(maps), Some(semantics)) = (self.queries.maps(), &state.semantics)
-            && at.iter().all(|v| *v >= 0.0)
-        {
-            brush.flood([at[0] as usize, at[1] as usize], &picture.rgb, &maps.identities, &semantics.identities);
-        }
-    }
-
     /// Takes over the newest frame, and what its pixels belong to.
     fn take_frame(&mut self, ctx: &egui::Context) {
         if let Some(maps) = self.display.take_maps(self.lane.maps(), self.requests.ticket()) {
@@ -406,22 +384,4 @@ impl Viewport {
         let aspect = f64::from(shown.height() / shown.width().max(1.0));
         self.display.picked(at, &self.eye).unwrap_or_else(|| self.eye.point_at_pivot_depth(at, aspect))
     }
-}
-
-/// The first view of a scene: from its first camera if it has one, else framed as a whole; upright
-/// if a user chose what is up.
-fn home_eye(scene: &OpenedScene, up: Option<DVec3>) -> Eye {
-    let home = &scene.home;
-    let mut eye = match &home.camera {
-        Some(c) => {
-            let mut eye = Eye::of_camera(c, home.bounds.center(), home.up);
-            eye.fov_y_rad = eye.fov_y_rad.clamp(0.5, 1.2);
-            eye
-        }
-        None => Eye::framing(&home.bounds, up.unwrap_or(home.up)),
-    };
-    if let Some(up) = up {
-        eye.set_up(up);
-    }
-    eye
 }

@@ -230,7 +230,7 @@ mod tests {
         assert!(not(&cut, &Now { on_gpu: true, ..now(&config, Some(&own), &drawing) }).contains("GPU"));
         assert!(not(&cut, &now(&config, None, &drawing)).contains("Open a scene"));
         assert!(not(&s.points[2], &here).contains("single precision"));
-        assert!(not(&point("cutoffs", json!({"alpha": 0.0, "transmittance": 1.0})), &here).contains("cut-offs"));
+        assert!(not(&point("cutoffs", json!({"alpha": 0.0, "transmittance": 1.0})), &here).contains("cutoffs"));
         let other = stage(StageName::Path, vec![]);
         assert!(matches!(offer(&other, &cut, &here), Offer::Not(_)));
     }

@@ -194,9 +194,11 @@ impl Item {
     }
 }
 
-/// Color of the knob with this number: those of the report's own frames, lighter on dark ground.
+/// Color of the setting with this number: those of the report's own plots, lighter on dark ground; once all are used,
+/// paler still.
 pub fn color(k: usize) -> Color32 {
-    let [r, g, b] = COLORS[k % COLORS.len()].map(|v| v + (255 - v) / 4);
+    let paler = if k / COLORS.len() % 2 == 0 { 4 } else { 2 };
+    let [r, g, b] = COLORS[k % COLORS.len()].map(|v| v + (255 - v) / paler);
     Color32::from_rgb(r, g, b)
 }
 
@@ -261,5 +263,6 @@ mod tests {
     fn series_differ_in_color_or_shape() {
         let looks: Vec<_> = (0..14).map(|k| (color(k), shape(k))).collect();
         assert!((0..14).all(|i| (0..i).all(|j| looks[i] != looks[j])));
+        assert!((0..14).all(|i| (0..i).all(|j| color(i) != color(j))), "twice as many colors as the palette has");
     }
 }

@@ -1,6 +1,7 @@
 //! The answer to the newest query: verdict, hits, and what can be done with the one that is shown.
 
 use egui::{RichText, Ui};
+use strum::VariantArray;
 
 use super::{OverlaySettings, Queries, times};
 use crate::navigate::target::Side;
@@ -131,7 +132,7 @@ fn show_target(ui: &mut Ui, target: IdentityId, facts: &Facts, actions: &mut Vec
             actions.push(go);
         }
         ui.menu_button(RichText::new("from\u{2026}").small(), |ui| {
-            for side in Side::ALL {
+            for &side in Side::VARIANTS {
                 if ui.button(side.text()).clicked() {
                     actions.push(Action::GoToTarget(target, side));
                     ui.close();

@@ -97,7 +97,7 @@ pub fn show(ui: &mut Ui, settings: &mut OverlaySettings, heat: Option<&[f32]>) -
                 }
             });
             ComboBox::from_id_salt("colormap").selected_text(settings.colormap.text()).width(70.0).show_ui(ui, |ui| {
-                for map in Colormap::ALL {
+                for &map in Colormap::VARIANTS {
                     ui.selectable_value(&mut settings.colormap, map, map.text());
                 }
             });
