@@ -19,7 +19,7 @@ use crate::pipeline::semantics::protocols::{
 };
 use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
 use crate::pipeline::semantics::view_map::ViewMap;
-use crate::render::cpu::Renderer;
+use crate::render::Renderer;
 use crate::scene::{Camera, Identities, IdentityId, NOBODY, SemanticMap};
 
 /// Rows of the table at most; the worst come first.

@@ -17,8 +17,7 @@ use crate::pipeline::semantics::localise::{Answer, Hit};
 use crate::pipeline::semantics::matching;
 use crate::pipeline::semantics::stages::ms_since;
 use crate::pipeline::semantics::view_map::ViewMap;
-use crate::render::cpu::Renderer;
-use crate::render::{Features, RenderSettings};
+use crate::render::{Features, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, Mask, SemanticMap};
 
 /// Ask a scene for an object or a part
@@ -139,7 +138,7 @@ pub fn write_heat(
     settings: &RenderSettings,
     relevancy: &[f32],
 ) -> Result<(), CliError> {
-    let frame = Renderer::<f32>::new().render(cloud, Features::NONE, camera, settings)?;
+    let frame = Renderer::new().render(cloud, Features::NONE, camera, settings)?;
     let mixed = frame.to_rgb8().into_iter().zip(relevancy).map(|(rgb, &relevancy)| {
         let heat = Colormap::Turbo.color(relevancy);
         let grey = (u32::from(rgb[0]) + u32::from(rgb[1]) + u32::from(rgb[2])) / 3;

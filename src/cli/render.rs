@@ -16,10 +16,9 @@ use crate::io;
 use crate::io::animation::{Encoder, Settings};
 use crate::navigate::film::MOST_PICTURES;
 use crate::navigate::{Film, Speed};
-use crate::pipeline::film::{self, FilmError, Marked};
+use crate::pipeline::film::{self, Marked};
 use crate::pipeline::semantics::grammar::Kind;
-use crate::render::cpu::normals;
-use crate::render::{Backend, BackendChoice, Frame, RenderSettings};
+use crate::render::{BackendChoice, Frame, RenderSettings, Renderer, normals};
 use crate::scene::{Camera, CameraPath, ScenePlan};
 
 /// Draw a scene from a given camera into a file
@@ -152,12 +151,12 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let job = args.check()?;
     let plan = args.plan.of_scene(&job.scene);
     let settings = RenderSettings { depth: args.what.needs_depth(), sh_degree: plan.sh_degree, ..job.scene.settings };
-    let mut backend = Backend::choose(choice(args.backend, &settings, &plan), output::warn)?;
+    let mut renderer = Renderer::choose(choice(args.backend, &settings, &plan), output::warn)?;
     // Only the CPU draws surfels as such.
-    let flat = settings.surfels && !matches!(backend, Backend::Cpu(_));
+    let flat = settings.surfels && renderer.is_gpu();
     let cloud = Arc::new(job.scene.cloud);
     let started = Instant::now();
-    let frame = backend.render(&cloud, &job.camera, &settings)?;
+    let frame = renderer.draw(&cloud, &job.camera, &settings)?;
     let millis = started.elapsed().as_secs_f64() * 1e3;
 
     output::make_parent(&args.out)?;
@@ -169,7 +168,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
             "size_px": size,
             "camera": job.camera,
             "gaussians": cloud.len(),
-            "backend": backend.name(),
+            "backend": renderer.name(),
             "render_ms": millis,
             "sh_degree": settings.sh_degree,
             "depth_full_scale": far,
@@ -182,7 +181,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     output::print(&format!(
         "{}: {width} x {height} px, drawn in {millis:.0} ms on {}{flat}{scale}",
         args.out.display(),
-        backend.name()
+        renderer.name()
     ))
 }
 
@@ -231,23 +230,20 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
         }
     }
     let marked = map.as_ref().map(|map| Marked { map, ids: &ids, color: [255, 64, 160] });
-    let mut backend = Backend::choose(choice(args.backend, &scene.settings, &plan), output::warn)?;
+    let mut renderer = Renderer::choose(choice(args.backend, &scene.settings, &plan), output::warn)?;
     let started = Instant::now();
     output::make_parent(&args.out)?;
     let mut console = Console::new(quiet);
     let cloud = Arc::new(scene.cloud);
     let out = (args.out.as_path(), &settings);
-    let made = film::write(&cloud, &scene.settings, &cameras, marked, &mut backend, out, &mut console);
-    let summary = made.map_err(|e| match e {
-        FilmError::Cancelled => CliError::Cancelled("no film was written".into()),
-        other => CliError::failed(other.to_string()),
-    })?;
+    let made = film::write(&cloud, &scene.settings, &cameras, marked, &mut renderer, out, &mut console);
+    let summary = made.map_err(|e| CliError::of_work(e, "no video was written"))?;
     let secs = started.elapsed().as_secs_f64();
     let (w, h) = summary.size_px;
     if args.json {
         return output::print_json(&json!({
             "out": summary.path, "frames": summary.frames, "bytes": summary.bytes, "film_secs": summary.secs,
-            "size_px": [w, h], "backend": backend.name(), "secs": secs,
+            "size_px": [w, h], "backend": renderer.name(), "secs": secs,
         }));
     }
     output::print(&format!(
@@ -256,7 +252,7 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
         summary.frames,
         summary.secs,
         summary.bytes as f64 / 1e6,
-        backend.name()
+        renderer.name()
     ))
 }
 

@@ -7,8 +7,7 @@ use strum::{IntoStaticStr, VariantArray};
 
 use super::matter::Matter;
 use super::pose::Pose;
-use crate::render::cpu::Renderer;
-use crate::render::{Features, RenderError, RenderSettings};
+use crate::render::{Features, RenderError, RenderSettings, Renderer};
 use crate::scene::{Bounds, Camera, GaussianCloud};
 
 /// Directions that are tried.
@@ -277,7 +276,7 @@ fn directions(n: usize) -> impl Iterator<Item = DVec3> {
 
 /// Draws a target in the scene and alone.
 struct Drawing<'a> {
-    renderer: Renderer<f32>,
+    renderer: Renderer,
     scene: &'a GaussianCloud,
     settings: RenderSettings,
     alone: GaussianCloud,

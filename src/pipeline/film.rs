@@ -2,14 +2,12 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
 
-use super::observer::{Observer, Progress, Signal};
+use super::observer::{Interrupted, Observer, Ticker};
 use super::semantics::view_map::ViewMap;
 use crate::io::animation::{AnimationError, AnimationWriter, Settings, Summary};
 
-use crate::render::cpu::Renderer;
-use crate::render::{Backend, DrawError, RenderError, RenderSettings};
+use crate::render::{DrawError, RenderError, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 
 /// How much of a marked pixel is the mark, of 8.
@@ -40,7 +38,7 @@ pub enum FilmError {
     Animation(#[from] AnimationError),
     /// The observer asked to stop; nothing is left of the film.
     #[error("cancelled")]
-    Cancelled,
+    Interrupted(#[from] Interrupted),
 }
 
 /// Draws the scene from every camera into a film at `out`.
@@ -52,35 +50,25 @@ pub fn write(
     draw: &RenderSettings,
     cameras: &[Camera],
     marked: Option<Marked<'_>>,
-    backend: &mut Backend,
+    renderer: &mut Renderer,
     out: (&Path, &Settings),
     observer: &mut dyn Observer,
 ) -> Result<Summary, FilmError> {
-    let start = Instant::now();
+    let mut ticker = Ticker::new("Drawing the video", cameras.len());
+    observer.proceed()?;
     let mut writer = AnimationWriter::create(out.0, out.1)?;
-    let mut identities = Renderer::new();
     for (done, camera) in cameras.iter().enumerate() {
-        if observer.signal() == Signal::Cancel {
-            return Err(FilmError::Cancelled);
-        }
-        let mut pixels = backend.render(cloud, camera, draw)?.to_rgb8();
+        let mut pixels = renderer.draw(cloud, camera, draw)?.to_rgb8();
         if let Some(marked) = marked.filter(|m| !m.ids.is_empty()) {
             let Marked { map, ids, .. } = marked;
-            let view = ViewMap::render(&mut identities, cloud, &map.of, &map.identities, camera, draw)?;
+            let view = ViewMap::render(renderer, cloud, &map.of, &map.identities, camera, draw)?;
             for id in ids {
                 let mask = view.mask(&map.identities, *id);
                 mark(&mut pixels, camera.width_px as usize, |i| mask.contains(i), marked.color);
             }
         }
         writer.push(pixels.as_flattened())?;
-        let elapsed_secs = start.elapsed().as_secs_f64();
-        observer.progress(Progress {
-            stage: "Drawing the film".into(),
-            done: done as u64 + 1,
-            total: cameras.len() as u64,
-            elapsed_secs,
-            rate: (done + 1) as f64 / elapsed_secs.max(1e-9),
-        });
+        ticker.tick(done + 1, observer)?;
     }
     Ok(writer.finish()?)
 }
@@ -106,8 +94,7 @@ fn mark(pixels: &mut [[u8; 3]], width: usize, inside: impl Fn(usize) -> bool, co
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::observer::Silent;
-    use crate::render::BackendChoice;
+    use crate::pipeline::observer::{Signal, Silent};
 
     #[test]
     fn a_film_has_a_frame_per_camera_and_a_cancelled_one_leaves_nothing() {
@@ -128,7 +115,7 @@ mod tests {
         cloud.opacity_logits.push(3.0);
         cloud.sh.push([1.0; 3]);
         let cloud = Arc::new(cloud);
-        let mut backend = Backend::choose(BackendChoice::Cpu, |_| {}).expect("the processor");
+        let mut backend = Renderer::new();
         let mut film = |name: &str, observer: &mut dyn Observer| {
             let path = folder.path().join(name);
             let settings = Settings::new(32, 16, 10.0);
@@ -141,7 +128,7 @@ mod tests {
         assert_eq!((summary.frames, summary.size_px), (5, (32, 16)));
         assert!(path.is_file());
         let (stopped, path) = film("b.gif", &mut Impatient);
-        assert!(matches!(stopped, Err(FilmError::Cancelled)) && !path.exists());
+        assert!(matches!(stopped, Err(FilmError::Interrupted(_))) && !path.exists());
         assert_eq!(std::fs::read_dir(folder.path()).expect("lists").count(), 1, "no half file");
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::app::App;
 use super::state::Tone;
-use crate::report::{Knobs, StageName, turned};
+use crate::measure::{Knobs, StageName, turned};
 use crate::ui::actions::Pane;
 use crate::worker::{Command, MeasureRequest};
 

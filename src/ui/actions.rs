@@ -7,9 +7,9 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use strum::{IntoStaticStr, VariantArray};
 
+use crate::measure::{Knobs, StageName};
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::edit::Edit;
-use crate::report::{Knobs, StageName};
 use crate::scene::{IdentityId, NOBODY};
 use crate::worker::{Start, ViewMode};
 

@@ -43,7 +43,7 @@ pub fn run(first: Vec<Start>, overrides: Vec<PlanOverride>) -> eframe::Result {
         .with_drag_and_drop(true);
     // An emulated adapter draws the window several times faster through OpenGL: its Vulkan side
     // runs both branches of every condition in the toolkit's shader.
-    if crate::render::gpu::real_gpu().is_none() {
+    if crate::render::real_gpu().is_none() {
         match open(viewport.clone(), eframe::Renderer::Glow, first.clone(), overrides.clone()) {
             // Not every system has it.
             Err(eframe::Error::OpenGL(_) | eframe::Error::Glutin(_) | eframe::Error::NoGlutinConfigs(..)) => {}

@@ -6,10 +6,10 @@ use std::sync::Arc;
 
 use super::actions::Action;
 pub use super::train_history::TrainHistory;
-use crate::pipeline::observer::{Evaluation, Level, Progress};
+use crate::measure::Report;
+use crate::pipeline::observer::{Evaluation, Progress, Severity};
 use crate::pipeline::semantics::portraits::Gallery;
 use crate::render::RenderSettings;
-use crate::report::Report;
 use crate::scene::undo::UndoHistory;
 use crate::scene::{Facts, Limits, Overrides, PhotoPixels, ScenePlan, SemanticMap, text};
 use crate::worker::models::ModelList;
@@ -176,8 +176,8 @@ impl AppState {
                 }
             }
             Event::Evaluation(job, evaluation) => self.evaluated(job, evaluation),
-            Event::Note(_, Level::Info, text) => self.say(Tone::Info, text),
-            Event::Note(_, Level::Warning, text) => self.say(Tone::Warning, text),
+            Event::Note(_, Severity::Info, text) => self.say(Tone::Info, text),
+            Event::Note(_, Severity::Warning, text) => self.say(Tone::Warning, text),
             Event::Finished(job, outcome) => return self.finished(job, outcome),
             Event::Cancelled(job) => {
                 if let Some(ended) = self.end(job) {

@@ -6,8 +6,7 @@ use super::protocol::{Failure, Stop};
 use crate::pipeline::semantics::edit::{Edit, apply};
 use crate::pipeline::semantics::extend::extend;
 use crate::pipeline::semantics::votes::Votes;
-use crate::render::RenderSettings;
-use crate::render::cpu::Renderer;
+use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, Level, Mask, NOBODY, SemanticMap};
 
 /// What is to be changed.

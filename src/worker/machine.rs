@@ -2,7 +2,7 @@
 
 use crate::io::memory;
 use crate::pipeline::train::budget;
-use crate::render::gpu::real_gpu;
+use crate::render::real_gpu;
 use crate::scene::Machine;
 
 /// Looks at memory, cores and the graphics adapter. Takes some milliseconds: not for the window's

@@ -31,7 +31,7 @@ use super::camera::CameraPane;
 use super::layout::Layout;
 use super::state::{AppState, Tone};
 use crate::navigate::Pose;
-use crate::render::Backend;
+use crate::render::Renderer;
 use crate::scene::plan::When;
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
 use crate::ui::actions::Action;
@@ -372,7 +372,7 @@ impl Viewport {
 
     /// Whether a GPU draws the view.
     pub fn on_gpu(&self) -> bool {
-        self.display.picture().is_some_and(|p| p.drawn_by != Backend::CPU)
+        self.display.picture().is_some_and(|p| p.drawn_by != Renderer::CPU)
     }
 
     /// The world point under a window position: at the drawn depth, else at the pivot's.

@@ -6,12 +6,12 @@ use serde_json::{Map, Value};
 use super::super::super::layout::Layout;
 use super::super::super::viewport::overrides::RenderOverrides;
 use crate::math::format::share;
+use crate::measure::{Knobs, Point, Stage, StageName, turned};
 use crate::pipeline::train::TrainConfig;
 use crate::render::{Cutoffs, RenderSettings};
-use crate::report::{Knobs, Point, Stage, StageName, turned};
 use crate::ui::actions::Action;
 
-/// The settings in force.
+/// The settings that are active.
 pub struct Now<'a> {
     /// Of the next training.
     pub config: &'a TrainConfig,
@@ -39,8 +39,8 @@ pub struct Change {
 pub enum Offer {
     /// It changes this.
     Changes(Vec<Change>, Action),
-    /// It is in force already.
-    InForce,
+    /// It is active already.
+    Active,
     /// It cannot be taken over, because.
     Not(String),
 }
@@ -56,7 +56,7 @@ pub fn offer(stage: &Stage, point: &Point, now: &Now<'_>) -> Offer {
         _ => Err("The window has no such setting.".into()),
     };
     match result {
-        Ok((changes, _)) if changes.is_empty() => Offer::InForce,
+        Ok((changes, _)) if changes.is_empty() => Offer::Active,
         Ok((changes, action)) => Offer::Changes(changes, action),
         Err(why) => Offer::Not(why),
     }
@@ -169,7 +169,7 @@ mod tests {
             seeds: vec![0],
             planned: points.len(),
             measures: Vec::new(),
-            rule: crate::report::Rule { measure: String::new(), times: 1.0, floor: 0.0, spare_secs: 0.0 },
+            rule: crate::measure::Rule { measure: String::new(), times: 1.0, floor: 0.0, spare_secs: 0.0 },
             points,
             orders: Vec::new(),
             left_out: Vec::new(),
@@ -193,7 +193,7 @@ mod tests {
         let change = Change { name: "coarse share".into(), from: "0.0".into(), to: "0.3".into() };
         assert_eq!(changes, [change]);
         assert_eq!(turned(&config, &knobs).expect("fits"), TrainConfig { coarse_share: 0.3, ..config.clone() });
-        assert_eq!(offer(&s, &s.points[2], &now), Offer::InForce);
+        assert_eq!(offer(&s, &s.points[2], &now), Offer::Active);
         let Offer::Changes(changes, Action::ApplySetting(_, knobs)) = offer(&s, &default, &now) else {
             panic!("steps differ");
         };
@@ -216,7 +216,7 @@ mod tests {
         };
         assert_eq!(changes[0].from, "alpha 1/255, transmittance 1e-4");
         assert_eq!(changes[0].to, "alpha 1/64, transmittance 1e-4");
-        assert_eq!(offer(&s, &default, &here), Offer::InForce);
+        assert_eq!(offer(&s, &default, &here), Offer::Active);
         let chosen = turned(&drawing, &knobs).expect("fits");
         let Offer::Changes(_, Action::ApplySetting(_, back)) = offer(&s, &default, &now(&config, Some(&own), &chosen))
         else {

@@ -1,5 +1,5 @@
 //! Error against run time: a report's measurements as a plot, what they say of the defaults, and the
-//! way from a measured setting to one in force.
+//! way from a measured setting to an active one.
 
 pub mod apply;
 mod empty;
@@ -15,7 +15,7 @@ use super::super::layout::Layout;
 use super::super::state::{AppState, ShownReport};
 use super::super::theme;
 use super::super::viewport::Viewport;
-use crate::report::{Measure, Point, Report, Stage, StageName, table};
+use crate::measure::{Measure, Point, Report, Stage, StageName, table};
 use crate::scene::text;
 use crate::ui::actions::Action;
 
@@ -254,7 +254,7 @@ fn chosen(ui: &mut Ui, stage: &Stage, selected: Option<&Point>, now: &Now<'_>, a
                     actions.push(action);
                 }
             }
-            Offer::InForce => {
+            Offer::Active => {
                 ui.colored_label(theme::GOOD, "Already active.");
             }
             Offer::Not(why) => {
@@ -267,7 +267,7 @@ fn chosen(ui: &mut Ui, stage: &Stage, selected: Option<&Point>, now: &Now<'_>, a
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::{Computer, Rule, Sample, VERSION};
+    use crate::measure::{Computer, Rule, Sample, VERSION};
     use std::collections::BTreeMap;
     use std::sync::Arc;
 
@@ -293,7 +293,7 @@ mod tests {
             input: BTreeMap::new(),
             seeds: vec![0],
             planned: 3,
-            measures: vec![Measure::new("PSNR", "dB", crate::report::Form::Decibels, "")],
+            measures: vec![Measure::new("PSNR", "dB", crate::measure::ErrorKind::Decibels, "")],
             rule: Rule { measure: "PSNR".into(), times: 1.0, floor: 0.0, spare_secs: 0.0 },
             points: vec![point("default", "all", 2.0), point("steps", "500", 1.0), point("steps", "50", 0.1)],
             orders: Vec::new(),

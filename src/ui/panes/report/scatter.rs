@@ -6,8 +6,8 @@ use egui_plot::{Corner, Legend, Line, MarkerShape, Plot, PlotPoint, PlotPoints, 
 use super::super::super::theme;
 use super::scale;
 use crate::math::format;
-use crate::report::plot::{COLORS, LEAST};
-use crate::report::{Measure, Point, Stage, table};
+use crate::measure::plot::{COLORS, LEAST};
+use crate::measure::{Measure, Point, Stage, table};
 
 /// How near the pointer must be to a point, in window points.
 const NEAR: f32 = 14.0;

@@ -5,7 +5,7 @@ use egui::{Color32, Grid, RichText, Ui};
 use super::super::super::theme;
 use super::scatter;
 use crate::math::format;
-use crate::report::{Comparison, Measure, Point, Report, Stage, table};
+use crate::measure::{Comparison, Measure, Point, Report, Stage, table};
 use crate::scene::text;
 
 /// Letters of a setting that are shown in a table.
