@@ -29,6 +29,8 @@ pub mod schema;
 pub mod session;
 pub mod tool;
 pub mod transcript;
+#[cfg(test)]
+mod undo_tests;
 pub mod wish;
 pub mod words;
 pub mod world;

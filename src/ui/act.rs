@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::app::App;
 use super::chat::Snapshot;
 use super::context::SceneContext;
-use super::dialogs::{Purpose, Question};
+use super::dialogs::Question;
 use super::edits::EditStep;
 use super::state::Tone;
 use super::viewport::brush::Brush;
@@ -28,10 +28,6 @@ impl App {
             Action::TryDemo => self.replace_scene(Action::TryDemo),
             Action::Open(path) if is_report(&path) => self.read_report(path, false),
             Action::Open(path) => self.replace_scene(Action::Open(path)),
-            Action::OpenFolder => self.choose(Purpose::OpenFolder),
-            Action::OpenFile => self.choose(Purpose::OpenFile),
-            Action::ExportPly => self.choose(Purpose::ExportPly),
-            Action::Screenshot => self.choose(Purpose::Screenshot),
             Action::StartTraining => self.start_training(),
             Action::PauseTraining => {
                 if let Some(job) = self.state.job.as_ref().filter(|j| j.kind == JobKind::Train) {
@@ -45,9 +41,7 @@ impl App {
             }
             Action::Evaluate => self.evaluate(),
             Action::FindObjects => self.find_objects(None),
-            Action::ChooseMasks => self.choose(Purpose::Masks),
             Action::FetchModel(id) => self.install_model(id, None),
-            Action::AddModel(id) => self.choose(Purpose::Model(id)),
             Action::TypeQuery => self.type_question(),
             Action::Ask(text) => {
                 if let Some(semantics) = self.state.semantics.clone() {
@@ -55,8 +49,6 @@ impl App {
                 }
             }
             Action::Show(mode) => self.layout.mode = mode,
-            Action::ChooseReport => self.choose(Purpose::Report),
-            Action::ChooseSecondReport => self.choose(Purpose::SecondReport),
             Action::OpenReport(path) => self.read_report(path, false),
             Action::CompareReport(path) => self.read_report(path, true),
             Action::EndComparison => self.state.second_report = None,
@@ -91,15 +83,23 @@ impl App {
                 self.camera.record(&self.viewport.pose());
                 self.layout.hidden.retain(|p| *p != Pane::Camera);
             }
-            Action::OpenPath => self.choose(Purpose::OpenPath),
-            Action::SavePath => self.choose(Purpose::SavePath),
-            Action::ExportVideo => self.choose(Purpose::ExportVideo),
-            Action::SaveChat => self.choose(Purpose::SaveChat),
             Action::StartChat => {
                 self.layout.hidden.retain(|p| *p != Pane::Chat);
                 self.chat.start_typing();
             }
-            Action::ExportTarget(id) => self.choose(Purpose::ExportTarget(id)),
+            Action::OpenFolder
+            | Action::OpenFile
+            | Action::ExportPly
+            | Action::ExportTarget(_)
+            | Action::Screenshot
+            | Action::ChooseMasks
+            | Action::AddModel(_)
+            | Action::ChooseReport
+            | Action::ChooseSecondReport
+            | Action::OpenPath
+            | Action::SavePath
+            | Action::ExportVideo
+            | Action::SaveChat => self.choose(action),
             Action::FrameScene
             | Action::Paint(_)
             | Action::Isolate(_)
