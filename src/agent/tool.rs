@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::camera_args::{self, Direction, Distance, Side};
 use super::relation::Relation;
 use crate::pipeline::semantics::grammar::Kind;
-use crate::scene::{Identities, IdentityId, Level};
+use crate::scene::{IdentityId, Level};
 
 /// Longest text in a call, in characters.
 pub const MAX_TEXT: usize = 300;
@@ -301,12 +301,6 @@ impl ToolCall {
         }
         call
     }
-}
-
-/// A number without needless digits.
-pub(super) fn short(number: f64) -> String {
-    let text = format!("{number:.3}");
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 #[cfg(test)]
