@@ -9,7 +9,8 @@
 //! * [`render`]: the splat renderer, forward and backward, on the CPU and on the GPU;
 //! * [`pipeline`]: training, evaluation, synthetic data; reports to an `Observer` only;
 //! * [`report`]: error against run time, swept, plotted, and what defaults follow from it;
-//! * [`worker`]: the background thread that runs the pipeline for the window;
+//! * [`jobs`]: one file per use case, for the window, the command line and the agent;
+//! * [`worker`]: the background thread that runs jobs for the window;
 //! * [`agent`]: plain sentences become checked calls of a closed set of tools;
 //! * [`cli`]: one file per subcommand;
 //! * [`ui`]: the window.
@@ -17,6 +18,7 @@
 pub mod agent;
 pub mod cli;
 pub mod io;
+pub mod jobs;
 pub mod math;
 pub mod models;
 pub mod navigate;

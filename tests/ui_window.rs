@@ -10,12 +10,12 @@ use std::time::Duration;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
+use fmlgs::jobs::Folders;
 use fmlgs::pipeline::observer::Silent;
 use fmlgs::pipeline::semantics::edit::Edit;
 use fmlgs::pipeline::synth::{self, SynthOptions};
 use fmlgs::report::{self, Form, Knobs, Measure, Point, Report, Rule, Sample, Stage, StageName};
 use fmlgs::ui::app::App;
-use fmlgs::worker::places::Places;
 use fmlgs::worker::{Action, Pane, ViewMode};
 
 struct Window {
@@ -33,7 +33,7 @@ impl Window {
 
     /// A window that keeps what it makes in `data`.
     fn keeping(data: PathBuf, first: Option<Action>) -> Self {
-        let harness = ui_common::window(Places { data }, first);
+        let harness = ui_common::window(Folders { data }, first);
         Self { harness, _folder: None }
     }
 

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::{CliError, output, process};
+use crate::jobs::Folders;
 use crate::math::stats::median;
 use crate::models;
 use crate::pipeline::bench;
@@ -19,7 +20,6 @@ use crate::render::{Backend, BackendChoice, Features, RenderSettings, gpu};
 use crate::scene::plan::{Overrides, ScenePlan, When, bytes};
 use crate::scene::{Camera, trace};
 use crate::worker::jobs::PipelineJobs;
-use crate::worker::places::Places;
 use crate::worker::view::{Effort, Leave, ViewLane, ViewRequest};
 use crate::worker::{Command, Jobs, OpenedScene, Outcome, Stop, ViewMode};
 
@@ -134,7 +134,7 @@ fn middle(costs: Vec<Cost>) -> Result<Cost, CliError> {
 
 fn measure(path: &Path, variant: Variant, repeats: usize) -> Result<Cost, CliError> {
     let overrides = if variant == Variant::Plan { Overrides::default() } else { Overrides::everything() };
-    let jobs = PipelineJobs::new(Places::of_user());
+    let jobs = PipelineJobs::new(Folders::of_user());
     // The window has looked for a GPU before it opens anything, and keeps the driver that it found.
     let _ = crate::render::gpu::real_gpu();
     let before = resident();
@@ -198,15 +198,7 @@ fn wait(done: impl Fn() -> bool) -> Result<(), CliError> {
 /// The first view, as the window has it.
 fn home(scene: &OpenedScene) -> Camera {
     let [width, height] = SIZE;
-    match &scene.home.camera {
-        Some(camera) => super::view::with_size(camera, width, height),
-        None => {
-            let (center, radius) = (scene.home.bounds.center(), scene.home.bounds.radius().max(1e-6));
-            let eye = center + glam::DVec3::new(1.0, 0.0, -2.0) * radius + scene.home.up * (0.5 * radius);
-            let seen = Camera::look_at(eye, center, scene.home.up, 0.8, width, height);
-            seen.unwrap_or_else(|| Camera::of_pose(eye, glam::DMat3::IDENTITY, 0.8, width, height))
-        }
-    }
+    super::view::with_size(&scene.home.camera(SIZE), width, height)
 }
 
 fn settings(scene: &OpenedScene, plan: &ScenePlan) -> RenderSettings {

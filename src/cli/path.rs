@@ -1,21 +1,19 @@
 //! `fmlgs path`: a flight through a scene.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
-use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::asking::{Asker, semantics};
-use super::opened::DrawableScene;
-use super::{CliError, number, opened, output, path_survey, view};
+use super::{CliError, number, output, path_survey, view};
 use crate::io;
+use crate::jobs::go_to::{self, Explored, VisitRequest};
+use crate::jobs::{Scene, open, query};
 use crate::navigate::flight::Smoothness;
 use crate::navigate::target::{Side, Wish};
-use crate::navigate::visit::{NoVisit, Place};
-use crate::navigate::{FRAMES, Flight, Navigator, NoWay, Pose, Speed};
-use crate::pipeline::semantics::grammar::Kind;
-use crate::scene::{Camera, CameraPath, PathKey};
+use crate::navigate::{FRAMES, Flight, Pose};
+use crate::scene::{CameraPath, LevelFilter, PathKey};
 
 /// Find a way through a scene, to what is asked for or to a photo
 ///
@@ -40,8 +38,8 @@ pub struct Args {
     #[arg(long, conflicts_with = "to")]
     to_photo: Option<String>,
     /// From which side the target is seen
-    #[arg(long, value_enum, default_value_t = SideArg::Best)]
-    side: SideArg,
+    #[arg(long, value_enum, default_value_t = Side::Best)]
+    side: Side,
     /// Distance to the target as a multiple of the usual one
     #[arg(long, default_value_t = 1.0, value_parser = number::within(0.01..=100.0))]
     distance: f64,
@@ -69,72 +67,33 @@ pub struct Args {
     json: bool,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum SideArg {
-    /// Whichever shows it best
-    Best,
-    /// As it is seen now
-    Same,
-    /// The opposite
-    Other,
-    /// Its front
-    Front,
-    /// Its left, seen from the start
-    Left,
-    /// Its right, seen from the start
-    Right,
-    /// From above
-    Above,
-    /// From below
-    Below,
-}
-
-impl From<SideArg> for Side {
-    fn from(side: SideArg) -> Self {
-        match side {
-            SideArg::Best => Self::Best,
-            SideArg::Same => Self::Same,
-            SideArg::Other => Self::Other,
-            SideArg::Front => Self::Front,
-            SideArg::Left => Self::Left,
-            SideArg::Right => Self::Right,
-            SideArg::Above => Self::Above,
-            SideArg::Below => Self::Below,
-        }
-    }
-}
-
-/// What moves about in a scene that was opened.
-pub fn navigator(scene: &DrawableScene) -> Navigator {
-    let cameras: Vec<Camera> = scene.cameras.iter().map(|c| c.camera.clone()).collect();
-    Navigator::new(&scene.cloud, &cameras, up_of(&cameras))
-}
-
-/// Upwards for the cameras of a scene; as in files of splats where they do not tell.
-pub fn up_of(cameras: &[Camera]) -> DVec3 {
-    Camera::up_of(cameras.iter()).unwrap_or(DVec3::NEG_Y)
+/// What one knows of moving about in a scene that was opened.
+fn explored(scene: &Scene) -> Arc<Explored> {
+    let home = scene.home();
+    Arc::new(Explored::new(Arc::clone(&scene.cloud), &scene.views(), home.up))
 }
 
 pub fn run(args: Args) -> Result<(), CliError> {
-    let scene = opened::drawable(&args.scene)?;
+    let scene = open::scene(&args.scene)?;
     if let Some(out) = &args.out {
-        output::check(out, &[".json"], &scene.reads(&args.scene))?;
+        output::check(out, &[".json"], &scene.reads())?;
     }
     if let Some(flights) = args.survey {
         let counts: Vec<usize> = args.cameras.iter().map(|n| *n as usize).collect();
         return path_survey::run(&scene, flights, &counts, args.frames as usize, args.json);
     }
     let start = Instant::now();
-    let navigator = navigator(&scene);
+    let explored = explored(&scene);
+    let navigator = &explored.navigator;
     let build_ms = start.elapsed().as_secs_f64() * 1e3;
     let from = Pose::of(&view::choose(args.from.as_deref(), &scene)?);
     let start = Instant::now();
     let (flight, what) = match (&args.to, &args.to_photo) {
-        (Some(query), _) => to_target(&args, query, &scene, &navigator, &from)?,
+        (Some(query), _) => to_target(&args, query, &scene, &explored, from)?,
         (None, photo) => {
             let to = Pose::of(&view::choose(photo.as_deref(), &scene)?);
-            let flight = navigator.fly(&from, &to, None, args.frames as usize, Speed::Eased);
-            (flight.map_err(|e| no_way(&e, &navigator))?, "the photo".to_owned())
+            let flight = explored.fly(&from, &to, args.frames as usize);
+            (flight.map_err(|e| CliError::failed(explored.no_way(&e)))?, "the photo".to_owned())
         }
     };
     let route_ms = start.elapsed().as_secs_f64() * 1e3;
@@ -193,32 +152,29 @@ pub fn run(args: Args) -> Result<(), CliError> {
 fn to_target(
     args: &Args,
     query: &str,
-    scene: &DrawableScene,
-    navigator: &Navigator,
-    from: &Pose,
+    scene: &Scene,
+    explored: &Arc<Explored>,
+    from: Pose,
 ) -> Result<(Flight, String), CliError> {
-    let map = semantics(&args.scene, scene.state.as_deref(), &scene.cloud)?;
-    let answered = Asker::new(&map)?.ask(query, Kind::Auto)?;
-    let id = answered.as_ref().and_then(|a| a.chosen(1).first().copied());
-    let id = id.ok_or_else(|| CliError::failed(format!("nothing here fits '{query}'; see 'fmlgs query'")))?;
-    if !(args.distance.is_finite() && args.distance > 0.0 && args.aspect.is_finite() && args.aspect > 0.0) {
-        return Err(CliError::Usage("--distance and --aspect have to be over 0".into()));
+    let map = scene.semantics()?;
+    let id = query::identities(&map, query, LevelFilter::Auto, 1)?[0];
+    let (_, visited) = go_to::visit(VisitRequest {
+        explored: Some(Arc::clone(explored)),
+        cloud: Arc::clone(&scene.cloud),
+        cameras: scene.views(),
+        up: scene.home().up,
+        settings: scene.settings.clone(),
+        map: Arc::new(map),
+        id,
+        wish: Wish { side: args.side, distance: args.distance },
+        from,
+        aspect: args.aspect,
+        frames: args.frames as usize,
+    });
+    match (visited.problem, visited.flight) {
+        (None, Some(visit)) => Ok((visit.flight, visited.name)),
+        (problem, _) => Err(CliError::failed(format!("{}: {}", visited.name, problem.unwrap_or_default()))),
     }
-    let wish = Wish { side: args.side.into(), distance: args.distance };
-    let place = Place { cloud: &scene.cloud, settings: &scene.settings, map: &map };
-    let name = map.identities.full_name(id);
-    match navigator.visit(place, id, wish, from, args.aspect, args.frames as usize) {
-        Ok(visit) => Ok((visit.flight, name)),
-        Err(NoVisit::NoWay { why, .. }) => Err(no_way(&why, navigator)),
-        Err(e) => Err(CliError::failed(format!("{name}: {e}"))),
-    }
-}
-
-/// Why there is no way, with how much of the scene hangs together.
-fn no_way(why: &NoWay, navigator: &Navigator) -> CliError {
-    let parts = navigator.graph.parts(&navigator.matter);
-    let count = parts.iter().max().map_or(0, |m| m + 1);
-    CliError::failed(format!("{why} ({} keypoints in {count} parts that are not connected)", parts.len()))
 }
 
 /// The flight as a path with a key per pose.

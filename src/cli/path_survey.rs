@@ -6,11 +6,10 @@ use std::time::Instant;
 use serde_json::{Value, json};
 
 use super::opened::DrawableScene;
-use super::path::up_of;
 use super::{CliError, output};
 use crate::navigate::Navigator;
 use crate::navigate::survey::{Ends, Sum, Survey, more_cameras, survey};
-use crate::scene::Camera;
+use crate::scene::{Camera, HomeView};
 
 /// Seed of the pairs of keypoints and of added cameras.
 const SEED: u64 = 1;
@@ -39,7 +38,7 @@ pub fn run(scene: &DrawableScene, flights: usize, counts: &[usize], frames: usiz
         let spread = 2.0 * crate::navigate::keypoints::spacing(&own);
         let cameras = more_cameras(&own, count, spread, SEED);
         let start = Instant::now();
-        let navigator = Navigator::new(&scene.cloud, &cameras, up_of(&cameras));
+        let navigator = Navigator::new(&scene.cloud, &cameras, HomeView::new(&cameras, None).up);
         let matter_secs = start.elapsed().as_secs_f64();
         navigator.graph.look_at_all(&navigator.matter);
         let build_secs = start.elapsed().as_secs_f64();

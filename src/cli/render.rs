@@ -7,20 +7,19 @@ use std::time::Instant;
 use image::ColorType;
 use serde_json::json;
 
-use super::asking::{Asker, semantics};
 use super::opened::DrawableScene;
 use super::plan::PlanArgs;
 use super::progress::Console;
-use super::{CliError, number, opened, output, view};
+use super::{CliError, number, output, view};
 use crate::io;
 use crate::io::animation::{Encoder, Settings};
+use crate::jobs::video::{self, Video, VideoRequest};
+use crate::jobs::{export, open, plan, query};
 use crate::navigate::film::MOST_PICTURES;
 use crate::navigate::{Film, Speed};
-use crate::pipeline::film::{self, FilmError, Marked};
-use crate::pipeline::semantics::grammar::Kind;
 use crate::render::cpu::normals;
 use crate::render::{Backend, BackendChoice, Frame, RenderSettings};
-use crate::scene::{Camera, CameraPath, ScenePlan};
+use crate::scene::{Camera, CameraPath, LevelFilter};
 
 /// Draw a scene from a given camera into a file
 ///
@@ -128,11 +127,11 @@ impl Args {
                 return Err(CliError::Usage(format!("'{file}' must end in .png, or in .npy for depth and alpha")));
             }
         };
-        let mut scene = opened::drawable(&self.scene)?;
+        let mut scene = open::scene(&self.scene)?;
         if let Some(photos) = &self.photos {
-            scene.cameras = opened::named_cameras(&opened::dataset(photos)?, scene.config.holdout_every);
+            scene.cameras = open::cameras(&open::dataset(photos)?, scene.config.holdout_every);
         }
-        output::check(&self.out, &[], &scene.reads(&self.scene))?;
+        output::check(&self.out, &[], &scene.reads())?;
         let mut camera = view::choose(self.camera.as_deref(), &scene)?;
         if let Some([width, height]) = self.size {
             camera = view::with_size(&camera, width, height);
@@ -150,12 +149,12 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         return film(&args, &path, quiet);
     }
     let job = args.check()?;
-    let plan = args.plan.of_scene(&job.scene);
+    let plan = plan::of_scene(&job.scene, &args.plan.overrides());
     let settings = RenderSettings { depth: args.what.needs_depth(), sh_degree: plan.sh_degree, ..job.scene.settings };
-    let mut backend = Backend::choose(choice(args.backend, &settings, &plan), output::warn)?;
+    let mut backend = Backend::choose(video::backend(args.backend, &settings, plan.on_cpu), output::warn)?;
     // Only the CPU draws surfels as such.
     let flat = settings.surfels && !matches!(backend, Backend::Cpu(_));
-    let cloud = Arc::new(job.scene.cloud);
+    let cloud = job.scene.cloud;
     let started = Instant::now();
     let frame = backend.render(&cloud, &job.camera, &settings)?;
     let millis = started.elapsed().as_secs_f64() * 1e3;
@@ -186,26 +185,20 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     ))
 }
 
-/// Only the CPU draws surfels as such: it is chosen for them unless a person wants otherwise.
-fn choice(wanted: BackendChoice, settings: &RenderSettings, plan: &ScenePlan) -> BackendChoice {
-    let cpu = (settings.surfels || plan.on_cpu) && wanted == BackendChoice::Auto;
-    if cpu { BackendChoice::Cpu } else { wanted }
-}
-
 /// Draws a film along the camera path in `path`.
 fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
     let keys = io::camera_path::open(path)?;
     let film = Film::new(&keys, Speed::Constant);
     let film = film.ok_or_else(|| CliError::failed(format!("{}: there are no keys in it", path.display())))?;
-    let mut scene = opened::drawable(&args.scene)?;
-    let reads: Vec<&Path> = scene.reads(&args.scene).into_iter().chain([path]).collect();
+    let scene = open::scene(&args.scene)?;
+    let reads: Vec<&Path> = scene.reads().into_iter().chain([path]).collect();
     if args.out.is_dir() {
         output::check_folder(&args.out, &reads)?
     } else {
         output::check(&args.out, &[], &reads)?
     }
-    let plan = args.plan.of_scene(&scene);
-    scene.settings.sh_degree = plan.sh_degree;
+    let plan = plan::of_scene(&scene, &args.plan.overrides());
+    let draw = RenderSettings { sh_degree: plan.sh_degree, ..scene.settings.clone() };
     let fps = args.fps.unwrap_or(keys.fps);
     let [width, height] = args.size.unwrap_or_else(|| {
         let limit = args.max_side.unwrap_or(1280);
@@ -218,36 +211,24 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
         settings.encoder = Encoder::Ffmpeg { program: program.clone(), args: Vec::new() };
     }
     let cameras: Vec<Camera> = film.pictures(fps, MOST_PICTURES).iter().map(|p| p.camera(width, height)).collect();
-    let map = match &args.mark {
-        Some(_) => Some(semantics(&args.scene, scene.state.as_deref(), &scene.cloud)?),
+    let marked = match &args.mark {
+        Some(query) => {
+            let map = scene.semantics()?;
+            let ids = query::identities(&map, query, LevelFilter::Auto, 1)?;
+            Some((Arc::new(map), ids))
+        }
         None => None,
     };
-    let mut ids = Vec::new();
-    if let (Some(map), Some(query)) = (&map, &args.mark) {
-        let answered = Asker::new(map)?.ask(query, Kind::Auto)?;
-        ids = answered.map(|a| a.chosen(1)).unwrap_or_default();
-        if ids.is_empty() {
-            return Err(CliError::failed(format!("nothing here fits '{query}'; see 'fmlgs query'")));
-        }
-    }
-    let marked = map.as_ref().map(|map| Marked { map, ids: &ids, color: [255, 64, 160] });
-    let mut backend = Backend::choose(choice(args.backend, &scene.settings, &plan), output::warn)?;
-    let started = Instant::now();
-    output::make_parent(&args.out)?;
-    let mut console = Console::new(quiet);
-    let cloud = Arc::new(scene.cloud);
-    let out = (args.out.as_path(), &settings);
-    let made = film::write(&cloud, &scene.settings, &cameras, marked, &mut backend, out, &mut console);
-    let summary = made.map_err(|e| match e {
-        FilmError::Cancelled => CliError::Cancelled("no film was written".into()),
-        other => CliError::failed(other.to_string()),
-    })?;
-    let secs = started.elapsed().as_secs_f64();
+    let backend = video::backend(args.backend, &draw, plan.on_cpu);
+    let (cloud, out) = (Arc::clone(&scene.cloud), args.out.clone());
+    let request = VideoRequest { cloud, draw, cameras, marked, out, settings, backend };
+    let Video { summary, backend, secs } = video::run(request, &mut Console::new(quiet))
+        .map_err(|e| CliError::from(e).or_cancelled("no film was written"))?;
     let (w, h) = summary.size_px;
     if args.json {
         return output::print_json(&json!({
             "out": summary.path, "frames": summary.frames, "bytes": summary.bytes, "film_secs": summary.secs,
-            "size_px": [w, h], "backend": backend.name(), "secs": secs,
+            "size_px": [w, h], "backend": backend, "secs": secs,
         }));
     }
     output::print(&format!(
@@ -256,7 +237,7 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
         summary.frames,
         summary.secs,
         summary.bytes as f64 / 1e6,
-        backend.name()
+        backend
     ))
 }
 
@@ -271,29 +252,29 @@ fn save(
     let size = [frame.width_px as u32, frame.height_px as u32];
     match (what, storage) {
         (What::Picture, _) => {
-            output::write_png(out, frame.to_rgb8().as_flattened(), size, ColorType::Rgb8)?;
+            export::png(out, frame.to_rgb8().as_flattened(), size, ColorType::Rgb8)?;
         }
         (What::Normals, _) => {
             // Where there is none it is 0, which is the grey in the middle.
             let code = |n: [f32; 3]| n.map(|c| (c * 127.5 + 128.0) as u8);
             let rgb: Vec<[u8; 3]> = normals::of_depth(&frame.median_depth, camera).into_iter().map(code).collect();
-            output::write_png(out, rgb.as_flattened(), size, ColorType::Rgb8)?;
+            export::png(out, rgb.as_flattened(), size, ColorType::Rgb8)?;
         }
-        (What::Alpha, Storage::Npy) => output::write_npy(out, &frame.alpha, size)?,
+        (What::Alpha, Storage::Npy) => export::npy(out, &frame.alpha, size)?,
         (What::Alpha, Storage::Png) => {
             let bytes: Vec<u8> = frame.alpha.iter().map(|a| (a.clamp(0.0, 1.0) * 255.0 + 0.5) as u8).collect();
-            output::write_png(out, &bytes, size, ColorType::L8)?;
+            export::png(out, &bytes, size, ColorType::L8)?;
         }
         (What::Depth | What::ExpectedDepth, _) => {
             let depth = if what == What::Depth { frame.median_depth.clone() } else { frame.expected_depth() };
             if storage == Storage::Npy {
-                output::write_npy(out, &depth, size)?;
+                export::npy(out, &depth, size)?;
                 return Ok(None);
             }
             let far = depth.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
             let code = |d: &f32| ((d / far * 65535.0 + 0.5) as u16).to_ne_bytes();
             let bytes: Vec<u8> = depth.iter().flat_map(code).collect();
-            output::write_png(out, &bytes, size, ColorType::L16)?;
+            export::png(out, &bytes, size, ColorType::L16)?;
             return Ok(Some(far));
         }
     }

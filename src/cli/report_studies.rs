@@ -155,7 +155,7 @@ impl Subject {
             views = self.cameras().into_iter().map(|c| (c, None)).collect();
         }
         let input = self.input(&[("views", views.len().to_string())]);
-        let (cloud, settings) = (self.scene.cloud.clone(), &self.scene.settings);
+        let (cloud, settings) = ((*self.scene.cloud).clone(), &self.scene.settings);
         Ok(RenderStudy::new(cloud, settings, views, self.options.repeats, input)?)
     }
 
@@ -194,7 +194,7 @@ impl Subject {
         if views.is_empty() {
             return Err(CliError::failed(format!("{}: there are no labels of this scene's photos", masks.display())));
         }
-        let drawn = (&self.scene.cloud, &self.scene.settings);
+        let drawn = (&*self.scene.cloud, &self.scene.settings);
         let input = self.input(&[("photos", which.into())]);
         let study = QueryStudy::new(drawn, map, encoder, views, self.options.repeats, input);
         sweep(&mut study.map_err(|e| CliError::failed(e.to_string()))?)
@@ -246,7 +246,7 @@ impl Subject {
             ("views", format!("{} + {} held out", training.len(), held_out.len())),
             ("identities", identities.len().to_string()),
         ]);
-        let drawn = (&self.scene.cloud, &self.scene.settings);
+        let drawn = (&*self.scene.cloud, &self.scene.settings);
         let (steps, repeats) = (&self.options.steps, self.options.repeats);
         sweep(&mut FeatureStudy::new(drawn, identities, [&training, &held_out], steps, repeats, input)?)
     }

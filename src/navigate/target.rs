@@ -26,24 +26,24 @@ const DRAWN_PX: u32 = 128;
 const PHOTO_ANGLE: f64 = 0.6;
 
 /// From which side.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, clap::ValueEnum)]
 pub enum Side {
-    /// Whichever shows it best.
+    /// Whichever shows it best
     #[default]
     Best,
-    /// As the eye sees it now.
+    /// As it is seen now
     Same,
-    /// The opposite of that.
+    /// The opposite
     Other,
-    /// Its front: away from what it is a part of, or where most photos were taken.
+    /// Its front: away from what it is a part of, or where most photos were taken
     Front,
-    /// What is left of it now.
+    /// Its left, seen from the start
     Left,
-    /// What is right of it now.
+    /// Its right, seen from the start
     Right,
-    /// Over it.
+    /// From above
     Above,
-    /// Under it.
+    /// From below
     Below,
 }
 

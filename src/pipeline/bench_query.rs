@@ -7,11 +7,10 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
 
-use super::semantics::answer::{Language, by_meaning, phrases_of};
 use super::semantics::codes::{self, TOLERANCE};
-use super::semantics::grammar::{Kind, Phrase};
 use super::semantics::matching;
 use super::semantics::meaning::{MeaningOptions, Phrasebook};
+use super::semantics::query_engine::ask_by_embedding;
 use super::semantics::stages::{Stages, StagesMs, ms_since};
 use super::semantics::view_map::ViewMap;
 use crate::math::stats::quantile;
@@ -81,12 +80,8 @@ pub fn time(
             false => format!("a {color} {thing}"),
         };
         let mut phrases = canonical.clone();
-        let start = Instant::now();
-        let Some(phrase) = Phrase::parse(&text) else { continue };
-        phrases.learn(&phrases_of(&phrase), |p| encoder.text(p))?;
-        let encode = ms_since(start);
-        let language = Language { features: &features, phrases: &phrases, options: MeaningOptions::default() };
-        let answered = by_meaning(&all, &phrase, Kind::Auto, language);
+        let how = (&features, MeaningOptions::default());
+        let Some(answered) = ask_by_embedding(&all, how, &text, &mut phrases, |p| encoder.text(p))? else { continue };
         let target = answered.answer.hits().first().map_or(NOBODY, |h| h.identity);
         let start = Instant::now();
         let pixels = matching::exact(&map, &all, target, TOLERANCE);
@@ -95,7 +90,7 @@ pub fn time(
         let heat = answered.heat(&map);
         let draw = ms_since(start);
         std::hint::black_box((pixels, heat));
-        each.push(StagesMs { encode, mask, draw, ..answered.stages });
+        each.push(StagesMs { mask, draw, ..answered.stages });
     }
     let percentiles = |of: &dyn Fn(&StagesMs) -> f64| {
         let ms: Vec<f64> = each.iter().map(of).collect();

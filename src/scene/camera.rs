@@ -163,6 +163,20 @@ impl Camera {
         if sum.length() > 0.1 * f64::from(count) { sum.try_normalize() } else { None }
     }
 
+    /// The point nearest to the axes of these cameras: what they look at. `None` where the axes are
+    /// parallel.
+    pub fn focus_of<'a>(cameras: impl Iterator<Item = &'a Self>) -> Option<DVec3> {
+        let (mut a, mut b, mut n) = (DMat3::ZERO, DVec3::ZERO, 0.0);
+        for c in cameras {
+            let d = c.forward();
+            let m = DMat3::IDENTITY - DMat3::from_cols(d * d.x, d * d.y, d * d.z);
+            a += m;
+            b += m * c.center;
+            n += 1.0_f64;
+        }
+        (n > 1.0 && a.determinant() > 1e-4 * n.powi(3)).then(|| a.inverse() * b)
+    }
+
     /// The same camera with a picture of another size: intrinsics scaled per axis.
     pub fn resized(&self, width_px: u32, height_px: u32) -> Self {
         let scale = DVec2::new(

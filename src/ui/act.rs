@@ -11,13 +11,15 @@ use super::state::Tone;
 use super::viewport::brush::Brush;
 use super::viewport::drawing::Drawing;
 use crate::agent::scene::{Deed, Parts};
+use crate::navigate::FRAMES;
 use crate::navigate::target::Wish;
 use crate::pipeline::semantics::edit::Edit;
 use crate::pipeline::train::TrainConfig;
+use crate::render::BackendChoice;
 use crate::report::is_report;
 use crate::scene::IdentityId;
 use crate::scene::plan::When;
-use crate::worker::{Action, Command, EditRequest, Failure, FilmRequest, JobKind, Pane, VisitRequest, Visited};
+use crate::worker::{Action, Command, EditRequest, Failure, JobKind, Pane, VideoRequest, VisitRequest, Visited};
 
 impl App {
     /// Does what a person asked for.
@@ -172,11 +174,11 @@ impl App {
     }
 
     fn evaluate(&mut self) {
-        let dataset = self.state.scene.as_ref().and_then(|s| s.dataset.clone());
+        let scene = self.state.scene.as_ref().and_then(|s| Some((s.dataset.clone()?, s.out.clone())));
         let trained = self.state.training_job.is_some() || self.state.scene.as_ref().is_some_and(|s| s.trained);
-        match (dataset, self.viewport.cloud().cloned()) {
-            (Some(dataset), Some(cloud)) if trained => {
-                self.submit(Command::Evaluate { dataset, cloud, config: self.layout.config.clone() });
+        match (scene, self.viewport.cloud().cloned()) {
+            (Some((dataset, out)), Some(cloud)) if trained => {
+                self.submit(Command::Evaluate { dataset, cloud, config: self.layout.config.clone(), out });
             }
             _ => self
                 .state
@@ -240,6 +242,7 @@ impl App {
             wish,
             from: self.viewport.pose(),
             aspect: self.viewport.aspect(),
+            frames: FRAMES,
         })));
     }
 
@@ -269,8 +272,8 @@ impl App {
         };
         let found = self.viewport.questions.found();
         let marked = self.state.semantics.clone().filter(|_| self.camera.mark).map(|map| (map, found));
-        let draw = self.state.drawing();
-        self.submit(Command::Film(Box::new(FilmRequest { cloud, draw, cameras, marked, out, settings })));
+        let (draw, backend) = (self.state.drawing(), BackendChoice::Auto);
+        self.submit(Command::Film(Box::new(VideoRequest { cloud, draw, cameras, marked, out, settings, backend })));
     }
 
     /// Sends what was typed to the assistant, with the scene as it is.

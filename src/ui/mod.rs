@@ -22,10 +22,10 @@ pub mod viewport;
 
 use std::sync::Arc;
 
+use crate::jobs::Folders;
 use crate::scene::plan::Wish;
 use crate::worker::Action;
 use crate::worker::jobs::PipelineJobs;
-use crate::worker::places::Places;
 
 /// Opens the window, takes what is wanted of plans, does `first` one after the other, and returns when it is closed.
 pub fn run(first: Vec<Action>, wishes: Vec<Wish>) -> eframe::Result {
@@ -59,7 +59,7 @@ fn open(
         "fmlgs",
         options,
         Box::new(|cc| {
-            let mut app = app::App::new(cc, PipelineJobs::new(Places::of_user()), first)?;
+            let mut app = app::App::new(cc, PipelineJobs::new(Folders::of_user()), first)?;
             app.wish(wishes);
             Ok(Box::new(app))
         }),

@@ -5,15 +5,10 @@
 
 pub mod action;
 pub mod control;
-pub mod edit;
-pub mod guide;
 pub mod jobs;
-pub mod machine;
 pub mod measure;
 pub mod observer;
 mod paint;
-pub mod places;
-pub mod preview;
 pub mod protocol;
 mod quiet;
 pub mod slot;
@@ -22,10 +17,13 @@ pub mod view;
 
 pub use action::{Action, Axis, Pane, Shortcut, ViewMode};
 pub use control::Control;
-pub use edit::EditRequest;
-pub use guide::{Explored, FilmRequest, VisitRequest, Visited};
 pub use measure::MeasureRequest;
-pub use protocol::{Command, Event, Failure, HomeView, JobId, JobKind, Lane, OpenedScene, Outcome, Stop};
+pub use protocol::{Command, Event, Failure, JobId, JobKind, Lane, Outcome, Stop};
 pub use slot::Slot;
 pub use thread::{CloudSnapshot, Jobs, QueueFull, Repaint, Worker};
-pub use view::ViewMaps;
+
+pub use crate::jobs::OpenedScene;
+pub use crate::jobs::edit::EditRequest;
+pub use crate::jobs::go_to::{Explored, VisitRequest, Visited};
+pub use crate::jobs::query::ViewMaps;
+pub use crate::jobs::video::VideoRequest;

@@ -5,17 +5,19 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::edit::EditRequest;
-use super::guide::{Explored, FilmRequest, VisitRequest, Visited};
 use super::measure::MeasureRequest;
-use crate::io::trained::History;
+use crate::jobs::OpenedScene;
+use crate::jobs::edit::EditRequest;
+use crate::jobs::error::chain;
+use crate::jobs::find_objects::FindSettings;
+use crate::jobs::go_to::{Explored, VisitRequest, Visited};
+use crate::jobs::video::VideoRequest;
 use crate::pipeline::observer::{Evaluation, Level, Progress, StepMetrics};
-use crate::pipeline::semantics::find::Finding;
 use crate::pipeline::semantics::portraits::Gallery;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::report::Report;
-use crate::scene::{Bounds, Camera, Dataset, Facts, GaussianCloud, Photo, PhotoPixels, SemanticMap};
+use crate::scene::{Camera, Dataset, Facts, GaussianCloud, HomeView, Photo, PhotoPixels, SemanticMap};
 
 /// Names one job of one worker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -116,8 +118,10 @@ pub enum Command {
         dataset: Arc<Dataset>,
         /// The Gaussians.
         cloud: Arc<GaussianCloud>,
-        /// Picture size and hold-out rule.
+        /// Picture size, and the hold-out rule where the scene does not say which photos are.
         config: TrainConfig,
+        /// Folder of the trained scene.
+        out: PathBuf,
     },
     /// Find the objects and parts of a trained scene, and store them with it.
     FindObjects {
@@ -134,7 +138,7 @@ pub enum Command {
         /// Where the masks are; `None` = regions of the photos are found.
         masks: Option<PathBuf>,
         /// With which models.
-        with: Finding,
+        with: FindSettings,
         /// Folder of the trained scene.
         out: PathBuf,
     },
@@ -193,7 +197,7 @@ pub enum Command {
     /// Find the way to where an identity is seen best.
     Visit(Box<VisitRequest>),
     /// Draw a film.
-    Film(Box<FilmRequest>),
+    Film(Box<VideoRequest>),
     /// Measure error against run time of drawing, and write it as a report.
     Measure(Box<MeasureRequest>),
     /// Read a report.
@@ -263,60 +267,6 @@ impl Command {
     }
 }
 
-/// How to look at a scene at first.
-#[derive(Clone, Debug, PartialEq)]
-pub struct HomeView {
-    /// What a person would call the scene.
-    pub bounds: Bounds,
-    /// Upwards in the world, unit length.
-    pub up: DVec3,
-    /// A camera to start from, where the scene has one.
-    pub camera: Option<Camera>,
-}
-
-impl Default for HomeView {
-    fn default() -> Self {
-        Self { bounds: Bounds { min: DVec3::NEG_ONE, max: DVec3::ONE }, up: DVec3::Z, camera: None }
-    }
-}
-
-/// A scene as the window needs it.
-#[derive(Clone, Debug, Default)]
-pub struct OpenedScene {
-    /// Where it was read from.
-    pub path: PathBuf,
-    /// Short name for titles.
-    pub name: String,
-    /// Posed photos, if it has any.
-    pub dataset: Option<Arc<Dataset>>,
-    /// What to draw: trained Gaussians, or the sparse points as small ones.
-    pub cloud: Option<Arc<GaussianCloud>>,
-    /// Whether `cloud` is a result, not just sparse points.
-    pub trained: bool,
-    /// Objects and parts, if they were found before.
-    pub semantics: Option<Arc<SemanticMap>>,
-    /// Where masks of its photos are, if they came with them.
-    pub masks: Option<PathBuf>,
-    /// Folder in which training keeps its results and checkpoints.
-    pub out: PathBuf,
-    /// Measurements of earlier training.
-    pub history: History,
-    /// Length of a scene unit in metres, if that is known.
-    pub metres_per_unit: Option<f64>,
-    /// How to look at it at first.
-    pub home: HomeView,
-    /// How to draw it: background and filter.
-    pub render: RenderSettings,
-    /// Degree of the harmonics in its file.
-    pub sh_stored: u8,
-    /// What its plan is computed from.
-    pub facts: Facts,
-    /// Reports that may be of it.
-    pub reports: Vec<PathBuf>,
-    /// Folder for a report of it.
-    pub report_out: PathBuf,
-}
-
 /// What a finished job brings.
 #[derive(Clone, Debug)]
 pub enum Outcome {
@@ -381,17 +331,7 @@ pub struct Failure {
 impl Failure {
     /// The failure of an error and all its causes.
     pub fn of(error: &dyn std::error::Error, remedy: impl Into<String>) -> Self {
-        let mut message = error.to_string();
-        let mut cause = error.source();
-        while let Some(c) = cause {
-            let text = c.to_string();
-            // Many errors already print their cause.
-            if !message.contains(&text) {
-                message = format!("{message}: {text}");
-            }
-            cause = c.source();
-        }
-        Self { message, remedy: remedy.into() }
+        Self { message: chain(error), remedy: remedy.into() }
     }
 }
 

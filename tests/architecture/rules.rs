@@ -6,7 +6,7 @@ use super::source::{SourceFile, library_code, test_module_files};
 pub type Complaint = String;
 
 /// Each module of the library and the other modules it may use, in the order of the data flow.
-const MODULES: [(&str, &[&str]); 13] = [
+const MODULES: [(&str, &[&str]); 14] = [
     ("math", &[]),
     ("scene", &["math"]),
     ("io", &["math", "scene"]),
@@ -16,13 +16,27 @@ const MODULES: [(&str, &[&str]); 13] = [
     ("navigate", &["math", "scene", "render"]),
     ("stability", &["math", "scene", "io", "render", "pipeline", "navigate"]),
     ("report", &["math", "scene", "io", "models", "render", "pipeline", "navigate"]),
-    ("worker", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "report"]),
-    ("agent", &["math", "scene", "io", "render", "pipeline", "navigate", "worker"]),
+    ("jobs", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "report"]),
+    ("worker", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "report", "jobs"]),
+    ("agent", &["math", "scene", "io", "render", "pipeline", "navigate", "jobs", "worker"]),
     (
         "cli",
-        &["math", "scene", "io", "models", "render", "pipeline", "navigate", "stability", "report", "worker", "agent"],
+        &[
+            "math",
+            "scene",
+            "io",
+            "models",
+            "render",
+            "pipeline",
+            "navigate",
+            "stability",
+            "report",
+            "jobs",
+            "worker",
+            "agent",
+        ],
     ),
-    ("ui", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "report", "worker", "agent"]),
+    ("ui", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "report", "jobs", "worker", "agent"]),
 ];
 
 /// Longest Rust file in lines.

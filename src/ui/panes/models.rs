@@ -6,9 +6,10 @@ use egui::{Button, RichText, Ui};
 
 use super::super::state::AppState;
 use super::super::theme;
+use crate::jobs::find_objects::FindSettings;
 use crate::models::catalogue::{self, Entry, Role, SAM2, State};
 use crate::models::engine::engine;
-use crate::pipeline::semantics::find::{Carry, Finding, REGIONS};
+use crate::pipeline::semantics::find::{Carry, REGIONS};
 use crate::worker::Action;
 
 /// What is known of engine and models; looked up off the window's thread.
@@ -43,7 +44,7 @@ impl Known {
 
 impl Models {
     /// Draws the pane.
-    pub fn show(&mut self, ui: &mut Ui, state: &AppState, finding: &mut Finding, actions: &mut Vec<Action>) {
+    pub fn show(&mut self, ui: &mut Ui, state: &AppState, finding: &mut FindSettings, actions: &mut Vec<Action>) {
         if self.installed != state.models_installed {
             *self = Self { installed: state.models_installed, ..Self::default() };
         }
@@ -74,7 +75,7 @@ impl Models {
 }
 
 /// The models that find objects, of those that are here.
-fn choose(ui: &mut Ui, models: &[(Entry, State)], finding: &mut Finding) {
+fn choose(ui: &mut Ui, models: &[(Entry, State)], finding: &mut FindSettings) {
     let here = |role: Role| {
         let of_role = models.iter().filter(move |(e, s)| e.role == role && matches!(s, State::Here | State::BuiltIn));
         of_role.map(|(e, _)| (e.id.clone(), e.title.clone())).collect::<Vec<_>>()

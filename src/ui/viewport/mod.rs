@@ -115,7 +115,7 @@ struct Asked {
 impl Viewport {
     /// An empty viewport. Fails only if the system gives no thread.
     pub fn new(repaint: Repaint) -> std::io::Result<Self> {
-        let home = crate::worker::HomeView::default();
+        let home = crate::scene::HomeView::default();
         Ok(Self {
             lane: ViewLane::start(repaint)?,
             eye: Eye::framing(&home.bounds, home.up),

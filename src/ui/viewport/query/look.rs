@@ -5,8 +5,8 @@ use egui::{Color32, ComboBox, Rect, Sense, Slider, Stroke, Ui, pos2, vec2};
 use super::super::super::theme;
 use crate::math::colormap::Colormap;
 use crate::pipeline::semantics::codes::TOLERANCE;
-use crate::pipeline::semantics::grammar::Kind;
 use crate::pipeline::semantics::matching::MatchMode;
+use crate::scene::LevelFilter;
 
 /// What tints the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -57,7 +57,7 @@ pub struct Look {
     /// Opacity of the tint.
     pub opacity: f32,
     /// Which level questions are about.
-    pub kind: Kind,
+    pub kind: LevelFilter,
     /// Answers whose pixels are shown at most.
     pub top: usize,
     /// Where the codes that are matched come from.
@@ -74,7 +74,7 @@ impl Default for Look {
             tint: Tint::Masks,
             colormap: Colormap::Turbo,
             opacity: 0.6,
-            kind: Kind::Auto,
+            kind: LevelFilter::Auto,
             top: 1,
             mode: MatchMode::Exact,
             tolerance: TOLERANCE,
@@ -90,7 +90,9 @@ pub fn show(ui: &mut Ui, look: &mut Look, heat: Option<&[f32]>) -> bool {
     egui::Grid::new("look").num_columns(2).spacing(vec2(10.0, 5.0)).show(ui, |ui| {
         ui.weak("Ask for");
         ui.horizontal(|ui| {
-            for (kind, text) in [(Kind::Auto, "as worded"), (Kind::Object, "objects"), (Kind::Part, "parts")] {
+            for (kind, text) in
+                [(LevelFilter::Auto, "as worded"), (LevelFilter::Object, "objects"), (LevelFilter::Part, "parts")]
+            {
                 ui.selectable_value(&mut look.kind, kind, text);
             }
         });

@@ -20,11 +20,8 @@ use egui::{Align2, Area, Color32, Id, Order, Rect, TextureHandle, TextureOptions
 pub use self::look::{Look, Tint};
 use self::speech::Speech;
 use super::super::theme;
-use crate::pipeline::semantics::answer::{Answered, Language, answer};
-use crate::pipeline::semantics::grammar::Phrase;
-use crate::pipeline::semantics::matching::{self, MatchMode};
-use crate::pipeline::semantics::meaning::MeaningOptions;
-use crate::pipeline::semantics::names;
+use crate::pipeline::semantics::answer::Answered;
+use crate::pipeline::semantics::matching::MatchMode;
 use crate::pipeline::semantics::stages::{StagesMs, ms_since};
 use crate::scene::{GaussianCloud, Identities, IdentityId, Mask, NOBODY, ScenePlan, SemanticMap};
 use crate::worker::{Action, ViewMaps};
@@ -195,17 +192,7 @@ impl Questions {
     }
 
     fn asked(&mut self, text: &str, semantics: &SemanticMap) -> Option<Asked> {
-        let start = Instant::now();
-        let phrase = Phrase::parse(text)?;
-        let phrases = self.speech.learn(&phrase);
-        let encode = ms_since(start);
-        let language = semantics.language.as_ref().zip(phrases);
-        let language =
-            language.map(|(features, phrases)| Language { features, phrases, options: MeaningOptions::default() });
-        let mut answered = answer(&semantics.identities, &phrase, self.look.kind, language);
-        answered.stages.encode = encode;
-        let to_encoder = self.speech.unknown_words(text);
-        let unknown = names::unknown_to_all(&semantics.identities, text, to_encoder.as_deref());
+        let (answered, unknown) = self.speech.ask(semantics, text, self.look.kind)?;
         Some(Asked { text: text.trim().to_owned(), answered, chosen: None, unknown })
     }
 
@@ -225,12 +212,7 @@ impl Questions {
 
     /// The target's pixels in the present view.
     fn mask_of(&self, maps: &ViewMaps, semantics: &SemanticMap, target: IdentityId) -> Mask {
-        match (&maps.codes, self.look.mode) {
-            (Some(codes), MatchMode::Blend) => {
-                matching::blend(codes, &semantics.identities, target, self.look.tolerance)
-            }
-            _ => matching::exact(&maps.identities, &semantics.identities, target, self.look.tolerance),
-        }
+        maps.mask(semantics, target, self.look.mode, self.look.tolerance)
     }
 
     /// Pixels of an identity in the present view, if that is drawn; counted once for a view.

@@ -1,17 +1,17 @@
-//! The encoder that understands typed phrases: loaded off the window's thread when a scene has
-//! features of it, then asked while a person types.
+//! What answers typed questions: its encoder is loaded off the window's thread when a scene has features of
+//! it; until then, and where there is none, names answer.
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use crate::models::{self, Encoder, ModelError};
-use crate::pipeline::semantics::answer::phrases_of;
-use crate::pipeline::semantics::grammar::Phrase;
-use crate::pipeline::semantics::meaning::Phrasebook;
+use crate::models;
+use crate::pipeline::semantics::answer::Answered;
+use crate::pipeline::semantics::query_engine::QueryEngine;
 use crate::pipeline::semantics::relevancy::CANONICAL;
+use crate::scene::{LevelFilter, SemanticMap};
 
-type Loaded = Result<Mutex<Box<dyn Encoder>>, String>;
+type Loaded = Result<Mutex<QueryEngine>, String>;
 
-/// What turns phrases into vectors.
+/// What answers questions.
 #[derive(Default)]
 pub struct Speech {
     /// Which encoder is wanted.
@@ -19,7 +19,6 @@ pub struct Speech {
     loaded: Arc<OnceLock<Loaded>>,
     /// Whether it has been noticed that it is there.
     noticed: bool,
-    phrases: Phrasebook,
     /// Why the encoder could not read the last question, if it could not.
     failed: Option<String>,
 }
@@ -35,7 +34,7 @@ impl Speech {
                     // Networks are prepared at the first use, which shall not be a person's.
                     let ready = models::encoder(&name).and_then(|mut e| e.text(CANONICAL[0]).map(|_| e));
                     // Nobody else fills this slot.
-                    let _ = slot.set(ready.map(Mutex::new).map_err(|e| e.to_string()));
+                    let _ = slot.set(ready.map(|e| Mutex::new(QueryEngine::with(e))).map_err(|e| e.to_string()));
                     ctx.request_repaint();
                 };
                 // Without a thread, names alone are understood.
@@ -52,30 +51,29 @@ impl Speech {
         self.loaded.get().and_then(|l| l.as_ref().err()).or(self.failed.as_ref()).map(String::as_str)
     }
 
-    /// The words of a phrase that it does not know; `None` without an encoder.
-    pub fn unknown_words(&self, text: &str) -> Option<Vec<String>> {
-        let encoder = self.loaded.get()?.as_ref().ok()?;
-        Some(encoder.lock().unwrap_or_else(PoisonError::into_inner).unknown_words(text))
-    }
-
-    /// Phrases with those of a question among them; `None` if there is no encoder, or it knows none of
-    /// the words.
-    pub fn learn(&mut self, phrase: &Phrase) -> Option<&Phrasebook> {
-        let encoder = self.loaded.get()?.as_ref().ok()?;
-        let mut encoder = encoder.lock().unwrap_or_else(PoisonError::into_inner);
-        let learnt = self.phrases.learn(&phrases_of(phrase), |p| encoder.text(p));
-        self.failed = match &learnt {
-            Ok(()) | Err(ModelError::NoKnownWord { .. }) => None,
-            Err(e) => Some(e.to_string()),
+    /// The answer to a question and the words of it that nothing here knows; `None` if there is nothing in it.
+    pub fn ask(&mut self, map: &SemanticMap, text: &str, level: LevelFilter) -> Option<(Answered, Vec<String>)> {
+        let ask = |engine: &mut QueryEngine| {
+            let answered = engine.ask(map, text, level)?;
+            Ok(answered.map(|a| (a, engine.unknown_words(&map.identities, text))))
         };
-        learnt.ok().map(|()| &self.phrases)
+        self.failed = None;
+        if let Some(Ok(engine)) = self.loaded.get() {
+            match ask(&mut engine.lock().unwrap_or_else(PoisonError::into_inner)) {
+                Ok(answered) => return answered,
+                Err::<_, models::ModelError>(e) => self.failed = Some(e.to_string()),
+            }
+        }
+        // Names alone need nothing that could fail.
+        ask(&mut QueryEngine::default()).ok().flatten()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::models::Tile;
+    use crate::models::{Encoder, ModelError, Tile};
+    use crate::scene::{Level, NOBODY};
 
     /// Fails as a damaged network does, or knows no word.
     struct Failing {
@@ -113,12 +111,14 @@ mod tests {
 
     #[test]
     fn an_encoder_that_fails_at_a_question_is_told() {
-        let phrase = Phrase::parse("the giraffe").expect("a phrase");
+        let mut map = SemanticMap::default();
+        map.identities.add(Level::Object, NOBODY, vec!["giraffe".into()]);
         for knows in [true, false] {
             let mut speech = Speech::default();
             let encoder: Box<dyn Encoder> = Box::new(Failing { knows });
-            assert!(speech.loaded.set(Ok(Mutex::new(encoder))).is_ok());
-            assert!(speech.learn(&phrase).is_none());
+            assert!(speech.loaded.set(Ok(Mutex::new(QueryEngine::with(encoder)))).is_ok());
+            let (answered, _) = speech.ask(&map, "the giraffe", LevelFilter::Auto).expect("names answer");
+            assert_eq!(answered.chosen(1), [1]);
             // A word that nobody knows is no failure.
             assert_eq!(speech.trouble().is_some_and(|t| t.contains("out of memory")), knows);
         }

@@ -1,0 +1,108 @@
+//! Putting networks in place, and checking those that are there.
+
+use std::path::Path;
+use std::time::Instant;
+
+use super::JobError;
+use crate::math::stats::median;
+use crate::models::catalogue::{self, Entry, State};
+use crate::models::fetch::Patience;
+use crate::models::{self, ModelError, Role, Tile};
+use crate::pipeline::observer::{Observer, Progress, Signal};
+
+/// Where the files of a model come from.
+#[derive(Clone, Copy, Debug)]
+pub enum Source<'a> {
+    /// An address; `None` = the one in the list.
+    Fetch(Option<&'a str>),
+    /// A folder.
+    Folder(&'a Path),
+}
+
+/// Puts the model called `id` in place.
+///
+/// # Errors
+/// If there is none, its files cannot be had or are not right, or the observer asks to stop.
+pub fn install(id: &str, source: Source<'_>, observer: &mut dyn Observer) -> Result<Entry, JobError> {
+    let (folder, start) = (catalogue::folder(), Instant::now());
+    let entry = catalogue::entry(id)?;
+    match source {
+        Source::Folder(brought) => entry.add(&folder, brought)?,
+        Source::Fetch(from) => entry.fetch(&folder, from, Patience::default(), &mut |name, there, all| {
+            let elapsed_secs = start.elapsed().as_secs_f64();
+            observer.progress(Progress {
+                stage: format!("Fetching {name} (kB)"),
+                done: there / 1000,
+                total: all.unwrap_or(there) / 1000,
+                elapsed_secs,
+                rate: there as f64 / 1000.0 / elapsed_secs.max(1e-9),
+            });
+            observer.signal() != Signal::Cancel
+        })?,
+    }
+    Ok(entry)
+}
+
+/// Compares all files that are here with their checksums: what is wrong with each model, if anything.
+///
+/// # Errors
+/// If the list that came with the program is damaged.
+pub fn check() -> Result<Vec<(String, Option<String>)>, JobError> {
+    let folder = catalogue::folder();
+    let here = |e: &Entry| !matches!(e.state(&folder), State::Missing(_));
+    let check = |e: Entry| (e.id.clone(), e.verify(&folder).err().map(|e| e.to_string()));
+    Ok(catalogue::entries()?.into_iter().filter(here).map(check).collect())
+}
+
+/// How long an encoder takes.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct EncoderTimes {
+    /// Its name.
+    pub id: String,
+    /// Loading it and its first use, ms.
+    pub load_ms: f64,
+    /// A picture, ms.
+    pub picture_ms: f64,
+    /// A phrase, ms.
+    pub phrase_ms: f64,
+    /// What it made of the picture.
+    pub picture: Vec<f32>,
+    /// What it made of the phrase.
+    pub phrase: Vec<f32>,
+}
+
+/// Times every encoder that can be used here on a picture and a phrase: medians of so many `runs`. `told` hears
+/// of each that is here and cannot be used.
+///
+/// # Errors
+/// If one fails.
+pub fn time_encoders(runs: usize, told: &mut dyn FnMut(String)) -> Result<Vec<EncoderTimes>, JobError> {
+    const PHRASE: &str = "a red wooden chair";
+    let times = |run: &mut dyn FnMut() -> Result<(), ModelError>| -> Result<f64, ModelError> {
+        let mut ms = Vec::with_capacity(runs);
+        for _ in 0..runs {
+            let start = Instant::now();
+            run()?;
+            ms.push(start.elapsed().as_secs_f64() * 1e3);
+        }
+        Ok(median(&ms))
+    };
+    let mut list = Vec::new();
+    for id in catalogue::usable(Role::Encoder, told)? {
+        let start = Instant::now();
+        let mut encoder = models::encoder(&id)?;
+        let side_px = encoder.tile_side_px().unwrap_or(224);
+        let color = |i: usize| {
+            let (x, y) = (i % side_px, i / side_px);
+            [x as f32 / side_px as f32, y as f32 / side_px as f32, ((x / 8 + y / 8) % 2) as f32]
+        };
+        let tile = Tile { side_px, rgb: (0..side_px * side_px).map(color).collect() };
+        // The first run prepares the networks.
+        let (picture, phrase) = (encoder.image(&tile)?, encoder.text(PHRASE)?);
+        let load_ms = start.elapsed().as_secs_f64() * 1e3;
+        let picture_ms = times(&mut || encoder.image(&tile).map(drop))?;
+        let phrase_ms = times(&mut || encoder.text(PHRASE).map(drop))?;
+        list.push(EncoderTimes { id, load_ms, picture_ms, phrase_ms, picture, phrase });
+    }
+    Ok(list)
+}
