@@ -198,7 +198,7 @@ fn wait(done: impl Fn() -> bool) -> Result<(), CliError> {
 /// The first view, as the window has it.
 fn home(scene: &OpenedScene) -> Camera {
     let [width, height] = SIZE;
-    super::view::with_size(&scene.home.camera(SIZE), width, height)
+    scene.home.camera(SIZE).with_size(width, height)
 }
 
 fn settings(scene: &OpenedScene, plan: &ScenePlan) -> RenderSettings {

@@ -7,13 +7,12 @@ use std::time::Instant;
 use serde_json::{Value, json};
 
 use super::{CliError, number, output, path_survey, view};
-use crate::io;
 use crate::jobs::go_to::{self, Explored, VisitRequest};
-use crate::jobs::{Scene, open, query};
+use crate::jobs::{Scene, export, open, query};
 use crate::navigate::flight::Smoothness;
 use crate::navigate::target::{Side, Wish};
 use crate::navigate::{FRAMES, Flight, Pose};
-use crate::scene::{CameraPath, LevelFilter, PathKey};
+use crate::scene::LevelFilter;
 
 /// Find a way through a scene, to what is asked for or to a photo
 ///
@@ -98,24 +97,10 @@ pub fn run(args: Args) -> Result<(), CliError> {
     };
     let route_ms = start.elapsed().as_secs_f64() * 1e3;
     if let Some(out) = &args.out {
-        output::make_parent(out)?;
-        let path = as_path(&flight);
-        if out.to_string_lossy().ends_with(".nerfstudio.json") {
-            io::camera_path::nerfstudio::write(out, &path, &path.keys, (1280, (1280.0 / args.aspect) as u32))?;
-        } else {
-            io::camera_path::write(out, &path)?;
-        }
+        export::camera_path(out, &flight.camera_path(), args.aspect)?;
     }
     let ours = flight.smoothness(&navigator.matter, navigator.clearance);
-    let [paper, through] = match (args.compare, flight.poses.as_slice()) {
-        (true, [first, .., last]) => {
-            let frames = args.frames as usize;
-            let keys = navigator.keys(first, last).unwrap_or_default();
-            [Flight::of_paper(&[*first, *last], frames), Flight::of_paper_through(&keys, frames)]
-                .map(|p| p.map(|p| p.smoothness(&navigator.matter, navigator.clearance)))
-        }
-        _ => [None, None],
-    };
+    let [paper, through] = if args.compare { explored.of_paper(&flight) } else { [None, None] };
     if args.json {
         return output::print_json(&json!({
             "target": what,
@@ -175,15 +160,6 @@ fn to_target(
         (None, Some(visit)) => Ok((visit.flight, visited.name)),
         (problem, _) => Err(CliError::failed(format!("{}: {}", visited.name, problem.unwrap_or_default()))),
     }
-}
-
-/// The flight as a path with a key per pose.
-fn as_path(flight: &Flight) -> CameraPath {
-    let last = (flight.poses.len() - 1).max(1) as f64;
-    let time = |i: usize| Some(flight.seconds * i as f64 / last);
-    let key = |(i, p): (usize, &Pose)| PathKey { time_secs: time(i), ..p.key() };
-    let keys = flight.poses.iter().enumerate().map(key).collect();
-    CameraPath { keys, closed: false, fps: last / flight.seconds.max(1e-3), seconds: flight.seconds }
 }
 
 pub fn told(s: &Smoothness) -> Value {

@@ -2,8 +2,6 @@
 
 use std::path::Path;
 
-use glam::DVec2;
-
 use super::CliError;
 use super::opened::DrawableScene;
 use crate::io;
@@ -56,20 +54,6 @@ fn of_photo(wanted: &str, cameras: &[SceneCamera]) -> Result<Option<Camera>, Cli
 fn ends_with_path(name: &str, wanted: &str) -> bool {
     let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
     [name, stem].iter().any(|n| *n == wanted || n.strip_suffix(wanted).is_some_and(|front| front.ends_with('/')))
-}
-
-/// The camera with a picture of `width_px` x `height_px`. The vertical field of view stays; where
-/// the shape differs, the picture shows more or less at the sides, never anything stretched.
-pub fn with_size(camera: &Camera, width_px: u32, height_px: u32) -> Camera {
-    let scale = f64::from(height_px) / f64::from(camera.height_px);
-    let shift = f64::from(width_px) * 0.5 - f64::from(camera.width_px) * 0.5 * scale;
-    Camera {
-        width_px,
-        height_px,
-        focal_px: camera.focal_px * scale,
-        principal_px: camera.principal_px * scale + DVec2::new(shift, 0.0),
-        ..camera.clone()
-    }
 }
 
 /// Bytes that drawing a pixel takes: colour, depth and opacity, their copies on the way to the file.
@@ -142,14 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn another_size_keeps_the_middle_and_the_vertical_view() {
-        let camera = scene(&["a"]).cameras[0].camera.clone();
-        let wide = with_size(&camera, 200, 96);
-        wide.validate().expect("valid");
-        let middle = wide.project(DVec3::ZERO).expect("in front");
-        assert!((middle - DVec2::new(100.0, 48.0)).length() < 1e-9, "{middle}");
-        let top = camera.center + camera.ray(DVec2::new(32.0, 0.0)) * 2.0;
-        assert!(wide.project(top).expect("in front").y.abs() < 1e-9);
+    fn sizes_are_two_numbers() {
         assert_eq!(parse_size("640x480"), Ok([640, 480]));
         for bad in ["640", "0x4", "4x", "x", "99999x4", "-1x4"] {
             assert!(parse_size(bad).is_err(), "{bad}");

@@ -15,8 +15,8 @@ use crate::pipeline::semantics::segmenter::SegmentError;
 use crate::pipeline::synth::SynthError;
 use crate::pipeline::train::TrainError;
 use crate::pipeline::train::config::UnreadableConfig;
-use crate::render::RenderError;
 use crate::render::gpu::GpuError;
+use crate::render::{DrawError, RenderError};
 
 /// Why a job did not do what was asked.
 #[derive(Debug, thiserror::Error)]
@@ -93,6 +93,9 @@ pub enum JobError {
     /// The GPU failed, or there is none.
     #[error(transparent)]
     Gpu(#[from] GpuError),
+    /// A frame could not be drawn.
+    #[error(transparent)]
+    Draw(#[from] DrawError),
     /// A video could not be made.
     #[error(transparent)]
     Video(#[from] FilmError),

@@ -7,8 +7,9 @@ use image::codecs::png::PngEncoder;
 use image::{ColorType, ImageEncoder};
 use npyz::WriterBuilder;
 
-use crate::io::{IoError, atomic, splat_ply};
-use crate::scene::{GaussianCloud, PhotoPixels};
+use crate::io::{self, IoError, atomic, splat_ply};
+use crate::navigate::{Film, Pose, Speed};
+use crate::scene::{CameraPath, GaussianCloud, PathKey, PhotoPixels};
 
 /// Writes Gaussians as a `.ply`.
 ///
@@ -48,6 +49,22 @@ pub fn npy(path: &Path, values: &[f32], size_px: [u32; 2]) -> Result<(), IoError
         array.extend(values.iter().copied())?;
         array.finish()
     })
+}
+
+/// Writes a camera path: this program's `.json`, or frames of this `aspect` for nerfstudio where the name ends in
+/// `.nerfstudio.json`.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn camera_path(file: &Path, path: &CameraPath, aspect: f64) -> Result<(), IoError> {
+    make_parent(file)?;
+    if !file.to_string_lossy().ends_with(".nerfstudio.json") {
+        return io::camera_path::write(file, path);
+    }
+    let film = Film::new(path, Speed::Constant);
+    let poses = film.map_or_else(Vec::new, |film| film.pictures(path.fps, CameraPath::MAX_KEYS as f64));
+    let frames: Vec<PathKey> = poses.iter().map(Pose::key).collect();
+    io::camera_path::nerfstudio::write(file, path, &frames, (1280, (1280.0 / aspect.max(0.01)) as u32))
 }
 
 /// Makes the folder that `path` lies in.

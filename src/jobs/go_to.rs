@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use crate::navigate::flight::Smoothness;
 use crate::navigate::target::Wish;
 use crate::navigate::visit::{NoVisit, Place, Visit};
 use crate::navigate::{Flight, Navigator, NoWay, Pose, Speed};
@@ -42,6 +43,15 @@ impl Explored {
     /// If there is no way.
     pub fn fly(&self, from: &Pose, to: &Pose, frames: usize) -> Result<Flight, NoWay> {
         self.navigator.fly(from, to, None, frames, Speed::Eased)
+    }
+
+    /// How smooth the paper's interpolation of a flight's ends is, and that through all keypoints of the route.
+    pub fn of_paper(&self, flight: &Flight) -> [Option<Smoothness>; 2] {
+        let [first, .., last] = flight.poses.as_slice() else { return [None, None] };
+        let (navigator, frames) = (&self.navigator, flight.poses.len());
+        let keys = navigator.keys(first, last).unwrap_or_default();
+        [Flight::of_paper(&[*first, *last], frames), Flight::of_paper_through(&keys, frames)]
+            .map(|p| p.map(|p| p.smoothness(&navigator.matter, navigator.clearance)))
     }
 
     /// Why there is no way, with how much of the scene hangs together.

@@ -15,6 +15,7 @@ pub mod models;
 pub mod open;
 pub mod plan;
 pub mod query;
+pub mod render;
 pub mod segment;
 pub mod thumbnails;
 pub mod train;

@@ -192,6 +192,20 @@ impl Camera {
         }
     }
 
+    /// The camera with a picture of this size. The vertical field of view stays; where the shape differs, the
+    /// picture shows more or less at the sides, never anything stretched.
+    pub fn with_size(&self, width_px: u32, height_px: u32) -> Self {
+        let scale = f64::from(height_px) / f64::from(self.height_px);
+        let shift = f64::from(width_px) * 0.5 - f64::from(self.width_px) * 0.5 * scale;
+        Self {
+            width_px,
+            height_px,
+            focal_px: self.focal_px * scale,
+            principal_px: self.principal_px * scale + DVec2::new(shift, 0.0),
+            ..self.clone()
+        }
+    }
+
     /// The camera of the picture whose `factor` x `factor` pixels are one; rows and columns that do not
     /// fill one are cut off.
     pub fn reduced(&self, factor: u32) -> Self {
@@ -355,5 +369,16 @@ mod tests {
         assert!(matches!(with(&|c| c.principal_px.x = f64::NAN), Err(CameraError::Principal(..))));
         assert!(with(&|c| c.world_from_camera.x_axis *= 1.0004).is_ok(), "8e-4 off");
         assert!(matches!(with(&|c| c.world_from_camera.x_axis *= 1.0006), Err(CameraError::Rotation(_))));
+    }
+
+    #[test]
+    fn another_size_keeps_the_middle_and_the_vertical_view() {
+        let camera = Camera::look_at(DVec3::new(1.0, -3.0, 1.0), DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid");
+        let wide = camera.with_size(200, 96);
+        wide.validate().expect("valid");
+        let middle = wide.project(DVec3::ZERO).expect("in front");
+        assert!((middle - DVec2::new(100.0, 48.0)).length() < 1e-9, "{middle}");
+        let top = camera.center + camera.ray(DVec2::new(32.0, 0.0)) * 2.0;
+        assert!(wide.project(top).expect("in front").y.abs() < 1e-9);
     }
 }

@@ -9,7 +9,7 @@ use super::super::theme;
 use crate::jobs::find_objects::FindSettings;
 use crate::models::catalogue::{self, Entry, Role, SAM2, State};
 use crate::models::engine::engine;
-use crate::pipeline::semantics::find::{Carry, REGIONS};
+use crate::pipeline::semantics::find::{Carry, Lifting, REGIONS};
 use crate::worker::Action;
 
 /// What is known of engine and models; looked up off the window's thread.
@@ -109,6 +109,23 @@ fn choose(ui: &mut Ui, models: &[(Entry, State)], finding: &mut FindSettings) {
         ui.weak("Looked at by");
         one_of(ui, "encoder", &mut finding.encoder, &here(Role::Encoder))
             .on_hover_text("What turns their looks into something that words can be compared with.");
+        ui.end_row();
+        ui.weak("Codes");
+        let names = [
+            (Lifting::Votes, "of the votes"),
+            (Lifting::Refined, "of the votes, then trained"),
+            (Lifting::Paper, "trained alone, as in the paper"),
+        ];
+        let chosen = names.iter().find(|(l, _)| *l == finding.lifting).map_or("", |(_, name)| *name);
+        egui::ComboBox::from_id_salt("lifting").selected_text(chosen).width(180.0).show_ui(ui, |ui| {
+            for (lifting, name) in names {
+                ui.selectable_value(&mut finding.lifting, lifting, name);
+            }
+        });
+        ui.end_row();
+        ui.weak("Photos");
+        ui.add(egui::DragValue::new(&mut finding.max_seeds).range(1..=100_000).suffix(" at most"))
+            .on_hover_text("Photos whose masks are used: more are taken where those before leave much unknown.");
         ui.end_row();
     });
     ui.add_space(4.0);
