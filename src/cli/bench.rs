@@ -13,7 +13,7 @@ use crate::models;
 use crate::pipeline::bench::{self, RenderTiming, StepTiming};
 use crate::pipeline::bench_gpu::{self, GpuTiming};
 use crate::pipeline::bench_query::{self, QueryTiming};
-use crate::pipeline::observer::{Level, Observer, Signal};
+use crate::pipeline::observer::{Observer, Severity, Signal};
 use crate::pipeline::train::{TrainConfig, TrainView, load_views};
 use crate::render::gpu::Context;
 use crate::scene::Dataset;
@@ -122,7 +122,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
             if console.signal() == Signal::Cancel {
                 return Err(CliError::Cancelled("nothing was printed".into()));
             }
-            console.note(Level::Info, format!("Drawing {name} at {} x {}", size[0], size[1]));
+            console.note(Severity::Info, format!("Drawing {name} at {} x {}", size[0], size[1]));
             timings.render.push(bench::render(&name, &cloud, size, repeats)?);
             if let Some(context) = &gpu {
                 timings.gpu_render.push(bench_gpu::render(context, &name, &cloud, size, repeats)?);
@@ -150,7 +150,7 @@ fn photos(
     if views.is_empty() {
         return Err(CliError::failed(format!("{} has no photo to train on", dataset.root.display())));
     }
-    console.note(Level::Info, format!("Training on {}", dataset.name));
+    console.note(Severity::Info, format!("Training on {}", dataset.name));
     Ok((config, views))
 }
 

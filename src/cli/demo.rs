@@ -15,7 +15,7 @@ use crate::io;
 use crate::jobs::evaluate::{self, Comparison, Options};
 use crate::jobs::plan;
 use crate::math::stats::median;
-use crate::pipeline::observer::{Evaluation, Level, Observer, ViewScore};
+use crate::pipeline::observer::{Evaluation, Observer, Severity, ViewScore};
 use crate::pipeline::synth::demo;
 use crate::pipeline::train::{self, TrainConfig, TrainEnd};
 use crate::render::cpu::Renderer;
@@ -127,11 +127,11 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
 /// Renders the photos unless they are there; returns the seconds it took.
 fn make_photos(folder: &Path, console: &mut Console) -> Result<Option<f64>, CliError> {
     if demo::demo_is_written(folder) {
-        console.note(Level::Info, format!("Using the photos in {}", folder.display()));
+        console.note(Severity::Info, format!("Using the photos in {}", folder.display()));
         return Ok(None);
     }
     let report = demo::write_demo(folder, console).map_err(synth::failure)?;
-    console.note(Level::Info, synth::summary(&report));
+    console.note(Severity::Info, synth::summary(&report));
     Ok(Some(report.secs))
 }
 

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use super::output;
 use crate::jobs::JobError;
 use crate::jobs::error::chain;
+use crate::pipeline::observer::Interrupted;
 
 /// Why a subcommand did not do what was asked.
 #[derive(Debug)]
@@ -40,9 +41,9 @@ impl CliError {
         Self::failed(format!("{error}{remedy}"))
     }
 
-    /// The same, with these words where somebody asked to stop: what is left, and how to go on.
-    pub fn or_cancelled(self, what: impl Into<String>) -> Self {
-        if matches!(self, Self::Cancelled(_)) { Self::Cancelled(what.into()) } else { self }
+    /// Of work that may have been asked to stop; `saved` says what is left of it then.
+    pub fn of_work(error: impl Error + Send + Sync + 'static, saved: &str) -> Self {
+        if Interrupted::is_cause_of(&error) { Self::Cancelled(saved.into()) } else { error.into() }
     }
 
     /// Prints the error to standard error and returns its exit code.

@@ -79,7 +79,7 @@ impl Args {
 
 /// Without all views there is no result.
 pub fn stopped(error: JobError) -> CliError {
-    CliError::from(error).or_cancelled("not all views were measured")
+    CliError::of_work(error, "not all views were measured")
 }
 
 pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {

@@ -117,8 +117,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         with: &args.settings(),
     };
     let done = find_objects::run(request, &mut observer);
-    let FoundObjects { found, photos, secs, .. } =
-        done.map_err(|e| CliError::from(e).or_cancelled("nothing was stored"))?;
+    let FoundObjects { found, photos, secs, .. } = done.map_err(|e| CliError::of_work(e, "nothing was stored"))?;
     let Found { map, views, disagreements, secs: stages } = found;
     let count = |level: Level| map.identities.iter().filter(|(_, i)| i.level == level).count();
     if args.json {

@@ -171,8 +171,8 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
     let backend = video::backend(args.backend, &draw, plan.on_cpu);
     let (cloud, out) = (Arc::clone(&scene.cloud), args.out.clone());
     let request = VideoRequest { cloud, draw, cameras, marked, out, settings, backend };
-    let Video { summary, backend, secs } = video::run(request, &mut Console::new(quiet))
-        .map_err(|e| CliError::from(e).or_cancelled("no film was written"))?;
+    let Video { summary, backend, secs } =
+        video::run(request, &mut Console::new(quiet)).map_err(|e| CliError::of_work(e, "no video was written"))?;
     let (w, h) = summary.size_px;
     if args.json {
         return output::print_json(&json!({

@@ -7,7 +7,7 @@ use super::progress::Console;
 use super::report_studies::{Options, Subject};
 use super::{CliError, number, output};
 use crate::io;
-use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::observer::{Observer, Severity};
 use crate::report::{BeginError, End, FILE, Report, ReportError, Stage, StageName, StudyError, sweep};
 use crate::report::{computer, defaults, page, plot};
 
@@ -93,7 +93,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     };
     let subject = Subject::open(&scene, options)?;
     let (stages, missing) = subject.stages(&args.stages)?;
-    missing.iter().for_each(|m| console.note(Level::Info, m.clone()));
+    missing.iter().for_each(|m| console.note(Severity::Info, m.clone()));
     output::make_folder(&args.out)?;
     let start = Instant::now();
     let mut stopped = None;
@@ -103,7 +103,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         let end = match measure(&subject, *name, &mut report, &args.out, share, console) {
             // A stage that nobody named may turn out impossible; the others go on.
             Err(CliError::Failed(why)) if args.stages.is_empty() => {
-                console.note(Level::Warning, format!("Stage '{}' left out: {why}", name.name()));
+                console.note(Severity::Warning, format!("Stage '{}' left out: {why}", name.name()));
                 continue;
             }
             other => other?,
@@ -123,7 +123,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
             Err(CliError::Cancelled(format!("{} holds what was measured", args.out.join(FILE).display())))
         }
         Some(_) => {
-            console.note(Level::Info, "The budget is used up; the same command goes on with the rest".into());
+            console.note(Severity::Info, "The budget is used up; the same command goes on with the rest".into());
             Ok(())
         }
         None => Ok(()),

@@ -9,7 +9,7 @@ use super::progress::{Console, evaluation_line};
 use super::{CliError, number, output};
 use crate::jobs::open::{self, Contents};
 use crate::jobs::{plan, train};
-use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::train::TrainConfig;
 use crate::render::BackendChoice;
 use crate::scene::Dataset;
@@ -168,7 +168,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let (dataset, config, folders) = args.check()?;
     let mut console = Console::new(quiet);
     for warning in &dataset.warnings {
-        console.note(Level::Warning, warning.clone());
+        console.note(Severity::Warning, warning.clone());
     }
     let done = train::run(&dataset, &config, folders, &mut console)?;
     let (outcome, finished) = (&done.outcome, done.is_finished());

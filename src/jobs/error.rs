@@ -9,6 +9,7 @@ use crate::models::catalogue::InstallError;
 use crate::models::fetch::FetchError;
 use crate::pipeline::depth::DepthError;
 use crate::pipeline::film::FilmError;
+use crate::pipeline::observer::Interrupted;
 use crate::pipeline::semantics::edit::EditError;
 use crate::pipeline::semantics::find::FindError;
 use crate::pipeline::semantics::segmenter::SegmentError;
@@ -23,7 +24,7 @@ use crate::render::{DrawError, RenderError};
 pub enum JobError {
     /// The observer asked to stop.
     #[error("cancelled")]
-    Cancelled,
+    Interrupted(#[from] Interrupted),
     /// Nothing that is known lies there.
     #[error(transparent)]
     Open(#[from] OpenError),
@@ -107,15 +108,8 @@ pub enum JobError {
 impl JobError {
     /// Whether the observer asked to stop.
     pub fn is_cancelled(&self) -> bool {
-        match self {
-            Self::Cancelled
-            | Self::Install(InstallError::Fetch(FetchError::Cancelled { .. }))
-            | Self::Video(FilmError::Cancelled)
-            | Self::Synth(SynthError::Cancelled)
-            | Self::Segment(SegmentError::Cancelled) => true,
-            Self::Find(e) => e.is_cancelled(),
-            _ => false,
-        }
+        let fetch = matches!(self, Self::Install(InstallError::Fetch(FetchError::Cancelled { .. })));
+        fetch || Interrupted::is_cause_of(self)
     }
 }
 

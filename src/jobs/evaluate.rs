@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 
 use image::ColorType;
 
@@ -12,7 +11,7 @@ use crate::io::trained::SceneCamera;
 use crate::math::stats::{mean, median};
 use crate::pipeline::depth::{self, DepthCounter, DepthScores};
 use crate::pipeline::evaluate::evaluate;
-use crate::pipeline::observer::{Evaluation, Level, Observer, Progress, Signal, ViewScore};
+use crate::pipeline::observer::{Evaluation, Observer, Severity, Ticker, ViewScore};
 use crate::pipeline::train::TrainView;
 use crate::pipeline::train::border::Borders;
 use crate::render::cpu::Renderer;
@@ -116,20 +115,11 @@ impl Comparison {
         observer: &mut dyn Observer,
         mut each: impl FnMut(usize) -> Result<(), JobError>,
     ) -> Result<(), JobError> {
-        let start = Instant::now();
+        let mut ticker = Ticker::new(stage, self.views.len());
         for (done, &index) in self.views.iter().enumerate() {
-            if observer.signal() == Signal::Cancel {
-                return Err(JobError::Cancelled);
-            }
+            ticker.proceed(observer)?;
             each(index)?;
-            let elapsed_secs = start.elapsed().as_secs_f64();
-            observer.progress(Progress {
-                stage: stage.into(),
-                done: done as u64 + 1,
-                total: self.views.len() as u64,
-                elapsed_secs,
-                rate: (done + 1) as f64 / elapsed_secs.max(1e-9),
-            });
+            ticker.report(done as u64 + 1, observer);
         }
         Ok(())
     }
@@ -141,7 +131,7 @@ impl Comparison {
 /// If a photo cannot be read or drawn, a picture cannot be written, or the observer asks to stop.
 pub fn photometric(comparison: &Comparison, observer: &mut dyn Observer) -> Result<Evaluation, JobError> {
     for warning in &comparison.dataset.warnings {
-        observer.note(Level::Warning, warning.clone());
+        observer.note(Severity::Warning, warning.clone());
     }
     let Comparison { cloud, settings, .. } = comparison;
     let mut views: Vec<ViewScore> = Vec::with_capacity(comparison.views.len());

@@ -10,7 +10,7 @@ use crate::io::trained::{self, CLOUD_FILE};
 use crate::io::{IoError, SceneFolder, splat_ply};
 use crate::models;
 use crate::models::catalogue::{self, Role, SAM2};
-use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::semantics::find::{
     CODE_STEPS, Carry, FindOptions, Found, Lifting, REGIONS, Tools, find_objects, segmenter,
 };
@@ -133,7 +133,7 @@ pub fn run(request: Request<'_>, observer: &mut dyn Observer) -> Result<FoundObj
         lifting: with.lifting,
         code_steps: with.code_steps,
     };
-    let mut warn = |text: String| observer.note(Level::Warning, text);
+    let mut warn = |text: String| observer.note(Severity::Warning, text);
     let network = match (request.masks, with.segmenter.as_deref()) {
         (Some(_), _) | (None, Some(REGIONS)) => None,
         (None, Some(name)) => Some(name.to_owned()),
@@ -157,7 +157,7 @@ pub fn run(request: Request<'_>, observer: &mut dyn Observer) -> Result<FoundObj
     let found = find_objects(cloud, &photos, settings, tools, &options, observer)?;
     let (kept, state) = scene.replace_map(known, &found.map, cloud)?;
     if let Some(kept) = &kept {
-        observer.note(Level::Info, format!("The objects and parts before are kept in {}", kept.display()));
+        observer.note(Severity::Info, format!("The objects and parts before are kept in {}", kept.display()));
     }
     Ok(FoundObjects { found, photos, kept, state, secs: start.elapsed().as_secs_f64() })
 }

@@ -8,7 +8,7 @@ use crate::math::stats::median;
 use crate::models::catalogue::{self, Entry, State};
 use crate::models::fetch::Patience;
 use crate::models::{self, ModelError, Role, Tile};
-use crate::pipeline::observer::{Observer, Progress, Signal};
+use crate::pipeline::observer::{Observer, Ticker};
 
 /// Where the files of a model come from.
 #[derive(Clone, Copy, Debug)]
@@ -24,20 +24,13 @@ pub enum Source<'a> {
 /// # Errors
 /// If there is none, its files cannot be had or are not right, or the observer asks to stop.
 pub fn install(id: &str, source: Source<'_>, observer: &mut dyn Observer) -> Result<Entry, JobError> {
-    let (folder, start) = (catalogue::folder(), Instant::now());
+    let (folder, mut ticker) = (catalogue::folder(), Ticker::new("", 0));
     let entry = catalogue::entry(id)?;
     match source {
         Source::Folder(brought) => entry.add(&folder, brought)?,
         Source::Fetch(from) => entry.fetch(&folder, from, Patience::default(), &mut |name, there, all| {
-            let elapsed_secs = start.elapsed().as_secs_f64();
-            observer.progress(Progress {
-                stage: format!("Fetching {name} (kB)"),
-                done: there / 1000,
-                total: all.unwrap_or(there) / 1000,
-                elapsed_secs,
-                rate: there as f64 / 1000.0 / elapsed_secs.max(1e-9),
-            });
-            observer.signal() != Signal::Cancel
+            ticker.enter(format!("Fetching {name} (kB)"), all.unwrap_or(there) / 1000);
+            ticker.tick((there / 1000) as usize, observer).is_ok()
         })?,
     }
     Ok(entry)

@@ -10,7 +10,7 @@ use crate::io::labels::Labels;
 use crate::io::trained::{self, History, SceneCamera};
 use crate::io::{self, Opened, TrainedScene};
 use crate::math::sh::SH_C0;
-use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::synth::demo;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
@@ -289,7 +289,7 @@ pub fn known_objects(scene: &Scene, observer: &mut dyn Observer) -> Option<Arc<S
         }
         Err(JobError::NoObjects(_)) => None,
         Err(e) => {
-            observer.note(Level::Warning, format!("Its objects cannot be shown: {e}"));
+            observer.note(Severity::Warning, format!("Its objects cannot be shown: {e}"));
             None
         }
     }
@@ -301,7 +301,7 @@ fn photos(dataset: Dataset, folders: &Folders, observer: &mut dyn Observer) -> O
     let before = trained::is_scene(&out).then(|| trained::load(&out)).and_then(|loaded| match loaded {
         Ok(scene) => Some(scene),
         Err(e) => {
-            observer.note(Level::Warning, format!("Earlier training of these photos cannot be shown: {e}"));
+            observer.note(Severity::Warning, format!("Earlier training of these photos cannot be shown: {e}"));
             None
         }
     });
@@ -321,7 +321,7 @@ fn photos(dataset: Dataset, folders: &Folders, observer: &mut dyn Observer) -> O
 /// A trained scene; where its settings cannot be read this is told, and it is drawn with the defaults.
 fn tolerant(path: &Path, scene: TrainedScene, observer: &mut dyn Observer) -> Scene {
     let config = TrainConfig::stored(&scene.folder, scene.info.config.clone()).unwrap_or_else(|e| {
-        observer.note(Level::Warning, format!("It may not look as it was trained: {e}"));
+        observer.note(Severity::Warning, format!("It may not look as it was trained: {e}"));
         TrainConfig::default()
     });
     Scene::trained(path, scene, config)
@@ -335,7 +335,7 @@ fn photos_of(scene: &Scene, observer: &mut dyn Observer) -> Option<Arc<Dataset>>
         Some((Err(e), _)) => format!("The photos cannot be read, the scene opens without them: {e}"),
         None => "The photos are not where they were; the scene opens without them".into(),
     };
-    observer.note(Level::Warning, why);
+    observer.note(Severity::Warning, why);
     None
 }
 

@@ -7,7 +7,7 @@ use image::ColorType;
 
 use super::{JobError, Scene, export, plan, video};
 use crate::io::IoError;
-use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::observer::{Observer, Severity};
 use crate::render::cpu::normals;
 use crate::render::{Backend, BackendChoice, Frame, RenderSettings};
 use crate::scene::{Camera, Overrides};
@@ -67,7 +67,7 @@ pub fn run(
     let depth = matches!(what, Quantity::Depth | Quantity::ExpectedDepth | Quantity::Normals);
     let settings = RenderSettings { depth, sh_degree: plan.sh_degree, ..scene.settings.clone() };
     let choice = video::backend(wanted, &settings, plan.on_cpu);
-    let mut backend = Backend::choose(choice, |why| observer.note(Level::Warning, why))?;
+    let mut backend = Backend::choose(choice, |why| observer.note(Severity::Warning, why))?;
     let flat = settings.surfels && !matches!(backend, Backend::Cpu(_));
     let start = Instant::now();
     let frame = backend.render(&scene.cloud, camera, &settings)?;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::{JobError, Scene, open};
 use crate::io::{splat_ply, trained};
-use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::train::checkpoint::CheckpointError;
 use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainError, TrainOutcome};
 use crate::scene::{Dataset, SemanticMap};
@@ -47,7 +47,7 @@ pub fn run(
         if let Some(earlier) = earlier.take() {
             let kept = earlier.display();
             let text = format!("The settings changed, so this is a new training; the earlier one stays in {kept}");
-            observer.note(Level::Info, text);
+            observer.note(Severity::Info, text);
         }
         match train::run(dataset, config, Some(&out), observer) {
             Err(TrainError::Checkpoint(CheckpointError::OtherRun { .. } | CheckpointError::Missing { .. }))
@@ -77,7 +77,7 @@ fn finished(outcome: TrainOutcome, out: PathBuf, observer: &mut dyn Observer) ->
     }
     if !done.is_finished() && done.semantics.is_some() {
         let text = "Its objects are stored with the Gaussians as they are now; open the scene again to see them";
-        observer.note(Level::Info, text.into());
+        observer.note(Severity::Info, text.into());
     }
     Ok(done)
 }

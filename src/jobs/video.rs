@@ -7,7 +7,7 @@ use std::time::Instant;
 use super::{JobError, export};
 use crate::io::animation::{Settings, Summary};
 use crate::pipeline::film::{self, Marked};
-use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::observer::{Observer, Severity};
 use crate::render::{Backend, BackendChoice, RenderSettings};
 use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 
@@ -60,7 +60,7 @@ pub fn run(request: VideoRequest, observer: &mut dyn Observer) -> Result<Video, 
     let VideoRequest { cloud, draw, cameras, marked, out, settings, backend } = request;
     let marked = marked.as_ref().map(|(map, ids)| Marked { map, ids, color: MARK });
     let choice = self::backend(backend, &draw, false);
-    let mut backend = Backend::choose(choice, |why| observer.note(Level::Warning, why))?;
+    let mut backend = Backend::choose(choice, |why| observer.note(Severity::Warning, why))?;
     let start = Instant::now();
     export::make_parent(&out)?;
     let summary = film::write(&cloud, &draw, &cameras, marked, &mut backend, (&out, &settings), observer)?;

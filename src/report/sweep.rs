@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::document::{Order, Point, Stage};
 use super::knobs::Knobs;
-use crate::pipeline::observer::{Level, Observer, Progress, Signal};
+use crate::pipeline::observer::{Observer, Severity, Ticker};
 
 /// A setting to be measured.
 #[derive(Clone, Debug, PartialEq)]
@@ -111,9 +111,10 @@ pub fn sweep(
     stage.points.retain(|p| cases.iter().any(|c| c.is(p)));
     let total = (cases.len() * stage.seeds.len()) as u64;
     let measured = |stage: &Stage| stage.points.iter().map(|p| p.secs.each.len() as u64).sum::<u64>().min(total);
-    let first = measured(&stage);
     let mut impossible: Vec<&Case> = Vec::new();
     let start = Instant::now();
+    let what = format!("Measuring {}", stage.name.title().to_lowercase());
+    let mut ticker = Ticker::resumed(what, total, measured(&stage), 0.0);
     if stage.orders.is_empty() {
         stage.orders = study.orders(observer)?;
         keep(&stage)?;
@@ -125,7 +126,7 @@ pub fn sweep(
             if impossible.contains(&case) || stage.points.iter().any(|p| case.is(p) && p.secs.each.len() > repeat) {
                 continue;
             }
-            if observer.signal() == Signal::Cancel {
+            if observer.proceed().is_err() {
                 return Ok((stage, End::Cancelled));
             }
             if start.elapsed().as_secs_f64() >= budget_secs {
@@ -137,16 +138,14 @@ pub fn sweep(
                 // One setting that fails is no reason to give up the others.
                 Err(why) => {
                     let text = format!("{}, {}: {why}", case.method, case.setting);
-                    observer.note(Level::Warning, format!("Left out: {text}"));
+                    observer.note(Severity::Warning, format!("Left out: {text}"));
                     stage.left_out.push(text);
                     impossible.push(case);
                 }
             }
             keep(&stage)?;
-            let (done, elapsed_secs) = (measured(&stage), start.elapsed().as_secs_f64());
-            let rate = (done - first) as f64 / elapsed_secs.max(1e-9);
-            let name = format!("Measuring {}", stage.name.title().to_lowercase());
-            observer.progress(Progress { stage: name, done, total, elapsed_secs, rate });
+            let done = measured(&stage);
+            ticker.report(done, observer);
         }
     }
     Ok((stage, End::Finished))

@@ -171,7 +171,7 @@ fn foreign_text_is_cleaned_on_its_way_to_the_window() {
     let mut s = fold([
         Event::Started { job: JOB, kind: JobKind::Train, title: evil.into() },
         Event::Progress(JOB, progress),
-        Event::Note(JOB, Level::Warning, evil.into()),
+        Event::Note(JOB, Severity::Warning, evil.into()),
     ]);
     s.toast(Tone::Info, evil);
     s.fail(evil, Failure { message: evil.into(), remedy: evil.into() });

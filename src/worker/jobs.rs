@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use super::measure as measuring;
 use super::protocol::{Command, Failure, Outcome, Stop};
 use super::thread::Jobs;
-use crate::io::{self, OpenError, trained};
+use crate::io::{self, trained};
 use crate::jobs::evaluate::{self, Comparison, Options};
 use crate::jobs::models::Source;
 use crate::jobs::train::Trained;
@@ -105,24 +105,24 @@ impl Jobs for PipelineJobs {
                 Outcome::Objects(Arc::new(done.found.map))
             }
             Command::EditObjects { cloud, map, settings, request, out } => {
-                let unchanged = |e: JobError| stop(&e, "Nothing has changed.");
-                let new = edit::apply(&cloud, &map, &settings, &request).map_err(unchanged)?;
+                let failed = |remedy| move |e: JobError| Stop::Failed(Failure::of(&e, remedy));
+                let new = edit::apply(&cloud, &map, &settings, &request).map_err(failed("Nothing has changed."))?;
                 let stored = edit::store(&out, self.known(&out).as_deref(), &new, &cloud);
-                if let Some(state) = stored.map_err(|e| stop(&e, "The change is not stored."))? {
+                if let Some(state) = stored.map_err(failed("The change is not stored."))? {
                     self.knows(&out, Some(state));
                 }
                 Outcome::Edited(new)
             }
             Command::Export { cloud, path } => {
-                export::ply(&path, &cloud).map_err(JobError::from)?;
+                export::ply(&path, &cloud)?;
                 Outcome::Written(path)
             }
             Command::Photo { index, photo, max_side_px } => {
-                let pixels = io::photo::load(&photo, max_side_px).map_err(JobError::from)?;
+                let pixels = io::photo::load(&photo, max_side_px)?;
                 Outcome::Photo { index, max_side_px, pixels: Arc::new(pixels) }
             }
             Command::Picture { pixels, path } => {
-                export::picture(&path, &pixels).map_err(JobError::from)?;
+                export::picture(&path, &pixels)?;
                 Outcome::Written(path)
             }
             Command::InstallModel { id, brought } => {
@@ -160,23 +160,4 @@ fn measured(
     let settings = config.render_settings(dataset.background);
     let scene = Scene { cloud, cameras, settings, config, ..Scene::default() };
     evaluate::photometric(&Comparison::of(&scene, dataset, Options::default())?, observer)
-}
-
-/// How a job ends with an error, and what a person can do where the error does not say that itself.
-fn stop(error: &JobError, remedy: &str) -> Stop {
-    if error.is_cancelled() { Stop::Cancelled } else { Stop::Failed(Failure::of(error, remedy)) }
-}
-
-impl From<JobError> for Stop {
-    fn from(error: JobError) -> Self {
-        let remedy = match &error {
-            JobError::Open(OpenError::NotFound { .. }) => "Check the path: the file may have been moved or renamed.",
-            JobError::Open(OpenError::Unrecognised { .. }) => {
-                "Open the folder that holds the photos and their poses, or a splat .ply."
-            }
-            JobError::NothingHeldOut(_) => "Choose how many to hold out in the Training pane.",
-            _ => "",
-        };
-        stop(&error, remedy)
-    }
 }

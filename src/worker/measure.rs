@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::protocol::{Failure, Outcome, Stop};
-use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::observer::{Observer, Severity};
 use crate::render::RenderSettings;
 use crate::report::studies::Input;
 use crate::report::studies::render::RenderStudy;
@@ -40,7 +40,7 @@ pub struct MeasureRequest {
 
 /// Reads a report; the `second` is one to compare with.
 pub fn read(path: PathBuf, second: bool) -> Result<Outcome, Stop> {
-    let report = Report::read(&path).map_err(|e| Stop::Failed(Failure::of(&e, "")))?;
+    let report = Report::read(&path)?;
     Ok(Outcome::Report { path, report: Arc::new(report), second })
 }
 
@@ -82,7 +82,7 @@ pub fn run(request: MeasureRequest, observer: &mut dyn Observer) -> Result<Outco
     };
     let (_, end) = sweep(&mut study, before, f64::INFINITY, &mut keep, observer).map_err(|e| failed(&e))?;
     if end == End::Cancelled {
-        observer.note(Level::Info, format!("What was measured so far is kept in {}", file.display()));
+        observer.note(Severity::Info, format!("What was measured so far is kept in {}", file.display()));
         return Err(Stop::Cancelled);
     }
     Ok(Outcome::Report { path: out, report: Arc::new(report), second: false })
@@ -94,7 +94,7 @@ fn views(request: &MeasureRequest, observer: &mut dyn Observer) -> Result<Vec<Vi
         Some(dataset) => held_out(dataset, request.holdout_every, MAX_SIDE_PX, VIEWS, observer),
         None => Ok(Some(Vec::new())),
     };
-    let mut views = views.map_err(|e| Stop::Failed(Failure::of(&e, "")))?.ok_or(Stop::Cancelled)?;
+    let mut views = views?.ok_or(Stop::Cancelled)?;
     if views.is_empty() {
         views.push((request.camera.limited_to(MAX_SIDE_PX), None));
     }

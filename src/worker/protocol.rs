@@ -6,13 +6,14 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::measure::MeasureRequest;
-use crate::jobs::OpenedScene;
+use crate::io::OpenError;
 use crate::jobs::edit::EditRequest;
 use crate::jobs::error::chain;
 use crate::jobs::find_objects::FindSettings;
 use crate::jobs::go_to::{Explored, VisitRequest, Visited};
 use crate::jobs::video::VideoRequest;
-use crate::pipeline::observer::{Evaluation, Level, Progress, StepMetrics};
+use crate::jobs::{JobError, OpenedScene};
+use crate::pipeline::observer::{Evaluation, Interrupted, Progress, Severity, StepMetrics};
 use crate::pipeline::semantics::portraits::Gallery;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
@@ -344,6 +345,28 @@ pub enum Stop {
     Failed(Failure),
 }
 
+impl<E: std::error::Error + 'static> From<E> for Stop {
+    fn from(error: E) -> Self {
+        let job = (&error as &dyn std::error::Error).downcast_ref::<JobError>();
+        if Interrupted::is_cause_of(&error) || job.is_some_and(JobError::is_cancelled) {
+            return Self::Cancelled;
+        }
+        Self::Failed(Failure::of(&error, job.map_or("", remedy)))
+    }
+}
+
+/// What a person can do in the window, where the error does not say that itself.
+fn remedy(error: &JobError) -> &'static str {
+    match error {
+        JobError::Open(OpenError::NotFound { .. }) => "Check the path: the file may have been moved or renamed.",
+        JobError::Open(OpenError::Unrecognised { .. }) => {
+            "Open the folder that holds the photos and their poses, or a splat .ply."
+        }
+        JobError::NothingHeldOut(_) => "Choose how many to hold out in the Training pane.",
+        _ => "",
+    }
+}
+
 /// What happened. For each job: first `Started`, then any of the middle ones, at last exactly one of
 /// `Finished`, `Cancelled`, `Failed`. Only `Progress` may be missing.
 #[derive(Clone, Debug)]
@@ -364,7 +387,7 @@ pub enum Event {
     /// A held-out evaluation.
     Evaluation(JobId, Evaluation),
     /// A line for the log.
-    Note(JobId, Level, String),
+    Note(JobId, Severity, String),
     /// The job now waits (`true`) or goes on (`false`).
     Paused(JobId, bool),
     /// It did what it was to do.

@@ -5,7 +5,7 @@ use serde_json::json;
 use super::{Input, Plans, stage, timed};
 use crate::math::stats::mean;
 use crate::pipeline::depth::{Samples, TrueDepth};
-use crate::pipeline::observer::{Observer, Signal};
+use crate::pipeline::observer::Observer;
 use crate::render::cpu::Renderer;
 use crate::render::{Cutoffs, Features, RenderSettings};
 use crate::report::document::Form;
@@ -100,7 +100,7 @@ impl Study for DepthStudy<'_> {
         let (mut all, mut edges, mut secs) = (Samples::default(), Samples::default(), Vec::new());
         let mut renderer = Renderer::<f32>::new();
         for (camera, truth) in &self.views {
-            if observer.signal() == Signal::Cancel {
+            if observer.proceed().is_err() {
                 return Ok(None);
             }
             let size = [camera.width_px / plan.smaller, camera.height_px / plan.smaller];

@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::{Input, Plans, overlap, stage};
 use crate::math::stats::mean;
-use crate::pipeline::observer::{Observer, Signal};
+use crate::pipeline::observer::Observer;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::codes::{self, TOLERANCE};
 use crate::pipeline::semantics::find::centers;
@@ -190,7 +190,7 @@ impl Study for FeatureStudy<'_> {
             let training = CodeTraining { steps, seed };
             let (cloud, all) = (self.cloud, self.training);
             train_codes(cloud, &mut codes, all, &self.identities, self.settings, training, observer).map_err(failed)?;
-            if observer.signal() == Signal::Cancel {
+            if observer.proceed().is_err() {
                 return Ok(None);
             }
             of = decode(&codes, &self.identities);

@@ -13,7 +13,7 @@ use crate::navigate::curve::{Curve, bend};
 use crate::navigate::graph::Graph;
 use crate::navigate::pose::{RotationSpline, angle};
 use crate::navigate::{FRAMES, Flight, Navigator, Pose, Speed};
-use crate::pipeline::observer::{Observer, Signal};
+use crate::pipeline::observer::Observer;
 use crate::report::document::Form;
 use crate::report::{Case, Measure, Order, Rule, Stage, StageName, Study, StudyError, Trial};
 use crate::scene::{Camera, GaussianCloud};
@@ -187,7 +187,7 @@ impl Study for PathStudy {
         let start = Instant::now();
         let mut flights = Vec::new();
         for pair in &pairs {
-            if observer.signal() == Signal::Cancel {
+            if observer.proceed().is_err() {
                 return Ok(None);
             }
             flights.extend(self.fly(plan, *pair));

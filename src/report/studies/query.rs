@@ -7,7 +7,7 @@ use serde_json::json;
 use super::{Input, Plans, overlap, stage};
 use crate::math::stats::mean;
 use crate::models::Encoder;
-use crate::pipeline::observer::{Observer, Signal};
+use crate::pipeline::observer::Observer;
 use crate::pipeline::semantics::answer::{Answered, by_name};
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::codes::TOLERANCE;
@@ -193,7 +193,7 @@ impl Study for QueryStudy<'_> {
         let (mut secs, mut ious, mut hits) = (Vec::new(), [Vec::new(), Vec::new()], Vec::new());
         let (mut not_understood, mut broken) = (Vec::new(), None);
         for view in &self.views {
-            if observer.signal() == Signal::Cancel {
+            if observer.proceed().is_err() {
                 return Ok(None);
             }
             let (w, h) = (view.camera.width_px, view.camera.height_px);

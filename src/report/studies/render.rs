@@ -8,7 +8,7 @@ use serde_json::json;
 use super::{Input, Plans, stage, timed};
 use crate::math::Real;
 use crate::math::stats::mean;
-use crate::pipeline::observer::{Observer, Signal};
+use crate::pipeline::observer::Observer;
 use crate::render::cpu::Renderer;
 use crate::render::gpu::GpuError;
 use crate::render::{Backend, BackendChoice, Cutoffs, Features, Frame, RenderError, RenderSettings};
@@ -221,7 +221,7 @@ impl Study for RenderStudy {
         let Some(plan) = self.plans.of(case).cloned() else { return Ok(None) };
         let (mut secs, mut errors, mut photos) = (Vec::new(), Vec::new(), Vec::new());
         for (i, camera) in self.cameras.clone().iter().enumerate() {
-            if observer.signal() == Signal::Cancel {
+            if observer.proceed().is_err() {
                 return Ok(None);
             }
             let (drawn, took) = self.draw(&plan, camera)?;
