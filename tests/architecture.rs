@@ -5,6 +5,9 @@
 //! an offender, so a rule that has gone blind fails here.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+// The generator of a committed asset: its own test compares the two.
+#[path = "../tools/demo_scene/mod.rs"]
+mod demo_scene;
 #[path = "architecture/rules.rs"]
 mod rules;
 #[path = "architecture/source.rs"]
@@ -12,7 +15,7 @@ mod source;
 
 use std::path::Path;
 
-use rules::{Complaint, dependencies, headers, kernels, module_order, printing, size_caps};
+use rules::{Complaint, dependencies, headers, kernels, module_order, printing, render_doors, size_caps};
 use source::{SourceFile, read_tree};
 
 fn tree() -> Vec<SourceFile> {
@@ -28,6 +31,11 @@ fn check(complaints: Vec<Complaint>) {
 #[test]
 fn modules_use_only_what_stands_above_them() {
     check(module_order(&tree()));
+}
+
+#[test]
+fn only_oracles_name_the_renderers_behind_render() {
+    check(render_doors(&tree()));
 }
 
 #[test]
@@ -94,6 +102,18 @@ fn module_order_looks_past_comments_strings_and_tests() {
         file("src/io/checks.rs", "//! x\nuse crate::render::Frame;\n"),
     ];
     assert!(module_order(&test_file).is_empty());
+}
+
+#[test]
+fn render_doors_catch_who_goes_around_them() {
+    let n = |path, text| complaints(render_doors, path, text);
+    assert_eq!(n("src/worker/view.rs", "use crate::render::cpu::Renderer;"), 1);
+    assert_eq!(n("src/worker/view.rs", "use crate::render::{Frame, gpu::{Device, cpu}};"), 1);
+    assert_eq!(n("src/cli/x.rs", "use crate::{render::cpu, io}; fn f() { super::super::render::gpu::real_gpu() }"), 2);
+    assert_eq!(n("src/worker/view.rs", "use crate::render::{Renderer, normals};"), 0);
+    assert_eq!(n("src/worker/view.rs", "#[cfg(test)]\nmod tests {\n    use crate::render::cpu::Renderer;\n}\n"), 0);
+    assert_eq!(n("src/render/mod.rs", "pub use crate::render::cpu::ssim;"), 0);
+    assert_eq!(n("src/stability/forward.rs", "use crate::render::cpu::Renderer;"), 0);
 }
 
 #[test]

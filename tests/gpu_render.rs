@@ -8,7 +8,7 @@ use common::{camera, random_cloud, rng};
 use fmlgs::math::{Real, stats};
 use fmlgs::render::cpu::project::{View, compensation, direction, geometry, raw_color};
 use fmlgs::render::gpu::{GpuError, Renderer};
-use fmlgs::render::{ALPHA_MIN, Backend, Features, Frame, RenderError, RenderSettings, TILE_PX, cpu};
+use fmlgs::render::{ALPHA_MIN, Features, Frame, RenderError, RenderSettings, TILE_PX, cpu};
 use fmlgs::scene::{Camera, GaussianCloud};
 use glam::DVec3;
 use gpu_common::compare::{agree_in_bands, bands};
@@ -302,13 +302,13 @@ fn dots(shift: f32) -> Arc<GaussianCloud> {
 #[test]
 fn both_backends_draw_the_same_view_and_follow_the_cloud() {
     with_context(|context| {
-        let mut gpu = Backend::on_gpu(context).unwrap();
-        let mut cpu = Backend::on_cpu();
+        let mut gpu = fmlgs::render::Renderer::on_gpu(context).unwrap();
+        let mut cpu = fmlgs::render::Renderer::new();
         let camera = Camera::look_at(DVec3::new(0.2, 0.1, -2.0), DVec3::ZERO, DVec3::NEG_Y, 0.8, 64, 48).unwrap();
         let settings = RenderSettings { depth: true, ..RenderSettings::default() };
         let mut worst = |cloud: &Arc<GaussianCloud>, on_cpu: &Arc<GaussianCloud>| {
-            let a = gpu.render(cloud, &camera, &settings).unwrap();
-            let b = cpu.render(on_cpu, &camera, &settings).unwrap();
+            let a = gpu.draw(cloud, &camera, &settings).unwrap();
+            let b = cpu.draw(on_cpu, &camera, &settings).unwrap();
             stats::worst_difference(&a.color.concat(), &b.color.concat())
         };
         let (one, other) = (dots(0.0), dots(0.07));
@@ -319,7 +319,7 @@ fn both_backends_draw_the_same_view_and_follow_the_cloud() {
         assert_eq!(names, ["project", "sort", "bin", "blend"]);
         assert!(gpu.stage_times().is_empty(), "nobody asked for them");
         gpu.time_stages(true).unwrap();
-        gpu.render(&one, &camera, &settings).unwrap();
+        gpu.draw(&one, &camera, &settings).unwrap();
         assert_eq!(gpu.stage_times().is_empty(), !context.has_timestamps());
         gpu.time_stages(false).unwrap();
         assert!(gpu.stage_times().is_empty());

@@ -9,7 +9,7 @@ use fmlgs::render::cpu::adam::AdamStep;
 use fmlgs::render::cpu::adam::Rates;
 use fmlgs::render::cpu::ssim::PhotoLoss;
 use fmlgs::render::gpu::ssim::photo_loss;
-use fmlgs::render::gpu::{Context, GpuError, Parameters, Trainer, TrainerSettings};
+use fmlgs::render::gpu::{Device, GpuError, Parameters, Trainer, TrainerSettings};
 use fmlgs::render::{Features, FrameGradient, RenderSettings, cpu};
 use fmlgs::scene::{Camera, GaussianCloud, PhotoPixels};
 use gpu_common::compare::{INTERIOR, agree};
@@ -332,13 +332,13 @@ fn more_than_a_binding_holds_is_refused_with_the_numbers() {
 #[test]
 fn a_lost_device_is_an_error_and_no_panic() {
     with_context(|_| {
-        let own = Context::new().unwrap();
+        let own = Device::new().unwrap();
         let lesson = Lesson::new(0);
         let mut trainer = Trainer::new(&own, &lesson.cloud, TrainerSettings::default()).unwrap();
         let photo = trainer.photo(&lesson.photo).unwrap();
         trainer.step(&lesson.camera, &photo, &lesson.rates, 0).unwrap();
         trainer.metrics().unwrap();
-        own.device().destroy();
+        own.wgpu().destroy();
         let stepped = trainer.step(&lesson.camera, &photo, &lesson.rates, 0);
         let told = trainer.metrics();
         assert!(stepped.is_err() || told.is_err(), "{stepped:?} {told:?}");
@@ -348,16 +348,16 @@ fn a_lost_device_is_an_error_and_no_panic() {
 
 #[test]
 fn stages_are_measured() {
-    use fmlgs::render::gpu::measure;
+    use fmlgs::measure::bench::gpu::{Measurement, frame, training_step};
     with_context(|context| {
         let lesson = Lesson::new(0);
-        let settings = RenderSettings::default();
-        let frame = measure::frame(context, &lesson.cloud, &lesson.camera, &settings, 3).unwrap();
-        let step = measure::training_step(context, &lesson.cloud, &lesson.camera, &lesson.photo, 3).unwrap();
-        assert!(frame.visible > 60 && frame.pairs >= frame.visible && step.pairs == frame.pairs);
+        let mut renderer = fmlgs::render::Renderer::on_gpu(context).unwrap();
+        let cloud = std::sync::Arc::new(lesson.cloud.clone());
+        let frame = frame(&mut renderer, &cloud, &lesson.camera, &RenderSettings::default(), 3).unwrap();
+        let step = training_step(context, &lesson.cloud, &lesson.camera, &lesson.photo, 3).unwrap();
         assert!(frame.whole_secs > 0.0 && step.whole_secs > 0.0);
         if context.has_timestamps() {
-            let names = |m: &measure::Measurement| m.stages.iter().map(|s| s.0).collect::<Vec<_>>();
+            let names = |m: &Measurement| m.stages.iter().map(|s| s.0).collect::<Vec<_>>();
             assert_eq!(names(&frame), ["project", "sort by depth", "bin", "sort by tile", "blend"]);
             let backward = ["loss", "blend backward", "project backward", "adam"];
             assert_eq!(names(&step)[5..], backward);

@@ -14,9 +14,8 @@ use fmlgs::math::stats;
 use fmlgs::pipeline::semantics::code_map::CodeMap;
 use fmlgs::pipeline::semantics::matching;
 use fmlgs::pipeline::semantics::view_map::ViewMap;
-use fmlgs::render::cpu::Renderer;
 use fmlgs::render::gpu::cloud::Packed;
-use fmlgs::render::{Backend, BackendChoice, Features, Frame, RenderSettings};
+use fmlgs::render::{BackendChoice, Features, Frame, RenderSettings, Renderer};
 use fmlgs::scene::plan::{Item, NOISE_FLOOR, When, Wish};
 use fmlgs::scene::trace::{self, Sort};
 use fmlgs::scene::{
@@ -214,49 +213,46 @@ fn maps_and_depth_are_drawn_only_where_the_plan_says_so() {
 fn working_memory_is_given_back_and_the_next_picture_is_the_same() {
     let (cloud, view) = (Arc::new(ball(2_000, -3.0, 0.1)), camera(320));
     let settings = RenderSettings { depth: true, ..RenderSettings::default() };
-    let mut backend = Backend::on_cpu();
-    let held = |backend: &Backend| match backend {
-        Backend::Cpu(renderer) => renderer.working_bytes(),
-        Backend::Gpu(_) => 0,
-    };
-    let before = backend.render(&cloud, &view, &settings).expect("drawn");
+    let mut backend = Renderer::new();
+    let held = Renderer::working_bytes;
+    let before = backend.draw(&cloud, &view, &settings).expect("drawn");
     assert!(held(&backend) > cloud.len() * 48, "the control: it does hold something, {}", held(&backend));
     backend.rest();
     assert_eq!(held(&backend), 0);
-    assert_eq!(backend.render(&cloud, &view, &settings).expect("drawn"), before);
+    assert_eq!(backend.draw(&cloud, &view, &settings).expect("drawn"), before);
 }
 
 #[test]
 fn without_a_gpu_no_device_is_opened() {
     let devices = || trace::since(0).iter().filter(|l| l.sort == Sort::Device).count();
     let before = devices();
-    let mut chosen = Backend::choose(BackendChoice::Auto, |why| panic!("{why}")).expect("one that works");
-    let real = fmlgs::render::gpu::real_gpu().is_some();
+    let mut chosen = Renderer::choose(BackendChoice::Auto, |why| panic!("{why}")).expect("one that works");
+    let real = fmlgs::render::real_gpu().is_some();
     assert_eq!(devices() > before, real, "a device for a real adapter only");
-    assert_eq!(matches!(chosen, Backend::Gpu(_)), real);
+    assert_eq!(chosen.is_gpu(), real);
     let (cloud, view) = (Arc::new(ball(300, -2.5, 0.1)), camera(96));
     let settings = RenderSettings::default();
-    let drawn = chosen.render(&cloud, &view, &settings).expect("drawn");
+    let drawn = chosen.draw(&cloud, &view, &settings).expect("drawn");
     // Everything on is the GPU, emulated if it must be; its buffers are what is saved.
     if adapter::context().is_none() {
         return;
     }
     let before = devices();
-    let mut gpu = Backend::choose(BackendChoice::Gpu, drop).expect("there is an adapter");
+    let mut gpu = Renderer::choose(BackendChoice::Gpu, drop).expect("there is an adapter");
     assert!(devices() > before, "the control: asked for, it is opened");
-    let other = gpu.render(&cloud, &view, &settings).expect("drawn");
+    let other = gpu.draw(&cloud, &view, &settings).expect("drawn");
     assert!(worst(&drawn, &other) < 1e-3, "{}", worst(&drawn, &other));
     assert!(gpu.device_bytes() > (cloud.len() * 60 * 4) as u64);
-    assert_eq!(Backend::on_cpu().device_bytes(), 0);
+    assert_eq!(Renderer::new().device_bytes(), 0);
     bands_that_are_sent(gpu);
 }
 
 /// Only the bands that are drawn are sent to a GPU.
-fn bands_that_are_sent(mut gpu: Backend) {
+fn bands_that_are_sent(mut gpu: Renderer) {
     let (cloud, view) = (Arc::new(ball(3_000, -2.5, 2e-4)), camera(96));
     let mut drawn = |sh_degree: u8| {
         let settings = RenderSettings { sh_degree, ..RenderSettings::default() };
-        (gpu.render(&cloud, &view, &settings).expect("drawn"), gpu.device_bytes())
+        (gpu.draw(&cloud, &view, &settings).expect("drawn"), gpu.device_bytes())
     };
     let ((planned, few), (full, many)) = (drawn(0), drawn(3));
     assert!(worst(&planned, &full) < NOISE_FLOOR + 1e-3);

@@ -17,8 +17,7 @@ use crate::pipeline::semantics::answer::Answered;
 use crate::pipeline::semantics::asker::Asker;
 use crate::pipeline::semantics::grammar::Kind;
 use crate::pipeline::semantics::view_map::ViewMap;
-use crate::render::RenderSettings;
-use crate::render::cpu::Renderer;
+use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Bounds, Camera, GaussianCloud, Identities, IdentityId, SemanticMap, text};
 use crate::worker::Explored;
 

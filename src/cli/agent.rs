@@ -151,8 +151,7 @@ pub fn run(args: Args) -> Result<(), CliError> {
     }
     if let Some(path) = &args.view {
         let camera = world.eye().camera(camera.width_px, camera.height_px).limited_to(1280);
-        let mut backend = crate::render::Backend::on_cpu();
-        let frame = backend.render(&cloud, &camera, &settings)?;
+        let frame = crate::render::Renderer::new().draw(&cloud, &camera, &settings)?;
         output::make_parent(path)?;
         let size = [camera.width_px, camera.height_px];
         output::write_png(path, frame.to_rgb8().as_flattened(), size, image::ColorType::Rgb8)?;

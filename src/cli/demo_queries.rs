@@ -20,7 +20,7 @@ use crate::pipeline::semantics::query_engine::QueryEngine;
 use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
 use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::pipeline::semantics::view_map::ViewMap;
-use crate::render::cpu::Renderer;
+use crate::render::Renderer;
 use crate::scene::{LevelFilter, Photo};
 
 /// What is asked; the last two are not in the scene.

@@ -6,7 +6,6 @@
 
 mod agent;
 mod bench;
-mod bench_plan;
 mod check_stability;
 mod demo;
 mod demo_queries;
@@ -22,7 +21,6 @@ mod number;
 mod opened;
 mod output;
 mod path;
-mod path_survey;
 mod plan;
 mod preprocess;
 mod process;
@@ -30,7 +28,6 @@ mod progress;
 mod query;
 mod render;
 mod report;
-mod report_studies;
 mod segment;
 mod synth;
 mod train;

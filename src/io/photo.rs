@@ -7,7 +7,7 @@ use std::path::Path;
 
 use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageError, ImageReader, Limits, Luma, RgbaImage};
 
-use super::resample::{Pixels, resample};
+use super::resample::{Pixels, resample, shrink};
 use super::{IoError, files, memory};
 use crate::scene::{Camera, Photo, PhotoPixels};
 
@@ -32,6 +32,12 @@ pub fn load(photo: &Photo, max_side_px: u32) -> Result<PhotoPixels, IoError> {
         true => Err(IoError::NothingShown { path: photo.path.clone() }),
         false => Ok(seen),
     }
+}
+
+/// A loaded photo and its camera at half their size; pixels that the photo does not cover do not count.
+pub fn half(pixels: &PhotoPixels, camera: &Camera) -> (PhotoPixels, Camera) {
+    let small = camera.reduced(2);
+    (shrink(pixels, camera, &small), small)
 }
 
 /// Width and height in px of a picture file, from its header.

@@ -7,6 +7,7 @@
 use glam::Vec2;
 use rayon::prelude::*;
 
+use crate::math::resize::{Filter, Tap, taps};
 use crate::scene::{Camera, Distortion, PhotoPixels};
 
 /// A decoded picture.
@@ -37,10 +38,11 @@ pub(super) fn resample(
     let mut rgb = vec![[0_u8; 3]; w * h];
     let mut coverage = vec![0_u8; w * h];
     let lens = distortion.map(|d| Lens::new(camera, d));
+    let [columns, rows] = [(pixels.width, w), (pixels.height, h)].map(|(from, to)| taps(from, to, Filter::Area));
     rgb.par_chunks_exact_mut(w).zip(coverage.par_chunks_exact_mut(w)).enumerate().for_each(|(y, (rgb, coverage))| {
         let sums = match (&lens, pixels.channels) {
-            (None, 3) => area_row::<3>(pixels, w, h, y),
-            (None, _) => area_row::<4>(pixels, w, h, y),
+            (None, 3) => area_row::<3>(pixels, &columns, &rows[y]),
+            (None, _) => area_row::<4>(pixels, &columns, &rows[y]),
             (Some(lens), 3) => lens.row::<3>(pixels, w, h, y),
             (Some(lens), _) => lens.row::<4>(pixels, w, h, y),
         };
@@ -70,31 +72,21 @@ fn add(sum: &mut Sum, value: Sum, weight: f32) {
     }
 }
 
-/// Row `y` of the `w x h` picture of exact area means, each divided by the area.
-fn area_row<const C: usize>(pixels: &Pixels, w: usize, h: usize, y: usize) -> Vec<Sum> {
-    let mut column = vec![[0.0; 4]; pixels.width];
-    for (source_y, weight) in overlaps(pixels.height, h, y) {
-        for (x, sum) in column.iter_mut().enumerate() {
-            add(sum, texel::<C>(&pixels.data, source_y * pixels.width + x), weight);
-        }
-    }
-    let mean = |x| {
-        let mut sum = [0.0; 4];
-        overlaps(pixels.width, w, x).for_each(|(source_x, weight)| add(&mut sum, column[source_x], weight));
-        sum
-    };
-    (0..w).map(mean).collect()
+/// A row of the picture of exact area means, each divided by the area.
+fn area_row<const C: usize>(pixels: &Pixels, columns: &[Tap<Sum>], row: &Tap<Sum>) -> Vec<Sum> {
+    let at = |x: usize, y: usize| texel::<C>(&pixels.data, y * pixels.width + x);
+    let line: Vec<Sum> = (0..pixels.width).map(|x| row.mix(|y| at(x, y))).collect();
+    columns.iter().map(|tap| tap.mix(|x| line[x])).collect()
 }
 
-/// The cells out of `from` that cell `i` out of `to` overlaps when both span the same length, and
-/// the fractions of the latter that they make up.
-fn overlaps(from: usize, to: usize, i: usize) -> impl Iterator<Item = (usize, f32)> {
-    // In units of 1 / (from * to) of the span, all bounds are integers.
-    let (start, end) = (i * from, (i + 1) * from);
-    (start / to..end.div_ceil(to)).map(move |j| {
-        let overlap = end.min((j + 1) * to) - start.max(j * to);
-        (j, overlap as f32 / from as f32)
-    })
+/// A photo as `target` (the same camera, smaller) would see it: means of what it covers.
+pub(super) fn shrink(photo: &PhotoPixels, camera: &Camera, target: &Camera) -> PhotoPixels {
+    let (width, height) = (photo.width_px as usize, photo.height_px as usize);
+    let (channels, data) = match &photo.coverage {
+        None => (3, photo.rgb.as_flattened().to_vec()),
+        Some(coverage) => (4, photo.rgb.iter().zip(coverage).flat_map(|(&[r, g, b], &a)| [r, g, b, a]).collect()),
+    };
+    resample(&Pixels { width, height, channels, data }, camera, None, target)
 }
 
 /// Whether anything of the picture is left once it is undistorted: one of the places of a grid, at least.

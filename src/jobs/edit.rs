@@ -8,8 +8,7 @@ use crate::io::{SceneFolder, trained};
 use crate::pipeline::semantics::edit::{self, Edit};
 use crate::pipeline::semantics::extend::extend;
 use crate::pipeline::semantics::votes::Votes;
-use crate::render::RenderSettings;
-use crate::render::cpu::Renderer;
+use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, Level, Mask, NOBODY, SemanticMap};
 
 /// What is to be changed.

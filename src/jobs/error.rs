@@ -16,8 +16,7 @@ use crate::pipeline::semantics::segmenter::SegmentError;
 use crate::pipeline::synth::SynthError;
 use crate::pipeline::train::TrainError;
 use crate::pipeline::train::config::UnreadableConfig;
-use crate::render::gpu::GpuError;
-use crate::render::{DrawError, RenderError};
+use crate::render::{DrawError, GpuError, RenderError};
 
 /// Why a job did not do what was asked.
 #[derive(Debug, thiserror::Error)]

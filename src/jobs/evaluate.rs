@@ -14,8 +14,7 @@ use crate::pipeline::evaluate::evaluate;
 use crate::pipeline::observer::{Evaluation, Observer, Severity, Ticker, ViewScore};
 use crate::pipeline::train::TrainView;
 use crate::pipeline::train::border::Borders;
-use crate::render::cpu::Renderer;
-use crate::render::{Features, RenderSettings};
+use crate::render::{Features, RenderSettings, Renderer};
 use crate::scene::{Dataset, GaussianCloud};
 
 /// The difference picture shows errors this many times larger.
@@ -153,7 +152,7 @@ pub fn photometric(comparison: &Comparison, observer: &mut dyn Observer) -> Resu
 /// # Errors
 /// If a true depth is missing, a view cannot be drawn, or the observer asks to stop.
 pub fn depth(comparison: &Comparison, observer: &mut dyn Observer) -> Result<(DepthScores, f64), JobError> {
-    let mut renderer = Renderer::<f32>::new();
+    let mut renderer = Renderer::new();
     let mut counter = DepthCounter::default();
     let mut millis = Vec::with_capacity(comparison.views.len());
     comparison.walk("Measuring depth", observer, |index| {
@@ -181,7 +180,7 @@ fn side_by_side(
     view: &TrainView,
     path: &Path,
 ) -> Result<(), JobError> {
-    let frame = Renderer::<f32>::new().render(cloud, Features::NONE, &view.camera, settings)?;
+    let frame = Renderer::new().render(cloud, Features::NONE, &view.camera, settings)?;
     let mut render = frame.to_rgb8();
     let width = frame.width_px;
     let difference = |(a, b): (&[u8; 3], &[u8; 3])| {

@@ -18,7 +18,7 @@ use crate::pipeline::semantics::protocols::{
 use crate::pipeline::semantics::query_engine::QueryEngine;
 use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
 use crate::pipeline::semantics::view_map::ViewMap;
-use crate::render::cpu::Renderer;
+use crate::render::Renderer;
 use crate::scene::{Camera, Identities, IdentityId, LevelFilter, NOBODY, SemanticMap};
 
 /// How objects and parts are compared with labels.

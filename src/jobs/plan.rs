@@ -3,7 +3,7 @@
 use super::Scene;
 use crate::io::memory;
 use crate::pipeline::train::{TrainConfig, budget};
-use crate::render::gpu::real_gpu;
+use crate::render::real_gpu;
 use crate::scene::{Dataset, Facts, GaussianCloud, Machine, Overrides, ScenePlan};
 
 /// Looks at memory, cores and the graphics adapter. Takes some milliseconds: not for the window's

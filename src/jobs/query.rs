@@ -13,8 +13,7 @@ use crate::pipeline::semantics::matching::{self, MatchMode};
 use crate::pipeline::semantics::query_engine::QueryEngine;
 use crate::pipeline::semantics::stages::ms_since;
 use crate::pipeline::semantics::view_map::ViewMap;
-use crate::render::cpu::Renderer;
-use crate::render::{Features, RenderSettings};
+use crate::render::{Features, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, IdentityId, LevelFilter, Mask, SemanticMap};
 
 /// What the pixels of a view belong to, drawn once for all questions.
@@ -32,7 +31,7 @@ impl ViewMaps {
     /// # Errors
     /// If the view cannot be drawn.
     pub fn draw(
-        renderer: &mut Renderer<f32>,
+        renderer: &mut Renderer,
         (cloud, settings): (&GaussianCloud, &RenderSettings),
         map: &SemanticMap,
         camera: &Camera,
@@ -141,7 +140,7 @@ pub fn write_heat(
     camera: &Camera,
     relevancy: &[f32],
 ) -> Result<(), JobError> {
-    let frame = Renderer::<f32>::new().render(cloud, Features::NONE, camera, settings)?;
+    let frame = Renderer::new().render(cloud, Features::NONE, camera, settings)?;
     let mixed = frame.to_rgb8().into_iter().zip(relevancy).map(|(rgb, &relevancy)| {
         let heat = Colormap::Turbo.color(relevancy);
         let gray = (u32::from(rgb[0]) + u32::from(rgb[1]) + u32::from(rgb[2])) / 3;

@@ -8,8 +8,7 @@ use image::ColorType;
 use super::{JobError, Scene, export, plan, video};
 use crate::io::IoError;
 use crate::pipeline::observer::{Observer, Severity};
-use crate::render::cpu::normals;
-use crate::render::{Backend, BackendChoice, Frame, RenderSettings};
+use crate::render::{BackendChoice, Frame, RenderSettings, Renderer, normals};
 use crate::scene::{Camera, Overrides};
 
 /// What of a scene is drawn.
@@ -67,12 +66,12 @@ pub fn run(
     let depth = matches!(what, Quantity::Depth | Quantity::ExpectedDepth | Quantity::Normals);
     let settings = RenderSettings { depth, sh_degree: plan.sh_degree, ..scene.settings.clone() };
     let choice = video::backend(wanted, &settings, plan.on_cpu);
-    let mut backend = Backend::choose(choice, |why| observer.note(Severity::Warning, why))?;
-    let flat = settings.surfels && !matches!(backend, Backend::Cpu(_));
+    let mut renderer = Renderer::choose(choice, |why| observer.note(Severity::Warning, why))?;
+    let flat = settings.surfels && renderer.is_gpu();
     let start = Instant::now();
-    let frame = backend.render(&scene.cloud, camera, &settings)?;
+    let frame = renderer.draw(&scene.cloud, camera, &settings)?;
     let millis = start.elapsed().as_secs_f64() * 1e3;
-    Ok(Rendered { frame, backend: backend.name().to_owned(), millis, sh_degree: settings.sh_degree, flat })
+    Ok(Rendered { frame, backend: renderer.name().to_owned(), millis, sh_degree: settings.sh_degree, flat })
 }
 
 /// Writes a frame as a `.png`, or as an array where the name ends in `.npy`. Returns the depth that 65535 stands

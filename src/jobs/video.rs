@@ -8,7 +8,7 @@ use super::{JobError, export};
 use crate::io::animation::{Settings, Summary};
 use crate::pipeline::film::{self, Marked};
 use crate::pipeline::observer::{Observer, Severity};
-use crate::render::{Backend, BackendChoice, RenderSettings};
+use crate::render::{BackendChoice, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 
 /// The color of what is marked.
@@ -60,9 +60,9 @@ pub fn run(request: VideoRequest, observer: &mut dyn Observer) -> Result<Video, 
     let VideoRequest { cloud, draw, cameras, marked, out, settings, backend } = request;
     let marked = marked.as_ref().map(|(map, ids)| Marked { map, ids, color: MARK });
     let choice = self::backend(backend, &draw, false);
-    let mut backend = Backend::choose(choice, |why| observer.note(Severity::Warning, why))?;
+    let mut renderer = Renderer::choose(choice, |why| observer.note(Severity::Warning, why))?;
     let start = Instant::now();
     export::make_parent(&out)?;
-    let summary = film::write(&cloud, &draw, &cameras, marked, &mut backend, (&out, &settings), observer)?;
-    Ok(Video { summary, backend: backend.name().to_owned(), secs: start.elapsed().as_secs_f64() })
+    let summary = film::write(&cloud, &draw, &cameras, marked, &mut renderer, (&out, &settings), observer)?;
+    Ok(Video { summary, backend: renderer.name().to_owned(), secs: start.elapsed().as_secs_f64() })
 }

@@ -6,6 +6,7 @@ pub mod finite;
 pub mod grid;
 pub mod lanes;
 pub mod real;
+pub mod resize;
 pub mod rotation;
 pub mod sh;
 pub mod srgb;

@@ -39,6 +39,11 @@ pub fn worst_difference<A: Real, B: Real>(a: &[A], b: &[B]) -> f64 {
     worst(a.iter().zip(b).map(|(a, b)| (a.f64() - b.f64()).abs()))
 }
 
+/// PSNR in dB (peak 1) of a mean squared error; infinite for 0.
+pub fn psnr_of(mse: f64) -> f64 {
+    -10.0 * mse.log10()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,13 +1,8 @@
 //! Cutting a tile: the same arithmetic as `tools/encoder/tiles.py`, held equal by a test.
 
 use super::Tile;
+use crate::math::resize::{Filter, resize};
 use crate::scene::Mask;
-
-/// Weights of the pixels `first..` of a line for one pixel of the resized line.
-struct Tap {
-    first: usize,
-    weights: Vec<f32>,
-}
 
 impl Tile {
     /// The region of a picture on black: its bounding box, padded to a square, resized. `None` for
@@ -21,52 +16,14 @@ impl Tile {
         let (w, h) = (bounds.x.len(), bounds.y.len());
         let square = w.max(h);
         let (left, top) = ((square - w) / 2, (square - h) / 2);
-        let taps = taps(square, side_px);
-        // Rows first: only those of the box have anything in them.
-        let mut wide = vec![[0.0_f32; 3]; h * side_px];
-        for (y, row) in wide.chunks_exact_mut(side_px).enumerate() {
-            let line = (bounds.y.start + y) * width_px + bounds.x.start;
-            for (tap, out) in taps.iter().zip(row) {
-                for (k, weight) in tap.weights.iter().enumerate() {
-                    let x = (tap.first + k).wrapping_sub(left);
-                    if x < w && mask.contains(line + x) {
-                        add(out, rgb[line + x], *weight);
-                    }
-                }
-            }
+        let mut padded = vec![[0.0_f32; 3]; square * square];
+        for y in 0..h {
+            let from = (bounds.y.start + y) * width_px + bounds.x.start;
+            let to = (top + y) * square + left;
+            (0..w).filter(|x| mask.contains(from + x)).for_each(|x| padded[to + x] = rgb[from + x]);
         }
-        let mut out = vec![[0.0_f32; 3]; side_px * side_px];
-        for (tap, row) in taps.iter().zip(out.chunks_exact_mut(side_px)) {
-            for (k, weight) in tap.weights.iter().enumerate() {
-                let y = (tap.first + k).wrapping_sub(top);
-                if y < h {
-                    let source = &wide[y * side_px..(y + 1) * side_px];
-                    row.iter_mut().zip(source).for_each(|(out, from)| add(out, *from, *weight));
-                }
-            }
-        }
-        Some(Self { side_px, rgb: out })
+        Some(Self { side_px, rgb: resize(&padded, (square, square), (side_px, side_px), Filter::Bilinear) })
     }
-}
-
-fn add(sum: &mut [f32; 3], value: [f32; 3], weight: f32) {
-    sum.iter_mut().zip(value).for_each(|(s, v)| *s += v * weight);
-}
-
-/// A triangle filter from `from` pixels to `to`, as wide as an output pixel where it shrinks.
-fn taps(from: usize, to: usize) -> Vec<Tap> {
-    let scale = from as f64 / to as f64;
-    let support = scale.max(1.0);
-    let tap = |i: usize| {
-        let centre = (i as f64 + 0.5) * scale;
-        let first = (centre - support - 0.5).ceil().max(0.0) as usize;
-        let end = ((centre + support - 0.5).floor().max(0.0) as usize + 1).min(from);
-        let weights: Vec<f64> =
-            (first..end).map(|j| (1.0 - (j as f64 + 0.5 - centre).abs() / support).max(0.0)).collect();
-        let sum: f64 = weights.iter().sum();
-        Tap { first, weights: weights.iter().map(|w| (w / sum) as f32).collect() }
-    };
-    (0..to).map(tap).collect()
 }
 
 #[cfg(test)]

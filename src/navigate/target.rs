@@ -6,8 +6,7 @@ use rayon::prelude::*;
 
 use super::matter::Matter;
 use super::pose::Pose;
-use crate::render::cpu::Renderer;
-use crate::render::{Features, RenderError, RenderSettings};
+use crate::render::{Features, RenderError, RenderSettings, Renderer};
 use crate::scene::{Bounds, Camera, GaussianCloud};
 
 /// Directions that are tried.
@@ -281,7 +280,7 @@ fn directions(n: usize) -> impl Iterator<Item = DVec3> {
 
 /// Draws a target in the scene and alone.
 struct Drawing<'a> {
-    renderer: Renderer<f32>,
+    renderer: Renderer,
     scene: &'a GaussianCloud,
     settings: RenderSettings,
     alone: GaussianCloud,

@@ -4,8 +4,7 @@ use super::metrics;
 use super::observer::{Evaluation, ViewScore};
 use super::train::TrainView;
 use crate::math::stats::mean;
-use crate::render::cpu::Renderer;
-use crate::render::{Features, RenderError, RenderSettings};
+use crate::render::{Features, RenderError, RenderSettings, Renderer};
 use crate::scene::GaussianCloud;
 
 /// PSNR and SSIM of each view. `step` and `secs` are copied into the result.
@@ -16,7 +15,7 @@ pub fn evaluate(
     step: u64,
     secs: f64,
 ) -> Result<Evaluation, RenderError> {
-    let mut renderer = Renderer::<f32>::new();
+    let mut renderer = Renderer::new();
     let mut scores = Vec::with_capacity(views.len());
     for view in views {
         let frame = renderer.render(cloud, Features::NONE, &view.camera, settings)?;

@@ -7,8 +7,7 @@ use super::observer::{Interrupted, Observer, Ticker};
 use super::semantics::view_map::ViewMap;
 use crate::io::animation::{AnimationError, AnimationWriter, Settings, Summary};
 
-use crate::render::cpu::Renderer;
-use crate::render::{Backend, DrawError, RenderError, RenderSettings};
+use crate::render::{DrawError, RenderError, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 
 /// How much of a marked pixel is the mark, of 8.
@@ -51,19 +50,18 @@ pub fn write(
     draw: &RenderSettings,
     cameras: &[Camera],
     marked: Option<Marked<'_>>,
-    backend: &mut Backend,
+    renderer: &mut Renderer,
     out: (&Path, &Settings),
     observer: &mut dyn Observer,
 ) -> Result<Summary, FilmError> {
     let mut ticker = Ticker::new("Drawing the video", cameras.len());
     observer.proceed()?;
     let mut writer = AnimationWriter::create(out.0, out.1)?;
-    let mut identities = Renderer::new();
     for (done, camera) in cameras.iter().enumerate() {
-        let mut pixels = backend.render(cloud, camera, draw)?.to_rgb8();
+        let mut pixels = renderer.draw(cloud, camera, draw)?.to_rgb8();
         if let Some(marked) = marked.filter(|m| !m.ids.is_empty()) {
             let Marked { map, ids, .. } = marked;
-            let view = ViewMap::render(&mut identities, cloud, &map.of, &map.identities, camera, draw)?;
+            let view = ViewMap::render(renderer, cloud, &map.of, &map.identities, camera, draw)?;
             for id in ids {
                 let mask = view.mask(&map.identities, *id);
                 mark(&mut pixels, camera.width_px as usize, |i| mask.contains(i), marked.color);
@@ -97,7 +95,6 @@ fn mark(pixels: &mut [[u8; 3]], width: usize, inside: impl Fn(usize) -> bool, co
 mod tests {
     use super::*;
     use crate::pipeline::observer::{Signal, Silent};
-    use crate::render::BackendChoice;
 
     #[test]
     fn a_film_has_a_frame_per_camera_and_a_cancelled_one_leaves_nothing() {
@@ -118,7 +115,7 @@ mod tests {
         cloud.opacity_logits.push(3.0);
         cloud.sh.push([1.0; 3]);
         let cloud = Arc::new(cloud);
-        let mut backend = Backend::choose(BackendChoice::Cpu, |_| {}).expect("the processor");
+        let mut backend = Renderer::new();
         let mut film = |name: &str, observer: &mut dyn Observer| {
             let path = folder.path().join(name);
             let settings = Settings::new(32, 16, 10.0);

@@ -1,8 +1,9 @@
 //! How close a picture is to a photo.
 
 use crate::math::Real;
-use crate::render::Frame;
-use crate::render::cpu::ssim::ssim;
+use crate::math::resize::nearest;
+use crate::math::stats::psnr_of;
+use crate::render::{Frame, ssim};
 use crate::scene::PhotoPixels;
 
 /// The colour planes of a photo, 0 to 1.
@@ -10,9 +11,24 @@ pub fn planes<R: Real>(photo: &PhotoPixels) -> [Vec<R>; 3] {
     std::array::from_fn(|c| photo.rgb.iter().map(|p| R::of(f64::from(p[c]) / 255.0)).collect())
 }
 
-/// PSNR in dB (peak 1) of a mean squared error; infinite for 0.
-pub fn psnr_of(mse: f64) -> f64 {
-    -10.0 * mse.log10()
+/// PSNR in dB of a picture of (width, height) px, clamped to 0..1, against a photo; infinite for an exact match. Pixels
+/// that the photo does not cover do not count; of a photo of another size the nearest pixels are compared.
+pub fn psnr<R: Real>(color: &[Vec<R>; 3], (width, height): (usize, usize), photo: &PhotoPixels) -> f64 {
+    let (w, h) = (photo.width_px as usize, photo.height_px as usize);
+    let (mut squared, mut covered) = (0.0, 0_usize);
+    for y in 0..height {
+        let row = nearest(y, h, height) * w;
+        for x in 0..width {
+            let at = row + nearest(x, w, width);
+            if photo.coverage.as_ref().is_some_and(|c| c[at] == 0) {
+                continue;
+            }
+            covered += 1;
+            let off = |c: usize| color[c][y * width + x].f64().clamp(0.0, 1.0) - f64::from(photo.rgb[at][c]) / 255.0;
+            squared += (0..3).map(|c| off(c) * off(c)).sum::<f64>();
+        }
+    }
+    psnr_of(squared / (3 * covered.max(1)) as f64)
 }
 
 /// PSNR and SSIM of a rendered frame, clamped to 0..1, against a photo of the same size. Pixels
@@ -21,9 +37,7 @@ pub fn score(frame: &Frame<f32>, photo: &PhotoPixels) -> (f64, f64) {
     let target = planes::<f64>(photo);
     let mut rendered: [Vec<f64>; 3] =
         std::array::from_fn(|c| frame.color[c].iter().map(|v| f64::from(v.clamp(0.0, 1.0))).collect());
-    let mut covered = target[0].len();
     if let Some(coverage) = &photo.coverage {
-        covered = coverage.iter().filter(|&&c| c > 0).count();
         for (plane, want) in rendered.iter_mut().zip(&target) {
             for ((r, t), c) in plane.iter_mut().zip(want).zip(coverage) {
                 if *c == 0 {
@@ -32,9 +46,8 @@ pub fn score(frame: &Frame<f32>, photo: &PhotoPixels) -> (f64, f64) {
             }
         }
     }
-    let squared: f64 = rendered.iter().flatten().zip(target.iter().flatten()).map(|(a, b)| (a - b) * (a - b)).sum();
-    let mse = squared / (3 * covered.max(1)) as f64;
-    (psnr_of(mse), ssim(&rendered, &target, frame.width_px))
+    let size = (frame.width_px, frame.height_px);
+    (psnr(&frame.color, size, photo), ssim(&rendered, &target, frame.width_px))
 }
 
 #[cfg(test)]
@@ -55,6 +68,14 @@ mod tests {
         assert!((db - 20.0).abs() < 1e-6);
         let (db, similarity) = score(&frame(0.0), &photo(0, None));
         assert!(db.is_infinite() && (similarity - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_photo_of_another_size_is_looked_at_where_the_pixels_centers_lie() {
+        let mut big = PhotoPixels { width_px: 8, height_px: 8, rgb: vec![[255; 3]; 64], coverage: None };
+        (0..16).for_each(|i| big.rgb[(2 * (i / 4) + 1) * 8 + 2 * (i % 4) + 1] = [0; 3]);
+        assert!((psnr(&frame(0.1).color, (4, 4), &big) - 20.0).abs() < 1e-6);
+        assert!(psnr(&frame(0.1).color, (4, 4), &photo(255, None)) < 1.0);
     }
 
     #[test]

@@ -8,12 +8,18 @@
 //! * a pixel is closed before the splat that would bring its transmittance under
 //!   `TRANSMITTANCE_MIN`.
 
-mod backend;
 pub mod cpu;
 pub mod gpu;
+mod renderer;
 
-pub use backend::{Backend, BackendChoice, Cost, DrawError, instead_of_gpu};
+pub use cpu::adam::{AdamStep, Rates};
+pub use cpu::contributions::ContributionSink;
+pub use cpu::ssim::{LossParts, PhotoLoss, ssim};
+pub use cpu::{RenderStats, normals, validate};
 pub use gpu::timing::StageTimes;
+pub use gpu::trainer::{StepLoss, Trainer as DeviceTrainer, TrainerSettings};
+pub use gpu::{Device, DevicePhoto, GpuError, real_gpu};
+pub use renderer::{BackendChoice, Cost, DifferentiableRenderer, DrawError, Renderer, instead_of_gpu};
 
 use serde::{Deserialize, Serialize};
 
@@ -217,4 +223,22 @@ pub struct CloudGradient<R> {
     pub screen: Vec<R>,
     /// Radius in px at which each Gaussian was drawn (3 sigma along its longer axis); 0 = not drawn.
     pub radius_px: Vec<f32>,
+}
+
+/// What density control knows of each Gaussian since it last ran.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DensityStats {
+    /// Sum of the screen gradients' lengths, loss per half picture side.
+    pub gradient: Vec<f32>,
+    /// Frames in which it was drawn.
+    pub seen: Vec<u32>,
+    /// Largest radius as a share of the picture's longer side.
+    pub radius: Vec<f32>,
+}
+
+impl DensityStats {
+    /// Nothing seen of `n` Gaussians.
+    pub fn new(n: usize) -> Self {
+        Self { gradient: vec![0.0; n], seen: vec![0; n], radius: vec![0.0; n] }
+    }
 }

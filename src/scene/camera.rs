@@ -206,17 +206,10 @@ impl Camera {
         }
     }
 
-    /// The camera of the picture whose `factor` x `factor` pixels are one; rows and columns that do not
-    /// fill one are cut off.
+    /// The same camera with a picture `factor` times smaller.
     pub fn reduced(&self, factor: u32) -> Self {
-        let factor = factor.max(1);
-        Self {
-            width_px: self.width_px / factor,
-            height_px: self.height_px / factor,
-            focal_px: self.focal_px / f64::from(factor),
-            principal_px: self.principal_px / f64::from(factor),
-            ..self.clone()
-        }
+        let side = |s: u32| (s / factor.max(1)).max(1);
+        self.resized(side(self.width_px), side(self.height_px))
     }
 
     /// The same camera at most `max_side_px` along its longer side, never enlarged.
@@ -325,7 +318,7 @@ mod tests {
         assert!((at(&other) - DVec2::new(50.0, 100.0)).length() < 1e-9, "{}", at(&other));
         let third = c.reduced(3);
         assert_eq!((third.width_px, third.height_px), (213, 160));
-        assert!((at(&third) - DVec2::new(100.0, 400.0) / 3.0).length() < 1e-9, "{}", at(&third));
+        assert!((at(&third) - DVec2::new(100.0 * 213.0 / 640.0, 400.0 / 3.0)).length() < 1e-9, "{}", at(&third));
         assert_eq!(c.reduced(0), c);
         assert_eq!((c.limited_to(640), c.limited_to(9_000)), (c.clone(), c.clone()));
         let small = c.limited_to(321);

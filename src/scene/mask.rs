@@ -4,6 +4,8 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use crate::math::resize::nearest;
+
 /// Words that one thread fills at least: less is not worth handing over.
 const WORDS_PER_TASK: usize = 1024;
 
@@ -158,10 +160,9 @@ impl Mask {
 
     /// The same region in a picture of another size: each pixel takes the value at its centre.
     pub fn resized(&self, width_px: usize, height_px: usize) -> Self {
-        let at = |i: usize, from: usize, to: usize| ((2 * i + 1) * from / (2 * to)).min(from.saturating_sub(1));
         Self::from_fn(width_px, height_px, |i| {
             let (x, y) = (i % width_px, i / width_px);
-            self.contains(at(y, self.height_px, height_px) * self.width_px + at(x, self.width_px, width_px))
+            self.contains(nearest(y, self.height_px, height_px) * self.width_px + nearest(x, self.width_px, width_px))
         })
     }
 }

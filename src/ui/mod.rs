@@ -37,7 +37,7 @@ pub fn run(first: Vec<Action>, wishes: Vec<Wish>) -> eframe::Result {
         .with_drag_and_drop(true);
     // An emulated adapter draws the window several times faster through OpenGL: its Vulkan side
     // runs both branches of every condition in the toolkit's shader.
-    if crate::render::gpu::real_gpu().is_none() {
+    if crate::render::real_gpu().is_none() {
         match open(viewport.clone(), eframe::Renderer::Glow, first.clone(), wishes.clone()) {
             // Not every system has it.
             Err(eframe::Error::OpenGL(_) | eframe::Error::Glutin(_) | eframe::Error::NoGlutinConfigs(..)) => {}

@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Progress, Severity, StepMetrics};
 use crate::pipeline::semantics::portraits::Gallery;
 use crate::render::RenderSettings;
-use crate::report::Report;
 use crate::scene::{Facts, Limits, Overrides, PhotoPixels, ScenePlan, SemanticMap, text};
 use crate::worker::{Event, Explored, Failure, JobId, JobKind, Lane, OpenedScene, Outcome, Visited};
 

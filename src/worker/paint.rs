@@ -2,7 +2,9 @@
 
 use super::action::ViewMode;
 use crate::math::colormap::Colormap;
+use crate::math::resize::nearest;
 use crate::math::stats::quantile;
+use crate::pipeline::metrics;
 use crate::render::Frame;
 use crate::scene::PhotoPixels;
 
@@ -22,7 +24,9 @@ pub(super) struct Drawn {
 pub(super) fn paint(frame: &Frame<f32>, mode: ViewMode, photo: Option<&PhotoPixels>) -> Drawn {
     let photo = photo.filter(|p| p.len() == p.width_px as usize * p.height_px as usize && !p.is_empty());
     let rgb = || frame.to_rgb8();
-    let psnr = photo.and_then(|p| psnr(frame, p));
+    // An exact match has no finite PSNR; none is shown for it.
+    let measure = |p| metrics::psnr(&frame.color, (frame.width_px, frame.height_px), p);
+    let psnr = photo.map(measure).filter(|db| db.is_finite());
     match (mode, photo) {
         (ViewMode::Depth, _) => {
             let (rgb, depth_range) = depth(frame);
@@ -52,37 +56,17 @@ fn depth(frame: &Frame<f32>) -> (Vec<[u8; 3]>, Option<(f32, f32)>) {
     (depths.iter().map(|d| Colormap::Turbo.color((d - near) / span)).collect(), Some((near, far)))
 }
 
-/// Calls `each` with the drawn and the photographed colour of every pixel that the photo covers.
-fn pairs(frame: &Frame<f32>, photo: &PhotoPixels, mut each: impl FnMut(usize, [u8; 3], [u8; 3])) {
-    let drawn = frame.to_rgb8();
-    let (w, h) = (photo.width_px as usize, photo.height_px as usize);
-    for (i, d) in drawn.into_iter().enumerate() {
-        let (x, y) = (i % frame.width_px, i / frame.width_px);
-        let at = ((2 * y + 1) * h / (2 * frame.height_px)) * w + (2 * x + 1) * w / (2 * frame.width_px);
-        if photo.coverage.as_ref().is_none_or(|c| c.get(at).is_some_and(|c| *c > 127)) {
-            each(i, d, photo.rgb[at]);
-        }
-    }
-}
-
+/// The amplified difference of every pixel that the photo covers.
 fn difference(frame: &Frame<f32>, photo: &PhotoPixels) -> Vec<[u8; 3]> {
-    let mut out = vec![[0; 3]; frame.alpha.len()];
-    pairs(frame, photo, |i, drawn, real| {
-        for c in 0..3 {
-            out[i][c] = u8::try_from(u16::from(drawn[c].abs_diff(real[c])) * DIFFERENCE_GAIN).unwrap_or(u8::MAX);
-        }
-    });
-    out
-}
-
-fn psnr(frame: &Frame<f32>, photo: &PhotoPixels) -> Option<f64> {
-    let (mut sum, mut n) = (0.0_f64, 0.0_f64);
-    pairs(frame, photo, |_, drawn, real| {
-        sum += (0..3).map(|c| f64::from(drawn[c].abs_diff(real[c])).powi(2)).sum::<f64>();
-        n += 3.0;
-    });
-    // An exact match has no finite PSNR; none is shown for it.
-    (sum > 0.0).then(|| 10.0 * (255.0 * 255.0 * n / sum).log10())
+    let (w, h) = (photo.width_px as usize, photo.height_px as usize);
+    let pixel = |(i, drawn): (usize, [u8; 3])| {
+        let (x, y) = (i % frame.width_px, i / frame.width_px);
+        let at = nearest(y, h, frame.height_px) * w + nearest(x, w, frame.width_px);
+        let covered = photo.coverage.as_ref().is_none_or(|c| c[at] > 127);
+        let off = |c: usize| u16::from(drawn[c].abs_diff(photo.rgb[at][c])) * DIFFERENCE_GAIN;
+        if covered { std::array::from_fn(|c| u8::try_from(off(c)).unwrap_or(u8::MAX)) } else { [0; 3] }
+    };
+    frame.to_rgb8().into_iter().enumerate().map(pixel).collect()
 }
 
 #[cfg(test)]

@@ -13,11 +13,11 @@ use crate::jobs::find_objects::FindSettings;
 use crate::jobs::go_to::{Explored, VisitRequest, Visited};
 use crate::jobs::video::VideoRequest;
 use crate::jobs::{JobError, OpenedScene};
+use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Interrupted, Progress, Severity, StepMetrics};
 use crate::pipeline::semantics::portraits::Gallery;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
-use crate::report::Report;
 use crate::scene::{Camera, Dataset, Facts, GaussianCloud, HomeView, Photo, PhotoPixels, SemanticMap};
 
 /// Names one job of one worker.

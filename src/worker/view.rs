@@ -11,8 +11,7 @@ use super::protocol::Failure;
 use super::thread::{Repaint, panic_failure};
 use super::{Slot, paint};
 use crate::jobs::query::ViewMaps;
-use crate::render::cpu::Renderer;
-use crate::render::{self, Backend, BackendChoice, Frame, RenderError, RenderSettings, StageTimes};
+use crate::render::{self, BackendChoice, Frame, RenderError, RenderSettings, Renderer, StageTimes};
 use crate::scene::plan::When;
 use crate::scene::trace::{self, Sort};
 use crate::scene::{Camera, GaussianCloud, PhotoPixels, ScenePlan, SemanticMap};
@@ -164,7 +163,7 @@ impl ViewLane {
                 let request = match next(&box_, patience.take()) {
                     Waited::Request(request) => request,
                     Waited::InVain => {
-                        painter.iter_mut().for_each(|p| p.backend.rest());
+                        painter.iter_mut().for_each(|p| p.renderer.rest());
                         mapper = Renderer::new();
                         continue;
                     }
@@ -265,7 +264,7 @@ fn next(mailbox: &(Mutex<Mailbox>, Condvar), patience: Option<Duration>) -> Wait
 }
 
 /// What the pixels of a resting view belong to; `None` if nobody wants to know.
-fn maps_of(renderer: &mut Renderer<f32>, request: &ViewRequest) -> Option<Result<ViewMaps, Failure>> {
+fn maps_of(renderer: &mut Renderer, request: &ViewRequest) -> Option<Result<ViewMaps, Failure>> {
     let semantics = request.semantics.as_ref().filter(|s| s.of.len() == request.cloud.len())?;
     if request.effort != Effort::Full {
         return None;
@@ -286,7 +285,7 @@ fn maps_of(renderer: &mut Renderer<f32>, request: &ViewRequest) -> Option<Result
 
 /// Draws requests, and learns how fast it can.
 struct Painter {
-    backend: Backend,
+    renderer: Renderer,
     /// Whether no GPU was to be used.
     without_gpu: bool,
     /// Why the CPU draws though there is a GPU.
@@ -307,27 +306,27 @@ impl Painter {
     fn without_gpu(without_gpu: bool) -> Self {
         let choice = if without_gpu { BackendChoice::Cpu } else { BackendChoice::Auto };
         let mut instead_of_gpu = None;
-        let backend = Backend::choose(choice, |why| instead_of_gpu = Some(why)).unwrap_or_else(|_| Backend::on_cpu());
-        Self { backend, without_gpu, instead_of_gpu, cost: None }
+        let renderer = Renderer::choose(choice, |why| instead_of_gpu = Some(why)).unwrap_or_default();
+        Self { renderer, without_gpu, instead_of_gpu, cost: None }
     }
 
     /// Goes on with the CPU: a GPU has failed, or buffers may be in any state.
     fn fall_back(&mut self, why: &str) {
-        if matches!(self.backend, Backend::Gpu(_)) {
+        if self.renderer.is_gpu() {
             self.instead_of_gpu = Some(render::instead_of_gpu(&why));
         }
-        (self.backend, self.cost) = (Backend::on_cpu(), None);
+        (self.renderer, self.cost) = (Renderer::new(), None);
     }
 
     fn draw(&mut self, request: &ViewRequest) -> ViewResult {
         let camera = self.fitting_camera(&request.camera, request.effort);
         let full = camera == request.camera;
         // Without times there is still a picture.
-        let _ = self.backend.time_stages(request.timed);
+        let _ = self.renderer.time_stages(request.timed);
         let start = Instant::now();
         let frame = match self.try_render(request, &camera) {
             // A GPU that fails (lost, out of memory) leaves the CPU to draw from then on.
-            Err(failure) if matches!(self.backend, Backend::Gpu(_)) => {
+            Err(failure) if self.renderer.is_gpu() => {
                 self.fall_back(&failure.message);
                 self.try_render(request, &camera)?
             }
@@ -335,7 +334,7 @@ impl Painter {
         };
         let secs = start.elapsed().as_secs_f64();
         self.learn(secs, f64::from(camera.width_px * camera.height_px));
-        let stages = self.backend.stage_times();
+        let stages = self.renderer.stage_times();
         let start = Instant::now();
         let drawn = paint::paint(&frame, request.mode, request.photo.as_deref());
         let paint_secs = start.elapsed().as_secs_f64();
@@ -351,7 +350,7 @@ impl Painter {
             secs,
             stages,
             paint_secs,
-            drawn_by: self.backend.name().to_owned(),
+            drawn_by: self.renderer.name().to_owned(),
             instead_of_gpu: self.instead_of_gpu.clone(),
         }))
     }
@@ -359,7 +358,7 @@ impl Painter {
     fn try_render(&mut self, request: &ViewRequest, camera: &Camera) -> Result<Frame<f32>, Failure> {
         let depth = request.effort == Effort::Full || request.mode == ViewMode::Depth || !request.leave.depth;
         let settings = RenderSettings { depth, ..request.settings.clone() };
-        match catch_unwind(AssertUnwindSafe(|| self.backend.render(&request.cloud, camera, &settings))) {
+        match catch_unwind(AssertUnwindSafe(|| self.renderer.draw(&request.cloud, camera, &settings))) {
             Ok(result) => result.map_err(|e| Failure::of(&e, "Reset the view (Home), or open the scene again.")),
             Err(payload) => {
                 let failure = panic_failure(payload.as_ref());
@@ -371,7 +370,7 @@ impl Painter {
 
     /// Takes in what the last frame cost.
     fn learn(&mut self, secs: f64, pixels: f64) {
-        let cost = self.backend.cost(secs);
+        let cost = self.renderer.cost(secs);
         let now = Speed { fixed_secs: cost.fixed_secs, secs_per_px: cost.pixels_secs / pixels };
         let old = self.cost.unwrap_or(now);
         let mix = |old: f64, new: f64| 0.6 * old + 0.4 * new;
@@ -458,7 +457,7 @@ mod tests {
     fn a_slow_machine_draws_smaller_while_the_eye_moves() {
         let camera = Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 1000, 600).expect("valid");
         let of = |fixed_secs, secs_per_px| Painter {
-            backend: Backend::on_cpu(),
+            renderer: Renderer::new(),
             without_gpu: true,
             instead_of_gpu: None,
             cost: Some(Speed { fixed_secs, secs_per_px }),

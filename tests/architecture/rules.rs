@@ -6,7 +6,7 @@ use super::source::{SourceFile, library_code, test_module_files};
 pub type Complaint = String;
 
 /// Each module of the library and the other modules it may use, in the order of the data flow.
-const MODULES: [(&str, &[&str]); 14] = [
+const MODULES: [(&str, &[&str]); 13] = [
     ("math", &[]),
     ("scene", &["math"]),
     ("io", &["math", "scene"]),
@@ -14,29 +14,12 @@ const MODULES: [(&str, &[&str]); 14] = [
     ("render", &["math", "scene"]),
     ("pipeline", &["math", "scene", "io", "models", "render"]),
     ("navigate", &["math", "scene", "render"]),
-    ("stability", &["math", "scene", "io", "render", "pipeline", "navigate"]),
-    ("report", &["math", "scene", "io", "models", "render", "pipeline", "navigate"]),
-    ("jobs", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "report"]),
-    ("worker", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "report", "jobs"]),
+    ("measure", &["math", "scene", "io", "models", "render", "pipeline", "navigate"]),
+    ("jobs", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "measure"]),
+    ("worker", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "measure", "jobs"]),
     ("agent", &["math", "scene", "io", "render", "pipeline", "navigate", "jobs", "worker"]),
-    (
-        "cli",
-        &[
-            "math",
-            "scene",
-            "io",
-            "models",
-            "render",
-            "pipeline",
-            "navigate",
-            "stability",
-            "report",
-            "jobs",
-            "worker",
-            "agent",
-        ],
-    ),
-    ("ui", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "report", "jobs", "worker", "agent"]),
+    ("cli", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "measure", "jobs", "worker", "agent"]),
+    ("ui", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "measure", "jobs", "worker", "agent"]),
 ];
 
 /// Longest Rust file in lines.
@@ -57,6 +40,22 @@ pub fn module_order(files: &[SourceFile]) -> Vec<Complaint> {
             let known = MODULES.iter().any(|(name, _)| *name == used);
             if known && used != module && !allowed.contains(&used.as_str()) {
                 complaints.push(format!("{}: '{module}' may not use '{used}'", file.path));
+            }
+        }
+    }
+    complaints
+}
+
+/// Modules that may name the CPU and the GPU renderer: they draw in double precision to measure by it.
+const ORACLES: [&str; 4] = ["render", "stability", "report", "measure"];
+
+/// Everybody else draws by the doors of `render`, whatever is behind them; test code is exempt.
+pub fn render_doors(files: &[SourceFile]) -> Vec<Complaint> {
+    let mut complaints = Vec::new();
+    for file in library_files(files).filter(|f| !top_module(&f.path).is_some_and(|m| ORACLES.contains(&m))) {
+        for behind in names_after(&library_code(&file.text), &["render::".to_owned()]) {
+            if ["cpu", "gpu"].contains(&behind.as_str()) {
+                complaints.push(format!("{}: names 'render::{behind}': use what 'render' itself offers", file.path));
             }
         }
     }
@@ -178,13 +177,21 @@ fn depth(path: &str) -> usize {
 /// The crate's own modules that `code` names by `crate::`, by a group `crate::{..}`, or by as
 /// many `super::` as lead to the root.
 fn used_modules(code: &str, depth: usize) -> Vec<String> {
+    // A longer chain of `super::` leads elsewhere.
+    names_after(code, &["crate::".to_owned(), "super::".repeat(depth)])
+}
+
+/// The path segments that follow any of `starts`, each at the start of a name.
+fn names_after(code: &str, starts: &[String]) -> Vec<String> {
     let flat: String = code.split_whitespace().collect::<Vec<_>>().join(" ");
     let flat = flat.replace(" ::", "::").replace(":: ", "::");
     let mut used = Vec::new();
-    for start in ["crate::".to_owned(), "super::".repeat(depth)] {
-        for (at, _) in flat.match_indices(&start) {
-            // A longer chain of `super::`, or a name such as `my_crate::`, is something else.
-            if flat[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ':') {
+    for start in starts {
+        for (at, _) in flat.match_indices(start) {
+            // So is a name such as `my_crate::`.
+            let before = &flat[..at];
+            let chained = start.starts_with("super::") && before.ends_with(':');
+            if chained || before.ends_with(|c: char| c.is_alphanumeric() || c == '_') {
                 continue;
             }
             used.extend(first_names(&flat[at + start.len()..]));

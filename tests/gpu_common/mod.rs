@@ -6,11 +6,11 @@ pub mod compare;
 
 use std::sync::{Mutex, PoisonError};
 
-use fmlgs::render::gpu::Context;
+use fmlgs::render::gpu::Device;
 
 /// Runs `test` on the machine's GPU, or skips it. One test at a time, since a software adapter uses
 /// every core for each.
-pub fn with_context(test: impl FnOnce(&Context)) {
+pub fn with_context(test: impl FnOnce(&Device)) {
     static TURN: Mutex<()> = Mutex::new(());
     let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(context) = adapter::context() {

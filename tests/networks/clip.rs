@@ -1,10 +1,11 @@
 //! CLIP: tokens, prepared pictures, embeddings.
 
+use fmlgs::math::resize::Filter;
 use fmlgs::math::vector::{dot, unit};
 use fmlgs::models::clip::ClipEncoder;
 use fmlgs::models::clip::tokens::{Tokens, clean};
 use fmlgs::models::network::Array;
-use fmlgs::models::prepare::{Filter, Prepare, Side};
+use fmlgs::models::prepare::{Prepare, Side};
 use fmlgs::models::{Encoder, ModelError, Tile};
 use fmlgs::scene::PhotoPixels;
 

@@ -1,10 +1,10 @@
 //! SAM and SAM 2 on single pictures, and their automatic masks.
 
+use fmlgs::math::resize::{Filter, resize};
 use fmlgs::models::network::Array;
-use fmlgs::models::prepare::{Filter, Side, resize};
+use fmlgs::models::prepare::{Side, enlarge};
 use fmlgs::models::room::close_idle;
 use fmlgs::models::sam::automatic::{AutomaticOptions, Collector, Something, crops, everything};
-use fmlgs::models::sam::enlarge::enlarge;
 use fmlgs::models::sam::{PromptedMasks, Sam};
 use fmlgs::models::sam2::Sam2;
 use fmlgs::scene::Mask;
@@ -41,7 +41,8 @@ fn decoder_agrees(network: &mut dyn PromptedMasks, t: &Tensors) {
 fn sam_agrees_with_the_official_code() {
     let (t, mut sam) = (Tensors::open("sam.safetensors"), Sam::open(&fixture::path("sam.json")).expect("opens"));
     let picture = t.picture("picture", 0);
-    let resized = resize(&picture, 128, 96, Filter::Bilinear).expect("pixels");
+    let resized =
+        resize(&picture.rgb, (picture.width_px as usize, picture.height_px as usize), (128, 96), Filter::Bilinear);
     let official = t.picture("resized", 0).rgb;
     let largest = resized.as_flattened().iter().zip(official.as_flattened()).map(|(a, b)| a.abs_diff(*b)).max();
     assert_eq!(largest, Some(0), "resized bit by bit");

@@ -9,8 +9,9 @@ use serde::Deserialize;
 
 use self::tokens::Tokens;
 use super::network::{Array, Network};
-use super::prepare::{Filter, Prepare, Side};
+use super::prepare::{Prepare, Side};
 use super::{Encoder, ModelError, Tile, metadata};
+use crate::math::resize::Filter;
 use crate::scene::PhotoPixels;
 
 /// Tiles that go through the network together.

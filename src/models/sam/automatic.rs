@@ -5,11 +5,10 @@
 use rayon::prelude::*;
 
 use super::PromptedMasks;
-use super::enlarge::enlarge;
 use crate::math::grid::regions;
 use crate::models::ModelError;
 use crate::models::network::Array;
-use crate::models::prepare::Side;
+use crate::models::prepare::{Side, enlarge};
 use crate::scene::{Mask, PhotoPixels};
 
 /// Settings; the defaults are LangSplat's.

@@ -4,15 +4,15 @@
 //! asks it for a grid of points and keeps what is good.
 
 pub mod automatic;
-pub mod enlarge;
 
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
 use super::network::{Array, Network};
-use super::prepare::{Filter, Prepare, Side};
+use super::prepare::{Prepare, Side};
 use super::{ModelError, metadata};
+use crate::math::resize::Filter;
 use crate::scene::PhotoPixels;
 
 /// Masks for a batch of prompts.

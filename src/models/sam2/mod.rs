@@ -11,10 +11,10 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::network::{Array, Network};
-use super::prepare::{Filter, Prepare, Side};
-use super::sam::enlarge::shrink;
+use super::prepare::{Prepare, Side};
 use super::sam::{Prompted, PromptedMasks, prompt_inputs};
 use super::{ModelError, metadata};
+use crate::math::resize::{Filter, resize};
 use crate::scene::PhotoPixels;
 
 /// What the metadata file says.
@@ -163,7 +163,9 @@ impl Sam2 {
         let Metadata { image_size, mean, std, .. } = self.about;
         let plane = |c: usize| {
             let values: Vec<f32> = picture.rgb.iter().map(|p| f32::from(p[c]) / 255.0).collect();
-            shrink(&values, (w, h), image_size).into_iter().map(move |v| (v - mean[c]) / std[c])
+            resize(&values, (w, h), (image_size, image_size), Filter::Bilinear)
+                .into_iter()
+                .map(move |v| (v - mean[c]) / std[c])
         };
         Some(Array::new(&[1, 3, image_size, image_size], (0..3).flat_map(plane).collect()))
     }

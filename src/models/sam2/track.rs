@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Decoded, Frame, Sam2};
 use crate::math::grid::regions;
+use crate::math::resize::{Filter, resize};
 use crate::models::ModelError;
 use crate::models::network::Array;
-use crate::models::sam::enlarge::{bilinear, shrink};
 use crate::scene::{Mask, PhotoPixels};
 
 /// The caller's number of an object.
@@ -169,7 +169,7 @@ impl<'a> Track<'a> {
         let side = self.model.about.image_size;
         let (w, h) = (mask.width_px(), mask.height_px());
         let plane: Vec<f32> = (0..w * h).map(|i| f32::from(u8::from(mask.contains(i)))).collect();
-        let square = if (w, h) == (side, side) { plane } else { shrink(&plane, (w, h), side) };
+        let square = resize(&plane, (w, h), (side, side), Filter::Bilinear);
         let square: Vec<f32> = square.into_iter().map(|v| f32::from(u8::from(v >= 0.5))).collect();
         let is_there = square.contains(&1.0);
         let (as_prompt, logits) = self.model.mask_prompt(Array::new(&[1, 1, side, side], square))?;
@@ -367,7 +367,7 @@ impl<'a> Track<'a> {
 /// An object's pixels in a picture of `size` px.
 pub fn mask_of(out: &Output, size: (usize, usize)) -> Mask {
     let low = out.logits.shape[3];
-    let full = bilinear(&out.logits.values, (low, low), size);
+    let full = resize(&out.logits.values, (low, low), size, Filter::Linear);
     Mask::from_fn(size.0, size.1, |i| full[i] > 0.0)
 }
 

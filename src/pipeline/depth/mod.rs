@@ -47,8 +47,7 @@ pub use errors::{DepthErrors, Samples};
 pub use truth::{EDGE_JUMP, EDGE_PX, TrueDepth};
 
 use crate::io::IoError;
-use crate::render::cpu::Renderer;
-use crate::render::{Features, RenderError, RenderSettings};
+use crate::render::{Features, RenderError, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, Photo};
 
 /// The folder of true depths in a synthetic data set.
@@ -126,7 +125,7 @@ impl DepthCounter {
     /// If the view cannot be drawn.
     pub fn draw(
         &mut self,
-        renderer: &mut Renderer<f32>,
+        renderer: &mut Renderer,
         cloud: &GaussianCloud,
         camera: &Camera,
         settings: &RenderSettings,

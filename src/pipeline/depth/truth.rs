@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::io::{IoError, npy};
 use crate::math::grid::neighbours;
+use crate::math::resize::between;
 
 /// Neighbouring depths whose ratio is larger belong to different surfaces.
 pub const EDGE_JUMP: f32 = 1.05;
@@ -38,15 +39,9 @@ impl TrueDepth {
         if (width, height) == (self.width, self.height) {
             return self.clone();
         }
-        let place = |i: usize, from: usize, to: usize| (i as f64 + 0.5) * from as f64 / to as f64 - 0.5;
         let at = |x: usize, y: usize| self.values[y * self.width + x];
-        let pair = |p: f64, n: usize| {
-            let low = p.floor().clamp(0.0, (n - 1) as f64) as usize;
-            (low, (low + 1).min(n - 1), (p - low as f64).clamp(0.0, 1.0) as f32)
-        };
         let value = |x: usize, y: usize| {
-            let ((x0, x1, u), (y0, y1, v)) =
-                (pair(place(x, self.width, width), self.width), pair(place(y, self.height, height), self.height));
+            let ((x0, x1, u), (y0, y1, v)) = (between(x, self.width, width), between(y, self.height, height));
             let four = [at(x0, y0), at(x1, y0), at(x0, y1), at(x1, y1)];
             let (near, far) = four.iter().fold((f32::INFINITY, 0.0_f32), |(n, f), &z| (n.min(z), f.max(z)));
             if near > 0.0 && far <= near * EDGE_JUMP {

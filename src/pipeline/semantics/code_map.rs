@@ -1,7 +1,6 @@
 //! Codes of a view's pixels, blended as the paper does: both levels in one pass, divided by alpha.
 
-use crate::render::cpu::Renderer;
-use crate::render::{Features, RenderError, RenderSettings};
+use crate::render::{Features, RenderError, RenderSettings, Renderer};
 use crate::scene::semantic_map::CODE_CHANNELS;
 use crate::scene::{Camera, GaussianCloud, Level};
 
@@ -26,7 +25,7 @@ impl CodeMap {
     /// # Errors
     /// If the camera is not usable or there is not one set of codes per Gaussian.
     pub fn render(
-        renderer: &mut Renderer<f32>,
+        renderer: &mut Renderer,
         cloud: &GaussianCloud,
         codes: &[[f32; CODE_CHANNELS]],
         parts: bool,

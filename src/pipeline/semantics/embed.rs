@@ -7,8 +7,7 @@ use super::view_map::ViewMap;
 use crate::io::{self, IoError};
 use crate::models::{Encoder, ModelError, Tile};
 use crate::pipeline::observer::{Interrupted, Observer, Ticker};
-use crate::render::cpu::Renderer;
-use crate::render::{RenderError, RenderSettings};
+use crate::render::{RenderError, RenderSettings, Renderer};
 use crate::scene::language::MAX_VIEWS;
 use crate::scene::{
     GaussianCloud, Identities, IdentityId, LanguageFeatures, Level, Mask, Photo, PhotoPixels, SemanticMap, ViewFeatures,
@@ -96,7 +95,7 @@ struct Looker<'a> {
     cloud: &'a GaussianCloud,
     map: &'a SemanticMap,
     settings: &'a RenderSettings,
-    renderer: Renderer<f32>,
+    renderer: Renderer,
 }
 
 impl Looker<'_> {

@@ -19,8 +19,7 @@ use super::view_map::ViewMap;
 use crate::io::labels::Labels;
 use crate::models::Encoder;
 use crate::pipeline::observer::{Observer, Severity};
-use crate::render::cpu::Renderer;
-use crate::render::{RenderError, RenderSettings};
+use crate::render::{RenderError, RenderSettings, Renderer};
 use crate::scene::semantic_map::{BACKGROUND_CODE, CODE_CHANNELS};
 use crate::scene::{GaussianCloud, Identities, IdentityId, Photo, SemanticMap};
 

@@ -24,8 +24,7 @@ use crate::models::{self, Encoder, ModelError};
 use crate::pipeline::observer::Silent;
 use crate::pipeline::synth::{self, Rig, SynthOptions};
 use crate::pipeline::train::{self, TrainConfig};
-use crate::render::cpu::Renderer;
-use crate::render::{BackendChoice, RenderSettings};
+use crate::render::{BackendChoice, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, LanguageFeatures, Level, Photo, SemanticMap};
 
 /// What is measured on.

@@ -2,8 +2,7 @@
 
 use glam::DVec3;
 
-use crate::render::cpu::Renderer;
-use crate::render::{Features, RenderError, RenderSettings};
+use crate::render::{Features, RenderError, RenderSettings, Renderer};
 use crate::scene::{Bounds, Camera, GaussianCloud, SemanticMap};
 
 /// Width and height of a portrait, px.
@@ -26,7 +25,7 @@ pub fn portraits(
     from: DVec3,
     up: DVec3,
 ) -> Result<Gallery, RenderError> {
-    let mut renderer = Renderer::<f32>::new();
+    let mut renderer = Renderer::new();
     let mut list = Vec::with_capacity(map.identities.len());
     for (id, _) in map.identities.iter() {
         let alone = cloud.select(&map.members(id));

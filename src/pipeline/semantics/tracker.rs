@@ -11,8 +11,7 @@ use super::segmenter::{FoundMask, SegmentError, Segmenter};
 use super::view_map::ViewMap;
 use super::votes::{Belonging, UNKNOWN, Votes};
 use crate::pipeline::observer::{Interrupted, Observer, Severity, Ticker};
-use crate::render::cpu::Renderer;
-use crate::render::{RenderError, RenderSettings};
+use crate::render::{RenderError, RenderSettings, Renderer};
 use crate::scene::{GaussianCloud, Identities, IdentityId, NOBODY, Photo};
 
 /// Least weight of votes, in px of the photos voted on, that says something about a Gaussian.
@@ -173,7 +172,7 @@ struct Tracker<'a> {
     photos: &'a [Photo],
     settings: &'a RenderSettings,
     options: &'a TrackOptions,
-    renderer: Renderer<f32>,
+    renderer: Renderer,
     identities: Identities,
     votes: Votes,
     disagreements: Vec<(usize, Disagreement)>,

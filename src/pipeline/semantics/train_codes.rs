@@ -10,10 +10,9 @@ use super::votes::UNKNOWN;
 use crate::math::finite::{CHECKED, all_finite};
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::pipeline::train::device::LAMBDA;
-use crate::render::cpu::Renderer;
-use crate::render::cpu::adam::AdamStep;
-use crate::render::cpu::ssim::PhotoLoss;
-use crate::render::{Features, FrameGradient, RenderError, RenderSettings};
+use crate::render::{
+    AdamStep, DifferentiableRenderer, Features, FrameGradient, PhotoLoss, RenderError, RenderSettings,
+};
 use crate::scene::semantic_map::{BACKGROUND_CODE, CODE_CHANNELS};
 use crate::scene::{Camera, GaussianCloud, Identities, IdentityId};
 
@@ -57,7 +56,7 @@ pub fn train_codes(
     let targets: Vec<[Vec<f32>; CODE_CHANNELS]> = views.iter().map(|v| target(v, identities)).collect();
     let mut moments = vec![[[0.0_f32; 2]; CODE_CHANNELS]; codes.len()];
     let mut touched = vec![0_u64; codes.len()];
-    let mut renderer = Renderer::new();
+    let mut renderer = DifferentiableRenderer::new();
     let mut loss = PhotoLoss::default();
     let mut rng = Pcg64Mcg::seed_from_u64(training.seed);
     let (mut order, mut last): (Vec<usize>, Vec<f64>) = (Vec::new(), Vec::new());
@@ -101,7 +100,7 @@ pub fn train_codes(
 
 /// Draws a view and goes back; afterwards the renderer holds the gradient. Returns the loss.
 fn one_step(
-    renderer: &mut Renderer<f32>,
+    renderer: &mut DifferentiableRenderer,
     loss: &mut PhotoLoss<f32>,
     cloud: &GaussianCloud,
     codes: &[[f32; CODE_CHANNELS]],

@@ -3,9 +3,7 @@
 //! Rendered once per view; every query then only reads it.
 
 use crate::math::lanes::Lane;
-use crate::render::cpu::Renderer;
-use crate::render::cpu::weigh::Weighed;
-use crate::render::{RenderError, RenderSettings, TILE_PX};
+use crate::render::{ContributionSink, RenderError, RenderSettings, Renderer, TILE_PX};
 use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, Mask, NOBODY};
 
 use super::votes::UNKNOWN;
@@ -35,7 +33,7 @@ impl ViewMap {
     /// # Errors
     /// If the camera is not usable.
     pub fn render(
-        renderer: &mut Renderer<f32>,
+        renderer: &mut Renderer,
         cloud: &GaussianCloud,
         of: &[IdentityId],
         identities: &Identities,
@@ -49,7 +47,7 @@ impl ViewMap {
         let mut rows: Vec<Row<'_>> = (0..strips)
             .map(|ty| Row { of, width, top: ty * TILE_PX, slots: vec![[(NOBODY, 0.0); SLOTS]; strip(ty)] })
             .collect();
-        renderer.weigh(cloud, camera, settings, &mut rows)?;
+        renderer.contributions(cloud, camera, settings, &mut rows)?;
         let objects: Vec<IdentityId> = (0..=identities.len() as IdentityId).map(|i| identities.object_of(i)).collect();
         let mut map = Self { width_px: width, height_px: height, ..Self::default() };
         for slots in rows.iter().flat_map(|r| &r.slots) {
@@ -102,7 +100,7 @@ struct Row<'a> {
     slots: Vec<[(IdentityId, f32); SLOTS]>,
 }
 
-impl Weighed<f32> for Row<'_> {
+impl ContributionSink<f32> for Row<'_> {
     fn add(&mut self, gaussian: u32, x: usize, y: usize, weights: &Lane<f32>) {
         let identity = self.of[gaussian as usize];
         let first = (y - self.top) * self.width + x;

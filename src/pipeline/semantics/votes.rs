@@ -5,9 +5,7 @@ use rayon::prelude::*;
 
 use crate::math::finite::{CHECKED, all_finite};
 use crate::math::lanes::Lane;
-use crate::render::cpu::Renderer;
-use crate::render::cpu::weigh::Weighed;
-use crate::render::{RenderError, RenderSettings, TILE_PX};
+use crate::render::{ContributionSink, RenderError, RenderSettings, Renderer, TILE_PX};
 use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, NOBODY};
 
 /// A pixel about which nothing is known.
@@ -60,7 +58,7 @@ impl Votes {
     /// If the camera is not usable or has another number of pixels.
     pub fn add_view(
         &mut self,
-        renderer: &mut Renderer<f32>,
+        renderer: &mut Renderer,
         cloud: &GaussianCloud,
         camera: &Camera,
         settings: &RenderSettings,
@@ -70,7 +68,7 @@ impl Votes {
         assert_eq!(labels.len(), width * height, "one label per pixel");
         let row = || Row { labels, width, gaussian: u32::MAX, sums: Vec::new(), found: Vec::new() };
         let mut rows: Vec<Row<'_>> = (0..height.div_ceil(TILE_PX)).map(|_| row()).collect();
-        renderer.weigh(cloud, camera, settings, &mut rows)?;
+        renderer.contributions(cloud, camera, settings, &mut rows)?;
         for mut row in rows {
             row.finish();
             for (gaussian, identity, weight) in row.found {
@@ -141,7 +139,7 @@ impl Row<'_> {
     }
 }
 
-impl Weighed<f32> for Row<'_> {
+impl ContributionSink<f32> for Row<'_> {
     fn add(&mut self, gaussian: u32, x: usize, y: usize, weights: &Lane<f32>) {
         if gaussian != self.gaussian {
             self.finish();

@@ -4,6 +4,7 @@ use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 
 use crate::math::Real;
+pub use crate::render::DensityStats;
 use crate::scene::GaussianCloud;
 
 /// Mean screen gradient (loss per half picture side) above which a region is under-reconstructed.
@@ -20,24 +21,6 @@ const PRUNE_OPACITY: f32 = 0.005;
 const RESET_OPACITY: f64 = 0.01;
 /// Split Gaussians shrink by this.
 const SPLIT_SHRINK: f32 = 1.6;
-
-/// What density control knows of each Gaussian since it last ran.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct DensityStats {
-    /// Sum of screen gradients.
-    pub gradient: Vec<f32>,
-    /// Frames in which it was drawn.
-    pub seen: Vec<u32>,
-    /// Largest radius as a share of the picture's longer side.
-    pub radius: Vec<f32>,
-}
-
-impl DensityStats {
-    /// Nothing seen of `n` Gaussians.
-    pub fn new(n: usize) -> Self {
-        Self { gradient: vec![0.0; n], seen: vec![0; n], radius: vec![0.0; n] }
-    }
-}
 
 /// What a round of density control did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

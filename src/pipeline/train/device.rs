@@ -2,11 +2,9 @@
 //! there from step to step; the host sees them when it asks.
 
 use super::TrainView;
-use super::density::DensityStats;
-use crate::render::RenderSettings;
-use crate::render::cpu::adam::Rates;
-use crate::render::gpu::trainer::Growth;
-use crate::render::gpu::{Context, DevicePhoto, GpuError, Trainer, TrainerSettings};
+use crate::render::{
+    DensityStats, Device, DevicePhoto, DeviceTrainer, GpuError, Rates, RenderSettings, StepLoss, TrainerSettings,
+};
 use crate::scene::GaussianCloud;
 
 /// Weight of D-SSIM in the loss.
@@ -26,15 +24,15 @@ pub struct StepResult {
 }
 
 /// A run on a GPU.
-pub struct Device {
-    trainer: Trainer,
+pub struct DeviceRun {
+    trainer: DeviceTrainer,
     photos: Vec<DevicePhoto>,
 }
 
-impl Device {
+impl DeviceRun {
     /// Sends a run's state and photos to the device.
     pub fn new(
-        context: &Context,
+        device: &Device,
         cloud: &GaussianCloud,
         moments: &[GaussianCloud; 2],
         step: u64,
@@ -42,7 +40,7 @@ impl Device {
         views: &[TrainView],
     ) -> Result<Self, GpuError> {
         let settings = TrainerSettings { render, lambda: LAMBDA };
-        let mut trainer = Trainer::new(context, cloud, settings)?;
+        let mut trainer = DeviceTrainer::new(device, cloud, settings)?;
         trainer.upload(cloud, Some([&moments[0], &moments[1]]), step)?;
         let photos = views.iter().map(|v| trainer.photo(&v.pixels)).collect::<Result<_, _>>()?;
         Ok(Self { trainer, photos })
@@ -65,7 +63,7 @@ impl Device {
     /// buffers, which have been enlarged since, moved nothing and are left out. Waits.
     pub fn results(&mut self) -> Result<Vec<StepResult>, GpuError> {
         let done = self.trainer.metrics()?;
-        let result = |s: &crate::render::gpu::trainer::StepLoss| StepResult {
+        let result = |s: &StepLoss| StepResult {
             loss: s.loss,
             psnr: s.sums.psnr(),
             skipped: s.sums.bad_gradients as usize,
@@ -82,7 +80,6 @@ impl Device {
     /// Cloud, moments, and statistics since the last upload. Waits.
     pub fn download(&self) -> Result<(GaussianCloud, [GaussianCloud; 2], DensityStats), GpuError> {
         let (cloud, moments) = self.trainer.download()?;
-        let Growth { gradient, seen, radius } = self.trainer.stats()?;
-        Ok((cloud, moments, DensityStats { gradient, seen, radius }))
+        Ok((cloud, moments, self.trainer.stats()?))
     }
 }

@@ -2,7 +2,7 @@
 //! and surfels that lie together along each ray.
 
 use super::{TrainConfig, TrainView};
-use crate::render::cpu::normals::{self, SurfaceDepth};
+use crate::render::normals::{self, SurfaceDepth};
 use crate::render::{Features, Frame, FrameGradient};
 use crate::scene::GaussianCloud;
 

@@ -9,8 +9,7 @@ use rstar::RTree;
 use super::TrainView;
 use crate::math::sh::{SH_C0, coefficients};
 use crate::math::stats::quantile;
-use crate::render::cpu::Renderer;
-use crate::render::{Features, RenderSettings};
+use crate::render::{Features, RenderSettings, Renderer};
 use crate::scene::{Bounds, Dataset, GaussianCloud, SparsePoint};
 
 /// Opacity of a new Gaussian.
@@ -46,7 +45,7 @@ pub fn initial_cloud(
 fn fill_holes(cloud: &mut GaussianCloud, dataset: &Dataset, views: &[TrainView]) {
     let stride = cloud.sh_stride();
     let settings = RenderSettings { sh_degree: 0, depth: true, ..RenderSettings::default() };
-    let mut renderer = Renderer::<f32>::new();
+    let mut renderer = Renderer::new();
     // The same cloud all but opaque, so that its alpha says where it covers the picture.
     let mut solid = cloud.clone();
     solid.opacity_logits.fill(3.0);

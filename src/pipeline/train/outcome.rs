@@ -6,8 +6,7 @@ use super::checkpoint::CheckpointError;
 use crate::io::IoError;
 use crate::math::finite::NotFinite;
 use crate::pipeline::observer::Evaluation;
-use crate::render::RenderError;
-use crate::render::gpu::GpuError;
+use crate::render::{GpuError, RenderError};
 use crate::scene::GaussianCloud;
 
 /// How a run ended.

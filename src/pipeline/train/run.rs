@@ -20,8 +20,7 @@ use crate::io::trained::{History, SceneInfo};
 use crate::math::stats::{mean, median};
 use crate::pipeline::evaluate::evaluate;
 use crate::pipeline::observer::{Observer, Severity, StepMetrics, Ticker};
-use crate::render::BackendChoice;
-use crate::render::gpu::Context;
+use crate::render::{BackendChoice, Device};
 use crate::scene::{Dataset, GaussianCloud};
 
 /// Steps between copies of the cloud to roll back to.
@@ -70,11 +69,11 @@ pub fn run(
     views.shrink_to_fit();
     let mut job = Job::start(dataset, config, scene, &held, views, tests, saved);
     let told = |why| observer.note(Severity::Warning, why);
-    job.context = if config.needs_cpu() { None } else { config.backend.gpu(told)? };
-    match &job.context {
-        Some(context) => {
-            observer.note(Severity::Info, format!("Training on {}", context.describe()));
-            job.trainer.move_to(context, job.coarse.as_ref().unwrap_or(&job.views))?;
+    job.device = if config.needs_cpu() { None } else { config.backend.gpu(told)? };
+    match &job.device {
+        Some(device) => {
+            observer.note(Severity::Info, format!("Training on {}", device.describe()));
+            job.trainer.move_to(device, job.coarse.as_ref().unwrap_or(&job.views))?;
         }
         None => observer.note(Severity::Info, "Training on the CPU".into()),
     }
@@ -125,7 +124,7 @@ struct Job<'a> {
     /// The same at half their size, while those are trained on.
     coarse: Option<Vec<TrainView>>,
     tests: Vec<TrainView>,
-    context: Option<Context>,
+    device: Option<Device>,
     trainer: Trainer,
     secs: f64,
     history: History,
@@ -192,7 +191,7 @@ impl<'a> Job<'a> {
             views,
             coarse,
             tests,
-            context: None,
+            device: None,
             trainer,
             secs,
             history,
@@ -272,9 +271,9 @@ impl<'a> Job<'a> {
     fn step(&mut self, observer: &mut dyn Observer) -> Result<Vec<StepResult>, TrainError> {
         if self.coarse.is_some() && self.trainer.step >= coarse_steps(self.config) {
             self.coarse = None;
-            if let Some(context) = &self.context {
+            if let Some(device) = &self.device {
                 self.trainer.fetch()?;
-                self.trainer.move_to(context, &self.views)?;
+                self.trainer.move_to(device, &self.views)?;
             }
         }
         let views = self.coarse.as_ref().unwrap_or(&self.views);

@@ -3,7 +3,7 @@
 //! 3DGS's values are made for 30,000 steps; a run of `n` steps goes through the same phases.
 
 use super::TrainConfig;
-use crate::render::cpu::adam::{AdamStep, Rates};
+use crate::render::{AdamStep, Rates};
 
 /// Steps that 3DGS's milestones are written for.
 const REFERENCE_STEPS: f64 = 30_000.0;

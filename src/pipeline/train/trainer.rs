@@ -6,20 +6,18 @@ use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
 use super::density::{self, DensityReport, DensityStats};
-use super::device::{Device, LAMBDA, StepResult};
+use super::device::{DeviceRun, LAMBDA, StepResult};
 use super::geometry::Geometry;
 use super::schedule::Schedule;
 use super::{TrainConfig, TrainView};
 use crate::math::finite::{CHECKED, NotFinite, all_finite};
 use crate::math::sh;
+use crate::math::stats::psnr_of;
 use crate::pipeline::metrics;
-use crate::render::cpu::Renderer;
-use crate::render::cpu::adam::{AdamStep, Rates};
-use crate::render::cpu::normals;
-use crate::render::cpu::ssim::{LossParts, PhotoLoss};
-use crate::render::cpu::validate;
-use crate::render::gpu::{Context, GpuError};
-use crate::render::{FrameGradient, RenderError, RenderSettings};
+use crate::render::{
+    AdamStep, Device, DifferentiableRenderer, FrameGradient, GpuError, LossParts, PhotoLoss, Rates, RenderError,
+    RenderSettings, normals, validate,
+};
 use crate::scene::{Camera, Gaussian, GaussianCloud};
 
 /// Steps between measurements that are reported.
@@ -65,11 +63,11 @@ pub struct Trainer {
     pub budget: usize,
     settings: RenderSettings,
     densify: bool,
-    renderer: Renderer<f32>,
+    renderer: DifferentiableRenderer,
     losses: [PhotoLoss<f32>; 3],
     gradient: FrameGradient<f32>,
     geometry: Geometry,
-    device: Option<Device>,
+    device: Option<DeviceRun>,
 }
 
 impl Trainer {
@@ -87,7 +85,7 @@ impl Trainer {
             budget: config.max_gaussians.unwrap_or(usize::MAX),
             settings: config.render_settings(Some(background)),
             densify: config.densify,
-            renderer: Renderer::new(),
+            renderer: DifferentiableRenderer::new(),
             losses: Default::default(),
             gradient: FrameGradient::default(),
             geometry: Geometry::new(config, extent),
@@ -97,8 +95,8 @@ impl Trainer {
     }
 
     /// Goes on on a GPU.
-    pub fn move_to(&mut self, context: &Context, views: &[TrainView]) -> Result<(), GpuError> {
-        let device = Device::new(context, &self.cloud, &self.moments, self.step, self.settings.clone(), views)?;
+    pub fn move_to(&mut self, device: &Device, views: &[TrainView]) -> Result<(), GpuError> {
+        let device = DeviceRun::new(device, &self.cloud, &self.moments, self.step, self.settings.clone(), views)?;
         self.device = Some(device);
         Ok(())
     }
@@ -161,14 +159,14 @@ impl Trainer {
             planes.try_for_each(|p| all_finite("the loss", "the gradient of pixel", p))?;
             self.renderer.check_backward()?;
         }
-        let Left { skipped, outliers, first } = self.descend(&view.camera);
+        let StepStats { skipped, outliers, first } = self.optimizer_step(&view.camera);
         self.step += 1;
         if CHECKED {
             let bad = |index| NotFinite { stage: "projection backward", field: "the gradient of Gaussian", index };
             first.map_or(Ok(()), |i| Err(bad(i)))?;
             self.check("Adam")?;
         }
-        Ok(vec![StepResult { loss: parts.total(LAMBDA), psnr: metrics::psnr_of(parts.mse), skipped, outliers }])
+        Ok(vec![StepResult { loss: parts.total(LAMBDA), psnr: psnr_of(parts.mse), skipped, outliers }])
     }
 
     /// Density control and opacity reset where they are due. Returns what was done.
@@ -249,7 +247,7 @@ impl Trainer {
 
     /// Backward of the projection and Adam, fused per Gaussian: gradients never reach memory, and
     /// Gaussians that were not drawn cost nothing.
-    fn descend(&mut self, camera: &Camera) -> Left {
+    fn optimizer_step(&mut self, camera: &Camera) -> StepStats {
         let update = Update {
             rates: self.schedule.rates(self.step),
             adam: self.schedule.adam(self.step),
@@ -279,14 +277,14 @@ impl Trainer {
             .collect();
         blocks
             .into_par_iter()
-            .map(|mut block| descend_block(renderer, &mut block, &update))
-            .reduce(Left::default, Left::add)
+            .map(|mut block| step_block(renderer, &mut block, &update))
+            .reduce(StepStats::default, StepStats::add)
     }
 }
 
 /// What a step left out.
 #[derive(Clone, Copy, Default)]
-struct Left {
+struct StepStats {
     /// Gaussians whose gradient was not finite.
     skipped: usize,
     /// The first of them.
@@ -295,7 +293,7 @@ struct Left {
     outliers: usize,
 }
 
-impl Left {
+impl StepStats {
     fn add(self, other: Self) -> Self {
         Self {
             skipped: self.skipped + other.skipped,
@@ -371,10 +369,10 @@ fn zeros_like(cloud: &GaussianCloud) -> GaussianCloud {
 
 /// Updates a block and returns what it left out.
 #[multiversion::multiversion(targets("x86_64+avx2+fma"))]
-fn descend_block(renderer: &Renderer<f32>, block: &mut Block<'_>, update: &Update) -> Left {
+fn step_block(renderer: &DifferentiableRenderer, block: &mut Block<'_>, update: &Update) -> StepStats {
     let Update { rates, adam, stride, active, radius_scale, eye } = update;
     let Block { first, p, m, v, gradient, seen, radius } = block;
-    let mut left = Left::default();
+    let mut left = StepStats::default();
     for i in 0..p.positions.len() {
         let own = i * stride..(i + 1) * stride;
         let gaussian = Gaussian {

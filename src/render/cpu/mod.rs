@@ -8,6 +8,7 @@ pub mod adam;
 pub mod bin;
 pub mod blend;
 pub mod blend_backward;
+pub mod contributions;
 pub mod lanes;
 pub mod normals;
 pub mod project;
@@ -16,7 +17,6 @@ pub mod sort;
 pub mod ssim;
 pub mod surfel;
 pub mod validate;
-pub mod weigh;
 
 use std::time::Instant;
 
@@ -25,10 +25,10 @@ use rayon::prelude::*;
 use self::bin::Tiles;
 use self::blend::{BlendRow, RowOut};
 use self::blend_backward::{BlendRowBackward, MOMENTS, RowIn};
-use self::project::{Part, View};
+use self::contributions::{ContributionRow, ContributionSink};
+use self::project::{Chunk, View};
 use self::project_backward::{GaussianGradient, project_backward};
 use self::sort::Ordered;
-use self::weigh::{WeighRow, Weighed};
 use super::{
     CloudGradient, Cutoffs, Features, Frame, FrameGradient, MAX_CHANNELS, RenderError, RenderSettings, TILE_PX,
 };
@@ -82,7 +82,7 @@ pub struct RenderStats {
 /// A renderer with its buffers, to be kept from frame to frame.
 #[derive(Debug, Default)]
 pub struct Renderer<R> {
-    parts: Vec<Part<R>>,
+    parts: Vec<Chunk<R>>,
     ordered: Ordered<R>,
     /// For each Gaussian its splat, or `NONE`; filled by the backward pass.
     splat_of: Vec<u32>,
@@ -226,17 +226,17 @@ impl<R: Real> Renderer<R> {
             .sum()
     }
 
-    /// Hands the weight of every Gaussian at every pixel of a view to `counters`, one for each row
+    /// Hands the weight of every Gaussian at every pixel of a view to `sinks`, one for each row
     /// of tiles, which are `height.div_ceil(TILE_PX)`. Surfels count as flat Gaussians.
     ///
     /// # Errors
     /// If the camera is not usable.
-    pub fn weigh<V: Weighed<R>>(
+    pub fn contributions<S: ContributionSink<R>>(
         &mut self,
         cloud: &GaussianCloud<R>,
         camera: &Camera,
         settings: &RenderSettings,
-        counters: &mut [V],
+        sinks: &mut [S],
     ) -> Result<(), RenderError> {
         camera.validate()?;
         let view = View::new(camera, cloud.origin, settings.near);
@@ -250,8 +250,8 @@ impl<R: Real> Renderer<R> {
         self.frame = None;
         self.surfels = None;
         let (splats, tiles) = (&self.ordered.splats, &self.tiles);
-        counters.par_iter_mut().take(tiles.grid[1]).enumerate().for_each(|(ty, counter)| {
-            R::vectorize(WeighRow { splats, tiles, size: view.size, ty, cutoffs: settings.cutoffs, counter });
+        sinks.par_iter_mut().take(tiles.grid[1]).enumerate().for_each(|(ty, sink)| {
+            R::vectorize(ContributionRow { splats, tiles, size: view.size, ty, cutoffs: settings.cutoffs, sink });
         });
         Ok(())
     }
@@ -396,7 +396,7 @@ impl<R: Real> Renderer<R> {
 }
 
 /// Under `debug-validation`: whether projection, sorting (if `by_depth`) and binning left what they should.
-fn checked<R: Real>(parts: &[Part<R>], ordered: &Ordered<R>, tiles: &Tiles, by_depth: bool) -> Result<(), NotFinite> {
+fn checked<R: Real>(parts: &[Chunk<R>], ordered: &Ordered<R>, tiles: &Tiles, by_depth: bool) -> Result<(), NotFinite> {
     if CHECKED {
         validate::projected(parts)?;
         validate::ordered(ordered, by_depth)?;

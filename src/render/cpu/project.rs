@@ -202,7 +202,7 @@ pub fn compensation<R: Real>(g: &Geometry<R>) -> R {
 
 /// The splats of some consecutive Gaussians with their composited values, in the cloud's order.
 #[derive(Debug, Default)]
-pub struct Part<R> {
+pub struct Chunk<R> {
     /// The Gaussians that reach at least one pixel centre.
     pub splats: Vec<Splat<R>>,
     /// `[splats * channels]`: colour, extra channels, depth if asked for, padding zeros.
@@ -214,7 +214,7 @@ pub struct Part<R> {
 /// Projects the whole cloud, in parts of [`CHUNK`] Gaussians. `channels` is the padded number of
 /// values per splat.
 pub fn project<R: Real>(
-    parts: &mut Vec<Part<R>>,
+    parts: &mut Vec<Chunk<R>>,
     cloud: &GaussianCloud<R>,
     features: Features<'_, R>,
     view: &View<R>,
@@ -228,11 +228,11 @@ pub fn project<R: Real>(
 
 /// Has every part filled from its [`CHUNK`] of `n` Gaussians, all at once; parts come empty.
 pub fn in_chunks<R: Real>(
-    parts: &mut Vec<Part<R>>,
+    parts: &mut Vec<Chunk<R>>,
     n: usize,
-    fill: impl Fn(&mut Part<R>, std::ops::Range<usize>) + Sync,
+    fill: impl Fn(&mut Chunk<R>, std::ops::Range<usize>) + Sync,
 ) {
-    parts.resize_with(n.div_ceil(CHUNK), Part::default);
+    parts.resize_with(n.div_ceil(CHUNK), Chunk::default);
     parts.par_iter_mut().enumerate().for_each(|(c, part)| {
         part.splats.clear();
         part.values.clear();
@@ -243,7 +243,7 @@ pub fn in_chunks<R: Real>(
 
 #[multiversion::multiversion(targets("x86_64+avx2+fma"))]
 fn project_chunk<R: Real>(
-    part: &mut Part<R>,
+    part: &mut Chunk<R>,
     cloud: &GaussianCloud<R>,
     features: Features<'_, R>,
     view: &View<R>,

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::project::{CHUNK, Part, Splat};
+use super::project::{CHUNK, Chunk, Splat};
 use crate::math::Real;
 
 /// The splats of one frame, front to back.
@@ -10,7 +10,7 @@ use crate::math::Real;
 pub struct Ordered<R> {
     /// By ascending depth; equal depths in the cloud's order.
     pub splats: Vec<Splat<R>>,
-    /// Their values, as in [`Part::values`].
+    /// Their values, as in [`Chunk::values`].
     pub values: Vec<R>,
     keys: Vec<u64>,
 }
@@ -18,7 +18,7 @@ pub struct Ordered<R> {
 /// Brings the splats of all parts into order. Everything after this reads them nearly from front
 /// to back, instead of jumping through the cloud. With `keep`, the order is that of the frame before;
 /// splats that were not in it come last.
-pub fn sort<R: Real>(out: &mut Ordered<R>, parts: &[Part<R>], channels: usize, keep: bool) {
+pub fn sort<R: Real>(out: &mut Ordered<R>, parts: &[Chunk<R>], channels: usize, keep: bool) {
     if keep {
         keep_order(out, parts);
     } else {
@@ -32,7 +32,7 @@ fn place(part: usize, i: usize) -> u64 {
     (part * CHUNK + i) as u64
 }
 
-fn by_depth<R: Real>(out: &mut Ordered<R>, parts: &[Part<R>]) {
+fn by_depth<R: Real>(out: &mut Ordered<R>, parts: &[Chunk<R>]) {
     // Depths are positive, so their bit patterns order like the numbers. The low half of a key is
     // the splat's part and its place in there, which makes keys unique and an unstable sort
     // deterministic.
@@ -44,7 +44,7 @@ fn by_depth<R: Real>(out: &mut Ordered<R>, parts: &[Part<R>]) {
     out.keys.par_sort_unstable();
 }
 
-fn keep_order<R: Real>(out: &mut Ordered<R>, parts: &[Part<R>]) {
+fn keep_order<R: Real>(out: &mut Ordered<R>, parts: &[Chunk<R>]) {
     const GONE: u32 = u32::MAX;
     let largest = parts.iter().flat_map(|p| &p.splats).chain(&out.splats).map(|s| s.gaussian as usize + 1).max();
     let mut now = vec![GONE; largest.unwrap_or(0)];
@@ -62,7 +62,7 @@ fn keep_order<R: Real>(out: &mut Ordered<R>, parts: &[Part<R>]) {
 }
 
 /// Copies the splats in the order of the keys.
-fn gather<R: Real>(out: &mut Ordered<R>, parts: &[Part<R>], channels: usize) {
+fn gather<R: Real>(out: &mut Ordered<R>, parts: &[Chunk<R>], channels: usize) {
     let n = out.keys.len();
     out.splats.resize(n, Splat::default());
     out.values.resize(n * channels, R::ZERO);

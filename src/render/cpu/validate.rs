@@ -4,7 +4,7 @@
 use std::sync::atomic::Ordering::Relaxed;
 
 use super::bin::Tiles;
-use super::project::{Part, Splat};
+use super::project::{Chunk, Splat};
 use super::sort::Ordered;
 use crate::math::Real;
 use crate::math::finite::{NotFinite, all_finite};
@@ -23,7 +23,7 @@ fn splats<R: Real>(stage: &'static str, splats: &[Splat<R>], values: &[R]) -> Re
 }
 
 /// After the projection. Like all of this module, it names the first number that is none.
-pub fn projected<R: Real>(parts: &[Part<R>]) -> Result<(), NotFinite> {
+pub fn projected<R: Real>(parts: &[Chunk<R>]) -> Result<(), NotFinite> {
     parts.iter().try_for_each(|p| splats("projection", &p.splats, &p.values))
 }
 
@@ -84,7 +84,7 @@ mod tests {
 
     #[test]
     fn a_poisoned_splat_is_named_by_its_gaussian() {
-        let part = |conic| Part {
+        let part = |conic| Chunk {
             splats: vec![splat(1.0), Splat { conic, gaussian: 7, ..splat(2.0) }],
             values: vec![0.5; 6],
             degenerate: 0,

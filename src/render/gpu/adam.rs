@@ -4,7 +4,7 @@ use super::cloud::{Parameters, strides};
 use super::kernel::{Access, Kernel, Module, Stage};
 use super::layout::AdamStep;
 use super::shader::Variant;
-use super::{Context, GpuError};
+use super::{Device, GpuError};
 use crate::math::sh;
 use crate::render::cpu::adam::{AdamStep as Constants, BETA1, BETA2, CLIP, EPSILON, GROWTH, OUTLIER, Rates};
 
@@ -46,21 +46,21 @@ pub struct AdamBuffers<'a> {
 
 impl Adam {
     /// Compiles the kernel.
-    pub fn new(context: &Context) -> Result<Self, GpuError> {
+    pub fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
-        let module = Module::new(context, "adam", Variant::default())?;
+        let module = Module::new(device, "adam", Variant::default())?;
         let slots = [(0, Uniform), (1, Write), (2, Read), (3, Write), (4, Write), (5, Read), (6, Read), (7, Write)];
-        let step = || context.uniform("Adam step", bytemuck::bytes_of(&AdamStep::default()));
+        let step = || device.uniform("Adam step", bytemuck::bytes_of(&AdamStep::default()));
         Ok(Self {
-            kernel: Kernel::new(context, &module, "main", &slots)?,
+            kernel: Kernel::new(device, &module, "main", &slots)?,
             steps: [step()?, step()?, step()?],
-            outliers: context.storage("outliers", 16)?,
+            outliers: device.storage("outliers", 16)?,
         })
     }
 
     /// Sets the constants of step `t`, counted from 1, for `gaussians` Gaussians of which `stored`
     /// degrees are kept and `active` trained.
-    pub fn prepare(&self, context: &Context, gaussians: u32, [stored, active]: [u8; 2], rates: &Rates, t: u64) {
+    pub fn prepare(&self, device: &Device, gaussians: u32, [stored, active]: [u8; 2], rates: &Rates, t: u64) {
         let constants = Constants::new(t);
         for ((buffer, stride), rates) in self.steps.iter().zip(strides(stored)).zip(records(rates, active)) {
             let mut step = AdamStep {
@@ -77,7 +77,7 @@ impl Adam {
                 ..AdamStep::default()
             };
             step.rates.as_flattened_mut().copy_from_slice(&rates);
-            context.queue().write_buffer(buffer, 0, bytemuck::bytes_of(&step));
+            device.queue().write_buffer(buffer, 0, bytemuck::bytes_of(&step));
         }
     }
 

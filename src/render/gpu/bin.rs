@@ -1,9 +1,9 @@
 //! Splats in depth order to each tile's list; `shaders/bin.wgsl`.
 
-use super::kernel::{Access, Kernel, Module, Shot, Stage};
+use super::kernel::{Access, FrameBindings, Kernel, Module, Stage};
 use super::scratch::{BIN_BLOCK, PerGaussian, PerPair};
 use super::shader::Variant;
-use super::{Context, GpuError};
+use super::{Device, GpuError};
 
 /// Workgroups of the kernel that looks for the ends of tiles; they stride over the pairs.
 const RANGE_GROUPS: u32 = 256;
@@ -19,10 +19,10 @@ pub struct Bin {
 
 impl Bin {
     /// Compiles the kernels.
-    pub fn new(context: &Context) -> Result<Self, GpuError> {
+    pub fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
-        let module = Module::new(context, "bin", Variant::default())?;
-        let kernel = |entry, slots: &[_]| Kernel::new(context, &module, entry, slots);
+        let module = Module::new(device, "bin", Variant::default())?;
+        let kernel = |entry, slots: &[_]| Kernel::new(device, &module, entry, slots);
         Ok(Self {
             sum_counts: kernel("sum_counts", &[(0, Uniform), (1, Read), (2, Read), (3, Write)])?,
             scan_sums: kernel("scan_sums", &[(0, Uniform), (3, Write), (4, Write)])?,
@@ -35,32 +35,44 @@ impl Bin {
     }
 
     /// Records the count of pairs, after which the counters say whether they fit.
-    pub fn encode_count(&self, stage: &mut Stage<'_>, shot: Shot<'_>, scratch: &PerGaussian) {
+    pub fn encode_count(&self, stage: &mut Stage<'_>, bindings: FrameBindings<'_>, scratch: &PerGaussian) {
         let order = &scratch.by_depth.values[scratch.by_depth.result()];
-        let blocks = [shot.gaussians.div_ceil(BIN_BLOCK), 1, 1];
-        stage.run(&self.sum_counts, &[shot.view, order, &scratch.tile_counts, &scratch.sums], blocks);
-        stage.run(&self.scan_sums, &[shot.view, &scratch.sums, shot.counters], [1, 1, 1]);
+        let blocks = [bindings.gaussians.div_ceil(BIN_BLOCK), 1, 1];
+        stage.run(&self.sum_counts, &[bindings.view, order, &scratch.tile_counts, &scratch.sums], blocks);
+        stage.run(&self.scan_sums, &[bindings.view, &scratch.sums, bindings.counters], [1, 1, 1]);
     }
 
     /// Records the emission of pairs.
-    pub fn encode_emit(&self, stage: &mut Stage<'_>, shot: Shot<'_>, scratch: &PerGaussian, pairs: &PerPair) {
+    pub fn encode_emit(
+        &self,
+        stage: &mut Stage<'_>,
+        bindings: FrameBindings<'_>,
+        scratch: &PerGaussian,
+        pairs: &PerPair,
+    ) {
         let order = &scratch.by_depth.values[scratch.by_depth.result()];
         let buffers = [
-            shot.view,
+            bindings.view,
             order,
             &scratch.tile_counts,
             &scratch.sums,
-            shot.counters,
+            bindings.counters,
             &scratch.splats,
             &pairs.by_tile.keys[0],
             &pairs.by_tile.values[0],
         ];
-        stage.run(&self.emit, &buffers, [shot.gaussians.div_ceil(BIN_BLOCK), 1, 1]);
+        stage.run(&self.emit, &buffers, [bindings.gaussians.div_ceil(BIN_BLOCK), 1, 1]);
     }
 
     /// Records the search for each tile's range, after the sort. `ranges` must be zero.
-    pub fn encode_ranges(&self, stage: &mut Stage<'_>, shot: Shot<'_>, pairs: &PerPair, ranges: &wgpu::Buffer) {
+    pub fn encode_ranges(
+        &self,
+        stage: &mut Stage<'_>,
+        bindings: FrameBindings<'_>,
+        pairs: &PerPair,
+        ranges: &wgpu::Buffer,
+    ) {
         let tiles = &pairs.by_tile.keys[pairs.by_tile.result()];
-        stage.run(&self.ranges, &[shot.view, shot.counters, tiles, ranges], [RANGE_GROUPS, 1, 1]);
+        stage.run(&self.ranges, &[bindings.view, bindings.counters, tiles, ranges], [RANGE_GROUPS, 1, 1]);
     }
 }

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::kernel::{Access, Kernel, Module, Shot, Stage};
+use super::kernel::{Access, FrameBindings, Kernel, Module, Stage};
 use super::scratch::{PerGaussian, PerPair, PerPicture};
 use super::shader::Variant;
-use super::{Context, GpuError};
+use super::{Device, GpuError};
 
 /// The blending kernel, one pipeline for each number of extra channels in a pass.
 #[derive(Debug, Default)]
@@ -15,12 +15,12 @@ pub struct Blend {
 
 impl Blend {
     /// Compiles what passes of `channels` extra channels need, if that has not been done.
-    pub fn prepare(&mut self, context: &Context, channels: usize) -> Result<(), GpuError> {
+    pub fn prepare(&mut self, device: &Device, channels: usize) -> Result<(), GpuError> {
         use Access::{Read, Uniform, Write};
         if self.kernels.contains_key(&channels) {
             return Ok(());
         }
-        let module = Module::new(context, "blend", Variant { channels, ..Variant::default() })?;
+        let module = Module::new(device, "blend", Variant { channels, ..Variant::default() })?;
         let slots = [
             (0, Uniform),
             (1, Uniform),
@@ -33,7 +33,7 @@ impl Blend {
             (8, Write),
             (9, Write),
         ];
-        self.kernels.insert(channels, Kernel::new(context, &module, "main", &slots)?);
+        self.kernels.insert(channels, Kernel::new(device, &module, "main", &slots)?);
         Ok(())
     }
 
@@ -41,7 +41,7 @@ impl Blend {
     pub fn encode(
         &self,
         stage: &mut Stage<'_>,
-        shot: Shot<'_>,
+        bindings: FrameBindings<'_>,
         scratch: (&PerGaussian, &PerPair, &PerPicture),
         features: &wgpu::Buffer,
     ) {
@@ -50,7 +50,7 @@ impl Blend {
         for (channels, chunk) in &picture.chunks {
             let Some(kernel) = self.kernels.get(channels) else { continue };
             let buffers = [
-                shot.view,
+                bindings.view,
                 chunk,
                 &picture.ranges,
                 list,
@@ -61,7 +61,7 @@ impl Blend {
                 &picture.depths,
                 &picture.features,
             ];
-            stage.run(kernel, &buffers, [shot.tiles[0], shot.tiles[1], 1]);
+            stage.run(kernel, &buffers, [bindings.tiles[0], bindings.tiles[1], 1]);
         }
     }
 }

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::kernel::{Access, Kernel, Module, Shot, Stage};
+use super::kernel::{Access, FrameBindings, Kernel, Module, Stage};
 use super::scratch::{GRADIENT_BASE, PerGaussian, PerPair, PerPicture};
 use super::shader::Variant;
-use super::{Context, GpuError};
+use super::{Device, GpuError};
 
 /// The kernel, one pipeline for each number of extra channels in a pass.
 #[derive(Debug)]
@@ -26,19 +26,19 @@ pub struct BlendGradients {
 }
 
 impl BlendGradients {
-    /// Room for `room` Gaussians and a picture of `pixels` pixels; `planes` is 2 if there can be a
+    /// Room for `capacity` Gaussians and a picture of `pixels` pixels; `planes` is 2 if there can be a
     /// gradient with respect to depth, else 1.
     pub fn new(
-        context: &Context,
-        room: usize,
+        device: &Device,
+        capacity: usize,
         pixels: usize,
         channels: usize,
         planes: usize,
     ) -> Result<Self, GpuError> {
         Ok(Self {
-            pixels: context.storage("gradient of the picture", (pixels * planes * 16) as u64)?,
-            features: context.storage("gradient of extra channels", (pixels * channels * 4) as u64)?,
-            splats: context.storage("gradient of splats", (room * (GRADIENT_BASE + channels) * 4) as u64)?,
+            pixels: device.storage("gradient of the picture", (pixels * planes * 16) as u64)?,
+            features: device.storage("gradient of extra channels", (pixels * channels * 4) as u64)?,
+            splats: device.storage("gradient of splats", (capacity * (GRADIENT_BASE + channels) * 4) as u64)?,
         })
     }
 }
@@ -50,13 +50,13 @@ impl BlendBackward {
     }
 
     /// Compiles what passes of `channels` extra channels need, if that has not been done.
-    pub fn prepare(&mut self, context: &Context, channels: usize) -> Result<(), GpuError> {
+    pub fn prepare(&mut self, device: &Device, channels: usize) -> Result<(), GpuError> {
         use Access::{Read, Uniform, Write};
         if self.kernels.contains_key(&channels) {
             return Ok(());
         }
         let variant = Variant { channels, float_atomics: self.float_atomics };
-        let module = Module::new(context, "blend_backward", variant)?;
+        let module = Module::new(device, "blend_backward", variant)?;
         let slots = [
             (0, Uniform),
             (1, Uniform),
@@ -69,7 +69,7 @@ impl BlendBackward {
             (8, Read),
             (9, Write),
         ];
-        self.kernels.insert(channels, Kernel::new(context, &module, "main", &slots)?);
+        self.kernels.insert(channels, Kernel::new(device, &module, "main", &slots)?);
         Ok(())
     }
 
@@ -77,7 +77,7 @@ impl BlendBackward {
     pub fn encode(
         &self,
         stage: &mut Stage<'_>,
-        shot: Shot<'_>,
+        bindings: FrameBindings<'_>,
         scratch: (&PerGaussian, &PerPair, &PerPicture),
         features: &wgpu::Buffer,
         gradients: &BlendGradients,
@@ -87,7 +87,7 @@ impl BlendBackward {
         for (channels, chunk) in &picture.chunks {
             let Some(kernel) = self.kernels.get(channels) else { continue };
             let buffers = [
-                shot.view,
+                bindings.view,
                 chunk,
                 &picture.ranges,
                 list,
@@ -98,7 +98,7 @@ impl BlendBackward {
                 &gradients.features,
                 &gradients.splats,
             ];
-            stage.run(kernel, &buffers, [shot.tiles[0], shot.tiles[1], 1]);
+            stage.run(kernel, &buffers, [bindings.tiles[0], bindings.tiles[1], 1]);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! A cloud on the device: three buffers of parameters, and the way there and back.
 
-use super::{Context, GpuError};
+use super::{Device, GpuError};
 use crate::math::sh;
 use crate::scene::GaussianCloud;
 
@@ -24,41 +24,41 @@ pub struct Parameters {
 }
 
 impl Parameters {
-    /// Zeroed room for `room` Gaussians. `what` names it in errors.
-    pub fn new(context: &Context, what: &str, room: usize, degree: u8) -> Result<Self, GpuError> {
-        check(context, what, room, degree)?;
-        let bytes = strides(degree).map(|s| (s * room * 4) as u64);
-        let [a, b, c] = bytes.map(|b| context.storage(what, b));
+    /// Zeroed room for `capacity` Gaussians. `what` names it in errors.
+    pub fn new(device: &Device, what: &str, capacity: usize, degree: u8) -> Result<Self, GpuError> {
+        check(device, what, capacity, degree)?;
+        let bytes = strides(degree).map(|s| (s * capacity * 4) as u64);
+        let [a, b, c] = bytes.map(|b| device.storage(what, b));
         Ok(Self { buffers: [a?, b?, c?] })
     }
 
     /// Overwrites the first Gaussians.
-    pub fn write(&self, context: &Context, packed: &Packed) {
+    pub fn write(&self, device: &Device, packed: &Packed) {
         for (buffer, floats) in self.buffers.iter().zip(&packed.floats) {
             if !floats.is_empty() {
-                context.queue().write_buffer(buffer, 0, bytemuck::cast_slice(floats));
+                device.queue().write_buffer(buffer, 0, bytemuck::cast_slice(floats));
             }
         }
     }
 
     /// Reads the first `n` Gaussians back.
-    pub fn read(&self, context: &Context, n: usize, degree: u8) -> Result<Packed, GpuError> {
+    pub fn read(&self, device: &Device, n: usize, degree: u8) -> Result<Packed, GpuError> {
         let [a, b, c] = strides(degree).map(|s| (s * n * 4) as u64);
         let [x, y, z] = &self.buffers;
-        let mut bytes = context.read(&[(x, a), (y, b), (z, c)])?.into_iter();
+        let mut bytes = device.read(&[(x, a), (y, b), (z, c)])?.into_iter();
         let mut next = || bytes.next().map_or_else(Vec::new, |b| bytemuck::pod_collect_to_vec(&b));
         Ok(Packed { floats: [next(), next(), next()], degree })
     }
 }
 
 /// Refuses a cloud that the device cannot bind, with the numbers, before anything is allocated.
-fn check(context: &Context, what: &str, room: usize, degree: u8) -> Result<(), GpuError> {
+fn check(device: &Device, what: &str, capacity: usize, degree: u8) -> Result<(), GpuError> {
     let remedy = "use fewer Gaussians or a lower spherical-harmonics degree";
     for stride in strides(degree) {
-        let what = format!("{what} of {room} Gaussians of degree {degree} (bytes in one binding)");
-        context.fits_binding(&what, (stride * room * 4) as u64, remedy)?;
+        let what = format!("{what} of {capacity} Gaussians of degree {degree} (bytes in one binding)");
+        device.fits_binding(&what, (stride * capacity * 4) as u64, remedy)?;
     }
-    context.fits_dispatch("one thread a Gaussian", room.div_ceil(64) as u64, remedy)
+    device.fits_dispatch("one thread a Gaussian", capacity.div_ceil(64) as u64, remedy)
 }
 
 /// Parameters on the host in the device's layout.

@@ -2,7 +2,7 @@
 
 use super::shader::{self, Variant};
 use super::timing::Timer;
-use super::{Context, GpuError};
+use super::{Device, GpuError};
 
 /// How a kernel uses a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,10 +24,10 @@ pub struct Module {
 
 impl Module {
     /// Compiles kernel file `name`.
-    pub fn new(context: &Context, name: &'static str, variant: Variant) -> Result<Self, GpuError> {
+    pub fn new(device: &Device, name: &'static str, variant: Variant) -> Result<Self, GpuError> {
         let source = shader::source(name, variant)?;
-        let module = context.scoped(name, 0, || {
-            context.device().create_shader_module(wgpu::ShaderModuleDescriptor {
+        let module = device.scoped(name, 0, || {
+            device.wgpu().create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(name),
                 source: wgpu::ShaderSource::Wgsl(source.into()),
             })
@@ -46,7 +46,7 @@ pub struct Kernel {
 
 impl Kernel {
     /// Makes the pipeline of `entry`, whose bindings in group 0 are `slots`.
-    pub fn new(context: &Context, module: &Module, entry: &str, slots: &[(u32, Access)]) -> Result<Self, GpuError> {
+    pub fn new(device: &Device, module: &Module, entry: &str, slots: &[(u32, Access)]) -> Result<Self, GpuError> {
         let entries: Vec<_> = slots
             .iter()
             .map(|&(binding, access)| wgpu::BindGroupLayoutEntry {
@@ -65,16 +65,16 @@ impl Kernel {
             })
             .collect();
         let label = format!("{}::{entry}", module.name);
-        let device = context.device();
-        let (pipeline, layout) = context.scoped(&label, 0, || {
-            let layout = device
+        let wgpu = device.wgpu();
+        let (pipeline, layout) = device.scoped(&label, 0, || {
+            let layout = wgpu
                 .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(&label), entries: &entries });
-            let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            let pipeline_layout = wgpu.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                 label: Some(&label),
                 bind_group_layouts: &[Some(&layout)],
                 immediate_size: 0,
             });
-            let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            let pipeline = wgpu.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label: Some(&label),
                 layout: Some(&pipeline_layout),
                 module: &module.module,
@@ -88,13 +88,7 @@ impl Kernel {
     }
 
     /// Records a dispatch. `buffers` are in the order of the slots.
-    fn dispatch(
-        &self,
-        context: &Context,
-        pass: &mut wgpu::ComputePass<'_>,
-        buffers: &[&wgpu::Buffer],
-        groups: [u32; 3],
-    ) {
+    fn dispatch(&self, device: &Device, pass: &mut wgpu::ComputePass<'_>, buffers: &[&wgpu::Buffer], groups: [u32; 3]) {
         if groups.contains(&0) {
             return;
         }
@@ -104,7 +98,7 @@ impl Kernel {
             .zip(buffers)
             .map(|(&binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
             .collect();
-        let group = context.device().create_bind_group(&wgpu::BindGroupDescriptor {
+        let group = device.wgpu().create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
             layout: &self.layout,
             entries: &entries,
@@ -117,7 +111,7 @@ impl Kernel {
 
 /// What every kernel of one frame is told.
 #[derive(Clone, Copy, Debug)]
-pub struct Shot<'a> {
+pub struct FrameBindings<'a> {
     /// The camera and the picture, see [`super::layout::View`].
     pub view: &'a wgpu::Buffer,
     /// See [`super::layout::Counters`].
@@ -131,30 +125,30 @@ pub struct Shot<'a> {
 /// One stage that is being recorded.
 #[derive(Debug)]
 pub struct Stage<'a> {
-    context: &'a Context,
+    device: &'a Device,
     pass: wgpu::ComputePass<'a>,
 }
 
 impl Stage<'_> {
     /// Records a dispatch. `buffers` are in the order of the kernel's slots.
     pub fn run(&mut self, kernel: &Kernel, buffers: &[&wgpu::Buffer], groups: [u32; 3]) {
-        kernel.dispatch(self.context, &mut self.pass, buffers, groups);
+        kernel.dispatch(self.device, &mut self.pass, buffers, groups);
     }
 }
 
 /// Commands of one frame or step, with its stages timed if a timer is there.
 #[derive(Debug)]
 pub struct Recorder<'a> {
-    context: &'a Context,
+    device: &'a Device,
     encoder: wgpu::CommandEncoder,
     timer: Option<&'a mut Timer>,
 }
 
 impl<'a> Recorder<'a> {
     /// Starts recording.
-    pub fn new(context: &'a Context, timer: Option<&'a mut Timer>) -> Self {
-        let encoder = context.device().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("fmlgs") });
-        Self { context, encoder, timer }
+    pub fn new(device: &'a Device, timer: Option<&'a mut Timer>) -> Self {
+        let encoder = device.wgpu().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("fmlgs") });
+        Self { device, encoder, timer }
     }
 
     /// Records one stage.
@@ -162,7 +156,7 @@ impl<'a> Recorder<'a> {
         let timestamp_writes = self.timer.as_mut().and_then(|t| t.stage(name));
         let pass =
             self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(name), timestamp_writes });
-        record(&mut Stage { context: self.context, pass });
+        record(&mut Stage { device: self.device, pass });
     }
 
     /// Records that a buffer is filled with zeros.
@@ -175,6 +169,6 @@ impl<'a> Recorder<'a> {
         if let Some(timer) = self.timer {
             timer.resolve(&mut self.encoder);
         }
-        self.context.queue().submit([self.encoder.finish()]);
+        self.device.queue().submit([self.encoder.finish()]);
     }
 }

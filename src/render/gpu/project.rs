@@ -1,10 +1,10 @@
 //! Gaussians to splats in the picture; `shaders/project.wgsl`.
 
-use super::kernel::{Access, Kernel, Module, Shot, Stage};
+use super::kernel::{Access, FrameBindings, Kernel, Module, Stage};
 use super::layout::View;
 use super::scratch::PerGaussian;
 use super::shader::Variant;
-use super::{Context, GpuError, Parameters};
+use super::{Device, GpuError, Parameters};
 use crate::render::{RenderSettings, TANGENT_CLAMP, TILE_PX};
 use crate::scene::Camera;
 
@@ -16,20 +16,26 @@ pub struct Project {
 
 impl Project {
     /// Compiles the kernel.
-    pub fn new(context: &Context) -> Result<Self, GpuError> {
+    pub fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
-        let module = Module::new(context, "project", Variant::default())?;
+        let module = Module::new(device, "project", Variant::default())?;
         let slots =
             [(0, Uniform), (1, Read), (2, Read), (3, Read), (4, Write), (5, Write), (6, Write), (7, Write), (8, Write)];
-        Ok(Self { kernel: Kernel::new(context, &module, "main", &slots)? })
+        Ok(Self { kernel: Kernel::new(device, &module, "main", &slots)? })
     }
 
     /// Records the projection.
-    pub fn encode(&self, stage: &mut Stage<'_>, shot: Shot<'_>, cloud: &Parameters, scratch: &PerGaussian) {
+    pub fn encode(
+        &self,
+        stage: &mut Stage<'_>,
+        bindings: FrameBindings<'_>,
+        cloud: &Parameters,
+        scratch: &PerGaussian,
+    ) {
         let [geometry, low, high] = &cloud.buffers;
         let by_depth = &scratch.by_depth;
         let buffers = [
-            shot.view,
+            bindings.view,
             geometry,
             low,
             high,
@@ -37,9 +43,9 @@ impl Project {
             &by_depth.keys[0],
             &by_depth.values[0],
             &scratch.tile_counts,
-            shot.counters,
+            bindings.counters,
         ];
-        stage.run(&self.kernel, &buffers, [shot.gaussians.div_ceil(256), 1, 1]);
+        stage.run(&self.kernel, &buffers, [bindings.gaussians.div_ceil(256), 1, 1]);
     }
 }
 

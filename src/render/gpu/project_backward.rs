@@ -1,8 +1,8 @@
 //! Gradient of projection, and statistics for density control; `shaders/project_backward.wgsl`.
 
-use super::kernel::{Access, Kernel, Module, Shot, Stage};
+use super::kernel::{Access, FrameBindings, Kernel, Module, Stage};
 use super::shader::Variant;
-use super::{Context, GpuError, Parameters};
+use super::{Device, GpuError, Parameters};
 
 /// The kernels.
 #[derive(Debug)]
@@ -13,15 +13,15 @@ pub struct ProjectBackward {
 
 impl ProjectBackward {
     /// Compiles the kernels.
-    pub fn new(context: &Context) -> Result<Self, GpuError> {
+    pub fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
-        let module = Module::new(context, "project_backward", Variant::default())?;
+        let module = Module::new(device, "project_backward", Variant::default())?;
         let slots =
             [(0, Uniform), (1, Read), (2, Read), (3, Read), (4, Read), (5, Read), (6, Write), (7, Write), (8, Write)];
         let statistics = [(0, Uniform), (4, Read), (6, Write), (9, Write), (10, Write)];
         Ok(Self {
-            main: Kernel::new(context, &module, "main", &slots)?,
-            statistics: Kernel::new(context, &module, "statistics", &statistics)?,
+            main: Kernel::new(device, &module, "main", &slots)?,
+            statistics: Kernel::new(device, &module, "statistics", &statistics)?,
         })
     }
 
@@ -29,27 +29,27 @@ impl ProjectBackward {
     pub fn encode(
         &self,
         stage: &mut Stage<'_>,
-        shot: Shot<'_>,
+        bindings: FrameBindings<'_>,
         cloud: &Parameters,
         (splats, splat_gradient): (&wgpu::Buffer, &wgpu::Buffer),
         gradient: &Parameters,
     ) {
         let [geometry, low, high] = &cloud.buffers;
         let [to_geometry, to_low, to_high] = &gradient.buffers;
-        let buffers = [shot.view, geometry, low, high, splats, splat_gradient, to_geometry, to_low, to_high];
-        stage.run(&self.main, &buffers, [shot.gaussians.div_ceil(64), 1, 1]);
+        let buffers = [bindings.view, geometry, low, high, splats, splat_gradient, to_geometry, to_low, to_high];
+        stage.run(&self.main, &buffers, [bindings.gaussians.div_ceil(64), 1, 1]);
     }
 
     /// Records the gathering of screen gradients and radii into `growth`.
     pub fn encode_statistics(
         &self,
         stage: &mut Stage<'_>,
-        shot: Shot<'_>,
+        bindings: FrameBindings<'_>,
         splats: &wgpu::Buffer,
         gradient: &Parameters,
         growth: &wgpu::Buffer,
     ) {
-        let buffers = [shot.view, splats, &gradient.buffers[0], growth, shot.counters];
-        stage.run(&self.statistics, &buffers, [shot.gaussians.div_ceil(256), 1, 1]);
+        let buffers = [bindings.view, splats, &gradient.buffers[0], growth, bindings.counters];
+        stage.run(&self.statistics, &buffers, [bindings.gaussians.div_ceil(256), 1, 1]);
     }
 }

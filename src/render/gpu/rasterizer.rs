@@ -2,12 +2,12 @@
 
 use super::bin::Bin;
 use super::blend::Blend;
-use super::kernel::{Recorder, Shot};
+use super::kernel::{FrameBindings, Recorder};
 use super::layout::{Counters, View};
 use super::project::{CloudShape, Project, view};
 use super::scratch::{PerGaussian, PerPair, PerPicture, extent};
 use super::sort::Sort;
-use super::{Context, GpuError, Parameters};
+use super::{Device, GpuError, Parameters};
 use crate::render::{Cutoffs, RenderError, RenderSettings};
 use crate::scene::Camera;
 
@@ -33,30 +33,30 @@ pub struct Rasterizer {
     pub pairs: PerPair,
     /// Buffers by picture.
     pub picture: PerPicture,
-    shot: (u32, [u32; 2]),
+    extent: (u32, [u32; 2]),
 }
 
 impl Rasterizer {
     /// Compiles the kernels; the buffers are as small as they can be.
-    pub fn new(context: &Context) -> Result<Self, GpuError> {
+    pub fn new(device: &Device) -> Result<Self, GpuError> {
         Ok(Self {
-            project: Project::new(context)?,
-            sort: Sort::new(context)?,
-            bin: Bin::new(context)?,
+            project: Project::new(device)?,
+            sort: Sort::new(device)?,
+            bin: Bin::new(device)?,
             blend: Blend::default(),
-            view: context.uniform("view", bytemuck::bytes_of(&View::default()))?,
-            counters: context.storage("counters", size_of::<Counters>() as u64)?,
-            gaussians: PerGaussian::new(context, 1)?,
-            pairs: PerPair::new(context, 1, 1)?,
-            picture: PerPicture::new(context, [1, 1], 0)?,
-            shot: (0, [0, 0]),
+            view: device.uniform("view", bytemuck::bytes_of(&View::default()))?,
+            counters: device.storage("counters", size_of::<Counters>() as u64)?,
+            gaussians: PerGaussian::new(device, 1)?,
+            pairs: PerPair::new(device, 1, 1)?,
+            picture: PerPicture::new(device, [1, 1], 0)?,
+            extent: (0, [0, 0]),
         })
     }
 
     /// Makes room for a frame, tells the device what to draw, and resets the counters.
     pub fn prepare(
         &mut self,
-        context: &Context,
+        device: &Device,
         camera: &Camera,
         settings: &RenderSettings,
         cloud: CloudShape,
@@ -69,61 +69,61 @@ impl Rasterizer {
         let size_px = [camera.width_px, camera.height_px];
         let [pixels, tiles] = extent(size_px);
         let n = cloud.gaussians as usize;
-        if self.gaussians.room < n {
-            self.gaussians = PerGaussian::new(context, n)?;
+        if self.gaussians.capacity < n {
+            self.gaussians = PerGaussian::new(device, n)?;
         }
-        let room = self.pairs.room.max(cloud.gaussians.saturating_mul(FIRST_GUESS)).max(1024);
-        if self.pairs.room < room || (self.pairs.tiles as usize) < tiles {
-            self.pairs = PerPair::new(context, room, tiles as u32)?;
+        let capacity = self.pairs.capacity.max(cloud.gaussians.saturating_mul(FIRST_GUESS)).max(1024);
+        if self.pairs.capacity < capacity || (self.pairs.tiles as usize) < tiles {
+            self.pairs = PerPair::new(device, capacity, tiles as u32)?;
         }
         let p = &self.picture;
         if p.pixels < pixels || p.tiles < tiles || p.channels != channels {
-            self.picture = PerPicture::new(context, size_px, channels)?;
+            self.picture = PerPicture::new(device, size_px, channels)?;
         }
         for (carried, _) in &self.picture.chunks {
-            self.blend.prepare(context, *carried)?;
+            self.blend.prepare(device, *carried)?;
         }
-        let view = view(camera, settings, cloud, channels as u32, self.pairs.room);
-        self.shot = (cloud.gaussians, view.tiles);
-        context.queue().write_buffer(&self.view, 0, bytemuck::bytes_of(&view));
+        let view = view(camera, settings, cloud, channels as u32, self.pairs.capacity);
+        self.extent = (cloud.gaussians, view.tiles);
+        device.queue().write_buffer(&self.view, 0, bytemuck::bytes_of(&view));
         let counters = Counters { gaussians: cloud.gaussians, ..Counters::default() };
-        context.queue().write_buffer(&self.counters, 0, bytemuck::bytes_of(&counters));
+        device.queue().write_buffer(&self.counters, 0, bytemuck::bytes_of(&counters));
         Ok(())
     }
 
     /// What the kernels of the prepared frame are told.
-    pub fn shot(&self) -> Shot<'_> {
-        Shot { view: &self.view, counters: &self.counters, gaussians: self.shot.0, tiles: self.shot.1 }
+    pub fn bindings(&self) -> FrameBindings<'_> {
+        FrameBindings { view: &self.view, counters: &self.counters, gaussians: self.extent.0, tiles: self.extent.1 }
     }
 
     /// Records projection, depth order and the count of pairs.
     pub fn encode_count(&self, recorder: &mut Recorder<'_>, cloud: &Parameters) {
-        let shot = self.shot();
-        recorder.stage("project", |s| self.project.encode(s, shot, cloud, &self.gaussians));
+        let bindings = self.bindings();
+        recorder.stage("project", |s| self.project.encode(s, bindings, cloud, &self.gaussians));
         recorder.stage("sort by depth", |s| self.sort.encode(s, &self.gaussians.by_depth, &self.counters));
-        recorder.stage("bin", |s| self.bin.encode_count(s, shot, &self.gaussians));
+        recorder.stage("bin", |s| self.bin.encode_count(s, bindings, &self.gaussians));
     }
 
     /// Records the rest of the forward pass after [`Self::encode_count`].
     pub fn encode_draw(&self, recorder: &mut Recorder<'_>, features: &wgpu::Buffer) {
-        let shot = self.shot();
+        let bindings = self.bindings();
         recorder.clear(&self.picture.ranges);
-        recorder.stage("bin", |s| self.bin.encode_emit(s, shot, &self.gaussians, &self.pairs));
+        recorder.stage("bin", |s| self.bin.encode_emit(s, bindings, &self.gaussians, &self.pairs));
         recorder.stage("sort by tile", |s| self.sort.encode(s, &self.pairs.by_tile, &self.counters));
-        recorder.stage("bin", |s| self.bin.encode_ranges(s, shot, &self.pairs, &self.picture.ranges));
+        recorder.stage("bin", |s| self.bin.encode_ranges(s, bindings, &self.pairs, &self.picture.ranges));
         recorder.stage("blend", |s| {
-            self.blend.encode(s, shot, (&self.gaussians, &self.pairs, &self.picture), features);
+            self.blend.encode(s, bindings, (&self.gaussians, &self.pairs, &self.picture), features);
         });
     }
 
     /// Makes room for `wanted` pairs and some more.
-    pub fn grow_pairs(&mut self, context: &Context, wanted: u32) -> Result<(), GpuError> {
-        if wanted <= self.pairs.room {
+    pub fn grow_pairs(&mut self, device: &Device, wanted: u32) -> Result<(), GpuError> {
+        if wanted <= self.pairs.capacity {
             return Ok(());
         }
         let tiles = self.pairs.tiles.min(self.picture.tiles as u32);
         let roomy = (f64::from(wanted) * HEADROOM).min(f64::from(u32::MAX)) as u32;
-        let made = PerPair::new(context, roomy, tiles).or_else(|_| PerPair::new(context, wanted, tiles));
+        let made = PerPair::new(device, roomy, tiles).or_else(|_| PerPair::new(device, wanted, tiles));
         self.pairs = made?;
         Ok(())
     }
@@ -139,8 +139,8 @@ impl Rasterizer {
     }
 
     /// Reads the frame's counters.
-    pub fn read_counters(&self, context: &Context) -> Result<Counters, GpuError> {
-        let bytes = context.read(&[(&self.counters, size_of::<Counters>() as u64)])?;
+    pub fn read_counters(&self, device: &Device) -> Result<Counters, GpuError> {
+        let bytes = device.read(&[(&self.counters, size_of::<Counters>() as u64)])?;
         Ok(counters_of(&bytes[0]))
     }
 }

@@ -9,14 +9,14 @@ use super::project_backward::ProjectBackward;
 use super::rasterizer::{Rasterizer, counters_of};
 use super::scratch::GRADIENT_BASE;
 use super::timing::{StageTimes, Timer};
-use super::{Context, GpuError};
+use super::{Device, GpuError};
 use crate::render::{CloudGradient, Features, Frame, FrameGradient, RenderError, RenderSettings};
 use crate::scene::{Camera, GaussianCloud};
 
 /// A renderer with its buffers and the cloud that was uploaded last.
 #[derive(Debug)]
 pub struct Renderer {
-    context: Context,
+    device: Device,
     rasterizer: Rasterizer,
     blend_backward: BlendBackward,
     project_backward: ProjectBackward,
@@ -49,22 +49,22 @@ struct Drawn {
 }
 
 impl Renderer {
-    /// A renderer on `context`.
-    pub fn new(context: &Context) -> Result<Self, GpuError> {
-        Self::with_float_atomics(context, context.has_float_atomics())
+    /// A renderer on `device`.
+    pub fn new(device: &Device) -> Result<Self, GpuError> {
+        Self::with_float_atomics(device, device.has_float_atomics())
     }
 
     /// A renderer that uses float atomics or not, whatever the device offers. Asking for what it
     /// does not have is an error at the first backward pass.
-    pub fn with_float_atomics(context: &Context, float_atomics: bool) -> Result<Self, GpuError> {
+    pub fn with_float_atomics(device: &Device, float_atomics: bool) -> Result<Self, GpuError> {
         Ok(Self {
-            context: context.clone(),
-            rasterizer: Rasterizer::new(context)?,
+            device: device.clone(),
+            rasterizer: Rasterizer::new(device)?,
             blend_backward: BlendBackward::new(float_atomics),
-            project_backward: ProjectBackward::new(context)?,
-            cloud: Parameters::new(context, "cloud", 0, 0)?,
+            project_backward: ProjectBackward::new(device)?,
+            cloud: Parameters::new(device, "cloud", 0, 0)?,
             shape: CloudShape::default(),
-            features: context.storage("features", 0)?,
+            features: device.storage("features", 0)?,
             channels: 0,
             drawn: None,
             timer: None,
@@ -74,7 +74,7 @@ impl Renderer {
 
     /// Times the stages of every later frame, where the device can.
     pub fn measure(&mut self) -> Result<(), GpuError> {
-        self.timer = Timer::new(&self.context)?;
+        self.timer = Timer::new(&self.device)?;
         Ok(())
     }
 
@@ -112,10 +112,10 @@ impl Renderer {
         self.drawn = None;
         let degree = degree.min(cloud.sh_degree);
         if self.shape.gaussians as usize != cloud.len() || self.shape.degree != degree {
-            self.cloud = Parameters::new(&self.context, "cloud", cloud.len(), degree)?;
+            self.cloud = Parameters::new(&self.device, "cloud", cloud.len(), degree)?;
         }
-        self.cloud.write(&self.context, &Packed::up_to(cloud, degree));
-        self.features = self.context.storage_with("features", bytemuck::cast_slice(features.values))?;
+        self.cloud.write(&self.device, &Packed::up_to(cloud, degree));
+        self.features = self.device.storage_with("features", bytemuck::cast_slice(features.values))?;
         self.shape = CloudShape { origin: cloud.origin, gaussians: cloud.len() as u32, degree };
         self.channels = features.channels;
         Ok(())
@@ -143,21 +143,21 @@ impl Renderer {
     /// Draws the uploaded cloud.
     pub fn draw(&mut self, camera: &Camera, settings: &RenderSettings) -> Result<Frame<f32>, GpuError> {
         loop {
-            self.rasterizer.prepare(&self.context, camera, settings, self.shape, self.channels)?;
-            let mut recorder = Recorder::new(&self.context, self.timer.as_mut());
+            self.rasterizer.prepare(&self.device, camera, settings, self.shape, self.channels)?;
+            let mut recorder = Recorder::new(&self.device, self.timer.as_mut());
             self.rasterizer.encode_count(&mut recorder, &self.cloud);
             self.rasterizer.encode_draw(&mut recorder, &self.features);
             recorder.submit();
             let (frame, counters) = self.read_frame(camera, settings)?;
             if let Some(timer) = &mut self.timer {
-                self.times = timer.finish(&self.context)?;
+                self.times = timer.finish(&self.device)?;
             }
             if counters.overflow == 0 {
                 let size_px = [camera.width_px, camera.height_px];
                 self.drawn = Some(Drawn { size_px, depth: settings.depth, counters });
                 return Ok(frame);
             }
-            self.rasterizer.grow_pairs(&self.context, counters.wanted)?;
+            self.rasterizer.grow_pairs(&self.device, counters.wanted)?;
         }
     }
 
@@ -167,9 +167,9 @@ impl Renderer {
         let Some(drawn) = self.drawn else { return Ok(None) };
         let r = &self.rasterizer;
         let n = self.shape.gaussians as usize;
-        let tiles = r.shot().tiles.iter().product::<u32>() as u64;
+        let tiles = r.bindings().tiles.iter().product::<u32>() as u64;
         let list = &r.pairs.by_tile.values[r.pairs.by_tile.result()];
-        let bytes = self.context.read(&[
+        let bytes = self.device.read(&[
             (&r.gaussians.splats, (n * size_of::<Splat>()) as u64),
             (&r.picture.ranges, tiles * 8),
             (list, u64::from(drawn.counters.pairs) * 4),
@@ -185,7 +185,7 @@ impl Renderer {
         let pixels = u64::from(camera.width_px) * u64::from(camera.height_px);
         let picture = &self.rasterizer.picture;
         let depth_bytes = if settings.depth { pixels * 8 } else { 0 };
-        let bytes = self.context.read(&[
+        let bytes = self.device.read(&[
             (&self.rasterizer.counters, size_of::<Counters>() as u64),
             (&picture.colors, pixels * 16),
             (&picture.depths, depth_bytes),
@@ -230,32 +230,32 @@ impl Renderer {
         };
         let planes = if drawn.depth { 2 } else { 1 };
         let pixels = (drawn.size_px[0] * drawn.size_px[1]) as usize;
-        let gradients = BlendGradients::new(&self.context, n, pixels, self.channels, planes)?;
-        let out = Parameters::new(&self.context, "gradient of the cloud", n, self.shape.degree)?;
+        let gradients = BlendGradients::new(&self.device, n, pixels, self.channels, planes)?;
+        let out = Parameters::new(&self.device, "gradient of the cloud", n, self.shape.degree)?;
         self.write_gradient(gradient, &gradients, pixels, drawn.depth)?;
         let r = &self.rasterizer;
         for (carried, _) in &r.picture.chunks {
-            self.blend_backward.prepare(&self.context, *carried)?;
+            self.blend_backward.prepare(&self.device, *carried)?;
         }
-        let shot = r.shot();
+        let bindings = r.bindings();
         let splats = &r.gaussians.splats;
-        let mut recorder = Recorder::new(&self.context, self.timer.as_mut());
+        let mut recorder = Recorder::new(&self.device, self.timer.as_mut());
         recorder.stage("blend backward", |s| {
-            self.blend_backward.encode(s, shot, (&r.gaussians, &r.pairs, &r.picture), &self.features, &gradients);
+            self.blend_backward.encode(s, bindings, (&r.gaussians, &r.pairs, &r.picture), &self.features, &gradients);
         });
         recorder.stage("project backward", |s| {
-            self.project_backward.encode(s, shot, &self.cloud, (splats, &gradients.splats), &out);
+            self.project_backward.encode(s, bindings, &self.cloud, (splats, &gradients.splats), &out);
         });
         recorder.submit();
         if let Some(timer) = &mut self.timer {
-            self.times.extend(timer.finish(&self.context)?);
+            self.times.extend(timer.finish(&self.device)?);
         }
         let stride = GRADIENT_BASE + self.channels;
-        let bytes = self.context.read(&[
+        let bytes = self.device.read(&[
             (&gradients.splats, if self.channels > 0 { (n * stride * 4) as u64 } else { 0 }),
             (splats, (n * size_of::<Splat>()) as u64),
         ])?;
-        let packed = out.read(&self.context, n, self.shape.degree)?;
+        let packed = out.read(&self.device, n, self.shape.degree)?;
         let splat_gradient: Vec<f32> = bytemuck::pod_collect_to_vec(&bytes[0]);
         let splats: Vec<Splat> = bytemuck::pod_collect_to_vec(&bytes[1]);
         Ok(unpack(&packed, &splat_gradient, &splats, self.channels))
@@ -281,14 +281,14 @@ impl Renderer {
         if depth {
             values.extend((0..pixels).map(|i| [at(&gradient.depth, i), 0.0, 0.0, 0.0]));
         }
-        self.rasterizer.picture.set_depth_gradient(&self.context, depth);
-        self.context.queue().write_buffer(&to.pixels, 0, bytemuck::cast_slice(&values));
+        self.rasterizer.picture.set_depth_gradient(&self.device, depth);
+        self.device.queue().write_buffer(&to.pixels, 0, bytemuck::cast_slice(&values));
         if self.channels > 0 {
             let none = Vec::new();
             let values: Vec<f32> = (0..pixels * self.channels)
                 .map(|k| at(gradient.features.get(k % self.channels).unwrap_or(&none), k / self.channels))
                 .collect();
-            self.context.queue().write_buffer(&to.features, 0, bytemuck::cast_slice(&values));
+            self.device.queue().write_buffer(&to.features, 0, bytemuck::cast_slice(&values));
         }
         Ok(())
     }

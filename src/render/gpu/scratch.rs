@@ -3,7 +3,7 @@
 
 use super::layout::{Chunk, Splat};
 use super::sort::SortBuffers;
-use super::{Context, GpuError};
+use super::{Device, GpuError};
 use crate::render::TILE_PX;
 
 /// Word of the counters that holds the number of Gaussians.
@@ -21,7 +21,7 @@ pub const CHUNK_CHANNELS: usize = 16;
 #[derive(Debug)]
 pub struct PerGaussian {
     /// Gaussians that fit.
-    pub room: usize,
+    pub capacity: usize,
     /// Splats in the picture.
     pub splats: wgpu::Buffer,
     /// Tiles that each reaches.
@@ -33,15 +33,15 @@ pub struct PerGaussian {
 }
 
 impl PerGaussian {
-    /// Room for `room` Gaussians.
-    pub fn new(context: &Context, room: usize) -> Result<Self, GpuError> {
-        let n = room as u64;
+    /// Room for `capacity` Gaussians.
+    pub fn new(device: &Device, capacity: usize) -> Result<Self, GpuError> {
+        let n = capacity as u64;
         Ok(Self {
-            room,
-            splats: context.storage("splats", n * size_of::<Splat>() as u64)?,
-            tile_counts: context.storage("tile counts", n * 4)?,
-            by_depth: SortBuffers::new(context, n, 32, COUNT_GAUSSIANS)?,
-            sums: context.storage("sums of tile counts", n.div_ceil(u64::from(BIN_BLOCK)) * 4)?,
+            capacity,
+            splats: device.storage("splats", n * size_of::<Splat>() as u64)?,
+            tile_counts: device.storage("tile counts", n * 4)?,
+            by_depth: SortBuffers::new(device, n, 32, COUNT_GAUSSIANS)?,
+            sums: device.storage("sums of tile counts", n.div_ceil(u64::from(BIN_BLOCK)) * 4)?,
         })
     }
 }
@@ -50,7 +50,7 @@ impl PerGaussian {
 #[derive(Debug)]
 pub struct PerPair {
     /// Pairs that fit.
-    pub room: u32,
+    pub capacity: u32,
     /// Tiles that the sort's passes can tell apart.
     pub tiles: u32,
     /// Tile indices with the splats' indices.
@@ -58,12 +58,12 @@ pub struct PerPair {
 }
 
 impl PerPair {
-    /// Room for `room` pairs in a picture of `tiles` tiles.
-    pub fn new(context: &Context, room: u32, tiles: u32) -> Result<Self, GpuError> {
+    /// Room for `capacity` pairs in a picture of `tiles` tiles.
+    pub fn new(device: &Device, capacity: u32, tiles: u32) -> Result<Self, GpuError> {
         // One value more than there are tiles: pairs that belong nowhere.
         let bits = (32 - tiles.leading_zeros()).next_multiple_of(8);
         let most = if bits >= 32 { u32::MAX } else { (1 << bits) - 1 };
-        Ok(Self { room, tiles: most, by_tile: SortBuffers::new(context, u64::from(room), bits, COUNT_PAIRS)? })
+        Ok(Self { capacity, tiles: most, by_tile: SortBuffers::new(device, u64::from(capacity), bits, COUNT_PAIRS)? })
     }
 }
 
@@ -92,30 +92,30 @@ pub struct PerPicture {
 
 impl PerPicture {
     /// Room for a picture of this size.
-    pub fn new(context: &Context, size_px: [u32; 2], channels: usize) -> Result<Self, GpuError> {
+    pub fn new(device: &Device, size_px: [u32; 2], channels: usize) -> Result<Self, GpuError> {
         let [pixels, tiles] = extent(size_px);
         let n = pixels as u64;
         let mut chunks = Vec::new();
         for first in (0..channels.max(1)).step_by(CHUNK_CHANNELS) {
             let chunk = Chunk { channels: channels as u32, first: first as u32, ..Chunk::default() };
-            let buffer = context.uniform("channels of a pass", bytemuck::bytes_of(&chunk))?;
+            let buffer = device.uniform("channels of a pass", bytemuck::bytes_of(&chunk))?;
             chunks.push(((channels - first).min(CHUNK_CHANNELS), buffer));
         }
         Ok(Self {
             pixels,
             tiles,
             channels,
-            ranges: context.storage("tile ranges", tiles as u64 * 8)?,
-            colors: context.storage("picture", n * 16)?,
-            ends: context.storage("ends of lists", n * 8)?,
-            depths: context.storage("depths", n * 8)?,
-            features: context.storage("extra channels of the picture", n * 4 * channels as u64)?,
+            ranges: device.storage("tile ranges", tiles as u64 * 8)?,
+            colors: device.storage("picture", n * 16)?,
+            ends: device.storage("ends of lists", n * 8)?,
+            depths: device.storage("depths", n * 8)?,
+            features: device.storage("extra channels of the picture", n * 4 * channels as u64)?,
             chunks,
         })
     }
 
     /// Tells the blending passes whether the loss has a gradient with respect to depth.
-    pub fn set_depth_gradient(&self, context: &Context, present: bool) {
+    pub fn set_depth_gradient(&self, device: &Device, present: bool) {
         for (i, (_, buffer)) in self.chunks.iter().enumerate() {
             let chunk = Chunk {
                 channels: self.channels as u32,
@@ -123,7 +123,7 @@ impl PerPicture {
                 depth_gradient: u32::from(present),
                 ..Chunk::default()
             };
-            context.queue().write_buffer(buffer, 0, bytemuck::bytes_of(&chunk));
+            device.queue().write_buffer(buffer, 0, bytemuck::bytes_of(&chunk));
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::kernel::{Access, Kernel, Module, Recorder, Stage};
 use super::layout::Pass;
 use super::shader::Variant;
-use super::{Context, GpuError};
+use super::{Device, GpuError};
 
 /// Pairs of one workgroup.
 const BLOCK: u64 = 4096;
@@ -32,23 +32,23 @@ pub struct SortBuffers {
 }
 
 impl SortBuffers {
-    /// Room for `room` pairs, sorted by the low `bits` bits of their keys; how many there are
+    /// Room for `capacity` pairs, sorted by the low `bits` bits of their keys; how many there are
     /// stands at word `counter` of the counters.
-    pub fn new(context: &Context, room: u64, bits: u32, counter: u32) -> Result<Self, GpuError> {
-        let blocks = room.div_ceil(BLOCK).max(1);
-        context.fits_dispatch("sorting", blocks, "use fewer Gaussians or smaller pictures")?;
-        let pairs = || context.storage("pairs to sort", room * 4);
+    pub fn new(device: &Device, capacity: u64, bits: u32, counter: u32) -> Result<Self, GpuError> {
+        let blocks = capacity.div_ceil(BLOCK).max(1);
+        device.fits_dispatch("sorting", blocks, "use fewer Gaussians or smaller pictures")?;
+        let pairs = || device.storage("pairs to sort", capacity * 4);
         let passes = (0..bits.div_ceil(8))
             .map(|p| {
                 let pass = Pass { shift: 8 * p, counter, ..Pass::default() };
-                context.uniform("radix pass", bytemuck::bytes_of(&pass))
+                device.uniform("radix pass", bytemuck::bytes_of(&pass))
             })
             .collect::<Result<_, _>>()?;
         Ok(Self {
             keys: [pairs()?, pairs()?],
             values: [pairs()?, pairs()?],
-            histogram: context.storage("digit counts", blocks * DIGITS * 4)?,
-            totals: context.storage("digit totals", DIGITS * 4)?,
+            histogram: device.storage("digit counts", blocks * DIGITS * 4)?,
+            totals: device.storage("digit totals", DIGITS * 4)?,
             passes,
             blocks: blocks as u32,
         })
@@ -68,10 +68,10 @@ impl SortBuffers {
 
 impl Sort {
     /// Compiles the kernels.
-    pub fn new(context: &Context) -> Result<Self, GpuError> {
+    pub fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
-        let module = Module::new(context, "sort", Variant::default())?;
-        let kernel = |entry, slots: &[_]| Kernel::new(context, &module, entry, slots);
+        let module = Module::new(device, "sort", Variant::default())?;
+        let kernel = |entry, slots: &[_]| Kernel::new(device, &module, entry, slots);
         Ok(Self {
             count: kernel("count", &[(0, Uniform), (1, Read), (2, Read), (6, Write)])?,
             scan: kernel("scan", &[(0, Uniform), (1, Read), (6, Write), (7, Write)])?,
@@ -109,26 +109,21 @@ impl Sort {
 
 /// Sorts `(key, value)` pairs by the low `bits` bits of the keys and returns them: the sort alone,
 /// for tests and measurements.
-pub fn sort_pairs(
-    context: &Context,
-    keys: &[u32],
-    values: &[u32],
-    bits: u32,
-) -> Result<(Vec<u32>, Vec<u32>), GpuError> {
+pub fn sort_pairs(device: &Device, keys: &[u32], values: &[u32], bits: u32) -> Result<(Vec<u32>, Vec<u32>), GpuError> {
     if keys.len() != values.len() {
         return Err(GpuError::Size { what: "values to sort", have: values.len(), want: keys.len() });
     }
-    let sort = Sort::new(context)?;
-    let buffers = SortBuffers::new(context, keys.len() as u64, bits, 0)?;
-    let counters = context.storage_with("pair count", bytemuck::bytes_of(&[keys.len() as u32; 4]))?;
-    context.queue().write_buffer(&buffers.keys[0], 0, bytemuck::cast_slice(keys));
-    context.queue().write_buffer(&buffers.values[0], 0, bytemuck::cast_slice(values));
-    let mut recorder = Recorder::new(context, None);
+    let sort = Sort::new(device)?;
+    let buffers = SortBuffers::new(device, keys.len() as u64, bits, 0)?;
+    let counters = device.storage_with("pair count", bytemuck::bytes_of(&[keys.len() as u32; 4]))?;
+    device.queue().write_buffer(&buffers.keys[0], 0, bytemuck::cast_slice(keys));
+    device.queue().write_buffer(&buffers.values[0], 0, bytemuck::cast_slice(values));
+    let mut recorder = Recorder::new(device, None);
     recorder.stage("sort", |stage| sort.encode(stage, &buffers, &counters));
     recorder.submit();
     let bytes = keys.len() as u64 * 4;
     let result = buffers.result();
-    let out = context.read(&[(&buffers.keys[result], bytes), (&buffers.values[result], bytes)])?;
+    let out = device.read(&[(&buffers.keys[result], bytes), (&buffers.values[result], bytes)])?;
     let [keys, values] = [0, 1].map(|i| out.get(i).map_or_else(Vec::new, |b| bytemuck::pod_collect_to_vec(b)));
     Ok((keys, values))
 }

@@ -4,7 +4,8 @@ use super::kernel::{Access, Kernel, Module, Recorder, Stage};
 use super::layout::Loss;
 use super::scratch::extent;
 use super::shader::Variant;
-use super::{Context, GpuError};
+use super::{Device, GpuError};
+use crate::math::stats::psnr_of;
 use crate::render::TILE_PX;
 use crate::scene::PhotoPixels;
 
@@ -23,7 +24,7 @@ pub struct DevicePhoto {
 
 impl DevicePhoto {
     /// Sends a photo to the device.
-    pub fn new(context: &Context, photo: &PhotoPixels) -> Result<Self, GpuError> {
+    pub fn new(device: &Device, photo: &PhotoPixels) -> Result<Self, GpuError> {
         let size_px = [photo.width_px, photo.height_px];
         let [want, _] = extent(size_px);
         let lengths = [photo.rgb.len(), photo.coverage.as_ref().map_or(want, Vec::len)];
@@ -32,7 +33,7 @@ impl DevicePhoto {
         }
         let covered = |i: usize| photo.coverage.as_ref().map_or(255, |c| c[i]);
         let packed: Vec<[u8; 4]> = photo.rgb.iter().enumerate().map(|(i, &[r, g, b])| [r, g, b, covered(i)]).collect();
-        Ok(Self { pixels: context.storage_with("photo", packed.as_flattened())?, size_px })
+        Ok(Self { pixels: device.storage_with("photo", packed.as_flattened())?, size_px })
     }
 }
 
@@ -65,7 +66,7 @@ impl LossSums {
 
     /// PSNR in dB for a peak of 1.
     pub fn psnr(&self) -> f64 {
-        -10.0 * self.mse.log10()
+        psnr_of(self.mse)
     }
 }
 
@@ -79,38 +80,38 @@ pub struct Ssim {
     maps: wgpu::Buffer,
     partials: wgpu::Buffer,
     ring: wgpu::Buffer,
-    room: [usize; 2],
+    capacity: [usize; 2],
 }
 
 impl Ssim {
     /// Compiles the kernels; the buffers grow with the first photo.
-    pub fn new(context: &Context) -> Result<Self, GpuError> {
+    pub fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
-        let module = Module::new(context, "ssim", Variant::default())?;
-        let kernel = |entry, slots: &[_]| Kernel::new(context, &module, entry, slots);
+        let module = Module::new(device, "ssim", Variant::default())?;
+        let kernel = |entry, slots: &[_]| Kernel::new(device, &module, entry, slots);
         Ok(Self {
             moments: kernel("moments", &[(0, Uniform), (1, Read), (2, Read), (3, Write), (5, Write)])?,
             gradient: kernel("gradient", &[(0, Uniform), (1, Read), (2, Read), (3, Write), (4, Write)])?,
             reduce: kernel("reduce", &[(0, Uniform), (5, Write), (6, Write), (7, Read), (8, Read)])?,
-            loss: context.uniform("loss", bytemuck::bytes_of(&Loss::default()))?,
-            maps: context.storage("derivatives of SSIM", 0)?,
-            partials: context.storage("sums of the loss", 0)?,
-            ring: context.storage("losses of steps", RING as u64 * SLOT_BYTES)?,
-            room: [0, 0],
+            loss: device.uniform("loss", bytemuck::bytes_of(&Loss::default()))?,
+            maps: device.storage("derivatives of SSIM", 0)?,
+            partials: device.storage("sums of the loss", 0)?,
+            ring: device.storage("losses of steps", RING as u64 * SLOT_BYTES)?,
+            capacity: [0, 0],
         })
     }
 
     /// Makes room for pictures of this size and says where the sums go. `lambda` is the share of
     /// D-SSIM in the loss.
-    pub fn prepare(&mut self, context: &Context, size_px: [u32; 2], slot: usize, lambda: f64) -> Result<(), GpuError> {
+    pub fn prepare(&mut self, device: &Device, size_px: [u32; 2], slot: usize, lambda: f64) -> Result<(), GpuError> {
         let [pixels, tiles] = extent(size_px);
-        if self.room[0] < pixels {
-            self.maps = context.storage("derivatives of SSIM", pixels as u64 * 36)?;
-            self.room[0] = pixels;
+        if self.capacity[0] < pixels {
+            self.maps = device.storage("derivatives of SSIM", pixels as u64 * 36)?;
+            self.capacity[0] = pixels;
         }
-        if self.room[1] < tiles {
-            self.partials = context.storage("sums of the loss", tiles as u64 * 16)?;
-            self.room[1] = tiles;
+        if self.capacity[1] < tiles {
+            self.partials = device.storage("sums of the loss", tiles as u64 * 16)?;
+            self.capacity[1] = tiles;
         }
         let values = (pixels * 3) as f64;
         let loss = Loss {
@@ -121,7 +122,7 @@ impl Ssim {
             dssim: (lambda / values) as f32,
             ..Loss::default()
         };
-        context.queue().write_buffer(&self.loss, 0, bytemuck::bytes_of(&loss));
+        device.queue().write_buffer(&self.loss, 0, bytemuck::bytes_of(&loss));
         Ok(())
     }
 
@@ -145,8 +146,8 @@ impl Ssim {
     }
 
     /// Fetches the sums of slots from 0, one for each of `pixels`, the number of pixels compared.
-    pub fn read(&self, context: &Context, pixels: &[usize]) -> Result<Vec<LossSums>, GpuError> {
-        let bytes = context.read(&[(&self.ring, pixels.len() as u64 * SLOT_BYTES)])?;
+    pub fn read(&self, device: &Device, pixels: &[usize]) -> Result<Vec<LossSums>, GpuError> {
+        let bytes = device.read(&[(&self.ring, pixels.len() as u64 * SLOT_BYTES)])?;
         let slots: Vec<[f32; 8]> = bytemuck::pod_collect_to_vec(&bytes[0]);
         Ok(slots
             .iter()
@@ -171,28 +172,28 @@ impl Ssim {
 /// Loss of a rendered picture (interleaved RGB) against a photo, and its gradient: the loss alone,
 /// for tests and measurements.
 pub fn photo_loss(
-    context: &Context,
+    device: &Device,
     rendered: &[[f32; 3]],
     photo: &PhotoPixels,
     lambda: f64,
 ) -> Result<(LossSums, Vec<[f32; 3]>), GpuError> {
-    let target = DevicePhoto::new(context, photo)?;
+    let target = DevicePhoto::new(device, photo)?;
     let [pixels, _] = extent(target.size_px);
     if rendered.len() != pixels {
         return Err(GpuError::Size { what: "pixels of a picture", have: rendered.len(), want: pixels });
     }
-    let mut ssim = Ssim::new(context)?;
-    ssim.prepare(context, target.size_px, 0, lambda)?;
+    let mut ssim = Ssim::new(device)?;
+    ssim.prepare(device, target.size_px, 0, lambda)?;
     let wide: Vec<[f32; 4]> = rendered.iter().map(|&[r, g, b]| [r, g, b, 0.0]).collect();
-    let colors = context.storage_with("picture", bytemuck::cast_slice(&wide))?;
-    let gradient = context.storage("gradient of the picture", pixels as u64 * 16)?;
-    let [counters, outliers] = [context.storage("counters", 32)?, context.storage("outliers", 16)?];
-    let mut recorder = Recorder::new(context, None);
+    let colors = device.storage_with("picture", bytemuck::cast_slice(&wide))?;
+    let gradient = device.storage("gradient of the picture", pixels as u64 * 16)?;
+    let [counters, outliers] = [device.storage("counters", 32)?, device.storage("outliers", 16)?];
+    let mut recorder = Recorder::new(device, None);
     recorder.stage("loss", |s| ssim.encode(s, &colors, &target, &gradient));
     recorder.stage("loss", |s| ssim.encode_sums(s, &counters, &outliers));
     recorder.submit();
-    let sums = ssim.read(context, &[pixels])?.first().copied().unwrap_or_default();
-    let bytes = context.read(&[(&gradient, pixels as u64 * 16)])?;
+    let sums = ssim.read(device, &[pixels])?.first().copied().unwrap_or_default();
+    let bytes = device.read(&[(&gradient, pixels as u64 * 16)])?;
     let gradient: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes[0]);
     Ok((sums, gradient.iter().map(|g| [g[0], g[1], g[2]]).collect()))
 }

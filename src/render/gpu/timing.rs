@@ -1,6 +1,6 @@
 //! Times of the stages of a frame or step, from timestamps that the device writes itself.
 
-use super::{Context, GpuError};
+use super::{Device, GpuError};
 
 /// Stages that one timer holds.
 const STAGES: u32 = 32;
@@ -19,20 +19,20 @@ pub struct Timer {
 
 impl Timer {
     /// A timer, or `None` on a device without timestamps.
-    pub fn new(context: &Context) -> Result<Option<Self>, GpuError> {
-        if !context.has_timestamps() {
+    pub fn new(device: &Device) -> Result<Option<Self>, GpuError> {
+        if !device.has_timestamps() {
             return Ok(None);
         }
-        let queries = context.scoped("timestamps", 0, || {
-            context.device().create_query_set(&wgpu::QuerySetDescriptor {
+        let queries = device.scoped("timestamps", 0, || {
+            device.wgpu().create_query_set(&wgpu::QuerySetDescriptor {
                 label: Some("stage times"),
                 ty: wgpu::QueryType::Timestamp,
                 count: 2 * STAGES,
             })
         })?;
         let usage = wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC;
-        let resolved = context.buffer("stage times", u64::from(2 * STAGES) * 8, usage)?;
-        let secs_per_tick = f64::from(context.queue().get_timestamp_period()) * 1e-9;
+        let resolved = device.buffer("stage times", u64::from(2 * STAGES) * 8, usage)?;
+        let secs_per_tick = f64::from(device.queue().get_timestamp_period()) * 1e-9;
         Ok(Some(Self { queries, resolved, names: Vec::new(), secs_per_tick }))
     }
 
@@ -58,9 +58,9 @@ impl Timer {
 
     /// Waits for the submission and returns its times; passes of one name are added up. The timer
     /// is then ready for the next submission.
-    pub fn finish(&mut self, context: &Context) -> Result<StageTimes, GpuError> {
+    pub fn finish(&mut self, device: &Device) -> Result<StageTimes, GpuError> {
         let names = std::mem::take(&mut self.names);
-        let bytes = context.read(&[(&self.resolved, names.len() as u64 * 16)])?;
+        let bytes = device.read(&[(&self.resolved, names.len() as u64 * 16)])?;
         let ticks: Vec<u64> =
             bytes.iter().flatten().copied().collect::<Vec<u8>>().chunks_exact(8).map(read_u64).collect();
         let mut out: StageTimes = Vec::new();

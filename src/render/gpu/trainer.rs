@@ -11,7 +11,8 @@ use super::rasterizer::Rasterizer;
 use super::scratch::extent;
 use super::ssim::{DevicePhoto, LossSums, RING, Ssim};
 use super::timing::{StageTimes, Timer};
-use super::{Context, GpuError};
+use super::{Device, GpuError};
+use crate::render::DensityStats;
 use crate::render::RenderSettings;
 use crate::render::cpu::adam::Rates;
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
@@ -31,17 +32,6 @@ impl Default for TrainerSettings {
     }
 }
 
-/// What density control asks for, per Gaussian, since the cloud was last uploaded.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Growth {
-    /// Sum of the screen gradients' lengths, loss per half picture side.
-    pub gradient: Vec<f32>,
-    /// Frames in which it was drawn.
-    pub seen: Vec<u32>,
-    /// Largest radius as a share of the picture's longer side.
-    pub radius: Vec<f32>,
-}
-
 /// Measurements of one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepLoss {
@@ -56,7 +46,7 @@ pub struct StepLoss {
 /// The state of a training run on the device.
 #[derive(Debug)]
 pub struct Trainer {
-    context: Context,
+    device: Device,
     settings: TrainerSettings,
     rasterizer: Rasterizer,
     ssim: Ssim,
@@ -64,13 +54,13 @@ pub struct Trainer {
     project_backward: ProjectBackward,
     adam: Adam,
     shape: CloudShape,
-    room: usize,
+    capacity: usize,
     cloud: Parameters,
     gradient: Parameters,
     moments: [Parameters; 2],
     growth: wgpu::Buffer,
     gradients: BlendGradients,
-    gradient_room: [usize; 2],
+    gradient_capacity: [usize; 2],
     features: wgpu::Buffer,
     step: u64,
     /// Whether a frame of this cloud has told how many pairs it needs.
@@ -85,25 +75,25 @@ pub struct Trainer {
 
 impl Trainer {
     /// Starts a run from `cloud`.
-    pub fn new(context: &Context, cloud: &GaussianCloud, settings: TrainerSettings) -> Result<Self, GpuError> {
-        let empty = |what| Parameters::new(context, what, 0, 0);
+    pub fn new(device: &Device, cloud: &GaussianCloud, settings: TrainerSettings) -> Result<Self, GpuError> {
+        let empty = |what| Parameters::new(device, what, 0, 0);
         let mut trainer = Self {
-            context: context.clone(),
+            device: device.clone(),
             settings,
-            rasterizer: Rasterizer::new(context)?,
-            ssim: Ssim::new(context)?,
-            blend_backward: BlendBackward::new(context.has_float_atomics()),
-            project_backward: ProjectBackward::new(context)?,
-            adam: Adam::new(context)?,
+            rasterizer: Rasterizer::new(device)?,
+            ssim: Ssim::new(device)?,
+            blend_backward: BlendBackward::new(device.has_float_atomics()),
+            project_backward: ProjectBackward::new(device)?,
+            adam: Adam::new(device)?,
             shape: CloudShape::default(),
-            room: 0,
+            capacity: 0,
             cloud: empty("cloud")?,
             gradient: empty("gradient of the cloud")?,
             moments: [empty("first moments")?, empty("second moments")?],
-            growth: context.storage("density statistics", 0)?,
-            gradients: BlendGradients::new(context, 0, 0, 0, 1)?,
-            gradient_room: [0, 0],
-            features: context.storage("features", 0)?,
+            growth: device.storage("density statistics", 0)?,
+            gradients: BlendGradients::new(device, 0, 0, 0, 1)?,
+            gradient_capacity: [0, 0],
+            features: device.storage("features", 0)?,
             step: 0,
             sized: false,
             pending: Vec::new(),
@@ -111,14 +101,14 @@ impl Trainer {
             timer: None,
             times: StageTimes::new(),
         };
-        trainer.blend_backward.prepare(context, 0)?;
+        trainer.blend_backward.prepare(device, 0)?;
         trainer.upload(cloud, None, 0)?;
         Ok(trainer)
     }
 
     /// Sends a photo to the device.
     pub fn photo(&self, pixels: &PhotoPixels) -> Result<DevicePhoto, GpuError> {
-        DevicePhoto::new(&self.context, pixels)
+        DevicePhoto::new(&self.device, pixels)
     }
 
     /// Number of Gaussians.
@@ -150,37 +140,37 @@ impl Trainer {
                 return Err(GpuError::Size { what: "Gaussians of a moment", have: m.len(), want: cloud.len() });
             }
         }
-        let (context, n, degree) = (&self.context, cloud.len(), cloud.sh_degree);
-        if n > self.room || degree != self.shape.degree {
+        let (device, n, degree) = (&self.device, cloud.len(), cloud.sh_degree);
+        if n > self.capacity || degree != self.shape.degree {
             // Clouds grow a little at a time; room for a quarter more saves most reallocations.
-            let make = |room: usize| -> Result<_, GpuError> {
-                let new = |what| Parameters::new(context, what, room, degree);
+            let make = |capacity: usize| -> Result<_, GpuError> {
+                let new = |what| Parameters::new(device, what, capacity, degree);
                 let parameters = [new("cloud")?, new("gradient of the cloud")?, new("first moments")?];
-                Ok((parameters, new("second moments")?, context.storage("density statistics", room as u64 * 16)?))
+                Ok((parameters, new("second moments")?, device.storage("density statistics", capacity as u64 * 16)?))
             };
             let roomy = n + n / 4;
-            let (room, made) = match make(roomy) {
+            let (capacity, made) = match make(roomy) {
                 Ok(made) => (roomy, made),
                 Err(_) => (n, make(n)?),
             };
             let ([cloud, gradient, first], second, growth) = made;
             (self.cloud, self.gradient, self.moments, self.growth) = (cloud, gradient, [first, second], growth);
-            self.room = room;
+            self.capacity = capacity;
         }
-        self.cloud.write(context, &Packed::of(cloud));
-        let mut recorder = Recorder::new(context, None);
+        self.cloud.write(device, &Packed::of(cloud));
+        let mut recorder = Recorder::new(device, None);
         recorder.clear(&self.growth);
         self.moments.iter().flat_map(|m| &m.buffers).for_each(|b| recorder.clear(b));
         recorder.submit();
         if let Some(moments) = moments {
             for (to, from) in self.moments.iter().zip(moments) {
-                to.write(context, &Packed::of(from));
+                to.write(device, &Packed::of(from));
             }
         }
         self.shape = CloudShape { origin: cloud.origin, gaussians: n as u32, degree };
         self.step = step;
         self.sized = false;
-        self.context.check()
+        self.device.check()
     }
 
     /// One step on one photo, with harmonics up to `sh_degree`. Returns as soon as the work is
@@ -200,27 +190,27 @@ impl Trainer {
         }
         let settings = RenderSettings { sh_degree, depth: false, ..self.settings.render.clone() };
         self.make_room(size_px)?;
-        self.rasterizer.prepare(&self.context, camera, &settings, self.shape, 0)?;
+        self.rasterizer.prepare(&self.device, camera, &settings, self.shape, 0)?;
         if !self.sized {
             self.size_up(camera, &settings)?;
         }
-        self.ssim.prepare(&self.context, size_px, self.pending.len(), self.settings.lambda)?;
+        self.ssim.prepare(&self.device, size_px, self.pending.len(), self.settings.lambda)?;
         let degrees = [self.shape.degree, sh_degree.min(self.shape.degree)];
         let n = self.shape.gaussians;
-        self.adam.prepare(&self.context, n, degrees, rates, self.step + 1);
+        self.adam.prepare(&self.device, n, degrees, rates, self.step + 1);
         self.encode_step(photo);
         if let Some(timer) = &mut self.timer {
-            self.times = timer.finish(&self.context)?;
+            self.times = timer.finish(&self.device)?;
         }
         self.step += 1;
         self.pending.push((self.step, extent(size_px)[0]));
-        self.context.check()
+        self.device.check()
     }
 
     fn encode_step(&mut self, photo: &DevicePhoto) {
         let r = &self.rasterizer;
-        let (shot, splats) = (r.shot(), &r.gaussians.splats);
-        let mut recorder = Recorder::new(&self.context, self.timer.as_mut());
+        let (bindings, splats) = (r.bindings(), &r.gaussians.splats);
+        let mut recorder = Recorder::new(&self.device, self.timer.as_mut());
         recorder.clear(&self.gradients.splats);
         recorder.clear(&self.adam.outliers);
         r.encode_count(&mut recorder, &self.cloud);
@@ -228,38 +218,38 @@ impl Trainer {
         recorder.stage("loss", |s| self.ssim.encode(s, &r.picture.colors, photo, &self.gradients.pixels));
         recorder.stage("blend backward", |s| {
             let scratch = (&r.gaussians, &r.pairs, &r.picture);
-            self.blend_backward.encode(s, shot, scratch, &self.features, &self.gradients);
+            self.blend_backward.encode(s, bindings, scratch, &self.features, &self.gradients);
         });
         recorder.stage("project backward", |s| {
-            self.project_backward.encode(s, shot, &self.cloud, (splats, &self.gradients.splats), &self.gradient);
-            self.project_backward.encode_statistics(s, shot, splats, &self.gradient, &self.growth);
+            self.project_backward.encode(s, bindings, &self.cloud, (splats, &self.gradients.splats), &self.gradient);
+            self.project_backward.encode_statistics(s, bindings, splats, &self.gradient, &self.growth);
         });
         recorder.stage("adam", |s| {
             let on = AdamBuffers { parameters: &self.cloud, gradient: &self.gradient, moments: &self.moments };
-            self.adam.encode(s, on, shot.counters, shot.gaussians, self.shape.degree);
-            self.ssim.encode_sums(s, shot.counters, &self.adam.outliers);
+            self.adam.encode(s, on, bindings.counters, bindings.gaussians, self.shape.degree);
+            self.ssim.encode_sums(s, bindings.counters, &self.adam.outliers);
         });
         recorder.submit();
     }
 
     /// Counts the pairs of one frame, so that the first step of a cloud is not lost.
     fn size_up(&mut self, camera: &Camera, settings: &RenderSettings) -> Result<(), GpuError> {
-        let mut recorder = Recorder::new(&self.context, None);
+        let mut recorder = Recorder::new(&self.device, None);
         self.rasterizer.encode_count(&mut recorder, &self.cloud);
         recorder.submit();
-        let counters = self.rasterizer.read_counters(&self.context)?;
-        self.rasterizer.grow_pairs(&self.context, counters.wanted)?;
+        let counters = self.rasterizer.read_counters(&self.device)?;
+        self.rasterizer.grow_pairs(&self.device, counters.wanted)?;
         self.sized = true;
-        self.rasterizer.prepare(&self.context, camera, settings, self.shape, 0)
+        self.rasterizer.prepare(&self.device, camera, settings, self.shape, 0)
     }
 
     fn make_room(&mut self, size_px: [u32; 2]) -> Result<(), GpuError> {
         let [pixels, _] = extent(size_px);
-        let [room, area] = self.gradient_room;
-        if room < self.room || area < pixels {
-            let (room, area) = (self.room, area.max(pixels));
-            self.gradients = BlendGradients::new(&self.context, room, area, 0, 1)?;
-            self.gradient_room = [room, area];
+        let [capacity, area] = self.gradient_capacity;
+        if capacity < self.capacity || area < pixels {
+            let (capacity, area) = (self.capacity, area.max(pixels));
+            self.gradients = BlendGradients::new(&self.device, capacity, area, 0, 1)?;
+            self.gradient_capacity = [capacity, area];
         }
         Ok(())
     }
@@ -270,13 +260,13 @@ impl Trainer {
             return Ok(());
         }
         let pixels: Vec<usize> = self.pending.iter().map(|p| p.1).collect();
-        let sums = self.ssim.read(&self.context, &pixels)?;
+        let sums = self.ssim.read(&self.device, &pixels)?;
         let wanted = sums.iter().filter(|s| s.overflow).map(|s| s.wanted).max();
         let lambda = self.settings.lambda;
         let steps = self.pending.drain(..).zip(sums);
         self.fetched.extend(steps.map(|((step, _), sums)| StepLoss { step, sums, loss: sums.total(lambda) }));
         match wanted {
-            Some(wanted) => self.rasterizer.grow_pairs(&self.context, wanted),
+            Some(wanted) => self.rasterizer.grow_pairs(&self.device, wanted),
             None => Ok(()),
         }
     }
@@ -288,10 +278,10 @@ impl Trainer {
     }
 
     /// Statistics for density control since the cloud was uploaded. Waits for the device.
-    pub fn stats(&self) -> Result<Growth, GpuError> {
-        let bytes = self.context.read(&[(&self.growth, self.len() as u64 * 16)])?;
+    pub fn stats(&self) -> Result<DensityStats, GpuError> {
+        let bytes = self.device.read(&[(&self.growth, self.len() as u64 * 16)])?;
         let rows: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes[0]);
-        Ok(Growth {
+        Ok(DensityStats {
             gradient: rows.iter().map(|r| r[0]).collect(),
             seen: rows.iter().map(|r| r[1] as u32).collect(),
             radius: rows.iter().map(|r| r[2]).collect(),
@@ -300,14 +290,14 @@ impl Trainer {
 
     /// The cloud as it is. Waits for the device.
     pub fn cloud(&self) -> Result<GaussianCloud, GpuError> {
-        let packed = self.cloud.read(&self.context, self.len(), self.shape.degree)?;
+        let packed = self.cloud.read(&self.device, self.len(), self.shape.degree)?;
         Ok(GaussianCloud { origin: self.shape.origin, ..packed.to_cloud() })
     }
 
     /// The cloud and Adam's first and second moments, laid out like it. Waits for the device.
     pub fn download(&self) -> Result<(GaussianCloud, [GaussianCloud; 2]), GpuError> {
         let moment = |m: &Parameters| -> Result<GaussianCloud, GpuError> {
-            let packed = m.read(&self.context, self.len(), self.shape.degree)?;
+            let packed = m.read(&self.device, self.len(), self.shape.degree)?;
             Ok(GaussianCloud { origin: self.shape.origin, ..packed.to_cloud() })
         };
         let [first, second] = &self.moments;
@@ -316,7 +306,7 @@ impl Trainer {
 
     /// Times the stages of every later step, where the device can; steps then wait for it.
     pub fn measure(&mut self) -> Result<(), GpuError> {
-        self.timer = Timer::new(&self.context)?;
+        self.timer = Timer::new(&self.device)?;
         Ok(())
     }
 

@@ -30,7 +30,7 @@ use super::layout::Layout;
 use super::state::{AppState, Tone};
 use super::theme;
 use crate::navigate::Pose;
-use crate::render::Backend;
+use crate::render::Renderer;
 use crate::scene::plan::When;
 use crate::scene::trace::{self, Sort};
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
@@ -508,7 +508,7 @@ impl Viewport {
 
     /// Whether a GPU draws the view.
     pub fn on_gpu(&self) -> bool {
-        self.picture.as_ref().is_some_and(|p| p.drawn_by != Backend::CPU)
+        self.picture.as_ref().is_some_and(|p| p.drawn_by != Renderer::CPU)
     }
 
     /// The world point under a window position: at the drawn depth, else at the pivot's.

@@ -3,8 +3,7 @@
 use super::{AskedScene, LabelledView, Unit};
 use crate::pipeline::semantics::codes::TOLERANCE;
 use crate::pipeline::semantics::matching::{MatchMode, gaussians};
-use crate::render::cpu::Renderer;
-use crate::render::{Features, RenderError, RenderSettings};
+use crate::render::{Features, RenderError, RenderSettings, Renderer};
 use crate::scene::{GaussianCloud, Mask};
 
 /// Accumulated alpha that belongs to the silhouette.

@@ -7,8 +7,7 @@
 use rayon::prelude::*;
 
 use super::edges::blur;
-use crate::render::cpu::Renderer;
-use crate::render::{Features, RenderSettings};
+use crate::render::{Features, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud};
 
 /// Focal lengths per distance over which depths are compared.
@@ -26,7 +25,7 @@ const JUMP: [f32; 2] = [12.0, 37.0];
 /// How clearly a surface ends at each pixel of a view, 0 to 1; `None` if it cannot be drawn.
 pub fn ends_of(cloud: &GaussianCloud, settings: &RenderSettings, camera: &Camera) -> Option<Vec<f32>> {
     let settings = RenderSettings { depth: true, sh_degree: 0, ..settings.clone() };
-    let frame = Renderer::<f32>::new().render(cloud, Features::NONE, camera, &settings).ok()?;
+    let frame = Renderer::new().render(cloud, Features::NONE, camera, &settings).ok()?;
     let depth = |(&d, &a): (&f32, &f32)| if a >= SOLID { d / a } else { 0.0 };
     let depth: Vec<f32> = frame.depth.iter().zip(&frame.alpha).map(depth).collect();
     Some(ends(&depth, frame.width_px, 0.5 * (camera.focal_px.x + camera.focal_px.y)))
@@ -128,8 +127,7 @@ mod tests {
             Camera::look_at(glam::DVec3::new(0.0, 0.0, -4.0), glam::DVec3::ZERO, glam::DVec3::NEG_Y, 0.8, 90, 60)
                 .expect("valid");
         let ends = ends_of(&cloud, &RenderSettings::default(), &camera).expect("drawn");
-        let frame =
-            Renderer::<f32>::new().render(&cloud, Features::NONE, &camera, &RenderSettings::default()).expect("drawn");
+        let frame = Renderer::new().render(&cloud, Features::NONE, &camera, &RenderSettings::default()).expect("drawn");
         let last = (0..90).rfind(|x| frame.alpha[30 * 90 + x] >= SOLID).expect("seen");
         assert!((50..80).contains(&last), "{last}");
         let row = &ends[30 * 90..31 * 90];

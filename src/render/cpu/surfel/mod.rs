@@ -26,7 +26,7 @@ use self::blend_backward::{BlendRowBackward, RECORD, RowIn};
 use self::project::SHAPE;
 use self::project_backward::project_backward;
 use super::bin::{self, Tiles};
-use super::project::{Part, View};
+use super::project::{Chunk, View};
 use super::project_backward::GaussianGradient;
 use super::sort::{self, Ordered};
 use super::{Clock, NONE, RenderStats, checked, empty_frame, finish, validate, with_channels};
@@ -46,7 +46,7 @@ fn padded(channels: usize) -> usize {
 /// A renderer of surfels with its buffers, to be kept from frame to frame.
 #[derive(Debug, Default)]
 pub struct Rasterizer<R> {
-    parts: Vec<Part<R>>,
+    parts: Vec<Chunk<R>>,
     pub(super) ordered: Ordered<R>,
     splat_of: Vec<u32>,
     tiles: Tiles,

@@ -1,6 +1,6 @@
 //! Projection of surfels: what the compositing needs of each, and an ellipse around what it touches.
 
-use super::super::project::{Part, Splat, View, color, direction, in_chunks};
+use super::super::project::{Chunk, Splat, View, color, direction, in_chunks};
 use super::disk::INVERSE_BLUR;
 use crate::math::{Real, rotation, sh};
 use crate::render::{ALPHA_MIN, Features, RenderSettings};
@@ -128,7 +128,7 @@ pub fn bound<R: Real>(g: &Geometry<R>, reach: R) -> Option<Bound<R>> {
 /// Projects the whole cloud, in parts of [`CHUNK`](crate::render::cpu::project::CHUNK) Gaussians: `SHAPE + channels` values per splat,
 /// the channels being colour, extra channels, normal if depth is asked for, padding zeros.
 pub fn project<R: Real>(
-    parts: &mut Vec<Part<R>>,
+    parts: &mut Vec<Chunk<R>>,
     cloud: &GaussianCloud<R>,
     features: Features<'_, R>,
     view: &View<R>,
@@ -142,7 +142,7 @@ pub fn project<R: Real>(
 
 #[multiversion::multiversion(targets("x86_64+avx2+fma"))]
 fn project_chunk<R: Real>(
-    part: &mut Part<R>,
+    part: &mut Chunk<R>,
     cloud: &GaussianCloud<R>,
     features: Features<'_, R>,
     view: &View<R>,

@@ -1,0 +1,290 @@
+//! The adapter and its device: what they are, what they can do, and how their faults are told.
+
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
+
+use super::GpuError;
+use crate::scene::trace::{self, Sort};
+
+/// Features that are used where an adapter offers them. Everything works without any of them.
+const WANTED: wgpu::Features =
+    wgpu::Features::SHADER_FLOAT32_ATOMIC.union(wgpu::Features::SUBGROUP).union(wgpu::Features::TIMESTAMP_QUERY);
+
+/// A GPU device with its queue. Cheap to clone; clones are the same device.
+#[derive(Clone, Debug)]
+pub struct Device {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    info: wgpu::AdapterInfo,
+    /// The first fault that no call was there to return.
+    fault: Arc<Mutex<Option<GpuError>>>,
+}
+
+/// The fastest adapter, or a software one.
+fn adapter(software: bool) -> Result<wgpu::Adapter, wgpu::RequestAdapterError> {
+    let mut description = wgpu::InstanceDescriptor::new_without_display_handle();
+    description.backends = wgpu::Backends::PRIMARY;
+    let options = wgpu::RequestAdapterOptions {
+        power_preference: wgpu::PowerPreference::HighPerformance,
+        force_fallback_adapter: software,
+        ..wgpu::RequestAdapterOptions::default()
+    };
+    pollster::block_on(wgpu::Instance::new(description.with_env()).request_adapter(&options))
+}
+
+impl Device {
+    /// Opens the best adapter: a real GPU before a software one.
+    pub fn new() -> Result<Self, GpuError> {
+        let adapter = adapter(false).or_else(|_| adapter(true)).map_err(|e| GpuError::NoAdapter(e.to_string()))?;
+        Self::open(&adapter)
+    }
+
+    /// Opens the best real GPU; `None` where there is none. No device of an emulated adapter is opened
+    /// to find that out.
+    ///
+    /// # Errors
+    /// If there is one that does not open.
+    pub fn real() -> Result<Option<Self>, GpuError> {
+        let adapter = adapter(false).ok().filter(|a| a.get_info().device_type != wgpu::DeviceType::Cpu);
+        adapter.map(|a| Self::open(&a)).transpose()
+    }
+
+    /// Opens a device on an adapter of the caller's choice.
+    pub fn open(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
+        trace::record(Sort::Device, format!("device on {}", adapter.get_info().name), "something is drawn on it", 0);
+        let (device, queue) = pollster::block_on(adapter.request_device(&Self::device_descriptor(adapter)))
+            .map_err(|e| GpuError::Device { adapter: adapter.get_info().name, reason: e.to_string() })?;
+        Ok(Self::from_parts(adapter.get_info(), device, queue))
+    }
+
+    /// The device that this module would ask of `adapter`: all its limits, and those of the wanted
+    /// features that it has. For callers that open the device themselves, such as a window.
+    pub fn device_descriptor(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'static> {
+        wgpu::DeviceDescriptor {
+            label: Some("fmlgs"),
+            required_features: adapter.features() & WANTED,
+            required_limits: adapter.limits(),
+            ..wgpu::DeviceDescriptor::default()
+        }
+    }
+
+    /// Uses a device that exists already, such as the window's. Takes over its handlers for
+    /// faults, so that none of them ends the process.
+    pub fn from_parts(info: wgpu::AdapterInfo, device: wgpu::Device, queue: wgpu::Queue) -> Self {
+        let fault = Arc::new(Mutex::new(None));
+        let slot = Arc::clone(&fault);
+        device.on_uncaptured_error(Arc::new(move |error| keep_first(&slot, told(error, "a command", 0))));
+        let slot = Arc::clone(&fault);
+        device.set_device_lost_callback(move |reason, text| {
+            // Dropping the last handle of a device also ends it; nobody is left to be told then.
+            if reason != wgpu::DeviceLostReason::Destroyed {
+                keep_first(&slot, GpuError::Lost(text));
+            }
+        });
+        Self { device, queue, info, fault }
+    }
+
+    /// The device.
+    pub fn wgpu(&self) -> &wgpu::Device {
+        &self.device
+    }
+
+    /// Its queue.
+    pub fn queue(&self) -> &wgpu::Queue {
+        &self.queue
+    }
+
+    /// Name, type and driver of the adapter.
+    pub fn info(&self) -> &wgpu::AdapterInfo {
+        &self.info
+    }
+
+    /// Limits of the device.
+    pub fn limits(&self) -> wgpu::Limits {
+        self.device.limits()
+    }
+
+    /// Whether the "GPU" is a program on the CPU, slower than the CPU backend.
+    pub fn is_software(&self) -> bool {
+        self.info.device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// Whether floats can be added atomically; sums go through compare-and-exchange if not.
+    pub fn has_float_atomics(&self) -> bool {
+        self.device.features().contains(wgpu::Features::SHADER_FLOAT32_ATOMIC)
+    }
+
+    /// Whether passes can be timed on the device.
+    pub fn has_timestamps(&self) -> bool {
+        self.device.features().contains(wgpu::Features::TIMESTAMP_QUERY)
+    }
+
+    /// One line for people: name, kind, interface, features in use, largest binding.
+    pub fn describe(&self) -> String {
+        let kind = match self.info.device_type {
+            wgpu::DeviceType::DiscreteGpu => "discrete GPU",
+            wgpu::DeviceType::IntegratedGpu => "integrated GPU",
+            wgpu::DeviceType::VirtualGpu => "virtual GPU",
+            wgpu::DeviceType::Cpu => "software",
+            wgpu::DeviceType::Other => "unknown kind",
+        };
+        let atomics = if self.has_float_atomics() { "float atomics" } else { "no float atomics" };
+        let binding = self.limits().max_storage_buffer_binding_size / (1 << 20);
+        format!("{} ({kind}, {:?}, {atomics}, {binding} MiB per binding)", self.info.name, self.info.backend)
+    }
+
+    /// The first fault since the last call that nobody was told of: device lost, out of memory.
+    pub fn check(&self) -> Result<(), GpuError> {
+        let taken = self.fault.lock().unwrap_or_else(PoisonError::into_inner).take();
+        match taken {
+            // A lost device stays lost.
+            Some(lost @ GpuError::Lost(_)) => {
+                keep_first(&self.fault, lost.clone());
+                Err(lost)
+            }
+            Some(fault) => Err(fault),
+            None => Ok(()),
+        }
+    }
+
+    /// Refuses `need` bytes in one storage binding where the adapter cannot bind so many.
+    pub(super) fn fits_binding(&self, what: &str, need: u64, remedy: &'static str) -> Result<(), GpuError> {
+        let limits = self.limits();
+        let checks = [
+            ("maxStorageBufferBindingSize", limits.max_storage_buffer_binding_size),
+            ("maxBufferSize", limits.max_buffer_size),
+        ];
+        for (limit_name, limit) in checks {
+            if need > limit {
+                return Err(GpuError::Limit { what: what.to_owned(), need, limit_name, limit, remedy });
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses a dispatch of `need` workgroups along one axis where the adapter cannot do it.
+    pub(super) fn fits_dispatch(&self, what: &str, need: u64, remedy: &'static str) -> Result<(), GpuError> {
+        let limit = u64::from(self.limits().max_compute_workgroups_per_dimension);
+        let limit_name = "maxComputeWorkgroupsPerDimension";
+        let what = format!("{what} (workgroups)");
+        if need > limit { Err(GpuError::Limit { what, need, limit_name, limit, remedy }) } else { Ok(()) }
+    }
+
+    /// A zeroed storage buffer of `bytes`, at least 16, that can be copied from and to.
+    pub(super) fn storage(&self, what: &str, bytes: u64) -> Result<wgpu::Buffer, GpuError> {
+        self.fits_binding(what, bytes, "use fewer Gaussians or smaller pictures")?;
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+        self.buffer(what, bytes, usage)
+    }
+
+    /// A storage buffer with contents.
+    pub(super) fn storage_with(&self, what: &str, contents: &[u8]) -> Result<wgpu::Buffer, GpuError> {
+        let buffer = self.storage(what, contents.len() as u64)?;
+        self.queue.write_buffer(&buffer, 0, contents);
+        Ok(buffer)
+    }
+
+    /// A uniform buffer with contents.
+    pub(super) fn uniform(&self, what: &str, contents: &[u8]) -> Result<wgpu::Buffer, GpuError> {
+        let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
+        let buffer = self.buffer(what, contents.len() as u64, usage)?;
+        self.queue.write_buffer(&buffer, 0, contents);
+        Ok(buffer)
+    }
+
+    pub(super) fn buffer(&self, what: &str, bytes: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer, GpuError> {
+        // Bindings may not be empty, and copies move whole words.
+        let size = bytes.max(16).next_multiple_of(4);
+        self.scoped(what, size, || {
+            self.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(what),
+                size,
+                usage,
+                mapped_at_creation: false,
+            })
+        })
+    }
+
+    /// Runs `create` and returns its fault, if it has one, instead of passing it to the handler.
+    pub(super) fn scoped<T>(&self, what: &str, bytes: u64, create: impl FnOnce() -> T) -> Result<T, GpuError> {
+        let filters = [wgpu::ErrorFilter::Internal, wgpu::ErrorFilter::Validation, wgpu::ErrorFilter::OutOfMemory];
+        let scopes = filters.map(|f| self.device.push_error_scope(f));
+        let made = create();
+        let mut fault = None;
+        for scope in scopes.into_iter().rev() {
+            if let Some(error) = pollster::block_on(scope.pop()) {
+                fault = Some(told(error, what, bytes));
+            }
+        }
+        fault.map_or(Ok(made), Err)
+    }
+
+    /// Waits for everything submitted so far.
+    pub fn wait(&self) -> Result<(), GpuError> {
+        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| GpuError::Lost(e.to_string()))?;
+        self.check()
+    }
+
+    /// Copies the first bytes of buffers to the host; waits for all work submitted before.
+    pub(super) fn read(&self, sources: &[(&wgpu::Buffer, u64)]) -> Result<Vec<Vec<u8>>, GpuError> {
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("read") });
+        let mut staged = Vec::with_capacity(sources.len());
+        for &(source, bytes) in sources {
+            let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
+            let staging = self.buffer("a copy for the host", bytes, usage)?;
+            if bytes > 0 {
+                encoder.copy_buffer_to_buffer(source, 0, &staging, 0, bytes);
+            }
+            staged.push((staging, bytes));
+        }
+        self.queue.submit([encoder.finish()]);
+        let (sender, receiver) = mpsc::channel();
+        for (staging, _) in &staged {
+            let sender = sender.clone();
+            staging.map_async(wgpu::MapMode::Read, .., move |r| {
+                // The receiver outlives the wait below; if it is gone, nobody needs the result.
+                let _ = sender.send(r);
+            });
+        }
+        self.wait()?;
+        for _ in &staged {
+            let mapped =
+                receiver.try_recv().map_err(|_| GpuError::Lost("a copy to the host never ended".to_owned()))?;
+            mapped.map_err(|e| GpuError::Lost(format!("a copy to the host failed: {e}")))?;
+        }
+        let mut out = Vec::with_capacity(staged.len());
+        for (staging, bytes) in &staged {
+            let view = staging.get_mapped_range(..).map_err(|e| GpuError::Refused(e.to_string()))?;
+            out.push(view.iter().copied().take(*bytes as usize).collect());
+        }
+        Ok(out)
+    }
+}
+
+fn keep_first(slot: &Mutex<Option<GpuError>>, error: GpuError) {
+    slot.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+}
+
+fn told(error: wgpu::Error, what: &str, bytes: u64) -> GpuError {
+    match error {
+        wgpu::Error::OutOfMemory { .. } => GpuError::OutOfMemory { what: what.to_owned(), bytes },
+        wgpu::Error::Validation { description, .. } | wgpu::Error::Internal { description, .. } => {
+            GpuError::Refused(format!("{what}: {description}"))
+        }
+    }
+}
+
+/// Name of the first adapter that is not emulated. Opens no device.
+pub fn real_gpu() -> Option<String> {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
+    adapters
+        .iter()
+        .map(wgpu::Adapter::get_info)
+        .find(|i| {
+            matches!(
+                i.device_type,
+                wgpu::DeviceType::DiscreteGpu | wgpu::DeviceType::IntegratedGpu | wgpu::DeviceType::VirtualGpu
+            )
+        })
+        .map(|i| i.name)
+}

@@ -1,0 +1,254 @@
+//! The renderer that the rest of the program uses: the GPU where there is a real one, else the CPU.
+
+use std::sync::{Arc, Weak};
+
+use serde::{Deserialize, Serialize};
+
+use super::gpu::{self, Device, GpuError};
+use super::{ContributionSink, Features, Frame, RenderError, RenderSettings, RenderStats, StageTimes, cpu};
+use crate::scene::{Camera, GaussianCloud};
+
+/// Which renderer is wanted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum BackendChoice {
+    /// The GPU if the machine has a real one, else the CPU.
+    #[default]
+    Auto,
+    /// The CPU.
+    Cpu,
+    /// The GPU, even a software one.
+    Gpu,
+}
+
+impl BackendChoice {
+    /// The GPU to use; `None` = the CPU. `Auto` takes a GPU only if it is a real one: the CPU
+    /// renderer is faster than an emulated GPU. `told` hears why one that is there is not used.
+    ///
+    /// # Errors
+    /// If a GPU is demanded and there is none.
+    pub fn gpu(self, told: impl FnOnce(String)) -> Result<Option<Device>, GpuError> {
+        match self {
+            Self::Cpu => Ok(None),
+            Self::Gpu => Device::new().map(Some),
+            Self::Auto => Ok(or_told(Device::real(), told).flatten()),
+        }
+    }
+}
+
+/// What a GPU gave, or `None` and a word on why the CPU does its work.
+fn or_told<T>(given: Result<T, GpuError>, told: impl FnOnce(String)) -> Option<T> {
+    given.map_err(|e| told(instead_of_gpu(&e))).ok()
+}
+
+/// That the CPU does a GPU's work, and why.
+pub fn instead_of_gpu(why: &impl std::fmt::Display) -> String {
+    format!("The CPU does the work of the GPU, which failed: {why}")
+}
+
+/// Why a view could not be drawn.
+#[derive(Debug, thiserror::Error)]
+pub enum DrawError {
+    /// By the CPU.
+    #[error(transparent)]
+    Cpu(#[from] RenderError),
+    /// By the GPU.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+}
+
+/// Stages of a picture on the CPU, in their order.
+const STAGES: [&str; 4] = ["project", "sort", "bin", "blend"];
+
+/// Seconds of a picture: the part that every Gaussian has at any size, and that of the pixels.
+#[derive(Clone, Copy, Debug)]
+pub struct Cost {
+    /// For every Gaussian, whatever the picture's size.
+    pub fixed_secs: f64,
+    /// For the pixels.
+    pub pixels_secs: f64,
+}
+
+/// A renderer with its buffers, to be kept from frame to frame: a GPU draws the pictures where one was chosen,
+/// the CPU everything else.
+#[derive(Default)]
+pub struct Renderer {
+    cpu: cpu::Renderer<f32>,
+    gpu: Option<Box<Gpu>>,
+}
+
+/// The renderer with a way back, for training on the CPU.
+pub type DifferentiableRenderer = cpu::Renderer<f32>;
+
+/// The GPU renderer and the cloud that it holds.
+struct Gpu {
+    renderer: gpu::Renderer,
+    name: String,
+    uploaded: Weak<GaussianCloud>,
+    /// Degree of the harmonics that were sent.
+    degree: u8,
+    timed: bool,
+}
+
+impl Renderer {
+    /// Name of the CPU among the names of what draws.
+    pub const CPU: &str = "CPU";
+
+    /// The CPU.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// The renderer that `choice` asks for. `told` hears why a GPU that is there is not used.
+    ///
+    /// # Errors
+    /// If a GPU is demanded and there is none that works.
+    pub fn choose(choice: BackendChoice, mut told: impl FnMut(String)) -> Result<Self, GpuError> {
+        match choice.gpu(&mut told)? {
+            None => Ok(Self::new()),
+            Some(device) if choice == BackendChoice::Auto => {
+                Ok(or_told(Self::on_gpu(&device), told).unwrap_or_default())
+            }
+            Some(device) => Self::on_gpu(&device),
+        }
+    }
+
+    /// This GPU, whether real or emulated.
+    pub fn on_gpu(device: &Device) -> Result<Self, GpuError> {
+        let renderer = gpu::Renderer::new(device)?;
+        let name = device.info().name.clone();
+        let gpu = Gpu { renderer, name, uploaded: Weak::new(), degree: 0, timed: false };
+        Ok(Self { cpu: cpu::Renderer::new(), gpu: Some(Box::new(gpu)) })
+    }
+
+    /// Whether a GPU draws the pictures.
+    pub fn is_gpu(&self) -> bool {
+        self.gpu.is_some()
+    }
+
+    /// Name of what draws the pictures, for people.
+    pub fn name(&self) -> &str {
+        self.gpu.as_ref().map_or(Self::CPU, |gpu| &gpu.name)
+    }
+
+    /// Draws a cloud; it is sent to the GPU only if it is another one than last time.
+    ///
+    /// # Errors
+    /// If the camera is not usable, or the GPU fails.
+    pub fn draw(
+        &mut self,
+        cloud: &Arc<GaussianCloud>,
+        camera: &Camera,
+        settings: &RenderSettings,
+    ) -> Result<Frame<f32>, DrawError> {
+        let Some(gpu) = &mut self.gpu else { return Ok(self.render(cloud, Features::NONE, camera, settings)?) };
+        camera.validate().map_err(RenderError::from)?;
+        // Bands that are not drawn are not sent.
+        let degree = settings.sh_degree.min(cloud.sh_degree);
+        if gpu.uploaded.as_ptr() != Arc::as_ptr(cloud) || gpu.degree < degree {
+            gpu.uploaded = Weak::new();
+            gpu.renderer.upload_bands(cloud, Features::NONE, degree)?;
+            // A weak handle keeps the address from being given to another cloud.
+            (gpu.uploaded, gpu.degree) = (Arc::downgrade(cloud), degree);
+        }
+        Ok(gpu.renderer.draw(camera, settings)?)
+    }
+
+    /// Draws a cloud with values of its Gaussians composited like colors, on the CPU.
+    ///
+    /// # Errors
+    /// If the camera is not usable, or the values are too many or of another cloud.
+    pub fn render(
+        &mut self,
+        cloud: &GaussianCloud,
+        features: Features<'_, f32>,
+        camera: &Camera,
+        settings: &RenderSettings,
+    ) -> Result<Frame<f32>, RenderError> {
+        self.cpu.render(cloud, features, camera, settings)
+    }
+
+    /// Hands the weight of every Gaussian at every pixel of a view to `sinks`, one for each row of
+    /// tiles, which are `height.div_ceil(TILE_PX)`; on the CPU. Surfels count as flat Gaussians.
+    ///
+    /// # Errors
+    /// If the camera is not usable.
+    pub fn contributions<S: ContributionSink<f32>>(
+        &mut self,
+        cloud: &GaussianCloud,
+        camera: &Camera,
+        settings: &RenderSettings,
+        sinks: &mut [S],
+    ) -> Result<(), RenderError> {
+        self.cpu.contributions(cloud, camera, settings, sinks)
+    }
+
+    /// What the last frame of [`Self::render`] cost.
+    pub fn stats(&self) -> RenderStats {
+        self.cpu.stats()
+    }
+
+    /// Bytes of working memory on the CPU that are kept for the next frame.
+    pub fn working_bytes(&self) -> usize {
+        self.cpu.working_bytes()
+    }
+
+    /// Gives back working memory that the next picture can make again: on the CPU all of it; a
+    /// device keeps its own, which nobody else needs.
+    pub fn rest(&mut self) {
+        self.cpu = cpu::Renderer::new();
+    }
+
+    /// Bytes of buffers on the device; 0 on the CPU.
+    pub fn device_bytes(&self) -> u64 {
+        self.gpu.as_ref().map_or(0, |gpu| gpu.renderer.device_bytes())
+    }
+
+    /// Whether the stages of later pictures are timed. The CPU always does; a GPU does it only where
+    /// it is asked to, and can.
+    ///
+    /// # Errors
+    /// If the GPU gives no memory for it.
+    pub fn time_stages(&mut self, timed: bool) -> Result<(), GpuError> {
+        let Some(gpu) = &mut self.gpu else { return Ok(()) };
+        if std::mem::replace(&mut gpu.timed, timed) != timed {
+            match timed {
+                true => gpu.renderer.measure()?,
+                false => gpu.renderer.stop_measuring(),
+            }
+        }
+        Ok(())
+    }
+
+    /// Seconds of the last picture by stage; empty where that is not known.
+    pub fn stage_times(&self) -> StageTimes {
+        match &self.gpu {
+            None => STAGES.into_iter().zip(self.cpu.stats().stage_secs).collect(),
+            Some(gpu) => gpu.renderer.times().clone(),
+        }
+    }
+
+    /// What the last picture cost, `secs` in all.
+    pub fn cost(&self, secs: f64) -> Cost {
+        if self.is_gpu() {
+            return Cost { fixed_secs: 0.0, pixels_secs: secs };
+        }
+        let [project, sort, bin, blend] = self.cpu.stats().stage_secs;
+        Cost { fixed_secs: project + sort, pixels_secs: bin + blend }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gpu_that_fails_is_told() {
+        let mut heard = Vec::new();
+        let lost: Result<(), GpuError> = Err(GpuError::Lost("unplugged".into()));
+        assert_eq!(or_told(lost, |why| heard.push(why)), None);
+        assert!(heard[0].contains("CPU") && heard[0].contains("unplugged"), "{heard:?}");
+        assert_eq!(or_told(Ok(3), |why| heard.push(why)), Some(3));
+        assert_eq!(heard.len(), 1);
+    }
+}
