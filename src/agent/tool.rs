@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::relation::Relation;
 use super::wish::{self, Direction, Distance, Side, TurnWay};
+use crate::math::format::short;
 use crate::pipeline::semantics::grammar::Kind;
 use crate::scene::{Identities, IdentityId, Level};
 
@@ -419,12 +420,6 @@ impl ToolCall {
         }
         format!("{}({})", self.name(), parts.join(", "))
     }
-}
-
-/// A number without needless digits.
-pub(super) fn short(number: f64) -> String {
-    let text = format!("{number:.3}");
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 #[cfg(test)]

@@ -258,7 +258,7 @@ fn line(deed: &Deed) -> Option<String> {
         }
         Deed::Mark(ids) => Some(format!("marks {} of them", ids.len())),
         Deed::Hidden(ids) => Some(format!("leaves {} out of the picture", ids.len())),
-        Deed::Renamed(id, name) => Some(format!("calls #{id} {name}")),
+        Deed::Renamed(id, name) | Deed::RenameUndone(id, name) => Some(format!("calls #{id} {name}")),
         Deed::Explored(_) => None,
     }
 }

@@ -5,10 +5,37 @@ use std::time::Instant;
 
 use super::JobError;
 use crate::math::stats::median;
-use crate::models::catalogue::{self, Entry, State};
+use crate::models::catalogue;
+pub use crate::models::catalogue::{Entry as ModelEntry, Role as ModelRole, SAM2, State as ModelState};
+use crate::models::engine::engine;
 use crate::models::fetch::Patience;
-use crate::models::{self, ModelError, Role, Tile};
+use crate::models::{self, ModelError, Tile};
 use crate::pipeline::observer::{Observer, Ticker};
+
+/// Engine and models of this machine.
+#[derive(Clone, Debug)]
+pub struct ModelList {
+    /// What runs them, and where.
+    pub engine: String,
+    /// What is wrong with it, or could be better.
+    pub note: Option<String>,
+    /// All models of the catalog.
+    pub models: Vec<(ModelEntry, ModelState)>,
+}
+
+/// Lists the models, installed or not: reads and verifies files.
+pub fn list() -> ModelList {
+    let (engine, mut note) = match engine() {
+        Ok(engine) => (format!("{}, {}", engine.name(), engine.device()), engine.note().map(str::to_owned)),
+        Err(e) => ("none".to_owned(), Some(e.to_string())),
+    };
+    let folder = catalogue::folder();
+    let models = catalogue::entries().unwrap_or_else(|e| {
+        note = Some(e.to_string());
+        Vec::new()
+    });
+    ModelList { engine, note, models: models.into_iter().map(|e| (e.clone(), e.state(&folder))).collect() }
+}
 
 /// Where the files of a model come from.
 #[derive(Clone, Copy, Debug)]
@@ -23,7 +50,7 @@ pub enum Source<'a> {
 ///
 /// # Errors
 /// If there is none, its files cannot be had or are not right, or the observer asks to stop.
-pub fn install(id: &str, source: Source<'_>, observer: &mut dyn Observer) -> Result<Entry, JobError> {
+pub fn install(id: &str, source: Source<'_>, observer: &mut dyn Observer) -> Result<ModelEntry, JobError> {
     let (folder, mut ticker) = (catalogue::folder(), Ticker::new("", 0));
     let entry = catalogue::entry(id)?;
     match source {
@@ -42,8 +69,8 @@ pub fn install(id: &str, source: Source<'_>, observer: &mut dyn Observer) -> Res
 /// If the list that came with the program is damaged.
 pub fn check() -> Result<Vec<(String, Option<String>)>, JobError> {
     let folder = catalogue::folder();
-    let here = |e: &Entry| !matches!(e.state(&folder), State::Missing(_));
-    let check = |e: Entry| (e.id.clone(), e.verify(&folder).err().map(|e| e.to_string()));
+    let here = |e: &ModelEntry| !matches!(e.state(&folder), ModelState::Missing(_));
+    let check = |e: ModelEntry| (e.id.clone(), e.verify(&folder).err().map(|e| e.to_string()));
     Ok(catalogue::entries()?.into_iter().filter(here).map(check).collect())
 }
 
@@ -81,7 +108,7 @@ pub fn time_encoders(runs: usize, told: &mut dyn FnMut(String)) -> Result<Vec<En
         Ok(median(&ms))
     };
     let mut list = Vec::new();
-    for id in catalogue::usable(Role::Encoder, told)? {
+    for id in catalogue::usable(ModelRole::Encoder, told)? {
         let start = Instant::now();
         let mut encoder = models::encoder(&id)?;
         let side_px = encoder.tile_side_px().unwrap_or(224);

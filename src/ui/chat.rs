@@ -4,10 +4,10 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crossbeam_channel::{Receiver, Sender, bounded, unbounded};
+use crossbeam_channel::{Receiver, Sender, bounded};
 use egui::{Button, ComboBox, Key, RichText, ScrollArea, TextEdit, Ui};
 
-use super::panes::portraits::Portraits;
+use super::panes::object_thumbnails::ObjectThumbnails;
 use super::theme;
 use crate::agent::llm::settings::LlmSettings;
 use crate::agent::llm::{Llm, SENT};
@@ -17,12 +17,15 @@ use crate::agent::{AgentEvent, Planner, Policy, Refusal, Session};
 use crate::navigate::Pose;
 use crate::scene::trace::{self, Sort};
 use crate::scene::{IdentityId, SemanticMap, text};
-use crate::worker::{Action, Repaint};
+use crate::ui::actions::Action;
+use crate::worker::Repaint;
 
+/// News that may wait for the window; the agent waits for it beyond that.
+const NEWS: usize = 1024;
 /// Lines that are kept.
 const MAX_LINES: usize = 400;
-/// Side of a candidate's portrait, points.
-const PORTRAIT: f32 = 34.0;
+/// Side of a candidate's thumbnail, points.
+const THUMBNAIL_PX: f32 = 34.0;
 
 /// Which planner is used; kept from one run to the next.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -38,17 +41,19 @@ pub struct ChatSettings {
 pub struct Snapshot {
     /// The scene.
     pub parts: Parts,
+    /// Generation of its Gaussians.
+    pub cloud: u64,
     /// Counts the scenes shown so far.
     pub scene: u64,
     /// Where the eye is.
     pub eye: Pose,
-    /// Width by height of the picture.
+    /// Width by height of the frame.
     pub aspect: f64,
-    /// What is left out of the picture.
+    /// What is left out of the frame.
     pub hidden: Vec<IdentityId>,
 }
 
-/// A line of the talk.
+/// A line of the conversation.
 enum Line {
     Said(String),
     Did(String, Option<bool>),
@@ -69,7 +74,7 @@ enum News {
     Reply { text: String, candidates: Vec<(IdentityId, String)>, refused: Option<Refusal>, transcript: [String; 2] },
 }
 
-/// The talk with the agent.
+/// The conversation with the agent.
 #[derive(Default)]
 pub struct Chat {
     typed: String,
@@ -152,15 +157,17 @@ impl Chat {
         &mut self,
         ui: &mut Ui,
         settings: &mut ChatSettings,
-        portraits: &Portraits,
+        object_thumbnails: &ObjectThumbnails,
         ready: bool,
         actions: &mut Vec<Action>,
     ) {
         let mut say = None;
         if self.lines.is_empty() {
             ui.label(
-                RichText::new("Ask in plain sentences. It finds things, flies there, tells what it sees, and asks if it is in doubt.")
-                    .color(theme::WEAK),
+                RichText::new(
+                    "Ask in plain sentences. It finds things, flies there, describes them, and asks back when unsure.",
+                )
+                .color(theme::WEAK),
             );
             ui.horizontal_wrapped(|ui| {
                 for example in ["What is in view?", "What can you do?"] {
@@ -172,7 +179,7 @@ impl Chat {
         } else {
             ScrollArea::vertical().id_salt("talk").max_height(280.0).stick_to_bottom(true).show(ui, |ui| {
                 for line in &self.lines {
-                    say = show_line(ui, line, portraits).or(say.take());
+                    say = show_line(ui, line, object_thumbnails).or(say.take());
                 }
                 if self.cancel.is_some() {
                     ui.horizontal(|ui| {
@@ -208,11 +215,11 @@ impl Chat {
         });
         ui.horizontal(|ui| {
             choose_planner(ui, settings);
-            if ui.add_enabled(self.transcript.is_some(), Button::new("Save talk\u{2026}").small()).clicked() {
-                actions.push(Action::SaveTalk);
+            if ui.add_enabled(self.transcript.is_some(), Button::new("Save conversation\u{2026}").small()).clicked() {
+                actions.push(Action::SaveChat);
             }
             if ui
-                .add_enabled(self.cancel.is_none() && !self.lines.is_empty(), Button::new("New talk").small())
+                .add_enabled(self.cancel.is_none() && !self.lines.is_empty(), Button::new("New conversation").small())
                 .clicked()
             {
                 *self = Self::default();
@@ -230,7 +237,7 @@ fn did(line: &str, done: Option<bool>) -> Line {
 }
 
 /// One line; a candidate that was clicked.
-fn show_line(ui: &mut Ui, line: &Line, portraits: &Portraits) -> Option<String> {
+fn show_line(ui: &mut Ui, line: &Line, object_thumbnails: &ObjectThumbnails) -> Option<String> {
     let mut clicked = None;
     match line {
         Line::Said(text) => {
@@ -253,7 +260,7 @@ fn show_line(ui: &mut Ui, line: &Line, portraits: &Portraits) -> Option<String> 
             };
             ui.horizontal_wrapped(|ui| {
                 for (id, name) in candidates.iter().take(8) {
-                    portraits.show(ui, *id, PORTRAIT);
+                    object_thumbnails.show(ui, *id, THUMBNAIL_PX);
                     if ui.add(Button::new(name).small()).clicked() {
                         clicked = Some(name.clone());
                     }
@@ -267,18 +274,17 @@ fn show_line(ui: &mut Ui, line: &Line, portraits: &Portraits) -> Option<String> 
 fn choose_planner(ui: &mut Ui, settings: &mut ChatSettings) {
     let text = if settings.use_model { "Chat model" } else { "Built-in" };
     ComboBox::from_id_salt("planner").selected_text(text).width(90.0).show_ui(ui, |ui| {
-        ui.selectable_value(&mut settings.use_model, false, "Built-in")
-            .on_hover_text("A grammar of English; no network.");
+        ui.selectable_value(&mut settings.use_model, false, "Built-in").on_hover_text("Built-in commands; no network.");
         ui.selectable_value(&mut settings.use_model, true, "Chat model").on_hover_text(SENT);
     });
     if settings.use_model {
-        ui.menu_button("Address\u{2026}", |ui| {
+        ui.menu_button("Server\u{2026}", |ui| {
             ui.set_min_width(300.0);
             let model = &mut settings.model;
             for (label, value, hint) in [
                 ("Address", &mut model.base_url, "http://127.0.0.1:11434/v1"),
-                ("Model", &mut model.model, "its name there"),
-                ("Key from variable", &mut model.key_variable, "name of an environment variable; empty for none"),
+                ("Model", &mut model.model, "its name on the server"),
+                ("API key variable", &mut model.key_variable, "name of an environment variable; empty for none"),
             ] {
                 ui.label(RichText::new(label).small().color(theme::WEAK));
                 ui.add(TextEdit::singleline(value).hint_text(hint).desired_width(f32::INFINITY));
@@ -291,7 +297,7 @@ fn choose_planner(ui: &mut Ui, settings: &mut ChatSettings) {
 /// Starts the agent's thread.
 fn start(repaint: Repaint) -> std::io::Result<(Sender<Request>, Receiver<News>)> {
     let (sender, requests) = bounded::<Request>(4);
-    let (news_sender, news) = unbounded();
+    let (news_sender, news) = bounded(NEWS);
     let work = move || {
         let mut agent = Agent { session: None, world: None, news: news_sender, repaint };
         for request in requests {
@@ -306,8 +312,8 @@ fn start(repaint: Repaint) -> std::io::Result<(Sender<Request>, Receiver<News>)>
 struct Agent {
     /// With the settings that it was started with.
     session: Option<(ChatSettings, Session)>,
-    /// With the number of its scene and the address of its Gaussians.
-    world: Option<((u64, usize), SceneWorld)>,
+    /// With the number of its scene and the generation of its Gaussians.
+    world: Option<((u64, u64), SceneWorld)>,
     news: Sender<News>,
     repaint: Repaint,
 }
@@ -346,8 +352,8 @@ impl Agent {
 
     /// Brings session and world up to date.
     fn get_ready(&mut self, snapshot: Snapshot, settings: ChatSettings) -> Result<(), String> {
-        let Snapshot { parts, scene, eye, aspect, hidden } = snapshot;
-        let key = (scene, Arc::as_ptr(&parts.cloud) as usize);
+        let Snapshot { parts, cloud, scene, eye, aspect, hidden } = snapshot;
+        let key = (scene, cloud);
         if self.world.as_ref().is_none_or(|(known, _)| *known != key) {
             let (news, repaint) = (self.news.clone(), Arc::clone(&self.repaint));
             let tell = Box::new(move |deed: Deed| {
@@ -369,7 +375,7 @@ impl Agent {
             } else {
                 Box::new(Rules::default())
             };
-            trace::record(Sort::Agent, "assistant with its policy", "a sentence was sent to it", 0);
+            trace::record(Sort::Agent, "agent with its policy", "a message was sent to it", 0);
             self.session = Some((settings, Session::new(policy, planner)));
         }
         Ok(())

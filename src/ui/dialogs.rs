@@ -1,16 +1,17 @@
-//! Dialogs: choosing files, errors, and questions before something is given up.
+//! Dialogs: choosing files, errors, and queries before something is given up.
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use crossbeam_channel::{Receiver, Sender, unbounded};
+use crossbeam_channel::{Receiver, Sender, bounded};
 use egui::{Id, Modal, RichText};
 use rfd::{AsyncFileDialog, FileHandle};
 
 use super::state::{ErrorBox, Tone};
 use super::theme;
 use crate::scene::IdentityId;
-use crate::worker::{Action, Repaint};
+use crate::ui::actions::Action;
+use crate::worker::Repaint;
 
 /// What a chosen path is for.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -27,16 +28,16 @@ pub enum Purpose {
     ExportPly,
     /// Write the Gaussians of an identity there.
     ExportTarget(IdentityId),
-    /// Write the picture there.
+    /// Write the frame there.
     Screenshot,
     /// Read a camera path.
     OpenPath,
     /// Write the camera path there.
     SavePath,
     /// Write a film there.
-    SaveFilm,
-    /// Write the talk with the assistant there.
-    SaveTalk,
+    ExportVideo,
+    /// Write the conversation with the agent there.
+    SaveChat,
     /// Read a report.
     Report,
     /// Read a report to compare with.
@@ -47,7 +48,7 @@ pub enum Purpose {
 pub enum Chosen {
     /// This path.
     Path(Purpose, PathBuf),
-    /// A person closed the dialog.
+    /// A user closed the dialog.
     Nothing,
     /// It closed faster than anybody could: the system has no such dialog.
     NoDialog,
@@ -62,7 +63,7 @@ pub struct FileDialogs {
 
 impl Default for FileDialogs {
     fn default() -> Self {
-        let (sender, answers) = unbounded();
+        let (sender, answers) = bounded(1);
         Self { sender, answers, open: false }
     }
 }
@@ -103,11 +104,11 @@ impl FileDialogs {
             Purpose::SavePath => Box::pin(
                 dialog.set_title("Save the camera path").set_file_name(format!("{name}-path.json")).save_file(),
             ),
-            Purpose::SaveTalk => {
-                Box::pin(dialog.set_title("Save the talk").set_file_name(format!("{name}-talk.md")).save_file())
-            }
-            Purpose::SaveFilm => {
-                Box::pin(dialog.set_title("Make a film").set_file_name(format!("{name}.mp4")).save_file())
+            Purpose::SaveChat => Box::pin(
+                dialog.set_title("Save the conversation").set_file_name(format!("{name}-conversation.md")).save_file(),
+            ),
+            Purpose::ExportVideo => {
+                Box::pin(dialog.set_title("Export video").set_file_name(format!("{name}.mp4")).save_file())
             }
             Purpose::Screenshot => {
                 Box::pin(dialog.set_title("Save the view").set_file_name(format!("{name}.png")).save_file())
@@ -137,7 +138,7 @@ impl FileDialogs {
     }
 }
 
-/// A question before something is given up.
+/// A query before something is given up.
 pub struct Question {
     /// What is asked.
     pub text: String,
@@ -164,11 +165,11 @@ pub fn show_error(ctx: &egui::Context, error: &ErrorBox) -> bool {
             ui.label(RichText::new(&error.failure.remedy).color(theme::TEXT).strong());
         }
         ui.add_space(6.0);
-        ui.weak("Nothing that was open has changed.");
+        ui.weak("What was open is unchanged.");
         ui.add_space(12.0);
         ui.horizontal(|ui| {
             let close = ui.add(theme::primary_button("Close")).clicked();
-            if ui.button("Copy the message").clicked() {
+            if ui.button("Copy message").clicked() {
                 let f = &error.failure;
                 ui.ctx().copy_text(format!("{}: {}\n{}", error.doing, f.message, f.remedy));
             }
@@ -179,7 +180,7 @@ pub fn show_error(ctx: &egui::Context, error: &ErrorBox) -> bool {
     response.inner || response.should_close()
 }
 
-/// Asks a question. `Some(true)` to go ahead, `Some(false)` not to, `None` while nobody answered.
+/// Asks a query. `Some(true)` to go ahead, `Some(false)` not to, `None` while no one answered.
 pub fn show_question(ctx: &egui::Context, question: &Question) -> Option<bool> {
     let response = Modal::new(Id::unique("question")).frame(theme::dialog()).show(ctx, |ui| {
         ui.set_width(420.0);

@@ -134,6 +134,7 @@ impl Jobs for PipelineJobs {
                 let (explored, visited) = go_to::visit(*request);
                 Outcome::Visited(explored, visited)
             }
+            Command::ListModels => Outcome::Models(Arc::new(models::list())),
             Command::Explore { cloud, cameras, up } => {
                 Outcome::Explored(Arc::new(go_to::Explored::new(cloud, &cameras, up)))
             }

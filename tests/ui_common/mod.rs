@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 use egui_kittest::Harness;
 
 use fmlgs::jobs::Folders;
+use fmlgs::ui::actions::Action;
 use fmlgs::ui::app::App;
-use fmlgs::worker::Action;
 use fmlgs::worker::jobs::PipelineJobs;
 
 /// Only a test that hangs takes this long: making the demo's photos is the longest step.

@@ -7,7 +7,7 @@ use super::answer::{Answered, Language, answer, by_meaning, phrases_of};
 use super::grammar::Phrase;
 use super::meaning::{MeaningOptions, Phrasebook};
 use super::names;
-use super::stages::ms_since;
+use super::stages::{StagesMs, ms_since};
 use crate::models::{self, Encoder, ModelError};
 use crate::scene::{Identities, LanguageFeatures, LevelFilter, SemanticMap};
 
@@ -50,12 +50,8 @@ impl QueryEngine {
             None => false,
         };
         let encode = ms_since(start);
-        let language = map.language.as_ref().filter(|_| known);
-        let language =
-            language.map(|features| Language { features, phrases: &self.phrases, options: MeaningOptions::default() });
-        let mut answered = answer(&map.identities, &phrase, level, language);
-        answered.stages.encode = encode;
-        Ok(Some(answered))
+        let answered = answer_encoded(map, text, level, known.then_some(&self.phrases));
+        Ok(answered.map(|a| Answered { stages: StagesMs { encode, ..a.stages }, ..a }))
     }
 
     /// The words of a question that nothing here knows.
@@ -63,6 +59,21 @@ impl QueryEngine {
         let to_encoder = self.encoder.as_ref().map(|e| e.unknown_words(text));
         names::unknown_to_all(identities, text, to_encoder.as_deref())
     }
+}
+
+/// Answers a question whose phrases are among those that were encoded, or by names alone without them; `None` if
+/// there is nothing in it.
+pub fn answer_encoded(
+    map: &SemanticMap,
+    text: &str,
+    level: LevelFilter,
+    phrases: Option<&Phrasebook>,
+) -> Option<Answered> {
+    let phrase = Phrase::parse(text)?;
+    let language = map.language.as_ref().zip(phrases);
+    let language =
+        language.map(|(features, phrases)| Language { features, phrases, options: MeaningOptions::default() });
+    Some(answer(&map.identities, &phrase, level, language))
 }
 
 /// Answers a question by these `features` alone, whatever identities are called; `None` if there is nothing in

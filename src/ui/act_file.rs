@@ -1,0 +1,101 @@
+//! What the actions around files do: dialogs, and what becomes of the path that is chosen.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::actions::Action;
+use super::actions::Pane;
+use super::app::App;
+use super::camera;
+use super::context::SceneContext;
+use super::dialogs::{Chosen, Purpose};
+use super::state::Tone;
+use crate::render::BackendChoice;
+use crate::worker::{Command, Failure, VideoRequest};
+
+impl App {
+    pub(super) fn choose(&mut self, purpose: Purpose) {
+        let writes = matches!(purpose, Purpose::ExportPly | Purpose::ExportTarget(_) | Purpose::Screenshot);
+        if writes && self.viewport.picture().is_none() {
+            self.state.toast(Tone::Warning, "There is nothing to save yet: open a scene first.");
+            return;
+        }
+        let name = self.state.scene.as_ref().map_or_else(|| "scene".to_owned(), |s| s.name.clone());
+        if let Err(e) = self.dialogs.ask(purpose, &name, Arc::clone(&self.repaint)) {
+            self.state.fail("Opening the file dialog", Failure::of(&e, "Close other programs and try again."));
+        }
+    }
+
+    /// Continues with what the file dialog brought.
+    pub(super) fn chosen(&mut self, answer: Chosen) {
+        match answer {
+            Chosen::Path(Purpose::OpenFolder | Purpose::OpenFile, path) => self.ask(Action::Open(path)),
+            Chosen::Path(Purpose::Report, path) => self.read_report(path, false),
+            Chosen::Path(Purpose::SecondReport, path) => self.read_report(path, true),
+            Chosen::Path(Purpose::Masks, path) => self.find_objects(Some(path)),
+            Chosen::Path(Purpose::Model(id), path) => self.install_model(id, Some(path)),
+            Chosen::Path(Purpose::ExportPly, path) => {
+                if let Some(cloud) = self.viewport.cloud() {
+                    self.submit(Command::Export { cloud: Arc::clone(cloud), path });
+                }
+            }
+            Chosen::Path(Purpose::ExportTarget(id), path) => {
+                if let (Some(cloud), Some(map)) = (self.viewport.cloud(), &self.state.semantics) {
+                    let cloud = Arc::new(cloud.select(&map.members(id)));
+                    self.submit(Command::Export { cloud, path });
+                }
+            }
+            Chosen::Path(Purpose::OpenPath, path) => match camera::read(&path) {
+                Ok(read) => {
+                    self.camera.open(read);
+                    self.layout.hidden.retain(|p| *p != Pane::Camera);
+                }
+                Err(message) => {
+                    self.state.fail("Opening the camera path", Failure { message, remedy: String::new() });
+                }
+            },
+            Chosen::Path(Purpose::SavePath, path) => {
+                match camera::write(&path, &self.camera.path, self.viewport.aspect()) {
+                    Ok(()) => self.state.toast(Tone::Good, format!("Wrote {}", path.display())),
+                    Err(message) => {
+                        self.state.fail("Saving the camera path", Failure { message, remedy: String::new() });
+                    }
+                }
+            }
+            Chosen::Path(Purpose::ExportVideo, path) => self.export_video(path),
+            Chosen::Path(Purpose::SaveChat, path) => self.save_chat(&path),
+            Chosen::Path(Purpose::Screenshot, path) => {
+                if let Some(pixels) = self.viewport.pixels() {
+                    self.submit(Command::Picture { pixels: Arc::new(pixels), path });
+                }
+            }
+            Chosen::Nothing => {}
+            Chosen::NoDialog => self.state.toast(
+                Tone::Warning,
+                "No file dialog appeared on this system. Drop the file onto the window, or press Ctrl+P and type its path.",
+            ),
+        }
+    }
+
+    /// Exports a video of what is played.
+    fn export_video(&mut self, out: PathBuf) {
+        let Some(SceneContext { cloud, map, settings: draw, aspect, .. }) = self.context() else { return };
+        let Some((cameras, settings)) = self.camera.film(&out, aspect) else {
+            self.state.toast(Tone::Warning, "There is nothing to export: add keyframes, or go to something first.");
+            return;
+        };
+        let found = self.viewport.queries.found();
+        let marked = map.filter(|_| self.camera.mark).map(|map| (Arc::clone(&map), found));
+        let (cloud, backend) = (Arc::clone(&cloud), BackendChoice::Auto);
+        self.submit(Command::Film(Box::new(VideoRequest { cloud, draw, cameras, marked, out, settings, backend })));
+    }
+
+    fn save_chat(&mut self, path: &Path) {
+        let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+        let Some(text) = self.chat.transcript(json).map(str::to_owned) else { return };
+        match crate::io::atomic::write(path, |w| w.write_all(text.as_bytes())) {
+            Ok(()) => self.state.toast(Tone::Good, format!("Wrote {}", path.display())),
+            Err(e) => self.state.fail("Saving the conversation", Failure::of(&e, "")),
+        }
+    }
+}
