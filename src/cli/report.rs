@@ -1,7 +1,6 @@
 //! `fmlgs report`: error against run time.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::Instant;
 
 use super::progress::Console;
