@@ -29,10 +29,10 @@ use std::sync::Arc;
 
 pub use self::actions::Action;
 
+use crate::jobs::Folders;
 use crate::scene::plan::PlanOverride;
 use crate::worker::Start;
 use crate::worker::jobs::PipelineJobs;
-use crate::worker::places::Places;
 
 /// Opens the window, takes what is wanted of plans, does `first` one after the other, and returns when it is closed.
 pub fn run(first: Vec<Start>, overrides: Vec<PlanOverride>) -> eframe::Result {
@@ -66,7 +66,8 @@ fn open(
         "fmlgs",
         options,
         Box::new(|cc| {
-            let mut app = app::App::new(cc, PipelineJobs::new(Places::of_user()), first.into_iter().map(Action::from))?;
+            let first = first.into_iter().map(Action::from);
+            let mut app = app::App::new(cc, PipelineJobs::new(Folders::of_user()), first)?;
             app.override_plan(overrides);
             Ok(Box::new(app))
         }),
