@@ -90,7 +90,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let mut console = Console::new(quiet);
     let sizes = if args.size.is_empty() { vec![[640, 480], [1280, 720]] } else { args.size };
     let repeats = args.repeats as usize;
-    let gpu = args.gpu.then(Device::new).transpose()?;
+    let gpu = args.gpu.then(Device::shared).transpose()?;
     let mut timings = Timings {
         render: Vec::new(),
         train: Vec::new(),

@@ -87,7 +87,7 @@ pub fn run(scenes: &[PathBuf], runs: u32, repeats: u32, as_json: bool) -> Result
         let (plan, everything) = (middle(plan)?, middle(everything)?);
         rows.push(Row { scene: bench::label(scene), disk: disk(scene), plan, everything });
     }
-    let adapter = Device::new().ok().map(|d| d.describe());
+    let adapter = Device::shared().ok().map(|d| d.describe());
     if as_json {
         return output::print_json(&json!({ "size_px": SIZE, "runs": runs, "adapter": adapter, "scenes": rows }));
     }
@@ -272,7 +272,7 @@ fn frame(scene: &OpenedScene, plan: &ScenePlan, repeats: usize) -> Result<f64, C
 /// Bytes of the buffers that the GPU renderer allocates for the first view, on whatever adapter
 /// there is; 0 without any.
 fn device_bytes(scene: &OpenedScene, plan: &ScenePlan, camera: &Camera) -> Result<u64, CliError> {
-    let (Some(cloud), Ok(device)) = (&scene.cloud, Device::new()) else { return Ok(0) };
+    let (Some(cloud), Ok(device)) = (&scene.cloud, Device::shared()) else { return Ok(0) };
     let mut renderer = Renderer::on_gpu(&device)?;
     renderer.draw(cloud, camera, &settings(scene, plan))?;
     Ok(renderer.device_bytes())

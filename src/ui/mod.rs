@@ -22,6 +22,9 @@ pub mod viewport;
 
 use std::sync::Arc;
 
+use eframe::egui_wgpu::WgpuSetup;
+
+use crate::render::Device;
 use crate::scene::plan::Wish;
 use crate::worker::Action;
 use crate::worker::jobs::PipelineJobs;
@@ -54,11 +57,20 @@ fn open(
     wishes: Vec<Wish>,
 ) -> eframe::Result {
     // Shades that dithering would smooth do not occur in a flat theme.
-    let options = eframe::NativeOptions { viewport, renderer, dithering: false, ..eframe::NativeOptions::default() };
+    let mut options =
+        eframe::NativeOptions { viewport, renderer, dithering: false, ..eframe::NativeOptions::default() };
+    // A device that can draw and train too.
+    if let WgpuSetup::CreateNew(setup) = &mut options.wgpu_options.wgpu_setup {
+        setup.power_preference = eframe::wgpu::PowerPreference::HighPerformance;
+        setup.device_descriptor = Arc::new(Device::device_descriptor);
+    }
     eframe::run_native(
         "fmlgs",
         options,
         Box::new(|cc| {
+            if let Some(window) = &cc.wgpu_render_state {
+                Device::adopt(&window.adapter, &window.device, &window.queue);
+            }
             let mut app = app::App::new(cc, PipelineJobs::new(Places::of_user()), first)?;
             app.wish(wishes);
             Ok(Box::new(app))
