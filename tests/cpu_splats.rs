@@ -3,7 +3,7 @@
 mod common;
 
 use common::psnr;
-use fmlgs::pipeline::bench::views_of;
+use fmlgs::measure::bench::views_of;
 use fmlgs::render::cpu::Renderer;
 use fmlgs::render::{Features, RenderSettings};
 use fmlgs::scene::Camera;

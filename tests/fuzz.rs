@@ -1,19 +1,23 @@
-//! Fuzzing of every reader on stable Rust: small seeds, deterministic mutations, and three promises
-//! held against each input: no panic, bounded memory, bounded time.
+//! Fuzzing on stable Rust: of numbers (see `numbers`), and of every reader: small seeds, deterministic mutations, and
+//! three promises that each input must keep: no panic, bounded memory, bounded time.
 //!
 //! `cargo test --test fuzz` tries some thousands of inputs a reader. The long run tries
 //! `FMLGS_FUZZ_TOTAL` (ten million if not set) over all readers and prints a table of them:
-//! `cargo test --test fuzz -- --ignored --nocapture long_run`; two runs with different
+//! `cargo test --test fuzz -- --ignored --nocapture --exact long_run`; two runs with different
 //! `FMLGS_FUZZ_SEED` go side by side. `FMLGS_FUZZ_ONLY=sog,photo` tries these readers alone,
 //! `FMLGS_FUZZ_FILE` names a file to try with them. An input that breaks a promise is written to
 //! `target/fuzz/` and named; once mended it belongs into `tests/corpus/<reader>/`, whose files are
 //! all tried unchanged as well. `cargo test --test fuzz -- --ignored write_seeds` writes the seeds anew.
+//! Numbers have a long run of their own: `cargo test --test fuzz -- --ignored long_run_of_numbers`, with
+//! `FMLGS_FUZZ_ROUNDS` inputs an area.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 #[path = "fuzz/memory.rs"]
 mod memory;
 #[path = "fuzz/mutate.rs"]
 mod mutate;
+#[path = "fuzz/numbers/mod.rs"]
+mod numbers;
 #[path = "fuzz/repair.rs"]
 mod repair;
 #[path = "fuzz/search.rs"]

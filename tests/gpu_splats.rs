@@ -5,7 +5,7 @@ mod common;
 mod gpu_common;
 
 use common::psnr;
-use fmlgs::pipeline::bench::views_of;
+use fmlgs::measure::bench::views_of;
 use fmlgs::render::gpu::Renderer;
 use fmlgs::render::{Features, RenderSettings, cpu};
 use fmlgs::scene::Camera;

@@ -348,16 +348,16 @@ fn a_lost_device_is_an_error_and_no_panic() {
 
 #[test]
 fn stages_are_measured() {
-    use fmlgs::render::gpu::measure;
+    use fmlgs::measure::bench::gpu::{Measurement, frame, training_step};
     with_context(|context| {
         let lesson = Lesson::new(0);
-        let settings = RenderSettings::default();
-        let frame = measure::frame(context, &lesson.cloud, &lesson.camera, &settings, 3).unwrap();
-        let step = measure::training_step(context, &lesson.cloud, &lesson.camera, &lesson.photo, 3).unwrap();
-        assert!(frame.visible > 60 && frame.pairs >= frame.visible && step.pairs == frame.pairs);
+        let mut renderer = fmlgs::render::Renderer::on_gpu(context).unwrap();
+        let cloud = std::sync::Arc::new(lesson.cloud.clone());
+        let frame = frame(&mut renderer, &cloud, &lesson.camera, &RenderSettings::default(), 3).unwrap();
+        let step = training_step(context, &lesson.cloud, &lesson.camera, &lesson.photo, 3).unwrap();
         assert!(frame.whole_secs > 0.0 && step.whole_secs > 0.0);
         if context.has_timestamps() {
-            let names = |m: &measure::Measurement| m.stages.iter().map(|s| s.0).collect::<Vec<_>>();
+            let names = |m: &Measurement| m.stages.iter().map(|s| s.0).collect::<Vec<_>>();
             assert_eq!(names(&frame), ["project", "sort by depth", "bin", "sort by tile", "blend"]);
             let backward = ["loss", "blend backward", "project backward", "adam"];
             assert_eq!(names(&step)[5..], backward);

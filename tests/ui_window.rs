@@ -10,10 +10,10 @@ use std::time::Duration;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
+use fmlgs::measure::{self, ErrorKind, Knobs, Measure, Point, Report, Rule, Sample, Stage, StageName};
 use fmlgs::pipeline::observer::Silent;
 use fmlgs::pipeline::semantics::edit::Edit;
 use fmlgs::pipeline::synth::{self, SynthOptions};
-use fmlgs::report::{self, Form, Knobs, Measure, Point, Report, Rule, Sample, Stage, StageName};
 use fmlgs::ui::app::App;
 use fmlgs::worker::places::Places;
 use fmlgs::worker::{Action, Pane, ViewMode};
@@ -390,7 +390,7 @@ fn write_report(folder: &Path, times: f64, cores: usize) {
         input: Default::default(),
         seeds: vec![0, 1, 2],
         planned: 4,
-        measures: vec![Measure::new("error", "", Form::Error, "how wrong it is")],
+        measures: vec![Measure::new("error", "", ErrorKind::Error, "how wrong it is")],
         rule: Rule { measure: "error".into(), times: 1.1, floor: 0.0, spare_secs: 0.0 },
         points,
         orders: Vec::new(),
@@ -404,14 +404,14 @@ fn write_report(folder: &Path, times: f64, cores: usize) {
     let training =
         vec![point("default", "all", &[], 20.0, 0.1), point("steps", "500", &[("steps", 500.into())], 5.0, 0.2)];
     let report = Report {
-        version: report::VERSION,
+        version: measure::VERSION,
         program: "test".into(),
         scene: "dots".into(),
-        computer: report::Computer { cores, ..Default::default() },
+        computer: measure::Computer { cores, ..Default::default() },
         stages: vec![stage(StageName::Render, drawing), stage(StageName::Train, training)],
     };
     std::fs::create_dir_all(folder).expect("folder");
-    report.write(&folder.join(report::FILE)).expect("written");
+    report.write(&folder.join(measure::FILE)).expect("written");
 }
 
 #[test]
@@ -457,7 +457,7 @@ fn a_report_is_opened_compared_and_its_settings_are_applied() {
     w.ask(Action::EndComparison);
     assert!(!w.shows("Both reports"));
 
-    std::fs::write(at("two").join(report::FILE), "{").expect("written");
+    std::fs::write(at("two").join(measure::FILE), "{").expect("written");
     w.ask(Action::OpenReport(at("two")));
     w.until("the error", |a| a.state.error.is_some());
     assert!(w.shows("not a report") && w.app().state.report.is_some(), "what was open stays");

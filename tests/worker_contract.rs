@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use fmlgs::pipeline::observer::{Level, Observer, Progress, Signal, StepMetrics};
+use fmlgs::pipeline::observer::{Observer, Progress, Severity, Signal, StepMetrics};
 use fmlgs::scene::GaussianCloud;
 use fmlgs::worker::{Command, Event, Failure, JobId, Jobs, Outcome, QueueFull, Stop, Worker};
 
@@ -39,7 +39,7 @@ impl Jobs for Script {
                 for i in 0..5_000 {
                     observer.progress(progress(i));
                     observer.step(StepMetrics { step: i, ..StepMetrics::default() });
-                    observer.note(Level::Info, i.to_string());
+                    observer.note(Severity::Info, i.to_string());
                 }
                 Ok(Outcome::Written(path))
             }
@@ -52,7 +52,7 @@ impl Jobs for Script {
                         given += 1;
                     }
                 }
-                observer.note(Level::Info, given.to_string());
+                observer.note(Severity::Info, given.to_string());
                 Ok(Outcome::Written(path))
             }
             _ => Ok(Outcome::Written(path)),

@@ -1,22 +1,25 @@
 //! `fmlgs bench`: how long drawing and training take on this machine, stage by stage.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::process::Command as Process;
+use std::sync::Arc;
 
-use serde::Serialize;
 use serde_json::json;
 
-use super::bench_plan::{self, Variant};
 use super::progress::Console;
-use super::{CliError, number, output, view};
+use super::{CliError, number, output, process, view};
 use crate::io::{self, Opened};
+use crate::measure::StudyError;
+use crate::measure::bench::{self, Timings, cpu, gpu, query};
+use crate::measure::plan::{self, Cost, OpenScene, SIZE, Saving, Variant};
 use crate::models;
-use crate::pipeline::bench::{self, RenderTiming, StepTiming};
-use crate::pipeline::bench_gpu::{self, GpuTiming};
-use crate::pipeline::bench_query::{self, QueryTiming};
-use crate::pipeline::observer::{Level, Observer, Signal};
+use crate::pipeline::observer::{Observer, Severity, Signal, Silent};
 use crate::pipeline::train::{TrainConfig, TrainView, load_views};
 use crate::render::Device;
-use crate::scene::Dataset;
+use crate::scene::{Camera, Dataset};
+use crate::worker::jobs::PipelineJobs;
+use crate::worker::places::Places;
+use crate::worker::{Command, Jobs, Outcome, Stop};
 
 /// Time drawing and training on this machine, stage by stage
 ///
@@ -48,7 +51,7 @@ pub struct Args {
     /// Time this many typed queries too, on a made-up view of 1008 x 567 px with 300 objects and parts
     #[arg(long, value_name = "COUNT", value_parser = number::within(1..=100_000_000_usize))]
     queries: Option<usize>,
-    /// Hold what each scene's plan leaves out against everything on, each in processes of its own
+    /// Compare each scene's plan with everything enabled, each in processes of its own
     #[arg(long, conflicts_with_all = ["queries", "gpu", "size"])]
     plan: bool,
     /// Processes for each of the two
@@ -62,19 +65,6 @@ pub struct Args {
     json: bool,
 }
 
-/// Everything that was measured.
-#[derive(Debug, Serialize)]
-struct Timings {
-    render: Vec<RenderTiming>,
-    train: Vec<StepTiming>,
-    /// Name and features of the GPU, if it was asked for.
-    gpu: Option<String>,
-    gpu_render: Vec<GpuTiming>,
-    gpu_train: Vec<GpuTiming>,
-    one_core_products_per_sec: f64,
-    queries: Option<QueryTiming>,
-}
-
 /// Objects and parts of the view that is asked.
 const QUERY_IDENTITIES: usize = 300;
 /// Its size in px.
@@ -82,50 +72,46 @@ const QUERY_SIZE: [usize; 2] = [1_008, 567];
 
 pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     if let (Some(variant), Some(scene)) = (args.variant, args.paths.first()) {
-        return bench_plan::run_child(scene, variant, args.repeats as usize);
+        // As the window has it.
+        process::settle();
+        return output::print_json(&plan::cost(|| open(scene), variant, args.repeats as usize)?);
     }
     if args.plan {
-        return bench_plan::run(&args.paths, args.runs, args.repeats, args.json);
+        return savings(&args);
     }
     let mut console = Console::new(quiet);
     let sizes = if args.size.is_empty() { vec![[640, 480], [1280, 720]] } else { args.size };
     let repeats = args.repeats as usize;
-    let gpu = args.gpu.then(Device::shared).transpose()?;
-    let mut timings = Timings {
-        render: Vec::new(),
-        train: Vec::new(),
-        gpu: gpu.as_ref().map(Device::describe),
-        gpu_render: Vec::new(),
-        gpu_train: Vec::new(),
-        one_core_products_per_sec: bench::one_core_limit(),
-        queries: None,
-    };
+    let device = args.gpu.then(Device::shared).transpose()?;
+    let gpu_name = device.as_ref().map(Device::describe);
+    let one_core_products_per_sec = bench::one_core_limit();
+    let mut timings = Timings { gpu: gpu_name, one_core_products_per_sec, ..Timings::default() };
     if let Some(count) = args.queries {
         let mut encoder = models::encoder(models::DEMO)?;
-        timings.queries = Some(bench_query::time(encoder.as_mut(), QUERY_IDENTITIES, QUERY_SIZE, count)?);
+        timings.queries = Some(query::time(encoder.as_mut(), QUERY_IDENTITIES, QUERY_SIZE, count)?);
     }
     for path in &args.paths {
         let name = bench::label(path);
         let cloud = match io::open(path)? {
             Opened::Dataset(dataset) => {
                 let (config, views) = photos(&dataset, args.max_side, &mut console)?;
-                timings.train.push(bench::train_steps(&dataset, &views, &config, repeats)?);
-                if let Some(device) = &gpu {
-                    timings.gpu_train.push(bench_gpu::train_steps(device, &dataset, &views, &config, repeats)?);
+                timings.train.push(cpu::train_steps(&dataset, &views, &config, repeats)?);
+                if let Some(context) = &device {
+                    timings.gpu_train.push(gpu::train_steps(context, &dataset, &views, &config, repeats)?);
                 }
                 continue;
             }
-            Opened::Cloud(cloud) => cloud,
-            Opened::Trained(scene) => scene.cloud,
+            Opened::Cloud(cloud) => Arc::new(cloud),
+            Opened::Trained(scene) => Arc::new(scene.cloud),
         };
         for &size in &sizes {
             if console.signal() == Signal::Cancel {
                 return Err(CliError::Cancelled("nothing was printed".into()));
             }
-            console.note(Level::Info, format!("Drawing {name} at {} x {}", size[0], size[1]));
-            timings.render.push(bench::render(&name, &cloud, size, repeats)?);
-            if let Some(device) = &gpu {
-                timings.gpu_render.push(bench_gpu::render(device, &name, &cloud, size, repeats)?);
+            console.note(Severity::Info, format!("Drawing {name} at {} x {}", size[0], size[1]));
+            timings.render.push(cpu::render(&name, &cloud, size, repeats)?);
+            if let Some(context) = &device {
+                timings.gpu_render.push(gpu::render(context, &name, &cloud, size, repeats)?);
             }
         }
     }
@@ -133,7 +119,11 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     if args.json {
         return output::print_json(&json!(timings));
     }
-    output::print(&text(&timings))
+    let part = |(rows, about): &(Vec<Vec<String>>, String)| match rows.is_empty() {
+        true => about.clone(),
+        false => format!("{}\n{about}", output::table(rows)).trim_end().to_owned(),
+    };
+    output::print(&timings.tables().iter().map(part).collect::<Vec<_>>().join("\n\n"))
 }
 
 /// The photos to train on, and how.
@@ -150,69 +140,75 @@ fn photos(
     if views.is_empty() {
         return Err(CliError::failed(format!("{} has no photo to train on", dataset.root.display())));
     }
-    console.note(Level::Info, format!("Training on {}", dataset.name));
+    console.note(Severity::Info, format!("Training on {}", dataset.name));
     Ok((config, views))
 }
 
-fn text(t: &Timings) -> String {
-    let mut parts = Vec::new();
-    if let Some(q) = &t.queries {
-        let mut rows = vec![["query stage", "p50 ms", "p95 ms"].map(str::to_owned).to_vec()];
-        let stages = [
-            ("text encoding", q.stages.encode),
-            ("relevancy", q.stages.relevancy),
-            ("localisation", q.stages.localise),
-            ("mask", q.stages.mask),
-            ("heat map", q.stages.draw),
-            ("without text encoding", q.without_encoding),
-            ("whole", q.whole),
-        ];
-        rows.extend(stages.map(|(name, p)| vec![name.into(), format!("{:.3}", p.p50_ms), format!("{:.3}", p.p95_ms)]));
-        let what = format!(
-            "{} queries, {} identities, {} x {} px, encoder '{}'",
-            q.queries, q.identities, q.size[0], q.size[1], q.encoder
-        );
-        parts.push(format!("{}\n{what}", output::table(&rows)));
+/// Measures each scene with its plan and with everything on, each in processes of its own.
+fn savings(args: &Args) -> Result<(), CliError> {
+    let mut scenes = Vec::new();
+    for scene in &args.paths {
+        // In turns, so that what else the machine does meets both alike.
+        let mut costs = [Vec::new(), Vec::new()];
+        for _ in 0..args.runs {
+            for (costs, variant) in costs.iter_mut().zip(["plan", "everything"]) {
+                costs.push(child(scene, variant, args.repeats)?);
+            }
+        }
+        if let [Some(plan), Some(everything)] = costs.map(|c| Cost::median(&c)) {
+            scenes.push(Saving::new(scene, plan, everything));
+        }
     }
-    if !t.render.is_empty() {
-        let head = ["drawing, CPU", "Gaussians", "size", "ms", "project", "sort", "bin", "blend", "products", "per s"];
-        let mut rows = vec![head.map(str::to_owned).to_vec()];
-        rows.extend(t.render.iter().map(|r| {
-            let mut row = vec![r.name.clone(), r.gaussians.to_string(), format!("{}x{}", r.size[0], r.size[1])];
-            row.push(format!("{:.1}", r.total_ms));
-            row.extend(r.stages_ms.iter().map(|ms| format!("{ms:.1}")));
-            row.extend([format!("{:.1e}", r.products), format!("{:.2e}", r.products_per_sec)]);
-            row
-        }));
-        parts.push(output::table(&rows));
+    let adapter = Device::shared().ok().map(|c| c.describe());
+    if args.json {
+        let document = json!({ "size_px": SIZE, "runs": args.runs, "adapter": adapter, "scenes": scenes });
+        return output::print_json(&document);
     }
-    if !t.train.is_empty() {
-        let head = ["training step, CPU", "Gaussians", "size", "ms", "steps per s"];
-        let mut rows = vec![head.map(str::to_owned).to_vec()];
-        rows.extend(t.train.iter().map(|s| {
-            let size = format!("{}x{}", s.size[0], s.size[1]);
-            let ms = format!("{:.1}", s.step_ms);
-            vec![s.name.clone(), s.gaussians.to_string(), size, ms, format!("{:.2}", s.steps_per_sec)]
-        }));
-        parts.push(output::table(&rows));
-    }
-    if let Some(gpu) = &t.gpu {
-        parts.push(format!("GPU: {gpu}"));
-        parts.extend(
-            [("drawing", &t.gpu_render), ("training step", &t.gpu_train)].map(|(what, rows)| gpu_text(what, rows)),
-        );
-    }
-    parts.push(format!("one core at most: {:.2e} products per s", t.one_core_products_per_sec));
-    parts.retain(|p| !p.is_empty());
-    parts.join("\n\n")
+    let disks: Vec<String> = scenes.iter().map(Saving::on_disk).collect();
+    output::print(&format!(
+        "{}\n\n{}\n\nImages of {} x {} px; memory beyond the process before it read anything; buffers counted on: {}",
+        output::table(&plan::table(&scenes)),
+        disks.join("\n"),
+        SIZE[0],
+        SIZE[1],
+        adapter.as_deref().unwrap_or("none, so no GPU memory is given")
+    ))
 }
 
-/// One line per measurement, its stages on the device behind it.
-fn gpu_text(what: &str, timings: &[GpuTiming]) -> String {
-    let line = |t: &GpuTiming| {
-        let stages: Vec<String> = t.stages_ms.iter().map(|(name, ms)| format!("{name} {ms:.2}")).collect();
-        let (size, ms) = (format!("{}x{}", t.size[0], t.size[1]), t.total_ms);
-        format!("{what} {}, {} Gaussians, {size}: {ms:.2} ms ({})", t.name, t.gaussians, stages.join(", "))
+/// What a process of its own has measured.
+fn child(scene: &Path, variant: &str, repeats: u32) -> Result<Cost, CliError> {
+    let program = std::env::current_exe().map_err(|e| CliError::failed(format!("the program's own path: {e}")))?;
+    let mut process = Process::new(program);
+    process.args(["bench", "--variant", variant, "--repeats", &repeats.to_string()]).arg(scene);
+    let done = process.output();
+    let done = done.map_err(|e| CliError::failed(format!("a process for {}: {e}", scene.display())))?;
+    if !done.status.success() {
+        let why = String::from_utf8_lossy(&done.stderr);
+        return Err(CliError::failed(format!("{}: {}", scene.display(), why.trim())));
+    }
+    Ok(serde_json::from_slice(&done.stdout)?)
+}
+
+/// Opens a scene as the window does, with the window's first view.
+fn open(path: &Path) -> Result<OpenScene, StudyError> {
+    let jobs = PipelineJobs::new(Places::of_user());
+    let opened = jobs.run(Command::Open { path: path.to_path_buf() }, &mut Silent).map_err(|stop| match stop {
+        Stop::Cancelled => StudyError("it was cancelled".into()),
+        Stop::Failed(failure) => StudyError(format!("{} {}", failure.message, failure.remedy)),
+    })?;
+    let Outcome::Opened(scene) = opened else { return Err(StudyError("opening brought no scene".into())) };
+    let cloud = scene.cloud.clone().ok_or_else(|| StudyError("there is nothing to draw".into()))?;
+    let [width, height] = SIZE;
+    let first = match &scene.home.camera {
+        Some(camera) => view::with_size(camera, width, height),
+        None => {
+            let (center, radius) = (scene.home.bounds.center(), scene.home.bounds.radius().max(1e-6));
+            let eye = center + glam::DVec3::new(1.0, 0.0, -2.0) * radius + scene.home.up * (0.5 * radius);
+            let seen = Camera::look_at(eye, center, scene.home.up, 0.8, width, height);
+            seen.unwrap_or_else(|| Camera::of_pose(eye, glam::DMat3::IDENTITY, 0.8, width, height))
+        }
     };
-    timings.iter().map(line).collect::<Vec<_>>().join("\n")
+    let cameras = scene.dataset.as_ref().map(|d| d.cameras()).unwrap_or_default();
+    let (settings, map) = (scene.render.clone(), scene.semantics.clone());
+    Ok(OpenScene { cloud, settings, map, cameras, up: scene.home.up, first, facts: scene.facts.clone() })
 }

@@ -13,9 +13,12 @@ use super::train::Settings;
 use super::{CliError, eval, interrupt, opened, output, synth};
 use crate::io;
 use crate::math::stats::median;
-use crate::pipeline::observer::{Evaluation, Level, Observer, ViewScore};
+use crate::measure::studies::Input;
+use crate::measure::table::{markdown, rows};
+use crate::measure::{Case, ErrorKind, Measure, Report, Rule, Stage, StageName, Trial, computer};
+use crate::pipeline::observer::{Evaluation, Observer, Severity, ViewScore};
 use crate::pipeline::synth::demo;
-use crate::pipeline::train::{self, TrainConfig, TrainEnd};
+use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainOutcome};
 use crate::render::{Features, RenderSettings, Renderer};
 use crate::scene::{Camera, Dataset, GaussianCloud, Machine};
 use crate::worker::machine;
@@ -53,9 +56,11 @@ fn config() -> TrainConfig {
     TrainConfig { steps: 1_500, max_side_px: 400, eval_every: 250, checkpoint_secs: 30.0, ..TrainConfig::default() }
 }
 
-/// What the demo found, as written to `report.json`.
+/// What the demo found, as written to `report.json`: a report of training and queries, and more.
 #[derive(Debug, Serialize)]
-struct Report {
+struct DemoReport {
+    #[serde(flatten)]
+    document: Report,
     machine: Machine,
     config: TrainConfig,
     photos: usize,
@@ -97,7 +102,9 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let millis = fly(&job.cloud, &job.settings, &dataset, &flight)?;
 
     let (psnr, ssim) = eval::means(&views);
-    let report = Report {
+    let document = document(&args.out, &outcome, [psnr, ssim], &queries);
+    let report = DemoReport {
+        document,
         machine: machine::look(),
         photos: dataset.photos.len(),
         held_out: views.len(),
@@ -120,17 +127,41 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     if args.json {
         return output::print_json(&report);
     }
-    output::print(&format!("{}\nSee {}", text(&report), args.out.join("report.md").display()))
+    output::print(&format!("{}\nSee {}", summary(&report), args.out.join("report.md").display()))
+}
+
+/// The demo as a report that the window opens: training and queries, each with the one setting that it ran.
+fn document(out: &Path, outcome: &TrainOutcome, [psnr, ssim]: [f64; 2], queries: &Queries) -> Report {
+    let share = |name: &str, meaning: &str| Measure::new(name, "", ErrorKind::Share, meaning);
+    let decibels = Measure::new("PSNR", "dB", ErrorKind::Decibels, "peak signal to noise ratio in held-out photos");
+    let labels = "labels of held-out photos, asked for by name";
+    let curve = outcome.evaluations.iter().map(|e| [e.secs, e.psnr]).collect();
+    let stage = |name, words, measures: Vec<Measure>, trial: &Trial| {
+        let rule = Rule::new(&measures[0].name, 1.0, 0.0, 0.0);
+        let mut stage = Stage { planned: 1, ..Stage::new(name, words, (Input::new(), 1), rule, measures) };
+        stage.add(&Case::default("the demo's settings"), trial);
+        stage
+    };
+    let trained = Trial { secs: outcome.secs, values: vec![("PSNR", psnr), ("SSIM", ssim)], curve };
+    let millis: Vec<f64> = queries.asked.iter().map(|q| q.millis).collect();
+    let values = vec![("object mIoU", queries.object_miou), ("part mIoU", queries.part_miou)];
+    let asked = Trial { secs: 1e-3 * median(&millis), values, curve: Vec::new() };
+    let mut report = Report::empty(&out.display().to_string(), &computer::look());
+    let words = ["training, evaluation left out", "photos that training did not see"];
+    report.put(stage(StageName::Train, words, vec![decibels, share("SSIM", "structural similarity")], &trained));
+    let overlaps = vec![share("object mIoU", "mean overlap of objects"), share("part mIoU", "mean overlap of parts")];
+    report.put(stage(StageName::Query, ["one query, from the text to the mask", labels], overlaps, &asked));
+    report
 }
 
 /// Renders the photos unless they are there; returns the seconds it took.
 fn make_photos(folder: &Path, console: &mut Console) -> Result<Option<f64>, CliError> {
     if demo::demo_is_written(folder) {
-        console.note(Level::Info, format!("Using the photos in {}", folder.display()));
+        console.note(Severity::Info, format!("Using the photos in {}", folder.display()));
         return Ok(None);
     }
     let report = demo::write_demo(folder, console).map_err(synth::failure)?;
-    console.note(Level::Info, synth::summary(&report));
+    console.note(Severity::Info, synth::summary(&report));
     Ok(Some(report.secs))
 }
 
@@ -171,7 +202,7 @@ fn circle(dataset: &Dataset) -> Vec<Camera> {
     (0..FLIGHT_PICTURES).filter_map(at).collect()
 }
 
-fn text(r: &Report) -> String {
+fn summary(r: &DemoReport) -> String {
     format!(
         "{} steps in {:.0} s: {} Gaussians, held-out PSNR {:.2} dB, SSIM {:.3} over {} views; asked by name, objects \
          {:.3} and parts {:.3} mean IoU; {:.0} ms per picture",
@@ -188,38 +219,37 @@ fn text(r: &Report) -> String {
 }
 
 /// Writes `report.json` and, for people, `report.md`.
-fn write_report(r: &Report, folder: &Path) -> Result<(), CliError> {
+fn write_report(r: &DemoReport, folder: &Path) -> Result<(), CliError> {
     let json = serde_json::to_vec_pretty(r)?;
     io::atomic::write(&folder.join("report.json"), |w| w.write_all(&json))?;
     let curve: String = r.curve.iter().map(|e| format!("* {}\n", evaluation_line(e))).collect();
-    let mut rows = vec![vec!["view".to_owned(), "PSNR dB".to_owned(), "SSIM".to_owned()]];
-    rows.extend(r.views.iter().map(|s| vec![s.name.clone(), format!("{:.2}", s.psnr), format!("{:.4}", s.ssim)]));
-    let mut asked = vec![["question", "verdict", "answer", "px", "ms"].map(str::to_owned).to_vec()];
-    asked.extend(r.queries.asked.iter().map(|q| {
+    let view = |s: &ViewScore| vec![s.name.clone(), format!("{:.2}", s.psnr), format!("{:.4}", s.ssim)];
+    let views = rows(&["view", "PSNR dB", "SSIM"], r.views.iter().map(view));
+    let asked = r.queries.asked.iter().map(|q| {
         let answer = q.answer.join(", ");
         vec![q.question.clone(), q.verdict.into(), answer, q.pixels.to_string(), format!("{:.1}", q.millis)]
-    }));
-    let gpu = r.machine.gpu.as_deref().unwrap_or("no GPU");
+    });
+    let asked = rows(&["question", "verdict", "answer", "px", "ms"], asked);
     let synth = r.synth_secs.map_or("reused".to_owned(), |s| format!("made in {s:.1} s"));
-    let markdown = format!(
-        "# Demo\n\n{}.\n\n* Machine: {} cores, {gpu}\n* Photos: {}, {synth}\n* In all: {:.0} s\n\n## While training\n\n\
-         {curve}\n## Held-out views\n\n`compare/` holds photo, render and difference (x 4) side by side.\n\n```text\n{}\n```\n\n\
+    let text = format!(
+        "# Demo\n\n{}.\n\n* Machine: {}\n* Photos: {}, {synth}\n* In all: {:.0} s\n\n## While training\n\n\
+         {curve}\n## Held-out views\n\n`compare/` holds photo, render and difference (x 4) side by side.\n\n{}\n\
          ## Questions\n\n`queries/` holds relevancy maps in a held-out view. Objects were found in {:.0} s from the masks of \
-         {}.\n\n```text\n{}\n```\n\n\
+         {}.\n\n{}\n\
          ## Flight\n\n`flight/` holds {} pictures on a circle around the scene, {:.0} ms each.\n\n\
          ## To look at it\n\n`scene/` is a trained scene: `fmlgs scene`, or open `scene/point_cloud.ply` in any splat viewer.\n",
-        text(r),
-        r.machine.cores,
+        summary(r),
+        r.document.computer.words(),
         r.photos,
         r.total_secs,
-        output::table(&rows),
+        markdown(&views),
         r.queries.find_secs,
         r.queries.seeds.join(", "),
-        output::table(&asked),
+        markdown(&asked),
         r.flight_pictures,
         r.flight_ms_per_picture,
     );
-    Ok(io::atomic::write(&folder.join("report.md"), |w| w.write_all(markdown.as_bytes()))?)
+    Ok(io::atomic::write(&folder.join("report.md"), |w| w.write_all(text.as_bytes()))?)
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use super::{CliError, output, query};
 use crate::io::SceneFolder;
 use crate::io::labels::Labels;
 use crate::models;
-use crate::pipeline::observer::{Level, Observer, Silent};
+use crate::pipeline::observer::{Observer, Severity, Silent};
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::find::{FindOptions, Found, Tools, find_objects};
 use crate::pipeline::semantics::grammar::Kind;
@@ -90,16 +90,13 @@ pub fn run(
         &options,
         console,
     );
-    let Found { map, .. } = found.map_err(|e| match e {
-        e if e.is_cancelled() => CliError::Cancelled("the trained scene is saved".into()),
-        other => other.into(),
-    })?;
+    let Found { map, .. } = found.map_err(|e| CliError::of_work(e, "the trained scene is saved"))?;
     let find_secs = start.elapsed().as_secs_f64();
     let (kept, _) = SceneFolder::hold(scene, "storing objects")?.replace_map(job.state.as_deref(), &map, &job.cloud)?;
     if let Some(kept) = kept {
-        console.note(Level::Info, format!("The objects and parts before are kept in {}", kept.display()));
+        console.note(Severity::Info, format!("The objects and parts before are kept in {}", kept.display()));
     }
-    console.note(Level::Info, format!("{} objects and parts found", map.identities.len()));
+    console.note(Severity::Info, format!("{} objects and parts found", map.identities.len()));
 
     output::make_folder(pictures)?;
     let mut asker = Asker::new(&map)?;

@@ -4,6 +4,7 @@ use std::error::Error;
 use std::process::ExitCode;
 
 use super::output;
+use crate::pipeline::observer::Interrupted;
 
 /// Why a subcommand did not do what was asked.
 #[derive(Debug)]
@@ -20,6 +21,11 @@ impl CliError {
     /// A failure described by `text`: what, where, and what to do about it.
     pub fn failed(text: impl Into<String>) -> Self {
         Self::Failed(text.into().into())
+    }
+
+    /// Of work that may have been asked to stop; `saved` says what is left of it then.
+    pub fn of_work(error: impl Error + Send + Sync + 'static, saved: &str) -> Self {
+        if Interrupted::is_cause_of(&error) { Self::Cancelled(saved.into()) } else { error.into() }
     }
 
     /// Prints the error to standard error and returns its exit code.

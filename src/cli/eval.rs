@@ -1,7 +1,6 @@
 //! `fmlgs eval`: PSNR and SSIM on held-out photos, with pictures side by side.
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use image::ColorType;
 use serde_json::json;
@@ -13,7 +12,7 @@ use super::{CliError, eval_depth, number, opened, output};
 use crate::io;
 use crate::math::stats::mean;
 use crate::pipeline::evaluate::evaluate;
-use crate::pipeline::observer::{Level, Observer, Progress, Signal, ViewScore};
+use crate::pipeline::observer::{Observer, Severity, Ticker, ViewScore};
 use crate::pipeline::train::TrainView;
 use crate::pipeline::train::border::Borders;
 use crate::render::{Features, RenderSettings, Renderer};
@@ -179,16 +178,16 @@ pub fn means(scores: &[ViewScore]) -> (f64, f64) {
 
 /// Scores every view, one at a time so that memory holds one photo, and writes its picture.
 pub fn measure(job: &Job, observer: &mut dyn Observer) -> Result<Vec<ViewScore>, CliError> {
-    let started = Instant::now();
+    let mut ticker = Ticker::new("Measuring", job.views.len());
     let mut scores = Vec::with_capacity(job.views.len());
     if let Some(folder) = &job.pictures {
         output::make_folder(folder)?;
     }
     for warning in &job.dataset.warnings {
-        observer.note(Level::Warning, warning.clone());
+        observer.note(Severity::Warning, warning.clone());
     }
     for (done, &index) in job.views.iter().enumerate() {
-        if observer.signal() == Signal::Cancel {
+        if ticker.proceed(observer).is_err() {
             return Err(CliError::Cancelled(format!("{done} of {} views were measured", job.views.len())));
         }
         let photo = &job.dataset.photos[index];
@@ -203,14 +202,7 @@ pub fn measure(job: &Job, observer: &mut dyn Observer) -> Result<Vec<ViewScore>,
         if let Some(folder) = &job.pictures {
             write_comparison(&job.cloud, &job.settings, &view, &folder.join(picture_name(index, &view.name)))?;
         }
-        let elapsed_secs = started.elapsed().as_secs_f64();
-        observer.progress(Progress {
-            stage: "Measuring".into(),
-            done: done as u64 + 1,
-            total: job.views.len() as u64,
-            elapsed_secs,
-            rate: (done + 1) as f64 / elapsed_secs.max(1e-9),
-        });
+        ticker.report(done as u64 + 1, observer);
     }
     Ok(scores)
 }

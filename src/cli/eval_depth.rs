@@ -1,7 +1,6 @@
 //! `fmlgs eval --depth`: drawn depth against the true depth of a synthetic data set.
 
 use std::path::Path;
-use std::time::Instant;
 
 use serde_json::json;
 
@@ -9,16 +8,16 @@ use super::eval::Job;
 use super::{CliError, output};
 use crate::math::stats::median;
 use crate::pipeline::depth::{self, DepthCounter, DepthErrors};
-use crate::pipeline::observer::{Observer, Progress, Signal};
+use crate::pipeline::observer::{Observer, Ticker};
 use crate::render::Renderer;
 
 pub fn run(scene: &Path, job: &Job, as_json: bool, observer: &mut dyn Observer) -> Result<(), CliError> {
-    let started = Instant::now();
+    let mut ticker = Ticker::new("Measuring depth", job.views.len());
     let mut renderer = Renderer::new();
     let mut counter = DepthCounter::default();
     let mut millis = Vec::with_capacity(job.views.len());
     for (done, &index) in job.views.iter().enumerate() {
-        if observer.signal() == Signal::Cancel {
+        if ticker.proceed(observer).is_err() {
             return Err(CliError::Cancelled(format!("{done} of {} views were measured", job.views.len())));
         }
         let photo = &job.dataset.photos[index];
@@ -26,14 +25,7 @@ pub fn run(scene: &Path, job: &Job, as_json: bool, observer: &mut dyn Observer) 
         let camera = photo.camera.limited_to(job.max_side_px);
         counter.draw(&mut renderer, &job.cloud, &camera, &job.settings, &truth)?;
         millis.push(renderer.stats().stage_secs.iter().sum::<f64>() * 1e3);
-        let elapsed_secs = started.elapsed().as_secs_f64();
-        observer.progress(Progress {
-            stage: "Measuring depth".into(),
-            done: done as u64 + 1,
-            total: job.views.len() as u64,
-            elapsed_secs,
-            rate: (done + 1) as f64 / elapsed_secs.max(1e-9),
-        });
+        ticker.report(done as u64 + 1, observer);
     }
     let scores = counter.scores();
     if as_json {

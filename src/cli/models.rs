@@ -6,12 +6,12 @@ use std::time::Instant;
 use serde_json::json;
 
 use super::progress::Console;
-use super::{CliError, interrupt, output};
+use super::{CliError, output};
 use crate::models::catalogue::{self, Entry, InstallError, State};
 use crate::models::engine::engine;
 use crate::models::fetch::{FetchError, Patience};
 use crate::models::{self, Tile};
-use crate::pipeline::observer::{Observer, Progress};
+use crate::pipeline::observer::Ticker;
 
 /// List, fetch and check the neural networks
 ///
@@ -126,17 +126,10 @@ fn state_text(entry: &Entry, state: &State) -> (String, String) {
 fn fetch(id: &str, from: Option<&str>, quiet: bool) -> Result<(), CliError> {
     let entry = catalogue::entry(id)?;
     let mut console = Console::new(quiet);
-    let start = Instant::now();
+    let mut ticker = Ticker::new("", 0);
     let result = entry.fetch(&catalogue::folder(), from, Patience::default(), &mut |name, there, all| {
-        let elapsed_secs = start.elapsed().as_secs_f64();
-        console.progress(Progress {
-            stage: format!("Fetching {name} (kB)"),
-            done: there / 1000,
-            total: all.unwrap_or(there) / 1000,
-            elapsed_secs,
-            rate: there as f64 / 1000.0 / elapsed_secs.max(1e-9),
-        });
-        !interrupt::asked_to_stop()
+        ticker.enter(format!("Fetching {name} (kB)"), all.unwrap_or(there) / 1000);
+        ticker.tick((there / 1000) as usize, &mut console).is_ok()
     });
     drop(console);
     match result {

@@ -9,7 +9,7 @@ use npyz::WriterBuilder;
 use serde::Serialize;
 
 use super::CliError;
-use crate::io::{atomic, scene_folder, trained};
+use crate::io::{atomic, scene_files, trained};
 use crate::scene::text;
 
 /// Prints `text` and a line break to standard output. A reader that has closed its end (`| head`)
@@ -66,7 +66,7 @@ pub fn check(path: &Path, endings: &[&str], reads: &[&Path]) -> Result<(), CliEr
     if !endings.is_empty() && !endings.iter().any(|e| name.ends_with(e)) {
         return Err(CliError::Usage(format!("'{}' must end in {}", path.display(), endings.join(" or "))));
     }
-    scene_folder::refuse_scene_file(path)?;
+    scene_files::refuse_scene_file(path)?;
     let Ok(real) = path.canonicalize() else { return Ok(()) };
     for read in reads {
         let within = read.canonicalize().is_ok_and(|read| real.starts_with(read));

@@ -4,12 +4,14 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use glam::DVec3;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::asking::{Asker, semantics};
 use super::opened::DrawableScene;
-use super::{CliError, number, opened, output, path_survey, view};
+use super::{CliError, number, opened, output, view};
 use crate::io;
+use crate::measure::survey::{self, smoothness};
+use crate::measure::table::rows;
 use crate::navigate::flight::Smoothness;
 use crate::navigate::target::{Side, Wish};
 use crate::navigate::visit::{NoVisit, Place};
@@ -121,8 +123,15 @@ pub fn run(args: Args) -> Result<(), CliError> {
         output::check(out, &[".json"], &scene.reads(&args.scene))?;
     }
     if let Some(flights) = args.survey {
-        let counts: Vec<usize> = args.cameras.iter().map(|n| *n as usize).collect();
-        return path_survey::run(&scene, flights, &counts, args.frames as usize, args.json);
+        let own: Vec<Camera> = scene.cameras.iter().map(|c| c.camera.clone()).collect();
+        let counts = if args.cameras.is_empty() { vec![own.len() as u32] } else { args.cameras };
+        let frames = args.frames as usize;
+        let survey = |count: &u32| survey::surveyed(&scene.cloud, &own, *count as usize, flights, frames);
+        let found: Vec<_> = counts.iter().map(survey).collect();
+        return match args.json {
+            true => output::print_json(&survey::documents(&found)),
+            false => output::print(&output::table(&survey::table(&found))),
+        };
     }
     let start = Instant::now();
     let navigator = navigator(&scene);
@@ -168,25 +177,23 @@ pub fn run(args: Args) -> Result<(), CliError> {
             "clearance": navigator.clearance,
             "keypoints": navigator.graph.keypoints.len(),
             "keypoints_in_matter": navigator.in_matter,
-            "smoothness": told(&ours),
-            "paper": paper.as_ref().map(told),
-            "paper_through_keypoints": through.as_ref().map(told),
+            "smoothness": smoothness(&ours),
+            "paper": paper.as_ref().map(smoothness),
+            "paper_through_keypoints": through.as_ref().map(smoothness),
             "build_ms": build_ms,
             "route_ms": route_ms,
             "out": args.out,
         }));
     }
-    let mut rows =
-        vec![["way", "largest step", "largest turn", "least clearance", "poses too near"].map(str::to_owned).to_vec()];
-    rows.push(row("this", &ours));
-    rows.extend(paper.as_ref().map(|p| row("paper", p)));
-    rows.extend(through.as_ref().map(|p| row("paper, through keypoints", p)));
+    let kinds = [("this", Some(&ours)), ("paper", paper.as_ref()), ("paper, through keypoints", through.as_ref())];
+    let body = kinds.into_iter().filter_map(|(name, s)| Some(row(name, s?)));
+    let table = rows(&["way", "largest step", "largest turn", "least clearance", "poses too near"], body);
     output::print(&format!(
         "to {what}: {:.2} units in {:.1} s, {} poses\n{}\nscene looked at in {build_ms:.0} ms, way found in {route_ms:.0} ms",
         flight.length,
         flight.seconds,
         flight.poses.len(),
-        output::table(&rows)
+        output::table(&table)
     ))
 }
 
@@ -228,17 +235,6 @@ fn as_path(flight: &Flight) -> CameraPath {
     let key = |(i, p): (usize, &Pose)| PathKey { time_secs: time(i), ..p.key() };
     let keys = flight.poses.iter().enumerate().map(key).collect();
     CameraPath { keys, closed: false, fps: last / flight.seconds.max(1e-3), seconds: flight.seconds }
-}
-
-pub fn told(s: &Smoothness) -> Value {
-    json!({
-        "largest_step": s.largest_step,
-        "largest_turn_deg": s.largest_turn.to_degrees(),
-        "largest_jolt": s.largest_jolt,
-        "least_clearance": s.least_clearance,
-        "poses_too_near": s.violations,
-        "rotation_error": s.rotation_error,
-    })
 }
 
 fn row(name: &str, s: &Smoothness) -> Vec<String> {

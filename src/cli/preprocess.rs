@@ -11,7 +11,7 @@ use super::{CliError, number, opened, output};
 use crate::io::{self, SceneFolder};
 use crate::models;
 use crate::models::catalogue::{self, Role};
-use crate::pipeline::observer::{Level as Severity, Observer};
+use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::semantics::find::{FindOptions, Found, Lifting, REGIONS, Tools, find_objects, segmenter};
 use crate::pipeline::semantics::follow::Follower;
 use crate::pipeline::semantics::tracker::TrackOptions;
@@ -169,10 +169,8 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let (cloud, settings) = (&scene.cloud, &scene.settings);
     let tools = Tools { segmenter: &mut *segmenter, follower: follower.as_mut(), encoder: encoder.as_deref_mut() };
     let found = find_objects(cloud, &photos, settings, tools, &options, &mut observer);
-    let Found { map, views, disagreements, secs: stages } = found.map_err(|e| match e {
-        e if e.is_cancelled() => CliError::Cancelled("nothing was stored".into()),
-        other => other.into(),
-    })?;
+    let Found { map, views, disagreements, secs: stages } =
+        found.map_err(|e| CliError::of_work(e, "nothing was stored"))?;
     let (kept, _) = folder.replace_map(scene.state.as_deref(), &map, &scene.cloud)?;
     if let Some(kept) = kept {
         observer.note(Severity::Info, format!("The objects and parts before are kept in {}", kept.display()));

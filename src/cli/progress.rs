@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use indicatif::{HumanCount, HumanDuration, ProgressBar, ProgressStyle};
 
 use super::{interrupt, output};
-use crate::pipeline::observer::{Evaluation, Level, Observer, Progress, Signal, StepMetrics};
+use crate::pipeline::observer::{Evaluation, Observer, Progress, Severity, Signal, StepMetrics};
 use crate::scene::text;
 
 /// Time between lines where standard error is no terminal.
@@ -95,11 +95,11 @@ impl Observer for Console {
         }
     }
 
-    fn note(&mut self, level: Level, text: String) {
-        match level {
-            Level::Warning => self.line(&format!("warning: {text}")),
-            Level::Info if !self.quiet => self.line(&text),
-            Level::Info => {}
+    fn note(&mut self, severity: Severity, text: String) {
+        match severity {
+            Severity::Warning => self.line(&format!("warning: {text}")),
+            Severity::Info if !self.quiet => self.line(&text),
+            Severity::Info => {}
         }
     }
 }

@@ -16,7 +16,7 @@ use crate::io;
 use crate::io::animation::{Encoder, Settings};
 use crate::navigate::film::MOST_PICTURES;
 use crate::navigate::{Film, Speed};
-use crate::pipeline::film::{self, FilmError, Marked};
+use crate::pipeline::film::{self, Marked};
 use crate::pipeline::semantics::grammar::Kind;
 use crate::render::{BackendChoice, Frame, RenderSettings, Renderer, normals};
 use crate::scene::{Camera, CameraPath, ScenePlan};
@@ -237,10 +237,7 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
     let cloud = Arc::new(scene.cloud);
     let out = (args.out.as_path(), &settings);
     let made = film::write(&cloud, &scene.settings, &cameras, marked, &mut renderer, out, &mut console);
-    let summary = made.map_err(|e| match e {
-        FilmError::Cancelled => CliError::Cancelled("no film was written".into()),
-        other => CliError::failed(other.to_string()),
-    })?;
+    let summary = made.map_err(|e| CliError::of_work(e, "no video was written"))?;
     let secs = started.elapsed().as_secs_f64();
     let (w, h) = summary.size_px;
     if args.json {

@@ -1,15 +1,15 @@
 //! `fmlgs report`: error against run time.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::progress::Console;
-use super::report_studies::{Options, Subject};
-use super::{CliError, number, output};
+use super::{CliError, number, opened, output};
 use crate::io;
-use crate::pipeline::observer::{Level, Observer};
-use crate::report::{BeginError, End, FILE, Report, ReportError, Stage, StageName, StudyError, sweep};
-use crate::report::{computer, defaults, page, plot};
+use crate::measure::subject::{Options, Subject};
+use crate::measure::{BeginError, End, FILE, Report, Stage, StageName, computer, defaults, page, plot};
+use crate::pipeline::observer::{Observer, Severity};
 
 /// Measure error against run time, knob by knob
 ///
@@ -18,7 +18,7 @@ use crate::report::{computer, defaults, page, plot};
 /// 'Report' shows the same report.json.
 ///
 /// Every setting is measured once before any is measured twice, and everything measured is kept: after
-/// Ctrl-C, a kill or the end of the budget the same command goes on where it stopped.
+/// Ctrl-C, a kill or the end of the budget the same command resumes.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs report scene/ --out report/                          all stages that the scene allows\n  \
@@ -41,13 +41,13 @@ pub struct Args {
     /// Labels of the photos, for the stages 'features' and 'query'
     #[arg(long)]
     masks: Option<PathBuf>,
-    /// Optimiser steps of the stage 'features'; may be given several times
+    /// Optimizer steps of the stage 'features'; may be given several times
     #[arg(long, default_values_t = [300, 1000], value_parser = number::within(1..=100_000_000_u64))]
     steps: Vec<u64>,
-    /// Optimiser steps of the default of the stage 'train'
+    /// Optimizer steps of the default of the stage 'train'
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u64).range(20..=1_000_000))]
     train_steps: u64,
-    /// Longer side of the compared pictures in px
+    /// Longer side of the compared images in px
     #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u32).range(16..=4096))]
     max_side: u32,
     /// Most views that are compared
@@ -91,19 +91,20 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         views: args.views as usize,
         repeats: args.repeats,
     };
-    let subject = Subject::open(&scene, options)?;
+    let subject = subject(&scene, options)?;
     let (stages, missing) = subject.stages(&args.stages)?;
-    missing.iter().for_each(|m| console.note(Level::Info, m.clone()));
+    missing.iter().for_each(|m| console.note(Severity::Info, m.clone()));
     output::make_folder(&args.out)?;
     let start = Instant::now();
     let mut stopped = None;
     for (k, name) in stages.iter().enumerate() {
         let left = args.budget.map_or(f64::INFINITY, |b| (b - start.elapsed().as_secs_f64()).max(0.0));
         let share = left / (stages.len() - k) as f64;
-        let end = match measure(&subject, *name, &mut report, &args.out, share, console) {
+        let study = subject.study(*name);
+        let end = match study.and_then(|mut study| report.measure(&mut study, &args.out, share, console)) {
             // A stage that nobody named may turn out impossible; the others go on.
-            Err(CliError::Failed(why)) if args.stages.is_empty() => {
-                console.note(Level::Warning, format!("Stage '{}' left out: {why}", name.name()));
+            Err(why) if args.stages.is_empty() => {
+                console.note(Severity::Warning, format!("Stage '{}' left out: {why}", name.name()));
                 continue;
             }
             other => other?,
@@ -123,30 +124,27 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
             Err(CliError::Cancelled(format!("{} holds what was measured", args.out.join(FILE).display())))
         }
         Some(_) => {
-            console.note(Level::Info, "The budget is used up; the same command goes on with the rest".into());
+            console.note(Severity::Info, "The budget is used up; the same command resumes with the rest".into());
             Ok(())
         }
         None => Ok(()),
     }
 }
 
-/// Sweeps one stage; what is measured is on disk at once.
-fn measure(
-    subject: &Subject,
-    name: StageName,
-    report: &mut Report,
-    out: &Path,
-    budget_secs: f64,
-    console: &mut Console,
-) -> Result<End, CliError> {
-    let path = out.join(FILE);
-    subject.with_study(name, &mut |study| {
-        let before = report.earlier(&study.stage());
-        let mut keep = |stage: &Stage| {
-            report.put(stage.clone());
-            report.write(&path).map_err(|e: ReportError| StudyError(e.to_string()))
-        };
-        Ok(sweep(study, before, budget_secs, &mut keep, console).map_err(|e| CliError::failed(e.to_string()))?.1)
+/// A trained scene with its photos, if they are there.
+fn subject(path: &Path, options: Options) -> Result<Subject, CliError> {
+    let scene = opened::drawable(path)?;
+    let dataset = scene.dataset_path.as_ref().filter(|p| p.exists()).map(|p| opened::dataset(p)).transpose()?;
+    let map = if path.is_dir() { io::semantic_map::load(path, scene.state.as_deref(), &scene.cloud)? } else { None };
+    Ok(Subject {
+        name: path.display().to_string(),
+        cloud: Arc::new(scene.cloud),
+        settings: scene.settings,
+        cameras: scene.cameras.into_iter().map(|c| (c.camera, c.held_out)).collect(),
+        holdout_every: scene.config.holdout_every,
+        dataset,
+        map,
+        options,
     })
 }
 

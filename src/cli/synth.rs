@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::progress::Console;
 use super::{CliError, output, view};
-use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::synth::{self, Levels, Rig, SynthError, SynthOptions, SynthReport};
 
 /// Render a glTF scene into posed photos with object and part ids
@@ -83,7 +83,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let mut console = Console::new(quiet);
     let report = synth::run(&args.scene, &options, &args.out, &mut console).map_err(failure)?;
     for warning in &report.warnings {
-        console.note(Level::Warning, warning.clone());
+        console.note(Severity::Warning, warning.clone());
     }
     drop(console);
     if args.json { output::print_json(&as_json(&report)) } else { output::print(&summary(&report)) }
@@ -91,10 +91,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
 
 /// A cancelled run has its own exit code.
 pub fn failure(error: SynthError) -> CliError {
-    match error {
-        SynthError::Cancelled => CliError::Cancelled("the dataset is not complete; run the same command again".into()),
-        other => other.into(),
-    }
+    CliError::of_work(error, "the dataset is not complete; run the same command again")
 }
 
 /// What was made, as one line.

@@ -8,7 +8,7 @@ use super::plan::PlanArgs;
 use super::progress::{Console, evaluation_line};
 use super::{CliError, number, opened, output};
 use crate::io::{self, Opened};
-use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::train::{self, TrainConfig, TrainEnd};
 use crate::render::BackendChoice;
 use crate::scene::{Dataset, Facts, Machine, ScenePlan};
@@ -166,7 +166,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let job = args.check()?;
     let mut console = Console::new(quiet);
     for warning in &job.dataset.warnings {
-        console.note(Level::Warning, warning.clone());
+        console.note(Severity::Warning, warning.clone());
     }
     let outcome = train::run(&job.dataset, &job.config, Some(&job.out), &mut console)?;
     let out = job.out.display();

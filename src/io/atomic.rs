@@ -6,8 +6,11 @@ use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
+use super::IoError;
+use super::error::write_error;
+use super::files::{folder_of, sync_folder};
+use super::scene_files::refuse_scene_file;
 use super::temporary::temporary_file;
-use super::{IoError, scene_folder};
 
 /// Replaces `path` by what `fill` writes: a temporary file in the same folder is filled, synced
 /// and renamed over it, and the folder is synced. On any failure the temporary file is removed
@@ -46,7 +49,7 @@ impl Draft {
     pub fn create(path: &Path) -> Result<Self, IoError> {
         let failed = |cause| write_error(path, cause);
         let real = behind_links(path).map_err(failed)?;
-        scene_folder::refuse_scene_file(&real)?;
+        refuse_scene_file(&real)?;
         if is_stream(&real) {
             let file = OpenOptions::new().write(true).open(&real).map_err(failed)?;
             return Ok(Self { path: path.into(), into: Into::Stream(BufWriter::with_capacity(1 << 20, file)) });
@@ -135,36 +138,6 @@ pub(super) fn put(file: NamedTempFile, path: &Path) -> io::Result<()> {
     file.as_file().sync_all()?;
     file.persist(path).map_err(|e| e.error)?;
     sync_folder(folder_of(path))
-}
-
-/// The folder that a file is in.
-pub(super) fn folder_of(path: &Path) -> &Path {
-    match path.parent() {
-        Some(p) if !p.as_os_str().is_empty() => p,
-        _ => Path::new("."),
-    }
-}
-
-/// The error of a failed write, with its remedy.
-pub(super) fn write_error(path: &Path, cause: io::Error) -> IoError {
-    IoError::Write { path: path.into(), remedy: remedy(cause.kind()), cause }
-}
-
-/// Makes a rename in `folder` survive a power cut, on systems where folders can be synced.
-pub(super) fn sync_folder(folder: &Path) -> io::Result<()> {
-    if cfg!(unix) { std::fs::File::open(folder)?.sync_all() } else { Ok(()) }
-}
-
-/// What a person can do about a failed write.
-fn remedy(kind: io::ErrorKind) -> &'static str {
-    use io::ErrorKind as K;
-    match kind {
-        K::StorageFull | K::QuotaExceeded => "the disk is full: free some space or choose another folder",
-        K::FileTooLarge => "the disk does not hold files of this size: choose another folder",
-        K::PermissionDenied | K::ReadOnlyFilesystem => "the folder cannot be written to: choose another folder",
-        K::NotFound | K::NotADirectory => "the folder does not exist: create it or choose another one",
-        _ => "what was there before is unchanged",
-    }
 }
 
 #[cfg(test)]
@@ -286,13 +259,5 @@ mod tests {
             // The superuser may write anywhere.
             Ok(()) => assert_eq!(fs::read(&path).expect("read"), b"new"),
         }
-    }
-
-    #[test]
-    fn folders_and_remedies() {
-        assert_eq!(folder_of(Path::new("a.bin")), Path::new("."));
-        assert_eq!(folder_of(Path::new("b/a.bin")), Path::new("b"));
-        assert!(remedy(io::ErrorKind::FileTooLarge).contains("files of this size"));
-        assert!(remedy(io::ErrorKind::QuotaExceeded).contains("disk is full"));
     }
 }

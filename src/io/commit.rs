@@ -10,13 +10,14 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::atomic::{Draft, sync_folder, write_error};
+use super::atomic::Draft;
+use super::error::write_error;
+use super::files::sync_folder;
+use super::scene_files::{JOURNAL, is_pending};
 use super::temporary::{is_temporary, temporary_file};
 use super::{IoError, files};
 use tempfile::NamedTempFile;
 
-/// The journal's name.
-const JOURNAL: &str = ".fmlgs_commit.json";
 /// Largest journal that is read.
 const MAX_BYTES: u64 = 1 << 16;
 
@@ -91,11 +92,6 @@ impl<'a> Commit<'a> {
             .collect();
         carry_out(folder)
     }
-}
-
-/// Whether a change of this folder was decided and not carried out.
-pub(super) fn is_pending(folder: &Path) -> bool {
-    folder.join(JOURNAL).exists()
 }
 
 /// Carries out a change that was decided; the caller holds the folder. Does nothing where there is none.

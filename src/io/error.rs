@@ -2,7 +2,7 @@
 //! one, the remedy.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::scene::{CameraError, CloudError};
 
@@ -268,4 +268,32 @@ pub enum OpenError {
     /// Recognised, but broken.
     #[error(transparent)]
     Io(#[from] IoError),
+}
+
+/// The error of a failed write, with its remedy.
+pub fn write_error(path: &Path, cause: io::Error) -> IoError {
+    IoError::Write { path: path.into(), remedy: remedy(cause.kind()), cause }
+}
+
+/// What a person can do about a failed write.
+fn remedy(kind: io::ErrorKind) -> &'static str {
+    use io::ErrorKind as K;
+    match kind {
+        K::StorageFull | K::QuotaExceeded => "the disk is full: free some space or choose another folder",
+        K::FileTooLarge => "the disk does not hold files of this size: choose another folder",
+        K::PermissionDenied | K::ReadOnlyFilesystem => "the folder cannot be written to: choose another folder",
+        K::NotFound | K::NotADirectory => "the folder does not exist: create it or choose another one",
+        _ => "what was there before is unchanged",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_write_has_its_remedy() {
+        assert!(remedy(io::ErrorKind::FileTooLarge).contains("files of this size"));
+        assert!(remedy(io::ErrorKind::QuotaExceeded).contains("disk is full"));
+    }
 }

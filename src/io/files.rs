@@ -1,7 +1,7 @@
 //! Bounded reading, and paths that stay inside their folder.
 
 use std::fs::{self, File};
-use std::io::Read;
+use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
 
 use super::{IoError, memory};
@@ -11,6 +11,19 @@ use crate::scene::text;
 pub const MAX_TEXT_BYTES: u64 = 512 << 20;
 /// Largest picture file in bytes.
 pub const MAX_PICTURE_BYTES: u64 = 256 << 20;
+
+/// The folder that a file is in.
+pub fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(p) if !p.as_os_str().is_empty() => p,
+        _ => Path::new("."),
+    }
+}
+
+/// Makes a rename in `folder` survive a power cut, on systems where folders can be synced.
+pub fn sync_folder(folder: &Path) -> io::Result<()> {
+    if cfg!(unix) { std::fs::File::open(folder)?.sync_all() } else { Ok(()) }
+}
 
 /// Opens a file to be read, if it is a regular one. A pipe would keep the program waiting and a
 /// device has no end, so both are refused before they are opened; every read of a file that a

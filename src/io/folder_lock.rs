@@ -7,7 +7,7 @@ use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use super::IoError;
-use super::atomic::write_error;
+use super::error::write_error;
 
 /// The locked file's name.
 const FILE: &str = ".fmlgs.lock";

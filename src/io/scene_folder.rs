@@ -7,20 +7,18 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use super::atomic::{Draft, folder_of, write_error};
+use super::atomic::Draft;
 use super::commit::{self, Commit};
+use super::error::write_error;
 use super::folder_lock::FolderLock;
+use super::scene_files::{CHECKPOINT_FILE, CLOUD_FILE, SCENE_FILE, is_scene};
+use super::scene_info::{SceneInfo, VERSION, load_info, relative_to};
 use super::temporary::{sweep, temporary_folder};
-use super::trained::{self, CLOUD_FILE, SCENE_FILE, SceneInfo};
 use super::{IoError, semantic_map, splat_ply};
 use crate::scene::{GaussianCloud, SemanticMap};
 
-/// The state of a training, if it can go on.
-pub const CHECKPOINT_FILE: &str = "checkpoint.bin";
 /// Folder of what was replaced: `earlier/1`, `earlier/2`, each a scene of its own.
 const EARLIER: &str = "earlier";
-/// The files of a scene, which nothing else may replace.
-const FILES: [&str; 4] = [SCENE_FILE, CLOUD_FILE, semantic_map::FILE, CHECKPOINT_FILE];
 
 /// A scene's folder, held for writing.
 #[derive(Debug)]
@@ -58,7 +56,7 @@ impl SceneFolder {
     /// If a file cannot be written, or the Gaussians are not valid.
     pub fn save(&self, info: &SceneInfo, cloud: &GaussianCloud, map: Option<&SemanticMap>) -> Result<String, IoError> {
         let state = format!("{:032x}", rand::random::<u128>());
-        let info = SceneInfo { version: trained::VERSION, state: Some(state.clone()), ..info.clone() };
+        let info = SceneInfo { version: VERSION, state: Some(state.clone()), ..info.clone() };
         let stored = map.map(|map| {
             let mut stored = cloud.clone();
             map.store(&mut stored);
@@ -89,7 +87,7 @@ impl SceneFolder {
     /// # Errors
     /// As [`Self::save`]; [`IoError::Changed`] if the scene has another state by now.
     pub fn save_map(&self, known: Option<&str>, map: &SemanticMap, cloud: &GaussianCloud) -> Result<String, IoError> {
-        let info = trained::load_info(self.path())?;
+        let info = load_info(self.path())?;
         if splat_ply::state(&self.path().join(CLOUD_FILE))?.as_deref() != known {
             return Err(IoError::Changed { folder: self.path().into() });
         }
@@ -117,9 +115,13 @@ impl SceneFolder {
     /// The scene's state, if `map` is what is stored in it.
     fn has(&self, map: &SemanticMap) -> Result<Option<String>, IoError> {
         let path = self.path().join(semantic_map::FILE);
-        let (Ok(bytes), Ok(scene)) = (fs::read(&path), trained::load(self.path())) else { return Ok(None) };
-        let Some(state) = scene.state else { return Ok(None) };
-        let stored = semantic_map::load(self.path(), Some(&state), &scene.cloud).ok().flatten();
+        let cloud = self.path().join(CLOUD_FILE);
+        let (Ok(bytes), Ok(info), Ok(cloud)) = (fs::read(&path), load_info(self.path()), splat_ply::read(&cloud))
+        else {
+            return Ok(None);
+        };
+        let Some(state) = info.state else { return Ok(None) };
+        let stored = semantic_map::load(self.path(), Some(&state), &cloud).ok().flatten();
         let gaussians = |m: &SemanticMap| (m.of.clone(), m.margin.clone(), m.codes.clone());
         let same = stored.is_some_and(|s| gaussians(&s) == gaussians(map));
         Ok((same && semantic_map::encode(map, Some(&state), &path)? == bytes).then_some(state))
@@ -142,14 +144,14 @@ impl SceneFolder {
     /// # Errors
     /// If that cannot be written.
     pub fn keep_earlier(&self) -> Result<Option<PathBuf>, IoError> {
-        if !self.path().join(semantic_map::FILE).exists() || !trained::is_scene(self.path()) {
+        if !self.path().join(semantic_map::FILE).exists() || !is_scene(self.path()) {
             return Ok(None);
         }
-        let mut info = trained::load_info(self.path())?;
+        let mut info = load_info(self.path())?;
         let all = self.path().join(EARLIER);
         let place = (1..).map(|n: u32| all.join(n.to_string())).find(|p| !p.exists()).unwrap_or_else(|| all.clone());
         if let Some(dataset) = &mut info.dataset {
-            dataset.path = trained::relative_to(&self.path().join(&dataset.path), &place);
+            dataset.path = relative_to(&self.path().join(&dataset.path), &place);
         }
         let keep = || {
             fs::create_dir_all(&all)?;
@@ -171,23 +173,11 @@ impl SceneFolder {
     }
 }
 
-/// Refuses `path` if it is a file of a trained scene.
-///
-/// # Errors
-/// [`IoError::Protected`].
-pub fn refuse_scene_file(path: &Path) -> Result<(), IoError> {
-    let folder = folder_of(path);
-    let named = path.file_name().is_some_and(|n| FILES.iter().any(|f| n.eq_ignore_ascii_case(f)));
-    if named && trained::is_scene(folder) {
-        return Err(IoError::Protected { path: path.into(), folder: folder.into() });
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::atomic;
+    use crate::io::scene_files::FILES;
+    use crate::io::{atomic, trained};
     use crate::scene::{Identities, Level, NOBODY};
 
     fn cloud(x: f32) -> GaussianCloud {

@@ -23,7 +23,7 @@ use crate::scene::language::MAX_VIEWS;
 use crate::scene::{GaussianCloud, Identities, LanguageFeatures, SemanticMap, ViewFeatures};
 
 /// The file's name in a trained scene's folder.
-pub const FILE: &str = "semantic_map.safetensors";
+pub use super::scene_files::MAP_FILE as FILE;
 /// Version that this program writes, and the highest it reads.
 const VERSION: u64 = 1;
 /// Key of the metadata.
@@ -95,7 +95,7 @@ pub fn load(folder: &Path, state: Option<&str>, cloud: &GaussianCloud) -> Result
     }
     let torn = || IoError::Torn {
         path: path.clone(),
-        with: super::trained::CLOUD_FILE,
+        with: super::scene_files::CLOUD_FILE,
         remedy: "put back the file that was, or find the objects anew with 'fmlgs preprocess'",
     };
     let bytes = files::read(&path, MAX_BYTES)?;

@@ -11,8 +11,8 @@ use std::sync::{Mutex, PoisonError};
 
 use tempfile::{Builder, NamedTempFile, TempDir};
 
-use super::atomic::folder_of;
-use super::commit;
+use super::files::folder_of;
+use super::scene_files::is_pending;
 
 /// Part of the name of every temporary file, and of no other.
 const MARK: &str = ".fmlgs-";
@@ -104,7 +104,7 @@ pub(super) fn sweep(folder: &Path) {
         let path = entry.path();
         let Ok(file) = File::open(&path) else { continue };
         // Looked at once the lock is there: files that a save has decided on are not for sweeping.
-        if file.try_lock().is_err() || commit::is_pending(folder) {
+        if file.try_lock().is_err() || is_pending(folder) {
             continue;
         }
         let is_folder = entry.file_type().is_ok_and(|t| t.is_dir());

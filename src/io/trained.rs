@@ -10,21 +10,15 @@
 //!
 //! `scene.json` makes the folder a scene. [`SceneFolder`] writes it.
 
-use std::fs;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use serde::{Deserialize, Serialize};
+use super::scene_files::is_pending;
+use super::{IoError, SceneFolder, splat_ply};
+use crate::scene::{GaussianCloud, SemanticMap};
 
-use super::{IoError, SceneFolder, commit, files, splat_ply};
-use crate::scene::{Camera, Dataset, Evaluation, GaussianCloud, SemanticMap, StepMetrics, text};
-
-/// The file that makes a folder a trained scene.
-pub const SCENE_FILE: &str = "scene.json";
-/// The Gaussians.
-pub const CLOUD_FILE: &str = "point_cloud.ply";
-/// Version of the folder's format that this program writes, and the highest it reads.
-pub const VERSION: u64 = 1;
+pub use super::scene_files::{CLOUD_FILE, SCENE_FILE, is_scene};
+pub use super::scene_info::{DatasetReference, History, SceneCamera, SceneInfo, VERSION, load_info};
 
 /// A trained scene with its folder.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,104 +33,12 @@ pub struct TrainedScene {
     pub state: Option<String>,
 }
 
-/// The contents of `scene.json`. Fields that a later version adds are left out when this version
-/// reads; fields that are missing get their defaults.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct SceneInfo {
-    /// Version of the format.
-    pub version: u64,
-    /// Short name for titles.
-    #[serde(default, deserialize_with = "text::read_name")]
-    pub name: String,
-    /// The photos that it was trained on, if known.
-    #[serde(default)]
-    pub dataset: Option<DatasetReference>,
-    /// The photos' cameras, in the dataset's order.
-    #[serde(default)]
-    pub cameras: Vec<SceneCamera>,
-    /// Length of a scene unit in metres, if that is known.
-    #[serde(default)]
-    pub metres_per_unit: Option<f64>,
-    /// Colour behind everything.
-    #[serde(default)]
-    pub background: Option<[f32; 3]>,
-    /// Settings of the training run.
-    #[serde(default)]
-    pub config: serde_json::Value,
-    /// Measurements of the training run.
-    #[serde(default)]
-    pub history: History,
-    /// Id of the save that wrote it, which the files that belong to it carry too.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub state: Option<String>,
-}
-
-/// Where the photos of a trained scene are.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct DatasetReference {
-    /// Path of the dataset's folder or file, relative to the scene's folder where it can be.
-    pub path: PathBuf,
-    /// Which layout it has, for people.
-    pub format: String,
-}
-
-/// The camera of a photo.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SceneCamera {
-    /// The photo's name.
-    pub name: String,
-    /// Its pinhole camera at full resolution.
-    pub camera: Camera,
-    /// Whether it was held out from training.
-    pub held_out: bool,
-}
-
-/// What was measured while training, in order.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct History {
-    /// Training steps (every few).
-    #[serde(default)]
-    pub steps: Vec<StepMetrics>,
-    /// Held-out evaluations.
-    #[serde(default)]
-    pub evaluations: Vec<Evaluation>,
-}
-
-impl SceneInfo {
-    /// The description of a scene in `folder` trained on `dataset`, whose photos at `held_out`
-    /// were not trained on. Settings and history are empty.
-    pub fn of(dataset: &Dataset, held_out: &[usize], folder: &Path) -> Self {
-        let camera = |(i, p): (usize, &crate::scene::Photo)| SceneCamera {
-            name: p.name.clone(),
-            camera: p.camera.clone(),
-            held_out: held_out.contains(&i),
-        };
-        Self {
-            version: VERSION,
-            name: dataset.name.clone(),
-            dataset: Some(DatasetReference {
-                path: relative_to(&dataset.root, folder),
-                format: dataset.format.clone(),
-            }),
-            cameras: dataset.photos.iter().enumerate().map(camera).collect(),
-            background: dataset.background,
-            metres_per_unit: dataset.metres_per_unit,
-            ..Self::default()
-        }
-    }
-}
-
 impl TrainedScene {
     /// Where the photos are, if the scene knows and the folder still exists.
     pub fn dataset_path(&self) -> Option<PathBuf> {
         let path = self.folder.join(&self.info.dataset.as_ref()?.path);
         path.exists().then_some(path)
     }
-}
-
-/// Whether `folder` is a trained scene.
-pub fn is_scene(folder: &Path) -> bool {
-    folder.join(SCENE_FILE).is_file()
 }
 
 /// Writes a scene into `folder`, which is created if need be. All of its files change, or none.
@@ -163,7 +65,7 @@ pub fn load(folder: &Path) -> Result<TrainedScene, IoError> {
     let mut tries = 0;
     loop {
         tries += 1;
-        let result = match commit::is_pending(folder) {
+        let result = match is_pending(folder) {
             true => SceneFolder::hold(folder, "finishing a save").and_then(|_| load_once(folder)),
             false => load_once(folder),
         };
@@ -185,41 +87,6 @@ fn load_once(folder: &Path) -> Result<TrainedScene, IoError> {
         return Err(IoError::Torn { path, with: SCENE_FILE, remedy });
     }
     Ok(TrainedScene { folder: folder.into(), info, cloud, state })
-}
-
-/// Reads `scene.json` alone.
-pub fn load_info(folder: &Path) -> Result<SceneInfo, IoError> {
-    #[derive(Deserialize)]
-    struct Versioned {
-        version: u64,
-    }
-    let path = folder.join(SCENE_FILE);
-    let bytes = files::read(&path, files::MAX_TEXT_BYTES)?;
-    // The version first: the rest of a newer file may not parse.
-    let Versioned { version } = serde_json::from_slice(&bytes).map_err(|e| files::json_error(&path, &e))?;
-    if version == 0 || version > VERSION {
-        return Err(IoError::Version { path, found: version, supported: VERSION });
-    }
-    let info: SceneInfo = serde_json::from_slice(&bytes).map_err(|e| files::json_error(&path, &e))?;
-    for c in &info.cameras {
-        files::photo_name(&c.name, &path)?;
-        c.camera.believe().map_err(|cause| IoError::Camera { path: path.clone(), photo: c.name.clone(), cause })?;
-    }
-    Ok(info)
-}
-
-/// `path` as seen from `folder`; absolute where they have no common root or do not exist.
-pub(super) fn relative_to(path: &Path, folder: &Path) -> PathBuf {
-    // The scene's folder may not exist yet; its parents do not matter then beyond their names.
-    let real = |p: &Path| fs::canonicalize(p).or_else(|_| std::path::absolute(p));
-    let (Ok(path), Ok(folder)) = (real(path), real(folder)) else { return path.into() };
-    let shared = path.components().zip(folder.components()).take_while(|(a, b)| a == b).count();
-    if shared <= 1 {
-        return path;
-    }
-    let up = folder.components().skip(shared).map(|_| Component::ParentDir);
-    let relative: PathBuf = up.chain(path.components().skip(shared)).collect();
-    if relative.as_os_str().is_empty() { PathBuf::from(".") } else { relative }
 }
 
 #[cfg(test)]

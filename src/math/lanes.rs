@@ -254,7 +254,7 @@ mod avx2 {
         #[inline(always)]
         fn exp_neg(self, v: f32x8) -> f32x8 {
             // The polynomial of `Real::exp_neg` for f32; see there.
-            use crate::math::real::fast_exp::{LN2_HI, LN2_LO, POLYNOMIAL, ROUND, SMALLEST};
+            use crate::math::fast_exp::{LN2_HI, LN2_LO, POLYNOMIAL, ROUND, SMALLEST};
             let x = self.max_f32x8(v, self.splat_f32x8(SMALLEST));
             let round = self.splat_f32x8(ROUND);
             let shifted = self.mul_add_f32x8(x, self.splat_f32x8(std::f32::consts::LOG2_E), round);

@@ -1,6 +1,7 @@
 //! Plain mathematics with no knowledge of scenes: everything here is pure and total.
 
 pub mod colormap;
+mod fast_exp;
 pub mod finite;
 pub mod grid;
 pub mod lanes;

@@ -117,22 +117,6 @@ impl Real for f64 {
     }
 }
 
-/// Constants of the fast `f32` exponential: `exp(x) = 2^n exp(r)` with `n = round(x / ln 2)`,
-/// `|r| <= ln(2) / 2`, a minimax polynomial for `exp(r)`, and `n` added to the exponent field.
-pub(super) mod fast_exp {
-    /// Smaller arguments give the result of this one.
-    pub const SMALLEST: f32 = -87.0;
-    /// Adding 1.5 * 2^23 rounds to the nearest integer and leaves it in the low mantissa bits.
-    pub const ROUND: f32 = 12_582_912.0;
-    /// Upper part of ln 2, short enough for exact products with n.
-    pub const LN2_HI: f32 = 0.693_359_4;
-    /// Lower part of ln 2.
-    pub const LN2_LO: f32 = -2.121_944_4e-4;
-    /// Coefficients from the highest power down.
-    pub const POLYNOMIAL: [f32; 8] =
-        [1.987_569_1e-4, 1.398_199_9e-3, 8.333_452e-3, 4.166_579_6e-2, 1.666_666_5e-1, 5.000_000_3e-1, 1.0, 1.0];
-}
-
 impl Real for f32 {
     const ZERO: Self = 0.0;
     const ONE: Self = 1.0;
@@ -156,11 +140,11 @@ impl Real for f32 {
     #[inline(always)]
     fn exp(self) -> Self {
         // The fast form holds for positive numbers too, up to where the exponent field ends.
-        if self.abs() <= -fast_exp::SMALLEST { self.exp_neg() } else { f32::exp(self) }
+        if self.abs() <= -super::fast_exp::SMALLEST { self.exp_neg() } else { f32::exp(self) }
     }
     #[inline(always)]
     fn exp_neg(self) -> Self {
-        use fast_exp::{LN2_HI, LN2_LO, POLYNOMIAL, ROUND, SMALLEST};
+        use super::fast_exp::{LN2_HI, LN2_LO, POLYNOMIAL, ROUND, SMALLEST};
         let x = if self < SMALLEST { SMALLEST } else { self };
         let shifted = x * std::f32::consts::LOG2_E + ROUND;
         let n = shifted - ROUND;

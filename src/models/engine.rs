@@ -7,6 +7,7 @@
 //! [`Engine::note`] says so. `FMLGS_DEVICE` chooses what it computes on (`cpu`, `cuda`, `tensorrt`,
 //! `coreml`, `directml`); otherwise the first of CUDA, Core ML and DirectML that it offers.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -16,7 +17,7 @@ use ort::session::Session;
 use ort::session::builder::GraphOptimizationLevel;
 
 use super::ModelError;
-use super::network::{Network, guarded};
+use super::network::Network;
 use super::room;
 use crate::scene::trace::{self, Sort};
 
@@ -238,6 +239,14 @@ fn loaded(path: &Path) -> Result<ort::environment::EnvironmentBuilder, String> {
         return Err("there is no such file".into());
     }
     ort::init_from(path).map_err(|e| e.to_string())
+}
+
+/// What an engine makes of a model; a panic in it is an error as any other.
+pub(super) fn guarded<T>(name: &str, work: impl FnOnce() -> ort::Result<T>) -> Result<T, String> {
+    match catch_unwind(AssertUnwindSafe(work)) {
+        Ok(done) => done.map_err(|e| e.to_string()),
+        Err(_) => Err(format!("the engine gave up on {name}; its file is damaged, or made for another engine")),
+    }
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ use crate::io::http::{self, Piece, TICK};
 const LEAST_BYTES: u64 = 1024;
 
 /// Largest file whose size nobody has promised: a description.
-pub const MOST_UNPROMISED: u64 = super::metadata::MAX_BYTES;
+pub const MOST_UNPROMISED: u64 = 16 << 20;
 
 /// A file to fetch.
 #[derive(Clone, Copy, Debug)]

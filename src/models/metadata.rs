@@ -13,7 +13,7 @@ use super::network::Network;
 /// Version of the file that this program reads.
 const VERSION: u64 = 1;
 /// Largest file that is read, bytes.
-pub const MAX_BYTES: u64 = 16 << 20;
+pub const MAX_BYTES: u64 = super::fetch::MOST_UNPROMISED;
 
 /// A graph of a model.
 #[derive(Clone, Debug, Deserialize)]

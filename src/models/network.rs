@@ -1,7 +1,6 @@
 //! A network: named arrays in, named arrays out.
 
 use std::collections::BTreeMap;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
@@ -10,7 +9,7 @@ use ort::session::{Session, SessionInputValue};
 use ort::value::Tensor;
 
 use super::ModelError;
-use super::engine::engine;
+use super::engine::{engine, guarded};
 use super::room::{self, Place};
 
 /// Numbers with a shape, row-major.
@@ -204,14 +203,6 @@ where
 {
     let shape: Vec<i64> = array.shape.iter().map(|n| *n as i64).collect();
     Ok(SessionInputValue::from(Tensor::from_array((shape, array.values))?))
-}
-
-/// What an engine makes of a model; a panic in it is an error as any other.
-pub(super) fn guarded<T>(name: &str, work: impl FnOnce() -> ort::Result<T>) -> Result<T, String> {
-    match catch_unwind(AssertUnwindSafe(work)) {
-        Ok(done) => done.map_err(|e| e.to_string()),
-        Err(_) => Err(format!("the engine gave up on {name}; its file is damaged, or made for another engine")),
-    }
 }
 
 /// A row scaled to unit length, if it has a direction.

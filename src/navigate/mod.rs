@@ -15,7 +15,6 @@ pub mod keypoints;
 pub mod matter;
 pub mod navigator;
 pub mod pose;
-pub mod survey;
 pub mod target;
 #[cfg(test)]
 pub(crate) mod testing;

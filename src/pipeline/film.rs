@@ -2,9 +2,8 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
 
-use super::observer::{Observer, Progress, Signal};
+use super::observer::{Interrupted, Observer, Ticker};
 use super::semantics::view_map::ViewMap;
 use crate::io::animation::{AnimationError, AnimationWriter, Settings, Summary};
 
@@ -39,7 +38,7 @@ pub enum FilmError {
     Animation(#[from] AnimationError),
     /// The observer asked to stop; nothing is left of the film.
     #[error("cancelled")]
-    Cancelled,
+    Interrupted(#[from] Interrupted),
 }
 
 /// Draws the scene from every camera into a film at `out`.
@@ -55,12 +54,10 @@ pub fn write(
     out: (&Path, &Settings),
     observer: &mut dyn Observer,
 ) -> Result<Summary, FilmError> {
-    let start = Instant::now();
+    let mut ticker = Ticker::new("Drawing the video", cameras.len());
+    observer.proceed()?;
     let mut writer = AnimationWriter::create(out.0, out.1)?;
     for (done, camera) in cameras.iter().enumerate() {
-        if observer.signal() == Signal::Cancel {
-            return Err(FilmError::Cancelled);
-        }
         let mut pixels = renderer.draw(cloud, camera, draw)?.to_rgb8();
         if let Some(marked) = marked.filter(|m| !m.ids.is_empty()) {
             let Marked { map, ids, .. } = marked;
@@ -71,14 +68,7 @@ pub fn write(
             }
         }
         writer.push(pixels.as_flattened())?;
-        let elapsed_secs = start.elapsed().as_secs_f64();
-        observer.progress(Progress {
-            stage: "Drawing the film".into(),
-            done: done as u64 + 1,
-            total: cameras.len() as u64,
-            elapsed_secs,
-            rate: (done + 1) as f64 / elapsed_secs.max(1e-9),
-        });
+        ticker.tick(done + 1, observer)?;
     }
     Ok(writer.finish()?)
 }
@@ -104,7 +94,7 @@ fn mark(pixels: &mut [[u8; 3]], width: usize, inside: impl Fn(usize) -> bool, co
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::observer::Silent;
+    use crate::pipeline::observer::{Signal, Silent};
 
     #[test]
     fn a_film_has_a_frame_per_camera_and_a_cancelled_one_leaves_nothing() {
@@ -138,7 +128,7 @@ mod tests {
         assert_eq!((summary.frames, summary.size_px), (5, (32, 16)));
         assert!(path.is_file());
         let (stopped, path) = film("b.gif", &mut Impatient);
-        assert!(matches!(stopped, Err(FilmError::Cancelled)) && !path.exists());
+        assert!(matches!(stopped, Err(FilmError::Interrupted(_))) && !path.exists());
         assert_eq!(std::fs::read_dir(folder.path()).expect("lists").count(), 1, "no half file");
     }
 

@@ -1,10 +1,6 @@
-//! What the program does with scenes: training, evaluation, synthetic data, measurements.
+//! What the program does with scenes: training, evaluation, synthetic data.
 //! Everything here talks to the outside through an [`observer::Observer`] and nothing else.
 
-pub mod bench;
-pub mod bench_gpu;
-pub mod bench_query;
-pub mod demo_scene;
 pub mod depth;
 pub mod evaluate;
 pub mod film;

@@ -1,6 +1,9 @@
 //! How long work reports what it does, and learns whether to go on.
 
+use std::collections::VecDeque;
+use std::error::Error;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
@@ -33,6 +36,91 @@ pub struct Progress {
     pub rate: f64,
 }
 
+/// The observer asked to stop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("cancelled")]
+pub struct Interrupted;
+
+impl Interrupted {
+    /// Whether `error`, or what caused it, is that the observer asked to stop.
+    pub fn is_cause_of(error: &(dyn Error + 'static)) -> bool {
+        error.is::<Self>() || error.source().is_some_and(Self::is_cause_of)
+    }
+}
+
+/// Seconds over which a rate is measured.
+const RATE_SECS: f64 = 3.0;
+
+/// Reports the progress of one stage, and asks whether to go on. Pauses do not count as time.
+pub struct Ticker {
+    stage: String,
+    /// Units in all.
+    pub total: u64,
+    start: Instant,
+    /// Seconds of earlier runs.
+    before_secs: f64,
+    /// Units that were done at a time in seconds: those of the last few seconds.
+    marks: VecDeque<(u64, f64)>,
+}
+
+impl Ticker {
+    /// Starts the clock of `stage`, which has `total` units.
+    pub fn new(stage: impl Into<String>, total: usize) -> Self {
+        Self::resumed(stage, total as u64, 0, 0.0)
+    }
+
+    /// The same where earlier runs did `done` units in `secs` seconds.
+    pub fn resumed(stage: impl Into<String>, total: u64, done: u64, secs: f64) -> Self {
+        let marks = VecDeque::from([(done, secs)]);
+        Self { stage: stage.into(), total, start: Instant::now(), before_secs: secs, marks }
+    }
+
+    /// Goes on with `stage`: its clock starts if it is another than before.
+    pub fn enter(&mut self, stage: String, total: u64) {
+        if self.stage != stage {
+            *self = Self::new(stage, 0);
+        }
+        self.total = total;
+    }
+
+    /// Reports that `done` units are done, and waits out a pause.
+    ///
+    /// # Errors
+    /// If the work should stop.
+    pub fn tick(&mut self, done: usize, observer: &mut dyn Observer) -> Result<(), Interrupted> {
+        self.report(done as u64, observer);
+        self.proceed(observer)
+    }
+
+    /// Waits out a pause.
+    ///
+    /// # Errors
+    /// If the work should stop.
+    pub fn proceed(&mut self, observer: &dyn Observer) -> Result<(), Interrupted> {
+        let before = Instant::now();
+        let result = observer.proceed();
+        self.start += before.elapsed();
+        result
+    }
+
+    /// Reports that `done` units are done.
+    pub fn report(&mut self, done: u64, observer: &mut dyn Observer) {
+        let elapsed_secs = self.before_secs + self.start.elapsed().as_secs_f64();
+        let rate = self.rate(done, elapsed_secs);
+        let (stage, total) = (self.stage.clone(), self.total);
+        observer.progress(Progress { stage, done: done.min(total), total, elapsed_secs, rate });
+    }
+
+    fn rate(&mut self, done: u64, secs: f64) -> f64 {
+        self.marks.push_back((done, secs));
+        while self.marks.len() > 2 && self.marks[1].1 < secs - RATE_SECS {
+            self.marks.pop_front();
+        }
+        let (first, since) = self.marks[0];
+        if secs > since { done.saturating_sub(first) as f64 / (secs - since) } else { 0.0 }
+    }
+}
+
 impl Progress {
     /// Seconds to go at the present rate; `None` if not known.
     pub fn eta_secs(&self) -> Option<f64> {
@@ -42,7 +130,7 @@ impl Progress {
 
 /// Something a person should see in a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub enum Level {
+pub enum Severity {
     /// For the record.
     Info,
     /// Something was left out or changed.
@@ -55,6 +143,19 @@ pub trait Observer: Send {
     fn signal(&self) -> Signal {
         Signal::Continue
     }
+    /// Waits out a pause.
+    ///
+    /// # Errors
+    /// If the work should stop.
+    fn proceed(&self) -> Result<(), Interrupted> {
+        loop {
+            match self.signal() {
+                Signal::Continue => return Ok(()),
+                Signal::Cancel => return Err(Interrupted),
+                Signal::Pause => std::thread::sleep(Duration::from_millis(20)),
+            }
+        }
+    }
     /// Now and then, at least ten times a second where steps are short.
     fn progress(&mut self, _progress: Progress) {}
     /// Training measurements.
@@ -62,7 +163,7 @@ pub trait Observer: Send {
     /// A held-out evaluation.
     fn evaluation(&mut self, _evaluation: Evaluation) {}
     /// A line for the log.
-    fn note(&mut self, _level: Level, _text: String) {}
+    fn note(&mut self, _severity: Severity, _text: String) {}
     /// Whether a copy of the cloud is wanted now. Copies cost time, so the observer limits them.
     fn wants_cloud(&self) -> bool {
         false
@@ -75,3 +176,37 @@ pub trait Observer: Send {
 pub struct Silent;
 
 impl Observer for Silent {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_are_those_of_the_last_seconds() {
+        let mut ticker = Ticker::resumed("x", 1000, 100, 50.0);
+        assert_eq!(ticker.rate(100, 50.0), 0.0);
+        assert_eq!(ticker.rate(110, 51.0), 10.0);
+        for step in 1..=10 {
+            ticker.rate(110 + 20 * step, 51.0 + step as f64);
+        }
+        assert_eq!(ticker.rate(330, 62.0), 20.0);
+        assert!(ticker.marks.len() < 8);
+    }
+
+    #[test]
+    fn an_interruption_is_found_behind_other_errors() {
+        #[derive(Debug, thiserror::Error)]
+        enum Inner {
+            #[error("stopped")]
+            Stopped(#[from] Interrupted),
+            #[error("broken")]
+            Broken,
+        }
+        #[derive(Debug, thiserror::Error)]
+        #[error(transparent)]
+        struct Outer(#[from] Inner);
+        assert!(Interrupted::is_cause_of(&Interrupted));
+        assert!(Interrupted::is_cause_of(&Outer(Interrupted.into())));
+        assert!(!Interrupted::is_cause_of(&Outer(Inner::Broken)));
+    }
+}

@@ -18,7 +18,7 @@ pub use cpu::ssim::{LossParts, PhotoLoss, ssim};
 pub use cpu::{RenderStats, normals, validate};
 pub use gpu::timing::StageTimes;
 pub use gpu::trainer::{StepLoss, Trainer as DeviceTrainer, TrainerSettings};
-pub use gpu::{Device, DevicePhoto, GpuError, measure, real_gpu};
+pub use gpu::{Device, DevicePhoto, GpuError, real_gpu};
 pub use renderer::{BackendChoice, Cost, DifferentiableRenderer, DrawError, Renderer, instead_of_gpu};
 
 use serde::{Deserialize, Serialize};

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::app::App;
 use super::state::Tone;
-use crate::report::{Knobs, StageName, turned};
+use crate::measure::{Knobs, StageName, turned};
 use crate::worker::{Command, MeasureRequest, Pane};
 
 impl App {
@@ -50,7 +50,7 @@ impl App {
             }),
             StageName::Render => turned(&self.viewport.drawing, knobs).map(|drawing| {
                 self.viewport.drawing = drawing;
-                "The view is drawn with it; films and exports stay as they are"
+                "The view is drawn with it; exported videos and images stay as they are"
             }),
             _ => Err("the window has no setting for it".into()),
         };

@@ -18,7 +18,7 @@ use super::state::AppState;
 use super::toasts::Toasts;
 use super::viewport::Viewport;
 use super::{keys, theme};
-use crate::report::is_report;
+use crate::measure::is_report;
 use crate::scene::plan::Wish;
 use crate::scene::trace::{self, Sort};
 use crate::worker::{Action, Jobs, Pane, Repaint, Worker};

@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::pipeline::observer::{Evaluation, Level, Progress, StepMetrics};
+use crate::measure::Report;
+use crate::pipeline::observer::{Evaluation, Progress, Severity, StepMetrics};
 use crate::pipeline::semantics::portraits::Gallery;
 use crate::render::RenderSettings;
-use crate::report::Report;
 use crate::scene::{Facts, Limits, Overrides, PhotoPixels, ScenePlan, SemanticMap, text};
 use crate::worker::{Event, Explored, Failure, JobId, JobKind, Lane, OpenedScene, Outcome, Visited};
 
@@ -190,8 +190,8 @@ impl AppState {
                 }
             }
             Event::Evaluation(job, evaluation) => self.evaluated(job, evaluation),
-            Event::Note(_, Level::Info, text) => self.say(Tone::Info, text),
-            Event::Note(_, Level::Warning, text) => self.say(Tone::Warning, text),
+            Event::Note(_, Severity::Info, text) => self.say(Tone::Info, text),
+            Event::Note(_, Severity::Warning, text) => self.say(Tone::Warning, text),
             Event::Finished(job, outcome) => self.finished(job, outcome),
             Event::Cancelled(job) => {
                 if let Some(ended) = self.end(job) {

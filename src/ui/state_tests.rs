@@ -132,7 +132,7 @@ fn long_histories_are_thinned_and_keep_their_ends() {
 
 #[test]
 fn reports_are_shown_and_compared_and_a_cancelled_measurement_is_read() {
-    use crate::report::{Computer, Report, VERSION};
+    use crate::measure::{Computer, Report, VERSION};
     let read = |scene: &str, second| {
         let computer = Computer::default();
         let report = Report { version: VERSION, program: String::new(), scene: scene.into(), computer, stages: vec![] };
@@ -171,7 +171,7 @@ fn foreign_text_is_cleaned_on_its_way_to_the_window() {
     let mut s = fold([
         Event::Started { job: JOB, kind: JobKind::Train, title: evil.into() },
         Event::Progress(JOB, progress),
-        Event::Note(JOB, Level::Warning, evil.into()),
+        Event::Note(JOB, Severity::Warning, evil.into()),
     ]);
     s.toast(Tone::Info, evil);
     s.fail(evil, Failure { message: evil.into(), remedy: evil.into() });

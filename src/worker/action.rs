@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+use crate::measure::{Knobs, StageName};
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::edit::Edit;
-use crate::report::{Knobs, StageName};
 use crate::scene::{IdentityId, NOBODY};
 
 /// What the viewport shows.

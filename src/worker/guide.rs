@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::protocol::{Failure, Outcome, Stop};
+use super::protocol::{Outcome, Stop};
 use crate::io::animation::Settings;
 use crate::navigate::target::Wish;
 use crate::navigate::visit::{NoVisit, Place, Visit};
 use crate::navigate::{FRAMES, Navigator, Pose};
-use crate::pipeline::film::{self, FilmError, Marked};
-use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::film::{self, Marked};
+use crate::pipeline::observer::{Observer, Severity};
 use crate::render::{BackendChoice, RenderSettings, Renderer};
 use crate::scene::trace::{self, Sort};
 use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
@@ -114,12 +114,8 @@ pub struct Visited {
 pub fn film(request: FilmRequest, observer: &mut dyn Observer) -> Result<Outcome, Stop> {
     let FilmRequest { cloud, draw, cameras, marked, out, settings } = request;
     let marked = marked.as_ref().map(|(map, ids)| Marked { map, ids, color: [255, 64, 160] });
-    let told = |why| observer.note(Level::Warning, why);
+    let told = |why| observer.note(Severity::Warning, why);
     let mut renderer = Renderer::choose(BackendChoice::Auto, told).unwrap_or_default();
     let out: (&Path, &Settings) = (&out, &settings);
-    match film::write(&cloud, &draw, &cameras, marked, &mut renderer, out, observer) {
-        Ok(summary) => Ok(Outcome::Written(summary.path)),
-        Err(FilmError::Cancelled) => Err(Stop::Cancelled),
-        Err(e) => Err(Stop::Failed(Failure::of(&e, ""))),
-    }
+    Ok(Outcome::Written(film::write(&cloud, &draw, &cameras, marked, &mut renderer, out, observer)?.path))
 }

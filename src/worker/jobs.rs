@@ -15,11 +15,11 @@ use crate::models;
 use crate::models::catalogue::{self, InstallError, Role, SAM2};
 use crate::models::fetch::{FetchError, Patience};
 use crate::pipeline::evaluate::evaluate;
-use crate::pipeline::observer::{Level, Observer, Progress, Signal};
+use crate::pipeline::observer::{Observer, Severity, Ticker};
 use crate::pipeline::semantics::find::{Carry, FindOptions, Finding, Found, REGIONS, Tools, find_objects, segmenter};
 use crate::pipeline::semantics::follow::Follower;
 use crate::pipeline::semantics::portraits::portraits;
-use crate::pipeline::synth::{SynthError, demo};
+use crate::pipeline::synth::demo;
 use crate::pipeline::train::checkpoint::CheckpointError;
 use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainError};
 use crate::render::RenderSettings;
@@ -61,7 +61,7 @@ impl PipelineJobs {
                 Arc::new(map)
             }),
             Err(e) => {
-                observer.note(Level::Warning, format!("Its objects cannot be shown: {e}"));
+                observer.note(Severity::Warning, format!("Its objects cannot be shown: {e}"));
                 None
             }
         }
@@ -107,10 +107,7 @@ impl PipelineJobs {
     fn demo(&self, observer: &mut dyn Observer) -> Result<Outcome, Stop> {
         let out = self.places.demo();
         if !demo::demo_is_written(&out) {
-            demo::write_demo(&out, observer).map_err(|e| match e {
-                SynthError::Cancelled => Stop::Cancelled,
-                e => Stop::Failed(Failure::of(&e, "")),
-            })?;
+            demo::write_demo(&out, observer)?;
         }
         Ok(Outcome::Opened(Box::new(self.open(&out, observer)?)))
     }
@@ -127,7 +124,7 @@ impl PipelineJobs {
             Err(TrainError::Checkpoint(CheckpointError::OtherRun { .. } | CheckpointError::Missing { .. })) => {
                 let fresh = self.places.fresh(&dataset.root);
                 observer.note(
-                    Level::Info,
+                    Severity::Info,
                     format!(
                         "The settings changed, so this is a new training; the earlier one stays in {}",
                         out.display()
@@ -137,7 +134,7 @@ impl PipelineJobs {
             }
             result => (result, out),
         };
-        let outcome = result.map_err(|e| Stop::Failed(Failure::of(&e, "")))?;
+        let outcome = result?;
         // Its objects are carried over to Gaussians that went on, and have to be read with their state.
         let semantics = match trained::is_scene(&out) {
             true => {
@@ -152,7 +149,7 @@ impl PipelineJobs {
             if semantics.is_some() {
                 let text =
                     "Its objects are stored with the Gaussians as they are now; open the scene again to see them";
-                observer.note(Level::Info, text.into());
+                observer.note(Severity::Info, text.into());
             }
             return Err(Stop::Cancelled);
         }
@@ -188,26 +185,26 @@ impl PipelineJobs {
             Some(REGIONS) => None,
             Some(name) => Some(name.to_owned()),
             None => {
-                let usable = catalogue::usable(Role::Segmenter, &mut |text| observer.note(Level::Warning, text));
-                usable.map_err(|e| Stop::Failed(Failure::of(&e, "")))?.into_iter().next()
+                let usable = catalogue::usable(Role::Segmenter, &mut |text| observer.note(Severity::Warning, text));
+                usable?.into_iter().next()
             }
         };
         let found = segmenter(masks, cloud, settings, network.as_deref());
-        let mut segmenter = found.map_err(|e| Stop::Failed(Failure::of(&e, "")))?;
+        let mut segmenter = found?;
         let mut follower = match with.carry {
             Carry::Gaussians => None,
             _ => {
                 let opened = Follower::open(SAM2, Some(out.join("cache")));
-                Some(opened.map_err(|e| Stop::Failed(Failure::of(&e, "")))?)
+                Some(opened?)
             }
         };
         // Without the encoder, names alone are understood.
         let encoder = match with.encoder.as_deref() {
             Some(name) => models::encoder(name),
-            None => models::best_encoder(&mut |text| observer.note(Level::Warning, text)),
+            None => models::best_encoder(&mut |text| observer.note(Severity::Warning, text)),
         };
         let mut encoder = encoder
-            .inspect_err(|e| observer.note(Level::Warning, format!("Objects are found without their looks: {e}")))
+            .inspect_err(|e| observer.note(Severity::Warning, format!("Objects are found without their looks: {e}")))
             .ok();
         let mut options = FindOptions::default();
         options.track.veto = with.carry == Carry::Both;
@@ -217,15 +214,12 @@ impl PipelineJobs {
             let tools = Tools { segmenter: &mut *segmenter, follower, encoder };
             find_objects(cloud, photos, settings, tools, &options, observer)
         };
-        let Found { map, .. } = found.map_err(|e| match e {
-            e if e.is_cancelled() => Stop::Cancelled,
-            e => Stop::Failed(Failure::of(&e, "")),
-        })?;
+        let Found { map, .. } = found?;
         let (kept, state) =
             scene.replace_map(self.known(&scene).as_deref(), &map, cloud).map_err(|e| io_failure(&e))?;
         self.knows(out, Some(state));
         if let Some(kept) = kept {
-            observer.note(Level::Info, format!("The objects and parts before are kept in {}", kept.display()));
+            observer.note(Severity::Info, format!("The objects and parts before are kept in {}", kept.display()));
         }
         Ok(Outcome::Objects(Arc::new(map)))
     }
@@ -236,7 +230,7 @@ impl PipelineJobs {
         let before = trained::is_scene(&out).then(|| trained::load(&out)).and_then(|loaded| match loaded {
             Ok(scene) => Some(scene),
             Err(e) => {
-                observer.note(Level::Warning, format!("Earlier training of these photos cannot be shown: {e}"));
+                observer.note(Severity::Warning, format!("Earlier training of these photos cannot be shown: {e}"));
                 None
             }
         });
@@ -276,7 +270,7 @@ impl PipelineJobs {
 /// defaults.
 fn config_of(folder: &Path, config: serde_json::Value, observer: &mut dyn Observer) -> TrainConfig {
     TrainConfig::stored(folder, config).unwrap_or_else(|e| {
-        observer.note(Level::Warning, format!("It may not look as it was trained: {e}"));
+        observer.note(Severity::Warning, format!("It may not look as it was trained: {e}"));
         TrainConfig::default()
     })
 }
@@ -288,17 +282,17 @@ fn trained_scene(scene: TrainedScene, observer: &mut dyn Observer) -> OpenedScen
         Some((Ok(Opened::Dataset(d)), _)) => Some(Arc::new(d)),
         Some((Ok(_), p)) => {
             observer.note(
-                Level::Warning,
+                Severity::Warning,
                 format!("{} holds no photos any more; the scene opens without them", p.display()),
             );
             None
         }
         Some((Err(e), _)) => {
-            observer.note(Level::Warning, format!("The photos cannot be read, the scene opens without them: {e}"));
+            observer.note(Severity::Warning, format!("The photos cannot be read, the scene opens without them: {e}"));
             None
         }
         None => {
-            observer.note(Level::Warning, "The photos are not where they were; the scene opens without them".into());
+            observer.note(Severity::Warning, "The photos are not where they were; the scene opens without them".into());
             None
         }
     };
@@ -372,7 +366,7 @@ impl Jobs for PipelineJobs {
                 let from = home.camera.as_ref().map_or(home.bounds.center() + home.up, |c| c.center);
                 trace::record(Sort::Portraits, "portraits of objects and parts", "a list of them is shown", 0);
                 let drawn = portraits(&cloud, &map, &settings, from, home.up);
-                Ok(Outcome::Portraits(map, drawn.map_err(|e| Stop::Failed(Failure::of(&e, "")))?))
+                Ok(Outcome::Portraits(map, drawn?))
             }
         }
     }
@@ -394,28 +388,21 @@ fn measure(
         }));
     }
     let views = train::load_views(dataset, &held, config, "Loading held-out photos", observer);
-    let views = views.map_err(|e| Stop::Failed(Failure::of(&e, "")))?.ok_or(Stop::Cancelled)?;
+    let views = views?.ok_or(Stop::Cancelled)?;
     let settings = config.render_settings(dataset.background);
-    let evaluation = evaluate(cloud, &views, &settings, 0, 0.0).map_err(|e| Stop::Failed(Failure::of(&e, "")))?;
+    let evaluation = evaluate(cloud, &views, &settings, 0, 0.0)?;
     Ok(Outcome::Evaluated(evaluation))
 }
 
 /// Puts a model in place.
 fn install(id: &str, brought: Option<&Path>, observer: &mut dyn Observer) -> Result<Outcome, Stop> {
     let folder = catalogue::folder();
-    let start = std::time::Instant::now();
+    let mut ticker = Ticker::new("", 0);
     let done = catalogue::entry(id).and_then(|entry| match brought {
         Some(brought) => entry.add(&folder, brought),
         None => entry.fetch(&folder, None, Patience::default(), &mut |name, there, all| {
-            let elapsed_secs = start.elapsed().as_secs_f64();
-            observer.progress(Progress {
-                stage: format!("Fetching {name} (kB)"),
-                done: there / 1000,
-                total: all.unwrap_or(there) / 1000,
-                elapsed_secs,
-                rate: there as f64 / 1000.0 / elapsed_secs.max(1e-9),
-            });
-            observer.signal() != Signal::Cancel
+            ticker.enter(format!("Fetching {name} (kB)"), all.unwrap_or(there) / 1000);
+            ticker.tick((there / 1000) as usize, observer).is_ok()
         }),
     });
     match done {

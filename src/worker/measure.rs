@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::protocol::{Failure, Outcome, Stop};
-use crate::pipeline::observer::{Level, Observer};
+use crate::measure::studies::Input;
+use crate::measure::studies::render;
+use crate::measure::studies::views::{View, held_out};
+use crate::measure::{End, FILE, Report, computer, is_report};
+use crate::pipeline::observer::{Observer, Severity};
 use crate::render::RenderSettings;
-use crate::report::studies::Input;
-use crate::report::studies::render::RenderStudy;
-use crate::report::studies::views::{View, held_out};
-use crate::report::{End, FILE, Report, Stage, Study, StudyError, computer, is_report, sweep};
 use crate::scene::{Camera, Dataset, GaussianCloud};
 
 /// Most views that are compared.
@@ -40,7 +40,7 @@ pub struct MeasureRequest {
 
 /// Reads a report; the `second` is one to compare with.
 pub fn read(path: PathBuf, second: bool) -> Result<Outcome, Stop> {
-    let report = Report::read(&path).map_err(|e| Stop::Failed(Failure::of(&e, "")))?;
+    let report = Report::read(&path)?;
     Ok(Outcome::Report { path, report: Arc::new(report), second })
 }
 
@@ -72,17 +72,10 @@ pub fn run(request: MeasureRequest, observer: &mut dyn Observer) -> Result<Outco
         ("views".to_owned(), views.len().to_string()),
     ]);
     let MeasureRequest { cloud, settings, out, .. } = request;
-    let study = RenderStudy::new((*cloud).clone(), &settings, views, REPEATS, input);
-    let mut study = study.map_err(|e| failed(&e))?;
-    let before = report.earlier(&study.stage());
-    let file = out.join(FILE);
-    let mut keep = |stage: &Stage| {
-        report.put(stage.clone());
-        report.write(&file).map_err(|e| StudyError(e.to_string()))
-    };
-    let (_, end) = sweep(&mut study, before, f64::INFINITY, &mut keep, observer).map_err(|e| failed(&e))?;
+    let mut study = render::study(cloud, &settings, views, REPEATS, input).map_err(|e| failed(&e))?;
+    let end = report.measure(&mut study, &out, f64::INFINITY, observer).map_err(|e| failed(&e))?;
     if end == End::Cancelled {
-        observer.note(Level::Info, format!("What was measured so far is kept in {}", file.display()));
+        observer.note(Severity::Info, format!("What was measured so far is kept in {}", out.join(FILE).display()));
         return Err(Stop::Cancelled);
     }
     Ok(Outcome::Report { path: out, report: Arc::new(report), second: false })
@@ -94,7 +87,7 @@ fn views(request: &MeasureRequest, observer: &mut dyn Observer) -> Result<Vec<Vi
         Some(dataset) => held_out(dataset, request.holdout_every, MAX_SIDE_PX, VIEWS, observer),
         None => Ok(Some(Vec::new())),
     };
-    let mut views = views.map_err(|e| Stop::Failed(Failure::of(&e, "")))?.ok_or(Stop::Cancelled)?;
+    let mut views = views?.ok_or(Stop::Cancelled)?;
     if views.is_empty() {
         views.push((request.camera.limited_to(MAX_SIDE_PX), None));
     }

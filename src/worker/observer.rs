@@ -9,7 +9,7 @@ use crossbeam_channel::Sender;
 use super::protocol::{Event, JobId};
 use super::thread::{CloudSnapshot, Repaint};
 use super::{Control, Slot};
-use crate::pipeline::observer::{Evaluation, Level, Observer, Progress, Signal, StepMetrics};
+use crate::pipeline::observer::{Evaluation, Observer, Progress, Severity, Signal, StepMetrics};
 use crate::scene::GaussianCloud;
 
 /// Least time between two copies of the cloud: three a second keep the picture alive and cost
@@ -71,8 +71,8 @@ impl Observer for JobObserver {
         self.send(Event::Evaluation(self.job, evaluation));
     }
 
-    fn note(&mut self, level: Level, text: String) {
-        self.send(Event::Note(self.job, level, text));
+    fn note(&mut self, severity: Severity, text: String) {
+        self.send(Event::Note(self.job, severity, text));
     }
 
     fn wants_cloud(&self) -> bool {

@@ -9,12 +9,12 @@ use super::edit::EditRequest;
 use super::guide::{Explored, FilmRequest, VisitRequest, Visited};
 use super::measure::MeasureRequest;
 use crate::io::trained::History;
-use crate::pipeline::observer::{Evaluation, Level, Progress, StepMetrics};
+use crate::measure::Report;
+use crate::pipeline::observer::{Evaluation, Interrupted, Progress, Severity, StepMetrics};
 use crate::pipeline::semantics::find::Finding;
 use crate::pipeline::semantics::portraits::Gallery;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
-use crate::report::Report;
 use crate::scene::{Bounds, Camera, Dataset, Facts, GaussianCloud, Photo, PhotoPixels, SemanticMap};
 
 /// Names one job of one worker.
@@ -404,6 +404,12 @@ pub enum Stop {
     Failed(Failure),
 }
 
+impl<E: std::error::Error + 'static> From<E> for Stop {
+    fn from(error: E) -> Self {
+        if Interrupted::is_cause_of(&error) { Self::Cancelled } else { Self::Failed(Failure::of(&error, "")) }
+    }
+}
+
 /// What happened. For each job: first `Started`, then any of the middle ones, at last exactly one of
 /// `Finished`, `Cancelled`, `Failed`. Only `Progress` may be missing.
 #[derive(Clone, Debug)]
@@ -424,7 +430,7 @@ pub enum Event {
     /// A held-out evaluation.
     Evaluation(JobId, Evaluation),
     /// A line for the log.
-    Note(JobId, Level, String),
+    Note(JobId, Severity, String),
     /// The job now waits (`true`) or goes on (`false`).
     Paused(JobId, bool),
     /// It did what it was to do.

@@ -1,4 +1,4 @@
-//! All that is sent to a chat model, held against what the README says is sent.
+//! All that is sent to a chat model, held against what the guide says is sent.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -159,5 +159,5 @@ fn what_is_sent_is_what_the_readme_says() {
     assert_eq!(absolute_paths("{\"a\":\"see (/tmp/a/b.ply); and/or 1/2 //x / /a\"}"), ["/tmp/a/b.ply"]);
 
     let flat = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(flat(include_str!("../../README.md")).contains(&flat(SENT)), "the README does not say: {SENT}");
+    assert!(flat(include_str!("../../docs/guide.md")).contains(&flat(SENT)), "the guide does not say: {SENT}");
 }

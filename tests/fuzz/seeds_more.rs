@@ -210,7 +210,7 @@ fn report() -> Value {
     };
     let order = json!({ "what": "samples", "pairs": [[1, 1], [2, 0.25]], "expected": 2, "observed": 2, "agrees": true,
         "meaning": "it falls" });
-    json!({ "version": fmlgs::report::VERSION, "program": "0", "scene": "x",
+    json!({ "version": fmlgs::measure::VERSION, "program": "0", "scene": "x",
         "computer": { "processor": "one", "cores": 2, "memory_bytes": 5, "gpu": null, "system": "l", "build": "d" },
         "stages": [{ "name": "render", "secs_of": "one picture", "reference": "exact", "input": { "size": "64" },
             "seeds": [0, 1, 2], "planned": 3,

@@ -7,13 +7,13 @@ use std::path::Path;
 use fmlgs::agent::llm::wire::Collector;
 use fmlgs::agent::{Policy, ToolCall};
 use fmlgs::io::{self, IoError};
+use fmlgs::measure::{self, Report};
 use fmlgs::models::sam::Sam;
 use fmlgs::models::sam2::Sam2;
 use fmlgs::models::{ClipEncoder, ModelError, metadata};
 use fmlgs::pipeline::semantics::follow;
 use fmlgs::pipeline::semantics::grammar::Phrase;
 use fmlgs::pipeline::train::checkpoint;
-use fmlgs::report::{self, Report};
 
 use super::seeds_more as seeds;
 use super::targets::{Door, Target, picture, sound, text, valid};
@@ -79,9 +79,9 @@ pub fn all() -> Vec<Target> {
         Target::in_folder(
             "report",
             Door::Json,
-            report::FILE,
+            measure::FILE,
             |_| {},
-            |f| Report::read(f).map(|r| (report::page::html(&r), report::defaults::markdown(&[r]))),
+            |f| Report::read(f).map(|r| (measure::page::html(&r), measure::defaults::markdown(&[r]))),
         )
         .slow(16),
         Target::in_folder(

@@ -8,23 +8,28 @@ use std::time::{Duration, Instant};
 const HANG: Duration = Duration::from_secs(10);
 
 struct Watched {
-    since: Option<Instant>,
+    until: Option<Instant>,
     target: &'static str,
     input: Vec<u8>,
 }
 
-static WATCHED: Mutex<Watched> = Mutex::new(Watched { since: None, target: "", input: Vec::new() });
+static WATCHED: Mutex<Watched> = Mutex::new(Watched { until: None, target: "", input: Vec::new() });
 /// Where the last panic was, and its words.
 static PANIC: Mutex<String> = Mutex::new(String::new());
 
 /// From now on `input` is being tried.
 pub fn begin(target: &'static str, input: &[u8]) {
+    begin_for(target, input, HANG);
+}
+
+/// The same with other patience.
+pub fn begin_for(target: &'static str, input: &[u8], patience: Duration) {
     static START: Once = Once::new();
     START.call_once(|| {
         std::thread::Builder::new().name("fuzz-watch".into()).spawn(watch).expect("a thread");
     });
     let mut watched = WATCHED.lock().unwrap_or_else(PoisonError::into_inner);
-    watched.since = Some(Instant::now());
+    watched.until = Some(Instant::now() + patience);
     watched.target = target;
     watched.input.clear();
     watched.input.extend_from_slice(input);
@@ -32,14 +37,14 @@ pub fn begin(target: &'static str, input: &[u8]) {
 
 /// It has come to an end.
 pub fn end() {
-    WATCHED.lock().unwrap_or_else(PoisonError::into_inner).since = None;
+    WATCHED.lock().unwrap_or_else(PoisonError::into_inner).until = None;
 }
 
 fn watch() {
     loop {
         std::thread::sleep(Duration::from_millis(500));
         let watched = WATCHED.lock().unwrap_or_else(PoisonError::into_inner);
-        if watched.since.is_some_and(|since| since.elapsed() > HANG) {
+        if watched.until.is_some_and(|until| Instant::now() > until) {
             let file = save(watched.target, &watched.input);
             eprintln!("{}: an input never ends; see {}", watched.target, file.display());
             std::process::abort();

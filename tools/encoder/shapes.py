@@ -1,4 +1,4 @@
-"""Triangle meshes of simple shapes: the same family as src/pipeline/demo_scene/shapes.rs, coarser."""
+"""Triangle meshes of simple shapes: the same family as tools/demo_scene/shapes.rs, coarser."""
 
 import numpy as np
 

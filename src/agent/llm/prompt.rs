@@ -13,7 +13,7 @@ const MOST: usize = 250;
 /// Longest name in characters.
 const LONGEST_NAME: usize = 80;
 
-/// What goes to a chat model and what does not, for whoever chooses one. The README says the same.
+/// What goes to a chat model and what does not, for whoever chooses one. docs/guide.md says the same.
 pub const SENT: &str = "Sent to the chat model: what you write; of the scene's objects and parts their numbers, names, \
     wholes, and whether they are hidden or in view, which of them was spoken of last, and whether the length of a metre \
     is known; what came of each step, with the sizes and distances that were asked for; the talk so far; the \

@@ -9,7 +9,8 @@ use std::thread::JoinHandle;
 use tempfile::NamedTempFile;
 
 use super::{AnimationError, Result, Settings, Sink};
-use crate::io::atomic::{put, write_error};
+use crate::io::atomic::put;
+use crate::io::error::write_error;
 use crate::io::temporary::temporary_file;
 
 /// Lines of the program's error output that are kept.

@@ -11,7 +11,8 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder, ImageError};
 
 use super::{AnimationError, Result, Settings, Sink};
-use crate::io::atomic::{folder_of, sync_folder, write_error};
+use crate::io::error::write_error;
+use crate::io::files::{folder_of, sync_folder};
 use crate::io::temporary::{TemporaryFolder, temporary_folder};
 
 /// See the module.

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use gif::{DisposalMethod, EncodingError, Frame, Repeat};
 
 use super::{AnimationError, Result, Settings, Sink};
-use crate::io::atomic::{Draft, write_error};
+use crate::io::atomic::Draft;
+use crate::io::error::write_error;
 
 /// See the module.
 pub(super) struct Gif {

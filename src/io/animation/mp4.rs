@@ -22,7 +22,8 @@ use shiguredo_mp4::mux::{Mp4FileMuxer, Sample};
 
 use super::yuv::Planes;
 use super::{AnimationError, Result, Settings, Sink};
-use crate::io::atomic::{Draft, write_error};
+use crate::io::atomic::Draft;
+use crate::io::error::write_error;
 
 /// See the module.
 pub(super) struct Mp4 {

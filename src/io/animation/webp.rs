@@ -12,7 +12,8 @@ use crossbeam_channel::{Receiver, Sender, bounded};
 use webp_animation::{ColorMode, EncoderOptions, EncodingConfig, EncodingType, Error};
 
 use super::{AnimationError, Result, Settings, Sink};
-use crate::io::atomic::{Draft, write_error};
+use crate::io::atomic::Draft;
+use crate::io::error::write_error;
 
 /// See the module.
 pub(super) struct WebP {

@@ -13,7 +13,12 @@ mod read;
 mod stream;
 mod write;
 
-pub use read::{parse, read};
+use std::path::Path;
+
+use crate::io::{IoError, files};
+use crate::scene::GaussianCloud;
+
+pub use read::parse;
 pub use stream::state;
 pub use write::{check, encode, write};
 
@@ -50,6 +55,14 @@ const STATE: &str = "fmlgs state ";
 /// Whether a property is one that this module writes itself.
 fn is_standard(name: &str) -> bool {
     STANDARD.contains(&name) || name.strip_prefix("f_rest_").is_some_and(|k| k.bytes().all(|b| b.is_ascii_digit()))
+}
+
+/// Reads a splat `.ply`, plain or compressed (PlayCanvas's `.compressed.ply`).
+pub fn read(path: &Path) -> Result<GaussianCloud, IoError> {
+    if let Some(cloud) = stream::read(path)? {
+        return Ok(cloud);
+    }
+    parse(&files::read(path, u64::MAX)?, path)
 }
 
 #[cfg(test)]

@@ -5,19 +5,11 @@ use std::path::Path;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{ORIGIN, is_standard, stream};
+use super::{ORIGIN, is_standard};
 use crate::io::ply::{Column, Ply, Scalar, Table};
-use crate::io::{IoError, compressed_ply, files};
+use crate::io::{IoError, compressed_ply};
 use crate::math::sh::coefficients;
 use crate::scene::{ExtraProperty, GaussianCloud};
-
-/// Reads a splat `.ply`, plain or compressed (PlayCanvas's `.compressed.ply`).
-pub fn read(path: &Path) -> Result<GaussianCloud, IoError> {
-    if let Some(cloud) = stream::read(path)? {
-        return Ok(cloud);
-    }
-    parse(&files::read(path, u64::MAX)?, path)
-}
 
 /// The Gaussians of a splat `.ply`'s bytes; `path` is for errors.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {

@@ -2,8 +2,10 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
+use std::fs;
+
 use super::*;
-use crate::scene::{ExtraProperty, Photo, ViewScore};
+use crate::scene::{Camera, Dataset, Evaluation, ExtraProperty, Photo, StepMetrics, ViewScore};
 
 fn camera() -> Camera {
     Camera {

@@ -1,13 +1,12 @@
 //! Language features of identities: an encoder looks at each in the photos that show it best.
 
 use std::collections::{BTreeSet, HashMap};
-use std::time::Instant;
 
 use super::relevancy::{PART_WEIGHT, deviate};
 use super::view_map::ViewMap;
 use crate::io::{self, IoError};
 use crate::models::{Encoder, ModelError, Tile};
-use crate::pipeline::observer::{Observer, Progress, Signal};
+use crate::pipeline::observer::{Interrupted, Observer, Ticker};
 use crate::render::{RenderError, RenderSettings, Renderer};
 use crate::scene::language::MAX_VIEWS;
 use crate::scene::{
@@ -35,7 +34,7 @@ pub enum EmbedError {
     Model(#[from] ModelError),
     /// The observer asked to stop.
     #[error("cancelled")]
-    Cancelled,
+    Interrupted(#[from] Interrupted),
 }
 
 /// Lets `encoder` look at every identity of `map`, in up to [`MAX_VIEWS`] of the `photos`.
@@ -51,13 +50,7 @@ pub fn embed(
     observer: &mut dyn Observer,
 ) -> Result<LanguageFeatures, EmbedError> {
     let mut looker = Looker { cloud, map, settings, renderer: Renderer::new() };
-    let start = Instant::now();
-    let mut report = |stage: &str, done: usize, total: usize| {
-        let elapsed_secs = start.elapsed().as_secs_f64();
-        let rate = done as f64 / elapsed_secs.max(1e-9);
-        observer.progress(Progress { stage: stage.into(), done: done as u64, total: total as u64, elapsed_secs, rate });
-        if observer.signal() == Signal::Cancel { Err(EmbedError::Cancelled) } else { Ok(()) }
-    };
+    let mut ticker = Ticker::new("Choosing views of the objects", photos.len());
     let n = map.identities.len();
     let mut seen: Vec<Vec<(f64, usize)>> = vec![Vec::new(); n];
     for (i, photo) in photos.iter().enumerate() {
@@ -65,7 +58,7 @@ pub fn embed(
         for (found, seen) in counts(&view, &map.identities).into_iter().zip(&mut seen) {
             seen.extend((found >= LEAST_PX as f64).then_some((found, i)));
         }
-        report("Choosing views of the objects", i + 1, photos.len())?;
+        ticker.tick(i + 1, observer)?;
     }
     let mut wanted: HashMap<usize, Vec<IdentityId>> = HashMap::new();
     for (k, seen) in seen.iter_mut().enumerate() {
@@ -93,7 +86,7 @@ pub fn embed(
             features.raw.push(raw);
             features.deviated.push(deviated);
         }
-        report("Looking at the objects", done + 1, order.len())?;
+        ticker.tick(done + 1, observer)?;
     }
     Ok(LanguageFeatures { encoder: encoder.name().into(), dimension: encoder.dimension(), of })
 }
@@ -172,7 +165,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::pipeline::observer::Silent;
+    use crate::pipeline::observer::{Signal, Silent};
     use crate::scene::{Camera, NOBODY};
 
     /// Sees whether there is red in a picture, and nothing else.
@@ -276,7 +269,7 @@ mod tests {
         let (cloud, map, photos) = doll(folder.path());
         let mut encoder = Reddish { side_px: None, tiles: vec![] };
         let stopped = embed(&cloud, &map, &photos, &RenderSettings::default(), &mut encoder, &mut Stop);
-        assert!(matches!(stopped, Err(EmbedError::Cancelled)), "{stopped:?}");
+        assert!(matches!(stopped, Err(EmbedError::Interrupted(_))), "{stopped:?}");
     }
 
     #[test]

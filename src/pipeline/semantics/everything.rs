@@ -9,7 +9,7 @@ use crate::models::sam::automatic::{AutomaticOptions, Something, everything};
 use crate::models::sam::{PromptedMasks, Sam};
 use crate::models::sam2::Sam2;
 use crate::models::{ModelError, metadata};
-use crate::pipeline::observer::{Observer, Progress, Signal};
+use crate::pipeline::observer::{Interrupted, Observer, Ticker};
 use crate::scene::{Level, Mask, Photo, PhotoPixels};
 
 /// Masks by a network.
@@ -58,10 +58,12 @@ impl NetworkMasks {
         options: &AutomaticOptions,
         watch: &mut Watch<'_>,
     ) -> Result<Vec<Mask>, SegmentError> {
-        let found = everything(&mut *self.network, picture, options, &mut |share| watch.go_on(share))?;
-        if watch.stopped() {
-            return Err(SegmentError::Cancelled);
-        }
+        let mut end = Ok(());
+        let found = everything(&mut *self.network, picture, options, &mut |share| {
+            end = watch.tick(share);
+            end.is_ok()
+        })?;
+        end?;
         watch.done += 1.0;
         Ok(distinct(found))
     }
@@ -95,26 +97,19 @@ impl NetworkMasks {
 /// Passes progress on, and the wish to stop.
 struct Watch<'a> {
     observer: &'a mut dyn Observer,
-    what: String,
+    ticker: Ticker,
     /// Looks that are done, and all of them.
     done: f64,
     all: f64,
-    start: std::time::Instant,
 }
 
 impl Watch<'_> {
-    fn stopped(&self) -> bool {
-        self.observer.signal() == Signal::Cancel
-    }
-
-    /// Tells that this share of a look is done; whether to go on.
-    fn go_on(&mut self, share: f64) -> bool {
-        let elapsed_secs = self.start.elapsed().as_secs_f64();
+    /// Reports that this share of a look is done, and asks whether to go on.
+    fn tick(&mut self, share: f64) -> Result<(), Interrupted> {
         // In hundredths of a look.
         let [done, all] = [self.done + share, self.all].map(|looks| (100.0 * looks) as u64);
-        let rate = done as f64 / elapsed_secs.max(1e-9);
-        self.observer.progress(Progress { stage: self.what.clone(), done, total: all, elapsed_secs, rate });
-        !self.stopped()
+        self.ticker.total = all;
+        self.ticker.tick(done as usize, self.observer)
     }
 }
 
@@ -149,8 +144,8 @@ impl Segmenter for NetworkMasks {
         observer: &mut dyn Observer,
     ) -> Result<Vec<FoundMask>, SegmentError> {
         let picture = io::photo::load(photo, max_side_px)?;
-        let what = format!("Finding masks in {}", photo.name);
-        let mut watch = Watch { observer, what, done: 0.0, all: 1.0, start: std::time::Instant::now() };
+        let ticker = Ticker::new(format!("Finding masks in {}", photo.name), 0);
+        let mut watch = Watch { observer, ticker, done: 0.0, all: 1.0 };
         let options = self.options;
         let mut masks = self.look(&picture, &options, &mut watch)?;
         let objects = filters::objects(&masks, &self.filters);

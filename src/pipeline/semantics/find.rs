@@ -18,7 +18,7 @@ use super::train_codes::{CodeTraining, CodeView, decode, train_codes};
 use super::view_map::ViewMap;
 use crate::io::labels::Labels;
 use crate::models::Encoder;
-use crate::pipeline::observer::{Level, Observer, Signal};
+use crate::pipeline::observer::{Observer, Severity};
 use crate::render::{RenderError, RenderSettings, Renderer};
 use crate::scene::semantic_map::{BACKGROUND_CODE, CODE_CHANNELS};
 use crate::scene::{GaussianCloud, Identities, IdentityId, Photo, SemanticMap};
@@ -103,13 +103,6 @@ pub enum FindError {
     Embed(#[from] EmbedError),
 }
 
-impl FindError {
-    /// Whether the observer asked to stop.
-    pub fn is_cancelled(&self) -> bool {
-        matches!(self, Self::Track(TrackError::Cancelled) | Self::Embed(EmbedError::Cancelled))
-    }
-}
-
 /// What finds the masks of photos that `cloud` was trained on: files, where there are any, else the
 /// network of this name, else regions of the photos.
 ///
@@ -155,7 +148,7 @@ pub fn find_objects(
     let Tools { segmenter, follower, encoder } = tools;
     let tracked = track(cloud, photos, settings, segmenter, follower, &options.track, observer)?;
     if let Some(text) = unknown(&tracked.views, photos, options.track.reseed_share) {
-        observer.note(Level::Info, text);
+        observer.note(Severity::Info, text);
     }
     let mut identities = tracked.identities.clone();
     let of: Vec<IdentityId> = tracked.belongings.iter().map(|b| b.identity).collect();
@@ -203,9 +196,7 @@ fn lift(
     }
     let training = CodeTraining { steps, seed: SEED };
     train_codes(cloud, &mut map.codes, &views, &map.identities, settings, training, observer)?;
-    if observer.signal() == Signal::Cancel {
-        return Err(TrackError::Cancelled.into());
-    }
+    observer.proceed().map_err(TrackError::from)?;
     if matches!(lifting, Lifting::Paper(_)) {
         map.of = decode(&map.codes, &map.identities);
     }
@@ -244,7 +235,7 @@ mod tests {
     use std::path::PathBuf;
 
     use super::*;
-    use crate::pipeline::observer::Silent;
+    use crate::pipeline::observer::{Interrupted, Signal, Silent};
     use crate::pipeline::semantics::segmenter::FoundMask;
     use crate::scene::{Camera, Level as Of, Mask, NOBODY};
 
@@ -362,7 +353,7 @@ mod tests {
     fn what_no_mask_reached_is_nobodys_and_told() {
         struct Notes(Vec<String>);
         impl Observer for Notes {
-            fn note(&mut self, _: Level, text: String) {
+            fn note(&mut self, _: Severity, text: String) {
                 self.0.push(text);
             }
         }
@@ -406,9 +397,9 @@ mod tests {
             }
         }
         let nothing = find(Told { named: true, covers: false }, Lifting::Votes, 12, &mut Silent).expect_err("no masks");
-        assert!(!nothing.is_cancelled() && nothing.to_string().contains("'told'"), "{nothing}");
+        assert!(!Interrupted::is_cause_of(&nothing) && nothing.to_string().contains("'told'"), "{nothing}");
         let stopped = find(Told { named: true, covers: true }, Lifting::Votes, 12, &mut Stop).expect_err("stopped");
-        assert!(stopped.is_cancelled(), "{stopped}");
+        assert!(Interrupted::is_cause_of(&stopped), "{stopped}");
     }
 
     #[test]

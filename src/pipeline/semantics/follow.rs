@@ -12,7 +12,7 @@ use crate::models::catalogue::{self, Role};
 use crate::models::network::Array;
 use crate::models::sam2::track::{Frames, ObjectId, Prompt, Track, mask_of};
 use crate::models::sam2::{Frame, Sam2};
-use crate::pipeline::observer::{Observer, Progress, Signal};
+use crate::pipeline::observer::{Interrupted, Observer, Ticker};
 use crate::scene::{IdentityId, Photo};
 
 /// Objects that are followed together; memory grows with it.
@@ -28,7 +28,7 @@ pub enum FollowError {
     Model(#[from] ModelError),
     /// The observer asked to stop.
     #[error("cancelled")]
-    Cancelled,
+    Interrupted(#[from] Interrupted),
 }
 
 /// Follows masks through a sequence of photos.
@@ -64,7 +64,6 @@ impl Follower {
         ids: &[IdentityId],
         observer: &mut dyn Observer,
     ) -> Result<Vec<Vec<IdentityId>>, FollowError> {
-        let start = std::time::Instant::now();
         let size = |photo: &Photo| {
             let camera = photo.camera.limited_to(LABEL_SIDE_PX);
             (camera.width_px as usize, camera.height_px as usize)
@@ -72,16 +71,16 @@ impl Follower {
         let sizes: Vec<(usize, usize)> = photos.iter().map(size).collect();
         let mut labels: Vec<Vec<IdentityId>> = sizes.iter().map(|(w, h)| vec![UNKNOWN; w * h]).collect();
         let mut frames = Cached { photos, folder: self.cache.clone(), kept: None, secs: &mut self.encode_secs };
-        let batches = found.len().div_ceil(BATCH) as u64;
-        let total = batches * photos.len() as u64;
-        let mut done = 0_u64;
+        let batches = found.len().div_ceil(BATCH);
+        let mut ticker = Ticker::new("Tracking masks", batches * photos.len());
+        let mut done = 0;
         for (k, batch) in found.chunks(BATCH).enumerate() {
+            let mut end = Ok(());
             let mut track = Track::new(&mut self.model, &mut frames, sizes[seed]);
             for (i, mask) in batch.iter().enumerate() {
                 let (w, h) = sizes[seed];
                 track.prompt(seed, (k * BATCH + i) as ObjectId, &Prompt::Mask(mask.mask.resized(w, h)))?;
             }
-            let mut cancelled = false;
             for backward in [false, true] {
                 track.run(backward, |frame, seen| {
                     // The seed is passed in both directions.
@@ -92,20 +91,10 @@ impl Follower {
                         let mask = mask_of(out, sizes[frame]);
                         mask.pixels().for_each(|i| labels[frame][i] = ids[*object as usize]);
                     }
-                    let elapsed_secs = start.elapsed().as_secs_f64();
-                    observer.progress(Progress {
-                        stage: format!("Following masks, batch {} of {batches}", k + 1),
-                        done: done.min(total),
-                        total,
-                        elapsed_secs,
-                        rate: done as f64 / elapsed_secs.max(1e-9),
-                    });
-                    cancelled = observer.signal() == Signal::Cancel;
-                    !cancelled
+                    end = ticker.tick(done, observer);
+                    end.is_ok()
                 })?;
-                if cancelled {
-                    return Err(FollowError::Cancelled);
-                }
+                end?;
             }
         }
         Ok(labels)

@@ -3,7 +3,7 @@
 use crate::io::IoError;
 use crate::io::labels::{Labels, Region};
 use crate::models::ModelError;
-use crate::pipeline::observer::Observer;
+use crate::pipeline::observer::{Interrupted, Observer};
 use crate::scene::{Level, Mask, Photo};
 
 /// A mask that a segmenter found in one photo.
@@ -51,7 +51,7 @@ pub enum SegmentError {
     Model(#[from] ModelError),
     /// The observer asked to stop.
     #[error("cancelled")]
-    Cancelled,
+    Interrupted(#[from] Interrupted),
 }
 
 /// Masks that come with the dataset. Regions that do not say what they are count as objects where

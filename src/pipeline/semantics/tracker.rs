@@ -10,7 +10,7 @@ use super::link::{Disagreement, Link, disagreements, link};
 use super::segmenter::{FoundMask, SegmentError, Segmenter};
 use super::view_map::ViewMap;
 use super::votes::{Belonging, UNKNOWN, Votes};
-use crate::pipeline::observer::{Level as Severity, Observer, Progress, Signal};
+use crate::pipeline::observer::{Interrupted, Observer, Severity, Ticker};
 use crate::render::{RenderError, RenderSettings, Renderer};
 use crate::scene::{GaussianCloud, Identities, IdentityId, NOBODY, Photo};
 
@@ -93,13 +93,13 @@ pub enum TrackError {
     Masks(#[from] SegmentError),
     /// Masks could not be followed.
     #[error(transparent)]
-    Follow(FollowError),
+    Follow(#[from] FollowError),
     /// A view could not be drawn.
     #[error("photo {0}: {1}")]
     Render(String, RenderError),
     /// The observer asked to stop.
     #[error("cancelled")]
-    Cancelled,
+    Interrupted(#[from] Interrupted),
 }
 
 /// Finds the identities of `cloud` in `photos`. With a `follower`, the first photo's masks are followed
@@ -191,10 +191,7 @@ impl Tracker<'_> {
         let start = Instant::now();
         let found = segmenter.segment(&self.photos[photo], self.options.max_side_px, observer);
         self.segment_secs += start.elapsed().as_secs_f64();
-        let found = found.map_err(|e| match e {
-            SegmentError::Cancelled => TrackError::Cancelled,
-            e => e.into(),
-        })?;
+        let found = found?;
         if found.is_empty() {
             return Ok(None);
         }
@@ -234,11 +231,7 @@ impl Tracker<'_> {
         ids: &[IdentityId],
         observer: &mut dyn Observer,
     ) -> Result<(), TrackError> {
-        let followed = follower.follow(self.photos, seed, found, ids, observer);
-        let mut followed = followed.map_err(|e| match e {
-            FollowError::Cancelled => TrackError::Cancelled,
-            e => TrackError::Follow(e),
-        })?;
+        let mut followed = follower.follow(self.photos, seed, found, ids, observer)?;
         // What is known from the seed alone: it shall not be judged by what it is to judge.
         let of: Vec<IdentityId> = self.votes.decide(&self.identities, LEAST_VOTES).iter().map(|b| b.identity).collect();
         for photo in (0..self.photos.len()).filter(|photo| *photo != seed) {
@@ -288,25 +281,16 @@ impl Tracker<'_> {
 
     /// Draws what is known into every view.
     fn look(&mut self, round: usize, observer: &mut dyn Observer) -> Result<Vec<ViewReport>, TrackError> {
-        let start = Instant::now();
+        let mut ticker = Ticker::new(format!("Carrying identities to all views, round {round}"), self.photos.len());
+        observer.proceed()?;
         // To see how much is unknown, small pictures will do.
         let side = self.options.max_side_px.min(256);
         let of: Vec<IdentityId> = self.votes.decide(&self.identities, LEAST_VOTES).iter().map(|b| b.identity).collect();
         let mut views = Vec::with_capacity(self.photos.len());
         for photo in 0..self.photos.len() {
-            if observer.signal() == Signal::Cancel {
-                return Err(TrackError::Cancelled);
-            }
             let map = self.map_of(photo, side, &of)?;
             views.push(report(photo, &map, self.identities.len()));
-            let elapsed_secs = start.elapsed().as_secs_f64();
-            observer.progress(Progress {
-                stage: format!("Carrying identities to all views, round {round}"),
-                done: photo as u64 + 1,
-                total: self.photos.len() as u64,
-                elapsed_secs,
-                rate: (photo + 1) as f64 / elapsed_secs.max(1e-9),
-            });
+            ticker.tick(photo + 1, observer)?;
         }
         Ok(views)
     }

@@ -1,8 +1,6 @@
 //! The paper's lifting: codes of the Gaussians, both levels in one pass, trained until the rendered
 //! codes look like the masks' (L1 + 0.2 D-SSIM). The Gaussians themselves do not change.
 
-use std::time::Instant;
-
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_pcg::Pcg64Mcg;
@@ -10,8 +8,8 @@ use rayon::prelude::*;
 
 use super::votes::UNKNOWN;
 use crate::math::finite::{CHECKED, all_finite};
-use crate::pipeline::observer::{Observer, Progress, Signal};
-use crate::pipeline::train::trainer::LAMBDA;
+use crate::pipeline::observer::{Observer, Ticker};
+use crate::pipeline::train::device::LAMBDA;
 use crate::render::{
     AdamStep, DifferentiableRenderer, Features, FrameGradient, PhotoLoss, RenderError, RenderSettings,
 };
@@ -62,9 +60,9 @@ pub fn train_codes(
     let mut loss = PhotoLoss::default();
     let mut rng = Pcg64Mcg::seed_from_u64(training.seed);
     let (mut order, mut last): (Vec<usize>, Vec<f64>) = (Vec::new(), Vec::new());
-    let start = Instant::now();
+    let mut ticker = Ticker::new("Training codes", training.steps as usize);
     for step in 0..training.steps {
-        if views.is_empty() || observer.signal() == Signal::Cancel {
+        if views.is_empty() || observer.proceed().is_err() {
             break;
         }
         if order.is_empty() {
@@ -94,14 +92,7 @@ pub fn train_codes(
             all_finite("Adam on codes", "code", codes.as_flattened())?;
         }
         if step % 10 == 9 {
-            let elapsed_secs = start.elapsed().as_secs_f64();
-            observer.progress(Progress {
-                stage: "Training codes".into(),
-                done: step + 1,
-                total: training.steps,
-                elapsed_secs,
-                rate: (step + 1) as f64 / elapsed_secs.max(1e-9),
-            });
+            ticker.report(step + 1, observer);
         }
     }
     Ok(last.iter().sum::<f64>() / last.len().max(1) as f64)

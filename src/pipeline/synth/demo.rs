@@ -10,7 +10,7 @@ use super::{SynthError, SynthReport, render_scene};
 use crate::io::{files, gltf_mesh};
 use crate::pipeline::observer::Observer;
 
-/// The demo scene: a table-top of things with parts, written by [`crate::pipeline::demo_scene`].
+/// The demo scene: a table-top of things with parts, made by `tools/demo_scene`.
 pub fn demo_glb() -> &'static [u8] {
     include_bytes!("../../../assets/demo.glb")
 }

@@ -35,7 +35,7 @@ mod view;
 mod write;
 
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg32;
@@ -48,7 +48,7 @@ pub use options::{Levels, Rig, SynthOptions};
 use crate::io::IoError;
 use crate::io::gltf_mesh::{self, MeshScene};
 use crate::io::memory;
-use crate::pipeline::observer::{self, Observer, Progress, Signal};
+use crate::pipeline::observer::{self, Interrupted, Observer, Ticker};
 use crate::scene::Camera;
 
 /// Bytes that a pixel of a photo takes while it is rendered and written: colour, depth and ids, and
@@ -97,7 +97,7 @@ pub enum SynthError {
     Folder(#[from] IoError),
     /// The observer asked to stop.
     #[error("cancelled")]
-    Cancelled,
+    Interrupted(#[from] Interrupted),
 }
 
 /// What was made.
@@ -146,15 +146,9 @@ fn render_scene(
 ) -> Result<SynthReport, SynthError> {
     let start = Instant::now();
     for warning in &scene.warnings {
-        observer.note(observer::Level::Warning, warning.clone());
+        observer.note(observer::Severity::Warning, warning.clone());
     }
-    let progress = |done: usize, stage: &str, observer: &mut dyn Observer| {
-        let elapsed_secs = start.elapsed().as_secs_f64();
-        let rate = if done > 0 { done as f64 / elapsed_secs.max(1e-9) } else { 0.0 };
-        let (done, total) = (done as u64, options.views as u64);
-        observer.progress(Progress { stage: stage.into(), done, total, elapsed_secs, rate });
-    };
-    progress(0, "Building the scene", observer);
+    Ticker::new("Building the scene", options.views).report(0, observer);
     let mut identities = levels::identities(scene, options.levels, name)?;
     let stage = stage(scene, &identities)?;
     let cameras = rig::cameras(&stage.surface, &stage.tracer, options);
@@ -168,8 +162,9 @@ fn render_scene(
     let what = format!("a photo of {} x {} px", options.width_px, options.height_px);
     memory::room(what, photo_bytes, "make photos smaller with --size")?;
     let batch = (2 * rayon::current_num_threads()).min((memory::free() / photo_bytes) as usize).max(1);
+    let mut ticker = Ticker::new("Rendering photos", cameras.len());
+    observer.proceed()?;
     for first in (0..cameras.len()).step_by(batch) {
-        wait_or_cancel(observer)?;
         let last = (first + batch).min(cameras.len());
         let results: Vec<_> = (first..last)
             .into_par_iter()
@@ -189,7 +184,7 @@ fn render_scene(
                 }
             }
         }
-        progress(last, "Rendering photos", observer);
+        ticker.tick(last, observer)?;
     }
     cloud.truncate(options.points);
     let points = cloud.len();
@@ -226,16 +221,6 @@ fn held_out(options: &SynthOptions) -> Vec<bool> {
         test[rng.random_range(from..to)] = true;
     }
     test
-}
-
-fn wait_or_cancel(observer: &mut dyn Observer) -> Result<(), SynthError> {
-    loop {
-        match observer.signal() {
-            Signal::Continue => return Ok(()),
-            Signal::Cancel => return Err(SynthError::Cancelled),
-            Signal::Pause => std::thread::sleep(Duration::from_millis(20)),
-        }
-    }
 }
 
 /// nerfstudio's camera: 4x4 rows of world_from_camera with x right, y up, z back.

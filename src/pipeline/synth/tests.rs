@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use super::*;
 use crate::io::gltf_mesh::tests::{cubes, glb, real_scenes};
-use crate::pipeline::observer::Silent;
+use crate::pipeline::observer::{Signal, Silent};
 use crate::scene::Level;
 
 /// Two cubes: a small one in front of a larger one, as two objects.
@@ -373,7 +373,7 @@ fn cancelling_leaves_no_data_set() {
     let (out, _) = write(&small());
     assert!(out.path().join("transforms.json").is_file());
     let result = render_scene(&two_cubes(), "two", None, &small(), out.path(), &mut Stop);
-    assert!(matches!(result, Err(SynthError::Cancelled)));
+    assert!(matches!(result, Err(SynthError::Interrupted(_))));
     assert!(!out.path().join("transforms.json").exists());
 }
 

@@ -21,7 +21,7 @@ use crate::io::{IoError, SceneFolder, files};
 use crate::math::sh::coefficients;
 use crate::scene::GaussianCloud;
 
-pub use crate::io::scene_folder::CHECKPOINT_FILE as FILE;
+pub use crate::io::scene_files::CHECKPOINT_FILE as FILE;
 
 const MAGIC: &[u8; 8] = b"FMLGSCP2";
 /// How files of the first version begin, which end without a checksum.

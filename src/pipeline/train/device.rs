@@ -2,11 +2,26 @@
 //! there from step to step; the host sees them when it asks.
 
 use super::TrainView;
-use super::trainer::{LAMBDA, StepResult};
 use crate::render::{
     DensityStats, Device, DevicePhoto, DeviceTrainer, GpuError, Rates, RenderSettings, StepLoss, TrainerSettings,
 };
 use crate::scene::GaussianCloud;
+
+/// Weight of D-SSIM in the loss.
+pub const LAMBDA: f64 = 0.2;
+
+/// What one step measured.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StepResult {
+    /// Loss of the photo before the step.
+    pub loss: f64,
+    /// PSNR of the photo before the step, dB.
+    pub psnr: f64,
+    /// Gaussians whose gradient was not finite and that were left as they are.
+    pub skipped: usize,
+    /// Gradients that were cut because they were far above what their parameters had seen.
+    pub outliers: usize,
+}
 
 /// A run on a GPU.
 pub struct DeviceRun {

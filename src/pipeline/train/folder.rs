@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use super::TrainConfig;
 use super::checkpoint::{self, Checkpoint, CheckpointError};
-use super::run::{TrainEnd, TrainError, TrainOutcome};
+use super::outcome::{TrainEnd, TrainError, TrainOutcome};
 use crate::io::trained::{self, CLOUD_FILE};
 use crate::io::{IoError, SceneFolder, semantic_map};
-use crate::pipeline::observer::{Level, Observer};
+use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::semantics::carry;
 use crate::scene::{Dataset, GaussianCloud, SemanticMap};
 
@@ -86,7 +86,9 @@ pub(super) fn objects_for(
     }
     let before = trained::load(folder)
         .and_then(|s| Ok((semantic_map::load(folder, s.state.as_deref(), &s.cloud)?, s.cloud)))
-        .inspect_err(|e| observer.note(Level::Warning, format!("Its objects and parts cannot be carried over: {e}")));
+        .inspect_err(|e| {
+            observer.note(Severity::Warning, format!("Its objects and parts cannot be carried over: {e}"))
+        });
     let before = before.ok().and_then(|(map, cloud)| Some((map?, cloud)));
     if let Some((map, old)) = &before
         && (old.origin, &old.positions) == (cloud.origin, &cloud.positions)
@@ -94,7 +96,7 @@ pub(super) fn objects_for(
         return Ok(Some(map.clone()));
     }
     if let Some(kept) = scene.keep_earlier()? {
-        observer.note(Level::Info, format!("The scene as it was before is kept in {}", kept.display()));
+        observer.note(Severity::Info, format!("The scene as it was before is kept in {}", kept.display()));
     }
     Ok(before.map(|(map, old)| {
         let (map, share) = carry::carry(&map, &old, cloud);
@@ -103,7 +105,7 @@ pub(super) fn objects_for(
              them anew",
             100.0 * share
         );
-        observer.note(Level::Info, text);
+        observer.note(Severity::Info, text);
         map
     }))
 }

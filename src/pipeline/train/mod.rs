@@ -9,18 +9,20 @@ pub mod checkpoint;
 mod coarse;
 pub mod config;
 pub mod density;
-mod device;
+pub mod device;
 mod folder;
 pub mod geometry;
 pub mod init;
+mod outcome;
 mod photos;
 mod run;
 pub mod schedule;
 pub mod trainer;
 
 pub use config::TrainConfig;
+pub use outcome::{TrainEnd, TrainError, TrainOutcome};
 pub use photos::load_views;
-pub use run::{TrainEnd, TrainError, TrainOutcome, run};
+pub use run::run;
 
 use crate::scene::{Camera, PhotoPixels};
 

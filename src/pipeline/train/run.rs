@@ -8,18 +8,19 @@ use std::time::Instant;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
-use super::checkpoint::{self, Checkpoint, CheckpointError, Header};
+use super::checkpoint::{self, Checkpoint, Header};
+use super::device::StepResult;
 use super::folder::{claim, finished, objects_for, resumable};
-use super::photos::{load_views, wait};
-use super::trainer::{REPORT_STEPS, StepError, StepResult, Trainer};
+use super::outcome::{TrainEnd, TrainError, TrainOutcome};
+use super::photos::load_views;
+use super::trainer::{REPORT_STEPS, StepError, Trainer};
 use super::{TrainConfig, TrainView, coarse, density, geometry, init};
+use crate::io::SceneFolder;
 use crate::io::trained::{History, SceneInfo};
-use crate::io::{IoError, SceneFolder};
-use crate::math::finite::NotFinite;
 use crate::math::stats::{mean, median};
 use crate::pipeline::evaluate::evaluate;
-use crate::pipeline::observer::{Evaluation, Level, Observer, Progress, Signal, StepMetrics};
-use crate::render::{BackendChoice, Device, GpuError, RenderError};
+use crate::pipeline::observer::{Observer, Severity, StepMetrics, Ticker};
+use crate::render::{BackendChoice, Device};
 use crate::scene::{Dataset, GaussianCloud};
 
 /// Steps between copies of the cloud to roll back to.
@@ -28,62 +29,6 @@ const SAFE_STEPS: u64 = 500;
 const DIVERGED: f64 = 10.0;
 /// How often a run may diverge before it gives up.
 const MAX_ROLLBACKS: u32 = 4;
-
-/// How a run ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TrainEnd {
-    /// All steps were done.
-    Finished,
-    /// The observer asked to stop; the state is saved.
-    Cancelled,
-}
-
-/// What a run leaves behind.
-#[derive(Clone, Debug)]
-pub struct TrainOutcome {
-    /// The Gaussians.
-    pub cloud: Arc<GaussianCloud>,
-    /// Held-out evaluations, the last one of the final state.
-    pub evaluations: Vec<Evaluation>,
-    /// How it ended.
-    pub end: TrainEnd,
-    /// Steps done.
-    pub steps: u64,
-    /// Seconds of training.
-    pub secs: f64,
-}
-
-/// Why a run failed.
-#[derive(Debug, thiserror::Error)]
-pub enum TrainError {
-    /// No photo to train on.
-    #[error("{0} has no photo to train on: {1} photos, all held out; lower --holdout or add photos")]
-    NoPhotos(String, usize),
-    /// A photo could not be read.
-    #[error(transparent)]
-    Photo(IoError),
-    /// A view could not be drawn.
-    #[error("photo {0}: {1}")]
-    Render(String, RenderError),
-    /// The GPU failed. The last checkpoint is intact.
-    #[error("the GPU failed: {0}; --backend cpu does without")]
-    Gpu(#[from] GpuError),
-    /// The checkpoint in the result's folder cannot be used.
-    #[error(transparent)]
-    Checkpoint(#[from] CheckpointError),
-    /// The result could not be saved.
-    #[error(transparent)]
-    Save(IoError),
-    /// The loss kept growing.
-    #[error("the training diverged {0} times even with lowered rates; the photos' poses may be wrong")]
-    Diverged(u32),
-    /// A stage left a number that is none; looked for under `debug-validation` only.
-    #[error(transparent)]
-    NotFinite(#[from] NotFinite),
-    /// Settings that make no sense.
-    #[error("{0}")]
-    Config(String),
-}
 
 /// Trains on `dataset` and saves into the folder `out`, if given. A checkpoint of the same run in
 /// that folder is continued; where that run is finished, nothing is done. Objects and parts that the
@@ -111,7 +56,7 @@ pub fn run(
     if let (Some(folder), Some(saved)) = (out, &saved)
         && let Some(done) = finished(folder, saved, config)?
     {
-        observer.note(Level::Info, format!("All {} steps were done before; nothing has changed", config.steps));
+        observer.note(Severity::Info, format!("All {} steps were done before; nothing has changed", config.steps));
         observer.cloud(Arc::clone(&done.cloud), done.steps);
         return Ok(done);
     }
@@ -123,14 +68,14 @@ pub fn run(
     };
     views.shrink_to_fit();
     let mut job = Job::start(dataset, config, scene, &held, views, tests, saved);
-    let told = |why| observer.note(Level::Warning, why);
+    let told = |why| observer.note(Severity::Warning, why);
     job.device = if config.needs_cpu() { None } else { config.backend.gpu(told)? };
     match &job.device {
         Some(device) => {
-            observer.note(Level::Info, format!("Training on {}", device.describe()));
+            observer.note(Severity::Info, format!("Training on {}", device.describe()));
             job.trainer.move_to(device, job.coarse.as_ref().unwrap_or(&job.views))?;
         }
-        None => observer.note(Level::Info, "Training on the CPU".into()),
+        None => observer.note(Severity::Info, "Training on the CPU".into()),
     }
     let end = job.train(observer)?;
     job.finish(end, observer)
@@ -261,20 +206,20 @@ impl<'a> Job<'a> {
 
     fn train(&mut self, observer: &mut dyn Observer) -> Result<TrainEnd, TrainError> {
         if self.trainer.step > 0 {
-            observer.note(Level::Info, format!("Continuing at step {} of {}", self.trainer.step, self.config.steps));
+            observer.note(Severity::Info, format!("Continuing at step {} of {}", self.trainer.step, self.config.steps));
         }
         if self.trainer.cloud.len() > self.trainer.budget {
             let (have, may) = (self.trainer.cloud.len(), self.trainer.budget);
             observer.note(
-                Level::Warning,
+                Severity::Warning,
                 format!("{have} Gaussians to start from are over the budget of {may}; none will be added"),
             );
         }
-        let mut meter = Meter::default();
+        let mut ticker = Ticker::resumed("Training", self.config.steps, self.trainer.step, self.secs);
         let mut window = Window::default();
         let mut saved_at = Instant::now();
         while self.trainer.step < self.config.steps {
-            if wait(observer) == Signal::Cancel {
+            if ticker.proceed(observer).is_err() {
                 return Ok(TrainEnd::Cancelled);
             }
             let start = Instant::now();
@@ -294,13 +239,7 @@ impl<'a> Job<'a> {
                 self.history.steps.push(metrics);
                 observer.step(metrics);
             }
-            observer.progress(Progress {
-                stage: "Training".into(),
-                done: step,
-                total: self.config.steps,
-                elapsed_secs: self.secs,
-                rate: meter.rate(step, self.secs),
-            });
+            ticker.report(step, observer);
             if observer.wants_cloud() {
                 self.trainer.fetch_cloud()?;
                 observer.cloud(Arc::new(self.trainer.cloud.clone()), step);
@@ -313,12 +252,12 @@ impl<'a> Job<'a> {
                 match self.checkpoint() {
                     // A full disk now is no reason to lose what is in memory.
                     Err(TrainError::Save(e)) if !std::mem::replace(&mut self.unsaved, true) => {
-                        observer.note(Level::Warning, format!("No checkpoint was saved, the training goes on: {e}"));
+                        observer.note(Severity::Warning, format!("No checkpoint was saved, the training goes on: {e}"));
                     }
                     Err(TrainError::Save(_)) => {}
                     Err(e) => return Err(e),
                     Ok(()) if std::mem::take(&mut self.unsaved) => {
-                        observer.note(Level::Info, "Checkpoints are saved again".into());
+                        observer.note(Severity::Info, "Checkpoints are saved again".into());
                     }
                     Ok(()) => {}
                 }
@@ -342,12 +281,13 @@ impl<'a> Job<'a> {
         for result in &results {
             if result.skipped > 0 && self.trainer.step % 100 == 0 {
                 let text = format!("{} Gaussians had a gradient that is not finite", result.skipped);
-                observer.note(Level::Warning, text);
+                observer.note(Severity::Warning, text);
             }
             self.outliers += result.outliers as u64;
             if self.outliers > 0 && self.trainer.step % 100 == 0 {
                 let count = std::mem::take(&mut self.outliers);
-                observer.note(Level::Warning, format!("{count} gradients were far above what is usual, and were cut"));
+                observer
+                    .note(Severity::Warning, format!("{count} gradients were far above what is usual, and were cut"));
             }
             if self.diverges(result.loss) {
                 self.roll_back(result.loss, observer)?;
@@ -357,7 +297,7 @@ impl<'a> Job<'a> {
         if let Some(report) = self.trainer.control_density().map_err(|e| self.failed(e))? {
             if report.refused > 0 && !self.full {
                 self.full = true;
-                observer.note(Level::Info, format!("The budget of {} Gaussians is reached", self.trainer.budget));
+                observer.note(Severity::Info, format!("The budget of {} Gaussians is reached", self.trainer.budget));
             }
             self.recent.clear();
         }
@@ -399,7 +339,7 @@ impl<'a> Job<'a> {
             "Step {}: the loss is {loss:.3}, far above what it was; back to the last good state with halved rates",
             self.trainer.step
         );
-        observer.note(Level::Warning, text);
+        observer.note(Severity::Warning, text);
         self.trainer.roll_back(self.safe.clone())?;
         self.recent.clear();
         Ok(())
@@ -478,22 +418,5 @@ impl Window {
         if psnr.is_finite() {
             self.psnrs.push(psnr);
         }
-    }
-}
-
-/// Steps per second over the last few seconds.
-#[derive(Default)]
-struct Meter {
-    marks: VecDeque<(u64, f64)>,
-}
-
-impl Meter {
-    fn rate(&mut self, step: u64, secs: f64) -> f64 {
-        self.marks.push_back((step, secs));
-        while self.marks.len() > 2 && self.marks[1].1 < secs - 3.0 {
-            self.marks.pop_front();
-        }
-        let (first, since) = self.marks[0];
-        if secs > since { (step - first) as f64 / (secs - since) } else { 0.0 }
     }
 }

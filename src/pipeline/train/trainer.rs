@@ -6,7 +6,7 @@ use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
 use super::density::{self, DensityReport, DensityStats};
-use super::device::DeviceRun;
+use super::device::{DeviceRun, LAMBDA, StepResult};
 use super::geometry::Geometry;
 use super::schedule::Schedule;
 use super::{TrainConfig, TrainView};
@@ -20,25 +20,10 @@ use crate::render::{
 };
 use crate::scene::{Camera, Gaussian, GaussianCloud};
 
-/// Weight of D-SSIM in the loss.
-pub const LAMBDA: f64 = 0.2;
 /// Steps between measurements that are reported.
 pub const REPORT_STEPS: u64 = 10;
 /// Gaussians that one task updates.
 const BLOCK: usize = 512;
-
-/// What one step measured.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct StepResult {
-    /// Loss of the photo before the step.
-    pub loss: f64,
-    /// PSNR of the photo before the step, dB.
-    pub psnr: f64,
-    /// Gaussians whose gradient was not finite and that were left as they are.
-    pub skipped: usize,
-    /// Gradients that were cut because they were far above what their parameters had seen.
-    pub outliers: usize,
-}
 
 /// Why a step failed.
 #[derive(Debug, thiserror::Error)]

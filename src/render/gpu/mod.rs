@@ -14,7 +14,6 @@ pub mod device;
 pub mod error;
 pub mod kernel;
 pub mod layout;
-pub mod measure;
 pub mod project;
 pub mod project_backward;
 pub mod rasterizer;

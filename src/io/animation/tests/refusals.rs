@@ -127,7 +127,7 @@ fn wrong_frames_and_no_frames_are_refused() {
 fn a_full_disk_is_named() {
     use std::io::Write;
 
-    use crate::io::atomic::write_error;
+    use crate::io::error::write_error;
     let mut full = fs::OpenOptions::new().write(true).open("/dev/full").expect("open");
     let cause = full.write_all(b"x").expect_err("full");
     let e = AnimationError::from(write_error("a.mp4".as_ref(), cause)).to_string();

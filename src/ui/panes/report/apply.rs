@@ -5,12 +5,12 @@ use serde_json::{Map, Value};
 
 use super::super::super::layout::Layout;
 use super::super::super::viewport::drawing::{Drawing, share};
+use crate::measure::{Knobs, Point, Stage, StageName, turned};
 use crate::pipeline::train::TrainConfig;
 use crate::render::{Cutoffs, RenderSettings};
-use crate::report::{Knobs, Point, Stage, StageName, turned};
 use crate::worker::Action;
 
-/// The settings in force.
+/// The settings that are active.
 pub struct Now<'a> {
     /// Of the next training.
     pub config: &'a TrainConfig,
@@ -38,8 +38,8 @@ pub struct Change {
 pub enum Offer {
     /// It changes this.
     Changes(Vec<Change>, Action),
-    /// It is in force already.
-    InForce,
+    /// It is active already.
+    Active,
     /// It cannot be taken over, because.
     Not(String),
 }
@@ -55,7 +55,7 @@ pub fn offer(stage: &Stage, point: &Point, now: &Now<'_>) -> Offer {
         _ => Err("The window has no setting for this knob.".into()),
     };
     match result {
-        Ok((changes, _)) if changes.is_empty() => Offer::InForce,
+        Ok((changes, _)) if changes.is_empty() => Offer::Active,
         Ok((changes, action)) => Offer::Changes(changes, action),
         Err(why) => Offer::Not(why),
     }
@@ -84,7 +84,7 @@ fn drawing(stage: &Stage, point: &Point, now: &Now<'_>) -> Taken {
     knobs.retain(|name, _| names.contains_key(name));
     let then = turned(now.drawing, &knobs).map_err(|e| format!("The report does not fit this version: {e}."))?;
     if let Some(problem) = then.problem() {
-        return Err(format!("It makes no picture: {problem}."));
+        return Err(format!("It makes no image: {problem}."));
     }
     if now.on_gpu && then.cutoffs.is_some_and(|c| c != Cutoffs::default()) {
         return Err("The GPU draws with the default cut-offs; others are for the CPU.".into());
@@ -126,7 +126,7 @@ fn changes<T: Serialize>(before: &T, after: &T, knobs: &Knobs) -> Vec<Change> {
     knobs.keys().filter(differs).map(change).collect()
 }
 
-/// A value for people.
+/// A value as it is shown.
 fn words(value: &Value) -> String {
     match value {
         Value::Null => "automatic".into(),
@@ -168,7 +168,7 @@ mod tests {
             seeds: vec![0],
             planned: points.len(),
             measures: Vec::new(),
-            rule: crate::report::Rule { measure: String::new(), times: 1.0, floor: 0.0, spare_secs: 0.0 },
+            rule: crate::measure::Rule { measure: String::new(), times: 1.0, floor: 0.0, spare_secs: 0.0 },
             points,
             orders: Vec::new(),
             left_out: Vec::new(),
@@ -192,7 +192,7 @@ mod tests {
         let change = Change { name: "coarse share".into(), from: "0.0".into(), to: "0.3".into() };
         assert_eq!(changes, [change]);
         assert_eq!(turned(&config, &knobs).expect("fits"), TrainConfig { coarse_share: 0.3, ..config.clone() });
-        assert_eq!(offer(&s, &s.points[2], &now), Offer::InForce);
+        assert_eq!(offer(&s, &s.points[2], &now), Offer::Active);
         let Offer::Changes(changes, Action::ApplySetting(_, knobs)) = offer(&s, &default, &now) else {
             panic!("steps differ");
         };
@@ -215,7 +215,7 @@ mod tests {
         };
         assert_eq!(changes[0].from, "alpha 1/255, transmittance 1e-4");
         assert_eq!(changes[0].to, "alpha 1/64, transmittance 1e-4");
-        assert_eq!(offer(&s, &default, &here), Offer::InForce);
+        assert_eq!(offer(&s, &default, &here), Offer::Active);
         let chosen = turned(&drawing, &knobs).expect("fits");
         let Offer::Changes(_, Action::ApplySetting(_, back)) = offer(&s, &default, &now(&config, Some(&own), &chosen))
         else {

@@ -24,7 +24,7 @@ pub fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
                 p.done, p.total
             ));
         } else {
-            ui.weak("Drawing the exact pictures that all others are held against.");
+            ui.weak("Drawing the exact images that all others are compared with.");
         }
         if ui.add(egui::Button::new("Cancel").min_size(vec2(92.0, 28.0))).clicked() {
             actions.push(Action::Cancel);
@@ -34,7 +34,7 @@ pub fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     ui.horizontal_wrapped(|ui| {
         let size = vec2(0.0, 28.0);
         if state.is_trained() {
-            let button = theme::primary_button("Measure drawing of this scene").min_size(size);
+            let button = theme::primary_button("Benchmark rendering of this scene").min_size(size);
             let response = ui.add_enabled(state.job.is_none(), button);
             let disabled = "Another job is running; it would falsify the times.";
             if response.on_hover_text(Action::MeasureDrawing.tooltip()).on_disabled_hover_text(disabled).clicked() {

@@ -1,5 +1,5 @@
 //! Error against run time: a report's measurements as a plot, what they say of the defaults, and the
-//! way from a measured setting to one in force.
+//! way from a measured setting to an active one.
 
 pub mod apply;
 mod empty;
@@ -15,10 +15,10 @@ use super::super::layout::Layout;
 use super::super::state::{AppState, ShownReport};
 use super::super::viewport::Viewport;
 use super::super::{format, theme};
-use crate::report::{Measure, Point, Report, Stage, StageName, table};
+use crate::measure::{Measure, Point, Report, Stage, StageName, table};
 use crate::worker::Action;
 
-/// What a person looks at in a report.
+/// What is shown of a report.
 #[derive(Default)]
 pub struct ReportPane {
     stage: Option<StageName>,
@@ -48,7 +48,7 @@ impl ReportPane {
         let report = &*shown.report;
         self.header(ui, &shown, second.as_ref(), state, actions);
         let Some(stage) = self.stage_of(report) else {
-            ui.weak("Nothing was measured yet: the report has no stage. Run the same command again to go on.");
+            ui.weak("Nothing was measured yet: the report has no stage. Run the same command again to resume.");
             return;
         };
         let Some(measure) = self.measure_of(stage) else {
@@ -173,7 +173,7 @@ impl ReportPane {
             button(ui, "Open\u{2026}", &Action::ChooseReport, true, actions);
             button(ui, "Compare\u{2026}", &Action::ChooseSecondReport, true, actions);
             let can_measure = state.is_trained() && state.job.is_none();
-            button(ui, "Measure drawing", &Action::MeasureDrawing, can_measure, actions);
+            button(ui, "Benchmark rendering", &Action::MeasureDrawing, can_measure, actions);
         });
     }
 }
@@ -213,7 +213,7 @@ fn warnings(ui: &mut Ui, stage: &Stage, report: &Report, second: Option<&Report>
     if !stage.complete() {
         let done = stage.points.iter().filter(|p| p.secs.each.len() >= stage.seeds.len()).count();
         let text = format!(
-            "Not complete: {done} of {} settings were measured {} times. The same command goes on with the rest.",
+            "Not complete: {done} of {} settings were measured {} times. The same command measures the rest.",
             stage.planned,
             stage.seeds.len()
         );
@@ -253,8 +253,8 @@ fn chosen(ui: &mut Ui, stage: &Stage, selected: Option<&Point>, now: &Now<'_>, a
                     actions.push(action);
                 }
             }
-            Offer::InForce => {
-                ui.colored_label(theme::GOOD, "In force: applying it would change nothing.");
+            Offer::Active => {
+                ui.colored_label(theme::GOOD, "Already active: applying it would change nothing.");
             }
             Offer::Not(why) => {
                 ui.label(RichText::new(why).color(theme::WEAK));
@@ -266,7 +266,7 @@ fn chosen(ui: &mut Ui, stage: &Stage, selected: Option<&Point>, now: &Now<'_>, a
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::{Computer, Rule, Sample, VERSION};
+    use crate::measure::{Computer, Rule, Sample, VERSION};
     use std::collections::BTreeMap;
     use std::sync::Arc;
 
@@ -292,7 +292,7 @@ mod tests {
             input: BTreeMap::new(),
             seeds: vec![0],
             planned: 3,
-            measures: vec![Measure::new("PSNR", "dB", crate::report::Form::Decibels, "")],
+            measures: vec![Measure::new("PSNR", "dB", crate::measure::ErrorKind::Decibels, "")],
             rule: Rule { measure: "PSNR".into(), times: 1.0, floor: 0.0, spare_secs: 0.0 },
             points: vec![point("default", "all", 2.0), point("steps", "500", 1.0), point("steps", "50", 0.1)],
             orders: Vec::new(),

@@ -1,12 +1,12 @@
-//! Logarithmic axes for a plot that has none: places are decimal logarithms, marks are where people
-//! expect them.
+//! Logarithmic axes for a plot that has none: places are decimal logarithms, marks are where they are
+//! expected.
 
 use std::ops::RangeInclusive;
 
 use egui_plot::GridMark;
 
-use crate::report::plot;
-use crate::report::{Measure, Point, Sample};
+use crate::measure::plot;
+use crate::measure::{Measure, Point, Sample};
 
 /// Spans of fewer decades than this get evenly spaced marks, as on a common axis.
 const SMALL: f64 = 0.5;
@@ -98,7 +98,7 @@ fn rounded(v: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::document::Form;
+    use crate::measure::document::ErrorKind;
 
     fn point(secs: [f64; 3], values: [f64; 3]) -> Point {
         let mut p = Point::default();
@@ -110,13 +110,13 @@ mod tests {
 
     #[test]
     fn places_are_logarithms_of_time_and_error() {
-        let psnr = Measure::new("PSNR", "dB", Form::Decibels, "");
+        let psnr = Measure::new("PSNR", "dB", ErrorKind::Decibels, "");
         let p = point([0.1, 0.01, 1.0], [40.0, 20.0, 60.0]);
         assert_eq!(place(&p, &psnr), Some([-1.0, -2.0]), "40 dB are an error of a hundredth");
         let [time, error] = whiskers(&p, &psnr).expect("measured");
         assert_eq!(time, [[-2.0, -2.0], [0.0, -2.0]]);
         assert_eq!(error, [[-1.0, -1.0], [-1.0, -3.0]]);
-        let other = Measure::new("SSIM", "", Form::Share, "");
+        let other = Measure::new("SSIM", "", ErrorKind::Share, "");
         assert!(place(&p, &other).is_none() && whiskers(&p, &other).is_none());
     }
 

@@ -1,16 +1,16 @@
-//! Error over seconds, both logarithmic: one colour per knob, the Pareto front, the repeats' spread.
+//! Error over seconds, both logarithmic: one color per knob, the Pareto front, the repeats' spread.
 
 use egui::{Color32, Response, Stroke, Ui, Vec2b};
 use egui_plot::{Corner, Legend, Line, MarkerShape, Plot, PlotPoint, PlotPoints, PlotTransform, Points};
 
 use super::super::super::theme;
 use super::scale;
-use crate::report::plot::{COLORS, LEAST};
-use crate::report::{Measure, Point, Stage, table};
+use crate::measure::plot::{COLORS, LEAST};
+use crate::measure::{Measure, Point, Stage, table};
 
 /// How near the pointer must be to a point, in window points.
 const NEAR: f32 = 14.0;
-/// Shapes of knobs, in turn with each round of colours.
+/// Shapes of knobs, in turn with each round of colors.
 const SHAPES: [MarkerShape; 3] = [MarkerShape::Circle, MarkerShape::Diamond, MarkerShape::Square];
 
 /// What is drawn.
@@ -95,7 +95,7 @@ impl<'a> Scatter<'a> {
             self.series(method, k, &mut items);
         }
         for p in self.second.into_iter().flat_map(|s| &s.points) {
-            // Knobs that only the second has are grey.
+            // Knobs that only the second has are gray.
             let k = methods.iter().position(|m| *m == p.method);
             let color = k.map_or(theme::WEAK, color);
             let shape = k.map_or(MarkerShape::Circle, shape);
@@ -121,7 +121,7 @@ impl<'a> Scatter<'a> {
     fn series(&self, method: &str, k: usize, items: &mut Vec<Item>) {
         let color = color(k);
         let points: Vec<&Point> = self.stage.points.iter().filter(|p| p.method == method).collect();
-        // What has the series' name has its colour, too: the legend shows one.
+        // What has the series' name has its color, too: the legend shows one.
         let line = |name: &str, places: Vec<[f64; 2]>, style: Stroke| {
             Item::Line(Line::new(name, PlotPoints::from(places)).stroke(style).allow_hover(false))
         };
@@ -193,7 +193,7 @@ impl Item {
     }
 }
 
-/// Colour of the knob with this number: those of the report's own pictures, lighter on dark ground.
+/// Color of the knob with this number: those of the report's own plots, lighter on dark ground.
 pub fn color(k: usize) -> Color32 {
     let [r, g, b] = COLORS[k % COLORS.len()].map(|v| v + (255 - v) / 4);
     Color32::from_rgb(r, g, b)
@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn series_differ_in_colour_or_shape() {
+    fn series_differ_in_color_or_shape() {
         let looks: Vec<_> = (0..14).map(|k| (color(k), shape(k))).collect();
         assert!((0..14).all(|i| (0..i).all(|j| looks[i] != looks[j])));
     }

@@ -4,7 +4,7 @@ use egui::{Color32, Grid, RichText, Ui};
 
 use super::super::super::{format, theme};
 use super::scatter;
-use crate::report::{Comparison, Measure, Point, Report, Stage, table};
+use crate::measure::{Comparison, Measure, Point, Report, Stage, table};
 
 /// Letters of a setting that are shown in a table.
 const MOST_LETTERS: usize = 34;

@@ -1,0 +1,70 @@
+//! Timings of drawing, training and queries, stage by stage: what `fmlgs bench` prints. Every number is a median
+//! over repeats in one process; compare only numbers of one run.
+
+pub(crate) mod cpu;
+pub mod gpu;
+pub(crate) mod query;
+
+pub use cpu::{label, one_core_limit, views_of};
+
+use serde::Serialize;
+
+use self::cpu::{RenderTiming, StepTiming};
+use self::gpu::Timing;
+use self::query::QueryTiming;
+use super::table::{Rows, rows};
+
+/// Everything that one run has measured.
+#[derive(Debug, Default, Serialize)]
+pub struct Timings {
+    /// Drawing on the CPU.
+    pub render: Vec<RenderTiming>,
+    /// Training on the CPU.
+    pub train: Vec<StepTiming>,
+    /// Name and features of the GPU, if it was asked for.
+    pub gpu: Option<String>,
+    /// Drawing on the GPU.
+    pub gpu_render: Vec<Timing>,
+    /// Training on the GPU.
+    pub gpu_train: Vec<Timing>,
+    /// What one core could do at most (see [`one_core_limit`]).
+    pub one_core_products_per_sec: f64,
+    /// Typed queries, if they were asked for.
+    pub queries: Option<QueryTiming>,
+}
+
+impl Timings {
+    /// A table of each kind, with a line about it.
+    pub fn tables(&self) -> Vec<(Rows, String)> {
+        let size = |[w, h]: [u32; 2]| format!("{w}x{h}");
+        let mut all: Vec<(Rows, String)> = self.queries.iter().map(QueryTiming::table).collect();
+        let head = ["drawing, CPU", "Gaussians", "size", "ms", "project", "sort", "bin", "blend", "products", "per s"];
+        let drawn = self.render.iter().map(|t| {
+            let mut row = vec![t.name.clone(), t.gaussians.to_string(), size(t.size), format!("{:.1}", t.total_ms)];
+            row.extend(t.stages_ms.iter().map(|ms| format!("{ms:.1}")));
+            row.extend([format!("{:.1e}", t.products), format!("{:.2e}", t.products_per_sec)]);
+            row
+        });
+        all.push((rows(&head, drawn), String::new()));
+        let head = ["training step, CPU", "Gaussians", "size", "ms", "steps per s"];
+        let trained = self.train.iter().map(|t| {
+            let speed = [format!("{:.1}", t.step_ms), format!("{:.2}", t.steps_per_sec)];
+            [vec![t.name.clone(), t.gaussians.to_string(), size(t.size)], speed.to_vec()].concat()
+        });
+        all.push((rows(&head, trained), String::new()));
+        for (what, timings) in [("drawing, GPU", &self.gpu_render), ("training step, GPU", &self.gpu_train)] {
+            let head = [what, "Gaussians", "size", "ms", "stages, ms"];
+            let timed = timings.iter().map(|t| {
+                let stages: Vec<String> = t.stages_ms.iter().map(|(name, ms)| format!("{name} {ms:.2}")).collect();
+                let row = [t.name.clone(), t.gaussians.to_string(), size(t.size), format!("{:.2}", t.total_ms)];
+                [row.to_vec(), vec![stages.join(", ")]].concat()
+            });
+            all.push((rows(&head, timed), String::new()));
+        }
+        all.retain(|(rows, _)| rows.len() > 1);
+        let limit = format!("one core at most: {:.2e} products per s", self.one_core_products_per_sec);
+        all.extend(self.gpu.iter().map(|gpu| (Rows::new(), format!("GPU: {gpu}"))));
+        all.push((Rows::new(), limit));
+        all
+    }
+}

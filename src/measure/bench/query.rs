@@ -1,0 +1,174 @@
+//! How long a typed query takes, stage by stage, on a made-up view with many identities.
+
+use std::time::Instant;
+
+use rand::seq::IndexedRandom;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use serde::Serialize;
+
+use super::super::table::{Rows, rows};
+use crate::math::stats::quantile;
+use crate::math::vector::unit;
+use crate::models::{Encoder, ModelError};
+use crate::pipeline::semantics::answer::{Language, by_meaning, phrases_of};
+use crate::pipeline::semantics::codes::{self, TOLERANCE};
+use crate::pipeline::semantics::grammar::{Kind, Phrase};
+use crate::pipeline::semantics::matching;
+use crate::pipeline::semantics::meaning::{MeaningOptions, Phrasebook};
+use crate::pipeline::semantics::stages::{Stages, StagesMs, ms_since};
+use crate::pipeline::semantics::view_map::ViewMap;
+use crate::scene::language::MAX_VIEWS;
+use crate::scene::{Identities, IdentityId, LanguageFeatures, Level, NOBODY, ViewFeatures};
+
+/// Median and 95th percentile, ms.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Percentiles {
+    /// Half of the queries take no longer.
+    pub p50_ms: f64,
+    /// 95 of 100 take no longer.
+    pub p95_ms: f64,
+}
+
+/// Times of the stages of a query.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct QueryTiming {
+    pub encoder: String,
+    pub identities: usize,
+    /// Size of the view, px.
+    pub size: [usize; 2],
+    pub queries: usize,
+    /// Each stage; what is drawn is the heat map.
+    #[serde(flatten)]
+    pub stages: Stages<Percentiles>,
+    pub without_encoding: Percentiles,
+    /// From the text to the mask.
+    pub whole: Percentiles,
+}
+
+impl QueryTiming {
+    /// A row for each stage, and what was asked.
+    pub(super) fn table(&self) -> (Rows, String) {
+        let stages = [
+            ("text encoding", self.stages.encode),
+            ("relevancy", self.stages.relevancy),
+            ("localisation", self.stages.localise),
+            ("mask", self.stages.mask),
+            ("heat map", self.stages.draw),
+            ("without text encoding", self.without_encoding),
+            ("whole", self.whole),
+        ];
+        let row =
+            |(name, p): (&str, Percentiles)| vec![name.into(), format!("{:.3}", p.p50_ms), format!("{:.3}", p.p95_ms)];
+        let [w, h] = self.size;
+        let what = format!(
+            "{} queries, {} identities, {w} x {h} px, encoder '{}'",
+            self.queries, self.identities, self.encoder
+        );
+        (rows(&["query stage", "p50 ms", "p95 ms"], stages.into_iter().map(row)), what)
+    }
+}
+
+/// Words that queries are made of.
+const COLORS: [&str; 6] = ["red", "blue", "green", "yellow", "white", "black"];
+const THINGS: [&str; 8] = ["controller", "mug", "kettle", "lamp", "camera", "book", "car", "jar"];
+const PARTS: [&str; 6] = ["button", "handle", "lid", "shade", "lens", "wheel"];
+
+/// Asks `queries` questions of a view of `size` px with `identities` objects and parts. Every text is
+/// another one, so none is encoded already.
+pub fn time(
+    encoder: &mut dyn Encoder,
+    identities: usize,
+    size: [usize; 2],
+    queries: usize,
+) -> Result<QueryTiming, ModelError> {
+    let mut rng = Pcg64Mcg::seed_from_u64(1);
+    let all = scene(identities);
+    let features = features(&mut rng, &all, encoder);
+    let map = view(&mut rng, identities, size);
+    let mut each: Vec<StagesMs> = Vec::with_capacity(queries);
+    // Canonical phrases are encoded when a scene opens, once.
+    let mut canonical = Phrasebook::default();
+    canonical.learn(&[], |p| encoder.text(p))?;
+    for _ in 0..queries {
+        let word = |list: &[&str], rng: &mut Pcg64Mcg| list.choose(rng).copied().unwrap_or("mug").to_owned();
+        let (color, thing) = (word(&COLORS, &mut rng), word(&THINGS, &mut rng));
+        let text = match rng.random_bool(0.5) {
+            true => format!("the {} of the {color} {thing}", word(&PARTS, &mut rng)),
+            false => format!("a {color} {thing}"),
+        };
+        let mut phrases = canonical.clone();
+        let start = Instant::now();
+        let Some(phrase) = Phrase::parse(&text) else { continue };
+        phrases.learn(&phrases_of(&phrase), |p| encoder.text(p))?;
+        let encode = ms_since(start);
+        let language = Language { features: &features, phrases: &phrases, options: MeaningOptions::default() };
+        let answered = by_meaning(&all, &phrase, Kind::Auto, language);
+        let target = answered.answer.hits().first().map_or(NOBODY, |h| h.identity);
+        let start = Instant::now();
+        let pixels = matching::exact(&map, &all, target, TOLERANCE);
+        let mask = ms_since(start);
+        let start = Instant::now();
+        let heat = answered.heat(&map);
+        let draw = ms_since(start);
+        std::hint::black_box((pixels, heat));
+        each.push(StagesMs { encode, mask, draw, ..answered.stages });
+    }
+    let percentiles = |of: &dyn Fn(&StagesMs) -> f64| {
+        let ms: Vec<f64> = each.iter().map(of).collect();
+        Percentiles { p50_ms: quantile(&ms, 0.5), p95_ms: quantile(&ms, 0.95) }
+    };
+    Ok(QueryTiming {
+        encoder: encoder.name().into(),
+        identities,
+        size,
+        queries: each.len(),
+        stages: Stages::of(std::array::from_fn(|k| percentiles(&|s| s.values()[k]))),
+        without_encoding: percentiles(&|s| s.whole() - s.encode),
+        whole: percentiles(&StagesMs::whole),
+    })
+}
+
+/// Objects with four parts each.
+fn scene(identities: usize) -> Identities {
+    let mut all = Identities::default();
+    let mut object = NOBODY;
+    for i in 0..identities {
+        if i % 5 == 0 {
+            object = all.add(Level::Object, NOBODY, Vec::new());
+        } else {
+            all.add(Level::Part, object, Vec::new());
+        }
+    }
+    codes::assign(&mut all, &[]);
+    all
+}
+
+fn features(rng: &mut Pcg64Mcg, all: &Identities, encoder: &dyn Encoder) -> LanguageFeatures {
+    let dimension = encoder.dimension();
+    let mut vector = || {
+        let v: Vec<f32> = (0..dimension).map(|_| rng.random_range(-1.0..1.0)).collect();
+        unit(&v).unwrap_or(v)
+    };
+    let mut views = || (0..MAX_VIEWS).map(|_| vector()).collect::<Vec<_>>();
+    let of = (0..all.len()).map(|_| ViewFeatures { raw: views(), deviated: views() }).collect();
+    LanguageFeatures { encoder: encoder.name().into(), dimension, of }
+}
+
+/// A view whose pixels belong to the nearest of scattered points, one per identity.
+fn view(rng: &mut Pcg64Mcg, identities: usize, [w, h]: [usize; 2]) -> ViewMap {
+    let points: Vec<[i64; 2]> =
+        (0..identities).map(|_| [rng.random_range(0..w as i64), rng.random_range(0..h as i64)]).collect();
+    let nearest = |i: usize| -> IdentityId {
+        let (x, y) = ((i % w) as i64, (i / w) as i64);
+        let far = |k: &usize| (points[*k][0] - x).pow(2) + (points[*k][1] - y).pow(2);
+        (0..points.len()).min_by_key(far).map_or(NOBODY, |k| k as IdentityId + 1)
+    };
+    ViewMap {
+        width_px: w,
+        height_px: h,
+        identity: (0..w * h).map(nearest).collect(),
+        share: vec![1.0; w * h],
+        alpha: vec![1.0; w * h],
+    }
+}

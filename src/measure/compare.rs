@@ -1,0 +1,108 @@
+//! Two reports side by side: the same settings on two machines, scenes or versions of the program.
+
+use super::document::{Measure, Point, Report, Stage};
+use super::front::NOISE;
+
+/// A setting that both reports have measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pair<'a> {
+    /// As the first has it.
+    pub one: &'a Point,
+    /// As the second has it.
+    pub other: &'a Point,
+    /// Times of the second by times of the first.
+    pub times: f64,
+    /// The measure in the second less that in the first, where both have it.
+    pub difference: Option<f64>,
+}
+
+impl Pair<'_> {
+    /// Whether the times differ by more than repeats of the same do.
+    pub fn differs(&self) -> bool {
+        !(1.0 / (1.0 + NOISE)..=1.0 + NOISE).contains(&self.times)
+    }
+}
+
+/// A stage of two reports, by what they have in common.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Comparison<'a> {
+    /// Settings of both, in the order of the first.
+    pub pairs: Vec<Pair<'a>>,
+    /// How many settings only the first has, and only the second.
+    pub alone: [usize; 2],
+}
+
+impl Stage {
+    /// This stage beside `other`, by the names of knobs and settings and by `measure`.
+    pub fn beside<'a>(&'a self, other: &'a Stage, measure: &Measure) -> Comparison<'a> {
+        let value = |p: &Point| p.values.get(&measure.name).map(|s| s.median);
+        let pair = |one: &'a Point| {
+            let other = other.points.iter().find(|p| p.is_setting(one))?;
+            let times = other.secs.median / one.secs.median;
+            let difference = value(one).zip(value(other)).map(|(a, b)| b - a);
+            Some(Pair { one, other, times, difference })
+        };
+        let pairs: Vec<Pair<'_>> = self.points.iter().filter_map(pair).collect();
+        let alone = [self.points.len() - pairs.len(), other.points.len().saturating_sub(pairs.len())];
+        Comparison { pairs, alone }
+    }
+}
+
+impl Point {
+    /// Whether both are the same setting of the same knob. Defaults are one setting, whatever words
+    /// describe them.
+    pub fn is_setting(&self, other: &Point) -> bool {
+        self.method == other.method && (self.setting == other.setting || self.default && other.default)
+    }
+}
+
+impl Report {
+    /// In what respects `other` was measured under other conditions, so that times do not compare.
+    pub fn differs_from(&self, other: &Report) -> Vec<String> {
+        let (a, b) = (&self.computer, &other.computer);
+        let name = |gpu: &Option<String>| gpu.clone().unwrap_or_else(|| "none".into());
+        let all = [
+            ("processor", a.processor.clone(), b.processor.clone()),
+            ("cores", a.cores.to_string(), b.cores.to_string()),
+            ("GPU", name(&a.gpu), name(&b.gpu)),
+            ("system", a.system.clone(), b.system.clone()),
+            ("build", a.build.clone(), b.build.clone()),
+            ("version", self.program.clone(), other.program.clone()),
+            ("scene", self.scene.clone(), other.scene.clone()),
+        ];
+        all.into_iter().filter(|(_, a, b)| a != b).map(|(what, a, b)| format!("{what}: {a} / {b}")).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Computer;
+    use super::super::tests::example;
+    use super::*;
+
+    #[test]
+    fn the_same_settings_are_compare_images_each_other() {
+        let one = example();
+        let mut other = example();
+        let stage = &mut other.stages[0];
+        stage.points[1].secs.median *= 2.0;
+        stage.points[1].values.get_mut("RMS").expect("measured").median += 0.5;
+        stage.points[0].setting = "other words".into();
+        stage.points[3].setting = "1/2000".into();
+        let c = one.stages[0].beside(&other.stages[0], &one.stages[0].measures[0]);
+        assert_eq!((c.pairs.len(), c.alone), (3, [1, 1]));
+        assert!(c.pairs[0].one.default && !c.pairs[0].differs(), "defaults are one setting");
+        assert_eq!((c.pairs[1].times, c.pairs[1].differs()), (2.0, true));
+        assert!((c.pairs[1].difference.expect("both have it") - 0.5).abs() < 1e-12);
+        let missing = Measure { name: "none".into(), ..one.stages[0].measures[0].clone() };
+        assert!(one.stages[0].beside(&other.stages[0], &missing).pairs.iter().all(|p| p.difference.is_none()));
+    }
+
+    #[test]
+    fn other_conditions_are_named() {
+        let one = example();
+        assert!(one.differs_from(&one).is_empty());
+        let other = Report { computer: Computer { cores: 64, ..one.computer.clone() }, ..one.clone() };
+        assert_eq!(one.differs_from(&other), ["cores: 2 / 64"]);
+    }
+}

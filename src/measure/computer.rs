@@ -1,0 +1,45 @@
+//! The machine that a report was measured on: times of different machines do not compare.
+
+use super::document::Computer;
+use crate::render::real_gpu;
+
+/// Looks at this machine.
+pub fn look() -> Computer {
+    let (mut processor, mut memory_bytes) = (String::new(), 0);
+    if let Ok(mut system) = sysinfo::System::new() {
+        system.refresh_cpu_all();
+        system.refresh_memory();
+        processor = system.cpus().first().map_or("", |c| c.brand()).trim().to_owned();
+        memory_bytes = system.total_memory();
+    }
+    Computer {
+        processor: if processor.is_empty() { "unknown".into() } else { processor },
+        cores: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+        memory_bytes,
+        gpu: real_gpu(),
+        system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
+        build: if cfg!(debug_assertions) { "for development" } else { "optimized" }.into(),
+    }
+}
+
+impl Computer {
+    /// In a line.
+    pub fn words(&self) -> String {
+        let gpu = self.gpu.as_deref().unwrap_or("no GPU");
+        let memory = self.memory_bytes as f64 / 1e9;
+        format!(
+            "{}, {} cores, {memory:.0} GB, {gpu}, {}, built {}",
+            self.processor, self.cores, self.system, self.build
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn a_machine_has_cores_and_memory() {
+        let here = super::look();
+        assert!(here.cores > 0 && here.memory_bytes > 1 << 20, "{here:?}");
+        assert!(here.words().contains("cores"));
+    }
+}

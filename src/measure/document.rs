@@ -1,0 +1,370 @@
+//! The report as data: what was measured, on what, how often. One JSON document holds it all; the
+//! table, the plots, the page and the window's pane are made of it.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::front;
+use super::knobs::Knobs;
+use crate::math::stats::median;
+
+/// Version of the JSON document.
+pub const VERSION: u32 = 2;
+
+/// A part of the program whose knobs are measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum StageName {
+    /// Images against the exact image.
+    Render,
+    /// Training against held-out photos.
+    Train,
+    /// Identities of Gaussians against labels.
+    Features,
+    /// Answers to typed queries against labels.
+    Query,
+    /// Flights against matter and their own length.
+    Path,
+    /// Drawn depth against true depth.
+    Depth,
+}
+
+impl StageName {
+    /// All, in the order of the program.
+    pub const ALL: [Self; 6] = [Self::Render, Self::Train, Self::Features, Self::Query, Self::Path, Self::Depth];
+
+    /// As in JSON and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Render => "render",
+            Self::Train => "train",
+            Self::Features => "features",
+            Self::Query => "query",
+            Self::Path => "path",
+            Self::Depth => "depth",
+        }
+    }
+
+    /// For people.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Render => "Drawing",
+            Self::Train => "Training",
+            Self::Features => "Finding objects",
+            Self::Query => "Queries",
+            Self::Path => "Camera paths",
+            Self::Depth => "Depth",
+        }
+    }
+}
+
+/// How a measure becomes an error, which is what is plotted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ErrorKind {
+    /// It is one.
+    Error,
+    /// A share that should be 1: the error is what is missing.
+    Share,
+    /// Decibels: the error is the root mean square that they stand for.
+    Decibels,
+}
+
+/// Something that was measured of every setting.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Measure {
+    /// Its name: "PSNR".
+    pub name: String,
+    /// Its unit; empty for plain numbers.
+    pub unit: String,
+    /// How it becomes an error.
+    #[serde(rename = "form")]
+    pub kind: ErrorKind,
+    /// What it is, in a sentence.
+    pub meaning: String,
+}
+
+impl Measure {
+    /// A measure.
+    pub fn new(name: &str, unit: &str, kind: ErrorKind, meaning: &str) -> Self {
+        Self { name: name.into(), unit: unit.into(), kind, meaning: meaning.into() }
+    }
+
+    /// The error that a value stands for; 0 is perfect.
+    pub fn error(&self, value: f64) -> f64 {
+        match self.kind {
+            ErrorKind::Error => value,
+            ErrorKind::Share => 1.0 - value,
+            ErrorKind::Decibels => 10.0_f64.powf(-value / 20.0),
+        }
+    }
+
+    /// Name of the axis that shows its errors.
+    pub fn error_name(&self) -> String {
+        match self.kind {
+            ErrorKind::Error if self.unit.is_empty() => self.name.clone(),
+            ErrorKind::Error => format!("{} ({})", self.name, self.unit),
+            ErrorKind::Share => format!("1 - {}", self.name),
+            ErrorKind::Decibels => format!("error, as {}", self.name),
+        }
+    }
+}
+
+/// A number that was measured several times.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Sample {
+    /// The middle one.
+    pub median: f64,
+    /// The least.
+    pub least: f64,
+    /// The most.
+    pub most: f64,
+    /// All, in the order of the repeats.
+    pub each: Vec<f64>,
+}
+
+impl Sample {
+    /// Adds a repeat. One that is NaN is left out: JSON has none.
+    pub fn add(&mut self, value: f64) {
+        if !value.is_finite() {
+            return;
+        }
+        self.each.push(value);
+        self.median = median(&self.each);
+        self.least = self.each.iter().copied().fold(f64::INFINITY, f64::min);
+        self.most = self.each.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    }
+}
+
+impl FromIterator<f64> for Sample {
+    fn from_iter<T: IntoIterator<Item = f64>>(values: T) -> Self {
+        let mut sample = Self::default();
+        values.into_iter().for_each(|v| sample.add(v));
+        sample
+    }
+}
+
+/// A method at one setting.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Point {
+    /// The knob that was turned: "alpha cut-off". Points of one method make one series.
+    pub method: String,
+    /// Where it was turned to, for people.
+    pub setting: String,
+    /// The same for the program: fields of the stage's settings.
+    pub knobs: Knobs,
+    /// Whether these are the program's defaults.
+    pub default: bool,
+    /// Seconds of it.
+    pub secs: Sample,
+    /// What came out, by name of the measure.
+    pub values: BTreeMap<String, Sample>,
+    /// Seconds and first measure on the way there, where there is a way: a training.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub curve: Vec<[f64; 2]>,
+}
+
+impl Point {
+    /// The error that `measure` stands at, of the middle repeat.
+    pub fn error(&self, measure: &Measure) -> Option<f64> {
+        let value = self.values.get(&measure.name)?;
+        (!value.each.is_empty()).then(|| measure.error(value.median))
+    }
+}
+
+/// A check of how fast an error falls as work grows.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Order {
+    /// What was refined: "samples of a pixel's footprint".
+    pub what: String,
+    /// Work (samples, pieces) and error.
+    pub pairs: Vec<[f64; 2]>,
+    /// The order that theory gives: the error falls like `work^-order`.
+    pub expected: f64,
+    /// The order that was seen (see [`super::order`]).
+    pub observed: f64,
+    /// Whether they agree.
+    pub agrees: bool,
+    /// What that means, in a sentence.
+    pub meaning: String,
+}
+
+/// When a cheaper setting is good enough.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Rule {
+    /// The measure that decides.
+    pub measure: String,
+    /// An error this many times the least is good enough.
+    pub times: f64,
+    /// So is any error below this.
+    pub floor: f64,
+    /// Times that are no further apart than this, in seconds, are the same time to a person.
+    #[serde(default)]
+    pub spare_secs: f64,
+}
+
+impl Rule {
+    /// Errors in `measure` up to `times` the least, or below `floor`, are good enough.
+    pub fn new(measure: &str, times: f64, floor: f64, spare_secs: f64) -> Self {
+        Self { measure: measure.into(), times, floor, spare_secs }
+    }
+
+    /// In words.
+    pub fn words(&self) -> String {
+        let times = 100.0 * (self.times - 1.0);
+        let same = match self.spare_secs > 0.0 {
+            true => format!("; {} more or less do not count", super::table::seconds(self.spare_secs)),
+            false => String::new(),
+        };
+        // "RMS error" is one by its name; "PSNR" stands for one.
+        let what = match self.measure.contains("error") || self.measure == "faults" {
+            true => self.measure.clone(),
+            false => format!("error in {}", self.measure),
+        };
+        let least = match times > 0.0 {
+            true => format!("{times:.0} % over the least"),
+            false => "the least".to_owned(),
+        };
+        let words = match self.floor > 0.0 {
+            true => format!("the fastest whose {what} is at most {:.1e} or {least}", self.floor),
+            false => format!("the fastest whose {what} is at most {least}"),
+        };
+        words + &same
+    }
+}
+
+/// Measurements of one stage on one input.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Stage {
+    /// Which.
+    pub name: StageName,
+    /// What its seconds are seconds of: "one picture".
+    pub secs_of: String,
+    /// What errors are compared with, in a sentence.
+    pub reference: String,
+    /// On what: scene, sizes, views.
+    pub input: BTreeMap<String, String>,
+    /// Seed of each repeat.
+    pub seeds: Vec<u64>,
+    /// Settings that the sweep consists of; fewer points mean that it was stopped.
+    pub planned: usize,
+    /// What was measured; the first is what is looked at first.
+    pub measures: Vec<Measure>,
+    /// How a default is chosen.
+    pub rule: Rule,
+    /// The measurements.
+    pub points: Vec<Point>,
+    /// Orders of convergence.
+    #[serde(default)]
+    pub orders: Vec<Order>,
+    /// Settings that could not be measured, and why.
+    #[serde(default)]
+    pub left_out: Vec<String>,
+}
+
+impl Stage {
+    /// A stage that nothing was measured of yet: seconds of what, compared with what, on what, how often.
+    pub fn new(
+        name: StageName,
+        [secs_of, reference]: [&str; 2],
+        (input, repeats): (BTreeMap<String, String>, u32),
+        rule: Rule,
+        measures: Vec<Measure>,
+    ) -> Self {
+        Self {
+            name,
+            secs_of: secs_of.into(),
+            reference: reference.into(),
+            input,
+            seeds: (0..u64::from(repeats)).collect(),
+            planned: 0,
+            measures,
+            rule,
+            points: Vec::new(),
+            orders: Vec::new(),
+            left_out: Vec::new(),
+        }
+    }
+
+    /// Names of the methods, in the order of their first points.
+    pub fn methods(&self) -> Vec<&str> {
+        let mut names: Vec<&str> = Vec::new();
+        for p in &self.points {
+            if !names.contains(&p.method.as_str()) {
+                names.push(&p.method);
+            }
+        }
+        names
+    }
+
+    /// The measure of this name.
+    pub fn measure(&self, name: &str) -> Option<&Measure> {
+        self.measures.iter().find(|m| m.name == name)
+    }
+
+    /// Whether every setting was measured at every seed.
+    pub fn complete(&self) -> bool {
+        self.points.len() == self.planned && self.points.iter().all(|p| p.secs.each.len() >= self.seeds.len())
+    }
+
+    /// Indices of the points that no other point beats in both time and error, fastest first.
+    pub fn front(&self, measure: &Measure) -> Vec<usize> {
+        let at = |p: &Point| (p.secs.median, p.error(measure).unwrap_or(f64::NAN));
+        front::pareto(&self.points.iter().map(at).collect::<Vec<_>>())
+    }
+}
+
+/// The machine that was measured on.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Computer {
+    /// Name of the processor.
+    pub processor: String,
+    /// Its cores, as far as this program may use them.
+    pub cores: usize,
+    /// Memory in bytes.
+    pub memory_bytes: u64,
+    /// The graphics adapter, if there is a real one.
+    pub gpu: Option<String>,
+    /// Operating system.
+    pub system: String,
+    /// "optimized" or "for development".
+    pub build: String,
+}
+
+/// All stages that were measured on one scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// [`VERSION`].
+    pub version: u32,
+    /// Version of the program.
+    pub program: String,
+    /// The scene.
+    pub scene: String,
+    /// The machine.
+    pub computer: Computer,
+    /// The stages.
+    pub stages: Vec<Stage>,
+}
+
+impl Report {
+    /// The stage of this name.
+    pub fn stage(&self, name: StageName) -> Option<&Stage> {
+        self.stages.iter().find(|s| s.name == name)
+    }
+
+    /// What was measured of a sweep earlier, if it was the same sweep: on the same input, of the same
+    /// measures.
+    pub fn earlier(&self, fresh: &Stage) -> Option<Stage> {
+        let measures =
+            |s: &Stage| s.measures.iter().map(|m| (m.name.clone(), m.unit.clone(), m.kind)).collect::<Vec<_>>();
+        self.stage(fresh.name).filter(|s| s.input == fresh.input && measures(s) == measures(fresh)).cloned()
+    }
+
+    /// Puts a stage in, in the place of an older one.
+    pub fn put(&mut self, stage: Stage) {
+        self.stages.retain(|s| s.name != stage.name);
+        self.stages.push(stage);
+        self.stages.sort_by_key(|s| s.name);
+    }
+}

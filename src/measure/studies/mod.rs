@@ -1,0 +1,50 @@
+//! What is swept, one file per stage of the program.
+
+pub mod depth;
+pub mod features;
+pub mod path;
+pub mod query;
+pub mod render;
+pub mod train;
+pub mod views;
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use super::document::{ErrorKind, Measure};
+use super::sweep::{Case, StudyError};
+
+/// What a sweep is run on, in words: name and value.
+pub type Input = BTreeMap<String, String>;
+
+/// Settings of a stage, each with what it means to the study: the default first.
+struct Variants<V>(Vec<(Case, V)>);
+
+impl<V> Variants<V> {
+    fn new(default: impl Into<String>, variant: V) -> Self {
+        Self(vec![(Case::default(default), variant)])
+    }
+
+    /// Adds a setting of a knob.
+    fn add(&mut self, method: &str, setting: impl Into<String>, knobs: &[(&str, serde_json::Value)], variant: V) {
+        self.0.push((Case::new(method, setting, knobs), variant));
+    }
+}
+
+/// What is drawn, and the seconds that took: the second time, as buffers are kept from image to image.
+fn timed<F>(mut draw: impl FnMut() -> Result<F, StudyError>) -> Result<(F, f64), StudyError> {
+    draw()?;
+    let start = Instant::now();
+    let drawn = draw()?;
+    Ok((drawn, start.elapsed().as_secs_f64()))
+}
+
+/// A measure that is an error.
+fn error(name: &str, meaning: &str) -> Measure {
+    Measure::new(name, "", ErrorKind::Error, meaning)
+}
+
+/// Mean IoU, of which there are several.
+fn overlap(name: &str, meaning: &str) -> Measure {
+    Measure::new(name, "", ErrorKind::Share, meaning)
+}

@@ -1,0 +1,249 @@
+//! Knobs of typed queries, compared with labeled photos.
+
+use std::time::Instant;
+
+use serde_json::{Value, json};
+
+use super::{Input, Variants, error, overlap};
+use crate::math::stats::mean;
+use crate::measure::sweep::failed;
+use crate::measure::{Rule, Stage, StageName, Study, StudyError, Trial};
+use crate::models::{Encoder, ModelError};
+use crate::pipeline::semantics::answer::{Answered, Language, by_meaning, by_name, phrases_of};
+use crate::pipeline::semantics::code_map::CodeMap;
+use crate::pipeline::semantics::codes::TOLERANCE;
+use crate::pipeline::semantics::grammar::{Kind, Phrase};
+use crate::pipeline::semantics::localise::Strategy;
+use crate::pipeline::semantics::matching;
+use crate::pipeline::semantics::meaning::{MeaningOptions, PartFeatures, Phrasebook};
+use crate::pipeline::semantics::protocols::part_recall::HIT_IOU;
+use crate::pipeline::semantics::protocols::{AskedScene, Category, LabelledView, langsplat};
+use crate::pipeline::semantics::view_map::ViewMap;
+use crate::render::{RenderSettings, Renderer};
+use crate::scene::{Camera, GaussianCloud, IdentityId, LanguageFeatures, Level, Mask, SemanticMap};
+
+pub struct Asked {
+    pub name: String,
+    /// Its camera, of the labels' size.
+    pub camera: Camera,
+    pub categories: Vec<Category>,
+}
+
+/// How stored embeddings are kept.
+#[derive(Clone, Copy, PartialEq)]
+enum Precision {
+    Stored,
+    Half,
+    Byte,
+}
+
+#[derive(Clone, Copy)]
+struct Variant {
+    /// `None` asks by names alone.
+    options: Option<MeaningOptions>,
+    /// Maps of the view are smaller by this factor.
+    smaller: u32,
+    blend: bool,
+    precision: Precision,
+    /// Share of the objects that can be found.
+    share: f64,
+}
+
+/// The sweep of queries to a scene that `encoder` has embedded, asked for what labeled views show.
+pub fn study<'a>(
+    (cloud, settings): (&'a GaussianCloud, &'a RenderSettings),
+    map: &'a SemanticMap,
+    mut encoder: Box<dyn Encoder>,
+    views: Vec<Asked>,
+    repeats: u32,
+    mut input: Input,
+) -> Result<Study<'a>, StudyError> {
+    let language = map.language.as_ref().ok_or_else(|| failed("no encoder has looked at this scene"))?;
+    let queries: usize = views.iter().map(|v| v.categories.len()).sum();
+    input.insert("queries".into(), format!("{queries} in {} views", views.len()));
+    input.insert("identities".into(), map.identities.len().to_string());
+    input.insert("encoder".into(), language.encoder.clone());
+    let measures = vec![
+        overlap("mIoU", "mean overlap of the answer's mask with the label, over all names of the views"),
+        overlap("part recall", "share of parts that are answered with an overlap of a half or more"),
+        overlap("localisation", "share of names whose most relevant pixel lies in their box (LangSplat's protocol)"),
+        overlap("object mIoU", "mean overlap of objects"),
+        overlap("part mIoU", "mean overlap of parts"),
+        error("not understood", "share of names of which the encoder knows no word; they count as an overlap of 0"),
+    ];
+    let words = [
+        "one query, from the text to the mask, maps of the view there",
+        "labels of photos whose masks were not used; by embedding unless it says otherwise, the best answer whatever \
+         its score; names alone measure the lifting",
+    ];
+    let rule = Rule::new("mIoU", 1.02, 0.0, 5e-3);
+    let stage = Stage::new(StageName::Query, words, (input, repeats), rule, measures);
+    Ok(Study::new(stage, variants().0, move |variant: &Variant, _seed, observer| {
+        let features = reduced(language, map, variant);
+        let mut canonical = Phrasebook::default();
+        canonical.learn(&[], |p| encoder.text(p)).map_err(failed)?;
+        let mut renderer = Renderer::new();
+        let (mut secs, mut ious, mut hits) = (Vec::new(), [Vec::new(), Vec::new()], Vec::new());
+        let (mut not_understood, mut broken) = (Vec::new(), None);
+        for view in &views {
+            if observer.proceed().is_err() {
+                return Ok(None);
+            }
+            let (w, h) = (view.camera.width_px, view.camera.height_px);
+            let small = view.camera.resized((w / variant.smaller).max(1), (h / variant.smaller).max(1));
+            let (of, all) = (&map.of, &map.identities);
+            let exact = ViewMap::render(&mut renderer, cloud, of, all, &small, settings).map_err(failed)?;
+            let blended = match variant.blend {
+                true => CodeMap::render(&mut renderer, cloud, &map.codes, true, &small, settings).map_err(failed)?,
+                false => CodeMap::default(),
+            };
+            for category in &view.categories {
+                let start = Instant::now();
+                let answered = ask(&category.name, map, &features, variant, canonical.clone(), &mut *encoder)?;
+                let mask = answered.map(|a| found(&a, &exact, &blended, map, variant));
+                secs.push(start.elapsed().as_secs_f64());
+                not_understood.push(f64::from(u8::from(mask.is_none())));
+                let iou = mask.map_or(0.0, |m| m.resized(w as usize, h as usize).iou(&category.mask));
+                ious[usize::from(category.level == Level::Part)].push(iou);
+            }
+            // An encoder that fails is no answer that misses.
+            let mut again = |text: &str| {
+                let answered = ask(text, map, &features, variant, canonical.clone(), &mut *encoder);
+                answered.unwrap_or_else(|e| {
+                    broken.get_or_insert(e);
+                    None
+                })
+            };
+            let full = ViewMap::render(&mut renderer, cloud, of, all, &view.camera, settings).map_err(failed)?;
+            let labeled = LabelledView {
+                name: &view.name,
+                camera: &view.camera,
+                exact: &full,
+                blended: &CodeMap::default(),
+                categories: view.categories.clone(),
+            };
+            let units = langsplat::compare(&mut AskedScene { map, ask: &mut again }, &labeled);
+            hits.extend(units.into_iter().map(|u| f64::from(u8::from(u.hit == Some(true)))));
+            if let Some(e) = broken.take() {
+                return Err(e);
+            }
+        }
+        let all: Vec<f64> = ious.iter().flatten().copied().collect();
+        let recalled = ious[1].iter().map(|iou| f64::from(u8::from(*iou >= HIT_IOU))).collect::<Vec<_>>();
+        let values = vec![
+            ("mIoU", mean(&all)),
+            ("part recall", mean(&recalled)),
+            ("localisation", mean(&hits)),
+            ("object mIoU", mean(&ious[0])),
+            ("part mIoU", mean(&ious[1])),
+            ("not understood", mean(&not_understood)),
+        ];
+        Ok(Some(Trial { secs: mean(&secs), values, curve: Vec::new() }))
+    }))
+}
+
+/// The features that a variant leaves.
+fn reduced(language: &LanguageFeatures, map: &SemanticMap, variant: &Variant) -> LanguageFeatures {
+    let mut features = language.clone();
+    let objects: Vec<IdentityId> =
+        map.identities.iter().filter(|(_, i)| i.level == Level::Object).map(|(id, _)| id).collect();
+    let known = (variant.share * objects.len() as f64).ceil() as usize;
+    let dropped = &objects[known.min(objects.len())..];
+    for ((id, _), of) in map.identities.iter().zip(&mut features.of) {
+        if dropped.contains(&map.identities.object_of(id)) {
+            *of = Default::default();
+        }
+        of.raw.iter_mut().chain(&mut of.deviated).for_each(|v| round(v, variant.precision));
+    }
+    features
+}
+
+fn round(v: &mut [f32], precision: Precision) {
+    let largest = v.iter().fold(0.0_f32, |m, x| m.max(x.abs()));
+    for x in v {
+        *x = match precision {
+            Precision::Stored => *x,
+            Precision::Half => half::f16::from_f32(*x).to_f32(),
+            Precision::Byte if largest > 0.0 => (*x / largest * 127.0).round() / 127.0 * largest,
+            Precision::Byte => *x,
+        };
+    }
+}
+
+fn variants() -> Variants<Variant> {
+    let options = MeaningOptions::default();
+    let base = Variant { options: Some(options), smaller: 1, blend: false, precision: Precision::Stored, share: 1.0 };
+    let mut all = Variants::new("part and whole at once, exact masks", base);
+    let mut add = |method: &str, setting: &str, knob: (&str, Value), variant: Variant| {
+        all.add(method, setting, &[knob], variant);
+    };
+    for (strategy, words) in [
+        (Strategy::Paper, "the paper's two steps"),
+        (Strategy::OneStep, "one step"),
+        (Strategy::WholeFirst, "whole first"),
+    ] {
+        let options = Some(MeaningOptions { strategy, ..options });
+        add("localisation", words, ("strategy", json!(words)), Variant { options, ..base });
+    }
+    let raw = Some(MeaningOptions { parts: PartFeatures::Raw, ..options });
+    add("part features", "without deviation", ("parts", json!("raw")), Variant { options: raw, ..base });
+    add("encoder", "none: names alone", ("encoder", json!("names")), Variant { options: None, ..base });
+    for (smaller, words) in [(2, "1/2 of the size"), (4, "1/4 of the size")] {
+        add("map resolution", words, ("scale", json!(1.0 / f64::from(smaller))), Variant { smaller, ..base });
+    }
+    add("decoding", "blended codes", ("read", json!("blend")), Variant { blend: true, ..base });
+    add("precision", "16 bits", ("precision", json!(16)), Variant { precision: Precision::Half, ..base });
+    add("precision", "8 bits", ("precision", json!(8)), Variant { precision: Precision::Byte, ..base });
+    for (share, words) in [(0.25, "a quarter of the objects"), (0.5, "half of the objects")] {
+        add("identities", words, ("share", json!(share)), Variant { share, ..base });
+    }
+    all
+}
+
+/// Answers a name; `None` if there is nothing in it, or no word that the encoder knows.
+fn ask(
+    text: &str,
+    map: &SemanticMap,
+    features: &LanguageFeatures,
+    variant: &Variant,
+    mut phrases: Phrasebook,
+    encoder: &mut dyn Encoder,
+) -> Result<Option<Answered>, StudyError> {
+    let Some(phrase) = Phrase::parse(text) else { return Ok(None) };
+    let Some(options) = variant.options else { return Ok(Some(by_name(&map.identities, &phrase, Kind::Auto))) };
+    match phrases.learn(&phrases_of(&phrase), |p| encoder.text(p)) {
+        Ok(()) => {}
+        Err(ModelError::NoKnownWord { .. }) => return Ok(None),
+        Err(other) => return Err(failed(other)),
+    }
+    Ok(Some(by_meaning(&map.identities, &phrase, Kind::Auto, Language { features, phrases: &phrases, options })))
+}
+
+/// The pixels of the best answer, whatever its score: it is asked where, not whether.
+fn found(answered: &Answered, exact: &ViewMap, blended: &CodeMap, map: &SemanticMap, variant: &Variant) -> Mask {
+    let Some(best) = answered.answer.hits().first().map(|h| h.identity) else {
+        return Mask::empty(exact.width_px, exact.height_px);
+    };
+    match variant.blend {
+        true => matching::blend(blended, &map.identities, best, TOLERANCE),
+        false => matching::exact(exact, &map.identities, best, TOLERANCE),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::stats::worst_difference;
+
+    #[test]
+    fn rounding_keeps_as_much_as_it_says() {
+        let v: Vec<f32> = (0..64).map(|i| (i as f32 * 0.7).sin() / 8.0).collect();
+        let off = |p: Precision| {
+            let mut r = v.clone();
+            round(&mut r, p);
+            worst_difference(&v, &r)
+        };
+        assert_eq!(off(Precision::Stored), 0.0);
+        assert!(off(Precision::Half) < 1e-4 && off(Precision::Byte) < 1e-3 && off(Precision::Byte) > 1e-5);
+    }
+}

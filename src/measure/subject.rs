@@ -1,0 +1,261 @@
+//! What `fmlgs report` sweeps: the studies that a scene allows, each opened when its turn comes.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::studies::views::{held_out, spread};
+use super::studies::{Input, depth, features, path, query, render, train};
+use super::sweep::failed;
+use super::{StageName, Study, StudyError};
+use crate::io::labels::Labels;
+use crate::models;
+use crate::pipeline::depth as true_depth;
+use crate::pipeline::observer::Silent;
+use crate::pipeline::semantics::protocols::categories;
+use crate::pipeline::semantics::segmenter::{FileMasks, FoundMask, Segmenter};
+use crate::pipeline::semantics::tracker::labels_of;
+use crate::pipeline::semantics::train_codes::CodeView;
+use crate::pipeline::train::TrainConfig;
+use crate::render::RenderSettings;
+use crate::scene::{Camera, Dataset, GaussianCloud, Identities, IdentityId, NOBODY, Photo, SemanticMap};
+
+pub struct Options {
+    pub masks: Option<PathBuf>,
+    pub steps: Vec<u64>,
+    pub train_steps: u64,
+    /// Longer side of compared images, px.
+    pub max_side_px: u32,
+    /// Most views that are compared.
+    pub views: usize,
+    pub repeats: u32,
+}
+
+/// A scene and what came with it.
+pub struct Subject {
+    /// Its name in the report.
+    pub name: String,
+    pub cloud: Arc<GaussianCloud>,
+    pub settings: RenderSettings,
+    /// Cameras of its photos, and whether training did not see them.
+    pub cameras: Vec<(Camera, bool)>,
+    /// Every how-manieth photo is held out.
+    pub holdout_every: usize,
+    /// Its photos, if they are there.
+    pub dataset: Option<Dataset>,
+    pub map: Option<SemanticMap>,
+    pub options: Options,
+}
+
+impl Subject {
+    /// The stages that are wanted, and for each that is not possible why.
+    ///
+    /// # Errors
+    /// If one was asked for that is not possible.
+    pub fn stages(&self, wanted: &[StageName]) -> Result<(Vec<StageName>, Vec<String>), StudyError> {
+        let (mut stages, mut missing) = (Vec::new(), Vec::new());
+        for name in StageName::ALL {
+            let asked = wanted.contains(&name);
+            match self.lacks(name) {
+                None if asked || wanted.is_empty() => stages.push(name),
+                Some(what) if asked => {
+                    return Err(failed(format!("{}: the stage '{}' needs {what}", self.name, name.name())));
+                }
+                Some(what) if wanted.is_empty() => {
+                    missing.push(format!("Stage '{}' left out: it needs {what}", name.name()))
+                }
+                _ => {}
+            }
+        }
+        Ok((stages, missing))
+    }
+
+    /// What a stage needs that is not here.
+    fn lacks(&self, name: StageName) -> Option<&'static str> {
+        let photos = self.dataset.is_none().then_some("the scene's photos");
+        let labels = self.options.masks.is_none().then_some("labels of the photos: --masks");
+        match name {
+            StageName::Render => self.cameras.is_empty().then_some("cameras"),
+            StageName::Train => photos,
+            StageName::Features => photos.or(labels),
+            StageName::Query => {
+                photos.or(labels).or(self.language().is_none().then_some(
+                    "objects that an encoder has looked at: run 'fmlgs preprocess' on it with --encoder demo",
+                ))
+            }
+            StageName::Path => self.cameras.is_empty().then_some("cameras"),
+            StageName::Depth => match &self.dataset {
+                Some(d) => {
+                    (!d.root.join(true_depth::FOLDER).is_dir()).then_some("true depths, which synthetic photos have")
+                }
+                None => photos,
+            },
+        }
+    }
+
+    /// The study of a stage.
+    pub fn study(&self, name: StageName) -> Result<Study<'_>, StudyError> {
+        match name {
+            StageName::Render => self.drawing(),
+            StageName::Train => self.training(),
+            StageName::Features => self.features(),
+            StageName::Query => self.asking(),
+            StageName::Path => {
+                let cameras: Vec<Camera> = self.cameras.iter().map(|c| c.0.clone()).collect();
+                let input = self.input(&[("cameras", cameras.len().to_string())]);
+                Ok(path::study(&self.cloud, &cameras, self.options.repeats, input))
+            }
+            StageName::Depth => self.depth(),
+        }
+    }
+
+    /// Objects and parts, if an encoder has embedded them.
+    fn language(&self) -> Option<(&SemanticMap, &str)> {
+        self.map.as_ref().and_then(|m| Some((m, m.language.as_ref()?.encoder.as_str())))
+    }
+
+    /// What is swept on, in words.
+    fn input(&self, more: &[(&str, String)]) -> Input {
+        let mut input = Input::from([
+            ("scene".to_owned(), self.name.clone()),
+            ("Gaussians".to_owned(), self.cloud.len().to_string()),
+            ("longer side".to_owned(), format!("{} px", self.options.max_side_px)),
+        ]);
+        input.extend(more.iter().map(|(k, v)| ((*k).to_owned(), v.clone())));
+        input
+    }
+
+    fn dataset(&self) -> Result<&Dataset, StudyError> {
+        self.dataset.as_ref().ok_or_else(|| failed("photos are needed"))
+    }
+
+    fn labels(&self) -> Result<FileMasks, StudyError> {
+        let masks = self.options.masks.as_ref().ok_or_else(|| failed("labels are needed"))?;
+        Ok(FileMasks(Labels::open(masks).map_err(failed)?))
+    }
+
+    fn few_labels(&self, what: &str) -> StudyError {
+        let masks = self.options.masks.clone().unwrap_or_default();
+        failed(format!("{}: {what}", masks.display()))
+    }
+
+    fn drawing(&self) -> Result<Study<'_>, StudyError> {
+        let (side, count) = (self.options.max_side_px, self.options.views);
+        let mut views = match &self.dataset {
+            Some(dataset) => held_out(dataset, self.holdout_every, side, count, &mut Silent).map_err(failed)?,
+            None => None,
+        }
+        .unwrap_or_default();
+        if views.is_empty() {
+            // Spread over those that training did not see, or over all.
+            let held: Vec<&Camera> = self.cameras.iter().filter(|c| c.1).map(|c| &c.0).collect();
+            let from = if held.is_empty() { self.cameras.iter().map(|c| &c.0).collect() } else { held };
+            views = spread(&from, count).into_iter().map(|c| (c.limited_to(side), None)).collect();
+        }
+        let input = self.input(&[("views", views.len().to_string())]);
+        render::study(Arc::clone(&self.cloud), &self.settings, views, self.options.repeats, input).map_err(failed)
+    }
+
+    fn training(&self) -> Result<Study<'_>, StudyError> {
+        let dataset = self.dataset()?;
+        let base = TrainConfig {
+            steps: self.options.train_steps,
+            max_side_px: self.options.max_side_px,
+            holdout_every: self.holdout_every,
+            ..TrainConfig::default()
+        };
+        let held = dataset.split(base.holdout_every).1.len();
+        let input = self.input(&[
+            ("photos", format!("{} + {held} held out", dataset.photos.len() - held)),
+            ("steps of the default", base.steps.to_string()),
+        ]);
+        train::study(dataset, base, self.options.repeats, input)
+    }
+
+    fn asking(&self) -> Result<Study<'_>, StudyError> {
+        let (dataset, mut labels) = (self.dataset()?, self.labels()?);
+        let (map, encoder) = self.language().ok_or_else(|| failed("objects are needed"))?;
+        let encoder = models::encoder(encoder).map_err(failed)?;
+        let [seen, held_out] = self.labeled(dataset, &labels);
+        // Labels of few photos are rarely of held-out ones.
+        let (asked, which) = if held_out.is_empty() { (seen, "trained on") } else { (held_out, "held out") };
+        let side = self.options.max_side_px;
+        let mut views = Vec::new();
+        for i in spread(&asked, self.options.views) {
+            let photo = &dataset.photos[i];
+            let categories = categories(&labels.segment(photo, side, &mut Silent).map_err(failed)?);
+            let camera = photo.camera.limited_to(side);
+            views.push(query::Asked { name: photo.name.clone(), camera, categories });
+        }
+        if views.is_empty() {
+            return Err(self.few_labels("there are no labels of this scene's photos"));
+        }
+        let input = self.input(&[("photos", which.into())]);
+        query::study((&self.cloud, &self.settings), map, encoder, views, self.options.repeats, input)
+    }
+
+    /// Indices of the labeled photos that training saw, and of those that it did not see.
+    fn labeled(&self, dataset: &Dataset, labels: &FileMasks) -> [Vec<usize>; 2] {
+        let (seen, held_out) = dataset.split(self.holdout_every);
+        [seen, held_out].map(|of| of.into_iter().filter(|&i| labels.covers(&dataset.photos[i])).collect())
+    }
+
+    fn depth(&self) -> Result<Study<'_>, StudyError> {
+        let dataset = self.dataset()?;
+        let held = dataset.split(self.holdout_every).1;
+        let mut views = Vec::new();
+        for i in spread(&held, self.options.views) {
+            let photo = &dataset.photos[i];
+            let camera = photo.camera.limited_to(self.options.max_side_px);
+            views.push((camera, true_depth::of_photo(&dataset.root, photo).map_err(failed)?));
+        }
+        let input = self.input(&[("views", views.len().to_string())]);
+        Ok(depth::study(&self.cloud, &self.settings, views, self.options.repeats, input))
+    }
+
+    fn features(&self) -> Result<Study<'_>, StudyError> {
+        let (dataset, mut segmenter) = (self.dataset()?, self.labels()?);
+        let [mut training, mut held_out] = self.labeled(dataset, &segmenter);
+        // Few labels may all be of photos that the Gaussians were trained on; the lifting does without some.
+        if held_out.is_empty() {
+            held_out = training.iter().copied().step_by(TrainConfig::default().holdout_every).collect();
+            training.retain(|i| !held_out.contains(i));
+        }
+        let mut identities = Identities::default();
+        let mut views = |indices: &[usize]| -> Result<Vec<CodeView>, StudyError> {
+            let photos = indices.iter().map(|&i| &dataset.photos[i]);
+            let each = photos.map(|p| view(p, &mut segmenter, &mut identities, self.options.max_side_px));
+            each.collect()
+        };
+        let views = [views(&training)?, views(&spread(&held_out, self.options.views))?];
+        if views.iter().any(Vec::is_empty) {
+            return Err(self.few_labels("masks of two photos of the scene are needed at least"));
+        }
+        let input = self.input(&[
+            ("views", format!("{} + {} held out", views[0].len(), views[1].len())),
+            ("identities", identities.len().to_string()),
+        ]);
+        let drawn = (&*self.cloud, &self.settings);
+        features::study(drawn, identities, views, &self.options.steps, self.options.repeats, input).map_err(failed)
+    }
+}
+
+/// The labels of a photo that has some, its regions matched with known identities by their names.
+fn view(
+    photo: &Photo,
+    segmenter: &mut FileMasks,
+    identities: &mut Identities,
+    max_side_px: u32,
+) -> Result<CodeView, StudyError> {
+    let found: Vec<FoundMask> = segmenter.segment(photo, max_side_px, &mut Silent).map_err(failed)?;
+    let mut ids: Vec<IdentityId> = Vec::with_capacity(found.len());
+    for mask in &found {
+        let parent = mask.parent.map_or(NOBODY, |p| ids[p]);
+        let names: Vec<String> = mask.name.iter().cloned().collect();
+        let known = identities.iter().find(|(_, i)| i.level == mask.level && i.parent == parent && i.names == names);
+        let known = known.map(|(id, _)| id);
+        ids.push(known.unwrap_or_else(|| identities.add(mask.level, parent, names)));
+    }
+    let camera = photo.camera.limited_to(max_side_px);
+    let labels = labels_of(&found, &ids, camera.width_px as usize * camera.height_px as usize);
+    Ok(CodeView { camera, labels })
+}

@@ -1,0 +1,66 @@
+//! How a training ends: with Gaussians, or with an error.
+
+use std::sync::Arc;
+
+use super::checkpoint::CheckpointError;
+use crate::io::IoError;
+use crate::math::finite::NotFinite;
+use crate::pipeline::observer::Evaluation;
+use crate::render::{GpuError, RenderError};
+use crate::scene::GaussianCloud;
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TrainEnd {
+    /// All steps were done.
+    Finished,
+    /// The observer asked to stop; the state is saved.
+    Cancelled,
+}
+
+/// What a run leaves behind.
+#[derive(Clone, Debug)]
+pub struct TrainOutcome {
+    /// The Gaussians.
+    pub cloud: Arc<GaussianCloud>,
+    /// Held-out evaluations, the last one of the final state.
+    pub evaluations: Vec<Evaluation>,
+    /// How it ended.
+    pub end: TrainEnd,
+    /// Steps done.
+    pub steps: u64,
+    /// Seconds of training.
+    pub secs: f64,
+}
+
+/// Why a run failed.
+#[derive(Debug, thiserror::Error)]
+pub enum TrainError {
+    /// No photo to train on.
+    #[error("{0} has no photo to train on: {1} photos, all held out; lower --holdout or add photos")]
+    NoPhotos(String, usize),
+    /// A photo could not be read.
+    #[error(transparent)]
+    Photo(IoError),
+    /// A view could not be drawn.
+    #[error("photo {0}: {1}")]
+    Render(String, RenderError),
+    /// The GPU failed. The last checkpoint is intact.
+    #[error("the GPU failed: {0}; --backend cpu does without")]
+    Gpu(#[from] GpuError),
+    /// The checkpoint in the result's folder cannot be used.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// The result could not be saved.
+    #[error(transparent)]
+    Save(IoError),
+    /// The loss kept growing.
+    #[error("the training diverged {0} times even with lowered rates; the photos' poses may be wrong")]
+    Diverged(u32),
+    /// A stage left a number that is none; looked for under `debug-validation` only.
+    #[error(transparent)]
+    NotFinite(#[from] NotFinite),
+    /// Settings that make no sense.
+    #[error("{0}")]
+    Config(String),
+}
