@@ -4,7 +4,8 @@
 use std::collections::VecDeque;
 
 use super::adam::{Adam, AdamBuffers};
-use super::blend_backward::{BlendBackward, BlendGradients};
+use super::blend::TileKernel;
+use super::blend_backward::{BlendGradients, blend_backward};
 use super::cloud::{Packed, Parameters};
 use super::kernel::Recorder;
 use super::project::CloudShape;
@@ -55,7 +56,7 @@ pub struct Trainer {
     settings: TrainerSettings,
     rasterizer: Rasterizer,
     ssim: Ssim,
-    blend_backward: BlendBackward,
+    blend_backward: TileKernel,
     project_backward: ProjectBackward,
     adam: Adam,
     shape: CloudShape,
@@ -89,7 +90,7 @@ impl Trainer {
             settings,
             rasterizer: Rasterizer::new(device)?,
             ssim: Ssim::new(device)?,
-            blend_backward: BlendBackward::new(device.has_float_atomics()),
+            blend_backward: blend_backward(device.has_float_atomics()),
             project_backward: ProjectBackward::new(device)?,
             adam: Adam::new(device)?,
             shape: CloudShape::default(),
@@ -230,7 +231,7 @@ impl Trainer {
         recorder.stage("loss", |s| self.ssim.encode(s, &r.picture.colors, photo, &self.gradients.pixels));
         recorder.stage("blend backward", |s| {
             let scratch = (&r.gaussians, &r.pairs, &r.picture);
-            self.blend_backward.encode(s, bindings, scratch, &self.features, &self.gradients);
+            self.blend_backward.encode(s, bindings, scratch, &self.features, self.gradients.buffers(&r.picture));
         });
         recorder.stage("project backward", |s| {
             self.project_backward.encode(s, bindings, &self.cloud, (splats, &self.gradients.splats), &self.gradient);
