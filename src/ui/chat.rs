@@ -1,38 +1,32 @@
 //! The chat: what is asked in plain sentences goes to the agent on a thread of its own, what it does
-//! comes back as deeds.
+//! comes back as effects. Below the box stands how a command can go on.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crossbeam_channel::{Receiver, Sender, bounded, unbounded};
-use egui::{Button, ComboBox, Key, RichText, ScrollArea, TextEdit, Ui};
+use egui::text::{CCursor, CCursorRange};
+use egui::{Button, Key, Modifiers, Response, RichText, ScrollArea, TextEdit, Ui};
 
+pub use super::chat_model::ChatSettings;
+use super::chat_model::ModelChooser;
 use super::panes::portraits::Portraits;
 use super::theme;
-use crate::agent::llm::settings::LlmSettings;
-use crate::agent::llm::{Llm, SENT};
-use crate::agent::rules::Rules;
-use crate::agent::scene::{Deed, Parts, SceneWorld};
+use crate::agent::commands::{Commands, complete};
+use crate::agent::llm::Llm;
+use crate::agent::scene::{Effect, Parts, SceneWorld};
 use crate::agent::{AgentEvent, Planner, Policy, Refusal, Session};
 use crate::navigate::Pose;
 use crate::scene::trace::{self, Sort};
-use crate::scene::{IdentityId, SemanticMap, text};
+use crate::scene::{Identities, IdentityId, SemanticMap, text};
 use crate::worker::{Action, Repaint};
 
 /// Lines that are kept.
 const MAX_LINES: usize = 400;
+/// Ways to go on that are shown at once.
+const CONTINUATIONS: usize = 4;
 /// Side of a candidate's portrait, points.
 const PORTRAIT: f32 = 34.0;
-
-/// Which planner is used; kept from one run to the next.
-#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(default)]
-pub struct ChatSettings {
-    /// Whether a chat model plans, instead of the built-in grammar.
-    pub use_model: bool,
-    /// Where it is.
-    pub model: LlmSettings,
-}
 
 /// What the agent is to work on, as the window has it now.
 pub struct Snapshot {
@@ -65,7 +59,7 @@ struct Request {
 /// What comes back from the agent's thread.
 enum News {
     Event(AgentEvent),
-    Deed(Deed),
+    Effect(Effect),
     Reply { text: String, candidates: Vec<(IdentityId, String)>, refused: Option<Refusal>, transcript: [String; 2] },
 }
 
@@ -83,16 +77,19 @@ pub struct Chat {
     waiting: Option<String>,
     /// Set while the box is to take the keyboard.
     focus: bool,
+    /// What was typed, and how it can go on.
+    continuations: (String, Vec<String>),
+    chooser: ModelChooser,
 }
 
 impl Chat {
-    /// Deeds that came in since.
-    pub fn news(&mut self) -> Vec<Deed> {
-        let mut deeds = Vec::new();
-        let Some((_, news)) = &self.thread else { return deeds };
+    /// Effects that came in since.
+    pub fn news(&mut self) -> Vec<Effect> {
+        let mut effects = Vec::new();
+        let Some((_, news)) = &self.thread else { return effects };
         for news in news.try_iter() {
             match news {
-                News::Deed(deed) => deeds.push(deed),
+                News::Effect(effect) => effects.push(effect),
                 News::Event(AgentEvent::Call { line, .. }) => self.lines.push(did(&line, None)),
                 News::Event(AgentEvent::Result { text, done }) => self.lines.push(did(&text, Some(done))),
                 News::Event(AgentEvent::Note(text)) => self.lines.push(did(&text, None)),
@@ -107,7 +104,7 @@ impl Chat {
         }
         let surplus = self.lines.len().saturating_sub(MAX_LINES);
         self.lines.drain(..surplus);
-        deeds
+        effects
     }
 
     /// The talk as text: JSON if the file is called so, else Markdown.
@@ -153,17 +150,17 @@ impl Chat {
         ui: &mut Ui,
         settings: &mut ChatSettings,
         portraits: &Portraits,
-        ready: bool,
+        identities: Option<&Identities>,
         actions: &mut Vec<Action>,
     ) {
-        let mut say = None;
+        let (ready, mut say) = (identities.is_some(), None);
         if self.lines.is_empty() {
             ui.label(
-                RichText::new("Ask in plain sentences. It finds things, flies there, tells what it sees, and asks if it is in doubt.")
+                RichText::new("Type a command: it finds things, goes there, measures, hides. 'help' lists them all.")
                     .color(theme::WEAK),
             );
             ui.horizontal_wrapped(|ui| {
-                for example in ["What is in view?", "What can you do?"] {
+                for example in ["What is in view?", "help"] {
                     if ui.add_enabled(ready, Button::new(example).small()).clicked() {
                         say = Some(example.to_owned());
                     }
@@ -185,11 +182,14 @@ impl Chat {
         ui.horizontal(|ui| {
             let width = (ui.available_width() - 62.0).max(80.0);
             let hint = if ready { "show me \u{2026}" } else { "Find objects first" };
+            let takes_tab = !self.continuations.1.is_empty();
             let edit = TextEdit::singleline(&mut self.typed).hint_text(hint).desired_width(width).char_limit(1000);
+            let edit = edit.lock_focus(takes_tab);
             let response = ui.add_enabled(ready && self.cancel.is_none(), edit);
             if std::mem::take(&mut self.focus) {
                 response.request_focus();
             }
+            self.take_continuation(ui, &response);
             let enter = response.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
             match &self.cancel {
                 Some(cancel) => {
@@ -206,8 +206,9 @@ impl Chat {
                 }
             }
         });
+        self.show_continuations(ui, identities.filter(|_| !settings.use_model));
         ui.horizontal(|ui| {
-            choose_planner(ui, settings);
+            self.chooser.show(ui, settings);
             if ui.add_enabled(self.transcript.is_some(), Button::new("Save talk\u{2026}").small()).clicked() {
                 actions.push(Action::SaveTalk);
             }
@@ -220,6 +221,33 @@ impl Chat {
         });
         if self.cancel.is_none() && say.is_some() {
             self.waiting = say;
+        }
+    }
+}
+
+impl Chat {
+    /// Below the box, how what is typed can go on.
+    fn show_continuations(&mut self, ui: &mut Ui, identities: Option<&Identities>) {
+        let known = identities.filter(|_| !self.typed.trim().is_empty());
+        if self.continuations.0 != self.typed || known.is_none() {
+            let next = known.map(|all| complete(&self.typed, all, CONTINUATIONS)).unwrap_or_default();
+            self.continuations = (self.typed.clone(), next);
+        }
+        for (i, text) in self.continuations.1.iter().enumerate() {
+            let tab = if i == 0 { "  (Tab)" } else { "" };
+            ui.label(RichText::new(format!("{text}{tab}")).small().color(theme::WEAK));
+        }
+    }
+
+    /// Tab in the box takes the first of them.
+    fn take_continuation(&mut self, ui: &Ui, response: &Response) {
+        let pressed = || ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Tab));
+        let Some(first) = self.continuations.1.first().filter(|_| response.has_focus() && pressed()) else { return };
+        self.typed = format!("{first} ");
+        if let Some(mut state) = TextEdit::load_state(ui.ctx(), response.id) {
+            let end = CCursor::new(self.typed.chars().count());
+            state.cursor.set_char_range(Some(CCursorRange::one(end)));
+            state.store(ui.ctx(), response.id);
         }
     }
 }
@@ -262,30 +290,6 @@ fn show_line(ui: &mut Ui, line: &Line, portraits: &Portraits) -> Option<String> 
         }
     }
     clicked
-}
-
-fn choose_planner(ui: &mut Ui, settings: &mut ChatSettings) {
-    let text = if settings.use_model { "Chat model" } else { "Built-in" };
-    ComboBox::from_id_salt("planner").selected_text(text).width(90.0).show_ui(ui, |ui| {
-        ui.selectable_value(&mut settings.use_model, false, "Built-in")
-            .on_hover_text("A grammar of English; no network.");
-        ui.selectable_value(&mut settings.use_model, true, "Chat model").on_hover_text(SENT);
-    });
-    if settings.use_model {
-        ui.menu_button("Address\u{2026}", |ui| {
-            ui.set_min_width(300.0);
-            let model = &mut settings.model;
-            for (label, value, hint) in [
-                ("Address", &mut model.base_url, "http://127.0.0.1:11434/v1"),
-                ("Model", &mut model.model, "its name there"),
-                ("Key from variable", &mut model.key_variable, "name of an environment variable; empty for none"),
-            ] {
-                ui.label(RichText::new(label).small().color(theme::WEAK));
-                ui.add(TextEdit::singleline(value).hint_text(hint).desired_width(f32::INFINITY));
-            }
-            ui.label(RichText::new(SENT).small().color(theme::WEAK));
-        });
-    }
 }
 
 /// Starts the agent's thread.
@@ -350,11 +354,11 @@ impl Agent {
         let key = (scene, Arc::as_ptr(&parts.cloud) as usize);
         if self.world.as_ref().is_none_or(|(known, _)| *known != key) {
             let (news, repaint) = (self.news.clone(), Arc::clone(&self.repaint));
-            let tell = Box::new(move |deed: Deed| {
-                let _ = news.send(News::Deed(deed));
+            let emit = Box::new(move |effect: Effect| {
+                let _ = news.send(News::Effect(effect));
                 repaint();
             });
-            let world = SceneWorld::new(parts, eye, aspect, tell).map_err(|e| e.to_string())?;
+            let world = SceneWorld::new(parts, eye, aspect, emit).map_err(|e| e.to_string())?;
             self.world = Some((key, world));
             // What was spoken of belongs to another scene.
             self.session = None;
@@ -367,7 +371,7 @@ impl Agent {
             let planner: Box<dyn Planner> = if settings.use_model {
                 Box::new(Llm::new(settings.model.clone()).map_err(|e| e.to_string())?)
             } else {
-                Box::new(Rules::default())
+                Box::new(Commands::default())
             };
             trace::record(Sort::Agent, "assistant with its policy", "a sentence was sent to it", 0);
             self.session = Some((settings, Session::new(policy, planner)));

@@ -9,6 +9,7 @@ mod act_report;
 pub mod app;
 pub mod camera;
 pub mod chat;
+pub mod chat_model;
 pub mod dialogs;
 pub mod format;
 pub mod keys;
