@@ -10,12 +10,12 @@ use super::camera_args::{Direction, Distance, NORMAL, Side};
 use super::relation::{Extent, View};
 use super::world::{Arrival, Facts, Moved, Unreachable, World, WorldError};
 use crate::io;
+use crate::navigate::approach::{Approach, ApproachError, Place};
 use crate::navigate::target::{self, Wish};
-use crate::navigate::visit::{NoVisit, Place, Visit};
 use crate::navigate::{FRAMES, Flight, Pose, Speed};
-use crate::pipeline::semantics::answer::Answered;
+use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::asker::Asker;
-use crate::pipeline::semantics::grammar::Kind;
+use crate::pipeline::semantics::parse::Kind;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::undo::UndoHistory;
@@ -26,7 +26,7 @@ use crate::worker::Explored;
 const COUNT_SIDE_PX: u32 = 256;
 /// Points of a thing that its size is measured by, at most.
 const MEASURED_POINTS: usize = 4096;
-/// A step, as a multiple of the distance that flights keep to matter.
+/// A step, as a multiple of the distance that flights keep to occupied space.
 const STEP: f64 = 6.0;
 
 /// A change of what is shown, for whoever shows the scene.
@@ -41,7 +41,7 @@ pub enum Effect {
     Renamed(IdentityId, String),
     /// The last change of a name was undone: it is called this again.
     RenameUndone(IdentityId, String),
-    /// The scene was looked at: where matter is is known.
+    /// The scene was looked at: which space is occupied is known.
     Explored(Arc<Explored>),
 }
 
@@ -52,8 +52,8 @@ pub struct Parts {
     pub map: Arc<SemanticMap>,
     pub cameras: Vec<Camera>,
     pub up: DVec3,
-    /// Length of a unit in metres, if that is known.
-    pub metres: Option<f64>,
+    /// Length of a unit in meters, if that is known.
+    pub meters: Option<f64>,
     pub exports: PathBuf,
     /// What is known of moving about, if the scene was looked at before.
     pub explored: Option<Arc<Explored>>,
@@ -118,7 +118,7 @@ impl SceneWorld {
         })
     }
 
-    /// Takes over what a person has done since: where the eye is, what is hidden, and what things are
+    /// Takes over what the user has done since: where the eye is, what is hidden, and what things are
     /// called.
     pub fn keep_up(&mut self, eye: Pose, aspect: f64, hidden: &[IdentityId], map: &Arc<SemanticMap>) {
         (self.eye, self.aspect) = (eye, aspect);
@@ -148,7 +148,7 @@ impl SceneWorld {
         new
     }
 
-    /// The Gaussians that a person sees.
+    /// The Gaussians that the user sees.
     fn drawn(&self, id: IdentityId) -> bool {
         !self.parts.map.identities.line(id).any(|i| self.hidden.get(i as usize).copied().unwrap_or(false))
     }
@@ -257,7 +257,7 @@ impl World for SceneWorld {
         &self.parts.map.identities
     }
 
-    fn locate(&mut self, query: &str, kind: Kind) -> Result<Answered, WorldError> {
+    fn locate(&mut self, query: &str, kind: Kind) -> Result<QueryAnswer, WorldError> {
         let answered = self.asker.ask(&self.parts.map, query, kind).map_err(|e| WorldError(e.to_string()))?;
         Ok(answered.unwrap_or_else(|| super::world::locate_by_names(&self.parts.map.identities, query, kind)))
     }
@@ -288,7 +288,7 @@ impl World for SceneWorld {
     }
 
     fn metres_per_unit(&self) -> Option<f64> {
-        self.parts.metres
+        self.parts.meters
     }
 
     fn go_to(&mut self, id: IdentityId, from: Side, closeness: f64) -> Result<Arrival, Unreachable> {
@@ -306,14 +306,14 @@ impl World for SceneWorld {
             visit = go(target::Side::Best);
         }
         match visit {
-            Ok(Visit { view, target, flight }) => {
+            Ok(Approach { view, target, flight }) => {
                 let arrival = Arrival { distance: flight.length, in_view: view.covers };
                 let what = format!("going to {}", self.name(id));
                 (self.emit)(Effect::Mark(vec![id]));
                 self.fly(flight, Some(target), what);
                 Ok(arrival)
             }
-            Err(NoVisit::NoWay { why, nearest }) => {
+            Err(ApproachError::NoRoute { why, nearest }) => {
                 let center = self.bounds.get(id as usize).copied().flatten().map(|b| b.center());
                 let nearest = nearest.and_then(|n| Some(n.view.pose.center.distance(center?)));
                 Err(Unreachable { reason: why.to_string(), nearest })
@@ -336,10 +336,10 @@ impl World for SceneWorld {
     fn move_eye(&mut self, direction: Direction, distance: Distance) -> Result<Moved, Unreachable> {
         let explored = self.explored();
         let step = STEP * explored.navigator.clearance;
-        let wanted = match (distance, self.parts.metres) {
-            (Distance::Metres(m), Some(metres)) => m / metres.max(1e-9),
-            // Nobody knows what a metre is here: the agent asks for steps then.
-            (Distance::Metres(n), None) | (Distance::Relative(n), _) => n * step,
+        let wanted = match (distance, self.parts.meters) {
+            (Distance::Meters(m), Some(meters)) => m / meters.max(1e-9),
+            // Nobody knows what a meter is here: the agent asks for steps then.
+            (Distance::Meters(n), None) | (Distance::Relative(n), _) => n * step,
             (Distance::Default, _) => step,
         };
         let axis = match direction {
@@ -350,10 +350,10 @@ impl World for SceneWorld {
             Direction::Up => DVec3::NEG_Y,
             Direction::Down => DVec3::Y,
         };
-        let (center, stopped_by_matter) = explored.navigator.step(&self.eye, axis, wanted);
+        let (center, stopped_by_obstacle) = explored.navigator.step(&self.eye, axis, wanted);
         let to = Pose { center, ..self.eye };
         let distance_done = self.straight(to, format!("moving {}", direction.text()))?;
-        Ok(Moved { distance_done, stopped_by_matter })
+        Ok(Moved { distance_done, stopped_by_obstacle })
     }
 
     fn turn(&mut self, direction: Direction, degrees: f64) -> Result<(), Unreachable> {

@@ -32,7 +32,7 @@ const FLIGHT_PICTURES: usize = 24;
 /// Opens the window and trains there. With --headless it needs no display: it renders the demo
 /// scene's photos, trains on them, measures the result on held-out photos, asks for objects and
 /// parts, flies around the scene, and leaves pictures and a report in the folder given by --out.
-/// Run again, it goes on where it was and reuses the photos.
+/// Run again, it resumes where it was and reuses the photos.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs demo\n  \
@@ -218,7 +218,7 @@ fn summary(r: &DemoReport) -> String {
     )
 }
 
-/// Writes `report.json` and, for people, `report.md`.
+/// Writes `report.json` and, for display, `report.md`.
 fn write_report(r: &DemoReport, folder: &Path) -> Result<(), CliError> {
     let json = serde_json::to_vec_pretty(r)?;
     io::atomic::write(&folder.join("report.json"), |w| w.write_all(&json))?;

@@ -268,7 +268,7 @@ fn distance(words: &[&str]) -> Option<Distance> {
     if matches!(*unit, "step" | "steps") {
         return Some(Distance::Relative(amount));
     }
-    find(&language.units, unit).map(|meters| Distance::Metres(amount * meters))
+    find(&language.units, unit).map(|meters| Distance::Meters(amount * meters))
 }
 
 /// "90 degrees".
