@@ -97,7 +97,7 @@ fn text(t: &str) -> Say {
 fn a_good_model_is_heard_step_by_step() {
     let script = vec![
         calls(&[("go_to", json!({ "target": "the handle of the kettle", "side": "other" }))]),
-        calls(&[("move", json!({ "direction": "back", "distance": { "metres": 0.5 } }))]),
+        calls(&[("move", json!({ "direction": "back", "distance": { "meters": 0.5 } }))]),
         text("Here is the handle, from half a metre farther back."),
     ];
     let t = talk(script, "Show me the handle of the kettle from the other side, then step back half a metre.");
@@ -149,7 +149,7 @@ fn as_call(line: &str) -> Option<(String, String)> {
             if let Some(far) = parts.get(1) {
                 let (n, unit) = far.split_once(' ')?;
                 let n: f64 = n.parse().ok()?;
-                a["distance"] = if unit == "m" { json!({ "metres": n }) } else { json!({ "relative": n }) };
+                a["distance"] = if unit == "m" { json!({ "meters": n }) } else { json!({ "relative": n }) };
             }
             a
         }

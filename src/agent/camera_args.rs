@@ -74,6 +74,7 @@ impl Direction {
 #[serde(rename_all = "snake_case")]
 pub enum Distance {
     /// So many meters, which needs a scene whose scale is known.
+    #[serde(alias = "metres")]
     Meters(f64),
     /// So many steps; a step is what suits the scene.
     Relative(f64),

@@ -278,7 +278,7 @@ fn act(
         ToolCall::Move { direction, distance } => {
             let (distance, note) = match distance {
                 Distance::Meters(m) if world.metres_per_unit().is_none() => {
-                    let note = " This scene's scale in metres is not known, so I took a step for a metre.";
+                    let note = " This scene's scale in meters is not known, so I took a step for a meter.";
                     (Distance::Relative(*m), note)
                 }
                 known => (*known, ""),
