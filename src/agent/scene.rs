@@ -22,9 +22,9 @@ use crate::scene::{Bounds, Camera, GaussianCloud, Identities, IdentityId, Semant
 use crate::worker::Explored;
 
 /// Longer side of the picture in which pixels of identities are counted, px.
-const COUNT_SIDE_PX: u32 = 256;
+const COUNT_SIDE_PX: f64 = 256.0;
 /// Points of a thing that its size is measured by, at most.
-const MEASURED_POINTS: usize = 4096;
+const MEASURED_POINTS: usize = 2048;
 /// A step, as a multiple of the distance that flights keep to matter.
 const STEP: f64 = 6.0;
 
@@ -155,11 +155,7 @@ impl SceneWorld {
             return counted.of(id);
         }
         let Parts { cloud, settings, map, .. } = &self.parts;
-        let (w, h) = if self.aspect >= 1.0 {
-            (COUNT_SIDE_PX, (f64::from(COUNT_SIDE_PX) / self.aspect).max(1.0) as u32)
-        } else {
-            ((f64::from(COUNT_SIDE_PX) * self.aspect).max(1.0) as u32, COUNT_SIDE_PX)
-        };
+        let [w, h] = [self.aspect.min(1.0), 1.0 / self.aspect.max(1.0)].map(|s| (COUNT_SIDE_PX * s).max(1.0) as u32);
         let camera = self.eye.camera(w, h);
         let identities = &map.identities;
         let mut shares = vec![0.0; identities.len() + 1];

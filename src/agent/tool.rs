@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::camera_args::{self, Direction, Distance, Side};
 use super::relation::Relation;
 use crate::pipeline::semantics::grammar::Kind;
-use crate::scene::{Identities, IdentityId, Level};
+use crate::scene::{IdentityId, Level};
 
 /// Longest text in a call, in characters.
 pub const MAX_TEXT: usize = 300;
