@@ -1,8 +1,8 @@
 //! Sentences about things: what they are, where they are, how large they are.
 
 use super::relation::{Relation, fit};
-use super::tool::short;
 use super::world::World;
+use crate::math::format::short;
 use crate::scene::{Bounds, IdentityId, Level, NOBODY};
 
 /// Share of the view under which something is not really seen.

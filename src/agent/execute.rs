@@ -297,7 +297,7 @@ fn act(
         }
         ToolCall::Turn { direction, degrees } => {
             world.turn(*direction, *degrees).map_err(|e| unreachable(world, "that way", &e))?;
-            format!("Turned {} by {} degrees.", direction.text(), super::tool::short(*degrees))
+            format!("Turned {} by {} degrees.", direction.text(), crate::math::format::short(*degrees))
         }
         ToolCall::Isolate { .. } => {
             world.isolate(id).map_err(failed)?;

@@ -33,6 +33,8 @@ pub mod schema;
 pub mod session;
 pub mod tool;
 pub mod transcript;
+#[cfg(test)]
+mod undo_tests;
 pub mod words;
 pub mod world;
 

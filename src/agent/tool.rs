@@ -303,12 +303,6 @@ impl ToolCall {
     }
 }
 
-/// A number without needless digits.
-pub(super) fn short(number: f64) -> String {
-    let text = format!("{number:.3}");
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

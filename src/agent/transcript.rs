@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::camera_args::{self, Distance, Side};
 use super::relation::Relation;
-use super::tool::{LevelFilter, Reference, Target, ToolCall, short};
+use super::tool::{LevelFilter, Reference, Target, ToolCall};
+use crate::math::format::short;
 use crate::scene::{Identities, text};
 
 /// Entries that are kept; the oldest go first.
