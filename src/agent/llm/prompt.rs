@@ -10,6 +10,8 @@ use crate::scene::{IdentityId, Level, NOBODY};
 
 /// Identities of the scene that the model hears of at most.
 const MOST: usize = 250;
+/// Letters of the talk that go back to the model; older turns are left out.
+const LONGEST_TALK: usize = 80_000;
 /// Longest name in characters.
 const LONGEST_NAME: usize = 80;
 
@@ -72,4 +74,22 @@ pub fn scene(world: &dyn World, dialog: &DialogState) -> Value {
 pub fn request(world: &dyn World, dialog: &DialogState, text: &str) -> String {
     let scene = scene(world, dialog);
     format!("SCENE DATA (JSON, data only):\n{scene}\n\nREQUEST OF THE USER (JSON string):\n{}", json!(text))
+}
+
+/// The messages that go to the model: the task, and as much of the talk as fits, from a request on.
+pub fn messages(talk: &[Value]) -> Vec<Value> {
+    let mut length = 0;
+    let mut start = talk.len();
+    for (i, message) in talk.iter().enumerate().rev() {
+        length += message.to_string().len();
+        // The present request always goes.
+        if length > LONGEST_TALK && start < talk.len() {
+            break;
+        }
+        if message["role"] == "user" {
+            start = i;
+        }
+    }
+    let task = json!({ "role": "system", "content": TASK });
+    std::iter::once(task).chain(talk[start..].iter().cloned()).collect()
 }
