@@ -1,6 +1,6 @@
 //! Sentences about things: what they are, where they are, how large they are.
 
-use super::relation::{Relation, fit, span};
+use super::relation::{Relation, fit};
 use super::world::World;
 use crate::math::format::short;
 use crate::scene::{Bounds, IdentityId, Level, NOBODY};
@@ -44,20 +44,16 @@ pub fn length(world: &dyn World, units: f64) -> String {
     }
 }
 
-/// Width, depth and height of a box as seen now.
-pub fn size(world: &dyn World, bounds: &Bounds) -> String {
-    let frame = world.view().frame();
-    let along = |axis| {
-        let (low, high) = span(bounds, axis);
-        length(world, high - low)
-    };
-    let (wide, deep, high) = (along(frame.right), along(frame.ahead), along(frame.up));
-    let unknown = if world.metres_per_unit().is_none() { " (the scene's scale in metres is not known)" } else { "" };
-    format!("about {wide} wide, {deep} deep and {high} high{unknown}")
+/// The edges of a thing's own upright box: the same from wherever it is seen.
+pub fn size(world: &dyn World, id: IdentityId) -> String {
+    let Some(extent) = world.extent(id) else { return "of unknown size".into() };
+    let [long, wide, high] = [extent.length, extent.width, extent.height].map(|edge| length(world, edge));
+    let unknown = if world.metres_per_unit().is_none() { " (the scene's scale in meters is not known)" } else { "" };
+    format!("{long} on its longer side, {wide} on its shorter side and {high} high{unknown}")
 }
 
 /// The objects that stand in `relation` to an identity, nearest first.
-pub fn neighbours(world: &dyn World, id: IdentityId, relation: Relation) -> Vec<IdentityId> {
+pub fn neighbors(world: &dyn World, id: IdentityId, relation: Relation) -> Vec<IdentityId> {
     let all = world.identities();
     let Some(anchor) = world.facts(id).and_then(|f| f.bounds) else { return Vec::new() };
     let frame = world.view().frame();
@@ -76,25 +72,22 @@ pub fn place(world: &dyn World, id: IdentityId) -> String {
     let object = world.identities().object_of(id);
     let Some(own) = world.facts(object).and_then(|f| f.bounds) else { return String::new() };
     let frame = world.view().frame();
-    let mut said = Vec::new();
-    // On what it stands: what has it on top.
-    let bears = |other: &IdentityId| {
-        let other = world.facts(*other).and_then(|f| f.bounds);
-        other.is_some_and(|b| fit(Relation::On, &own, &b, &frame).is_some())
+    let others: Vec<(IdentityId, Bounds)> = world
+        .identities()
+        .iter()
+        .filter(|(i, o)| o.parent == NOBODY && *i != object)
+        .filter_map(|(i, _)| Some((i, world.facts(i)?.bounds?)))
+        .collect();
+    let first = |relation, fits: &dyn Fn(&Bounds) -> bool| {
+        others.iter().find(|(_, b)| fits(b) && fit(relation, &own, b, &frame).is_some()).map(|(id, _)| *id)
     };
-    let objects = world.identities().iter().filter(|(i, o)| o.parent == NOBODY && *i != object).map(|(i, _)| i);
-    let bearer = objects.filter(|id| world.facts(*id).is_some()).find(bears);
-    said.extend(bearer.map(|id| format!("on {}", the(world, id))));
-    let over = |other: &IdentityId| {
-        let other = world.facts(*other).and_then(|f| f.bounds);
-        // A table is not said to be under its mugs.
-        other.is_some_and(|b| b.radius() > own.radius() && fit(Relation::Under, &own, &b, &frame).is_some())
-    };
-    let objects = world.identities().iter().filter(|(i, o)| o.parent == NOBODY && *i != object).map(|(i, _)| i);
-    let over = objects.filter(|id| world.facts(*id).is_some()).find(over);
+    let bearer = first(Relation::On, &|_| true);
+    // A table is not said to be under its mugs.
+    let over = first(Relation::Under, &|b| b.radius() > own.radius());
+    let mut said: Vec<String> = bearer.map(|id| format!("on {}", the(world, id))).into_iter().collect();
     said.extend(over.map(|id| format!("under {}", the(world, id))));
     for (relation, words) in [(Relation::RightOf, "left of"), (Relation::LeftOf, "right of")] {
-        let next = neighbours(world, object, relation).into_iter().find(|id| Some(*id) != bearer && Some(*id) != over);
+        let next = neighbors(world, object, relation).into_iter().find(|id| Some(*id) != bearer && Some(*id) != over);
         said.extend(next.map(|id| format!("{words} {}", the(world, id))));
     }
     join(&said)
@@ -113,8 +106,8 @@ pub fn thing(world: &dyn World, id: IdentityId) -> String {
         text += &format!(" with {word}: {}", names(world, &pieces, 10));
     }
     text += ".";
-    if let Some(bounds) = &facts.bounds {
-        text += &format!(" It is {}.", size(world, bounds));
+    if facts.bounds.is_some() {
+        text += &format!(" It is {}.", size(world, id));
     }
     let place = place(world, id);
     if !place.is_empty() {

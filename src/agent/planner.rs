@@ -2,9 +2,9 @@
 
 use std::sync::atomic::AtomicBool;
 
+use super::dialog::DialogState;
 use super::event::AgentEvent;
 use super::execute::Outcome;
-use super::focus::Focus;
 use super::policy::Policy;
 use super::refusal::Refusal;
 use super::tool::ToolCall;
@@ -13,9 +13,7 @@ use super::world::World;
 /// What to do next.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Step {
-    /// Make a call.
     Call(ToolCall),
-    /// The request is dealt with.
     Finish {
         /// What to say beyond the calls' results; of a planner that speaks for itself, all of it.
         text: String,
@@ -32,16 +30,12 @@ impl Step {
 }
 
 /// What a planner sees of the session.
-pub struct Desk<'a> {
+pub struct PlannerContext<'a> {
     /// The scene. Planners look; only the session acts.
     pub world: &'a mut dyn World,
-    /// What was spoken of last.
-    pub focus: &'a Focus,
-    /// What may be done.
+    pub dialog: &'a DialogState,
     pub policy: &'a Policy,
-    /// To be told what goes on.
     pub on: &'a mut dyn FnMut(AgentEvent),
-    /// Set when the user wants it to end.
     pub cancel: &'a AtomicBool,
 }
 
@@ -51,13 +45,13 @@ pub trait Planner: Send {
     fn name(&self) -> &'static str;
 
     /// A new request. What was left of the last one is forgotten.
-    fn start(&mut self, request: &str, desk: &mut Desk<'_>);
+    fn start(&mut self, request: &str, context: &mut PlannerContext<'_>);
 
     /// The next step; `last` is what became of the last call.
     ///
     /// # Errors
     /// If it cannot go on.
-    fn next(&mut self, last: Option<&Outcome>, desk: &mut Desk<'_>) -> Result<Step, Refusal>;
+    fn next(&mut self, last: Option<&Outcome>, context: &mut PlannerContext<'_>) -> Result<Step, Refusal>;
 
     /// Whether its last words stand for the calls' results, which are else said one by one.
     fn speaks(&self) -> bool {

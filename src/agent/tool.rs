@@ -2,11 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::camera_args::{self, Direction, Distance, Side};
 use super::relation::Relation;
-use super::wish::{self, Direction, Distance, Side, TurnWay};
-use crate::math::format::short;
 use crate::pipeline::semantics::grammar::Kind;
-use crate::scene::{Identities, IdentityId, Level};
+use crate::scene::{IdentityId, Level};
 
 /// Longest text in a call, in characters.
 pub const MAX_TEXT: usize = 300;
@@ -15,7 +14,6 @@ pub const MAX_TEXT: usize = 300;
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Target {
-    /// By its number.
     Identity(IdentityId),
     /// In words, such as "the handle of the mug left of the laptop".
     Query(String),
@@ -31,17 +29,15 @@ impl Target {
 /// Which level to look at.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum LevelWish {
+pub enum LevelFilter {
     /// Objects and parts.
     #[default]
     Any,
-    /// Whole objects.
     Object,
-    /// Parts.
     Part,
 }
 
-impl LevelWish {
+impl LevelFilter {
     /// As queries have it.
     pub fn kind(self) -> Kind {
         match self {
@@ -52,7 +48,7 @@ impl LevelWish {
     }
 
     /// Whether an identity of `level` is asked for.
-    pub fn takes(self, level: Level) -> bool {
+    pub fn accepts(self, level: Level) -> bool {
         match self {
             Self::Any => true,
             Self::Object => level == Level::Object,
@@ -67,88 +63,65 @@ impl LevelWish {
 pub enum ToolCall {
     /// Find what words mean, and mark it in the view.
     Locate {
-        /// The words.
         query: String,
         /// Object or part.
         #[serde(default)]
-        kind: LevelWish,
+        kind: LevelFilter,
     },
-    /// Fly to a target.
     GoTo {
-        /// Which.
         target: Target,
         /// From where to look at it.
         #[serde(default)]
         side: Side,
         /// 1 as usual, 2 twice as close, 0.5 from twice as far.
-        #[serde(default = "wish::normal", deserialize_with = "wish::closeness")]
+        #[serde(default = "camera_args::normal", deserialize_with = "camera_args::closeness")]
         closeness: f64,
     },
     /// Turn towards a target without moving.
     LookAt {
-        /// Which.
         target: Target,
     },
-    /// Move the eye.
     Move {
-        /// Where to.
         direction: Direction,
         /// How far.
         #[serde(default)]
         distance: Distance,
     },
-    /// Turn the eye.
     Turn {
-        /// Where to.
-        direction: TurnWay,
+        direction: Direction,
         /// By how much, in degrees, above 0 to 360.
         degrees: f64,
     },
-    /// Draw one thing alone.
     Isolate {
-        /// Which.
         target: Target,
     },
-    /// Mark a thing in the view.
     Highlight {
-        /// Which.
         target: Target,
     },
-    /// Leave a thing out of the picture.
     Hide {
-        /// Which.
         target: Target,
     },
-    /// Draw a hidden thing again.
     Unhide {
-        /// Which.
         target: Target,
     },
-    /// Draw everything again.
     ShowAll {},
-    /// Take a thing out of the scene.
     Remove {
-        /// Which.
         target: Target,
     },
-    /// Give a thing another name.
     Rename {
-        /// Which.
         target: Target,
-        /// The new name.
         name: String,
     },
-    /// Tell about a thing, or about what is in the view.
+    /// Emit about a thing, or about what is in the view.
     Describe {
         /// Which; none for the view.
         #[serde(default)]
         target: Option<Target>,
     },
-    /// List or count things.
     List {
         /// Objects or parts.
         #[serde(default)]
-        level: LevelWish,
+        level: LevelFilter,
         /// Only what stands in `relation` to this.
         #[serde(default)]
         of: Option<Target>,
@@ -159,27 +132,21 @@ pub enum ToolCall {
         #[serde(default)]
         named: Option<String>,
     },
-    /// Size of a thing, or its distance.
     Measure {
-        /// Which.
         target: Target,
         /// Distance to what, in place of its size.
         #[serde(default)]
         to: Option<Reference>,
     },
-    /// Ask the user.
     AskUser {
-        /// What.
         question: String,
         /// Numbers of the identities that can be chosen from; may be empty.
         #[serde(default)]
         candidates: Vec<IdentityId>,
     },
-    /// Take back the last change.
     Undo {},
     /// Write the Gaussians of a thing to a file.
     Export {
-        /// Which.
         target: Target,
     },
 }
@@ -188,9 +155,7 @@ pub enum ToolCall {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reference {
-    /// The viewer's eye.
     Eye,
-    /// Another thing.
     Thing(Target),
 }
 
@@ -202,12 +167,7 @@ pub enum ToolError {
     Unknown(String),
     /// Arguments of another kind than the tool's.
     #[error("wrong arguments for '{tool}': {problem}")]
-    Arguments {
-        /// The tool.
-        tool: String,
-        /// What is wrong.
-        problem: String,
-    },
+    Arguments { tool: String, problem: String },
 }
 
 /// Names of all tools, in the order of [`ToolCall`].
@@ -231,6 +191,22 @@ pub const NAMES: [&str; 18] = [
     "undo",
     "export",
 ];
+
+/// The calls that always have a target.
+macro_rules! targeted {
+    ($target:ident) => {
+        Self::GoTo { target: $target, .. }
+            | Self::LookAt { target: $target }
+            | Self::Isolate { target: $target }
+            | Self::Highlight { target: $target }
+            | Self::Hide { target: $target }
+            | Self::Unhide { target: $target }
+            | Self::Remove { target: $target }
+            | Self::Rename { target: $target, .. }
+            | Self::Measure { target: $target, .. }
+            | Self::Export { target: $target }
+    };
+}
 
 impl ToolCall {
     /// Reads a call from a tool's name and its arguments as JSON.
@@ -261,12 +237,15 @@ impl ToolCall {
     pub fn sound(&self) -> Result<(), String> {
         match self {
             Self::Move { distance, .. } if !distance.is_sound() => {
-                return Err(format!("the distance must be above 0 and at most {}", wish::FARTHEST));
+                return Err(format!("the distance must be above 0 and at most {}", camera_args::FARTHEST));
             }
             Self::Turn { degrees, .. } if !(*degrees > 0.0 && *degrees <= 360.0) => {
                 return Err("degrees must be above 0 and at most 360".into());
             }
-            Self::GoTo { closeness, .. } if !wish::CLOSENESS.contains(closeness) => {
+            Self::Turn { direction: Direction::Forward | Direction::Back, .. } => {
+                return Err("a turn goes left, right, up or down".into());
+            }
+            Self::GoTo { closeness, .. } if !camera_args::CLOSENESS.contains(closeness) => {
                 return Err("closeness must be between 0.1 and 10".into());
             }
             _ => {}
@@ -297,48 +276,16 @@ impl ToolCall {
 
     /// The tool's name.
     pub fn name(&self) -> &'static str {
-        match self {
-            Self::Locate { .. } => "locate",
-            Self::GoTo { .. } => "go_to",
-            Self::LookAt { .. } => "look_at",
-            Self::Move { .. } => "move",
-            Self::Turn { .. } => "turn",
-            Self::Isolate { .. } => "isolate",
-            Self::Highlight { .. } => "highlight",
-            Self::Hide { .. } => "hide",
-            Self::Unhide { .. } => "unhide",
-            Self::ShowAll {} => "show_all",
-            Self::Remove { .. } => "remove",
-            Self::Rename { .. } => "rename",
-            Self::Describe { .. } => "describe",
-            Self::List { .. } => "list",
-            Self::Measure { .. } => "measure",
-            Self::AskUser { .. } => "ask_user",
-            Self::Undo {} => "undo",
-            Self::Export { .. } => "export",
-        }
+        let tagged = serde_json::to_value(self).unwrap_or_default();
+        NAMES.into_iter().find(|name| tagged["name"] == *name).unwrap_or("unknown")
     }
 
     /// What it is done to.
     pub fn target(&self) -> Option<&Target> {
         match self {
-            Self::GoTo { target, .. }
-            | Self::LookAt { target }
-            | Self::Isolate { target }
-            | Self::Highlight { target }
-            | Self::Hide { target }
-            | Self::Unhide { target }
-            | Self::Remove { target }
-            | Self::Rename { target, .. }
-            | Self::Measure { target, .. }
-            | Self::Export { target } => Some(target),
+            targeted!(target) => Some(target),
             Self::Describe { target } | Self::List { of: target, .. } => target.as_ref(),
-            Self::Locate { .. }
-            | Self::Move { .. }
-            | Self::Turn { .. }
-            | Self::ShowAll {}
-            | Self::AskUser { .. }
-            | Self::Undo {} => None,
+            _ => None,
         }
     }
 
@@ -347,78 +294,12 @@ impl ToolCall {
     pub fn with_target(&self, new: Target) -> Self {
         let mut call = self.clone();
         match &mut call {
-            Self::GoTo { target, .. }
-            | Self::LookAt { target }
-            | Self::Isolate { target }
-            | Self::Highlight { target }
-            | Self::Hide { target }
-            | Self::Unhide { target }
-            | Self::Remove { target }
-            | Self::Rename { target, .. }
-            | Self::Measure { target, .. }
-            | Self::Export { target } => *target = new,
+            targeted!(target) => *target = new,
             Self::Describe { target } | Self::List { of: target, .. } => *target = Some(new),
             Self::Locate { .. } => return Self::Highlight { target: new },
-            Self::Move { .. } | Self::Turn { .. } | Self::ShowAll {} | Self::AskUser { .. } | Self::Undo {} => {}
-        }
-        call
-    }
-
-    /// In one line for people, with names in place of numbers.
-    pub fn line(&self, identities: &Identities) -> String {
-        let name = |target: &Target| match target {
-            Target::Identity(id) => identities.full_name(*id),
-            Target::Query(words) => format!("\"{words}\""),
-        };
-        let mut parts: Vec<String> = self.target().map(name).into_iter().collect();
-        match self {
-            Self::Locate { query, kind } => {
-                parts.push(format!("\"{query}\""));
-                match kind {
-                    LevelWish::Any => {}
-                    LevelWish::Object => parts.push("object".into()),
-                    LevelWish::Part => parts.push("part".into()),
-                }
-            }
-            Self::GoTo { side, closeness, .. } => {
-                if *side != Side::Same {
-                    parts.push(format!("from {}", side.text()));
-                }
-                if *closeness > wish::NORMAL {
-                    parts.push("closer".into());
-                } else if *closeness < wish::NORMAL {
-                    parts.push("farther".into());
-                }
-            }
-            Self::Move { direction, distance } => {
-                parts.push(direction.text().into());
-                match distance {
-                    Distance::Metres(m) => parts.push(format!("{} m", short(*m))),
-                    Distance::Relative(r) => parts.push(format!("{} steps", short(*r))),
-                    Distance::Default => {}
-                }
-            }
-            Self::Turn { direction, degrees } => {
-                parts.extend([direction.text().into(), format!("{} degrees", short(*degrees))]);
-            }
-            Self::Rename { name, .. } => parts.push(format!("\"{name}\"")),
-            Self::List { level, relation, named, of } => {
-                if of.is_some() && *relation != Relation::PartOf {
-                    parts.insert(0, relation.text().into());
-                }
-                match level {
-                    LevelWish::Any => {}
-                    LevelWish::Object => parts.insert(0, "objects".into()),
-                    LevelWish::Part => parts.insert(0, "parts".into()),
-                }
-                parts.extend(named.iter().map(|n| format!("\"{n}\"")));
-            }
-            Self::Measure { to: Some(Reference::Eye), .. } => parts.push("from here".into()),
-            Self::Measure { to: Some(Reference::Thing(t)), .. } => parts.push(format!("from {}", name(t))),
-            Self::AskUser { question, .. } => parts.push(format!("\"{question}\"")),
             _ => {}
         }
-        format!("{}({})", self.name(), parts.join(", "))
+        call
     }
 }
 

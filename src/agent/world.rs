@@ -1,8 +1,8 @@
 //! What the agent needs of the scene. The window, the command line and tests supply it; everything
 //! that does not need a camera or a file is in [`super::resolve`] and [`super::describe`].
 
-use super::relation::View;
-use super::wish::{Direction, Distance, GoWish, TurnWay};
+use super::camera_args::{Direction, Distance, Side};
+use super::relation::{Extent, View};
 use crate::pipeline::semantics::answer::{Answered, by_name};
 use crate::pipeline::semantics::grammar::{Kind, Phrase};
 use crate::pipeline::semantics::localise::Answer;
@@ -14,7 +14,6 @@ use crate::scene::{Bounds, Identities, IdentityId, Level};
 pub struct Facts {
     /// What it is called; the first is shown.
     pub names: Vec<String>,
-    /// Object or part.
     pub level: Level,
     /// What it is a piece of; `NOBODY` for objects.
     pub parent: IdentityId,
@@ -29,7 +28,6 @@ pub struct Facts {
 /// What came of a flight.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Arrival {
-    /// Length of the way, in scene units.
     pub distance: f64,
     /// The share of the picture that the target covers now, 0 to 1.
     pub in_view: f64,
@@ -39,7 +37,6 @@ pub struct Arrival {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{reason}")]
 pub struct Unreachable {
-    /// In plain words.
     pub reason: String,
     /// How near to the goal the camera could come, in scene units, if that is known.
     pub nearest: Option<f64>,
@@ -48,9 +45,7 @@ pub struct Unreachable {
 /// What came of a movement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Moved {
-    /// How far it went, in scene units.
     pub distance_done: f64,
-    /// Whether matter ended it early.
     pub stopped_by_matter: bool,
 }
 
@@ -70,14 +65,19 @@ pub trait World {
     /// What is known of an identity; `None` if it is not (or no more) in the scene.
     fn facts(&self, id: IdentityId) -> Option<Facts>;
 
+    /// The size of an identity, if it has any matter: that of its box, unless more is known.
+    fn extent(&self, id: IdentityId) -> Option<Extent> {
+        Extent::of_box(&self.facts(id)?.bounds?, self.view().up)
+    }
+
     /// The present view.
     fn view(&self) -> View;
 
     /// Length of a scene unit in metres, if that is known.
     fn metres_per_unit(&self) -> Option<f64>;
 
-    /// Flies to an identity.
-    fn go_to(&mut self, id: IdentityId, wish: GoWish) -> Result<Arrival, Unreachable>;
+    /// Flies to an identity, to see it from `side`: 1 as close as usual, 2 twice as close.
+    fn go_to(&mut self, id: IdentityId, side: Side, closeness: f64) -> Result<Arrival, Unreachable>;
 
     /// Turns towards an identity.
     fn look_at(&mut self, id: IdentityId) -> Result<Arrival, Unreachable>;
@@ -86,7 +86,7 @@ pub trait World {
     fn move_eye(&mut self, direction: Direction, distance: Distance) -> Result<Moved, Unreachable>;
 
     /// Turns the eye by degrees.
-    fn turn(&mut self, way: TurnWay, degrees: f64) -> Result<(), Unreachable>;
+    fn turn(&mut self, direction: Direction, degrees: f64) -> Result<(), Unreachable>;
 
     /// Marks these in the view, and nothing else.
     fn highlight(&mut self, ids: &[IdentityId]) -> Result<(), WorldError>;

@@ -6,12 +6,12 @@ use std::sync::Arc;
 use super::app::App;
 use super::chat::Snapshot;
 use super::context::SceneContext;
-use super::dialogs::{Purpose, Question};
+use super::dialogs::Question;
 use super::edits::EditStep;
 use super::state::Tone;
 use super::viewport::brush::Brush;
 use super::viewport::overrides::RenderOverrides;
-use crate::agent::scene::{Deed, Parts};
+use crate::agent::scene::{Effect, Parts};
 use crate::measure::is_report;
 use crate::navigate::FRAMES;
 use crate::navigate::target::Wish;
@@ -29,10 +29,6 @@ impl App {
             Action::TryDemo => self.replace_scene(Action::TryDemo),
             Action::Open(path) if is_report(&path) => self.read_report(path, false),
             Action::Open(path) => self.replace_scene(Action::Open(path)),
-            Action::OpenFolder => self.choose(Purpose::OpenFolder),
-            Action::OpenFile => self.choose(Purpose::OpenFile),
-            Action::ExportPly => self.choose(Purpose::ExportPly),
-            Action::Screenshot => self.choose(Purpose::Screenshot),
             Action::StartTraining => self.start_training(),
             Action::PauseTraining => {
                 if let Some(job) = self.state.job.as_ref().filter(|j| j.kind == JobKind::Train) {
@@ -46,9 +42,7 @@ impl App {
             }
             Action::Evaluate => self.evaluate(),
             Action::FindObjects => self.find_objects(None),
-            Action::ChooseMasks => self.choose(Purpose::Masks),
             Action::FetchModel(id) => self.install_model(id, None),
-            Action::AddModel(id) => self.choose(Purpose::Model(id)),
             Action::TypeQuery => self.type_question(),
             Action::Ask(text) => {
                 if let Some(semantics) = self.state.semantics.clone() {
@@ -56,8 +50,6 @@ impl App {
                 }
             }
             Action::Show(mode) => self.layout.mode = mode,
-            Action::ChooseReport => self.choose(Purpose::Report),
-            Action::ChooseSecondReport => self.choose(Purpose::SecondReport),
             Action::OpenReport(path) => self.read_report(path, false),
             Action::CompareReport(path) => self.read_report(path, true),
             Action::EndComparison => self.state.second_report = None,
@@ -92,15 +84,23 @@ impl App {
                 self.camera.record(&self.viewport.pose());
                 self.layout.hidden.retain(|p| *p != Pane::Camera);
             }
-            Action::OpenPath => self.choose(Purpose::OpenPath),
-            Action::SavePath => self.choose(Purpose::SavePath),
-            Action::ExportVideo => self.choose(Purpose::ExportVideo),
-            Action::SaveChat => self.choose(Purpose::SaveChat),
             Action::StartChat => {
                 self.layout.hidden.retain(|p| *p != Pane::Chat);
                 self.chat.start_typing();
             }
-            Action::ExportTarget(id) => self.choose(Purpose::ExportTarget(id)),
+            Action::OpenFolder
+            | Action::OpenFile
+            | Action::ExportPly
+            | Action::ExportTarget(_)
+            | Action::Screenshot
+            | Action::ChooseMasks
+            | Action::AddModel(_)
+            | Action::ChooseReport
+            | Action::ChooseSecondReport
+            | Action::OpenPath
+            | Action::SavePath
+            | Action::ExportVideo
+            | Action::SaveChat => self.choose(action),
             Action::FrameScene
             | Action::Paint(_)
             | Action::Isolate(_)
@@ -295,24 +295,24 @@ impl App {
     }
 
     /// Does to the window what the agent has done.
-    pub(super) fn deed(&mut self, deed: Deed) {
-        match deed {
-            Deed::Fly(flight, about) => {
+    pub(super) fn effect(&mut self, effect: Effect) {
+        match effect {
+            Effect::Fly(flight, about) => {
                 if let Some(point) = about {
                     self.viewport.turn_about(point);
                 }
                 self.camera.play_flight(*flight);
             }
-            Deed::Mark(ids) => {
+            Effect::Mark(ids) => {
                 if let Some(map) = self.state.semantics.clone() {
                     let names: Vec<String> = ids.iter().take(6).map(|id| map.identities.full_name(*id)).collect();
                     self.viewport.queries.mark(&names, &map);
                 }
             }
-            Deed::Hidden(ids) => self.viewport.visibility.set_hidden(ids),
-            Deed::Renamed(id, name) => self.edit(EditStep::Request(EditRequest::Apply(Edit::Rename(id, name)))),
-            Deed::RenameUndone(id, name) => self.edit(EditStep::UndoRename(id, name)),
-            Deed::Explored(explored) => self.state.explored = Some(explored),
+            Effect::Hidden(ids) => self.viewport.visibility.set_hidden(ids),
+            Effect::Renamed(id, name) => self.edit(EditStep::Request(EditRequest::Apply(Edit::Rename(id, name)))),
+            Effect::RenameUndone(id, name) => self.edit(EditStep::UndoRename(id, name)),
+            Effect::Explored(explored) => self.state.explored = Some(explored),
         }
     }
 

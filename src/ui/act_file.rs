@@ -3,25 +3,24 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::actions::Action;
-use super::actions::Pane;
+use super::actions::{Action, Pane};
 use super::app::App;
 use super::camera;
 use super::context::SceneContext;
-use super::dialogs::{Chosen, Purpose};
+use super::dialogs::Chosen;
 use super::state::Tone;
 use crate::render::BackendChoice;
 use crate::worker::{Command, Failure, VideoRequest};
 
 impl App {
-    pub(super) fn choose(&mut self, purpose: Purpose) {
-        let writes = matches!(purpose, Purpose::ExportPly | Purpose::ExportTarget(_) | Purpose::Screenshot);
+    pub(super) fn choose(&mut self, action: Action) {
+        let writes = matches!(action, Action::ExportPly | Action::ExportTarget(_) | Action::Screenshot);
         if writes && self.viewport.picture().is_none() {
             self.state.toast(Tone::Warning, "There is nothing to save yet: open a scene first.");
             return;
         }
         let name = self.state.scene.as_ref().map_or_else(|| "scene".to_owned(), |s| s.name.clone());
-        if let Err(e) = self.dialogs.ask(purpose, &name, Arc::clone(&self.repaint)) {
+        if let Err(e) = self.dialogs.ask(action, &name, Arc::clone(&self.repaint)) {
             self.state.fail("Opening the file dialog", Failure::of(&e, "Close other programs and try again."));
         }
     }
@@ -29,23 +28,23 @@ impl App {
     /// Continues with what the file dialog brought.
     pub(super) fn chosen(&mut self, answer: Chosen) {
         match answer {
-            Chosen::Path(Purpose::OpenFolder | Purpose::OpenFile, path) => self.ask(Action::Open(path)),
-            Chosen::Path(Purpose::Report, path) => self.read_report(path, false),
-            Chosen::Path(Purpose::SecondReport, path) => self.read_report(path, true),
-            Chosen::Path(Purpose::Masks, path) => self.find_objects(Some(path)),
-            Chosen::Path(Purpose::Model(id), path) => self.install_model(id, Some(path)),
-            Chosen::Path(Purpose::ExportPly, path) => {
+            Chosen::Path(Action::OpenFolder | Action::OpenFile, path) => self.ask(Action::Open(path)),
+            Chosen::Path(Action::ChooseReport, path) => self.read_report(path, false),
+            Chosen::Path(Action::ChooseSecondReport, path) => self.read_report(path, true),
+            Chosen::Path(Action::ChooseMasks, path) => self.find_objects(Some(path)),
+            Chosen::Path(Action::AddModel(id), path) => self.install_model(id, Some(path)),
+            Chosen::Path(Action::ExportPly, path) => {
                 if let Some(cloud) = self.viewport.cloud() {
                     self.submit(Command::Export { cloud: Arc::clone(cloud), path });
                 }
             }
-            Chosen::Path(Purpose::ExportTarget(id), path) => {
+            Chosen::Path(Action::ExportTarget(id), path) => {
                 if let (Some(cloud), Some(map)) = (self.viewport.cloud(), &self.state.semantics) {
                     let cloud = Arc::new(cloud.select(&map.members(id)));
                     self.submit(Command::Export { cloud, path });
                 }
             }
-            Chosen::Path(Purpose::OpenPath, path) => match camera::read(&path) {
+            Chosen::Path(Action::OpenPath, path) => match camera::read(&path) {
                 Ok(read) => {
                     self.camera.open(read);
                     self.layout.hidden.retain(|p| *p != Pane::Camera);
@@ -54,7 +53,7 @@ impl App {
                     self.state.fail("Opening the camera path", Failure { message, remedy: String::new() });
                 }
             },
-            Chosen::Path(Purpose::SavePath, path) => {
+            Chosen::Path(Action::SavePath, path) => {
                 match camera::write(&path, &self.camera.path, self.viewport.aspect()) {
                     Ok(()) => self.state.toast(Tone::Good, format!("Wrote {}", path.display())),
                     Err(message) => {
@@ -62,14 +61,14 @@ impl App {
                     }
                 }
             }
-            Chosen::Path(Purpose::ExportVideo, path) => self.export_video(path),
-            Chosen::Path(Purpose::SaveChat, path) => self.save_chat(&path),
-            Chosen::Path(Purpose::Screenshot, path) => {
+            Chosen::Path(Action::ExportVideo, path) => self.export_video(path),
+            Chosen::Path(Action::SaveChat, path) => self.save_chat(&path),
+            Chosen::Path(Action::Screenshot, path) => {
                 if let Some(pixels) = self.viewport.pixels() {
                     self.submit(Command::Picture { pixels: Arc::new(pixels), path });
                 }
             }
-            Chosen::Nothing => {}
+            Chosen::Path(..) | Chosen::Nothing => {}
             Chosen::NoDialog => self.state.toast(
                 Tone::Warning,
                 "No file dialog appeared on this system. Drop the file onto the window, or press Ctrl+P and type its path.",

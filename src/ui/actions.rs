@@ -188,7 +188,10 @@ actions! {
     PreviousPhoto: "Previous photo", "OverlaySettings through the camera of the previous photo.", "[";
     NextPhoto: "Next photo", "OverlaySettings through the camera of the next photo.", "]";
     GoToPhoto(index: usize): format!("Go to photo {}", index + 1), "OverlaySettings through the camera of this photo.";
-    Show(mode: ViewMode): format!("Show {}", mode.text().to_lowercase()), "Choose what the viewport shows.";
+    Show(mode: ViewMode): match mode {
+            ViewMode::Rgb => "Show RGB".to_owned(),
+            other => format!("Show {}", other.text().to_lowercase()),
+        }, "Choose what the viewport shows.";
     ToggleCompare: "Compare with the photo", "Show the photo beside the rendering with a slider between them.", "C";
     ToggleCameras: "Show or hide cameras", "Draw the camera of every photo into the view.", "V";
     TogglePane(pane: Pane): format!("Show or hide the {} pane", pane.text().to_lowercase()),

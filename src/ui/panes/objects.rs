@@ -94,9 +94,7 @@ impl Tree<'_> {
             ui.label(RichText::new(size).small().color(theme::WEAK)).on_hover_text("Gaussians");
         });
     }
-}
 
-impl Tree<'_> {
     /// What can be corrected about an identity.
     fn menu(&self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
         let all = self.identities;

@@ -144,7 +144,7 @@ impl Viewport {
             state.toast(Tone::Warning, why);
         }
         if let Some(photo) = &mut self.photo {
-            photo.take_loaded(state, worker);
+            photo.take_loaded(state);
         }
     }
 
@@ -277,7 +277,7 @@ impl Viewport {
         self.take_frame(ui.ctx());
         let now = ui.input(|i| i.time);
         self.use_brush(&response, rect, state);
-        if self.handle_input(ui, &response, rect, &scene, actions) {
+        if self.handle_input(ui, &response, rect, &scene) {
             self.leave_photo();
             self.moved_at = now;
         }

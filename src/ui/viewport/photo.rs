@@ -53,7 +53,7 @@ impl PhotoView {
         self.failed
     }
 
-    pub(super) fn take_loaded(&mut self, state: &mut AppState, worker: &Worker) {
+    pub(super) fn take_loaded(&mut self, state: &mut AppState) {
         if let Some(pixels) = state.photos.remove(&(self.index, SIDE_PX)) {
             self.pixels = Some(pixels);
         }
@@ -63,7 +63,6 @@ impl PhotoView {
         }
         // Photos of earlier visits that came too late are not kept.
         state.photos.retain(|(_, side), _| *side != SIDE_PX);
-        let _ = worker;
     }
 
     /// The largest rectangle of the photo's shape in `rect`.

@@ -90,9 +90,7 @@ impl Queries {
         self.facts = Some(facts.clone());
         facts
     }
-}
 
-impl Queries {
     fn show_verdict(&self, ui: &mut Ui, newest: &super::Asked) {
         let unknown = newest.unknown.join("\", \"");
         let unknown = text::shortened(&unknown, 80);
