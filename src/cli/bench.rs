@@ -80,7 +80,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let mut console = Console::new(quiet);
     let sizes = if args.size.is_empty() { vec![[640, 480], [1280, 720]] } else { args.size };
     let repeats = args.repeats as usize;
-    let device = args.gpu.then(Device::new).transpose()?;
+    let device = args.gpu.then(Device::shared).transpose()?;
     let gpu_name = device.as_ref().map(Device::describe);
     let one_core_products_per_sec = bench::one_core_limit();
     let mut timings = Timings { gpu: gpu_name, one_core_products_per_sec, ..Timings::default() };
@@ -157,7 +157,7 @@ fn savings(args: &Args) -> Result<(), CliError> {
             scenes.push(Saving::new(scene, plan, everything));
         }
     }
-    let adapter = Device::new().ok().map(|c| c.describe());
+    let adapter = Device::shared().ok().map(|c| c.describe());
     if args.json {
         let document = json!({ "size_px": SIZE, "runs": args.runs, "adapter": adapter, "scenes": scenes });
         return output::print_json(&document);
