@@ -45,7 +45,7 @@ pub fn number(v: f64) -> String {
     }
 }
 
-/// Seconds for people: "3.2 ms".
+/// Seconds as they are shown: "3.2 ms".
 pub fn seconds(secs: f64) -> String {
     match secs {
         s if !(s > 0.0) => "0".into(),
