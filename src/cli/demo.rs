@@ -91,9 +91,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let outcome = train::run(&dataset, &config, Some(&scene), &mut console)?;
     if outcome.end == TrainEnd::Cancelled {
         let (done, all) = (outcome.steps, config.steps);
-        return Err(CliError::Cancelled(format!(
-            "{done} of {all} steps are saved; the same command resumes there"
-        )));
+        return Err(CliError::Cancelled(format!("{done} of {all} steps are saved; the same command resumes there")));
     }
     let job =
         eval::job(opened::drawable(&scene)?, &photos, eval::Options { pictures: Some(compare), ..Default::default() })?;
