@@ -449,7 +449,7 @@ fn a_request_can_be_ended_while_the_server_is_silent() {
     let mut session = Session::new(Policy::built_in().expect("policy"), Box::new(planner));
     let cancel = Arc::new(AtomicBool::new(false));
     let stopper = Arc::clone(&cancel);
-    let (stop, waits) = std::sync::mpsc::channel::<()>();
+    let (stop, waits) = std::sync::mpsc::sync_channel::<()>(16);
     std::thread::Builder::new()
         .name("stop".into())
         .spawn(move || {

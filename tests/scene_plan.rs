@@ -16,13 +16,13 @@ use fmlgs::pipeline::semantics::matching;
 use fmlgs::pipeline::semantics::view_map::ViewMap;
 use fmlgs::render::gpu::cloud::Packed;
 use fmlgs::render::{BackendChoice, Features, Frame, RenderSettings, Renderer};
-use fmlgs::scene::plan::{Item, NOISE_FLOOR, When, Wish};
+use fmlgs::scene::plan::{Item, NOISE_FLOOR, PlanOverride, When};
 use fmlgs::scene::trace::{self, Sort};
 use fmlgs::scene::{
     Camera, Facts, GaussianCloud, Identities, Level, Limits, Machine, NOBODY, Overrides, ScenePlan, SemanticMap,
 };
 use fmlgs::worker::ViewMode;
-use fmlgs::worker::view::{Effort, Leave, ViewLane, ViewRequest};
+use fmlgs::worker::view::{QualityBudget, SkipPasses, ViewLane, ViewRequest};
 
 const LIMITS: Limits = Limits { train_side_px: 512, object_side_px: 1_024, sh_degree: 3, holdout_every: 8 };
 
@@ -162,19 +162,19 @@ fn a_far_larger_photo_than_the_gaussians_resolve_is_looked_at_smaller() {
 }
 
 /// What a drawing lane brings for a request: the picture's median depth, and whether maps come.
-fn looked_at(cloud: &GaussianCloud, map: Option<&SemanticMap>, plan: &ScenePlan, effort: Effort) -> [bool; 2] {
+fn looked_at(cloud: &GaussianCloud, map: Option<&SemanticMap>, plan: &ScenePlan, budget: QualityBudget) -> [bool; 2] {
     let lane = ViewLane::start(Arc::new(|| {})).expect("a thread");
     let semantics = map.filter(|_| plan.maps.now(false)).map(|m| Arc::new(m.clone()));
     lane.request(ViewRequest {
         cloud: Arc::new(cloud.clone()),
         camera: camera(160),
-        mode: ViewMode::Picture,
+        mode: ViewMode::Rgb,
         settings: RenderSettings::default(),
-        effort,
+        budget,
         photo: None,
         semantics,
         codes: false,
-        leave: Leave::of(plan),
+        skip: SkipPasses::of(plan),
         timed: false,
         ticket: 1,
     });
@@ -198,15 +198,15 @@ fn looked_at(cloud: &GaussianCloud, map: Option<&SemanticMap>, plan: &ScenePlan,
 fn maps_and_depth_are_drawn_only_where_the_plan_says_so() {
     let cloud = ball(200, -2.5, 0.0);
     let map = objects(&cloud, true);
-    let of = |map: Option<&SemanticMap>, overrides: &Overrides, effort| {
-        looked_at(&cloud, map, &plan(&cloud, map, &[camera(160)], overrides), effort)
+    let of = |map: Option<&SemanticMap>, overrides: &Overrides, budget| {
+        looked_at(&cloud, map, &plan(&cloud, map, &[camera(160)], overrides), budget)
     };
     let (auto, all) = (Overrides::default(), Overrides::everything());
-    assert_eq!(of(None, &all, Effort::Full), [true, false], "no semantics, no maps");
-    assert_eq!(of(Some(&map), &auto, Effort::Full), [true, false], "nobody has asked");
-    assert_eq!(of(Some(&map), &all, Effort::Full), [true, true], "the control: always wanted");
-    assert_eq!(of(None, &auto, Effort::Moving), [false, false], "the eye moves");
-    assert_eq!(of(None, &all, Effort::Moving), [true, false], "the control: always wanted");
+    assert_eq!(of(None, &all, QualityBudget::Full), [true, false], "no semantics, no maps");
+    assert_eq!(of(Some(&map), &auto, QualityBudget::Full), [true, false], "nobody has asked");
+    assert_eq!(of(Some(&map), &all, QualityBudget::Full), [true, true], "the control: always wanted");
+    assert_eq!(of(None, &auto, QualityBudget::Moving), [false, false], "the eye moves");
+    assert_eq!(of(None, &all, QualityBudget::Moving), [true, false], "the control: always wanted");
 }
 
 #[test]
@@ -282,10 +282,10 @@ fn rounding_stored_features_keeps_cosines() {
 }
 
 #[test]
-fn wishes_on_the_command_line_are_those_of_the_plan() {
+fn overrides_on_the_command_line_are_those_of_the_plan() {
     let cloud = ball(50, -2.5, 2e-4);
-    let wish: Wish = "colour=full".parse().expect("a wish");
-    let planned = plan(&cloud, None, &[], &[wish].into_iter().collect());
+    let one: PlanOverride = "color=full".parse().expect("an override");
+    let planned = plan(&cloud, None, &[], &[one].into_iter().collect());
     assert_eq!(planned.sh_degree, 3);
-    assert!(planned.line(Item::Colour).is_some_and(|l| l.overridden));
+    assert!(planned.line(Item::Color).is_some_and(|l| l.overridden));
 }

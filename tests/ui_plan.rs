@@ -13,11 +13,11 @@ use fmlgs::navigate::target::Side;
 use fmlgs::pipeline::observer::Silent;
 use fmlgs::pipeline::synth::{self, SynthOptions};
 use fmlgs::scene::IdentityId;
-use fmlgs::scene::plan::Wish;
+use fmlgs::scene::plan::PlanOverride;
 use fmlgs::scene::trace::{self, Sort};
+use fmlgs::ui::actions::{Action, Pane};
 use fmlgs::ui::app::App;
 use fmlgs::worker::places::Places;
-use fmlgs::worker::{Action, Pane};
 
 /// A window and what was traced since it was opened.
 struct Window {
@@ -26,13 +26,13 @@ struct Window {
 }
 
 impl Window {
-    /// A window without the panes that list objects, for which `wishes` are made.
-    fn new(data: &Path, first: PathBuf, wishes: &[&str]) -> Self {
+    /// A window without the panes that list objects, for which `overrides` are made.
+    fn new(data: &Path, first: PathBuf, overrides: &[&str]) -> Self {
         let traced = trace::since(0).len();
         let mut harness = ui_common::window(Places { data: data.to_path_buf() }, Some(Action::Open(first)));
         let app = harness.state_mut();
         app.layout.hidden.extend([Pane::Objects, Pane::Chat]);
-        app.wish(wishes.iter().map(|w| w.parse::<Wish>().expect("a wish")));
+        app.override_plan(overrides.iter().map(|w| w.parse::<PlanOverride>().expect("an override")));
         Self { harness, traced }
     }
 
@@ -98,10 +98,10 @@ fn trained(folder: &Path) -> PathBuf {
 /// The objects that are found, and the pixels of the first.
 fn answer(w: &mut Window, question: &str) -> (Vec<IdentityId>, usize) {
     w.ask(Action::Ask(question.into()));
-    w.until("the maps", |a| a.viewport.questions.maps().is_some());
+    w.until("the maps", |a| a.viewport.queries.maps().is_some());
     let map = w.app().state.semantics.clone().expect("objects");
-    let found = w.app().viewport.questions.found();
-    let maps = w.app().viewport.questions.maps().cloned().expect("maps");
+    let found = w.app().viewport.queries.found();
+    let maps = w.app().viewport.queries.maps().cloned().expect("maps");
     let area = found.first().map_or(0, |id| maps.identities.mask(&map.identities, *id).area());
     (found, area)
 }
@@ -145,15 +145,15 @@ fn nothing_is_loaded_or_drawn_before_it_is_used() {
     drop(w);
 
     // Everything on: all of that at opening, and the same answer.
-    let wishes = ["maps=always", "encoder=open", "portraits=open", "navigation=open"];
-    let mut all = Window::new(&data, scene, &wishes);
+    let overrides = ["maps=always", "encoder=open", "portraits=open", "navigation=open"];
+    let mut all = Window::new(&data, scene, &overrides);
     all.until("a picture at rest", |a| a.viewport.picture().is_some_and(|p| p.full));
     all.until("the graph", |a| a.state.explored.is_some());
     [Sort::Maps, Sort::Portraits, Sort::Model].into_iter().for_each(|sort| all.until_loaded(sort));
     let ticket = all.ticket();
-    all.harness.state_mut().wish(["redraw=always".parse::<Wish>().expect("a wish")]);
+    all.harness.state_mut().override_plan(["redraw=always".parse::<PlanOverride>().expect("an override")]);
     all.rest();
     assert!(all.ticket() > ticket && all.next_frame() < Duration::from_secs(1), "it draws all the time");
-    all.harness.state_mut().wish(["redraw=auto".parse::<Wish>().expect("a wish")]);
+    all.harness.state_mut().override_plan(["redraw=auto".parse::<PlanOverride>().expect("an override")]);
     assert_eq!(answer(&mut all, "the table"), lazy);
 }

@@ -14,9 +14,10 @@ use fmlgs::measure::{self, ErrorKind, Knobs, Measure, Point, Report, Rule, Sampl
 use fmlgs::pipeline::observer::Silent;
 use fmlgs::pipeline::semantics::edit::Edit;
 use fmlgs::pipeline::synth::{self, SynthOptions};
+use fmlgs::ui::actions::{Action, Pane};
 use fmlgs::ui::app::App;
+use fmlgs::worker::ViewMode;
 use fmlgs::worker::places::Places;
-use fmlgs::worker::{Action, Pane, ViewMode};
 
 struct Window {
     harness: Harness<'static, App>,
@@ -122,7 +123,7 @@ fn a_splat_is_drawn_in_every_mode_and_only_when_something_changes() {
     w.harness.run_steps(2);
     assert_eq!(w.app().viewport.picture().expect("drawn").ticket, ticket, "nothing changed, so nothing is drawn anew");
     for (key, mode) in
-        [(egui::Key::Num5, ViewMode::Depth), (egui::Key::Num7, ViewMode::Alpha), (egui::Key::Num1, ViewMode::Picture)]
+        [(egui::Key::Num5, ViewMode::Depth), (egui::Key::Num7, ViewMode::Alpha), (egui::Key::Num1, ViewMode::Rgb)]
     {
         let before = w.app().viewport.picture().expect("drawn").rgb.clone();
         w.harness.key_press(key);
@@ -219,7 +220,7 @@ fn last_step(app: &App) -> u64 {
 fn training_moves_the_plot_pauses_resumes_and_is_cancelled() {
     let mut w = Window::new(Some(Action::Open(photos())));
     w.until("the photos", |a| a.state.scene.is_some());
-    assert!(w.shows("7 train") && w.shows("1 held out"), "the photos pane");
+    assert!(w.shows("7 train") && w.shows("1 held-out"), "the photos pane");
     assert!(w.shows("Feature maps"), "the scene plan");
     w.harness.state_mut().layout.config.steps = 50_000;
     w.click("Start training");
@@ -294,10 +295,10 @@ fn opening_something_else_while_a_job_runs_asks_first() {
     w.until("training", |a| a.state.is_training());
     w.ask(Action::Open(splat.clone()));
     assert!(w.shows("still running"));
-    w.click("Keep it running");
+    w.click("Keep running");
     assert!(w.app().state.is_training());
     w.ask(Action::Open(splat));
-    w.click("Cancel it and go on");
+    w.click("Cancel and continue");
     w.until("the splat", |a| a.state.scene.as_ref().is_some_and(|s| s.name == "dots"));
 }
 
@@ -333,19 +334,20 @@ fn objects_are_found_asked_for_renamed_hidden_and_undone() {
     assert!(map.language.as_ref().is_some_and(|l| l.is_valid(&map.identities)), "the encoder has looked");
 
     w.ask(Action::Ask("the red controller".into()));
-    let red = w.app().viewport.questions.all().last().expect("asked").answered.chosen(1);
+    let red = w.app().viewport.queries.all().last().expect("asked").answered.chosen(1);
     assert_eq!(red.iter().map(|id| map.identities.name(*id)).collect::<Vec<_>>(), ["red controller"]);
     assert!(w.shows("Go there") && w.shows("Isolate"), "what can be done with it");
-    w.until("what the pixels belong to", |a| a.viewport.questions.maps().is_some());
+    w.until("what the pixels belong to", |a| a.viewport.queries.maps().is_some());
     w.ask(Action::Ask("giraffe".into()));
-    assert!(w.shows("Nothing here"), "not found is an answer");
+    w.until("an answer", |a| a.viewport.queries.all().last().is_some_and(|q| !q.pending));
+    assert!(w.shows("No match"), "not found is an answer");
     w.ask(Action::Ask("x".repeat(10_000)));
     w.ask(Action::Ask(String::new()));
     assert!(w.app().state.error.is_none());
 
     // The table is seen from everywhere.
     let table = map.identities.iter().find(|(_, i)| i.names == ["table"]).map(|(id, _)| id).expect("a table");
-    let drawn = |a: &App| a.viewport.questions.maps().map(|m| m.identities.mask(&map.identities, table).area());
+    let drawn = |a: &App| a.viewport.queries.maps().map(|m| m.identities.mask(&map.identities, table).area());
     assert!(drawn(w.app()).is_some_and(|n| n > 0), "it is in view");
     w.ask(Action::Hide(table));
     w.until("it is gone from the view", |a| drawn(a) == Some(0));
@@ -423,7 +425,7 @@ fn a_report_is_opened_compared_and_its_settings_are_applied() {
     let mut w = Window::new(Some(Action::Open(write_splat(folder.path()))));
     w.until("the splat", |a| a.viewport.picture().is_some_and(|p| p.full));
     w.ask(Action::TogglePane(Pane::Report));
-    assert!(w.shows("Error against run time") && w.shows("fmlgs report") && w.shows("Measure drawing of this scene"));
+    assert!(w.shows("Error against run time") && w.shows("fmlgs report") && w.shows("Benchmark rendering"));
 
     // As if it was dropped: it is no scene, and takes no scene's place.
     w.ask(Action::Open(at("one")));
@@ -436,9 +438,9 @@ fn a_report_is_opened_compared_and_its_settings_are_applied() {
     w.click("filter: on");
     let before = w.app().viewport.picture().expect("drawn").rgb.clone();
     w.click("Apply to the view");
-    assert_eq!(w.app().viewport.drawing.antialias, Some(true));
+    assert_eq!(w.app().viewport.overrides.antialias, Some(true));
     w.until("another picture", |a| a.viewport.picture().is_some_and(|p| p.full && p.rgb != before));
-    assert!(w.shows("drawn with filter on") && w.shows("In force"));
+    assert!(w.shows("rendered with filter on") && w.shows("Already active"));
     w.click("default: as the scene says");
     w.click("Apply to the view");
     w.until("the first picture", |a| a.viewport.picture().is_some_and(|p| p.full && p.rgb == before));
@@ -474,7 +476,7 @@ fn frame_times_are_shown_and_cost_nothing_when_they_are_not() {
     assert!(w.app().layout.times);
     w.until("times of a picture", |a| a.viewport.picture().is_some_and(|p| p.full && p.ticket > 1));
     w.harness.run_steps(3);
-    assert!(w.shows("median of") && w.shows("whole") && w.shows("upload"));
+    assert!(w.shows("median of") && w.shows("total") && w.shows("upload"));
     w.harness.key_press(egui::Key::F3);
     w.harness.run_steps(3);
     assert!(!w.shows("median of"));

@@ -18,6 +18,7 @@ use crate::pipeline::semantics::asker::Asker;
 use crate::pipeline::semantics::grammar::Kind;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderSettings, Renderer};
+use crate::scene::undo::UndoHistory;
 use crate::scene::{Bounds, Camera, GaussianCloud, Identities, IdentityId, SemanticMap, text};
 use crate::worker::Explored;
 
@@ -37,27 +38,22 @@ pub enum Effect {
     Mark(Vec<IdentityId>),
     /// Which identities are left out of the picture.
     Hidden(Vec<IdentityId>),
-    /// Names have changed.
     Renamed(IdentityId, String),
+    /// The last change of a name was undone: it is called this again.
+    RenameUndone(IdentityId, String),
     /// The scene was looked at: where matter is is known.
     Explored(Arc<Explored>),
 }
 
 /// What a scene is made of.
 pub struct Parts {
-    /// The Gaussians.
     pub cloud: Arc<GaussianCloud>,
-    /// How they are drawn.
     pub settings: RenderSettings,
-    /// Objects and parts.
     pub map: Arc<SemanticMap>,
-    /// The photos' cameras.
     pub cameras: Vec<Camera>,
-    /// Which way is up.
     pub up: DVec3,
     /// Length of a unit in metres, if that is known.
     pub metres: Option<f64>,
-    /// Folder that exports go to.
     pub exports: PathBuf,
     /// What is known of moving about, if the scene was looked at before.
     pub explored: Option<Arc<Explored>>,
@@ -75,7 +71,7 @@ pub struct SceneWorld {
     hidden: Vec<bool>,
     bounds: Vec<Option<Bounds>>,
     shares: Mutex<Option<Counted>>,
-    done: Vec<Before>,
+    done: UndoHistory<Before>,
     emit: Emit,
 }
 
@@ -117,7 +113,7 @@ impl SceneWorld {
             hidden: vec![false; n],
             bounds,
             shares: Mutex::new(None),
-            done: Vec::new(),
+            done: UndoHistory::default(),
             emit,
         })
     }
@@ -127,9 +123,12 @@ impl SceneWorld {
     pub fn keep_up(&mut self, eye: Pose, aspect: f64, hidden: &[IdentityId], map: &Arc<SemanticMap>) {
         (self.eye, self.aspect) = (eye, aspect);
         if !Arc::ptr_eq(map, &self.parts.map) {
+            // An edit of the agent's own comes back as the window's; another makes what was done stale.
+            if map.identities != self.parts.map.identities {
+                self.done = UndoHistory::default();
+            }
             self.parts.map = Arc::clone(map);
             self.bounds = bounds(&self.parts);
-            self.done.clear();
         }
         self.hidden = (0..=map.identities.len() as IdentityId).map(|id| hidden.contains(&id)).collect();
     }
@@ -187,7 +186,7 @@ impl SceneWorld {
     }
 
     fn fly(&mut self, flight: Flight, about: Option<DVec3>, what: String) {
-        self.done.push(Before::Eye(self.eye, what));
+        self.done.record(Before::Eye(self.eye, what));
         if let Some(last) = flight.poses.last() {
             self.eye = *last;
         }
@@ -201,7 +200,7 @@ impl SceneWorld {
 
     fn set_hidden_list(&mut self, hidden: Vec<bool>, what: String) {
         let before = std::mem::replace(&mut self.hidden, hidden);
-        self.done.push(Before::Hidden(before, what));
+        self.done.record(Before::Hidden(before, what));
         self.emit_hidden();
     }
 
@@ -409,20 +408,16 @@ impl World for SceneWorld {
     fn rename(&mut self, id: IdentityId, name: &str) -> Result<(), WorldError> {
         let before = Arc::clone(&self.parts.map);
         let map = Arc::make_mut(&mut self.parts.map);
-        let identity = map.identities.get_mut(id).ok_or_else(|| WorldError(format!("there is no #{id}")))?;
-        let name = text::name(name);
-        let old = identity.names.first().cloned().unwrap_or_default();
-        match identity.names.first_mut() {
-            Some(first) => first.clone_from(&name),
-            None => identity.names.push(name.clone()),
-        }
-        self.done.push(Before::Named(before, id, old));
+        let identity = map.identities.get(id).ok_or_else(|| WorldError(format!("there is no #{id}")))?;
+        let (name, old) = (text::name(name), identity.names.first().cloned().unwrap_or_default());
+        map.identities.rename(id, &name);
+        self.done.record(Before::Named(before, id, old));
         (self.emit)(Effect::Renamed(id, name));
         Ok(())
     }
 
     fn undo(&mut self) -> Result<String, WorldError> {
-        match self.done.pop().ok_or_else(|| WorldError("There is nothing to take back.".into()))? {
+        match self.done.take().ok_or_else(|| WorldError("There is nothing to take back.".into()))? {
             Before::Hidden(hidden, what) => {
                 self.hidden = hidden;
                 self.emit_hidden();
@@ -431,13 +426,13 @@ impl World for SceneWorld {
             Before::Named(map, id, old) => {
                 let new = self.parts.map.identities.name(id);
                 self.parts.map = map;
-                (self.emit)(Effect::Renamed(id, old));
+                (self.emit)(Effect::RenameUndone(id, old));
                 Ok(format!("calling it {new}"))
             }
             Before::Eye(eye, what) => {
                 self.straight(eye, String::new()).map_err(|e| WorldError(e.reason))?;
                 // The way back is not itself something to take back.
-                self.done.pop();
+                self.done.take();
                 Ok(what)
             }
         }

@@ -297,7 +297,7 @@ fn line(effect: &Effect) -> Option<String> {
         }
         Effect::Mark(ids) => Some(format!("marks {} of them", ids.len())),
         Effect::Hidden(ids) => Some(format!("leaves {} out of the picture", ids.len())),
-        Effect::Renamed(id, name) => Some(format!("calls #{id} {name}")),
+        Effect::Renamed(id, name) | Effect::RenameUndone(id, name) => Some(format!("calls #{id} {name}")),
         Effect::Explored(_) => None,
     }
 }

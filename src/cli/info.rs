@@ -20,7 +20,7 @@ use crate::worker::machine;
 /// this machine, why, and what that saves.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  fmlgs info photos/\n  fmlgs info scene.ply --json | jq .gaussians\n  \
-    fmlgs info scene/ --plan colour=full --plan maps=always")]
+    fmlgs info scene/ --plan color=full --plan feature-maps=always")]
 pub struct Args {
     /// Dataset folder, transforms.json, splat file or trained scene
     path: PathBuf,

@@ -42,9 +42,9 @@ use clap::{Parser, Subcommand};
 pub use error::CliError;
 
 use self::plan::PlanArgs;
-use crate::scene::plan::Wish;
+use crate::scene::plan::PlanOverride;
 use crate::scene::{text, trace};
-use crate::worker::Action;
+use crate::worker::Start;
 
 /// What each exit code means; part of `--help`.
 const EXIT_CODES: &str = "\
@@ -114,8 +114,8 @@ enum Command {
     CheckStability(check_stability::Args),
 }
 
-/// Opens the window with what is wanted of plans, does these actions, and returns when the window is closed.
-pub type OpenWindow = fn(Vec<Action>, Vec<Wish>) -> Result<(), Box<dyn std::error::Error>>;
+/// Opens the window with what is wanted of plans, does these things first, and returns when the window is closed.
+pub type OpenWindow = fn(Vec<Start>, Vec<PlanOverride>) -> Result<(), Box<dyn std::error::Error>>;
 
 /// Runs the command line of this process and returns its exit code. `open_window` stands above this
 /// module, so the caller hands it in.
@@ -150,8 +150,8 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         if cli.report.len() > 2 {
             return Err(CliError::Usage("--report: at most two reports are compared".into()));
         }
-        let reports = cli.report.into_iter().zip([Action::OpenReport, Action::CompareReport]);
-        let first = cli.path.map(Action::Open).into_iter().chain(reports.map(|(path, action)| action(path)));
+        let reports = cli.report.into_iter().zip([Start::Report, Start::SecondReport]);
+        let first = cli.path.map(Start::Scene).into_iter().chain(reports.map(|(path, start)| start(path)));
         return window(first.collect(), wishes, open_window);
     };
     if !cli.report.is_empty() {
@@ -177,7 +177,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Agent(args) => agent::run(args),
         Command::Synth(args) => synth::run(args, quiet),
         Command::Demo(args) if args.headless => demo::run(args, quiet),
-        Command::Demo(_) => window(vec![Action::TryDemo], wishes, open_window),
+        Command::Demo(_) => window(vec![Start::Demo], wishes, open_window),
         Command::Export(args) => export::run(args),
         Command::Bench(args) => bench::run(args, quiet),
         Command::Report(args) => report::run(args, quiet),
@@ -185,14 +185,14 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
     }
 }
 
-fn window(first: Vec<Action>, wishes: Vec<Wish>, open_window: OpenWindow) -> Result<(), CliError> {
-    for action in &first {
-        match action {
-            Action::Open(path) if !path.exists() => {
+fn window(first: Vec<Start>, wishes: Vec<PlanOverride>, open_window: OpenWindow) -> Result<(), CliError> {
+    for start in &first {
+        match start {
+            Start::Scene(path) if !path.exists() => {
                 let name = path.display();
                 return Err(CliError::Usage(format!("'{name}' is no file, no folder and no subcommand")));
             }
-            Action::OpenReport(path) | Action::CompareReport(path) if !path.exists() => {
+            Start::Report(path) | Start::SecondReport(path) if !path.exists() => {
                 return Err(CliError::Usage(format!("--report: '{}' is no file and no folder", path.display())));
             }
             _ => {}

@@ -1,37 +1,33 @@
-//! Colour maps from a number between 0 and 1 to sRGB.
+//! Color maps from a number between 0 and 1 to sRGB.
 
-/// A colour map.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+use strum::{IntoStaticStr, VariantArray};
+
+/// A color map.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "lowercase")]
 pub enum Colormap {
     /// Blue over green to red.
     #[default]
     Turbo,
-    /// Dark violet to yellow, evenly brighter; safe for the colour-blind.
+    /// Dark violet to yellow, evenly brighter; safe for the color-blind.
     Viridis,
     /// Black to white.
-    Grey,
+    Gray,
 }
 
 impl Colormap {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Turbo, Self::Viridis, Self::Grey];
-
     /// Its name.
     pub fn text(self) -> &'static str {
-        match self {
-            Self::Turbo => "turbo",
-            Self::Viridis => "viridis",
-            Self::Grey => "grey",
-        }
+        self.into()
     }
 
-    /// The colour of `t`, clamped to 0..1; NaN is black, so that holes stand out.
+    /// The color of `t`, clamped to 0..1; NaN is black, so that holes stand out.
     pub fn color(self, t: f32) -> [u8; 3] {
         match self {
             _ if t.is_nan() => [0; 3],
             Self::Turbo => turbo(t),
             Self::Viridis => viridis(t),
-            Self::Grey => [(t.clamp(0.0, 1.0) * 255.0 + 0.5) as u8; 3],
+            Self::Gray => [(t.clamp(0.0, 1.0) * 255.0 + 0.5) as u8; 3],
         }
     }
 }
@@ -86,7 +82,7 @@ mod tests {
 
     #[test]
     fn viridis_and_grey_get_evenly_brighter() {
-        for map in [Colormap::Viridis, Colormap::Grey] {
+        for map in [Colormap::Viridis, Colormap::Gray] {
             let brightness = |t: f32| {
                 let [r, g, b] = map.color(t).map(f32::from);
                 0.21 * r + 0.72 * g + 0.07 * b
@@ -103,7 +99,7 @@ mod tests {
 
     #[test]
     fn ends_and_middle_are_those_of_the_fits() {
-        assert_eq!(Colormap::ALL.map(Colormap::text), ["turbo", "viridis", "grey"]);
+        assert_eq!(Colormap::VARIANTS.iter().map(|m| m.text()).collect::<Vec<_>>(), ["turbo", "viridis", "gray"]);
         // The polynomials by hand: their first coefficients at 0, their sums at 1, both within a rounding.
         for (map, t, expected) in [
             (Colormap::Turbo, 0.0, [35, 23, 27]),
@@ -112,14 +108,14 @@ mod tests {
             (Colormap::Viridis, 0.0, [71, 1, 85]),
             (Colormap::Viridis, 0.4, [40, 120, 142]),
             (Colormap::Viridis, 1.0, [252, 231, 33]),
-            (Colormap::Grey, 0.0, [0; 3]),
-            (Colormap::Grey, 0.4, [102; 3]),
-            (Colormap::Grey, 1.0, [255; 3]),
-            (Colormap::Grey, 0.25, [64; 3]),
+            (Colormap::Gray, 0.0, [0; 3]),
+            (Colormap::Gray, 0.4, [102; 3]),
+            (Colormap::Gray, 1.0, [255; 3]),
+            (Colormap::Gray, 0.25, [64; 3]),
         ] {
             let found = map.color(t);
             assert!(found.iter().zip(expected).all(|(a, b)| a.abs_diff(b) <= 1), "{map:?} {t}: {found:?}");
         }
-        assert_eq!((Colormap::Grey.color(0.25), Colormap::Grey.color(0.0)), ([64; 3], [0; 3]));
+        assert_eq!((Colormap::Gray.color(0.25), Colormap::Gray.color(0.0)), ([64; 3], [0; 3]));
     }
 }

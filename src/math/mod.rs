@@ -3,6 +3,7 @@
 pub mod colormap;
 mod fast_exp;
 pub mod finite;
+pub mod format;
 pub mod grid;
 pub mod lanes;
 pub mod real;

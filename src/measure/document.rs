@@ -214,7 +214,7 @@ impl Rule {
     pub fn words(&self) -> String {
         let times = 100.0 * (self.times - 1.0);
         let same = match self.spare_secs > 0.0 {
-            true => format!("; {} more or less do not count", super::table::seconds(self.spare_secs)),
+            true => format!("; {} more or less do not count", crate::math::format::seconds(self.spare_secs)),
             false => String::new(),
         };
         // "RMS error" is one by its name; "PSNR" stands for one.

@@ -4,7 +4,8 @@ use htmlize::escape_all_quotes;
 
 use super::document::{Report, Stage};
 use super::plot::{order_svg, svg};
-use super::table::{html as html_table, number, seconds, title};
+use super::table::{html as html_table, title};
+use crate::math::format::{number, seconds};
 
 const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;color:#1b1b1f;background:#fff;max-width:1080px;\
 margin:2em auto;padding:0 1em}h1{margin-bottom:0}h2{margin-top:2.2em;border-top:1px solid #ccc;padding-top:.6em}\

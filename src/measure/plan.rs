@@ -11,13 +11,14 @@ use super::bench::views_of;
 use super::sweep::failed;
 use super::table::{Rows, rows};
 use super::{StudyError, document::Sample};
+use crate::math::format::bytes;
 use crate::models;
 use crate::navigate::Navigator;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::portraits::portraits;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{BackendChoice, Device, RenderSettings, Renderer, real_gpu};
-use crate::scene::plan::{Overrides, ScenePlan, When, bytes};
+use crate::scene::plan::{Overrides, ScenePlan, When};
 use crate::scene::{Camera, Facts, GaussianCloud, SemanticMap, trace};
 
 /// Size of the images, px.
@@ -178,7 +179,7 @@ fn at_opening(scene: &OpenScene, plan: &ScenePlan, settings: &RenderSettings) ->
         navigator
     });
     let map = scene.map.as_deref();
-    let thumbnails = map.filter(|_| plan.portraits == When::Always).map(|map| {
+    let thumbnails = map.filter(|_| plan.thumbnails == When::Always).map(|map| {
         let from = scene.first.center;
         portraits(&scene.cloud, map, settings, from, scene.up).map_err(failed)
     });

@@ -75,7 +75,7 @@ fn mesh(chart: &mut Area<'_, '_>, x: &str, y: &str) -> Result<(), Failed> {
     let label = |v: &f64| {
         let leading = v / 10.0_f64.powf(v.log10().floor());
         let round = [1.0, 2.0, 5.0, 10.0].iter().any(|r| (leading - r).abs() < 1e-6);
-        if round { super::table::number(*v) } else { String::new() }
+        if round { crate::math::format::number(*v) } else { String::new() }
     };
     chart
         .configure_mesh()

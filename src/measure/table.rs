@@ -1,6 +1,7 @@
 //! A report as tables: rows of text, comma-separated values.
 
 use super::document::{Measure, Order, Point, Report, Sample, Stage};
+use crate::math::format::{number, seconds};
 
 /// Rows of cells, the header first.
 pub type Rows = Vec<Vec<String>>;
@@ -30,29 +31,6 @@ pub fn html(rows: &Rows) -> String {
     let mut lines = rows.iter().map(line);
     let head = lines.next().unwrap_or_default().replace("<td", "<th").replace("</td", "</th");
     format!("<table><thead>{head}</thead><tbody>\n{}</tbody></table>\n", lines.collect::<String>())
-}
-
-/// A number with four digits that count.
-pub fn number(v: f64) -> String {
-    let size = v.abs();
-    match size {
-        _ if v == 0.0 => "0".into(),
-        1e-3..1e4 => {
-            let decimals = (3 - size.log10().floor() as i32).clamp(0, 6) as usize;
-            format!("{v:.decimals$}")
-        }
-        _ => format!("{v:.2e}"),
-    }
-}
-
-/// Seconds for people: "3.2 ms".
-pub fn seconds(secs: f64) -> String {
-    match secs {
-        s if !(s > 0.0) => "0".into(),
-        s if s < 1e-3 => format!("{} \u{b5}s", number(s * 1e6)),
-        s if s < 1.0 => format!("{} ms", number(s * 1e3)),
-        s => format!("{} s", number(s)),
-    }
 }
 
 /// The middle, and how far the repeats are apart.
@@ -142,7 +120,6 @@ impl Report {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::measure::tests::example;
 
     #[test]
@@ -155,11 +132,5 @@ mod tests {
         let csv = report.csv();
         assert_eq!(csv.lines().count(), 1 + 2 * 4);
         assert!(csv.contains("\"1/255 <&> \"\"quoted\"\"\",true,\"{}\",\"RMS\",\"\",3,0.02,"));
-    }
-
-    #[test]
-    fn numbers_are_short() {
-        assert_eq!([0.0, 0.123456, 12.3456, 12345.6, 1e-9].map(number), ["0", "0.1235", "12.35", "1.23e4", "1.00e-9"]);
-        assert_eq!([0.0, 2.5e-6, 0.0123, 12.0].map(seconds), ["0", "2.500 \u{b5}s", "12.30 ms", "12.00 s"]);
     }
 }

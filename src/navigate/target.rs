@@ -3,6 +3,7 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
+use strum::{IntoStaticStr, VariantArray};
 
 use super::matter::Matter;
 use super::pose::Pose;
@@ -25,44 +26,39 @@ const DRAWN_PX: u32 = 128;
 const PHOTO_ANGLE: f64 = 0.6;
 
 /// From which side.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, IntoStaticStr, VariantArray)]
 pub enum Side {
     /// Whichever shows it best.
     #[default]
+    #[strum(serialize = "where it is seen best")]
     Best,
     /// As the eye sees it now.
+    #[strum(serialize = "from this side")]
     Same,
     /// The opposite of that.
+    #[strum(serialize = "from the other side")]
     Other,
     /// Its front: away from what it is a part of, or where most photos were taken.
+    #[strum(serialize = "from its front")]
     Front,
     /// What is left of it now.
+    #[strum(serialize = "from its left")]
     Left,
     /// What is right of it now.
+    #[strum(serialize = "from its right")]
     Right,
     /// Over it.
+    #[strum(serialize = "from above")]
     Above,
     /// Under it.
+    #[strum(serialize = "from below")]
     Below,
 }
 
 impl Side {
-    /// All of them.
-    pub const ALL: [Self; 8] =
-        [Self::Best, Self::Same, Self::Other, Self::Front, Self::Left, Self::Right, Self::Above, Self::Below];
-
     /// In words.
     pub fn text(self) -> &'static str {
-        match self {
-            Self::Best => "where it is seen best",
-            Self::Same => "from this side",
-            Self::Other => "from the other side",
-            Self::Front => "from its front",
-            Self::Left => "from its left",
-            Self::Right => "from its right",
-            Self::Above => "from above",
-            Self::Below => "from below",
-        }
+        self.into()
     }
 }
 

@@ -14,6 +14,7 @@ pub mod plan;
 pub mod semantic_map;
 pub mod text;
 pub mod trace;
+pub mod undo;
 
 pub use bounds::Bounds;
 pub use camera::{Camera, CameraError};

@@ -67,6 +67,23 @@ pub fn shortened(text: &str, most: usize) -> Cow<'_, str> {
     Cow::Owned(format!("{}\u{2026}", &text[..end]))
 }
 
+/// A text on one line, cut in the middle so that it has at most `most` letters.
+pub fn elided(text: &str, most: usize) -> String {
+    let text = &*line(text);
+    let n = text.chars().count();
+    if n <= most {
+        return text.to_owned();
+    }
+    let keep = most.saturating_sub(1);
+    let (head, tail) = (keep / 2, keep - keep / 2);
+    text.chars().take(head).chain(['\u{2026}']).chain(text.chars().skip(n - tail)).collect()
+}
+
+/// A path on one line.
+pub fn path(path: &std::path::Path) -> String {
+    line(&path.to_string_lossy()).into_owned()
+}
+
 /// The name of an identity or a scene as it is kept: one line of at most [`LONGEST_NAME`] letters.
 pub fn name(text: &str) -> String {
     // The rest of an endless name need not be looked at.
@@ -167,5 +184,7 @@ mod tests {
             ("abc".into(), "ab\u{2026}".into(), "\u{2026}".into())
         );
         assert_eq!(name("  kettle \n"), "kettle");
+        assert_eq!(elided("short", 10), "short");
+        assert_eq!(elided("a/very/long/path/to/a/file.ply", 12), "a/ver\u{2026}le.ply");
     }
 }

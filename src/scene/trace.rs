@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::plan::bytes;
+use crate::math::format::bytes;
 
 /// What sort of thing was loaded or built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

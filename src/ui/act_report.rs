@@ -1,11 +1,13 @@
 //! What the actions around reports do.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use super::app::App;
 use super::state::Tone;
 use crate::measure::{Knobs, StageName, turned};
-use crate::worker::{Command, MeasureRequest, Pane};
+use crate::ui::actions::Pane;
+use crate::worker::{Command, MeasureRequest};
 
 impl App {
     /// Reads a report and shows its pane.
@@ -19,17 +21,17 @@ impl App {
         let scene = self.state.scene.clone();
         let cloud = self.viewport.cloud().cloned().filter(|_| self.state.is_trained());
         let (Some(scene), Some(cloud)) = (scene, cloud) else {
-            self.state.toast(Tone::Warning, "Open or train a scene first: its Gaussians are what is drawn.");
+            self.state.toast(Tone::Warning, "Open or train a scene first: its Gaussians are what is rendered.");
             return;
         };
         if let Some(job) = &self.state.job {
-            let text = format!("{} is still running; cancel it first (Esc), or it falsifies the times.", job.title);
+            let text = format!("{} is still running; cancel it first (Esc), or it would distort the times.", job.title);
             self.state.toast(Tone::Warning, text);
             return;
         }
         let request = MeasureRequest {
             scene: scene.path.display().to_string(),
-            cloud,
+            cloud: Arc::clone(&cloud),
             settings: scene.render.clone(),
             dataset: scene.dataset.clone(),
             holdout_every: self.layout.config.holdout_every,
@@ -48,9 +50,9 @@ impl App {
                 self.layout.hidden.retain(|p| *p != Pane::Training);
                 "The next training will use it (pane Training)"
             }),
-            StageName::Render => turned(&self.viewport.drawing, knobs).map(|drawing| {
-                self.viewport.drawing = drawing;
-                "The view is drawn with it; exported videos and images stay as they are"
+            StageName::Render => turned(&self.viewport.overrides, knobs).map(|drawing| {
+                self.viewport.overrides = drawing;
+                "The view is rendered with it; videos and exports stay as they are"
             }),
             _ => Err("the window has no setting for it".into()),
         };

@@ -1,5 +1,6 @@
 //! The application: takes events in, draws the window, sends commands out.
 
+use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -8,20 +9,22 @@ use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 use super::camera::CameraPane;
 use super::chat::Chat;
 use super::dialogs::{self, FileDialogs, Question};
+use super::edits::EditStep;
 use super::layout::Layout;
 use super::palette::{Palette, shortcut_sheet};
 use super::panes::{
-    bars, dataset::Thumbnails, empty, log, models::Models, objects, plan, portraits::Portraits, report::ReportPane,
-    training,
+    bars, dataset::PhotoThumbnails, empty, log, models::Models, object_thumbnails::ObjectThumbnails, objects, plan,
+    report::ReportPane, training,
 };
 use super::state::AppState;
 use super::toasts::Toasts;
 use super::viewport::Viewport;
 use super::{keys, theme};
 use crate::measure::is_report;
-use crate::scene::plan::Wish;
+use crate::scene::plan::PlanOverride;
 use crate::scene::trace::{self, Sort};
-use crate::worker::{Action, Jobs, Pane, Repaint, Worker};
+use crate::ui::actions::{Action, Pane};
+use crate::worker::{JobId, Jobs, Repaint, Worker};
 
 /// The window's application.
 pub struct App {
@@ -37,14 +40,14 @@ pub struct App {
     pub(super) question: Option<Question>,
     pub(super) palette: Palette,
     pub(super) sheet: bool,
-    thumbnails: Thumbnails,
-    portraits: Portraits,
+    photo_thumbnails: PhotoThumbnails,
+    object_thumbnails: ObjectThumbnails,
     models: Models,
     /// Error against run time.
     pub report: ReportPane,
     /// The camera's path and its player.
     pub camera: CameraPane,
-    /// The talk with the assistant.
+    /// The conversation with the agent.
     pub chat: Chat,
     toasts: Toasts,
     actions: Vec<Action>,
@@ -54,6 +57,10 @@ pub struct App {
     pub(super) explored_for: u64,
     /// Lines of the trace that are in the log already.
     traced: usize,
+    /// Edits of objects and parts that wait for the one that is under way.
+    pub(super) edits: VecDeque<EditStep>,
+    /// The newest edit.
+    pub(super) editing: Option<JobId>,
 }
 
 impl App {
@@ -65,7 +72,7 @@ impl App {
         first: impl IntoIterator<Item = Action>,
     ) -> std::io::Result<Self> {
         theme::install(&cc.egui_ctx);
-        // Pictures answer a person's hand. Progress can be read no faster than it is written, and
+        // Frames answer a user's hand. Progress can be read no faster than it is written, and
         // every frame takes from what it reports on.
         let (repaint, unhurried) = (super::repainter(&cc.egui_ctx, 8), super::repainter(&cc.egui_ctx, 120));
         trace::record(Sort::Window, "window", "the program was started", 0);
@@ -82,8 +89,8 @@ impl App {
             question: None,
             palette: Palette::default(),
             sheet: false,
-            thumbnails: Thumbnails::default(),
-            portraits: Portraits::default(),
+            photo_thumbnails: PhotoThumbnails::default(),
+            object_thumbnails: ObjectThumbnails::default(),
             models: Models::default(),
             report: ReportPane::default(),
             camera: CameraPane::default(),
@@ -92,6 +99,8 @@ impl App {
             last_frame: 0.0,
             explored_for: 0,
             traced: 0,
+            edits: VecDeque::new(),
+            editing: None,
             actions: first.into_iter().collect(),
         })
     }
@@ -101,15 +110,16 @@ impl App {
         self.actions.push(action);
     }
 
-    /// Takes what a person wants of scene plans, for this run and, as it is kept, later ones.
-    pub fn wish(&mut self, wishes: impl IntoIterator<Item = Wish>) {
-        wishes.into_iter().for_each(|wish| self.layout.plan.set(wish));
+    /// Takes what a user wants of scene plans, for this run and, as it is kept, later ones.
+    pub fn override_plan(&mut self, overrides: impl IntoIterator<Item = PlanOverride>) {
+        overrides.into_iter().for_each(|one| self.layout.plan.set(one));
     }
 
     /// Takes in everything that happened since.
     fn take_events(&mut self, ctx: &egui::Context) {
         while let Some(event) = self.worker.next_event() {
-            self.state.apply(event);
+            let next = self.state.apply(event);
+            self.actions.extend(next);
         }
         self.state.replan(&self.layout.plan, self.layout.config.limits());
         for load in trace::since(self.traced) {
@@ -123,21 +133,11 @@ impl App {
         for effect in self.chat.news() {
             self.effect(effect);
         }
-        self.talk();
+        self.next_edit();
+        self.send_chat();
         self.play(ctx);
-        self.thumbnails.update(ctx, &mut self.state);
-        self.portraits.update(ctx, &mut self.state, self.viewport.cloud(), &self.worker);
-        if std::mem::take(&mut self.state.wants_training) {
-            self.actions.push(Action::StartTraining);
-        }
-        if std::mem::take(&mut self.state.wants_objects) {
-            self.actions.push(Action::FindObjects);
-        }
-        if std::mem::take(&mut self.state.wants_report)
-            && let Some(scene) = &self.state.scene
-        {
-            self.actions.push(Action::OpenReport(scene.report_out.clone()));
-        }
+        self.photo_thumbnails.update(ctx, &mut self.state);
+        self.object_thumbnails.update(ctx, &mut self.state, self.viewport.cloud().map(|c| &**c), &self.worker);
         while let Some(answer) = self.dialogs.answer() {
             self.chosen(answer);
         }
@@ -208,7 +208,7 @@ impl App {
             Panel::left("photos").frame(pane).resizable(true).default_size(270.0).size_range(180.0..=600.0).show(
                 ui,
                 |ui| {
-                    self.thumbnails.show(ui, state, layout, viewport.photo_index(), &self.worker, actions);
+                    self.photo_thumbnails.show(ui, state, layout, viewport.photo_index(), &self.worker, actions);
                 },
             );
         }
@@ -220,7 +220,7 @@ impl App {
                         let objects = layout.shows(Pane::Objects) && scene.dataset.is_some();
                         let show_objects = |ui: &mut Ui, actions: &mut Vec<Action>| {
                             egui::CollapsingHeader::new(Pane::Objects.text()).default_open(true).show(ui, |ui| {
-                                objects::show(ui, state, &self.portraits, &viewport.visibility, actions)
+                                objects::show(ui, state, &self.object_thumbnails, &viewport.visibility, actions)
                             });
                             ui.add_space(10.0);
                         };
@@ -228,11 +228,11 @@ impl App {
                             let map = state.semantics.clone();
                             egui::CollapsingHeader::new(Pane::Chat.text()).default_open(map.is_some()).show(ui, |ui| {
                                 let identities = map.as_deref().map(|map| &map.identities);
-                                self.chat.show(ui, &mut layout.chat, &self.portraits, identities, actions);
+                                self.chat.show(ui, &mut layout.chat, &self.object_thumbnails, identities, actions);
                             });
                             ui.add_space(8.0);
                         }
-                        // Once there are any, they are what a person works with.
+                        // Once there are any, they are what a user works with.
                         if objects && state.semantics.is_some() {
                             show_objects(ui, actions);
                         }
@@ -251,7 +251,7 @@ impl App {
                         }
                         if layout.shows(Pane::Models) {
                             egui::CollapsingHeader::new(Pane::Models.text())
-                                .show(ui, |ui| self.models.show(ui, state, &mut layout.finding, actions));
+                                .show(ui, |ui| self.models.show(ui, state, &mut layout.finding, &self.worker, actions));
                         }
                     });
                 },

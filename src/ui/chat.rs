@@ -4,13 +4,13 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crossbeam_channel::{Receiver, Sender, bounded, unbounded};
+use crossbeam_channel::{Receiver, Sender, bounded};
 use egui::text::{CCursor, CCursorRange};
 use egui::{Button, Key, Modifiers, Response, RichText, ScrollArea, TextEdit, Ui};
 
 pub use super::chat_model::ChatSettings;
 use super::chat_model::ModelChooser;
-use super::panes::portraits::Portraits;
+use super::panes::object_thumbnails::ObjectThumbnails;
 use super::theme;
 use crate::agent::commands::{Commands, complete};
 use crate::agent::llm::Llm;
@@ -19,30 +19,35 @@ use crate::agent::{AgentEvent, Planner, Policy, Refusal, Session};
 use crate::navigate::Pose;
 use crate::scene::trace::{self, Sort};
 use crate::scene::{Identities, IdentityId, SemanticMap, text};
-use crate::worker::{Action, Repaint};
+use crate::ui::actions::Action;
+use crate::worker::Repaint;
 
+/// News that may wait for the window; the agent waits for it beyond that.
+const NEWS: usize = 1024;
 /// Lines that are kept.
 const MAX_LINES: usize = 400;
 /// Ways to go on that are shown at once.
 const CONTINUATIONS: usize = 4;
-/// Side of a candidate's portrait, points.
-const PORTRAIT: f32 = 34.0;
+/// Side of a candidate's thumbnail, points.
+const THUMBNAIL_PX: f32 = 34.0;
 
 /// What the agent is to work on, as the window has it now.
 pub struct Snapshot {
     /// The scene.
     pub parts: Parts,
+    /// Generation of its Gaussians.
+    pub cloud: u64,
     /// Counts the scenes shown so far.
     pub scene: u64,
     /// Where the eye is.
     pub eye: Pose,
-    /// Width by height of the picture.
+    /// Width by height of the frame.
     pub aspect: f64,
-    /// What is left out of the picture.
+    /// What is left out of the frame.
     pub hidden: Vec<IdentityId>,
 }
 
-/// A line of the talk.
+/// A line of the conversation.
 enum Line {
     Said(String),
     Did(String, Option<bool>),
@@ -63,7 +68,7 @@ enum News {
     Reply { text: String, candidates: Vec<(IdentityId, String)>, refused: Option<Refusal>, transcript: [String; 2] },
 }
 
-/// The talk with the agent.
+/// The conversation with the agent.
 #[derive(Default)]
 pub struct Chat {
     typed: String,
@@ -149,7 +154,7 @@ impl Chat {
         &mut self,
         ui: &mut Ui,
         settings: &mut ChatSettings,
-        portraits: &Portraits,
+        object_thumbnails: &ObjectThumbnails,
         identities: Option<&Identities>,
         actions: &mut Vec<Action>,
     ) {
@@ -169,7 +174,7 @@ impl Chat {
         } else {
             ScrollArea::vertical().id_salt("talk").max_height(280.0).stick_to_bottom(true).show(ui, |ui| {
                 for line in &self.lines {
-                    say = show_line(ui, line, portraits).or(say.take());
+                    say = show_line(ui, line, object_thumbnails).or(say.take());
                 }
                 if self.cancel.is_some() {
                     ui.horizontal(|ui| {
@@ -209,11 +214,11 @@ impl Chat {
         self.show_continuations(ui, identities.filter(|_| !settings.use_model));
         ui.horizontal(|ui| {
             self.chooser.show(ui, settings);
-            if ui.add_enabled(self.transcript.is_some(), Button::new("Save talk\u{2026}").small()).clicked() {
-                actions.push(Action::SaveTalk);
+            if ui.add_enabled(self.transcript.is_some(), Button::new("Save conversation\u{2026}").small()).clicked() {
+                actions.push(Action::SaveChat);
             }
             if ui
-                .add_enabled(self.cancel.is_none() && !self.lines.is_empty(), Button::new("New talk").small())
+                .add_enabled(self.cancel.is_none() && !self.lines.is_empty(), Button::new("New conversation").small())
                 .clicked()
             {
                 *self = Self::default();
@@ -258,7 +263,7 @@ fn did(line: &str, done: Option<bool>) -> Line {
 }
 
 /// One line; a candidate that was clicked.
-fn show_line(ui: &mut Ui, line: &Line, portraits: &Portraits) -> Option<String> {
+fn show_line(ui: &mut Ui, line: &Line, object_thumbnails: &ObjectThumbnails) -> Option<String> {
     let mut clicked = None;
     match line {
         Line::Said(text) => {
@@ -281,7 +286,7 @@ fn show_line(ui: &mut Ui, line: &Line, portraits: &Portraits) -> Option<String> 
             };
             ui.horizontal_wrapped(|ui| {
                 for (id, name) in candidates.iter().take(8) {
-                    portraits.show(ui, *id, PORTRAIT);
+                    object_thumbnails.show(ui, *id, THUMBNAIL_PX);
                     if ui.add(Button::new(name).small()).clicked() {
                         clicked = Some(name.clone());
                     }
@@ -295,7 +300,7 @@ fn show_line(ui: &mut Ui, line: &Line, portraits: &Portraits) -> Option<String> 
 /// Starts the agent's thread.
 fn start(repaint: Repaint) -> std::io::Result<(Sender<Request>, Receiver<News>)> {
     let (sender, requests) = bounded::<Request>(4);
-    let (news_sender, news) = unbounded();
+    let (news_sender, news) = bounded(NEWS);
     let work = move || {
         let mut agent = Agent { session: None, world: None, news: news_sender, repaint };
         for request in requests {
@@ -310,8 +315,8 @@ fn start(repaint: Repaint) -> std::io::Result<(Sender<Request>, Receiver<News>)>
 struct Agent {
     /// With the settings that it was started with.
     session: Option<(ChatSettings, Session)>,
-    /// With the number of its scene and the address of its Gaussians.
-    world: Option<((u64, usize), SceneWorld)>,
+    /// With the number of its scene and the generation of its Gaussians.
+    world: Option<((u64, u64), SceneWorld)>,
     news: Sender<News>,
     repaint: Repaint,
 }
@@ -350,8 +355,8 @@ impl Agent {
 
     /// Brings session and world up to date.
     fn get_ready(&mut self, snapshot: Snapshot, settings: ChatSettings) -> Result<(), String> {
-        let Snapshot { parts, scene, eye, aspect, hidden } = snapshot;
-        let key = (scene, Arc::as_ptr(&parts.cloud) as usize);
+        let Snapshot { parts, cloud, scene, eye, aspect, hidden } = snapshot;
+        let key = (scene, cloud);
         if self.world.as_ref().is_none_or(|(known, _)| *known != key) {
             let (news, repaint) = (self.news.clone(), Arc::clone(&self.repaint));
             let emit = Box::new(move |effect: Effect| {
@@ -373,7 +378,7 @@ impl Agent {
             } else {
                 Box::new(Commands::default())
             };
-            trace::record(Sort::Agent, "assistant with its policy", "a sentence was sent to it", 0);
+            trace::record(Sort::Agent, "agent with its policy", "a message was sent to it", 0);
             self.session = Some((settings, Session::new(policy, planner)));
         }
         Ok(())

@@ -1,53 +1,23 @@
-//! Dialogs: choosing files, errors, and questions before something is given up.
+//! Dialogs: choosing files, errors, and queries before something is given up.
 
 use std::path::PathBuf;
+use std::pin::Pin;
 use std::time::{Duration, Instant};
 
-use crossbeam_channel::{Receiver, Sender, unbounded};
+use crossbeam_channel::{Receiver, Sender, bounded};
 use egui::{Id, Modal, RichText};
 use rfd::{AsyncFileDialog, FileHandle};
 
 use super::state::{ErrorBox, Tone};
 use super::theme;
-use crate::scene::IdentityId;
-use crate::worker::{Action, Repaint};
-
-/// What a chosen path is for.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Purpose {
-    /// Open this folder.
-    OpenFolder,
-    /// Open this file.
-    OpenFile,
-    /// Find objects with the masks in this folder.
-    Masks,
-    /// Take over the files of this model from there.
-    Model(String),
-    /// Write Gaussians there.
-    ExportPly,
-    /// Write the Gaussians of an identity there.
-    ExportTarget(IdentityId),
-    /// Write the picture there.
-    Screenshot,
-    /// Read a camera path.
-    OpenPath,
-    /// Write the camera path there.
-    SavePath,
-    /// Write a film there.
-    SaveFilm,
-    /// Write the talk with the assistant there.
-    SaveTalk,
-    /// Read a report.
-    Report,
-    /// Read a report to compare with.
-    SecondReport,
-}
+use crate::ui::actions::Action;
+use crate::worker::Repaint;
 
 /// The system's answer.
 pub enum Chosen {
-    /// This path.
-    Path(Purpose, PathBuf),
-    /// A person closed the dialog.
+    /// This path, for the action that asked for one.
+    Path(Action, PathBuf),
+    /// A user closed the dialog.
     Nothing,
     /// It closed faster than anybody could: the system has no such dialog.
     NoDialog,
@@ -62,62 +32,29 @@ pub struct FileDialogs {
 
 impl Default for FileDialogs {
     fn default() -> Self {
-        let (sender, answers) = unbounded();
+        let (sender, answers) = bounded(1);
         Self { sender, answers, open: false }
     }
 }
 
 impl FileDialogs {
-    /// Shows the system's dialog, unless one is open already.
-    pub fn ask(&mut self, purpose: Purpose, name: &str, repaint: Repaint) -> std::io::Result<()> {
-        if self.open {
-            return Ok(());
-        }
-        // Some systems want the dialog made on the window's thread; waiting for it is what must not
-        // happen here.
-        let dialog = AsyncFileDialog::new();
-        let answer: std::pin::Pin<Box<dyn Future<Output = Option<FileHandle>> + Send>> = match &purpose {
-            Purpose::OpenFolder => {
-                Box::pin(dialog.set_title("Open a folder of photos or a trained scene").pick_folder())
+    /// Shows the system's dialog for an action that needs a path, unless one is open already.
+    pub fn ask(&mut self, action: Action, name: &str, repaint: Repaint) -> std::io::Result<()> {
+        let Some((title, dialog)) = dialog(&action, name).filter(|_| !self.open) else { return Ok(()) };
+        let title = AsyncFileDialog::new().set_title(title);
+        // Some systems want the dialog made on the window's thread; waiting for it is what must not happen here.
+        let answer: Pin<Box<dyn Future<Output = Option<FileHandle>> + Send>> = match dialog {
+            Dialog::Folder => Box::pin(title.pick_folder()),
+            Dialog::File(files, endings) => {
+                Box::pin(title.add_filter(files, endings).add_filter("All files", &["*"]).pick_file())
             }
-            Purpose::OpenFile => Box::pin(
-                dialog
-                    .set_title("Open a scene")
-                    .add_filter("Scenes", &["ply", "json"])
-                    .add_filter("All files", &["*"])
-                    .pick_file(),
-            ),
-            Purpose::Model(id) => {
-                Box::pin(dialog.set_title(format!("Choose the folder with the files of {id}")).pick_folder())
-            }
-            Purpose::Masks => Box::pin(dialog.set_title("Choose the folder with the masks").pick_folder()),
-            Purpose::ExportPly | Purpose::ExportTarget(_) => {
-                Box::pin(dialog.set_title("Export Gaussians").set_file_name(format!("{name}.ply")).save_file())
-            }
-            Purpose::OpenPath => {
-                Box::pin(dialog.set_title("Open a camera path").add_filter("Camera paths", &["json"]).pick_file())
-            }
-            Purpose::Report | Purpose::SecondReport => {
-                Box::pin(dialog.set_title("Open a report").add_filter("Reports", &["json"]).pick_file())
-            }
-            Purpose::SavePath => Box::pin(
-                dialog.set_title("Save the camera path").set_file_name(format!("{name}-path.json")).save_file(),
-            ),
-            Purpose::SaveTalk => {
-                Box::pin(dialog.set_title("Save the talk").set_file_name(format!("{name}-talk.md")).save_file())
-            }
-            Purpose::SaveFilm => {
-                Box::pin(dialog.set_title("Make a film").set_file_name(format!("{name}.mp4")).save_file())
-            }
-            Purpose::Screenshot => {
-                Box::pin(dialog.set_title("Save the view").set_file_name(format!("{name}.png")).save_file())
-            }
+            Dialog::Save(file) => Box::pin(title.set_file_name(file).save_file()),
         };
         let sender = self.sender.clone();
         std::thread::Builder::new().name("file dialog".into()).spawn(move || {
             let start = Instant::now();
             let chosen = match pollster::block_on(answer) {
-                Some(file) => Chosen::Path(purpose, file.path().to_path_buf()),
+                Some(file) => Chosen::Path(action, file.path().to_path_buf()),
                 None if start.elapsed() < Duration::from_millis(200) => Chosen::NoDialog,
                 None => Chosen::Nothing,
             };
@@ -135,6 +72,35 @@ impl FileDialogs {
         self.open = false;
         Some(answer)
     }
+}
+
+/// What is to be chosen.
+enum Dialog {
+    Folder,
+    /// A file of this kind, with these endings.
+    File(&'static str, &'static [&'static str]),
+    /// Where to write a file, with the name that is proposed.
+    Save(String),
+}
+
+/// Title and dialog of an action that needs a path; `name` is the scene's.
+fn dialog(action: &Action, name: &str) -> Option<(String, Dialog)> {
+    let save = |ending: &str| Dialog::Save(format!("{name}{ending}"));
+    let (title, dialog) = match action {
+        Action::OpenFolder => ("Open a folder of photos or a trained scene", Dialog::Folder),
+        Action::OpenFile => ("Open a scene", Dialog::File("Scenes", &["ply", "json"])),
+        Action::AddModel(id) => return Some((format!("Choose the folder with the files of {id}"), Dialog::Folder)),
+        Action::ChooseMasks => ("Choose the folder with the masks", Dialog::Folder),
+        Action::ExportPly | Action::ExportTarget(_) => ("Export Gaussians", save(".ply")),
+        Action::OpenPath => ("Open a camera path", Dialog::File("Camera paths", &["json"])),
+        Action::ChooseReport | Action::ChooseSecondReport => ("Open a report", Dialog::File("Reports", &["json"])),
+        Action::SavePath => ("Save the camera path", save("-path.json")),
+        Action::SaveChat => ("Save the conversation", save("-conversation.md")),
+        Action::ExportVideo => ("Export video", save(".mp4")),
+        Action::Screenshot => ("Save the view", save(".png")),
+        _ => return None,
+    };
+    Some((title.to_owned(), dialog))
 }
 
 /// A question before something is given up.
@@ -164,11 +130,11 @@ pub fn show_error(ctx: &egui::Context, error: &ErrorBox) -> bool {
             ui.label(RichText::new(&error.failure.remedy).color(theme::TEXT).strong());
         }
         ui.add_space(6.0);
-        ui.weak("Nothing that was open has changed.");
+        ui.weak("What was open is unchanged.");
         ui.add_space(12.0);
         ui.horizontal(|ui| {
             let close = ui.add(theme::primary_button("Close")).clicked();
-            if ui.button("Copy the message").clicked() {
+            if ui.button("Copy message").clicked() {
                 let f = &error.failure;
                 ui.ctx().copy_text(format!("{}: {}\n{}", error.doing, f.message, f.remedy));
             }
@@ -179,7 +145,7 @@ pub fn show_error(ctx: &egui::Context, error: &ErrorBox) -> bool {
     response.inner || response.should_close()
 }
 
-/// Asks a question. `Some(true)` to go ahead, `Some(false)` not to, `None` while nobody answered.
+/// Asks a question. `Some(true)` to go ahead, `Some(false)` not to, `None` while no one answered.
 pub fn show_question(ctx: &egui::Context, question: &Question) -> Option<bool> {
     let response = Modal::new(Id::unique("question")).frame(theme::dialog()).show(ctx, |ui| {
         ui.set_width(420.0);

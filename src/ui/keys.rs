@@ -2,7 +2,7 @@
 
 use egui::{Key, KeyboardShortcut, Modifiers};
 
-use crate::worker::{Action, Shortcut};
+use crate::ui::actions::{Action, Shortcut};
 
 /// Mouse gestures and held keys in the viewport, which are no actions: for the shortcut sheet.
 pub const GESTURES: [(&str, &str); 8] = [
@@ -11,7 +11,7 @@ pub const GESTURES: [(&str, &str); 8] = [
     ("Shift  Alt", "Fly faster, slower (held)"),
     ("Left drag", "Orbit the pivot"),
     ("Right drag", "Pan"),
-    ("Wheel", "Zoom towards the cursor"),
+    ("Wheel", "Zoom toward the cursor"),
     ("Double click", "Set the pivot to what is under the cursor"),
     ("Click on a camera", "Look through it"),
 ];
@@ -22,7 +22,7 @@ pub fn binding(shortcut: Shortcut) -> Option<KeyboardShortcut> {
     Some(KeyboardShortcut::new(modifiers, Key::from_name(shortcut.key)?))
 }
 
-/// The action's key for people: "Ctrl+P"; empty if it has none.
+/// The action's key for the user: "Ctrl+P"; empty if it has none.
 pub fn label(ctx: &egui::Context, action: &Action) -> String {
     let Some(shortcut) = action.shortcut() else { return String::new() };
     // Symbols such as "[" read better as they stand on the key than by the toolkit's name.
@@ -37,7 +37,7 @@ pub fn label(ctx: &egui::Context, action: &Action) -> String {
 pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
     let typing = ctx.text_edit_focused();
     let mut found = Vec::new();
-    for action in Action::ALL.into_iter().chain([Action::Quit]) {
+    for action in Action::all() {
         let Some(shortcut) = action.shortcut().filter(|s| s.ctrl || !typing) else { continue };
         let Some(key) = binding(shortcut) else { continue };
         let times = ctx.input_mut(|i| i.count_and_consume_key(key.modifiers, key.logical_key));
@@ -52,7 +52,7 @@ mod tests {
 
     #[test]
     fn every_shortcut_names_a_real_key() {
-        for action in Action::ALL.into_iter().chain([Action::Quit]) {
+        for action in Action::all() {
             if let Some(s) = action.shortcut() {
                 assert!(binding(s).is_some(), "{action:?}: no key '{}'", s.key);
             }

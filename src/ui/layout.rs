@@ -8,7 +8,8 @@ use super::chat::ChatSettings;
 use crate::pipeline::semantics::find::Finding;
 use crate::pipeline::train::TrainConfig;
 use crate::scene::Overrides;
-use crate::worker::{Pane, ViewMode};
+use crate::ui::actions::Pane;
+use crate::worker::ViewMode;
 
 /// Key of the layout in the storage.
 const KEY: &str = "layout";
@@ -19,11 +20,11 @@ pub enum PlotAxis {
     /// Seconds of training.
     #[default]
     Seconds,
-    /// Optimiser steps.
+    /// Optimizer steps.
     Steps,
 }
 
-/// Choices of a person about the window, and the settings of the next training.
+/// Choices of a user about the window, and the settings of the next training.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Layout {
@@ -31,15 +32,15 @@ pub struct Layout {
     pub hidden: Vec<Pane>,
     /// Whether cameras are drawn into the view.
     pub cameras: bool,
-    /// Whether the photo is shown beside the picture.
+    /// Whether the photo is shown beside the frame.
     pub compare: bool,
-    /// Where the split between picture and photo is, 0 to 1.
+    /// Where the split between frame and photo is, 0 to 1.
     pub split: f32,
     /// What the viewport shows.
     pub mode: ViewMode,
     /// What the plots run over.
     pub plot_axis: PlotAxis,
-    /// Whether the times of a picture's stages are shown.
+    /// Whether the times of a frame's stages are shown.
     pub times: bool,
     /// Settings of the next training.
     pub config: TrainConfig,
@@ -47,7 +48,7 @@ pub struct Layout {
     pub plan: Overrides,
     /// Models that find objects.
     pub finding: Finding,
-    /// What plans for the assistant.
+    /// What plans for the agent.
     pub chat: ChatSettings,
     /// Files and folders opened lately.
     pub recent: Vec<PathBuf>,
@@ -60,7 +61,7 @@ impl Default for Layout {
             cameras: true,
             compare: false,
             split: 0.5,
-            mode: ViewMode::Picture,
+            mode: ViewMode::Rgb,
             plot_axis: PlotAxis::default(),
             times: false,
             config: TrainConfig { steps: 3_000, eval_every: 250, ..TrainConfig::default() },

@@ -1,17 +1,20 @@
 //! The window.
 //!
 //! [`state::AppState`] is what the window knows: a pure fold over the worker's events.
-//! [`app::App`] draws it and turns what a person does into [`crate::worker::Action`]s; an action
+//! [`app::App`] draws it and turns what a user does into [`Action`]s; an action
 //! changes the view or becomes a job. Nothing here computes for longer than a redraw may take.
 
 mod act;
+mod act_file;
 mod act_report;
+pub mod actions;
 pub mod app;
 pub mod camera;
 pub mod chat;
 pub mod chat_model;
+mod context;
 pub mod dialogs;
-pub mod format;
+mod edits;
 pub mod keys;
 pub mod layout;
 pub mod palette;
@@ -19,20 +22,23 @@ pub mod panes;
 pub mod state;
 pub mod theme;
 pub mod toasts;
+mod train_history;
 pub mod viewport;
 
 use std::sync::Arc;
 
+pub use self::actions::Action;
+
 use eframe::egui_wgpu::WgpuSetup;
 
 use crate::render::Device;
-use crate::scene::plan::Wish;
-use crate::worker::Action;
+use crate::scene::plan::PlanOverride;
+use crate::worker::Start;
 use crate::worker::jobs::PipelineJobs;
 use crate::worker::places::Places;
 
 /// Opens the window, takes what is wanted of plans, does `first` one after the other, and returns when it is closed.
-pub fn run(first: Vec<Action>, wishes: Vec<Wish>) -> eframe::Result {
+pub fn run(first: Vec<Start>, overrides: Vec<PlanOverride>) -> eframe::Result {
     let viewport = egui::ViewportBuilder::default()
         .with_title("FMLGS")
         .with_app_id("fmlgs")
@@ -42,20 +48,20 @@ pub fn run(first: Vec<Action>, wishes: Vec<Wish>) -> eframe::Result {
     // An emulated adapter draws the window several times faster through OpenGL: its Vulkan side
     // runs both branches of every condition in the toolkit's shader.
     if crate::render::real_gpu().is_none() {
-        match open(viewport.clone(), eframe::Renderer::Glow, first.clone(), wishes.clone()) {
+        match open(viewport.clone(), eframe::Renderer::Glow, first.clone(), overrides.clone()) {
             // Not every system has it.
             Err(eframe::Error::OpenGL(_) | eframe::Error::Glutin(_) | eframe::Error::NoGlutinConfigs(..)) => {}
             result => return result,
         }
     }
-    open(viewport, eframe::Renderer::Wgpu, first, wishes)
+    open(viewport, eframe::Renderer::Wgpu, first, overrides)
 }
 
 fn open(
     viewport: egui::ViewportBuilder,
     renderer: eframe::Renderer,
-    first: Vec<Action>,
-    wishes: Vec<Wish>,
+    first: Vec<Start>,
+    overrides: Vec<PlanOverride>,
 ) -> eframe::Result {
     // Shades that dithering would smooth do not occur in a flat theme.
     let mut options =
@@ -72,8 +78,8 @@ fn open(
             if let Some(window) = &cc.wgpu_render_state {
                 Device::adopt(&window.adapter, &window.device, &window.queue);
             }
-            let mut app = app::App::new(cc, PipelineJobs::new(Places::of_user()), first)?;
-            app.wish(wishes);
+            let mut app = app::App::new(cc, PipelineJobs::new(Places::of_user()), first.into_iter().map(Action::from))?;
+            app.override_plan(overrides);
             Ok(Box::new(app))
         }),
     )

@@ -4,7 +4,7 @@ use egui::{Align2, Key, Modifiers, RichText, ScrollArea, TextEdit};
 
 use super::keys;
 use super::theme;
-use crate::worker::Action;
+use crate::ui::actions::Action;
 
 /// The command palette.
 #[derive(Default)]
@@ -102,7 +102,7 @@ fn matches(query: &str) -> Vec<Action> {
     let query = path.to_lowercase();
     let words: Vec<&str> = query.split_whitespace().collect();
     let mut found: Vec<Action> =
-        Action::ALL.into_iter().filter(|a| words.iter().all(|w| a.text().to_lowercase().contains(w))).collect();
+        Action::all().into_iter().filter(|a| words.iter().all(|w| a.text().to_lowercase().contains(w))).collect();
     found.sort_by_key(|a| !a.text().to_lowercase().starts_with(&query));
     found
 }
@@ -117,9 +117,8 @@ pub fn shortcut_sheet(ctx: &egui::Context, open: &mut bool) {
         ui.heading("Keyboard and mouse");
         ui.add_space(8.0);
         ui.columns_const(|[left, right]| {
-            let bound: Vec<(String, String)> = Action::ALL
+            let bound: Vec<(String, String)> = Action::all()
                 .into_iter()
-                .chain([Action::Quit])
                 .filter(|a| a.shortcut().is_some())
                 .map(|a| (keys::label(left.ctx(), &a), a.text()))
                 .collect();
@@ -129,7 +128,7 @@ pub fn shortcut_sheet(ctx: &egui::Context, open: &mut bool) {
         });
         ui.add_space(8.0);
         ui.horizontal(|ui| {
-            ui.weak("While a text field has the focus, it owns the plain keys.");
+            ui.weak("While a text field has the focus, plain keys go to it.");
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| ui.button("Close").clicked()).inner
         })
         .inner
@@ -156,7 +155,7 @@ mod tests {
 
     #[test]
     fn an_empty_query_lists_everything() {
-        assert_eq!(matches("").len(), Action::ALL.len());
+        assert_eq!(matches("").len(), Action::all().len());
     }
 
     #[test]

@@ -4,15 +4,17 @@ use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::actions::Action;
+pub use super::train_history::TrainHistory;
 use crate::measure::Report;
-use crate::pipeline::observer::{Evaluation, Progress, Severity, StepMetrics};
+use crate::pipeline::observer::{Evaluation, Progress, Severity};
 use crate::pipeline::semantics::portraits::Gallery;
 use crate::render::RenderSettings;
+use crate::scene::undo::UndoHistory;
 use crate::scene::{Facts, Limits, Overrides, PhotoPixels, ScenePlan, SemanticMap, text};
-use crate::worker::{Event, Explored, Failure, JobId, JobKind, Lane, OpenedScene, Outcome, Visited};
+use crate::worker::models::ModelList;
+use crate::worker::{Event, Explored, Failure, JobId, JobKind, Lane, OpenedScene, Outcome, Versioned, Visited};
 
-/// Measurements kept for the plots; beyond that every second one is dropped.
-const MAX_STEPS: usize = 4_000;
 /// Lines kept in the log.
 const MAX_LOG: usize = 1_000;
 /// Files and folders kept in the recent list.
@@ -58,7 +60,7 @@ pub struct RunningJob {
     pub id: JobId,
     /// Its sort.
     pub kind: JobKind,
-    /// What it does, for people.
+    /// What it does, for the user.
     pub title: String,
     /// Where it stands, once it says.
     pub progress: Option<Progress>,
@@ -66,19 +68,7 @@ pub struct RunningJob {
     pub paused: bool,
 }
 
-/// States of objects and parts that are kept for undoing.
-const MAX_UNDO: usize = 100;
-
-/// What training has shown so far.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct TrainHistory {
-    /// Measurements, oldest first, thinned out when there are many.
-    pub steps: Vec<StepMetrics>,
-    /// Held-out evaluations, oldest first.
-    pub evaluations: Vec<Evaluation>,
-}
-
-/// An error that is shown until a person has read it.
+/// An error that is shown until a user has read it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ErrorBox {
     /// What was being done: "Opening fox".
@@ -108,21 +98,23 @@ pub struct AppState {
     /// Whether the Gaussians on screen want the 2-D filter of Mip-Splatting.
     pub antialias: bool,
     /// Objects and parts of the Gaussians on screen.
-    pub semantics: Option<Arc<SemanticMap>>,
+    pub semantics: Option<Versioned<SemanticMap>>,
     /// Gaussians of each of them by number, pieces included.
     pub sizes: Vec<usize>,
-    /// New portraits of objects and parts, until they are taken over.
-    pub portraits: Option<(Arc<SemanticMap>, Gallery)>,
+    /// New thumbnails of objects and parts, until they are taken over.
+    pub thumbnails: Option<(Arc<SemanticMap>, Gallery)>,
     /// What is known of moving about in the scene.
     pub explored: Option<Arc<Explored>>,
     /// The way that was looked for last, until the window takes it.
     pub visited: Option<Visited>,
+    /// Models and the engine that runs them, once they were listed.
+    pub models: Option<Arc<ModelList>>,
     /// Models that were put in place so far.
     pub models_installed: u64,
-    /// Earlier states of objects and parts, oldest first.
-    pub undo: Vec<Arc<SemanticMap>>,
-    /// States that were taken back, the latest last.
-    pub redo: Vec<Arc<SemanticMap>>,
+    /// Earlier states of objects and parts, whoever changed them.
+    pub edits: UndoHistory<Arc<SemanticMap>>,
+    /// The newest short job that is over; they end in order.
+    pub short_jobs_done: JobId,
     /// The long job that runs.
     pub job: Option<RunningJob>,
     /// Training of the present scene.
@@ -145,12 +137,6 @@ pub struct AppState {
     pub report: Option<ShownReport>,
     /// The report that it is compared with.
     pub second_report: Option<ShownReport>,
-    /// Set when a measurement was cancelled: the window is to show what there is of it.
-    pub wants_report: bool,
-    /// Set when training has finished on photos with masks: the window is to find their objects.
-    pub wants_objects: bool,
-    /// Set when a demo was opened: the window is to train it.
-    pub wants_training: bool,
     /// Short jobs that run, with their titles.
     short_jobs: BTreeMap<JobId, (JobKind, String)>,
     next_toast: u64,
@@ -162,8 +148,8 @@ impl AppState {
         Self { recent, ..Self::default() }
     }
 
-    /// Takes in one event.
-    pub fn apply(&mut self, event: Event) {
+    /// Takes in one event; what the window is to do next because of it.
+    pub fn apply(&mut self, event: Event) -> Vec<Action> {
         match event {
             Event::Started { job, kind, title } if kind.lane() == Lane::Short => {
                 self.short_jobs.insert(job, (kind, text::line(&title).into_owned()));
@@ -173,7 +159,7 @@ impl AppState {
                 if kind == JobKind::Train {
                     // They belong to Gaussians that are about to change.
                     self.set_semantics(None);
-                    (self.undo, self.redo) = (Vec::new(), Vec::new());
+                    self.edits = UndoHistory::default();
                     self.training_job = Some(job);
                 }
                 self.say(Tone::Info, title.clone());
@@ -192,15 +178,18 @@ impl AppState {
             Event::Evaluation(job, evaluation) => self.evaluated(job, evaluation),
             Event::Note(_, Severity::Info, text) => self.say(Tone::Info, text),
             Event::Note(_, Severity::Warning, text) => self.say(Tone::Warning, text),
-            Event::Finished(job, outcome) => self.finished(job, outcome),
+            Event::Finished(job, outcome) => return self.finished(job, outcome),
             Event::Cancelled(job) => {
                 if let Some(ended) = self.end(job) {
-                    self.toast(Tone::Info, format!("{}: cancelled", ended.title));
-                    self.wants_report |= ended.kind == JobKind::Measure;
+                    self.toast(Tone::Info, format!("{}: canceled", ended.title));
+                    // What was measured before is worth seeing.
+                    let scene = self.scene.as_ref().filter(|_| ended.kind == JobKind::Measure);
+                    return scene.map(|s| Action::OpenReport(s.report_out.clone())).into_iter().collect();
                 }
             }
             Event::Failed(job, failure) => self.failed(job, failure),
         }
+        Vec::new()
     }
 
     /// Adds a line to the log.
@@ -245,7 +234,7 @@ impl AppState {
         self.job.as_ref().is_some_and(|j| j.kind == JobKind::Train)
     }
 
-    /// Follows what a person wants otherwise, and the settings of the next training.
+    /// Follows what a user wants otherwise, and the settings of the next training.
     pub fn replan(&mut self, overrides: &Overrides, limits: Limits) {
         if self.plan.overrides != *overrides || self.plan.facts.limits != limits {
             let dataset = self.scene.as_ref().and_then(|s| s.dataset.as_deref());
@@ -255,7 +244,7 @@ impl AppState {
     }
 
     /// How the Gaussians on screen are drawn: as they were trained, without what the plan leaves out.
-    pub fn drawing(&self) -> RenderSettings {
+    pub fn render_settings(&self) -> RenderSettings {
         let scene = self.scene.as_ref().map(|s| s.render.clone()).unwrap_or_default();
         let sh_degree = if self.is_training() { scene.sh_degree } else { self.plan.sh_degree };
         RenderSettings { sh_degree, antialias: self.antialias, ..scene }
@@ -273,8 +262,15 @@ impl AppState {
 
     /// Takes the long job off the screen if it is `job`.
     fn end(&mut self, job: JobId) -> Option<RunningJob> {
-        self.short_jobs.remove(&job);
+        self.end_short(job);
         self.job.take_if(|j| j.id == job)
+    }
+
+    /// Takes a short job off the list if it is `job`.
+    fn end_short(&mut self, job: JobId) -> Option<(JobKind, String)> {
+        let ended = self.short_jobs.remove(&job)?;
+        self.short_jobs_done = self.short_jobs_done.max(job);
+        Some(ended)
     }
 
     fn evaluated(&mut self, job: JobId, evaluation: Evaluation) {
@@ -290,10 +286,15 @@ impl AppState {
         }
     }
 
-    fn finished(&mut self, job: JobId, outcome: Outcome) {
+    fn finished(&mut self, job: JobId, outcome: Outcome) -> Vec<Action> {
         let ended = self.end(job);
+        let mut next = Vec::new();
         match outcome {
-            Outcome::Opened(scene) => self.opened(*scene, ended.is_some_and(|j| j.kind == JobKind::Demo)),
+            Outcome::Opened(scene) => {
+                let is_demo = ended.is_some_and(|j| j.kind == JobKind::Demo);
+                self.opened(*scene, is_demo);
+                next.extend(is_demo.then_some(Action::StartTraining));
+            }
             Outcome::Trained { evaluations, out, semantics, facts } => {
                 let carried = semantics.is_some();
                 if self.training_job == Some(job) {
@@ -306,7 +307,8 @@ impl AppState {
                 let quality = self.history.evaluations.last().map(|e| format!(", held-out PSNR {:.2} dB", e.psnr));
                 self.say(Tone::Info, format!("Saved to {}", out.display()));
                 self.toast(Tone::Good, format!("Training finished{}", quality.unwrap_or_default()));
-                self.wants_objects = !carried && self.scene.as_ref().is_some_and(|s| s.masks.is_some());
+                let has_masks = self.scene.as_ref().is_some_and(|s| s.masks.is_some());
+                next.extend((has_masks && !carried).then_some(Action::FindObjects));
             }
             Outcome::Evaluated(mut e) => {
                 if let Some(last) = self.history.steps.last() {
@@ -317,11 +319,12 @@ impl AppState {
                 self.history.evaluations.push(e);
             }
             Outcome::Objects(map) => {
-                self.toast(Tone::Good, format!("{} objects and parts found; ask for one", map.identities.len()));
+                self.toast(Tone::Good, format!("{} objects and parts found; query one", map.identities.len()));
                 self.set_semantics(Some(map));
-                (self.undo, self.redo) = (Vec::new(), Vec::new());
+                self.edits = UndoHistory::default();
             }
             Outcome::Edited(map) => self.edited(map),
+            Outcome::Models(models) => self.models = Some(models),
             Outcome::ModelInstalled(id) => {
                 self.models_installed += 1;
                 self.toast(Tone::Good, format!("The model {id} can be used now"));
@@ -338,38 +341,27 @@ impl AppState {
                     false => self.report = shown,
                 }
             }
-            Outcome::Portraits(map, pictures) => self.portraits = Some((map, pictures)),
+            Outcome::Portraits(map, pictures) => self.thumbnails = Some((map, pictures)),
             Outcome::Written(path) => self.toast(Tone::Good, format!("Wrote {}", path.display())),
             Outcome::Photo { index, max_side_px, pixels } => {
                 self.photos.insert((index, max_side_px), pixels);
             }
         }
+        next
     }
 
     /// Sets objects and parts, with what is counted of them; those that were there before.
-    fn set_semantics(&mut self, map: Option<Arc<SemanticMap>>) -> Option<Arc<SemanticMap>> {
+    fn set_semantics(&mut self, map: Option<Arc<SemanticMap>>) -> Option<Versioned<SemanticMap>> {
         self.sizes = map.as_ref().map_or_else(Vec::new, |m| m.sizes());
         self.set_facts(self.plan.facts.clone().with_semantics(map.as_deref()));
-        std::mem::replace(&mut self.semantics, map)
+        std::mem::replace(&mut self.semantics, map.map(Versioned::new))
     }
 
     /// Takes over a changed map. Going back and forth moves along the changes; a new one ends what
     /// could be redone.
     fn edited(&mut self, map: Arc<SemanticMap>) {
-        let is_last = |list: &[Arc<SemanticMap>]| list.last().is_some_and(|m| Arc::ptr_eq(m, &map));
-        let Some(old) = self.set_semantics(Some(Arc::clone(&map))) else { return };
-        if is_last(&self.undo) {
-            self.undo.pop();
-            self.redo.push(old);
-        } else if is_last(&self.redo) {
-            self.redo.pop();
-            self.undo.push(old);
-        } else {
-            self.undo.push(old);
-            self.redo.clear();
-            if self.undo.len() > MAX_UNDO {
-                self.undo.remove(0);
-            }
+        if let Some(old) = self.set_semantics(Some(Arc::clone(&map))) {
+            self.edits.replaced(Arc::clone(&old), |other| Arc::ptr_eq(other, &map));
         }
     }
 
@@ -382,7 +374,6 @@ impl AppState {
         self.training_job = None;
         (self.explored, self.visited) = (None, None);
         self.photos.clear();
-        self.wants_training = is_demo;
         if !is_demo {
             self.remember(scene.path.clone());
         }
@@ -390,13 +381,13 @@ impl AppState {
         self.set_facts(scene.facts.clone());
         self.antialias = scene.render.antialias;
         self.set_semantics(scene.semantics.clone());
-        (self.undo, self.redo) = (Vec::new(), Vec::new());
+        self.edits = UndoHistory::default();
         self.scene = Some(Arc::new(scene));
     }
 
     fn failed(&mut self, job: JobId, failure: Failure) {
-        let doing = match self.short_jobs.remove(&job) {
-            // A photo that cannot be read is no reason to stop a person.
+        let doing = match self.end_short(job) {
+            // A photo that cannot be read is no reason to stop a user.
             Some((JobKind::Photo, title)) => {
                 self.toast(Tone::Warning, format!("{title}: {}", failure.message));
                 self.failed_photos.push(job);
@@ -406,22 +397,6 @@ impl AppState {
             None => self.end(job).map_or_else(|| "Working".to_owned(), |j| j.title),
         };
         self.fail(doing, failure);
-    }
-}
-
-impl TrainHistory {
-    fn push(&mut self, metrics: StepMetrics) {
-        // A resumed run goes on from what was measured before; a new one starts over.
-        self.steps.retain(|s| s.step < metrics.step);
-        self.evaluations.retain(|e| e.step <= metrics.step);
-        if self.steps.len() >= MAX_STEPS {
-            let mut keep = false;
-            self.steps.retain(|_| {
-                keep = !keep;
-                keep
-            });
-        }
-        self.steps.push(metrics);
     }
 }
 

@@ -1,7 +1,9 @@
 //! Tests of the fold.
 
 use super::*;
+use crate::pipeline::observer::StepMetrics;
 use crate::scene::Dataset;
+use crate::ui::train_history::MAX_STEPS;
 
 const JOB: JobId = JobId(7);
 
@@ -90,14 +92,15 @@ fn opening_replaces_the_scene_and_is_remembered() {
     assert_eq!(s.scene_number, 2);
     assert_eq!(s.recent, vec![PathBuf::from("b"), PathBuf::from("a")]);
     assert_eq!(s.toasts[0].text, "17 photos are missing");
-    assert!(!s.wants_training);
 }
 
 #[test]
 fn the_demo_is_trained_at_once_and_not_listed_as_recent() {
-    let s = fold([started(JobKind::Demo), opened("demo", &[])]);
-    assert!(s.wants_training);
+    let mut s = fold([started(JobKind::Demo)]);
+    assert_eq!(s.apply(opened("demo", &[])), [Action::StartTraining]);
     assert!(s.recent.is_empty());
+    s.apply(started(JobKind::Open));
+    assert!(s.apply(opened("other", &[])).is_empty(), "nothing else is");
 }
 
 #[test]
@@ -146,12 +149,54 @@ fn reports_are_shown_and_compared_and_a_cancelled_measurement_is_read() {
     s.apply(Event::Failed(JOB, failure));
     assert!(s.error.is_some() && scenes(&s)[0].is_some(), "what was shown stays");
     assert!(s.error.take().is_some_and(|e| e.doing == "Doing it"));
+    s.apply(started(JobKind::Open));
+    s.apply(opened("d", &[]));
     s.apply(started(JobKind::Train));
-    s.apply(Event::Cancelled(JOB));
-    assert!(!s.wants_report);
+    assert!(s.apply(Event::Cancelled(JOB)).is_empty());
     s.apply(started(JobKind::Measure));
-    s.apply(Event::Cancelled(JOB));
-    assert!(s.wants_report, "what was measured before is worth seeing");
+    let report = s.scene.as_ref().expect("open").report_out.clone();
+    assert_eq!(s.apply(Event::Cancelled(JOB)), [Action::OpenReport(report)]);
+}
+
+#[test]
+fn objects_carried_by_masks_are_found_after_training() {
+    let trained = |semantics| {
+        let (out, facts) = (PathBuf::from("out"), Box::default());
+        Event::Finished(JOB, Outcome::Trained { evaluations: Vec::new(), out, semantics, facts })
+    };
+    let with_masks = |masks: bool| {
+        let masks = masks.then(|| PathBuf::from("masks"));
+        let scene = OpenedScene { masks, ..OpenedScene::default() };
+        let opened = Event::Finished(JOB, Outcome::Opened(Box::new(scene)));
+        fold([started(JobKind::Open), opened, started(JobKind::Train)])
+    };
+    assert_eq!(with_masks(true).apply(trained(None)), [Action::FindObjects]);
+    assert!(with_masks(true).apply(trained(Some(Arc::default()))).is_empty(), "they came along");
+    assert!(with_masks(false).apply(trained(None)).is_empty());
+}
+
+#[test]
+fn edits_are_undone_and_redone_whoever_made_them() {
+    let maps: Vec<Arc<SemanticMap>> = (0..3).map(|_| Arc::default()).collect();
+    let arrived = |s: &mut AppState, map: &Arc<SemanticMap>| {
+        s.apply(started(JobKind::Edit));
+        s.apply(Event::Finished(JOB, Outcome::Edited(Arc::clone(map))));
+    };
+    let mut s = fold([started(JobKind::Objects), Event::Finished(JOB, Outcome::Objects(Arc::clone(&maps[0])))]);
+    let generations: Vec<u64> = maps[1..]
+        .iter()
+        .map(|map| {
+            arrived(&mut s, map);
+            s.semantics.as_ref().expect("there").generation()
+        })
+        .collect();
+    assert!(generations[0] < generations[1] && s.short_jobs_done == JOB);
+    let is = |state: Option<&Arc<SemanticMap>>, map: usize| state.is_some_and(|m| Arc::ptr_eq(m, &maps[map]));
+    assert!(is(s.edits.last(), 1) && s.edits.next().is_none());
+    arrived(&mut s, &maps[1]);
+    assert!(is(s.edits.last(), 0) && is(s.edits.next(), 2), "an undo is no edit");
+    arrived(&mut s, &maps[2]);
+    assert!(is(s.edits.last(), 1) && s.edits.next().is_none(), "nor is a redo");
 }
 
 #[test]

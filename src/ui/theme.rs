@@ -1,10 +1,10 @@
-//! Colours, sizes and fonts of the window: dark and quiet, with one accent.
+//! Colors, sizes and fonts of the window: dark and quiet, with one accent.
 
 use egui::{Color32, CornerRadius, FontId, Margin, RichText, Stroke, Style, TextStyle, Theme, Visuals, vec2};
 
 use super::state::Tone;
 
-/// The one colour that asks for attention.
+/// The one color that asks for attention.
 pub const ACCENT: Color32 = Color32::from_rgb(0x6c, 0xb2, 0xf0);
 /// Text on the accent.
 pub const ON_ACCENT: Color32 = Color32::from_rgb(0x0c, 0x14, 0x1c);
@@ -27,7 +27,7 @@ pub const WARNING: Color32 = Color32::from_rgb(0xe3, 0xb3, 0x5f);
 /// Failed.
 pub const ERROR: Color32 = Color32::from_rgb(0xee, 0x82, 0x79);
 
-/// The colour of a message.
+/// The color of a message.
 pub fn tone_color(tone: Tone) -> Color32 {
     match tone {
         Tone::Info => TEXT,
@@ -113,7 +113,7 @@ pub fn dialog() -> egui::Frame {
     egui::Frame::new().fill(PANEL).stroke(Stroke::new(1.0, LINE)).corner_radius(10).inner_margin(18)
 }
 
-/// The one button of a group that a person most likely wants.
+/// The one button of a group that a user most likely wants.
 pub fn primary_button(text: &str) -> egui::Button<'static> {
     egui::Button::new(RichText::new(text.to_owned()).color(ON_ACCENT).strong()).fill(ACCENT).stroke(Stroke::NONE)
 }
@@ -124,7 +124,7 @@ pub fn section(ui: &mut egui::Ui, title: &str) {
     ui.label(RichText::new(title).small().strong().color(WEAK));
 }
 
-/// A round mark in the colour of a message.
+/// A round mark in the color of a message.
 pub fn mark(ui: &mut egui::Ui, tone: Tone, size: f32) {
     let (rect, _) = ui.allocate_exact_size(egui::Vec2::splat(size), egui::Sense::hover());
     let (color, c, r) = (tone_color(tone), rect.center(), 0.5 * size);

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use super::models::ModelList;
 use super::places::Places;
 use super::preview::{home_view, sparse_cloud};
 use super::protocol::{Command, Failure, OpenedScene, Outcome, Stop};
@@ -354,6 +355,7 @@ impl Jobs for PipelineJobs {
                 Ok(Outcome::Photo { index, max_side_px, pixels: Arc::new(pixels) })
             }
             Command::Picture { pixels, path } => save_picture(&pixels, &path),
+            Command::ListModels => Ok(Outcome::Models(Arc::new(ModelList::look()))),
             Command::InstallModel { id, brought } => install(&id, brought.as_deref(), observer),
             Command::Visit(request) => guide::visit(*request),
             Command::Explore { cloud, cameras, up } => {

@@ -8,6 +8,7 @@ use glam::DVec3;
 use super::edit::EditRequest;
 use super::guide::{Explored, FilmRequest, VisitRequest, Visited};
 use super::measure::MeasureRequest;
+use super::models::ModelList;
 use crate::io::trained::History;
 use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Interrupted, Progress, Severity, StepMetrics};
@@ -18,8 +19,21 @@ use crate::render::RenderSettings;
 use crate::scene::{Bounds, Camera, Dataset, Facts, GaussianCloud, Photo, PhotoPixels, SemanticMap};
 
 /// Names one job of one worker.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct JobId(pub u64);
+
+/// What the window does first.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// Makes the demo scene, opens it and trains it.
+    Demo,
+    /// Opens this scene.
+    Scene(PathBuf),
+    /// Shows this report.
+    Report(PathBuf),
+    /// Compares it with this one.
+    SecondReport(PathBuf),
+}
 
 /// What sort of job it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -44,6 +58,8 @@ pub enum JobKind {
     Picture,
     /// Draws objects and parts alone.
     Portraits,
+    /// Lists models.
+    Models,
     /// Looks at where one can go.
     Explore,
     /// Puts a model in place.
@@ -75,6 +91,7 @@ impl JobKind {
             | Self::Photo
             | Self::Picture
             | Self::Portraits
+            | Self::Models
             | Self::Explore
             | Self::Visit
             | Self::Report => Lane::Short,
@@ -181,6 +198,8 @@ pub enum Command {
         /// The folder with its files; `None` = its address.
         brought: Option<PathBuf>,
     },
+    /// List the models and the engine that runs them.
+    ListModels,
     /// Look at where one can go, before anybody wants to.
     Explore {
         /// The Gaussians.
@@ -230,6 +249,7 @@ impl Command {
             Self::Photo { .. } => JobKind::Photo,
             Self::Picture { .. } => JobKind::Picture,
             Self::Portraits { .. } => JobKind::Portraits,
+            Self::ListModels => JobKind::Models,
             Self::Explore { .. } => JobKind::Explore,
             Self::InstallModel { .. } => JobKind::Model,
             Self::Visit(_) => JobKind::Visit,
@@ -245,19 +265,20 @@ impl Command {
             |p: &PathBuf| p.file_name().map_or_else(|| p.display().to_string(), |n| n.to_string_lossy().into_owned());
         match self {
             Self::Open { path } => format!("Opening {}", name(path)),
-            Self::Demo => "Making the demo scene".into(),
+            Self::Demo => "Rendering the demo scene".into(),
             Self::Train { dataset, .. } => format!("Training {}", dataset.name),
-            Self::Evaluate { dataset, .. } => format!("Measuring {}", dataset.name),
+            Self::Evaluate { dataset, .. } => format!("Evaluating {}", dataset.name),
             Self::FindObjects { dataset, .. } => format!("Finding objects in {}", dataset.name),
-            Self::EditObjects { .. } => "Changing objects".into(),
+            Self::EditObjects { .. } => "Editing objects".into(),
             Self::Export { path, .. } | Self::Picture { path, .. } => format!("Writing {}", name(path)),
             Self::Photo { photo, .. } => format!("Loading {}", photo.name),
-            Self::Portraits { .. } => "Drawing objects".into(),
-            Self::Explore { .. } => "Looking at where one can go".into(),
-            Self::InstallModel { id, .. } => format!("Fetching the model {id}"),
-            Self::Visit(request) => format!("Finding the way to {}", request.map.identities.full_name(request.id)),
-            Self::Film(request) => format!("Drawing {}", name(&request.out)),
-            Self::Measure(_) => "Measuring how this scene is drawn".into(),
+            Self::Portraits { .. } => "Rendering thumbnails".into(),
+            Self::ListModels => "Listing models".into(),
+            Self::Explore { .. } => "Exploring where one can go".into(),
+            Self::InstallModel { id, .. } => format!("Installing the model {id}"),
+            Self::Visit(request) => format!("Planning the flight to {}", request.map.identities.full_name(request.id)),
+            Self::Film(request) => format!("Rendering {}", name(&request.out)),
+            Self::Measure(_) => "Benchmarking rendering".into(),
             Self::ReadReport { path, .. } => format!("Opening the report {}", name(path)),
         }
     }
@@ -352,6 +373,8 @@ pub enum Outcome {
     },
     /// Portraits of objects and parts by number less one, as `semantics::portraits` draws them.
     Portraits(Arc<SemanticMap>, Gallery),
+    /// The models were listed.
+    Models(Arc<ModelList>),
     /// A model can be used now.
     ModelInstalled(String),
     /// The scene was looked at.

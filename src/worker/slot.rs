@@ -1,5 +1,7 @@
 //! A place for the latest value of something too big to queue.
 
+use std::ops::Deref;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Holds the latest published value. Every value has a generation number, 1 for the first, so that
@@ -43,9 +45,55 @@ impl<T> Slot<T> {
     }
 }
 
+/// Generation of the next [`Versioned`] value.
+static NEXT: AtomicU64 = AtomicU64::new(1);
+
+/// A shared value with a generation that no other value of this run has. Whether two are the same is told by
+/// generations, never by addresses, which a later value may be given again.
+#[derive(Debug)]
+pub struct Versioned<T> {
+    generation: u64,
+    value: Arc<T>,
+}
+
+impl<T> Versioned<T> {
+    /// A value that is new.
+    pub fn new(value: Arc<T>) -> Self {
+        Self { generation: NEXT.fetch_add(1, Ordering::Relaxed), value }
+    }
+
+    /// Its generation, from 1.
+    pub fn generation(&self) -> u64 {
+        self.generation
+    }
+}
+
+impl<T> Clone for Versioned<T> {
+    fn clone(&self) -> Self {
+        Self { generation: self.generation, value: Arc::clone(&self.value) }
+    }
+}
+
+impl<T> Deref for Versioned<T> {
+    type Target = Arc<T>;
+
+    fn deref(&self) -> &Arc<T> {
+        &self.value
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_copies_share_a_generation() {
+        let value = Arc::new(1);
+        let first = Versioned::new(Arc::clone(&value));
+        let again = Versioned::new(value);
+        assert_eq!(first.generation(), first.clone().generation());
+        assert!(first.generation() != again.generation() && Arc::ptr_eq(&first, &again));
+    }
 
     #[test]
     fn a_reader_sees_the_latest_value_once() {

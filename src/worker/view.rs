@@ -6,10 +6,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::action::ViewMode;
+use super::Slot;
 use super::protocol::Failure;
 use super::thread::{Repaint, panic_failure};
-use super::{Slot, paint};
+use super::view_modes::{self, ViewMode};
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{self, BackendChoice, Frame, RenderError, RenderSettings, Renderer, StageTimes};
@@ -20,9 +20,9 @@ use crate::scene::{Camera, GaussianCloud, PhotoPixels, ScenePlan, SemanticMap};
 /// How long the eye rests before working memory is given back.
 const REST: Duration = Duration::from_secs(2);
 
-/// How much time a picture may take; decides its resolution.
+/// How much time a frame may take; decides its resolution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Effort {
+pub enum QualityBudget {
     /// The eye moves: keep up with it.
     Moving,
     /// The eye rests while something else needs the processor.
@@ -31,9 +31,9 @@ pub enum Effort {
     Full,
 }
 
-impl Effort {
-    /// Seconds a picture should take at most; `None` = as long as it takes.
-    fn budget_secs(self) -> Option<f64> {
+impl QualityBudget {
+    /// Seconds a frame should take at most; `None` = as long as it takes.
+    fn secs(self) -> Option<f64> {
         match self {
             Self::Moving => Some(0.030),
             Self::Shared => Some(0.120),
@@ -51,10 +51,10 @@ pub struct ViewRequest {
     pub camera: Camera,
     /// What of it.
     pub mode: ViewMode,
-    /// How: degree of the colours, background, filter. Depth is drawn where it is needed.
+    /// How: degree of the colors, background, filter. Depth is drawn where it is needed.
     pub settings: RenderSettings,
     /// How long it may take.
-    pub effort: Effort,
+    pub budget: QualityBudget,
     /// The photo taken from this camera, for the difference and for PSNR.
     pub photo: Option<Arc<PhotoPixels>>,
     /// Objects and parts of the Gaussians, to be drawn too once the eye rests.
@@ -62,17 +62,17 @@ pub struct ViewRequest {
     /// Whether blended codes are wanted too.
     pub codes: bool,
     /// What is left out.
-    pub leave: Leave,
+    pub skip: SkipPasses,
     /// Whether the stages are to be timed, where that is not free.
     pub timed: bool,
-    /// Comes back with the picture.
+    /// Comes back with the frame.
     pub ticket: u64,
 }
 
-/// What of the drawing a scene's plan leaves out.
+/// Passes that the scene's plan skips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Leave {
-    /// Depth of pictures from which nobody picks points.
+pub struct SkipPasses {
+    /// Depth of frames from which no one picks points.
     pub depth: bool,
     /// Codes of parts.
     pub parts: bool,
@@ -82,7 +82,7 @@ pub struct Leave {
     pub buffers: bool,
 }
 
-impl Leave {
+impl SkipPasses {
     /// What `plan` leaves out.
     pub fn of(plan: &ScenePlan) -> Self {
         Self {
@@ -105,7 +105,7 @@ pub struct MappedView {
     pub secs: f64,
 }
 
-/// What the pixels of a view belong to, drawn once for all questions.
+/// What the pixels of a view belong to, drawn once for all queries.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ViewMaps {
     /// By identity of largest weight.
@@ -127,7 +127,7 @@ pub struct ViewPicture {
     pub rgb: Vec<[u8; 3]>,
     /// Median depth in scene units, row-major, 0 where there is none; `None` if not drawn.
     pub median_depth: Option<Vec<f32>>,
-    /// Depths at the two ends of the colour scale, in the depth mode.
+    /// Depths at the two ends of the color scale, in the depth mode.
     pub depth_range: Option<(f32, f32)>,
     /// PSNR in dB against the photo, if the request had one.
     pub psnr: Option<f64>,
@@ -135,7 +135,7 @@ pub struct ViewPicture {
     pub secs: f64,
     /// The same by stage, where that is known.
     pub stages: StageTimes,
-    /// Seconds from colours to bytes: depth scales, differences.
+    /// Seconds from colors to bytes: depth scales, differences.
     pub paint_secs: f64,
     /// What drew it: "CPU", or the name of the GPU.
     pub drawn_by: String,
@@ -179,15 +179,15 @@ impl ViewLane {
                     }
                     Waited::Closed => return,
                 };
-                patience = request.leave.buffers.then_some(REST);
-                // Looking for a GPU takes a moment; here nobody waits for it.
-                let painter = match painter.take().filter(|p| p.without_gpu == request.leave.gpu) {
+                patience = request.skip.buffers.then_some(REST);
+                // Looking for a GPU takes a moment; here no one waits for it.
+                let painter = match painter.take().filter(|p| p.without_gpu == request.skip.gpu) {
                     Some(known) => painter.insert(known),
-                    None => painter.insert(Painter::without_gpu(request.leave.gpu)),
+                    None => painter.insert(Painter::without_gpu(request.skip.gpu)),
                 };
                 out.publish(painter.draw(&request));
                 repaint();
-                // What the pixels belong to comes second, and only if nobody waits for a picture.
+                // What the pixels belong to comes second, and only if no one waits for a frame.
                 let start = Instant::now();
                 if lock(&box_.0).request.is_none()
                     && let Some(maps) = maps_of(&mut mapper, &request)
@@ -225,7 +225,7 @@ impl ViewLane {
         &self.maps
     }
 
-    /// Where pictures are published.
+    /// Where frames are published.
     pub fn pictures(&self) -> &Slot<ViewResult> {
         &self.pictures
     }
@@ -273,17 +273,17 @@ fn next(mailbox: &(Mutex<Mailbox>, Condvar), patience: Option<Duration>) -> Wait
     }
 }
 
-/// What the pixels of a resting view belong to; `None` if nobody wants to know.
+/// What the pixels of a resting view belong to; `None` if no one wants to know.
 fn maps_of(renderer: &mut Renderer, request: &ViewRequest) -> Option<Result<ViewMaps, Failure>> {
     let semantics = request.semantics.as_ref().filter(|s| s.of.len() == request.cloud.len())?;
-    if request.effort != Effort::Full {
+    if request.budget != QualityBudget::Full {
         return None;
     }
     let (cloud, camera, settings) = (&request.cloud, &request.camera, &request.settings);
     let draw = AssertUnwindSafe(|| {
         let identities = ViewMap::render(renderer, cloud, &semantics.of, &semantics.identities, camera, settings)?;
         let codes = match request.codes {
-            true => Some(CodeMap::render(renderer, cloud, &semantics.codes, !request.leave.parts, camera, settings)?),
+            true => Some(CodeMap::render(renderer, cloud, &semantics.codes, !request.skip.parts, camera, settings)?),
             false => None,
         };
         Ok(ViewMaps { identities, codes })
@@ -305,11 +305,11 @@ struct Painter {
     without_gpu: bool,
     /// Why the CPU draws though there is a GPU.
     instead_of_gpu: Option<String>,
-    /// What pictures cost lately; `None` before the first.
+    /// What frames cost lately; `None` before the first.
     cost: Option<Speed>,
 }
 
-/// What a picture costs: the part that every Gaussian has at any size, and that of each pixel.
+/// What a frame costs: the part that every Gaussian has at any size, and that of each pixel.
 #[derive(Clone, Copy, Debug)]
 struct Speed {
     fixed_secs: f64,
@@ -334,9 +334,9 @@ impl Painter {
     }
 
     fn draw(&mut self, request: &ViewRequest) -> ViewResult {
-        let camera = self.fitting_camera(&request.camera, request.effort);
+        let camera = self.fitting_camera(&request.camera, request.budget);
         let full = camera == request.camera;
-        // Without times there is still a picture.
+        // Without times there is still a frame.
         let _ = self.renderer.time_stages(request.timed);
         let start = Instant::now();
         let frame = match self.try_render(request, &camera) {
@@ -351,7 +351,7 @@ impl Painter {
         self.learn(secs, f64::from(camera.width_px * camera.height_px));
         let stages = self.renderer.stage_times();
         let start = Instant::now();
-        let drawn = paint::paint(&frame, request.mode, request.photo.as_deref());
+        let drawn = view_modes::paint(&frame, request.mode, request.photo.as_deref());
         let paint_secs = start.elapsed().as_secs_f64();
         let median_depth = (!frame.median_depth.is_empty()).then_some(frame.median_depth);
         Ok(Arc::new(ViewPicture {
@@ -371,7 +371,7 @@ impl Painter {
     }
 
     fn try_render(&mut self, request: &ViewRequest, camera: &Camera) -> Result<Frame<f32>, Failure> {
-        let depth = request.effort == Effort::Full || request.mode == ViewMode::Depth || !request.leave.depth;
+        let depth = request.budget == QualityBudget::Full || request.mode == ViewMode::Depth || !request.skip.depth;
         let settings = RenderSettings { depth, ..request.settings.clone() };
         match catch_unwind(AssertUnwindSafe(|| self.renderer.draw(&request.cloud, camera, &settings))) {
             Ok(result) => result.map_err(|e| Failure::of(&e, "Reset the view (Home), or open the scene again.")),
@@ -396,15 +396,15 @@ impl Painter {
     }
 
     /// The camera at a resolution that is likely to keep to the budget.
-    fn fitting_camera(&self, camera: &Camera, effort: Effort) -> Camera {
+    fn fitting_camera(&self, camera: &Camera, budget: QualityBudget) -> Camera {
         let pixels = f64::from(camera.width_px) * f64::from(camera.height_px);
-        // The first picture says how fast this machine is with this scene; it must be quick itself.
+        // The first frame says how fast this machine is with this scene; it must be quick itself.
         let cost = self.cost.unwrap_or(Speed { fixed_secs: 0.0, secs_per_px: 4e-7 });
-        let Some(budget) = effort.budget_secs() else { return camera.clone() };
-        // Where the fixed part alone breaks the budget, smaller pictures would help nobody.
-        let left = (budget - cost.fixed_secs).max(0.4 * budget);
+        let Some(secs) = budget.secs() else { return camera.clone() };
+        // Where the fixed part alone breaks the budget, smaller frames would help no one.
+        let left = (secs - cost.fixed_secs).max(0.4 * secs);
         let scale = (left / (cost.secs_per_px * pixels)).sqrt().clamp(0.2, 1.0);
-        // In quarter-octave steps, so that the picture does not change its grain all the time.
+        // In quarter-octave steps, so that the frame does not change its grain all the time.
         let scale = 2.0_f64.powf((scale.log2() * 4.0).floor() / 4.0);
         if scale >= 1.0 {
             return camera.clone();
@@ -439,13 +439,13 @@ mod tests {
                 cloud: Arc::new(cloud.clone()),
                 camera: Camera::look_at(DVec3::new(0.0, 0.0, -3.0), DVec3::ZERO, DVec3::NEG_Y, 0.8, 32, 24)
                     .expect("valid"),
-                mode: ViewMode::Picture,
+                mode: ViewMode::Rgb,
                 settings: RenderSettings::default(),
-                effort: Effort::Full,
+                budget: QualityBudget::Full,
                 photo: None,
                 semantics: Some(Arc::new(map.clone())),
                 codes: true,
-                leave: Leave { depth: false, parts: false, gpu: true, buffers: false },
+                skip: SkipPasses { depth: false, parts: false, gpu: true, buffers: false },
                 timed: false,
                 ticket,
             });
@@ -478,13 +478,13 @@ mod tests {
             cost: Some(Speed { fixed_secs, secs_per_px }),
         };
         let slow = of(0.0, 1e-6);
-        let moving = slow.fitting_camera(&camera, Effort::Moving);
+        let moving = slow.fitting_camera(&camera, QualityBudget::Moving);
         assert!(moving.width_px < 300, "{}", moving.width_px);
         assert!((f64::from(moving.width_px) / f64::from(moving.height_px) - 5.0 / 3.0).abs() < 0.02);
-        assert!(slow.fitting_camera(&camera, Effort::Shared).width_px > moving.width_px);
-        assert_eq!(slow.fitting_camera(&camera, Effort::Full), camera);
-        assert_eq!(of(0.0, 1e-9).fitting_camera(&camera, Effort::Moving), camera);
+        assert!(slow.fitting_camera(&camera, QualityBudget::Shared).width_px > moving.width_px);
+        assert_eq!(slow.fitting_camera(&camera, QualityBudget::Full), camera);
+        assert_eq!(of(0.0, 1e-9).fitting_camera(&camera, QualityBudget::Moving), camera);
         // A scene whose Gaussians alone take longer than the budget is not drawn any smaller for it.
-        assert_eq!(of(5.0, 1e-9).fitting_camera(&camera, Effort::Moving), camera);
+        assert_eq!(of(5.0, 1e-9).fitting_camera(&camera, QualityBudget::Moving), camera);
     }
 }

@@ -4,8 +4,8 @@ use std::time::{Duration, Instant};
 
 use egui_kittest::Harness;
 
+use fmlgs::ui::actions::Action;
 use fmlgs::ui::app::App;
-use fmlgs::worker::Action;
 use fmlgs::worker::jobs::PipelineJobs;
 use fmlgs::worker::places::Places;
 

@@ -295,7 +295,7 @@ impl Device {
             staged.push((staging, bytes));
         }
         let submitted = self.queue.submit([encoder.finish()]);
-        let (sender, receiver) = mpsc::channel();
+        let (sender, receiver) = mpsc::sync_channel(sources.len().max(1));
         for (staging, _) in &staged {
             let sender = sender.clone();
             staging.map_async(wgpu::MapMode::Read, .., move |r| {

@@ -1,129 +1,109 @@
-//! What can be decided about a scene, by stable names, and what a person wants instead.
+//! What can be decided about a scene, by stable names, and what the user wants instead.
 
 use std::collections::BTreeSet;
 use std::fmt;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
+use strum::{EnumProperty, EnumString, IntoStaticStr, VariantArray};
 
-/// One thing that a plan decides.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+/// One thing that a plan decides: its name on the command line, the same in every version (with the name of earlier
+/// versions, where there was another), its subject for the user, and what can be had instead.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Serialize,
+    Deserialize,
+    EnumProperty,
+    EnumString,
+    IntoStaticStr,
+    VariantArray,
+)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Item {
     /// Bands of the spherical harmonics that are drawn.
-    Colour,
+    #[serde(alias = "colour")]
+    #[strum(to_string = "color", serialize = "colour", props(subject = "Color", instead = "full"))]
+    Color,
     /// When the maps of a view's identities are drawn.
-    Maps,
+    #[serde(alias = "maps")]
+    #[strum(to_string = "feature-maps", serialize = "maps", props(subject = "Feature maps", instead = "always"))]
+    FeatureMaps,
     /// Whether they have a level for parts.
+    #[strum(props(subject = "Part level", instead = "on"))]
     Parts,
     /// When objects and parts are drawn alone.
-    Portraits,
+    #[serde(alias = "portraits")]
+    #[strum(to_string = "thumbnails", serialize = "portraits", props(subject = "Thumbnails", instead = "eager"))]
+    Thumbnails,
     /// When the encoder that understands phrases is loaded.
+    #[strum(props(subject = "Text encoder", instead = "eager"))]
     Encoder,
     /// Precision of the features that are stored.
+    #[strum(props(subject = "Precision"))]
     Precision,
-    /// When the graph for moving about is built.
+    /// When the navigation graph is built.
+    #[strum(props(subject = "Navigation graph", instead = "eager"))]
     Navigation,
     /// When depth is drawn.
+    #[strum(props(subject = "Depth", instead = "always"))]
     Depth,
-    /// Size of the pictures to train on.
+    /// Size of the images to train on.
+    #[strum(props(subject = "Photos", instead = "full"))]
     Photos,
     /// Photos that are held out.
-    Held,
-    /// Size of the pictures in which objects are looked for.
+    #[serde(alias = "held")]
+    #[strum(to_string = "holdout", serialize = "held", props(subject = "Holdout"))]
+    Holdout,
+    /// Size of the images in which objects are looked for.
+    #[strum(props(subject = "Object search", instead = "full"))]
     Objects,
     /// Most Gaussians of a training.
+    #[strum(props(subject = "Gaussians"))]
     Gaussians,
     /// Which renderer draws.
+    #[strum(props(subject = "Backend", instead = "cpu"))]
     Backend,
     /// When the window is drawn.
+    #[strum(props(subject = "Redraw", instead = "always"))]
     Redraw,
     /// How long the renderer keeps its working memory.
+    #[strum(props(subject = "Render buffers", instead = "keep"))]
     Buffers,
 }
 
 /// The only word besides an item's alternative.
 const AUTO: &str = "auto";
+/// What "eager" was called in earlier versions.
+const FORMER_EAGER: &str = "open";
 
 impl Item {
-    /// All of them, in the order of a plan.
-    pub const ALL: [Self; 15] = [
-        Self::Colour,
-        Self::Maps,
-        Self::Parts,
-        Self::Portraits,
-        Self::Encoder,
-        Self::Precision,
-        Self::Navigation,
-        Self::Depth,
-        Self::Photos,
-        Self::Held,
-        Self::Objects,
-        Self::Gaussians,
-        Self::Backend,
-        Self::Redraw,
-        Self::Buffers,
-    ];
-
-    /// Its name on the command line, the same in every version.
+    /// Its name on the command line.
     pub fn id(self) -> &'static str {
-        match self {
-            Self::Colour => "colour",
-            Self::Maps => "maps",
-            Self::Parts => "parts",
-            Self::Portraits => "portraits",
-            Self::Encoder => "encoder",
-            Self::Precision => "precision",
-            Self::Navigation => "navigation",
-            Self::Depth => "depth",
-            Self::Photos => "photos",
-            Self::Held => "held",
-            Self::Objects => "objects",
-            Self::Gaussians => "gaussians",
-            Self::Backend => "backend",
-            Self::Redraw => "redraw",
-            Self::Buffers => "buffers",
-        }
+        self.into()
     }
 
-    /// Its name for people.
+    /// Its name for the user.
     pub fn subject(self) -> &'static str {
-        match self {
-            Self::Colour => "Colour",
-            Self::Maps => "Feature maps",
-            Self::Parts => "Part level",
-            Self::Portraits => "Portraits",
-            Self::Encoder => "Text encoder",
-            Self::Precision => "Precision",
-            Self::Navigation => "Path graph",
-            Self::Depth => "Depth",
-            Self::Photos => "Photos",
-            Self::Held => "Held out",
-            Self::Objects => "Object search",
-            Self::Gaussians => "Gaussians",
-            Self::Backend => "Backend",
-            Self::Redraw => "Redraw",
-            Self::Buffers => "Drawing buffers",
-        }
+        self.get_str("subject").unwrap_or_default()
     }
 
-    /// What a person can have instead of what the data suggest.
+    /// What can be had instead of what the data suggest.
     pub fn alternative(self) -> Option<&'static str> {
-        match self {
-            Self::Colour | Self::Photos | Self::Objects => Some("full"),
-            Self::Maps | Self::Depth | Self::Redraw => Some("always"),
-            Self::Parts => Some("on"),
-            Self::Portraits | Self::Encoder | Self::Navigation => Some("open"),
-            Self::Backend => Some("cpu"),
-            Self::Buffers => Some("keep"),
-            Self::Precision | Self::Held | Self::Gaussians => None,
-        }
+        self.get_str("instead")
     }
 
-    /// The choices that [`Wish`] takes, for help and errors: "colour=auto|full, ...".
+    /// The choices that [`PlanOverride`] takes, for help and errors: "color=auto|full, ...".
     pub fn choices() -> String {
         let one = |item: &Self| item.alternative().map(|a| format!("{}={AUTO}|{a}", item.id()));
-        Self::ALL.iter().filter_map(one).collect::<Vec<_>>().join(", ")
+        Self::VARIANTS.iter().filter_map(one).collect::<Vec<_>>().join(", ")
     }
 }
 
@@ -133,16 +113,16 @@ impl fmt::Display for Item {
     }
 }
 
-/// What a person wants of one item: "colour=full".
+/// What the user wants of one item: "color=full".
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Wish {
+pub struct PlanOverride {
     /// Of which.
     pub item: Item,
     /// The alternative instead of what the data suggest.
     pub instead: bool,
 }
 
-impl FromStr for Wish {
+impl FromStr for PlanOverride {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -151,19 +131,20 @@ impl FromStr for Wish {
             return Err(unknown(format!("'{text}' is not ITEM=VALUE")));
         };
         let (id, value) = (id.trim(), value.trim());
-        let known = Item::ALL.into_iter().find(|item| item.id() == id);
-        let Some((item, alternative)) = known.and_then(|item| Some((item, item.alternative()?))) else {
+        let known = Item::from_str(id).ok().and_then(|item| Some((item, item.alternative()?)));
+        let Some((item, alternative)) = known else {
             return Err(unknown(format!("nothing that can be chosen is called '{id}'")));
         };
         match value {
             AUTO => Ok(Self { item, instead: false }),
             v if v == alternative => Ok(Self { item, instead: true }),
+            FORMER_EAGER if alternative == "eager" => Ok(Self { item, instead: true }),
             v => Err(format!("'{v}' is no value of {id}, which is '{AUTO}' or '{alternative}'")),
         }
     }
 }
 
-/// The items of which a person wants the alternative.
+/// The items of which the user wants the alternative.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Overrides(BTreeSet<Item>);
@@ -171,7 +152,7 @@ pub struct Overrides(BTreeSet<Item>);
 impl Overrides {
     /// Everything on: all alternatives but another backend.
     pub fn everything() -> Self {
-        let all = Item::ALL.into_iter().filter(|i| i.alternative().is_some() && *i != Item::Backend);
+        let all = Item::VARIANTS.iter().copied().filter(|i| i.alternative().is_some() && *i != Item::Backend);
         Self(all.collect())
     }
 
@@ -180,20 +161,20 @@ impl Overrides {
         self.0.contains(&item)
     }
 
-    /// Takes a wish; a later one of the same item wins.
-    pub fn set(&mut self, wish: Wish) {
-        if wish.instead {
-            self.0.insert(wish.item);
+    /// Takes one; a later one of the same item wins.
+    pub fn set(&mut self, one: PlanOverride) {
+        if one.instead {
+            self.0.insert(one.item);
         } else {
-            self.0.remove(&wish.item);
+            self.0.remove(&one.item);
         }
     }
 }
 
-impl FromIterator<Wish> for Overrides {
-    fn from_iter<T: IntoIterator<Item = Wish>>(wishes: T) -> Self {
+impl FromIterator<PlanOverride> for Overrides {
+    fn from_iter<T: IntoIterator<Item = PlanOverride>>(overrides: T) -> Self {
         let mut all = Self::default();
-        wishes.into_iter().for_each(|wish| all.set(wish));
+        overrides.into_iter().for_each(|one| all.set(one));
         all
     }
 }
@@ -203,28 +184,46 @@ mod tests {
     use super::*;
 
     #[test]
-    fn wishes_are_read_and_the_last_one_wins() {
-        let read = |text: &str| text.parse::<Wish>();
-        let all: Overrides =
-            ["colour=full", "maps=always", "colour=auto"].iter().map(|t| read(t).expect("a wish")).collect();
-        assert!(all.has(Item::Maps) && !all.has(Item::Colour));
-        for (bad, names) in [("colour", "colour=auto|full"), ("shine=on", "maps=auto|always"), ("held=auto", "parts=")]
+    fn overrides_are_read_and_the_last_one_wins() {
+        let read = |text: &str| text.parse::<PlanOverride>();
+        let all = ["color=full", "feature-maps=always", "color=auto"].map(|t| read(t).expect("an override"));
+        let all = Overrides::from_iter(all);
+        assert!(all.has(Item::FeatureMaps) && !all.has(Item::Color));
+        for (bad, names) in
+            [("color", "color=auto|full"), ("shine=on", "feature-maps=auto|always"), ("holdout=auto", "parts=")]
         {
             assert!(read(bad).expect_err(bad).contains(names), "{bad}");
         }
-        assert!(read("colour=always").expect_err("no value").contains("'full'"));
+        assert!(read("color=always").expect_err("no value").contains("'full'"));
+        assert!(read("depth=open").is_err());
+    }
+
+    #[test]
+    fn words_of_earlier_versions_are_understood() {
+        for (former, now) in [
+            ("colour=full", "color=full"),
+            ("maps=always", "feature-maps=always"),
+            ("portraits=open", "thumbnails=eager"),
+            ("encoder=open", "encoder=eager"),
+        ] {
+            assert_eq!(former.parse::<PlanOverride>(), now.parse(), "{former}");
+            assert!(now.parse::<PlanOverride>().is_ok());
+        }
+        let stored: Overrides = serde_json::from_str(r#"["colour", "maps", "portraits", "held"]"#).expect("read");
+        assert!([Item::Color, Item::FeatureMaps, Item::Thumbnails, Item::Holdout].iter().all(|i| stored.has(*i)));
     }
 
     #[test]
     fn names_are_different_and_stored_ones_come_back() {
-        let ids: BTreeSet<&str> = Item::ALL.iter().map(|i| i.id()).collect();
-        assert_eq!(ids.len(), Item::ALL.len());
-        for item in Item::ALL {
+        let ids: BTreeSet<&str> = Item::VARIANTS.iter().map(|i| i.id()).collect();
+        assert_eq!(ids.len(), Item::VARIANTS.len());
+        for item in Item::VARIANTS {
             assert_eq!(serde_json::to_value(item).expect("json"), item.id());
+            assert!(!item.subject().is_empty());
         }
         let all = Overrides::everything();
         let text = serde_json::to_string(&all).expect("json");
         assert_eq!(serde_json::from_str::<Overrides>(&text).expect("json"), all);
-        assert!(!all.has(Item::Backend) && all.has(Item::Colour));
+        assert!(!all.has(Item::Backend) && all.has(Item::Color));
     }
 }

@@ -1,7 +1,7 @@
 //! What a scene needs and what is left out, each with its reason and what it saves.
 //!
 //! [`Facts`] are gathered from the data once; [`ScenePlan::new`] is a pure function of them and of
-//! what a person wants instead. The program reads its decisions here and makes none of them itself.
+//! what the user wants instead. The program reads its decisions here and makes none of them itself.
 
 mod facts;
 mod item;
@@ -15,7 +15,7 @@ pub use facts::{
     CloudFacts, Facts, Limits, Machine, NOISE_FLOOR, PhotoFacts, SemanticFacts, resolved_side_px, used_degree,
     visible_degree,
 };
-pub use item::{Item, Overrides, Wish};
+pub use item::{Item, Overrides, PlanOverride};
 
 /// When something is made or loaded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -41,22 +41,22 @@ impl When {
     }
 }
 
-/// One decision about a scene, for people.
+/// One decision about a scene, for the user.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PlanLine {
     /// What is decided.
     pub item: Item,
-    /// Its name: "Colour", "Feature maps", ...
+    /// Its name: "Color", "Feature maps", ...
     pub subject: String,
     /// The decision.
     pub choice: String,
     /// Why.
     pub reason: String,
-    /// What it saves, or what it costs where a person wants it otherwise; empty for nothing.
+    /// What it saves, or what it costs where the user wants it otherwise; empty for nothing.
     pub saving: String,
-    /// What a person can have instead, where that makes a difference.
+    /// What the user can have instead, where that makes a difference.
     pub alternative: Option<String>,
-    /// Whether a person wants it otherwise.
+    /// Whether the user wants it otherwise.
     pub overridden: bool,
 }
 
@@ -65,7 +65,7 @@ pub struct PlanLine {
 pub struct ScenePlan {
     /// What they were computed from.
     pub facts: Facts,
-    /// What a person wants otherwise.
+    /// What the user wants otherwise.
     pub overrides: Overrides,
     /// Highest spherical-harmonics degree that is drawn.
     pub sh_degree: u8,
@@ -74,18 +74,18 @@ pub struct ScenePlan {
     /// Whether these maps have a level for parts.
     pub parts: bool,
     /// When objects and parts are drawn alone.
-    pub portraits: When,
+    pub thumbnails: When,
     /// When the encoder of typed phrases is loaded.
     pub encoder: When,
-    /// When the graph for moving about is built.
+    /// When the graph for navigation is built.
     pub navigation: When,
     /// When depth is drawn: as it is used, or with every picture.
     pub depth: When,
-    /// Longer side of the pictures to train on, px.
+    /// Longer side of the images to train on, px.
     pub train_side_px: u32,
     /// Every how-manieth photo is held out; 0 = none.
     pub holdout_every: usize,
-    /// Longer side of the pictures in which objects are looked for, px.
+    /// Longer side of the images in which objects are looked for, px.
     pub object_side_px: u32,
     /// Most Gaussians that training may use on this machine.
     pub max_gaussians: usize,
@@ -95,12 +95,12 @@ pub struct ScenePlan {
     pub redraw: When,
     /// When the renderer holds its working memory.
     pub buffers: When,
-    /// The decisions, for people.
+    /// The decisions, for the user.
     pub lines: Vec<PlanLine>,
 }
 
 impl ScenePlan {
-    /// The plan for these facts, except for what a person wants otherwise.
+    /// The plan for these facts, except for what the user wants otherwise.
     pub fn new(facts: Facts, overrides: &Overrides) -> Self {
         let wants = |item: Item| overrides.has(item);
         let when = |there: bool, item: Item| match (there, wants(item)) {
@@ -115,13 +115,13 @@ impl ScenePlan {
         let resolved = facts.cloud.as_ref().and_then(|c| c.resolved_side_px).unwrap_or(u32::MAX);
         let mut plan = Self {
             sh_degree: match &facts.cloud {
-                Some(c) if wants(Item::Colour) => c.sh_used,
+                Some(c) if wants(Item::Color) => c.sh_used,
                 Some(c) => c.sh_visible,
                 None => limits.sh_degree,
             },
-            maps: when(semantics.is_some(), Item::Maps),
+            maps: when(semantics.is_some(), Item::FeatureMaps),
             parts: semantics.is_some_and(|s| s.parts > 0 || wants(Item::Parts)),
-            portraits: when(semantics.is_some(), Item::Portraits),
+            thumbnails: when(semantics.is_some(), Item::Thumbnails),
             encoder: when(semantics.is_some_and(|s| s.encoder.is_some()), Item::Encoder),
             navigation: when(semantics.is_some() && cameras > 0, Item::Navigation),
             depth: when(true, Item::Depth),
@@ -150,34 +150,11 @@ impl ScenePlan {
     }
 }
 
-/// Objects are never looked for in pictures smaller than this along their longer side.
+/// Objects are never looked for in images smaller than this along their longer side.
 pub const LEAST_SIDE_PX: u32 = 256;
 
 /// Every how-manieth of `photos` is held out where every `wanted`-th was asked for: a single one is
 /// all there is to train on.
 pub fn holdout(photos: usize, wanted: usize) -> usize {
     if photos > 1 { wanted } else { 0 }
-}
-
-/// A number of bytes for people, in decimal units.
-pub fn bytes(n: u64) -> String {
-    match n {
-        0..1_000 => format!("{n} B"),
-        1_000..1_000_000 => format!("{:.0} kB", n as f64 / 1e3),
-        1_000_000..1_000_000_000 => format!("{:.0} MB", n as f64 / 1e6),
-        _ => format!("{:.1} GB", n as f64 / 1e9),
-    }
-}
-
-/// A whole number with thousands separators.
-pub fn count(n: u64) -> String {
-    let digits = n.to_string();
-    let mut out = String::with_capacity(digits.len() + digits.len() / 3);
-    for (i, c) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            out.push(',');
-        }
-        out.push(c);
-    }
-    out
 }

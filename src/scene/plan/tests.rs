@@ -1,13 +1,15 @@
 //! What is decided from which facts, with a scene beside each that needs what is left out.
 
 use glam::DVec3;
+use strum::VariantArray;
 
 use super::*;
+use crate::math::format::bytes;
 use crate::math::{sh, stats};
 use crate::scene::{Camera, GaussianCloud, Identities, LanguageFeatures, Level, NOBODY, SemanticMap, ViewFeatures};
 
 /// One Gaussian whose second and third bands have one coefficient each.
-fn coloured(band_one: f32, band_two: f32) -> GaussianCloud {
+fn colored(band_one: f32, band_two: f32) -> GaussianCloud {
     let mut sh = vec![[0.0; 3]; 16];
     (sh[1], sh[5]) = ([band_one; 3], [band_two; 3]);
     GaussianCloud { sh_degree: 3, sh, ..blobs(1, 0.0) }
@@ -49,16 +51,16 @@ fn objects(with_part: bool, with_looks: bool) -> SemanticMap {
 fn plan(change: impl FnOnce(Facts) -> Facts) -> ScenePlan {
     let cameras = vec![camera(1_000); 9];
     let facts = Facts::of(Machine { max_gaussians: 1_234_567, cores: 2, ..Machine::default() }, limits());
-    let facts = facts.with_photos(&cameras).with_cloud(&coloured(0.2, 0.1), 3, &cameras);
+    let facts = facts.with_photos(&cameras).with_cloud(&colored(0.2, 0.1), 3, &cameras);
     ScenePlan::new(change(facts.with_semantics(Some(&objects(true, true)))), &Overrides::default())
 }
 
 #[test]
 fn bands_under_the_noise_floor_are_dropped_and_others_kept() {
-    assert_eq!(visible_degree(&coloured(0.2, 1e-4)), 1);
-    assert_eq!(visible_degree(&coloured(0.2, 0.05)), 2);
-    assert_eq!((visible_degree(&coloured(0.0, 1e-4)), used_degree(&coloured(0.0, 1e-4))), (0, 2));
-    assert_eq!(used_degree(&coloured(0.1, 0.0)), 1);
+    assert_eq!(visible_degree(&colored(0.2, 1e-4)), 1);
+    assert_eq!(visible_degree(&colored(0.2, 0.05)), 2);
+    assert_eq!((visible_degree(&colored(0.0, 1e-4)), used_degree(&colored(0.0, 1e-4))), (0, 2));
+    assert_eq!(used_degree(&colored(0.1, 0.0)), 1);
 }
 
 #[test]
@@ -72,10 +74,10 @@ fn dropped_bands_change_no_colour_by_half_a_step() {
         };
         stats::worst((0..500).map(change))
     };
-    let faint = coloured(0.2, 2.5e-3);
+    let faint = colored(0.2, 2.5e-3);
     assert_eq!(visible_degree(&faint), 1);
     assert!(worst(&faint, 1) < NOISE_FLOOR);
-    let strong = coloured(0.2, 0.05);
+    let strong = colored(0.2, 0.05);
     assert!(worst(&strong, 1) > NOISE_FLOOR, "a band that is seen is missed");
 }
 
@@ -101,22 +103,22 @@ fn what_the_gaussians_resolve_follows_their_size_and_not_the_photos() {
 fn a_scene_that_needs_everything_has_everything() {
     let p = plan(|facts| facts);
     assert_eq!((p.sh_degree, p.parts, p.holdout_every), (2, true, 8));
-    assert_eq!([p.maps, p.portraits, p.encoder, p.navigation], [When::Used; 4]);
+    assert_eq!([p.maps, p.thumbnails, p.encoder, p.navigation], [When::Used; 4]);
     assert!(p.lines.iter().all(|l| !l.reason.is_empty() && !l.choice.is_empty()));
     let line = |item: Item| p.line(item).expect("a line");
     assert_eq!(line(Item::Photos).choice, "500 x 250 px");
     assert_eq!(line(Item::Photos).saving, "10 MB");
     assert_eq!(line(Item::Gaussians).choice, "at most 1,234,567");
-    assert_eq!(p.lines.len(), Item::ALL.len());
+    assert_eq!(p.lines.len(), Item::VARIANTS.len());
 }
 
 #[test]
 fn without_semantics_nothing_is_kept_for_them() {
     let p = plan(|facts| facts.with_semantics(None));
-    assert_eq!([p.maps, p.portraits, p.encoder, p.navigation], [When::Never; 4]);
+    assert_eq!([p.maps, p.thumbnails, p.encoder, p.navigation], [When::Never; 4]);
     let all = ScenePlan::new(p.facts, &Overrides::everything());
     assert_eq!(all.maps, When::Never, "nobody can want maps of nothing");
-    assert!(!all.line(Item::Maps).expect("said").overridden);
+    assert!(!all.line(Item::FeatureMaps).expect("said").overridden);
 }
 
 #[test]
@@ -132,7 +134,7 @@ fn a_finished_splat_has_nothing_to_train_or_to_fly_between() {
     let p = plan(|facts| Facts { photos: None, ..facts });
     assert_eq!((p.navigation, p.holdout_every), (When::Never, 0));
     assert_eq!(p.line(Item::Photos).expect("said").choice, "none");
-    assert!([Item::Held, Item::Objects, Item::Gaussians].iter().all(|i| p.line(*i).is_none()));
+    assert!([Item::Holdout, Item::Objects, Item::Gaussians].iter().all(|i| p.line(*i).is_none()));
 }
 
 #[test]
@@ -156,18 +158,18 @@ fn a_single_photo_is_trained_on() {
 
 #[test]
 fn a_person_can_have_it_otherwise_and_is_told_what_it_costs() {
-    let faint = coloured(0.2, 1e-4);
+    let faint = colored(0.2, 1e-4);
     let facts = plan(|facts| facts.with_cloud(&faint, 3, &[camera(4_000)])).facts;
     let auto = ScenePlan::new(facts.clone(), &Overrides::default());
     let all = ScenePlan::new(facts, &Overrides::everything());
     assert_eq!((auto.sh_degree, all.sh_degree), (1, 2));
     assert_eq!((auto.maps, all.maps, all.navigation), (When::Used, When::Always, When::Always));
     assert!(auto.train_side_px < all.train_side_px && auto.object_side_px < all.object_side_px);
-    for item in [Item::Colour, Item::Maps, Item::Photos, Item::Objects, Item::Redraw] {
+    for item in [Item::Color, Item::FeatureMaps, Item::Photos, Item::Objects, Item::Redraw] {
         let (before, after) = (auto.line(item).expect("said"), all.line(item).expect("said"));
         assert!(!before.overridden && after.overridden, "{item}");
         assert_eq!(Some(after.choice.as_str()), item.alternative());
-        assert!(!after.saving.is_empty() && after.reason.starts_with("Wanted so"), "{item}");
+        assert!(!after.saving.is_empty() && after.reason.starts_with("Set by the user"), "{item}");
     }
     assert!(all.line(Item::Parts).is_some_and(|l| l.alternative.is_none()), "there are parts anyway");
 }
@@ -179,40 +181,31 @@ fn other_settings_of_a_person_change_the_plan() {
 }
 
 #[test]
-fn numbers_are_readable() {
-    assert_eq!(count(1_234_567), "1,234,567");
-    assert_eq!(count(999), "999");
-    assert_eq!(bytes(1_900), "2 kB");
-    assert_eq!(bytes(3_200_000_000), "3.2 GB");
-}
-
-#[test]
 fn lines_say_what_is_left_out_and_how_much_that_is() {
-    let p = plan(|facts| facts.with_cloud(&coloured(0.2, 1e-4), 3, &[camera(4_000)]));
+    let p = plan(|facts| facts.with_cloud(&colored(0.2, 1e-4), 3, &[camera(4_000)]));
     let line = |p: &ScenePlan, item: Item| {
         let l = p.line(item).expect("said").clone();
         (l.choice, l.reason, l.saving)
     };
     // Three bands are stored, the third is zero, the second too faint: 9 - 4 coefficients of 12 bytes are read.
-    let (choice, _, saving) = line(&p, Item::Colour);
-    assert_eq!((choice.as_str(), saving), ("SH degree 1 of 3", format!("{} read for every picture", bytes(60))));
+    let (choice, _, saving) = line(&p, Item::Color);
+    assert_eq!((choice.as_str(), saving), ("SH degree 1 of 3", format!("{} read for every frame", bytes(60))));
     // Only zero bands: they leave memory, 16 - 9 coefficients.
-    let zero = plan(|facts| facts.with_cloud(&coloured(0.2, 0.1), 3, &[camera(4_000)]));
-    assert_eq!(line(&zero, Item::Colour).2, format!("{} of memory", bytes(84)));
+    let zero = plan(|facts| facts.with_cloud(&colored(0.2, 0.1), 3, &[camera(4_000)]));
+    assert_eq!(line(&zero, Item::Color).2, format!("{} of memory", bytes(84)));
     let training = plan(|facts| Facts { cloud: None, ..facts });
-    assert_eq!(line(&training, Item::Colour).2, "15 of 16 coefficients at the start");
-    // What was wanted otherwise goes on in lower case.
+    assert_eq!(line(&training, Item::Color).2, "15 of 16 coefficients at the start");
     let all = ScenePlan::new(p.facts.clone(), &Overrides::everything());
     let (auto, wanted) = (line(&p, Item::Photos).1, line(&all, Item::Photos).1);
     assert!(auto.starts_with("Training is"), "{auto}");
-    assert_eq!(wanted, format!("Wanted so; else t{}", &auto[1..]));
+    assert_eq!(wanted, format!("Set by the user. By itself: {auto}"));
     let none = plan(|facts| facts.with_semantics(Some(&objects(false, false))));
     assert_eq!(line(&none, Item::Parts).0, "off");
     assert_eq!(line(&none, Item::Parts).2, "3 of 6 channels of blended codes");
     assert_eq!(line(&p, Item::Parts).0, "on");
-    assert_eq!(line(&p, Item::Portraits).2, "2 drawings at opening");
+    assert_eq!(line(&p, Item::Thumbnails).2, "2 renderings at opening");
     let lost = plan(|facts| Facts { photos: None, ..facts });
-    assert!(line(&lost, Item::Navigation).1.contains("nowhere to stand"));
+    assert!(line(&lost, Item::Navigation).1.contains("no reachable viewpoint"));
     // The narrower Gaussians resolve a share of the pixels; the rest is saved.
     let coarse = plan(|facts| facts.with_cloud(&blobs(40, -2.0), 3, &[camera(1_000)]));
     let share = 1.0 - (f64::from(coarse.object_side_px) / 1_000.0).powi(2);

@@ -6,8 +6,8 @@ use super::{CameraPane, caption};
 use crate::navigate::Pose;
 use crate::scene::PathKey;
 
-/// What a person wants of a key.
-enum Wish {
+/// What a user wants of a key.
+enum KeyChange {
     Choose,
     Go,
     Update,
@@ -17,19 +17,19 @@ enum Wish {
     Delete,
 }
 
-/// Draws it. The pose of the key that a person wants to see.
+/// Draws it. The pose of the key that a user wants to see.
 pub fn show(ui: &mut Ui, pane: &mut CameraPane, eye: &Pose) -> Option<Pose> {
     let mut keys = pane.path.keys.clone();
-    let mut wish: Option<(usize, Wish)> = None;
+    let mut wanted_change: Option<(usize, KeyChange)> = None;
     ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
         Grid::new("keys").num_columns(12).striped(true).spacing([10.0, 4.0]).show(ui, |ui| {
-            for text in ["Key", "Name", "Time", "View angle", "Roll", "Wait"] {
+            for text in ["Keyframe", "Name", "Time", "Field of view", "Roll", "Wait"] {
                 ui.label(caption(text));
             }
             ui.end_row();
             for (i, key) in keys.iter_mut().enumerate() {
                 if let Some(wanted) = row(ui, i, key, pane.selected == Some(i)) {
-                    wish = Some((i, wanted));
+                    wanted_change = Some((i, wanted));
                 }
                 ui.end_row();
             }
@@ -38,24 +38,24 @@ pub fn show(ui: &mut Ui, pane: &mut CameraPane, eye: &Pose) -> Option<Pose> {
     if pane.path.keys != keys {
         pane.change(|path| path.keys = keys);
     }
-    let (i, wish) = wish?;
+    let (i, wanted_change) = wanted_change?;
     pane.selected = Some(i);
-    match wish {
-        Wish::Choose => {}
-        Wish::Go => return pane.path.keys.get(i).map(Pose::of_key),
-        Wish::Update => pane.change(|path| {
+    match wanted_change {
+        KeyChange::Choose => {}
+        KeyChange::Go => return pane.path.keys.get(i).map(Pose::of_key),
+        KeyChange::Update => pane.change(|path| {
             let old = &path.keys[i];
             path.keys[i] =
                 PathKey { name: old.name.clone(), dwell_secs: old.dwell_secs, time_secs: old.time_secs, ..eye.key() };
         }),
-        Wish::Copy => pane.change(|path| {
+        KeyChange::Copy => pane.change(|path| {
             let copy = PathKey { time_secs: None, ..path.keys[i].clone() };
             path.keys.insert(i + 1, copy);
         }),
-        Wish::Up if i > 0 => pane.change(|path| swap(path.keys.as_mut_slice(), i, i - 1)),
-        Wish::Down if i + 1 < pane.path.keys.len() => pane.change(|path| swap(path.keys.as_mut_slice(), i, i + 1)),
-        Wish::Up | Wish::Down => {}
-        Wish::Delete => {
+        KeyChange::Up if i > 0 => pane.change(|path| swap(path.keys.as_mut_slice(), i, i - 1)),
+        KeyChange::Down if i + 1 < pane.path.keys.len() => pane.change(|path| swap(path.keys.as_mut_slice(), i, i + 1)),
+        KeyChange::Up | KeyChange::Down => {}
+        KeyChange::Delete => {
             pane.change(|path| drop(path.keys.remove(i)));
             pane.selected = None;
         }
@@ -70,10 +70,10 @@ fn swap(keys: &mut [PathKey], a: usize, b: usize) {
     (keys[b].time_secs, keys[a].time_secs) = times;
 }
 
-fn row(ui: &mut Ui, i: usize, key: &mut PathKey, chosen: bool) -> Option<Wish> {
-    let mut wish = None;
+fn row(ui: &mut Ui, i: usize, key: &mut PathKey, chosen: bool) -> Option<KeyChange> {
+    let mut wanted_change = None;
     if ui.selectable_label(chosen, format!("{}", i + 1)).clicked() {
-        wish = Some(Wish::Choose);
+        wanted_change = Some(KeyChange::Choose);
     }
     let mut name = key.name.clone().unwrap_or_default();
     let edit = TextEdit::singleline(&mut name).desired_width(120.0).char_limit(80).hint_text("name");
@@ -81,7 +81,7 @@ fn row(ui: &mut Ui, i: usize, key: &mut PathKey, chosen: bool) -> Option<Wish> {
     key.name = Some(name).filter(|n| !n.is_empty());
     ui.horizontal(|ui| {
         let mut fixed = key.time_secs.is_some();
-        if ui.checkbox(&mut fixed, "").on_hover_text("Fix when it is reached.").changed() {
+        if ui.checkbox(&mut fixed, "").on_hover_text("Fix the time at which it is reached.").changed() {
             key.time_secs = fixed.then_some(i as f64);
         }
         match &mut key.time_secs {
@@ -99,17 +99,17 @@ fn row(ui: &mut Ui, i: usize, key: &mut PathKey, chosen: bool) -> Option<Wish> {
     }
     ui.add(DragValue::new(&mut key.dwell_secs).range(0.0..=600.0).speed(0.02).suffix(" s"));
     let buttons = [
-        ("Go", "Look from here.", Wish::Go),
-        ("Set", "Make the present view this key.", Wish::Update),
-        ("Copy", "Another one like it behind it.", Wish::Copy),
-        ("Earlier", "Swap it with the key before.", Wish::Up),
-        ("Later", "Swap it with the key after.", Wish::Down),
-        ("Delete", "Take it out of the path.", Wish::Delete),
+        ("Go", "Move the view here.", KeyChange::Go),
+        ("Set", "Replace this keyframe by the current view.", KeyChange::Update),
+        ("Copy", "Insert a copy after it.", KeyChange::Copy),
+        ("Earlier", "Swap it with the previous keyframe.", KeyChange::Up),
+        ("Later", "Swap it with the next keyframe.", KeyChange::Down),
+        ("Delete", "Remove it from the path.", KeyChange::Delete),
     ];
     for (text, tip, wanted) in buttons {
         if ui.add(Button::new(text).small()).on_hover_text(tip).clicked() {
-            wish = Some(wanted);
+            wanted_change = Some(wanted);
         }
     }
-    wish
+    wanted_change
 }

@@ -9,17 +9,15 @@ use std::path::Path;
 
 use egui::{Button, ComboBox, DragValue, RichText, Slider, Ui};
 
-use self::player::{Player, Reel};
+use self::player::{Clip, Player};
 use super::state::AppState;
 use super::theme;
 use crate::io::animation::Settings;
 use crate::navigate::film::{MOST_PICTURES, steps_of};
 use crate::navigate::{Film, Flight, Pose, Speed};
+use crate::scene::undo::UndoHistory;
 use crate::scene::{Camera, CameraPath, PathKey};
-use crate::worker::Action;
-
-/// States of the path that are kept for undoing.
-const MAX_UNDO: usize = 200;
+use crate::ui::actions::Action;
 
 /// The path that is being edited, and how it is played.
 pub struct CameraPane {
@@ -31,8 +29,7 @@ pub struct CameraPane {
     pub player: Player,
     /// The key that was chosen.
     selected: Option<usize>,
-    undo: Vec<CameraPath>,
-    redo: Vec<CameraPath>,
+    edits: UndoHistory<CameraPath>,
     /// The path as it was last made a film of.
     filmed: Option<(CameraPath, Speed)>,
     /// Height of films, px.
@@ -54,8 +51,7 @@ impl Default for CameraPane {
             speed: Speed::Constant,
             player: Player::default(),
             selected: None,
-            undo: Vec::new(),
-            redo: Vec::new(),
+            edits: UndoHistory::default(),
             filmed: None,
             film_height: 720,
             quality: 80,
@@ -90,7 +86,7 @@ impl CameraPane {
             && let Some(flight) = self.next.pop_front()
         {
             self.player.looped = false;
-            self.player.load(Reel::Flight(Box::new(flight)), true);
+            self.player.load(Clip::Flight(Box::new(flight)), true);
         }
     }
 
@@ -102,13 +98,13 @@ impl CameraPane {
 
     /// Plays or stops; the path, if nothing else is in.
     pub fn toggle(&mut self) {
-        if self.player.reel().is_none() {
+        if self.player.clip().is_none() {
             self.put_path_in();
         }
         self.player.toggle();
     }
 
-    /// One picture on or back; the pose there.
+    /// One frame on or back; the pose there.
     pub fn step(&mut self, pictures: f64) -> Option<Pose> {
         let time = self.player.time + pictures / self.path.fps.max(1.0);
         self.player.seek(time)
@@ -134,18 +130,13 @@ impl CameraPane {
         let before = self.path.clone();
         change(&mut self.path);
         if self.path != before {
-            self.undo.push(before);
-            self.redo.clear();
-            if self.undo.len() > MAX_UNDO {
-                self.undo.remove(0);
-            }
+            self.edits.record(before);
         }
     }
 
     fn step_back_in_time(&mut self, redo: bool) {
-        let (from, to) = if redo { (&mut self.redo, &mut self.undo) } else { (&mut self.undo, &mut self.redo) };
-        if let Some(path) = from.pop() {
-            to.push(std::mem::replace(&mut self.path, path));
+        let stepped = if redo { self.edits.redo(&mut self.path) } else { self.edits.undo(&mut self.path) };
+        if stepped {
             self.selected = self.selected.filter(|i| *i < self.path.keys.len());
         }
     }
@@ -154,17 +145,17 @@ impl CameraPane {
     fn put_path_in(&mut self) {
         self.filmed = Some((self.path.clone(), self.speed));
         match Film::new(&self.path, self.speed) {
-            Some(film) if matches!(self.player.reel(), Some(Reel::Path(_))) => {
-                self.player.replace(Some(Reel::Path(Box::new(film))));
+            Some(film) if matches!(self.player.clip(), Some(Clip::Path(_))) => {
+                self.player.replace(Some(Clip::Path(Box::new(film))));
             }
-            Some(film) => self.player.load(Reel::Path(Box::new(film)), false),
+            Some(film) => self.player.load(Clip::Path(Box::new(film)), false),
             None => self.player.replace(None),
         }
     }
 
     /// The film of the path as it is.
     fn keep_up(&mut self) {
-        let is_path = matches!(self.player.reel(), Some(Reel::Path(_)) | None);
+        let is_path = matches!(self.player.clip(), Some(Clip::Path(_)) | None);
         let current = self.filmed.as_ref().is_some_and(|(path, speed)| *path == self.path && *speed == self.speed);
         if is_path && !current {
             self.put_path_in();
@@ -175,10 +166,10 @@ impl CameraPane {
     pub fn film(&self, out: &Path, aspect: f64) -> Option<(Vec<Camera>, Settings)> {
         let height = self.film_height;
         let width = (((f64::from(height) * aspect) / 2.0).round().max(1.0) * 2.0) as u32;
-        let reel = self.player.reel()?;
-        let frames = steps_of(reel.seconds(), self.path.fps, MOST_PICTURES);
-        let time = |i: usize| reel.seconds() * i as f64 / frames as f64;
-        let cameras = (0..=frames).filter_map(|i| reel.at(time(i))).map(|p| p.camera(width, height)).collect();
+        let clip = self.player.clip()?;
+        let frames = steps_of(clip.seconds(), self.path.fps, MOST_PICTURES);
+        let time = |i: usize| clip.seconds() * i as f64 / frames as f64;
+        let cameras = (0..=frames).filter_map(|i| clip.at(time(i))).map(|p| p.camera(width, height)).collect();
         let mut settings = Settings::new(width, height, self.path.fps);
         // The dialog has asked whether it may be replaced.
         (settings.quality, settings.overwrite) = (self.quality, out.exists());
@@ -187,9 +178,9 @@ impl CameraPane {
 
     /// Points along what is played, for drawing its way.
     pub fn way(&self) -> Vec<glam::DVec3> {
-        let Some(reel) = self.player.reel() else { return Vec::new() };
+        let Some(clip) = self.player.clip() else { return Vec::new() };
         let last = 120;
-        (0..=last).filter_map(|i| reel.at(reel.seconds() * f64::from(i) / f64::from(last))).map(|p| p.center).collect()
+        (0..=last).filter_map(|i| clip.at(clip.seconds() * f64::from(i) / f64::from(last))).map(|p| p.center).collect()
     }
 
     /// Places of the path's keys, and which of them is chosen.
@@ -197,7 +188,7 @@ impl CameraPane {
         self.path.keys.iter().enumerate().map(|(i, k)| (k.center, self.selected == Some(i)))
     }
 
-    /// Draws the pane. `eye` is the present view. The pose to show, if a person moved in time or asked
+    /// Draws the pane. `eye` is the present view. The pose to show, if a user moved in time or asked
     /// for a key.
     pub fn show(&mut self, ui: &mut Ui, state: &AppState, eye: &Pose, actions: &mut Vec<Action>) -> Option<Pose> {
         self.keep_up();
@@ -210,8 +201,8 @@ impl CameraPane {
         if self.path.keys.is_empty() {
             ui.add_space(4.0);
             ui.weak(
-                "No keys yet. Move the view and record it (K), open a path, or find something and go there: the \
-                 flight can be kept as a path.",
+                "No keyframes yet. Move the view and add it (K), open a path, or find something and go there: the \
+                 flight can be converted to a path.",
             );
         } else {
             wanted = keys::show(ui, self, eye).or(wanted);
@@ -220,9 +211,9 @@ impl CameraPane {
     }
 
     fn controls(&mut self, ui: &mut Ui, actions: &mut Vec<Action>) {
-        let has_reel = self.player.reel().is_some();
+        let has_reel = self.player.clip().is_some();
         let tip = |a: &Action| format!("{}  {}", a.tooltip(), super::keys::label(ui.ctx(), a));
-        let play = if self.player.playing { "Hold" } else { "Play" };
+        let play = if self.player.playing { "Pause" } else { "Play" };
         let entries = [("\u{2039}", Action::StepBack), (play, Action::PlayPath), ("\u{203a}", Action::StepForward)];
         let entries = entries.map(|(symbol, action)| (symbol, tip(&action), action));
         for (symbol, tip, action) in entries {
@@ -240,20 +231,23 @@ impl CameraPane {
                 }
             },
         );
-        let seconds = self.player.reel().map_or(0.0, Reel::seconds);
+        let seconds = self.player.clip().map_or(0.0, Clip::seconds);
         ui.label(RichText::new(format!("{:.2} / {seconds:.2} s", self.player.time)).monospace());
-        let what = match self.player.reel() {
-            Some(Reel::Flight(_)) => "flight to what was found",
-            Some(Reel::Path(_)) => "path",
+        let what = match self.player.clip() {
+            Some(Clip::Flight(_)) => "flight to the target",
+            Some(Clip::Path(_)) => "path",
             None => "nothing to play",
         };
         ui.weak(what);
         if let Some(rate) = self.player.rate_shown() {
-            ui.weak(format!("{rate:.0} pictures/s shown"));
+            ui.weak(format!("{rate:.0} fps"));
         }
-        if let Some(Reel::Flight(flight)) = self.player.reel() {
+        if let Some(Clip::Flight(flight)) = self.player.clip() {
             let flight = (**flight).clone();
-            if ui.button("Keep as path").on_hover_text("Make keys of this flight, so that it can be edited.").clicked()
+            if ui
+                .button("Convert to path")
+                .on_hover_text("Turn this flight into keyframes, so that it can be edited.")
+                .clicked()
             {
                 self.keep(&flight);
             }
@@ -280,10 +274,12 @@ impl CameraPane {
 
     fn tools(&mut self, ui: &mut Ui, state: &AppState, eye: &Pose, actions: &mut Vec<Action>) {
         let tip = format!("{}  {}", Action::AddKey.tooltip(), super::keys::label(ui.ctx(), &Action::AddKey));
-        if ui.button("Record this view").on_hover_text(tip).clicked() {
+        if ui.button("Add keyframe").on_hover_text(tip).clicked() {
             self.record(eye);
         }
-        for (text, redo, any) in [("Undo", false, !self.undo.is_empty()), ("Redo", true, !self.redo.is_empty())] {
+        for (text, redo, any) in
+            [("Undo", false, self.edits.last().is_some()), ("Redo", true, self.edits.next().is_some())]
+        {
             if ui.add_enabled(any, Button::new(text)).clicked() {
                 self.step_back_in_time(redo);
             }
@@ -297,20 +293,20 @@ impl CameraPane {
         }
         ui.separator();
         let mut path = self.path.clone();
-        ui.label("Seconds");
+        ui.label("Duration");
         ui.add(DragValue::new(&mut path.seconds).range(0.1..=3600.0).speed(0.05));
-        ui.checkbox(&mut path.closed, "Closed").on_hover_text("Go on from the last key to the first.");
+        ui.checkbox(&mut path.closed, "Closed loop").on_hover_text("Continue from the last keyframe to the first.");
         let mut eased = self.speed == Speed::Eased;
-        ui.checkbox(&mut eased, "Eased").on_hover_text("Start and stop gently, at waits too.");
+        ui.checkbox(&mut eased, "Ease in/out").on_hover_text("Start and stop smoothly, at waits too.");
         self.speed = if eased { Speed::Eased } else { Speed::Constant };
         ui.separator();
-        let idle = state.job.is_none() && self.player.reel().is_some();
-        let film = ui.add_enabled(idle, Button::new("Film\u{2026}"));
-        let why = if state.job.is_some() { "Another job is running." } else { "There is nothing to film." };
-        if film.on_hover_text(Action::SaveFilm.tooltip()).on_disabled_hover_text(why).clicked() {
-            actions.push(Action::SaveFilm);
+        let idle = state.job.is_none() && self.player.clip().is_some();
+        let film = ui.add_enabled(idle, Button::new("Export video\u{2026}"));
+        let why = if state.job.is_some() { "Another job is running." } else { "There is nothing to export." };
+        if film.on_hover_text(Action::ExportVideo.tooltip()).on_disabled_hover_text(why).clicked() {
+            actions.push(Action::ExportVideo);
         }
-        ComboBox::from_id_salt("film height").selected_text(format!("{} px", self.film_height)).width(72.0).show_ui(
+        ComboBox::from_id_salt("video height").selected_text(format!("{} px", self.film_height)).width(72.0).show_ui(
             ui,
             |ui| {
                 for height in [360, 480, 720, 1080, 2160] {
@@ -318,14 +314,15 @@ impl CameraPane {
                 }
             },
         );
-        ui.add(DragValue::new(&mut path.fps).range(1.0..=120.0).speed(0.2).suffix(" per s"));
+        ui.add(DragValue::new(&mut path.fps).range(1.0..=120.0).speed(0.2).suffix(" fps"));
         ui.add(Slider::new(&mut self.quality, 0..=100).text("Quality"));
-        ui.checkbox(&mut self.mark, "Mark").on_hover_text("Mark what was found in every picture of the film.");
+        ui.checkbox(&mut self.mark, "Highlight")
+            .on_hover_text("Highlight what the query found in every frame of the video.");
         self.change(|p| *p = path);
     }
 }
 
-/// Reads a path's file; the error for people.
+/// Reads a path's file; the error for the user.
 pub fn read(path: &Path) -> Result<CameraPath, String> {
     crate::io::camera_path::open(path).map_err(|e| e.to_string())
 }

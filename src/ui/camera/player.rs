@@ -1,20 +1,20 @@
-//! Plays a flight or a path, and counts the pictures that are shown while it runs.
+//! Plays a flight or a path, and counts the frames that are shown while it runs.
 
 use crate::navigate::{Film, Flight, Pose};
 
-/// Seconds over which pictures are counted.
+/// Seconds over which frames are counted.
 const COUNTED_SECS: f64 = 1.0;
 
 /// What is played.
 #[derive(Clone, Debug)]
-pub enum Reel {
+pub enum Clip {
     /// A flight to a target.
     Flight(Box<Flight>),
     /// The path that is being edited.
     Path(Box<Film>),
 }
 
-impl Reel {
+impl Clip {
     /// How long it runs.
     pub fn seconds(&self) -> f64 {
         match self {
@@ -39,7 +39,7 @@ impl Reel {
 /// The state of playing.
 #[derive(Debug)]
 pub struct Player {
-    reel: Option<Reel>,
+    clip: Option<Clip>,
     /// Seconds into it.
     pub time: f64,
     /// Whether it runs.
@@ -48,41 +48,41 @@ pub struct Player {
     pub looped: bool,
     /// Speed as a multiple of the usual one.
     pub rate: f64,
-    /// When pictures were shown lately, window time.
+    /// When frames were shown lately, window time.
     shown: Vec<f64>,
 }
 
 impl Default for Player {
     fn default() -> Self {
-        Self { reel: None, time: 0.0, playing: false, looped: false, rate: 1.0, shown: Vec::new() }
+        Self { clip: None, time: 0.0, playing: false, looped: false, rate: 1.0, shown: Vec::new() }
     }
 }
 
 impl Player {
-    /// Puts a reel in, at its beginning; running if wanted.
-    pub fn load(&mut self, reel: Reel, playing: bool) {
-        self.reel = Some(reel);
+    /// Puts a clip in, at its beginning; running if wanted.
+    pub fn load(&mut self, clip: Clip, playing: bool) {
+        self.clip = Some(clip);
         self.time = 0.0;
         self.playing = playing;
         self.shown.clear();
     }
 
     /// The same path, changed: time and running stay.
-    pub fn replace(&mut self, reel: Option<Reel>) {
-        self.time = self.time.min(reel.as_ref().map_or(0.0, Reel::seconds));
-        self.playing &= reel.is_some();
-        self.reel = reel;
+    pub fn replace(&mut self, clip: Option<Clip>) {
+        self.time = self.time.min(clip.as_ref().map_or(0.0, Clip::seconds));
+        self.playing &= clip.is_some();
+        self.clip = clip;
     }
 
     /// What is in.
-    pub fn reel(&self) -> Option<&Reel> {
-        self.reel.as_ref()
+    pub fn clip(&self) -> Option<&Clip> {
+        self.clip.as_ref()
     }
 
     /// Starts or stops; begins anew at the end.
     pub fn toggle(&mut self) {
-        let Some(reel) = &self.reel else { return };
-        if !self.playing && self.time >= reel.seconds() {
+        let Some(clip) = &self.clip else { return };
+        if !self.playing && self.time >= clip.seconds() {
             self.time = 0.0;
         }
         self.playing = !self.playing;
@@ -91,32 +91,32 @@ impl Player {
 
     /// Goes on by `step_secs` of window time; the pose to show, if it runs.
     pub fn tick(&mut self, step_secs: f64) -> Option<Pose> {
-        let reel = self.reel.as_ref().filter(|_| self.playing)?;
-        let seconds = reel.seconds();
+        let clip = self.clip.as_ref().filter(|_| self.playing)?;
+        let seconds = clip.seconds();
         let rate = if self.rate > 0.0 { self.rate } else { 1.0 };
         self.time += step_secs.clamp(0.0, 0.5) * rate;
         if self.time >= seconds {
             self.time = if self.looped && seconds > 0.0 { self.time % seconds } else { seconds };
             self.playing = self.looped && seconds > 0.0;
         }
-        reel.at(self.time)
+        clip.at(self.time)
     }
 
     /// Stops and moves to a time; the pose there.
     pub fn seek(&mut self, time: f64) -> Option<Pose> {
-        let reel = self.reel.as_ref()?;
+        let clip = self.clip.as_ref()?;
         self.playing = false;
-        self.time = time.clamp(0.0, reel.seconds());
-        reel.at(self.time)
+        self.time = time.clamp(0.0, clip.seconds());
+        clip.at(self.time)
     }
 
-    /// Counts a picture that was shown at this window time.
+    /// Counts a frame that was shown at this window time.
     pub fn count(&mut self, now: f64) {
         self.shown.push(now);
         self.shown.retain(|t| now - t <= COUNTED_SECS);
     }
 
-    /// Pictures per second lately; `None` before anything is known.
+    /// Frames per second lately; `None` before anything is known.
     pub fn rate_shown(&self) -> Option<f64> {
         let (first, last) = (self.shown.first()?, self.shown.last()?);
         (last - first > 0.2).then(|| (self.shown.len() - 1) as f64 / (last - first))
@@ -128,9 +128,9 @@ mod tests {
     use super::*;
     use glam::{DMat3, DVec3};
 
-    fn reel() -> Reel {
+    fn clip() -> Clip {
         let pose = |i: usize| Pose { center: DVec3::X * i as f64, world_from_camera: DMat3::IDENTITY, fov_y_rad: 0.8 };
-        Reel::Flight(Box::new(Flight {
+        Clip::Flight(Box::new(Flight {
             poses: (0..11).map(pose).collect(),
             seconds: 2.0,
             length: 10.0,
@@ -143,7 +143,7 @@ mod tests {
     fn it_runs_to_its_end_and_begins_anew() {
         let mut p = Player::default();
         assert!(p.tick(0.1).is_none() && p.seek(1.0).is_none());
-        p.load(reel(), true);
+        p.load(clip(), true);
         assert_eq!(p.tick(0.4).map(|p| p.center.x), Some(2.0));
         (0..10).for_each(|_| assert!(p.time <= 2.0 && p.tick(0.4).is_some() || !p.playing));
         assert!(!p.playing && p.time == 2.0);

@@ -4,7 +4,7 @@ use egui::{CursorIcon, Rect, Sense, Stroke, Ui, pos2, vec2};
 
 use super::super::theme;
 use super::CameraPane;
-use super::player::Reel;
+use super::player::Clip;
 use crate::navigate::Pose;
 
 /// Height of the timeline, points.
@@ -12,19 +12,19 @@ const HEIGHT: f32 = 26.0;
 /// How near the pointer must come to a key, points.
 const REACH: f32 = 7.0;
 
-/// Draws it. The pose of the time that a person chose.
+/// Draws it. The pose of the time that a user chose.
 pub fn show(ui: &mut Ui, pane: &mut CameraPane) -> Option<Pose> {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), HEIGHT), Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, "Timeline"));
     let line = rect.shrink2(vec2(8.0, 0.0));
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect.shrink2(vec2(0.0, 5.0)), 6.0, theme::CANVAS);
-    let seconds = pane.player.reel().map_or(0.0, Reel::seconds).max(1e-3);
+    let seconds = pane.player.clip().map_or(0.0, Clip::seconds).max(1e-3);
     let x = |time: f64| line.left() + (time / seconds).clamp(0.0, 1.0) as f32 * line.width();
     let time = |x: f32| f64::from(((x - line.left()) / line.width().max(1.0)).clamp(0.0, 1.0)) * seconds;
     ticks(&painter, line, seconds, x);
-    let times: Vec<[f64; 2]> = match pane.player.reel() {
-        Some(Reel::Path(film)) => film.times.clone(),
+    let times: Vec<[f64; 2]> = match pane.player.clip() {
+        Some(Clip::Path(film)) => film.times.clone(),
         _ => Vec::new(),
     };
     let count = pane.path.keys.len();
@@ -46,7 +46,7 @@ pub fn show(ui: &mut Ui, pane: &mut CameraPane) -> Option<Pose> {
         let held: Option<usize> = ui.data(|d| d.get_temp(dragged)).flatten();
         match held.filter(|_| response.dragged()) {
             Some(key) => {
-                let t = between_neighbours(pane, key, time(at.x), &times);
+                let t = between_neighbors(pane, key, time(at.x), &times);
                 let one_step = response.drag_started();
                 retime(pane, key, t, one_step);
             }
@@ -69,7 +69,7 @@ pub fn show(ui: &mut Ui, pane: &mut CameraPane) -> Option<Pose> {
         let corners = [vec2(0.0, -size), vec2(size, 0.0), vec2(0.0, size), vec2(-size, 0.0)].map(|v| c + v);
         painter.add(egui::Shape::convex_polygon(corners.to_vec(), color, Stroke::new(1.0, theme::PANEL)));
     }
-    if pane.player.reel().is_some() {
+    if pane.player.clip().is_some() {
         let at = x(pane.player.time);
         painter.line_segment([pos2(at, rect.top()), pos2(at, rect.bottom())], Stroke::new(2.0, theme::ACCENT));
     }
@@ -77,7 +77,9 @@ pub fn show(ui: &mut Ui, pane: &mut CameraPane) -> Option<Pose> {
         let over = near(at);
         ui.ctx().set_cursor_icon(if over.is_some() { CursorIcon::ResizeHorizontal } else { CursorIcon::PointingHand });
         let text = match over.and_then(|i| pane.path.keys.get(i).map(|k| (i, k))) {
-            Some((i, k)) => format!("Key {}{}", i + 1, k.name.as_ref().map_or(String::new(), |n| format!(": {n}"))),
+            Some((i, k)) => {
+                format!("Keyframe {}{}", i + 1, k.name.as_ref().map_or(String::new(), |n| format!(": {n}")))
+            }
             None => format!("{:.2} s", time(at.x)),
         };
         response.on_hover_text_at_pointer(text);
@@ -95,7 +97,7 @@ fn ticks(painter: &egui::Painter, line: Rect, seconds: f64, x: impl Fn(f64) -> f
 }
 
 /// The time, kept after the key before and before the key after.
-fn between_neighbours(pane: &CameraPane, key: usize, time: f64, times: &[[f64; 2]]) -> f64 {
+fn between_neighbors(pane: &CameraPane, key: usize, time: f64, times: &[[f64; 2]]) -> f64 {
     const GAP: f64 = 0.02;
     let lowest = times.get(key.wrapping_sub(1)).map_or(0.0, |t| t[1] + GAP);
     let wait = pane.path.keys.get(key).map_or(0.0, |k| k.dwell_secs);

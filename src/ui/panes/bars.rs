@@ -1,13 +1,17 @@
 //! The bar at the top (menus, name of the scene) and the bar at the bottom (the running job).
 
 use egui::{Align, Button, RichText, Ui};
+use strum::VariantArray;
 
 use super::super::layout::Layout;
 use super::super::state::AppState;
-use super::super::{format, keys, theme};
+use super::super::{keys, theme};
+use crate::math::format;
 use crate::pipeline::observer::Progress;
+use crate::scene::text;
+use crate::ui::actions::{Action, Axis, Pane};
+use crate::worker::ViewMode;
 use crate::worker::view::ViewPicture;
-use crate::worker::{Action, Axis, Pane, ViewMode};
 
 /// Draws the bar at the top.
 pub fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut Vec<Action>) {
@@ -24,7 +28,7 @@ pub fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut Vec<Act
                     ui.weak("Nothing yet");
                 }
                 for path in &state.recent {
-                    let text = format::shortened(&path.to_string_lossy(), 60);
+                    let text = text::elided(&path.to_string_lossy(), 60);
                     if ui.button(text).clicked() {
                         actions.push(Action::Open(path.clone()));
                     }
@@ -38,7 +42,7 @@ pub fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut Vec<Act
         });
         ui.menu_button("View", |ui| {
             ui.set_min_width(280.0);
-            for mode in ViewMode::ALL {
+            for &mode in ViewMode::VARIANTS {
                 item(ui, has_scene, Some(layout.mode == mode), Action::Show(mode), actions);
             }
             ui.separator();
@@ -50,7 +54,7 @@ pub fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut Vec<Act
                 item(ui, has_scene, None, action, actions);
             }
             ui.menu_button("Up direction", |ui| {
-                for axis in Axis::ALL {
+                for &axis in Axis::VARIANTS {
                     item(ui, has_scene, None, Action::TurnUp(axis), actions);
                 }
             });
@@ -58,7 +62,7 @@ pub fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut Vec<Act
                 item(ui, has_photos, None, action, actions);
             }
             ui.separator();
-            for pane in Pane::ALL {
+            for &pane in Pane::VARIANTS {
                 item(ui, true, Some(layout.shows(pane)), Action::TogglePane(pane), actions);
             }
         });
@@ -76,7 +80,7 @@ pub fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut Vec<Act
         });
         if let Some(scene) = &state.scene {
             ui.separator();
-            ui.label(RichText::new(&scene.name).strong()).on_hover_text(format::path(&scene.path));
+            ui.label(RichText::new(&scene.name).strong()).on_hover_text(text::path(&scene.path));
         }
         ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
             let search = Button::new(RichText::new("Search actions").color(theme::WEAK))
@@ -136,7 +140,7 @@ pub fn status(
                 actions.push(Action::TogglePane(Pane::Log));
             }
             if let Some(p) = picture {
-                let text = RichText::new(format!("Drawn by the {}", p.drawn_by)).small();
+                let text = RichText::new(format!("Rendered on the {}", p.drawn_by)).small();
                 match &p.instead_of_gpu {
                     Some(why) => ui.label(text.color(theme::WARNING)).on_hover_text(why),
                     None => ui.label(text.color(theme::WEAK)),

@@ -8,29 +8,31 @@ use egui::{
 
 use super::super::layout::Layout;
 use super::super::state::AppState;
-use super::super::{format, theme};
+use super::super::theme;
+use crate::math::format;
 use crate::scene::{Dataset, PhotoPixels, text};
-use crate::worker::{Action, Command, JobId, Worker};
+use crate::ui::actions::Action;
+use crate::worker::{Command, JobId, Worker};
 
 /// Longest side of a thumbnail in px.
 const SIDE_PX: u32 = 224;
-/// Thumbnails that are loaded at once; more would keep a photo that is looked at waiting.
+/// PhotoThumbnails that are loaded at once; more would keep a photo that is looked at waiting.
 const AT_ONCE: usize = 2;
-/// Thumbnails kept.
+/// PhotoThumbnails kept.
 const KEPT: usize = 400;
 /// Height of the text under a thumbnail.
 const CAPTION: f32 = 18.0;
 
 /// The thumbnails of one scene.
 #[derive(Default)]
-pub struct Thumbnails {
+pub struct PhotoThumbnails {
     scene: u64,
     loaded: BTreeMap<usize, TextureHandle>,
     waiting: HashMap<JobId, usize>,
     failed: BTreeSet<usize>,
 }
 
-impl Thumbnails {
+impl PhotoThumbnails {
     /// Takes over what was loaded since.
     pub fn update(&mut self, ctx: &egui::Context, state: &mut AppState) {
         if self.scene != state.scene_number {
@@ -48,7 +50,7 @@ impl Thumbnails {
         state.failed_photos.retain(|job| waiting.remove(job).map(|i| failed.insert(i)).is_none());
     }
 
-    fn wish(&mut self, index: usize, dataset: &Dataset, worker: &Worker) {
+    fn request(&mut self, index: usize, dataset: &Dataset, worker: &Worker) {
         let known = self.loaded.contains_key(&index)
             || self.failed.contains(&index)
             || self.waiting.values().any(|i| *i == index);
@@ -57,7 +59,7 @@ impl Thumbnails {
         }
         let Some(photo) = dataset.photos.get(index) else { return };
         let command = Command::Photo { index, photo: Box::new(photo.clone()), max_side_px: SIDE_PX };
-        // With a full queue the wish comes again with the next redraw.
+        // With a full queue the request comes again with the next redraw.
         if let Ok(job) = worker.submit(command) {
             self.waiting.insert(job, index);
         }
@@ -112,7 +114,7 @@ impl Thumbnails {
                 ui.horizontal(|ui| {
                     ui.spacing_mut().item_spacing.x = gap;
                     for index in (row * columns..(row + 1) * columns).take_while(|i| *i < dataset.photos.len()) {
-                        self.wish(index, dataset, worker);
+                        self.request(index, dataset, worker);
                         let photo = &dataset.photos[index];
                         let (name, held) = (&*photo.title(), test.contains(&index));
                         let caption = Caption { name, held, psnr: scores.get(photo.name.as_str()).copied() };
@@ -128,7 +130,7 @@ impl Thumbnails {
 
     fn cell(&self, ui: &mut Ui, size: egui::Vec2, index: usize, caption: &Caption<'_>, selected: bool) -> bool {
         let (rect, response) = ui.allocate_exact_size(size, Sense::click());
-        let held = if caption.held { ", held out" } else { "" };
+        let held = if caption.held { ", held-out" } else { "" };
         response.widget_info(|| {
             egui::WidgetInfo::selected(egui::Role::Button, true, selected, format!("Photo {}{held}", caption.name))
         });
@@ -157,11 +159,11 @@ impl Thumbnails {
         let file = caption.name.rsplit('/').next().unwrap_or(caption.name);
         let color = if caption.held { theme::WARNING } else { theme::WEAK };
         let room = if caption.psnr.is_some() { 9 } else { 16 };
-        text(ui, pos2(rect.left() + 2.0, y), egui::Align2::LEFT_CENTER, &format::shortened(file, room), color);
+        text(ui, pos2(rect.left() + 2.0, y), egui::Align2::LEFT_CENTER, &text::elided(file, room), color);
         if let Some(psnr) = caption.psnr {
             text(ui, pos2(rect.right() - 2.0, y), egui::Align2::RIGHT_CENTER, &format!("{psnr:.1} dB"), theme::TEXT);
         }
-        let use_ = if caption.held { "held out for measuring" } else { "used for training" };
+        let use_ = if caption.held { "held-out for evaluation" } else { "used for training" };
         response.on_hover_text(format!("{}\n{use_}\nClick to look through its camera", caption.name)).clicked()
     }
 }
@@ -178,7 +180,7 @@ fn text(ui: &Ui, at: egui::Pos2, align: egui::Align2, text: &str, color: Color32
 
 fn facts(ui: &mut Ui, dataset: &Dataset, train: usize, test: usize) {
     ui.spacing_mut().item_spacing.y = 3.0;
-    ui.label(RichText::new(&dataset.name).heading()).on_hover_text(format::path(&dataset.root));
+    ui.label(RichText::new(&dataset.name).heading()).on_hover_text(text::path(&dataset.root));
     let size = dataset.photos.first().map(|p| format!("{} x {} px", p.camera.width_px, p.camera.height_px));
     let parts = [Some(dataset.format.clone()), size];
     ui.label(RichText::new(parts.into_iter().flatten().collect::<Vec<_>>().join("  ·  ")).color(theme::WEAK));
@@ -186,7 +188,7 @@ fn facts(ui: &mut Ui, dataset: &Dataset, train: usize, test: usize) {
         ui.spacing_mut().item_spacing.x = 4.0;
         ui.label(RichText::new(format!("{train} train")).color(theme::TEXT));
         ui.weak("·");
-        ui.label(RichText::new(format!("{test} held out")).color(theme::WARNING));
+        ui.label(RichText::new(format!("{test} held-out")).color(theme::WARNING));
         ui.weak(format!("·  {} points", format::count(dataset.points.len() as u64)));
     });
     if !dataset.warnings.is_empty() {

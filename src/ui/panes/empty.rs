@@ -5,8 +5,11 @@ use std::path::Path;
 use egui::{Button, ProgressBar, RichText, Ui, vec2};
 
 use super::super::state::{AppState, RunningJob};
-use super::super::{format, keys, theme};
-use crate::worker::{Action, JobKind};
+use super::super::{keys, theme};
+use crate::math::format;
+use crate::scene::text;
+use crate::ui::actions::Action;
+use crate::worker::JobKind;
 
 /// Draws the first page.
 pub fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
@@ -42,13 +45,13 @@ pub fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
             ui.add_space(22.0);
             ui.label(RichText::new("Recent").small().strong().color(theme::WEAK));
             for path in state.recent.iter().take(recent) {
-                let name = format::path(path.file_name().map_or(path.as_path(), Path::new));
-                let parent = path.parent().map(|p| format::shortened(&p.to_string_lossy(), 36)).unwrap_or_default();
+                let name = text::path(path.file_name().map_or(path.as_path(), Path::new));
+                let parent = path.parent().map(|p| text::elided(&p.to_string_lossy(), 36)).unwrap_or_default();
                 let row = Button::new(RichText::new(name).strong())
                     .right_text(RichText::new(parent).small().color(theme::WEAK))
                     .frame_when_inactive(false)
                     .min_size(vec2(420.0, 26.0));
-                if ui.add(row).on_hover_text(format::path(path)).clicked() {
+                if ui.add(row).on_hover_text(text::path(path)).clicked() {
                     actions.push(Action::Open(path.clone()));
                 }
             }
@@ -77,10 +80,7 @@ fn busy(ui: &mut Ui, job: &RunningJob, actions: &mut Vec<Action>) {
         }
         if job.kind == JobKind::Demo {
             ui.add_space(6.0);
-            ui.label(
-                RichText::new("The photos are made once; training starts as soon as they are there.")
-                    .color(theme::WEAK),
-            );
+            ui.label(RichText::new("The photos are rendered once; training then starts by itself.").color(theme::WEAK));
         }
         ui.add_space(14.0);
         if ui.add(Button::new("Cancel").min_size(vec2(110.0, 30.0))).clicked() {

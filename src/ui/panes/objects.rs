@@ -6,17 +6,23 @@ use egui::{Button, Color32, Id, Key, RichText, ScrollArea, TextEdit, Ui, vec2};
 use super::super::state::AppState;
 use super::super::theme;
 use super::super::viewport::visible::Visibility;
-use super::portraits::Portraits;
+use super::object_thumbnails::ObjectThumbnails;
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::edit::Edit;
 use crate::scene::{Identities, IdentityId, Level, NOBODY};
-use crate::worker::Action;
+use crate::ui::actions::Action;
 
-/// Side of a portrait, points.
-const PORTRAIT: f32 = 30.0;
+/// Side of a thumbnail, points.
+const THUMBNAIL_PX: f32 = 30.0;
 
 /// Draws the pane.
-pub fn show(ui: &mut Ui, state: &AppState, portraits: &Portraits, visibility: &Visibility, actions: &mut Vec<Action>) {
+pub fn show(
+    ui: &mut Ui,
+    state: &AppState,
+    object_thumbnails: &ObjectThumbnails,
+    visibility: &Visibility,
+    actions: &mut Vec<Action>,
+) {
     let Some(map) = &state.semantics else {
         return show_how_to_begin(ui, state, actions);
     };
@@ -25,7 +31,7 @@ pub fn show(ui: &mut Ui, state: &AppState, portraits: &Portraits, visibility: &V
     let from = if map.seeds.len() == 1 { "1 photo".to_owned() } else { format!("{} photos", map.seeds.len()) };
     ui.weak(format!("{} objects, {} parts, from the masks of {from}", count(Level::Object), count(Level::Part)));
     if identities.iter().all(|(_, i)| i.names.is_empty()) {
-        ui.weak("Regions of the photos: unnamed and rough. Ask by number, such as #1.");
+        ui.weak("Regions of the photos: unnamed and rough. Query them by number, such as #1.");
     }
     ui.add_space(4.0);
     ui.horizontal(|ui| {
@@ -33,16 +39,17 @@ pub fn show(ui: &mut Ui, state: &AppState, portraits: &Portraits, visibility: &V
             actions.push(Action::Isolate(None));
         }
         let new = Action::Paint(Some(NOBODY));
-        if ui.button("Mark an object\u{2026}").on_hover_text(new.tooltip()).clicked() {
+        if ui.button("Paint an object\u{2026}").on_hover_text(new.tooltip()).clicked() {
             actions.push(new);
         }
-        for (action, text, list) in [(Action::Undo, "Undo", &state.undo), (Action::Redo, "Redo", &state.redo)] {
-            if ui.add_enabled(!list.is_empty(), Button::new(text)).on_hover_text(action.tooltip()).clicked() {
+        let edits = [(Action::Undo, "Undo", state.edits.last()), (Action::Redo, "Redo", state.edits.next())];
+        for (action, text, other) in edits {
+            if ui.add_enabled(other.is_some(), Button::new(text)).on_hover_text(action.tooltip()).clicked() {
                 actions.push(action);
             }
         }
     });
-    let tree = Tree { identities, sizes: &state.sizes, portraits, visibility };
+    let tree = Tree { identities, sizes: &state.sizes, object_thumbnails, visibility };
     for (id, _) in identities.iter().filter(|(_, i)| i.parent == NOBODY) {
         tree.branch(ui, id, actions);
     }
@@ -52,7 +59,7 @@ struct Tree<'a> {
     identities: &'a Identities,
     /// Gaussians by number.
     sizes: &'a [usize],
-    portraits: &'a Portraits,
+    object_thumbnails: &'a ObjectThumbnails,
     visibility: &'a Visibility,
 }
 
@@ -68,18 +75,18 @@ impl Tree<'_> {
     }
 
     fn leaf(&self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
-        let Self { identities, sizes, portraits, visibility } = self;
+        let Self { identities, sizes, object_thumbnails, visibility } = self;
         ui.horizontal(|ui| {
             let mut drawn = !visibility.is_hidden(id);
-            if ui.checkbox(&mut drawn, "").on_hover_text("Draw it").changed() {
+            if ui.checkbox(&mut drawn, "").on_hover_text("Visible").changed() {
                 actions.push(Action::Hide(id));
             }
-            portraits.show(ui, id, PORTRAIT);
+            object_thumbnails.show(ui, id, THUMBNAIL_PX);
             let code = identities.get(id).map_or([0.5; 3], |i| i.code).map(|c| (c * 255.0) as u8);
             let (rect, _) = ui.allocate_exact_size(vec2(11.0, 11.0), egui::Sense::hover());
             ui.painter().rect_filled(rect, 3.0, Color32::from_rgb(code[0], code[1], code[2]));
             let button = Button::new(identities.name(id)).frame_when_inactive(false);
-            if ui.add(button).on_hover_text("Show where it is").clicked() {
+            if ui.add(button).on_hover_text("Highlight it in the view").clicked() {
                 actions.push(Action::Ask(identities.full_name(id)));
             }
             self.menu(ui, id, actions);
@@ -87,9 +94,7 @@ impl Tree<'_> {
             ui.label(RichText::new(size).small().color(theme::WEAK)).on_hover_text("Gaussians");
         });
     }
-}
 
-impl Tree<'_> {
     /// What can be corrected about an identity.
     fn menu(&self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
         let all = self.identities;
@@ -121,9 +126,9 @@ impl Tree<'_> {
             });
             for (action, text) in [
                 (Action::Change(Edit::Split(id)), "Split"),
-                (Action::Paint(Some(id)), "Mark a new part\u{2026}"),
+                (Action::Paint(Some(id)), "Paint a new part\u{2026}"),
                 (Action::GoToTarget(id, Side::Best), "Go there"),
-                (Action::Isolate(Some(id)), "Show it alone"),
+                (Action::Isolate(Some(id)), "Isolate"),
                 (Action::ExportTarget(id), "Export\u{2026}"),
             ] {
                 if ui.button(text).on_hover_text(action.tooltip()).clicked() {
@@ -139,7 +144,7 @@ fn show_how_to_begin(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     let has_masks = state.scene.as_ref().is_some_and(|s| s.masks.is_some());
     ui.label(
         RichText::new(
-            "Objects and parts are found from masks of one or a few photos; the Gaussians carry them to all others.",
+            "Objects and parts are found from masks of one or a few photos; the Gaussians propagate them to all others.",
         )
         .color(theme::WEAK),
     );
@@ -148,8 +153,8 @@ fn show_how_to_begin(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     let why = if state.is_trained() { "Another job is running." } else { "Train the scene first." };
     let button = |text: &str| Button::new(text.to_owned()).min_size(vec2(170.0, 28.0));
     if !has_masks {
-        let text = "No masks came with these photos. Without any, regions of even colour are taken for objects and \
-                    parts: they have no names, and are rough.";
+        let text = "No masks came with these photos. Without any, regions of uniform color become objects and parts: \
+                    unnamed and rough.";
         ui.label(RichText::new(text).color(theme::WEAK));
     }
     let action = Action::FindObjects;

@@ -1,9 +1,9 @@
-//! What is left out for this scene, why, what that saves, and what a person wants otherwise.
+//! What is left out for this scene, why, what that saves, and what a user wants otherwise.
 
 use egui::{ComboBox, RichText, Ui};
 
 use super::super::theme;
-use crate::scene::plan::{PlanLine, Wish};
+use crate::scene::plan::{PlanLine, PlanOverride};
 use crate::scene::{Overrides, ScenePlan};
 
 /// What stands for the plan's own choice.
@@ -44,6 +44,6 @@ fn choose(ui: &mut Ui, line: &PlanLine, overrides: &mut Overrides) {
     let label = || format!("{}: choice", line.subject);
     combo.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::ComboBox, true, label()));
     if instead != line.overridden {
-        overrides.set(Wish { item: line.item, instead });
+        overrides.set(PlanOverride { item: line.item, instead });
     }
 }

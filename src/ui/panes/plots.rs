@@ -43,7 +43,7 @@ pub fn show(ui: &mut Ui, history: &TrainHistory, curves: &[Curve], axis: &mut Pl
                     .color(theme::ACCENT),
             );
         });
-    theme::section(ui, "Loss, L1 + 0.2 D-SSIM");
+    theme::section(ui, "Loss (L1 + 0.2 D-SSIM)");
     let loss: Vec<[f64; 2]> = history.steps.iter().map(|m| [x_step(m), m.loss]).filter(finite).collect();
     plot("loss", "Loss", *axis).include_y(0.0).show(ui, |p| {
         p.line(Line::new("loss", smooth(&loss)).color(theme::ACCENT).width(1.5));

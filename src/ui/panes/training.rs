@@ -4,10 +4,12 @@ use egui::{DragValue, Grid, RichText, Slider, Ui};
 
 use super::super::layout::Layout;
 use super::super::state::{AppState, RunningJob};
-use super::super::{format, keys, theme};
+use super::super::{keys, theme};
 use super::plots::{self, Curve};
+use crate::math::format;
 use crate::pipeline::train::TrainConfig;
-use crate::worker::{Action, JobKind};
+use crate::ui::actions::Action;
+use crate::worker::JobKind;
 
 /// Draws the pane.
 /// Curves of a report stand beside this training's.
@@ -49,7 +51,7 @@ fn start(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
         }
         let trained = state.training_job.is_some() || state.scene.as_ref().is_some_and(|s| s.trained);
         let can_measure = trained && !busy;
-        let measure = ui.add_enabled(can_measure, egui::Button::new("Measure").min_size(egui::vec2(80.0, 30.0)));
+        let measure = ui.add_enabled(can_measure, egui::Button::new("Evaluate").min_size(egui::vec2(80.0, 30.0)));
         if measure
             .on_hover_text(Action::Evaluate.tooltip())
             .on_disabled_hover_text("Needs trained Gaussians.")
@@ -63,21 +65,21 @@ fn start(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
 fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {
     Grid::new("settings").num_columns(2).spacing([12.0, 6.0]).show(ui, |ui| {
         let label = |ui: &mut Ui, text: &str, tip: &str| ui.label(text).on_hover_text(tip).id;
-        let id = label(ui, "Steps", "Optimiser steps in all; every schedule scales with it.");
+        let id = label(ui, "Steps", "Total optimizer steps; every schedule scales with it.");
         ui.add(DragValue::new(&mut config.steps).range(100..=100_000).speed(50)).labelled_by(id);
         ui.end_row();
-        let id = label(ui, "Longest side", "Size of the training pictures; photos are never enlarged.");
-        // Small photos limit what is shown here, not what a person chose for others.
+        let id = label(ui, "Longest side", "Size of the training images; photos are never enlarged.");
+        // Small photos limit what is shown here, not what a user chose for others.
         let range = 64..=largest_px.clamp(65, 4096);
         let mut side = config.max_side_px.clamp(64, *range.end());
         if ui.add(Slider::new(&mut side, range).suffix(" px").step_by(8.0)).labelled_by(id).changed() {
             config.max_side_px = side;
         }
         ui.end_row();
-        let id = label(ui, "Colour", "Highest spherical-harmonics degree: 0 is the same colour from everywhere.");
+        let id = label(ui, "Color", "Highest spherical-harmonics degree: 0 is the same color from everywhere.");
         ui.add(Slider::new(&mut config.sh_degree, 0..=3).prefix("SH degree ")).labelled_by(id);
         ui.end_row();
-        let id = label(ui, "Held out", "Photos kept for measuring. Datasets that mark test photos use those.");
+        let id = label(ui, "Holdout", "Photos kept for evaluation. Datasets that mark test photos use those.");
         let shown = |n: f64, _: std::ops::RangeInclusive<usize>| match n as u64 {
             0 => "none".to_owned(),
             n => format!("1 of {n}"),
@@ -86,7 +88,7 @@ fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {
             .labelled_by(id);
         ui.end_row();
         let id = label(ui, "Gaussians", "Adds Gaussians where detail is missing and removes idle ones.");
-        ui.checkbox(&mut config.densify, "add and remove").labelled_by(id);
+        ui.checkbox(&mut config.densify, "densify and prune").labelled_by(id);
         ui.end_row();
     });
     ui.collapsing("More", |ui| {
@@ -97,13 +99,13 @@ fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {
                 config.max_gaussians = limited.then_some(200_000);
             }
             if let Some(n) = &mut config.max_gaussians {
-                ui.add(DragValue::new(n).range(1_000..=6_000_000).speed(1000)).accessible_name("Most Gaussians");
+                ui.add(DragValue::new(n).range(1_000..=6_000_000).speed(1000)).accessible_name("Maximum Gaussians");
             } else {
-                ui.weak("from free memory");
+                ui.weak("limited by free memory");
             }
         });
         ui.horizontal(|ui| {
-            let id = ui.label("Measure every").id;
+            let id = ui.label("Evaluate every").id;
             ui.add(DragValue::new(&mut config.eval_every).range(0..=100_000).speed(10).suffix(" steps"))
                 .labelled_by(id);
         });
@@ -162,7 +164,10 @@ fn facts(ui: &mut Ui, state: &AppState, job: Option<&RunningJob>) {
         ("Loss", last.map_or_else(dash, |m| format!("{:.4}", m.loss))),
         ("Rate", progress.map_or_else(dash, |p| format::rate(p.rate, "steps"))),
         ("Elapsed", last.map(|m| m.secs).or(held.map(|e| e.secs)).map_or_else(dash, format::duration)),
-        ("To go", progress.and_then(crate::pipeline::observer::Progress::eta_secs).map_or_else(dash, format::duration)),
+        (
+            "Remaining",
+            progress.and_then(crate::pipeline::observer::Progress::eta_secs).map_or_else(dash, format::duration),
+        ),
     ];
     egui::Frame::new().fill(theme::SURFACE).corner_radius(8).inner_margin(10).show(ui, |ui| {
         ui.columns_const(|[a, b]| {

@@ -1,22 +1,25 @@
-//! Marking a new piece by hand: dragging paints, a click takes what has the same colour around it.
+//! Marking a new piece by hand: dragging paints, a click takes what has the same color around it.
 
 use egui::{Align2, Area, Color32, ColorImage, Id, Order, Rect, Slider, TextEdit, TextureHandle, TextureOptions, Ui};
 
+use super::super::state::AppState;
 use super::super::theme;
+use super::Viewport;
 use crate::math::grid::neighbours;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::{Camera, Identities, IdentityId, Mask, NOBODY};
-use crate::worker::{Action, EditRequest};
+use crate::ui::actions::Action;
+use crate::worker::EditRequest;
 
-/// Largest difference of colour, per channel, over which a click spreads.
+/// Largest difference of color, per channel, over which a click spreads.
 const SAME_COLOR: u8 = 14;
 
-/// Colour of the paint: nothing in a scene is likely to have it.
+/// Color of the paint: nothing in a scene is likely to have it.
 const PAINT: [u8; 3] = [255, 60, 200];
 
 /// What is being marked.
 pub struct Brush {
-    /// Whose piece it will be; of nobody, an object.
+    /// Whose piece it will be; of no one, an object.
     pub of: IdentityId,
     name: String,
     radius_px: f32,
@@ -59,7 +62,7 @@ impl Brush {
         self.changed = true;
     }
 
-    /// Marks what hangs together with a pixel in colour and belongs to the same whole.
+    /// Marks what hangs together with a pixel in color and belongs to the same whole.
     pub fn flood(&mut self, at: [usize; 2], rgb: &[[u8; 3]], map: &ViewMap, identities: &Identities) {
         let (w, h) = (self.mask.width_px(), self.mask.height_px());
         if rgb.len() != w * h || map.identity.len() != w * h || at[0] >= w || at[1] >= h {
@@ -75,7 +78,7 @@ impl Brush {
         let mut seen = Mask::empty(w, h);
         let mut open = vec![first];
         while let Some(i) = open.pop() {
-            // Alike the neighbour it was reached from, and not too far from where it began.
+            // Alike the neighbor it was reached from, and not too far from where it began.
             if seen.contains(i)
                 || !mine(i)
                 || rgb[i].iter().zip(rgb[first]).any(|(a, b)| a.abs_diff(b) > 3 * SAME_COLOR)
@@ -89,7 +92,7 @@ impl Brush {
         self.changed = true;
     }
 
-    /// The paint, over the picture in `rect`.
+    /// The paint, over the frame in `rect`.
     pub fn paint(&mut self, ui: &Ui, rect: Rect) {
         if std::mem::take(&mut self.changed) {
             let size = [self.mask.width_px(), self.mask.height_px()];
@@ -126,21 +129,21 @@ impl Brush {
                     NOBODY => "a new object".to_owned(),
                     of => format!("a new part of the {}", identities.full_name(of)),
                 };
-                ui.label(format!("Mark {what}: drag to paint, click to take what has the same colour."));
-                ui.weak("Right-drag and the wheel move the view; paint on the old view is then gone.");
+                ui.label(format!("Paint {what}: drag to paint, click to select what has the same color."));
+                ui.weak("Right-drag and the wheel move the view; moving it clears what was painted.");
                 ui.horizontal(|ui| {
                     ui.add(TextEdit::singleline(&mut self.name).hint_text("Name").char_limit(80).desired_width(120.0));
                     ui.add(Slider::new(&mut self.radius_px, 2.0..=60.0).show_value(false).text("brush"));
                 });
                 ui.horizontal(|ui| {
                     let ready = !self.mask.is_empty();
-                    if ui.add_enabled(ready, theme::primary_button("Add it")).clicked() {
+                    if ui.add_enabled(ready, theme::primary_button("Add")).clicked() {
                         actions.push(Action::AddPainted);
                     }
-                    if ui.button("Wipe").clicked() {
+                    if ui.button("Clear").clicked() {
                         self.camera = None;
                     }
-                    if ui.button("Leave").clicked() {
+                    if ui.button("Cancel").clicked() {
                         actions.push(Action::Paint(None));
                     }
                 });
@@ -156,6 +159,30 @@ impl Brush {
     }
 }
 
+impl Viewport {
+    /// Paints where the pointer drags, floods where it clicks.
+    pub(super) fn use_brush(&mut self, response: &egui::Response, rect: Rect, state: &AppState) {
+        let (Some(brush), Some(picture)) = (&mut self.brush, self.display.picture()) else { return };
+        let shown = self.photo.as_mut().map_or(rect, |p| p.fit(rect));
+        // Only a full frame has the pixels that the maps have.
+        if !picture.full {
+            return;
+        }
+        brush.on_view(&picture.camera);
+        let Some(pos) = response.interact_pointer_pos() else { return };
+        let scale = picture.camera.width_px as f32 / shown.width();
+        let at = [(pos.x - shown.left()) * scale, (pos.y - shown.top()) * scale];
+        if response.dragged_by(egui::PointerButton::Primary) {
+            brush.dab(at, scale);
+        } else if response.clicked()
+            && let (Some(maps), Some(semantics)) = (self.queries.maps(), &state.semantics)
+            && at.iter().all(|v| *v >= 0.0)
+        {
+            brush.flood([at[0] as usize, at[1] as usize], &picture.rgb, &maps.identities, &semantics.identities);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -163,7 +190,7 @@ mod tests {
     use glam::DVec3;
 
     #[test]
-    fn a_click_takes_the_colour_and_only_of_the_whole() {
+    fn a_click_takes_the_color_and_only_of_the_whole() {
         let camera = Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 10, 10).expect("valid");
         let mut all = Identities::default();
         let doll = all.add(Level::Object, NOBODY, vec![]);

@@ -1,15 +1,16 @@
-//! The viewer's own camera: orbits a pivot, flies, pans, and zooms towards what is under the cursor.
+//! The viewer's own camera: orbits a pivot, flies, pans, and zooms toward what is under the cursor.
 
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::scene::{Bounds, Camera};
+use crate::worker::HomeView;
 
 /// Vertical field of view of a fresh eye, in radians.
 const FOV_Y_RAD: f64 = 0.85;
 /// How close the viewing direction may come to the up direction, in radians.
 const POLE_RAD: f64 = 0.03;
 
-/// The viewer's camera, without a picture size.
+/// The viewer's camera, without a frame size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Eye {
     /// Position in the world.
@@ -51,7 +52,7 @@ impl Eye {
         }
     }
 
-    /// The camera for a picture of this size.
+    /// The camera for a frame of this size.
     pub fn camera(&self, width_px: u32, height_px: u32) -> Camera {
         Camera::of_pose(self.center, self.world_from_eye, self.fov_y_rad, width_px.max(1), height_px.max(1))
     }
@@ -70,7 +71,7 @@ impl Eye {
     /// axis, stopping short of the poles.
     pub fn orbit(&mut self, yaw_rad: f64, pitch_rad: f64) {
         let from_up = self.forward().dot(self.up).clamp(-1.0, 1.0).acos();
-        // Positive pitch lifts the viewing direction towards up.
+        // Positive pitch lifts the viewing direction toward up.
         let lowest = (from_up - (std::f64::consts::PI - POLE_RAD)).min(0.0);
         let highest = (from_up - POLE_RAD).max(0.0);
         let pitch = pitch_rad.clamp(lowest, highest);
@@ -80,7 +81,7 @@ impl Eye {
         self.set_rotation(turn * self.world_from_eye);
     }
 
-    /// Moves eye and pivot in the picture plane so that what is at the pivot's depth follows the
+    /// Moves eye and pivot in the frame plane so that what is at the pivot's depth follows the
     /// cursor.
     pub fn pan(&mut self, delta_px: DVec2, height_px: f64) {
         let depth = (self.pivot - self.center).dot(self.forward()).abs().max(0.05 * self.distance());
@@ -90,8 +91,8 @@ impl Eye {
         self.pivot += shift;
     }
 
-    /// Moves towards `target` so that its distance is multiplied by `factor` (under 1: nearer).
-    /// The target stays where it is in the picture.
+    /// Moves toward `target` so that its distance is multiplied by `factor` (under 1: nearer).
+    /// The target stays where it is in the frame.
     pub fn zoom(&mut self, target: DVec3, factor: f64) {
         self.center = target + (self.center - target) * factor.clamp(0.05, 20.0);
     }
@@ -109,6 +110,31 @@ impl Eye {
         let radius = bounds.radius().max(1e-6);
         self.pivot = bounds.center();
         self.center = self.pivot - self.forward() * (1.15 * radius / (0.5 * self.fov_y_rad).sin());
+    }
+
+    /// The first view of a scene: from its first camera if it has one, else framed as a whole; upright if the user
+    /// chose what is up.
+    pub fn home(home: &HomeView, up: Option<DVec3>) -> Self {
+        let mut eye = match &home.camera {
+            Some(c) => {
+                let mut eye = Self::of_camera(c, home.bounds.center(), home.up);
+                eye.fov_y_rad = eye.fov_y_rad.clamp(0.5, 1.2);
+                eye
+            }
+            None => Self::framing(&home.bounds, up.unwrap_or(home.up)),
+        };
+        if let Some(up) = up {
+            eye.set_up(up);
+        }
+        eye
+    }
+
+    /// The point at a relative position of a view of this height by width, as far away as the pivot.
+    pub fn point_at_pivot_depth(&self, at: DVec2, aspect: f64) -> DVec3 {
+        let camera = self.camera(1000, (1000.0 * aspect).max(1.0) as u32);
+        let ray = camera.ray(at * DVec2::new(f64::from(camera.width_px), f64::from(camera.height_px)));
+        let depth = (self.pivot - self.center).dot(self.forward()).abs().max(0.05 * self.distance());
+        self.center + ray * depth
     }
 
     /// Chooses another up direction and turns upright.

@@ -1,4 +1,4 @@
-//! How long each stage of a picture takes: the last one, and the median of the last few.
+//! How long each stage of a frame takes: the last one, and the median of the last few.
 
 use std::collections::VecDeque;
 
@@ -8,13 +8,13 @@ use super::super::theme;
 use crate::math::stats::median;
 use crate::worker::view::ViewPicture;
 
-/// Pictures that medians are made of.
+/// Frames that medians are made of.
 const MOST: usize = 60;
 
-/// A stage of a picture.
+/// A stage of a frame.
 type Stage = (&'static str, f64);
 
-/// Times of the newest pictures, kept while they are shown.
+/// Times of the newest frames, kept while they are shown.
 #[derive(Default)]
 pub struct FrameTimes {
     frames: VecDeque<Vec<Stage>>,
@@ -26,16 +26,16 @@ pub struct FrameTimes {
 }
 
 impl FrameTimes {
-    /// Takes a picture in, whose pixels took `upload_secs` to become a texture.
+    /// Takes a frame in, whose pixels took `upload_secs` to become a texture.
     pub fn add(&mut self, picture: &ViewPicture, upload_secs: f64) {
         self.drawn_by.clone_from(&picture.drawn_by);
         self.has_stages = !picture.stages.is_empty();
         let mut stages = picture.stages.clone();
         // Waiting for the device and copying are in the whole, but in no stage.
         let known: f64 = stages.iter().map(|s| s.1).sum();
-        stages.push((if self.has_stages { "rest of drawing" } else { "draw" }, (picture.secs - known).max(0.0)));
-        stages.extend([("to bytes", picture.paint_secs), ("upload", upload_secs)]);
-        stages.push(("whole", picture.secs + picture.paint_secs + upload_secs));
+        stages.push((if self.has_stages { "rest of rendering" } else { "draw" }, (picture.secs - known).max(0.0)));
+        stages.extend([("to 8 bits", picture.paint_secs), ("upload", upload_secs)]);
+        stages.push(("total", picture.secs + picture.paint_secs + upload_secs));
         push(&mut self.frames, stages);
     }
 
@@ -44,7 +44,7 @@ impl FrameTimes {
         push(&mut self.maps, secs);
     }
 
-    /// Last and median seconds of each stage of the newest picture.
+    /// Last and median seconds of each stage of the newest frame.
     fn rows(&self) -> Vec<(&'static str, f64, f64)> {
         let Some(last) = self.frames.back() else { return Vec::new() };
         let of = |name: &str| -> Vec<f64> {
@@ -62,7 +62,7 @@ impl FrameTimes {
         let small = |text: &str| RichText::new(text).small();
         let rows = self.rows();
         if rows.is_empty() {
-            ui.label(small("Frame times appear with the next picture: move the view.").color(theme::WEAK));
+            ui.label(small("Frame times appear with the next frame: move the view.").color(theme::WEAK));
             return;
         }
         ui.vertical(|ui| {
@@ -73,7 +73,7 @@ impl FrameTimes {
                 head.iter().for_each(|h| drop(ui.label(small(h).color(theme::WEAK))));
                 ui.end_row();
                 for (name, last, median) in rows {
-                    let color = if name == "whole" { theme::ACCENT } else { theme::TEXT };
+                    let color = if name == "total" { theme::ACCENT } else { theme::TEXT };
                     ui.label(small(name).color(color));
                     for secs in [last, median] {
                         ui.label(RichText::new(format!("{:>7.2}", secs * 1e3)).monospace().size(11.0).color(color));
@@ -82,7 +82,7 @@ impl FrameTimes {
                 }
             });
             if !self.has_stages {
-                ui.label(small("This device tells no stages, only the whole.").color(theme::WARNING));
+                ui.label(small("This device reports no stages, only the total.").color(theme::WARNING));
             }
         });
     }
@@ -126,8 +126,8 @@ mod tests {
         times.add_maps(0.5);
         let row = |name: &str| times.rows().into_iter().find(|r| r.0 == name).map(|r| (r.1, r.2));
         assert_eq!(row("blend"), Some((2.0, 2.0)));
-        assert_eq!(row("rest of drawing"), Some((0.25, 0.25)));
-        assert_eq!(row("whole"), Some((2.875, 2.875)));
+        assert_eq!(row("rest of rendering"), Some((0.25, 0.25)));
+        assert_eq!(row("total"), Some((2.875, 2.875)));
         assert_eq!(row("feature maps, at rest"), Some((0.5, 0.5)));
         (0..2 * MOST).for_each(|_| times.add(&picture(4.0, false), 0.0));
         assert_eq!((times.frames.len(), times.has_stages), (MOST, false));

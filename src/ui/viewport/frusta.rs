@@ -7,7 +7,8 @@ use super::super::layout::Layout;
 use super::super::theme;
 use super::Viewport;
 use crate::scene::Camera;
-use crate::worker::{Action, OpenedScene};
+use crate::ui::actions::Action;
+use crate::worker::OpenedScene;
 
 /// How near the cursor must come to a camera to point at it, in points.
 const REACH: f32 = 12.0;

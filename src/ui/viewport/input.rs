@@ -4,7 +4,7 @@ use egui::{Key, PointerButton, Rect, Response, Ui};
 use glam::{DVec2, DVec3};
 
 use super::Viewport;
-use crate::worker::{Action, OpenedScene};
+use crate::worker::OpenedScene;
 
 /// Radians of orbit per point of mouse travel.
 const ORBIT_RAD: f64 = 0.006;
@@ -15,15 +15,7 @@ const ZOOM_PER_POINT: f64 = 0.9976;
 
 impl Viewport {
     /// Moves the eye. Returns whether it moved.
-    pub(super) fn handle_input(
-        &mut self,
-        ui: &Ui,
-        response: &Response,
-        rect: Rect,
-        scene: &OpenedScene,
-        actions: &mut Vec<Action>,
-    ) -> bool {
-        let _ = actions;
+    pub(super) fn handle_input(&mut self, ui: &Ui, response: &Response, rect: Rect, scene: &OpenedScene) -> bool {
         let shown = self.photo.as_mut().map_or(rect, |p| p.fit(rect));
         let by_drag = self.drag(response, rect);
         let by_wheel = self.wheel(ui, response, shown);

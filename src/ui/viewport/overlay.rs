@@ -1,12 +1,16 @@
-//! What lies over the picture: the choice of modes, the photo's name, and facts about the picture.
+//! What lies over the frame: the choice of modes, the photo's name, and facts about the frame.
 
 use egui::{Align2, Area, Id, Order, Rect, RichText, Ui};
+use strum::VariantArray;
 
 use super::super::layout::Layout;
 use super::super::state::AppState;
-use super::super::{format, keys, theme};
+use super::super::{keys, theme};
 use super::Viewport;
-use crate::worker::{Action, OpenedScene, ViewMode};
+use crate::math::format;
+use crate::scene::text;
+use crate::ui::actions::Action;
+use crate::worker::{OpenedScene, ViewMode};
 
 impl Viewport {
     pub(super) fn show_overlay(
@@ -37,22 +41,22 @@ impl Viewport {
         if let Some(facts) = self.facts(layout, state) {
             card("facts", Align2::LEFT_BOTTOM, 0.0, &mut |ui| {
                 ui.label(RichText::new(&facts).small().color(theme::WEAK));
-                if let Some(words) = self.drawing.words() {
-                    ui.label(RichText::new(format!("drawn with {words}")).small().color(theme::WARNING));
-                    let reset = ui.small_button("Reset").on_hover_text(Action::ResetDrawing.tooltip());
-                    if reset.accessible_name(Action::ResetDrawing.text()).clicked() {
-                        actions.push(Action::ResetDrawing);
+                if let Some(words) = self.overrides.words() {
+                    ui.label(RichText::new(format!("rendered with {words}")).small().color(theme::WARNING));
+                    let reset = ui.small_button("Reset").on_hover_text(Action::ResetRenderSettings.tooltip());
+                    if reset.accessible_name(Action::ResetRenderSettings.text()).clicked() {
+                        actions.push(Action::ResetRenderSettings);
                     }
                 }
             });
         }
-        // A small view is for the picture.
-        if let Some(times) = self.times.as_ref().filter(|_| rect.height() > 330.0) {
+        // A small view is for the frame.
+        if let Some(times) = self.display.times().filter(|_| rect.height() > 330.0) {
             card("times", Align2::LEFT_BOTTOM, -46.0, &mut |ui| times.show(ui));
         }
-        if self.error.is_some() || self.unmapped.is_some() {
+        if self.display.errors().next().is_some() {
             card("view error", Align2::CENTER_CENTER, 0.0, &mut |ui| {
-                for error in self.error.iter().chain(&self.unmapped) {
+                for error in self.display.errors() {
                     ui.colored_label(theme::ERROR, error);
                 }
             });
@@ -61,7 +65,7 @@ impl Viewport {
 
     fn modes(&self, ui: &mut Ui, layout: &Layout, has_photos: bool, actions: &mut Vec<Action>) {
         ui.spacing_mut().item_spacing.x = 2.0;
-        for mode in ViewMode::ALL {
+        for &mode in ViewMode::VARIANTS {
             if mode == ViewMode::Difference && !has_photos {
                 continue;
             }
@@ -92,9 +96,9 @@ impl Viewport {
         step(ui, "‹", Action::PreviousPhoto, actions);
         match &self.photo {
             Some(p) => {
-                ui.label(RichText::new(format::shortened(&p.name(), 28)).strong()).on_hover_text(&*p.name());
+                ui.label(RichText::new(text::elided(&p.name(), 28)).strong()).on_hover_text(&*p.name());
                 ui.weak(format!("{} of {total}", p.index() + 1));
-                if let Some(psnr) = self.picture.as_ref().and_then(|p| p.psnr) {
+                if let Some(psnr) = self.picture().and_then(|p| p.psnr) {
                     ui.label(RichText::new(format!("preview {}", format::decibel(psnr))).color(theme::ACCENT)).on_hover_text(
                         "PSNR of what is on screen against the photo, at the size on screen. The evaluation's number \
                          is at the photo's size in training.",
@@ -118,11 +122,11 @@ impl Viewport {
         }
     }
 
-    /// One line about the picture.
+    /// One line about the frame.
     fn facts(&self, layout: &Layout, state: &AppState) -> Option<String> {
-        let p = self.picture.as_ref()?;
+        let p = self.picture()?;
         let mut parts = vec![
-            format!("{} x {} px", p.camera.width_px, p.camera.height_px),
+            format!("{} \u{d7} {} px", p.camera.width_px, p.camera.height_px),
             format::millis(p.secs),
             format!("{} Gaussians", format::count(self.cloud.as_ref().map_or(0, |c| c.len()) as u64)),
         ];
@@ -131,8 +135,8 @@ impl Viewport {
         }
         if layout.mode == ViewMode::Difference {
             parts.push(match (&self.photo, p.psnr) {
-                (None, _) => "choose a photo to see the difference ( [ and ] )".into(),
-                (Some(_), _) => "difference x 4".into(),
+                (None, _) => "choose a photo to see the difference ( [ or ] )".into(),
+                (Some(_), _) => "difference \u{d7} 4".into(),
             });
         }
         let trained = state.training_job.is_some() || state.scene.as_ref().is_some_and(|s| s.trained);

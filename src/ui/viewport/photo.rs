@@ -1,4 +1,4 @@
-//! Looking through a photo's camera, and the photo beside the picture.
+//! Looking through a photo's camera, and the photo beside the frame.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use super::super::theme;
 use crate::scene::{Camera, Photo, PhotoPixels};
 use crate::worker::{Command, JobId, Worker};
 
-/// Longest side at which the photo beside the picture is loaded, in px.
+/// Longest side at which the photo beside the frame is loaded, in px.
 const SIDE_PX: u32 = 1600;
 
 /// A photo that the eye looks through.
@@ -21,7 +21,7 @@ pub(super) struct PhotoView {
     pixels: Option<Arc<PhotoPixels>>,
     texture: Option<TextureHandle>,
     failed: bool,
-    /// Height of the viewport over that of the picture in it.
+    /// Height of the viewport over that of the frame in it.
     margin: f64,
 }
 
@@ -53,7 +53,7 @@ impl PhotoView {
         self.failed
     }
 
-    pub(super) fn take_loaded(&mut self, state: &mut AppState, worker: &Worker) {
+    pub(super) fn take_loaded(&mut self, state: &mut AppState) {
         if let Some(pixels) = state.photos.remove(&(self.index, SIDE_PX)) {
             self.pixels = Some(pixels);
         }
@@ -63,7 +63,6 @@ impl PhotoView {
         }
         // Photos of earlier visits that came too late are not kept.
         state.photos.retain(|(_, side), _| *side != SIDE_PX);
-        let _ = worker;
     }
 
     /// The largest rectangle of the photo's shape in `rect`.
@@ -102,7 +101,7 @@ impl PhotoView {
         ui.painter().vline(x, shown.y_range(), Stroke::new(1.5, color));
         ui.painter().circle(pos2(x, shown.center().y), 9.0, theme::PANEL, Stroke::new(1.5, color));
         for (side, text, align) in
-            [(-1.0, "Picture", egui::Align2::RIGHT_BOTTOM), (1.0, "Photo", egui::Align2::LEFT_BOTTOM)]
+            [(-1.0, "Rendering", egui::Align2::RIGHT_BOTTOM), (1.0, "Photo", egui::Align2::LEFT_BOTTOM)]
         {
             let at = pos2(x + side * 10.0, shown.bottom() - 12.0);
             let font = egui::FontId::proportional(12.5);

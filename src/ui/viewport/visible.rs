@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use crate::scene::{GaussianCloud, IdentityId, SemanticMap};
+use crate::worker::Versioned;
 
 /// What of a scene is drawn.
 #[derive(Clone, Debug, Default)]
@@ -16,9 +17,9 @@ pub struct Visibility {
 
 #[derive(Clone, Debug)]
 struct Left {
-    of: (usize, usize),
-    cloud: Arc<GaussianCloud>,
-    semantics: Arc<SemanticMap>,
+    of: (u64, u64),
+    cloud: Versioned<GaussianCloud>,
+    semantics: Versioned<SemanticMap>,
 }
 
 impl Visibility {
@@ -58,23 +59,24 @@ impl Visibility {
     /// The Gaussians to draw and what they belong to.
     pub fn apply(
         &mut self,
-        cloud: &Arc<GaussianCloud>,
-        semantics: &Arc<SemanticMap>,
-    ) -> (Arc<GaussianCloud>, Arc<SemanticMap>) {
+        cloud: &Versioned<GaussianCloud>,
+        semantics: &Versioned<SemanticMap>,
+    ) -> (Versioned<GaussianCloud>, Versioned<SemanticMap>) {
         if !self.is_partial() || semantics.of.len() != cloud.len() {
-            return (Arc::clone(cloud), Arc::clone(semantics));
+            return (cloud.clone(), semantics.clone());
         }
-        let of = (Arc::as_ptr(cloud) as usize, Arc::as_ptr(semantics) as usize);
+        let of = (cloud.generation(), semantics.generation());
         if self.left.as_ref().is_none_or(|l| l.of != of) {
             let shown = self.shown(semantics);
             let kept: Vec<usize> =
                 (0..cloud.len()).filter(|&i| shown.get(semantics.of[i] as usize).copied().unwrap_or(true)).collect();
-            let left = Arc::new(semantics.select(&kept));
-            self.left = Some(Left { of, cloud: Arc::new(cloud.select(&kept)), semantics: left });
+            let (cloud, semantics) = (cloud.select(&kept), semantics.select(&kept));
+            let (cloud, semantics) = (Versioned::new(Arc::new(cloud)), Versioned::new(Arc::new(semantics)));
+            self.left = Some(Left { of, cloud, semantics });
         }
         match &self.left {
-            Some(l) => (Arc::clone(&l.cloud), Arc::clone(&l.semantics)),
-            None => (Arc::clone(cloud), Arc::clone(semantics)),
+            Some(l) => (l.cloud.clone(), l.semantics.clone()),
+            None => (cloud.clone(), semantics.clone()),
         }
     }
 
@@ -103,16 +105,18 @@ mod tests {
         let doll = all.add(Level::Object, NOBODY, vec![]);
         let eye = all.add(Level::Part, doll, vec![]);
         let cat = all.add(Level::Object, NOBODY, vec![]);
-        let map = Arc::new(SemanticMap::of_identities(all, vec![doll, eye, cat, NOBODY], vec![1.0; 4], vec![]));
+        let map = SemanticMap::of_identities(all, vec![doll, eye, cat, NOBODY], vec![1.0; 4], vec![]);
+        let map = Versioned::new(Arc::new(map));
         let n = 4;
-        let cloud = Arc::new(GaussianCloud {
+        let cloud = GaussianCloud {
             positions: (0..n).map(|i| [i as f32, 0.0, 0.0]).collect(),
             log_scales: vec![[0.0; 3]; n],
             quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
             opacity_logits: vec![0.0; n],
             sh: vec![[0.0; 3]; n],
             ..GaussianCloud::default()
-        });
+        };
+        let cloud = Versioned::new(Arc::new(cloud));
         let mut v = Visibility::default();
         let xs = |v: &mut Visibility| {
             let (cloud, map) = v.apply(&cloud, &map);

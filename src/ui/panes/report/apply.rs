@@ -4,11 +4,12 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::super::super::layout::Layout;
-use super::super::super::viewport::drawing::{Drawing, share};
+use super::super::super::viewport::overrides::RenderOverrides;
+use crate::math::format::share;
 use crate::measure::{Knobs, Point, Stage, StageName, turned};
 use crate::pipeline::train::TrainConfig;
 use crate::render::{Cutoffs, RenderSettings};
-use crate::worker::Action;
+use crate::ui::actions::Action;
 
 /// The settings that are active.
 pub struct Now<'a> {
@@ -17,7 +18,7 @@ pub struct Now<'a> {
     /// How the open scene says that it is drawn; none without a scene.
     pub own: Option<&'a RenderSettings>,
     /// What is drawn otherwise.
-    pub drawing: &'a Drawing,
+    pub drawing: &'a RenderOverrides,
     /// Whether a GPU draws.
     pub on_gpu: bool,
 }
@@ -50,9 +51,9 @@ pub fn offer(stage: &Stage, point: &Point, now: &Now<'_>) -> Offer {
         StageName::Train => training(stage, point, now),
         StageName::Render => drawing(stage, point, now),
         StageName::Features => {
-            Err("The window finds objects by the votes of all photos; this compares other ways.".into())
+            Err("The window finds objects by the votes of all photos; this compares alternatives.".into())
         }
-        _ => Err("The window has no setting for this knob.".into()),
+        _ => Err("The window has no such setting.".into()),
     };
     match result {
         Ok((changes, _)) if changes.is_empty() => Offer::Active,
@@ -76,7 +77,7 @@ fn training(stage: &Stage, point: &Point, now: &Now<'_>) -> Taken {
 
 fn drawing(stage: &Stage, point: &Point, now: &Now<'_>) -> Taken {
     let own = now.own.ok_or("Open a scene first: there is nothing to draw yet.")?;
-    let names = fields(&Drawing::default());
+    let names = fields(&RenderOverrides::default());
     if let Some(name) = point.knobs.keys().find(|name| !names.contains_key(*name)) {
         return Err(no_setting(name).into());
     }
@@ -84,10 +85,10 @@ fn drawing(stage: &Stage, point: &Point, now: &Now<'_>) -> Taken {
     knobs.retain(|name, _| names.contains_key(name));
     let then = turned(now.drawing, &knobs).map_err(|e| format!("The report does not fit this version: {e}."))?;
     if let Some(problem) = then.problem() {
-        return Err(format!("It makes no image: {problem}."));
+        return Err(format!("Nothing can be rendered with it: {problem}."));
     }
     if now.on_gpu && then.cutoffs.is_some_and(|c| c != Cutoffs::default()) {
-        return Err("The GPU draws with the default cut-offs; others are for the CPU.".into());
+        return Err("The GPU renders with the default cutoffs; others are for the CPU.".into());
     }
     let [before, after] = [now.drawing, &then].map(|d| d.over(own.clone(), now.on_gpu));
     Ok((changes(&before, &after, &knobs), Action::ApplySetting(stage.name, knobs)))
@@ -96,10 +97,10 @@ fn drawing(stage: &Stage, point: &Point, now: &Now<'_>) -> Taken {
 /// Why a knob of drawing is none of the view.
 fn no_setting(name: &str) -> &'static str {
     match name {
-        "precision" => "The view is drawn in single precision; the others are measured for comparison.",
-        "backend" => "What draws is chosen when the window opens: a real GPU if there is one, else the CPU.",
-        "scale" => "The view chooses its resolution by itself: smaller while the eye moves, full when it rests.",
-        "keep_order" | "degrees" => "An order that is never renewed would soon be wrong as the eye moves.",
+        "precision" => "The view is rendered in single precision; the others are measured for comparison.",
+        "backend" => "The backend is chosen when the window opens: a real GPU if there is one, else the CPU.",
+        "scale" => "The view adapts its resolution: lower while the camera moves, full at rest.",
+        "keep_order" | "degrees" => "A depth order that is never renewed would be wrong as soon as the camera moves.",
         _ => "The view has no such setting.",
     }
 }
@@ -126,7 +127,7 @@ fn changes<T: Serialize>(before: &T, after: &T, knobs: &Knobs) -> Vec<Change> {
     knobs.keys().filter(differs).map(change).collect()
 }
 
-/// A value as it is shown.
+/// A value for the user.
 fn words(value: &Value) -> String {
     match value {
         Value::Null => "automatic".into(),
@@ -175,13 +176,13 @@ mod tests {
         }
     }
 
-    fn now<'a>(config: &'a TrainConfig, own: Option<&'a RenderSettings>, drawing: &'a Drawing) -> Now<'a> {
+    fn now<'a>(config: &'a TrainConfig, own: Option<&'a RenderSettings>, drawing: &'a RenderOverrides) -> Now<'a> {
         Now { config, own, drawing, on_gpu: false }
     }
 
     #[test]
     fn settings_of_trainings_are_taken_over_and_defaults_taken_back() {
-        let (config, drawing) = (TrainConfig { steps: 500, ..Layout::default().config }, Drawing::default());
+        let (config, drawing) = (TrainConfig { steps: 500, ..Layout::default().config }, RenderOverrides::default());
         let half = point("coarse_share", json!(0.3));
         let default = Point { default: true, ..Point::default() };
         let s = stage(StageName::Train, vec![default.clone(), half.clone(), point("steps", json!(500))]);
@@ -205,7 +206,7 @@ mod tests {
 
     #[test]
     fn settings_of_drawing_are_taken_over_where_the_view_has_them() {
-        let (config, own, drawing) = (TrainConfig::default(), RenderSettings::default(), Drawing::default());
+        let (config, own, drawing) = (TrainConfig::default(), RenderSettings::default(), RenderOverrides::default());
         let cut = point("cutoffs", json!({"alpha": 1.0 / 64.0, "transmittance": 1e-4}));
         let default = Point { default: true, ..Point::default() };
         let s = stage(StageName::Render, vec![default.clone(), cut.clone(), point("precision", json!("half"))]);
@@ -221,7 +222,7 @@ mod tests {
         else {
             panic!("back to the scene's own");
         };
-        assert_eq!(turned(&chosen, &back).expect("fits"), Drawing::default());
+        assert_eq!(turned(&chosen, &back).expect("fits"), RenderOverrides::default());
         let not = |point: &Point, now: &Now<'_>| match offer(&s, point, now) {
             Offer::Not(why) => why,
             other => panic!("{other:?}"),
@@ -229,7 +230,7 @@ mod tests {
         assert!(not(&cut, &Now { on_gpu: true, ..now(&config, Some(&own), &drawing) }).contains("GPU"));
         assert!(not(&cut, &now(&config, None, &drawing)).contains("Open a scene"));
         assert!(not(&s.points[2], &here).contains("single precision"));
-        assert!(not(&point("cutoffs", json!({"alpha": 0.0, "transmittance": 1.0})), &here).contains("cut-offs"));
+        assert!(not(&point("cutoffs", json!({"alpha": 0.0, "transmittance": 1.0})), &here).contains("cutoffs"));
         let other = stage(StageName::Path, vec![]);
         assert!(matches!(offer(&other, &cut, &here), Offer::Not(_)));
     }

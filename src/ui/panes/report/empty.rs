@@ -3,15 +3,17 @@
 use egui::{RichText, Ui, vec2};
 
 use super::super::super::state::AppState;
-use super::super::super::{format, theme};
-use crate::worker::{Action, JobKind};
+use super::super::super::theme;
+use crate::scene::text;
+use crate::ui::actions::Action;
+use crate::worker::JobKind;
 
 /// Draws it.
 pub fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     ui.label(RichText::new("Error against run time").strong());
     ui.label(
-        "Every knob that trades accuracy for time can be measured. A report holds the measurements; here they are \
-         plotted, the settings worth having are marked, and a click takes one over.",
+        "Every setting that trades accuracy for time can be measured. A report holds the measurements; here they are \
+         plotted, the Pareto front is marked, and a click applies a setting.",
     );
     ui.add_space(6.0);
     if let Some(job) = state.job.as_ref().filter(|j| j.kind == JobKind::Measure) {
@@ -20,11 +22,11 @@ pub fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
             let share = p.done as f32 / p.total.max(1) as f32;
             ui.add(egui::ProgressBar::new(share).desired_width(320.0).desired_height(6.0).fill(theme::ACCENT));
             ui.weak(format!(
-                "{} of {} measurements. Leave the view alone: drawing it takes from what is measured.",
+                "{} of {} measurements. Leave the view alone: rendering it distorts the measurement.",
                 p.done, p.total
             ));
         } else {
-            ui.weak("Drawing the exact images that all others are compared with.");
+            ui.weak("Rendering the exact reference images.");
         }
         if ui.add(egui::Button::new("Cancel").min_size(vec2(92.0, 28.0))).clicked() {
             actions.push(Action::Cancel);
@@ -34,11 +36,11 @@ pub fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     ui.horizontal_wrapped(|ui| {
         let size = vec2(0.0, 28.0);
         if state.is_trained() {
-            let button = theme::primary_button("Benchmark rendering of this scene").min_size(size);
+            let button = theme::primary_button("Benchmark rendering").min_size(size);
             let response = ui.add_enabled(state.job.is_none(), button);
-            let disabled = "Another job is running; it would falsify the times.";
-            if response.on_hover_text(Action::MeasureDrawing.tooltip()).on_disabled_hover_text(disabled).clicked() {
-                actions.push(Action::MeasureDrawing);
+            let disabled = "Another job is running; it would distort the times.";
+            if response.on_hover_text(Action::BenchmarkRendering.tooltip()).on_disabled_hover_text(disabled).clicked() {
+                actions.push(Action::BenchmarkRendering);
             }
         }
         let open = ui.add(egui::Button::new("Open a report\u{2026}").min_size(size));
@@ -46,7 +48,7 @@ pub fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
             actions.push(Action::ChooseReport);
         }
         for path in state.scene.iter().flat_map(|s| &s.reports) {
-            let found = ui.add(egui::Button::new(format!("Open {}", format::path(path))).min_size(size));
+            let found = ui.add(egui::Button::new(format!("Open {}", text::path(path))).min_size(size));
             if found.on_hover_text("This report was found with the scene.").clicked() {
                 actions.push(Action::OpenReport(path.clone()));
             }

@@ -13,12 +13,13 @@ use self::apply::{Now, Offer};
 use self::scatter::Scatter;
 use super::super::layout::Layout;
 use super::super::state::{AppState, ShownReport};
+use super::super::theme;
 use super::super::viewport::Viewport;
-use super::super::{format, theme};
 use crate::measure::{Measure, Point, Report, Stage, StageName, table};
-use crate::worker::Action;
+use crate::scene::text;
+use crate::ui::actions::Action;
 
-/// What is shown of a report.
+/// What a user looks at in a report.
 #[derive(Default)]
 pub struct ReportPane {
     stage: Option<StageName>,
@@ -48,7 +49,7 @@ impl ReportPane {
         let report = &*shown.report;
         self.header(ui, &shown, second.as_ref(), state, actions);
         let Some(stage) = self.stage_of(report) else {
-            ui.weak("Nothing was measured yet: the report has no stage. Run the same command again to resume.");
+            ui.weak("Nothing was measured yet: the report has no stage. Run the same command again to continue.");
             return;
         };
         let Some(measure) = self.measure_of(stage) else {
@@ -59,9 +60,9 @@ impl ReportPane {
         warnings(ui, stage, report, second_report);
         let other = second_report.and_then(|r| r.stage(stage.name));
         let selected = self.selected_of(stage);
-        let own = state.scene.as_ref().map(|_| state.drawing());
+        let own = state.scene.as_ref().map(|_| state.render_settings());
         let now =
-            Now { config: &layout.config, own: own.as_ref(), drawing: &viewport.drawing, on_gpu: viewport.on_gpu() };
+            Now { config: &layout.config, own: own.as_ref(), drawing: &viewport.overrides, on_gpu: viewport.on_gpu() };
         let size = ui.available_size();
         // A column of its own where there is room, else on top of the tables.
         let wide = size.x > 1_100.0;
@@ -144,10 +145,10 @@ impl ReportPane {
     ) {
         ui.horizontal_wrapped(|ui| {
             ui.label(RichText::new("Error against run time").strong());
-            ui.label(RichText::new(name(shown)).color(theme::WEAK)).on_hover_text(format::path(&shown.path));
+            ui.label(RichText::new(name(shown)).color(theme::WEAK)).on_hover_text(text::path(&shown.path));
             if let Some(second) = second {
-                ui.label(RichText::new(format!("beside {} (hollow)", name(second))).color(theme::ACCENT))
-                    .on_hover_text(format::path(&second.path));
+                ui.label(RichText::new(format!("compared with {} (hollow)", name(second))).color(theme::ACCENT))
+                    .on_hover_text(text::path(&second.path));
                 button(ui, "End comparison", &Action::EndComparison, true, actions);
             }
             ui.separator();
@@ -173,7 +174,7 @@ impl ReportPane {
             button(ui, "Open\u{2026}", &Action::ChooseReport, true, actions);
             button(ui, "Compare\u{2026}", &Action::ChooseSecondReport, true, actions);
             let can_measure = state.is_trained() && state.job.is_none();
-            button(ui, "Benchmark rendering", &Action::MeasureDrawing, can_measure, actions);
+            button(ui, "Benchmark rendering", &Action::BenchmarkRendering, can_measure, actions);
         });
     }
 }
@@ -182,7 +183,7 @@ impl ReportPane {
 fn name(shown: &ShownReport) -> String {
     let folder = if shown.path.is_dir() { Some(shown.path.as_path()) } else { shown.path.parent() };
     let name = folder.and_then(|f| f.file_name()).map(|n| n.to_string_lossy().into_owned());
-    format::shortened(&name.unwrap_or_else(|| shown.path.display().to_string()), 32)
+    text::elided(&name.unwrap_or_else(|| shown.path.display().to_string()), 32)
 }
 
 fn button(ui: &mut Ui, text: &str, action: &Action, enabled: bool, actions: &mut Vec<Action>) {
@@ -213,7 +214,7 @@ fn warnings(ui: &mut Ui, stage: &Stage, report: &Report, second: Option<&Report>
     if !stage.complete() {
         let done = stage.points.iter().filter(|p| p.secs.each.len() >= stage.seeds.len()).count();
         let text = format!(
-            "Not complete: {done} of {} settings were measured {} times. The same command measures the rest.",
+            "Not complete: {done} of {} settings were measured {} times. The same command continues with the rest.",
             stage.planned,
             stage.seeds.len()
         );
@@ -223,7 +224,7 @@ fn warnings(ui: &mut Ui, stage: &Stage, report: &Report, second: Option<&Report>
     let differs = report.differs_from(second);
     if !differs.is_empty() {
         let text = format!("Measured under other conditions, so times do not compare: {}", differs.join("; "));
-        warn(ui, format::shortened(&text, 180)).on_hover_text(differs.join("\n"));
+        warn(ui, text::elided(&text, 180)).on_hover_text(differs.join("\n"));
     }
     if second.stage(stage.name).is_none() {
         warn(ui, format!("The second report has nothing about: {}.", stage.name.title().to_lowercase()));
@@ -254,7 +255,7 @@ fn chosen(ui: &mut Ui, stage: &Stage, selected: Option<&Point>, now: &Now<'_>, a
                 }
             }
             Offer::Active => {
-                ui.colored_label(theme::GOOD, "Already active: applying it would change nothing.");
+                ui.colored_label(theme::GOOD, "Already active.");
             }
             Offer::Not(why) => {
                 ui.label(RichText::new(why).color(theme::WEAK));

@@ -73,31 +73,10 @@ pub fn label(mark: GridMark, range: &RangeInclusive<f64>, text: impl Fn(f64) -> 
     if mark.step_size < least { String::new() } else { text(10.0_f64.powf(mark.value)) }
 }
 
-/// A number of an axis, without digits that say nothing.
-pub fn short(v: f64) -> String {
-    match v.abs() {
-        a if (1e-3..1e5).contains(&a) => format!("{}", rounded(v)),
-        _ => format!("{:e}", rounded(v)),
-    }
-}
-
-/// Seconds of an axis.
-pub fn short_secs(secs: f64) -> String {
-    match secs {
-        s if s < 0.999e-3 => format!("{} \u{b5}s", rounded(s * 1e6)),
-        s if s < 0.999 => format!("{} ms", rounded(s * 1e3)),
-        s => format!("{} s", rounded(s)),
-    }
-}
-
-/// Four digits that count; logarithms and back leave more.
-fn rounded(v: f64) -> f64 {
-    format!("{v:.3e}").parse().unwrap_or(v)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::format::tick;
     use crate::measure::document::ErrorKind;
 
     fn point(secs: [f64; 3], values: [f64; 3]) -> Point {
@@ -128,7 +107,7 @@ mod tests {
         assert!(all.iter().all(|m| (-2.5..=0.2).contains(&m.value)));
         let texts = |range: (f64, f64)| -> Vec<String> {
             let of = range.0..=range.1;
-            marks(range).into_iter().map(|m| label(m, &of, short)).filter(|t| !t.is_empty()).collect()
+            marks(range).into_iter().map(|m| label(m, &of, tick)).filter(|t| !t.is_empty()).collect()
         };
         assert_eq!(texts((-2.5, 0.2)), ["0.01", "0.1", "1"]);
         assert_eq!(texts((-1.1, 0.1)), ["0.1", "0.2", "0.5", "1"]);
@@ -138,14 +117,8 @@ mod tests {
     #[test]
     fn narrow_axes_have_marks_too() {
         let (low, high) = (0.030_f64.log10(), 0.0305_f64.log10());
-        let texts: Vec<String> = marks((low, high)).into_iter().map(|m| label(m, &(low..=high), short)).collect();
+        let texts: Vec<String> = marks((low, high)).into_iter().map(|m| label(m, &(low..=high), tick)).collect();
         assert_eq!(texts, ["0.03", "0.0301", "0.0302", "0.0303", "0.0304", "0.0305"]);
         assert!(marks((f64::NAN, 1.0)).is_empty() && marks((1.0, 1.0)).is_empty() && marks((0.0, 1e9)).is_empty());
-    }
-
-    #[test]
-    fn axes_have_short_texts() {
-        assert_eq!([0.1 + 0.2, 1e-7, 3.0, 2e6].map(short), ["0.3", "1e-7", "3", "2e6"]);
-        assert_eq!([2e-5, 0.001, 0.05, 1.0, 100.0].map(short_secs), ["20 \u{b5}s", "1 ms", "50 ms", "1 s", "100 s"]);
     }
 }

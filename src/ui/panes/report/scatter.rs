@@ -5,6 +5,7 @@ use egui_plot::{Corner, Legend, Line, MarkerShape, Plot, PlotPoint, PlotPoints, 
 
 use super::super::super::theme;
 use super::scale;
+use crate::math::format;
 use crate::measure::plot::{COLORS, LEAST};
 use crate::measure::{Measure, Point, Stage, table};
 
@@ -46,8 +47,8 @@ impl<'a> Scatter<'a> {
             .y_axis_min_width(46.0)
             .x_grid_spacer(|input| scale::marks(input.bounds))
             .y_grid_spacer(|input| scale::marks(input.bounds))
-            .x_axis_formatter(|mark, range| scale::label(mark, range, scale::short_secs))
-            .y_axis_formatter(|mark, range| scale::label(mark, range, scale::short))
+            .x_axis_formatter(|mark, range| scale::label(mark, range, format::tick_secs))
+            .y_axis_formatter(|mark, range| scale::label(mark, range, format::tick))
             .label_formatter(|_| None)
             .legend(Legend::default().position(corner).text_style(egui::TextStyle::Small).background_alpha(0.6));
         let shown = plot.show(ui, |p| self.items().into_iter().for_each(|item| item.add_to(p)));
@@ -193,9 +194,11 @@ impl Item {
     }
 }
 
-/// Color of the knob with this number: those of the report's own plots, lighter on dark ground.
+/// Color of the setting with this number: those of the report's own plots, lighter on dark ground; once all are used,
+/// paler still.
 pub fn color(k: usize) -> Color32 {
-    let [r, g, b] = COLORS[k % COLORS.len()].map(|v| v + (255 - v) / 4);
+    let paler = if k / COLORS.len() % 2 == 0 { 4 } else { 2 };
+    let [r, g, b] = COLORS[k % COLORS.len()].map(|v| v + (255 - v) / paler);
     Color32::from_rgb(r, g, b)
 }
 
@@ -219,12 +222,12 @@ pub fn facts(ui: &mut Ui, point: &Point, measures: &[Measure], whose: &str) {
         .min_row_height(17.0)
         .show(ui, |ui| {
             ui.label("time");
-            ui.label(table::spread(&point.secs, table::seconds));
+            ui.label(table::spread(&point.secs, format::seconds));
             ui.end_row();
             for measure in measures {
                 let Some(value) = point.values.get(&measure.name) else { continue };
                 ui.label(table::title(measure)).on_hover_text(&measure.meaning);
-                ui.label(table::spread(value, table::number));
+                ui.label(table::spread(value, format::number));
                 ui.end_row();
             }
         });
@@ -260,5 +263,6 @@ mod tests {
     fn series_differ_in_color_or_shape() {
         let looks: Vec<_> = (0..14).map(|k| (color(k), shape(k))).collect();
         assert!((0..14).all(|i| (0..i).all(|j| looks[i] != looks[j])));
+        assert!((0..14).all(|i| (0..i).all(|j| color(i) != color(j))), "twice as many colors as the palette has");
     }
 }

@@ -2,9 +2,11 @@
 
 use egui::{Color32, Grid, RichText, Ui};
 
-use super::super::super::{format, theme};
+use super::super::super::theme;
 use super::scatter;
+use crate::math::format;
 use crate::measure::{Comparison, Measure, Point, Report, Stage, table};
+use crate::scene::text;
 
 /// Letters of a setting that are shown in a table.
 const MOST_LETTERS: usize = 34;
@@ -19,12 +21,12 @@ pub fn points<'a>(ui: &mut Ui, stage: &'a Stage, measure: &Measure, selected: Op
         for (i, p) in stage.points.iter().enumerate() {
             let k = methods.iter().position(|m| *m == p.method).unwrap_or(0);
             let is_selected = selected.is_some_and(|s| std::ptr::eq(s, p));
-            let text = format::shortened(&title(p), MOST_LETTERS);
+            let text = text::elided(&title(p), MOST_LETTERS);
             let row = ui.selectable_label(is_selected, RichText::new(text).color(scatter::color(k)));
             if row.on_hover_text(title(p)).clicked() {
                 clicked = Some(p);
             }
-            ui.label(table::seconds(p.secs.median));
+            ui.label(format::seconds(p.secs.median));
             ui.label(value(p, measure));
             ui.label(if front.contains(&i) { "\u{2022}" } else { "" });
             ui.end_row();
@@ -39,7 +41,7 @@ pub fn title(p: &Point) -> String {
 }
 
 fn value(p: &Point, measure: &Measure) -> String {
-    p.values.get(&measure.name).map_or_else(|| "\u{2013}".into(), |s| table::number(s.median))
+    p.values.get(&measure.name).map_or_else(|| "\u{2013}".into(), |s| format::number(s.median))
 }
 
 /// What each knob's rule says of its default.
@@ -57,8 +59,8 @@ pub fn choices(ui: &mut Ui, stage: &Stage) {
             ui.label(c.method);
             verdict(ui, c.holds, ["holds", "does not hold"]);
             let chosen = if c.chosen.default { "the default" } else { &c.chosen.setting };
-            ui.label(format::shortened(chosen, MOST_LETTERS)).on_hover_text(chosen);
-            let of = |p: &Point| format!("{}, {}", table::seconds(p.secs.median), error(p, measure));
+            ui.label(text::elided(chosen, MOST_LETTERS)).on_hover_text(chosen);
+            let of = |p: &Point| format!("{}, {}", format::seconds(p.secs.median), error(p, measure));
             ui.label(RichText::new(format!("{}; {}", of(c.default), of(c.chosen))).small());
             ui.end_row();
         }
@@ -66,17 +68,17 @@ pub fn choices(ui: &mut Ui, stage: &Stage) {
 }
 
 fn error(p: &Point, measure: &Measure) -> String {
-    p.error(measure).map_or_else(|| "\u{2013}".into(), table::number)
+    p.error(measure).map_or_else(|| "\u{2013}".into(), format::number)
 }
 
 /// Whether errors fall as fast as theory says.
 pub fn orders(ui: &mut Ui, stage: &Stage) {
     Grid::new("orders").num_columns(4).striped(true).spacing([12.0, 1.0]).min_row_height(20.0).show(ui, |ui| {
-        head(ui, &["refined", "order seen", "expected", "theory"]);
+        head(ui, &["refined", "order observed", "expected", "theory"]);
         for o in &stage.orders {
             ui.label(&o.what).on_hover_text(&o.meaning);
             ui.label(format!("{:.2}", o.observed));
-            ui.label(table::number(o.expected));
+            ui.label(format::number(o.expected));
             verdict(ui, o.agrees, ["agrees", "does not agree"]);
             ui.end_row();
         }
@@ -91,14 +93,14 @@ pub fn comparison(ui: &mut Ui, comparison: &Comparison<'_>, measure: &Measure) {
     Grid::new("comparison").num_columns(4).striped(true).spacing([12.0, 1.0]).min_row_height(20.0).show(ui, |ui| {
         head(ui, &["setting", "times: second / first", "", &format!("{}: second - first", table::title(measure))]);
         for pair in &comparison.pairs {
-            ui.label(format::shortened(&title(pair.one), MOST_LETTERS)).on_hover_text(title(pair.one));
+            ui.label(text::elided(&title(pair.one), MOST_LETTERS)).on_hover_text(title(pair.one));
             let color = match pair.times {
                 _ if !pair.differs() => theme::TEXT,
                 t if t < 1.0 => theme::GOOD,
                 _ => theme::WARNING,
             };
             ui.colored_label(color, format!("\u{d7} {:.2}", pair.times));
-            let times = [pair.one, pair.other].map(|p| table::seconds(p.secs.median));
+            let times = [pair.one, pair.other].map(|p| format::seconds(p.secs.median));
             ui.label(RichText::new(format!("{}, {}", times[1], times[0])).small().color(theme::WEAK));
             ui.label(pair.difference.map_or_else(|| "\u{2013}".into(), signed));
             ui.end_row();
@@ -111,7 +113,7 @@ pub fn comparison(ui: &mut Ui, comparison: &Comparison<'_>, measure: &Measure) {
 }
 
 fn signed(v: f64) -> String {
-    if v > 0.0 { format!("+{}", table::number(v)) } else { table::number(v) }
+    if v > 0.0 { format!("+{}", format::number(v)) } else { format::number(v) }
 }
 
 /// On what, by what, against what was measured.

@@ -1,8 +1,8 @@
-//! The question box: typing, completion from known names, history.
+//! The query box: typing, completion from known names, history.
 
 use egui::{Key, Modifiers, RichText, TextEdit, Ui};
 
-use super::{COLORS, Questions};
+use super::{COLORS, Queries};
 use crate::pipeline::semantics::names;
 use crate::scene::SemanticMap;
 use crate::ui::theme;
@@ -10,7 +10,7 @@ use crate::ui::theme;
 /// Completions that are offered.
 const OFFERED: usize = 5;
 
-impl Questions {
+impl Queries {
     pub(super) fn show_bar(&mut self, ui: &mut Ui, semantics: &SemanticMap) {
         let id = ui.scope_id().with("typed");
         // Taken before the field sees them: it would move its cursor.
@@ -26,7 +26,7 @@ impl Questions {
             let width = ui.available_width() - 72.0;
             let edit = TextEdit::singleline(&mut self.typed)
                 .id(id)
-                .hint_text("Find an object, or \"the button of the red controller\"   ( / )")
+                .hint_text("Query an object, or \"the button of the red controller\"   ( / )")
                 .char_limit(2_000)
                 .desired_width(width);
             let response = ui.add(edit);
@@ -45,7 +45,7 @@ impl Questions {
                 self.keep();
                 response.request_focus();
             }
-            ui.toggle_value(&mut self.open, "Options").on_hover_text("How answers are found and drawn");
+            ui.toggle_value(&mut self.open, "Options").on_hover_text("How answers are found and displayed");
         });
         if focused && !self.typed.is_empty() && offered.first().is_some_and(|o| *o != self.typed) {
             self.show_offered(ui, &offered, semantics);
@@ -89,7 +89,7 @@ impl Questions {
         self.recalled = next;
     }
 
-    /// Chips of the questions that stay on screen.
+    /// Chips of the queries that stay on screen.
     pub(super) fn show_kept(&mut self, ui: &mut Ui) {
         if self.kept.is_empty() {
             return;
@@ -100,7 +100,7 @@ impl Questions {
                 let [r, g, b] = COLORS[k % COLORS.len()];
                 let text = RichText::new(format!("{}  \u{00d7}", question.text)).small();
                 let chip = ui.button(text.color(egui::Color32::from_rgb(r, g, b)));
-                if chip.on_hover_text("Take this question off the screen").clicked() {
+                if chip.on_hover_text("Remove this query").clicked() {
                     gone = Some(k);
                 }
             }

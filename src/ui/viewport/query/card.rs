@@ -1,32 +1,34 @@
-//! The answer to the newest question: verdict, hits, and what can be done with the one that is shown.
+//! The answer to the newest query: verdict, hits, and what can be done with the one that is shown.
 
 use egui::{RichText, Ui};
+use strum::VariantArray;
 
-use super::{Look, Questions, times};
+use super::{OverlaySettings, Queries, times};
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::answer::Basis;
 use crate::pipeline::semantics::localise::Answer;
 use crate::pipeline::semantics::matching::{self, MatchMode};
 use crate::pipeline::semantics::names;
 use crate::scene::{Bounds, GaussianCloud, IdentityId, SemanticMap, text};
+use crate::ui::actions::Action;
 use crate::ui::theme;
-use crate::worker::Action;
+use crate::worker::Versioned;
 
 /// Hits that are listed.
 const LISTED: usize = 5;
 
-impl Questions {
+impl Queries {
     pub(super) fn show_answer(
         &mut self,
         ui: &mut Ui,
-        semantics: &SemanticMap,
+        semantics: &Versioned<SemanticMap>,
         cloud: &GaussianCloud,
         actions: &mut Vec<Action>,
     ) {
         let Some(newest) = self.live.as_ref().or(self.kept.last()).cloned() else { return };
         let identities = &semantics.identities;
         self.show_verdict(ui, &newest);
-        let shown = newest.shown(&self.look);
+        let shown = newest.shown(&self.settings);
         let mut chosen = None;
         let hits = newest.answered.answer.hits().iter();
         for hit in hits.filter(|h| h.score > 0.0).take(LISTED) {
@@ -41,7 +43,7 @@ impl Questions {
                     None => String::new(),
                 };
                 ui.weak(format!("{:.2}  +{:.2}{pixels}", hit.score, hit.margin.max(0.0)))
-                    .on_hover_text("Score from 0 to 1, how much more than the next, and size in this view");
+                    .on_hover_text("Score from 0 to 1, margin over the next, and pixels in this view");
             });
         }
         if let Some(&target) = shown.first() {
@@ -49,13 +51,13 @@ impl Questions {
             show_target(ui, target, &facts, actions);
         }
         let basis = match newest.answered.basis {
-            Basis::Names => "by names",
-            Basis::Meaning => "by looks",
+            Basis::Names => "by name",
+            Basis::Meaning => "by embedding",
         };
         times::show(ui, basis, &newest.answered.stages.and(self.paint_ms));
         if newest.answered.answer.hits().iter().all(|h| h.score <= 0.0) {
             let known = names::completions(identities, "", 6).join(", ");
-            ui.weak(format!("Known here, for example: {known}"));
+            ui.weak(format!("Names in this scene: {known}"));
         }
         if let (Some(id), Some(newest)) = (chosen, self.live.as_mut().or(self.kept.last_mut())) {
             newest.chosen = (newest.chosen != Some(id)).then_some(id);
@@ -67,17 +69,17 @@ impl Questions {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Facts {
     /// What they were counted for.
-    of: (usize, IdentityId, MatchMode, u32),
+    of: (u64, IdentityId, MatchMode, u32),
     gaussians: usize,
     /// In scene units, without stray Gaussians.
     bounds: Option<Bounds>,
 }
 
-impl Questions {
+impl Queries {
     /// Facts of the target; counted anew only when it or the match has changed.
-    fn facts_of(&mut self, target: IdentityId, semantics: &SemanticMap, cloud: &GaussianCloud) -> Facts {
-        let Look { mode, tolerance, .. } = self.look;
-        let of = (std::ptr::from_ref(semantics) as usize, target, mode, tolerance.to_bits());
+    fn facts_of(&mut self, target: IdentityId, semantics: &Versioned<SemanticMap>, cloud: &GaussianCloud) -> Facts {
+        let OverlaySettings { mode, tolerance, .. } = self.settings;
+        let of = (semantics.generation(), target, mode, tolerance.to_bits());
         if let Some(facts) = self.facts.as_ref().filter(|f| f.of == of) {
             return facts.clone();
         }
@@ -88,39 +90,33 @@ impl Questions {
         self.facts = Some(facts.clone());
         facts
     }
-}
 
-impl Questions {
     fn show_verdict(&self, ui: &mut Ui, newest: &super::Asked) {
-        let unknown = shortened(&newest.unknown.join("\", \""));
+        let unknown = newest.unknown.join("\", \"");
+        let unknown = text::shortened(&unknown, 80);
         match &newest.answered.answer {
             Answer::Found(_) if unknown.is_empty() || newest.answered.basis == Basis::Names => {}
             Answer::Found(_) => {
-                ui.colored_label(theme::WARNING, format!("Not understood, and left out: \"{unknown}\"."));
+                ui.colored_label(theme::WARNING, format!("Ignored unknown words: \"{unknown}\"."));
             }
             Answer::Ambiguous(_) => {
-                ui.colored_label(theme::WARNING, "Several fit equally well:");
+                ui.colored_label(theme::WARNING, "Ambiguous:");
+            }
+            Answer::NotFound(_) if newest.pending => {
+                ui.weak("Encoding the query\u{2026}");
             }
             Answer::NotFound(_) => {
-                let text = match unknown.as_str() {
-                    "" => "Nothing here fits.".to_owned(),
-                    _ => format!("Nothing here is called \"{unknown}\"."),
+                let text = match &*unknown {
+                    "" => "No match.".to_owned(),
+                    _ => format!("No match for \"{unknown}\"."),
                 };
                 ui.colored_label(theme::WARNING, text);
             }
         }
-        if let Some(trouble) = self.speech.trouble() {
-            let text = format!("Only names are understood: {}", text::line(trouble));
+        if let Some(trouble) = self.embeddings.problem() {
+            let text = format!("Names only, no open-vocabulary queries: {}", text::line(trouble));
             ui.label(RichText::new(text).small().color(theme::WARNING));
         }
-    }
-}
-
-/// A text of reasonable length.
-fn shortened(text: &str) -> String {
-    match text.char_indices().nth(80) {
-        Some((end, _)) => format!("{}\u{2026}", &text[..end]),
-        None => text.to_owned(),
     }
 }
 
@@ -134,7 +130,7 @@ fn show_target(ui: &mut Ui, target: IdentityId, facts: &Facts, actions: &mut Vec
             actions.push(go);
         }
         ui.menu_button(RichText::new("from\u{2026}").small(), |ui| {
-            for side in Side::ALL {
+            for &side in Side::VARIANTS {
                 if ui.button(side.text()).clicked() {
                     actions.push(Action::GoToTarget(target, side));
                     ui.close();
@@ -157,15 +153,4 @@ fn show_target(ui: &mut Ui, target: IdentityId, facts: &Facts, actions: &mut Vec
 fn size_text(bounds: Bounds) -> String {
     let s = bounds.size();
     format!("  \u{00b7}  box {:.3} \u{00d7} {:.3} \u{00d7} {:.3}", s.x, s.y, s.z)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn long_words_are_cut_between_letters() {
-        assert_eq!(shortened("ééé"), "ééé");
-        assert_eq!(shortened(&"é".repeat(200)).chars().count(), 81);
-    }
 }

@@ -1,51 +1,48 @@
-//! Questions asked of the scene: the box to type them into, their answers, and what they draw over
-//! the picture.
+//! Queries asked of the scene: the box to type them into, their answers, and what they draw over
+//! the frame.
 //!
-//! What the view's pixels belong to is drawn once, when the eye rests; every question then only
+//! What the view's pixels belong to is drawn once, when the eye rests; every query then only
 //! reads it, while it is still being typed.
 
 mod bar;
 mod card;
-mod look;
+mod embeddings;
 mod overlay;
-mod speech;
+mod panel;
+mod settings;
 mod times;
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 use std::time::Instant;
 
-use egui::{Align2, Area, Color32, Id, Order, Rect, TextureHandle, TextureOptions, Ui};
+use egui::{Color32, Rect, TextureHandle, TextureOptions, Ui};
 
-pub use self::look::{Look, Tint};
-use self::speech::Speech;
-use super::super::theme;
+use self::embeddings::Embeddings;
+pub use self::settings::{ColorBy, OverlaySettings};
 use crate::pipeline::semantics::answer::{Answered, Language, answer};
 use crate::pipeline::semantics::grammar::Phrase;
 use crate::pipeline::semantics::matching::{self, MatchMode};
 use crate::pipeline::semantics::meaning::MeaningOptions;
 use crate::pipeline::semantics::names;
 use crate::pipeline::semantics::stages::{StagesMs, ms_since};
-use crate::scene::{GaussianCloud, Identities, IdentityId, Mask, NOBODY, ScenePlan, SemanticMap};
-use crate::worker::{Action, ViewMaps};
+use crate::scene::{IdentityId, Mask, ScenePlan, SemanticMap};
+use crate::worker::{Versioned, ViewMaps};
 
-/// Colours of questions, in turn.
+/// Colors of queries, in turn.
 const COLORS: [[u8; 3]; 6] =
     [[255, 179, 0], [0, 200, 215], [233, 84, 150], [128, 215, 70], [160, 130, 255], [255, 120, 70]];
-/// Questions that are kept on screen.
+/// Queries that are kept on screen.
 const MOST: usize = COLORS.len();
-/// Views narrower than this have no room for the question beside the view's own buttons, points.
-const BESIDE: f32 = 700.0;
-/// How far it is below them then: both rows of them.
-const BELOW: f32 = 92.0;
 
-/// A question with its answer.
+/// A query with its answer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Asked {
     /// As it was typed.
     pub text: String,
     /// What it comes to.
     pub answered: Answered,
+    /// Whether the text encoder has yet to read it: names alone have answered so far.
+    pub pending: bool,
     /// A hit that was chosen among the others; else the best are shown.
     chosen: Option<IdentityId>,
     /// Words that neither names nor the encoder know.
@@ -54,24 +51,24 @@ pub struct Asked {
 
 impl Asked {
     /// The identities that are shown.
-    pub fn shown(&self, look: &Look) -> Vec<IdentityId> {
-        self.chosen.map_or_else(|| self.answered.chosen(look.top), |id| vec![id])
+    pub fn shown(&self, settings: &OverlaySettings) -> Vec<IdentityId> {
+        self.chosen.map_or_else(|| self.answered.chosen(settings.top), |id| vec![id])
     }
 }
 
 /// What the overlay was painted for.
 #[derive(Clone, PartialEq)]
 struct Painted {
-    map: usize,
-    semantics: usize,
+    maps: u64,
+    semantics: u64,
     shown: Vec<Vec<IdentityId>>,
     newest: Option<String>,
-    look: Look,
+    settings: OverlaySettings,
 }
 
-/// The questions on screen.
+/// The queries on screen.
 #[derive(Default)]
-pub struct Questions {
+pub struct Queries {
     typed: String,
     /// Set while the box is to take the keyboard.
     focus: bool,
@@ -81,16 +78,16 @@ pub struct Questions {
     recalled: Option<usize>,
     /// Whether the settings are open.
     open: bool,
-    look: Look,
+    settings: OverlaySettings,
     live: Option<Asked>,
     kept: Vec<Asked>,
     /// What was asked, oldest first.
     history: Vec<String>,
-    maps: Option<Arc<ViewMaps>>,
-    /// The objects and parts that were asked, by address.
-    answered_for: usize,
-    /// What compares phrases with looks, once it is loaded.
-    speech: Speech,
+    maps: Option<Versioned<ViewMaps>>,
+    /// Generation of the objects and parts that were asked.
+    answered_for: u64,
+    /// Embeddings of the texts on screen.
+    embeddings: Embeddings,
     /// Relevancy of the pixels, for the histogram.
     heat: Vec<f32>,
     texture: Option<TextureHandle>,
@@ -99,7 +96,7 @@ pub struct Questions {
     facts: Option<card::Facts>,
     /// Pixels of identities in the present view, counted as they are listed.
     areas: Areas,
-    /// What finding the pixels and drawing them took, of all questions on screen.
+    /// What finding the pixels and drawing them took, of all queries on screen.
     paint_ms: StagesMs,
 }
 
@@ -107,34 +104,34 @@ pub struct Questions {
 #[derive(Default)]
 struct Areas {
     /// View, objects and match that they were counted for.
-    of: (usize, usize, MatchMode, u32),
+    of: (u64, u64, MatchMode, u32),
     known: BTreeMap<IdentityId, usize>,
 }
 
-impl Questions {
-    /// All questions, the one being typed last.
+impl Queries {
+    /// All queries, the one being typed last.
     pub fn all(&self) -> impl Iterator<Item = &Asked> {
         self.kept.iter().chain(&self.live)
     }
 
     /// The identities that are found on screen.
     pub fn found(&self) -> Vec<IdentityId> {
-        self.all().flat_map(|asked| asked.shown(&self.look)).collect()
+        self.all().flat_map(|asked| asked.shown(&self.settings)).collect()
     }
 
     /// What the present view's pixels belong to, once that is drawn.
-    pub fn maps(&self) -> Option<&Arc<ViewMaps>> {
+    pub fn maps(&self) -> Option<&Versioned<ViewMaps>> {
         self.maps.as_ref()
     }
 
-    /// Whether anything was asked in this scene, or begun to be: what questions need is needed now.
+    /// Whether anything was asked in this scene, or begun to be: what queries need is needed now.
     pub fn wanted(&self) -> bool {
         self.wanted
     }
 
     /// Whether blended codes of the view are wanted.
     pub fn wants_codes(&self) -> bool {
-        self.look.mode == MatchMode::Blend || self.look.tint == Tint::Difference
+        self.settings.mode == MatchMode::Blend || self.settings.color_by == ColorBy::Difference
     }
 
     /// Puts the cursor into the box.
@@ -142,13 +139,15 @@ impl Questions {
         (self.focus, self.wanted) = (true, true);
     }
 
-    /// Answers anew where objects and parts, or what understands phrases, have changed.
-    pub fn keep_up(&mut self, ctx: &egui::Context, semantics: &Arc<SemanticMap>, plan: &ScenePlan) {
+    /// Answers anew where objects and parts, or embeddings, have changed.
+    pub fn keep_up(&mut self, ctx: &egui::Context, semantics: &Versioned<SemanticMap>, plan: &ScenePlan) {
         let encoder = semantics.language.as_ref().map(|l| l.encoder.as_str());
-        let now = Arc::as_ptr(semantics) as usize;
-        // One that is of no more use goes at once, one that is new waits for a question.
-        let speaks = (encoder.is_none() || plan.encoder.now(self.wanted)) && self.speech.keep_up(ctx, encoder);
-        if speaks || self.answered_for != now {
+        let now = semantics.generation();
+        // One that is of no more use goes at once, one that is new waits for a query.
+        let texts: Vec<String> = self.all().map(|q| q.text.clone()).collect();
+        let encoded =
+            (encoder.is_none() || plan.encoder.now(self.wanted)) && self.embeddings.keep_up(ctx, encoder, texts);
+        if encoded || self.answered_for != now {
             self.answered_for = now;
             self.ask_again(semantics);
         }
@@ -161,7 +160,7 @@ impl Questions {
         self.live = self.asked(text, semantics);
     }
 
-    /// Shows the answers to these questions, and no others.
+    /// Shows the answers to these queries, and no others.
     pub fn mark(&mut self, texts: &[String], semantics: &SemanticMap) {
         self.typed.clear();
         self.wanted = true;
@@ -173,43 +172,41 @@ impl Questions {
         }
     }
 
-    /// Answers all questions anew: identities have changed.
+    /// Answers all queries anew: identities have changed.
     pub fn ask_again(&mut self, semantics: &SemanticMap) {
         let texts: Vec<String> = self.kept.iter().map(|q| q.text.clone()).collect();
         self.kept = texts.iter().filter_map(|text| self.asked(text, semantics)).collect();
         self.live = self.live.take().and_then(|q| self.asked(&q.text, semantics));
     }
 
-    /// Forgets questions and answers: another scene.
+    /// Forgets queries and answers: another scene.
     pub fn clear(&mut self) {
         let history = std::mem::take(&mut self.history);
-        let speech = std::mem::take(&mut self.speech);
-        *self = Self { look: self.look, open: self.open, history, speech, ..Self::default() };
+        let embeddings = std::mem::take(&mut self.embeddings);
+        *self = Self { settings: self.settings, open: self.open, history, embeddings, ..Self::default() };
     }
 
     /// Takes over what the present view's pixels belong to; `None` while it is not known.
-    pub fn set_maps(&mut self, maps: Option<Arc<ViewMaps>>) {
+    pub fn set_maps(&mut self, maps: Option<Versioned<ViewMaps>>) {
         self.maps = maps;
-        // What was painted and counted for the view before may have had the same address.
-        (self.painted, self.areas) = (None, Areas::default());
     }
 
-    fn asked(&mut self, text: &str, semantics: &SemanticMap) -> Option<Asked> {
-        let start = Instant::now();
+    fn asked(&self, text: &str, semantics: &SemanticMap) -> Option<Asked> {
+        let text = text.trim();
         let phrase = Phrase::parse(text)?;
-        let phrases = self.speech.learn(&phrase);
-        let encode = ms_since(start);
-        let language = semantics.language.as_ref().zip(phrases);
+        let encoded = self.embeddings.of(text);
+        let language = semantics.language.as_ref().zip(self.embeddings.phrases(text));
         let language =
             language.map(|(features, phrases)| Language { features, phrases, options: MeaningOptions::default() });
-        let mut answered = answer(&semantics.identities, &phrase, self.look.kind, language);
-        answered.stages.encode = encode;
-        let to_encoder = self.speech.unknown_words(text);
-        let unknown = names::unknown_to_all(&semantics.identities, text, to_encoder.as_deref());
-        Some(Asked { text: text.trim().to_owned(), answered, chosen: None, unknown })
+        let mut answered = answer(&semantics.identities, &phrase, self.settings.kind, language);
+        answered.stages.encode = encoded.map_or(0.0, |t| t.encode_ms);
+        let to_encoder = encoded.map(|t| t.unknown.as_slice());
+        let unknown = names::unknown_to_all(&semantics.identities, text, to_encoder);
+        let pending = semantics.language.is_some() && self.embeddings.is_pending(text);
+        Some(Asked { text: text.to_owned(), answered, pending, chosen: None, unknown })
     }
 
-    /// Keeps the question being typed on screen, and makes room for the next.
+    /// Keeps the query being typed on screen, and makes room for the next.
     fn keep(&mut self) {
         let Some(live) = self.live.take() else { return };
         self.kept.retain(|q| q.text != live.text);
@@ -225,19 +222,19 @@ impl Questions {
 
     /// The target's pixels in the present view.
     fn mask_of(&self, maps: &ViewMaps, semantics: &SemanticMap, target: IdentityId) -> Mask {
-        match (&maps.codes, self.look.mode) {
+        match (&maps.codes, self.settings.mode) {
             (Some(codes), MatchMode::Blend) => {
-                matching::blend(codes, &semantics.identities, target, self.look.tolerance)
+                matching::blend(codes, &semantics.identities, target, self.settings.tolerance)
             }
-            _ => matching::exact(&maps.identities, &semantics.identities, target, self.look.tolerance),
+            _ => matching::exact(&maps.identities, &semantics.identities, target, self.settings.tolerance),
         }
     }
 
     /// Pixels of an identity in the present view, if that is drawn; counted once for a view.
-    fn area_of(&mut self, semantics: &SemanticMap, id: IdentityId) -> Option<usize> {
+    fn area_of(&mut self, semantics: &Versioned<SemanticMap>, id: IdentityId) -> Option<usize> {
         let maps = self.maps.clone()?;
-        let Look { mode, tolerance, .. } = self.look;
-        let of = (Arc::as_ptr(&maps) as usize, std::ptr::from_ref(semantics) as usize, mode, tolerance.to_bits());
+        let OverlaySettings { mode, tolerance, .. } = self.settings;
+        let of = (maps.generation(), semantics.generation(), mode, tolerance.to_bits());
         if self.areas.of != of {
             self.areas = Areas { of, known: BTreeMap::new() };
         }
@@ -249,22 +246,23 @@ impl Questions {
         Some(area)
     }
 
-    /// Masks and tints over the picture in `rect`.
-    pub fn paint(&mut self, ui: &Ui, rect: Rect, semantics: &Arc<SemanticMap>) {
+    /// Masks and tints over the frame in `rect`.
+    pub fn paint(&mut self, ui: &Ui, rect: Rect, semantics: &Versioned<SemanticMap>) {
         let Some(maps) = self.maps.clone() else { return };
-        let shown: Vec<Vec<IdentityId>> = self.all().map(|q| q.shown(&self.look)).collect();
+        let shown: Vec<Vec<IdentityId>> = self.all().map(|q| q.shown(&self.settings)).collect();
         let newest = self.all().last().map(|q| q.text.clone());
-        let nothing = shown.iter().all(Vec::is_empty) && matches!(self.look.tint, Tint::Masks | Tint::Heat);
-        if nothing && (newest.is_none() || self.look.tint == Tint::Masks) && self.look.threshold <= 0.0 {
+        let nothing =
+            shown.iter().all(Vec::is_empty) && matches!(self.settings.color_by, ColorBy::Masks | ColorBy::Heat);
+        if nothing && (newest.is_none() || self.settings.color_by == ColorBy::Masks) && self.settings.threshold <= 0.0 {
             (self.painted, self.paint_ms) = (None, StagesMs::default());
             return;
         }
         let painted = Painted {
-            map: Arc::as_ptr(&maps) as usize,
-            semantics: Arc::as_ptr(semantics) as usize,
+            maps: maps.generation(),
+            semantics: semantics.generation(),
             shown,
             newest,
-            look: self.look,
+            settings: self.settings,
         };
         if self.painted.as_ref() != Some(&painted) {
             let start = Instant::now();
@@ -294,8 +292,8 @@ impl Questions {
         self.paint_ms.mask = ms_since(start);
         let newest = self.all().last();
         let relevancy = newest.map_or_else(Vec::new, |q| q.answered.relevancy.clone());
-        let features = match (&semantics.language, self.look.tint) {
-            (Some(language), Tint::Features) => {
+        let features = match (&semantics.language, self.settings.color_by) {
+            (Some(language), ColorBy::Features) => {
                 let of = |f: &crate::scene::ViewFeatures| f.deviated.first().cloned();
                 let vectors: Vec<Option<Vec<f32>>> = std::iter::once(None).chain(language.of.iter().map(of)).collect();
                 overlay::main_directions(&vectors.iter().map(Option::as_deref).collect::<Vec<_>>())
@@ -310,67 +308,16 @@ impl Questions {
             masks: &masks,
             relevancy: &relevancy,
             features: &features,
-            look: self.look,
+            settings: self.settings,
         };
         layers.paint()
-    }
-
-    /// The box, the answers, and the questions that are kept.
-    pub fn show(
-        &mut self,
-        ui: &Ui,
-        rect: Rect,
-        semantics: &SemanticMap,
-        cloud: &GaussianCloud,
-        actions: &mut Vec<Action>,
-    ) {
-        // In the corner: what is looked for is mostly in the middle.
-        let mut at = Align2::RIGHT_TOP.pos_in_rect(&rect.shrink(12.0));
-        if rect.width() < BESIDE {
-            at.y += BELOW;
-        }
-        let area = Area::new(Id::unique("question")).order(Order::Middle).pivot(Align2::RIGHT_TOP).fixed_pos(at);
-        area.constrain_to(rect).show(ui.ctx(), |ui| {
-            theme::overlay().show(ui, |ui| {
-                // Beside the view's own buttons, as long as there is room.
-                ui.set_width((rect.width() - 410.0).clamp(300.0, 380.0).min(rect.width() - 40.0));
-                self.show_bar(ui, semantics);
-                if self.open {
-                    let heat = (!self.heat.is_empty()).then_some(self.heat.as_slice());
-                    if look::show(ui, &mut self.look, heat) {
-                        self.ask_again(semantics);
-                    }
-                }
-                self.show_answer(ui, semantics, cloud, actions);
-                self.show_kept(ui);
-            });
-        });
-        self.show_name_under_cursor(ui, rect, &semantics.identities);
-    }
-
-    fn show_name_under_cursor(&self, ui: &Ui, rect: Rect, identities: &Identities) {
-        let Some(maps) = &self.maps else { return };
-        let map = &maps.identities;
-        let Some(pos) = ui.input(|i| i.pointer.hover_pos()).filter(|p| rect.contains(*p)) else { return };
-        let x = ((pos.x - rect.left()) / rect.width() * map.width_px as f32) as usize;
-        let y = ((pos.y - rect.top()) / rect.height() * map.height_px as f32) as usize;
-        let id = map.identity.get(y * map.width_px + x.min(map.width_px - 1)).copied().unwrap_or(NOBODY);
-        if identities.get(id).is_none() {
-            return;
-        }
-        let at = Align2::CENTER_BOTTOM.pos_in_rect(&rect.shrink(12.0));
-        let area =
-            Area::new(Id::unique("under cursor")).order(Order::Middle).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
-        area.interactable(false).show(ui.ctx(), |ui| {
-            theme::overlay().show(ui, |ui| ui.label(identities.full_name(id)));
-        });
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Level;
+    use crate::scene::{Identities, Level, NOBODY};
 
     fn semantics() -> SemanticMap {
         let mut identities = Identities::default();
@@ -381,30 +328,30 @@ mod tests {
 
     #[test]
     fn a_question_is_kept_and_answers_follow_the_names() {
-        let (mut semantics, mut questions) = (semantics(), Questions::default());
-        questions.ask("the lamp's shade", &semantics);
-        questions.keep();
-        questions.ask("lamp", &semantics);
-        let shown = |q: &Questions| q.all().map(|a| a.shown(&q.look)).collect::<Vec<_>>();
-        assert_eq!(shown(&questions), [vec![2], vec![1]]);
-        questions.ask("giraffe", &semantics);
-        assert!(shown(&questions)[1].is_empty());
+        let (mut semantics, mut queries) = (semantics(), Queries::default());
+        queries.ask("the lamp's shade", &semantics);
+        queries.keep();
+        queries.ask("lamp", &semantics);
+        let shown = |q: &Queries| q.all().map(|a| a.shown(&q.settings)).collect::<Vec<_>>();
+        assert_eq!(shown(&queries), [vec![2], vec![1]]);
+        queries.ask("giraffe", &semantics);
+        assert!(shown(&queries)[1].is_empty());
         semantics.identities.get_mut(2).expect("there").names = vec!["giraffe".into()];
-        questions.ask_again(&semantics);
-        assert_eq!(shown(&questions), [Vec::new(), vec![2]]);
-        questions.ask("  ", &semantics);
-        assert!(questions.live.is_none());
+        queries.ask_again(&semantics);
+        assert_eq!(shown(&queries), [Vec::new(), vec![2]]);
+        queries.ask("  ", &semantics);
+        assert!(queries.live.is_none());
     }
 
     #[test]
     fn history_is_kept_once_each() {
-        let (semantics, mut questions) = (semantics(), Questions::default());
+        let (semantics, mut queries) = (semantics(), Queries::default());
         for text in ["lamp", "shade", "lamp"] {
-            questions.ask(text, &semantics);
-            questions.keep();
+            queries.ask(text, &semantics);
+            queries.keep();
         }
-        assert_eq!(questions.history, ["shade", "lamp"]);
-        questions.clear();
-        assert_eq!((questions.history.len(), questions.kept.len()), (2, 0));
+        assert_eq!(queries.history, ["shade", "lamp"]);
+        queries.clear();
+        assert_eq!((queries.history.len(), queries.kept.len()), (2, 0));
     }
 }

@@ -1,9 +1,9 @@
-//! The picture that lies over the view: outlines and fills of masks, and tints.
+//! The frame that lies over the view: outlines and fills of masks, and tints.
 
 use egui::{Color32, ColorImage};
 use rayon::prelude::*;
 
-use super::look::{Look, Tint};
+use super::settings::{ColorBy, OverlaySettings};
 use crate::math::grid::neighbours;
 use crate::math::vector::dot;
 use crate::pipeline::semantics::code_map::CodeMap;
@@ -14,7 +14,7 @@ use crate::scene::{Identities, IdentityId, Level, Mask};
 
 /// Opacity of a mask's fill.
 const FILL: f32 = 0.35;
-/// Around outlines: whatever colour is beside them, they stand out.
+/// Around outlines: whatever color is beside them, they stand out.
 const RIM: Color32 = Color32::from_black_alpha(170);
 /// Where blended codes differ.
 const DIFFERENT: [u8; 3] = [255, 60, 160];
@@ -27,23 +27,23 @@ pub struct Layers<'a> {
     pub codes: Option<&'a CodeMap>,
     /// Objects and parts.
     pub identities: &'a Identities,
-    /// Masks of the answers, with their colours; later ones on top.
+    /// Masks of the answers, with their colors; later ones on top.
     pub masks: &'a [([u8; 3], Mask)],
     /// Relevancy of each identity by number.
     pub relevancy: &'a [f32],
-    /// Colours of the language features of each identity by number.
+    /// Colors of the language features of each identity by number.
     pub features: &'a [[u8; 3]],
     /// Settings.
-    pub look: Look,
+    pub settings: OverlaySettings,
 }
 
 impl Layers<'_> {
-    /// All layers in one picture of the view's size.
+    /// All layers in one frame of the view's size.
     pub fn paint(&self) -> ColorImage {
         let (w, h) = (self.map.width_px, self.map.height_px);
         let tints: Vec<Option<[u8; 3]>> = (0..=self.identities.len() as IdentityId).map(|id| self.tint(id)).collect();
-        let hot: Option<Mask> = (self.look.threshold > 0.0)
-            .then(|| Mask::from_fn(w, h, |i| self.relevancy_of(self.map.identity[i]) >= self.look.threshold));
+        let hot: Option<Mask> = (self.settings.threshold > 0.0)
+            .then(|| Mask::from_fn(w, h, |i| self.relevancy_of(self.map.identity[i]) >= self.settings.threshold));
         let codes: Vec<_> = (0..=self.identities.len() as IdentityId).map(|id| self.identities.codes(id)).collect();
         let pixel = |i: usize| {
             if hot.as_ref().is_some_and(|m| is_edge(m, i)) {
@@ -52,17 +52,17 @@ impl Layers<'_> {
             let mask = self.masks.iter().rev().find(|(_, mask)| mask.contains(i));
             match mask {
                 Some(([r, g, b], mask)) if is_edge(mask, i) => Color32::from_rgb(*r, *g, *b),
-                Some((color, _)) if self.look.tint == Tint::Masks => with_alpha(*color, FILL),
+                Some((color, _)) if self.settings.color_by == ColorBy::Masks => with_alpha(*color, FILL),
                 None if self.masks.iter().any(|(_, mask)| is_beside(mask, i)) => RIM,
                 _ => {
                     let own = || tints.get(self.map.identity[i] as usize).copied().flatten();
-                    let tint = match self.look.tint {
-                        Tint::Difference => {
+                    let tint = match self.settings.color_by {
+                        ColorBy::Difference => {
                             codes.get(self.map.identity[i] as usize).and_then(|c| self.difference(i, c))
                         }
                         _ => self.blended(i).or_else(own),
                     };
-                    tint.map_or(Color32::TRANSPARENT, |c| with_alpha(c, self.look.opacity))
+                    tint.map_or(Color32::TRANSPARENT, |c| with_alpha(c, self.settings.opacity))
                 }
             }
         };
@@ -73,9 +73,11 @@ impl Layers<'_> {
         self.relevancy.get(id as usize).copied().unwrap_or(0.0)
     }
 
-    /// Colour of a pixel in the codes view while codes are blended.
+    /// Color of a pixel in the codes view while codes are blended.
     fn blended(&self, i: usize) -> Option<[u8; 3]> {
-        let codes = self.codes.filter(|_| self.look.tint == Tint::Codes && self.look.mode == MatchMode::Blend)?;
+        let codes = self
+            .codes
+            .filter(|_| self.settings.color_by == ColorBy::Codes && self.settings.mode == MatchMode::Blend)?;
         let of = |level: Level| codes.level(level).iter().map(move |plane| plane.get(i).copied().unwrap_or(f32::NAN));
         // A part where there is one, else the object.
         let part: Vec<f32> = of(Level::Part).collect();
@@ -84,24 +86,24 @@ impl Layers<'_> {
         shown.iter().all(|c| c.is_finite()).then(|| std::array::from_fn(|c| (shown[c].clamp(0.0, 1.0) * 255.0) as u8))
     }
 
-    /// Colour of a pixel whose blended codes are farther from those of its identity than matches may
+    /// Color of a pixel whose blended codes are farther from those of its identity than matches may
     /// be. Where nothing is, nothing differs.
     fn difference(&self, i: usize, own: &[f32; CODE_CHANNELS]) -> Option<[u8; 3]> {
         let blended = self.codes?.planes.iter().map(|plane| plane.get(i).copied().unwrap_or(f32::NAN));
-        let far = blended.zip(own).any(|(b, o)| (b - o).abs() > self.look.tolerance);
+        let far = blended.zip(own).any(|(b, o)| (b - o).abs() > self.settings.tolerance);
         far.then_some(DIFFERENT)
     }
 
-    /// Colour of what has this identity; `None` leaves the picture as it is.
+    /// Color of what has this identity; `None` leaves the frame as it is.
     fn tint(&self, id: IdentityId) -> Option<[u8; 3]> {
         let code = |id: IdentityId| self.identities.get(id).map(|i| i.code.map(|c| (c * 255.0) as u8));
-        match self.look.tint {
-            Tint::Masks | Tint::Difference => None,
-            Tint::Heat => Some(self.look.colormap.color(self.relevancy_of(id))),
-            Tint::Objects => code(self.identities.object_of(id)),
-            Tint::Parts => code(id).filter(|_| self.identities.get(id).is_some_and(|i| i.level == Level::Part)),
-            Tint::Codes => code(id),
-            Tint::Features => self.features.get(id as usize).copied().filter(|_| self.identities.get(id).is_some()),
+        match self.settings.color_by {
+            ColorBy::Masks | ColorBy::Difference => None,
+            ColorBy::Heat => Some(self.settings.colormap.color(self.relevancy_of(id))),
+            ColorBy::Objects => code(self.identities.object_of(id)),
+            ColorBy::Parts => code(id).filter(|_| self.identities.get(id).is_some_and(|i| i.level == Level::Part)),
+            ColorBy::Codes => code(id),
+            ColorBy::Features => self.features.get(id as usize).copied().filter(|_| self.identities.get(id).is_some()),
         }
     }
 }
@@ -110,18 +112,18 @@ fn with_alpha([r, g, b]: [u8; 3], alpha: f32) -> Color32 {
     Color32::from_rgba_unmultiplied(r, g, b, (alpha * 255.0) as u8)
 }
 
-/// Whether a pixel outside of the mask has a neighbour in it.
+/// Whether a pixel outside of the mask has a neighbor in it.
 fn is_beside(mask: &Mask, i: usize) -> bool {
     neighbours(i, mask.width_px(), mask.width_px() * mask.height_px()).any(|j| mask.contains(j))
 }
 
-/// Whether a pixel of the mask has a neighbour outside of it.
+/// Whether a pixel of the mask has a neighbor outside of it.
 fn is_edge(mask: &Mask, i: usize) -> bool {
     let (w, h) = (mask.width_px(), mask.height_px());
     mask.contains(i) && neighbours(i, w, w * h).any(|j| !mask.contains(j))
 }
 
-/// Colours of vectors by their three main directions (principal components), by number from 0; grey
+/// Colors of vectors by their three main directions (principal components), by number from 0; gray
 /// for those without one.
 pub fn main_directions(vectors: &[Option<&[f32]>]) -> Vec<[u8; 3]> {
     let some: Vec<&[f32]> = vectors.iter().flatten().copied().collect();
@@ -176,7 +178,7 @@ mod tests {
         (all, ViewMap { width_px: 6, height_px: 3, identity, share: vec![1.0; 18], alpha: vec![1.0; 18] })
     }
 
-    fn paint(look: Look) -> ColorImage {
+    fn paint(settings: OverlaySettings) -> ColorImage {
         let (identities, map) = scene();
         let masks = [([255, 179, 0], map.mask(&identities, 2))];
         let relevancy = [0.0, 0.5, 1.0];
@@ -187,14 +189,14 @@ mod tests {
             masks: &masks,
             relevancy: &relevancy,
             features: &[],
-            look,
+            settings,
         };
         layers.paint()
     }
 
     #[test]
     fn masks_have_an_outline_and_a_fill() {
-        let image = paint(Look::default());
+        let image = paint(OverlaySettings::default());
         assert_eq!((image.pixels[6], image.pixels[7]), (Color32::TRANSPARENT, RIM), "the rim");
         assert_eq!(image.pixels[8], Color32::from_rgb(255, 179, 0), "the outline");
         assert_eq!(image.pixels[9], Color32::from_rgba_unmultiplied(255, 179, 0, 89), "the fill");
@@ -202,10 +204,10 @@ mod tests {
 
     #[test]
     fn heat_and_threshold_follow_relevancy() {
-        let image = paint(Look { tint: Tint::Heat, opacity: 1.0, ..Look::default() });
+        let image = paint(OverlaySettings { color_by: ColorBy::Heat, opacity: 1.0, ..OverlaySettings::default() });
         let [r, g, b] = Colormap::Turbo.color(1.0);
         assert_eq!(image.pixels[9], Color32::from_rgb(r, g, b));
-        let image = paint(Look { threshold: 0.4, ..Look::default() });
+        let image = paint(OverlaySettings { threshold: 0.4, ..OverlaySettings::default() });
         assert_eq!(image.pixels[8], Color32::WHITE, "where it begins");
         assert_eq!(image.pixels[6], Color32::TRANSPARENT);
     }
@@ -220,7 +222,7 @@ mod tests {
         // One pixel of the shade is blended with something else; nothing is in the first.
         codes.planes[4][9] += 0.1;
         codes.planes[0][0] = f32::NAN;
-        let look = Look { tint: Tint::Difference, opacity: 1.0, ..Look::default() };
+        let settings = OverlaySettings { color_by: ColorBy::Difference, opacity: 1.0, ..OverlaySettings::default() };
         let layers = Layers {
             map: &map,
             codes: Some(&codes),
@@ -228,7 +230,7 @@ mod tests {
             masks: &[],
             relevancy: &[],
             features: &[],
-            look,
+            settings,
         };
         let [r, g, b] = DIFFERENT;
         let image = layers.paint();
@@ -237,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn alike_features_have_alike_colours() {
+    fn alike_features_have_alike_colors() {
         let v: [&[f32]; 4] = [&[1.0, 0.0, 0.0], &[0.98, 0.05, 0.0], &[0.0, 1.0, 0.0], &[0.0, 0.0, 1.0]];
         let colors = main_directions(&[None, Some(v[0]), Some(v[1]), Some(v[2]), Some(v[3])]);
         let far = |a: [u8; 3], b: [u8; 3]| a.iter().zip(b).map(|(a, b)| a.abs_diff(b) as u32).sum::<u32>();

@@ -1,11 +1,12 @@
-//! Where the time of a query went: a thin bar in the colours of its stages, with their numbers.
+//! Where the time of a query went: a thin bar in the colors of its stages, with their numbers.
 
 use egui::{Color32, Rect, RichText, Sense, Ui, pos2, vec2};
 
 use super::super::super::theme;
+use crate::math::format::millis;
 use crate::pipeline::semantics::stages::{STAGES, StagesMs};
 
-/// Colours of the stages, in their order.
+/// Colors of the stages, in their order.
 const COLORS: [Color32; 5] = [
     Color32::from_rgb(0x56, 0xb4, 0xe9),
     Color32::from_rgb(0xe6, 0x9f, 0x00),
@@ -14,12 +15,12 @@ const COLORS: [Color32; 5] = [
     Color32::from_rgb(0x9a, 0xa0, 0xac),
 ];
 
-/// What each stage is, for people.
+/// What each stage is, for the user.
 const MEANING: &str = "encode: the words become vectors; nothing to do where they were typed before\n\
     relevancy: every object and part is scored\n\
     localise: those that are meant are chosen\n\
     mask: their pixels in this view are found\n\
-    draw: the pixels become a picture";
+    draw: the pixels become an overlay";
 
 /// Draws the bar with its numbers.
 pub fn show(ui: &mut Ui, basis: &str, stages: &StagesMs) {
@@ -32,9 +33,9 @@ pub fn show(ui: &mut Ui, basis: &str, stages: &StagesMs) {
     let numbers = ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(6.0, 0.0);
         let small = |text: String, color| RichText::new(text).small().color(color);
-        ui.label(small(format!("{basis} in {}", millis(stages.whole())), theme::TEXT));
+        ui.label(small(format!("{basis} in {}", millis(stages.whole() / 1e3)), theme::TEXT));
         for (name, (color, ms)) in STAGES.into_iter().zip(COLORS.into_iter().zip(stages.values())) {
-            ui.label(small(format!("{name} {}", millis(ms)), color));
+            ui.label(small(format!("{name} {}", millis(ms / 1e3)), color));
         }
     });
     bar.union(numbers.response).on_hover_text(MEANING);
@@ -50,15 +51,6 @@ fn shares(stages: &StagesMs) -> [[f64; 2]; 5] {
     })
 }
 
-/// Milliseconds with the digits that count.
-fn millis(ms: f64) -> String {
-    match ms {
-        v if v < 0.1 => format!("{v:.3} ms"),
-        v if v < 10.0 => format!("{v:.2} ms"),
-        v => format!("{v:.0} ms"),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -70,6 +62,5 @@ mod tests {
         assert!(parts.windows(2).all(|p| p[0][1] == p[1][0]), "no gap");
         assert!((parts[4][1] - 1.0).abs() < 1e-12);
         assert_eq!(shares(&StagesMs::default()), [[0.0; 2]; 5]);
-        assert_eq!([0.01234, 1.234, 123.4].map(millis), ["0.012 ms", "1.23 ms", "123 ms"]);
     }
 }

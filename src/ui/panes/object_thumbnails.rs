@@ -1,4 +1,4 @@
-//! The portraits of objects and parts as one texture, asked for when they change.
+//! The thumbnails of objects and parts as one texture, asked for when they change.
 
 use std::cell::Cell;
 use std::sync::Arc;
@@ -10,12 +10,12 @@ use crate::pipeline::semantics::portraits::SIDE_PX;
 use crate::scene::{GaussianCloud, IdentityId, SemanticMap};
 use crate::worker::{Command, Worker};
 
-/// Portraits in a row of the texture.
+/// ObjectThumbnails in a row of the texture.
 const COLUMNS: usize = 16;
 
-/// Portraits of what is on screen.
+/// ObjectThumbnails of what is on screen.
 #[derive(Default)]
-pub struct Portraits {
+pub struct ObjectThumbnails {
     /// Whether any was to be shown since they were last looked after.
     used: Cell<bool>,
     /// What they were asked for.
@@ -24,7 +24,7 @@ pub struct Portraits {
     shown: Option<(Arc<SemanticMap>, TextureHandle, usize)>,
 }
 
-impl Portraits {
+impl ObjectThumbnails {
     /// Asks for them if objects and parts have changed, and takes them over once they are drawn.
     pub fn update(
         &mut self,
@@ -37,27 +37,27 @@ impl Portraits {
             *self = Self::default();
             return;
         };
-        let wanted = state.plan.portraits.now(self.used.take());
+        let wanted = state.plan.thumbnails.now(self.used.take());
         if wanted && self.asked.as_ref().is_none_or(|a| !Arc::ptr_eq(a, map)) && map.of.len() == cloud.len() {
             let command = Command::Portraits {
                 cloud: Arc::clone(cloud),
                 map: Arc::clone(map),
-                settings: state.drawing(),
+                settings: state.render_settings(),
                 home: scene.home.clone(),
             };
-            // With a full queue the wish comes again with the next event.
+            // With a full queue the request comes again with the next event.
             if worker.submit(command).is_ok() {
                 self.asked = Some(Arc::clone(map));
             }
         }
-        if let Some((of, pictures)) = state.portraits.take() {
+        if let Some((of, pictures)) = state.thumbnails.take() {
             let rows = pictures.len().div_ceil(COLUMNS).max(1);
-            let texture = ctx.load_texture("portraits", atlas(&pictures, rows), TextureOptions::LINEAR);
+            let texture = ctx.load_texture("object_thumbnails", atlas(&pictures, rows), TextureOptions::LINEAR);
             self.shown = Some((of, texture, rows));
         }
     }
 
-    /// Draws the portrait of an identity, `side` points wide; an empty place while there is none.
+    /// Draws the thumbnail of an identity, `side` points wide; an empty place while there is none.
     pub fn show(&self, ui: &mut Ui, id: IdentityId, side: f32) {
         self.used.set(true);
         let (rect, _) = ui.allocate_exact_size(vec2(side, side), egui::Sense::hover());
@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_portrait_has_its_place() {
+    fn every_thumbnail_has_its_place() {
         let of = |v: u8| Some(vec![[v; 3]; SIDE_PX * SIDE_PX]);
         let mut pictures = vec![None; 18];
         (pictures[0], pictures[17]) = (of(10), of(20));

@@ -1,6 +1,7 @@
-//! How answers are drawn: the settings below the question box, and the histogram of relevancy.
+//! How answers are drawn: the settings below the query box, and the histogram of relevancy.
 
 use egui::{Color32, ComboBox, Rect, Sense, Slider, Stroke, Ui, pos2, vec2};
+use strum::{IntoStaticStr, VariantArray};
 
 use super::super::super::theme;
 use crate::math::colormap::Colormap;
@@ -8,55 +9,45 @@ use crate::pipeline::semantics::codes::TOLERANCE;
 use crate::pipeline::semantics::grammar::Kind;
 use crate::pipeline::semantics::matching::MatchMode;
 
-/// What tints the picture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Tint {
+/// What tints the frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, VariantArray, IntoStaticStr)]
+pub enum ColorBy {
     /// Only the masks of the answers.
     #[default]
     Masks,
-    /// Relevancy for the newest question.
+    /// Relevancy for the newest query.
+    #[strum(serialize = "Relevancy")]
     Heat,
-    /// A colour per object.
+    /// A color per object.
     Objects,
-    /// A colour per part.
+    /// A color per part.
     Parts,
     /// The codes of the pixels, blended or exact.
     Codes,
     /// The three main directions of the language features.
     Features,
     /// Where blended codes mean something else than the winning identities.
+    #[strum(serialize = "Exact \u{2260} blended")]
     Difference,
 }
 
-impl Tint {
-    /// All of them.
-    pub const ALL: [Self; 7] =
-        [Self::Masks, Self::Heat, Self::Objects, Self::Parts, Self::Codes, Self::Features, Self::Difference];
-
+impl ColorBy {
     /// Its name.
     pub fn text(self) -> &'static str {
-        match self {
-            Self::Masks => "Masks",
-            Self::Heat => "Relevancy",
-            Self::Objects => "Objects",
-            Self::Parts => "Parts",
-            Self::Codes => "Codes",
-            Self::Features => "Features",
-            Self::Difference => "Exact \u{2260} blended",
-        }
+        self.into()
     }
 }
 
 /// How answers are found and drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Look {
-    /// What tints the picture.
-    pub tint: Tint,
-    /// Colours of relevancy.
+pub struct OverlaySettings {
+    /// What tints the frame.
+    pub color_by: ColorBy,
+    /// Colors of relevancy.
     pub colormap: Colormap,
     /// Opacity of the tint.
     pub opacity: f32,
-    /// Which level questions are about.
+    /// Which level queries are about.
     pub kind: Kind,
     /// Answers whose pixels are shown at most.
     pub top: usize,
@@ -68,10 +59,10 @@ pub struct Look {
     pub threshold: f32,
 }
 
-impl Default for Look {
+impl Default for OverlaySettings {
     fn default() -> Self {
         Self {
-            tint: Tint::Masks,
+            color_by: ColorBy::Masks,
             colormap: Colormap::Turbo,
             opacity: 0.6,
             kind: Kind::Auto,
@@ -84,94 +75,94 @@ impl Default for Look {
 }
 
 /// The settings. `heat` is the relevancy of the view's pixels, for the histogram. Whether the
-/// question has to be answered anew.
-pub fn show(ui: &mut Ui, look: &mut Look, heat: Option<&[f32]>) -> bool {
-    let kind = look.kind;
-    egui::Grid::new("look").num_columns(2).spacing(vec2(10.0, 5.0)).show(ui, |ui| {
-        ui.weak("Ask for");
+/// query has to be answered anew.
+pub fn show(ui: &mut Ui, settings: &mut OverlaySettings, heat: Option<&[f32]>) -> bool {
+    let kind = settings.kind;
+    egui::Grid::new("overlay settings").num_columns(2).spacing(vec2(10.0, 5.0)).show(ui, |ui| {
+        ui.weak("Level");
         ui.horizontal(|ui| {
-            for (kind, text) in [(Kind::Auto, "as worded"), (Kind::Object, "objects"), (Kind::Part, "parts")] {
-                ui.selectable_value(&mut look.kind, kind, text);
+            for (kind, text) in [(Kind::Auto, "from the query"), (Kind::Object, "objects"), (Kind::Part, "parts")] {
+                ui.selectable_value(&mut settings.kind, kind, text);
             }
         });
         ui.end_row();
-        ui.weak("Best answers");
-        ui.add(Slider::new(&mut look.top, 1..=8)).on_hover_text("How many of the answers are outlined at once");
+        ui.weak("Top answers");
+        ui.add(Slider::new(&mut settings.top, 1..=8)).on_hover_text("How many answers are outlined at once");
         ui.end_row();
-        ui.weak("Colour by");
+        ui.weak("Color by");
         ui.horizontal(|ui| {
-            ComboBox::from_id_salt("tint").selected_text(look.tint.text()).width(112.0).show_ui(ui, |ui| {
-                for tint in Tint::ALL {
-                    ui.selectable_value(&mut look.tint, tint, tint.text());
+            ComboBox::from_id_salt("color by").selected_text(settings.color_by.text()).width(112.0).show_ui(ui, |ui| {
+                for &tint in ColorBy::VARIANTS {
+                    ui.selectable_value(&mut settings.color_by, tint, tint.text());
                 }
             });
-            ComboBox::from_id_salt("colours").selected_text(look.colormap.text()).width(70.0).show_ui(ui, |ui| {
-                for map in Colormap::ALL {
-                    ui.selectable_value(&mut look.colormap, map, map.text());
+            ComboBox::from_id_salt("colormap").selected_text(settings.colormap.text()).width(70.0).show_ui(ui, |ui| {
+                for &map in Colormap::VARIANTS {
+                    ui.selectable_value(&mut settings.colormap, map, map.text());
                 }
             });
         });
         ui.end_row();
         ui.weak("Opacity");
-        ui.add(Slider::new(&mut look.opacity, 0.0..=1.0).fixed_decimals(2));
+        ui.add(Slider::new(&mut settings.opacity, 0.0..=1.0).fixed_decimals(2));
         ui.end_row();
         ui.weak("Mask");
         ui.horizontal(|ui| {
-            ui.selectable_value(&mut look.mode, MatchMode::Exact, "exact")
+            ui.selectable_value(&mut settings.mode, MatchMode::Exact, "exact")
                 .on_hover_text("Pixels of the identity with the largest weight");
-            ui.selectable_value(&mut look.mode, MatchMode::Blend, "blended")
+            ui.selectable_value(&mut settings.mode, MatchMode::Blend, "blended")
                 .on_hover_text("Pixels whose alpha-blended code lies within the tolerance, as in the paper");
         });
         ui.end_row();
         ui.weak("Tolerance");
-        let mut steps = look.tolerance * 255.0;
+        let mut steps = settings.tolerance * 255.0;
         let slider = Slider::new(&mut steps, 0.0..=64.0).fixed_decimals(0).suffix(" / 255");
         if ui.add(slider).on_hover_text("Largest difference per channel from the target's code").changed() {
-            look.tolerance = steps / 255.0;
+            settings.tolerance = steps / 255.0;
         }
         ui.end_row();
     });
     if let Some(heat) = heat {
-        histogram(ui, look, heat);
+        histogram(ui, settings, heat);
     }
-    look.kind != kind
+    settings.kind != kind
 }
 
 /// Bins of the histogram.
 const BINS: usize = 64;
 
 /// How many pixels have which relevancy, with the threshold as a line to drag.
-fn histogram(ui: &mut Ui, look: &mut Look, heat: &[f32]) {
+fn histogram(ui: &mut Ui, settings: &mut OverlaySettings, heat: &[f32]) {
     let mut counts = [0_u32; BINS];
     heat.iter().for_each(|h| counts[((h * BINS as f32) as usize).min(BINS - 1)] += 1);
     ui.horizontal(|ui| {
         ui.weak("Relevancy of the pixels");
-        if look.threshold > 0.0 {
-            let above = heat.iter().filter(|h| **h >= look.threshold).count();
-            ui.weak(format!("· {above} px from {:.2} on, outlined in white", look.threshold));
+        if settings.threshold > 0.0 {
+            let above = heat.iter().filter(|h| **h >= settings.threshold).count();
+            ui.weak(format!("· {above} px at {:.2} or more, outlined in white", settings.threshold));
         }
     });
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 54.0), Sense::click_and_drag());
-    let response = response.on_hover_text("Drag: outline all pixels from this relevancy on. Double-click: none");
+    let response = response.on_hover_text("Drag: outline all pixels of at least this relevancy. Double-click: none");
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect, 3.0, theme::CANVAS);
-    // Logarithmic: most pixels have nothing to do with a question.
+    // Logarithmic: most pixels have nothing to do with a query.
     let height = |n: u32| (1.0 + n as f32).ln() / (1.0 + heat.len() as f32).ln() * rect.height();
     let width = rect.width() / BINS as f32;
     for (i, &n) in counts.iter().enumerate() {
-        let [r, g, b] = look.colormap.color((i as f32 + 0.5) / BINS as f32);
+        let [r, g, b] = settings.colormap.color((i as f32 + 0.5) / BINS as f32);
         let left = rect.left() + i as f32 * width;
         let bar = Rect::from_min_max(pos2(left, rect.bottom() - height(n)), pos2(left + width - 1.0, rect.bottom()));
         painter.rect_filled(bar, 0.0, Color32::from_rgb(r, g, b));
     }
     if let Some(pos) = response.interact_pointer_pos() {
-        look.threshold = ((pos.x - rect.left()) / rect.width()).clamp(0.0, 1.0);
+        settings.threshold = ((pos.x - rect.left()) / rect.width()).clamp(0.0, 1.0);
     }
     if response.double_clicked() {
-        look.threshold = 0.0;
+        settings.threshold = 0.0;
     }
-    if look.threshold > 0.0 {
-        let x = rect.left() + look.threshold * rect.width();
+    if settings.threshold > 0.0 {
+        let x = rect.left() + settings.threshold * rect.width();
         painter.vline(x, rect.y_range(), Stroke::new(1.5, Color32::WHITE));
     }
 }

@@ -1,12 +1,37 @@
-//! From a rendered frame to the pixels of a view mode.
+//! What the viewport shows, and how a rendered frame becomes its pixels.
 
-use super::action::ViewMode;
+use serde::{Deserialize, Serialize};
+use strum::{IntoStaticStr, VariantArray};
+
 use crate::math::colormap::Colormap;
 use crate::math::resize::nearest;
 use crate::math::stats::quantile;
 use crate::pipeline::metrics;
 use crate::render::Frame;
 use crate::scene::PhotoPixels;
+
+/// What the viewport shows, in the order of the toolbar.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, VariantArray, IntoStaticStr)]
+pub enum ViewMode {
+    /// The rendered image; stored layouts of earlier versions call it a frame.
+    #[default]
+    #[serde(alias = "Picture")]
+    #[strum(serialize = "RGB")]
+    Rgb,
+    /// Expected depth, turbo colors from near to far.
+    Depth,
+    /// Accumulated opacity.
+    Alpha,
+    /// Absolute difference from the photo.
+    Difference,
+}
+
+impl ViewMode {
+    /// Its name.
+    pub fn text(self) -> &'static str {
+        self.into()
+    }
+}
 
 /// How many times the difference from the photo is amplified, so that an error of 1/4 is white.
 pub const DIFFERENCE_GAIN: u16 = 4;
@@ -20,7 +45,7 @@ pub(super) struct Drawn {
 }
 
 /// Turns a frame into pixels. A photo of another size than the frame is sampled at the pixels'
-/// centres.
+/// centers.
 pub(super) fn paint(frame: &Frame<f32>, mode: ViewMode, photo: Option<&PhotoPixels>) -> Drawn {
     let photo = photo.filter(|p| p.len() == p.width_px as usize * p.height_px as usize && !p.is_empty());
     let rgb = || frame.to_rgb8();
@@ -37,7 +62,7 @@ pub(super) fn paint(frame: &Frame<f32>, mode: ViewMode, photo: Option<&PhotoPixe
             Drawn { rgb, depth_range: None, psnr }
         }
         (ViewMode::Difference, Some(p)) => Drawn { rgb: difference(frame, p), depth_range: None, psnr },
-        (ViewMode::Picture | ViewMode::Difference, _) => Drawn { rgb: rgb(), depth_range: None, psnr },
+        (ViewMode::Rgb | ViewMode::Difference, _) => Drawn { rgb: rgb(), depth_range: None, psnr },
     }
 }
 
@@ -95,7 +120,7 @@ mod tests {
         assert_eq!(drawn.rgb, vec![[40; 3], [40; 3], [0; 3], [40; 3]]);
         let psnr = drawn.psnr.expect("they differ");
         assert!((psnr - 20.0 * 25.5_f64.log10()).abs() < 1e-9, "{psnr}");
-        assert_eq!(paint(&frame(0.0), ViewMode::Picture, Some(&photo(0, None))).psnr, None);
+        assert_eq!(paint(&frame(0.0), ViewMode::Rgb, Some(&photo(0, None))).psnr, None);
     }
 
     #[test]

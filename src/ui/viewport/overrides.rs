@@ -1,12 +1,13 @@
-//! Drawing settings that a person chose for the view, in place of the scene's own.
+//! Render settings that a user chose for the view, in place of the scene's own.
 
 use serde::{Deserialize, Serialize};
 
+use crate::math::format::share;
 use crate::render::{Cutoffs, RenderSettings};
 
 /// What is drawn in another way than the scene says; its names are those of the settings.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Drawing {
+pub struct RenderOverrides {
     /// Highest spherical-harmonics degree.
     pub sh_degree: Option<u8>,
     /// The 2-D filter of Mip-Splatting.
@@ -15,7 +16,7 @@ pub struct Drawing {
     pub cutoffs: Option<Cutoffs>,
 }
 
-impl Drawing {
+impl RenderOverrides {
     /// These settings over others. A GPU has its own cut-offs and keeps to them.
     pub fn over(&self, settings: RenderSettings, on_gpu: bool) -> RenderSettings {
         RenderSettings {
@@ -26,34 +27,25 @@ impl Drawing {
         }
     }
 
-    /// Why these settings make no picture, if they do not.
+    /// Why these settings make no frame, if they do not.
     pub fn problem(&self) -> Option<&'static str> {
         let share = |v: f64| (1e-9..1.0).contains(&v);
         match self {
-            Self { sh_degree: Some(4..), .. } => Some("there is no such degree of the colours"),
+            Self { sh_degree: Some(4..), .. } => Some("there is no such spherical-harmonics degree"),
             Self { cutoffs: Some(c), .. } if !share(c.alpha) || !share(c.transmittance) => {
-                Some("cut-offs lie between 0 and 1")
+                Some("cutoffs lie between 0 and 1")
             }
             _ => None,
         }
     }
 
-    /// What is different, for people; `None` if nothing is.
+    /// What is different, for the user; `None` if nothing is.
     pub fn words(&self) -> Option<String> {
         let degree = self.sh_degree.map(|d| format!("SH degree {d}"));
         let filter = self.antialias.map(|on| format!("filter {}", if on { "on" } else { "off" }));
-        let cutoffs = self.cutoffs.map(|c| format!("cut-offs {} and {}", share(c.alpha), share(c.transmittance)));
+        let cutoffs = self.cutoffs.map(|c| format!("cutoffs {} and {}", share(c.alpha), share(c.transmittance)));
         let all: Vec<String> = degree.into_iter().chain(filter).chain(cutoffs).collect();
         (!all.is_empty()).then(|| all.join(", "))
-    }
-}
-
-/// A share as people write it: "1/255", "0.0001".
-pub fn share(v: f64) -> String {
-    let whole = (1.0 / v).round();
-    match (1.0 / v - whole).abs() < 1e-6 && whole < 9_999.0 {
-        true => format!("1/{whole}"),
-        false => format!("{v:.0e}"),
     }
 }
 
@@ -64,21 +56,24 @@ mod tests {
     #[test]
     fn only_what_was_chosen_differs() {
         let scene = RenderSettings { sh_degree: 2, near: 0.5, ..RenderSettings::default() };
-        assert_eq!(Drawing::default().over(scene.clone(), false), scene);
+        assert_eq!(RenderOverrides::default().over(scene.clone(), false), scene);
         let cutoffs = Cutoffs { alpha: 1.0 / 64.0, transmittance: 1e-4 };
-        let chosen = Drawing { sh_degree: Some(1), cutoffs: Some(cutoffs), ..Drawing::default() };
+        let chosen = RenderOverrides { sh_degree: Some(1), cutoffs: Some(cutoffs), ..RenderOverrides::default() };
         let drawn = chosen.over(scene.clone(), false);
         assert_eq!((drawn.sh_degree, drawn.cutoffs, drawn.near), (1, cutoffs, 0.5));
         assert_eq!(chosen.over(scene.clone(), true).cutoffs, scene.cutoffs, "a GPU would refuse them");
-        assert_eq!(chosen.words().expect("differs"), "SH degree 1, cut-offs 1/64 and 1e-4");
-        assert!(Drawing::default().words().is_none());
+        assert_eq!(chosen.words().expect("differs"), "SH degree 1, cutoffs 1/64 and 1e-4");
+        assert!(RenderOverrides::default().words().is_none());
     }
 
     #[test]
     fn impossible_settings_are_refused() {
-        let with = |alpha| Drawing { cutoffs: Some(Cutoffs { alpha, transmittance: 1e-4 }), ..Drawing::default() };
-        assert!(with(0.01).problem().is_none() && Drawing::default().problem().is_none());
+        let with = |alpha| RenderOverrides {
+            cutoffs: Some(Cutoffs { alpha, transmittance: 1e-4 }),
+            ..RenderOverrides::default()
+        };
+        assert!(with(0.01).problem().is_none() && RenderOverrides::default().problem().is_none());
         assert!([0.0, -1.0, 1.0, f64::NAN].into_iter().all(|alpha| with(alpha).problem().is_some()));
-        assert!(Drawing { sh_degree: Some(9), ..Drawing::default() }.problem().is_some());
+        assert!(RenderOverrides { sh_degree: Some(9), ..RenderOverrides::default() }.problem().is_some());
     }
 }

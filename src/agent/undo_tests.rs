@@ -1,0 +1,62 @@
+//! What the agent takes back, beside what the user does in the meantime.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
+
+use glam::{DMat3, DVec3};
+
+use super::scene::{Effect, Parts, SceneWorld};
+use super::world::World;
+use crate::navigate::Pose;
+use crate::render::RenderSettings;
+use crate::scene::{GaussianCloud, Identities, Level, NOBODY, SemanticMap};
+
+const EYE: Pose = Pose { center: DVec3::ZERO, world_from_camera: DMat3::IDENTITY, fov_y_rad: 0.8 };
+
+/// A lamp, called this by the window.
+fn map(name: Option<&str>) -> Arc<SemanticMap> {
+    let mut identities = Identities::default();
+    let lamp = identities.add(Level::Object, NOBODY, vec!["lamp".into()]);
+    name.into_iter().for_each(|name| identities.rename(lamp, name));
+    Arc::new(SemanticMap { identities, ..SemanticMap::default() })
+}
+
+/// A world in which the lamp was called a torch, and what was said of it.
+fn renamed() -> (SceneWorld, Arc<Mutex<Vec<Effect>>>) {
+    let effects = Arc::new(Mutex::new(Vec::new()));
+    let parts = Parts {
+        cloud: Arc::new(GaussianCloud::default()),
+        settings: RenderSettings::default(),
+        map: map(None),
+        cameras: Vec::new(),
+        up: DVec3::Z,
+        metres: None,
+        exports: PathBuf::new(),
+        explored: None,
+    };
+    let said = Arc::clone(&effects);
+    let tell = Box::new(move |effect| said.lock().expect("no panic").push(effect));
+    let mut world = SceneWorld::new(parts, EYE, 1.0, tell).expect("no encoder is needed");
+    world.rename(1, "torch").expect("it is there");
+    (world, effects)
+}
+
+#[test]
+fn a_rename_is_undone_as_one_step_of_the_window() {
+    let (mut world, effects) = renamed();
+    // The window has carried the rename out: the same names in another map.
+    world.keep_up(EYE, 1.0, &[], &map(Some("torch")));
+    world.undo().expect("there is something to undo");
+    assert_eq!(world.identities().name(1), "lamp");
+    let effects = effects.lock().expect("no panic");
+    assert!(matches!(&effects[0], Effect::Renamed(1, name) if name == "torch"), "{effects:?}");
+    assert!(matches!(&effects[1], Effect::RenameUndone(1, name) if name == "lamp"), "{effects:?}");
+}
+
+#[test]
+fn what_the_user_has_edited_since_is_not_undone() {
+    let (mut world, effects) = renamed();
+    world.keep_up(EYE, 1.0, &[], &map(Some("sun")));
+    assert!(world.undo().is_err());
+    assert_eq!((world.identities().name(1).as_str(), effects.lock().expect("no panic").len()), ("sun", 1));
+}

@@ -1,0 +1,159 @@
+//! Numbers as a person reads them: one form per quantity, in the window, on the command line and in reports.
+
+/// What stands where there is no number.
+pub const NONE: &str = "–";
+
+/// A whole number with thousands separators.
+pub fn count(n: u64) -> String {
+    let digits = n.to_string();
+    let mut out = String::with_capacity(digits.len() + digits.len() / 3);
+    for (i, c) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(c);
+    }
+    out
+}
+
+/// "3 parts", "1 part".
+pub fn things(n: usize, what: &str) -> String {
+    format!("{} {what}{}", count(n as u64), if n == 1 { "" } else { "s" })
+}
+
+/// Bytes in decimal units: "12 MB".
+pub fn bytes(n: u64) -> String {
+    match n {
+        0..1_000 => format!("{n} B"),
+        1_000..1_000_000 => format!("{:.0} kB", n as f64 / 1e3),
+        1_000_000..1_000_000_000 => format!("{:.0} MB", n as f64 / 1e6),
+        _ => format!("{:.1} GB", n as f64 / 1e9),
+    }
+}
+
+/// A time that passes while one waits: "8 s", "2:05", "1:02:05".
+pub fn duration(secs: f64) -> String {
+    if !secs.is_finite() || secs < 0.0 {
+        return NONE.into();
+    }
+    let s = secs.round() as u64;
+    match (s / 3600, (s / 60) % 60, s % 60) {
+        (0, 0, s) => format!("{s} s"),
+        (0, m, s) => format!("{m}:{s:02}"),
+        (h, m, s) => format!("{h}:{m:02}:{s:02}"),
+    }
+}
+
+/// A measured time with four significant digits: "3.200 ms".
+pub fn seconds(secs: f64) -> String {
+    match secs {
+        s if !(s > 0.0) => "0".into(),
+        s if s < 1e-3 => format!("{} \u{b5}s", number(s * 1e6)),
+        s if s < 1.0 => format!("{} ms", number(s * 1e3)),
+        s => format!("{} s", number(s)),
+    }
+}
+
+/// The time of a frame or of a step of a query: "12 ms", "1.23 ms".
+pub fn millis(secs: f64) -> String {
+    match secs * 1e3 {
+        ms if ms < 0.1 => format!("{ms:.3} ms"),
+        ms if ms < 10.0 => format!("{ms:.2} ms"),
+        ms => format!("{ms:.0} ms"),
+    }
+}
+
+/// A rate with three digits and its unit: "12.3 steps/s".
+pub fn rate(per_sec: f64, unit: &str) -> String {
+    match per_sec {
+        r if !r.is_finite() || r <= 0.0 => NONE.into(),
+        r if r < 10.0 => format!("{r:.2} {unit}/s"),
+        r if r < 100.0 => format!("{r:.1} {unit}/s"),
+        r => format!("{} {unit}/s", count(r.round() as u64)),
+    }
+}
+
+/// A PSNR: "23.41 dB".
+pub fn decibel(db: f64) -> String {
+    if db.is_finite() { format!("{db:.2} dB") } else { NONE.into() }
+}
+
+/// A measured number with four significant digits, all of them written: columns line up.
+pub fn number(v: f64) -> String {
+    let size = v.abs();
+    match size {
+        _ if v == 0.0 => "0".into(),
+        1e-3..1e4 => {
+            let decimals = (3 - size.log10().floor() as i32).clamp(0, 6) as usize;
+            format!("{v:.decimals$}")
+        }
+        _ => format!("{v:.2e}"),
+    }
+}
+
+/// A number within a sentence: at most three decimals, none of them needless.
+pub fn short(v: f64) -> String {
+    let text = format!("{v:.3}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+/// A number of an axis: at most four significant digits, none of them needless.
+pub fn tick(v: f64) -> String {
+    match v.abs() {
+        a if (1e-3..1e5).contains(&a) => format!("{}", significant(v)),
+        _ => format!("{:e}", significant(v)),
+    }
+}
+
+/// Seconds of an axis.
+pub fn tick_secs(secs: f64) -> String {
+    match secs {
+        s if s < 0.999e-3 => format!("{} \u{b5}s", significant(s * 1e6)),
+        s if s < 0.999 => format!("{} ms", significant(s * 1e3)),
+        s => format!("{} s", significant(s)),
+    }
+}
+
+/// Four significant digits; logarithms and back leave more.
+fn significant(v: f64) -> f64 {
+    format!("{v:.3e}").parse().unwrap_or(v)
+}
+
+/// A share as it is written in the field: "1/255", "1e-4".
+pub fn share(v: f64) -> String {
+    let whole = (1.0 / v).round();
+    match (1.0 / v - whole).abs() < 1e-6 && whole < 9_999.0 {
+        true => format!("1/{whole}"),
+        false => format!("{v:.0e}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn durations_and_rates() {
+        assert_eq!([8.4, 125.0, 3725.0, f64::NAN].map(duration), ["8 s", "2:05", "1:02:05", "–"]);
+        assert_eq!([12.345, 1234.0, 0.0].map(|r| rate(r, "steps")), ["12.3 steps/s", "1,234 steps/s", "–"]);
+        assert_eq!([1.234e-5, 1.234e-3, 0.1234].map(millis), ["0.012 ms", "1.23 ms", "123 ms"]);
+        assert_eq!([23.412, f64::INFINITY].map(decibel), ["23.41 dB", "–"]);
+    }
+
+    #[test]
+    fn counts_and_sizes() {
+        assert_eq!([7, 1_000, 1_234_567].map(count), ["7", "1,000", "1,234,567"]);
+        assert_eq!([999, 1_500, 2_000_000, 3_500_000_000].map(bytes), ["999 B", "2 kB", "2 MB", "3.5 GB"]);
+        assert_eq!([1, 2].map(|n| things(n, "part")), ["1 part", "2 parts"]);
+    }
+
+    #[test]
+    fn numbers_are_short() {
+        assert_eq!([0.0, 0.123456, 12.3456, 12345.6, 1e-9].map(number), ["0", "0.1235", "12.35", "1.23e4", "1.00e-9"]);
+        assert_eq!([0.0, 2.5e-6, 0.0123, 12.0].map(seconds), ["0", "2.500 \u{b5}s", "12.30 ms", "12.00 s"]);
+        assert_eq!([1.0, 0.1234, 12.5].map(short), ["1", "0.123", "12.5"]);
+        assert_eq!([0.1, 1e-5, 30.0 + 1e-12].map(tick), ["0.1", "1e-5", "30"]);
+        assert_eq!([1e-3, 2e-6, 5.0].map(tick_secs), ["1 ms", "2 \u{b5}s", "5 s"]);
+        assert_eq!([1.0 / 255.0, 1e-4].map(share), ["1/255", "1e-4"]);
+    }
+}

@@ -1,0 +1,111 @@
+//! Earlier and later states of something that a user changes: undo and redo.
+
+/// States that are kept at most.
+const MOST: usize = 200;
+
+/// Undo and redo of a value that lives elsewhere.
+#[derive(Clone, Debug)]
+pub struct UndoHistory<T> {
+    past: Vec<T>,
+    future: Vec<T>,
+}
+
+impl<T> Default for UndoHistory<T> {
+    fn default() -> Self {
+        Self { past: Vec::new(), future: Vec::new() }
+    }
+}
+
+impl<T> UndoHistory<T> {
+    /// Takes in how it was before a change. What could be redone is gone.
+    pub fn record(&mut self, before: T) {
+        self.future.clear();
+        self.past.push(before);
+        if self.past.len() > MOST {
+            self.past.remove(0);
+        }
+    }
+
+    /// What undoing brings back.
+    pub fn last(&self) -> Option<&T> {
+        self.past.last()
+    }
+
+    /// What redoing brings back.
+    pub fn next(&self) -> Option<&T> {
+        self.future.last()
+    }
+
+    /// Exchanges `now` for the state before it. Whether there is one.
+    pub fn undo(&mut self, now: &mut T) -> bool {
+        Self::step(&mut self.past, &mut self.future, now)
+    }
+
+    /// Exchanges `now` for the state that was undone last. Whether there is one.
+    pub fn redo(&mut self, now: &mut T) -> bool {
+        Self::step(&mut self.future, &mut self.past, now)
+    }
+
+    /// Takes the state before out: what is undone cannot be redone.
+    pub fn take(&mut self) -> Option<T> {
+        self.past.pop()
+    }
+
+    /// Takes in that `old` has given way to a state that [`Self::last`] or [`Self::next`] may be, as `is_it` says:
+    /// then this was an undo or a redo, else a change.
+    pub fn replaced(&mut self, mut old: T, is_it: impl Fn(&T) -> bool) {
+        if self.last().is_some_and(&is_it) {
+            self.undo(&mut old);
+        } else if self.next().is_some_and(&is_it) {
+            self.redo(&mut old);
+        } else {
+            self.record(old);
+        }
+    }
+
+    fn step(from: &mut Vec<T>, to: &mut Vec<T>, now: &mut T) -> bool {
+        let Some(other) = from.pop() else { return false };
+        to.push(std::mem::replace(now, other));
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn changes_are_undone_and_redone_in_order() {
+        let (mut history, mut now) = (UndoHistory::default(), 0);
+        assert!(!history.undo(&mut now) && !history.redo(&mut now));
+        for next in 1..=3 {
+            history.record(std::mem::replace(&mut now, next));
+        }
+        assert!(history.undo(&mut now) && history.undo(&mut now) && now == 1);
+        assert!(history.redo(&mut now) && now == 2);
+        assert_eq!((history.last(), history.next()), (Some(&1), Some(&3)));
+        history.record(std::mem::replace(&mut now, 9));
+        assert!(!history.redo(&mut now), "a change ends what could be redone");
+        assert!(history.undo(&mut now) && now == 2);
+        assert_eq!((history.take(), history.take(), history.take()), (Some(1), Some(0), None));
+    }
+
+    #[test]
+    fn states_that_come_back_are_no_changes() {
+        let mut history = UndoHistory::default();
+        history.replaced('a', |s| *s == 'b');
+        history.replaced('b', |s| *s == 'a');
+        assert_eq!((history.last(), history.next()), (None, Some(&'b')));
+        history.replaced('a', |s| *s == 'b');
+        assert_eq!((history.last(), history.next()), (Some(&'a'), None));
+        history.replaced('b', |s| *s == 'c');
+        assert_eq!((history.last(), history.next()), (Some(&'b'), None));
+    }
+
+    #[test]
+    fn it_is_bounded() {
+        let mut history = UndoHistory::default();
+        (0..3 * MOST).for_each(|i| history.record(i));
+        assert_eq!((history.past.len(), history.past[0]), (MOST, 2 * MOST));
+    }
+}

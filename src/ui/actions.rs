@@ -1,0 +1,300 @@
+//! What a user can do in the window: one table from which menus, command palette, shortcut sheet and key
+//! bindings are made. A row holds an action's name, one sentence on what it does, and its key if it has one.
+
+use std::path::PathBuf;
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+use strum::{IntoStaticStr, VariantArray};
+
+use crate::measure::{Knobs, StageName};
+use crate::navigate::target::Side;
+use crate::pipeline::semantics::edit::Edit;
+use crate::scene::{IdentityId, NOBODY};
+use crate::worker::{Start, ViewMode};
+
+/// A part of the window that can be hidden; the order is that of the menu.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, VariantArray, IntoStaticStr)]
+pub enum Pane {
+    /// Thumbnails and facts of the photos.
+    #[strum(serialize = "Photos")]
+    Dataset,
+    /// The conversation with the agent.
+    Chat,
+    /// Settings, progress and plots of training.
+    Training,
+    /// Objects and parts.
+    Objects,
+    /// What is left out for this scene, and why.
+    #[strum(serialize = "Scene plan")]
+    Plan,
+    /// Neural networks: which are installed, which are missing.
+    Models,
+    /// The camera's path.
+    #[strum(serialize = "Camera path")]
+    Camera,
+    /// Error against run time.
+    Report,
+    /// Messages.
+    Log,
+}
+
+impl Pane {
+    /// Its title.
+    pub fn text(self) -> &'static str {
+        self.into()
+    }
+}
+
+/// A direction of the world that can be upwards.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, VariantArray, IntoStaticStr)]
+pub enum Axis {
+    /// Along x.
+    #[strum(serialize = "+X")]
+    PlusX,
+    /// Against x.
+    #[strum(serialize = "-X")]
+    MinusX,
+    /// Along y.
+    #[strum(serialize = "+Y")]
+    PlusY,
+    /// Against y.
+    #[strum(serialize = "-Y")]
+    MinusY,
+    /// Along z.
+    #[strum(serialize = "+Z")]
+    PlusZ,
+    /// Against z.
+    #[strum(serialize = "-Z")]
+    MinusZ,
+}
+
+impl Axis {
+    /// Its name.
+    pub fn text(self) -> &'static str {
+        self.into()
+    }
+
+    /// Its unit vector.
+    pub fn vector(self) -> DVec3 {
+        let axis = [DVec3::X, DVec3::Y, DVec3::Z][self as usize / 2];
+        if (self as usize).is_multiple_of(2) { axis } else { -axis }
+    }
+}
+
+/// A key with modifiers. Keys are named as on the keyboard: "F", "Home", "F1", "[".
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Shortcut {
+    /// Control (Command on a Mac).
+    pub ctrl: bool,
+    /// The key's name.
+    pub key: &'static str,
+}
+
+macro_rules! actions {
+    (@plain $all:ident $name:ident) => {
+        $all.push(Self::$name);
+    };
+    (@plain $all:ident $name:ident ($($ty:ty),+)) => {};
+    ($($name:ident $(($($arg:ident: $ty:ty),+))?: $text:expr, $tip:literal $(, $key:literal)?;)*) => {
+        /// What a user wants.
+        #[derive(Clone, Debug, PartialEq, Eq)]
+        pub enum Action {
+            $(#[doc = $tip] $name $(($($ty),+))?,)*
+        }
+
+        impl Action {
+            /// Its name in menus and in the palette.
+            #[allow(unused_variables, clippy::useless_conversion)]
+            pub fn text(&self) -> String {
+                match self {
+                    $(Self::$name $(($($arg),+))? => String::from($text),)*
+                }
+            }
+
+            #[allow(unused_variables)]
+            fn row(&self) -> (&'static str, &'static str) {
+                match self {
+                    $(Self::$name $(($($arg),+))? => ($tip, concat!("" $(, $key)?)),)*
+                }
+            }
+
+            /// Those that need nothing else to be known, in the order of the table.
+            fn plain() -> Vec<Self> {
+                let mut all = Vec::new();
+                $(actions!(@plain all $name $(($($ty),+))?);)*
+                all
+            }
+        }
+    };
+}
+
+actions! {
+    TryDemo: "Try the demo",
+        "Render a tabletop scene into posed photos, open them and train at once. Needs no download.";
+    OpenFolder: "Open folder\u{2026}",
+        "COLMAP, transforms.json (nerfstudio, instant-ngp, Blender), LLFF, or a trained scene.", "Ctrl+O";
+    OpenFile: "Open file\u{2026}", "A splat .ply, a transforms.json, or the scene.json of a trained scene.";
+    Open(path: PathBuf): format!("Open {}", path.display()), "Open this path.";
+    ExportPly: "Export Gaussians as .ply\u{2026}", "Write the Gaussians in the format that 3DGS viewers read.", "Ctrl+E";
+    Screenshot: "Save the view as .png\u{2026}", "Write the image in the viewport, without the drawn cameras.", "Ctrl+S";
+    StartTraining: "Start training",
+        "Fit Gaussians to the photos. Resumes from the last checkpoint if the settings are the same.", "Ctrl+T";
+    PauseTraining: "Pause or resume training", "Pause training without losing its state.", "T";
+    Cancel: "Cancel the running job", "Stop the running job at its next step. What is trained so far stays.", "Escape";
+    Evaluate: "Evaluate on held-out photos", "PSNR and SSIM on the photos that training does not see.";
+    FindObjects: "Find objects and parts",
+        "Lift the masks that came with the photos, or else regions of uniform color, to the Gaussians and every view.";
+    ChooseMasks: "Find objects with other masks\u{2026}",
+        "Id maps of fmlgs synth, ISAT files, folders of SPIn-NeRF, 3D-OVS or LERF-Mask; one labeled photo is enough.";
+    FetchModel(id: String): format!("Download the model {id}"), "Download it, verify it, and use it from then on.";
+    AddModel(id: String): format!("Add files of the model {id}\u{2026}"),
+        "Choose a folder with its files; they are verified and copied.";
+    TypeQuery: "Query an object or a part", "A name, or \"the button of the red controller\".", "/";
+    Ask(text: String): format!("Query {text}"), "A name, or \"the button of the red controller\".";
+    GoToTarget(id: IdentityId, side: Side): format!("Go to #{id}, {}", side.text()),
+        "Fly to where it is seen best, around everything in between.";
+    PlayPath: "Play or pause the camera path", "Fly along the path, or pause where you are.", "Space";
+    StepBack: "Previous frame", "Move back along the path by one frame.", ",";
+    StepForward: "Next frame", "Move forward along the path by one frame.", ".";
+    AddKey: "Add the view as a keyframe", "The camera path will pass here, looking this way.", "K";
+    OpenPath: "Open a camera path\u{2026}", "A path of this program, or of nerfstudio's viewer.";
+    SavePath: "Save the camera path\u{2026}", "As .json; for nerfstudio, end its name in .nerfstudio.json.";
+    ExportVideo: "Export video\u{2026}", "H.264 (.mp4), .gif, .webp, or .png frames in a folder.";
+    StartChat: "Chat", "Ask in plain sentences: show me the lid of the kettle, then step back.", "Enter";
+    SaveChat: "Save conversation\u{2026}", "As Markdown, or .json, with every step and its result.";
+    Isolate(only: Option<IdentityId>): only.map_or_else(|| "Show all objects".into(), |id| format!("Show only #{id}")),
+        "Draw everything again that was hidden.";
+    Hide(id: IdentityId): format!("Hide or show #{id}"), "Leave it out of the view, or draw it again.";
+    ExportTarget(id: IdentityId): format!("Export #{id} as .ply\u{2026}"),
+        "Write its Gaussians in the format that 3DGS viewers read.";
+    Change(edit: Edit): match edit {
+            Edit::Rename(_, name) => format!("Rename to {name}"),
+            Edit::Merge(from, into) => format!("Merge #{from} into #{into}"),
+            Edit::Split(id) => format!("Split #{id}"),
+            Edit::AddPiece { name, .. } => format!("Add {name}"),
+        }, "Correct the segmentation; can be undone.";
+    Paint(of: Option<IdentityId>): match *of {
+            None => "Stop painting".into(),
+            Some(NOBODY) => "Paint a new object".to_owned(),
+            Some(id) => format!("Paint a new part of #{id}"),
+        }, "Drag over it or click on it in the view; its Gaussians become a new object or part.";
+    AddPainted: "Add what is painted", "Make the painted Gaussians a new object or part.";
+    Undo: "Undo the last edit of objects", "Take the last edit of objects and parts back.", "Ctrl+Z";
+    Redo: "Redo the last edit of objects", "Make the edit again that was undone.", "Ctrl+Y";
+    FrameScene: "Frame the scene", "Move back until all of the scene is in view.", "F";
+    ResetView: "Reset the view", "Return to the view with which the scene opened.", "Home";
+    TurnUp(axis: Axis): format!("Make {} the up direction", axis.text()), "For scenes that lie on their side.";
+    PreviousPhoto: "Previous photo", "OverlaySettings through the camera of the previous photo.", "[";
+    NextPhoto: "Next photo", "OverlaySettings through the camera of the next photo.", "]";
+    GoToPhoto(index: usize): format!("Go to photo {}", index + 1), "OverlaySettings through the camera of this photo.";
+    Show(mode: ViewMode): match mode {
+            ViewMode::Rgb => "Show RGB".to_owned(),
+            other => format!("Show {}", other.text().to_lowercase()),
+        }, "Choose what the viewport shows.";
+    ToggleCompare: "Compare with the photo", "Show the photo beside the rendering with a slider between them.", "C";
+    ToggleCameras: "Show or hide cameras", "Draw the camera of every photo into the view.", "V";
+    TogglePane(pane: Pane): format!("Show or hide the {} pane", pane.text().to_lowercase()),
+        "Show or hide this part of the window.";
+    ChooseReport: "Open a report\u{2026}", "A report.json of fmlgs report: error against run time of every setting.";
+    ChooseSecondReport: "Compare with another report\u{2026}", "Plotted with hollow markers, its numbers side by side.";
+    OpenReport(path: PathBuf): format!("Open the report {}", path.display()), "Read this report.";
+    CompareReport(path: PathBuf): format!("Compare with the report {}", path.display()), "Read this second report.";
+    EndComparison: "Stop comparing reports", "Close the second report.";
+    BenchmarkRendering: "Benchmark rendering",
+        "Render a few views with many settings and compare them with the exact image. Takes minutes; can be canceled and resumed.";
+    ApplySetting(stage: StageName, knobs: Knobs): format!("Apply a setting of {}", stage.title().to_lowercase()),
+        "Use this setting from now on.";
+    ResetRenderSettings: "Reset render settings", "Render with the scene's own settings, not those taken from a report.";
+    ToggleTimes: "Show or hide frame times",
+        "How long each stage of a frame takes: the last, and the median of the last 60.", "F3";
+    Palette: "Command palette", "Find and run any action by name.", "Ctrl+P";
+    Shortcuts: "Keyboard shortcuts", "List every key and mouse gesture.", "F1";
+    Quit: "Quit", "Close the window. A running training keeps its last checkpoint.", "Ctrl+Q";
+}
+
+impl Action {
+    /// Every action that needs no further input, in the order of the palette.
+    pub fn all() -> Vec<Self> {
+        let mut all = Self::plain();
+        // Without a brush there is nothing to add.
+        all.retain(|a| *a != Self::AddPainted);
+        all.extend([Self::Isolate(None), Self::Paint(Some(NOBODY))]);
+        all.extend(ViewMode::VARIANTS.iter().map(|mode| Self::Show(*mode)));
+        all.extend(Pane::VARIANTS.iter().map(|pane| Self::TogglePane(*pane)));
+        all.extend(Axis::VARIANTS.iter().map(|axis| Self::TurnUp(*axis)));
+        all
+    }
+
+    /// One sentence on what it does.
+    pub fn tooltip(&self) -> &'static str {
+        match self {
+            Self::Isolate(Some(_)) => "Draw nothing else.",
+            Self::Show(ViewMode::Rgb) => "The rendered image.",
+            Self::Show(ViewMode::Depth) => "Distance from the camera, near to far as blue to red.",
+            Self::Show(ViewMode::Alpha) => "Accumulated opacity, black to white.",
+            Self::Show(ViewMode::Difference) => {
+                "Absolute difference from the photo, amplified four times. Needs a photo's view."
+            }
+            other => other.row().0,
+        }
+    }
+
+    /// The key that runs it, if it has one.
+    pub fn shortcut(&self) -> Option<Shortcut> {
+        let key = match self {
+            Self::Show(ViewMode::Rgb) => "1",
+            Self::Show(ViewMode::Depth) => "5",
+            Self::Show(ViewMode::Difference) => "6",
+            Self::Show(ViewMode::Alpha) => "7",
+            other => other.row().1,
+        };
+        match key.strip_prefix("Ctrl+") {
+            Some(key) => Some(Shortcut { ctrl: true, key }),
+            None => (!key.is_empty()).then_some(Shortcut { ctrl: false, key }),
+        }
+    }
+}
+
+impl From<Start> for Action {
+    fn from(start: Start) -> Self {
+        match start {
+            Start::Demo => Self::TryDemo,
+            Start::Scene(path) => Self::Open(path),
+            Start::Report(path) => Self::OpenReport(path),
+            Start::SecondReport(path) => Self::CompareReport(path),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn no_two_actions_share_a_key_or_a_name_and_each_is_explained() {
+        let all = Action::all();
+        let keys: Vec<Shortcut> = all.iter().filter_map(Action::shortcut).collect();
+        assert_eq!(keys.iter().collect::<HashSet<_>>().len(), keys.len());
+        let names: HashSet<String> = all.iter().map(Action::text).collect();
+        assert_eq!(names.len(), all.len());
+        assert!(keys.len() > 20 && all.iter().all(|a| a.tooltip().ends_with('.')));
+    }
+
+    #[test]
+    fn no_action_takes_a_flying_key() {
+        for action in Action::all() {
+            if let Some(Shortcut { ctrl: false, key }) = action.shortcut() {
+                assert!(!["W", "A", "S", "D", "Q", "E"].contains(&key), "{action:?} would stop flying");
+            }
+        }
+    }
+
+    #[test]
+    fn axes_are_as_they_are_called() {
+        assert_eq!([Axis::PlusX, Axis::MinusY, Axis::PlusZ].map(Axis::vector), [DVec3::X, -DVec3::Y, DVec3::Z]);
+        assert_eq!(Axis::VARIANTS.iter().map(|a| a.vector()).sum::<DVec3>(), DVec3::ZERO);
+        assert_eq!(Axis::MinusZ.text(), "-Z");
+    }
+}

@@ -1,0 +1,229 @@
+//! The newest frame on screen: taken from where it is published, uploaded, painted and picked from.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use egui::{Color32, ColorImage, Rect, TextureHandle, TextureOptions, Ui, pos2};
+use glam::{DVec2, DVec3};
+
+use super::super::theme;
+use super::eye::Eye;
+use super::frame_times::FrameTimes;
+use crate::scene::trace::{self, Sort};
+use crate::worker::view::{MappedView, ViewPicture, ViewResult};
+use crate::worker::{Failure, Slot, Versioned, ViewMaps};
+
+/// What is on screen.
+#[derive(Default)]
+pub(super) struct Display {
+    picture: Option<Arc<ViewPicture>>,
+    texture: Option<TextureHandle>,
+    error: Option<String>,
+    /// Why it is not known what the pixels of this view belong to.
+    unmapped: Option<String>,
+    /// Why the CPU draws though there is a GPU, once that was reported.
+    instead_of_gpu: Option<String>,
+    /// Generation of the newest frame.
+    shown: u64,
+    /// The same, when it was asked for last.
+    counted: u64,
+    /// Generation of the newest maps.
+    mapped: u64,
+    /// Times of the newest frames, while they are shown.
+    times: Option<FrameTimes>,
+}
+
+impl Display {
+    /// The newest frame.
+    pub(super) fn picture(&self) -> Option<&ViewPicture> {
+        self.picture.as_deref()
+    }
+
+    /// The times of the newest frames, while they are shown.
+    pub(super) fn times(&self) -> Option<&FrameTimes> {
+        self.times.as_ref()
+    }
+
+    /// What could not be drawn, for the user.
+    pub(super) fn errors(&self) -> impl Iterator<Item = &String> {
+        self.error.iter().chain(&self.unmapped)
+    }
+
+    /// Forgets the frame of another scene.
+    pub(super) fn clear(&mut self) {
+        (self.picture, self.texture, self.error, self.unmapped) = (None, None, None, None);
+    }
+
+    /// Forgets why there are no maps: the view is another.
+    pub(super) fn forget_maps(&mut self) {
+        self.unmapped = None;
+    }
+
+    /// Collects the times of frames, or stops.
+    pub(super) fn time_frames(&mut self, on: bool) {
+        match on {
+            true => drop(self.times.get_or_insert_default()),
+            false => self.times = None,
+        }
+    }
+
+    /// Whether a frame has come since this was asked last.
+    pub(super) fn take_new(&mut self) -> bool {
+        std::mem::replace(&mut self.counted, self.shown) != self.shown
+    }
+
+    /// Why the CPU draws though there is a GPU, once for each reason.
+    pub(super) fn newly_instead_of_gpu(&mut self) -> Option<String> {
+        let why = self.picture.as_ref()?.instead_of_gpu.clone()?;
+        (self.instead_of_gpu.replace(why.clone()).as_ref() != Some(&why)).then_some(why)
+    }
+
+    /// Uploads the newest frame if there is one.
+    pub(super) fn take(&mut self, ctx: &egui::Context, pictures: &Slot<ViewResult>) {
+        let Some((generation, result)) = pictures.newer_than(self.shown) else { return };
+        self.shown = generation;
+        let picture = match &*result {
+            Ok(picture) => picture,
+            Err(failure) => {
+                self.error = Some(report(failure));
+                return;
+            }
+        };
+        let start = Instant::now();
+        let size = [picture.camera.width_px as usize, picture.camera.height_px as usize];
+        let pixels = picture.rgb.iter().map(|&[r, g, b]| Color32::from_rgb(r, g, b)).collect();
+        let image = ColorImage::new(size, pixels);
+        match &mut self.texture {
+            Some(texture) => texture.set(image, TextureOptions::LINEAR),
+            None => self.texture = Some(ctx.load_texture("viewport", image, TextureOptions::LINEAR)),
+        }
+        if self.picture.is_none() {
+            trace::record(Sort::Picture, "first frame", "the scene is on screen", 0);
+        }
+        if let Some(times) = &mut self.times {
+            times.add(picture, start.elapsed().as_secs_f64());
+        }
+        self.picture = Some(Arc::clone(picture));
+        self.error = None;
+    }
+
+    /// What the pixels belong to, if that has come since for the request with this ticket: maps of an earlier one
+    /// are of another view.
+    pub(super) fn take_maps(&mut self, maps: &Slot<MappedView>, ticket: u64) -> Option<Versioned<ViewMaps>> {
+        let (generation, mapped) = maps.newer_than(self.mapped)?;
+        self.mapped = generation;
+        if let Some(times) = &mut self.times {
+            times.add_maps(mapped.secs);
+        }
+        if mapped.ticket != ticket {
+            return None;
+        }
+        match &mapped.maps {
+            Ok(maps) => return Some(Versioned::new(Arc::clone(maps))),
+            Err(failure) => self.unmapped = Some(report(failure)),
+        }
+        None
+    }
+
+    /// Paints the frame into `shown`, a part of the viewport's `rect`.
+    pub(super) fn paint(&self, ui: &Ui, rect: Rect, shown: Rect) {
+        // Filling what the frame covers anyway would be a fifth of a redraw on an emulated adapter.
+        if self.texture.is_none() || shown != rect {
+            ui.painter().rect_filled(rect, 0.0, theme::CANVAS);
+        }
+        if let Some(texture) = &self.texture {
+            let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+            ui.painter().image(texture.id(), shown, uv, Color32::WHITE);
+        }
+    }
+
+    /// The drawn surface at a relative position of the frame, if its depth was drawn from where the eye is.
+    pub(super) fn picked(&self, at: DVec2, eye: &Eye) -> Option<DVec3> {
+        let picture = self.picture()?;
+        // A frame from somewhere else says nothing about here.
+        if picture.camera.center.distance(eye.center) > 1e-3 * eye.distance() {
+            return None;
+        }
+        let size = DVec2::new(f64::from(picture.camera.width_px), f64::from(picture.camera.height_px));
+        let px = (at * size).clamp(DVec2::ZERO, size - 1.0);
+        let index = px.y as usize * picture.camera.width_px as usize + px.x as usize;
+        let depth = f64::from(*picture.median_depth.as_ref()?.get(index)?);
+        (depth > 0.0).then(|| picture.camera.center + picture.camera.ray(at * size) * depth)
+    }
+}
+
+/// What went wrong and what can be done, in one line.
+fn report(failure: &Failure) -> String {
+    format!("{} {}", failure.message, failure.remedy)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Bounds;
+
+    /// A frame of 4 x 4 px as `eye` sees it, at depth 2 but for its first pixel.
+    fn frame(ticket: u64, eye: &Eye) -> ViewPicture {
+        let mut depth = vec![2.0; 16];
+        depth[0] = 0.0;
+        ViewPicture {
+            ticket,
+            full: true,
+            camera: eye.camera(4, 4),
+            rgb: vec![[9; 3]; 16],
+            median_depth: Some(depth),
+            depth_range: None,
+            psnr: None,
+            secs: 0.1,
+            stages: Vec::new(),
+            paint_secs: 0.0,
+            drawn_by: "CPU".into(),
+            instead_of_gpu: Some("it was lost".into()),
+        }
+    }
+
+    fn failure() -> Failure {
+        Failure { message: "no".into(), remedy: "wait".into() }
+    }
+
+    #[test]
+    fn frames_are_shown_and_picked_from_where_they_were_drawn() {
+        let ctx = egui::Context::default();
+        let mut eye = Eye::framing(&Bounds { min: DVec3::NEG_ONE, max: DVec3::ONE }, DVec3::Z);
+        let (mut display, pictures) = (Display::default(), Slot::default());
+        display.take(&ctx, &pictures);
+        assert!(!display.take_new() && display.picked(DVec2::splat(0.6), &eye).is_none());
+        pictures.publish(Ok(Arc::new(frame(1, &eye))));
+        display.take(&ctx, &pictures);
+        assert!(display.take_new() && !display.take_new() && display.texture.is_some());
+        let point = display.picked(DVec2::splat(0.625), &eye).expect("a surface");
+        let at = eye.camera(4, 4).project(point).expect("in front");
+        assert!((at - DVec2::splat(2.5)).length() < 1e-9, "{at}");
+        assert!(display.picked(DVec2::splat(0.1), &eye).is_none(), "nothing is there");
+        eye.fly(DVec3::Z);
+        assert!(display.picked(DVec2::splat(0.625), &eye).is_none(), "seen from elsewhere");
+        assert_eq!(display.newly_instead_of_gpu().as_deref(), Some("it was lost"));
+        assert_eq!(display.newly_instead_of_gpu(), None, "reported once");
+        pictures.publish(Err(failure()));
+        display.take(&ctx, &pictures);
+        assert_eq!(display.errors().collect::<Vec<_>>(), ["no wait"]);
+        assert!(display.picture().is_some(), "the last frame stays");
+        display.clear();
+        assert!(display.picture().is_none() && display.errors().next().is_none());
+    }
+
+    #[test]
+    fn maps_of_an_earlier_view_are_left_out() {
+        let (mut display, maps) = (Display::default(), Slot::default());
+        let mapped = |ticket, maps| MappedView { ticket, maps, secs: 0.0 };
+        maps.publish(mapped(1, Ok(Arc::default())));
+        assert!(display.take_maps(&maps, 2).is_none());
+        maps.publish(mapped(2, Ok(Arc::default())));
+        assert!(display.take_maps(&maps, 2).is_some());
+        assert!(display.take_maps(&maps, 2).is_none(), "taken once");
+        maps.publish(mapped(3, Err(failure())));
+        assert!(display.take_maps(&maps, 3).is_none() && display.errors().next().is_some());
+        display.forget_maps();
+        assert!(display.errors().next().is_none());
+    }
+}

@@ -1,0 +1,64 @@
+//! Embeddings of the texts on screen: asked of the text encoder's thread while they are typed, taken over as they come.
+
+use std::sync::Arc;
+
+use crate::pipeline::semantics::meaning::Phrasebook;
+use crate::worker::text_encoder::{Encoded, EncodedText, TextEncoder};
+
+/// What is known of the texts on screen.
+#[derive(Default)]
+pub(super) struct Embeddings {
+    /// Which encoder is wanted.
+    name: Option<String>,
+    encoder: Option<TextEncoder>,
+    /// Generation of what was taken over last.
+    seen: u64,
+    known: Arc<Encoded>,
+    /// The texts that were asked for last.
+    requested: Vec<String>,
+}
+
+impl Embeddings {
+    /// Loads the encoder of this name if it is another one than before, asks it for `texts`, and takes over what it
+    /// has encoded. Whether anything is new.
+    pub(super) fn keep_up(&mut self, ctx: &egui::Context, name: Option<&str>, texts: Vec<String>) -> bool {
+        if self.name.as_deref() != name {
+            *self = Self { name: name.map(str::to_owned), ..Self::default() };
+            if let Some(name) = self.name.clone() {
+                match TextEncoder::start(name, crate::ui::repainter(ctx, 0)) {
+                    Ok(encoder) => self.encoder = Some(encoder),
+                    Err(e) => self.known = Arc::new(Encoded { problem: Some(e.to_string()), ..Encoded::default() }),
+                }
+            }
+        }
+        let Some(encoder) = &self.encoder else { return false };
+        // With a full queue the request comes again with the next redraw.
+        if self.requested != texts && encoder.request(texts.clone()) {
+            self.requested = texts;
+        }
+        let Some((generation, known)) = encoder.encoded().newer_than(self.seen) else { return false };
+        (self.seen, self.known) = (generation, known);
+        true
+    }
+
+    /// What is known of a text; `None` until the encoder has read it.
+    pub(super) fn of(&self, text: &str) -> Option<&EncodedText> {
+        self.known.texts.get(text)
+    }
+
+    /// Embeddings of the phrases of a text, if the encoder knows its words.
+    pub(super) fn phrases(&self, text: &str) -> Option<&Phrasebook> {
+        self.of(text).filter(|t| t.known).map(|_| &self.known.phrases)
+    }
+
+    /// Whether a text may yet be encoded.
+    pub(super) fn is_pending(&self, text: &str) -> bool {
+        self.known.problem.is_none() && self.of(text).is_none()
+    }
+
+    /// Why texts cannot be compared with embeddings of objects, if they cannot.
+    pub(super) fn problem(&self) -> Option<&str> {
+        let failed = || self.known.texts.values().find_map(|t| t.problem.as_ref());
+        self.known.problem.as_ref().or_else(failed).map(String::as_str)
+    }
+}

@@ -1,0 +1,137 @@
+//! When a new frame is asked for: whenever anything that it shows has changed.
+
+use std::sync::Arc;
+
+use crate::render::RenderSettings;
+use crate::scene::{Camera, GaussianCloud, PhotoPixels, SemanticMap};
+use crate::worker::view::{QualityBudget, SkipPasses, ViewRequest};
+use crate::worker::{Versioned, ViewMode};
+
+/// What the view is to show now.
+pub(super) struct Wanted {
+    pub(super) cloud: Versioned<GaussianCloud>,
+    pub(super) camera: Camera,
+    pub(super) mode: ViewMode,
+    pub(super) settings: RenderSettings,
+    pub(super) budget: QualityBudget,
+    pub(super) photo: Option<Arc<PhotoPixels>>,
+    /// Objects and parts, if it is wanted what pixels belong to; with their blended codes or without.
+    pub(super) semantics: Option<Versioned<SemanticMap>>,
+    pub(super) codes: bool,
+    pub(super) skip: SkipPasses,
+    pub(super) timed: bool,
+}
+
+/// What a frame was asked for: a change means that a new one is needed.
+#[derive(Clone, PartialEq)]
+struct Key {
+    camera: Camera,
+    /// Generations.
+    cloud: u64,
+    semantics: Option<u64>,
+    mode: ViewMode,
+    settings: RenderSettings,
+    budget: QualityBudget,
+    with_photo: bool,
+    codes: bool,
+    skip: SkipPasses,
+    timed: bool,
+}
+
+/// The requests so far.
+#[derive(Default)]
+pub(super) struct Requests {
+    last: Option<Key>,
+    ticket: u64,
+}
+
+impl Requests {
+    /// Ticket of the newest request.
+    pub(super) fn ticket(&self) -> u64 {
+        self.ticket
+    }
+
+    /// Forgets what was asked for: the next frame is of another scene.
+    pub(super) fn forget(&mut self) {
+        self.last = None;
+    }
+
+    /// The request for what is wanted, if it is not what was asked for last or wanted `again`; and whether its
+    /// pixels belong to something else than those before.
+    pub(super) fn next(&mut self, wanted: Wanted, again: bool) -> Option<(ViewRequest, bool)> {
+        let Wanted { cloud, camera, mode, settings, budget, photo, semantics, codes, skip, timed } = wanted;
+        let key = Key {
+            camera: camera.clone(),
+            cloud: cloud.generation(),
+            semantics: semantics.as_ref().map(Versioned::generation),
+            mode,
+            settings: settings.clone(),
+            budget,
+            with_photo: photo.is_some(),
+            codes,
+            skip,
+            timed,
+        };
+        if self.last.as_ref() == Some(&key) && !again {
+            return None;
+        }
+        // A change of resolution alone does not move what the pixels belong to.
+        let same = |k: &Key| k.camera == key.camera && k.cloud == key.cloud && k.semantics == key.semantics;
+        let moved = !self.last.as_ref().is_some_and(same);
+        self.last = Some(key);
+        self.ticket += 1;
+        let (cloud, semantics) = (Arc::clone(&cloud), semantics.as_ref().map(|s| Arc::clone(s)));
+        let ticket = self.ticket;
+        let request =
+            ViewRequest { cloud, camera, mode, settings, budget, photo, semantics, codes, skip, timed, ticket };
+        Some((request, moved))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    #[test]
+    fn a_frame_is_asked_for_once_and_anew_as_anything_changes() {
+        let cloud = Versioned::new(Arc::new(GaussianCloud::default()));
+        let photo = Arc::new(PhotoPixels { width_px: 1, height_px: 1, rgb: vec![[0; 3]], coverage: None });
+        let wanted = |change: &dyn Fn(&mut Wanted)| {
+            let mut wanted = Wanted {
+                cloud: cloud.clone(),
+                camera: Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 8, 8).expect("valid"),
+                mode: ViewMode::Rgb,
+                settings: RenderSettings::default(),
+                budget: QualityBudget::Full,
+                photo: None,
+                semantics: None,
+                codes: false,
+                skip: SkipPasses { depth: true, parts: true, gpu: true, buffers: true },
+                timed: false,
+            };
+            change(&mut wanted);
+            wanted
+        };
+        let mut requests = Requests::default();
+        let mut next = |change: &dyn Fn(&mut Wanted), again| {
+            let next = requests.next(wanted(change), again);
+            next.map(|(request, moved)| (request.ticket, moved))
+        };
+        assert_eq!(next(&|_| {}, false), Some((1, true)), "the first");
+        assert_eq!(next(&|_| {}, false), None, "nothing has changed");
+        assert_eq!(next(&|_| {}, true), Some((2, false)));
+        // Each alone is a reason; the first three leave the pixels where they are.
+        assert_eq!(next(&|w| w.budget = QualityBudget::Moving, false), Some((3, false)));
+        assert_eq!(next(&|w| w.settings.sh_degree = 1, false), Some((4, false)));
+        assert_eq!(next(&|w| w.photo = Some(Arc::clone(&photo)), false), Some((5, false)));
+        assert_eq!(next(&|w| w.camera.center.x += 1.0, false), Some((6, true)));
+        assert_eq!(next(&|_| {}, false), Some((7, true)), "and back");
+        // The same Gaussians, published anew.
+        let newer = Versioned::new(Arc::clone(&cloud));
+        assert_eq!(next(&|w| w.cloud = newer.clone(), false), Some((8, true)));
+        assert_eq!(next(&|w| w.cloud = newer.clone(), false), None);
+        requests.forget();
+        assert!(requests.next(wanted(&|w| w.cloud = newer.clone()), false).is_some(), "another scene");
+    }
+}
