@@ -27,15 +27,15 @@ pub mod viewport;
 
 use std::sync::Arc;
 
-pub use self::actions::Action;
-
 use eframe::egui_wgpu::WgpuSetup;
 
+pub use self::actions::Action;
+
+use crate::jobs::Folders;
 use crate::render::Device;
 use crate::scene::plan::PlanOverride;
 use crate::worker::Start;
 use crate::worker::jobs::PipelineJobs;
-use crate::worker::places::Places;
 
 /// Opens the window, takes what is wanted of plans, does `first` one after the other, and returns when it is closed.
 pub fn run(first: Vec<Start>, overrides: Vec<PlanOverride>) -> eframe::Result {
@@ -78,7 +78,8 @@ fn open(
             if let Some(window) = &cc.wgpu_render_state {
                 Device::adopt(&window.adapter, &window.device, &window.queue);
             }
-            let mut app = app::App::new(cc, PipelineJobs::new(Places::of_user()), first.into_iter().map(Action::from))?;
+            let first = first.into_iter().map(Action::from);
+            let mut app = app::App::new(cc, PipelineJobs::new(Folders::of_user()), first)?;
             app.override_plan(overrides);
             Ok(Box::new(app))
         }),

@@ -6,7 +6,7 @@ use super::source::{SourceFile, library_code, test_module_files};
 pub type Complaint = String;
 
 /// Each module of the library and the other modules it may use, in the order of the data flow.
-const MODULES: [(&str, &[&str]); 12] = [
+const MODULES: [(&str, &[&str]); 13] = [
     ("math", &[]),
     ("scene", &["math"]),
     ("io", &["math", "scene"]),
@@ -15,10 +15,11 @@ const MODULES: [(&str, &[&str]); 12] = [
     ("pipeline", &["math", "scene", "io", "models", "render"]),
     ("navigate", &["math", "scene", "render"]),
     ("measure", &["math", "scene", "io", "models", "render", "pipeline", "navigate"]),
-    ("worker", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "measure"]),
-    ("agent", &["math", "scene", "io", "render", "pipeline", "navigate", "worker"]),
-    ("cli", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "measure", "worker", "agent"]),
-    ("ui", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "measure", "worker", "agent"]),
+    ("jobs", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "measure"]),
+    ("worker", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "measure", "jobs"]),
+    ("agent", &["math", "scene", "io", "render", "pipeline", "navigate", "jobs", "worker"]),
+    ("cli", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "measure", "jobs", "worker", "agent"]),
+    ("ui", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "measure", "jobs", "worker", "agent"]),
 ];
 
 /// Longest Rust file in lines.
