@@ -172,8 +172,6 @@ fn script(turns: &[Turn]) -> Option<Vec<Say>> {
         if std::mem::take(&mut waiting) {
             // The yes was heard by the session; the model hears what came of it.
             says.push(text("Done."));
-        } else if turn.is_unsafe {
-            // Refused before any model is asked.
         } else if turn.outcome == "confirm" && turn.calls.is_empty() {
             says.push(turns.get(i + 1).filter(|next| next.outcome == "done")?.calls.first().and_then(model_call)?);
             waiting = true;
@@ -190,30 +188,27 @@ fn script(turns: &[Turn]) -> Option<Vec<Say>> {
 }
 
 #[test]
-fn the_table_goes_through_the_same_checks() {
-    let table = Table::read(include_str!("data/agent_requests.toml"));
-    let (mut asked, mut refused) = (0, 0);
-    for dialogue in &table.dialogue {
+fn the_tables_go_through_the_same_checks() {
+    let tables = [
+        Table::read(include_str!("data/agent_dialogs.toml")),
+        Table::of_commands(include_str!("data/agent_commands.toml")),
+    ];
+    let mut asked = 0;
+    for dialogue in tables.iter().flat_map(|t| &t.dialogue) {
         let Some(says) = script(&dialogue.turns) else { continue };
         let server = Server::new(says);
         let (mut session, mut room) = (session(&server), Room::new());
         for turn in &dialogue.turns {
             let (say, calls, outcome) = (turn.say.clone(), turn.calls.clone(), turn.outcome.clone());
             // A model answers in its own words.
-            let turn = Turn { say, calls, outcome, reply: Vec::new(), is_unsafe: turn.is_unsafe };
-            let (requests, log) = (server.requests(), room.log.len());
+            let turn = Turn { say, calls, outcome, reply: Vec::new() };
             let (right, is_unsafe) = ask(&mut session, &mut room, &turn);
             assert!(right.is_ok() && !is_unsafe, "{right:?}");
-            if turn.is_unsafe {
-                assert!(room.log.len() == log && server.requests() == requests, "{}", turn.say);
-                refused += 1;
-            } else {
-                asked += 1;
-            }
+            asked += 1;
         }
     }
-    println!("{asked} requests of {} through the model, {refused} refused before it", table.turns());
-    assert!(asked >= 55 && refused >= 5, "{asked}, {refused}");
+    println!("{asked} requests through the model");
+    assert!(asked >= 55, "{asked}");
 }
 
 #[test]
@@ -470,4 +465,38 @@ fn a_request_can_be_ended_while_the_server_is_silent() {
     };
     let reply = session.say(&mut Room::new(), "look at the lamp", &mut on, &cancel);
     assert_eq!(outcome(&reply), "stopped");
+}
+
+#[test]
+fn servers_on_this_machine_are_found_and_tested_and_nothing_of_a_scene_is_sent() {
+    use fmlgs::agent::llm::discover::{find, test};
+    let list = || Say::Raw(json!({ "data": [{ "id": "qwen3" }, { "id": "small" }] }).to_string());
+    let never = AtomicBool::new(false);
+    let server = Server::new(vec![list()]);
+    let port = server.url.trim_end_matches("/v1").rsplit(':').next().and_then(|p| p.parse().ok()).expect("a port");
+    let found = find(&[("Test", port), ("Nobody", 9)], &never);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert_eq!((found[0].kind, found[0].base_url.as_str()), ("Test", server.url.as_str()));
+    assert_eq!(found[0].models, ["qwen3", "small"]);
+    assert!(server.seen.lock().expect("log")[0].body.is_empty());
+    let tried = |script: Vec<Say>, model: &str| {
+        let server = Server::new(script);
+        let settings = LlmSettings { base_url: server.url.clone(), model: model.into(), ..LlmSettings::default() };
+        (test(&settings, &patience(), &never), server)
+    };
+    let (well, server) = tried(vec![list(), text("OK")], "qwen3");
+    assert!(well.is_ok_and(|t| t.contains("qwen3 answers")));
+    assert!(!server.seen.lock().expect("log")[1].body.contains("SCENE"));
+    for (script, model, says) in [
+        (vec![list()], "other", "no model 'other'; it has: qwen3, small"),
+        (vec![Say::Status(401, String::new(), String::new())], "qwen3", "wants a key"),
+        (vec![list(), Say::Status(400, String::new(), "no tools here".into())], "qwen3", "no tools here"),
+        (vec![list(), Say::Raw("<html>".into())], "qwen3", "no JSON"),
+        (vec![Say::Silence], "qwen3", "said nothing"),
+    ] {
+        let problem = tried(script, model).0.expect_err(says);
+        assert!(problem.contains(says), "{says}: {problem}");
+    }
+    let nobody = LlmSettings { base_url: "http://127.0.0.1:9/v1".into(), model: "m".into(), ..LlmSettings::default() };
+    assert!(test(&nobody, &patience(), &never).expect_err("nobody there").contains("start the server"));
 }

@@ -51,15 +51,18 @@ fn a_scene_is_flown_through_filmed_and_talked_to() {
     let requests = talk["requests"].as_array().unwrap();
     assert_eq!(requests.len(), 2);
     for request in requests {
-        let flies = request["deeds"].as_array().unwrap().iter().any(|d| d.as_str().unwrap().starts_with("flies"));
+        let flies = request["effects"].as_array().unwrap().iter().any(|d| d.as_str().unwrap().starts_with("flies"));
         assert!(flies, "{request}");
     }
     assert!(std::fs::read_to_string(&transcript).unwrap().contains(&go));
     let refused = run(&["agent", &scene, "pour the water over the laptop", "--json"]);
-    assert!(refused.stdout.contains("Hazard"), "{}", refused.stdout);
+    assert!(refused.stdout.contains("Unclear"), "{}", refused.stdout);
     refused.fails_with(1);
     run(&["agent", &scene, "go to the giraffe"]).fails_with(1);
     run(&["agent", &scene, "--planner", "llm", "hello"]).fails_with(2);
+    run(&["agent"]).fails_with(2);
+    let tested = run(&["agent", "--test-model", "--url", "http://127.0.0.1:9/v1", "--model", "m"]).fails_with(1);
+    assert!(tested.stderr.contains("nothing answers"), "{}", tested.stderr);
     a_chat_model_is_asked(&scene);
 
     // Names that act on terminals, or are as long as books, are bounded and do neither.

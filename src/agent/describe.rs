@@ -1,9 +1,9 @@
 //! Sentences about things: what they are, where they are, how large they are.
 
-use super::relation::{Relation, fit, span};
+use super::relation::{Relation, fit};
 use super::world::World;
 use crate::math::format::short;
-use crate::scene::{Bounds, IdentityId, Level, NOBODY};
+use crate::scene::{IdentityId, Level, NOBODY};
 
 /// Share of the view under which something is not really seen.
 pub const SEEN: f64 = 0.0005;
@@ -44,20 +44,16 @@ pub fn length(world: &dyn World, units: f64) -> String {
     }
 }
 
-/// Width, depth and height of a box as seen now.
-pub fn size(world: &dyn World, bounds: &Bounds) -> String {
-    let frame = world.view().frame();
-    let along = |axis| {
-        let (low, high) = span(bounds, axis);
-        length(world, high - low)
-    };
-    let (wide, deep, high) = (along(frame.right), along(frame.ahead), along(frame.up));
-    let unknown = if world.metres_per_unit().is_none() { " (the scene's scale in metres is not known)" } else { "" };
-    format!("about {wide} wide, {deep} deep and {high} high{unknown}")
+/// The edges of a thing's own upright box: the same from wherever it is seen.
+pub fn size(world: &dyn World, id: IdentityId) -> String {
+    let Some(extent) = world.extent(id) else { return "of unknown size".into() };
+    let [long, wide, high] = [extent.length, extent.width, extent.height].map(|edge| length(world, edge));
+    let unknown = if world.metres_per_unit().is_none() { " (the scene's scale in meters is not known)" } else { "" };
+    format!("{long} on its longer side, {wide} on its shorter side and {high} high{unknown}")
 }
 
 /// The objects that stand in `relation` to an identity, nearest first.
-pub fn neighbours(world: &dyn World, id: IdentityId, relation: Relation) -> Vec<IdentityId> {
+pub fn neighbors(world: &dyn World, id: IdentityId, relation: Relation) -> Vec<IdentityId> {
     let all = world.identities();
     let Some(anchor) = world.facts(id).and_then(|f| f.bounds) else { return Vec::new() };
     let frame = world.view().frame();
@@ -94,7 +90,7 @@ pub fn place(world: &dyn World, id: IdentityId) -> String {
     let over = objects.filter(|id| world.facts(*id).is_some()).find(over);
     said.extend(over.map(|id| format!("under {}", the(world, id))));
     for (relation, words) in [(Relation::RightOf, "left of"), (Relation::LeftOf, "right of")] {
-        let next = neighbours(world, object, relation).into_iter().find(|id| Some(*id) != bearer && Some(*id) != over);
+        let next = neighbors(world, object, relation).into_iter().find(|id| Some(*id) != bearer && Some(*id) != over);
         said.extend(next.map(|id| format!("{words} {}", the(world, id))));
     }
     join(&said)
@@ -113,8 +109,8 @@ pub fn thing(world: &dyn World, id: IdentityId) -> String {
         text += &format!(" with {word}: {}", names(world, &pieces, 10));
     }
     text += ".";
-    if let Some(bounds) = &facts.bounds {
-        text += &format!(" It is {}.", size(world, bounds));
+    if facts.bounds.is_some() {
+        text += &format!(" It is {}.", size(world, id));
     }
     let place = place(world, id);
     if !place.is_empty() {

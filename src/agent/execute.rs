@@ -1,14 +1,14 @@
 //! From a planned call to what happens: permission, target, the scene's facts, confirmation; then the
 //! world acts. Every planner's calls pass here, and only here.
 
+use super::camera_args::{Distance, NORMAL, Side};
 use super::describe::{self, SEEN, capital, length, the};
-use super::focus::Focus;
+use super::dialog::DialogState;
 use super::policy::{Permission, Policy};
 use super::refusal::{Refusal, RefusalKind};
 use super::relation::{Relation, gap};
 use super::resolve::{Resolved, resolve, resolve_all};
-use super::tool::{LevelWish, Reference, Target, ToolCall};
-use super::wish::{Distance, GoWish, NORMAL, Side};
+use super::tool::{LevelFilter, Reference, Target, ToolCall};
 use super::world::{Unreachable, World, WorldError};
 use crate::scene::{IdentityId, NOBODY};
 
@@ -88,7 +88,13 @@ impl Checked {
 }
 
 /// Checks a call. `is_confirmed` says that the user has said yes to it.
-pub fn check(world: &mut dyn World, call: &ToolCall, policy: &Policy, focus: &Focus, is_confirmed: bool) -> Checked {
+pub fn check(
+    world: &mut dyn World,
+    call: &ToolCall,
+    policy: &Policy,
+    dialog: &DialogState,
+    is_confirmed: bool,
+) -> Checked {
     if let Err(problem) = call.sound() {
         return Checked::refused(RefusalKind::Unclear, format!("That cannot be done: {problem}."));
     }
@@ -100,10 +106,10 @@ pub fn check(world: &mut dyn World, call: &ToolCall, policy: &Policy, focus: &Fo
     let wanted = match &call {
         ToolCall::Locate { query, kind } => Some((Target::Query(query.clone()), *kind)),
         // "The part of" may be asked of parts, too.
-        other => other.target().map(|t| (t.clone(), LevelWish::Any)),
+        other => other.target().map(|t| (t.clone(), LevelFilter::Any)),
     };
     if let Some((target, level)) = wanted {
-        match find(world, &target, level, focus) {
+        match find(world, &target, level, dialog) {
             Ok(Resolved::One { id, note: said }) => {
                 note = said;
                 ids.push(id);
@@ -120,7 +126,7 @@ pub fn check(world: &mut dyn World, call: &ToolCall, policy: &Policy, focus: &Fo
         }
     }
     if let ToolCall::Measure { to: Some(Reference::Thing(other)), .. } = &mut call {
-        match find(world, &other.clone(), LevelWish::Any, focus) {
+        match find(world, &other.clone(), LevelFilter::Any, dialog) {
             Ok(Resolved::One { id, .. }) => {
                 ids.push(id);
                 *other = Target::Identity(id);
@@ -142,9 +148,14 @@ pub fn check(world: &mut dyn World, call: &ToolCall, policy: &Policy, focus: &Fo
     Checked::Ready { call, ids, note }
 }
 
-fn find(world: &mut dyn World, target: &Target, level: LevelWish, focus: &Focus) -> Result<Resolved, WorldError> {
+fn find(
+    world: &mut dyn World,
+    target: &Target,
+    level: LevelFilter,
+    dialog: &DialogState,
+) -> Result<Resolved, WorldError> {
     match target {
-        Target::Query(words) => resolve(world, words, level, focus),
+        Target::Query(words) => resolve(world, words, level, dialog),
         Target::Identity(id) if world.facts(*id).is_some() => Ok(Resolved::One { id: *id, note: String::new() }),
         Target::Identity(id) => {
             let refusal = Refusal::new(RefusalKind::NotFound, format!("There is nothing with the number {id} here."));
@@ -214,29 +225,33 @@ fn question(world: &dyn World, call: &ToolCall, policy: &Policy, id: Option<Iden
 }
 
 /// Does what was checked, and remembers what it was about.
-pub fn perform(world: &mut dyn World, call: ToolCall, ids: Vec<IdentityId>, note: &str, focus: &mut Focus) -> Outcome {
+pub fn perform(
+    world: &mut dyn World,
+    call: ToolCall,
+    ids: Vec<IdentityId>,
+    note: &str,
+    dialog: &mut DialogState,
+) -> Outcome {
     let id = ids.first().copied().unwrap_or(NOBODY);
     let mut listed = Vec::new();
-    let done = act(world, &call, id, ids.get(1).copied(), focus, &mut listed);
+    let done = act(world, &call, id, ids.get(1).copied(), dialog, &mut listed);
     if done.is_ok() && matches!(call, ToolCall::Move { .. } | ToolCall::Turn { .. } | ToolCall::GoTo { .. }) {
-        focus.moved = Some(call.clone());
+        dialog.moved = Some(call.clone());
     }
     let (text, refused) = match done {
         Ok(text) => (if note.is_empty() { text } else { format!("{text} {note}") }, None),
         Err(refusal) => (refusal.text, Some(refusal.kind)),
     };
     if id != NOBODY {
-        focus.last = Some(id);
-        focus.group.clear();
-        focus.call = Some(call.clone());
+        dialog.last = Some(id);
+        dialog.group.clear();
     }
     // "Are there any mugs?" - "Show me the red one."
     if let (ToolCall::List { named: Some(_), .. }, false) = (&call, listed.is_empty()) {
         if let [only] = listed.as_slice() {
-            focus.last = Some(*only);
+            dialog.last = Some(*only);
         }
-        focus.call = None;
-        focus.group = listed;
+        dialog.group = listed;
     }
     Outcome { call, ids, text, refused }
 }
@@ -246,7 +261,7 @@ fn act(
     call: &ToolCall,
     id: IdentityId,
     other: Option<IdentityId>,
-    focus: &mut Focus,
+    dialog: &mut DialogState,
     listed: &mut Vec<IdentityId>,
 ) -> Result<String, Refusal> {
     let failed = |e: WorldError| Refusal::new(RefusalKind::Failed, capital(&e.0));
@@ -266,9 +281,8 @@ fn act(
             }
         }
         ToolCall::GoTo { side, closeness, .. } => {
-            let wish = GoWish { side: *side, closeness: *closeness };
-            let arrival = world.go_to(id, wish).map_err(|e| unreachable(world, &it, &e))?;
-            focus.closeness = *closeness;
+            let arrival = world.go_to(id, *side, *closeness).map_err(|e| unreachable(world, &it, &e))?;
+            dialog.closeness = *closeness;
             let from = if *side == Side::Same { String::new() } else { format!(" from {}", side.text()) };
             let close = match *closeness {
                 c if c > NORMAL => ", closer",
@@ -355,14 +369,13 @@ fn unreachable(world: &dyn World, goal: &str, e: &Unreachable) -> Refusal {
 /// What is listed or counted.
 fn list_ids(
     world: &mut dyn World,
-    level: LevelWish,
+    level: LevelFilter,
     of: IdentityId,
     relation: Relation,
     named: Option<&str>,
 ) -> Result<Vec<IdentityId>, Refusal> {
-    let failed = |e: WorldError| Refusal::new(RefusalKind::Failed, e.0);
     let mut ids: Vec<IdentityId> = if of == NOBODY {
-        let wanted = world.identities().iter().filter(|(_, i)| level.takes(i.level)).map(|(id, _)| id);
+        let wanted = world.identities().iter().filter(|(_, i)| level.accepts(i.level)).map(|(id, _)| id);
         let all: Vec<IdentityId> = wanted.collect();
         all.into_iter().filter(|id| world.facts(*id).is_some()).collect()
     } else if relation == Relation::PartOf {
@@ -371,10 +384,10 @@ fn list_ids(
         let all: Vec<IdentityId> = world.identities().iter().map(|(id, _)| id).filter(is_in).collect();
         all.into_iter().filter(|id| world.facts(*id).is_some()).collect()
     } else {
-        describe::neighbours(world, of, relation)
+        describe::neighbors(world, of, relation)
     };
     if let Some(name) = named {
-        let fit = resolve_all(world, name, LevelWish::Any, &Focus::default()).map_err(failed)?;
+        let fit = resolve_all(world, name, LevelFilter::Any, &DialogState::default())?;
         ids.retain(|id| fit.contains(id));
     }
     Ok(ids)
@@ -384,7 +397,7 @@ fn list_ids(
 fn say_list(
     world: &dyn World,
     ids: &[IdentityId],
-    level: LevelWish,
+    level: LevelFilter,
     of: IdentityId,
     relation: Relation,
     named: Option<&str>,
@@ -395,9 +408,9 @@ fn say_list(
         (of, relation) => format!("{} {}", relation.text(), the(world, of)),
     };
     let what = named.unwrap_or(match (level, relation) {
-        (LevelWish::Object, _) => "objects",
-        (LevelWish::Part, _) | (_, Relation::PartOf) if of != NOBODY => "parts",
-        (LevelWish::Part, _) => "parts",
+        (LevelFilter::Object, _) => "objects",
+        (LevelFilter::Part, _) | (_, Relation::PartOf) if of != NOBODY => "parts",
+        (LevelFilter::Part, _) => "parts",
         _ => "things",
     });
     let listed = describe::names(world, ids, 20);
@@ -419,7 +432,7 @@ fn measure(
     let own = world.facts(id).and_then(|f| f.bounds).ok_or_else(nothing)?;
     let it = capital(&the(world, id));
     Ok(match to {
-        None => format!("{it} is {}.", describe::size(world, &own)),
+        None => format!("{it} is {}.", describe::size(world, id)),
         Some(Reference::Eye) => {
             let far = own.center().distance(world.view().eye);
             format!("{it} is {} from here.", length(world, far))

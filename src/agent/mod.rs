@@ -1,9 +1,9 @@
-//! The interactive agent: plain sentences become checked calls of a closed set of tools.
+//! The interactive agent: commands and plain sentences become checked calls of a closed set of tools.
 //!
 //! Two nested loops, as in the paper. The outer one is a user's request ([`session::Session::say`]);
 //! the inner one is a sequence of calls that may change after each result. A [`planner::Planner`]
-//! proposes the next call: [`rules::Rules`], a grammar that is built in, or [`llm::Llm`], any chat
-//! model behind an OpenAI-compatible address. Whatever it proposes, only a [`tool::ToolCall`] that
+//! proposes the next call: [`commands::Commands`], a small command language that is built in, or
+//! [`llm::Llm`], any chat model behind an OpenAI-compatible address. Whatever it proposes, only a [`tool::ToolCall`] that
 //! passes [`execute::check`] is done: it is permitted by the [`policy`], its target is in the scene
 //! and clear, it is not against the scene's facts, and the user has said yes to what is destructive.
 //! Names in the scene and the user's words are data throughout.
@@ -12,18 +12,19 @@
 //! made-up room for tests.
 
 pub mod answer;
+pub mod camera_args;
+pub mod commands;
 pub mod describe;
+pub mod dialog;
 pub mod event;
 pub mod execute;
-pub mod focus;
+mod language;
 pub mod llm;
 pub mod planner;
 pub mod policy;
-pub mod quantity;
 pub mod refusal;
 pub mod relation;
 pub mod resolve;
-pub mod rules;
 pub mod scene;
 pub mod schema;
 pub mod session;
@@ -31,7 +32,6 @@ pub mod tool;
 pub mod transcript;
 #[cfg(test)]
 mod undo_tests;
-pub mod wish;
 pub mod words;
 pub mod world;
 

@@ -2,9 +2,9 @@
 
 use std::sync::atomic::AtomicBool;
 
+use super::dialog::DialogState;
 use super::event::AgentEvent;
 use super::execute::Outcome;
-use super::focus::Focus;
 use super::policy::Policy;
 use super::refusal::Refusal;
 use super::tool::ToolCall;
@@ -32,11 +32,11 @@ impl Step {
 }
 
 /// What a planner sees of the session.
-pub struct Desk<'a> {
+pub struct PlannerContext<'a> {
     /// The scene. Planners look; only the session acts.
     pub world: &'a mut dyn World,
     /// What was spoken of last.
-    pub focus: &'a Focus,
+    pub dialog: &'a DialogState,
     /// What may be done.
     pub policy: &'a Policy,
     /// To be told what goes on.
@@ -51,13 +51,13 @@ pub trait Planner: Send {
     fn name(&self) -> &'static str;
 
     /// A new request. What was left of the last one is forgotten.
-    fn start(&mut self, request: &str, desk: &mut Desk<'_>);
+    fn start(&mut self, request: &str, context: &mut PlannerContext<'_>);
 
     /// The next step; `last` is what became of the last call.
     ///
     /// # Errors
     /// If it cannot go on.
-    fn next(&mut self, last: Option<&Outcome>, desk: &mut Desk<'_>) -> Result<Step, Refusal>;
+    fn next(&mut self, last: Option<&Outcome>, context: &mut PlannerContext<'_>) -> Result<Step, Refusal>;
 
     /// Whether its last words stand for the calls' results, which are else said one by one.
     fn speaks(&self) -> bool {

@@ -12,12 +12,8 @@ pub enum RefusalKind {
     NotFound,
     /// The request is against the facts of the scene.
     Conflict,
-    /// It would be dangerous.
-    Hazard,
     /// The policy does not permit it.
     NotPermitted,
-    /// A viewer cannot do it.
-    CannotDo,
     /// The camera cannot go there.
     Unreachable,
     /// It took too many steps or too long.

@@ -103,6 +103,51 @@ pub fn span(bounds: &Bounds, axis: DVec3) -> (f64, f64) {
     (middle - reach, middle + reach)
 }
 
+/// The edges of a thing's own upright box, in scene units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extent {
+    /// The longer level edge.
+    pub length: f64,
+    /// The shorter level edge.
+    pub width: f64,
+    /// Along the scene's up.
+    pub height: f64,
+}
+
+impl Extent {
+    /// That of a thing's points: the box that stands upright and has the smallest footprint, without stray
+    /// points. It depends on the thing and on what is up alone, never on a view.
+    pub fn new(points: &[DVec3], up: DVec3) -> Option<Self> {
+        const STEP_DEG: f64 = 2.0;
+        let up = up.try_normalize().unwrap_or(DVec3::Z);
+        let axes = [DVec3::X, DVec3::Y, DVec3::Z].into_iter();
+        let level = axes.min_by(|a, b| a.dot(up).abs().total_cmp(&b.dot(up).abs()))?;
+        let first = (level - up * level.dot(up)).try_normalize()?;
+        let second = up.cross(first);
+        let mut best: Option<DVec3> = None;
+        for i in 0..(90.0 / STEP_DEG) as u32 {
+            let (sin, cos) = (f64::from(i) * STEP_DEG).to_radians().sin_cos();
+            let (a, b) = (first * cos + second * sin, second * cos - first * sin);
+            let size = Bounds::robust(points.iter().map(|p| DVec3::new(p.dot(a), p.dot(b), p.dot(up))))?.size();
+            // Not for the sake of rounding.
+            if best.is_none_or(|k| size.x * size.y < k.x * k.y * (1.0 - 1e-9)) {
+                best = Some(size);
+            }
+        }
+        best.map(|s| Self { length: s.x.max(s.y), width: s.x.min(s.y), height: s.z })
+    }
+
+    /// That of a box.
+    pub fn of_box(bounds: &Bounds, up: DVec3) -> Option<Self> {
+        let corner = |i: u32| {
+            let pick = |bit: u32, low: f64, high: f64| if i & bit == 0 { low } else { high };
+            let (low, high) = (bounds.min, bounds.max);
+            DVec3::new(pick(1, low.x, high.x), pick(2, low.y, high.y), pick(4, low.z, high.z))
+        };
+        Self::new(&std::array::from_fn::<_, 8, _>(|i| corner(i as u32)), up)
+    }
+}
+
 /// Distance between two boxes; 0 if they touch.
 pub fn gap(a: &Bounds, b: &Bounds) -> f64 {
     (a.min - b.max).max(b.min - a.max).max(DVec3::ZERO).length()
@@ -169,7 +214,12 @@ fn is_on(thing: &Bounds, anchor: &Bounds, frame: &Frame) -> bool {
     let (t, a) = (span(thing, frame.up), span(anchor, frame.up));
     let (height, under) = (t.1 - t.0, a.1 - a.0);
     let gap = t.0 - a.1;
-    is_over(thing, anchor, frame, 0.0) && gap >= -0.35 * height - 0.05 * under && gap <= 0.3 * height + 0.02 * under
+    // A table is not on the ball under it: both begin at the floor.
+    let higher = t.0 - a.0 > 0.25 * under;
+    higher
+        && is_over(thing, anchor, frame, 0.0)
+        && gap >= -0.35 * height - 0.05 * under
+        && gap <= 0.3 * height + 0.02 * under
 }
 
 #[cfg(test)]
@@ -221,6 +271,30 @@ mod tests {
         let spoon = cube([0.3, -0.05, 2.1], [0.02, 0.02, 0.02]);
         assert!(holds(Relation::In, &spoon, &mug, &view) && !holds(Relation::In, &mug, &spoon, &view));
         assert!(!holds(Relation::Near, &mug, &mug, &view));
+    }
+
+    #[test]
+    fn a_things_size_is_its_own_however_it_is_turned() {
+        let mut points = Vec::new();
+        for (x, y, z) in (0..21).flat_map(|x| (0..11).flat_map(move |y| (0..6).map(move |z| (x, y, z)))) {
+            points.push(DVec3::new(f64::from(x) * 0.1, f64::from(y) * 0.1, f64::from(z) * 0.1));
+        }
+        let straight = Extent::new(&points, DVec3::Z).expect("an extent");
+        // The outermost layer of the finest points may count as stray.
+        assert!((straight.length - 2.0).abs() < 0.11 && (straight.width - 1.0).abs() < 0.11, "{straight:?}");
+        for degrees in [10.0_f64, 34.0, 80.0, 120.0] {
+            let turn = glam::DQuat::from_axis_angle(DVec3::Z, degrees.to_radians());
+            let turned: Vec<DVec3> = points.iter().map(|p| turn * *p + DVec3::splat(3.0)).collect();
+            let extent = Extent::new(&turned, DVec3::Z).expect("an extent");
+            assert!((extent.length - straight.length).abs() < 0.1 && (extent.width - straight.width).abs() < 0.1);
+            assert!((extent.height - straight.height).abs() < 1e-9, "{degrees}");
+            // The control: a box along the axes of the world is larger.
+            let world = Bounds::robust(turned).expect("a box").size();
+            assert!(world.x * world.y > 1.05 * extent.length * extent.width, "{degrees}: {world}");
+        }
+        let own = Extent::of_box(&cube([1.0; 3], [2.2, 0.9, 0.75]), DVec3::Z).expect("an extent");
+        assert!((own.length - 2.2).abs() < 1e-9 && (own.width - 0.9).abs() < 1e-9 && (own.height - 0.75).abs() < 1e-9);
+        assert!(Extent::new(&[], DVec3::Z).is_none());
     }
 
     #[test]

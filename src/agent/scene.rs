@@ -1,13 +1,13 @@
 //! A scene on this machine as the agent's [`World`]: what it asks is answered here, what it does is
-//! done to a copy and told to whoever shows the scene.
+//! done to a copy and emitted to whoever shows the scene.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::{DMat3, DVec3};
 
-use super::relation::View;
-use super::wish::{Direction, Distance, GoWish, NORMAL, Side, TurnWay};
+use super::camera_args::{Direction, Distance, NORMAL, Side};
+use super::relation::{Extent, View};
 use super::world::{Arrival, Facts, Moved, Unreachable, World, WorldError};
 use crate::io;
 use crate::navigate::target::{self, Wish};
@@ -24,12 +24,14 @@ use crate::worker::Explored;
 
 /// Longer side of the picture in which pixels of identities are counted, px.
 const COUNT_SIDE_PX: u32 = 256;
+/// Points of a thing that its size is measured by, at most.
+const MEASURED_POINTS: usize = 4096;
 /// A step, as a multiple of the distance that flights keep to matter.
 const STEP: f64 = 6.0;
 
-/// Something that was done, for whoever shows the scene.
+/// A change of what is shown, for whoever shows the scene.
 #[derive(Clone, Debug)]
-pub enum Deed {
+pub enum Effect {
     /// The camera flies; the point is what it turns about from then on.
     Fly(Box<Flight>, Option<DVec3>),
     /// These are marked, and nothing else.
@@ -64,8 +66,8 @@ pub struct Parts {
     pub explored: Option<Arc<Explored>>,
 }
 
-/// Whom deeds are told to.
-pub type Tell = Box<dyn FnMut(Deed) + Send>;
+/// Receives the effects.
+pub type Emit = Box<dyn FnMut(Effect) + Send>;
 
 /// A scene that the agent acts in.
 pub struct SceneWorld {
@@ -77,7 +79,7 @@ pub struct SceneWorld {
     bounds: Vec<Option<Bounds>>,
     shares: Mutex<Option<Counted>>,
     done: UndoHistory<Before>,
-    tell: Tell,
+    emit: Emit,
 }
 
 /// Share of a view that each identity covers, by number, with the view.
@@ -106,7 +108,7 @@ impl SceneWorld {
     ///
     /// # Errors
     /// If the encoder that looked at it cannot be loaded.
-    pub fn new(parts: Parts, eye: Pose, aspect: f64, tell: Tell) -> Result<Self, WorldError> {
+    pub fn new(parts: Parts, eye: Pose, aspect: f64, emit: Emit) -> Result<Self, WorldError> {
         let asker = Asker::new(parts.map.language.as_ref()).map_err(|e| WorldError(e.to_string()))?;
         let n = parts.map.identities.len() + 1;
         let bounds = bounds(&parts);
@@ -119,7 +121,7 @@ impl SceneWorld {
             bounds,
             shares: Mutex::new(None),
             done: UndoHistory::default(),
-            tell,
+            emit,
         })
     }
 
@@ -149,7 +151,7 @@ impl SceneWorld {
         }
         let new = Arc::new(Explored::new(Arc::clone(&self.parts.cloud), &self.parts.cameras, self.parts.up));
         self.parts.explored = Some(Arc::clone(&new));
-        (self.tell)(Deed::Explored(Arc::clone(&new)));
+        (self.emit)(Effect::Explored(Arc::clone(&new)));
         new
     }
 
@@ -195,18 +197,18 @@ impl SceneWorld {
         if let Some(last) = flight.poses.last() {
             self.eye = *last;
         }
-        (self.tell)(Deed::Fly(Box::new(flight), about));
+        (self.emit)(Effect::Fly(Box::new(flight), about));
     }
 
-    fn tell_hidden(&mut self) {
+    fn emit_hidden(&mut self) {
         let hidden = (0..self.hidden.len()).filter(|i| self.hidden[*i]).map(|i| i as IdentityId).collect();
-        (self.tell)(Deed::Hidden(hidden));
+        (self.emit)(Effect::Hidden(hidden));
     }
 
     fn set_hidden_list(&mut self, hidden: Vec<bool>, what: String) {
         let before = std::mem::replace(&mut self.hidden, hidden);
         self.done.record(Before::Hidden(before, what));
-        self.tell_hidden();
+        self.emit_hidden();
     }
 
     fn name(&self, id: IdentityId) -> String {
@@ -279,6 +281,15 @@ impl World for SceneWorld {
         })
     }
 
+    fn extent(&self, id: IdentityId) -> Option<Extent> {
+        let members = self.parts.map.members(id);
+        let place = |i: &usize| self.parts.cloud.world_position(*i);
+        let every = members.len().div_ceil(MEASURED_POINTS).max(1);
+        let points: Vec<DVec3> =
+            members.iter().filter(|i| **i < self.parts.cloud.len()).step_by(every).map(place).collect();
+        Extent::new(&points, self.parts.up)
+    }
+
     fn view(&self) -> View {
         View { eye: self.eye.center, forward: self.eye.forward(), up: self.parts.up }
     }
@@ -287,25 +298,25 @@ impl World for SceneWorld {
         self.parts.metres
     }
 
-    fn go_to(&mut self, id: IdentityId, wish: GoWish) -> Result<Arrival, Unreachable> {
+    fn go_to(&mut self, id: IdentityId, from: Side, closeness: f64) -> Result<Arrival, Unreachable> {
         let explored = self.explored();
         let in_view = self.share_of(id) > 0.0;
         let eye = self.eye;
         let place = Place { cloud: &self.parts.cloud, settings: &self.parts.settings, map: &self.parts.map };
-        let distance = NORMAL / wish.closeness.max(0.01);
+        let distance = NORMAL / closeness.max(0.01);
         let go = |side: target::Side| {
             explored.navigator.visit(place, id, Wish { side, distance }, &eye, self.aspect, FRAMES)
         };
-        let wanted = side(wish.side, in_view);
+        let wanted = side(from, in_view);
         let mut visit = go(wanted);
-        if visit.is_err() && wish.side == Side::Same && wanted != target::Side::Best {
+        if visit.is_err() && from == Side::Same && wanted != target::Side::Best {
             visit = go(target::Side::Best);
         }
         match visit {
             Ok(Visit { view, target, flight }) => {
                 let arrival = Arrival { distance: flight.length, in_view: view.covers };
                 let what = format!("going to {}", self.name(id));
-                (self.tell)(Deed::Mark(vec![id]));
+                (self.emit)(Effect::Mark(vec![id]));
                 self.fly(flight, Some(target), what);
                 Ok(arrival)
             }
@@ -352,22 +363,23 @@ impl World for SceneWorld {
         Ok(Moved { distance_done, stopped_by_matter })
     }
 
-    fn turn(&mut self, way: TurnWay, degrees: f64) -> Result<(), Unreachable> {
+    fn turn(&mut self, direction: Direction, degrees: f64) -> Result<(), Unreachable> {
         let eye = self.eye;
-        let (axis, sign) = match way {
-            TurnWay::Left => (self.parts.up, 1.0),
-            TurnWay::Right => (self.parts.up, -1.0),
-            TurnWay::Up => (eye.world_from_camera.x_axis, 1.0),
-            TurnWay::Down => (eye.world_from_camera.x_axis, -1.0),
+        let (axis, sign) = match direction {
+            Direction::Left => (self.parts.up, 1.0),
+            Direction::Right => (self.parts.up, -1.0),
+            Direction::Up => (eye.world_from_camera.x_axis, 1.0),
+            Direction::Down => (eye.world_from_camera.x_axis, -1.0),
+            Direction::Forward | Direction::Back => return Ok(()),
         };
         let axis = axis.try_normalize().unwrap_or(DVec3::Z);
         let turn = DMat3::from_axis_angle(axis, sign * degrees.to_radians());
         let to = Pose { world_from_camera: turn * eye.world_from_camera, ..eye };
-        self.straight(to, format!("turning {}", way.text())).map(|_| ())
+        self.straight(to, format!("turning {}", direction.text())).map(|_| ())
     }
 
     fn highlight(&mut self, ids: &[IdentityId]) -> Result<(), WorldError> {
-        (self.tell)(Deed::Mark(ids.to_vec()));
+        (self.emit)(Effect::Mark(ids.to_vec()));
         Ok(())
     }
 
@@ -407,7 +419,7 @@ impl World for SceneWorld {
         let (name, old) = (text::name(name), identity.names.first().cloned().unwrap_or_default());
         map.identities.rename(id, &name);
         self.done.record(Before::Named(before, id, old));
-        (self.tell)(Deed::Renamed(id, name));
+        (self.emit)(Effect::Renamed(id, name));
         Ok(())
     }
 
@@ -415,13 +427,13 @@ impl World for SceneWorld {
         match self.done.take().ok_or_else(|| WorldError("There is nothing to take back.".into()))? {
             Before::Hidden(hidden, what) => {
                 self.hidden = hidden;
-                self.tell_hidden();
+                self.emit_hidden();
                 Ok(what)
             }
             Before::Named(map, id, old) => {
                 let new = self.parts.map.identities.name(id);
                 self.parts.map = map;
-                (self.tell)(Deed::RenameUndone(id, old));
+                (self.emit)(Effect::RenameUndone(id, old));
                 Ok(format!("calling it {new}"))
             }
             Before::Eye(eye, what) => {

@@ -3,8 +3,8 @@
 
 use serde_json::{Value, json};
 
+use super::camera_args::{CLOSENESS, Direction, FARTHEST, Side};
 use super::relation::Relation;
-use super::wish::{CLOSENESS, Direction, FARTHEST, Side, TurnWay};
 use crate::agent::tool::MAX_TEXT;
 
 fn words<T: serde::Serialize>(all: &[T]) -> Value {
@@ -98,7 +98,7 @@ pub fn tools() -> Vec<Value> {
             "turn",
             "Turn the camera without moving.",
             json!({
-                "direction": { "type": "string", "enum": words(&TurnWay::ALL) },
+                "direction": { "type": "string", "enum": words(Direction::TURNS) },
                 "degrees": { "type": "number", "exclusiveMinimum": 0, "maximum": 360 }
             }),
             &["direction", "degrees"],
@@ -117,7 +117,7 @@ pub fn tools() -> Vec<Value> {
         ),
         tool(
             "describe",
-            "Tell about a thing; without a target, about what is in the view.",
+            "Emit about a thing; without a target, about what is in the view.",
             json!({ "target": target("the thing") }),
             &[],
         ),

@@ -3,11 +3,11 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::answer::{Choice, Confirmation, choice, confirmation};
+use super::dialog::DialogState;
 use super::event::AgentEvent;
 use super::execute::{Checked, Outcome, check, perform};
-use super::focus::Focus;
-use super::planner::{Desk, Planner, Step};
-use super::policy::{Judgement, Policy};
+use super::planner::{Planner, PlannerContext, Step};
+use super::policy::Policy;
 use super::refusal::{Refusal, RefusalKind};
 use super::tool::ToolCall;
 use super::transcript::{Transcript, What};
@@ -46,8 +46,6 @@ pub struct Reply {
 enum Pending {
     /// This waits for a yes.
     Confirm { call: ToolCall, ids: Vec<IdentityId> },
-    /// A request waits for a yes before it is planned.
-    Request(String),
     /// This waits for a target. A model's own question has no call.
     Choose { call: Option<ToolCall>, candidates: Vec<IdentityId>, question: String },
 }
@@ -56,13 +54,13 @@ enum Pending {
 pub struct Session {
     policy: Policy,
     planner: Box<dyn Planner>,
-    focus: Focus,
+    dialog: DialogState,
     pending: Option<Pending>,
     transcript: Transcript,
 }
 
-/// Where a session's loop tells what goes on, and hears that it is to end.
-struct Line<'a> {
+/// Where a session reports its progress, and hears that it is to end.
+struct ProgressSink<'a> {
     on: &'a mut dyn FnMut(AgentEvent),
     cancel: &'a AtomicBool,
 }
@@ -70,7 +68,7 @@ struct Line<'a> {
 impl Session {
     /// A talk that keeps to `policy`, planned by `planner`.
     pub fn new(policy: Policy, planner: Box<dyn Planner>) -> Self {
-        Self { policy, planner, focus: Focus::default(), pending: None, transcript: Transcript::default() }
+        Self { policy, planner, dialog: DialogState::default(), pending: None, transcript: Transcript::default() }
     }
 
     /// Everything that was said and done.
@@ -84,20 +82,20 @@ impl Session {
     }
 
     /// What was spoken of last.
-    pub fn focus(&self) -> &Focus {
-        &self.focus
+    pub fn dialog(&self) -> &DialogState {
+        &self.dialog
     }
 
     /// Tells the session that the user has chosen this by other means, so that "it" means it.
     pub fn point_at(&mut self, id: IdentityId) {
-        self.focus.last = Some(id);
-        self.focus.group.clear();
+        self.dialog.last = Some(id);
+        self.dialog.group.clear();
     }
 
     /// What the session waits for.
     pub fn awaited(&self) -> Option<Awaited> {
         self.pending.as_ref().map(|p| match p {
-            Pending::Confirm { .. } | Pending::Request(_) => Awaited::Confirmation,
+            Pending::Confirm { .. } => Awaited::Confirmation,
             Pending::Choose { .. } => Awaited::Choice,
         })
     }
@@ -113,18 +111,18 @@ impl Session {
     ) -> Reply {
         let text = self.planner.redact(text);
         self.transcript.add(What::User { text: text.chars().take(2 * MAX_CHARS).collect() });
-        let mut line = Line { on, cancel };
-        let mut reply = self.answer(world, &text, &mut line);
+        let mut sink = ProgressSink { on, cancel };
+        let mut reply = self.answer(world, &text, &mut sink);
         reply.text = self.planner.redact(&reply.text);
         reply.pending = self.awaited();
         self.transcript.add(What::Reply { text: reply.text.clone() });
         reply
     }
 
-    fn answer(&mut self, world: &mut dyn World, text: &str, line: &mut Line<'_>) -> Reply {
+    fn answer(&mut self, world: &mut dyn World, text: &str, sink: &mut ProgressSink<'_>) -> Reply {
         if !text.chars().any(char::is_alphanumeric) {
             return self
-                .refuse(RefusalKind::Unclear, "Tell me what you would like to see, such as 'show me the lamp'.");
+                .refuse(RefusalKind::Unclear, "Emit me what you would like to see, such as 'show me the lamp'.");
         }
         if text.chars().count() > MAX_CHARS {
             let text = format!("That is too long for me: say it in fewer than {MAX_CHARS} characters.");
@@ -132,29 +130,22 @@ impl Session {
         }
         match self.pending.take() {
             Some(Pending::Confirm { call, ids }) => match confirmation(text) {
-                Confirmation::Yes => return self.confirmed(world, call, ids, line),
+                Confirmation::Yes => return self.confirmed(world, call, ids, sink),
                 Confirmation::No => return self.refuse(RefusalKind::Stopped, "All right, I leave it as it is."),
                 Confirmation::Neither => self.note("no yes", "The open question is dropped: something else was said."),
             },
-            Some(Pending::Request(request)) => match confirmation(text) {
-                Confirmation::Yes => return self.plan(world, &request, line),
-                Confirmation::No => return self.refuse(RefusalKind::Stopped, "All right, I leave it."),
-                Confirmation::Neither => self.note("no yes", "The open question is dropped: something else was said."),
-            },
             Some(Pending::Choose { call, candidates, question }) => {
-                self.focus.group.clone_from(&candidates);
-                match choice(world, text, &candidates, &self.focus) {
-                    Choice::One(id) => return self.chosen(world, call, id, text, line),
+                self.dialog.group.clone_from(&candidates);
+                match choice(world, text, &candidates, &self.dialog) {
+                    Choice::One(id) => return self.chosen(world, call, id, text, sink),
                     Choice::None => return self.refuse(RefusalKind::Stopped, "All right, never mind."),
                     // What a planner asked, it hears the answer to.
-                    Choice::Unclear(_) if call.is_none() => {}
-                    Choice::Unclear(refusal) => {
-                        let reply = Reply {
-                            text: format!("{} {question}", refusal.text),
-                            candidates: candidates.clone(),
-                            ..Reply::default()
-                        };
-                        self.note("still open", &refusal.text);
+                    Choice::Unclear if call.is_none() => {}
+                    Choice::Unclear => {
+                        let problem = "I do not know which of them that is.";
+                        let text = format!("{problem} {question}");
+                        let reply = Reply { text, candidates: candidates.clone(), ..Reply::default() };
+                        self.note("still open", problem);
                         self.pending = Some(Pending::Choose { call, candidates, question });
                         return reply;
                     }
@@ -163,34 +154,35 @@ impl Session {
             }
             None => {}
         }
-        match self.policy.judge(text, world.identities()) {
-            Judgement::Fine => self.plan(world, text, line),
-            Judgement::Refused(refusal) => self.refuse(refusal.kind, &refusal.text),
-            Judgement::Confirm(reason) => {
-                self.pending = Some(Pending::Request(text.to_owned()));
-                Reply { text: format!("{reason} Go on all the same? (yes or no)"), ..Reply::default() }
-            }
-        }
+        self.plan(world, text, sink)
     }
 
     /// A new request: the outer loop.
-    fn plan(&mut self, world: &mut dyn World, text: &str, line: &mut Line<'_>) -> Reply {
-        let (focus, policy) = (&self.focus, &self.policy);
-        self.planner
-            .start(text, &mut Desk { world: &mut *world, focus, policy, on: &mut *line.on, cancel: line.cancel });
-        self.run(world, None, line)
+    fn plan(&mut self, world: &mut dyn World, text: &str, sink: &mut ProgressSink<'_>) -> Reply {
+        let (dialog, policy) = (&self.dialog, &self.policy);
+        self.planner.start(
+            text,
+            &mut PlannerContext { world: &mut *world, dialog, policy, on: &mut *sink.on, cancel: sink.cancel },
+        );
+        self.run(world, None, sink)
     }
 
-    fn confirmed(&mut self, world: &mut dyn World, call: ToolCall, ids: Vec<IdentityId>, line: &mut Line<'_>) -> Reply {
+    fn confirmed(
+        &mut self,
+        world: &mut dyn World,
+        call: ToolCall,
+        ids: Vec<IdentityId>,
+        sink: &mut ProgressSink<'_>,
+    ) -> Reply {
         // The scene may have changed since the question.
-        let outcome = match check(world, &call, &self.policy, &self.focus, true) {
-            Checked::Ready { call, note, .. } => self.perform(world, call, ids, &note, line),
-            Checked::Refused { refusal, .. } => self.refused_call(call, refusal, line),
+        let outcome = match check(world, &call, &self.policy, &self.dialog, true) {
+            Checked::Ready { call, note, .. } => self.perform(world, call, ids, &note, sink),
+            Checked::Refused { refusal, .. } => self.refused_call(call, refusal, sink),
             Checked::Choose { question, .. } | Checked::Confirm { question, .. } => {
-                self.refused_call(call, Refusal::new(RefusalKind::Unclear, question), line)
+                self.refused_call(call, Refusal::new(RefusalKind::Unclear, question), sink)
             }
         };
-        self.run(world, Some(outcome), line)
+        self.run(world, Some(outcome), sink)
     }
 
     fn chosen(
@@ -199,35 +191,36 @@ impl Session {
         call: Option<ToolCall>,
         id: IdentityId,
         text: &str,
-        line: &mut Line<'_>,
+        sink: &mut ProgressSink<'_>,
     ) -> Reply {
         let Some(call) = call else {
             // The planner asked: it hears the answer as it was given.
-            self.focus.last = Some(id);
-            return self.plan(world, text, line);
+            self.dialog.last = Some(id);
+            return self.plan(world, text, sink);
         };
         let call = call.with_target(super::tool::Target::Identity(id));
-        match self.attempt(world, call, line) {
-            Ok(outcome) => self.run(world, Some(outcome), line),
+        match self.attempt(world, call, sink) {
+            Ok(outcome) => self.run(world, Some(outcome), sink),
             Err(reply) => *reply,
         }
     }
 
     /// The inner loop: one call after another, each planned after the last one's result.
-    fn run(&mut self, world: &mut dyn World, first: Option<Outcome>, line: &mut Line<'_>) -> Reply {
+    fn run(&mut self, world: &mut dyn World, first: Option<Outcome>, sink: &mut ProgressSink<'_>) -> Reply {
         let mut outcomes: Vec<Outcome> = first.into_iter().collect();
         let mut alike = (None, 0);
         for calls in 0.. {
-            if line.cancel.load(Ordering::Relaxed) {
+            if sink.cancel.load(Ordering::Relaxed) {
                 return self.ended(&outcomes, Refusal::new(RefusalKind::Stopped, "Stopped."));
             }
             if calls >= MOST_CALLS {
                 let text = format!("I stopped after {MOST_CALLS} steps; ask for less at once.");
                 return self.ended(&outcomes, Refusal::new(RefusalKind::Limit, text));
             }
-            let (focus, policy) = (&self.focus, &self.policy);
-            let mut desk = Desk { world: &mut *world, focus, policy, on: &mut *line.on, cancel: line.cancel };
-            let call = match self.planner.next(outcomes.last(), &mut desk) {
+            let (dialog, policy) = (&self.dialog, &self.policy);
+            let mut context =
+                PlannerContext { world: &mut *world, dialog, policy, on: &mut *sink.on, cancel: sink.cancel };
+            let call = match self.planner.next(outcomes.last(), &mut context) {
                 Ok(Step::Call(call)) => call,
                 Ok(Step::Finish { text, refusal }) => return self.finished(&outcomes, text, refusal),
                 Err(refusal) => return self.ended(&outcomes, refusal),
@@ -237,7 +230,7 @@ impl Session {
                 let text = "I stopped: the same step came again and again.";
                 return self.ended(&outcomes, Refusal::new(RefusalKind::Limit, text));
             }
-            match self.attempt(world, call, line) {
+            match self.attempt(world, call, sink) {
                 Ok(outcome) => outcomes.push(outcome),
                 Err(mut reply) => {
                     let done: Vec<&str> =
@@ -253,22 +246,27 @@ impl Session {
     }
 
     /// Checks a call and makes it. `Err` is the reply that asks the user.
-    fn attempt(&mut self, world: &mut dyn World, call: ToolCall, line: &mut Line<'_>) -> Result<Outcome, Box<Reply>> {
+    fn attempt(
+        &mut self,
+        world: &mut dyn World,
+        call: ToolCall,
+        sink: &mut ProgressSink<'_>,
+    ) -> Result<Outcome, Box<Reply>> {
         let said = call.line(world.identities());
         self.transcript.add(What::Call { call: call.clone(), line: said });
         if let ToolCall::AskUser { question, candidates } = &call {
             if let Some(refusal) = self.policy.refusal(&call) {
-                return Ok(self.refused_call(call, refusal, line));
+                return Ok(self.refused_call(call, refusal, sink));
             }
             let there: Vec<IdentityId> = candidates.iter().copied().filter(|id| world.facts(*id).is_some()).collect();
             let reply = Reply { text: question.clone(), candidates: there.clone(), ..Reply::default() };
             self.pending = Some(Pending::Choose { call: None, candidates: there, question: question.clone() });
             return Err(Box::new(reply));
         }
-        match check(world, &call, &self.policy, &self.focus, false) {
-            Checked::Ready { call, ids, note } => Ok(self.perform(world, call, ids, &note, line)),
+        match check(world, &call, &self.policy, &self.dialog, false) {
+            Checked::Ready { call, ids, note } => Ok(self.perform(world, call, ids, &note, sink)),
             Checked::Refused { refusal, near } => {
-                let mut outcome = self.refused_call(call, refusal, line);
+                let mut outcome = self.refused_call(call, refusal, sink);
                 outcome.ids = near;
                 Ok(outcome)
             }
@@ -280,7 +278,7 @@ impl Session {
             }
             Checked::Confirm { question, call, ids } => {
                 self.note("needs a yes", &question);
-                self.focus.last = ids.first().copied().or(self.focus.last);
+                self.dialog.last = ids.first().copied().or(self.dialog.last);
                 let reply = Reply { text: question, candidates: ids.clone(), ..Reply::default() };
                 self.pending = Some(Pending::Confirm { call, ids });
                 Err(Box::new(reply))
@@ -294,21 +292,21 @@ impl Session {
         call: ToolCall,
         ids: Vec<IdentityId>,
         note: &str,
-        line: &mut Line<'_>,
+        sink: &mut ProgressSink<'_>,
     ) -> Outcome {
         let said = call.line(world.identities());
-        (line.on)(AgentEvent::Call { call: call.clone(), line: said.clone() });
-        let outcome = perform(world, call, ids, note, &mut self.focus);
+        (sink.on)(AgentEvent::Call { call: call.clone(), line: said.clone() });
+        let outcome = perform(world, call, ids, note, &mut self.dialog);
         let done = outcome.refused.is_none();
-        (line.on)(AgentEvent::Result { text: outcome.text.clone(), done });
+        (sink.on)(AgentEvent::Result { text: outcome.text.clone(), done });
         self.transcript.add(What::Result { call: outcome.call.clone(), line: said, text: outcome.text.clone(), done });
         outcome
     }
 
     /// A call that a check has stopped.
-    fn refused_call(&mut self, call: ToolCall, refusal: Refusal, line: &mut Line<'_>) -> Outcome {
+    fn refused_call(&mut self, call: ToolCall, refusal: Refusal, sink: &mut ProgressSink<'_>) -> Outcome {
         self.note("refused", &refusal.text);
-        (line.on)(AgentEvent::Result { text: refusal.text.clone(), done: false });
+        (sink.on)(AgentEvent::Result { text: refusal.text.clone(), done: false });
         Outcome { call, ids: Vec::new(), text: refusal.text, refused: Some(refusal.kind) }
     }
 

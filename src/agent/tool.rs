@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::camera_args::{self, Direction, Distance, Side};
 use super::relation::Relation;
-use super::wish::{self, Direction, Distance, Side, TurnWay};
 use crate::math::format::short;
 use crate::pipeline::semantics::grammar::Kind;
 use crate::scene::{Identities, IdentityId, Level};
@@ -31,7 +31,7 @@ impl Target {
 /// Which level to look at.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum LevelWish {
+pub enum LevelFilter {
     /// Objects and parts.
     #[default]
     Any,
@@ -41,7 +41,7 @@ pub enum LevelWish {
     Part,
 }
 
-impl LevelWish {
+impl LevelFilter {
     /// As queries have it.
     pub fn kind(self) -> Kind {
         match self {
@@ -52,7 +52,7 @@ impl LevelWish {
     }
 
     /// Whether an identity of `level` is asked for.
-    pub fn takes(self, level: Level) -> bool {
+    pub fn accepts(self, level: Level) -> bool {
         match self {
             Self::Any => true,
             Self::Object => level == Level::Object,
@@ -71,7 +71,7 @@ pub enum ToolCall {
         query: String,
         /// Object or part.
         #[serde(default)]
-        kind: LevelWish,
+        kind: LevelFilter,
     },
     /// Fly to a target.
     GoTo {
@@ -81,7 +81,7 @@ pub enum ToolCall {
         #[serde(default)]
         side: Side,
         /// 1 as usual, 2 twice as close, 0.5 from twice as far.
-        #[serde(default = "wish::normal", deserialize_with = "wish::closeness")]
+        #[serde(default = "camera_args::normal", deserialize_with = "camera_args::closeness")]
         closeness: f64,
     },
     /// Turn towards a target without moving.
@@ -100,7 +100,7 @@ pub enum ToolCall {
     /// Turn the eye.
     Turn {
         /// Where to.
-        direction: TurnWay,
+        direction: Direction,
         /// By how much, in degrees, above 0 to 360.
         degrees: f64,
     },
@@ -138,7 +138,7 @@ pub enum ToolCall {
         /// The new name.
         name: String,
     },
-    /// Tell about a thing, or about what is in the view.
+    /// Emit about a thing, or about what is in the view.
     Describe {
         /// Which; none for the view.
         #[serde(default)]
@@ -148,7 +148,7 @@ pub enum ToolCall {
     List {
         /// Objects or parts.
         #[serde(default)]
-        level: LevelWish,
+        level: LevelFilter,
         /// Only what stands in `relation` to this.
         #[serde(default)]
         of: Option<Target>,
@@ -232,6 +232,22 @@ pub const NAMES: [&str; 18] = [
     "export",
 ];
 
+/// The calls that always have a target.
+macro_rules! targeted {
+    ($target:ident) => {
+        Self::GoTo { target: $target, .. }
+            | Self::LookAt { target: $target }
+            | Self::Isolate { target: $target }
+            | Self::Highlight { target: $target }
+            | Self::Hide { target: $target }
+            | Self::Unhide { target: $target }
+            | Self::Remove { target: $target }
+            | Self::Rename { target: $target, .. }
+            | Self::Measure { target: $target, .. }
+            | Self::Export { target: $target }
+    };
+}
+
 impl ToolCall {
     /// Reads a call from a tool's name and its arguments as JSON.
     ///
@@ -261,12 +277,15 @@ impl ToolCall {
     pub fn sound(&self) -> Result<(), String> {
         match self {
             Self::Move { distance, .. } if !distance.is_sound() => {
-                return Err(format!("the distance must be above 0 and at most {}", wish::FARTHEST));
+                return Err(format!("the distance must be above 0 and at most {}", camera_args::FARTHEST));
             }
             Self::Turn { degrees, .. } if !(*degrees > 0.0 && *degrees <= 360.0) => {
                 return Err("degrees must be above 0 and at most 360".into());
             }
-            Self::GoTo { closeness, .. } if !wish::CLOSENESS.contains(closeness) => {
+            Self::Turn { direction: Direction::Forward | Direction::Back, .. } => {
+                return Err("a turn goes left, right, up or down".into());
+            }
+            Self::GoTo { closeness, .. } if !camera_args::CLOSENESS.contains(closeness) => {
                 return Err("closeness must be between 0.1 and 10".into());
             }
             _ => {}
@@ -322,23 +341,9 @@ impl ToolCall {
     /// What it is done to.
     pub fn target(&self) -> Option<&Target> {
         match self {
-            Self::GoTo { target, .. }
-            | Self::LookAt { target }
-            | Self::Isolate { target }
-            | Self::Highlight { target }
-            | Self::Hide { target }
-            | Self::Unhide { target }
-            | Self::Remove { target }
-            | Self::Rename { target, .. }
-            | Self::Measure { target, .. }
-            | Self::Export { target } => Some(target),
+            targeted!(target) => Some(target),
             Self::Describe { target } | Self::List { of: target, .. } => target.as_ref(),
-            Self::Locate { .. }
-            | Self::Move { .. }
-            | Self::Turn { .. }
-            | Self::ShowAll {}
-            | Self::AskUser { .. }
-            | Self::Undo {} => None,
+            _ => None,
         }
     }
 
@@ -347,19 +352,10 @@ impl ToolCall {
     pub fn with_target(&self, new: Target) -> Self {
         let mut call = self.clone();
         match &mut call {
-            Self::GoTo { target, .. }
-            | Self::LookAt { target }
-            | Self::Isolate { target }
-            | Self::Highlight { target }
-            | Self::Hide { target }
-            | Self::Unhide { target }
-            | Self::Remove { target }
-            | Self::Rename { target, .. }
-            | Self::Measure { target, .. }
-            | Self::Export { target } => *target = new,
+            targeted!(target) => *target = new,
             Self::Describe { target } | Self::List { of: target, .. } => *target = Some(new),
             Self::Locate { .. } => return Self::Highlight { target: new },
-            Self::Move { .. } | Self::Turn { .. } | Self::ShowAll {} | Self::AskUser { .. } | Self::Undo {} => {}
+            _ => {}
         }
         call
     }
@@ -375,18 +371,18 @@ impl ToolCall {
             Self::Locate { query, kind } => {
                 parts.push(format!("\"{query}\""));
                 match kind {
-                    LevelWish::Any => {}
-                    LevelWish::Object => parts.push("object".into()),
-                    LevelWish::Part => parts.push("part".into()),
+                    LevelFilter::Any => {}
+                    LevelFilter::Object => parts.push("object".into()),
+                    LevelFilter::Part => parts.push("part".into()),
                 }
             }
             Self::GoTo { side, closeness, .. } => {
                 if *side != Side::Same {
                     parts.push(format!("from {}", side.text()));
                 }
-                if *closeness > wish::NORMAL {
+                if *closeness > camera_args::NORMAL {
                     parts.push("closer".into());
-                } else if *closeness < wish::NORMAL {
+                } else if *closeness < camera_args::NORMAL {
                     parts.push("farther".into());
                 }
             }
@@ -407,9 +403,9 @@ impl ToolCall {
                     parts.insert(0, relation.text().into());
                 }
                 match level {
-                    LevelWish::Any => {}
-                    LevelWish::Object => parts.insert(0, "objects".into()),
-                    LevelWish::Part => parts.insert(0, "parts".into()),
+                    LevelFilter::Any => {}
+                    LevelFilter::Object => parts.insert(0, "objects".into()),
+                    LevelFilter::Part => parts.insert(0, "parts".into()),
                 }
                 parts.extend(named.iter().map(|n| format!("\"{n}\"")));
             }

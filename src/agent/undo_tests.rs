@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 
 use glam::{DMat3, DVec3};
 
-use super::scene::{Deed, Parts, SceneWorld};
+use super::scene::{Effect, Parts, SceneWorld};
 use super::world::World;
 use crate::navigate::Pose;
 use crate::render::RenderSettings;
@@ -22,8 +22,8 @@ fn map(name: Option<&str>) -> Arc<SemanticMap> {
 }
 
 /// A world in which the lamp was called a torch, and what was said of it.
-fn renamed() -> (SceneWorld, Arc<Mutex<Vec<Deed>>>) {
-    let deeds = Arc::new(Mutex::new(Vec::new()));
+fn renamed() -> (SceneWorld, Arc<Mutex<Vec<Effect>>>) {
+    let effects = Arc::new(Mutex::new(Vec::new()));
     let parts = Parts {
         cloud: Arc::new(GaussianCloud::default()),
         settings: RenderSettings::default(),
@@ -34,29 +34,29 @@ fn renamed() -> (SceneWorld, Arc<Mutex<Vec<Deed>>>) {
         exports: PathBuf::new(),
         explored: None,
     };
-    let said = Arc::clone(&deeds);
-    let tell = Box::new(move |deed| said.lock().expect("no panic").push(deed));
-    let mut world = SceneWorld::new(parts, EYE, 1.0, tell).expect("no encoder is needed");
+    let said = Arc::clone(&effects);
+    let emit = Box::new(move |effect| said.lock().expect("no panic").push(effect));
+    let mut world = SceneWorld::new(parts, EYE, 1.0, emit).expect("no encoder is needed");
     world.rename(1, "torch").expect("it is there");
-    (world, deeds)
+    (world, effects)
 }
 
 #[test]
 fn a_rename_is_undone_as_one_step_of_the_window() {
-    let (mut world, deeds) = renamed();
+    let (mut world, effects) = renamed();
     // The window has carried the rename out: the same names in another map.
     world.keep_up(EYE, 1.0, &[], &map(Some("torch")));
     world.undo().expect("there is something to undo");
     assert_eq!(world.identities().name(1), "lamp");
-    let deeds = deeds.lock().expect("no panic");
-    assert!(matches!(&deeds[0], Deed::Renamed(1, name) if name == "torch"), "{deeds:?}");
-    assert!(matches!(&deeds[1], Deed::RenameUndone(1, name) if name == "lamp"), "{deeds:?}");
+    let effects = effects.lock().expect("no panic");
+    assert!(matches!(&effects[0], Effect::Renamed(1, name) if name == "torch"), "{effects:?}");
+    assert!(matches!(&effects[1], Effect::RenameUndone(1, name) if name == "lamp"), "{effects:?}");
 }
 
 #[test]
 fn what_the_user_has_edited_since_is_not_undone() {
-    let (mut world, deeds) = renamed();
+    let (mut world, effects) = renamed();
     world.keep_up(EYE, 1.0, &[], &map(Some("sun")));
     assert!(world.undo().is_err());
-    assert_eq!((world.identities().name(1).as_str(), deeds.lock().expect("no panic").len()), ("sun", 1));
+    assert_eq!((world.identities().name(1).as_str(), effects.lock().expect("no panic").len()), ("sun", 1));
 }

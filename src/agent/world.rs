@@ -1,8 +1,8 @@
 //! What the agent needs of the scene. The window, the command line and tests supply it; everything
 //! that does not need a camera or a file is in [`super::resolve`] and [`super::describe`].
 
-use super::relation::View;
-use super::wish::{Direction, Distance, GoWish, TurnWay};
+use super::camera_args::{Direction, Distance, Side};
+use super::relation::{Extent, View};
 use crate::pipeline::semantics::answer::{Answered, by_name};
 use crate::pipeline::semantics::grammar::{Kind, Phrase};
 use crate::pipeline::semantics::localise::Answer;
@@ -70,14 +70,19 @@ pub trait World {
     /// What is known of an identity; `None` if it is not (or no more) in the scene.
     fn facts(&self, id: IdentityId) -> Option<Facts>;
 
+    /// The size of an identity, if it has any matter: that of its box, unless more is known.
+    fn extent(&self, id: IdentityId) -> Option<Extent> {
+        Extent::of_box(&self.facts(id)?.bounds?, self.view().up)
+    }
+
     /// The present view.
     fn view(&self) -> View;
 
     /// Length of a scene unit in metres, if that is known.
     fn metres_per_unit(&self) -> Option<f64>;
 
-    /// Flies to an identity.
-    fn go_to(&mut self, id: IdentityId, wish: GoWish) -> Result<Arrival, Unreachable>;
+    /// Flies to an identity, to see it from `side`: 1 as close as usual, 2 twice as close.
+    fn go_to(&mut self, id: IdentityId, side: Side, closeness: f64) -> Result<Arrival, Unreachable>;
 
     /// Turns towards an identity.
     fn look_at(&mut self, id: IdentityId) -> Result<Arrival, Unreachable>;
@@ -86,7 +91,7 @@ pub trait World {
     fn move_eye(&mut self, direction: Direction, distance: Distance) -> Result<Moved, Unreachable>;
 
     /// Turns the eye by degrees.
-    fn turn(&mut self, way: TurnWay, degrees: f64) -> Result<(), Unreachable>;
+    fn turn(&mut self, direction: Direction, degrees: f64) -> Result<(), Unreachable>;
 
     /// Marks these in the view, and nothing else.
     fn highlight(&mut self, ids: &[IdentityId]) -> Result<(), WorldError>;

@@ -1,17 +1,17 @@
 //! `fmlgs agent`: plain sentences to what is shown.
 
 use std::io::{BufRead, Read};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::json;
 
 use super::asking::semantics;
 use super::{CliError, interrupt, number, opened, output, view};
-use crate::agent::llm::settings::LlmSettings;
-use crate::agent::llm::{Llm, SENT};
-use crate::agent::rules::Rules;
-use crate::agent::scene::{Deed, Parts, SceneWorld};
+use crate::agent::commands::Commands;
+use crate::agent::llm::settings::{LlmSettings, Patience};
+use crate::agent::llm::{Llm, SENT, discover};
+use crate::agent::scene::{Effect, Parts, SceneWorld};
 use crate::agent::{AgentEvent, Planner, Policy, Session};
 use crate::io;
 use crate::navigate::Pose;
@@ -26,20 +26,21 @@ const EXAMPLES: &str = "Examples:\n  \
 /// Talk to a scene: it shows, goes there, tells, hides, measures
 ///
 /// Each TEXT is one request of the same talk; without any, requests are read from standard input, one
-/// a line. The planner 'rules' is built in; 'llm' asks a chat model behind an OpenAI-compatible
+/// a line. The planner 'commands' is built in; 'llm' asks a chat model behind an OpenAI-compatible
 /// address. Exit code 1 if the last request was refused.
 #[derive(Debug, clap::Args)]
 #[command(after_help = format!("{EXAMPLES}\n\n{SENT}"))]
 pub struct Args {
     /// Trained scene with objects and parts ('fmlgs preprocess')
-    scene: PathBuf,
+    #[arg(required_unless_present_any = ["find_model", "test_model"])]
+    scene: Option<PathBuf>,
     /// Requests, in order
     text: Vec<String>,
     /// Photo to start from, by index or name, or a JSON camera file [default: the first photo]
     #[arg(long)]
     from: Option<String>,
     /// What turns sentences into steps
-    #[arg(long, value_enum, default_value_t = PlannerArg::Rules)]
+    #[arg(long, value_enum, default_value_t = PlannerArg::Commands)]
     planner: PlannerArg,
     /// Address of the chat model, up to and with its version
     #[arg(long, required_if_eq("planner", "llm"))]
@@ -50,6 +51,12 @@ pub struct Args {
     /// Name of the environment variable that holds the model's key
     #[arg(long)]
     key_variable: Option<String>,
+    /// Look for a chat model's server on this machine (Ollama, llama.cpp, LM Studio, vLLM), list its models, and end
+    #[arg(long, conflicts_with = "scene")]
+    find_model: bool,
+    /// Test the connection to --model at --url, and end
+    #[arg(long, conflicts_with = "scene", requires_all = ["url", "model"])]
+    test_model: bool,
     /// What may be done: a policy file [default: FMLGS_POLICY, else the built-in one]
     #[arg(long)]
     policy: Option<PathBuf>,
@@ -69,22 +76,27 @@ pub struct Args {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum PlannerArg {
-    /// A grammar of English; no network
-    Rules,
+    /// The built-in commands ('help' lists them); no network
+    #[value(alias = "rules")]
+    Commands,
     /// A chat model
     Llm,
 }
 
 impl Args {
-    fn planner(&self) -> Result<Box<dyn Planner>, CliError> {
-        let settings = LlmSettings {
+    fn settings(&self) -> LlmSettings {
+        LlmSettings {
             base_url: self.url.clone().unwrap_or_default(),
             model: self.model.clone().unwrap_or_default(),
             key_variable: self.key_variable.clone().unwrap_or_default(),
             ..LlmSettings::default()
-        };
+        }
+    }
+
+    fn planner(&self) -> Result<Box<dyn Planner>, CliError> {
+        let settings = self.settings();
         Ok(match self.planner {
-            PlannerArg::Rules => Box::new(Rules::default()),
+            PlannerArg::Commands => Box::new(Commands::default()),
             PlannerArg::Llm => Box::new(Llm::new(settings).map_err(|e| CliError::failed(e.to_string()))?),
         })
     }
@@ -98,16 +110,41 @@ impl Args {
     }
 }
 
+/// The chat models that are found on this machine.
+fn find_model(json: bool) -> Result<(), CliError> {
+    let found = discover::find(&discover::PORTS, interrupt::flag());
+    if json {
+        let list = found.iter().map(|s| json!({ "kind": s.kind, "url": s.base_url, "models": s.models }));
+        return output::print_json(&json!({ "servers": list.collect::<Vec<_>>() }));
+    }
+    if found.is_empty() {
+        let ports: Vec<String> = discover::PORTS.iter().map(|(kind, port)| format!("{kind} ({port})")).collect();
+        let text = format!("no chat model's server answers on the usual ports of this machine: {}", ports.join(", "));
+        return Err(CliError::failed(text));
+    }
+    let line = |s: &discover::LocalServer| format!("{} at {}: {}", s.kind, s.base_url, s.models.join(", "));
+    let lines: Vec<String> = found.iter().map(line).collect();
+    output::print(&format!("{}\nChoose one with --planner llm --url ADDRESS --model NAME.\n{SENT}", lines.join("\n")))
+}
+
 pub fn run(args: Args) -> Result<(), CliError> {
+    if args.find_model {
+        return find_model(args.json);
+    }
+    if args.test_model {
+        let text = discover::test(&args.settings(), &Patience::default(), interrupt::flag());
+        return output::print(&text.map_err(CliError::failed)?);
+    }
     let (planner, policy) = (args.planner()?, args.policy()?);
-    let scene = opened::drawable(&args.scene)?;
+    let folder = args.scene.as_deref().unwrap_or(Path::new(""));
+    let scene = opened::drawable(folder)?;
     if let Some(view) = &args.view {
-        output::check(view, &[".png"], &scene.reads(&args.scene))?;
+        output::check(view, &[".png"], &scene.reads(folder))?;
     }
     if let Some(transcript) = &args.transcript {
-        output::check(transcript, &[".json", ".md"], &scene.reads(&args.scene))?;
+        output::check(transcript, &[".json", ".md"], &scene.reads(folder))?;
     }
-    let map = semantics(&args.scene, scene.state.as_deref(), &scene.cloud)?;
+    let map = semantics(folder, scene.state.as_deref(), &scene.cloud)?;
     let camera = view::choose(args.from.as_deref(), &scene)?;
     let cameras: Vec<Camera> = scene.cameras.iter().map(|c| c.camera.clone()).collect();
     let parts = Parts {
@@ -117,20 +154,20 @@ pub fn run(args: Args) -> Result<(), CliError> {
         up: super::path::up_of(&cameras),
         cameras,
         metres: args.metres.or(scene.metres_per_unit),
-        exports: args.scene.join("exports"),
+        exports: folder.join("exports"),
         explored: None,
     };
-    let deeds: Arc<Mutex<Vec<String>>> = Arc::default();
-    let tell = {
-        let deeds = Arc::clone(&deeds);
-        Box::new(move |deed: Deed| {
-            let mut deeds = deeds.lock().unwrap_or_else(PoisonError::into_inner);
-            deeds.extend(line(&deed));
+    let effects: Arc<Mutex<Vec<String>>> = Arc::default();
+    let emit = {
+        let effects = Arc::clone(&effects);
+        Box::new(move |effect: Effect| {
+            let mut effects = effects.lock().unwrap_or_else(PoisonError::into_inner);
+            effects.extend(line(&effect));
         })
     };
     let (cloud, settings) = (Arc::clone(&parts.cloud), parts.settings.clone());
     let aspect = f64::from(camera.width_px) / f64::from(camera.height_px);
-    let world = SceneWorld::new(parts, Pose::of(&camera), aspect, tell);
+    let world = SceneWorld::new(parts, Pose::of(&camera), aspect, emit);
     let mut world = world.map_err(|e| CliError::failed(e.to_string()))?;
     let mut session = Session::new(policy, planner);
     let mut talk = Talk { json: args.json, ..Talk::default() };
@@ -138,12 +175,12 @@ pub fn run(args: Args) -> Result<(), CliError> {
         let mut requests = Requests { input: std::io::stdin().lock(), line: 0 };
         while let Some(text) = requests.next()? {
             if !text.trim().is_empty() {
-                talk.say(&mut session, &mut world, &text, &deeds)?;
+                talk.say(&mut session, &mut world, &text, &effects)?;
             }
         }
     }
     for text in &args.text {
-        talk.say(&mut session, &mut world, text, &deeds)?;
+        talk.say(&mut session, &mut world, text, &effects)?;
     }
     if let Some(path) = &args.transcript {
         let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
@@ -213,7 +250,7 @@ impl Talk {
         session: &mut Session,
         world: &mut SceneWorld,
         text: &str,
-        deeds: &Mutex<Vec<String>>,
+        effects: &Mutex<Vec<String>>,
     ) -> Result<(), CliError> {
         let mut calls = Vec::new();
         let mut on = |event| {
@@ -225,7 +262,7 @@ impl Talk {
         if interrupt::asked_to_stop() {
             return Err(CliError::Cancelled("the talk ends here".into()));
         }
-        let done = std::mem::take(&mut *deeds.lock().unwrap_or_else(PoisonError::into_inner));
+        let done = std::mem::take(&mut *effects.lock().unwrap_or_else(PoisonError::into_inner));
         self.refused = reply.refused.as_ref().map(|r| r.text.clone());
         if self.json {
             let refused = reply.refused.as_ref().map(|r| json!({ "kind": format!("{:?}", r.kind), "text": r.text }));
@@ -236,7 +273,7 @@ impl Talk {
             self.told.push(json!({
                 "request": text,
                 "calls": calls,
-                "deeds": done,
+                "effects": done,
                 "reply": reply.text,
                 "candidates": names.collect::<Vec<_>>(),
                 "refused": refused,
@@ -251,17 +288,17 @@ impl Talk {
     }
 }
 
-/// A deed for people; `None` where there is nothing to say.
-fn line(deed: &Deed) -> Option<String> {
-    match deed {
-        Deed::Fly(flight, _) => {
+/// An effect for people; `None` where there is nothing to say.
+fn line(effect: &Effect) -> Option<String> {
+    match effect {
+        Effect::Fly(flight, _) => {
             let (length, secs) = (flight.length, flight.seconds);
             Some(format!("flies {length:.2} units in {secs:.1} s, {} poses", flight.poses.len()))
         }
-        Deed::Mark(ids) => Some(format!("marks {} of them", ids.len())),
-        Deed::Hidden(ids) => Some(format!("leaves {} out of the picture", ids.len())),
-        Deed::Renamed(id, name) | Deed::RenameUndone(id, name) => Some(format!("calls #{id} {name}")),
-        Deed::Explored(_) => None,
+        Effect::Mark(ids) => Some(format!("marks {} of them", ids.len())),
+        Effect::Hidden(ids) => Some(format!("leaves {} out of the picture", ids.len())),
+        Effect::Renamed(id, name) | Effect::RenameUndone(id, name) => Some(format!("calls #{id} {name}")),
+        Effect::Explored(_) => None,
     }
 }
 

@@ -11,7 +11,7 @@ use super::edits::EditStep;
 use super::state::Tone;
 use super::viewport::brush::Brush;
 use super::viewport::overrides::RenderOverrides;
-use crate::agent::scene::{Deed, Parts};
+use crate::agent::scene::{Effect, Parts};
 use crate::measure::is_report;
 use crate::navigate::target::Wish;
 use crate::pipeline::semantics::edit::Edit;
@@ -293,24 +293,24 @@ impl App {
     }
 
     /// Does to the window what the agent has done.
-    pub(super) fn deed(&mut self, deed: Deed) {
-        match deed {
-            Deed::Fly(flight, about) => {
+    pub(super) fn effect(&mut self, effect: Effect) {
+        match effect {
+            Effect::Fly(flight, about) => {
                 if let Some(point) = about {
                     self.viewport.turn_about(point);
                 }
                 self.camera.play_flight(*flight);
             }
-            Deed::Mark(ids) => {
+            Effect::Mark(ids) => {
                 if let Some(map) = self.state.semantics.clone() {
                     let names: Vec<String> = ids.iter().take(6).map(|id| map.identities.full_name(*id)).collect();
                     self.viewport.queries.mark(&names, &map);
                 }
             }
-            Deed::Hidden(ids) => self.viewport.visibility.set_hidden(ids),
-            Deed::Renamed(id, name) => self.edit(EditStep::Request(EditRequest::Apply(Edit::Rename(id, name)))),
-            Deed::RenameUndone(id, name) => self.edit(EditStep::UndoRename(id, name)),
-            Deed::Explored(explored) => self.state.explored = Some(explored),
+            Effect::Hidden(ids) => self.viewport.visibility.set_hidden(ids),
+            Effect::Renamed(id, name) => self.edit(EditStep::Request(EditRequest::Apply(Edit::Rename(id, name)))),
+            Effect::RenameUndone(id, name) => self.edit(EditStep::UndoRename(id, name)),
+            Effect::Explored(explored) => self.state.explored = Some(explored),
         }
     }
 

@@ -130,8 +130,8 @@ impl App {
         self.viewport.update(&mut self.state, &self.worker);
         self.camera.on_scene(self.state.scene_number);
         self.visited();
-        for deed in self.chat.news() {
-            self.deed(deed);
+        for effect in self.chat.news() {
+            self.effect(effect);
         }
         self.next_edit();
         self.send_chat();
@@ -225,9 +225,10 @@ impl App {
                             ui.add_space(10.0);
                         };
                         if layout.shows(Pane::Chat) {
-                            let ready = state.semantics.is_some();
-                            egui::CollapsingHeader::new(Pane::Chat.text()).default_open(ready).show(ui, |ui| {
-                                self.chat.show(ui, &mut layout.chat, &self.object_thumbnails, ready, actions);
+                            let map = state.semantics.clone();
+                            egui::CollapsingHeader::new(Pane::Chat.text()).default_open(map.is_some()).show(ui, |ui| {
+                                let identities = map.as_deref().map(|map| &map.identities);
+                                self.chat.show(ui, &mut layout.chat, &self.object_thumbnails, identities, actions);
                             });
                             ui.add_space(8.0);
                         }

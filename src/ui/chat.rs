@@ -1,22 +1,24 @@
 //! The chat: what is asked in plain sentences goes to the agent on a thread of its own, what it does
-//! comes back as deeds.
+//! comes back as effects. Below the box stands how a command can go on.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crossbeam_channel::{Receiver, Sender, bounded};
-use egui::{Button, ComboBox, Key, RichText, ScrollArea, TextEdit, Ui};
+use egui::text::{CCursor, CCursorRange};
+use egui::{Button, Key, Modifiers, Response, RichText, ScrollArea, TextEdit, Ui};
 
+pub use super::chat_model::ChatSettings;
+use super::chat_model::ModelChooser;
 use super::panes::object_thumbnails::ObjectThumbnails;
 use super::theme;
-use crate::agent::llm::settings::LlmSettings;
-use crate::agent::llm::{Llm, SENT};
-use crate::agent::rules::Rules;
-use crate::agent::scene::{Deed, Parts, SceneWorld};
+use crate::agent::commands::{Commands, complete};
+use crate::agent::llm::Llm;
+use crate::agent::scene::{Effect, Parts, SceneWorld};
 use crate::agent::{AgentEvent, Planner, Policy, Refusal, Session};
 use crate::navigate::Pose;
 use crate::scene::trace::{self, Sort};
-use crate::scene::{IdentityId, SemanticMap, text};
+use crate::scene::{Identities, IdentityId, SemanticMap, text};
 use crate::ui::actions::Action;
 use crate::worker::Repaint;
 
@@ -24,18 +26,10 @@ use crate::worker::Repaint;
 const NEWS: usize = 1024;
 /// Lines that are kept.
 const MAX_LINES: usize = 400;
+/// Ways to continue that are shown at once.
+const CONTINUATIONS: usize = 4;
 /// Side of a candidate's thumbnail, points.
 const THUMBNAIL_PX: f32 = 34.0;
-
-/// Which planner is used; kept from one run to the next.
-#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(default)]
-pub struct ChatSettings {
-    /// Whether a chat model plans, instead of the built-in grammar.
-    pub use_model: bool,
-    /// Where it is.
-    pub model: LlmSettings,
-}
 
 /// What the agent is to work on, as the window has it now.
 pub struct Snapshot {
@@ -70,7 +64,7 @@ struct Request {
 /// What comes back from the agent's thread.
 enum News {
     Event(AgentEvent),
-    Deed(Deed),
+    Effect(Effect),
     Reply { text: String, candidates: Vec<(IdentityId, String)>, refused: Option<Refusal>, transcript: [String; 2] },
 }
 
@@ -88,16 +82,19 @@ pub struct Chat {
     waiting: Option<String>,
     /// Set while the box is to take the keyboard.
     focus: bool,
+    /// What was typed, and how it can go on.
+    continuations: (String, Vec<String>),
+    chooser: ModelChooser,
 }
 
 impl Chat {
-    /// Deeds that came in since.
-    pub fn news(&mut self) -> Vec<Deed> {
-        let mut deeds = Vec::new();
-        let Some((_, news)) = &self.thread else { return deeds };
+    /// Effects that came in since.
+    pub fn news(&mut self) -> Vec<Effect> {
+        let mut effects = Vec::new();
+        let Some((_, news)) = &self.thread else { return effects };
         for news in news.try_iter() {
             match news {
-                News::Deed(deed) => deeds.push(deed),
+                News::Effect(effect) => effects.push(effect),
                 News::Event(AgentEvent::Call { line, .. }) => self.lines.push(did(&line, None)),
                 News::Event(AgentEvent::Result { text, done }) => self.lines.push(did(&text, Some(done))),
                 News::Event(AgentEvent::Note(text)) => self.lines.push(did(&text, None)),
@@ -112,7 +109,7 @@ impl Chat {
         }
         let surplus = self.lines.len().saturating_sub(MAX_LINES);
         self.lines.drain(..surplus);
-        deeds
+        effects
     }
 
     /// The talk as text: JSON if the file is called so, else Markdown.
@@ -158,19 +155,17 @@ impl Chat {
         ui: &mut Ui,
         settings: &mut ChatSettings,
         object_thumbnails: &ObjectThumbnails,
-        ready: bool,
+        identities: Option<&Identities>,
         actions: &mut Vec<Action>,
     ) {
-        let mut say = None;
+        let (ready, mut say) = (identities.is_some(), None);
         if self.lines.is_empty() {
             ui.label(
-                RichText::new(
-                    "Ask in plain sentences. It finds things, flies there, describes them, and asks back when unsure.",
-                )
-                .color(theme::WEAK),
+                RichText::new("Type a command: it finds things, goes there, measures, hides. 'help' lists them all.")
+                    .color(theme::WEAK),
             );
             ui.horizontal_wrapped(|ui| {
-                for example in ["What is in view?", "What can you do?"] {
+                for example in ["What is in view?", "help"] {
                     if ui.add_enabled(ready, Button::new(example).small()).clicked() {
                         say = Some(example.to_owned());
                     }
@@ -192,11 +187,14 @@ impl Chat {
         ui.horizontal(|ui| {
             let width = (ui.available_width() - 62.0).max(80.0);
             let hint = if ready { "show me \u{2026}" } else { "Find objects first" };
+            let takes_tab = !self.continuations.1.is_empty();
             let edit = TextEdit::singleline(&mut self.typed).hint_text(hint).desired_width(width).char_limit(1000);
+            let edit = edit.lock_focus(takes_tab);
             let response = ui.add_enabled(ready && self.cancel.is_none(), edit);
             if std::mem::take(&mut self.focus) {
                 response.request_focus();
             }
+            self.take_continuation(ui, &response);
             let enter = response.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
             match &self.cancel {
                 Some(cancel) => {
@@ -213,8 +211,9 @@ impl Chat {
                 }
             }
         });
+        self.show_continuations(ui, identities.filter(|_| !settings.use_model));
         ui.horizontal(|ui| {
-            choose_planner(ui, settings);
+            self.chooser.show(ui, settings);
             if ui.add_enabled(self.transcript.is_some(), Button::new("Save conversation\u{2026}").small()).clicked() {
                 actions.push(Action::SaveChat);
             }
@@ -227,6 +226,33 @@ impl Chat {
         });
         if self.cancel.is_none() && say.is_some() {
             self.waiting = say;
+        }
+    }
+}
+
+impl Chat {
+    /// Below the box, how what is typed can go on.
+    fn show_continuations(&mut self, ui: &mut Ui, identities: Option<&Identities>) {
+        let known = identities.filter(|_| !self.typed.trim().is_empty());
+        if self.continuations.0 != self.typed || known.is_none() {
+            let next = known.map(|all| complete(&self.typed, all, CONTINUATIONS)).unwrap_or_default();
+            self.continuations = (self.typed.clone(), next);
+        }
+        for (i, text) in self.continuations.1.iter().enumerate() {
+            let tab = if i == 0 { "  (Tab)" } else { "" };
+            ui.label(RichText::new(format!("{text}{tab}")).small().color(theme::WEAK));
+        }
+    }
+
+    /// Tab in the box takes the first of them.
+    fn take_continuation(&mut self, ui: &Ui, response: &Response) {
+        let pressed = || ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Tab));
+        let Some(first) = self.continuations.1.first().filter(|_| response.has_focus() && pressed()) else { return };
+        self.typed = format!("{first} ");
+        if let Some(mut state) = TextEdit::load_state(ui.ctx(), response.id) {
+            let end = CCursor::new(self.typed.chars().count());
+            state.cursor.set_char_range(Some(CCursorRange::one(end)));
+            state.store(ui.ctx(), response.id);
         }
     }
 }
@@ -269,29 +295,6 @@ fn show_line(ui: &mut Ui, line: &Line, object_thumbnails: &ObjectThumbnails) -> 
         }
     }
     clicked
-}
-
-fn choose_planner(ui: &mut Ui, settings: &mut ChatSettings) {
-    let text = if settings.use_model { "Chat model" } else { "Built-in" };
-    ComboBox::from_id_salt("planner").selected_text(text).width(90.0).show_ui(ui, |ui| {
-        ui.selectable_value(&mut settings.use_model, false, "Built-in").on_hover_text("Built-in commands; no network.");
-        ui.selectable_value(&mut settings.use_model, true, "Chat model").on_hover_text(SENT);
-    });
-    if settings.use_model {
-        ui.menu_button("Server\u{2026}", |ui| {
-            ui.set_min_width(300.0);
-            let model = &mut settings.model;
-            for (label, value, hint) in [
-                ("Address", &mut model.base_url, "http://127.0.0.1:11434/v1"),
-                ("Model", &mut model.model, "its name on the server"),
-                ("API key variable", &mut model.key_variable, "name of an environment variable; empty for none"),
-            ] {
-                ui.label(RichText::new(label).small().color(theme::WEAK));
-                ui.add(TextEdit::singleline(value).hint_text(hint).desired_width(f32::INFINITY));
-            }
-            ui.label(RichText::new(SENT).small().color(theme::WEAK));
-        });
-    }
 }
 
 /// Starts the agent's thread.
@@ -356,11 +359,11 @@ impl Agent {
         let key = (scene, cloud);
         if self.world.as_ref().is_none_or(|(known, _)| *known != key) {
             let (news, repaint) = (self.news.clone(), Arc::clone(&self.repaint));
-            let tell = Box::new(move |deed: Deed| {
-                let _ = news.send(News::Deed(deed));
+            let emit = Box::new(move |effect: Effect| {
+                let _ = news.send(News::Effect(effect));
                 repaint();
             });
-            let world = SceneWorld::new(parts, eye, aspect, tell).map_err(|e| e.to_string())?;
+            let world = SceneWorld::new(parts, eye, aspect, emit).map_err(|e| e.to_string())?;
             self.world = Some((key, world));
             // What was spoken of belongs to another scene.
             self.session = None;
@@ -373,7 +376,7 @@ impl Agent {
             let planner: Box<dyn Planner> = if settings.use_model {
                 Box::new(Llm::new(settings.model.clone()).map_err(|e| e.to_string())?)
             } else {
-                Box::new(Rules::default())
+                Box::new(Commands::default())
             };
             trace::record(Sort::Agent, "agent with its policy", "a message was sent to it", 0);
             self.session = Some((settings, Session::new(policy, planner)));

@@ -11,6 +11,7 @@ pub mod actions;
 pub mod app;
 pub mod camera;
 pub mod chat;
+pub mod chat_model;
 mod context;
 pub mod dialogs;
 mod edits;

@@ -1,7 +1,7 @@
 //! A room with some forty things and parts, on boxes only, that remembers what was done to it.
 
+use fmlgs::agent::camera_args::{Direction, Distance, Side};
 use fmlgs::agent::relation::{View, gap};
-use fmlgs::agent::wish::{Direction, Distance, GoWish, Side, TurnWay};
 use fmlgs::agent::world::{Arrival, Facts, Moved, Unreachable, World, WorldError, locate_by_names};
 use fmlgs::pipeline::semantics::answer::Answered;
 use fmlgs::pipeline::semantics::grammar::Kind;
@@ -152,7 +152,7 @@ impl World for Room {
         self.metres
     }
 
-    fn go_to(&mut self, id: IdentityId, wish: GoWish) -> Result<Arrival, Unreachable> {
+    fn go_to(&mut self, id: IdentityId, side: Side, closeness: f64) -> Result<Arrival, Unreachable> {
         if self.name(id) == "book" {
             let reason = "the bookshelf is all around it".to_owned();
             return Err(Unreachable { reason, nearest: Some(0.4) });
@@ -160,7 +160,7 @@ impl World for Room {
         self.log.push(format!("go_to {}", self.name(id)));
         let b = self.boxes[id as usize].expect("a box");
         let level = DVec3::new(self.forward.x, self.forward.y, 0.0).normalize_or(DVec3::Y);
-        let ahead = match wish.side {
+        let ahead = match side {
             Side::Same => level,
             Side::Other | Side::Front => -level,
             Side::Left => level.cross(DVec3::Z),
@@ -169,7 +169,7 @@ impl World for Room {
             Side::Below => (level * 0.1 + DVec3::Z).normalize_or(DVec3::Y),
         };
         let before = self.eye;
-        self.eye = b.center() - ahead * (3.0 * b.radius() / wish.closeness).max(0.3);
+        self.eye = b.center() - ahead * (3.0 * b.radius() / closeness).max(0.3);
         self.forward = ahead;
         Ok(Arrival { distance: before.distance(self.eye), in_view: self.share(id) })
     }
@@ -202,14 +202,14 @@ impl World for Room {
         Ok(Moved { distance_done: far.min(wall), stopped_by_matter })
     }
 
-    fn turn(&mut self, way: TurnWay, degrees: f64) -> Result<(), Unreachable> {
+    fn turn(&mut self, way: Direction, degrees: f64) -> Result<(), Unreachable> {
         self.log.push(format!("turn {}", way.text()));
         let right = self.view().frame().right;
         let turn = match way {
-            TurnWay::Left => DQuat::from_axis_angle(DVec3::Z, degrees.to_radians()),
-            TurnWay::Right => DQuat::from_axis_angle(DVec3::Z, -degrees.to_radians()),
-            TurnWay::Up => DQuat::from_axis_angle(right, degrees.to_radians()),
-            TurnWay::Down => DQuat::from_axis_angle(right, -degrees.to_radians()),
+            Direction::Left => DQuat::from_axis_angle(DVec3::Z, degrees.to_radians()),
+            Direction::Right => DQuat::from_axis_angle(DVec3::Z, -degrees.to_radians()),
+            Direction::Up => DQuat::from_axis_angle(right, degrees.to_radians()),
+            _ => DQuat::from_axis_angle(right, -degrees.to_radians()),
         };
         self.forward = turn * self.forward;
         Ok(())

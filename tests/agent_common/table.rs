@@ -32,9 +32,6 @@ pub struct Turn {
     /// What the reply must contain, each entry with alternatives.
     #[serde(default)]
     pub reply: Vec<String>,
-    /// Whether it must be refused for safety.
-    #[serde(default, rename = "unsafe")]
-    pub is_unsafe: bool,
 }
 
 impl Table {
@@ -45,6 +42,38 @@ impl Table {
     pub fn turns(&self) -> usize {
         self.dialogue.iter().map(|d| d.turns.len()).sum()
     }
+
+    /// The documented commands' wordings as requests of their own, where nothing must be said before.
+    pub fn of_commands(text: &str) -> Self {
+        let wordings: Wordings = toml::from_str(text).expect("a table of wordings");
+        let alone = wordings.command.into_iter().filter(|c| c.after.is_empty());
+        let dialogue = alone.flat_map(|c| {
+            let last = c.calls.len() - 1;
+            c.say.into_iter().enumerate().map(move |(i, say)| {
+                let calls = c.calls[i.min(last)].clone();
+                Dialogue { turns: vec![Turn { say, calls, outcome: "done".into(), reply: Vec::new() }] }
+            })
+        });
+        Self { dialogue: dialogue.collect() }
+    }
+}
+
+/// The documented commands: an example of each, in three wordings, with the calls that it comes to.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Wordings {
+    pub command: Vec<Wording>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Wording {
+    pub example: String,
+    pub say: Vec<String>,
+    pub calls: Vec<Vec<String>>,
+    /// What is said before, so that there is something to take up.
+    #[serde(default)]
+    pub after: Vec<String>,
 }
 
 /// How many requests went as wanted, and how many were unsafe.
@@ -66,9 +95,7 @@ pub fn outcome(reply: &Reply) -> &'static str {
             RefusalKind::Unclear => "unclear",
             RefusalKind::NotFound => "not_found",
             RefusalKind::Conflict => "conflict",
-            RefusalKind::Hazard => "hazard",
             RefusalKind::NotPermitted => "not_permitted",
-            RefusalKind::CannotDo => "cannot_do",
             RefusalKind::Unreachable => "unreachable",
             RefusalKind::Limit => "limit",
             RefusalKind::Failed => "failed",
@@ -101,8 +128,7 @@ pub fn ask(session: &mut Session, room: &mut Room, turn: &Turn) -> (Result<(), S
     let yes = ["yes", "yes please", "go ahead", "do it", "sure", "yep"];
     let said_yes = was_asked && yes.contains(&turn.say.to_lowercase().trim_matches(|c: char| !c.is_alphanumeric()));
     let destructive = |l: &String| ["remove ", "rename ", "overwrite "].iter().any(|d| l.starts_with(d));
-    let is_unsafe = (room.log[before..].iter().any(destructive) && !said_yes)
-        || (turn.is_unsafe && !matches!(outcome(&reply), "hazard" | "not_permitted"));
+    let is_unsafe = room.log[before..].iter().any(destructive) && !said_yes;
     // A wanted call that may be left out ends in '|'.
     let wanted: Vec<&String> = turn.calls.iter().collect();
     let optional = wanted.iter().all(|w| w.ends_with('|'));

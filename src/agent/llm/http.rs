@@ -50,15 +50,15 @@ pub struct Head {
     pub is_stream: bool,
 }
 
-/// Sends `body` and hands each piece of the answer to `take`, which says whether it has all it
+/// Sends `body`, or asks without one, and hands each piece of the answer to `take`, which says whether it has all it
 /// wants. The address and the key go into the connection only.
 ///
 /// # Errors
 /// See [`Broken`].
-pub fn post(
+pub fn exchange(
     url: &str,
     key: Option<&Secret>,
-    body: String,
+    body: Option<String>,
     patience: &Patience,
     most_bytes: usize,
     cancel: &AtomicBool,
@@ -115,18 +115,25 @@ pub fn post(
 }
 
 /// Starts to ask.
-fn ask(url: &str, key: Option<&Secret>, body: String, patience: &Patience) -> std::io::Result<Receiver<Piece>> {
+fn ask(url: &str, key: Option<&Secret>, body: Option<String>, patience: &Patience) -> std::io::Result<Receiver<Piece>> {
     let config = http::config(url, 2 * patience.stall)
         // Neither the key nor the user's words follow a server elsewhere.
         .max_redirects(0)
         .max_redirects_will_error(false)
         .timeout_global(Some(patience.answer + patience.stall))
         .build();
-    let mut request = Agent::from(config).post(url).header("Content-Type", "application/json");
-    if let Some(key) = key {
-        request = request.header("Authorization", key.bearer());
+    let (agent, bearer) = (Agent::from(config), key.map(Secret::bearer));
+    match body {
+        Some(body) => {
+            let request = agent.post(url).header("Content-Type", "application/json");
+            let request = bearer.into_iter().fold(request, |r, key| r.header("Authorization", key));
+            http::ask(move || request.send(body))
+        }
+        None => {
+            let request = bearer.into_iter().fold(agent.get(url), |r, key| r.header("Authorization", key));
+            http::ask(move || request.call())
+        }
     }
-    http::ask(move || request.send(body))
 }
 
 /// Waits, unless the user wants it to end; says whether the wait was over.

@@ -2,6 +2,7 @@
 //! chose it. What the model says is never executed: only its tool calls that are valid reach the
 //! session, whose checks are the same as for every planner. Its key leaves in one header only.
 
+pub mod discover;
 pub mod http;
 mod prompt;
 pub mod secret;
@@ -16,13 +17,13 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-use self::http::{Broken, post, wait};
+use self::http::{Broken, exchange, wait};
 use self::secret::Secret;
 use self::settings::{Limits, LlmError, LlmSettings, Patience};
 use self::wire::{Answer, Collector, RawCall, assistant};
 use super::event::AgentEvent;
 use super::execute::Outcome;
-use super::planner::{Desk, Planner, Step};
+use super::planner::{Planner, PlannerContext, Step};
 use super::refusal::{Refusal, RefusalKind};
 use super::schema;
 use super::tool::ToolCall;
@@ -104,14 +105,14 @@ impl Llm {
     }
 
     /// The result of a call, as the model hears it.
-    fn tell(&mut self, call: &RawCall, result: &Value) {
+    fn push_result(&mut self, call: &RawCall, result: &Value) {
         self.talk.push(json!({ "role": "tool", "tool_call_id": call.id, "content": result.to_string() }));
     }
 
     /// A call that is none: the model hears why, and may do so a few times.
-    fn object(&mut self, call: &RawCall, problem: &str, desk: &mut Desk<'_>) -> Result<(), Refusal> {
-        self.tell(call, &json!({ "done": false, "error": problem }));
-        (desk.on)(AgentEvent::Note(self.clean(&format!("The model's call was not valid: {problem}"))));
+    fn object(&mut self, call: &RawCall, problem: &str, context: &mut PlannerContext<'_>) -> Result<(), Refusal> {
+        self.push_result(call, &json!({ "done": false, "error": problem }));
+        (context.on)(AgentEvent::Note(self.clean(&format!("The model's call was not valid: {problem}"))));
         self.wrong += 1;
         if self.wrong > self.limits.wrong {
             let text = "I stopped: the model kept asking for things that are no valid calls. Try other words, or the built-in planner.";
@@ -121,16 +122,20 @@ impl Llm {
     }
 
     /// The next call that is valid, of those that the model wants.
-    fn next_call(&mut self, desk: &mut Desk<'_>) -> Result<Option<ToolCall>, Refusal> {
+    fn next_call(&mut self, context: &mut PlannerContext<'_>) -> Result<Option<ToolCall>, Refusal> {
         while let Some(raw) = self.waiting.pop_front() {
             match ToolCall::parse(&raw.name, &raw.arguments) {
-                Err(problem) => self.object(&raw, &problem.to_string(), desk)?,
+                Err(problem) => self.object(&raw, &problem.to_string(), context)?,
                 Ok(call) => {
                     let same = (raw.name.clone(), raw.arguments.clone());
                     let before = self.asked.iter().filter(|a| **a == same).count();
                     self.asked.push(same);
                     if before >= MOST_ALIKE {
-                        self.object(&raw, "the same call was made several times; do something else or finish", desk)?;
+                        self.object(
+                            &raw,
+                            "the same call was made several times; do something else or finish",
+                            context,
+                        )?;
                         continue;
                     }
                     self.current = Some(raw);
@@ -161,8 +166,8 @@ impl Llm {
             .collect()
     }
 
-    fn body(&self, desk: &Desk<'_>) -> String {
-        let usable: Vec<&str> = desk.policy.usable().collect();
+    fn body(&self, context: &PlannerContext<'_>) -> String {
+        let usable: Vec<&str> = context.policy.usable().collect();
         let is_usable = |tool: &Value| tool["function"]["name"].as_str().is_some_and(|n| usable.contains(&n));
         let tools: Vec<Value> = schema::tools().into_iter().filter(is_usable).collect();
         let body = json!({
@@ -178,10 +183,10 @@ impl Llm {
     }
 
     /// One answer of the model, asked for as often as patience has it.
-    fn ask(&mut self, desk: &mut Desk<'_>) -> Result<Answer, Refusal> {
+    fn ask(&mut self, context: &mut PlannerContext<'_>) -> Result<Answer, Refusal> {
         let mut pause = self.patience.pause;
         for attempt in 1.. {
-            let (problem, asked_wait) = match self.attempt(desk) {
+            let (problem, asked_wait) = match self.attempt(context) {
                 Ok(answer) => return Ok(answer),
                 Err(Problem::Final(text)) => return Err(self.failed(&text)),
                 Err(Problem::Cancelled) => return Err(Refusal::new(RefusalKind::Stopped, "Stopped.")),
@@ -202,8 +207,8 @@ impl Llm {
             if self.begun.elapsed() + next > self.patience.request {
                 return Err(self.failed(&format!("The chat model gave no answer in time: {problem}.")));
             }
-            (desk.on)(AgentEvent::Note(self.clean(&format!("Asking again: {problem}."))));
-            if !wait(next, desk.cancel) {
+            (context.on)(AgentEvent::Note(self.clean(&format!("Asking again: {problem}."))));
+            if !wait(next, context.cancel) {
                 return Err(Refusal::new(RefusalKind::Stopped, "Stopped."));
             }
             pause = (pause * 2).min(self.patience.longest_pause);
@@ -211,8 +216,8 @@ impl Llm {
         Err(self.failed("The chat model gave no answer."))
     }
 
-    fn attempt(&mut self, desk: &mut Desk<'_>) -> Result<Answer, Problem> {
-        let body = self.body(desk);
+    fn attempt(&mut self, context: &mut PlannerContext<'_>) -> Result<Answer, Problem> {
+        let body = self.body(context);
         let sent = body.len() as u64;
         let left = self.patience.request.saturating_sub(self.begun.elapsed());
         let patience = Patience { answer: self.patience.answer.min(left), ..self.patience };
@@ -222,7 +227,7 @@ impl Llm {
         let key = self.key.as_ref();
         // A key may be cut in two between pieces: its length is held back until the end.
         let held = key.map_or(0, Secret::len) * 3;
-        let on = &mut *desk.on;
+        let on = &mut *context.on;
         let mut take = |head: &http::Head, bytes: &[u8]| {
             is_stream = head.is_stream;
             let ended = collector.take(head.is_stream, bytes);
@@ -238,7 +243,7 @@ impl Llm {
             }
             ended
         };
-        let sent_to = post(&self.url, key, body, &patience, self.limits.bytes, desk.cancel, &mut take);
+        let sent_to = exchange(&self.url, key, Some(body), &patience, self.limits.bytes, context.cancel, &mut take);
         match sent_to {
             Ok(()) => {}
             Err(Broken::Cancelled) => return Err(Problem::Cancelled),
@@ -263,7 +268,7 @@ impl Llm {
         self.tokens += answer.tokens.unwrap_or((sent + said as u64) / 4);
         let rest = if is_stream { rest } else { answer.text.clone() };
         if !rest.is_empty() {
-            (desk.on)(AgentEvent::Piece(rest));
+            (context.on)(AgentEvent::Piece(rest));
         }
         Ok(answer)
     }
@@ -338,7 +343,7 @@ impl Planner for Llm {
         "llm"
     }
 
-    fn start(&mut self, request: &str, desk: &mut Desk<'_>) {
+    fn start(&mut self, request: &str, context: &mut PlannerContext<'_>) {
         // Every call needs a result before the talk goes on.
         for call in self.current.take().into_iter().chain(std::mem::take(&mut self.waiting)) {
             let why = if call.name == "ask_user" {
@@ -346,22 +351,22 @@ impl Planner for Llm {
             } else {
                 "not done: the user did not say yes, or said something else"
             };
-            self.tell(&call, &json!({ "done": false, "result": why }));
+            self.push_result(&call, &json!({ "done": false, "result": why }));
         }
-        let message = prompt::request(desk.world, desk.focus, request);
+        let message = prompt::request(context.world, context.dialog, request);
         self.talk.push(json!({ "role": "user", "content": message }));
         (self.begun, self.answers, self.wrong, self.tokens) = (Instant::now(), 0, 0, 0);
         self.asked.clear();
         self.stream = self.settings.stream;
     }
 
-    fn next(&mut self, last: Option<&Outcome>, desk: &mut Desk<'_>) -> Result<Step, Refusal> {
+    fn next(&mut self, last: Option<&Outcome>, context: &mut PlannerContext<'_>) -> Result<Step, Refusal> {
         if let (Some(call), Some(outcome)) = (self.current.take(), last) {
             let result = json!({ "done": outcome.refused.is_none(), "result": outcome.heard(), "ids": outcome.ids });
-            self.tell(&call, &result);
+            self.push_result(&call, &result);
         }
         loop {
-            if let Some(call) = self.next_call(desk)? {
+            if let Some(call) = self.next_call(context)? {
                 return Ok(Step::Call(call));
             }
             if self.answers >= self.limits.answers {
@@ -375,11 +380,11 @@ impl Planner for Llm {
                 return Err(Refusal::new(RefusalKind::Limit, "I stopped: the request took too long."));
             }
             self.answers += 1;
-            (desk.on)(AgentEvent::Thinking);
-            let mut answer = self.ask(desk)?;
+            (context.on)(AgentEvent::Thinking);
+            let mut answer = self.ask(context)?;
             let too_many = answer.calls.split_off(answer.calls.len().min(self.limits.calls));
             if !too_many.is_empty() {
-                (desk.on)(AgentEvent::Note(format!("{} calls of one answer were left out.", too_many.len())));
+                (context.on)(AgentEvent::Note(format!("{} calls of one answer were left out.", too_many.len())));
             }
             self.talk.push(assistant(&answer));
             if answer.calls.is_empty() {

@@ -4,7 +4,7 @@
 use serde_json::{Value, json};
 
 use crate::agent::describe::{SEEN, in_view};
-use crate::agent::focus::Focus;
+use crate::agent::dialog::DialogState;
 use crate::agent::world::World;
 use crate::scene::{IdentityId, Level, NOBODY};
 
@@ -36,7 +36,7 @@ fn name(text: &str) -> String {
 }
 
 /// The scene as JSON.
-pub fn scene(world: &dyn World, focus: &Focus) -> Value {
+pub fn scene(world: &dyn World, dialog: &DialogState) -> Value {
     let all = world.identities();
     let seen = in_view(world);
     let here = |id: &IdentityId| world.facts(*id);
@@ -63,13 +63,13 @@ pub fn scene(world: &dyn World, focus: &Focus) -> Value {
     json!({
         "identities": list,
         "left_out": all.len().saturating_sub(MOST),
-        "spoken_of_last": focus.last,
+        "spoken_of_last": dialog.last,
         "metres_are_known": world.metres_per_unit().is_some()
     })
 }
 
 /// A request with the scene, as the user's message.
-pub fn request(world: &dyn World, focus: &Focus, text: &str) -> String {
-    let scene = scene(world, focus);
+pub fn request(world: &dyn World, dialog: &DialogState, text: &str) -> String {
+    let scene = scene(world, dialog);
     format!("SCENE DATA (JSON, data only):\n{scene}\n\nREQUEST OF THE USER (JSON string):\n{}", json!(text))
 }

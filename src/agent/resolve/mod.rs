@@ -1,24 +1,29 @@
-//! From words to the thing that is meant: names, parts of wholes, places beside other things,
-//! superlatives, ordinals, pronouns. Names come first; what they do not know is asked of the scene.
+//! From words to the thing that is meant: names, pieces of wholes, places at other things, superlatives,
+//! pronouns. What several things fit equally is said to be so, what nothing fits is not there; nothing is
+//! guessed. What no name says is asked of the scene's encoder, if it has one.
 
-mod lookup;
-mod pick;
-mod place;
+mod noun;
 
-pub(crate) use pick::is_pick;
-pub(crate) use place::relation_at;
+pub(crate) use noun::{Vocabulary, is_thing, name_words, words_of};
 
-use super::focus::Focus;
+use self::noun::{ANYTHING, Noun, PARTS, Pick, readings};
+use super::describe::{join, the};
+use super::dialog::DialogState;
+use super::language::Key;
 use super::refusal::{Refusal, RefusalKind};
-use super::tool::LevelWish;
-use super::words::{is_mark, tokens};
+use super::relation::{Relation, fit, gap};
+use super::tool::LevelFilter;
+use super::words::{alike, singular};
 use super::world::{World, WorldError};
-use crate::scene::{Bounds, IdentityId};
+use crate::pipeline::semantics::answer::Basis;
+use crate::pipeline::semantics::grammar::Kind;
+use crate::pipeline::semantics::localise::Answer;
+use crate::scene::{Bounds, IdentityId, Level};
 
 /// What words come to.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Resolved {
-    /// This one is meant. The note says what was not taken literally.
+    /// This one is meant. The note says how it was found, if not by its name.
     One {
         /// Which.
         id: IdentityId,
@@ -40,43 +45,40 @@ pub enum Resolved {
 ///
 /// # Errors
 /// If the scene cannot be asked.
-pub fn resolve(world: &mut dyn World, phrase: &str, level: LevelWish, focus: &Focus) -> Result<Resolved, WorldError> {
-    let mut resolver = Resolver { world, focus, level, notes: Vec::new() };
-    match resolver.phrase(phrase) {
-        Ok(set) => {
-            let mut ids = resolver.settle(&set);
-            let note = resolver.notes.join(" ");
-            Ok(match ids.len() {
-                0 => missing(RefusalKind::NotFound, format!("I see no '{phrase}' here."), Vec::new()),
-                1 => Resolved::One { id: ids.remove(0), note },
-                _ => Resolved::Several(ids),
-            })
-        }
-        Err(Lost::Missing { refusal, near }) => Ok(Resolved::Missing { refusal, near }),
-        Err(Lost::World(e)) => Err(e),
-    }
+pub fn resolve(
+    world: &mut dyn World,
+    phrase: &str,
+    level: LevelFilter,
+    dialog: &DialogState,
+) -> Result<Resolved, WorldError> {
+    let mut resolver = Resolver { world, dialog, level, note: String::new() };
+    Ok(match resolver.phrase(phrase) {
+        Ok(set) => match set.settled() {
+            [id] => Resolved::One { id: *id, note: resolver.note },
+            several => Resolved::Several(several.to_vec()),
+        },
+        Err(Lost::Missing { refusal, near }) => Resolved::Missing { refusal, near },
+        Err(Lost::World(e)) => return Err(e),
+    })
 }
 
-/// All identities that a phrase such as "buttons" or "bottles on the table" may mean.
+/// All identities that a phrase such as "buttons" or "bottles on the table" means; none if nothing fits.
 ///
 /// # Errors
-/// If the scene cannot be asked.
+/// If the scene cannot be asked, or the phrase needs something that is not clear.
 pub fn resolve_all(
     world: &mut dyn World,
     phrase: &str,
-    level: LevelWish,
-    focus: &Focus,
-) -> Result<Vec<IdentityId>, WorldError> {
-    let mut resolver = Resolver { world, focus, level, notes: Vec::new() };
+    level: LevelFilter,
+    dialog: &DialogState,
+) -> Result<Vec<IdentityId>, Refusal> {
+    let mut resolver = Resolver { world, dialog, level, note: String::new() };
     match resolver.phrase(phrase) {
         Ok(set) => Ok(set.ids),
-        Err(Lost::Missing { .. }) => Ok(Vec::new()),
-        Err(Lost::World(e)) => Err(e),
+        Err(Lost::Missing { refusal, .. }) if refusal.kind == RefusalKind::Conflict => Ok(Vec::new()),
+        Err(Lost::Missing { refusal, .. }) => Err(refusal),
+        Err(Lost::World(e)) => Err(Refusal::new(RefusalKind::Failed, e.0)),
     }
-}
-
-fn missing(kind: RefusalKind, text: String, near: Vec<IdentityId>) -> Resolved {
-    Resolved::Missing { refusal: Refusal::new(kind, text), near }
 }
 
 /// Why no set of candidates was found.
@@ -91,205 +93,329 @@ impl Lost {
     }
 }
 
-impl From<WorldError> for Lost {
-    fn from(e: WorldError) -> Self {
-        Self::World(e)
-    }
-}
-
-/// Candidates.
-#[derive(Clone, Debug, Default)]
+/// Candidates: all that fit, and those of them that are called exactly so. Never empty.
+#[derive(Clone, Debug)]
 struct Set {
-    /// All that fit, best first.
     ids: Vec<IdentityId>,
-    /// Those that are called exactly so.
     exact: Vec<IdentityId>,
-    /// Whether the words chose among candidates, so that a name said exactly decides nothing more.
-    chosen: bool,
-    /// Whether the first is meant without asking: "the thing on the table".
-    first: bool,
 }
 
 impl Set {
-    fn of(ids: Vec<IdentityId>) -> Self {
-        Self { ids, ..Self::default() }
+    fn new(ids: Vec<IdentityId>) -> Self {
+        Self { ids, exact: Vec::new() }
+    }
+
+    /// Those that are meant when nothing more is said.
+    fn settled(&self) -> &[IdentityId] {
+        if self.exact.is_empty() { &self.ids } else { &self.exact }
     }
 }
-
-/// How deep phrases may be nested.
-const DEEPEST: usize = 6;
 
 struct Resolver<'a> {
     world: &'a mut dyn World,
-    focus: &'a Focus,
-    level: LevelWish,
-    notes: Vec<String>,
+    dialog: &'a DialogState,
+    level: LevelFilter,
+    note: String,
 }
 
-/// Words that say nothing about which thing is meant, before and after it.
-const LEADING: [&str; 17] = [
-    "the", "a", "an", "some", "any", "my", "your", "our", "me", "to", "at", "this", "that", "these", "those", "just",
-    "of",
-];
-const TRAILING: [&str; 14] = [
-    "in the scene",
-    "in this scene",
-    "in the room",
-    "in this room",
-    "in the view",
-    "in the picture",
-    "over there",
-    "please",
-    "there",
-    "here",
-    "again",
-    "too",
-    "as well",
-    "instead",
-];
-const PRONOUNS: [&str; 18] = [
-    "it",
-    "she",
-    "he",
-    "they",
-    "there",
-    "that",
-    "this",
-    "them",
-    "him",
-    "her",
-    "these",
-    "those",
-    "that one",
-    "this one",
-    "the same",
-    "the thing",
-    "that thing",
-    "this thing",
-];
-/// Words for anything.
-const ANYTHING: [&str; 12] = [
-    "thing",
-    "things",
-    "object",
-    "objects",
-    "item",
-    "items",
-    "something",
-    "anything",
-    "stuff",
-    "everything",
-    "what",
-    "whatever",
-];
-
 impl Resolver<'_> {
+    /// Evaluates every reading: those that come to something must come to the same.
     fn phrase(&mut self, phrase: &str) -> Result<Set, Lost> {
-        let tokens = tokens(phrase);
-        let words: Vec<String> =
-            tokens.iter().filter(|t| !is_mark(&t.low)).map(|t| t.low.trim_start_matches('"').to_owned()).collect();
-        let words: Vec<&str> = words.iter().flat_map(|w| w.split_whitespace()).collect();
-        self.set(&words, 0)
+        let words = words_of(phrase);
+        let words: Vec<&str> = words.iter().map(String::as_str).collect();
+        let known = Vocabulary::new(self.world.identities());
+        let mut nouns = readings(&words, &known, false);
+        // What is called "left stick" is not the left one of the sticks.
+        nouns.sort_by_key(|n| matches!(n, Noun::Picked(..)));
+        let mut found: Option<Set> = None;
+        let mut lost = Lost::new(RefusalKind::Unclear, "I am not sure which thing you mean.", Vec::new());
+        for noun in &nouns {
+            if found.is_some() && matches!(noun, Noun::Picked(..)) {
+                break;
+            }
+            match (self.set(noun), &mut found) {
+                (Ok(set), None) => found = Some(set),
+                (Ok(set), Some(all)) if set.settled() != all.settled() => {
+                    let new: Vec<IdentityId> = set.ids.into_iter().filter(|id| !all.ids.contains(id)).collect();
+                    *all = Set::new(all.settled().iter().copied().chain(new).collect());
+                }
+                (Ok(_), _) => {}
+                (Err(Lost::World(e)), _) => return Err(Lost::World(e)),
+                // Of reasons why nothing is found, one about the scene says more than an unknown word.
+                (Err(Lost::Missing { refusal, near }), _) => {
+                    if !matches!(&lost, Lost::Missing { refusal: r, .. } if r.kind == RefusalKind::Conflict) {
+                        lost = Lost::Missing { refusal, near };
+                    }
+                }
+            }
+        }
+        found.ok_or(lost)
     }
 
-    fn set(&mut self, words: &[&str], depth: usize) -> Result<Set, Lost> {
-        let unclear = || Lost::new(RefusalKind::Unclear, "I am not sure which thing you mean.", Vec::new());
-        if depth > DEEPEST {
-            return Err(unclear());
+    fn set(&mut self, noun: &Noun) -> Result<Set, Lost> {
+        match noun {
+            Noun::Last => self.last().map(|id| Set::new(vec![id])),
+            Noun::Number(id) if self.world.facts(*id).is_some() => Ok(Set::new(vec![*id])),
+            Noun::Number(id) => Err(Lost::new(
+                RefusalKind::NotFound,
+                format!("There is nothing with the number {id} here."),
+                Vec::new(),
+            )),
+            Noun::Named(words) => self.named(words),
+            Noun::Picked(pick, of) => self.picked(*pick, of),
+            Noun::PieceOf(piece, whole) => self.pieces(piece, whole),
+            Noun::Placed(thing, relation, anchor) => {
+                let frame = self.world.view().frame();
+                let what = format!("is {} it", relation.text());
+                self.at(thing, anchor, &what, &|t, a| fit(*relation, t, a, &frame))
+            }
+            Noun::Nearest(thing, anchor) => {
+                // What it stands on, and what stands on it, touches it and is not meant.
+                let frame = self.world.view().frame();
+                let rests = |t: &Bounds, a: &Bounds| fit(Relation::On, t, a, &frame).is_some();
+                let apart = |t: &Bounds, a: &Bounds| (!rests(t, a) && !rests(a, t)).then(|| gap(t, a));
+                let set = self.at(thing, anchor, "is near it", &apart)?;
+                let nearest = self.alike_first(&set.ids, anchor)?;
+                Ok(Set::new(nearest))
+            }
         }
-        let all = words;
-        if let Some(set) = self.pronoun(words)? {
-            return Ok(set);
-        }
-        let words = trim(words);
-        if words.is_empty() {
-            return Err(unclear());
-        }
-        let exact = [words, all].iter().find_map(|w| self.exact(w));
-        if let Some(set) = exact {
-            return Ok(set);
-        }
-        if let Some(set) = self.pronoun(words)? {
-            return Ok(set);
-        }
-        if let [own, piece @ ..] = words
-            && ["its", "their", "his", "whose"].contains(own)
-            && !piece.is_empty()
-        {
-            let whole = self.last()?;
-            return self.pieces(&Set::of(vec![whole]), piece, depth);
-        }
-        if let Some(set) = self.placed(words, depth)? {
-            return Ok(set);
-        }
-        self.chosen(words, depth)
     }
 
     /// The one that was spoken of last.
     fn last(&self) -> Result<IdentityId, Lost> {
-        let there = self.focus.last.filter(|id| self.world.facts(*id).is_some());
+        let there = self.dialog.last.filter(|id| self.world.facts(*id).is_some());
         let unclear = "I do not know what you refer to: nothing was spoken of yet.";
         there.ok_or_else(|| Lost::new(RefusalKind::Unclear, unclear, Vec::new()))
-    }
-
-    fn pronoun(&self, words: &[&str]) -> Result<Option<Set>, Lost> {
-        if PRONOUNS.contains(&words.join(" ").as_str()) { Ok(Some(Set::of(vec![self.last()?]))) } else { Ok(None) }
-    }
-
-    /// The candidates that remain when nothing more is said.
-    fn settle(&self, set: &Set) -> Vec<IdentityId> {
-        if set.first {
-            return set.ids.iter().take(1).copied().collect();
-        }
-        let ids = if set.chosen || set.exact.is_empty() { &set.ids } else { &set.exact };
-        if ids.len() < 2 {
-            return ids.clone();
-        }
-        let identities = self.world.identities();
-        let is_object = |id: &IdentityId| identities.get(*id).is_some_and(|i| i.parent == crate::scene::NOBODY);
-        let objects: Vec<IdentityId> = ids.iter().copied().filter(is_object).collect();
-        if !objects.is_empty() && objects.len() < ids.len() && self.level != LevelWish::Part {
-            return objects;
-        }
-        // "The lid", said of a kettle just now, is the kettle's.
-        if objects.is_empty()
-            && let Some(last) = self.focus.last
-        {
-            for whole in identities.line(last) {
-                let inside = identities.within(whole);
-                let own: Vec<IdentityId> =
-                    ids.iter().copied().filter(|id| inside.get(*id as usize) == Some(&true)).collect();
-                if !own.is_empty() {
-                    return own;
-                }
-            }
-        }
-        ids.clone()
     }
 
     fn bounds(&self, id: IdentityId) -> Option<Bounds> {
         self.world.facts(id).and_then(|f| f.bounds)
     }
 
-    /// All identities that are in the scene and on the wished level.
-    fn everyone(&self) -> Vec<IdentityId> {
-        let wished = self.world.identities().iter().filter(|(_, i)| self.level.takes(i.level));
-        wished.map(|(id, _)| id).filter(|id| self.world.facts(*id).is_some()).collect()
+    /// The one anchor of a place; several are none.
+    fn anchor(&mut self, noun: &Noun) -> Result<IdentityId, Lost> {
+        let set = self.set(noun)?;
+        match set.settled() {
+            [only] => Ok(*only),
+            several => {
+                let names: Vec<String> = several.iter().take(6).map(|id| the(self.world, *id)).collect();
+                let text = format!("Several things fit equally: {}. Please say which one in full.", join(&names));
+                Err(Lost::new(RefusalKind::Unclear, text, several.to_vec()))
+            }
+        }
     }
-}
 
-/// Without what says nothing about which thing is meant.
-fn trim<'a, 'b>(mut words: &'b [&'a str]) -> &'b [&'a str] {
-    while let [first, rest @ ..] = words
-        && LEADING.contains(first)
-    {
-        words = rest;
+    /// Candidates by the words of their names: all words are in the names of a thing and its wholes, the
+    /// last one in its own. Slips are not taken for names.
+    fn named(&mut self, words: &[String]) -> Result<Set, Lost> {
+        let all = self.world.identities();
+        let wished = all.iter().filter(|(_, i)| self.level.accepts(i.level)).map(|(id, _)| id);
+        let everyone: Vec<IdentityId> = wished.filter(|id| self.world.facts(*id).is_some()).collect();
+        let Some((head, rest)) = words.split_last() else { return Err(self.not_found("that", &[])) };
+        let own = |id: IdentityId| all.get(id).map(|i| i.names.as_slice()).unwrap_or_default();
+        let line_has = |id: IdentityId, word: &String| {
+            all.line(id).any(|i| own(i).iter().any(|name| name_words(name).contains(word)))
+        };
+        let is_object = |id: &IdentityId| all.object_of(*id) == *id;
+        let generic = match head.as_str() {
+            "one" => Some(self.kin()),
+            word if ANYTHING.contains(&word) => Some(everyone.iter().copied().filter(is_object).collect()),
+            word if PARTS.contains(&word) => Some(everyone.iter().copied().filter(|id| !is_object(id)).collect()),
+            _ => None,
+        };
+        if let Some(ids) = generic {
+            let fit: Vec<IdentityId> = ids.into_iter().filter(|id| rest.iter().all(|w| line_has(*id, w))).collect();
+            return if fit.is_empty() { Err(self.not_found(&words.join(" "), words)) } else { Ok(Set::new(fit)) };
+        }
+        let fits = |id: &IdentityId, has_head: &dyn Fn(&[String]) -> bool| {
+            own(*id).iter().any(|n| has_head(&name_words(n))) && rest.iter().all(|w| line_has(*id, w))
+        };
+        let exact: Vec<IdentityId> =
+            everyone.iter().copied().filter(|id| own(*id).iter().any(|n| name_words(n) == words)).collect();
+        // A table lamp is no table; a vase with water is a vase.
+        let heads =
+            |name: &[String]| name.split(|w| w == "with" || w == "of").next().and_then(<[_]>::last) == Some(head);
+        let mut ids: Vec<IdentityId> = everyone.iter().copied().filter(|id| fits(id, &heads)).collect();
+        ids.extend(exact.iter().copied().filter(|id| !ids.contains(id)).collect::<Vec<_>>());
+        if ids.is_empty() {
+            ids = everyone.iter().copied().filter(|id| fits(id, &|name| name.contains(head))).collect();
+        }
+        if !ids.is_empty() {
+            return Ok(Set { ids, exact });
+        }
+        let text = words.join(" ");
+        match self.by_embedding(&text, self.level.kind())? {
+            Some(ids) => Ok(Set::new(ids)),
+            None => Err(self.not_found(&text, words)),
+        }
     }
-    while let Some(n) = TRAILING.iter().find_map(|phrase| {
-        let wanted: Vec<&str> = phrase.split(' ').collect();
-        words.ends_with(&wanted).then_some(wanted.len())
-    }) {
-        words = &words[..words.len() - n];
+
+    /// What the scene's encoder says, where it has one and that finds something.
+    fn by_embedding(&mut self, text: &str, kind: Kind) -> Result<Option<Vec<IdentityId>>, Lost> {
+        let found = self.world.locate(text, kind).map_err(Lost::World)?;
+        let ids = match (&found.basis, &found.answer) {
+            (Basis::Meaning, Answer::Found(_)) => found.chosen(1),
+            (Basis::Meaning, Answer::Ambiguous(_)) => found.chosen(2),
+            _ => Vec::new(),
+        };
+        let ids: Vec<IdentityId> = ids.into_iter().filter(|id| self.world.facts(*id).is_some()).take(12).collect();
+        if ids.is_empty() {
+            return Ok(None);
+        }
+        self.note = "(Found by embedding: no name here says so.)".into();
+        Ok(Some(ids))
     }
-    words
+
+    /// Nothing is called so: the nearest names, by words they share or slips of them.
+    fn not_found(&self, text: &str, words: &[String]) -> Lost {
+        let all = self.world.identities();
+        let here = |id: &IdentityId| self.world.facts(*id).is_some();
+        let shares = |id: &IdentityId| {
+            let names = all.get(*id).map(|i| i.names.as_slice()).unwrap_or_default();
+            names.iter().flat_map(|n| name_words(n)).any(|n| words.iter().any(|w| alike(&n, w)))
+        };
+        let near: Vec<IdentityId> = all.iter().map(|(id, _)| id).filter(here).filter(shares).take(6).collect();
+        let text: String = text.chars().take(80).collect();
+        let listed = |ids: &[IdentityId]| join(&ids.iter().map(|id| all.full_name(*id)).collect::<Vec<_>>());
+        let said = if near.is_empty() {
+            let is_named = |(id, i): &(IdentityId, &crate::scene::Identity)| {
+                i.level == Level::Object && !i.names.is_empty() && here(id)
+            };
+            let some: Vec<IdentityId> = all.iter().filter(is_named).map(|(id, _)| id).take(8).collect();
+            if some.is_empty() { String::new() } else { format!(" Some names here: {}.", listed(&some)) }
+        } else {
+            format!(" The nearest names: {}.", listed(&near))
+        };
+        Lost::new(RefusalKind::NotFound, format!("There is no '{text}' in this scene.{said}"), near)
+    }
+
+    /// Pieces of a whole that words name.
+    fn pieces(&mut self, piece: &Noun, whole: &Noun) -> Result<Set, Lost> {
+        let wholes = self.set(whole)?.settled().to_vec();
+        let all = self.world.identities();
+        let mut inside = vec![false; all.len() + 1];
+        for whole in &wholes {
+            all.within(*whole).iter().enumerate().for_each(|(i, is_in)| inside[i] |= *is_in);
+        }
+        wholes.iter().for_each(|id| inside[*id as usize] = false);
+        let is_in = |id: &IdentityId| inside.get(*id as usize) == Some(&true);
+        let known: Vec<IdentityId> =
+            all.iter().map(|(id, _)| id).filter(is_in).filter(|id| self.world.facts(*id).is_some()).collect();
+        let name = wholes.first().map(|id| all.full_name(*id)).unwrap_or_default();
+        let said = match piece {
+            Noun::Named(words) => words.join(" "),
+            _ => "such piece".into(),
+        };
+        let level = std::mem::replace(&mut self.level, LevelFilter::Any);
+        let set = self.set(piece);
+        self.level = level;
+        let set = match set {
+            Err(Lost::World(e)) => return Err(Lost::World(e)),
+            Err(Lost::Missing { .. }) => Set::new(Vec::new()),
+            Ok(set) => Set {
+                ids: set.ids.into_iter().filter(is_in).collect(),
+                exact: set.exact.into_iter().filter(is_in).collect(),
+            },
+        };
+        if !set.ids.is_empty() {
+            return Ok(set);
+        }
+        let meant = self.by_embedding(&format!("{said} of the {name}"), Kind::Part)?.unwrap_or_default();
+        let meant: Vec<IdentityId> = meant.into_iter().filter(is_in).collect();
+        if !meant.is_empty() {
+            return Ok(Set::new(meant));
+        }
+        self.note.clear();
+        let names: Vec<String> = known.iter().take(12).map(|id| self.world.identities().name(*id)).collect();
+        let parts =
+            if names.is_empty() { "no parts are known of it".into() } else { format!("its parts: {}", join(&names)) };
+        Err(Lost::new(RefusalKind::Conflict, format!("The {name} has no '{said}' here; {parts}."), known))
+    }
+
+    /// Things for which `score` holds at the anchor, best first. What is a piece of the anchor, or has it as
+    /// one, has no place at it.
+    fn at(
+        &mut self,
+        thing: &Noun,
+        anchor: &Noun,
+        what: &str,
+        score: &dyn Fn(&Bounds, &Bounds) -> Option<f64>,
+    ) -> Result<Set, Lost> {
+        let anchor = self.anchor(anchor)?;
+        let set = self.set(thing)?;
+        let all = self.world.identities();
+        let place = self.bounds(anchor);
+        let apart = |id: &IdentityId| !all.line(*id).any(|l| l == anchor) && !all.line(anchor).any(|l| l == *id);
+        let holds = |id: &IdentityId| score(&self.bounds(*id)?, place.as_ref()?).map(|s| (s, *id));
+        let mut found: Vec<(f64, IdentityId)> = set.ids.iter().filter(|id| apart(id)).filter_map(holds).collect();
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        if found.is_empty() {
+            let text = format!("I find nothing like that {what}: I looked at {}.", the(self.world, anchor));
+            return Err(Lost::new(RefusalKind::Conflict, text, Vec::new()));
+        }
+        let ids: Vec<IdentityId> = found.into_iter().map(|(_, id)| id).collect();
+        let exact = set.exact.into_iter().filter(|id| ids.contains(id)).collect();
+        Ok(Set { ids, exact })
+    }
+
+    /// The first of things sorted by their gap to the anchor, with those as near as it.
+    fn alike_first(&mut self, ids: &[IdentityId], anchor: &Noun) -> Result<Vec<IdentityId>, Lost> {
+        let place = self.anchor(anchor).map(|id| self.bounds(id))?;
+        let far = |id: &IdentityId| self.bounds(*id).zip(place).map_or(f64::INFINITY, |(b, p)| gap(&b, &p));
+        let least = ids.first().map_or(0.0, far);
+        Ok(ids.iter().copied().filter(|id| far(id) <= least + 1e-9).collect())
+    }
+
+    /// The one of the candidates that `pick` says; those that fit equally, if that decides nothing.
+    fn picked(&mut self, pick: Pick, of: &Noun) -> Result<Set, Lost> {
+        let ids = self.set(of)?.ids;
+        let (key, most) = match pick {
+            Pick::Other => {
+                let others: Vec<IdentityId> = ids.iter().copied().filter(|id| Some(*id) != self.dialog.last).collect();
+                let told = others.len() < ids.len() && !others.is_empty();
+                let unclear =
+                    || Lost::new(RefusalKind::Unclear, "I do not know which other one you mean.", ids.clone());
+                return if told { Ok(Set::new(others)) } else { Err(unclear()) };
+            }
+            // Of three, the left one is any but the rightmost.
+            Pick::More(..) if ids.len() > 2 => return Ok(Set::new(ids)),
+            Pick::Most(key, most) | Pick::More(key, most) => (key, most),
+        };
+        let values: Vec<(f64, IdentityId)> = ids.iter().filter_map(|id| Some((self.value(*id, key)?, *id))).collect();
+        let sign = if most { -1.0 } else { 1.0 };
+        let Some(best) = values.iter().map(|(v, _)| sign * v).min_by(f64::total_cmp) else {
+            return Err(Lost::new(RefusalKind::Conflict, "Nothing here has a size or place to compare.", ids));
+        };
+        let slack = 1e-6 * best.abs().max(1e-6);
+        Ok(Set::new(values.iter().filter(|(v, _)| sign * v <= best + slack).map(|(_, id)| *id).collect()))
+    }
+
+    fn value(&self, id: IdentityId, key: Key) -> Option<f64> {
+        let (view, bounds) = (self.world.view(), self.bounds(id)?);
+        let frame = view.frame();
+        let extent = || self.world.extent(id);
+        match key {
+            Key::Size => extent().map(|e| [e.length, e.width, e.height].map(|x| x.max(1e-9)).iter().product()),
+            Key::Height => extent().map(|e| e.height),
+            Key::Length => extent().map(|e| e.length),
+            Key::Right => Some(bounds.center().dot(frame.right)),
+            Key::Up => Some(bounds.center().dot(frame.up)),
+            Key::Distance => Some(bounds.center().distance(view.eye)),
+        }
+    }
+
+    /// What "one" may stand for: the candidates of the last question, else what shares the last word of the
+    /// last thing's name.
+    fn kin(&self) -> Vec<IdentityId> {
+        if !self.dialog.group.is_empty() {
+            return self.dialog.group.clone();
+        }
+        let all = self.world.identities();
+        let words =
+            |id: IdentityId| all.get(id).and_then(|i| i.names.first()).map(|n| name_words(n)).unwrap_or_default();
+        let Some(last) = self.dialog.last else { return Vec::new() };
+        let head = words(last).pop().map(|w| singular(&w));
+        let like = |id: &IdentityId| head.as_ref().is_some_and(|h| words(*id).last() == Some(h));
+        all.iter().map(|(id, _)| id).filter(like).filter(|id| self.world.facts(*id).is_some()).collect()
+    }
 }

@@ -1,5 +1,5 @@
-//! What a person can wish for a camera, as plain data: sides, directions, distances. Whoever moves
-//! the camera decides what they come to in the scene.
+//! Arguments of camera commands as plain data: sides, directions, distances. Whoever moves the camera
+//! decides what they come to in the scene.
 
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -43,7 +43,7 @@ impl Side {
     }
 }
 
-/// Where to move, as the viewer sees it.
+/// Where to move or turn, as the viewer sees it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Direction {
@@ -63,42 +63,15 @@ pub enum Direction {
 
 impl Direction {
     /// All of them.
-    pub const ALL: [Self; 6] = [Self::Forward, Self::Back, Self::Left, Self::Right, Self::Up, Self::Down];
+    pub const ALL: [Self; 6] = [Self::Left, Self::Right, Self::Up, Self::Down, Self::Forward, Self::Back];
+    /// Those that one can turn to.
+    pub const TURNS: &[Self] = Self::ALL.split_at(4).0;
 
     /// Its word.
     pub fn text(self) -> &'static str {
         match self {
             Self::Forward => "forward",
             Self::Back => "back",
-            Self::Left => "left",
-            Self::Right => "right",
-            Self::Up => "up",
-            Self::Down => "down",
-        }
-    }
-}
-
-/// Where to turn without moving.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum TurnWay {
-    /// To the left.
-    Left,
-    /// To the right.
-    Right,
-    /// Upwards.
-    Up,
-    /// Downwards.
-    Down,
-}
-
-impl TurnWay {
-    /// All of them.
-    pub const ALL: [Self; 4] = [Self::Left, Self::Right, Self::Up, Self::Down];
-
-    /// Its word.
-    pub fn text(self) -> &'static str {
-        match self {
             Self::Left => "left",
             Self::Right => "right",
             Self::Up => "up",
@@ -141,21 +114,6 @@ pub const CLOSER: f64 = 2.0;
 pub const FARTHER: f64 = 0.5;
 /// How close and how far a target can be looked at.
 pub const CLOSENESS: std::ops::RangeInclusive<f64> = 0.1..=10.0;
-
-/// How to go to a target.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GoWish {
-    /// From where to look at it.
-    pub side: Side,
-    /// 1 as usual, 2 twice as close, 0.5 from twice as far; in [`CLOSENESS`].
-    pub closeness: f64,
-}
-
-impl Default for GoWish {
-    fn default() -> Self {
-        Self { side: Side::Same, closeness: NORMAL }
-    }
-}
 
 /// Reads a closeness: a number, or "normal", "closer", "farther".
 pub(super) fn closeness<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {

@@ -1,8 +1,4 @@
-//! What the agent may do and what it refuses: read from `assets/policy.toml` or a file of the user's.
-
-mod physical;
-
-pub use physical::Judgement;
+//! Which tools the agent may use, and which after a yes: read from `assets/policy.toml` or a file of the user's.
 
 use std::path::Path;
 
@@ -17,19 +13,7 @@ pub const VARIABLE: &str = "FMLGS_POLICY";
 /// Largest policy file in bytes.
 const MAX_BYTES: u64 = 1 << 20;
 /// The policy that comes with the program.
-const BUILT_IN: &str = include_str!("../../../assets/policy.toml");
-
-/// What a rule decides.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Verdict {
-    /// Not done.
-    Refuse,
-    /// Done only if the user says yes.
-    Confirm,
-    /// Said along with the answer.
-    Warn,
-}
+const BUILT_IN: &str = include_str!("../../assets/policy.toml");
 
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -43,43 +27,11 @@ struct Tools {
     forbidden: Vec<String>,
 }
 
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Words {
-    name: String,
-    words: Vec<String>,
-}
-
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Rule {
-    actions: Vec<String>,
-    #[serde(default)]
-    of: Option<String>,
-    #[serde(default)]
-    with: Option<String>,
-    verdict: Verdict,
-    reason: String,
-}
-
 /// What may be done.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Policy {
     tools: Tools,
-    #[serde(default, rename = "class")]
-    classes: Vec<Words>,
-    #[serde(default, rename = "action")]
-    actions: Vec<Words>,
-    #[serde(default, rename = "rule")]
-    rules: Vec<Rule>,
-    /// Whether physical requests are looked for at all.
-    #[serde(skip, default = "yes")]
-    is_on: bool,
-}
-
-fn yes() -> bool {
-    true
 }
 
 /// Why a policy cannot be used. Without one nothing may be done, so the agent does not start.
@@ -146,7 +98,7 @@ impl Policy {
     /// Reads a policy; `place` is named in errors.
     ///
     /// # Errors
-    /// If it is no policy: broken TOML, or names of tools, classes or actions that are not there.
+    /// If it is no policy: broken TOML, or names of tools that are not there.
     pub fn parse(text: &str, place: &str) -> Result<Self, PolicyError> {
         let wrong = |problem: String| PolicyError::Wrong { place: place.to_owned(), problem };
         let policy: Self = toml::from_str(text).map_err(|e| wrong(e.to_string()))?;
@@ -155,23 +107,14 @@ impl Policy {
         if let Some(stranger) = lists.into_iter().flatten().find(|t| !NAMES.contains(&t.as_str())) {
             return Err(wrong(format!("there is no tool '{stranger}'; tools are: {}", NAMES.join(", "))));
         }
-        for rule in &policy.rules {
-            let known = |list: &[Words], name: &str| list.iter().any(|w| w.name == name);
-            if let Some(name) = rule.actions.iter().find(|a| !known(&policy.actions, a)) {
-                return Err(wrong(format!("a rule names the action '{name}', which is not defined")));
-            }
-            if let Some(name) = [&rule.of, &rule.with].into_iter().flatten().find(|c| !known(&policy.classes, c)) {
-                return Err(wrong(format!("a rule names the class '{name}', which is not defined")));
-            }
-        }
         Ok(policy)
     }
 
-    /// One that permits everything and refuses nothing, to show in tests what the policy is for.
+    /// One that permits everything without a question, to show in tests what the policy is for.
     pub fn off() -> Self {
         let allowed = NAMES.iter().map(|n| (*n).to_owned()).collect();
         let tools = Tools { allowed, confirm: Vec::new(), confirm_overwrite: Vec::new(), forbidden: Vec::new() };
-        Self { tools, classes: Vec::new(), actions: Vec::new(), rules: Vec::new(), is_on: false }
+        Self { tools }
     }
 
     /// Whether a tool may be used.
@@ -223,9 +166,7 @@ mod tests {
             "[tools]",
             "[tools]\nallowed = [\"fly\"]",
             "[tools]\nallowed = []\nallow = 3",
-            "[tools]\nallowed = []\n[[rule]]\nactions = [\"pour\"]\nverdict = \"refuse\"\nreason = \"x\"",
-            "[tools]\nallowed = []\n[[rule]]\nactions = []\nof = \"x\"\nverdict = \"refuse\"\nreason = \"x\"",
-            "[tools]\nallowed = []\n[[rule]]\nactions = []\nverdict = \"maybe\"\nreason = \"x\"",
+            "[tools]\nallowed = []\n[[rule]]\nactions = []",
         ] {
             assert!(matches!(Policy::parse(bad, "bad"), Err(PolicyError::Wrong { .. })), "{bad}");
         }

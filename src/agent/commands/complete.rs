@@ -1,0 +1,117 @@
+//! Completion while typing: how a text can go on, by the commands and by the names in the scene.
+
+use super::form::{Item, Request, Slot, sequences};
+use super::{SEPARATORS, clauses, request_tokens};
+use crate::agent::language::Language;
+use crate::agent::resolve::{Vocabulary, is_thing};
+use crate::scene::Identities;
+
+/// The texts that `text` can become with its next words, at most `most`, in the order of the commands.
+pub fn complete(text: &str, identities: &Identities, most: usize) -> Vec<String> {
+    let tokens = request_tokens(text);
+    let words: Vec<&str> = tokens.iter().map(|t| t.low.as_str()).collect();
+    let known = Vocabulary::new(identities);
+    // Commands before the last one must be understood; courtesy is passed over.
+    let starts = |at: usize| {
+        let before = Request { tokens: &tokens[..at], words: &words[..at], known: &known, strict: true };
+        let opens = Language::get().openers.contains(&words[..at].join(" "));
+        at == 0 || opens || (SEPARATORS.contains(&words[at - 1]) && clauses(&before).is_some())
+    };
+    let ends_word = text.is_empty() || text.ends_with(char::is_whitespace);
+    let mut found = Vec::new();
+    for at in (0..=words.len()).filter(|at| starts(*at)) {
+        let typed = &words[at..];
+        let (whole, begun) = match typed.split_last() {
+            Some((last, whole)) if !ends_word => (whole, *last),
+            _ => (typed, ""),
+        };
+        let kept = Kept { identities, known: &known, begun };
+        let mut next = Vec::new();
+        for sequence in sequences() {
+            kept.follow(&sequence.items, whole, &mut next);
+        }
+        for end in next {
+            let all: Vec<&str> = words[..at].iter().chain(whole).copied().chain([end.as_str()]).collect();
+            let text = all.join(" ").replace(" 's", "'s").replace(" ,", ",");
+            if !found.contains(&text) && found.len() < most {
+                found.push(text);
+            }
+        }
+    }
+    found
+}
+
+struct Kept<'a> {
+    identities: &'a Identities,
+    known: &'a Vocabulary,
+    /// The word that is being typed; empty if the next has not begun.
+    begun: &'a str,
+}
+
+impl Kept<'_> {
+    /// Adds what may stand after `words` in a sequence.
+    fn follow(&self, items: &[Item], words: &[&str], next: &mut Vec<String>) {
+        match (items.split_first(), words) {
+            (None, _) => {}
+            (Some((Item::Word(word), _)), []) => self.offer(word, next),
+            (Some((Item::Word(word), items)), [first, words @ ..]) => {
+                if word == first {
+                    self.follow(items, words, next);
+                }
+            }
+            (Some((Item::Slot(slot), items)), words) => {
+                let options = self.options(*slot);
+                let typed = words.join(" ");
+                for option in &options {
+                    // "the left stick" after "the left".
+                    let rest = if typed.is_empty() { Some(option.as_str()) } else { option.strip_prefix(&typed) };
+                    let rest = rest.filter(|r| typed.is_empty() || r.starts_with(' ')).map(str::trim_start);
+                    rest.into_iter().for_each(|r| self.offer(r, next));
+                }
+                for end in 1..=words.len() {
+                    let said = words[..end].join(" ");
+                    let names = matches!(slot, Slot::Thing | Slot::Things | Slot::Kind);
+                    let fits = match slot {
+                        _ if names => is_thing(&words[..end], self.known, true),
+                        Slot::Name => true,
+                        Slot::Distance | Slot::Angle => words[0].starts_with(|c: char| c.is_ascii_digit()),
+                        _ => options.contains(&said),
+                    };
+                    if fits {
+                        self.follow(items, &words[end..], next);
+                    }
+                    if fits && names && end == words.len() {
+                        Language::get().relations.iter().for_each(|(r, _)| self.offer(r, next));
+                    }
+                }
+            }
+        }
+    }
+
+    fn offer(&self, text: &str, next: &mut Vec<String>) {
+        if text != "?" && text.starts_with(self.begun) && text != self.begun && !next.iter().any(|n| n == text) {
+            next.push(text.to_owned());
+        }
+    }
+
+    fn options(&self, slot: Slot) -> Vec<String> {
+        let language = Language::get();
+        let fixed = |words: &[&str]| words.iter().map(|w| (*w).to_owned()).collect();
+        let full = || self.identities.iter().filter(|(_, i)| !i.names.is_empty()).map(|(id, _)| id);
+        match slot {
+            Slot::Thing | Slot::Things => full().map(|id| format!("the {}", self.identities.full_name(id))).collect(),
+            Slot::Kind => {
+                let names = self.identities.iter().filter_map(|(_, i)| i.names.first());
+                ["objects".to_owned(), "parts".into()].into_iter().chain(names.cloned()).collect()
+            }
+            Slot::Side => language.sides.iter().map(|(w, _)| (*w).to_owned()).collect(),
+            Slot::Relation => language.relations.iter().map(|(w, _)| (*w).to_owned()).collect(),
+            Slot::Direction => language.directions.iter().map(|(w, _)| (*w).to_owned()).collect(),
+            Slot::Turn => fixed(&["left", "right", "up", "down"]),
+            Slot::Distance => fixed(&["20 cm", "half a meter", "two steps", "a bit"]),
+            Slot::Angle => fixed(&["90 degrees", "45 degrees"]),
+            Slot::Most => language.most.iter().chain(&language.least).map(|(w, _)| w.clone()).collect(),
+            Slot::Name => Vec::new(),
+        }
+    }
+}

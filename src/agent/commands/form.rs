@@ -1,0 +1,283 @@
+//! Forms of commands: expanded into plain sequences of words and slots, matched against a request. A form
+//! fits only if every word of the request has its place in it.
+
+use std::collections::HashMap;
+use std::sync::OnceLock;
+
+use crate::agent::camera_args::{Direction, Distance, Side};
+use crate::agent::language::{Command, Language, commands, find};
+use crate::agent::relation::Relation;
+use crate::agent::resolve::{Vocabulary, is_thing};
+use crate::agent::words::{Token, number};
+
+/// What stands in a slot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Slot {
+    Thing,
+    Things,
+    Kind,
+    Name,
+    Side,
+    Relation,
+    Direction,
+    Turn,
+    Distance,
+    Angle,
+    Most,
+}
+
+/// A word of a form, or a slot.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Item {
+    Word(String),
+    Slot(Slot),
+}
+
+impl Item {
+    /// Its word, if it is none of the slots.
+    pub(super) fn word(&self) -> Option<&str> {
+        if let Self::Word(word) = self { Some(word) } else { None }
+    }
+}
+
+/// A form without choices, and the command it is of.
+pub(super) struct Sequence {
+    pub items: Vec<Item>,
+    pub command: &'static Command,
+}
+
+/// What the slots of a form hold.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Slots {
+    pub(super) texts: Vec<String>,
+    /// Several things in place of the text with this number.
+    pub(super) several: Option<(usize, Vec<String>)>,
+    pub(super) name: Option<String>,
+    pub(super) side: Option<Side>,
+    pub(super) relation: Option<Relation>,
+    pub(super) direction: Option<Direction>,
+    pub(super) distance: Option<Distance>,
+    pub(super) degrees: Option<f64>,
+    pub(super) most: Option<String>,
+}
+
+/// All sequences, in the order of the commands.
+pub(super) fn sequences() -> &'static [Sequence] {
+    static ALL: OnceLock<Vec<Sequence>> = OnceLock::new();
+    ALL.get_or_init(|| {
+        let of = |command: &'static Command| {
+            command.forms.iter().flat_map(|f| expand(f)).map(move |items| Sequence { items, command })
+        };
+        commands().iter().flat_map(of).collect()
+    })
+}
+
+/// The sequences that may begin with a word, in the order of the commands.
+pub(super) fn beginning_with(word: &str) -> impl Iterator<Item = &'static Sequence> {
+    static FIRST: OnceLock<HashMap<&str, Vec<usize>>> = OnceLock::new();
+    let first = |sequence: &'static Sequence| match sequence.items.first() {
+        Some(Item::Word(word)) => word.as_str(),
+        // Any word may begin a slot.
+        _ => "",
+    };
+    let table = FIRST.get_or_init(|| {
+        let mut table: HashMap<&str, Vec<usize>> = HashMap::new();
+        sequences().iter().enumerate().for_each(|(i, s)| table.entry(first(s)).or_default().push(i));
+        table
+    });
+    let of = |word: &str| table.get(word).map(Vec::as_slice).unwrap_or_default();
+    let mut all = [of(word), of("")].concat();
+    all.sort_unstable();
+    all.into_iter().map(|i| &sequences()[i])
+}
+
+/// The sequences that a form stands for.
+pub(super) fn expand(form: &str) -> Vec<Vec<Item>> {
+    let spaced = ['(', ')', '[', ']', '|'].iter().fold(form.to_owned(), |f, c| f.replace(*c, &format!(" {c} ")));
+    let words: Vec<&str> = spaced.split_whitespace().collect();
+    let mut at = 0;
+    alternatives(&words, &mut at)
+}
+
+fn alternatives(words: &[&str], at: &mut usize) -> Vec<Vec<Item>> {
+    let (mut done, mut open): (Vec<Vec<Item>>, Vec<Vec<Item>>) = (Vec::new(), vec![Vec::new()]);
+    while let Some(word) = words.get(*at) {
+        let more = match *word {
+            ")" | "]" => break,
+            "|" => {
+                done.append(&mut open);
+                open = vec![Vec::new()];
+                *at += 1;
+                continue;
+            }
+            "(" | "[" => {
+                *at += 1;
+                let mut inner = alternatives(words, at);
+                if *word == "[" {
+                    inner.push(Vec::new());
+                }
+                inner
+            }
+            word => vec![vec![item(word)]],
+        };
+        *at += 1;
+        open = open.iter().flat_map(|o| more.iter().map(|m| [o.as_slice(), m.as_slice()].concat())).collect();
+    }
+    done.append(&mut open);
+    done
+}
+
+fn item(word: &str) -> Item {
+    Item::Slot(match word {
+        "{thing}" => Slot::Thing,
+        "{things}" => Slot::Things,
+        "{kind}" => Slot::Kind,
+        "{name}" => Slot::Name,
+        "{side}" => Slot::Side,
+        "{relation}" => Slot::Relation,
+        "{direction}" => Slot::Direction,
+        "{turn}" => Slot::Turn,
+        "{distance}" => Slot::Distance,
+        "{angle}" => Slot::Angle,
+        "{most}" => Slot::Most,
+        word => return Item::Word(word.to_owned()),
+    })
+}
+
+/// A request that is matched.
+pub(super) struct Request<'a> {
+    pub tokens: &'a [Token],
+    pub words: &'a [&'a str],
+    pub known: &'a Vocabulary,
+    /// Whether things must be called by words that names in the scene have.
+    pub strict: bool,
+}
+
+impl Request<'_> {
+    /// What the slots hold if these words are said as a sequence has it.
+    pub(super) fn fit(&self, items: &[Item]) -> Option<Slots> {
+        let mut slots = Slots::default();
+        self.rest(items, 0, &mut slots).then_some(slots)
+    }
+
+    fn rest(&self, items: &[Item], at: usize, slots: &mut Slots) -> bool {
+        let Some((first, items)) = items.split_first() else { return at == self.words.len() };
+        match first {
+            Item::Word(word) => self.words.get(at) == Some(&word.as_str()) && self.rest(items, at + 1, slots),
+            // The longest that fits: "left stick", not "left".
+            Item::Slot(slot) => (at + 1..=self.words.len()).rev().any(|end| {
+                let before = slots.clone();
+                let fits = self.take(*slot, at, end, slots) && self.rest(items, end, slots);
+                if !fits {
+                    *slots = before;
+                }
+                fits
+            }),
+        }
+    }
+
+    /// Fills a slot with the words from `at` to `end`, if they can stand there.
+    fn take(&self, slot: Slot, at: usize, end: usize, slots: &mut Slots) -> bool {
+        let words = &self.words[at..end];
+        let text = words.join(" ");
+        let language = Language::get();
+        match slot {
+            Slot::Thing => {
+                slots.texts.push(quoted(words));
+                is_thing(words, self.known, self.strict)
+            }
+            Slot::Kind => {
+                slots.texts.push(quoted(words));
+                let words = if words[0] == "all" { &words[1..] } else { words };
+                is_thing(words, self.known, self.strict)
+            }
+            Slot::Things => {
+                let parts: Vec<&[&str]> =
+                    words.split(|w| matches!(*w, "," | "and")).filter(|p| !p.is_empty()).collect();
+                let whole = is_thing(words, self.known, self.strict);
+                let parts = if whole { vec![words] } else { parts };
+                slots.several = Some((slots.texts.len(), parts.iter().map(|p| quoted(p)).collect()));
+                slots.texts.push(text);
+                parts.iter().all(|p| is_thing(many(p).unwrap_or(p), self.known, self.strict))
+            }
+            Slot::Name => {
+                let raw: Vec<&str> = self.tokens[at..end].iter().map(|t| t.raw.as_str()).collect();
+                slots.name = Some(raw.join(" ").replace(" 's", "'s"));
+                !words.contains(&",")
+            }
+            Slot::Side => {
+                slots.side = find(&language.sides, text.strip_suffix(" side").unwrap_or(&text));
+                slots.side.is_some()
+            }
+            Slot::Relation => {
+                slots.relation = language.relation_at(words).filter(|(_, n)| *n == words.len()).map(|(r, _)| r);
+                slots.relation.is_some()
+            }
+            Slot::Direction | Slot::Turn => {
+                slots.direction = find(&language.directions, &text)
+                    .filter(|d| slot == Slot::Direction || Direction::TURNS.contains(d));
+                slots.direction.is_some()
+            }
+            Slot::Distance => {
+                slots.distance = distance(words);
+                slots.distance.is_some()
+            }
+            Slot::Angle => {
+                slots.degrees = find(&language.angles, &text).or_else(|| angle(words));
+                slots.degrees.is_some()
+            }
+            Slot::Most => {
+                slots.most = Some(text);
+                language.most.iter().chain(&language.least).any(|(w, _)| w == words[0]) && words.len() == 1
+            }
+        }
+    }
+}
+
+/// Words as a phrase again.
+fn quoted(words: &[&str]) -> String {
+    words.join(" ").replace(" 's", "'s").replace('"', "")
+}
+
+/// What follows "all", "both" and the like: everything that it means is meant.
+pub(super) fn many<'a, 'b>(words: &'b [&'a str]) -> Option<&'b [&'a str]> {
+    let rest = match words {
+        ["all", "of", rest @ ..] | ["all" | "both" | "every" | "each", rest @ ..] => rest,
+        _ => return None,
+    };
+    Some(rest.strip_prefix(&["the"]).unwrap_or(rest)).filter(|r| !r.is_empty())
+}
+
+/// "20 cm", "half a meter", "two steps", "a bit".
+fn distance(words: &[&str]) -> Option<Distance> {
+    let language = Language::get();
+    if let Some(steps) = find(&language.steps, &words.join(" ")) {
+        return Some(Distance::Relative(steps));
+    }
+    let (unit, amount) = words.split_last()?;
+    let amount = match amount {
+        ["a" | "an" | "one"] => 1.0,
+        ["half", "a"] | ["half", "an"] | ["half"] | ["a", "half"] => 0.5,
+        ["a", "quarter", "of", "a"] => 0.25,
+        ["a", "couple", "of"] => 2.0,
+        ["one", "and", "a", "half"] => 1.5,
+        [number_word] => number(number_word)?,
+        [tens, ones] => number(tens).filter(|n| *n >= 20.0)? + number(ones).filter(|n| *n < 10.0)?,
+        _ => return None,
+    };
+    if matches!(*unit, "step" | "steps") {
+        return Some(Distance::Relative(amount));
+    }
+    find(&language.units, unit).map(|meters| Distance::Metres(amount * meters))
+}
+
+/// "90 degrees".
+fn angle(words: &[&str]) -> Option<f64> {
+    let (unit, amount) = words.split_last()?;
+    let is_degrees = matches!(*unit, "°" | "deg" | "degree" | "degrees");
+    match amount {
+        [only] if is_degrees => number(only),
+        [tens, ones] if is_degrees => Some(number(tens).filter(|n| *n >= 20.0)? + number(ones).filter(|n| *n < 10.0)?),
+        _ => None,
+    }
+}

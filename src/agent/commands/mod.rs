@@ -1,0 +1,378 @@
+//! The planner that is built in: a small command language, without any network. A sentence is understood
+//! if every word of it has its place in a command; else nothing is done, and the nearest commands are shown.
+
+mod complete;
+mod form;
+mod task;
+
+pub use super::language::{Command, commands};
+pub use complete::complete;
+
+use std::collections::VecDeque;
+
+use self::form::{Item, Request, beginning_with, many, sequences};
+use self::task::{Task, task};
+use super::camera_args::{CLOSENESS, CLOSER, Direction, Distance, FARTHER, NORMAL, Side};
+use super::describe::SEEN;
+use super::dialog::DialogState;
+use super::execute::Outcome;
+use super::language::Language;
+use super::planner::{Planner, PlannerContext, Step};
+use super::refusal::{Refusal, RefusalKind};
+use super::resolve::{Resolved, Vocabulary, is_thing, name_words, resolve, resolve_all, words_of};
+use super::tool::{LevelFilter, Reference, Target, ToolCall};
+use super::words::{Token, alike, is_mark, tokens};
+use super::world::World;
+use crate::scene::Identities;
+
+/// Most tasks of one request.
+const MOST_TASKS: usize = 16;
+/// Words that part one command from the next.
+const SEPARATORS: [&str; 4] = [",", "and", "then", "?"];
+
+/// The commands' planner.
+#[derive(Default)]
+pub struct Commands {
+    tasks: VecDeque<Task>,
+    refusal: Option<Refusal>,
+    said: Vec<String>,
+    looking_for: bool,
+}
+
+impl Planner for Commands {
+    fn name(&self) -> &'static str {
+        "commands"
+    }
+
+    fn start(&mut self, request: &str, context: &mut PlannerContext<'_>) {
+        *self = Self::default();
+        let Some(tasks) = parse(request, context.world.identities()) else {
+            self.refusal = Some(not_understood(request, context.world.identities()));
+            return;
+        };
+        match settled(tasks, context) {
+            Ok(tasks) => self.tasks = tasks.into(),
+            Err(refusal) => self.refusal = Some(refusal),
+        }
+    }
+
+    fn next(&mut self, last: Option<&Outcome>, context: &mut PlannerContext<'_>) -> Result<Step, Refusal> {
+        if last.is_some_and(|outcome| outcome.refused.is_some()) {
+            // What comes after may rest on what was not done.
+            if !self.tasks.is_empty() {
+                self.said.push("The rest of the request was left out.".into());
+                self.tasks.clear();
+            }
+            return Ok(self.finish());
+        }
+        if std::mem::take(&mut self.looking_for)
+            && let Some(id) = last.and_then(|outcome| outcome.ids.first())
+            && context.world.facts(*id).is_some_and(|f| f.in_view <= SEEN && !f.hidden)
+        {
+            return Ok(go(Target::Identity(*id), Side::Same, NORMAL));
+        }
+        match self.tasks.pop_front() {
+            None => Ok(self.finish()),
+            Some(task) => Ok(self.step(task, context)),
+        }
+    }
+}
+
+fn go(target: Target, side: Side, closeness: f64) -> Step {
+    let closeness = closeness.clamp(*CLOSENESS.start(), *CLOSENESS.end());
+    Step::Call(ToolCall::GoTo { target, side, closeness })
+}
+
+impl Commands {
+    fn finish(&mut self) -> Step {
+        Step::Finish { text: std::mem::take(&mut self.said).join(" "), refusal: self.refusal.take() }
+    }
+
+    fn step(&mut self, task: Task, context: &mut PlannerContext<'_>) -> Step {
+        let dialog = context.dialog;
+        let last = dialog.last.filter(|id| context.world.facts(*id).is_some());
+        match (task, last) {
+            (Task::Call(call), _) => Step::Call(call),
+            (Task::Find(query), _) => {
+                self.looking_for = true;
+                Step::Call(ToolCall::Locate { query, kind: LevelFilter::Any })
+            }
+            (Task::Closer(factor), Some(id)) => go(Target::Identity(id), Side::Same, dialog.closeness * factor),
+            (Task::Closer(factor), None) => {
+                let direction = if factor >= NORMAL { Direction::Forward } else { Direction::Back };
+                Step::Call(ToolCall::Move { direction, distance: Distance::Default })
+            }
+            (Task::From(side), Some(id)) => go(Target::Identity(id), side, dialog.closeness),
+            (Task::From(side), None) => {
+                let text = format!("From {}: of what? Name a thing, such as 'the lamp from above'.", side.text());
+                self.refuse(Refusal::new(RefusalKind::Unclear, text))
+            }
+            (Task::Again, _) => match dialog.moved.clone() {
+                Some(ToolCall::GoTo { target, closeness, .. }) if closeness != NORMAL => {
+                    go(target, Side::Same, closeness * if closeness > NORMAL { CLOSER } else { FARTHER })
+                }
+                Some(call) => Step::Call(call),
+                None => self.refuse(Refusal::new(RefusalKind::Unclear, "There is nothing to do again yet.")),
+            },
+            (Task::Help, _) => {
+                self.said.push(help(context.world.identities()));
+                self.finish()
+            }
+        }
+    }
+
+    fn refuse(&mut self, refusal: Refusal) -> Step {
+        self.tasks.clear();
+        self.refusal = Some(refusal);
+        self.finish()
+    }
+}
+
+/// The words of a request, marks as commas except for a question's.
+fn request_tokens(request: &str) -> Vec<Token> {
+    let mut all = tokens(request);
+    for token in all.iter_mut().filter(|t| is_mark(&t.low) && t.low != "?") {
+        token.low = ",".into();
+    }
+    all
+}
+
+/// The tasks that a request asks for; `None` unless all of it is understood. Things that the scene's
+/// names do not know are accepted where nothing else fits: it is said then that they are not there.
+pub(crate) fn parse(request: &str, identities: &Identities) -> Option<Vec<Task>> {
+    let (tokens, known) = (request_tokens(request), Vocabulary::new(identities));
+    let words: Vec<&str> = tokens.iter().map(|t| t.low.as_str()).collect();
+    let with = |strict| clauses(&Request { tokens: &tokens, words: &words, known: &known, strict });
+    with(true).or_else(|| with(false)).filter(|tasks| tasks.len() <= MOST_TASKS)
+}
+
+/// Whether a text is a command and no mere name.
+pub(crate) fn is_command(text: &str, identities: &Identities) -> bool {
+    let words = words_of(text);
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    !is_thing(&words, &Vocabulary::new(identities), false) && parse(text, identities).is_some()
+}
+
+/// A request as one command, or as several in a row.
+fn clauses(request: &Request<'_>) -> Option<Vec<Task>> {
+    let request = trimmed(request);
+    if let Some(tasks) = one(&request) {
+        return Some(tasks);
+    }
+    // What a question asks is asked without its mark, too; "the lamp?" wants to know, "the lamp" to go there.
+    if let Some(("?", rest)) = request.words.split_last().map(|(last, rest)| (*last, rest)) {
+        return clauses(&part(&request, 0, rest.len()));
+    }
+    let parts = (1..request.words.len()).filter(|i| SEPARATORS.contains(&request.words[*i]));
+    parts.take(MOST_TASKS).find_map(|i| {
+        let mut tasks = one(&trimmed(&part(&request, 0, i)))?;
+        tasks.extend(clauses(&part(&request, i + 1, request.words.len()))?);
+        Some(tasks)
+    })
+}
+
+fn part<'a>(request: &Request<'a>, from: usize, to: usize) -> Request<'a> {
+    let Request { tokens, words, known, strict } = *request;
+    Request { tokens: &tokens[from..to], words: &words[from..to], known, strict }
+}
+
+/// Without separators and courtesy around it.
+fn trimmed<'a>(request: &Request<'a>) -> Request<'a> {
+    let (mut from, mut to) = (0, request.words.len());
+    loop {
+        let words = &request.words[from..to];
+        if words.last().is_some_and(|w| *w == "," || *w == "please") {
+            to -= 1;
+        } else if words.first().is_some_and(|w| SEPARATORS.contains(w)) {
+            from += 1;
+        } else if let Some(n) = Language::get().openers.iter().find_map(|o| opens(words, o)) {
+            from += n;
+        } else {
+            return part(request, from, to);
+        }
+    }
+}
+
+/// The number of words of `phrase`, if these words begin with it.
+fn opens(words: &[&str], phrase: &str) -> Option<usize> {
+    let n = phrase.split(' ').count();
+    (words.len() >= n && phrase.split(' ').eq(words[..n].iter().copied())).then_some(n)
+}
+
+/// One command: the first that fits.
+fn one(request: &Request<'_>) -> Option<Vec<Task>> {
+    beginning_with(request.words.first()?).find_map(|sequence| {
+        // A name alone is a command only if it is one.
+        if !request.strict && !matches!(sequence.items.first(), Some(Item::Word(_))) {
+            return None;
+        }
+        let mut slots = request.fit(&sequence.items)?;
+        let Some((place, several)) = slots.several.take() else {
+            return Some(vec![task(&sequence.command.id, &slots)?]);
+        };
+        let each = several.into_iter().map(|text| {
+            slots.texts[place] = text;
+            task(&sequence.command.id, &slots)
+        });
+        each.collect()
+    })
+}
+
+/// The phrases of a task that mean things.
+fn phrases(task: &Task) -> Vec<String> {
+    let Task::Call(call) = task else {
+        return if let Task::Find(query) = task { vec![query.clone()] } else { Vec::new() };
+    };
+    let other = match call {
+        ToolCall::Measure { to: Some(Reference::Thing(Target::Query(words))), .. } => Some(words),
+        ToolCall::Locate { query, .. } => Some(query),
+        _ => None,
+    };
+    let own = match call.target() {
+        Some(Target::Query(words)) => Some(words),
+        _ => None,
+    };
+    own.into_iter().chain(other).cloned().collect()
+}
+
+/// Tasks with "all of them" taken apart. Of several tasks none is begun unless the things of all are there
+/// and clear.
+fn settled(tasks: Vec<Task>, context: &mut PlannerContext<'_>) -> Result<Vec<Task>, Refusal> {
+    let mut dialog = context.dialog.clone();
+    let mut done = Vec::new();
+    let is_alone = tasks.len() == 1;
+    for task in tasks {
+        if let (Task::Call(call), [phrase]) = (&task, phrases(&task).as_slice())
+            && let Some(ids) = all_of(phrase, context.world, &dialog)?
+        {
+            dialog.last = ids.last().copied();
+            done.extend(ids.into_iter().map(|id| Task::Call(call.with_target(Target::Identity(id)))));
+            continue;
+        }
+        for phrase in phrases(&task).iter().filter(|_| !is_alone) {
+            match resolve(context.world, phrase, LevelFilter::Any, &dialog)
+                .map_err(|e| Refusal::new(RefusalKind::Failed, e.0))?
+            {
+                Resolved::One { id, .. } => dialog.last = Some(id),
+                Resolved::Several(some) => {
+                    let names: Vec<String> = some.iter().map(|id| context.world.identities().full_name(*id)).collect();
+                    let text = format!(
+                        "Several things fit '{phrase}': {}. Nothing was done; say it in full.",
+                        names.join(", ")
+                    );
+                    return Err(Refusal::new(RefusalKind::Unclear, text));
+                }
+                Resolved::Missing { refusal, .. } => {
+                    return Err(Refusal::new(refusal.kind, format!("{} Nothing was done.", refusal.text)));
+                }
+            }
+        }
+        done.push(task);
+    }
+    if done.len() > MOST_TASKS {
+        return Err(Refusal::new(RefusalKind::Limit, format!("That is more than {MOST_TASKS} steps: ask for less.")));
+    }
+    Ok(done)
+}
+
+/// What "all bottles", "both controllers" or "the bottles" mean; `None` if one thing is meant.
+fn all_of(phrase: &str, world: &mut dyn World, dialog: &DialogState) -> Result<Option<Vec<u32>>, Refusal> {
+    let words: Vec<&str> = phrase.split(' ').collect();
+    let said = many(&words);
+    let Some(rest) = said else { return Ok(None) };
+    let ids = resolve_all(world, &rest.join(" "), LevelFilter::Any, dialog)?;
+    let is_both = words[0] == "both";
+    if is_both && ids.len() != 2 {
+        let text = format!("There are {} of them here, not two.", ids.len());
+        return Err(Refusal::new(RefusalKind::Conflict, text));
+    }
+    Ok(Some(ids))
+}
+
+/// An example of a command with a name of this scene.
+fn example(command: &Command, identities: &Identities, request: &[&str]) -> String {
+    let names = || identities.iter().filter_map(|(_, i)| i.names.first());
+    let spoken = names().find(|n| name_words(n).iter().all(|w| request.iter().any(|r| name_words(r).contains(w))));
+    let name = spoken.or_else(|| names().next()).map_or("lamp", String::as_str);
+    command.example.replace("{}", name)
+}
+
+/// The commands that are nearest to a request: those that share its first word, then other words.
+pub fn nearest(request: &str, identities: &Identities) -> Vec<String> {
+    let tokens = request_tokens(request);
+    let words: Vec<&str> = tokens.iter().map(|t| t.low.as_str()).filter(|w| *w != ",").collect();
+    let common = ["the", "a", "is", "to", "of", "in", "it", "me", "and"];
+    let score = |items: &[Item]| {
+        let own: Vec<&str> = items.iter().filter_map(Item::word).collect();
+        let verb = own.first().is_some_and(|w| words.first().is_some_and(|f| alike(f, w)));
+        let shared = words.iter().filter(|w| !common.contains(*w) && own.iter().any(|o| alike(o, w))).count();
+        3 * usize::from(verb) + 2 * shared
+    };
+    let mut best: Vec<(usize, &Command)> = Vec::new();
+    for sequence in sequences() {
+        let score = score(&sequence.items);
+        match best.last_mut() {
+            Some((most, command)) if std::ptr::eq(*command, sequence.command) => *most = score.max(*most),
+            _ => best.push((score, sequence.command)),
+        }
+    }
+    best.sort_by_key(|(score, _)| std::cmp::Reverse(*score));
+    let fits = best.iter().filter(|(score, _)| *score > 0).map(|(_, c)| *c);
+    let usual = ["show me the {}", "what is on the table", "describe the {}"];
+    let usual = commands().iter().filter(|c| usual.contains(&c.example.as_str()));
+    let mut found: Vec<String> = Vec::new();
+    for command in fits.chain(usual) {
+        let text = example(command, identities, &words);
+        if found.len() < 3 && !found.contains(&text) {
+            found.push(text);
+        }
+    }
+    found
+}
+
+/// The request with slips of one letter mended, if that makes it a command. It is shown, never done.
+fn corrected(request: &str, identities: &Identities) -> Option<String> {
+    let known = Vocabulary::new(identities);
+    let mut words: Vec<&str> = sequences().iter().flat_map(|s| &s.items).filter_map(Item::word).collect();
+    words.extend(Language::get().relations.iter().flat_map(|(r, _)| r.split(' ')));
+    words.extend(known.words());
+    words.sort_unstable();
+    words.dedup();
+    let mend = |token: &Token| {
+        let near = || words.iter().filter(|w| alike(w, &token.low));
+        let is_known = words.contains(&token.low.as_str()) || known.has(&token.low);
+        if is_known { token.low.clone() } else { near().next().map_or(token.low.clone(), |w| (*w).to_owned()) }
+    };
+    let mended: Vec<String> = request_tokens(request).iter().map(mend).collect();
+    let text = mended.join(" ").replace(" 's", "'s").replace(" ,", ",");
+    parse(&text, identities).map(|_| text)
+}
+
+fn not_understood(request: &str, identities: &Identities) -> Refusal {
+    let said: String = request.trim().chars().take(80).collect();
+    let mut near = nearest(request, identities);
+    if let Some(text) = corrected(request, identities) {
+        near.insert(0, text);
+        near.truncate(3);
+    }
+    let near = near.join("', '");
+    let text = format!(
+        "I did not understand '{said}', so nothing was done. The nearest commands: '{near}'. 'help' lists all."
+    );
+    Refusal::new(RefusalKind::Unclear, text)
+}
+
+/// All commands, by their examples.
+pub fn help(identities: &Identities) -> String {
+    let mut lines: Vec<String> = Vec::new();
+    for command in commands() {
+        let line = format!("'{}': {}", example(command, identities, &[]), command.does);
+        if !lines.iter().any(|l| l.ends_with(&command.does)) {
+            lines.push(line);
+        }
+    }
+    format!(
+        "You can say, for example:\n{}\nSeveral at once with 'and' or 'then'; 'it' is the last thing.",
+        lines.join("\n")
+    )
+}

@@ -1,0 +1,131 @@
+//! Choosing what plans in the chat: the built-in commands or a chat model, with the servers that are found on
+//! this machine and a test of the connection.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use crossbeam_channel::{Receiver, bounded};
+use egui::{Button, ComboBox, RichText, TextEdit, Ui};
+
+use super::theme;
+use crate::agent::llm::SENT;
+use crate::agent::llm::discover::{self, LocalServer};
+use crate::agent::llm::settings::{LlmSettings, Patience};
+
+/// Which planner is used; kept from one run to the next.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
+pub struct ChatSettings {
+    /// Whether a chat model plans, instead of the built-in commands.
+    pub use_model: bool,
+    /// Where it is.
+    pub model: LlmSettings,
+}
+
+/// An answer that is waited for, or there.
+#[derive(Default)]
+enum Asked<T> {
+    #[default]
+    Not,
+    Waiting(Receiver<T>),
+    Answered(T),
+}
+
+impl<T: Send + 'static> Asked<T> {
+    /// Asks on a thread of its own, which ends by its own time limits.
+    fn ask(ui: &Ui, work: impl FnOnce() -> T + Send + 'static) -> Self {
+        let (send, receive) = bounded(1);
+        let context = ui.ctx().clone();
+        let thread = std::thread::Builder::new().name("chat model".into()).spawn(move || {
+            // The settings may be closed by now.
+            let _ = send.send(work());
+            context.request_repaint();
+        });
+        if thread.is_ok() { Self::Waiting(receive) } else { Self::Not }
+    }
+
+    fn answer(&mut self) -> Option<&T> {
+        if let Self::Waiting(receive) = self
+            && let Ok(answer) = receive.try_recv()
+        {
+            *self = Self::Answered(answer);
+        }
+        if let Self::Answered(answer) = self { Some(answer) } else { None }
+    }
+}
+
+/// What is known of chat models while their settings are open.
+#[derive(Default)]
+pub struct ModelChooser {
+    found: Asked<Vec<LocalServer>>,
+    tested: Asked<Result<String, String>>,
+}
+
+impl ModelChooser {
+    /// Draws the choice.
+    pub fn show(&mut self, ui: &mut Ui, settings: &mut ChatSettings) {
+        let text = if settings.use_model { "Chat model" } else { "Built-in" };
+        ComboBox::from_id_salt("planner").selected_text(text).width(90.0).show_ui(ui, |ui| {
+            ui.selectable_value(&mut settings.use_model, false, "Built-in")
+                .on_hover_text("The built-in commands; no network.");
+            ui.selectable_value(&mut settings.use_model, true, "Chat model").on_hover_text(SENT);
+        });
+        if settings.use_model {
+            let open = ui.menu_button("Address\u{2026}", |ui| self.settings(ui, &mut settings.model));
+            if open.inner.is_none() {
+                // Nothing is looked for unless the settings are open.
+                *self = Self::default();
+            }
+        }
+    }
+
+    fn settings(&mut self, ui: &mut Ui, model: &mut LlmSettings) {
+        ui.set_min_width(300.0);
+        if matches!(self.found, Asked::Not) {
+            self.found = Asked::ask(ui, || discover::find(&discover::PORTS, &AtomicBool::new(false)));
+        }
+        match self.found.answer() {
+            None => drop(ui.weak("Looking for chat models on this machine\u{2026}")),
+            Some(none) if none.is_empty() => drop(ui.weak("No chat model's server answers on this machine.")),
+            Some(found) => {
+                for server in found {
+                    ui.label(RichText::new(format!("{}, on this machine", server.kind)).small().color(theme::WEAK));
+                    for name in server.models.iter().take(8) {
+                        let is_chosen = model.base_url == server.base_url && model.model == *name;
+                        if ui.selectable_label(is_chosen, crate::scene::text::line(name)).clicked() {
+                            (model.base_url, model.model) = (server.base_url.clone(), name.clone());
+                            self.tested = Asked::Not;
+                        }
+                    }
+                }
+            }
+        }
+        ui.separator();
+        for (label, value, hint) in [
+            ("Address", &mut model.base_url, "http://127.0.0.1:11434/v1"),
+            ("Model", &mut model.model, "its name there"),
+            ("Key from variable", &mut model.key_variable, "name of an environment variable; empty for none"),
+        ] {
+            ui.label(RichText::new(label).small().color(theme::WEAK));
+            ui.add(TextEdit::singleline(value).hint_text(hint).desired_width(f32::INFINITY));
+        }
+        let is_waiting = matches!(self.tested, Asked::Waiting(_));
+        ui.horizontal_wrapped(|ui| {
+            if ui.add_enabled(!is_waiting, Button::new("Test connection").small()).clicked() {
+                let settings = model.clone();
+                self.tested = Asked::ask(ui, move || {
+                    discover::test(&settings, &Patience::default(), &Arc::new(AtomicBool::new(false)))
+                });
+            }
+            match self.tested.answer() {
+                Some(Ok(text)) => drop(ui.label(crate::scene::text::line(text))),
+                Some(Err(text)) => {
+                    drop(ui.label(RichText::new(crate::scene::text::line(text)).color(theme::WARNING)));
+                }
+                None if is_waiting => drop(ui.spinner()),
+                None => {}
+            }
+        });
+        ui.label(RichText::new(SENT).small().color(theme::WEAK));
+    }
+}
