@@ -10,7 +10,8 @@
 //! * [`pipeline`]: training, evaluation, synthetic data; reports to an `Observer` only;
 //! * [`navigate`]: camera paths through occupied space;
 //! * [`measure`]: error against run time, speed, extreme cases: one document, one set of tables;
-//! * [`worker`]: the background thread that runs the pipeline for the window;
+//! * [`jobs`]: one file per use case, for the window, the command line and the agent;
+//! * [`worker`]: the background thread that runs jobs for the window;
 //! * [`agent`]: plain sentences become checked calls of a closed set of tools;
 //! * [`cli`]: one file per subcommand;
 //! * [`ui`]: the window.
@@ -18,6 +19,7 @@
 pub mod agent;
 pub mod cli;
 pub mod io;
+pub mod jobs;
 pub mod math;
 pub mod measure;
 pub mod models;

@@ -113,7 +113,7 @@ fn render_doors_catch_who_goes_around_them() {
     assert_eq!(n("src/worker/view.rs", "use crate::render::{Renderer, normals};"), 0);
     assert_eq!(n("src/worker/view.rs", "#[cfg(test)]\nmod tests {\n    use crate::render::cpu::Renderer;\n}\n"), 0);
     assert_eq!(n("src/render/mod.rs", "pub use crate::render::cpu::ssim;"), 0);
-    assert_eq!(n("src/stability/forward.rs", "use crate::render::cpu::Renderer;"), 0);
+    assert_eq!(n("src/measure/stability/forward.rs", "use crate::render::cpu::Renderer;"), 0);
 }
 
 #[test]

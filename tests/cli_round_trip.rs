@@ -5,7 +5,18 @@
 mod adapter;
 mod cli_support;
 
-use cli_support::{fmlgs, folder, tiny_dataset};
+use std::path::Path;
+
+use cli_support::{first_version, fmlgs, folder, tiny_dataset, tiny_splat};
+use fmlgs::io::splat_ply;
+use fmlgs::jobs::{self, Folders, find_objects::FindSettings};
+use fmlgs::pipeline::observer::Silent;
+use fmlgs::pipeline::train::TrainConfig;
+use fmlgs::scene::Camera;
+use fmlgs::ui::viewport::eye::Eye;
+use fmlgs::worker::jobs::PipelineJobs;
+use fmlgs::worker::{Command as Job, Jobs, Outcome};
+use glam::DVec3;
 
 #[test]
 fn synth_train_eval_render_export() {
@@ -94,4 +105,62 @@ fn a_run_on_the_gpu_follows_the_one_on_the_cpu() {
     assert!((count(&cpu) / count(&gpu) - 1.0).abs() < 0.03, "{} {}", count(&cpu), count(&gpu));
     assert_ne!(psnr(&cpu), psnr(&gpu), "the GPU did not train");
     assert_ne!(psnr(&cpu), psnr(&other), "another seed must give another run");
+}
+
+#[test]
+fn the_window_and_the_command_line_do_the_same() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let worker = PipelineJobs::new(Folders { data: folder.path().join("data") });
+    let window = |command: Job| worker.run(command, &mut Silent).unwrap_or_else(|e| panic!("{e:?}"));
+    let open = |path: &str| match window(Job::Open { path: path.into() }) {
+        Outcome::Opened(scene) => scene,
+        other => panic!("{other:?}"),
+    };
+    let near = |a: &Camera, b: &Camera| {
+        assert!((a.center - b.center).length() < 1e-9 && (a.fov_y_rad() - b.fov_y_rad()).abs() < 1e-9, "{a:?} {b:?}");
+        assert!((a.world_from_camera.mul_vec3(DVec3::ONE) - b.world_from_camera.mul_vec3(DVec3::ONE)).length() < 1e-9);
+    };
+    let first_view = |path: &str| -> Camera {
+        let drawn = fmlgs(&["render", path, "--out", &at("view.png"), "--json"]).ok().json();
+        serde_json::from_value(drawn["camera"].clone()).unwrap()
+    };
+
+    // A bare splat is framed alike, whoever opens it.
+    let splat = tiny_splat(&folder.path().join("a.ply"));
+    let scene = open(splat.to_str().unwrap());
+    let (shown, drawn) = (Eye::framing(&scene.home.bounds, scene.home.up), first_view(splat.to_str().unwrap()));
+    near(&shown.camera(640, 480), &drawn);
+    near(&scene.home.camera([640, 480]), &drawn);
+
+    // A trained scene: its first view, its Gaussians, its quality and its objects.
+    let photos = first_version(folder.path());
+    let (photos, trained) = (photos.to_str().unwrap(), at("scene"));
+    let scene = open(&trained);
+    near(&scene.home.camera([640, 480]), &first_view(&trained));
+    fmlgs(&["export", &trained, "--out", &at("out.ply")]).ok();
+    let cloud = scene.cloud.clone().unwrap();
+    assert_eq!(splat_ply::read(Path::new(&at("out.ply"))).unwrap(), *cloud);
+
+    let dataset = scene.dataset.clone().unwrap();
+    let config = TrainConfig { max_side_px: 64, ..TrainConfig::default() };
+    // Whatever is set for the next training: the scene knows what it has not seen.
+    let config = TrainConfig { holdout_every: 3, ..config };
+    let (out, settings) = (scene.out.clone(), scene.render.clone());
+    let command =
+        Job::Evaluate { dataset: dataset.clone(), cloud: cloud.clone(), config: config.clone(), out: out.clone() };
+    let Outcome::Evaluated(evaluation) = window(command) else { panic!("no evaluation") };
+    let eval = fmlgs(&["eval", &trained, "--json"]).ok().json();
+    assert_eq!(eval["views"].as_array().unwrap().len(), evaluation.views.len());
+    assert!((eval["psnr"].as_f64().unwrap() - evaluation.psnr).abs() < 1e-9, "{eval}");
+
+    let with = FindSettings { encoder: Some("none".into()), ..FindSettings::default() };
+    let holdout_every = config.holdout_every;
+    let masks = Some(photos.into());
+    let command =
+        Job::FindObjects { dataset, cloud, holdout_every, settings, side_px: 64, masks, with, out: out.clone() };
+    let Outcome::Objects(found) = window(command) else { panic!("no objects") };
+    let told = fmlgs(&["preprocess", &trained, "--masks", photos, "--encoder", "none"]).ok();
+    let stored = jobs::open::scene(&out).unwrap().semantics().unwrap();
+    assert_eq!((&stored.of, &stored.seeds), (&found.of, &found.seeds), "{}", told.stderr);
 }

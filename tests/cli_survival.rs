@@ -7,10 +7,10 @@ mod cli_support;
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::{Duration, Instant};
 
-use cli_support::{Done, Server, command, fmlgs, folder, tiny_dataset};
+use cli_support::{Done, Server, command, first_version, fmlgs, folder, tiny_dataset};
 
 /// Training that saves at every opportunity and takes long enough to be interrupted.
 fn train_arguments<'a>(photos: &'a str, out: &'a str, steps: &'a str) -> Vec<&'a str> {
@@ -266,7 +266,7 @@ fn a_full_disk_is_named_and_ends_nothing() {
 
 /// What a process tells on standard error, line by line.
 fn lines_of(child: &mut Child) -> Receiver<String> {
-    let (told, lines) = channel();
+    let (told, lines) = sync_channel(10_000);
     let stderr = BufReader::new(child.stderr.take().unwrap());
     let read = move || stderr.lines().map_while(Result::ok).try_for_each(|line| told.send(line));
     std::thread::Builder::new().name("lines".into()).spawn(read).unwrap();
@@ -498,4 +498,32 @@ impl Drop for Mount<'_> {
     fn drop(&mut self) {
         let _ = Command::new("umount").arg(self.0).status();
     }
+}
+
+#[test]
+fn a_scene_of_the_first_version_opens_answers_and_goes_on() {
+    let folder = folder();
+    first_version(folder.path());
+    let out = folder.path().join("scene");
+    let scene = out.to_str().unwrap();
+    let checkpoint = out.join("checkpoint.bin");
+    assert!(std::fs::read(&checkpoint).unwrap().starts_with(b"FMLGSCP1"), "no checksum at its end");
+
+    let info = fmlgs(&["info", scene, "--json"]).ok().json();
+    assert_eq!((&info["kind"], &info["gaussians"], &info["identities"]), (&"trained".into(), &150.into(), &3.into()));
+    // What the version that wrote it answered: this name, 253 px.
+    let query = |text: &str| fmlgs(&["query", scene, text, "--json"]);
+    let found = query("box 1").ok().json();
+    assert_eq!((&found["answer"], &found["hits"][0]["name"]), (&"found".into(), &"box 1".into()));
+    let pixels = found["pixels"].as_u64().unwrap();
+    assert!((240..=266).contains(&pixels), "{pixels}");
+    query("giraffe").fails_with(1);
+
+    // It was stopped after 9 of 80 steps.
+    let gone_on = fmlgs(&["train", scene, "--json"]).ok();
+    let done = gone_on.json();
+    assert_eq!((&done["end"], &done["steps"]), (&"finished".into(), &80.into()));
+    assert!(gone_on.stderr.contains("carried over"), "{}", gone_on.stderr);
+    assert!(!std::fs::read(&checkpoint).unwrap().starts_with(b"FMLGSCP1"), "it is written as it is now");
+    assert_eq!(query("box 1").ok().json()["answer"], "found");
 }

@@ -15,10 +15,10 @@ use std::time::{Duration, Instant};
 
 use cli_support::{Done, Server, command, fmlgs, folder, tiny_dataset};
 use fmlgs::io::{SceneFolder, semantic_map, trained};
+use fmlgs::jobs::Folders;
 use fmlgs::pipeline::train::checkpoint;
 use fmlgs::scene::SemanticMap;
 use fmlgs::worker::jobs::PipelineJobs;
-use fmlgs::worker::places::Places;
 use fmlgs::worker::{Command as Job, EditRequest, Event, Outcome, Worker};
 use rand::{RngExt, SeedableRng};
 
@@ -154,7 +154,7 @@ const EDITED: &str = "FMLGS_EDITED_SCENE";
 
 /// Changes the objects of a scene to and fro.
 fn edit_for_ever(scene: PathBuf) {
-    let worker = Worker::start(PipelineJobs::new(Places { data: scene.join("data") }), Arc::new(|| ())).unwrap();
+    let worker = Worker::start(PipelineJobs::new(Folders { data: scene.join("data") }), Arc::new(|| ())).unwrap();
     let outcome = |command: Job| {
         worker.submit(command).unwrap();
         loop {

@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use egui_kittest::Harness;
 
+use fmlgs::jobs::Folders;
 use fmlgs::navigate::target::Side;
 use fmlgs::pipeline::observer::Silent;
 use fmlgs::pipeline::synth::{self, SynthOptions};
@@ -17,7 +18,6 @@ use fmlgs::scene::plan::PlanOverride;
 use fmlgs::scene::trace::{self, Sort};
 use fmlgs::ui::actions::{Action, Pane};
 use fmlgs::ui::app::App;
-use fmlgs::worker::places::Places;
 
 /// A window and what was traced since it was opened.
 struct Window {
@@ -29,7 +29,7 @@ impl Window {
     /// A window without the panes that list objects, for which `overrides` are made.
     fn new(data: &Path, first: PathBuf, overrides: &[&str]) -> Self {
         let traced = trace::since(0).len();
-        let mut harness = ui_common::window(Places { data: data.to_path_buf() }, Some(Action::Open(first)));
+        let mut harness = ui_common::window(Folders { data: data.to_path_buf() }, Some(Action::Open(first)));
         let app = harness.state_mut();
         app.layout.hidden.extend([Pane::Objects, Pane::Chat]);
         app.override_plan(overrides.iter().map(|w| w.parse::<PlanOverride>().expect("an override")));

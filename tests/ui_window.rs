@@ -10,6 +10,7 @@ use std::time::Duration;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
+use fmlgs::jobs::Folders;
 use fmlgs::measure::{self, ErrorKind, Knobs, Measure, Point, Report, Rule, Sample, Stage, StageName};
 use fmlgs::pipeline::observer::Silent;
 use fmlgs::pipeline::semantics::edit::Edit;
@@ -17,7 +18,6 @@ use fmlgs::pipeline::synth::{self, SynthOptions};
 use fmlgs::ui::actions::{Action, Pane};
 use fmlgs::ui::app::App;
 use fmlgs::worker::ViewMode;
-use fmlgs::worker::places::Places;
 
 struct Window {
     harness: Harness<'static, App>,
@@ -34,7 +34,7 @@ impl Window {
 
     /// A window that keeps what it makes in `data`.
     fn keeping(data: PathBuf, first: Option<Action>) -> Self {
-        let harness = ui_common::window(Places { data }, first);
+        let harness = ui_common::window(Folders { data }, first);
         Self { harness, _folder: None }
     }
 

@@ -12,11 +12,8 @@ use crate::scene::IdentityId;
 /// An answer to "shall I?".
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Confirmation {
-    /// Do it.
     Yes,
-    /// Do not.
     No,
-    /// Something else was said.
     Neither,
 }
 
@@ -39,9 +36,7 @@ pub fn confirmation(text: &str) -> Confirmation {
 /// An answer to "which one?".
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Choice {
-    /// This one.
     One(IdentityId),
-    /// None of them, after all.
     None,
     /// It is an answer, but not a clear one.
     Unclear,
@@ -77,7 +72,7 @@ pub fn choice(world: &mut dyn World, text: &str, candidates: &[IdentityId], dial
     }
     let among = DialogState { group: candidates.to_vec(), ..dialog.clone() };
     for phrase in [words.join(" "), format!("{} one", words.join(" "))] {
-        if let Ok(Resolved::One { id, .. }) = resolve(world, &phrase, LevelFilter::Any, &among)
+        if let Resolved::One { id, .. } = resolve(world, &phrase, LevelFilter::Any, &among)
             && candidates.contains(&id)
         {
             return Choice::One(id);

@@ -10,17 +10,12 @@ pub enum Side {
     /// As it is seen now.
     #[default]
     Same,
-    /// The side that is turned away now.
     Other,
     /// The side that is turned to the scene's cameras.
     Front,
-    /// Left of the present view.
     Left,
-    /// Right of the present view.
     Right,
-    /// From above.
     Above,
-    /// From below.
     Below,
 }
 
@@ -47,17 +42,11 @@ impl Side {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Direction {
-    /// Into the picture.
     Forward,
-    /// Out of the picture.
     Back,
-    /// To the left.
     Left,
-    /// To the right.
     Right,
-    /// Upwards.
     Up,
-    /// Downwards.
     Down,
 }
 

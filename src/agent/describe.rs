@@ -3,7 +3,7 @@
 use super::relation::{Relation, fit};
 use super::world::World;
 use crate::math::format::short;
-use crate::scene::{IdentityId, Level, NOBODY};
+use crate::scene::{Bounds, IdentityId, Level, NOBODY};
 
 /// Share of the view under which something is not really seen.
 pub const SEEN: f64 = 0.0005;
@@ -72,22 +72,19 @@ pub fn place(world: &dyn World, id: IdentityId) -> String {
     let object = world.identities().object_of(id);
     let Some(own) = world.facts(object).and_then(|f| f.bounds) else { return String::new() };
     let frame = world.view().frame();
-    let mut said = Vec::new();
-    // On what it stands: what has it on top.
-    let bears = |other: &IdentityId| {
-        let other = world.facts(*other).and_then(|f| f.bounds);
-        other.is_some_and(|b| fit(Relation::On, &own, &b, &frame).is_some())
+    let others: Vec<(IdentityId, Bounds)> = world
+        .identities()
+        .iter()
+        .filter(|(i, o)| o.parent == NOBODY && *i != object)
+        .filter_map(|(i, _)| Some((i, world.facts(i)?.bounds?)))
+        .collect();
+    let first = |relation, fits: &dyn Fn(&Bounds) -> bool| {
+        others.iter().find(|(_, b)| fits(b) && fit(relation, &own, b, &frame).is_some()).map(|(id, _)| *id)
     };
-    let objects = world.identities().iter().filter(|(i, o)| o.parent == NOBODY && *i != object).map(|(i, _)| i);
-    let bearer = objects.filter(|id| world.facts(*id).is_some()).find(bears);
-    said.extend(bearer.map(|id| format!("on {}", the(world, id))));
-    let over = |other: &IdentityId| {
-        let other = world.facts(*other).and_then(|f| f.bounds);
-        // A table is not said to be under its mugs.
-        other.is_some_and(|b| b.radius() > own.radius() && fit(Relation::Under, &own, &b, &frame).is_some())
-    };
-    let objects = world.identities().iter().filter(|(i, o)| o.parent == NOBODY && *i != object).map(|(i, _)| i);
-    let over = objects.filter(|id| world.facts(*id).is_some()).find(over);
+    let bearer = first(Relation::On, &|_| true);
+    // A table is not said to be under its mugs.
+    let over = first(Relation::Under, &|b| b.radius() > own.radius());
+    let mut said: Vec<String> = bearer.map(|id| format!("on {}", the(world, id))).into_iter().collect();
     said.extend(over.map(|id| format!("under {}", the(world, id))));
     for (relation, words) in [(Relation::RightOf, "left of"), (Relation::LeftOf, "right of")] {
         let next = neighbors(world, object, relation).into_iter().find(|id| Some(*id) != bearer && Some(*id) != over);

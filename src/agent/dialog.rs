@@ -7,7 +7,6 @@ use crate::scene::IdentityId;
 /// The last things that were spoken of.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DialogState {
-    /// The last target.
     pub last: Option<IdentityId>,
     /// What "the left one" and "the second one" choose from: the candidates of the last question.
     pub group: Vec<IdentityId>,

@@ -11,16 +11,11 @@ pub enum AgentEvent {
     Piece(String),
     /// A call is about to be made, targets by number.
     Call {
-        /// The call.
         call: ToolCall,
-        /// The same for people.
         line: String,
     },
-    /// What a call came to.
     Result {
-        /// In plain words.
         text: String,
-        /// Whether it was done.
         done: bool,
     },
     /// The planner reports about itself: retries, limits.

@@ -4,10 +4,10 @@
 use super::camera_args::{Distance, NORMAL, Side};
 use super::describe::{self, SEEN, capital, length, the};
 use super::dialog::DialogState;
+use super::listing::{list_ids, measure, say_list};
 use super::policy::{Permission, Policy};
 use super::refusal::{Refusal, RefusalKind};
-use super::relation::{Relation, gap};
-use super::resolve::{Resolved, resolve, resolve_all};
+use super::resolve::{Resolved, resolve};
 use super::tool::{LevelFilter, Reference, Target, ToolCall};
 use super::world::{Unreachable, World, WorldError};
 use crate::scene::{IdentityId, NOBODY};
@@ -17,9 +17,7 @@ use crate::scene::{IdentityId, NOBODY};
 pub struct Outcome {
     /// The call, with targets by number where they were found.
     pub call: ToolCall,
-    /// What it was about.
     pub ids: Vec<IdentityId>,
-    /// What happened, in plain words.
     pub text: String,
     /// Why it was not done, if it was not.
     pub refused: Option<RefusalKind>,
@@ -47,36 +45,23 @@ impl Outcome {
 /// A call after its checks.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Checked {
-    /// It may be done.
     Ready {
-        /// With targets by number.
         call: ToolCall,
-        /// What it is about.
         ids: Vec<IdentityId>,
         /// What was not taken literally; mostly empty.
         note: String,
     },
-    /// It is not done.
     Refused {
-        /// Why.
         refusal: Refusal,
-        /// What comes near.
         near: Vec<IdentityId>,
     },
-    /// The user must say which is meant.
     Choose {
-        /// What to ask.
         question: String,
-        /// What can be chosen.
         candidates: Vec<IdentityId>,
     },
-    /// The user must say yes.
     Confirm {
-        /// What to ask.
         question: String,
-        /// What is done then.
         call: ToolCall,
-        /// What it is about.
         ids: Vec<IdentityId>,
     },
 }
@@ -110,33 +95,31 @@ pub fn check(
     };
     if let Some((target, level)) = wanted {
         match find(world, &target, level, dialog) {
-            Ok(Resolved::One { id, note: said }) => {
+            Resolved::One { id, note: said } => {
                 note = said;
                 ids.push(id);
                 if !matches!(call, ToolCall::Locate { .. }) {
                     call = call.with_target(Target::Identity(id));
                 }
             }
-            Ok(Resolved::Several(candidates)) => {
+            Resolved::Several(candidates) => {
                 let question = format!("Which one do you mean: {}?", choices(world, &candidates));
                 return Checked::Choose { question, candidates };
             }
-            Ok(Resolved::Missing { refusal, near }) => return Checked::Refused { refusal, near },
-            Err(e) => return Checked::refused(RefusalKind::Failed, e.to_string()),
+            Resolved::Missing { refusal, near } => return Checked::Refused { refusal, near },
         }
     }
     if let ToolCall::Measure { to: Some(Reference::Thing(other)), .. } = &mut call {
         match find(world, &other.clone(), LevelFilter::Any, dialog) {
-            Ok(Resolved::One { id, .. }) => {
+            Resolved::One { id, .. } => {
                 ids.push(id);
                 *other = Target::Identity(id);
             }
-            Ok(Resolved::Several(some)) => {
+            Resolved::Several(some) => {
                 let text = format!("From which one: {}? Please say it in full.", choices(world, &some));
                 return Checked::Refused { refusal: Refusal::new(RefusalKind::Unclear, text), near: some };
             }
-            Ok(Resolved::Missing { refusal, near }) => return Checked::Refused { refusal, near },
-            Err(e) => return Checked::refused(RefusalKind::Failed, e.to_string()),
+            Resolved::Missing { refusal, near } => return Checked::Refused { refusal, near },
         }
     }
     if let Some(conflict) = conflict(world, &call, ids.first().copied()) {
@@ -148,19 +131,10 @@ pub fn check(
     Checked::Ready { call, ids, note }
 }
 
-fn find(
-    world: &mut dyn World,
-    target: &Target,
-    level: LevelFilter,
-    dialog: &DialogState,
-) -> Result<Resolved, WorldError> {
+fn find(world: &mut dyn World, target: &Target, level: LevelFilter, dialog: &DialogState) -> Resolved {
     match target {
         Target::Query(words) => resolve(world, words, level, dialog),
-        Target::Identity(id) if world.facts(*id).is_some() => Ok(Resolved::One { id: *id, note: String::new() }),
-        Target::Identity(id) => {
-            let refusal = Refusal::new(RefusalKind::NotFound, format!("There is nothing with the number {id} here."));
-            Ok(Resolved::Missing { refusal, near: Vec::new() })
-        }
+        Target::Identity(id) => resolve(world, &format!("#{id}"), level, dialog),
     }
 }
 
@@ -364,86 +338,4 @@ fn act(
 fn unreachable(world: &dyn World, goal: &str, e: &Unreachable) -> Refusal {
     let near = e.nearest.map(|d| format!(" The camera can come as near as {}.", length(world, d))).unwrap_or_default();
     Refusal::new(RefusalKind::Unreachable, format!("I cannot go to {goal}: {}.{near}", e.reason.trim_end_matches('.')))
-}
-
-/// What is listed or counted.
-fn list_ids(
-    world: &mut dyn World,
-    level: LevelFilter,
-    of: IdentityId,
-    relation: Relation,
-    named: Option<&str>,
-) -> Result<Vec<IdentityId>, Refusal> {
-    let mut ids: Vec<IdentityId> = if of == NOBODY {
-        let wanted = world.identities().iter().filter(|(_, i)| level.accepts(i.level)).map(|(id, _)| id);
-        let all: Vec<IdentityId> = wanted.collect();
-        all.into_iter().filter(|id| world.facts(*id).is_some()).collect()
-    } else if relation == Relation::PartOf {
-        let inside = world.identities().within(of);
-        let is_in = |id: &IdentityId| *id != of && inside.get(*id as usize) == Some(&true);
-        let all: Vec<IdentityId> = world.identities().iter().map(|(id, _)| id).filter(is_in).collect();
-        all.into_iter().filter(|id| world.facts(*id).is_some()).collect()
-    } else {
-        describe::neighbors(world, of, relation)
-    };
-    if let Some(name) = named {
-        let fit = resolve_all(world, name, LevelFilter::Any, &DialogState::default())?;
-        ids.retain(|id| fit.contains(id));
-    }
-    Ok(ids)
-}
-
-/// The list in words.
-fn say_list(
-    world: &dyn World,
-    ids: &[IdentityId],
-    level: LevelFilter,
-    of: IdentityId,
-    relation: Relation,
-    named: Option<&str>,
-) -> String {
-    let here = match (of, relation) {
-        (NOBODY, _) => "in the scene".into(),
-        (of, Relation::PartOf) => format!("of {}", the(world, of)),
-        (of, relation) => format!("{} {}", relation.text(), the(world, of)),
-    };
-    let what = named.unwrap_or(match (level, relation) {
-        (LevelFilter::Object, _) => "objects",
-        (LevelFilter::Part, _) | (_, Relation::PartOf) if of != NOBODY => "parts",
-        (LevelFilter::Part, _) => "parts",
-        _ => "things",
-    });
-    let listed = describe::names(world, ids, 20);
-    match ids.len() {
-        0 => format!("I know no {what} {here}."),
-        1 => format!("There is 1 {} {here}: {listed}.", super::words::singular(what)),
-        n => format!("There are {n} {what} {here}: {listed}."),
-    }
-}
-
-/// A size or a distance.
-fn measure(
-    world: &dyn World,
-    id: IdentityId,
-    to: Option<&Reference>,
-    other: Option<IdentityId>,
-) -> Result<String, Refusal> {
-    let nothing = || Refusal::new(RefusalKind::Conflict, "It has no matter that could be measured.");
-    let own = world.facts(id).and_then(|f| f.bounds).ok_or_else(nothing)?;
-    let it = capital(&the(world, id));
-    Ok(match to {
-        None => format!("{it} is {}.", describe::size(world, id)),
-        Some(Reference::Eye) => {
-            let far = own.center().distance(world.view().eye);
-            format!("{it} is {} from here.", length(world, far))
-        }
-        Some(Reference::Thing(_)) => {
-            let other = other.ok_or_else(nothing)?;
-            let bounds = world.facts(other).and_then(|f| f.bounds).ok_or_else(nothing)?;
-            let (middle, free) = (own.center().distance(bounds.center()), gap(&own, &bounds));
-            let name = the(world, other);
-            let free = if free > 0.0 { format!("{} apart", length(world, free)) } else { "touching".into() };
-            format!("{it} is {} from {name}, middle to middle ({free}).", length(world, middle))
-        }
-    })
 }

@@ -11,6 +11,8 @@
 //! The scene is a [`world::World`]: [`scene::SceneWorld`] for the window and the command line, a
 //! made-up room for tests.
 
+#![allow(missing_docs, reason = "fields and variants whose name says it all have no doc of three words")]
+
 pub mod answer;
 pub mod camera_args;
 pub mod commands;
@@ -19,6 +21,7 @@ pub mod dialog;
 pub mod event;
 pub mod execute;
 mod language;
+mod listing;
 pub mod llm;
 pub mod planner;
 pub mod policy;

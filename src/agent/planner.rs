@@ -13,9 +13,7 @@ use super::world::World;
 /// What to do next.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Step {
-    /// Make a call.
     Call(ToolCall),
-    /// The request is dealt with.
     Finish {
         /// What to say beyond the calls' results; of a planner that speaks for itself, all of it.
         text: String,
@@ -35,13 +33,9 @@ impl Step {
 pub struct PlannerContext<'a> {
     /// The scene. Planners look; only the session acts.
     pub world: &'a mut dyn World,
-    /// What was spoken of last.
     pub dialog: &'a DialogState,
-    /// What may be done.
     pub policy: &'a Policy,
-    /// To be told what goes on.
     pub on: &'a mut dyn FnMut(AgentEvent),
-    /// Set when the user wants it to end.
     pub cancel: &'a AtomicBool,
 }
 

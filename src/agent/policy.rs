@@ -42,24 +42,16 @@ pub enum PolicyError {
     File(#[from] IoError),
     /// It is no policy.
     #[error("{place}: {problem}")]
-    Wrong {
-        /// The file, or "built-in policy".
-        place: String,
-        /// What is wrong.
-        problem: String,
-    },
+    Wrong { place: String, problem: String },
 }
 
 /// Whether a tool may be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Permission {
-    /// It may.
     Free,
-    /// If the user says yes.
     Confirm,
     /// If no file is replaced, or the user says yes.
     ConfirmOverwrite,
-    /// It may not.
     Never,
 }
 

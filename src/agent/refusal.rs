@@ -6,19 +6,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RefusalKind {
-    /// It is not clear what is meant.
     Unclear,
-    /// The target is not in the scene.
     NotFound,
     /// The request is against the facts of the scene.
     Conflict,
-    /// The policy does not permit it.
     NotPermitted,
-    /// The camera cannot go there.
     Unreachable,
     /// It took too many steps or too long.
     Limit,
-    /// Something broke.
     Failed,
     /// The user did not want it after all, or stopped it.
     Stopped,
@@ -27,9 +22,7 @@ pub enum RefusalKind {
 /// A refusal in plain words.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Refusal {
-    /// Its kind.
     pub kind: RefusalKind,
-    /// Its reason, one or two sentences.
     pub text: String,
 }
 

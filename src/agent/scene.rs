@@ -38,7 +38,6 @@ pub enum Effect {
     Mark(Vec<IdentityId>),
     /// Which identities are left out of the picture.
     Hidden(Vec<IdentityId>),
-    /// Names have changed.
     Renamed(IdentityId, String),
     /// The last change of a name was undone: it is called this again.
     RenameUndone(IdentityId, String),
@@ -48,19 +47,13 @@ pub enum Effect {
 
 /// What a scene is made of.
 pub struct Parts {
-    /// The Gaussians.
     pub cloud: Arc<GaussianCloud>,
-    /// How they are drawn.
     pub settings: RenderSettings,
-    /// Objects and parts.
     pub map: Arc<SemanticMap>,
-    /// The photos' cameras.
     pub cameras: Vec<Camera>,
-    /// Which way is up.
     pub up: DVec3,
     /// Length of a unit in metres, if that is known.
     pub metres: Option<f64>,
-    /// Folder that exports go to.
     pub exports: PathBuf,
     /// What is known of moving about, if the scene was looked at before.
     pub explored: Option<Arc<Explored>>,

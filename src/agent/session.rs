@@ -23,16 +23,13 @@ const MOST_ALIKE: usize = 5;
 /// What the session waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Awaited {
-    /// A yes or a no.
     Confirmation,
-    /// Which of the candidates is meant.
     Choice,
 }
 
 /// What the agent answers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Reply {
-    /// In plain words.
     pub text: String,
     /// What can be chosen, or what comes near; may be empty.
     pub candidates: Vec<IdentityId>,
@@ -44,10 +41,16 @@ pub struct Reply {
 
 /// A question to the user that is open.
 enum Pending {
-    /// This waits for a yes.
-    Confirm { call: ToolCall, ids: Vec<IdentityId> },
+    Confirm {
+        call: ToolCall,
+        ids: Vec<IdentityId>,
+    },
     /// This waits for a target. A model's own question has no call.
-    Choose { call: Option<ToolCall>, candidates: Vec<IdentityId>, question: String },
+    Choose {
+        call: Option<ToolCall>,
+        candidates: Vec<IdentityId>,
+        question: String,
+    },
 }
 
 /// A talk with the agent.

@@ -4,9 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::camera_args::{self, Direction, Distance, Side};
 use super::relation::Relation;
-use crate::math::format::short;
 use crate::pipeline::semantics::grammar::Kind;
-use crate::scene::{Identities, IdentityId, Level};
+use crate::scene::{IdentityId, Level};
 
 /// Longest text in a call, in characters.
 pub const MAX_TEXT: usize = 300;
@@ -15,7 +14,6 @@ pub const MAX_TEXT: usize = 300;
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Target {
-    /// By its number.
     Identity(IdentityId),
     /// In words, such as "the handle of the mug left of the laptop".
     Query(String),
@@ -35,9 +33,7 @@ pub enum LevelFilter {
     /// Objects and parts.
     #[default]
     Any,
-    /// Whole objects.
     Object,
-    /// Parts.
     Part,
 }
 
@@ -67,15 +63,12 @@ impl LevelFilter {
 pub enum ToolCall {
     /// Find what words mean, and mark it in the view.
     Locate {
-        /// The words.
         query: String,
         /// Object or part.
         #[serde(default)]
         kind: LevelFilter,
     },
-    /// Fly to a target.
     GoTo {
-        /// Which.
         target: Target,
         /// From where to look at it.
         #[serde(default)]
@@ -86,56 +79,37 @@ pub enum ToolCall {
     },
     /// Turn towards a target without moving.
     LookAt {
-        /// Which.
         target: Target,
     },
-    /// Move the eye.
     Move {
-        /// Where to.
         direction: Direction,
         /// How far.
         #[serde(default)]
         distance: Distance,
     },
-    /// Turn the eye.
     Turn {
-        /// Where to.
         direction: Direction,
         /// By how much, in degrees, above 0 to 360.
         degrees: f64,
     },
-    /// Draw one thing alone.
     Isolate {
-        /// Which.
         target: Target,
     },
-    /// Mark a thing in the view.
     Highlight {
-        /// Which.
         target: Target,
     },
-    /// Leave a thing out of the picture.
     Hide {
-        /// Which.
         target: Target,
     },
-    /// Draw a hidden thing again.
     Unhide {
-        /// Which.
         target: Target,
     },
-    /// Draw everything again.
     ShowAll {},
-    /// Take a thing out of the scene.
     Remove {
-        /// Which.
         target: Target,
     },
-    /// Give a thing another name.
     Rename {
-        /// Which.
         target: Target,
-        /// The new name.
         name: String,
     },
     /// Emit about a thing, or about what is in the view.
@@ -144,7 +118,6 @@ pub enum ToolCall {
         #[serde(default)]
         target: Option<Target>,
     },
-    /// List or count things.
     List {
         /// Objects or parts.
         #[serde(default)]
@@ -159,27 +132,21 @@ pub enum ToolCall {
         #[serde(default)]
         named: Option<String>,
     },
-    /// Size of a thing, or its distance.
     Measure {
-        /// Which.
         target: Target,
         /// Distance to what, in place of its size.
         #[serde(default)]
         to: Option<Reference>,
     },
-    /// Ask the user.
     AskUser {
-        /// What.
         question: String,
         /// Numbers of the identities that can be chosen from; may be empty.
         #[serde(default)]
         candidates: Vec<IdentityId>,
     },
-    /// Take back the last change.
     Undo {},
     /// Write the Gaussians of a thing to a file.
     Export {
-        /// Which.
         target: Target,
     },
 }
@@ -188,9 +155,7 @@ pub enum ToolCall {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reference {
-    /// The viewer's eye.
     Eye,
-    /// Another thing.
     Thing(Target),
 }
 
@@ -202,12 +167,7 @@ pub enum ToolError {
     Unknown(String),
     /// Arguments of another kind than the tool's.
     #[error("wrong arguments for '{tool}': {problem}")]
-    Arguments {
-        /// The tool.
-        tool: String,
-        /// What is wrong.
-        problem: String,
-    },
+    Arguments { tool: String, problem: String },
 }
 
 /// Names of all tools, in the order of [`ToolCall`].
@@ -316,26 +276,8 @@ impl ToolCall {
 
     /// The tool's name.
     pub fn name(&self) -> &'static str {
-        match self {
-            Self::Locate { .. } => "locate",
-            Self::GoTo { .. } => "go_to",
-            Self::LookAt { .. } => "look_at",
-            Self::Move { .. } => "move",
-            Self::Turn { .. } => "turn",
-            Self::Isolate { .. } => "isolate",
-            Self::Highlight { .. } => "highlight",
-            Self::Hide { .. } => "hide",
-            Self::Unhide { .. } => "unhide",
-            Self::ShowAll {} => "show_all",
-            Self::Remove { .. } => "remove",
-            Self::Rename { .. } => "rename",
-            Self::Describe { .. } => "describe",
-            Self::List { .. } => "list",
-            Self::Measure { .. } => "measure",
-            Self::AskUser { .. } => "ask_user",
-            Self::Undo {} => "undo",
-            Self::Export { .. } => "export",
-        }
+        let tagged = serde_json::to_value(self).unwrap_or_default();
+        NAMES.into_iter().find(|name| tagged["name"] == *name).unwrap_or("unknown")
     }
 
     /// What it is done to.
@@ -358,63 +300,6 @@ impl ToolCall {
             _ => {}
         }
         call
-    }
-
-    /// In one line for people, with names in place of numbers.
-    pub fn line(&self, identities: &Identities) -> String {
-        let name = |target: &Target| match target {
-            Target::Identity(id) => identities.full_name(*id),
-            Target::Query(words) => format!("\"{words}\""),
-        };
-        let mut parts: Vec<String> = self.target().map(name).into_iter().collect();
-        match self {
-            Self::Locate { query, kind } => {
-                parts.push(format!("\"{query}\""));
-                match kind {
-                    LevelFilter::Any => {}
-                    LevelFilter::Object => parts.push("object".into()),
-                    LevelFilter::Part => parts.push("part".into()),
-                }
-            }
-            Self::GoTo { side, closeness, .. } => {
-                if *side != Side::Same {
-                    parts.push(format!("from {}", side.text()));
-                }
-                if *closeness > camera_args::NORMAL {
-                    parts.push("closer".into());
-                } else if *closeness < camera_args::NORMAL {
-                    parts.push("farther".into());
-                }
-            }
-            Self::Move { direction, distance } => {
-                parts.push(direction.text().into());
-                match distance {
-                    Distance::Metres(m) => parts.push(format!("{} m", short(*m))),
-                    Distance::Relative(r) => parts.push(format!("{} steps", short(*r))),
-                    Distance::Default => {}
-                }
-            }
-            Self::Turn { direction, degrees } => {
-                parts.extend([direction.text().into(), format!("{} degrees", short(*degrees))]);
-            }
-            Self::Rename { name, .. } => parts.push(format!("\"{name}\"")),
-            Self::List { level, relation, named, of } => {
-                if of.is_some() && *relation != Relation::PartOf {
-                    parts.insert(0, relation.text().into());
-                }
-                match level {
-                    LevelFilter::Any => {}
-                    LevelFilter::Object => parts.insert(0, "objects".into()),
-                    LevelFilter::Part => parts.insert(0, "parts".into()),
-                }
-                parts.extend(named.iter().map(|n| format!("\"{n}\"")));
-            }
-            Self::Measure { to: Some(Reference::Eye), .. } => parts.push("from here".into()),
-            Self::Measure { to: Some(Reference::Thing(t)), .. } => parts.push(format!("from {}", name(t))),
-            Self::AskUser { question, .. } => parts.push(format!("\"{question}\"")),
-            _ => {}
-        }
-        format!("{}({})", self.name(), parts.join(", "))
     }
 }
 

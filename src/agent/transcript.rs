@@ -4,8 +4,11 @@ use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-use super::tool::ToolCall;
-use crate::scene::text;
+use super::camera_args::{self, Distance, Side};
+use super::relation::Relation;
+use super::tool::{LevelFilter, Reference, Target, ToolCall};
+use crate::math::format::short;
+use crate::scene::{Identities, text};
 
 /// Entries that are kept; the oldest go first.
 const MOST: usize = 4000;
@@ -14,44 +17,30 @@ const MOST: usize = 4000;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum What {
-    /// The user said something.
     User {
-        /// What.
         text: String,
     },
-    /// A planner wants this done.
     Call {
-        /// What.
         call: ToolCall,
-        /// The same for people.
         line: String,
     },
     /// A check stopped or changed the course.
     Check {
-        /// In a word or two.
         verdict: String,
-        /// In plain words.
         text: String,
     },
-    /// Something was done.
     Result {
         /// The call as it was done, targets by number.
         call: ToolCall,
-        /// The same for people.
         line: String,
-        /// What came of it.
         text: String,
-        /// Whether it was done.
         done: bool,
     },
     /// The planner reports about itself: retries, limits.
     Planner {
-        /// What.
         text: String,
     },
-    /// What the agent answered.
     Reply {
-        /// What.
         text: String,
     },
 }
@@ -69,7 +58,6 @@ pub struct Entry {
 /// Everything that happened in a session.
 #[derive(Clone, Debug, Serialize)]
 pub struct Transcript {
-    /// Oldest first.
     pub entries: Vec<Entry>,
     #[serde(skip)]
     start: Instant,
@@ -125,6 +113,65 @@ impl Transcript {
             text.push('\n');
         }
         text
+    }
+}
+
+impl ToolCall {
+    /// In one line for people, with names in place of numbers.
+    pub fn line(&self, identities: &Identities) -> String {
+        let name = |target: &Target| match target {
+            Target::Identity(id) => identities.full_name(*id),
+            Target::Query(words) => format!("\"{words}\""),
+        };
+        let mut parts: Vec<String> = self.target().map(name).into_iter().collect();
+        match self {
+            Self::Locate { query, kind } => {
+                parts.push(format!("\"{query}\""));
+                match kind {
+                    LevelFilter::Any => {}
+                    LevelFilter::Object => parts.push("object".into()),
+                    LevelFilter::Part => parts.push("part".into()),
+                }
+            }
+            Self::GoTo { side, closeness, .. } => {
+                if *side != Side::Same {
+                    parts.push(format!("from {}", side.text()));
+                }
+                if *closeness > camera_args::NORMAL {
+                    parts.push("closer".into());
+                } else if *closeness < camera_args::NORMAL {
+                    parts.push("farther".into());
+                }
+            }
+            Self::Move { direction, distance } => {
+                parts.push(direction.text().into());
+                match distance {
+                    Distance::Metres(m) => parts.push(format!("{} m", short(*m))),
+                    Distance::Relative(r) => parts.push(format!("{} steps", short(*r))),
+                    Distance::Default => {}
+                }
+            }
+            Self::Turn { direction, degrees } => {
+                parts.extend([direction.text().into(), format!("{} degrees", short(*degrees))]);
+            }
+            Self::Rename { name, .. } => parts.push(format!("\"{name}\"")),
+            Self::List { level, relation, named, of } => {
+                if of.is_some() && *relation != Relation::PartOf {
+                    parts.insert(0, relation.text().into());
+                }
+                match level {
+                    LevelFilter::Any => {}
+                    LevelFilter::Object => parts.insert(0, "objects".into()),
+                    LevelFilter::Part => parts.insert(0, "parts".into()),
+                }
+                parts.extend(named.iter().map(|n| format!("\"{n}\"")));
+            }
+            Self::Measure { to: Some(Reference::Eye), .. } => parts.push("from here".into()),
+            Self::Measure { to: Some(Reference::Thing(t)), .. } => parts.push(format!("from {}", name(t))),
+            Self::AskUser { question, .. } => parts.push(format!("\"{question}\"")),
+            _ => {}
+        }
+        format!("{}({})", self.name(), parts.join(", "))
     }
 }
 

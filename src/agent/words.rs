@@ -6,7 +6,6 @@ pub const MAX_CHARS: usize = 600;
 /// A word or a mark, as typed and in lower case.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Token {
-    /// As typed.
     pub raw: String,
     /// In lower case; a quoted text starts with `"`.
     pub low: String,

@@ -14,7 +14,6 @@ use crate::scene::{Bounds, Identities, IdentityId, Level};
 pub struct Facts {
     /// What it is called; the first is shown.
     pub names: Vec<String>,
-    /// Object or part.
     pub level: Level,
     /// What it is a piece of; `NOBODY` for objects.
     pub parent: IdentityId,
@@ -29,7 +28,6 @@ pub struct Facts {
 /// What came of a flight.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Arrival {
-    /// Length of the way, in scene units.
     pub distance: f64,
     /// The share of the picture that the target covers now, 0 to 1.
     pub in_view: f64,
@@ -39,7 +37,6 @@ pub struct Arrival {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{reason}")]
 pub struct Unreachable {
-    /// In plain words.
     pub reason: String,
     /// How near to the goal the camera could come, in scene units, if that is known.
     pub nearest: Option<f64>,
@@ -48,9 +45,7 @@ pub struct Unreachable {
 /// What came of a movement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Moved {
-    /// How far it went, in scene units.
     pub distance_done: f64,
-    /// Whether matter ended it early.
     pub stopped_by_matter: bool,
 }
 

@@ -6,16 +6,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::json;
 
-use super::asking::semantics;
-use super::{CliError, interrupt, number, opened, output, view};
+use super::{CliError, interrupt, number, output, view};
 use crate::agent::commands::Commands;
 use crate::agent::llm::settings::{LlmSettings, Patience};
 use crate::agent::llm::{Llm, SENT, discover};
 use crate::agent::scene::{Effect, Parts, SceneWorld};
 use crate::agent::{AgentEvent, Planner, Policy, Session};
 use crate::io;
+use crate::jobs::open;
 use crate::navigate::Pose;
-use crate::scene::Camera;
 
 const EXAMPLES: &str = "Examples:\n  \
     fmlgs agent scene/ \"show me the handle of the kettle from the other side\" \"step back half a metre\"\n  \
@@ -137,22 +136,21 @@ pub fn run(args: Args) -> Result<(), CliError> {
     }
     let (planner, policy) = (args.planner()?, args.policy()?);
     let folder = args.scene.as_deref().unwrap_or(Path::new(""));
-    let scene = opened::drawable(folder)?;
+    let scene = open::scene(folder)?;
     if let Some(view) = &args.view {
-        output::check(view, &[".png"], &scene.reads(folder))?;
+        output::check(view, &[".png"], &scene.reads())?;
     }
     if let Some(transcript) = &args.transcript {
-        output::check(transcript, &[".json", ".md"], &scene.reads(folder))?;
+        output::check(transcript, &[".json", ".md"], &scene.reads())?;
     }
-    let map = semantics(folder, scene.state.as_deref(), &scene.cloud)?;
+    let map = scene.semantics()?;
     let camera = view::choose(args.from.as_deref(), &scene)?;
-    let cameras: Vec<Camera> = scene.cameras.iter().map(|c| c.camera.clone()).collect();
     let parts = Parts {
-        cloud: Arc::new(scene.cloud),
+        cameras: scene.views(),
+        up: scene.home().up,
+        cloud: scene.cloud,
         settings: scene.settings,
         map: Arc::new(map),
-        up: super::path::up_of(&cameras),
-        cameras,
         metres: args.metres.or(scene.metres_per_unit),
         exports: folder.join("exports"),
         explored: None,

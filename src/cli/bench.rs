@@ -9,6 +9,7 @@ use serde_json::json;
 use super::progress::Console;
 use super::{CliError, number, output, process, view};
 use crate::io::{self, Opened};
+use crate::jobs::{self, Folders};
 use crate::measure::StudyError;
 use crate::measure::bench::{self, Timings, cpu, gpu, query};
 use crate::measure::plan::{self, Cost, OpenScene, SIZE, Saving, Variant};
@@ -16,10 +17,7 @@ use crate::models;
 use crate::pipeline::observer::{Observer, Severity, Signal, Silent};
 use crate::pipeline::train::{TrainConfig, TrainView, load_views};
 use crate::render::Device;
-use crate::scene::{Camera, Dataset};
-use crate::worker::jobs::PipelineJobs;
-use crate::worker::places::Places;
-use crate::worker::{Command, Jobs, Outcome, Stop};
+use crate::scene::Dataset;
 
 /// Time drawing and training on this machine, stage by stage
 ///
@@ -82,7 +80,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let mut console = Console::new(quiet);
     let sizes = if args.size.is_empty() { vec![[640, 480], [1280, 720]] } else { args.size };
     let repeats = args.repeats as usize;
-    let device = args.gpu.then(Device::new).transpose()?;
+    let device = args.gpu.then(Device::shared).transpose()?;
     let gpu_name = device.as_ref().map(Device::describe);
     let one_core_products_per_sec = bench::one_core_limit();
     let mut timings = Timings { gpu: gpu_name, one_core_products_per_sec, ..Timings::default() };
@@ -159,7 +157,7 @@ fn savings(args: &Args) -> Result<(), CliError> {
             scenes.push(Saving::new(scene, plan, everything));
         }
     }
-    let adapter = Device::new().ok().map(|c| c.describe());
+    let adapter = Device::shared().ok().map(|c| c.describe());
     if args.json {
         let document = json!({ "size_px": SIZE, "runs": args.runs, "adapter": adapter, "scenes": scenes });
         return output::print_json(&document);
@@ -191,23 +189,10 @@ fn child(scene: &Path, variant: &str, repeats: u32) -> Result<Cost, CliError> {
 
 /// Opens a scene as the window does, with the window's first view.
 fn open(path: &Path) -> Result<OpenScene, StudyError> {
-    let jobs = PipelineJobs::new(Places::of_user());
-    let opened = jobs.run(Command::Open { path: path.to_path_buf() }, &mut Silent).map_err(|stop| match stop {
-        Stop::Cancelled => StudyError("it was cancelled".into()),
-        Stop::Failed(failure) => StudyError(format!("{} {}", failure.message, failure.remedy)),
-    })?;
-    let Outcome::Opened(scene) = opened else { return Err(StudyError("opening brought no scene".into())) };
+    let opened = jobs::open::open(path, &Folders::of_user(), &jobs::plan::machine(), &mut Silent);
+    let scene = opened.map_err(|e| StudyError(e.to_string()))?;
     let cloud = scene.cloud.clone().ok_or_else(|| StudyError("there is nothing to draw".into()))?;
-    let [width, height] = SIZE;
-    let first = match &scene.home.camera {
-        Some(camera) => view::with_size(camera, width, height),
-        None => {
-            let (center, radius) = (scene.home.bounds.center(), scene.home.bounds.radius().max(1e-6));
-            let eye = center + glam::DVec3::new(1.0, 0.0, -2.0) * radius + scene.home.up * (0.5 * radius);
-            let seen = Camera::look_at(eye, center, scene.home.up, 0.8, width, height);
-            seen.unwrap_or_else(|| Camera::of_pose(eye, glam::DMat3::IDENTITY, 0.8, width, height))
-        }
-    };
+    let first = scene.home.camera(SIZE).with_size(SIZE[0], SIZE[1]);
     let cameras = scene.dataset.as_ref().map(|d| d.cameras()).unwrap_or_default();
     let (settings, map) = (scene.render.clone(), scene.semantics.clone());
     Ok(OpenScene { cloud, settings, map, cameras, up: scene.home.up, first, facts: scene.facts.clone() })

@@ -12,6 +12,8 @@ use super::progress::{Console, evaluation_line};
 use super::train::Settings;
 use super::{CliError, eval, interrupt, opened, output, synth};
 use crate::io;
+use crate::jobs::evaluate::{self, Comparison, Options};
+use crate::jobs::plan;
 use crate::math::stats::median;
 use crate::measure::studies::Input;
 use crate::measure::table::{markdown, rows};
@@ -21,7 +23,6 @@ use crate::pipeline::synth::demo;
 use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainOutcome};
 use crate::render::{Features, RenderSettings, Renderer};
 use crate::scene::{Camera, Dataset, GaussianCloud, Machine};
-use crate::worker::machine;
 
 /// Pictures of the flight around the scene.
 const FLIGHT_PICTURES: usize = 24;
@@ -95,17 +96,16 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
             "{done} of {all} steps are saved; the same command goes on from there"
         )));
     }
-    let job =
-        eval::job(opened::drawable(&scene)?, &photos, eval::Options { pictures: Some(compare), ..Default::default() })?;
-    let views = eval::measure(&job, &mut console)?;
+    let options = Options { pictures: Some(compare), ..Options::default() };
+    let job = Comparison::new(opened::drawable(&scene)?, &photos, options)?;
+    let Evaluation { psnr, ssim, views, .. } = evaluate::photometric(&job, &mut console).map_err(eval::stopped)?;
     let queries = demo_queries::run(&scene, &photos, &job, &queries, &mut console)?;
     let millis = fly(&job.cloud, &job.settings, &dataset, &flight)?;
 
-    let (psnr, ssim) = eval::means(&views);
     let document = document(&args.out, &outcome, [psnr, ssim], &queries);
     let report = DemoReport {
         document,
-        machine: machine::look(),
+        machine: plan::machine(),
         photos: dataset.photos.len(),
         held_out: views.len(),
         synth_secs,

@@ -5,23 +5,23 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::asking::Asker;
-use super::eval::Job;
 use super::progress::Console;
-use super::{CliError, output, query};
+use super::{CliError, output};
 use crate::io::SceneFolder;
 use crate::io::labels::Labels;
+use crate::jobs::evaluate::Comparison;
+use crate::jobs::query;
 use crate::models;
 use crate::pipeline::observer::{Observer, Severity, Silent};
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::find::{FindOptions, Found, Tools, find_objects};
-use crate::pipeline::semantics::grammar::Kind;
 use crate::pipeline::semantics::protocols::{AskedScene, LabelledView, categories, masks};
+use crate::pipeline::semantics::query_engine::QueryEngine;
 use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
 use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::Renderer;
-use crate::scene::Photo;
+use crate::scene::{LevelFilter, Photo};
 
 /// What is asked; the last two are not in the scene.
 const QUESTIONS: [&str; 7] = [
@@ -69,7 +69,7 @@ pub struct Queries {
 pub fn run(
     scene: &Path,
     photos: &Path,
-    job: &Job,
+    job: &Comparison,
     pictures: &Path,
     console: &mut Console,
 ) -> Result<Queries, CliError> {
@@ -99,7 +99,7 @@ pub fn run(
     console.note(Severity::Info, format!("{} objects and parts found", map.identities.len()));
 
     output::make_folder(pictures)?;
-    let mut asker = Asker::new(&map)?;
+    let mut asker = QueryEngine::new(map.language.as_ref())?;
     let (mut units, mut asked) = (Vec::new(), Vec::new());
     let mut renderer = Renderer::new();
     for (k, &i) in job.views.iter().enumerate() {
@@ -115,22 +115,22 @@ pub fn run(
         };
         let mut failed = None;
         let mut by_name = |text: &str| {
-            asker.ask(text, Kind::Auto).unwrap_or_else(|e| {
+            asker.ask(&map, text, LevelFilter::Auto).unwrap_or_else(|e| {
                 failed.get_or_insert(e);
                 None
             })
         };
         units.extend(masks::compare(&mut AskedScene { map: &map, ask: &mut by_name }, &labelled));
         if let Some(error) = failed {
-            return Err(error);
+            return Err(error.into());
         }
         for (n, question) in QUESTIONS.iter().enumerate().filter(|_| k == 0) {
             let start = Instant::now();
-            let Some(answered) = asker.ask(question, Kind::Auto)? else { continue };
+            let Some(answered) = asker.ask(&map, question, LevelFilter::Auto)? else { continue };
             let mask = answered.mask(&view, &map.identities, 1);
             let millis = start.elapsed().as_secs_f64() * 1e3;
             let path = pictures.join(format!("{n}_{}.png", question.replace([' ', '\''], "_")));
-            query::write_heat(&path, &job.cloud, &camera, &job.settings, &answered.heat(&view))?;
+            query::write_heat(&path, (&job.cloud, &job.settings), &camera, &answered.heat(&view))?;
             asked.push(Asked {
                 question: (*question).to_owned(),
                 verdict: answered.answer.verdict(),

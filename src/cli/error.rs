@@ -4,6 +4,8 @@ use std::error::Error;
 use std::process::ExitCode;
 
 use super::output;
+use crate::jobs::JobError;
+use crate::jobs::error::chain;
 use crate::pipeline::observer::Interrupted;
 
 /// Why a subcommand did not do what was asked.
@@ -21,6 +23,22 @@ impl CliError {
     /// A failure described by `text`: what, where, and what to do about it.
     pub fn failed(text: impl Into<String>) -> Self {
         Self::Failed(text.into().into())
+    }
+
+    /// A job that failed, with what can be done about it here.
+    fn of_job(error: JobError) -> Self {
+        let remedy = match &error {
+            _ if error.is_cancelled() => return Self::Cancelled(chain(&error)),
+            JobError::EmptyQuery => return Self::Usage(error.to_string()),
+            JobError::NotTrained(path) => format!(", with 'fmlgs train {} --out SCENE'", path.display()),
+            JobError::PhotosGone(_) => "; give them with --photos".into(),
+            JobError::NothingHeldOut(_) => "; --holdout-every 0 compares with all photos".into(),
+            JobError::NoObjects(path) => format!("; find them with 'fmlgs preprocess {}'", path.display()),
+            JobError::UnknownPhoto(_) => "; see 'fmlgs info'".into(),
+            JobError::NoMatch(_) => "; see 'fmlgs query'".into(),
+            _ => return Self::Failed(Box::new(error)),
+        };
+        Self::failed(format!("{error}{remedy}"))
     }
 
     /// Of work that may have been asked to stop; `saved` says what is left of it then.
@@ -51,41 +69,7 @@ impl CliError {
 
 impl<E: Error + Send + Sync + 'static> From<E> for CliError {
     fn from(error: E) -> Self {
-        Self::Failed(Box::new(error))
-    }
-}
-
-/// The error and its causes, each once: many errors already quote their cause.
-fn chain(error: &dyn Error) -> String {
-    let mut text = error.to_string();
-    let mut next = error.source();
-    while let Some(cause) = next {
-        let cause_text = cause.to_string();
-        if !text.contains(&cause_text) {
-            text.push_str(": ");
-            text.push_str(&cause_text);
-        }
-        next = cause.source();
-    }
-    text
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[derive(Debug, thiserror::Error)]
-    enum Outer {
-        #[error("cannot save")]
-        Silent(#[source] std::io::Error),
-        #[error("cannot save: {0}")]
-        Quoting(#[source] std::io::Error),
-    }
-
-    #[test]
-    fn each_cause_is_told_once() {
-        let cause = || std::io::Error::other("disk full");
-        assert_eq!(chain(&Outer::Silent(cause())), "cannot save: disk full");
-        assert_eq!(chain(&Outer::Quoting(cause())), "cannot save: disk full");
+        let error: Box<dyn Error + Send + Sync> = Box::new(error);
+        error.downcast::<JobError>().map_or_else(Self::Failed, |job| Self::of_job(*job))
     }
 }

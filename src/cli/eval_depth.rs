@@ -4,30 +4,13 @@ use std::path::Path;
 
 use serde_json::json;
 
-use super::eval::Job;
 use super::{CliError, output};
-use crate::math::stats::median;
-use crate::pipeline::depth::{self, DepthCounter, DepthErrors};
-use crate::pipeline::observer::{Observer, Ticker};
-use crate::render::Renderer;
+use crate::jobs::evaluate::{self, Comparison};
+use crate::pipeline::depth::{self, DepthErrors};
+use crate::pipeline::observer::Observer;
 
-pub fn run(scene: &Path, job: &Job, as_json: bool, observer: &mut dyn Observer) -> Result<(), CliError> {
-    let mut ticker = Ticker::new("Measuring depth", job.views.len());
-    let mut renderer = Renderer::new();
-    let mut counter = DepthCounter::default();
-    let mut millis = Vec::with_capacity(job.views.len());
-    for (done, &index) in job.views.iter().enumerate() {
-        if ticker.proceed(observer).is_err() {
-            return Err(CliError::Cancelled(format!("{done} of {} views were measured", job.views.len())));
-        }
-        let photo = &job.dataset.photos[index];
-        let truth = depth::of_photo(&job.dataset.root, photo)?;
-        let camera = photo.camera.limited_to(job.max_side_px);
-        counter.draw(&mut renderer, &job.cloud, &camera, &job.settings, &truth)?;
-        millis.push(renderer.stats().stage_secs.iter().sum::<f64>() * 1e3);
-        ticker.report(done as u64 + 1, observer);
-    }
-    let scores = counter.scores();
+pub fn run(scene: &Path, job: &Comparison, as_json: bool, observer: &mut dyn Observer) -> Result<(), CliError> {
+    let (scores, median_render_ms) = evaluate::depth(job, observer).map_err(super::eval::stopped)?;
     if as_json {
         return output::print_json(&json!({
             "scene": scene,
@@ -37,7 +20,7 @@ pub fn run(scene: &Path, job: &Job, as_json: bool, observer: &mut dyn Observer) 
             "views": job.views.len(),
             "edge_px": depth::EDGE_PX,
             "edge_jump": depth::EDGE_JUMP,
-            "median_render_ms": median(&millis),
+            "median_render_ms": median_render_ms,
             "scores": scores,
         }));
     }

@@ -1,11 +1,10 @@
 //! `fmlgs export`: Gaussians as a `.ply` that other splat viewers open.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
-use super::{CliError, opened, output};
-use crate::io::splat_ply;
-use crate::math::sh;
-use crate::scene::GaussianCloud;
+use super::{CliError, output};
+use crate::jobs::{export, open};
 
 /// Write the Gaussians of a scene as a .ply for other splat viewers
 ///
@@ -28,45 +27,14 @@ pub struct Args {
 }
 
 pub fn run(args: Args) -> Result<(), CliError> {
-    let scene = opened::drawable(&args.scene)?;
-    output::check(&args.out, &[".ply"], &scene.reads(&args.scene))?;
-    let mut cloud = scene.cloud;
-    if let Some(degree) = args.sh_degree {
-        limit_degree(&mut cloud, degree);
-    }
-    output::make_parent(&args.out)?;
-    splat_ply::write(&args.out, &cloud)?;
+    let scene = open::scene(&args.scene)?;
+    output::check(&args.out, &[".ply"], &scene.reads())?;
+    let cloud = match args.sh_degree {
+        Some(degree) => Arc::unwrap_or_clone(scene.cloud).up_to_degree(degree).into(),
+        None => scene.cloud,
+    };
+    export::ply(&args.out, &cloud)?;
     let bytes = std::fs::metadata(&args.out).map_or(0, |m| m.len());
     let size = indicatif::HumanBytes(bytes);
     output::print(&format!("{}: {} Gaussians, SH degree {}, {size}", args.out.display(), cloud.len(), cloud.sh_degree))
-}
-
-/// Drops the bands above `degree`.
-fn limit_degree(cloud: &mut GaussianCloud, degree: u8) {
-    if degree >= cloud.sh_degree {
-        return;
-    }
-    let (stride, kept) = (cloud.sh_stride(), sh::coefficients(degree));
-    cloud.sh = cloud.sh.chunks_exact(stride).flat_map(|one| &one[..kept]).copied().collect();
-    cloud.sh_degree = degree;
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lower_bands_survive() {
-        let mut cloud = GaussianCloud {
-            positions: vec![[0.0; 3]; 2],
-            sh_degree: 1,
-            sh: (0..8).map(|i| [i as f32; 3]).collect(),
-            ..GaussianCloud::default()
-        };
-        limit_degree(&mut cloud, 2);
-        assert_eq!(cloud.sh.len(), 8);
-        limit_degree(&mut cloud, 0);
-        assert_eq!(cloud.sh, [[0.0; 3], [4.0; 3]]);
-        assert_eq!(cloud.sh_degree, 0);
-    }
 }

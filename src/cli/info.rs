@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::opened::named_cameras;
 use super::plan::PlanArgs;
 use super::{CliError, output};
-use crate::io::{self, Opened, trained::TrainedScene};
+use crate::io::{semantic_map, trained};
+use crate::jobs::open::{self, Contents};
+use crate::jobs::{JobError, Scene, plan};
 use crate::pipeline::train::TrainConfig;
-use crate::scene::{Bounds, Camera, Dataset, Facts as PlanFacts, GaussianCloud, ScenePlan};
-use crate::worker::machine;
+use crate::scene::{Bounds, Dataset, ScenePlan, SemanticMap};
 
 /// Say what a folder or file holds, and the plan for it
 ///
@@ -43,30 +43,19 @@ struct Facts {
 
 pub fn run(args: Args) -> Result<(), CliError> {
     let defaults = TrainConfig::default();
-    let limits = TrainConfig { max_side_px: args.max_side, ..defaults.clone() }.limits();
-    let machine = PlanFacts::of(machine::look(), limits);
-    let (mut facts, planned) = match io::open(&args.path)? {
-        Opened::Dataset(d) => (of_dataset(&d, defaults.holdout_every), machine.with_photos(&d.cameras())),
-        Opened::Cloud(c) => (of_cloud(&c), machine.with_cloud(&c, c.sh_degree, &[])),
-        Opened::Trained(t) => {
-            let cameras: Vec<Camera> = t.info.cameras.iter().map(|c| c.camera.clone()).collect();
-            let planned = machine.with_photos(&cameras).with_cloud(&t.cloud, t.cloud.sh_degree, &cameras);
-            let map = io::semantic_map::load(&t.folder, t.state.as_deref(), &t.cloud);
-            let mut facts = of_trained(&t);
-            let of_others = matches!(map, Ok(None)) && t.folder.join(io::semantic_map::FILE).exists();
-            facts.warnings.extend(match &map {
-                Err(e) => Some(format!("its objects cannot be read ('fmlgs preprocess' finds them anew): {e}")),
-                Ok(None) if of_others => Some(format!(
-                    "{} is of other Gaussians than {}, so no objects are known; 'fmlgs preprocess' finds them anew",
-                    io::semantic_map::FILE,
-                    io::trained::CLOUD_FILE
-                )),
-                Ok(_) => None,
-            });
-            let known = map.as_ref().ok().and_then(Option::as_ref).map(|m| m.identities.len());
-            facts.lines.push(("objects and parts", known.map_or_else(|| "none known".into(), |n| n.to_string())));
-            facts.json.insert("identities".into(), json!(known));
-            (facts, planned.with_semantics(map.ok().flatten().as_ref()))
+    let config = TrainConfig { max_side_px: args.max_side, ..defaults.clone() };
+    let machine = plan::machine();
+    let (mut facts, planned) = match open::contents(&args.path)? {
+        Contents::Photos(d) => (of_dataset(&d, defaults.holdout_every), plan::facts(&machine, Some(&d), None, &config)),
+        Contents::Scene(s) => {
+            let planned = plan::scene_facts(&machine, &s, &config);
+            match &s.folder {
+                Some(folder) => {
+                    let (facts, map) = of_trained(&s, folder);
+                    (facts, planned.with_semantics(map.as_ref()))
+                }
+                None => (of_splat(&s), planned),
+            }
         }
     };
     let plan = ScenePlan::new(planned, &args.plan.overrides());
@@ -126,61 +115,79 @@ fn of_dataset(d: &Dataset, holdout_every: usize) -> Facts {
         "points": points,
         "camera_extent": extent,
         "background": d.background,
-        "cameras": cameras_json(&named_cameras(d, holdout_every)),
+        "cameras": open::cameras(d, holdout_every),
     });
     facts(lines, json, d.warnings.clone())
 }
 
-fn of_cloud(c: &GaussianCloud) -> Facts {
-    let (lines, json) = cloud_facts(c);
-    let mut lines = lines;
+fn of_splat(s: &Scene) -> Facts {
+    let (mut lines, json) = cloud_facts(s);
     lines.insert(0, ("kind", "Gaussian splat".into()));
     let mut facts = facts(lines, json, Vec::new());
     facts.json.insert("kind".into(), json!("splat"));
     facts
 }
 
-fn of_trained(t: &TrainedScene) -> Facts {
-    let (cloud_lines, json) = cloud_facts(&t.cloud);
-    let held_out = t.info.cameras.iter().filter(|c| c.held_out).count();
-    let photos = match (t.dataset_path(), &t.info.dataset) {
+fn of_trained(s: &Scene, folder: &Path) -> (Facts, Option<SemanticMap>) {
+    let (cloud_lines, json) = cloud_facts(s);
+    let held_out = s.cameras.iter().filter(|c| c.held_out).count();
+    let photos = match (&s.dataset_path, &s.photos) {
         (Some(path), _) => path.display().to_string(),
-        (None, Some(d)) => format!("{} (not found)", d.path.display()),
+        (None, Some(gone)) => format!("{} (not found)", gone.display()),
         (None, None) => "not known".into(),
     };
     let mut lines = vec![
-        ("kind", format!("trained scene '{}'", t.info.name)),
-        ("cameras", format!("{} ({held_out} held out)", t.info.cameras.len())),
+        ("kind", format!("trained scene '{}'", s.name)),
+        ("cameras", format!("{} ({held_out} held out)", s.cameras.len())),
         ("photos", photos),
     ];
     lines.extend(cloud_lines);
-    if let Some(e) = t.info.history.evaluations.last() {
+    if let Some(e) = s.history.evaluations.last() {
         lines.push((
             "held-out PSNR",
             format!("{:.2} dB, SSIM {:.3} after step {}, {:.0} s", e.psnr, e.ssim, e.step, e.secs),
         ));
     }
-    let mut facts = facts(lines, json, Vec::new());
+    let map = match s.semantics() {
+        Err(JobError::NoObjects(_)) => Ok(None),
+        map => map.map(Some),
+    };
+    let of_others = matches!(map, Ok(None)) && folder.join(semantic_map::FILE).exists();
+    let warning = match &map {
+        Err(e) => Some(format!("its objects cannot be read ('fmlgs preprocess' finds them anew): {e}")),
+        Ok(None) if of_others => Some(format!(
+            "{} is of other Gaussians than {}, so no objects are known; 'fmlgs preprocess' finds them anew",
+            semantic_map::FILE,
+            trained::CLOUD_FILE
+        )),
+        Ok(_) => None,
+    };
+    let map = map.ok().flatten();
+    let known = map.as_ref().map(|m| m.identities.len());
+    lines.push(("objects and parts", known.map_or_else(|| "none known".into(), |n| n.to_string())));
+    let mut facts = facts(lines, json, warning.into_iter().collect());
     facts.json.insert("kind".into(), json!("trained"));
-    facts.json.insert("name".into(), json!(t.info.name));
-    facts.json.insert("dataset".into(), json!(t.dataset_path()));
-    facts.json.insert("cameras".into(), json!(t.info.cameras));
-    facts.json.insert("history".into(), json!(t.info.history));
-    facts
+    facts.json.insert("name".into(), json!(s.name));
+    facts.json.insert("dataset".into(), json!(s.dataset_path));
+    facts.json.insert("cameras".into(), json!(s.cameras));
+    facts.json.insert("history".into(), json!(s.history));
+    facts.json.insert("identities".into(), json!(known));
+    (facts, map)
 }
 
-fn cloud_facts(c: &GaussianCloud) -> (Vec<(&'static str, String)>, Value) {
+fn cloud_facts(s: &Scene) -> (Vec<(&'static str, String)>, Value) {
+    let c = &s.cloud;
     let bounds = Bounds::robust((0..c.len()).map(|i| c.world_position(i)));
     let extras: Vec<&str> = c.extras.iter().map(|e| e.name.as_str()).collect();
     let mut lines =
-        vec![("Gaussians", c.len().to_string()), ("colour", format!("spherical harmonics of degree {}", c.sh_degree))];
+        vec![("Gaussians", c.len().to_string()), ("color", format!("spherical harmonics of degree {}", s.sh_stored))];
     if let Some(b) = bounds {
         lines.push(("middle 96 %", format!("{} to {} scene units", vector(b.min), vector(b.max))));
     }
     if !extras.is_empty() {
         lines.push(("kept besides", extras.join(", ")));
     }
-    (lines, json!({ "gaussians": c.len(), "sh_degree": c.sh_degree, "bounds": bounds, "extras": extras }))
+    (lines, json!({ "gaussians": c.len(), "sh_degree": s.sh_stored, "bounds": bounds, "extras": extras }))
 }
 
 fn facts(lines: Vec<(&'static str, String)>, json: Value, warnings: Vec<String>) -> Facts {
@@ -189,11 +196,6 @@ fn facts(lines: Vec<(&'static str, String)>, json: Value, warnings: Vec<String>)
         other => serde_json::Map::from_iter([("value".to_owned(), other)]),
     };
     Facts { lines, json, warnings }
-}
-
-fn cameras_json(cameras: &[super::opened::NamedCamera]) -> Vec<Value> {
-    let entry = |c: &super::opened::NamedCamera| json!({ "name": c.name, "camera": c.camera, "held_out": c.held_out });
-    cameras.iter().map(entry).collect()
 }
 
 fn vector(v: glam::DVec3) -> String {

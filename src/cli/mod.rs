@@ -5,7 +5,6 @@
 //! error. Exit codes are listed in `EXIT_CODES`.
 
 mod agent;
-mod asking;
 mod bench;
 mod check_stability;
 mod demo;

@@ -1,17 +1,16 @@
 //! `fmlgs models`: which networks there are, which are here, and how to get the others.
 
 use std::path::PathBuf;
-use std::time::Instant;
 
 use serde_json::json;
 
 use super::progress::Console;
 use super::{CliError, output};
-use crate::models::catalogue::{self, Entry, InstallError, State};
+use crate::jobs::models::{self, Source};
+use crate::models::Role;
+use crate::models::catalogue::{self, Entry, State};
 use crate::models::engine::engine;
-use crate::models::fetch::{FetchError, Patience};
-use crate::models::{self, Tile};
-use crate::pipeline::observer::Ticker;
+use crate::pipeline::observer::Silent;
 
 /// List, fetch and check the neural networks
 ///
@@ -60,8 +59,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         None => list(args.json),
         Some(Command::Fetch { id, from }) => fetch(&id, from.as_deref(), quiet),
         Some(Command::Add { id, folder }) => {
-            let entry = catalogue::entry(&id)?;
-            entry.add(&catalogue::folder(), &folder)?;
+            let entry = models::install(&id, Source::Folder(&folder), &mut Silent)?;
             output::print(&format!("'{id}' is here now: {}", entry.adds))
         }
         Some(Command::Check) => check(args.json),
@@ -88,8 +86,8 @@ fn list(as_json: bool) -> Result<(), CliError> {
         let (state, how) = state_text(e, &e.state(&folder));
         let size = if e.built_in { String::new() } else { e.megabytes().to_string() };
         let role = match e.role {
-            models::Role::Encoder => "looks",
-            models::Role::Segmenter => "masks",
+            Role::Encoder => "looks",
+            Role::Segmenter => "masks",
         };
         rows.push(vec![e.id.clone(), role.into(), state, size, e.licence.clone()]);
         notes.push_str(&format!("\n{}: {} {how}", e.id, e.adds));
@@ -124,30 +122,12 @@ fn state_text(entry: &Entry, state: &State) -> (String, String) {
 }
 
 fn fetch(id: &str, from: Option<&str>, quiet: bool) -> Result<(), CliError> {
-    let entry = catalogue::entry(id)?;
-    let mut console = Console::new(quiet);
-    let mut ticker = Ticker::new("", 0);
-    let result = entry.fetch(&catalogue::folder(), from, Patience::default(), &mut |name, there, all| {
-        ticker.enter(format!("Fetching {name} (kB)"), all.unwrap_or(there) / 1000);
-        ticker.tick((there / 1000) as usize, &mut console).is_ok()
-    });
-    drop(console);
-    match result {
-        Ok(()) => output::print(&format!("'{id}' is here now: {}", entry.adds)),
-        Err(InstallError::Fetch(e @ FetchError::Cancelled { .. })) => Err(CliError::Cancelled(e.to_string())),
-        Err(e) => Err(e.into()),
-    }
+    let entry = models::install(id, Source::Fetch(from), &mut Console::new(quiet))?;
+    output::print(&format!("'{id}' is here now: {}", entry.adds))
 }
 
 fn check(as_json: bool) -> Result<(), CliError> {
-    let folder = catalogue::folder();
-    let mut results = Vec::new();
-    for entry in catalogue::entries()? {
-        if matches!(entry.state(&folder), State::Missing(_)) {
-            continue;
-        }
-        results.push((entry.id.clone(), entry.verify(&folder).err().map(|e| e.to_string())));
-    }
+    let results = models::check()?;
     let broken = results.iter().filter(|r| r.1.is_some()).count();
     if as_json {
         let list = results.iter().map(|(id, problem)| json!({ "id": id, "problem": problem }));
@@ -168,39 +148,13 @@ fn check(as_json: bool) -> Result<(), CliError> {
 fn bench(as_json: bool) -> Result<(), CliError> {
     const RUNS: usize = 20;
     let engine = engine()?;
-    let mut rows = vec![["model", "load ms", "picture ms", "phrase ms"].map(str::to_owned).to_vec()];
-    let mut list = Vec::new();
-    for id in catalogue::usable(models::Role::Encoder, &mut output::warn)? {
-        let start = Instant::now();
-        let mut encoder = models::encoder(&id)?;
-        let side_px = encoder.tile_side_px().unwrap_or(224);
-        let color = |i: usize| {
-            let (x, y) = (i % side_px, i / side_px);
-            [x as f32 / side_px as f32, y as f32 / side_px as f32, ((x / 8 + y / 8) % 2) as f32]
-        };
-        let tile = Tile { side_px, rgb: (0..side_px * side_px).map(color).collect() };
-        // The first run prepares the networks.
-        let (picture, phrase) = (encoder.image(&tile)?, encoder.text("a red wooden chair")?);
-        let load_ms = start.elapsed().as_secs_f64() * 1e3;
-        let median = |run: &mut dyn FnMut() -> Result<(), CliError>| -> Result<f64, CliError> {
-            let mut ms = Vec::with_capacity(RUNS);
-            for _ in 0..RUNS {
-                let start = Instant::now();
-                run()?;
-                ms.push(start.elapsed().as_secs_f64() * 1e3);
-            }
-            Ok(crate::math::stats::median(&ms))
-        };
-        let picture_ms = median(&mut || Ok(encoder.image(&tile).map(drop)?))?;
-        let phrase_ms = median(&mut || Ok(encoder.text("a red wooden chair").map(drop)?))?;
-        let ms = |v: f64| format!("{v:.2}");
-        rows.push(vec![id.clone(), ms(load_ms), ms(picture_ms), ms(phrase_ms)]);
-        list.push(json!({ "id": id, "load_ms": load_ms, "picture_ms": picture_ms, "phrase_ms": phrase_ms,
-            "picture": picture, "phrase": phrase }));
-    }
+    let times = models::time_encoders(RUNS, &mut output::warn)?;
     if as_json {
-        return output::print_json(&json!({ "engine": engine.name(), "device": engine.device(), "models": list }));
+        return output::print_json(&json!({ "engine": engine.name(), "device": engine.device(), "models": times }));
     }
+    let mut rows = vec![["model", "load ms", "picture ms", "phrase ms"].map(str::to_owned).to_vec()];
+    let ms = |v: f64| format!("{v:.2}");
+    rows.extend(times.iter().map(|t| vec![t.id.clone(), ms(t.load_ms), ms(t.picture_ms), ms(t.phrase_ms)]));
     output::print(&format!(
         "{}\nmedians of {RUNS} runs, {} on the {}",
         output::table(&rows),

@@ -4,12 +4,12 @@
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 
-use image::{ColorType, ImageEncoder, codecs::png::PngEncoder};
-use npyz::WriterBuilder;
+use image::ColorType;
 use serde::Serialize;
 
 use super::CliError;
 use crate::io::{atomic, scene_files, trained};
+use crate::jobs::export;
 use crate::scene::text;
 
 /// Prints `text` and a line break to standard output. A reader that has closed its end (`| head`)
@@ -87,36 +87,17 @@ pub fn check_folder(folder: &Path, reads: &[&Path]) -> Result<(), CliError> {
 
 /// Makes the folder that `path` lies in.
 pub fn make_parent(path: &Path) -> Result<(), CliError> {
-    match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => make_folder(folder),
-        _ => Ok(()),
-    }
+    Ok(export::make_parent(path)?)
 }
 
 /// Makes `folder` and those above it.
 pub fn make_folder(folder: &Path) -> Result<(), CliError> {
-    std::fs::create_dir_all(folder).map_err(|error| {
-        CliError::failed(format!("cannot create the folder {}: {error}; choose another place", folder.display()))
-    })
+    Ok(export::make_folder(folder)?)
 }
 
 /// Writes a PNG of `size_px` from raw samples, those of 16 bits in the machine's byte order.
 pub fn write_png(path: &Path, samples: &[u8], size_px: [u32; 2], color: ColorType) -> Result<(), CliError> {
-    let encode = |w: &mut dyn Write| {
-        PngEncoder::new(w).write_image(samples, size_px[0], size_px[1], color.into()).map_err(std::io::Error::other)
-    };
-    Ok(atomic::write(path, encode)?)
-}
-
-/// Writes rows of `f32` values as a NumPy array of shape `[height, width]`.
-pub fn write_npy(path: &Path, values: &[f32], size_px: [u32; 2]) -> Result<(), CliError> {
-    let fill = |w: &mut dyn Write| {
-        let shape = [u64::from(size_px[1]), u64::from(size_px[0])];
-        let mut array = npyz::WriteOptions::new().default_dtype().shape(&shape).writer(w).begin_nd()?;
-        array.extend(values.iter().copied())?;
-        array.finish()
-    };
-    Ok(atomic::write(path, fill)?)
+    Ok(export::png(path, samples, size_px, color)?)
 }
 
 #[cfg(test)]
@@ -135,22 +116,5 @@ mod tests {
         let lines = table(&rows);
         assert_eq!(lines.lines().count(), 2);
         assert!(lines.chars().count() < 3 * text::LONGEST_NAME && !lines.contains('\u{1b}'), "{lines}");
-    }
-
-    #[test]
-    fn pictures_and_arrays_read_back() {
-        let folder = tempfile::tempdir().expect("folder");
-        let png = folder.path().join("a.png");
-        write_png(&png, &[1, 2, 3, 4, 5, 6], [2, 1], ColorType::Rgb8).expect("write");
-        assert_eq!(image::open(&png).expect("read").to_rgb8().into_raw(), [1, 2, 3, 4, 5, 6]);
-        let bytes: Vec<u8> = [258_u16, 3].iter().flat_map(|v| v.to_ne_bytes()).collect();
-        write_png(&png, &bytes, [1, 2], ColorType::L16).expect("write");
-        assert_eq!(image::open(&png).expect("read").to_luma16().into_raw(), [258, 3]);
-        let npy = folder.path().join("a.npy");
-        write_npy(&npy, &[1.0, 2.5, 3.0, 4.0, 5.0, 6.0], [3, 2]).expect("write");
-        let bytes = std::fs::read(&npy).expect("read");
-        let array = npyz::NpyFile::new(&bytes[..]).expect("npy");
-        assert_eq!(array.shape(), [2, 3]);
-        assert_eq!(array.into_vec::<f32>().expect("values")[1], 2.5);
     }
 }

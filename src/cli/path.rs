@@ -1,23 +1,20 @@
 //! `fmlgs path`: a flight through a scene.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
-use glam::DVec3;
 use serde_json::json;
 
-use super::asking::{Asker, semantics};
-use super::opened::DrawableScene;
-use super::{CliError, number, opened, output, view};
-use crate::io;
+use super::{CliError, number, output, view};
+use crate::jobs::go_to::{self, Explored, VisitRequest};
+use crate::jobs::{Scene, export, open, query};
 use crate::measure::survey::{self, smoothness};
 use crate::measure::table::rows;
 use crate::navigate::flight::Smoothness;
 use crate::navigate::target::{Side, Wish};
-use crate::navigate::visit::{NoVisit, Place};
-use crate::navigate::{FRAMES, Flight, Navigator, NoWay, Pose, Speed};
-use crate::pipeline::semantics::grammar::Kind;
-use crate::scene::{Camera, CameraPath, PathKey};
+use crate::navigate::{FRAMES, Flight, Pose};
+use crate::scene::LevelFilter;
 
 /// Find a way through a scene, to what is asked for or to a photo
 ///
@@ -42,8 +39,8 @@ pub struct Args {
     #[arg(long, conflicts_with = "to")]
     to_photo: Option<String>,
     /// From which side the target is seen
-    #[arg(long, value_enum, default_value_t = SideArg::Best)]
-    side: SideArg,
+    #[arg(long, value_enum, default_value_t = Side::Best)]
+    side: Side,
     /// Distance to the target as a multiple of the usual one
     #[arg(long, default_value_t = 1.0, value_parser = number::within(0.01..=100.0))]
     distance: f64,
@@ -71,59 +68,19 @@ pub struct Args {
     json: bool,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum SideArg {
-    /// Whichever shows it best
-    Best,
-    /// As it is seen now
-    Same,
-    /// The opposite
-    Other,
-    /// Its front
-    Front,
-    /// Its left, seen from the start
-    Left,
-    /// Its right, seen from the start
-    Right,
-    /// From above
-    Above,
-    /// From below
-    Below,
-}
-
-impl From<SideArg> for Side {
-    fn from(side: SideArg) -> Self {
-        match side {
-            SideArg::Best => Self::Best,
-            SideArg::Same => Self::Same,
-            SideArg::Other => Self::Other,
-            SideArg::Front => Self::Front,
-            SideArg::Left => Self::Left,
-            SideArg::Right => Self::Right,
-            SideArg::Above => Self::Above,
-            SideArg::Below => Self::Below,
-        }
-    }
-}
-
-/// What moves about in a scene that was opened.
-pub fn navigator(scene: &DrawableScene) -> Navigator {
-    let cameras: Vec<Camera> = scene.cameras.iter().map(|c| c.camera.clone()).collect();
-    Navigator::new(&scene.cloud, &cameras, up_of(&cameras))
-}
-
-/// Upwards for the cameras of a scene; as in files of splats where they do not tell.
-pub fn up_of(cameras: &[Camera]) -> DVec3 {
-    Camera::up_of(cameras.iter()).unwrap_or(DVec3::NEG_Y)
+/// What one knows of moving about in a scene that was opened.
+fn explored(scene: &Scene) -> Arc<Explored> {
+    let home = scene.home();
+    Arc::new(Explored::new(Arc::clone(&scene.cloud), &scene.views(), home.up))
 }
 
 pub fn run(args: Args) -> Result<(), CliError> {
-    let scene = opened::drawable(&args.scene)?;
+    let scene = open::scene(&args.scene)?;
     if let Some(out) = &args.out {
-        output::check(out, &[".json"], &scene.reads(&args.scene))?;
+        output::check(out, &[".json"], &scene.reads())?;
     }
     if let Some(flights) = args.survey {
-        let own: Vec<Camera> = scene.cameras.iter().map(|c| c.camera.clone()).collect();
+        let own = scene.views();
         let counts = if args.cameras.is_empty() { vec![own.len() as u32] } else { args.cameras };
         let frames = args.frames as usize;
         let survey = |count: &u32| survey::surveyed(&scene.cloud, &own, *count as usize, flights, frames);
@@ -134,38 +91,25 @@ pub fn run(args: Args) -> Result<(), CliError> {
         };
     }
     let start = Instant::now();
-    let navigator = navigator(&scene);
+    let explored = explored(&scene);
+    let navigator = &explored.navigator;
     let build_ms = start.elapsed().as_secs_f64() * 1e3;
     let from = Pose::of(&view::choose(args.from.as_deref(), &scene)?);
     let start = Instant::now();
     let (flight, what) = match (&args.to, &args.to_photo) {
-        (Some(query), _) => to_target(&args, query, &scene, &navigator, &from)?,
+        (Some(query), _) => to_target(&args, query, &scene, &explored, from)?,
         (None, photo) => {
             let to = Pose::of(&view::choose(photo.as_deref(), &scene)?);
-            let flight = navigator.fly(&from, &to, None, args.frames as usize, Speed::Eased);
-            (flight.map_err(|e| no_way(&e, &navigator))?, "the photo".to_owned())
+            let flight = explored.fly(&from, &to, args.frames as usize);
+            (flight.map_err(|e| CliError::failed(explored.no_way(&e)))?, "the photo".to_owned())
         }
     };
     let route_ms = start.elapsed().as_secs_f64() * 1e3;
     if let Some(out) = &args.out {
-        output::make_parent(out)?;
-        let path = as_path(&flight);
-        if out.to_string_lossy().ends_with(".nerfstudio.json") {
-            io::camera_path::nerfstudio::write(out, &path, &path.keys, (1280, (1280.0 / args.aspect) as u32))?;
-        } else {
-            io::camera_path::write(out, &path)?;
-        }
+        export::camera_path(out, &flight.camera_path(), args.aspect)?;
     }
     let ours = flight.smoothness(&navigator.matter, navigator.clearance);
-    let [paper, through] = match (args.compare, flight.poses.as_slice()) {
-        (true, [first, .., last]) => {
-            let frames = args.frames as usize;
-            let keys = navigator.keys(first, last).unwrap_or_default();
-            [Flight::of_paper(&[*first, *last], frames), Flight::of_paper_through(&keys, frames)]
-                .map(|p| p.map(|p| p.smoothness(&navigator.matter, navigator.clearance)))
-        }
-        _ => [None, None],
-    };
+    let [paper, through] = if args.compare { explored.of_paper(&flight) } else { [None, None] };
     if args.json {
         return output::print_json(&json!({
             "target": what,
@@ -200,41 +144,29 @@ pub fn run(args: Args) -> Result<(), CliError> {
 fn to_target(
     args: &Args,
     query: &str,
-    scene: &DrawableScene,
-    navigator: &Navigator,
-    from: &Pose,
+    scene: &Scene,
+    explored: &Arc<Explored>,
+    from: Pose,
 ) -> Result<(Flight, String), CliError> {
-    let map = semantics(&args.scene, scene.state.as_deref(), &scene.cloud)?;
-    let answered = Asker::new(&map)?.ask(query, Kind::Auto)?;
-    let id = answered.as_ref().and_then(|a| a.chosen(1).first().copied());
-    let id = id.ok_or_else(|| CliError::failed(format!("nothing here fits '{query}'; see 'fmlgs query'")))?;
-    if !(args.distance.is_finite() && args.distance > 0.0 && args.aspect.is_finite() && args.aspect > 0.0) {
-        return Err(CliError::Usage("--distance and --aspect have to be over 0".into()));
+    let map = scene.semantics()?;
+    let id = query::identities(&map, query, LevelFilter::Auto, 1)?[0];
+    let (_, visited) = go_to::visit(VisitRequest {
+        explored: Some(Arc::clone(explored)),
+        cloud: Arc::clone(&scene.cloud),
+        cameras: scene.views(),
+        up: scene.home().up,
+        settings: scene.settings.clone(),
+        map: Arc::new(map),
+        id,
+        wish: Wish { side: args.side, distance: args.distance },
+        from,
+        aspect: args.aspect,
+        frames: args.frames as usize,
+    });
+    match (visited.problem, visited.flight) {
+        (None, Some(visit)) => Ok((visit.flight, visited.name)),
+        (problem, _) => Err(CliError::failed(format!("{}: {}", visited.name, problem.unwrap_or_default()))),
     }
-    let wish = Wish { side: args.side.into(), distance: args.distance };
-    let place = Place { cloud: &scene.cloud, settings: &scene.settings, map: &map };
-    let name = map.identities.full_name(id);
-    match navigator.visit(place, id, wish, from, args.aspect, args.frames as usize) {
-        Ok(visit) => Ok((visit.flight, name)),
-        Err(NoVisit::NoWay { why, .. }) => Err(no_way(&why, navigator)),
-        Err(e) => Err(CliError::failed(format!("{name}: {e}"))),
-    }
-}
-
-/// Why there is no way, with how much of the scene hangs together.
-fn no_way(why: &NoWay, navigator: &Navigator) -> CliError {
-    let parts = navigator.graph.parts(&navigator.matter);
-    let count = parts.iter().max().map_or(0, |m| m + 1);
-    CliError::failed(format!("{why} ({} keypoints in {count} parts that are not connected)", parts.len()))
-}
-
-/// The flight as a path with a key per pose.
-fn as_path(flight: &Flight) -> CameraPath {
-    let last = (flight.poses.len() - 1).max(1) as f64;
-    let time = |i: usize| Some(flight.seconds * i as f64 / last);
-    let key = |(i, p): (usize, &Pose)| PathKey { time_secs: time(i), ..p.key() };
-    let keys = flight.poses.iter().enumerate().map(key).collect();
-    CameraPath { keys, closed: false, fps: last / flight.seconds.max(1e-3), seconds: flight.seconds }
 }
 
 fn row(name: &str, s: &Smoothness) -> Vec<String> {

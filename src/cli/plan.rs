@@ -1,8 +1,7 @@
-//! The option that overrides a scene's plan, and plans of what a subcommand has opened.
+//! The option that overrides a scene's plan.
 
-use super::opened::DrawableScene;
+use crate::scene::Overrides;
 use crate::scene::plan::PlanOverride;
-use crate::scene::{Camera, Facts, Machine, Overrides, ScenePlan};
 
 /// What the user wants of a scene's plan.
 #[derive(Debug, Default, clap::Args)]
@@ -18,14 +17,6 @@ impl PlanArgs {
     /// All of them together.
     pub fn overrides(&self) -> Overrides {
         self.wishes.iter().copied().collect()
-    }
-
-    /// The plan for a scene that is to be drawn; nothing in it depends on the machine.
-    pub fn of_scene(&self, scene: &DrawableScene) -> ScenePlan {
-        let cameras: Vec<Camera> = scene.cameras.iter().map(|c| c.camera.clone()).collect();
-        let facts = Facts::of(Machine::default(), scene.config.limits()).with_photos(&cameras);
-        let facts = facts.with_cloud(&scene.cloud, scene.cloud.sh_degree, &cameras);
-        ScenePlan::new(facts, &self.overrides())
     }
 }
 

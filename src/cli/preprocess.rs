@@ -1,21 +1,18 @@
 //! `fmlgs preprocess`: objects and parts of a trained scene.
 
 use std::path::PathBuf;
-use std::time::Instant;
 
 use serde_json::json;
 
 use super::plan::PlanArgs;
 use super::progress::Console;
-use super::{CliError, number, opened, output};
-use crate::io::{self, SceneFolder};
-use crate::models;
-use crate::models::catalogue::{self, Role};
-use crate::pipeline::observer::{Observer, Severity};
-use crate::pipeline::semantics::find::{FindOptions, Found, Lifting, REGIONS, Tools, find_objects, segmenter};
-use crate::pipeline::semantics::follow::Follower;
+use super::{CliError, number, output};
+use crate::jobs::find_objects::{self, FindSettings, FoundObjects, Request};
+use crate::jobs::{JobError, open, plan};
+use crate::models::catalogue;
+use crate::pipeline::semantics::find::{CODE_STEPS, Carry, Found, Lifting};
 use crate::pipeline::semantics::tracker::TrackOptions;
-use crate::scene::{Level, Photo};
+use crate::scene::Level;
 
 /// Find the objects and parts of a trained scene
 ///
@@ -41,8 +38,8 @@ pub struct Args {
     #[arg(long)]
     segmenter: Option<String>,
     /// How masks are carried to the other photos
-    #[arg(long, value_enum, default_value_t = TrackerKind::Geometry)]
-    tracker: TrackerKind,
+    #[arg(long, value_enum, default_value_t = Carry::Gaussians)]
+    tracker: Carry,
     /// The SAM 2 that follows masks: a model of 'fmlgs models', or the path of a model's .json
     #[arg(long, default_value = catalogue::SAM2)]
     tracker_model: String,
@@ -59,10 +56,10 @@ pub struct Args {
     #[arg(long, default_value_t = 100.0 * TrackOptions::default().reseed_share, value_parser = number::within(0.0..=100.0))]
     unknown: f64,
     /// How Gaussians get their codes
-    #[arg(long, value_enum, default_value_t = LiftingArg::Votes)]
-    lifting: LiftingArg,
+    #[arg(long, value_enum, default_value_t = Lifting::Votes)]
+    lifting: Lifting,
     /// Steps of training codes
-    #[arg(long, default_value_t = 1_000, value_parser = number::within(0..=10_000_000_u64))]
+    #[arg(long, default_value_t = CODE_STEPS, value_parser = number::within(0..=10_000_000_u64))]
     code_steps: u64,
     /// What looks at the objects, so that they are found by what they look like: 'demo', a model of
     /// 'fmlgs models', the path of a model's .json, or 'none' [default: the best that is here]
@@ -73,27 +70,6 @@ pub struct Args {
     /// Print one JSON document
     #[arg(long)]
     json: bool,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum LiftingArg {
-    /// Those of the identities they voted for
-    Votes,
-    /// The same, refined by training
-    Refined,
-    /// By training alone, as in the paper
-    Paper,
-}
-
-/// How masks are carried to the other photos.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum TrackerKind {
-    /// By the trained Gaussians; no network
-    Geometry,
-    /// By SAM 2 from photo to photo, as in the paper; photos have to be in the order of a walk
-    Sam2,
-    /// By both, each correcting the other
-    Both,
 }
 
 /// Whether the arguments agree on where masks come from.
@@ -107,75 +83,42 @@ fn check_segmenter(args: &Args) -> Result<(), CliError> {
     }
 }
 
+impl Args {
+    fn settings(&self) -> FindSettings {
+        FindSettings {
+            segmenter: self.segmenter.clone().filter(|s| s != "files"),
+            carry: self.tracker,
+            tracker: self.tracker_model.clone(),
+            encoder: self.encoder.clone(),
+            lifting: self.lifting,
+            code_steps: self.code_steps,
+            seed: self.seed.clone(),
+            max_seeds: self.max_seeds,
+            unknown_share: self.unknown / 100.0,
+        }
+    }
+}
+
 pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let mut observer = Console::new(quiet);
     check_segmenter(&args)?;
-    if !io::trained::is_scene(&args.scene) {
-        // What it is instead is told by opening it.
-        opened::drawable(&args.scene)?;
-        let path = args.scene.display();
-        return Err(CliError::failed(format!("{path} is no trained scene; the result is stored in its folder")));
-    }
-    // Held from the beginning: nobody waits for objects that cannot be stored.
-    let folder = SceneFolder::hold(&args.scene, "finding objects")?;
-    let scene = opened::drawable(&args.scene)?;
-    let photos_path = args.photos.clone().or_else(|| scene.dataset_path.clone()).ok_or_else(|| {
-        let path = args.scene.display();
-        CliError::failed(format!("{path}: its photos are not known or no longer there; give them with --photos"))
-    })?;
-    let dataset = opened::dataset(&photos_path)?;
-    let held = |name: &str| scene.cameras.iter().any(|c| c.held_out && c.name == name);
-    let photos: Vec<Photo> = dataset.photos.iter().filter(|p| !held(&p.name)).cloned().collect();
-    let seed = match &args.seed {
-        None => None,
-        Some(name) => {
-            let ends = |p: &Photo| p.name.contains(name.as_str());
-            Some(photos.iter().position(ends).ok_or_else(|| {
-                CliError::failed(format!("no photo that was trained on is called '{name}'; see 'fmlgs info'"))
-            })?)
-        }
+    let scene = open::scene(&args.scene)?;
+    let folder = scene.folder.clone().ok_or_else(|| JobError::NoScene(args.scene.clone()))?;
+    let dataset = open::dataset(&scene.photos(args.photos.as_deref())?)?;
+    let request = Request {
+        folder: &folder,
+        known: scene.state.as_deref(),
+        cloud: &scene.cloud,
+        settings: &scene.settings,
+        dataset: &dataset,
+        holdout_every: scene.config.holdout_every,
+        masks: args.masks.as_deref(),
+        side_px: plan::of_scene(&scene, &args.plan.overrides()).object_side_px,
+        with: &args.settings(),
     };
-    let network = match args.segmenter.as_deref() {
-        Some("files" | REGIONS) => None,
-        Some(name) => Some(name.to_owned()),
-        None => {
-            catalogue::usable(Role::Segmenter, &mut |text| observer.note(Severity::Warning, text))?.into_iter().next()
-        }
-    };
-    let mut segmenter = segmenter(args.masks.as_deref(), &scene.cloud, &scene.settings, network.as_deref())?;
-    let track = TrackOptions {
-        seed,
-        max_seeds: args.max_seeds.max(1),
-        reseed_share: args.unknown / 100.0,
-        veto: args.tracker == TrackerKind::Both,
-        max_side_px: args.plan.of_scene(&scene).object_side_px,
-    };
-    let lifting = match args.lifting {
-        LiftingArg::Votes => Lifting::Votes,
-        LiftingArg::Refined => Lifting::Refined(args.code_steps),
-        LiftingArg::Paper => Lifting::Paper(args.code_steps),
-    };
-    let mut encoder = match args.encoder.as_deref() {
-        Some("none") => None,
-        Some(name) => Some(models::encoder(name)?),
-        None => Some(models::best_encoder(&mut |text| observer.note(Severity::Warning, text))?),
-    };
-    let mut follower = match args.tracker {
-        TrackerKind::Geometry => None,
-        _ => Some(Follower::open(&args.tracker_model, Some(args.scene.join("cache")))?),
-    };
-    let start = Instant::now();
-    let options = FindOptions { track, lifting };
-    let (cloud, settings) = (&scene.cloud, &scene.settings);
-    let tools = Tools { segmenter: &mut *segmenter, follower: follower.as_mut(), encoder: encoder.as_deref_mut() };
-    let found = find_objects(cloud, &photos, settings, tools, &options, &mut observer);
-    let Found { map, views, disagreements, secs: stages } =
-        found.map_err(|e| CliError::of_work(e, "nothing was stored"))?;
-    let (kept, _) = folder.replace_map(scene.state.as_deref(), &map, &scene.cloud)?;
-    if let Some(kept) = kept {
-        observer.note(Severity::Info, format!("The objects and parts before are kept in {}", kept.display()));
-    }
-    let secs = start.elapsed().as_secs_f64();
+    let done = find_objects::run(request, &mut observer);
+    let FoundObjects { found, photos, secs, .. } = done.map_err(|e| CliError::of_work(e, "nothing was stored"))?;
+    let Found { map, views, disagreements, secs: stages } = found;
     let count = |level: Level| map.identities.iter().filter(|(_, i)| i.level == level).count();
     if args.json {
         let sizes = map.sizes();

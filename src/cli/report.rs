@@ -1,7 +1,6 @@
 //! `fmlgs report`: error against run time.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::Instant;
 
 use super::progress::Console;
@@ -138,7 +137,7 @@ fn subject(path: &Path, options: Options) -> Result<Subject, CliError> {
     let map = if path.is_dir() { io::semantic_map::load(path, scene.state.as_deref(), &scene.cloud)? } else { None };
     Ok(Subject {
         name: path.display().to_string(),
-        cloud: Arc::new(scene.cloud),
+        cloud: scene.cloud,
         settings: scene.settings,
         cameras: scene.cameras.into_iter().map(|c| (c.camera, c.held_out)).collect(),
         holdout_every: scene.config.holdout_every,

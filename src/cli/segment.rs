@@ -2,12 +2,11 @@
 
 use std::path::PathBuf;
 
-use super::asking::{Asker, semantics};
-use super::query::KindArg;
-use super::{CliError, number, opened, output};
-use crate::io;
+use super::{CliError, number, output};
+use crate::jobs::{export, open, query, segment};
 use crate::pipeline::semantics::codes::TOLERANCE;
-use crate::pipeline::semantics::matching::{MatchMode, gaussians};
+use crate::pipeline::semantics::matching::MatchMode;
+use crate::scene::LevelFilter;
 
 /// Write the Gaussians of an object or a part as a .ply
 ///
@@ -33,8 +32,8 @@ pub struct Args {
     #[arg(long, default_value_t = 1, value_parser = number::within(1..=100_000_usize))]
     top: usize,
     /// Whether an object or a part is meant
-    #[arg(long, value_enum, default_value_t = KindArg::Auto)]
-    kind: KindArg,
+    #[arg(long, value_enum, default_value_t = LevelFilter::Auto)]
+    kind: LevelFilter,
     /// Match the codes of the Gaussians instead of their identities
     #[arg(long)]
     blend: bool,
@@ -44,30 +43,14 @@ pub struct Args {
 }
 
 pub fn run(args: Args) -> Result<(), CliError> {
-    let scene = opened::drawable(&args.scene)?;
-    output::check(&args.out, &[".ply"], &scene.reads(&args.scene))?;
-    let map = semantics(&args.scene, scene.state.as_deref(), &scene.cloud)?;
-    let answered = Asker::new(&map)?.ask(&args.text, args.kind.into())?;
-    let targets = answered.map(|a| a.chosen(args.top)).unwrap_or_default();
-    if targets.is_empty() {
-        return Err(CliError::failed(format!(
-            "nothing here is called '{}'; 'fmlgs query' says what is near",
-            args.text
-        )));
-    }
+    let scene = open::scene(&args.scene)?;
+    output::check(&args.out, &[".ply"], &scene.reads())?;
+    let map = scene.semantics()?;
+    let targets = query::identities(&map, &args.text, args.kind, args.top)?;
     let mode = if args.blend { MatchMode::Blend } else { MatchMode::Exact };
-    let mut inside = vec![false; scene.cloud.len()];
-    for target in &targets {
-        let found = gaussians(&map, *target, mode, args.tolerance / 255.0);
-        inside.iter_mut().zip(found).for_each(|(a, b)| *a |= b);
-    }
-    let kept: Vec<usize> = (0..inside.len()).filter(|&i| inside[i] != args.rest).collect();
-    if kept.is_empty() {
-        return Err(CliError::failed("no Gaussian is left to write"));
-    }
-    output::make_parent(&args.out)?;
-    io::splat_ply::write(&args.out, &scene.cloud.select(&kept))?;
+    let kept = segment::select(&scene.cloud, &map, &targets, mode, args.tolerance / 255.0, args.rest)?;
+    export::ply(&args.out, &kept)?;
     let names: Vec<String> = targets.iter().map(|id| map.identities.full_name(*id)).collect();
     let what = if args.rest { format!("all but {}", names.join(", ")) } else { names.join(", ") };
-    output::print(&format!("{what}: {} of {} Gaussians in {}", kept.len(), inside.len(), args.out.display()))
+    output::print(&format!("{what}: {} of {} Gaussians in {}", kept.len(), scene.cloud.len(), args.out.display()))
 }

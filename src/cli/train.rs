@@ -1,17 +1,18 @@
 //! `fmlgs train`: from posed photos to a trained scene.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
 use super::plan::PlanArgs;
 use super::progress::{Console, evaluation_line};
-use super::{CliError, number, opened, output};
-use crate::io::{self, Opened};
+use super::{CliError, number, output};
+use crate::jobs::open::{self, Contents};
+use crate::jobs::{plan, train};
 use crate::pipeline::observer::{Observer, Severity};
-use crate::pipeline::train::{self, TrainConfig, TrainEnd};
+use crate::pipeline::train::TrainConfig;
 use crate::render::BackendChoice;
-use crate::scene::{Dataset, Facts, Machine, ScenePlan};
+use crate::scene::Dataset;
 
 /// Train 3D Gaussians from posed photos
 ///
@@ -27,7 +28,8 @@ use crate::scene::{Dataset, Facts, Machine, ScenePlan};
 pub struct Args {
     /// Dataset folder or transforms.json; or a trained scene, to go on with it
     data: PathBuf,
-    /// Folder of the trained scene [default: out/NAME, the name of the dataset]
+    /// Folder of the trained scene [default: out/NAME, the name of the dataset; out/NAME-2 and so on where that
+    /// was trained with other settings]
     #[arg(long)]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -122,60 +124,60 @@ impl Settings {
     }
 }
 
-/// A checked training job.
-struct Job {
-    dataset: Dataset,
-    config: TrainConfig,
-    out: PathBuf,
-}
-
 impl Args {
-    fn check(&self) -> Result<Job, CliError> {
-        let planned = |config: TrainConfig, dataset: &Dataset| {
-            let facts = Facts::of(Machine::default(), config.limits()).with_photos(&dataset.cameras());
-            let plan = ScenePlan::new(facts, &self.plan.overrides());
-            let backend = if plan.on_cpu { BackendChoice::Cpu } else { config.backend };
-            TrainConfig { max_side_px: plan.train_side_px, backend, ..config }
-        };
-        match io::open(&self.data)? {
-            Opened::Dataset(dataset) => {
-                let out = self.out.clone().unwrap_or_else(|| PathBuf::from("out").join(&dataset.name));
-                Ok(Job { config: planned(self.settings.over(TrainConfig::default()), &dataset), dataset, out })
-            }
-            Opened::Trained(scene) => {
-                let Some(photos) = scene.dataset_path() else {
+    /// What to train on, how, and in which folders: the one that is given, or else the first that holds no
+    /// training with other settings.
+    fn check(&self) -> Result<(Dataset, TrainConfig, Vec<PathBuf>), CliError> {
+        let (dataset, base, own) = match open::contents(&self.data)? {
+            Contents::Photos(dataset) => (dataset, TrainConfig::default(), None),
+            Contents::Scene(scene) if scene.folder.is_some() => {
+                let Some(photos) = &scene.dataset_path else {
                     return Err(CliError::failed(format!(
                         "{}: its photos are no longer where they were; give their folder instead of the scene",
                         self.data.display()
                     )));
                 };
-                let trained_with = TrainConfig::stored(&scene.folder, scene.info.config)?;
-                let out = self.out.clone().unwrap_or(scene.folder);
-                let dataset = opened::dataset(&photos)?;
-                Ok(Job { config: planned(self.settings.over(trained_with), &dataset), dataset, out })
+                (open::dataset(photos)?, scene.config, scene.folder)
             }
-            Opened::Cloud(_) => Err(CliError::failed(format!(
-                "{} is a finished splat without photos; a folder of posed photos is needed to train",
-                self.data.display()
-            ))),
-        }
+            Contents::Scene(_) => {
+                return Err(CliError::failed(format!(
+                    "{} is a finished splat without photos; a folder of posed photos is needed to train",
+                    self.data.display()
+                )));
+            }
+        };
+        let config = self.settings.over(base);
+        let plan = plan::of_photos(&dataset, &config, &self.plan.overrides());
+        let backend = if plan.on_cpu { BackendChoice::Cpu } else { config.backend };
+        let folders = match self.out.clone().or(own) {
+            Some(out) => vec![out],
+            None => usual_folders(&PathBuf::from("out").join(&dataset.name)),
+        };
+        Ok((dataset, TrainConfig { max_side_px: plan.train_side_px, backend, ..config }, folders))
     }
 }
 
+/// `first`, `first-2` and so on, as far as they exist, and one more.
+fn usual_folders(first: &Path) -> Vec<PathBuf> {
+    let folder = |n: usize| if n == 1 { first.to_owned() } else { PathBuf::from(format!("{}-{n}", first.display())) };
+    let there = (1..).take_while(|n| folder(*n).exists()).count();
+    (1..=there + 1).map(folder).collect()
+}
+
 pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
-    let job = args.check()?;
+    let (dataset, config, folders) = args.check()?;
     let mut console = Console::new(quiet);
-    for warning in &job.dataset.warnings {
+    for warning in &dataset.warnings {
         console.note(Severity::Warning, warning.clone());
     }
-    let outcome = train::run(&job.dataset, &job.config, Some(&job.out), &mut console)?;
-    let out = job.out.display();
-    let finished = outcome.end == TrainEnd::Finished;
+    let done = train::run(&dataset, &config, folders, &mut console)?;
+    let (outcome, finished) = (&done.outcome, done.is_finished());
+    let out = done.out.display();
     if args.json {
         output::print_json(&json!({
             "end": if finished { "finished" } else { "cancelled" },
-            "out": job.out,
-            "config": job.config,
+            "out": done.out,
+            "config": config,
             "steps": outcome.steps,
             "secs": outcome.secs,
             "gaussians": outcome.cloud.len(),
@@ -190,8 +192,8 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     if finished {
         return Ok(());
     }
-    let (done, all) = (outcome.steps, job.config.steps);
-    Err(CliError::Cancelled(format!("{done} of {all} steps are saved in {out}; the same command goes on from there")))
+    let (steps, all) = (outcome.steps, config.steps);
+    Err(CliError::Cancelled(format!("{steps} of {all} steps are saved in {out}; the same command goes on from there")))
 }
 
 #[cfg(test)]
@@ -224,5 +226,15 @@ mod tests {
         assert_eq!(stated("seed"), d.seed.to_string());
         assert_eq!(stated("eval_every"), d.eval_every.to_string());
         assert_eq!(stated("checkpoint_secs"), d.checkpoint_secs.to_string());
+    }
+
+    #[test]
+    fn a_training_with_other_settings_gets_a_folder_of_its_own() {
+        let folder = tempfile::tempdir().expect("folder");
+        let first = folder.path().join("fox");
+        let second = PathBuf::from(format!("{}-2", first.display()));
+        assert_eq!(usual_folders(&first), std::slice::from_ref(&first));
+        std::fs::create_dir(&first).expect("create");
+        assert_eq!(usual_folders(&first), [first, second]);
     }
 }

@@ -2,23 +2,20 @@
 
 use std::path::Path;
 
-use glam::{DMat3, DVec2};
-
 use super::CliError;
-use super::opened::{DrawableScene, NamedCamera};
+use super::opened::DrawableScene;
 use crate::io;
-use crate::scene::{Bounds, Camera, GaussianCloud};
+use crate::io::trained::SceneCamera;
+use crate::scene::Camera;
 
 /// The camera that `wanted` names: an index from 0, a photo's name (its end is enough where that
-/// is unambiguous), or a JSON file. Without a wish it is the first photo's, or a view of the whole
-/// cloud where there are no photos.
+/// is unambiguous), or a JSON file. Without a wish it is the scene's first view.
 pub fn choose(wanted: Option<&str>, scene: &DrawableScene) -> Result<Camera, CliError> {
     let Some(wanted) = wanted else {
-        return match scene.cameras.first() {
-            Some(first) => Ok(first.camera.clone()),
-            None => whole(&scene.cloud)
-                .ok_or_else(|| CliError::failed("the splat holds no Gaussians, so there is nothing to look at")),
-        };
+        if scene.cameras.is_empty() && scene.cloud.is_empty() {
+            return Err(CliError::failed("the splat holds no Gaussians, so there is nothing to look at"));
+        }
+        return Ok(scene.home().camera([640, 480]));
     };
     if let Some(camera) = of_photo(wanted, &scene.cameras)? {
         return Ok(camera);
@@ -38,14 +35,14 @@ pub fn choose(wanted: Option<&str>, scene: &DrawableScene) -> Result<Camera, Cli
     Err(CliError::failed(format!("no photo and no file is called '{wanted}'. {known}")))
 }
 
-fn of_photo(wanted: &str, cameras: &[NamedCamera]) -> Result<Option<Camera>, CliError> {
+fn of_photo(wanted: &str, cameras: &[SceneCamera]) -> Result<Option<Camera>, CliError> {
     if let Some(exact) = cameras.iter().find(|c| c.name == wanted) {
         return Ok(Some(exact.camera.clone()));
     }
     if let Some(at) = wanted.parse::<usize>().ok().and_then(|i| cameras.get(i)) {
         return Ok(Some(at.camera.clone()));
     }
-    let ends: Vec<&NamedCamera> = cameras.iter().filter(|c| ends_with_path(&c.name, wanted)).collect();
+    let ends: Vec<&SceneCamera> = cameras.iter().filter(|c| ends_with_path(&c.name, wanted)).collect();
     match ends.as_slice() {
         [] => Ok(None),
         [one] => Ok(Some(one.camera.clone())),
@@ -57,31 +54,6 @@ fn of_photo(wanted: &str, cameras: &[NamedCamera]) -> Result<Option<Camera>, Cli
 fn ends_with_path(name: &str, wanted: &str) -> bool {
     let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
     [name, stem].iter().any(|n| *n == wanted || n.strip_suffix(wanted).is_some_and(|front| front.ends_with('/')))
-}
-
-/// A 640 x 480 view of the cloud from its front, as splats are usually oriented: x right, y down,
-/// z away. `None` for an empty cloud.
-fn whole(cloud: &GaussianCloud) -> Option<Camera> {
-    let bounds = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i)))?;
-    let fov_y_rad = 0.8_f64;
-    let distance = bounds.radius().max(1e-6) / (0.5 * fov_y_rad).sin();
-    let (width_px, height_px) = (640, 480);
-    let center = bounds.center() - glam::DVec3::Z * distance;
-    Some(Camera::of_pose(center, DMat3::IDENTITY, fov_y_rad, width_px, height_px))
-}
-
-/// The camera with a picture of `width_px` x `height_px`. The vertical field of view stays; where
-/// the shape differs, the picture shows more or less at the sides, never anything stretched.
-pub fn with_size(camera: &Camera, width_px: u32, height_px: u32) -> Camera {
-    let scale = f64::from(height_px) / f64::from(camera.height_px);
-    let shift = f64::from(width_px) * 0.5 - f64::from(camera.width_px) * 0.5 * scale;
-    Camera {
-        width_px,
-        height_px,
-        focal_px: camera.focal_px * scale,
-        principal_px: camera.principal_px * scale + DVec2::new(shift, 0.0),
-        ..camera.clone()
-    }
 }
 
 /// Bytes that drawing a pixel takes: colour, depth and opacity, their copies on the way to the file.
@@ -105,8 +77,6 @@ pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::train::TrainConfig;
-    use crate::render::RenderSettings;
     use glam::DVec3;
 
     fn scene(names: &[&str]) -> DrawableScene {
@@ -115,16 +85,8 @@ mod tests {
             Camera::look_at(eye, DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid")
         };
         let named =
-            |(i, name): (usize, &&str)| NamedCamera { name: (*name).to_owned(), camera: camera(i), held_out: false };
-        DrawableScene {
-            cloud: GaussianCloud::default(),
-            cameras: names.iter().enumerate().map(named).collect(),
-            settings: RenderSettings::default(),
-            config: TrainConfig::default(),
-            dataset_path: None,
-            metres_per_unit: None,
-            state: None,
-        }
+            |(i, name): (usize, &&str)| SceneCamera { name: (*name).to_owned(), camera: camera(i), held_out: false };
+        DrawableScene { cameras: names.iter().enumerate().map(named).collect(), ..DrawableScene::default() }
     }
 
     #[test]
@@ -164,14 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn another_size_keeps_the_middle_and_the_vertical_view() {
-        let camera = scene(&["a"]).cameras[0].camera.clone();
-        let wide = with_size(&camera, 200, 96);
-        wide.validate().expect("valid");
-        let middle = wide.project(DVec3::ZERO).expect("in front");
-        assert!((middle - DVec2::new(100.0, 48.0)).length() < 1e-9, "{middle}");
-        let top = camera.center + camera.ray(DVec2::new(32.0, 0.0)) * 2.0;
-        assert!(wide.project(top).expect("in front").y.abs() < 1e-9);
+    fn sizes_are_two_numbers() {
         assert_eq!(parse_size("640x480"), Ok([640, 480]));
         for bad in ["640", "0x4", "4x", "x", "99999x4", "-1x4"] {
             assert!(parse_size(bad).is_err(), "{bad}");

@@ -169,6 +169,15 @@ pub fn folder_name(folder: &Path) -> String {
     text::name(&real.file_name().unwrap_or(real.as_os_str()).to_string_lossy())
 }
 
+/// The path `now` of something that was called `earlier` by another version: it is renamed once, and used as it
+/// is where that is not possible.
+pub fn renamed(now: PathBuf, earlier: PathBuf) -> PathBuf {
+    if !now.exists() && earlier.exists() && fs::rename(&earlier, &now).is_err() {
+        return earlier;
+    }
+    now
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

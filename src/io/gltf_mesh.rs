@@ -13,15 +13,17 @@ mod accessor;
 mod geometry;
 mod material;
 mod model;
-mod resource;
+pub(super) mod resource;
 #[cfg(test)]
 pub(crate) mod tests;
 
-use std::path::{Path, PathBuf};
+use std::cell::Cell;
+use std::path::Path;
 
 use glam::{DMat4, DQuat, DVec3};
 use gltf::json::{self, Root};
 
+use super::{IoError, files};
 use crate::scene::text;
 
 pub use model::{AlphaMode, Material, Mesh, MeshNode, MeshScene, Primitive, TextureImage, TextureUse, Wrap};
@@ -35,104 +37,35 @@ const MAX_SHARING: u64 = 64;
 /// Most nodes and most primitives.
 const MAX_ITEMS: usize = 1 << 20;
 
-/// Why a glTF scene could not be read.
-#[derive(Debug, thiserror::Error)]
-pub enum GltfError {
-    /// A file could not be read, or is larger than the reader takes.
-    #[error(transparent)]
-    Read(#[from] super::IoError),
-    /// A file that the scene names could not be found.
-    #[error("{path}: {source}", path = path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// The container is neither binary glTF 2.0 nor JSON.
-    #[error("{path}: not a glTF 2.0 file: {problem}", path = path.display())]
-    Container {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        problem: String,
-    },
-    /// The JSON part does not parse as glTF.
-    #[error("{path}: the JSON part is not glTF 2.0: {source}", path = path.display())]
-    Json {
-        /// The file.
-        path: PathBuf,
-        /// Where and why.
-        source: json::Error,
-    },
-    /// The file cannot be shown without an extension that is not supported.
-    #[error("{path}: needs the extension {extension}, which is not supported; export it without", path = path.display())]
-    Extension {
-        /// The file.
-        path: PathBuf,
-        /// The extension's name.
-        extension: String,
-    },
-    /// Something inside the file is wrong.
-    #[error("{path}: {place}: {problem}", path = path.display())]
-    Content {
-        /// The file.
-        path: PathBuf,
-        /// Where in its JSON, for example `accessors[3]`.
-        place: String,
-        /// What is wrong.
-        problem: String,
-    },
-    /// A buffer or image outside the scene's folder.
-    #[error("{path}: {place}: refuses to read `{uri}`, which is not inside the scene's folder", path = path.display())]
-    OutsideFolder {
-        /// The scene's file.
-        path: PathBuf,
-        /// Where in its JSON.
-        place: String,
-        /// What it asked for.
-        uri: String,
-    },
-    /// More data than the reader takes.
-    #[error("{path}: {what} exceeds the limit of {limit}", path = path.display())]
-    TooLarge {
-        /// The file.
-        path: PathBuf,
-        /// What is too large.
-        what: String,
-        /// The limit with its unit.
-        limit: String,
-    },
-}
-
 /// Reads a scene from a `.gltf` or `.glb` file; external files only from the file's own folder.
-pub fn read(path: &Path) -> Result<MeshScene, GltfError> {
-    let bytes = resource::read_file(path)?;
+pub fn read(path: &Path) -> Result<MeshScene, IoError> {
+    let bytes = files::read(path, MAX_FILE_BYTES)?;
     let folder = path.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p });
     read_bytes(&bytes, path, folder)
 }
 
 /// Reads a self-contained scene from memory; `name` stands for its path in messages.
-pub fn read_slice(bytes: &[u8], name: &str) -> Result<MeshScene, GltfError> {
+pub fn read_slice(bytes: &[u8], name: &str) -> Result<MeshScene, IoError> {
     read_bytes(bytes, Path::new(name), None)
 }
 
-fn read_bytes(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<MeshScene, GltfError> {
+fn read_bytes(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<MeshScene, IoError> {
     let (text, blob) = resource::split_container(bytes, path)?;
-    let root = json::deserialize::from_slice::<Root>(text)
-        .map_err(|source| GltfError::Json { path: path.to_owned(), source })?;
+    let root: Root = parse(text, path)?;
     if let Some(extension) = root.extensions_required.iter().find(|e| !supported(e)) {
-        return Err(GltfError::Extension { path: path.to_owned(), extension: extension.clone() });
+        let what = format!("the required extension {extension}");
+        return Err(IoError::Unsupported { path: path.into(), what, remedy: "export the scene without it" });
     }
-    let buffers = resource::load_buffers(&root, path, folder, blob)?;
-    // Primitives may share vertices, but a small file that decodes to gigabytes means harm.
-    let held = buffers.iter().map(|b| b.len() as u64).sum::<u64>();
-    let values_left = held.saturating_mul(MAX_SHARING).clamp(1 << 20, MAX_VALUES);
-    let mut file = File { path, folder, root: &root, buffers, values_left, warnings: Vec::new() };
+    let mut file = File::open(&root, path, folder, blob, [MAX_FILE_BYTES, MAX_VALUES])?;
     let (nodes, roots) = file.nodes()?;
     let (materials, images) = file.materials()?;
     let meshes = file.meshes(&nodes, &materials)?;
     Ok(MeshScene { nodes, roots, meshes, materials, images, warnings: file.warnings })
+}
+
+/// The JSON part of a file.
+pub(super) fn parse<T: serde::de::DeserializeOwned>(text: &[u8], path: &Path) -> Result<T, IoError> {
+    serde_json::from_slice(text).map_err(|e| files::json_error(path, &e))
 }
 
 /// Whether a scene that requires the extension can be drawn right: those that only refine the look
@@ -143,43 +76,62 @@ fn supported(extension: &str) -> bool {
 }
 
 /// A parsed file while its content is taken over.
-struct File<'a> {
+pub(super) struct File<'a> {
     path: &'a Path,
     folder: Option<&'a Path>,
     root: &'a Root,
     buffers: Vec<std::borrow::Cow<'a, [u8]>>,
-    values_left: u64,
+    values_left: Cell<u64>,
     warnings: Vec<String>,
 }
 
-impl File<'_> {
-    fn content(&self, place: impl Into<String>, problem: impl Into<String>) -> GltfError {
-        GltfError::Content { path: self.path.to_owned(), place: place.into(), problem: problem.into() }
+impl<'a> File<'a> {
+    /// Loads the buffers of a file whose binary chunk is `blob`; its limits are the bytes of all buffers, and the values
+    /// that all accessors together may decode to.
+    pub fn open(
+        root: &'a Root,
+        path: &'a Path,
+        folder: Option<&'a Path>,
+        blob: Option<&'a [u8]>,
+        [most_bytes, most_values]: [u64; 2],
+    ) -> Result<Self, IoError> {
+        let buffers = resource::load_buffers(root, path, folder, blob, most_bytes)?;
+        // Primitives may share vertices, but a small file that decodes to gigabytes means harm.
+        let held = buffers.iter().map(|b| b.len() as u64).sum::<u64>();
+        let values_left = Cell::new(held.saturating_mul(MAX_SHARING).clamp(1 << 20, most_values));
+        Ok(Self { path, folder, root, buffers, values_left, warnings: Vec::new() })
+    }
+
+    /// Something at `place` that does not follow the format.
+    pub fn content(&self, place: impl Into<String>, problem: impl Into<String>) -> IoError {
+        IoError::Syntax { path: self.path.into(), place: place.into(), reason: problem.into() }
     }
 
     /// `list[index]`, or an error that names both.
-    fn item<'l, T>(&self, list: &'l [T], index: usize, name: &str, place: &str) -> Result<&'l T, GltfError> {
+    fn item<'l, T>(&self, list: &'l [T], index: usize, name: &str, place: &str) -> Result<&'l T, IoError> {
         list.get(index)
             .ok_or_else(|| self.content(place, format!("refers to {name}[{index}], but there are {}", list.len())))
     }
 
     /// Takes `count` values off the budget.
-    fn spend(&mut self, count: u64) -> Result<(), GltfError> {
-        self.values_left = self.values_left.checked_sub(count).ok_or_else(|| GltfError::TooLarge {
-            path: self.path.to_owned(),
-            what: "the geometry".into(),
-            limit: "what its buffers can hold, vertices shared within reason".into(),
-        })?;
+    fn spend(&self, count: u64) -> Result<(), IoError> {
+        let (limit, left) = (self.values_left.get(), self.values_left.get().checked_sub(count));
+        self.values_left.set(left.ok_or_else(|| IoError::OverBudget {
+            path: self.path.into(),
+            what: "the geometry",
+            bytes: count.saturating_mul(4),
+            limit: limit.saturating_mul(4),
+            remedy: "that is more than what its buffers can hold, vertices shared within reason",
+        })?);
         Ok(())
     }
 
     /// The node tree of the default scene (else of the first, else of every node that is no child),
     /// parents before children.
-    fn nodes(&mut self) -> Result<(Vec<MeshNode>, Vec<usize>), GltfError> {
+    pub fn nodes(&self) -> Result<(Vec<MeshNode>, Vec<usize>), IoError> {
         let root = self.root;
         if root.nodes.len() > MAX_ITEMS {
-            let limit = format!("{MAX_ITEMS}");
-            return Err(GltfError::TooLarge { path: self.path.to_owned(), what: "the number of nodes".into(), limit });
+            return Err(self.content("nodes", format!("there are more than {MAX_ITEMS}")));
         }
         let tops: Vec<usize> = match (root.scene, root.scenes.first()) {
             (Some(i), _) => {

@@ -195,7 +195,7 @@ fn at_opening(scene: &OpenScene, plan: &ScenePlan, settings: &RenderSettings) ->
 /// Bytes of the buffers that the GPU renderer allocates for the first view, on whatever adapter there is; 0
 /// without any.
 fn device_bytes(scene: &OpenScene, settings: &RenderSettings) -> Result<u64, StudyError> {
-    let Ok(device) = Device::new() else { return Ok(0) };
+    let Ok(device) = Device::shared() else { return Ok(0) };
     let mut renderer = Renderer::on_gpu(&device).map_err(failed)?;
     renderer.draw(&scene.cloud, &scene.first, settings).map_err(failed)?;
     Ok(renderer.device_bytes())

@@ -7,6 +7,7 @@ use super::curve::Curve;
 use super::matter::Matter;
 use super::pose::{Pose, RotationSpline, angle};
 use crate::math::stats::worst;
+use crate::scene::{CameraPath, PathKey};
 
 /// Poses of a flight (the paper's M).
 pub const FRAMES: usize = 150;
@@ -65,6 +66,14 @@ pub struct Smoothness {
 }
 
 impl Flight {
+    /// The flight as a path with a key per pose.
+    pub fn camera_path(&self) -> CameraPath {
+        let last = (self.poses.len() - 1).max(1) as f64;
+        let key = |(i, p): (usize, &Pose)| PathKey { time_secs: Some(self.seconds * i as f64 / last), ..p.key() };
+        let keys = self.poses.iter().enumerate().map(key).collect();
+        CameraPath { keys, closed: false, fps: last / self.seconds.max(1e-3), seconds: self.seconds }
+    }
+
     /// Along `legs` from one pose to another. On the way it looks at `look_at`, if there is such a
     /// thing. `None` for no legs.
     pub fn new(

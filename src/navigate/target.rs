@@ -26,31 +26,31 @@ const DRAWN_PX: u32 = 128;
 const PHOTO_ANGLE: f64 = 0.6;
 
 /// From which side.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, IntoStaticStr, VariantArray)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, clap::ValueEnum, IntoStaticStr, VariantArray)]
 pub enum Side {
-    /// Whichever shows it best.
+    /// Whichever shows it best
     #[default]
     #[strum(serialize = "where it is seen best")]
     Best,
-    /// As the eye sees it now.
+    /// As it is seen now
     #[strum(serialize = "from this side")]
     Same,
-    /// The opposite of that.
+    /// The opposite
     #[strum(serialize = "from the other side")]
     Other,
-    /// Its front: away from what it is a part of, or where most photos were taken.
+    /// Its front: away from what it is a part of, or where most photos were taken
     #[strum(serialize = "from its front")]
     Front,
-    /// What is left of it now.
+    /// Its left, seen from the start
     #[strum(serialize = "from its left")]
     Left,
-    /// What is right of it now.
+    /// Its right, seen from the start
     #[strum(serialize = "from its right")]
     Right,
-    /// Over it.
+    /// From above
     #[strum(serialize = "from above")]
     Above,
-    /// Under it.
+    /// From below
     #[strum(serialize = "from below")]
     Below,
 }

@@ -30,8 +30,8 @@ impl BackendChoice {
     pub fn gpu(self, told: impl FnOnce(String)) -> Result<Option<Device>, GpuError> {
         match self {
             Self::Cpu => Ok(None),
-            Self::Gpu => Device::new().map(Some),
-            Self::Auto => Ok(or_told(Device::real(), told).flatten()),
+            Self::Gpu => Device::shared().map(Some),
+            Self::Auto => Ok(or_told(Device::shared_real(), told).flatten()),
         }
     }
 }

@@ -163,6 +163,20 @@ impl Camera {
         if sum.length() > 0.1 * f64::from(count) { sum.try_normalize() } else { None }
     }
 
+    /// The point nearest to the axes of these cameras: what they look at. `None` where the axes are
+    /// parallel.
+    pub fn focus_of<'a>(cameras: impl Iterator<Item = &'a Self>) -> Option<DVec3> {
+        let (mut a, mut b, mut n) = (DMat3::ZERO, DVec3::ZERO, 0.0);
+        for c in cameras {
+            let d = c.forward();
+            let m = DMat3::IDENTITY - DMat3::from_cols(d * d.x, d * d.y, d * d.z);
+            a += m;
+            b += m * c.center;
+            n += 1.0_f64;
+        }
+        (n > 1.0 && a.determinant() > 1e-4 * n.powi(3)).then(|| a.inverse() * b)
+    }
+
     /// The same camera with a picture of another size: intrinsics scaled per axis.
     pub fn resized(&self, width_px: u32, height_px: u32) -> Self {
         let scale = DVec2::new(
@@ -174,6 +188,20 @@ impl Camera {
             height_px,
             focal_px: self.focal_px * scale,
             principal_px: self.principal_px * scale,
+            ..self.clone()
+        }
+    }
+
+    /// The camera with a picture of this size. The vertical field of view stays; where the shape differs, the
+    /// picture shows more or less at the sides, never anything stretched.
+    pub fn with_size(&self, width_px: u32, height_px: u32) -> Self {
+        let scale = f64::from(height_px) / f64::from(self.height_px);
+        let shift = f64::from(width_px) * 0.5 - f64::from(self.width_px) * 0.5 * scale;
+        Self {
+            width_px,
+            height_px,
+            focal_px: self.focal_px * scale,
+            principal_px: self.principal_px * scale + DVec2::new(shift, 0.0),
             ..self.clone()
         }
     }
@@ -334,5 +362,16 @@ mod tests {
         assert!(matches!(with(&|c| c.principal_px.x = f64::NAN), Err(CameraError::Principal(..))));
         assert!(with(&|c| c.world_from_camera.x_axis *= 1.0004).is_ok(), "8e-4 off");
         assert!(matches!(with(&|c| c.world_from_camera.x_axis *= 1.0006), Err(CameraError::Rotation(_))));
+    }
+
+    #[test]
+    fn another_size_keeps_the_middle_and_the_vertical_view() {
+        let camera = Camera::look_at(DVec3::new(1.0, -3.0, 1.0), DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid");
+        let wide = camera.with_size(200, 96);
+        wide.validate().expect("valid");
+        let middle = wide.project(DVec3::ZERO).expect("in front");
+        assert!((middle - DVec2::new(100.0, 48.0)).length() < 1e-9, "{middle}");
+        let top = camera.center + camera.ray(DVec2::new(32.0, 0.0)) * 2.0;
+        assert!(wide.project(top).expect("in front").y.abs() < 1e-9);
     }
 }

@@ -71,18 +71,8 @@ impl Dataset {
     /// The point nearest to all viewing axes: what the photos look at. Falls back to the mean of
     /// the sparse points where the axes are parallel.
     pub fn focus(&self) -> DVec3 {
-        let mut a = glam::DMat3::ZERO;
-        let mut b = DVec3::ZERO;
-        for p in &self.photos {
-            let d = p.camera.forward();
-            let outer = glam::DMat3::from_cols(d * d.x, d * d.y, d * d.z);
-            let m = glam::DMat3::IDENTITY - outer;
-            a += m;
-            b += m * p.camera.center;
-        }
-        let n = self.photos.len() as f64;
-        if n > 1.0 && a.determinant() > 1e-4 * n.powi(3) {
-            return a.inverse() * b;
+        if let Some(focus) = Camera::focus_of(self.photos.iter().map(|p| &p.camera)) {
+            return focus;
         }
         Bounds::robust(self.points.iter().map(|p| p.position)).map_or_else(
             || self.photos.first().map_or(DVec3::ZERO, |p| p.camera.center + p.camera.forward()),

@@ -15,6 +15,18 @@ pub enum Level {
     Part,
 }
 
+/// Which level is asked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum LevelFilter {
+    /// As the words say, else whatever fits better
+    #[default]
+    Auto,
+    /// A whole object
+    Object,
+    /// A part
+    Part,
+}
+
 /// Number of an identity: its place in the list plus one; 0 is nobody.
 pub type IdentityId = u32;
 

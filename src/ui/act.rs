@@ -13,6 +13,7 @@ use super::viewport::brush::Brush;
 use super::viewport::overrides::RenderOverrides;
 use crate::agent::scene::{Effect, Parts};
 use crate::measure::is_report;
+use crate::navigate::FRAMES;
 use crate::navigate::target::Wish;
 use crate::pipeline::semantics::edit::Edit;
 use crate::pipeline::train::TrainConfig;
@@ -179,12 +180,12 @@ impl App {
     }
 
     fn evaluate(&mut self) {
-        let dataset = self.state.scene.as_ref().and_then(|s| s.dataset.clone());
+        let scene = self.state.scene.as_ref().and_then(|s| Some((s.dataset.clone()?, s.out.clone())));
         let trained = self.state.training_job.is_some() || self.state.scene.as_ref().is_some_and(|s| s.trained);
-        match (dataset, self.viewport.cloud().cloned()) {
-            (Some(dataset), Some(cloud)) if trained => {
+        match (scene, self.viewport.cloud().cloned()) {
+            (Some((dataset, out)), Some(cloud)) if trained => {
                 let (cloud, config) = (Arc::clone(&cloud), self.layout.config.clone());
-                self.submit(Command::Evaluate { dataset, cloud, config });
+                self.submit(Command::Evaluate { dataset, cloud, config, out });
             }
             _ => self
                 .state
@@ -243,7 +244,8 @@ impl App {
             return;
         };
         let (cloud, map, from) = (Arc::clone(&cloud), Arc::clone(&map), eye);
-        let request = VisitRequest { explored, cloud, cameras, up, settings, map, id, wish, from, aspect };
+        let frames = FRAMES;
+        let request = VisitRequest { explored, cloud, cameras, up, settings, map, id, wish, from, aspect, frames };
         self.submit(Command::Visit(Box::new(request)));
     }
 

@@ -9,7 +9,8 @@ use super::camera;
 use super::context::SceneContext;
 use super::dialogs::Chosen;
 use super::state::Tone;
-use crate::worker::{Command, Failure, FilmRequest};
+use crate::render::BackendChoice;
+use crate::worker::{Command, Failure, VideoRequest};
 
 impl App {
     pub(super) fn choose(&mut self, action: Action) {
@@ -84,8 +85,8 @@ impl App {
         };
         let found = self.viewport.queries.found();
         let marked = map.filter(|_| self.camera.mark).map(|map| (Arc::clone(&map), found));
-        let cloud = Arc::clone(&cloud);
-        self.submit(Command::Film(Box::new(FilmRequest { cloud, draw, cameras, marked, out, settings })));
+        let (cloud, backend) = (Arc::clone(&cloud), BackendChoice::Auto);
+        self.submit(Command::Film(Box::new(VideoRequest { cloud, draw, cameras, marked, out, settings, backend })));
     }
 
     fn save_chat(&mut self, path: &Path) {

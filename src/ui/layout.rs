@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use super::chat::ChatSettings;
-use crate::pipeline::semantics::find::Finding;
+use crate::jobs::find_objects::FindSettings;
 use crate::pipeline::train::TrainConfig;
 use crate::scene::Overrides;
 use crate::ui::actions::Pane;
@@ -47,7 +47,7 @@ pub struct Layout {
     /// What of the scene plan is wanted otherwise.
     pub plan: Overrides,
     /// Models that find objects.
-    pub finding: Finding,
+    pub finding: FindSettings,
     /// What plans for the agent.
     pub chat: ChatSettings,
     /// Files and folders opened lately.
@@ -66,7 +66,7 @@ impl Default for Layout {
             times: false,
             config: TrainConfig { steps: 3_000, eval_every: 250, ..TrainConfig::default() },
             plan: Overrides::default(),
-            finding: Finding::default(),
+            finding: FindSettings::default(),
             chat: ChatSettings::default(),
             recent: Vec::new(),
         }

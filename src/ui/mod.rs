@@ -27,12 +27,15 @@ pub mod viewport;
 
 use std::sync::Arc;
 
+use eframe::egui_wgpu::WgpuSetup;
+
 pub use self::actions::Action;
 
+use crate::jobs::Folders;
+use crate::render::Device;
 use crate::scene::plan::PlanOverride;
 use crate::worker::Start;
 use crate::worker::jobs::PipelineJobs;
-use crate::worker::places::Places;
 
 /// Opens the window, takes what is wanted of plans, does `first` one after the other, and returns when it is closed.
 pub fn run(first: Vec<Start>, overrides: Vec<PlanOverride>) -> eframe::Result {
@@ -61,12 +64,22 @@ fn open(
     overrides: Vec<PlanOverride>,
 ) -> eframe::Result {
     // Shades that dithering would smooth do not occur in a flat theme.
-    let options = eframe::NativeOptions { viewport, renderer, dithering: false, ..eframe::NativeOptions::default() };
+    let mut options =
+        eframe::NativeOptions { viewport, renderer, dithering: false, ..eframe::NativeOptions::default() };
+    // A device that can draw and train too.
+    if let WgpuSetup::CreateNew(setup) = &mut options.wgpu_options.wgpu_setup {
+        setup.power_preference = eframe::wgpu::PowerPreference::HighPerformance;
+        setup.device_descriptor = Arc::new(Device::device_descriptor);
+    }
     eframe::run_native(
         "fmlgs",
         options,
         Box::new(|cc| {
-            let mut app = app::App::new(cc, PipelineJobs::new(Places::of_user()), first.into_iter().map(Action::from))?;
+            if let Some(window) = &cc.wgpu_render_state {
+                Device::adopt(&window.adapter, &window.device, &window.queue);
+            }
+            let first = first.into_iter().map(Action::from);
+            let mut app = app::App::new(cc, PipelineJobs::new(Folders::of_user()), first)?;
             app.override_plan(overrides);
             Ok(Box::new(app))
         }),

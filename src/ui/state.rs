@@ -6,13 +6,13 @@ use std::sync::Arc;
 
 use super::actions::Action;
 pub use super::train_history::TrainHistory;
+use crate::jobs::models::ModelList;
 use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Progress, Severity};
 use crate::pipeline::semantics::portraits::Gallery;
 use crate::render::RenderSettings;
 use crate::scene::undo::UndoHistory;
 use crate::scene::{Facts, Limits, Overrides, PhotoPixels, ScenePlan, SemanticMap, text};
-use crate::worker::models::ModelList;
 use crate::worker::{Event, Explored, Failure, JobId, JobKind, Lane, OpenedScene, Outcome, Versioned, Visited};
 
 /// Lines kept in the log.

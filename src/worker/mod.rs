@@ -4,15 +4,9 @@
 //! [`Event`]s (what happened). Bulk data never queues: it is published in a [`Slot`].
 
 pub mod control;
-pub mod edit;
-pub mod guide;
 pub mod jobs;
-pub mod machine;
 pub mod measure;
-pub mod models;
 pub mod observer;
-pub mod places;
-pub mod preview;
 pub mod protocol;
 mod quiet;
 pub mod slot;
@@ -22,11 +16,15 @@ pub mod view;
 pub mod view_modes;
 
 pub use control::Control;
-pub use edit::EditRequest;
-pub use guide::{Explored, FilmRequest, VisitRequest, Visited};
 pub use measure::MeasureRequest;
-pub use protocol::{Command, Event, Failure, HomeView, JobId, JobKind, Lane, OpenedScene, Outcome, Start, Stop};
+pub use protocol::{Command, Event, Failure, JobId, JobKind, Lane, Outcome, Start, Stop};
 pub use slot::{Slot, Versioned};
 pub use thread::{CloudSnapshot, Jobs, QueueFull, Repaint, Worker};
-pub use view::ViewMaps;
 pub use view_modes::ViewMode;
+
+pub use crate::jobs::OpenedScene;
+pub use crate::jobs::edit::EditRequest;
+pub use crate::jobs::go_to::{Explored, VisitRequest, Visited};
+pub use crate::jobs::query::ViewMaps;
+pub use crate::jobs::video::VideoRequest;
+pub use crate::scene::HomeView;

@@ -5,18 +5,21 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::edit::EditRequest;
-use super::guide::{Explored, FilmRequest, VisitRequest, Visited};
 use super::measure::MeasureRequest;
-use super::models::ModelList;
-use crate::io::trained::History;
+use crate::io::OpenError;
+use crate::jobs::edit::EditRequest;
+use crate::jobs::error::chain;
+use crate::jobs::find_objects::FindSettings;
+use crate::jobs::go_to::{Explored, VisitRequest, Visited};
+use crate::jobs::models::ModelList;
+use crate::jobs::video::VideoRequest;
+use crate::jobs::{JobError, OpenedScene};
 use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Interrupted, Progress, Severity, StepMetrics};
-use crate::pipeline::semantics::find::Finding;
 use crate::pipeline::semantics::portraits::Gallery;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
-use crate::scene::{Bounds, Camera, Dataset, Facts, GaussianCloud, Photo, PhotoPixels, SemanticMap};
+use crate::scene::{Camera, Dataset, Facts, GaussianCloud, HomeView, Photo, PhotoPixels, SemanticMap};
 
 /// Names one job of one worker.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -133,8 +136,10 @@ pub enum Command {
         dataset: Arc<Dataset>,
         /// The Gaussians.
         cloud: Arc<GaussianCloud>,
-        /// Picture size and hold-out rule.
+        /// Picture size, and the hold-out rule where the scene does not say which photos are.
         config: TrainConfig,
+        /// Folder of the trained scene.
+        out: PathBuf,
     },
     /// Find the objects and parts of a trained scene, and store them with it.
     FindObjects {
@@ -151,7 +156,7 @@ pub enum Command {
         /// Where the masks are; `None` = regions of the photos are found.
         masks: Option<PathBuf>,
         /// With which models.
-        with: Finding,
+        with: FindSettings,
         /// Folder of the trained scene.
         out: PathBuf,
     },
@@ -212,7 +217,7 @@ pub enum Command {
     /// Find the way to where an identity is seen best.
     Visit(Box<VisitRequest>),
     /// Draw a film.
-    Film(Box<FilmRequest>),
+    Film(Box<VideoRequest>),
     /// Measure error against run time of drawing, and write it as a report.
     Measure(Box<MeasureRequest>),
     /// Read a report.
@@ -284,60 +289,6 @@ impl Command {
     }
 }
 
-/// How to look at a scene at first.
-#[derive(Clone, Debug, PartialEq)]
-pub struct HomeView {
-    /// What a person would call the scene.
-    pub bounds: Bounds,
-    /// Upwards in the world, unit length.
-    pub up: DVec3,
-    /// A camera to start from, where the scene has one.
-    pub camera: Option<Camera>,
-}
-
-impl Default for HomeView {
-    fn default() -> Self {
-        Self { bounds: Bounds { min: DVec3::NEG_ONE, max: DVec3::ONE }, up: DVec3::Z, camera: None }
-    }
-}
-
-/// A scene as the window needs it.
-#[derive(Clone, Debug, Default)]
-pub struct OpenedScene {
-    /// Where it was read from.
-    pub path: PathBuf,
-    /// Short name for titles.
-    pub name: String,
-    /// Posed photos, if it has any.
-    pub dataset: Option<Arc<Dataset>>,
-    /// What to draw: trained Gaussians, or the sparse points as small ones.
-    pub cloud: Option<Arc<GaussianCloud>>,
-    /// Whether `cloud` is a result, not just sparse points.
-    pub trained: bool,
-    /// Objects and parts, if they were found before.
-    pub semantics: Option<Arc<SemanticMap>>,
-    /// Where masks of its photos are, if they came with them.
-    pub masks: Option<PathBuf>,
-    /// Folder in which training keeps its results and checkpoints.
-    pub out: PathBuf,
-    /// Measurements of earlier training.
-    pub history: History,
-    /// Length of a scene unit in metres, if that is known.
-    pub metres_per_unit: Option<f64>,
-    /// How to look at it at first.
-    pub home: HomeView,
-    /// How to draw it: background and filter.
-    pub render: RenderSettings,
-    /// Degree of the harmonics in its file.
-    pub sh_stored: u8,
-    /// What its plan is computed from.
-    pub facts: Facts,
-    /// Reports that may be of it.
-    pub reports: Vec<PathBuf>,
-    /// Folder for a report of it.
-    pub report_out: PathBuf,
-}
-
 /// What a finished job brings.
 #[derive(Clone, Debug)]
 pub enum Outcome {
@@ -404,17 +355,7 @@ pub struct Failure {
 impl Failure {
     /// The failure of an error and all its causes.
     pub fn of(error: &dyn std::error::Error, remedy: impl Into<String>) -> Self {
-        let mut message = error.to_string();
-        let mut cause = error.source();
-        while let Some(c) = cause {
-            let text = c.to_string();
-            // Many errors already print their cause.
-            if !message.contains(&text) {
-                message = format!("{message}: {text}");
-            }
-            cause = c.source();
-        }
-        Self { message, remedy: remedy.into() }
+        Self { message: chain(error), remedy: remedy.into() }
     }
 }
 
@@ -429,7 +370,23 @@ pub enum Stop {
 
 impl<E: std::error::Error + 'static> From<E> for Stop {
     fn from(error: E) -> Self {
-        if Interrupted::is_cause_of(&error) { Self::Cancelled } else { Self::Failed(Failure::of(&error, "")) }
+        let job = (&error as &dyn std::error::Error).downcast_ref::<JobError>();
+        if Interrupted::is_cause_of(&error) || job.is_some_and(JobError::is_cancelled) {
+            return Self::Cancelled;
+        }
+        Self::Failed(Failure::of(&error, job.map_or("", remedy)))
+    }
+}
+
+/// What a person can do in the window, where the error does not say that itself.
+fn remedy(error: &JobError) -> &'static str {
+    match error {
+        JobError::Open(OpenError::NotFound { .. }) => "Check the path: the file may have been moved or renamed.",
+        JobError::Open(OpenError::Unrecognised { .. }) => {
+            "Open the folder that holds the photos and their poses, or a splat .ply."
+        }
+        JobError::NothingHeldOut(_) => "Choose how many to hold out in the Training pane.",
+        _ => "",
     }
 }
 

@@ -10,8 +10,7 @@ use super::Slot;
 use super::protocol::Failure;
 use super::thread::{Repaint, panic_failure};
 use super::view_modes::{self, ViewMode};
-use crate::pipeline::semantics::code_map::CodeMap;
-use crate::pipeline::semantics::view_map::ViewMap;
+use crate::jobs::query::ViewMaps;
 use crate::render::{self, BackendChoice, Frame, RenderError, RenderSettings, Renderer, StageTimes};
 use crate::scene::plan::When;
 use crate::scene::trace::{self, Sort};
@@ -103,15 +102,6 @@ pub struct MappedView {
     pub maps: Result<Arc<ViewMaps>, Failure>,
     /// Seconds that drawing them took.
     pub secs: f64,
-}
-
-/// What the pixels of a view belong to, drawn once for all queries.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct ViewMaps {
-    /// By identity of largest weight.
-    pub identities: ViewMap,
-    /// Blended codes, if they were wanted.
-    pub codes: Option<CodeMap>,
 }
 
 /// A drawn view.
@@ -281,12 +271,7 @@ fn maps_of(renderer: &mut Renderer, request: &ViewRequest) -> Option<Result<View
     }
     let (cloud, camera, settings) = (&request.cloud, &request.camera, &request.settings);
     let draw = AssertUnwindSafe(|| {
-        let identities = ViewMap::render(renderer, cloud, &semantics.of, &semantics.identities, camera, settings)?;
-        let codes = match request.codes {
-            true => Some(CodeMap::render(renderer, cloud, &semantics.codes, !request.skip.parts, camera, settings)?),
-            false => None,
-        };
-        Ok(ViewMaps { identities, codes })
+        ViewMaps::draw(renderer, (cloud, settings), semantics, camera, request.codes, !request.skip.parts)
     });
     let told = |e: RenderError| {
         let failure = Failure::of(&e, "Reset the view (Home), or find the objects again.");

@@ -141,6 +141,26 @@ pub fn tiny_dataset(folder: &Path) -> PathBuf {
     photos
 }
 
+/// Copies into `folder` what the first version left there: `photos`, and `scene`, trained on them for 9 of 80 steps,
+/// with its objects. Returns the photos' folder.
+pub fn first_version(folder: &Path) -> PathBuf {
+    copy(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/first_version"), folder);
+    folder.join("photos")
+}
+
+/// Copies a folder with all that is in it.
+fn copy(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let (path, to) = (entry.as_ref().unwrap().path(), to.join(entry.unwrap().file_name()));
+        if path.is_dir() {
+            copy(&path, &to);
+        } else {
+            std::fs::copy(&path, &to).unwrap();
+        }
+    }
+}
+
 /// A server on this machine.
 pub struct Server {
     /// Host and port.

@@ -166,6 +166,7 @@ fn gltf(magic: Option<[u8; 4]>) -> Vec<u8> {
     let binary = floats.map(f32::to_le_bytes).concat();
     let accessor = |offset: usize, kind: &str| json!({ "bufferView": 0, "byteOffset": offset * 4, "componentType": 5126, "count": 1, "type": kind });
     let mut file = json!({
+        "asset": { "version": "2.0" },
         "scenes": [{ "nodes": [0] }],
         "nodes": [{ "children": [1], "translation": [1, 0, 0] }, { "mesh": 0, "rotation": [0, 0, 1, 0], "scale": [2, 2, 2] }],
         "meshes": [{ "primitives": [{

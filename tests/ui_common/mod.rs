@@ -4,16 +4,16 @@ use std::time::{Duration, Instant};
 
 use egui_kittest::Harness;
 
+use fmlgs::jobs::Folders;
 use fmlgs::ui::actions::Action;
 use fmlgs::ui::app::App;
 use fmlgs::worker::jobs::PipelineJobs;
-use fmlgs::worker::places::Places;
 
 /// Only a test that hangs takes this long: making the demo's photos is the longest step.
 const LONG: Duration = Duration::from_secs(600);
 
 /// A window that keeps what it makes in the folder of `places`.
-pub fn window(places: Places, first: Option<Action>) -> Harness<'static, App> {
+pub fn window(places: Folders, first: Option<Action>) -> Harness<'static, App> {
     Harness::builder()
         .with_size([1200.0, 800.0])
         .with_max_steps(20)

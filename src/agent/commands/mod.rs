@@ -13,7 +13,6 @@ use std::collections::VecDeque;
 use self::form::{Item, Request, beginning_with, many, sequences};
 use self::task::{Task, task};
 use super::camera_args::{CLOSENESS, CLOSER, Direction, Distance, FARTHER, NORMAL, Side};
-use super::describe::SEEN;
 use super::dialog::DialogState;
 use super::execute::Outcome;
 use super::language::Language;
@@ -36,7 +35,6 @@ pub struct Commands {
     tasks: VecDeque<Task>,
     refusal: Option<Refusal>,
     said: Vec<String>,
-    looking_for: bool,
 }
 
 impl Planner for Commands {
@@ -65,12 +63,6 @@ impl Planner for Commands {
             }
             return Ok(self.finish());
         }
-        if std::mem::take(&mut self.looking_for)
-            && let Some(id) = last.and_then(|outcome| outcome.ids.first())
-            && context.world.facts(*id).is_some_and(|f| f.in_view <= SEEN && !f.hidden)
-        {
-            return Ok(go(Target::Identity(*id), Side::Same, NORMAL));
-        }
         match self.tasks.pop_front() {
             None => Ok(self.finish()),
             Some(task) => Ok(self.step(task, context)),
@@ -93,10 +85,6 @@ impl Commands {
         let last = dialog.last.filter(|id| context.world.facts(*id).is_some());
         match (task, last) {
             (Task::Call(call), _) => Step::Call(call),
-            (Task::Find(query), _) => {
-                self.looking_for = true;
-                Step::Call(ToolCall::Locate { query, kind: LevelFilter::Any })
-            }
             (Task::Closer(factor), Some(id)) => go(Target::Identity(id), Side::Same, dialog.closeness * factor),
             (Task::Closer(factor), None) => {
                 let direction = if factor >= NORMAL { Direction::Forward } else { Direction::Back };
@@ -220,9 +208,7 @@ fn one(request: &Request<'_>) -> Option<Vec<Task>> {
 
 /// The phrases of a task that mean things.
 fn phrases(task: &Task) -> Vec<String> {
-    let Task::Call(call) = task else {
-        return if let Task::Find(query) = task { vec![query.clone()] } else { Vec::new() };
-    };
+    let Task::Call(call) = task else { return Vec::new() };
     let other = match call {
         ToolCall::Measure { to: Some(Reference::Thing(Target::Query(words))), .. } => Some(words),
         ToolCall::Locate { query, .. } => Some(query),
@@ -250,9 +236,7 @@ fn settled(tasks: Vec<Task>, context: &mut PlannerContext<'_>) -> Result<Vec<Tas
             continue;
         }
         for phrase in phrases(&task).iter().filter(|_| !is_alone) {
-            match resolve(context.world, phrase, LevelFilter::Any, &dialog)
-                .map_err(|e| Refusal::new(RefusalKind::Failed, e.0))?
-            {
+            match resolve(context.world, phrase, LevelFilter::Any, &dialog) {
                 Resolved::One { id, .. } => dialog.last = Some(id),
                 Resolved::Several(some) => {
                     let names: Vec<String> = some.iter().map(|id| context.world.identities().full_name(*id)).collect();

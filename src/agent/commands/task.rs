@@ -8,17 +8,12 @@ use crate::agent::tool::{LevelFilter, Reference, Target, ToolCall};
 /// One step of a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Task {
-    /// Make this call.
     Call(ToolCall),
-    /// Find something, and go there if it is not in view.
-    Find(String),
     /// Look at the last target from so much closer; without one, step forward or back.
     Closer(f64),
     /// Look at the last target from another side.
     From(Side),
-    /// Make the last movement again.
     Again,
-    /// Say which commands there are.
     Help,
 }
 
@@ -41,7 +36,6 @@ pub(super) fn task(id: &str, slots: &Slots) -> Option<Task> {
         "closer" => return Some(Task::Closer(CLOSER)),
         "farther" => return Some(Task::Closer(FARTHER)),
         "from_side" => return Some(Task::From(slots.side?)),
-        "find" => return Some(Task::Find(text(0)?.to_owned())),
         "move" => shift(slots.direction?),
         "back" => shift(Direction::Back),
         "turn_around" => turn(180.0),

@@ -18,11 +18,8 @@ const MAX_LIST_BYTES: usize = 1 << 20;
 /// A server that answers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LocalServer {
-    /// What usually has this port.
     pub kind: &'static str,
-    /// As settings have it.
     pub base_url: String,
-    /// Its models' names.
     pub models: Vec<String>,
 }
 

@@ -14,22 +14,15 @@ use crate::io::http::{self, Piece, TICK};
 /// Why there is no answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Broken {
-    /// No connection, or it ended.
     Connection(String),
-    /// Nothing came for too long.
     Stall,
-    /// More came than an answer may have.
     TooLong,
-    /// The server refused.
     Status {
-        /// HTTP status.
         code: u16,
         /// How long it wants to be left alone.
         retry_after: Option<Duration>,
-        /// What it said.
         body: String,
     },
-    /// The user wants it to end.
     Cancelled,
 }
 
@@ -46,7 +39,6 @@ impl Broken {
 
 /// What arrived: whether it is a stream of events.
 pub struct Head {
-    /// Whether the server sends events.
     pub is_stream: bool,
 }
 

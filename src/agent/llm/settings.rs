@@ -15,7 +15,6 @@ use crate::io::http::is_loopback;
 pub struct LlmSettings {
     /// Address up to and with the version, such as `http://127.0.0.1:11434/v1`.
     pub base_url: String,
-    /// The model's name there.
     pub model: String,
     /// Name of the environment variable that holds the key; empty if none is needed.
     pub key_variable: String,
@@ -34,11 +33,9 @@ impl Default for LlmSettings {
 pub struct Patience {
     /// How long the server may say nothing.
     pub stall: Duration,
-    /// How long one answer may take.
     pub answer: Duration,
     /// How long all answers to one request may take together.
     pub request: Duration,
-    /// How often one answer is asked for.
     pub attempts: u32,
     /// Wait before the second attempt; doubled before each further one, with some chance in it.
     pub pause: Duration,
@@ -62,7 +59,6 @@ impl Default for Patience {
 /// How much one request may take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// Answers of the model.
     pub answers: u32,
     /// Calls in an answer that are looked at.
     pub calls: usize,
@@ -70,7 +66,6 @@ pub struct Limits {
     pub wrong: u32,
     /// Tokens, as the server counts them, or as a quarter of the letters.
     pub tokens: u64,
-    /// Bytes of one answer.
     pub bytes: usize,
 }
 

@@ -1,6 +1,5 @@
 //! Answers of a chat model, whole or in pieces, as text and tool calls.
 
-use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::sse::Events;
@@ -11,9 +10,7 @@ const MOST_CALLS: usize = 64;
 /// A call as the model wrote it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RawCall {
-    /// Its number, as the model gave it.
     pub id: String,
-    /// The tool's name.
     pub name: String,
     /// Its arguments, JSON if the model kept to it.
     pub arguments: String,
@@ -22,9 +19,7 @@ pub struct RawCall {
 /// An answer.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Answer {
-    /// What it says.
     pub text: String,
-    /// What it wants done.
     pub calls: Vec<RawCall>,
     /// Tokens, as the server counted them.
     pub tokens: Option<u64>,
@@ -32,64 +27,12 @@ pub struct Answer {
     pub is_whole: bool,
 }
 
-#[derive(Deserialize)]
-struct Body {
-    #[serde(default)]
-    choices: Vec<Choice>,
-    #[serde(default)]
-    usage: Option<Usage>,
-    #[serde(default)]
-    error: Option<Value>,
-}
-
-#[derive(Deserialize)]
-struct Usage {
-    #[serde(default)]
-    total_tokens: Option<u64>,
-}
-
-#[derive(Deserialize)]
-struct Choice {
-    #[serde(default, alias = "delta")]
-    message: Option<Message>,
-    #[serde(default)]
-    finish_reason: Option<String>,
-}
-
-#[derive(Deserialize)]
-struct Message {
-    #[serde(default)]
-    content: Option<String>,
-    #[serde(default)]
-    tool_calls: Option<Vec<Call>>,
-}
-
-#[derive(Deserialize)]
-struct Call {
-    #[serde(default)]
-    index: Option<usize>,
-    #[serde(default)]
-    id: Option<String>,
-    #[serde(default)]
-    function: Option<Function>,
-}
-
-#[derive(Deserialize)]
-struct Function {
-    #[serde(default)]
-    name: Option<String>,
-    #[serde(default)]
-    arguments: Option<Value>,
-}
-
-impl Function {
-    /// Arguments are JSON in a string; some servers send the object itself.
-    fn arguments(&self) -> String {
-        match &self.arguments {
-            Some(Value::String(text)) => text.clone(),
-            Some(Value::Null) | None => String::new(),
-            Some(other) => other.to_string(),
-        }
+/// Arguments are JSON in a string; some servers send the object itself.
+fn arguments(given: &Value) -> String {
+    match given {
+        Value::String(text) => text.clone(),
+        Value::Null => String::new(),
+        other => other.to_string(),
     }
 }
 
@@ -128,26 +71,25 @@ impl Collector {
             self.answer.is_whole = true;
             return true;
         }
-        match serde_json::from_str::<Body>(data) {
-            Ok(body) => self.merge(body),
-            Err(_) => self.problem = Some("a piece of the answer is no JSON".into()),
+        match serde_json::from_str::<Value>(data) {
+            Ok(body) if body.is_object() => self.merge(&body),
+            _ => self.problem = Some("a piece of the answer is no JSON".into()),
         }
         false
     }
 
-    fn merge(&mut self, body: Body) {
-        if body.error.as_ref().is_some_and(|e| !e.is_null()) {
+    /// Takes over what a body has, whole (`message`) or a piece (`delta`).
+    fn merge(&mut self, body: &Value) {
+        if !body["error"].is_null() {
             self.problem = Some("the server reports an error in its answer".into());
         }
-        self.answer.tokens = body.usage.and_then(|u| u.total_tokens).or(self.answer.tokens);
-        let Some(choice) = body.choices.into_iter().next() else { return };
-        if choice.finish_reason.is_some() {
-            self.answer.is_whole = true;
-        }
-        let Some(message) = choice.message else { return };
-        self.answer.text.push_str(message.content.as_deref().unwrap_or_default());
-        for (place, call) in message.tool_calls.unwrap_or_default().into_iter().enumerate() {
-            let at = call.index.unwrap_or(place);
+        self.answer.tokens = body["usage"]["total_tokens"].as_u64().or(self.answer.tokens);
+        let choice = &body["choices"][0];
+        self.answer.is_whole |= !choice["finish_reason"].is_null();
+        let message = if choice["message"].is_object() { &choice["message"] } else { &choice["delta"] };
+        self.answer.text.push_str(message["content"].as_str().unwrap_or_default());
+        for (place, call) in message["tool_calls"].as_array().into_iter().flatten().enumerate() {
+            let at = call["index"].as_u64().map_or(place, |i| usize::try_from(i).unwrap_or(usize::MAX));
             if at >= MOST_CALLS {
                 self.problem = Some("the answer has too many calls".into());
                 return;
@@ -156,13 +98,11 @@ impl Collector {
                 self.answer.calls.resize(at + 1, RawCall::default());
             }
             let Some(slot) = self.answer.calls.get_mut(at) else { return };
-            if let Some(id) = call.id.filter(|id| !id.is_empty()) {
-                slot.id = id;
+            if let Some(id) = call["id"].as_str().filter(|id| !id.is_empty()) {
+                slot.id = id.to_owned();
             }
-            if let Some(function) = call.function {
-                slot.arguments.push_str(&function.arguments());
-                slot.name.push_str(function.name.as_deref().unwrap_or_default());
-            }
+            slot.arguments.push_str(&arguments(&call["function"]["arguments"]));
+            slot.name.push_str(call["function"]["name"].as_str().unwrap_or_default());
         }
     }
 
@@ -176,12 +116,12 @@ impl Collector {
                 self.event(&rest);
             }
         } else {
-            let body: Body =
+            let body: Value =
                 serde_json::from_slice(&self.whole).map_err(|_| "the answer is no JSON of a chat model")?;
-            if body.choices.is_empty() {
+            if !body["choices"][0].is_object() {
                 self.problem = Some("the answer has no choices".into());
             }
-            self.merge(body);
+            self.merge(&body);
             // A whole body is a whole answer.
             self.answer.is_whole = true;
         }

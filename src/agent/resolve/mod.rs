@@ -14,7 +14,7 @@ use super::refusal::{Refusal, RefusalKind};
 use super::relation::{Relation, fit, gap};
 use super::tool::LevelFilter;
 use super::words::{alike, singular};
-use super::world::{World, WorldError};
+use super::world::World;
 use crate::pipeline::semantics::answer::Basis;
 use crate::pipeline::semantics::grammar::Kind;
 use crate::pipeline::semantics::localise::Answer;
@@ -25,41 +25,26 @@ use crate::scene::{Bounds, IdentityId, Level};
 pub enum Resolved {
     /// This one is meant. The note says how it was found, if not by its name.
     One {
-        /// Which.
         id: IdentityId,
-        /// For the user; mostly empty.
         note: String,
     },
-    /// Any of these could be meant.
     Several(Vec<IdentityId>),
-    /// Nothing fits.
     Missing {
-        /// Why.
         refusal: Refusal,
-        /// What comes near.
         near: Vec<IdentityId>,
     },
 }
 
 /// Finds what `phrase` means.
-///
-/// # Errors
-/// If the scene cannot be asked.
-pub fn resolve(
-    world: &mut dyn World,
-    phrase: &str,
-    level: LevelFilter,
-    dialog: &DialogState,
-) -> Result<Resolved, WorldError> {
+pub fn resolve(world: &mut dyn World, phrase: &str, level: LevelFilter, dialog: &DialogState) -> Resolved {
     let mut resolver = Resolver { world, dialog, level, note: String::new() };
-    Ok(match resolver.phrase(phrase) {
+    match resolver.phrase(phrase) {
         Ok(set) => match set.settled() {
             [id] => Resolved::One { id: *id, note: resolver.note },
             several => Resolved::Several(several.to_vec()),
         },
-        Err(Lost::Missing { refusal, near }) => Resolved::Missing { refusal, near },
-        Err(Lost::World(e)) => return Err(e),
-    })
+        Err(Lost { refusal, near }) => Resolved::Missing { refusal, near },
+    }
 }
 
 /// All identities that a phrase such as "buttons" or "bottles on the table" means; none if nothing fits.
@@ -75,21 +60,20 @@ pub fn resolve_all(
     let mut resolver = Resolver { world, dialog, level, note: String::new() };
     match resolver.phrase(phrase) {
         Ok(set) => Ok(set.ids),
-        Err(Lost::Missing { refusal, .. }) if refusal.kind == RefusalKind::Conflict => Ok(Vec::new()),
-        Err(Lost::Missing { refusal, .. }) => Err(refusal),
-        Err(Lost::World(e)) => Err(Refusal::new(RefusalKind::Failed, e.0)),
+        Err(Lost { refusal, .. }) if refusal.kind == RefusalKind::Conflict => Ok(Vec::new()),
+        Err(Lost { refusal, .. }) => Err(refusal),
     }
 }
 
 /// Why no set of candidates was found.
-enum Lost {
-    Missing { refusal: Refusal, near: Vec<IdentityId> },
-    World(WorldError),
+struct Lost {
+    refusal: Refusal,
+    near: Vec<IdentityId>,
 }
 
 impl Lost {
     fn new(kind: RefusalKind, text: impl Into<String>, near: Vec<IdentityId>) -> Self {
-        Self::Missing { refusal: Refusal::new(kind, text), near }
+        Self { refusal: Refusal::new(kind, text), near }
     }
 }
 
@@ -140,13 +124,9 @@ impl Resolver<'_> {
                     *all = Set::new(all.settled().iter().copied().chain(new).collect());
                 }
                 (Ok(_), _) => {}
-                (Err(Lost::World(e)), _) => return Err(Lost::World(e)),
                 // Of reasons why nothing is found, one about the scene says more than an unknown word.
-                (Err(Lost::Missing { refusal, near }), _) => {
-                    if !matches!(&lost, Lost::Missing { refusal: r, .. } if r.kind == RefusalKind::Conflict) {
-                        lost = Lost::Missing { refusal, near };
-                    }
-                }
+                (Err(new), _) if lost.refusal.kind != RefusalKind::Conflict => lost = new,
+                (Err(_), _) => {}
             }
         }
         found.ok_or(lost)
@@ -252,7 +232,7 @@ impl Resolver<'_> {
 
     /// What the scene's encoder says, where it has one and that finds something.
     fn by_embedding(&mut self, text: &str, kind: Kind) -> Result<Option<Vec<IdentityId>>, Lost> {
-        let found = self.world.locate(text, kind).map_err(Lost::World)?;
+        let found = self.world.locate(text, kind).map_err(|e| Lost::new(RefusalKind::Failed, e.0, Vec::new()))?;
         let ids = match (&found.basis, &found.answer) {
             (Basis::Meaning, Answer::Found(_)) => found.chosen(1),
             (Basis::Meaning, Answer::Ambiguous(_)) => found.chosen(2),
@@ -309,16 +289,12 @@ impl Resolver<'_> {
         let level = std::mem::replace(&mut self.level, LevelFilter::Any);
         let set = self.set(piece);
         self.level = level;
-        let set = match set {
-            Err(Lost::World(e)) => return Err(Lost::World(e)),
-            Err(Lost::Missing { .. }) => Set::new(Vec::new()),
-            Ok(set) => Set {
-                ids: set.ids.into_iter().filter(is_in).collect(),
-                exact: set.exact.into_iter().filter(is_in).collect(),
-            },
-        };
-        if !set.ids.is_empty() {
-            return Ok(set);
+        if let Ok(set) = set {
+            let keep = |ids: Vec<IdentityId>| ids.into_iter().filter(is_in).collect::<Vec<_>>();
+            let set = Set { ids: keep(set.ids), exact: keep(set.exact) };
+            if !set.ids.is_empty() {
+                return Ok(set);
+            }
         }
         let meant = self.by_embedding(&format!("{said} of the {name}"), Kind::Part)?.unwrap_or_default();
         let meant: Vec<IdentityId> = meant.into_iter().filter(is_in).collect();

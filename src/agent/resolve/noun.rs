@@ -8,15 +8,12 @@ use crate::scene::Identities;
 /// A thing as a phrase has it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Noun {
-    /// The last one spoken of: "it".
     Last,
-    /// By its number: "#3".
     Number(u32),
     /// By these words of its name, or a word for anything.
     Named(Vec<String>),
     /// One among others: "the largest ...".
     Picked(Pick, Box<Noun>),
-    /// A piece of a whole.
     PieceOf(Box<Noun>, Box<Noun>),
     /// Something that stands so to something else.
     Placed(Box<Noun>, Relation, Box<Noun>),
@@ -27,11 +24,9 @@ pub(super) enum Noun {
 /// How a word chooses among things.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pick {
-    /// Not the last one spoken of.
     Other,
     /// The one with the most of this, or the least.
     Most(Key, bool),
-    /// The same, said of two.
     More(Key, bool),
 }
 

@@ -3,7 +3,8 @@
 use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::{Index, buffer::View, validation::Checked};
 
-use super::{File, GltfError};
+use super::File;
+use crate::io::IoError;
 
 /// Values of an accessor as `f32`, those of one element together.
 pub struct Values {
@@ -11,6 +12,8 @@ pub struct Values {
     pub width: usize,
     /// `[count * width]`, finite.
     pub data: Vec<f32>,
+    /// Whether the type is a signed integer.
+    pub signed_integer: bool,
 }
 
 impl Values {
@@ -22,7 +25,7 @@ impl Values {
 
 impl File<'_> {
     /// Reads a numeric accessor; integers are scaled to 0..1 or -1..1 where it says `normalized`.
-    pub(super) fn values(&mut self, index: usize, place: &str) -> Result<Values, GltfError> {
+    pub fn values(&self, index: usize, place: &str) -> Result<Values, IoError> {
         let root = self.root;
         let accessor = self.item(&root.accessors, index, "accessors", place)?;
         let place = format!("accessors[{index}]");
@@ -41,8 +44,9 @@ impl File<'_> {
         let mut data = match accessor.buffer_view {
             Some(view) => {
                 let offset = accessor.byte_offset.map_or(0, |o| o.0);
+                let elements = self.elements(view, offset, count, component, width, &place)?;
                 let mut out = Vec::with_capacity(count * width);
-                for element in self.elements(view, offset, count, component, width, &place)? {
+                for element in elements {
                     out.extend(element.chunks_exact(component.size()).map(|b| number(b, component, normalized)));
                 }
                 out
@@ -72,13 +76,14 @@ impl File<'_> {
             }
         }
         if let Some(i) = data.iter().position(|v| !v.is_finite()) {
-            return Err(self.content(place, format!("element {} is not finite", i / width)));
+            let (path, index) = (self.path.into(), i / width);
+            return Err(IoError::NotFinite { path, element: "element", index, property: place });
         }
-        Ok(Values { width, data })
+        Ok(Values { width, data, signed_integer: matches!(component, ComponentType::I8 | ComponentType::I16) })
     }
 
     /// Reads an index accessor.
-    pub(super) fn indices(&mut self, index: usize, place: &str) -> Result<Vec<u32>, GltfError> {
+    pub(super) fn indices(&self, index: usize, place: &str) -> Result<Vec<u32>, IoError> {
         let root = self.root;
         let accessor = self.item(&root.accessors, index, "accessors", place)?;
         let place = format!("accessors[{index}]");
@@ -93,7 +98,7 @@ impl File<'_> {
         Ok(self.elements(view, offset, count, component, 1, &place)?.map(|b| integer(b, component)).collect())
     }
 
-    fn component(&self, accessor: &Accessor, place: &str) -> Result<ComponentType, GltfError> {
+    fn component(&self, accessor: &Accessor, place: &str) -> Result<ComponentType, IoError> {
         match &accessor.component_type {
             Checked::Valid(c) => Ok(c.0),
             Checked::Invalid => Err(self.content(place, "its componentType is unknown")),
@@ -109,26 +114,27 @@ impl File<'_> {
         component: ComponentType,
         width: usize,
         place: &str,
-    ) -> Result<impl Iterator<Item = &'s [u8]> + use<'s>, GltfError> {
+    ) -> Result<impl Iterator<Item = &'s [u8]> + use<'s>, IoError> {
         let bytes = self.view_bytes(view.value(), place)?;
         let size = component.size() * width;
         let stride = self.root.buffer_views[view.value()].byte_stride.map_or(size, |s| s.0);
-        let reach = || {
-            let last = (count as u64).checked_sub(1)?.checked_mul(stride as u64)?;
-            last.checked_add(offset)?.checked_add(size as u64)
-        };
-        let needed = if count == 0 { Some(0) } else { reach() };
-        if stride < size || needed.is_none_or(|n| n > bytes.len() as u64) {
-            let problem =
-                format!("{count} elements of {size} bytes do not fit its buffer view of {} bytes", bytes.len());
-            return Err(self.content(place, problem));
+        // A stride under the size of a value would yield more values than there are bytes.
+        if stride < size {
+            return Err(self.content(place, format!("its stride of {stride} bytes is less than the {size} of a value")));
+        }
+        let after = (bytes.len() as u64).checked_sub(offset);
+        let after = after.ok_or_else(|| self.content(place, "it begins behind the end of its buffer view"))?;
+        let possible = if after < size as u64 { 0 } else { (after - size as u64) / stride as u64 + 1 };
+        if count as u64 > possible {
+            let (path, what) = (self.path.into(), format!("values in {place}"));
+            return Err(IoError::Count { path, what, claimed: count as u64, possible });
         }
         let offset = offset as usize;
         Ok((0..count).map(move |i| &bytes[offset + i * stride..][..size]))
     }
 
     /// The bytes of a buffer view.
-    pub(super) fn view_bytes(&self, index: usize, place: &str) -> Result<&[u8], GltfError> {
+    pub(super) fn view_bytes(&self, index: usize, place: &str) -> Result<&[u8], IoError> {
         let view = self.item(&self.root.buffer_views, index, "bufferViews", place)?;
         let buffer = self.item(&self.buffers, view.buffer.value(), "buffers", &format!("bufferViews[{index}]"))?;
         let start = view.byte_offset.map_or(0, |o| o.0);

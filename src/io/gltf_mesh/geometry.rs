@@ -4,7 +4,8 @@ use glam::{Vec2, Vec3, Vec4};
 use gltf::json::mesh::{Mode, Primitive as JsonPrimitive, Semantic};
 use gltf::json::validation::Checked;
 
-use super::{File, GltfError, MAX_ITEMS, Material, Mesh, MeshNode, Primitive};
+use super::{File, MAX_ITEMS, Material, Mesh, MeshNode, Primitive};
+use crate::io::IoError;
 use crate::scene::text;
 
 /// Highest texture coordinate set that is read.
@@ -12,16 +13,14 @@ const MAX_UV_SETS: u32 = 8;
 
 impl File<'_> {
     /// The meshes that `nodes` use; the others stay empty.
-    pub(super) fn meshes(&mut self, nodes: &[MeshNode], materials: &[Material]) -> Result<Vec<Mesh>, GltfError> {
+    pub(super) fn meshes(&mut self, nodes: &[MeshNode], materials: &[Material]) -> Result<Vec<Mesh>, IoError> {
         let root = self.root;
         let mut used = vec![false; root.meshes.len()];
         for m in nodes.iter().filter_map(|n| n.mesh) {
             used[m] = true;
         }
         if root.meshes.iter().map(|m| m.primitives.len()).sum::<usize>() > MAX_ITEMS {
-            let limit = format!("{MAX_ITEMS}");
-            let what = "the number of primitives".into();
-            return Err(GltfError::TooLarge { path: self.path.to_owned(), what, limit });
+            return Err(self.content("meshes", format!("there are more than {MAX_ITEMS} primitives")));
         }
         let mut meshes = Vec::with_capacity(root.meshes.len());
         for (m, mesh) in root.meshes.iter().enumerate() {
@@ -40,7 +39,7 @@ impl File<'_> {
         primitive: &JsonPrimitive,
         place: &str,
         materials: &[Material],
-    ) -> Result<Option<Primitive>, GltfError> {
+    ) -> Result<Option<Primitive>, IoError> {
         let mode = match primitive.mode {
             Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) => mode,
             Checked::Valid(_) => {

@@ -7,7 +7,8 @@ use gltf::json::material::AlphaMode as JsonAlphaMode;
 use gltf::json::texture::{Info, MagFilter, WrappingMode};
 use gltf::json::validation::Checked;
 
-use super::{AlphaMode, File, GltfError, Material, TextureImage, TextureUse, Wrap, resource};
+use super::{AlphaMode, File, MAX_FILE_BYTES, Material, TextureImage, TextureUse, Wrap, resource};
+use crate::io::IoError;
 
 /// Largest side of a texture in px.
 const MAX_TEXTURE_SIDE_PX: u32 = 16_384;
@@ -39,7 +40,7 @@ struct Images {
 
 impl File<'_> {
     /// All materials, the default one appended, and the images that they use.
-    pub(super) fn materials(&mut self) -> Result<(Vec<Material>, Vec<TextureImage>), GltfError> {
+    pub(super) fn materials(&mut self) -> Result<(Vec<Material>, Vec<TextureImage>), IoError> {
         let root = self.root;
         let known = vec![None; root.images.len()];
         let mut images = Images { list: Vec::new(), known, bytes_left: MAX_TEXTURE_BYTES };
@@ -78,7 +79,7 @@ impl File<'_> {
         info: Option<&Info>,
         place: &str,
         images: &mut Images,
-    ) -> Result<Option<TextureUse>, GltfError> {
+    ) -> Result<Option<TextureUse>, IoError> {
         let Some(info) = info else { return Ok(None) };
         let root = self.root;
         let index = info.index.value();
@@ -112,7 +113,7 @@ impl File<'_> {
     }
 
     /// Index of the decoded image, or `None` with a warning where it is missing or does not decode.
-    fn image(&mut self, index: usize, place: &str, images: &mut Images) -> Result<Option<usize>, GltfError> {
+    fn image(&mut self, index: usize, place: &str, images: &mut Images) -> Result<Option<usize>, IoError> {
         self.item(&self.root.images, index, "images", place)?;
         if let Some(known) = images.known[index] {
             return Ok(known);
@@ -121,17 +122,17 @@ impl File<'_> {
         let json = &self.root.images[index];
         let loaded;
         let bytes: &[u8] = match (&json.uri, json.buffer_view) {
-            (Some(uri), _) => match resource::load_uri(uri, &place, self.path, self.folder) {
+            (Some(uri), _) => match resource::load_uri(uri, &place, self.path, self.folder, MAX_FILE_BYTES) {
                 Ok(bytes) => {
                     loaded = bytes;
                     &loaded
                 }
-                Err(e @ (GltfError::Io { .. } | GltfError::Read(_))) => {
+                Err(e @ (IoError::Outside { .. } | IoError::Syntax { .. })) => return Err(e),
+                Err(e) => {
                     self.warnings.push(format!("{place}: {e}; drawn without it"));
                     images.known[index] = Some(None);
                     return Ok(None);
                 }
-                Err(other) => return Err(other),
             },
             (None, Some(view)) => self.view_bytes(view.value(), &place)?,
             (None, None) => return Err(self.content(place, "has neither a URI nor a bufferView")),

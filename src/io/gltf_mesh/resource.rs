@@ -1,108 +1,97 @@
-//! Bytes behind a scene: the container, its buffers and its encoded images.
+//! Bytes behind a glTF file: the container, its buffers and what addresses lead to.
 
 use std::borrow::Cow;
-use std::path::{Component, Path, PathBuf};
+use std::path::Path;
 
 use gltf::json::Root;
 
-use super::{GltfError, MAX_FILE_BYTES};
-use crate::io::files;
+use crate::io::{IoError, files};
 
-/// Reads a regular file of bounded size.
-pub fn read_file(path: &Path) -> Result<Vec<u8>, GltfError> {
-    Ok(files::read(path, MAX_FILE_BYTES)?)
-}
+/// Bytes of a `.glb` header, and of a chunk's.
+const HEADER: usize = 12;
+const CHUNK_HEADER: usize = 8;
 
 /// The JSON text and the binary chunk of a `.glb`, or the whole of a `.gltf`.
-pub fn split_container<'a>(bytes: &'a [u8], path: &Path) -> Result<(&'a [u8], Option<&'a [u8]>), GltfError> {
-    let problem = |problem: String| GltfError::Container { path: path.to_owned(), problem };
+pub fn split_container<'a>(bytes: &'a [u8], path: &Path) -> Result<(&'a [u8], Option<&'a [u8]>), IoError> {
     if !bytes.starts_with(b"glTF") {
-        let json = bytes.iter().find(|b| !b.is_ascii_whitespace() && **b > 0x7f || **b == b'{') == Some(&b'{');
-        return if json {
-            Ok((bytes, None))
-        } else {
-            Err(problem("starts neither with `glTF` nor with a JSON object".into()))
-        };
+        return Ok((bytes, None));
     }
-    let version = word(bytes, 4).ok_or_else(|| problem("ends inside its header".into()))?;
+    let cut = |place: &str, need: usize, at: usize| IoError::Truncated {
+        path: path.into(),
+        place: place.into(),
+        need: need as u64,
+        have: bytes.len().saturating_sub(at) as u64,
+    };
+    let version = word(bytes, 4).ok_or_else(|| cut("the header", HEADER, 0))?;
     if version != 2 {
-        return Err(problem(format!("version {version} of binary glTF; only 2 is supported")));
+        let what = format!("version {version} of binary glTF");
+        return Err(IoError::Unsupported { path: path.into(), what, remedy: "export it as version 2" });
     }
     let (mut json, mut binary) = (None, None);
-    let mut at = 12;
+    let mut at = HEADER;
     while let (Some(length), Some(kind)) = (word(bytes, at), word(bytes, at + 4)) {
-        let start = at + 8;
-        let chunk = start.checked_add(length as usize).and_then(|end| bytes.get(start..end)).ok_or_else(|| {
-            problem(format!("a chunk at byte {at} claims {length} bytes, beyond the end of the file"))
-        })?;
+        let (start, length) = (at + CHUNK_HEADER, length as usize);
+        let chunk = bytes.get(start..start.saturating_add(length)).ok_or_else(|| cut("a chunk", length, start))?;
         match &kind.to_le_bytes() {
             b"JSON" if json.is_none() => json = Some(chunk),
             b"BIN\0" if binary.is_none() => binary = Some(chunk),
             _ => {}
         }
-        at = start + length as usize;
+        at = start + length;
     }
-    json.map(|j| (j, binary)).ok_or_else(|| problem("has no JSON chunk".into()))
+    json.map(|j| (j, binary)).ok_or_else(|| cut("the JSON chunk", CHUNK_HEADER, at))
 }
 
 fn word(bytes: &[u8], at: usize) -> Option<u32> {
     bytes.get(at..at.checked_add(4)?)?.try_into().ok().map(u32::from_le_bytes)
 }
 
-/// Every buffer, each at least as long as it says.
+/// Every buffer, each at least as long as it says, together at most `limit` bytes.
 pub fn load_buffers<'a>(
     root: &Root,
     path: &Path,
     folder: Option<&Path>,
     mut blob: Option<&'a [u8]>,
-) -> Result<Vec<Cow<'a, [u8]>>, GltfError> {
+    limit: u64,
+) -> Result<Vec<Cow<'a, [u8]>>, IoError> {
     let mut total = 0_u64;
     let mut buffers = Vec::new();
     for (i, buffer) in root.buffers.iter().enumerate() {
         let place = format!("buffers[{i}]");
-        let content = |problem: String| GltfError::Content { path: path.to_owned(), place: place.clone(), problem };
+        let content = |reason: String| IoError::Syntax { path: path.into(), place: place.clone(), reason };
         let bytes: Cow<'a, [u8]> = match &buffer.uri {
-            Some(uri) => Cow::Owned(load_uri(uri, &place, path, folder)?),
+            Some(uri) => Cow::Owned(load_uri(uri, &place, path, folder, limit)?),
             None => Cow::Borrowed(blob.take().ok_or_else(|| content("has neither a URI nor a binary chunk".into()))?),
         };
         if (bytes.len() as u64) < buffer.byte_length.0 {
             return Err(content(format!("claims {} bytes, but there are {}", buffer.byte_length.0, bytes.len())));
         }
         total += bytes.len() as u64;
-        if total > MAX_FILE_BYTES {
-            let limit = format!("{} GiB", MAX_FILE_BYTES >> 30);
-            return Err(GltfError::TooLarge { path: path.to_owned(), what: "the buffers together".into(), limit });
+        if total > limit {
+            let (what, remedy) = ("all buffers together", "split the scene");
+            return Err(IoError::OverBudget { path: path.into(), what, bytes: total, limit, remedy });
         }
         buffers.push(bytes);
     }
     Ok(buffers)
 }
 
-/// The bytes behind a URI: `data:` or a file inside `folder`.
-pub fn load_uri(uri: &str, place: &str, path: &Path, folder: Option<&Path>) -> Result<Vec<u8>, GltfError> {
+/// The bytes behind a URI: `data:` or a file inside `folder`, links resolved.
+pub fn load_uri(uri: &str, place: &str, path: &Path, folder: Option<&Path>, limit: u64) -> Result<Vec<u8>, IoError> {
     if uri.starts_with("data:") {
         // Without a base path this decodes `data:` URIs only.
         return gltf::buffer::Data::from_source(gltf::buffer::Source::Uri(uri), None).map(|d| d.0).map_err(|e| {
-            let problem = format!("its data URI does not decode: {e}");
-            GltfError::Content { path: path.to_owned(), place: place.into(), problem }
+            let reason = format!("its data URI does not decode: {e}");
+            IoError::Syntax { path: path.into(), place: place.into(), reason }
         });
     }
-    read_file(&inside(uri, place, path, folder)?)
-}
-
-/// The file that a relative URI names, proven to lie inside `folder`, links resolved.
-fn inside(uri: &str, place: &str, path: &Path, folder: Option<&Path>) -> Result<PathBuf, GltfError> {
-    let outside = || GltfError::OutsideFolder { path: path.to_owned(), place: place.into(), uri: uri.into() };
+    let outside =
+        || IoError::Outside { path: path.into(), entry: uri.into(), folder: folder.unwrap_or(Path::new("")).into() };
+    let name = percent_decoded(uri).filter(|_| !uri.contains(':')).ok_or_else(outside)?;
     let folder = folder.ok_or_else(outside)?;
-    let relative = PathBuf::from(percent_decoded(uri).ok_or_else(outside)?.replace('\\', "/"));
-    let plain = relative.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
-    if !plain || uri.contains(':') {
-        return Err(outside());
-    }
-    let joined = folder.join(relative);
-    let io = |source| GltfError::Io { path: joined.clone(), source };
-    let real = joined.canonicalize().map_err(io)?;
-    if real.starts_with(folder.canonicalize().map_err(io)?) { Ok(real) } else { Err(outside()) }
+    let entry = files::relative(folder, &name, path)?;
+    let file = files::inside(folder, &entry, path)?.unwrap_or_else(|| folder.join(entry));
+    files::read(&file, limit)
 }
 
 /// `%41` and the like replaced; `None` where that is not UTF-8 or an escape is broken.

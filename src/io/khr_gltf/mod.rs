@@ -10,10 +10,9 @@ mod primitive;
 
 use std::path::Path;
 
-use glam::DMat4;
-
 pub use container::is_gltf;
 
+use super::gltf_mesh::resource::split_container;
 use super::{IoError, files};
 use crate::math::sh::coefficients;
 use crate::scene::GaussianCloud;
@@ -21,11 +20,6 @@ use container::Gltf;
 
 /// Name of the extension, and prefix of its attributes.
 const EXTENSION: &str = "KHR_gaussian_splatting";
-/// Deepest nesting of nodes.
-const MAX_DEPTH: usize = 64;
-/// Most nodes visited; shared subtrees could make that exponential.
-const MAX_VISITS: usize = 1 << 16;
-
 /// Reads every splat of a glTF file's scene.
 pub fn read(path: &Path) -> Result<GaussianCloud, IoError> {
     parse(&files::read(path, u64::MAX)?, path)
@@ -33,11 +27,16 @@ pub fn read(path: &Path) -> Result<GaussianCloud, IoError> {
 
 /// The Gaussians in the bytes of a glTF file. External buffers are read from the folder of `path`.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
-    let gltf = Gltf::parse(bytes, path)?;
+    let (text, blob) = split_container(bytes, path)?;
+    let json = container::json(text, path)?;
+    let gltf = Gltf::open(&json, blob, path)?;
     let mut parts = Vec::new();
-    let mut visits = 0;
-    for root in gltf.roots() {
-        visit(&gltf, root, DMat4::IDENTITY, 0, &mut visits, &mut parts)?;
+    for node in gltf.nodes()? {
+        for primitive in gltf.primitives(&node) {
+            if let Some(extension) = primitive.extensions.get(EXTENSION) {
+                parts.push(primitive::cloud(&gltf, primitive, extension, node.world_from_node)?);
+            }
+        }
     }
     if parts.is_empty() {
         return Err(IoError::Unsupported {
@@ -49,28 +48,6 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
     let cloud = joined(parts);
     cloud.validate().map_err(|cause| IoError::Cloud { path: path.into(), cause })?;
     Ok(cloud)
-}
-
-fn visit(
-    gltf: &Gltf<'_>,
-    index: usize,
-    parent: DMat4,
-    depth: usize,
-    visits: &mut usize,
-    parts: &mut Vec<GaussianCloud>,
-) -> Result<(), IoError> {
-    *visits += 1;
-    if depth > MAX_DEPTH || *visits > MAX_VISITS {
-        return Err(gltf.bad(format!("node {index}"), "the nodes are nested too deeply".into()));
-    }
-    let node = gltf.node(index)?;
-    let world = parent * node.local();
-    for primitive in node.mesh.map_or(Ok(&[][..]), |m| gltf.primitives(m))? {
-        if let Some(extension) = primitive.extensions.get(EXTENSION) {
-            parts.push(primitive::cloud(gltf, primitive, extension, world)?);
-        }
-    }
-    node.children.iter().try_for_each(|child| visit(gltf, *child, world, depth + 1, visits, parts))
 }
 
 /// One cloud of all parts, with the highest degree among them.

@@ -33,10 +33,9 @@ pub(super) fn cloud(
     let find = |name: &str| primitive.attributes.get(name).copied();
     let extended = |name: &str| {
         let full = format!("{EXTENSION}:{name}");
-        find(&full).ok_or_else(|| gltf.bad("a splat primitive".into(), format!("attribute {full} is missing")))
+        find(&full).ok_or_else(|| gltf.bad("a splat primitive", format!("attribute {full} is missing")))
     };
-    let position =
-        find("POSITION").ok_or_else(|| gltf.bad("a splat primitive".into(), "POSITION is missing".into()))?;
+    let position = find("POSITION").ok_or_else(|| gltf.bad("a splat primitive", "POSITION is missing".into()))?;
     let positions = gltf.values::<3>(position)?.rows;
     let n = positions.len();
     let rotations = gltf.values::<4>(extended("ROTATION")?)?.rows;
@@ -91,7 +90,7 @@ fn equal(gltf: &Gltf<'_>, n: usize, count: usize) -> Result<(), IoError> {
     if n == count {
         return Ok(());
     }
-    Err(gltf.bad("a splat primitive".into(), format!("{n} positions, but another attribute has {count} values")))
+    Err(gltf.bad("a splat primitive", format!("{n} positions, but another attribute has {count} values")))
 }
 
 /// Rotation (`None` for none) and scale of a node's transform.

@@ -11,11 +11,10 @@ use super::super::table::{Rows, rows};
 use crate::math::stats::quantile;
 use crate::math::vector::unit;
 use crate::models::{Encoder, ModelError};
-use crate::pipeline::semantics::answer::{Language, by_meaning, phrases_of};
 use crate::pipeline::semantics::codes::{self, TOLERANCE};
-use crate::pipeline::semantics::grammar::{Kind, Phrase};
 use crate::pipeline::semantics::matching;
 use crate::pipeline::semantics::meaning::{MeaningOptions, Phrasebook};
+use crate::pipeline::semantics::query_engine::ask_by_embedding;
 use crate::pipeline::semantics::stages::{Stages, StagesMs, ms_since};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::language::MAX_VIEWS;
@@ -98,12 +97,8 @@ pub fn time(
             false => format!("a {color} {thing}"),
         };
         let mut phrases = canonical.clone();
-        let start = Instant::now();
-        let Some(phrase) = Phrase::parse(&text) else { continue };
-        phrases.learn(&phrases_of(&phrase), |p| encoder.text(p))?;
-        let encode = ms_since(start);
-        let language = Language { features: &features, phrases: &phrases, options: MeaningOptions::default() };
-        let answered = by_meaning(&all, &phrase, Kind::Auto, language);
+        let how = (&features, MeaningOptions::default());
+        let Some(answered) = ask_by_embedding(&all, how, &text, &mut phrases, |p| encoder.text(p))? else { continue };
         let target = answered.answer.hits().first().map_or(NOBODY, |h| h.identity);
         let start = Instant::now();
         let pixels = matching::exact(&map, &all, target, TOLERANCE);
@@ -112,7 +107,7 @@ pub fn time(
         let heat = answered.heat(&map);
         let draw = ms_since(start);
         std::hint::black_box((pixels, heat));
-        each.push(StagesMs { encode, mask, draw, ..answered.stages });
+        each.push(StagesMs { mask, draw, ..answered.stages });
     }
     let percentiles = |of: &dyn Fn(&StagesMs) -> f64| {
         let ms: Vec<f64> = each.iter().map(of).collect();

@@ -9,18 +9,19 @@ use crate::math::stats::mean;
 use crate::measure::sweep::failed;
 use crate::measure::{Rule, Stage, StageName, Study, StudyError, Trial};
 use crate::models::{Encoder, ModelError};
-use crate::pipeline::semantics::answer::{Answered, Language, by_meaning, by_name, phrases_of};
+use crate::pipeline::semantics::answer::{Answered, by_name};
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::codes::TOLERANCE;
-use crate::pipeline::semantics::grammar::{Kind, Phrase};
+use crate::pipeline::semantics::grammar::Phrase;
 use crate::pipeline::semantics::localise::Strategy;
 use crate::pipeline::semantics::matching;
 use crate::pipeline::semantics::meaning::{MeaningOptions, PartFeatures, Phrasebook};
 use crate::pipeline::semantics::protocols::part_recall::HIT_IOU;
 use crate::pipeline::semantics::protocols::{AskedScene, Category, LabelledView, langsplat};
+use crate::pipeline::semantics::query_engine::ask_by_embedding;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderSettings, Renderer};
-use crate::scene::{Camera, GaussianCloud, IdentityId, LanguageFeatures, Level, Mask, SemanticMap};
+use crate::scene::{Camera, GaussianCloud, IdentityId, LanguageFeatures, Level, LevelFilter, Mask, SemanticMap};
 
 pub struct Asked {
     pub name: String,
@@ -209,14 +210,13 @@ fn ask(
     mut phrases: Phrasebook,
     encoder: &mut dyn Encoder,
 ) -> Result<Option<Answered>, StudyError> {
-    let Some(phrase) = Phrase::parse(text) else { return Ok(None) };
-    let Some(options) = variant.options else { return Ok(Some(by_name(&map.identities, &phrase, Kind::Auto))) };
-    match phrases.learn(&phrases_of(&phrase), |p| encoder.text(p)) {
-        Ok(()) => {}
-        Err(ModelError::NoKnownWord { .. }) => return Ok(None),
-        Err(other) => return Err(failed(other)),
+    let Some(options) = variant.options else {
+        return Ok(Phrase::parse(text).map(|phrase| by_name(&map.identities, &phrase, LevelFilter::Auto)));
+    };
+    match ask_by_embedding(&map.identities, (features, options), text, &mut phrases, |p| encoder.text(p)) {
+        Err(ModelError::NoKnownWord { .. }) => Ok(None),
+        answered => answered.map_err(failed),
     }
-    Ok(Some(by_meaning(&map.identities, &phrase, Kind::Auto, Language { features, phrases: &phrases, options })))
 }
 
 /// The pixels of the best answer, whatever its score: it is asked where, not whether.

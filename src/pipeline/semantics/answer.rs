@@ -4,13 +4,13 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::grammar::{Kind, Phrase};
+use super::grammar::Phrase;
 use super::localise::{Answer, Scorer, Strategy, localise};
 use super::meaning::{ByMeaning, MeaningOptions, Phrasebook};
 use super::names::{self, ByName};
 use super::stages::{StagesMs, ms_since};
 use super::view_map::ViewMap;
-use crate::scene::{Identities, IdentityId, LanguageFeatures, Mask};
+use crate::scene::{Identities, IdentityId, LanguageFeatures, LevelFilter, Mask};
 
 /// What an answer rests on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,14 +52,19 @@ pub fn phrases_of(phrase: &Phrase) -> Vec<&str> {
 }
 
 /// Answers by names where all words are known, else by meaning where that finds something.
-pub fn answer(identities: &Identities, phrase: &Phrase, kind: Kind, language: Option<Language<'_>>) -> Answered {
-    let named = by_name(identities, phrase, kind);
+pub fn answer(
+    identities: &Identities,
+    phrase: &Phrase,
+    level: LevelFilter,
+    language: Option<Language<'_>>,
+) -> Answered {
+    let named = by_name(identities, phrase, level);
     let Some(language) = language else { return named };
     let known = names::unknown_words(identities, &phrase.text).is_empty();
     if known && !matches!(named.answer, Answer::NotFound(_)) {
         return named;
     }
-    let meant = by_meaning(identities, phrase, kind, language);
+    let meant = by_meaning(identities, phrase, level, language);
     // Both were looked at, whichever is taken.
     let stages = named.stages.and(meant.stages);
     let nothing = |a: &Answer| matches!(a, Answer::NotFound(_));
@@ -96,14 +101,14 @@ impl<S: Scorer> Scorer for Timed<'_, S> {
 
 /// Localises by `scorer`, then makes the relevancy of every identity by `relevancy`.
 fn judged<S: Scorer>(
-    (identities, phrase, kind): (&Identities, &Phrase, Kind),
+    (identities, phrase, level): (&Identities, &Phrase, LevelFilter),
     basis: Basis,
     scorer: &mut S,
     relevancy: impl FnOnce(&Answer, &mut S) -> Vec<f32>,
 ) -> Answered {
     let start = Instant::now();
     let mut timed = Timed { scorer, ms: 0.0 };
-    let answer = localise(identities, phrase, kind, &mut timed);
+    let answer = localise(identities, phrase, level, &mut timed);
     let (scored_ms, localised_ms) = (timed.ms, ms_since(start));
     let relevancy = relevancy(&answer, scorer);
     let stages = StagesMs {
@@ -115,8 +120,8 @@ fn judged<S: Scorer>(
 }
 
 /// Answers by names alone.
-pub fn by_name(identities: &Identities, phrase: &Phrase, kind: Kind) -> Answered {
-    judged((identities, phrase, kind), Basis::Names, &mut ByName(identities), |answer, _| {
+pub fn by_name(identities: &Identities, phrase: &Phrase, level: LevelFilter) -> Answered {
+    judged((identities, phrase, level), Basis::Names, &mut ByName(identities), |answer, _| {
         let alone = names::scores(identities, &phrase.target);
         let mut relevancy = vec![0.0; identities.len() + 1];
         for (id, identity) in identities.iter() {
@@ -130,10 +135,10 @@ pub fn by_name(identities: &Identities, phrase: &Phrase, kind: Kind) -> Answered
 }
 
 /// Answers by meaning alone.
-pub fn by_meaning(identities: &Identities, phrase: &Phrase, kind: Kind, language: Language<'_>) -> Answered {
+pub fn by_meaning(identities: &Identities, phrase: &Phrase, level: LevelFilter, language: Language<'_>) -> Answered {
     let Language { features, phrases, options } = language;
     let mut scorer = ByMeaning::new(features, phrases, options);
-    judged((identities, phrase, kind), Basis::Meaning, &mut scorer, |_, scorer| {
+    judged((identities, phrase, level), Basis::Meaning, &mut scorer, |_, scorer| {
         let mut relevancy = vec![0.0];
         relevancy.extend(scorer.scores(&phrase.text, None));
         relevancy.resize(identities.len() + 1, 0.0);
@@ -216,7 +221,7 @@ mod tests {
         };
         phrases.learn(&phrases_of(&phrase), encode).expect("encodes");
         let language = Language { features: &features, phrases: &phrases, options: MeaningOptions::default() };
-        answer(&all, &phrase, Kind::Auto, with_meaning.then_some(language))
+        answer(&all, &phrase, LevelFilter::Auto, with_meaning.then_some(language))
     }
 
     #[test]
@@ -252,7 +257,7 @@ mod tests {
             let encode = |p: &str| Ok::<_, ()>(if p == text { to.to_vec() } else { vec![0.5, 0.5, 0.5] });
             phrases.learn(&phrases_of(&phrase), encode).expect("encodes");
             let language = Language { features: &features, phrases: &phrases, options: MeaningOptions::default() };
-            answer(&all, &phrase, Kind::Auto, Some(language))
+            answer(&all, &phrase, LevelFilter::Auto, Some(language))
         };
         let a = ask("beige lamp", [1.0, 0.0, 0.0]);
         assert_eq!((a.basis, a.chosen(1)), (Basis::Meaning, vec![3]), "by name it would be the lamp");

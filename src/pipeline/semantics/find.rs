@@ -25,55 +25,54 @@ use crate::scene::{GaussianCloud, Identities, IdentityId, Photo, SemanticMap};
 
 /// Longer side of the masks that codes are trained on, px.
 const CODE_SIDE_PX: u32 = 256;
+/// Steps of training codes.
+pub const CODE_STEPS: u64 = 1_000;
 /// Seed of the order in which views are trained on.
 const SEED: u64 = 0;
 
 /// How Gaussians get their codes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 pub enum Lifting {
-    /// Those of the identities they voted for.
+    /// Those of the identities they voted for
     #[default]
     Votes,
-    /// The same, refined by this many steps of training.
-    Refined(u64),
-    /// By training alone, as in the paper; identities are read off the trained codes.
-    Paper(u64),
+    /// The same, refined by training
+    Refined,
+    /// By training alone, as in the paper; identities are read off the trained codes
+    Paper,
 }
 
 /// How masks are carried to the other photos.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 pub enum Carry {
-    /// By the trained Gaussians; no network.
+    /// By the trained Gaussians; no network
     #[default]
+    #[value(name = "geometry")]
     Gaussians,
-    /// By SAM 2 from photo to photo besides, as in the paper; photos have to be in the order of a walk.
+    /// By SAM 2 from photo to photo, as in the paper; photos have to be in the order of a walk
     Sam2,
-    /// By both, and where SAM 2 contradicts the Gaussians it is not believed.
+    /// By both, each correcting the other
     Both,
 }
 
 /// Name of the masks that need no model.
 pub const REGIONS: &str = "regions";
 
-/// Which models find objects; `None` = the best that is here.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Finding {
-    /// Finds masks where none came with the photos.
-    pub segmenter: Option<String>,
-    /// Carries them to the other photos.
-    pub carry: Carry,
-    /// Looks at what was found.
-    pub encoder: Option<String>,
-}
-
 /// Settings of the whole way.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct FindOptions {
     /// How masks become identities.
     pub track: TrackOptions,
     /// How identities become codes of Gaussians.
     pub lifting: Lifting,
+    /// Steps of training codes, where they are trained.
+    pub code_steps: u64,
+}
+
+impl Default for FindOptions {
+    fn default() -> Self {
+        Self { track: TrackOptions::default(), lifting: Lifting::default(), code_steps: CODE_STEPS }
+    }
 }
 
 /// What was found.
@@ -160,7 +159,7 @@ pub fn find_objects(
     let Tracked { views, disagreements, mut secs, .. } = tracked;
     let mut timed = |stage: &'static str, start: Instant| secs.push((stage, start.elapsed().as_secs_f64()));
     let start = Instant::now();
-    lift(&mut map, cloud, photos, settings, options.lifting, observer)?;
+    lift(&mut map, cloud, photos, settings, options, observer)?;
     timed("train codes", start);
     if let Some(encoder) = encoder {
         let start = Instant::now();
@@ -176,13 +175,12 @@ fn lift(
     cloud: &GaussianCloud,
     photos: &[Photo],
     settings: &RenderSettings,
-    lifting: Lifting,
+    options: &FindOptions,
     observer: &mut dyn Observer,
 ) -> Result<(), FindError> {
-    let steps = match lifting {
-        Lifting::Votes => return Ok(()),
-        Lifting::Refined(steps) | Lifting::Paper(steps) => steps,
-    };
+    if options.lifting == Lifting::Votes {
+        return Ok(());
+    }
     let mut renderer = Renderer::new();
     let mut views = Vec::with_capacity(photos.len());
     for photo in photos {
@@ -190,14 +188,14 @@ fn lift(
         let seen = ViewMap::render(&mut renderer, cloud, &map.of, &map.identities, &camera, settings)?;
         views.push(CodeView { camera, labels: seen.identity });
     }
-    if matches!(lifting, Lifting::Paper(_)) {
+    if options.lifting == Lifting::Paper {
         let nothing: [f32; CODE_CHANNELS] = std::array::from_fn(|c| BACKGROUND_CODE[c % 3]);
         map.codes.fill(nothing);
     }
-    let training = CodeTraining { steps, seed: SEED };
+    let training = CodeTraining { steps: options.code_steps, seed: SEED };
     train_codes(cloud, &mut map.codes, &views, &map.identities, settings, training, observer)?;
     observer.proceed().map_err(TrackError::from)?;
-    if matches!(lifting, Lifting::Paper(_)) {
+    if options.lifting == Lifting::Paper {
         map.of = decode(&map.codes, &map.identities);
     }
     Ok(())
@@ -319,18 +317,23 @@ mod tests {
         }
     }
 
-    fn find(told: Told, lifting: Lifting, max_seeds: usize, observer: &mut dyn Observer) -> Result<Found, FindError> {
+    fn find(
+        told: Told,
+        (lifting, code_steps): (Lifting, u64),
+        max_seeds: usize,
+        observer: &mut dyn Observer,
+    ) -> Result<Found, FindError> {
         let mut told = told;
         let tools = Tools { segmenter: &mut told, follower: None, encoder: None };
         let track = TrackOptions { max_seeds, ..TrackOptions::default() };
-        let options = FindOptions { track, lifting };
+        let options = FindOptions { track, lifting, code_steps };
         find_objects(&cloud(), &photos(), &RenderSettings::default(), tools, &options, observer)
     }
 
     #[test]
     fn what_a_second_photo_shows_is_found_too() {
         for named in [true, false] {
-            let found = find(Told { named, covers: true }, Lifting::Votes, 12, &mut Silent).expect("found");
+            let found = find(Told { named, covers: true }, (Lifting::Votes, 0), 12, &mut Silent).expect("found");
             let map = &found.map;
             assert_eq!((map.of.as_slice(), map.seeds.as_slice()), (&TRUTH[..], &["near".into(), "far".to_owned()][..]));
             let list: Vec<_> = map.identities.iter().map(|(_, i)| (i.level, i.parent, i.names.clone())).collect();
@@ -358,7 +361,7 @@ mod tests {
             }
         }
         let mut notes = Notes(vec![]);
-        let found = find(Told { named: true, covers: true }, Lifting::Votes, 1, &mut notes).expect("found");
+        let found = find(Told { named: true, covers: true }, (Lifting::Votes, 0), 1, &mut notes).expect("found");
         assert_eq!(found.map.identities.len(), 2);
         assert_eq!((&found.map.of[..9], &found.map.of[9..]), (&TRUTH[..9], &[NOBODY; 6][..]));
         // The far photo shows the cat, too different in color to be taken for a piece of what is near.
@@ -377,8 +380,8 @@ mod tests {
     #[test]
     fn every_way_of_lifting_ends_at_the_same_identities() {
         let told = || Told { named: true, covers: true };
-        let votes = find(told(), Lifting::Votes, 12, &mut Silent).expect("found").map;
-        for lifting in [Lifting::Refined(20), Lifting::Paper(120)] {
+        let votes = find(told(), (Lifting::Votes, 0), 12, &mut Silent).expect("found").map;
+        for lifting in [(Lifting::Refined, 20), (Lifting::Paper, 120)] {
             let map = find(told(), lifting, 12, &mut Silent).expect("found").map;
             assert_eq!(map.of, TRUTH, "{lifting:?}");
             assert_ne!(map.codes, votes.codes, "{lifting:?} trains");
@@ -396,9 +399,11 @@ mod tests {
                 Signal::Cancel
             }
         }
-        let nothing = find(Told { named: true, covers: false }, Lifting::Votes, 12, &mut Silent).expect_err("no masks");
+        let nothing =
+            find(Told { named: true, covers: false }, (Lifting::Votes, 0), 12, &mut Silent).expect_err("no masks");
         assert!(!Interrupted::is_cause_of(&nothing) && nothing.to_string().contains("'told'"), "{nothing}");
-        let stopped = find(Told { named: true, covers: true }, Lifting::Votes, 12, &mut Stop).expect_err("stopped");
+        let stopped =
+            find(Told { named: true, covers: true }, (Lifting::Votes, 0), 12, &mut Stop).expect_err("stopped");
         assert!(Interrupted::is_cause_of(&stopped), "{stopped}");
     }
 

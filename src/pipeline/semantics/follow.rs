@@ -3,6 +3,9 @@
 //! stopped goes on where it was.
 
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+use sha2::{Digest, Sha256};
 
 use super::segmenter::FoundMask;
 use super::votes::UNKNOWN;
@@ -122,7 +125,7 @@ impl Frames for Cached<'_> {
         }
         let start = std::time::Instant::now();
         let photo = &self.photos[index];
-        let file = self.folder.as_ref().map(|folder| folder.join(file_name(model, photo)));
+        let file = self.folder.as_ref().map(|folder| kept_file(folder, (&model.about.name, model.digest()), photo));
         let frame = match file.as_deref().and_then(read) {
             Some(frame) => frame,
             None => {
@@ -141,14 +144,33 @@ impl Frames for Cached<'_> {
     }
 }
 
-/// One name per model and photo; another version of either has another.
-fn file_name(model: &Sam2, photo: &Photo) -> String {
+/// The file in `folder` for what the `model` of this name and digest makes of a photo; another version of either
+/// has another.
+fn kept_file(folder: &Path, model: (&str, &str), photo: &Photo) -> PathBuf {
+    let written = std::fs::metadata(&photo.path).and_then(|m| m.modified()).ok();
+    let [now, first] = [kept_name, first_name].map(|name| folder.join(name(model, photo, written)));
+    files::renamed(now, first)
+}
+
+fn kept_name((model, digest): (&str, &str), photo: &Photo, written: Option<SystemTime>) -> String {
+    let mut sum = Sha256::new();
+    for part in [photo.path.as_os_str().as_encoded_bytes(), photo.name.as_bytes(), digest.as_bytes()] {
+        sum.update((part.len() as u64).to_le_bytes());
+        sum.update(part);
+    }
+    let since = written.and_then(|t| t.duration_since(SystemTime::UNIX_EPOCH).ok());
+    sum.update(since.map_or(u128::MAX, |t| t.as_nanos()).to_le_bytes());
+    let sum: String = sum.finalize().iter().take(12).map(|byte| format!("{byte:02x}")).collect();
+    format!("{model}-{sum}.frame")
+}
+
+/// What the first version called the file, by a digest that the standard library does not promise to keep.
+fn first_name((model, digest): (&str, &str), photo: &Photo, written: Option<SystemTime>) -> String {
     use std::hash::{DefaultHasher, Hash, Hasher};
     let mut hasher = DefaultHasher::new();
-    (photo.path.as_path(), photo.name.as_str(), model.digest()).hash(&mut hasher);
-    let written = std::fs::metadata(&photo.path).and_then(|m| m.modified()).ok();
+    (photo.path.as_path(), photo.name.as_str(), digest).hash(&mut hasher);
     written.hash(&mut hasher);
-    format!("{}-{:016x}.frame", model.about.name, hasher.finish())
+    format!("{model}-{:016x}.frame", hasher.finish())
 }
 
 fn write(path: &Path, frame: &Frame) -> std::io::Result<()> {
@@ -218,5 +240,29 @@ mod tests {
         huge[8..16].copy_from_slice(&u64::MAX.to_le_bytes());
         std::fs::write(&path, &huge).expect("written");
         assert_eq!(read(&path), None);
+    }
+
+    #[test]
+    fn frames_of_the_first_version_are_used_on() {
+        let folder = tempfile::tempdir().expect("folder");
+        let camera = crate::scene::Camera::look_at(glam::DVec3::ONE, glam::DVec3::ZERO, glam::DVec3::Z, 0.8, 64, 48);
+        let photo = Photo {
+            name: "a.jpg".into(),
+            // It is not there, so nobody knows when it was written.
+            path: "/one/fox/a.jpg".into(),
+            camera: camera.expect("valid"),
+            distortion: None,
+            test_split: false,
+            background: None,
+        };
+        let model = ("sam2.1-tiny", "00ff");
+        let old = folder.path().join("sam2.1-tiny-7228bc543858c811.frame");
+        assert_eq!(folder.path().join(first_name(model, &photo, None)), old, "as the first version called it");
+        std::fs::write(&old, "kept").expect("write");
+        let now = kept_file(folder.path(), model, &photo);
+        assert_eq!(std::fs::read(&now).expect("there"), b"kept");
+        assert!(!old.exists() && now == kept_file(folder.path(), model, &photo), "it has one name and keeps it");
+        let other = kept_file(folder.path(), ("sam2.1-tiny", "00fe"), &photo);
+        assert!(other != now && !other.exists(), "the control: another version of the model");
     }
 }

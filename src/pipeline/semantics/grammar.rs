@@ -1,19 +1,9 @@
 //! What a typed query asks for: a thing, or a piece of a thing.
 
+pub use crate::scene::LevelFilter as Kind;
+
 /// Longest query that is looked at, in characters.
 pub const MAX_CHARS: usize = 300;
-
-/// Which level a query is about.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Kind {
-    /// What the grammar says; failing that, the level that fits better.
-    #[default]
-    Auto,
-    /// Whole objects.
-    Object,
-    /// Parts.
-    Part,
-}
 
 /// A query taken apart.
 #[derive(Clone, Debug, PartialEq, Eq)]

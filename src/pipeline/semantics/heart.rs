@@ -173,7 +173,7 @@ fn open(name: &str, seed: u64, folder: &Path) -> Scene {
 impl Scene {
     fn find(&mut self, lifting: Lifting, encoder: Option<&mut (dyn Encoder + 'static)>) -> SemanticMap {
         let tools = Tools { segmenter: &mut self.masks, follower: None, encoder };
-        let options = FindOptions { lifting, ..FindOptions::default() };
+        let options = FindOptions { lifting, code_steps: CODE_STEPS, ..FindOptions::default() };
         let found = find_objects(&self.cloud, &self.training, &self.settings, tools, &options, &mut Silent);
         found.expect("found").map
     }
@@ -285,7 +285,7 @@ fn measure(seed: u64, harms: &[Harm]) -> Vec<Figures> {
         let folder = tempfile::tempdir().expect("a folder");
         let mut scene = open(name, seed, folder.path());
         let map = scene.find(Lifting::Votes, Some(&mut *encoder));
-        let trained = scene.find(Lifting::Paper(CODE_STEPS), None);
+        let trained = scene.find(Lifting::Paper, None);
         for (harm, all) in harms.iter().zip(&mut all) {
             let mut encoder = Known { encoder: &mut *encoder, texts: &mut texts, harm: *harm };
             all.push(figures(&scene, &harmed(&map, *harm), &harmed(&trained, *harm), &mut encoder));

@@ -1,8 +1,8 @@
 //! Multilevel localisation: from scores of phrases to the identities meant, with "not found" and
 //! "ambiguous" among the answers.
 
-use super::grammar::{Kind, Phrase};
-use crate::scene::{Identities, IdentityId, Level};
+use super::grammar::Phrase;
+use crate::scene::{Identities, IdentityId, Level, LevelFilter};
 
 /// Answers that are given at most.
 const TOP: usize = 8;
@@ -84,20 +84,24 @@ impl Answer {
 }
 
 /// Finds what `phrase` means among the identities.
-pub fn localise(identities: &Identities, phrase: &Phrase, kind: Kind, scorer: &mut dyn Scorer) -> Answer {
-    match (&phrase.whole, kind, scorer.strategy()) {
-        (Some(whole), Kind::Auto | Kind::Part, Strategy::WholeFirst) => {
+pub fn localise(identities: &Identities, phrase: &Phrase, level: LevelFilter, scorer: &mut dyn Scorer) -> Answer {
+    match (&phrase.whole, level, scorer.strategy()) {
+        (Some(whole), LevelFilter::Auto | LevelFilter::Part, Strategy::WholeFirst) => {
             piece_of(identities, &phrase.target, whole, scorer)
         }
-        (Some(whole), Kind::Auto | Kind::Part, Strategy::Paper) => two_steps(identities, &phrase.text, whole, scorer),
-        (Some(whole), Kind::Auto | Kind::Part, Strategy::Joint) => jointly(identities, &phrase.text, whole, scorer),
+        (Some(whole), LevelFilter::Auto | LevelFilter::Part, Strategy::Paper) => {
+            two_steps(identities, &phrase.text, whole, scorer)
+        }
+        (Some(whole), LevelFilter::Auto | LevelFilter::Part, Strategy::Joint) => {
+            jointly(identities, &phrase.text, whole, scorer)
+        }
         (_, _, strategy) => {
             let text = if strategy == Strategy::WholeFirst { &phrase.target } else { &phrase.text };
             let scores = scorer.scores(text, None);
-            let wanted = |level: Level| match kind {
-                Kind::Auto => true,
-                Kind::Object => level == Level::Object,
-                Kind::Part => level == Level::Part,
+            let wanted = |own: Level| match level {
+                LevelFilter::Auto => true,
+                LevelFilter::Object => own == Level::Object,
+                LevelFilter::Part => own == Level::Part,
             };
             let all = identities.iter().filter(|(_, i)| wanted(i.level)).map(|(id, _)| id);
             judge(identities, rank(all, &scores), scorer)
@@ -218,10 +222,10 @@ mod tests {
         all
     }
 
-    fn ask(query: &str, kind: Kind) -> (Answer, Vec<String>) {
+    fn ask(query: &str, level: LevelFilter) -> (Answer, Vec<String>) {
         let all = scene();
         let phrase = Phrase::parse(query).expect("a phrase");
-        let answer = localise(&all, &phrase, kind, &mut ByName(&all));
+        let answer = localise(&all, &phrase, level, &mut ByName(&all));
         let names = answer.hits().iter().map(|h| {
             let line: Vec<String> = all.line(h.identity).map(|i| all.name(i)).collect();
             line.join(" < ")
@@ -233,30 +237,30 @@ mod tests {
     #[test]
     fn the_whole_decides_between_pieces_of_the_same_name() {
         for color in ["red", "blue"] {
-            let (answer, names) = ask(&format!("a button of the {color} controller"), Kind::Auto);
+            let (answer, names) = ask(&format!("a button of the {color} controller"), LevelFilter::Auto);
             assert!(matches!(answer, Answer::Found(_)), "{answer:?}");
             assert_eq!(names[0], format!("button a < {color} controller"));
         }
-        let (answer, names) = ask("button a", Kind::Auto);
+        let (answer, names) = ask("button a", LevelFilter::Auto);
         assert!(matches!(answer, Answer::Ambiguous(_)), "{answer:?}");
         assert_eq!(names[..2], ["button a < red controller", "button a < blue controller"]);
     }
 
     #[test]
     fn a_kind_can_be_forced() {
-        assert_eq!(ask("red controller", Kind::Auto).1[0], "red controller");
-        assert!(matches!(ask("red controller", Kind::Part).0, Answer::NotFound(_)));
-        assert_eq!(ask("left stick of the blue controller", Kind::Object).0.hits().len(), 3);
+        assert_eq!(ask("red controller", LevelFilter::Auto).1[0], "red controller");
+        assert!(matches!(ask("red controller", LevelFilter::Part).0, Answer::NotFound(_)));
+        assert_eq!(ask("left stick of the blue controller", LevelFilter::Object).0.hits().len(), 3);
     }
 
     #[test]
     fn what_is_not_there_is_not_found() {
         for absent in ["giraffe", "wing of the giraffe", "antenna of the red controller", "shade of the lamp"] {
-            assert!(matches!(ask(absent, Kind::Auto).0, Answer::NotFound(_)), "{absent}");
+            assert!(matches!(ask(absent, LevelFilter::Auto).0, Answer::NotFound(_)), "{absent}");
         }
         let all = Identities::default();
         let phrase = Phrase::parse("lamp").expect("a phrase");
-        assert_eq!(localise(&all, &phrase, Kind::Auto, &mut ByName(&all)), Answer::NotFound(vec![]));
+        assert_eq!(localise(&all, &phrase, LevelFilter::Auto, &mut ByName(&all)), Answer::NotFound(vec![]));
     }
 
     /// Scores from a table: (phrase, against) -> score per identity.
@@ -292,7 +296,7 @@ mod tests {
         let table = |strategy, step1: Vec<f32>, step2: Vec<f32>| {
             Table(strategy, vec![(text, None, step1), (text, Some("red controller"), step2)])
         };
-        let ask = |mut t: Table| localise(&all, &phrase, Kind::Auto, &mut t);
+        let ask = |mut t: Table| localise(&all, &phrase, LevelFilter::Auto, &mut t);
         assert_eq!(ask(table(Strategy::OneStep, step1.clone(), step2.clone())).hits()[0].identity, 1);
         assert_eq!(ask(table(Strategy::Paper, step1.clone(), step2)).hits()[0].identity, 2);
         // Pushed below the threshold, all of them: the order of step 1 stands.
@@ -313,7 +317,7 @@ mod tests {
         // Identities: 1 red (2 button, 3 stick), 4 blue (5, 6), 7 lamp.
         let ask = |by_text: [f32; 7], by_whole: [f32; 7]| {
             let rows = vec![(text, None, by_text.to_vec()), ("red controller", None, by_whole.to_vec())];
-            localise(&all, &phrase, Kind::Auto, &mut Table(Strategy::Joint, rows))
+            localise(&all, &phrase, LevelFilter::Auto, &mut Table(Strategy::Joint, rows))
         };
         // The blue button is a little more like a button; the red controller is clearly the red one.
         let answer = ask([0.9, 0.6, 0.4, 0.8, 0.63, 0.4, 0.1], [0.9, 0.1, 0.1, 0.4, 0.1, 0.1, 0.1]);
@@ -332,7 +336,7 @@ mod tests {
         // Identities: 1 red (2 button, 3 stick), 4 blue (5, 6), 7 lamp.
         let paper = |step1: [f32; 7], step2: [f32; 7]| {
             let rows = vec![(text, None, step1.to_vec()), (text, Some("red controller"), step2.to_vec())];
-            localise(&all, &phrase, Kind::Auto, &mut Table(Strategy::Paper, rows))
+            localise(&all, &phrase, LevelFilter::Auto, &mut Table(Strategy::Paper, rows))
         };
         // The object wins with just the threshold; of its pieces only the first reaches it.
         let answer = paper([0.5, 0.3, 0.4, 0.2, 0.1, 0.1, 0.1], [0.9, 0.5, 0.4, 0.9, 0.9, 0.9, 0.9]);
@@ -355,7 +359,7 @@ mod tests {
                 ("button", None, plain.to_vec()),
                 ("button", Some("red controller"), against.to_vec()),
             ];
-            localise(&all, &phrase, Kind::Auto, &mut Table(Strategy::WholeFirst, rows))
+            localise(&all, &phrase, LevelFilter::Auto, &mut Table(Strategy::WholeFirst, rows))
         };
         let pieces = |answer: &Answer| answer.hits().iter().map(|h| h.identity).collect::<Vec<_>>();
         let whole = [0.9, 0.1, 0.1, 0.8, 0.1, 0.1, 0.95];
@@ -381,7 +385,7 @@ mod tests {
         let phrase = Phrase::parse("thing").expect("a phrase");
         let ask = |scores: [f32; 7]| {
             let mut table = Table(Strategy::OneStep, vec![("thing", None, scores.to_vec())]);
-            localise(&all, &phrase, Kind::Auto, &mut table)
+            localise(&all, &phrase, LevelFilter::Auto, &mut table)
         };
         assert_eq!(ask([0.9, 0.1, 0.1, 0.8995, 0.1, 0.1, 0.1]).verdict(), "ambiguous");
         assert_eq!(ask([0.9, 0.1, 0.1, 0.898, 0.1, 0.1, 0.1]).verdict(), "found");

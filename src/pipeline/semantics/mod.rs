@@ -8,7 +8,6 @@
 //! meant, and [`answer`] puts it together, with the time of each of the [`stages`].
 
 pub mod answer;
-pub mod asker;
 pub mod carry;
 pub mod code_map;
 pub mod codes;
@@ -29,6 +28,7 @@ pub mod meaning;
 pub mod names;
 pub mod portraits;
 pub mod protocols;
+pub mod query_engine;
 pub mod regions;
 pub mod relevancy;
 pub mod segmenter;
@@ -37,3 +37,8 @@ pub mod tracker;
 pub mod train_codes;
 pub mod view_map;
 pub mod votes;
+
+/// The name of [`query_engine`] until now.
+pub mod asker {
+    pub use super::query_engine::QueryEngine as Asker;
+}

@@ -46,7 +46,7 @@ pub use levels::Identity;
 pub use options::{Levels, Rig, SynthOptions};
 
 use crate::io::IoError;
-use crate::io::gltf_mesh::{self, GltfError, MeshScene};
+use crate::io::gltf_mesh::{self, MeshScene};
 use crate::io::memory;
 use crate::pipeline::observer::{self, Interrupted, Observer, Ticker};
 use crate::scene::Camera;
@@ -58,9 +58,6 @@ const BYTES_PER_PX: u64 = 48;
 /// Why no data set was made.
 #[derive(Debug, thiserror::Error)]
 pub enum SynthError {
-    /// The scene could not be read.
-    #[error(transparent)]
-    Scene(#[from] GltfError),
     /// A setting is out of its range.
     #[error("{0}")]
     Options(String),

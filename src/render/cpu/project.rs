@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::walk::Primitive;
 use crate::math::{Real, rotation, sh};
 use crate::render::{BLUR_PX2, COLOR_MAX, Features, RenderSettings, TANGENT_CLAMP};
 use crate::scene::{Camera, Gaussian, GaussianCloud};
@@ -52,6 +53,14 @@ impl<R: Real> View<R> {
     #[inline(always)]
     pub fn relative(&self, p: [R; 3]) -> [R; 3] {
         [R::of(p[0].f64() + self.offset[0]), R::of(p[1].f64() + self.offset[1]), R::of(p[2].f64() + self.offset[2])]
+    }
+
+    /// Whether a box around `mean` has a pixel center of the picture in it.
+    #[inline(always)]
+    pub fn meets(&self, mean: [R; 2], half: [R; 2]) -> bool {
+        let last = self.size.map(|s| R::of(s as f64) - R::HALF);
+        let inside = |axis: usize| mean[axis] + half[axis] >= R::HALF && mean[axis] - half[axis] <= last[axis];
+        inside(0) && inside(1)
     }
 }
 
@@ -211,100 +220,119 @@ pub struct Chunk<R> {
     pub degenerate: usize,
 }
 
-/// Projects the whole cloud, in parts of [`CHUNK`] Gaussians. `channels` is the padded number of
-/// values per splat.
-pub fn project<R: Real>(
-    parts: &mut Vec<Chunk<R>>,
-    cloud: &GaussianCloud<R>,
-    features: Features<'_, R>,
-    view: &View<R>,
-    settings: &RenderSettings,
-    channels: usize,
-) {
-    in_chunks(parts, cloud.len(), |part, range| {
-        project_chunk(part, cloud, features, view, settings, channels, range);
-    });
+/// What is to be drawn, and how.
+#[derive(Clone, Copy)]
+pub struct Scene<'a, R> {
+    /// The Gaussians.
+    pub cloud: &'a GaussianCloud<R>,
+    /// Their extra channels.
+    pub features: Features<'a, R>,
+    /// How.
+    pub settings: &'a RenderSettings,
 }
 
-/// Has every part filled from its [`CHUNK`] of `n` Gaussians, all at once; parts come empty.
-pub fn in_chunks<R: Real>(
+/// Projects the whole cloud, in parts of [`CHUNK`] Gaussians: `P::SHAPE + channels` values per splat, the channels
+/// being color, extra channels, what depth needs, padding zeros.
+pub fn project<R: Real, P: Primitive<R>>(
     parts: &mut Vec<Chunk<R>>,
-    n: usize,
-    fill: impl Fn(&mut Chunk<R>, std::ops::Range<usize>) + Sync,
+    scene: Scene<'_, R>,
+    view: &View<R>,
+    primitive: P,
+    channels: usize,
 ) {
+    let n = scene.cloud.len();
     parts.resize_with(n.div_ceil(CHUNK), Chunk::default);
     parts.par_iter_mut().enumerate().for_each(|(c, part)| {
         part.splats.clear();
         part.values.clear();
         part.degenerate = 0;
-        fill(part, c * CHUNK..((c + 1) * CHUNK).min(n));
+        project_chunk(part, scene, view, primitive, channels, c * CHUNK..((c + 1) * CHUNK).min(n));
     });
 }
 
 #[multiversion::multiversion(targets("x86_64+avx2+fma"))]
-fn project_chunk<R: Real>(
+fn project_chunk<R: Real, P: Primitive<R>>(
     part: &mut Chunk<R>,
-    cloud: &GaussianCloud<R>,
-    features: Features<'_, R>,
+    scene: Scene<'_, R>,
     view: &View<R>,
-    settings: &RenderSettings,
+    primitive: P,
     channels: usize,
     range: std::ops::Range<usize>,
 ) {
+    let Scene { cloud, features, settings } = scene;
     let degree = settings.sh_degree.min(cloud.sh_degree);
-    let alpha_min = R::of(settings.cutoffs.alpha);
     for i in range {
         // Cheap tests first: most Gaussians of a scene are outside the picture.
         let relative = view.relative(cloud.positions[i]);
         if !(dot(view.rows[2], relative) > view.near) {
             continue;
         }
-        let mut opacity = cloud.opacity_logits[i].sigmoid();
-        if opacity < alpha_min {
+        let opacity = cloud.opacity_logits[i].sigmoid();
+        if opacity < primitive.alpha_min() {
             continue;
         }
         let gaussian = cloud.gaussian(i);
-        let Some(g) = geometry(&gaussian, view) else {
-            part.degenerate += 1;
-            continue;
-        };
-        if settings.antialias {
-            opacity *= compensation(&g);
-            if !(opacity >= alpha_min) {
+        let (mut splat, shape, depth) = match primitive.project(&gaussian, opacity, view, settings) {
+            Projected::Splat(splat, shape, depth) => (splat, shape, depth),
+            Projected::Outside => continue,
+            Projected::Degenerate => {
+                part.degenerate += 1;
                 continue;
             }
-        }
-        let z = g.local[2];
-        let mean = [
-            view.focal[0] * (g.local[0] / z) + view.principal[0],
-            view.focal[1] * (g.local[1] / z) + view.principal[1],
-        ];
-        let reach = R::of(2.0) * (opacity / alpha_min).ln();
-        let [xx, xy, yy] = g.covariance;
-        let half = [(reach * xx).sqrt(), (reach * yy).sqrt()];
-        let inside = |axis: usize| {
-            let last = R::of(view.size[axis] as f64) - R::HALF;
-            mean[axis] + half[axis] >= R::HALF && mean[axis] - half[axis] <= last
         };
-        if !(inside(0) && inside(1)) {
-            continue;
-        }
-        let det = g.determinants[1];
-        let conic = [yy / det, -xy / det, xx / det];
-        // A covariance so wide that its inverse underflows has no usable shape.
-        if !(conic[0] > R::ZERO && conic[2] > R::ZERO && half[0].is_finite() && half[1].is_finite()) {
-            part.degenerate += 1;
-            continue;
-        }
-        let basis = sh::basis(degree, direction(g.relative));
-        let color = color(gaussian.sh, &basis, degree);
+        splat.gaussian = i as u32;
+        let basis = sh::basis(degree, direction(relative));
         let first = part.values.len();
-        part.values.extend_from_slice(&color);
+        part.values.extend_from_slice(shape.as_ref());
+        part.values.extend_from_slice(&color(gaussian.sh, &basis, degree));
         part.values.extend_from_slice(&features.values[i * features.channels..(i + 1) * features.channels]);
         if settings.depth {
-            part.values.push(z);
+            part.values.extend_from_slice(depth.as_ref());
         }
-        part.values.resize(first + channels, R::ZERO);
-        part.splats.push(Splat { mean, conic, opacity, reach, half, depth: z, gaussian: i as u32 });
+        part.values.resize(first + shape.as_ref().len() + channels, R::ZERO);
+        part.splats.push(splat);
     }
+}
+
+/// What becomes of a Gaussian in front of the near plane.
+pub enum Projected<R, S, D> {
+    /// It reaches a pixel center: its splat, its shape, and what depth composites.
+    Splat(Splat<R>, S, D),
+    /// It reaches none.
+    Outside,
+    /// Its shape is not usable.
+    Degenerate,
+}
+
+/// A Gaussian as a splat of at least this alpha.
+#[inline(always)]
+pub fn splat<R: Real>(
+    gaussian: &Gaussian<'_, R>,
+    mut opacity: R,
+    alpha_min: R,
+    view: &View<R>,
+    settings: &RenderSettings,
+) -> Projected<R, [R; 0], [R; 1]> {
+    let Some(g) = geometry(gaussian, view) else { return Projected::Degenerate };
+    if settings.antialias {
+        opacity *= compensation(&g);
+        if !(opacity >= alpha_min) {
+            return Projected::Outside;
+        }
+    }
+    let depth = g.local[2];
+    let mean = [0, 1].map(|axis| view.focal[axis] * (g.local[axis] / depth) + view.principal[axis]);
+    let reach = R::of(2.0) * (opacity / alpha_min).ln();
+    let [xx, xy, yy] = g.covariance;
+    let half = [(reach * xx).sqrt(), (reach * yy).sqrt()];
+    if !view.meets(mean, half) {
+        return Projected::Outside;
+    }
+    let det = g.determinants[1];
+    let conic = [yy / det, -xy / det, xx / det];
+    // A covariance so wide that its inverse underflows has no usable shape.
+    if !(conic[0] > R::ZERO && conic[2] > R::ZERO && half[0].is_finite() && half[1].is_finite()) {
+        return Projected::Degenerate;
+    }
+    Projected::Splat(Splat { mean, conic, opacity, reach, half, depth, gaussian: 0 }, [], [depth])
 }

@@ -1,7 +1,7 @@
 //! From the moments of a splat back to the raw parameters of its Gaussian.
 
-use super::blend_backward::MOMENTS;
 use super::project::{Geometry, Splat, View, direction, geometry, raw_color};
+use super::splat::MOMENTS;
 use crate::math::{Real, rotation::unit_quaternion, sh};
 use crate::render::RenderSettings;
 use crate::scene::Gaussian;

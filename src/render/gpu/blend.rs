@@ -1,4 +1,4 @@
-//! Front-to-back blending; `shaders/blend.wgsl`.
+//! Front-to-back blending, `shaders/blend.wgsl`, and what it shares with its gradient.
 
 use std::collections::BTreeMap;
 
@@ -7,32 +7,36 @@ use super::scratch::{PerGaussian, PerPair, PerPicture};
 use super::shader::Variant;
 use super::{Device, GpuError};
 
-/// The blending kernel, one pipeline for each number of extra channels in a pass.
-#[derive(Debug, Default)]
-pub struct Blend {
+/// A kernel over the tiles of a frame, one pipeline for each number of extra channels in a pass.
+#[derive(Debug)]
+pub struct TileKernel {
+    shader: &'static str,
+    float_atomics: bool,
+    /// How the kernel's own buffers are used, which follow those that every tile kernel reads.
+    own: [Access; 4],
     kernels: BTreeMap<usize, Kernel>,
 }
 
-impl Blend {
+impl TileKernel {
+    /// The blending kernel; no pipelines yet.
+    pub fn blend() -> Self {
+        Self::new("blend", false, [Access::Write; 4])
+    }
+
+    /// The kernel of a shader.
+    pub fn new(shader: &'static str, float_atomics: bool, own: [Access; 4]) -> Self {
+        Self { shader, float_atomics, own, kernels: BTreeMap::new() }
+    }
+
     /// Compiles what passes of `channels` extra channels need, if that has not been done.
     pub fn prepare(&mut self, device: &Device, channels: usize) -> Result<(), GpuError> {
-        use Access::{Read, Uniform, Write};
+        use Access::{Read, Uniform};
         if self.kernels.contains_key(&channels) {
             return Ok(());
         }
-        let module = Module::new(device, "blend", Variant { channels, ..Variant::default() })?;
-        let slots = [
-            (0, Uniform),
-            (1, Uniform),
-            (2, Read),
-            (3, Read),
-            (4, Read),
-            (5, Read),
-            (6, Write),
-            (7, Write),
-            (8, Write),
-            (9, Write),
-        ];
+        let module = Module::new(device, self.shader, Variant { channels, float_atomics: self.float_atomics })?;
+        let accesses = [Uniform, Uniform, Read, Read, Read, Read].into_iter().chain(self.own);
+        let slots: Vec<_> = (0..).zip(accesses).collect();
         self.kernels.insert(channels, Kernel::new(device, &module, "main", &slots)?);
         Ok(())
     }
@@ -42,25 +46,15 @@ impl Blend {
         &self,
         stage: &mut Stage<'_>,
         bindings: FrameBindings<'_>,
-        scratch: (&PerGaussian, &PerPair, &PerPicture),
+        (gaussians, pairs, picture): (&PerGaussian, &PerPair, &PerPicture),
         features: &wgpu::Buffer,
+        own: [&wgpu::Buffer; 4],
     ) {
-        let (gaussians, pairs, picture) = scratch;
         let list = &pairs.by_tile.values[pairs.by_tile.result()];
         for (channels, chunk) in &picture.chunks {
             let Some(kernel) = self.kernels.get(channels) else { continue };
-            let buffers = [
-                bindings.view,
-                chunk,
-                &picture.ranges,
-                list,
-                &gaussians.splats,
-                features,
-                &picture.colors,
-                &picture.ends,
-                &picture.depths,
-                &picture.features,
-            ];
+            let read = [bindings.view, chunk, &picture.ranges, list, &gaussians.splats, features];
+            let buffers: Vec<_> = read.into_iter().chain(own).collect();
             stage.run(kernel, &buffers, [bindings.tiles[0], bindings.tiles[1], 1]);
         }
     }

@@ -31,7 +31,54 @@ fn adapter(software: bool) -> Result<wgpu::Adapter, wgpu::RequestAdapterError> {
     pollster::block_on(wgpu::Instance::new(description.with_env()).request_adapter(&options))
 }
 
+/// The device that everything in the process draws and trains on.
+static SHARED: Mutex<Option<Device>> = Mutex::new(None);
+
+/// What `open` gives, kept in `held` for who asks next; what is held and was lost is no longer given.
+fn held_or(
+    held: &Mutex<Option<Device>>,
+    open: impl FnOnce() -> Result<Option<Device>, GpuError>,
+) -> Result<Option<Device>, GpuError> {
+    let mut held = held.lock().unwrap_or_else(PoisonError::into_inner);
+    if held.as_ref().is_none_or(Device::is_lost) {
+        *held = open()?;
+    }
+    Ok(held.clone())
+}
+
 impl Device {
+    /// The process's device: the best adapter's, a real GPU's before a software one's. Opened when first asked for,
+    /// and again after it was lost.
+    pub fn shared() -> Result<Self, GpuError> {
+        let shared = held_or(&SHARED, || Self::new().map(Some))?;
+        shared.ok_or_else(|| GpuError::NoAdapter("none was opened".to_owned()))
+    }
+
+    /// The process's device where it is a real GPU's. No device of an emulated adapter is opened to find that out.
+    ///
+    /// # Errors
+    /// If there is one that does not open.
+    pub fn shared_real() -> Result<Option<Self>, GpuError> {
+        Ok(held_or(&SHARED, Self::real)?.filter(|device| !device.is_software()))
+    }
+
+    /// Makes a window's device the process's, and says whether it does: one of a real GPU that has all that
+    /// [`Self::device_descriptor`] asks for, before another was opened.
+    pub fn adopt(adapter: &wgpu::Adapter, device: &wgpu::Device, queue: &wgpu::Queue) -> bool {
+        let (info, wanted) = (adapter.get_info(), Self::device_descriptor(adapter));
+        let suits = info.device_type != wgpu::DeviceType::Cpu
+            && wgpu::Backends::PRIMARY.contains(info.backend.into())
+            && device.features().contains(wanted.required_features)
+            && wanted.required_limits.check_limits(&device.limits());
+        let mut held = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
+        if !suits || held.is_some() {
+            return false;
+        }
+        trace::record(Sort::Device, format!("the window's device on {}", info.name), "the window was opened", 0);
+        *held = Some(Self::from_parts(info, device.clone(), queue.clone()));
+        true
+    }
+
     /// Opens the best adapter: a real GPU before a software one.
     pub fn new() -> Result<Self, GpuError> {
         let adapter = adapter(false).or_else(|_| adapter(true)).map_err(|e| GpuError::NoAdapter(e.to_string()))?;
@@ -146,6 +193,10 @@ impl Device {
         }
     }
 
+    fn is_lost(&self) -> bool {
+        matches!(*self.fault.lock().unwrap_or_else(PoisonError::into_inner), Some(GpuError::Lost(_)))
+    }
+
     /// Refuses `need` bytes in one storage binding where the adapter cannot bind so many.
     pub(super) fn fits_binding(&self, what: &str, need: u64, remedy: &'static str) -> Result<(), GpuError> {
         let limits = self.limits();
@@ -220,7 +271,14 @@ impl Device {
 
     /// Waits for everything submitted so far.
     pub fn wait(&self) -> Result<(), GpuError> {
-        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| GpuError::Lost(e.to_string()))?;
+        self.wait_for(None)
+    }
+
+    /// Waits for a submission and what came before it, whoever made it, but for nothing that came later; without one
+    /// for everything so far.
+    pub(super) fn wait_for(&self, submission_index: Option<wgpu::SubmissionIndex>) -> Result<(), GpuError> {
+        let until = wgpu::PollType::Wait { submission_index, timeout: None };
+        self.device.poll(until).map_err(|e| GpuError::Lost(e.to_string()))?;
         self.check()
     }
 
@@ -236,7 +294,7 @@ impl Device {
             }
             staged.push((staging, bytes));
         }
-        self.queue.submit([encoder.finish()]);
+        let submitted = self.queue.submit([encoder.finish()]);
         let (sender, receiver) = mpsc::sync_channel(sources.len().max(1));
         for (staging, _) in &staged {
             let sender = sender.clone();
@@ -245,7 +303,7 @@ impl Device {
                 let _ = sender.send(r);
             });
         }
-        self.wait()?;
+        self.wait_for(Some(submitted))?;
         for _ in &staged {
             let mapped =
                 receiver.try_recv().map_err(|_| GpuError::Lost("a copy to the host never ended".to_owned()))?;
@@ -287,4 +345,30 @@ pub fn real_gpu() -> Option<String> {
             )
         })
         .map(|i| i.name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_device_is_opened_once_and_again_only_after_it_was_lost() {
+        let Ok(device) = Device::new() else { return };
+        let (held, opened) = (Mutex::new(None), std::cell::Cell::new(0));
+        let ask = || {
+            let open = || {
+                opened.set(opened.get() + 1);
+                let parts = (device.info().clone(), device.wgpu().clone(), device.queue().clone());
+                Ok(Some(Device::from_parts(parts.0, parts.1, parts.2)))
+            };
+            held_or(&held, open).expect("opens").expect("held")
+        };
+        let first = ask();
+        ask();
+        assert_eq!(opened.get(), 1);
+        first.fault.lock().expect("free").replace(GpuError::Lost("unplugged".into()));
+        assert!(ask().check().is_ok(), "a new one");
+        assert_eq!(opened.get(), 2);
+        assert!(matches!(held_or(&Mutex::new(None), || Err(GpuError::Lost("x".into()))), Err(GpuError::Lost(_))));
+    }
 }

@@ -165,10 +165,10 @@ impl<'a> Recorder<'a> {
     }
 
     /// Hands the commands to the device.
-    pub fn submit(mut self) {
+    pub fn submit(mut self) -> wgpu::SubmissionIndex {
         if let Some(timer) = self.timer {
             timer.resolve(&mut self.encoder);
         }
-        self.device.queue().submit([self.encoder.finish()]);
+        self.device.queue().submit([self.encoder.finish()])
     }
 }

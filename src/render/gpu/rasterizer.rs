@@ -1,7 +1,7 @@
 //! The forward pass: all its kernels and the buffers between them, for the renderer and the trainer.
 
 use super::bin::Bin;
-use super::blend::Blend;
+use super::blend::TileKernel;
 use super::kernel::{FrameBindings, Recorder};
 use super::layout::{Counters, View};
 use super::project::{CloudShape, Project, view};
@@ -22,7 +22,7 @@ pub struct Rasterizer {
     project: Project,
     sort: Sort,
     bin: Bin,
-    blend: Blend,
+    blend: TileKernel,
     /// Camera and picture.
     pub view: wgpu::Buffer,
     /// Counters of the frame.
@@ -43,7 +43,7 @@ impl Rasterizer {
             project: Project::new(device)?,
             sort: Sort::new(device)?,
             bin: Bin::new(device)?,
-            blend: Blend::default(),
+            blend: TileKernel::blend(),
             view: device.uniform("view", bytemuck::bytes_of(&View::default()))?,
             counters: device.storage("counters", size_of::<Counters>() as u64)?,
             gaussians: PerGaussian::new(device, 1)?,
@@ -112,7 +112,9 @@ impl Rasterizer {
         recorder.stage("sort by tile", |s| self.sort.encode(s, &self.pairs.by_tile, &self.counters));
         recorder.stage("bin", |s| self.bin.encode_ranges(s, bindings, &self.pairs, &self.picture.ranges));
         recorder.stage("blend", |s| {
-            self.blend.encode(s, bindings, (&self.gaussians, &self.pairs, &self.picture), features);
+            let picture = &self.picture;
+            let own = [&picture.colors, &picture.ends, &picture.depths, &picture.features];
+            self.blend.encode(s, bindings, (&self.gaussians, &self.pairs, picture), features, own);
         });
     }
 

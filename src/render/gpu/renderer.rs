@@ -1,6 +1,7 @@
 //! The renderer: a cloud in host memory to a frame in host memory, and gradients back.
 
-use super::blend_backward::{BlendBackward, BlendGradients};
+use super::blend::TileKernel;
+use super::blend_backward::{BlendGradients, blend_backward};
 use super::cloud::{Packed, Parameters};
 use super::kernel::Recorder;
 use super::layout::{Counters, Splat};
@@ -18,7 +19,7 @@ use crate::scene::{Camera, GaussianCloud};
 pub struct Renderer {
     device: Device,
     rasterizer: Rasterizer,
-    blend_backward: BlendBackward,
+    blend_backward: TileKernel,
     project_backward: ProjectBackward,
     cloud: Parameters,
     shape: CloudShape,
@@ -60,7 +61,7 @@ impl Renderer {
         Ok(Self {
             device: device.clone(),
             rasterizer: Rasterizer::new(device)?,
-            blend_backward: BlendBackward::new(float_atomics),
+            blend_backward: blend_backward(float_atomics),
             project_backward: ProjectBackward::new(device)?,
             cloud: Parameters::new(device, "cloud", 0, 0)?,
             shape: CloudShape::default(),
@@ -241,7 +242,8 @@ impl Renderer {
         let splats = &r.gaussians.splats;
         let mut recorder = Recorder::new(&self.device, self.timer.as_mut());
         recorder.stage("blend backward", |s| {
-            self.blend_backward.encode(s, bindings, (&r.gaussians, &r.pairs, &r.picture), &self.features, &gradients);
+            let scratch = (&r.gaussians, &r.pairs, &r.picture);
+            self.blend_backward.encode(s, bindings, scratch, &self.features, gradients.buffers(&r.picture));
         });
         recorder.stage("project backward", |s| {
             self.project_backward.encode(s, bindings, &self.cloud, (splats, &gradients.splats), &out);

@@ -1,8 +1,11 @@
 //! Training on the device: a step draws, compares, goes back and moves without the host waiting
-//! for any of it; sums of the losses are fetched every so many steps.
+//! for its result; sums of the losses are fetched every so many steps.
+
+use std::collections::VecDeque;
 
 use super::adam::{Adam, AdamBuffers};
-use super::blend_backward::{BlendBackward, BlendGradients};
+use super::blend::TileKernel;
+use super::blend_backward::{BlendGradients, blend_backward};
 use super::cloud::{Packed, Parameters};
 use super::kernel::Recorder;
 use super::project::CloudShape;
@@ -12,10 +15,13 @@ use super::scratch::extent;
 use super::ssim::{DevicePhoto, LossSums, RING, Ssim};
 use super::timing::{StageTimes, Timer};
 use super::{Device, GpuError};
-use crate::render::DensityStats;
-use crate::render::RenderSettings;
 use crate::render::cpu::adam::Rates;
+use crate::render::{DensityStats, RenderSettings};
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
+
+/// Steps that wait on the device while it works on one: enough that it never waits for the host, and so few that
+/// what else is drawn on it, such as the window, need not wait for many.
+const AHEAD: usize = 2;
 
 /// What stays the same over a run.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,7 +56,7 @@ pub struct Trainer {
     settings: TrainerSettings,
     rasterizer: Rasterizer,
     ssim: Ssim,
-    blend_backward: BlendBackward,
+    blend_backward: TileKernel,
     project_backward: ProjectBackward,
     adam: Adam,
     shape: CloudShape,
@@ -69,6 +75,8 @@ pub struct Trainer {
     pending: Vec<(u64, usize)>,
     /// Steps fetched but not asked for yet.
     fetched: Vec<StepLoss>,
+    /// Steps handed to the device that nobody has waited for.
+    ahead: VecDeque<wgpu::SubmissionIndex>,
     timer: Option<Timer>,
     times: StageTimes,
 }
@@ -82,7 +90,7 @@ impl Trainer {
             settings,
             rasterizer: Rasterizer::new(device)?,
             ssim: Ssim::new(device)?,
-            blend_backward: BlendBackward::new(device.has_float_atomics()),
+            blend_backward: blend_backward(device.has_float_atomics()),
             project_backward: ProjectBackward::new(device)?,
             adam: Adam::new(device)?,
             shape: CloudShape::default(),
@@ -98,6 +106,7 @@ impl Trainer {
             sized: false,
             pending: Vec::new(),
             fetched: Vec::new(),
+            ahead: VecDeque::new(),
             timer: None,
             times: StageTimes::new(),
         };
@@ -198,7 +207,11 @@ impl Trainer {
         let degrees = [self.shape.degree, sh_degree.min(self.shape.degree)];
         let n = self.shape.gaussians;
         self.adam.prepare(&self.device, n, degrees, rates, self.step + 1);
-        self.encode_step(photo);
+        let submitted = self.encode_step(photo);
+        self.ahead.push_back(submitted);
+        if self.ahead.len() > AHEAD {
+            self.device.wait_for(self.ahead.pop_front())?;
+        }
         if let Some(timer) = &mut self.timer {
             self.times = timer.finish(&self.device)?;
         }
@@ -207,7 +220,7 @@ impl Trainer {
         self.device.check()
     }
 
-    fn encode_step(&mut self, photo: &DevicePhoto) {
+    fn encode_step(&mut self, photo: &DevicePhoto) -> wgpu::SubmissionIndex {
         let r = &self.rasterizer;
         let (bindings, splats) = (r.bindings(), &r.gaussians.splats);
         let mut recorder = Recorder::new(&self.device, self.timer.as_mut());
@@ -218,7 +231,7 @@ impl Trainer {
         recorder.stage("loss", |s| self.ssim.encode(s, &r.picture.colors, photo, &self.gradients.pixels));
         recorder.stage("blend backward", |s| {
             let scratch = (&r.gaussians, &r.pairs, &r.picture);
-            self.blend_backward.encode(s, bindings, scratch, &self.features, &self.gradients);
+            self.blend_backward.encode(s, bindings, scratch, &self.features, self.gradients.buffers(&r.picture));
         });
         recorder.stage("project backward", |s| {
             self.project_backward.encode(s, bindings, &self.cloud, (splats, &self.gradients.splats), &self.gradient);
@@ -229,7 +242,7 @@ impl Trainer {
             self.adam.encode(s, on, bindings.counters, bindings.gaussians, self.shape.degree);
             self.ssim.encode_sums(s, bindings.counters, &self.adam.outliers);
         });
-        recorder.submit();
+        recorder.submit()
     }
 
     /// Counts the pairs of one frame, so that the first step of a cloud is not lost.

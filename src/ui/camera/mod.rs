@@ -329,15 +329,7 @@ pub fn read(path: &Path) -> Result<CameraPath, String> {
 
 /// Writes a path's file, in nerfstudio's format if its name says so.
 pub fn write(file: &Path, path: &CameraPath, aspect: f64) -> Result<(), String> {
-    let written = if file.to_string_lossy().ends_with(".nerfstudio.json") {
-        let film = Film::new(path, Speed::Constant);
-        let poses = film.map_or_else(Vec::new, |film| film.pictures(path.fps, CameraPath::MAX_KEYS as f64));
-        let frames: Vec<PathKey> = poses.iter().map(Pose::key).collect();
-        crate::io::camera_path::nerfstudio::write(file, path, &frames, (1280, (1280.0 / aspect.max(0.01)) as u32))
-    } else {
-        crate::io::camera_path::write(file, path)
-    };
-    written.map_err(|e| e.to_string())
+    crate::jobs::export::camera_path(file, path, aspect).map_err(|e| e.to_string())
 }
 
 /// A small caption.

@@ -4,9 +4,10 @@ use egui::{Button, RichText, Ui};
 
 use super::super::state::AppState;
 use super::super::theme;
-use crate::pipeline::semantics::find::{Carry, Finding, REGIONS};
+use crate::jobs::find_objects::FindSettings;
+use crate::jobs::models::{ModelEntry, ModelRole, ModelState, SAM2};
+use crate::pipeline::semantics::find::{Carry, Lifting, REGIONS};
 use crate::ui::actions::Action;
-use crate::worker::models::{ModelEntry, ModelRole, ModelState, SAM2};
 use crate::worker::{Command, Worker};
 
 /// Which list of models was asked for.
@@ -22,7 +23,7 @@ impl Models {
         &mut self,
         ui: &mut Ui,
         state: &AppState,
-        finding: &mut Finding,
+        finding: &mut FindSettings,
         worker: &Worker,
         actions: &mut Vec<Action>,
     ) {
@@ -47,7 +48,7 @@ impl Models {
 }
 
 /// The models that find objects, of those that are here.
-fn choose(ui: &mut Ui, models: &[(ModelEntry, ModelState)], finding: &mut Finding) {
+fn choose(ui: &mut Ui, models: &[(ModelEntry, ModelState)], finding: &mut FindSettings) {
     let here = |role: ModelRole| {
         let of_role =
             models.iter().filter(move |(e, s)| e.role == role && matches!(s, ModelState::Here | ModelState::BuiltIn));
@@ -82,6 +83,23 @@ fn choose(ui: &mut Ui, models: &[(ModelEntry, ModelState)], finding: &mut Findin
         ui.weak("Encoder");
         one_of(ui, "encoder", &mut finding.encoder, &here(ModelRole::Encoder))
             .on_hover_text("Embeds objects and parts, for open-vocabulary queries.");
+        ui.end_row();
+        ui.weak("Codes");
+        let names = [
+            (Lifting::Votes, "of the votes"),
+            (Lifting::Refined, "of the votes, then trained"),
+            (Lifting::Paper, "trained alone, as in the paper"),
+        ];
+        let chosen = names.iter().find(|(l, _)| *l == finding.lifting).map_or("", |(_, name)| *name);
+        egui::ComboBox::from_id_salt("lifting").selected_text(chosen).width(180.0).show_ui(ui, |ui| {
+            for (lifting, name) in names {
+                ui.selectable_value(&mut finding.lifting, lifting, name);
+            }
+        });
+        ui.end_row();
+        ui.weak("Photos");
+        ui.add(egui::DragValue::new(&mut finding.max_seeds).range(1..=100_000).suffix(" at most"))
+            .on_hover_text("Photos whose masks are used: more are taken where those before leave much unknown.");
         ui.end_row();
     });
     ui.add_space(4.0);

@@ -2,11 +2,8 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use crate::scene::{Bounds, Camera};
-use crate::worker::HomeView;
+use crate::scene::{Bounds, Camera, HomeView};
 
-/// Vertical field of view of a fresh eye, in radians.
-const FOV_Y_RAD: f64 = 0.85;
 /// How close the viewing direction may come to the up direction, in radians.
 const POLE_RAD: f64 = 0.03;
 
@@ -28,17 +25,8 @@ pub struct Eye {
 impl Eye {
     /// An eye that sees all of `bounds` from obliquely above.
     pub fn framing(bounds: &Bounds, up: DVec3) -> Self {
-        let side = up.any_orthogonal_vector();
-        let mut eye = Self {
-            center: bounds.center() - side,
-            world_from_eye: DMat3::IDENTITY,
-            pivot: bounds.center(),
-            up,
-            fov_y_rad: FOV_Y_RAD,
-        };
-        eye.look_along(-(side + up * 0.45));
-        eye.frame(bounds);
-        eye
+        // The size of the picture does not matter.
+        Self::of_camera(&HomeView::overview(bounds, up, [1, 1]), bounds.center(), up)
     }
 
     /// The eye of a photo's camera, with `pivot` to turn about.
@@ -107,9 +95,8 @@ impl Eye {
     /// Moves back or forth along the viewing direction until `bounds` fills the view, and turns
     /// about its middle from then on.
     pub fn frame(&mut self, bounds: &Bounds) {
-        let radius = bounds.radius().max(1e-6);
         self.pivot = bounds.center();
-        self.center = self.pivot - self.forward() * (1.15 * radius / (0.5 * self.fov_y_rad).sin());
+        self.center = self.pivot - self.forward() * HomeView::distance(bounds, self.fov_y_rad);
     }
 
     /// The first view of a scene: from its first camera if it has one, else framed as a whole; upright if the user

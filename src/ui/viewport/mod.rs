@@ -76,7 +76,7 @@ pub struct Viewport {
 impl Viewport {
     /// An empty viewport. Fails only if the system gives no thread.
     pub fn new(repaint: Repaint) -> std::io::Result<Self> {
-        let home = crate::worker::HomeView::default();
+        let home = crate::scene::HomeView::default();
         Ok(Self {
             lane: ViewLane::start(repaint)?,
             requests: Requests::default(),

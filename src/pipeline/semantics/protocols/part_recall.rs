@@ -4,11 +4,9 @@
 
 use super::{LabelledView, Unit};
 use crate::math::stats::mean;
-use crate::pipeline::semantics::answer::by_meaning;
-use crate::pipeline::semantics::answer::{Language, phrases_of};
-use crate::pipeline::semantics::grammar::{Kind, Phrase};
 use crate::pipeline::semantics::localise::Strategy;
 use crate::pipeline::semantics::meaning::{MeaningOptions, PartFeatures, Phrasebook};
+use crate::pipeline::semantics::query_engine::ask_by_embedding;
 use crate::scene::{Identities, LanguageFeatures, Level, Mask, SemanticMap};
 
 /// IoU from which a query counts as answered.
@@ -91,14 +89,11 @@ pub fn row<E>(
         for category in view.categories.iter().filter(|c| c.level == Level::Part) {
             let start = std::time::Instant::now();
             let mut mask = Mask::empty(view.exact.width_px, view.exact.height_px);
-            if let Some(phrase) = Phrase::parse(&category.name) {
-                phrases.learn(&phrases_of(&phrase), &mut encode)?;
-                let language = Language { features, phrases: &phrases, options: components.options() };
-                let answered = by_meaning(&map.identities, &phrase, Kind::Auto, language);
-                // The best is the answer whatever its score: recall asks where, not whether.
-                if let Some(best) = answered.answer.hits().first() {
-                    mask = view.exact.mask(&map.identities, best.identity);
-                }
+            let how = (features, components.options());
+            let answered = ask_by_embedding(&map.identities, how, &category.name, &mut phrases, &mut encode)?;
+            // The best is the answer whatever its score: recall asks where, not whether.
+            if let Some(best) = answered.iter().flat_map(|a| a.answer.hits()).next() {
+                mask = view.exact.mask(&map.identities, best.identity);
             }
             secs.push(start.elapsed().as_secs_f64());
             let iou = mask.iou(&category.mask);

@@ -12,10 +12,11 @@
 //! The second coordinate's sign is such that `D` is not negative.
 
 use super::super::project::Splat;
+use super::super::walk::{GROUPS, Reach};
 use super::project::SHAPE;
 use crate::math::Real;
 use crate::math::lanes::Lanes;
-use crate::render::{ALPHA_MAX, ALPHA_MIN};
+use crate::render::{ALPHA_MAX, ALPHA_MIN, TILE_PX};
 
 /// One over the variance, in px², below which no surfel is drawn in the picture.
 pub const INVERSE_BLUR: f64 = 2.0;
@@ -34,10 +35,17 @@ pub struct Disk<R: Real, L: Lanes<R>> {
     depth_factor: L::V,
     near: L::V,
     opacity: L::V,
+    /// Horizontal offsets of each group's pixel centers from the projected center.
+    dx: [L::V; GROUPS],
+    /// From the ellipse's center down to the projected center.
+    down: R,
 }
 
 /// What a surfel gives eight pixels.
+#[derive(Clone, Copy)]
 pub struct Hit<R: Real, L: Lanes<R>> {
+    /// Offsets of the pixel centers from the projected center.
+    pub offset: [L::V; 2],
     /// `p, q`.
     pub raw: [L::V; 2],
     /// Coordinates in the disk; 0 where the picture's distance counts.
@@ -55,8 +63,9 @@ pub struct Hit<R: Real, L: Lanes<R>> {
 impl<R: Real, L: Lanes<R>> Disk<R, L> {
     /// The constants of `s`, whose shape is as `project` laid it out.
     #[inline(always)]
-    pub fn new(l: L, s: &Splat<R>, shape: &[R; SHAPE], near: R) -> Self {
-        let [ax, ay, bx, by, along_u, along_v, ..] = *shape;
+    pub fn new(l: L, s: &Splat<R>, shape: &[R], near: R, dx: [L::V; GROUPS]) -> Self {
+        let [ax, ay, bx, by, along_u, along_v, x, y]: [R; SHAPE] = std::array::from_fn(|k| shape[k]);
+        let right = l.splat(s.mean[0] - x);
         let determinant = ax * by - ay * bx;
         Self {
             across: [[l.splat(ax), l.splat(ay)], [l.splat(bx), l.splat(by)]],
@@ -66,12 +75,15 @@ impl<R: Real, L: Lanes<R>> Disk<R, L> {
             depth_factor: l.splat(s.depth * determinant),
             near: l.splat(near),
             opacity: l.splat(s.opacity),
+            dx: dx.map(|dx| l.add(dx, right)),
+            down: s.mean[1] - y,
         }
     }
 
-    /// What pixels at these offsets from the projected centre get.
+    /// What the pixels of a slot get.
     #[inline(always)]
-    pub fn hit(&self, l: L, dx: L::V, dy: L::V) -> Hit<R, L> {
+    pub fn hit(&self, l: L, reach: &Reach<R>, slot: usize) -> Hit<R, L> {
+        let (dx, dy) = (self.dx[slot / TILE_PX], l.splat(reach.dy[slot % TILE_PX] + self.down));
         let zero = l.splat(R::ZERO);
         let [[ax, ay], [bx, by]] = self.across;
         let raw = [l.sub(l.mul(by, dx), l.mul(ay, dy)), l.sub(l.mul(ax, dy), l.mul(bx, dx))];
@@ -88,6 +100,7 @@ impl<R: Real, L: Lanes<R>> Disk<R, L> {
         let alpha = l.mul(self.opacity, l.exp_neg(l.mul(l.splat(-R::HALF), square)));
         let alpha = l.min(alpha, l.splat(R::of(ALPHA_MAX)));
         Hit {
+            offset: [dx, dy],
             raw,
             at: [l.keep(through, u), l.keep(through, v)],
             inverse: l.keep(through, inverse),

@@ -6,248 +6,232 @@
 //! surface that does not move with the view. As in the paper, a surfel is never drawn smaller than a
 //! pixel: the squared distance is the smaller of that in the plane and that in the picture.
 //!
-//! Sorting and binning are those of [`super::Renderer`]; own are projection ([`project`]),
-//! compositing ([`blend`], [`blend_backward`]) and the way back ([`mod@project_backward`]). With
+//! Own are projection ([`project`]), alpha ([`disk`]) and the way back ([`mod@project_backward`]). With
 //! depth asked for, frames also hold normals and the distortion `sum over pairs (w_i w_j (1/z_i -
 //! 1/z_j)²)`, which is in inverse depth because that is what a picture can resolve.
 
-pub mod blend;
-pub mod blend_backward;
 pub mod disk;
 pub mod project;
 pub mod project_backward;
 
-use std::time::Instant;
-
-use rayon::prelude::*;
-
-use self::blend::{BlendRow, RowOut};
-use self::blend_backward::{BlendRowBackward, RECORD, RowIn};
-use self::project::SHAPE;
+use self::disk::{Disk, Hit, INVERSE_BLUR};
+use self::project::{SHAPE, surfel};
 use self::project_backward::project_backward;
-use super::bin::{self, Tiles};
-use super::project::{Chunk, View};
+use super::project::{Projected, Splat, View};
 use super::project_backward::GaussianGradient;
-use super::sort::{self, Ordered};
-use super::{Clock, NONE, RenderStats, checked, empty_frame, finish, validate, with_channels};
+use super::walk::{GROUPS, Planes, Primitive, Reach, RowPass, With, with_channels};
 use crate::math::Real;
-use crate::math::finite::{CHECKED, NotFinite};
-use crate::render::{Features, Frame, FrameGradient, MAX_CHANNELS, RenderSettings, TILE_PX};
-use crate::scene::{Camera, Gaussian, GaussianCloud};
+use crate::math::lanes::Lanes;
+use crate::render::{ALPHA_MIN, Frame, FrameGradient, MAX_CHANNELS, RenderSettings, TRANSMITTANCE_MIN};
+use crate::scene::Gaussian;
 
 /// Most channels of one pass: those of every renderer, and normals.
 const MOST: usize = MAX_CHANNELS + 3;
 
-/// Channels that the kernels are compiled for: colour; with normals; any.
-fn padded(channels: usize) -> usize {
-    [3, 6].into_iter().find(|&c| channels <= c).unwrap_or(MOST)
+/// Sums in front of the channels in a tile entry's record: `dL/dopacity` times opacity; `dL/d` of
+/// the six derivatives of a splat's shape, of its depth, and of its projected center.
+pub const RECORD: usize = 10;
+
+/// Gaussians as surfels.
+#[derive(Clone, Copy, Debug)]
+pub struct Surfels<R> {
+    near: R,
 }
 
-/// A renderer of surfels with its buffers, to be kept from frame to frame.
-#[derive(Debug, Default)]
-pub struct Rasterizer<R> {
-    parts: Vec<Chunk<R>>,
-    pub(super) ordered: Ordered<R>,
-    splat_of: Vec<u32>,
-    tiles: Tiles,
-    pixels: Pixels<R>,
-    pub(super) records: Vec<R>,
-    frame: Option<FrameInfo<R>>,
-    pub(super) stats: RenderStats,
-}
+impl<R: Real> Primitive<R> for Surfels<R> {
+    const SHAPE: usize = SHAPE;
+    type Shape = [R; SHAPE];
+    type Depth = [R; 3];
+    /// `sum(w z)`, `sum(w / z)`, `sum(w / z²)`, median depth, place of its splat in the tile's list, from 1.
+    type Extra<V: Copy> = [V; 5];
+    /// Gradients of depth, distortion and median depth; `sum(w / z)`, `sum(w / z²)`, place of the median's
+    /// splat, transmittance.
+    type State<V: Copy> = [V; 7];
+    type Sums<V: Copy> = [V; RECORD];
+    type Constants<L: Lanes<R>> = Disk<R, L>;
+    type Hit<L: Lanes<R>> = Hit<R, L>;
 
-/// What the forward pass leaves of each pixel for the backward pass.
-#[derive(Debug, Default)]
-struct Pixels<R> {
-    transmittance: Vec<R>,
-    last: Vec<u32>,
-    /// `sum(w / z)` and `sum(w / z²)`.
-    inverse_depth: [Vec<R>; 2],
-    /// Place in the tile's list, from 1, of the splat that gives the median depth.
-    median: Vec<u32>,
-}
+    fn new(view: &View<R>, _: &RenderSettings) -> Self {
+        Self { near: view.near }
+    }
 
-/// The part of a plane that a row of tiles covers; nothing of an empty plane.
-fn cut<'a, T>(plane: &'a [T], span: &std::ops::Range<usize>) -> &'a [T] {
-    plane.get(span.clone()).unwrap_or(&[])
-}
+    fn least_transmittance(_: &RenderSettings) -> f64 {
+        TRANSMITTANCE_MIN
+    }
 
-/// What the backward pass must know of the forward pass.
-#[derive(Debug, Clone)]
-struct FrameInfo<R> {
-    view: View<R>,
-    settings: RenderSettings,
-    gaussians: usize,
-    extra: usize,
-    channels: usize,
-}
+    fn channels(extra: usize, depth: bool) -> usize {
+        3 + extra + if depth { 3 } else { 0 }
+    }
 
-impl<R: Real> Rasterizer<R> {
-    /// Draws `cloud` as `camera` sees it. Camera and lengths have been checked.
-    pub(super) fn render(
-        &mut self,
-        cloud: &GaussianCloud<R>,
-        features: Features<'_, R>,
-        camera: &Camera,
-        settings: &RenderSettings,
-    ) -> Result<Frame<R>, NotFinite> {
-        let extra = features.channels;
-        let channels = padded(3 + extra + if settings.depth { 3 } else { 0 });
-        let view = View::new(camera, cloud.origin, settings.near);
-        let size = view.size;
-        let mut clock = Clock::start();
-        project::project(&mut self.parts, cloud, features, &view, settings, channels);
-        let project_secs = clock.lap();
-        sort::sort(&mut self.ordered, &self.parts, SHAPE + channels, false);
-        let sort_secs = clock.lap();
-        bin::bin(&mut self.tiles, &self.ordered.splats, size);
-        let bin_secs = clock.lap();
-        checked(&self.parts, &self.ordered, &self.tiles, true)?;
+    /// Color; with normals; any.
+    fn padded(channels: usize) -> usize {
+        [3, 6].into_iter().find(|&c| channels <= c).unwrap_or(MOST)
+    }
 
-        let n = size[0] * size[1];
-        self.pixels.transmittance.resize(n, R::ONE);
-        self.pixels.last.resize(n, 0);
-        let geometry = if settings.depth { n } else { 0 };
-        self.pixels.inverse_depth.iter_mut().for_each(|p| p.resize(geometry, R::ZERO));
-        self.pixels.median.resize(geometry, 0);
-        let mut frame = empty_frame(size, extra, settings.depth);
-        frame.normals = std::array::from_fn(|_| vec![R::ZERO; geometry]);
-        let products = self.blend(&mut frame, channels, size, settings);
-        finish(&mut frame, &self.pixels.transmittance, settings.background);
-        let [first, second] = &self.pixels.inverse_depth;
+    fn run<T: RowPass<R>>(channels: usize, pass: T) -> T::Output {
+        with_channels!(channels, [3 6, MOST], pass)
+    }
+
+    #[inline(always)]
+    fn alpha_min(self) -> R {
+        R::of(ALPHA_MIN)
+    }
+
+    #[inline(always)]
+    fn project(
+        self,
+        gaussian: &Gaussian<'_, R>,
+        opacity: R,
+        view: &View<R>,
+        _: &RenderSettings,
+    ) -> Projected<R, [R; SHAPE], [R; 3]> {
+        surfel(gaussian, opacity, self.alpha_min(), view)
+    }
+
+    fn planes<'a>(frame: &'a mut Frame<R>, kept: &'a mut [Vec<R>; 3], depth: bool) -> Planes<&'a mut [R]> {
+        let pixels = if depth { frame.alpha.len() } else { 0 };
+        kept.iter_mut().for_each(|plane| plane.resize(pixels, R::ZERO));
+        frame.normals = std::array::from_fn(|_| vec![R::ZERO; pixels]);
+        let mut channels: Vec<&mut [R]> =
+            frame.color.iter_mut().chain(&mut frame.features).map(Vec::as_mut_slice).collect();
+        if !depth {
+            return [channels, Vec::new()];
+        }
+        channels.extend(frame.normals.iter_mut().map(Vec::as_mut_slice));
+        let [first, second, place] = kept.each_mut().map(Vec::as_mut_slice);
+        [channels, vec![&mut frame.depth, first, second, &mut frame.median_depth, place]]
+    }
+
+    fn finish(frame: &mut Frame<R>, [first, second, _]: &[Vec<R>; 3]) {
         let spread = |((a, m), s): ((&R, &R), &R)| (*a * *s - *m * *m).max(R::ZERO);
         frame.distortion = frame.alpha.iter().zip(first).zip(second).map(spread).collect();
-        if CHECKED {
-            validate::drawn(&frame)?;
-        }
-        self.stats = RenderStats {
-            visible: self.ordered.splats.len(),
-            degenerate: self.parts.iter().map(|p| p.degenerate).sum(),
-            entries: self.tiles.entries.len(),
-            products,
-            stage_secs: [project_secs, sort_secs, bin_secs, clock.lap()],
-            backward_secs: 0.0,
-        };
-        self.frame = Some(FrameInfo { view, settings: settings.clone(), gaussians: cloud.len(), extra, channels });
-        Ok(frame)
     }
 
-    fn blend(&mut self, frame: &mut Frame<R>, channels: usize, size: [usize; 2], settings: &RenderSettings) -> u64 {
-        let strip = size[0] * TILE_PX;
-        let [first, second] = &mut self.pixels.inverse_depth;
-        let mut rows: Vec<RowOut<'_, R>> = self
-            .pixels
-            .transmittance
-            .chunks_mut(strip)
-            .zip(self.pixels.last.chunks_mut(strip))
-            .map(|(transmittance, last)| RowOut { transmittance, last, ..RowOut::default() })
-            .collect();
-        let planes = frame.color.iter_mut().chain(&mut frame.features).chain(&mut frame.normals);
-        for plane in planes {
-            rows.iter_mut().zip(plane.chunks_mut(strip)).for_each(|(row, part)| row.planes.push(part));
+    fn gradients<'a>(
+        gradient: &'a FrameGradient<R>,
+        [first, second, place]: &'a [Vec<R>; 3],
+        transmittance: &'a [R],
+        extra: usize,
+        depth: bool,
+    ) -> Planes<&'a [R]> {
+        let mut channels: Vec<&[R]> = gradient.color.iter().chain(&gradient.features).map(Vec::as_slice).collect();
+        channels.resize(3 + extra, &[]);
+        let own: [&[R]; 3] = [&gradient.depth, &gradient.distortion, &gradient.median_depth];
+        if !depth {
+            return [channels, Vec::new()];
         }
-        let depths = [&mut frame.depth, first, second, &mut frame.median_depth];
-        for plane in depths {
-            rows.iter_mut().zip(plane.chunks_mut(strip)).for_each(|(row, part)| row.depths.push(part));
+        channels.extend(gradient.normals.iter().map(Vec::as_slice));
+        match own.iter().all(|plane| plane.is_empty()) {
+            true => [channels, Vec::new()],
+            false => [channels, [&own[..], &[first, second, place, transmittance]].concat()],
         }
-        rows.iter_mut().zip(self.pixels.median.chunks_mut(strip)).for_each(|(row, part)| row.median = part);
-        let (splats, values, tiles) = (&self.ordered.splats, &self.ordered.values, &self.tiles);
-        let near = R::of(settings.near);
-        rows.par_iter_mut()
-            .enumerate()
-            .map(|(ty, out)| {
-                with_channels!(channels, C in [3 6, MOST] => {
-                    R::vectorize(BlendRow::<R, C> { splats, values, tiles, size, ty, near, out })
-                })
-            })
-            .sum()
     }
 
-    /// Backward pass over the tiles of the last frame; does nothing before the first.
-    pub(super) fn backward_tiles(&mut self, gradient: &FrameGradient<R>) {
-        let Some(info) = &self.frame else { return };
-        let clock = Instant::now();
-        self.splat_of.clear();
-        self.splat_of.resize(info.gaussians, NONE);
-        for (s, splat) in self.ordered.splats.iter().enumerate() {
-            self.splat_of[splat.gaussian as usize] = s as u32;
-        }
-        let size = info.view.size;
-        let n = size[0] * size[1];
-        let d_transmittance = super::transmittance_gradient(gradient, info.settings.background, n);
-        let stride = RECORD + info.channels;
-        self.records.resize(self.tiles.entries.len() * stride, R::ZERO);
-        let strip = size[0] * TILE_PX;
-        let pixels = &self.pixels;
-        let mut rest = self.records.as_mut_slice();
-        let mut tasks = Vec::with_capacity(self.tiles.grid[1]);
-        for ty in 0..self.tiles.grid[1] {
-            let span = ty * strip..((ty + 1) * strip).min(n);
-            let mut planes: Vec<&[R]> = gradient.color.iter().map(|p| cut(p, &span)).collect();
-            planes.extend((0..info.extra).map(|k| gradient.features.get(k).map_or(&[][..], |p| cut(p, &span))));
-            let mut depths: [&[R]; 3] = [&[]; 3];
-            if info.settings.depth {
-                planes.extend(gradient.normals.iter().map(|p| cut(p, &span)));
-                depths = [&gradient.depth, &gradient.distortion, &gradient.median_depth].map(|p| cut(p, &span));
-            }
-            let input = RowIn {
-                planes,
-                depths,
-                transmittance_gradient: &d_transmittance[span.clone()],
-                transmittance: &pixels.transmittance[span.clone()],
-                last: &pixels.last[span.clone()],
-                inverse_depth: pixels.inverse_depth.each_ref().map(|p| cut(p, &span)),
-                median: cut(&pixels.median, &span),
-            };
-            let [from, to] = [ty * self.tiles.grid[0], (ty + 1) * self.tiles.grid[0]];
-            let entries = (self.tiles.first[to] - self.tiles.first[from]) as usize;
-            let (own, others) = rest.split_at_mut(entries * stride);
-            rest = others;
-            tasks.push((ty, input, own));
-        }
-        let (splats, values, tiles) = (&self.ordered.splats, &self.ordered.values, &self.tiles);
-        let near = info.view.near;
-        tasks.into_par_iter().for_each(|(ty, input, own)| {
-            with_channels!(info.channels, C in [3 6, MOST] => {
-                let input = &input;
-                R::vectorize(BlendRowBackward::<R, C> { splats, values, tiles, size, ty, near, input, records: own });
-            });
-        });
-        self.stats.backward_secs = clock.elapsed().as_secs_f64();
+    #[inline(always)]
+    fn project_backward(
+        gaussian: &Gaussian<'_, R>,
+        _: &Splat<R>,
+        view: &View<R>,
+        settings: &RenderSettings,
+        record: &[R],
+        extra: usize,
+    ) -> Option<GaussianGradient<R>> {
+        let normal = settings.depth.then_some(RECORD + 3 + extra);
+        project_backward(gaussian, view, settings, record, normal)
     }
 
-    /// Sum of surfel `i`'s tile records, or `None` if it was not drawn.
-    fn record(&self, i: usize, stride: usize) -> Option<[R; RECORD + MOST]> {
-        let s = *self.splat_of.get(i)?;
-        if s == NONE {
-            return None;
-        }
-        let (from, to) = self.tiles.span[s as usize];
-        let mut sum = [R::ZERO; RECORD + MOST];
-        for &place in &self.tiles.places[from as usize..to as usize] {
-            let at = place as usize * stride;
-            for (total, v) in sum.iter_mut().zip(&self.records[at..at + stride]) {
-                *total += *v;
-            }
-        }
-        Some(sum)
+    #[inline(always)]
+    fn constants<L: Lanes<R>>(self, l: L, s: &Splat<R>, shape: &[R], dx: [L::V; GROUPS]) -> Disk<R, L> {
+        Disk::new(l, s, shape, self.near, dx)
     }
 
-    /// Gradient of surfel `i`, whose parameters are still those that were drawn; `None` if it was
-    /// not drawn. The third scale has none.
-    pub(super) fn gaussian_gradient(&self, gaussian: &Gaussian<'_, R>, i: usize) -> Option<GaussianGradient<R>> {
-        let info = self.frame.as_ref()?;
-        let record = self.record(i, RECORD + info.channels)?;
-        let normal = info.settings.depth.then_some(RECORD + 3 + info.extra);
-        project_backward(gaussian, &info.view, &info.settings, &record, normal)
+    #[inline(always)]
+    fn hit<L: Lanes<R>>(l: L, disk: &Disk<R, L>, reach: &Reach<R>, slot: usize) -> Hit<R, L> {
+        disk.hit(l, reach, slot)
     }
 
-    /// Gradient with respect to the extra channels of surfel `i`; leaves `out` alone and returns
-    /// false if it was not drawn.
-    pub(super) fn feature_gradient(&self, i: usize, out: &mut [R]) -> bool {
-        let Some(stride) = self.frame.as_ref().map(|f| RECORD + f.channels) else { return false };
-        let Some(record) = self.record(i, stride) else { return false };
-        out.copy_from_slice(&record[RECORD + 3..RECORD + 3 + out.len()]);
-        true
+    #[inline(always)]
+    fn alpha<L: Lanes<R>>(hit: &Hit<R, L>) -> L::V {
+        hit.alpha
+    }
+
+    #[inline(always)]
+    fn gather<L: Lanes<R>>(
+        l: L,
+        [depth, first, second, median, at]: &mut [L::V; 5],
+        hit: &Hit<R, L>,
+        weight: L::V,
+        crossed: L::M,
+        place: L::V,
+    ) {
+        let inverse = l.div(l.splat(R::ONE), hit.depth);
+        let near = l.mul(weight, inverse);
+        *depth = l.mul_add(weight, hit.depth, *depth);
+        *first = l.add(*first, near);
+        *second = l.mul_add(near, inverse, *second);
+        *median = l.select(crossed, hit.depth, *median);
+        *at = l.select(crossed, place, *at);
+    }
+
+    #[inline(always)]
+    fn along<L: Lanes<R>>(l: L, state: &[L::V; 7], hit: &Hit<R, L>, along: L::V) -> L::V {
+        // Distortion A s - m² with A, m, s the sums of w, w / z and w / z².
+        let [d_depth, d_distortion, _, first, second, _, transmittance] = *state;
+        let alpha = l.sub(l.splat(R::ONE), transmittance);
+        let near = l.div(l.splat(R::ONE), hit.depth);
+        let spread = l.mul(near, l.sub(l.mul(near, alpha), l.mul(l.splat(R::of(2.0)), first)));
+        l.mul_add(d_distortion, l.add(spread, second), l.mul_add(d_depth, hit.depth, along))
+    }
+
+    #[inline(always)]
+    fn sum<L: Lanes<R>, const STATE: bool>(
+        l: L,
+        sums: &mut [L::V; RECORD],
+        disk: &Disk<R, L>,
+        hit: &Hit<R, L>,
+        state: &[L::V; 7],
+        [power, weight, place]: [L::V; 3],
+    ) {
+        let (zero, one, two) = (l.splat(R::ZERO), l.splat(R::ONE), l.splat(R::of(2.0)));
+        let mut d_depth = zero;
+        if STATE {
+            let [to_depth, to_distortion, to_median, first, _, at, transmittance] = *state;
+            let near = l.div(one, hit.depth);
+            let pull = l.mul(l.mul(near, near), l.sub(first, l.mul(near, l.sub(one, transmittance))));
+            d_depth = l.mul(weight, l.mul_add(l.mul(two, pull), to_distortion, to_depth));
+            let median = l.both(l.ge(at, place), l.ge(place, at));
+            d_depth = l.add(d_depth, l.keep(median, to_median));
+        }
+        // Through the plane, where its distance counts.
+        let d_through = l.keep(hit.through, d_depth);
+        let ([u, v], [dx, dy]) = (hit.at, hit.offset);
+        let d_u = l.sub(l.mul(d_through, disk.along[0]), l.mul(power, u));
+        let d_v = l.sub(l.mul(d_through, disk.along[1]), l.mul(power, v));
+        let d_w = l.sub(zero, l.mul(hit.inverse, l.mul_add(d_u, u, l.mul(d_v, v))));
+        let scale = l.mul(disk.z, hit.inverse);
+        let d_p = l.sub(l.mul(d_u, scale), l.mul(disk.along[0], d_w));
+        let d_q = l.sub(l.mul(d_v, scale), l.mul(disk.along[1], d_w));
+        let [p, q] = hit.raw;
+        let d_z = l.mul_add(hit.inverse, l.mul_add(d_u, p, l.mul(d_v, q)), d_depth);
+        let [[ax, ay], [bx, by]] = disk.across;
+        // Through the picture, where that distance counts.
+        let flat = l.mul(l.splat(R::of(INVERSE_BLUR)), l.select(hit.through, zero, power));
+        let center_x = l.sub(l.mul(bx, d_q), l.mul(by, d_p));
+        let center_y = l.sub(l.mul(ay, d_p), l.mul(ax, d_q));
+        let terms = [
+            power,
+            l.mul_add(dy, d_q, l.mul(by, d_w)),
+            l.sub(zero, l.mul_add(dy, d_p, l.mul(bx, d_w))),
+            l.sub(zero, l.mul_add(dx, d_q, l.mul(ay, d_w))),
+            l.mul_add(dx, d_p, l.mul(ax, d_w)),
+            l.sub(l.mul(d_through, u), l.mul(p, d_w)),
+            l.sub(l.mul(d_through, v), l.mul(q, d_w)),
+            d_z,
+            l.mul_add(flat, dx, center_x),
+            l.mul_add(flat, dy, center_y),
+        ];
+        for (sum, term) in sums.iter_mut().zip(terms) {
+            *sum = l.add(*sum, term);
+        }
     }
 }

@@ -1,10 +1,9 @@
 //! Projection of surfels: what the compositing needs of each, and an ellipse around what it touches.
 
-use super::super::project::{Chunk, Splat, View, color, direction, in_chunks};
+use super::super::project::{Projected, Splat, View};
 use super::disk::INVERSE_BLUR;
-use crate::math::{Real, rotation, sh};
-use crate::render::{ALPHA_MIN, Features, RenderSettings};
-use crate::scene::{Gaussian, GaussianCloud};
+use crate::math::{Real, rotation};
+use crate::scene::Gaussian;
 
 /// Numbers per splat in front of the composited channels: derivatives of the picture's x by the
 /// disk's two coordinates and of its y, both times depth, and of depth; the projected centre in px.
@@ -125,74 +124,22 @@ pub fn bound<R: Real>(g: &Geometry<R>, reach: R) -> Option<Bound<R>> {
     usable.then_some(Bound { offset, squared, determinant })
 }
 
-/// Projects the whole cloud, in parts of [`CHUNK`](crate::render::cpu::project::CHUNK) Gaussians: `SHAPE + channels` values per splat,
-/// the channels being colour, extra channels, normal if depth is asked for, padding zeros.
-pub fn project<R: Real>(
-    parts: &mut Vec<Chunk<R>>,
-    cloud: &GaussianCloud<R>,
-    features: Features<'_, R>,
-    view: &View<R>,
-    settings: &RenderSettings,
-    channels: usize,
-) {
-    in_chunks(parts, cloud.len(), |part, range| {
-        project_chunk(part, cloud, features, view, settings, channels, range);
-    });
-}
-
-#[multiversion::multiversion(targets("x86_64+avx2+fma"))]
-fn project_chunk<R: Real>(
-    part: &mut Chunk<R>,
-    cloud: &GaussianCloud<R>,
-    features: Features<'_, R>,
-    view: &View<R>,
-    settings: &RenderSettings,
-    channels: usize,
-    range: std::ops::Range<usize>,
-) {
-    let degree = settings.sh_degree.min(cloud.sh_degree);
-    let alpha_min = R::of(ALPHA_MIN);
-    for i in range {
-        let relative = view.relative(cloud.positions[i]);
-        if !(dot(view.rows[2], relative) > view.near) {
-            continue;
-        }
-        let opacity = cloud.opacity_logits[i].sigmoid();
-        if opacity < alpha_min {
-            continue;
-        }
-        let gaussian = cloud.gaussian(i);
-        let Some(g) = geometry(&gaussian, view) else {
-            part.degenerate += 1;
-            continue;
-        };
-        let reach = R::of(2.0) * (opacity / alpha_min).ln();
-        let Some(splat) = splat(&g, opacity, reach, view, i as u32) else { continue };
-        let basis = sh::basis(degree, direction(g.relative));
-        let color = color(gaussian.sh, &basis, degree);
-        let first = part.values.len();
-        let ([[ax, ay], [bx, by]], [u, v]) = (g.across, g.axes);
-        part.values.extend_from_slice(&[ax, ay, bx, by, u[2], v[2], g.center[0], g.center[1]]);
-        part.values.extend_from_slice(&color);
-        part.values.extend_from_slice(&features.values[i * features.channels..(i + 1) * features.channels]);
-        if settings.depth {
-            part.values.extend_from_slice(&g.normal);
-        }
-        part.values.resize(first + SHAPE + channels, R::ZERO);
-        part.splats.push(splat);
-    }
-}
-
-/// The splat that binning and the walk over a tile see: the ellipse around what the surfel touches.
-/// `None` if it touches no pixel centre.
+/// A Gaussian as a surfel: the ellipse around what it touches, which binning and the walk over a tile see, its
+/// shape, and its normal.
 #[inline(always)]
-fn splat<R: Real>(g: &Geometry<R>, opacity: R, reach: R, view: &View<R>, gaussian: u32) -> Option<Splat<R>> {
-    let size = view.size.map(|s| R::of(s as f64));
+pub fn surfel<R: Real>(
+    gaussian: &Gaussian<'_, R>,
+    opacity: R,
+    alpha_min: R,
+    view: &View<R>,
+) -> Projected<R, [R; SHAPE], [R; 3]> {
+    let Some(g) = geometry(gaussian, view) else { return Projected::Degenerate };
+    let reach = R::of(2.0) * (opacity / alpha_min).ln();
     // Nothing is drawn where the opacity is just the least: a reach of 0 bounds no ellipse.
     if !(reach > R::ZERO) {
-        return None;
+        return Projected::Outside;
     }
-    let bounded = bound(g, reach).and_then(|b| {
+    let bounded = bound(&g, reach).and_then(|b| {
         let half = [b.squared[0].sqrt(), b.squared[2].sqrt()];
         let [xx, xy, yy] = b.squared.map(|s| s * reach / b.determinant);
         // An ellipse so wide that its inverse underflows is as good as the whole picture.
@@ -201,10 +148,16 @@ fn splat<R: Real>(g: &Geometry<R>, opacity: R, reach: R, view: &View<R>, gaussia
         usable.then_some((mean, [yy, -xy, xx], half))
     });
     let (mean, conic, half) = bounded.unwrap_or_else(|| {
+        let size = view.size.map(|s| R::of(s as f64));
         let half = size[0] + size[1];
         let around = reach / (half * half);
         (size.map(|s| s * R::HALF), [around, R::ZERO, around], [half; 2])
     });
-    let inside = |axis: usize| mean[axis] + half[axis] >= R::HALF && mean[axis] - half[axis] <= size[axis] - R::HALF;
-    (inside(0) && inside(1)).then_some(Splat { mean, conic, opacity, reach, half, depth: g.local[2], gaussian })
+    if !view.meets(mean, half) {
+        return Projected::Outside;
+    }
+    let ([[ax, ay], [bx, by]], [u, v]) = (g.across, g.axes);
+    let shape = [ax, ay, bx, by, u[2], v[2], g.center[0], g.center[1]];
+    let splat = Splat { mean, conic, opacity, reach, half, depth: g.local[2], gaussian: 0 };
+    Projected::Splat(splat, shape, g.normal)
 }

@@ -2,7 +2,7 @@
 
 use super::super::project::View;
 use super::super::project_backward::{ColorGradient, GaussianGradient, color_gradient, quaternion_gradient, radius};
-use super::blend_backward::RECORD;
+use super::RECORD;
 use super::project::{bound, geometry};
 use crate::math::Real;
 use crate::render::RenderSettings;

@@ -19,11 +19,10 @@ use egui::{Color32, Rect, TextureHandle, TextureOptions, Ui};
 
 use self::embeddings::Embeddings;
 pub use self::settings::{ColorBy, OverlaySettings};
-use crate::pipeline::semantics::answer::{Answered, Language, answer};
-use crate::pipeline::semantics::grammar::Phrase;
-use crate::pipeline::semantics::matching::{self, MatchMode};
-use crate::pipeline::semantics::meaning::MeaningOptions;
+use crate::pipeline::semantics::answer::Answered;
+use crate::pipeline::semantics::matching::MatchMode;
 use crate::pipeline::semantics::names;
+use crate::pipeline::semantics::query_engine::answer_encoded;
 use crate::pipeline::semantics::stages::{StagesMs, ms_since};
 use crate::scene::{IdentityId, Mask, ScenePlan, SemanticMap};
 use crate::worker::{Versioned, ViewMaps};
@@ -193,12 +192,8 @@ impl Queries {
 
     fn asked(&self, text: &str, semantics: &SemanticMap) -> Option<Asked> {
         let text = text.trim();
-        let phrase = Phrase::parse(text)?;
         let encoded = self.embeddings.of(text);
-        let language = semantics.language.as_ref().zip(self.embeddings.phrases(text));
-        let language =
-            language.map(|(features, phrases)| Language { features, phrases, options: MeaningOptions::default() });
-        let mut answered = answer(&semantics.identities, &phrase, self.settings.kind, language);
+        let mut answered = answer_encoded(semantics, text, self.settings.kind, self.embeddings.phrases(text))?;
         answered.stages.encode = encoded.map_or(0.0, |t| t.encode_ms);
         let to_encoder = encoded.map(|t| t.unknown.as_slice());
         let unknown = names::unknown_to_all(&semantics.identities, text, to_encoder);
@@ -222,12 +217,7 @@ impl Queries {
 
     /// The target's pixels in the present view.
     fn mask_of(&self, maps: &ViewMaps, semantics: &SemanticMap, target: IdentityId) -> Mask {
-        match (&maps.codes, self.settings.mode) {
-            (Some(codes), MatchMode::Blend) => {
-                matching::blend(codes, &semantics.identities, target, self.settings.tolerance)
-            }
-            _ => matching::exact(&maps.identities, &semantics.identities, target, self.settings.tolerance),
-        }
+        maps.mask(semantics, target, self.settings.mode, self.settings.tolerance)
     }
 
     /// Pixels of an identity in the present view, if that is drawn; counted once for a view.

@@ -6,8 +6,8 @@ use strum::{IntoStaticStr, VariantArray};
 use super::super::super::theme;
 use crate::math::colormap::Colormap;
 use crate::pipeline::semantics::codes::TOLERANCE;
-use crate::pipeline::semantics::grammar::Kind;
 use crate::pipeline::semantics::matching::MatchMode;
+use crate::scene::LevelFilter;
 
 /// What tints the frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, VariantArray, IntoStaticStr)]
@@ -48,7 +48,7 @@ pub struct OverlaySettings {
     /// Opacity of the tint.
     pub opacity: f32,
     /// Which level queries are about.
-    pub kind: Kind,
+    pub kind: LevelFilter,
     /// Answers whose pixels are shown at most.
     pub top: usize,
     /// Where the codes that are matched come from.
@@ -65,7 +65,7 @@ impl Default for OverlaySettings {
             color_by: ColorBy::Masks,
             colormap: Colormap::Turbo,
             opacity: 0.6,
-            kind: Kind::Auto,
+            kind: LevelFilter::Auto,
             top: 1,
             mode: MatchMode::Exact,
             tolerance: TOLERANCE,
@@ -81,7 +81,9 @@ pub fn show(ui: &mut Ui, settings: &mut OverlaySettings, heat: Option<&[f32]>) -
     egui::Grid::new("overlay settings").num_columns(2).spacing(vec2(10.0, 5.0)).show(ui, |ui| {
         ui.weak("Level");
         ui.horizontal(|ui| {
-            for (kind, text) in [(Kind::Auto, "from the query"), (Kind::Object, "objects"), (Kind::Part, "parts")] {
+            for (kind, text) in
+                [(LevelFilter::Auto, "from the query"), (LevelFilter::Object, "objects"), (LevelFilter::Part, "parts")]
+            {
                 ui.selectable_value(&mut settings.kind, kind, text);
             }
         });

@@ -1,9 +1,11 @@
-//! Edits of objects and parts, off the window's thread.
+//! Edits of objects and parts, painted ones included, and storing them.
 
+use std::path::Path;
 use std::sync::Arc;
 
-use super::protocol::{Failure, Stop};
-use crate::pipeline::semantics::edit::{Edit, apply};
+use super::JobError;
+use crate::io::{SceneFolder, trained};
+use crate::pipeline::semantics::edit::{self, Edit};
 use crate::pipeline::semantics::extend::extend;
 use crate::pipeline::semantics::votes::Votes;
 use crate::render::{RenderSettings, Renderer};
@@ -30,22 +32,42 @@ pub enum EditRequest {
 }
 
 /// The map after the change.
-pub fn run(
+///
+/// # Errors
+/// If the edit makes no sense, or the view cannot be drawn; nothing has changed then.
+pub fn apply(
     cloud: &GaussianCloud,
     map: &SemanticMap,
     settings: &RenderSettings,
     request: &EditRequest,
-) -> Result<Arc<SemanticMap>, Stop> {
-    let failed = |e: &dyn std::error::Error| Stop::Failed(Failure::of(e, "Nothing has changed."));
-    match request {
-        EditRequest::Restore(map) => Ok(Arc::clone(map)),
-        EditRequest::Apply(edit) => Ok(Arc::new(apply(map, cloud, edit).map_err(|e| failed(&e))?)),
+) -> Result<Arc<SemanticMap>, JobError> {
+    Ok(match request {
+        EditRequest::Restore(map) => Arc::clone(map),
+        EditRequest::Apply(edit) => Arc::new(edit::apply(map, cloud, edit)?),
         EditRequest::Paint { of, name, camera, mask } => {
-            let gaussians = painted(cloud, camera, settings, mask).map_err(|e| failed(&e))?;
+            let gaussians = painted(cloud, camera, settings, mask)?;
             let edit = Edit::AddPiece { of: *of, name: name.clone(), gaussians };
-            Ok(Arc::new(apply(map, cloud, &edit).map_err(|e| failed(&e))?))
+            Arc::new(edit::apply(map, cloud, &edit)?)
         }
+    })
+}
+
+/// Stores the map of the scene in `folder`, which is known in the state `known`. Returns its state then; `None`
+/// if nothing is stored because there is no scene yet.
+///
+/// # Errors
+/// If it cannot be written, or somebody else has changed the scene.
+pub fn store(
+    folder: &Path,
+    known: Option<&str>,
+    map: &SemanticMap,
+    cloud: &GaussianCloud,
+) -> Result<Option<String>, JobError> {
+    if !trained::is_scene(folder) {
+        return Ok(None);
     }
+    let scene = SceneFolder::hold(folder, "storing an edit")?;
+    Ok(Some(scene.save_map(known, map, cloud)?))
 }
 
 /// Gaussians that the painted pixels show more than the others do, and those behind them that hang
@@ -93,11 +115,11 @@ mod tests {
 
         let map = SemanticMap::of_identities(Identities::default(), vec![NOBODY; n], vec![1.0; n], vec![]);
         let request = EditRequest::Paint { of: NOBODY, name: "left".into(), camera: Box::new(camera), mask: left };
-        let Ok(new) = run(&cloud, &map, &settings, &request) else {
+        let Ok(new) = apply(&cloud, &map, &settings, &request) else {
             panic!("not edited");
         };
         assert_eq!((new.identities.name(1), new.sizes()[1]), ("left".into(), n / 2));
         let wrong = EditRequest::Apply(Edit::Split(7));
-        assert!(matches!(run(&cloud, &map, &settings, &wrong), Err(Stop::Failed(_))));
+        assert!(matches!(apply(&cloud, &map, &settings, &wrong), Err(JobError::Edit(_))));
     }
 }

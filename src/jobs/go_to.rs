@@ -1,18 +1,14 @@
-//! Jobs that move the eye: looking at a scene's matter, visiting identities, and films of flights.
+//! Moving through a scene: what one knows before, and the flight to where an identity is seen best.
 
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::protocol::{Outcome, Stop};
-use crate::io::animation::Settings;
+use crate::navigate::flight::Smoothness;
 use crate::navigate::target::Wish;
 use crate::navigate::visit::{NoVisit, Place, Visit};
-use crate::navigate::{FRAMES, Navigator, Pose};
-use crate::pipeline::film::{self, Marked};
-use crate::pipeline::observer::{Observer, Severity};
-use crate::render::{BackendChoice, RenderSettings, Renderer};
+use crate::navigate::{Flight, Navigator, NoWay, Pose, Speed};
+use crate::render::RenderSettings;
 use crate::scene::trace::{self, Sort};
 use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 
@@ -40,6 +36,29 @@ impl Explored {
         let parts = navigator.graph.parts(&navigator.matter);
         Self { navigator, cloud, parts }
     }
+
+    /// The flight from one pose to another; `frames` poses long.
+    ///
+    /// # Errors
+    /// If there is no way.
+    pub fn fly(&self, from: &Pose, to: &Pose, frames: usize) -> Result<Flight, NoWay> {
+        self.navigator.fly(from, to, None, frames, Speed::Eased)
+    }
+
+    /// How smooth the paper's interpolation of a flight's ends is, and that through all keypoints of the route.
+    pub fn of_paper(&self, flight: &Flight) -> [Option<Smoothness>; 2] {
+        let [first, .., last] = flight.poses.as_slice() else { return [None, None] };
+        let (navigator, frames) = (&self.navigator, flight.poses.len());
+        let keys = navigator.keys(first, last).unwrap_or_default();
+        [Flight::of_paper(&[*first, *last], frames), Flight::of_paper_through(&keys, frames)]
+            .map(|p| p.map(|p| p.smoothness(&navigator.matter, navigator.clearance)))
+    }
+
+    /// Why there is no way, with how much of the scene hangs together.
+    pub fn no_way(&self, why: &NoWay) -> String {
+        let count = self.parts.iter().max().map_or(0, |m| m + 1);
+        format!("{why} ({} keypoints in {count} parts that are not connected)", self.parts.len())
+    }
 }
 
 /// What is to be visited.
@@ -65,38 +84,23 @@ pub struct VisitRequest {
     pub from: Pose,
     /// Width by height of the picture.
     pub aspect: f64,
+    /// Poses of the flight.
+    pub frames: usize,
 }
 
-/// A film to be made.
-#[derive(Clone, Debug)]
-pub struct FilmRequest {
-    /// The Gaussians.
-    pub cloud: Arc<GaussianCloud>,
-    /// How they are drawn.
-    pub draw: RenderSettings,
-    /// One per picture.
-    pub cameras: Vec<Camera>,
-    /// What is marked in every picture.
-    pub marked: Option<(Arc<SemanticMap>, Vec<IdentityId>)>,
-    /// Where it goes.
-    pub out: PathBuf,
-    /// How it is written.
-    pub settings: Settings,
-}
-
-/// Finds the flight to an identity.
-pub fn visit(request: VisitRequest) -> Result<Outcome, Stop> {
-    let VisitRequest { explored, cloud, cameras, up, settings, map, id, wish, from, aspect } = request;
+/// Finds the flight to an identity. What was learned about the scene comes back with it.
+pub fn visit(request: VisitRequest) -> (Arc<Explored>, Visited) {
+    let VisitRequest { explored, cloud, cameras, up, settings, map, id, wish, from, aspect, frames } = request;
     let known = explored.filter(|e| Arc::ptr_eq(&e.cloud, &cloud));
     let explored = known.unwrap_or_else(|| Arc::new(Explored::new(Arc::clone(&cloud), &cameras, up)));
     let place = Place { cloud: &cloud, settings: &settings, map: &map };
     let name = map.identities.full_name(id);
-    let visit = match explored.navigator.visit(place, id, wish, &from, aspect, FRAMES) {
+    let visit = match explored.navigator.visit(place, id, wish, &from, aspect, frames) {
         Ok(visit) => Visited { name, flight: Some(Box::new(visit)), problem: None },
-        Err(NoVisit::NoWay { why, nearest }) => Visited { name, flight: nearest, problem: Some(why.to_string()) },
+        Err(NoVisit::NoWay { why, nearest }) => Visited { name, flight: nearest, problem: Some(explored.no_way(&why)) },
         Err(e) => Visited { name, flight: None, problem: Some(e.to_string()) },
     };
-    Ok(Outcome::Visited(explored, visit))
+    (explored, visit)
 }
 
 /// What came of a visit.
@@ -108,14 +112,4 @@ pub struct Visited {
     pub flight: Option<Box<Visit>>,
     /// Why it does not lead there.
     pub problem: Option<String>,
-}
-
-/// Makes a film.
-pub fn film(request: FilmRequest, observer: &mut dyn Observer) -> Result<Outcome, Stop> {
-    let FilmRequest { cloud, draw, cameras, marked, out, settings } = request;
-    let marked = marked.as_ref().map(|(map, ids)| Marked { map, ids, color: [255, 64, 160] });
-    let told = |why| observer.note(Severity::Warning, why);
-    let mut renderer = Renderer::choose(BackendChoice::Auto, told).unwrap_or_default();
-    let out: (&Path, &Settings) = (&out, &settings);
-    Ok(Outcome::Written(film::write(&cloud, &draw, &cameras, marked, &mut renderer, out, observer)?.path))
 }

@@ -1,0 +1,92 @@
+//! What lists, counts and measurements come to, in words.
+
+use super::describe::{self, capital, length, the};
+use super::dialog::DialogState;
+use super::refusal::{Refusal, RefusalKind};
+use super::relation::{Relation, gap};
+use super::resolve::resolve_all;
+use super::tool::{LevelFilter, Reference};
+use super::world::World;
+use crate::scene::{IdentityId, NOBODY};
+
+/// What is listed or counted.
+pub(super) fn list_ids(
+    world: &mut dyn World,
+    level: LevelFilter,
+    of: IdentityId,
+    relation: Relation,
+    named: Option<&str>,
+) -> Result<Vec<IdentityId>, Refusal> {
+    let mut ids: Vec<IdentityId> = if of == NOBODY {
+        let wanted = world.identities().iter().filter(|(_, i)| level.accepts(i.level)).map(|(id, _)| id);
+        let all: Vec<IdentityId> = wanted.collect();
+        all.into_iter().filter(|id| world.facts(*id).is_some()).collect()
+    } else if relation == Relation::PartOf {
+        let inside = world.identities().within(of);
+        let is_in = |id: &IdentityId| *id != of && inside.get(*id as usize) == Some(&true);
+        let all: Vec<IdentityId> = world.identities().iter().map(|(id, _)| id).filter(is_in).collect();
+        all.into_iter().filter(|id| world.facts(*id).is_some()).collect()
+    } else {
+        describe::neighbors(world, of, relation)
+    };
+    if let Some(name) = named {
+        let fit = resolve_all(world, name, LevelFilter::Any, &DialogState::default())?;
+        ids.retain(|id| fit.contains(id));
+    }
+    Ok(ids)
+}
+
+/// The list in words.
+pub(super) fn say_list(
+    world: &dyn World,
+    ids: &[IdentityId],
+    level: LevelFilter,
+    of: IdentityId,
+    relation: Relation,
+    named: Option<&str>,
+) -> String {
+    let here = match (of, relation) {
+        (NOBODY, _) => "in the scene".into(),
+        (of, Relation::PartOf) => format!("of {}", the(world, of)),
+        (of, relation) => format!("{} {}", relation.text(), the(world, of)),
+    };
+    let what = named.unwrap_or(match (level, relation) {
+        (LevelFilter::Object, _) => "objects",
+        (LevelFilter::Part, _) | (_, Relation::PartOf) if of != NOBODY => "parts",
+        (LevelFilter::Part, _) => "parts",
+        _ => "things",
+    });
+    let listed = describe::names(world, ids, 20);
+    match ids.len() {
+        0 => format!("I know no {what} {here}."),
+        1 => format!("There is 1 {} {here}: {listed}.", super::words::singular(what)),
+        n => format!("There are {n} {what} {here}: {listed}."),
+    }
+}
+
+/// A size or a distance.
+pub(super) fn measure(
+    world: &dyn World,
+    id: IdentityId,
+    to: Option<&Reference>,
+    other: Option<IdentityId>,
+) -> Result<String, Refusal> {
+    let nothing = || Refusal::new(RefusalKind::Conflict, "It has no matter that could be measured.");
+    let own = world.facts(id).and_then(|f| f.bounds).ok_or_else(nothing)?;
+    let it = capital(&the(world, id));
+    Ok(match to {
+        None => format!("{it} is {}.", describe::size(world, id)),
+        Some(Reference::Eye) => {
+            let far = own.center().distance(world.view().eye);
+            format!("{it} is {} from here.", length(world, far))
+        }
+        Some(Reference::Thing(_)) => {
+            let other = other.ok_or_else(nothing)?;
+            let bounds = world.facts(other).and_then(|f| f.bounds).ok_or_else(nothing)?;
+            let (middle, free) = (own.center().distance(bounds.center()), gap(&own, &bounds));
+            let name = the(world, other);
+            let free = if free > 0.0 { format!("{} apart", length(world, free)) } else { "touching".into() };
+            format!("{it} is {} from {name}, middle to middle ({free}).", length(world, middle))
+        }
+    })
+}

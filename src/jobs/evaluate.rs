@@ -1,0 +1,231 @@
+//! Measuring a scene on photos that it was not trained on: colors and depth.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use image::ColorType;
+
+use super::{JobError, Scene, export, open};
+use crate::io;
+use crate::io::trained::SceneCamera;
+use crate::math::stats::{mean, median};
+use crate::pipeline::depth::{self, DepthCounter, DepthScores};
+use crate::pipeline::evaluate::evaluate;
+use crate::pipeline::observer::{Evaluation, Observer, Severity, Ticker, ViewScore};
+use crate::pipeline::train::TrainView;
+use crate::pipeline::train::border::Borders;
+use crate::render::{Features, RenderSettings, Renderer};
+use crate::scene::{Dataset, GaussianCloud};
+
+/// The difference picture shows errors this many times larger.
+const DIFFERENCE_GAIN: i32 = 4;
+
+/// The photos of `dataset` that a scene with these `cameras` was not trained on, or every `every`-th if that is
+/// given. By name, where the scene says which: the dataset may have gained or lost photos since, and settings
+/// may have changed; by `default_every` where it does not.
+pub fn held_out(dataset: &Dataset, cameras: &[SceneCamera], every: Option<usize>, default_every: usize) -> Vec<usize> {
+    if every.is_some() || cameras.is_empty() {
+        return dataset.split(every.unwrap_or(default_every)).1;
+    }
+    let held = |name: &str| cameras.iter().any(|c| c.held_out && c.name == name);
+    (0..dataset.photos.len()).filter(|&i| held(&dataset.photos[i].name)).collect()
+}
+
+/// What is compared; what is not given is as in training.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Longer side of the compared pictures in px.
+    pub max_side_px: Option<u32>,
+    /// Which photos count as held out: every n-th, 0 = all photos.
+    pub holdout_every: Option<usize>,
+    /// Whether the black borders of photos that were undistorted elsewhere are compared, too.
+    pub keep_borders: bool,
+    /// Folder for pictures: photo, render and difference side by side.
+    pub pictures: Option<PathBuf>,
+}
+
+/// A scene beside the photos that it is compared with.
+pub struct Comparison {
+    /// The Gaussians.
+    pub cloud: Arc<GaussianCloud>,
+    /// How they are drawn.
+    pub settings: RenderSettings,
+    /// The photos.
+    pub dataset: Arc<Dataset>,
+    /// Indices of the photos to compare with.
+    pub views: Vec<usize>,
+    /// Longer side of the compared pictures in px.
+    pub max_side_px: u32,
+    /// Borders of the photos, which are left out.
+    pub borders: Option<Borders>,
+    /// Folder for pictures.
+    pub pictures: Option<PathBuf>,
+    /// Id of the save that the scene's files are of.
+    pub state: Option<String>,
+}
+
+impl Comparison {
+    /// Of `scene` with `photos`.
+    ///
+    /// # Errors
+    /// If they cannot be read, or none is held out.
+    pub fn new(scene: Scene, photos: &Path, options: Options) -> Result<Self, JobError> {
+        let dataset = Arc::new(open::dataset(photos)?);
+        let mut comparison = Self::of(&scene, dataset, options)?;
+        comparison.state = scene.state;
+        Ok(comparison)
+    }
+
+    /// Of `scene` with the photos of `dataset`.
+    ///
+    /// # Errors
+    /// If they cannot be read, or none is held out.
+    pub fn of(scene: &Scene, dataset: Arc<Dataset>, options: Options) -> Result<Self, JobError> {
+        let Options { max_side_px, holdout_every, keep_borders, pictures } = options;
+        let default_every = scene.config.holdout_every;
+        let views = match holdout_every {
+            Some(0) => (0..dataset.photos.len()).collect(),
+            every => held_out(&dataset, &scene.cameras, every, default_every),
+        };
+        if views.is_empty() {
+            return Err(JobError::NothingHeldOut(dataset.root.clone()));
+        }
+        let max_side_px = max_side_px.unwrap_or(scene.config.max_side_px);
+        let (training, _) = dataset.split(holdout_every.unwrap_or(default_every));
+        let borders = if keep_borders { None } else { Some(Borders::of(&dataset, &training, max_side_px)?) };
+        let (cloud, settings) = (Arc::clone(&scene.cloud), scene.settings.clone());
+        Ok(Self { cloud, settings, dataset, views, max_side_px, borders, pictures, state: None })
+    }
+
+    fn view(&self, index: usize) -> Result<TrainView, JobError> {
+        let photo = &self.dataset.photos[index];
+        let pixels = match &self.borders {
+            Some(borders) => borders.load(photo)?,
+            None => io::photo::load(photo, self.max_side_px)?,
+        };
+        let camera = photo.camera.resized(pixels.width_px, pixels.height_px);
+        Ok(TrainView { name: photo.name.clone(), camera, pixels })
+    }
+
+    /// Calls `each` with every photo, and says how far that is.
+    fn walk(
+        &self,
+        stage: &str,
+        observer: &mut dyn Observer,
+        mut each: impl FnMut(usize) -> Result<(), JobError>,
+    ) -> Result<(), JobError> {
+        let mut ticker = Ticker::new(stage, self.views.len());
+        for (done, &index) in self.views.iter().enumerate() {
+            ticker.proceed(observer)?;
+            each(index)?;
+            ticker.report(done as u64 + 1, observer);
+        }
+        Ok(())
+    }
+}
+
+/// PSNR and SSIM of every view, one at a time so that memory holds one photo. Writes the pictures.
+///
+/// # Errors
+/// If a photo cannot be read or drawn, a picture cannot be written, or the observer asks to stop.
+pub fn photometric(comparison: &Comparison, observer: &mut dyn Observer) -> Result<Evaluation, JobError> {
+    for warning in &comparison.dataset.warnings {
+        observer.note(Severity::Warning, warning.clone());
+    }
+    let Comparison { cloud, settings, .. } = comparison;
+    let mut views: Vec<ViewScore> = Vec::with_capacity(comparison.views.len());
+    comparison.walk("Measuring", observer, |index| {
+        let view = comparison.view(index)?;
+        views.extend(evaluate(cloud, std::slice::from_ref(&view), settings, 0, 0.0)?.views);
+        if let Some(folder) = &comparison.pictures {
+            export::make_folder(folder)?;
+            side_by_side(cloud, settings, &view, &folder.join(picture_name(index, &view.name)))?;
+        }
+        Ok(())
+    })?;
+    let of = |f: fn(&ViewScore) -> f64| mean(&views.iter().map(f).collect::<Vec<_>>());
+    Ok(Evaluation { step: 0, secs: 0.0, psnr: of(|s| s.psnr), ssim: of(|s| s.ssim), gaussians: cloud.len(), views })
+}
+
+/// Drawn depth against the true depth of synthetic photos, and the median milliseconds of drawing it.
+///
+/// # Errors
+/// If a true depth is missing, a view cannot be drawn, or the observer asks to stop.
+pub fn depth(comparison: &Comparison, observer: &mut dyn Observer) -> Result<(DepthScores, f64), JobError> {
+    let mut renderer = Renderer::new();
+    let mut counter = DepthCounter::default();
+    let mut millis = Vec::with_capacity(comparison.views.len());
+    comparison.walk("Measuring depth", observer, |index| {
+        let photo = &comparison.dataset.photos[index];
+        let truth = depth::of_photo(&comparison.dataset.root, photo)?;
+        let camera = photo.camera.limited_to(comparison.max_side_px);
+        counter.draw(&mut renderer, &comparison.cloud, &camera, &comparison.settings, &truth)?;
+        millis.push(renderer.stats().stage_secs.iter().sum::<f64>() * 1e3);
+        Ok(())
+    })?;
+    Ok((counter.scores(), median(&millis)))
+}
+
+/// `012_images_0012.png` for photo 12, `images/0012.jpg`: in order, and safe as a file name.
+fn picture_name(index: usize, photo: &str) -> String {
+    let stem = photo.rsplit_once('.').map_or(photo, |(stem, _)| stem);
+    let safe: String = stem.chars().map(|c| if c.is_alphanumeric() || c == '-' { c } else { '_' }).collect();
+    format!("{index:03}_{safe}.png")
+}
+
+/// Writes photo, render and amplified difference side by side.
+fn side_by_side(
+    cloud: &GaussianCloud,
+    settings: &RenderSettings,
+    view: &TrainView,
+    path: &Path,
+) -> Result<(), JobError> {
+    let frame = Renderer::new().render(cloud, Features::NONE, &view.camera, settings)?;
+    let mut render = frame.to_rgb8();
+    let width = frame.width_px;
+    let difference = |(a, b): (&[u8; 3], &[u8; 3])| {
+        std::array::from_fn(|c| ((i32::from(a[c]) - i32::from(b[c])).abs() * DIFFERENCE_GAIN).min(255) as u8)
+    };
+    let mut pixels: Vec<[u8; 3]> = Vec::with_capacity(3 * render.len());
+    if let Some(coverage) = &view.pixels.coverage {
+        render.iter_mut().zip(coverage).filter(|(_, c)| **c == 0).for_each(|(rgb, _)| *rgb = [0; 3]);
+    }
+    for (photo_row, render_row) in view.pixels.rgb.chunks_exact(width).zip(render.chunks_exact(width)) {
+        pixels.extend_from_slice(photo_row);
+        pixels.extend_from_slice(render_row);
+        pixels.extend(photo_row.iter().zip(render_row).map(difference));
+    }
+    let size = [3 * frame.width_px as u32, frame.height_px as u32];
+    Ok(export::png(path, pixels.as_flattened(), size, ColorType::Rgb8)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Camera, Photo};
+    use glam::DVec3;
+
+    #[test]
+    fn picture_names_are_safe() {
+        assert_eq!(picture_name(7, "images/../a b.JPG"), "007_images____a_b.png");
+        assert_eq!(picture_name(1234, "x"), "1234_x.png");
+    }
+
+    #[test]
+    fn a_scene_says_by_name_which_photos_it_has_not_seen() {
+        let photo = |name: &str| Photo {
+            name: name.into(),
+            path: PathBuf::new(),
+            camera: Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid"),
+            distortion: None,
+            test_split: false,
+            background: None,
+        };
+        let trained_on = Dataset { photos: ["a", "b", "c", "d"].map(photo).to_vec(), ..Dataset::default() };
+        let cameras = open::cameras(&trained_on, 2);
+        let now = Dataset { photos: ["b", "c", "d", "e"].map(photo).to_vec(), ..Dataset::default() };
+        assert_eq!(held_out(&now, &cameras, None, 2), [1], "a is gone, b and d were trained on, e is new");
+        assert_eq!(held_out(&now, &cameras, Some(2), 9), [0, 2], "somebody wants otherwise");
+        assert_eq!(held_out(&now, &[], None, 2), [0, 2], "a splat says nothing");
+    }
+}

@@ -1,0 +1,290 @@
+//! Objects and parts against labelled photos, by one of the protocols of the literature.
+
+use std::path::Path;
+
+use image::ColorType;
+use serde::Serialize;
+
+use super::evaluate::Comparison;
+use super::{JobError, export};
+use crate::io::{self, labels::Labels};
+use crate::math::stats::mean;
+use crate::pipeline::observer::Silent;
+use crate::pipeline::semantics::code_map::CodeMap;
+use crate::pipeline::semantics::protocols::{
+    AskedScene, Category, LabelledView, Unit, categories, fastlgs_ex, langsplat, masks, means, multi_class,
+    part_recall, selection_3d, spin_nerf,
+};
+use crate::pipeline::semantics::query_engine::QueryEngine;
+use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
+use crate::pipeline::semantics::view_map::ViewMap;
+use crate::render::Renderer;
+use crate::scene::{Camera, Identities, IdentityId, LevelFilter, NOBODY, SemanticMap};
+
+/// How objects and parts are compared with labels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Protocol {
+    /// The pixels of the answer against the region, IoU; objects and parts apart
+    Masks,
+    /// LERF-OVS as LangSplat counts it: smoothed relevancy cut at 0.4, and localization
+    Langsplat,
+    /// FastLGS's evaluator, with its running pooled IoU; for comparison with published numbers only
+    FastlgsEx,
+    /// Gaussians chosen by text, their silhouette cut at 0.7 (OpenGaussian)
+    #[value(name = "3d-selection")]
+    Selection3d,
+    /// One foreground object at 1008 x 567: IoU and accuracy
+    SpinNerf,
+    /// Every class: own masks, and the arg-max over all
+    #[value(name = "3d-ovs")]
+    Ovs3d,
+    /// Part queries by embedding alone, with the paper's components switched on one after another
+    PartRecall,
+}
+
+/// What a protocol counts besides the IoU of each query.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Summary {
+    /// Of the protocol [`Protocol::Masks`].
+    Masks {
+        /// Mean IoU of objects.
+        object_miou: f64,
+        /// Mean IoU of parts.
+        part_miou: f64,
+    },
+    /// Of the protocol [`Protocol::Langsplat`].
+    Langsplat {
+        /// Share of queries whose most relevant pixel lies in their box.
+        localisation: f64,
+    },
+    /// Of the protocol [`Protocol::FastlgsEx`]: nothing.
+    FastlgsEx {},
+    /// Of the protocol [`Protocol::Selection3d`].
+    Selection3d {
+        /// Share of queries with an IoU of 0.25 or more.
+        accuracy_25: f64,
+        /// Share of queries with an IoU of 0.5 or more.
+        accuracy_50: f64,
+    },
+    /// Of the protocol [`Protocol::SpinNerf`].
+    SpinNerf {
+        /// Share of pixels that are right.
+        accuracy: f64,
+    },
+    /// Of the protocol [`Protocol::Ovs3d`].
+    Ovs3d {
+        /// Mean IoU where every pixel is of the class that fits best.
+        argmax_miou: f64,
+        /// How many classes.
+        #[serde(skip)]
+        classes: usize,
+    },
+    /// Of the protocol [`Protocol::PartRecall`].
+    PartRecall {
+        /// The encoder.
+        encoder: String,
+        /// The paper's ablation.
+        rows: Vec<part_recall::Row>,
+    },
+}
+
+/// What a comparison comes to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaskScores {
+    /// The views that were compared.
+    pub views: usize,
+    /// How many of them were trained on.
+    pub trained_on: usize,
+    /// Every query of every view.
+    pub units: Vec<Unit>,
+    /// What the protocol counts.
+    pub summary: Summary,
+}
+
+impl MaskScores {
+    /// Mean IoU over queries, and over views.
+    pub fn miou(&self) -> (f64, f64) {
+        means(&self.units)
+    }
+}
+
+/// Compares the objects and parts `map` with `labels`; `query` is what to ask for where those do not name it.
+/// Pictures show the identities over the photos.
+///
+/// # Errors
+/// If labels or photos cannot be read, no view has labels, or a protocol lacks what it needs.
+pub fn run(
+    comparison: &Comparison,
+    map: &SemanticMap,
+    labels: &Path,
+    protocol: Protocol,
+    query: Option<&str>,
+) -> Result<MaskScores, JobError> {
+    let mut known = FileMasks(Labels::open(labels)?);
+    let views = labelled(comparison, map, &mut known)?;
+    if views.is_empty() {
+        let text = format!("{}: no photo to compare with has labels", labels.display());
+        return Err(JobError::Protocol(text));
+    }
+    if let Some(folder) = &comparison.pictures {
+        pictures(folder, comparison, map, &views)?;
+    }
+    let list: Vec<LabelledView<'_>> = views.iter().map(Drawn::labelled).collect();
+    let (units, summary) = match protocol {
+        Protocol::PartRecall => recall(map, &list)?,
+        _ => {
+            let mut engine = QueryEngine::new(map.language.as_ref())?;
+            let mut failed = None;
+            let mut ask = |text: &str| {
+                engine.ask(map, text, LevelFilter::Auto).unwrap_or_else(|e| {
+                    failed.get_or_insert(e);
+                    None
+                })
+            };
+            let scores = compare(protocol, query, comparison, &mut AskedScene { map, ask: &mut ask }, &list)?;
+            // An encoder that fails is no answer that misses.
+            failed.map_or(Ok(scores), Err)?
+        }
+    };
+    let trained_on = views.iter().filter(|v| v.trained_on).count();
+    Ok(MaskScores { views: views.len(), trained_on, units, summary })
+}
+
+fn compare(
+    protocol: Protocol,
+    query: Option<&str>,
+    comparison: &Comparison,
+    scene: &mut AskedScene<'_>,
+    views: &[LabelledView<'_>],
+) -> Result<(Vec<Unit>, Summary), JobError> {
+    let mut units: Vec<Unit> = Vec::new();
+    let summary = match protocol {
+        Protocol::Masks => {
+            views.iter().for_each(|v| units.extend(masks::compare(scene, v)));
+            let [object_miou, part_miou] = masks::by_level(&units);
+            Summary::Masks { object_miou, part_miou }
+        }
+        Protocol::Langsplat => {
+            views.iter().for_each(|v| units.extend(langsplat::compare(scene, v)));
+            let hits = units.iter().filter(|u| u.hit == Some(true)).count();
+            Summary::Langsplat { localisation: hits as f64 / units.len().max(1) as f64 }
+        }
+        Protocol::FastlgsEx | Protocol::PartRecall => {
+            let mut pool = fastlgs_ex::Pool::default();
+            views.iter().for_each(|v| units.extend(fastlgs_ex::compare(scene, v, &mut pool)));
+            Summary::FastlgsEx {}
+        }
+        Protocol::Selection3d => {
+            for view in views {
+                units.extend(selection_3d::compare(scene, view, &comparison.cloud, &comparison.settings)?);
+            }
+            let [accuracy_25, accuracy_50] = [0.25, 0.5].map(|least| selection_3d::accuracy(&units, least));
+            Summary::Selection3d { accuracy_25, accuracy_50 }
+        }
+        Protocol::SpinNerf => {
+            let missing = || JobError::Protocol("the protocol spin-nerf needs the object's name (--query)".into());
+            let query = query.ok_or_else(missing)?;
+            let found: Vec<_> = views.iter().filter_map(|v| spin_nerf::compare(scene, v, query)).collect();
+            let accuracy = mean(&found.iter().map(|f| f.accuracy).collect::<Vec<_>>());
+            units.extend(found.into_iter().map(|f| f.unit));
+            Summary::SpinNerf { accuracy }
+        }
+        Protocol::Ovs3d => {
+            let mut classes: Vec<String> = views.iter().flat_map(|v| &v.categories).map(|c| c.name.clone()).collect();
+            classes.sort();
+            classes.dedup();
+            let mut of_winner = Vec::new();
+            for view in views {
+                let [own, winner] = multi_class::compare(scene, view, &classes);
+                units.extend(own);
+                of_winner.extend(winner);
+            }
+            Summary::Ovs3d { argmax_miou: means(&of_winner).0, classes: classes.len() }
+        }
+    };
+    Ok((units, summary))
+}
+
+/// The paper's ablation.
+fn recall(map: &SemanticMap, views: &[LabelledView<'_>]) -> Result<(Vec<Unit>, Summary), JobError> {
+    let language = map.language.as_ref().ok_or_else(|| {
+        let text = "no encoder has looked at this scene; run 'fmlgs preprocess' on it with --encoder demo";
+        JobError::Protocol(text.into())
+    })?;
+    let mut encoder = crate::models::encoder(&language.encoder)?;
+    let mut rows = Vec::new();
+    for components in part_recall::Components::ROWS {
+        rows.push(part_recall::row(components, map, language, views, |p| encoder.text(p))?);
+    }
+    // The paper's full method, not ours, is what others can compare with.
+    let units = rows.iter().rfind(|r| r.components.localisation).map(|r| r.units.clone()).unwrap_or_default();
+    Ok((units, Summary::PartRecall { encoder: language.encoder.clone(), rows }))
+}
+
+/// A labelled photo and what is drawn of its view.
+struct Drawn {
+    index: usize,
+    name: String,
+    camera: Camera,
+    trained_on: bool,
+    exact: ViewMap,
+    blended: CodeMap,
+    categories: Vec<Category>,
+}
+
+impl Drawn {
+    fn labelled(&self) -> LabelledView<'_> {
+        LabelledView {
+            name: &self.name,
+            camera: &self.camera,
+            exact: &self.exact,
+            blended: &self.blended,
+            categories: self.categories.clone(),
+        }
+    }
+}
+
+/// The held-out photos with labels; else those that were trained on, as long as no mask of theirs was
+/// used.
+fn labelled(comparison: &Comparison, map: &SemanticMap, labels: &mut FileMasks) -> Result<Vec<Drawn>, JobError> {
+    let Comparison { cloud, settings, max_side_px, .. } = comparison;
+    let photos = &comparison.dataset.photos;
+    let held: Vec<usize> = comparison.views.iter().copied().filter(|&i| labels.covers(&photos[i])).collect();
+    let trained_on = held.is_empty();
+    let free = |&i: &usize| labels.covers(&photos[i]) && !map.seeds.contains(&photos[i].name);
+    let views: Vec<usize> = if trained_on { (0..photos.len()).filter(free).collect() } else { held };
+    let mut renderer = Renderer::new();
+    let mut drawn = Vec::with_capacity(views.len());
+    for index in views {
+        let photo = &photos[index];
+        let camera = photo.camera.limited_to(*max_side_px);
+        let exact = ViewMap::render(&mut renderer, cloud, &map.of, &map.identities, &camera, settings)?;
+        let blended = CodeMap::render(&mut renderer, cloud, &map.codes, map.has_parts(), &camera, settings)?;
+        let categories = categories(&labels.segment(photo, *max_side_px, &mut Silent)?);
+        drawn.push(Drawn { index, name: photo.name.clone(), camera, trained_on, exact, blended, categories });
+    }
+    Ok(drawn)
+}
+
+fn pictures(folder: &Path, comparison: &Comparison, map: &SemanticMap, views: &[Drawn]) -> Result<(), JobError> {
+    export::make_folder(folder)?;
+    for view in views {
+        let pixels = io::photo::load(&comparison.dataset.photos[view.index], comparison.max_side_px)?;
+        let ids = tinted(&pixels.rgb, &view.exact.identity, &map.identities);
+        let size = [view.camera.width_px, view.camera.height_px];
+        export::png(&folder.join(format!("{:03}.png", view.index)), ids.as_flattened(), size, ColorType::Rgb8)?;
+    }
+    Ok(())
+}
+
+/// The photo with every identity's code as a tint.
+fn tinted(rgb: &[[u8; 3]], of: &[IdentityId], identities: &Identities) -> Vec<[u8; 3]> {
+    let tint = |(rgb, id): (&[u8; 3], &IdentityId)| match identities.get(*id) {
+        Some(identity) if *id != NOBODY => {
+            std::array::from_fn(|c| (0.4 * f32::from(rgb[c]) + 0.6 * 255.0 * identity.code[c]) as u8)
+        }
+        _ => *rgb,
+    };
+    rgb.iter().zip(of).map(tint).collect()
+}

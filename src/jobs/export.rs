@@ -1,0 +1,110 @@
+//! Writing what somebody wants to have: Gaussians for other viewers, pictures, arrays.
+
+use std::io::Write;
+use std::path::Path;
+
+use image::codecs::png::PngEncoder;
+use image::{ColorType, ImageEncoder};
+use npyz::WriterBuilder;
+
+use crate::io::{self, IoError, atomic, splat_ply};
+use crate::navigate::{Film, Pose, Speed};
+use crate::scene::{CameraPath, GaussianCloud, PathKey, PhotoPixels};
+
+/// Writes Gaussians as a `.ply`.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn ply(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
+    make_parent(path)?;
+    splat_ply::write(path, cloud)
+}
+
+/// Writes pixels as a `.png`.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn picture(path: &Path, pixels: &PhotoPixels) -> Result<(), IoError> {
+    png(path, pixels.rgb.as_flattened(), [pixels.width_px, pixels.height_px], ColorType::Rgb8)
+}
+
+/// Writes a `.png` of `size_px` from raw samples, those of 16 bits in the machine's byte order.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn png(path: &Path, samples: &[u8], size_px: [u32; 2], color: ColorType) -> Result<(), IoError> {
+    atomic::write(path, |w| {
+        PngEncoder::new(w).write_image(samples, size_px[0], size_px[1], color.into()).map_err(std::io::Error::other)
+    })
+}
+
+/// Writes rows of `f32` values as a NumPy array of shape `[height, width]`.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn npy(path: &Path, values: &[f32], size_px: [u32; 2]) -> Result<(), IoError> {
+    atomic::write(path, |w: &mut dyn Write| {
+        let shape = [u64::from(size_px[1]), u64::from(size_px[0])];
+        let mut array = npyz::WriteOptions::new().default_dtype().shape(&shape).writer(w).begin_nd()?;
+        array.extend(values.iter().copied())?;
+        array.finish()
+    })
+}
+
+/// Writes a camera path: this program's `.json`, or frames of this `aspect` for nerfstudio where the name ends in
+/// `.nerfstudio.json`.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn camera_path(file: &Path, path: &CameraPath, aspect: f64) -> Result<(), IoError> {
+    make_parent(file)?;
+    if !file.to_string_lossy().ends_with(".nerfstudio.json") {
+        return io::camera_path::write(file, path);
+    }
+    let film = Film::new(path, Speed::Constant);
+    let poses = film.map_or_else(Vec::new, |film| film.pictures(path.fps, CameraPath::MAX_KEYS as f64));
+    let frames: Vec<PathKey> = poses.iter().map(Pose::key).collect();
+    io::camera_path::nerfstudio::write(file, path, &frames, (1280, (1280.0 / aspect.max(0.01)) as u32))
+}
+
+/// Makes the folder that `path` lies in.
+///
+/// # Errors
+/// If that is not possible.
+pub fn make_parent(path: &Path) -> Result<(), IoError> {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => make_folder(folder),
+        _ => Ok(()),
+    }
+}
+
+/// Makes `folder` and those above it.
+///
+/// # Errors
+/// If that is not possible.
+pub fn make_folder(folder: &Path) -> Result<(), IoError> {
+    let remedy = "the folder cannot be created: choose another place";
+    std::fs::create_dir_all(folder).map_err(|cause| IoError::Write { path: folder.into(), remedy, cause })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_and_arrays_read_back() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("a.png");
+        png(&path, &[1, 2, 3, 4, 5, 6], [2, 1], ColorType::Rgb8).expect("write");
+        assert_eq!(image::open(&path).expect("read").to_rgb8().into_raw(), [1, 2, 3, 4, 5, 6]);
+        let bytes: Vec<u8> = [258_u16, 3].iter().flat_map(|v| v.to_ne_bytes()).collect();
+        png(&path, &bytes, [1, 2], ColorType::L16).expect("write");
+        assert_eq!(image::open(&path).expect("read").to_luma16().into_raw(), [258, 3]);
+        let path = folder.path().join("a.npy");
+        npy(&path, &[1.0, 2.5, 3.0, 4.0, 5.0, 6.0], [3, 2]).expect("write");
+        let bytes = std::fs::read(&path).expect("read");
+        let array = npyz::NpyFile::new(&bytes[..]).expect("npy");
+        assert_eq!(array.shape(), [2, 3]);
+        assert_eq!(array.into_vec::<f32>().expect("values")[1], 2.5);
+    }
+}

@@ -1,0 +1,163 @@
+//! Finding the objects and parts of a trained scene, and storing them with it.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use serde::{Deserialize, Serialize};
+
+use super::{JobError, evaluate};
+use crate::io::trained::{self, CLOUD_FILE};
+use crate::io::{IoError, SceneFolder, splat_ply};
+use crate::models;
+use crate::models::catalogue::{self, Role, SAM2};
+use crate::pipeline::observer::{Observer, Severity};
+use crate::pipeline::semantics::find::{
+    CODE_STEPS, Carry, FindOptions, Found, Lifting, REGIONS, Tools, find_objects, segmenter,
+};
+use crate::pipeline::semantics::follow::Follower;
+use crate::pipeline::semantics::tracker::TrackOptions;
+use crate::render::RenderSettings;
+use crate::scene::{Dataset, GaussianCloud, Photo};
+
+/// Name of the encoder that is none.
+pub const NO_ENCODER: &str = "none";
+
+/// How objects are found. Models that are not named are the best that are here.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct FindSettings {
+    /// What finds masks where none came with the photos.
+    pub segmenter: Option<String>,
+    /// What carries them to the other photos.
+    pub carry: Carry,
+    /// The SAM 2 that follows masks.
+    pub tracker: String,
+    /// The encoder for open-vocabulary queries, or [`NO_ENCODER`].
+    pub encoder: Option<String>,
+    /// How Gaussians get their codes.
+    pub lifting: Lifting,
+    /// Steps of training codes.
+    pub code_steps: u64,
+    /// Photo to begin with, by name; `None` = the first with masks.
+    pub seed: Option<String>,
+    /// Most photos whose masks are used.
+    pub max_seeds: usize,
+    /// Share of a photo that may stay unknown before its masks are used too.
+    pub unknown_share: f64,
+}
+
+impl Default for FindSettings {
+    fn default() -> Self {
+        let TrackOptions { max_seeds, reseed_share, .. } = TrackOptions::default();
+        Self {
+            segmenter: None,
+            carry: Carry::default(),
+            tracker: SAM2.into(),
+            encoder: None,
+            lifting: Lifting::default(),
+            code_steps: CODE_STEPS,
+            seed: None,
+            max_seeds,
+            unknown_share: reseed_share,
+        }
+    }
+}
+
+/// A scene whose objects are to be found.
+#[derive(Clone, Copy)]
+pub struct Request<'a> {
+    /// Folder of the trained scene.
+    pub folder: &'a Path,
+    /// The state in which it is known.
+    pub known: Option<&'a str>,
+    /// Its Gaussians.
+    pub cloud: &'a GaussianCloud,
+    /// How they are drawn.
+    pub settings: &'a RenderSettings,
+    /// The photos.
+    pub dataset: &'a Dataset,
+    /// Every how-manieth photo is held out, if the scene does not say which.
+    pub holdout_every: usize,
+    /// Where masks are; `None` = they are found.
+    pub masks: Option<&'a Path>,
+    /// Longer side of the pictures that are looked at, px.
+    pub side_px: u32,
+    /// How.
+    pub with: &'a FindSettings,
+}
+
+/// Objects and parts that were found and stored.
+#[derive(Clone, Debug)]
+pub struct FoundObjects {
+    /// They, and how they were found.
+    pub found: Found,
+    /// The photos that were looked at; what was found counts them.
+    pub photos: Vec<Photo>,
+    /// Where the objects and parts before are kept, if there were any.
+    pub kept: Option<PathBuf>,
+    /// The state of the scene now.
+    pub state: String,
+    /// Seconds that it took.
+    pub secs: f64,
+}
+
+/// Finds objects and parts, and stores them. Held-out photos are never used.
+///
+/// # Errors
+/// If the folder cannot be written or has changed, a model or photo cannot be read, no mask is found, or the
+/// observer asks to stop.
+pub fn run(request: Request<'_>, observer: &mut dyn Observer) -> Result<FoundObjects, JobError> {
+    let Request { folder, known, cloud, settings, dataset, with, .. } = request;
+    if !trained::is_scene(folder) {
+        return Err(JobError::NoScene(folder.into()));
+    }
+    // Held from the beginning: nobody waits for objects that cannot be stored.
+    let scene = SceneFolder::hold(folder, "finding objects")?;
+    if splat_ply::state(&folder.join(CLOUD_FILE))?.as_deref() != known {
+        return Err(IoError::Changed { folder: folder.into() }.into());
+    }
+    let cameras = trained::load_info(folder)?.cameras;
+    let held = evaluate::held_out(dataset, &cameras, None, request.holdout_every);
+    let all = dataset.photos.iter().enumerate();
+    let photos: Vec<Photo> = all.filter(|(i, _)| !held.contains(i)).map(|(_, p)| p.clone()).collect();
+    let unknown = |name: &String| JobError::UnknownPhoto(name.clone());
+    let place = |name: &String| photos.iter().position(|p| p.name.contains(name.as_str())).ok_or_else(|| unknown(name));
+    let options = FindOptions {
+        track: TrackOptions {
+            seed: with.seed.as_ref().map(place).transpose()?,
+            max_seeds: with.max_seeds.max(1),
+            reseed_share: with.unknown_share,
+            veto: with.carry == Carry::Both,
+            max_side_px: request.side_px,
+        },
+        lifting: with.lifting,
+        code_steps: with.code_steps,
+    };
+    let mut warn = |text: String| observer.note(Severity::Warning, text);
+    let network = match (request.masks, with.segmenter.as_deref()) {
+        (Some(_), _) | (None, Some(REGIONS)) => None,
+        (None, Some(name)) => Some(name.to_owned()),
+        (None, None) => catalogue::usable(Role::Segmenter, &mut warn)?.into_iter().next(),
+    };
+    let mut segmenter = segmenter(request.masks, cloud, settings, network.as_deref())?;
+    let mut encoder = match with.encoder.as_deref() {
+        Some(NO_ENCODER) => None,
+        Some(name) => Some(models::encoder(name)?),
+        // Without an encoder, names alone are understood.
+        None => models::best_encoder(&mut warn)
+            .inspect_err(|e| warn(format!("Objects are found without embeddings: {e}")))
+            .ok(),
+    };
+    let mut follower = match with.carry {
+        Carry::Gaussians => None,
+        _ => Some(Follower::open(&with.tracker, Some(folder.join("cache")))?),
+    };
+    let start = Instant::now();
+    let tools = Tools { segmenter: &mut *segmenter, follower: follower.as_mut(), encoder: encoder.as_deref_mut() };
+    let found = find_objects(cloud, &photos, settings, tools, &options, observer)?;
+    let (kept, state) = scene.replace_map(known, &found.map, cloud)?;
+    if let Some(kept) = &kept {
+        observer.note(Severity::Info, format!("The objects and parts before are kept in {}", kept.display()));
+    }
+    Ok(FoundObjects { found, photos, kept, state, secs: start.elapsed().as_secs_f64() })
+}

@@ -1,0 +1,115 @@
+//! Where the program keeps what it makes without being told where: demo photos, trained scenes, reports.
+
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+use crate::io::data_folder::data_folder;
+use crate::io::files;
+
+/// The program's folders, all below one.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Folders {
+    /// The folder that holds the others.
+    pub data: PathBuf,
+}
+
+impl Folders {
+    /// Below the user's data folder; below the system's temporary folder where there is none.
+    pub fn of_user() -> Self {
+        Self { data: data_folder() }
+    }
+
+    /// Folder of the demo's photos. Carries the version, because another version may make others.
+    pub fn demo(&self) -> PathBuf {
+        self.data.join(format!("demo-{}", env!("CARGO_PKG_VERSION")))
+    }
+
+    /// Folder of the newest scene trained from the dataset at `root`, whether it exists or not.
+    pub fn trained(&self, root: &Path) -> PathBuf {
+        self.runs(root).take_while(|run| run.exists()).last().unwrap_or_else(|| self.fresh(root))
+    }
+
+    /// A folder for a new training of the dataset at `root`, next to those of earlier ones.
+    pub fn fresh(&self, root: &Path) -> PathBuf {
+        self.runs(root).find(|run| !run.exists()).unwrap_or_default()
+    }
+
+    /// Folder for a report of the splat at `path`, which has no folder of its own.
+    pub fn report(&self, path: &Path) -> PathBuf {
+        unique(&self.data.join("reports"), path)
+    }
+
+    /// Folders of the trainings of the dataset at `root`, first to last without end.
+    fn runs(&self, root: &Path) -> impl Iterator<Item = PathBuf> {
+        let all = unique(&self.data.join("trained"), root);
+        (1..).map(move |n: usize| all.join(format!("run-{n}")))
+    }
+}
+
+/// The folder in `parent` for what belongs to `path`: called by its last name and a digest of all of it, so
+/// that two of one name do not share it.
+fn unique(parent: &Path, path: &Path) -> PathBuf {
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    let name = path.file_name().map_or_else(|| "scene".into(), |n| n.to_string_lossy().into_owned());
+    let digest = Sha256::digest(path.as_os_str().as_encoded_bytes());
+    let sum: String = digest.iter().take(8).map(|byte| format!("{byte:02x}")).collect();
+    files::renamed(parent.join(format!("{name}-{sum}")), parent.join(first_name(&name, &path)))
+}
+
+/// What the first version called the folder, by a digest that the standard library does not promise to keep.
+fn first_name(name: &str, path: &Path) -> String {
+    use std::hash::{DefaultHasher, Hash, Hasher};
+    let mut hasher = DefaultHasher::new();
+    path.hash(&mut hasher);
+    format!("{name}-{:08x}", hasher.finish() as u32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn datasets_of_one_name_do_not_share_a_folder() {
+        let places = Folders { data: "/data".into() };
+        let (a, b) = (places.trained(Path::new("/one/fox")), places.trained(Path::new("/two/fox")));
+        assert_ne!(a, b);
+        assert_eq!(a, places.trained(Path::new("/one/fox")));
+        assert!(a.to_string_lossy().contains("fox-"));
+    }
+
+    #[test]
+    fn a_fresh_run_never_touches_an_earlier_one() {
+        let folder = tempfile::tempdir().expect("folder");
+        let places = Folders { data: folder.path().into() };
+        let root = Path::new("/one/fox");
+        let first = places.trained(root);
+        assert_eq!(places.fresh(root), first, "nothing is there yet");
+        std::fs::create_dir_all(&first).expect("create");
+        let second = places.fresh(root);
+        assert_ne!(second, first);
+        assert_eq!(places.trained(root), first);
+        std::fs::create_dir_all(&second).expect("create");
+        assert_eq!(places.trained(root), second, "the newest is shown");
+    }
+
+    #[test]
+    fn folders_of_the_first_version_are_used_on() {
+        let folder = tempfile::tempdir().expect("folder");
+        let folders = Folders { data: folder.path().into() };
+        let root = Path::new("/one/fox");
+        assert_eq!(first_name("fox", root), "fox-a33b0693", "as the first version called it");
+        for (kind, found) in
+            [("trained", &Folders::trained as &dyn Fn(&Folders, &Path) -> PathBuf), ("reports", &Folders::report)]
+        {
+            let old = folders.data.join(kind).join("fox-a33b0693");
+            std::fs::create_dir_all(old.join("run-1")).expect("create");
+            std::fs::write(old.join("run-1").join("kept"), "x").expect("write");
+            let now = found(&folders, root);
+            assert!(now.join("kept").exists() || now.join("run-1").join("kept").exists(), "{}", now.display());
+            assert!(!old.exists(), "it has one name");
+            assert_eq!(found(&folders, root), now, "and keeps it");
+            assert!(!found(&folders, Path::new("/two/fox")).exists(), "the control");
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! Putting networks in place, and checking those that are there.
+
+use std::path::Path;
+use std::time::Instant;
+
+use super::JobError;
+use crate::math::stats::median;
+use crate::models::catalogue;
+pub use crate::models::catalogue::{Entry as ModelEntry, Role as ModelRole, SAM2, State as ModelState};
+use crate::models::engine::engine;
+use crate::models::fetch::Patience;
+use crate::models::{self, ModelError, Tile};
+use crate::pipeline::observer::{Observer, Ticker};
+
+/// Engine and models of this machine.
+#[derive(Clone, Debug)]
+pub struct ModelList {
+    /// What runs them, and where.
+    pub engine: String,
+    /// What is wrong with it, or could be better.
+    pub note: Option<String>,
+    /// All models of the catalog.
+    pub models: Vec<(ModelEntry, ModelState)>,
+}
+
+/// Lists the models, installed or not: reads and verifies files.
+pub fn list() -> ModelList {
+    let (engine, mut note) = match engine() {
+        Ok(engine) => (format!("{}, {}", engine.name(), engine.device()), engine.note().map(str::to_owned)),
+        Err(e) => ("none".to_owned(), Some(e.to_string())),
+    };
+    let folder = catalogue::folder();
+    let models = catalogue::entries().unwrap_or_else(|e| {
+        note = Some(e.to_string());
+        Vec::new()
+    });
+    ModelList { engine, note, models: models.into_iter().map(|e| (e.clone(), e.state(&folder))).collect() }
+}
+
+/// Where the files of a model come from.
+#[derive(Clone, Copy, Debug)]
+pub enum Source<'a> {
+    /// An address; `None` = the one in the list.
+    Fetch(Option<&'a str>),
+    /// A folder.
+    Folder(&'a Path),
+}
+
+/// Puts the model called `id` in place.
+///
+/// # Errors
+/// If there is none, its files cannot be had or are not right, or the observer asks to stop.
+pub fn install(id: &str, source: Source<'_>, observer: &mut dyn Observer) -> Result<ModelEntry, JobError> {
+    let (folder, mut ticker) = (catalogue::folder(), Ticker::new("", 0));
+    let entry = catalogue::entry(id)?;
+    match source {
+        Source::Folder(brought) => entry.add(&folder, brought)?,
+        Source::Fetch(from) => entry.fetch(&folder, from, Patience::default(), &mut |name, there, all| {
+            ticker.enter(format!("Fetching {name} (kB)"), all.unwrap_or(there) / 1000);
+            ticker.tick((there / 1000) as usize, observer).is_ok()
+        })?,
+    }
+    Ok(entry)
+}
+
+/// Compares all files that are here with their checksums: what is wrong with each model, if anything.
+///
+/// # Errors
+/// If the list that came with the program is damaged.
+pub fn check() -> Result<Vec<(String, Option<String>)>, JobError> {
+    let folder = catalogue::folder();
+    let here = |e: &ModelEntry| !matches!(e.state(&folder), ModelState::Missing(_));
+    let check = |e: ModelEntry| (e.id.clone(), e.verify(&folder).err().map(|e| e.to_string()));
+    Ok(catalogue::entries()?.into_iter().filter(here).map(check).collect())
+}
+
+/// How long an encoder takes.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct EncoderTimes {
+    /// Its name.
+    pub id: String,
+    /// Loading it and its first use, ms.
+    pub load_ms: f64,
+    /// A picture, ms.
+    pub picture_ms: f64,
+    /// A phrase, ms.
+    pub phrase_ms: f64,
+    /// What it made of the picture.
+    pub picture: Vec<f32>,
+    /// What it made of the phrase.
+    pub phrase: Vec<f32>,
+}
+
+/// Times every encoder that can be used here on a picture and a phrase: medians of so many `runs`. `told` hears
+/// of each that is here and cannot be used.
+///
+/// # Errors
+/// If one fails.
+pub fn time_encoders(runs: usize, told: &mut dyn FnMut(String)) -> Result<Vec<EncoderTimes>, JobError> {
+    const PHRASE: &str = "a red wooden chair";
+    let times = |run: &mut dyn FnMut() -> Result<(), ModelError>| -> Result<f64, ModelError> {
+        let mut ms = Vec::with_capacity(runs);
+        for _ in 0..runs {
+            let start = Instant::now();
+            run()?;
+            ms.push(start.elapsed().as_secs_f64() * 1e3);
+        }
+        Ok(median(&ms))
+    };
+    let mut list = Vec::new();
+    for id in catalogue::usable(ModelRole::Encoder, told)? {
+        let start = Instant::now();
+        let mut encoder = models::encoder(&id)?;
+        let side_px = encoder.tile_side_px().unwrap_or(224);
+        let color = |i: usize| {
+            let (x, y) = (i % side_px, i / side_px);
+            [x as f32 / side_px as f32, y as f32 / side_px as f32, ((x / 8 + y / 8) % 2) as f32]
+        };
+        let tile = Tile { side_px, rgb: (0..side_px * side_px).map(color).collect() };
+        // The first run prepares the networks.
+        let (picture, phrase) = (encoder.image(&tile)?, encoder.text(PHRASE)?);
+        let load_ms = start.elapsed().as_secs_f64() * 1e3;
+        let picture_ms = times(&mut || encoder.image(&tile).map(drop))?;
+        let phrase_ms = times(&mut || encoder.text(PHRASE).map(drop))?;
+        list.push(EncoderTimes { id, load_ms, picture_ms, phrase_ms, picture, phrase });
+    }
+    Ok(list)
+}

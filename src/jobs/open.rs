@@ -1,0 +1,391 @@
+//! Opening a scene: what the window and the command line see of a path, whatever kind of thing lies there.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::{Folders, JobError, plan};
+use crate::io::labels::Labels;
+use crate::io::trained::{self, History, SceneCamera};
+use crate::io::{self, Opened, TrainedScene};
+use crate::math::sh::SH_C0;
+use crate::pipeline::observer::{Observer, Severity};
+use crate::pipeline::synth::demo;
+use crate::pipeline::train::TrainConfig;
+use crate::render::RenderSettings;
+use crate::scene::plan::used_degree;
+use crate::scene::trace::{self, Sort};
+use crate::scene::{Bounds, Camera, Dataset, Facts, GaussianCloud, HomeView, Machine, SemanticMap};
+
+/// Gaussians that can be drawn, and what came with them.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// Where it was read from.
+    pub path: PathBuf,
+    /// Folder of the trained scene, if it is one.
+    pub folder: Option<PathBuf>,
+    /// Short name for titles.
+    pub name: String,
+    /// The Gaussians, without bands of harmonics that are zero.
+    pub cloud: Arc<GaussianCloud>,
+    /// Degree of the harmonics in its file.
+    pub sh_stored: u8,
+    /// The photos' cameras, possibly none.
+    pub cameras: Vec<SceneCamera>,
+    /// How it is drawn: background, filter and so on, as it was trained.
+    pub settings: RenderSettings,
+    /// How it was trained; defaults where that is not known.
+    pub config: TrainConfig,
+    /// Measurements of its training.
+    pub history: History,
+    /// Where its photos were, for people.
+    pub photos: Option<PathBuf>,
+    /// Where its photos are, if they are still there.
+    pub dataset_path: Option<PathBuf>,
+    /// Length of a scene unit in metres, if that is known.
+    pub metres_per_unit: Option<f64>,
+    /// Id of the save that its files are of, if it has one.
+    pub state: Option<String>,
+}
+
+impl Scene {
+    /// What was read to open it, which no result may replace.
+    pub fn reads(&self) -> Vec<&Path> {
+        std::iter::once(self.path.as_path()).chain(self.dataset_path.as_deref()).collect()
+    }
+
+    /// The cameras alone.
+    pub fn views(&self) -> Vec<Camera> {
+        self.cameras.iter().map(|c| c.camera.clone()).collect()
+    }
+
+    /// How to look at it at first.
+    pub fn home(&self) -> HomeView {
+        HomeView::new(&self.views(), Some(&self.cloud))
+    }
+
+    /// Its objects and parts.
+    ///
+    /// # Errors
+    /// If it has none, or they cannot be read.
+    pub fn semantics(&self) -> Result<SemanticMap, JobError> {
+        let map = match &self.folder {
+            Some(folder) => io::semantic_map::load(folder, self.state.as_deref(), &self.cloud)?,
+            None => None,
+        };
+        map.ok_or_else(|| JobError::NoObjects(self.path.clone()))
+    }
+
+    /// Where its photos are, unless they are somewhere else.
+    ///
+    /// # Errors
+    /// If nobody knows.
+    pub fn photos(&self, elsewhere: Option<&Path>) -> Result<PathBuf, JobError> {
+        let known = elsewhere.map(Path::to_path_buf).or_else(|| self.dataset_path.clone());
+        known.ok_or_else(|| JobError::PhotosGone(self.path.clone()))
+    }
+
+    fn bare(path: &Path, cloud: GaussianCloud) -> Self {
+        let name = path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let (cloud, sh_stored) = compact(cloud);
+        Self { path: path.into(), name, cloud, sh_stored, ..Self::default() }
+    }
+
+    fn trained(path: &Path, scene: TrainedScene, config: TrainConfig) -> Self {
+        let dataset_path = scene.dataset_path();
+        let TrainedScene { folder, info, cloud, state } = scene;
+        let (cloud, sh_stored) = compact(cloud);
+        Self {
+            path: path.into(),
+            folder: Some(folder),
+            name: info.name,
+            cloud,
+            sh_stored,
+            cameras: info.cameras,
+            settings: config.render_settings(info.background),
+            config,
+            history: info.history,
+            photos: info.dataset.map(|d| d.path),
+            dataset_path,
+            metres_per_unit: info.metres_per_unit.filter(|m| m.is_finite() && *m > 0.0),
+            state,
+        }
+    }
+}
+
+/// What lies at a path.
+// One value exists per opening; a box would only be in the reader's way.
+#[allow(clippy::large_enum_variant)]
+#[derive(Debug)]
+pub enum Contents {
+    /// Posed photos.
+    Photos(Dataset),
+    /// A splat or a trained scene.
+    Scene(Scene),
+}
+
+/// Reads what lies at `path`.
+///
+/// # Errors
+/// If it cannot be read, the settings of a trained scene included.
+pub fn contents(path: &Path) -> Result<Contents, JobError> {
+    Ok(match io::open(path)? {
+        Opened::Dataset(dataset) => Contents::Photos(dataset),
+        Opened::Cloud(cloud) => Contents::Scene(Scene::bare(path, cloud)),
+        Opened::Trained(scene) => {
+            let config = TrainConfig::stored(&scene.folder, scene.info.config.clone())?;
+            Contents::Scene(Scene::trained(path, scene, config))
+        }
+    })
+}
+
+/// Reads a trained scene or a splat.
+///
+/// # Errors
+/// If it cannot be read, or is something else.
+pub fn scene(path: &Path) -> Result<Scene, JobError> {
+    match contents(path)? {
+        Contents::Scene(scene) => Ok(scene),
+        Contents::Photos(_) => Err(JobError::NotTrained(path.into())),
+    }
+}
+
+/// Reads posed photos.
+///
+/// # Errors
+/// If they cannot be read, or it is something else.
+pub fn dataset(path: &Path) -> Result<Dataset, JobError> {
+    match io::open(path)? {
+        Opened::Dataset(dataset) => Ok(dataset),
+        Opened::Trained(_) | Opened::Cloud(_) => Err(JobError::NoPhotos(path.into())),
+    }
+}
+
+/// The cameras of a dataset's photos, those that `every` holds out marked.
+pub fn cameras(dataset: &Dataset, every: usize) -> Vec<SceneCamera> {
+    let (_, held_out) = dataset.split(every);
+    trained::SceneInfo::of(dataset, &held_out, Path::new("")).cameras
+}
+
+/// A scene with all that is known of it, as it is looked at and worked on.
+#[derive(Clone, Debug, Default)]
+pub struct OpenedScene {
+    /// Where it was read from.
+    pub path: PathBuf,
+    /// Short name for titles.
+    pub name: String,
+    /// Posed photos, if it has any.
+    pub dataset: Option<Arc<Dataset>>,
+    /// What to draw: trained Gaussians, or the sparse points as small ones.
+    pub cloud: Option<Arc<GaussianCloud>>,
+    /// Whether `cloud` is a result, not just sparse points.
+    pub trained: bool,
+    /// Objects and parts, if they were found before.
+    pub semantics: Option<Arc<SemanticMap>>,
+    /// Where masks of its photos are, if they came with them.
+    pub masks: Option<PathBuf>,
+    /// Folder in which training keeps its results and checkpoints.
+    pub out: PathBuf,
+    /// Measurements of earlier training.
+    pub history: History,
+    /// Length of a scene unit in metres, if that is known.
+    pub metres_per_unit: Option<f64>,
+    /// How to look at it at first.
+    pub home: HomeView,
+    /// How to draw it: background and filter.
+    pub render: RenderSettings,
+    /// Degree of the harmonics in its file.
+    pub sh_stored: u8,
+    /// What its plan is computed from.
+    pub facts: Facts,
+    /// Id of the save that its files are of, if it has one.
+    pub state: Option<String>,
+    /// Reports that may be of it.
+    pub reports: Vec<PathBuf>,
+    /// Folder for a report of it.
+    pub report_out: PathBuf,
+}
+
+impl OpenedScene {
+    fn of(scene: Scene, dataset: Option<Arc<Dataset>>, observer: &mut dyn Observer) -> Self {
+        let home = match &dataset {
+            Some(dataset) if scene.cameras.is_empty() => HomeView::new(&dataset.cameras(), Some(&scene.cloud)),
+            _ => scene.home(),
+        };
+        let semantics = scene.folder.is_some().then(|| known_objects(&scene, observer)).flatten();
+        Self {
+            path: scene.path,
+            name: scene.name,
+            dataset,
+            cloud: Some(scene.cloud),
+            trained: true,
+            semantics,
+            out: scene.folder.unwrap_or_default(),
+            history: scene.history,
+            metres_per_unit: scene.metres_per_unit,
+            home,
+            render: scene.settings,
+            sh_stored: scene.sh_stored,
+            state: scene.state,
+            ..Self::default()
+        }
+    }
+}
+
+/// Opens a path with all that is known of it: photos with the Gaussians that were trained on them before, a
+/// trained scene with its photos. What is missing or broken beside the scene itself is told and left out.
+///
+/// # Errors
+/// If nothing that is known lies there, or it cannot be read.
+pub fn open(
+    path: &Path,
+    folders: &Folders,
+    machine: &Machine,
+    observer: &mut dyn Observer,
+) -> Result<OpenedScene, JobError> {
+    let path = &std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    let mut scene = match io::open(path)? {
+        Opened::Dataset(dataset) => photos(dataset, folders, observer),
+        Opened::Cloud(cloud) => OpenedScene::of(Scene::bare(path, cloud), None, observer),
+        Opened::Trained(trained) => {
+            let scene = tolerant(path, trained, observer);
+            let dataset = photos_of(&scene, observer);
+            OpenedScene::of(scene, dataset, observer)
+        }
+    };
+    scene.path.clone_from(path);
+    let root = scene.dataset.as_ref().map(|d| d.root.clone());
+    scene.masks = root.filter(|root| Labels::open(root).is_ok());
+    scene.report_out = match scene.out.as_os_str().is_empty() {
+        true => folders.report(path),
+        false => scene.out.join("report"),
+    };
+    let cloud = scene.cloud.as_deref().filter(|_| scene.trained).map(|c| (c, scene.sh_stored));
+    let facts = plan::facts(machine, scene.dataset.as_deref(), cloud, &TrainConfig::default());
+    scene.facts = facts.with_semantics(scene.semantics.as_deref());
+    Ok(scene)
+}
+
+/// Opens the demo scene, whose photos are made unless that was done before.
+///
+/// # Errors
+/// If they cannot be made or read, or the observer asks to stop.
+pub fn demo(folders: &Folders, machine: &Machine, observer: &mut dyn Observer) -> Result<OpenedScene, JobError> {
+    let out = folders.demo();
+    if !demo::demo_is_written(&out) {
+        demo::write_demo(&out, observer)?;
+    }
+    open(&out, folders, machine, observer)
+}
+
+/// The objects and parts stored with a trained scene; broken ones are told and left out.
+pub fn known_objects(scene: &Scene, observer: &mut dyn Observer) -> Option<Arc<SemanticMap>> {
+    match scene.semantics() {
+        Ok(map) => {
+            let what = format!("{} objects and parts", map.identities.len());
+            trace::record(Sort::Objects, what, "the scene was opened", map.bytes());
+            Some(Arc::new(map))
+        }
+        Err(JobError::NoObjects(_)) => None,
+        Err(e) => {
+            observer.note(Severity::Warning, format!("Its objects cannot be shown: {e}"));
+            None
+        }
+    }
+}
+
+/// Photos, with the Gaussians that were trained on them before, if there are any.
+fn photos(dataset: Dataset, folders: &Folders, observer: &mut dyn Observer) -> OpenedScene {
+    let out = folders.trained(&dataset.root);
+    let before = trained::is_scene(&out).then(|| trained::load(&out)).and_then(|loaded| match loaded {
+        Ok(scene) => Some(scene),
+        Err(e) => {
+            observer.note(Severity::Warning, format!("Earlier training of these photos cannot be shown: {e}"));
+            None
+        }
+    });
+    let (name, background) = (dataset.name.clone(), dataset.background);
+    let dataset = Arc::new(dataset);
+    if let Some(before) = before {
+        let scene = tolerant(&out, before, observer);
+        let opened = OpenedScene::of(scene, Some(dataset), observer);
+        return OpenedScene { name, ..opened };
+    }
+    let cloud = sparse_cloud(&dataset).map(Arc::new);
+    let render = TrainConfig::default().render_settings(background);
+    let home = HomeView::new(&dataset.cameras(), cloud.as_deref());
+    OpenedScene { name, dataset: Some(dataset), cloud, out, render, home, ..OpenedScene::default() }
+}
+
+/// A trained scene; where its settings cannot be read this is told, and it is drawn with the defaults.
+fn tolerant(path: &Path, scene: TrainedScene, observer: &mut dyn Observer) -> Scene {
+    let config = TrainConfig::stored(&scene.folder, scene.info.config.clone()).unwrap_or_else(|e| {
+        observer.note(Severity::Warning, format!("It may not look as it was trained: {e}"));
+        TrainConfig::default()
+    });
+    Scene::trained(path, scene, config)
+}
+
+/// The photos of a trained scene, if they are still where they were.
+fn photos_of(scene: &Scene, observer: &mut dyn Observer) -> Option<Arc<Dataset>> {
+    let why = match scene.dataset_path.as_deref().map(|p| (io::open(p), p)) {
+        Some((Ok(Opened::Dataset(dataset)), _)) => return Some(Arc::new(dataset)),
+        Some((Ok(_), p)) => format!("{} holds no photos any more; the scene opens without them", p.display()),
+        Some((Err(e), _)) => format!("The photos cannot be read, the scene opens without them: {e}"),
+        None => "The photos are not where they were; the scene opens without them".into(),
+    };
+    observer.note(Severity::Warning, why);
+    None
+}
+
+/// The Gaussians without bands of harmonics that are zero, and the degree that they came with.
+fn compact(cloud: GaussianCloud) -> (Arc<GaussianCloud>, u8) {
+    let stored = cloud.sh_degree;
+    let used = used_degree(&cloud);
+    let cloud = cloud.up_to_degree(used);
+    trace::record(Sort::Gaussians, format!("{} Gaussians", cloud.len()), "the scene was opened", cloud.bytes());
+    (Arc::new(cloud), stored)
+}
+
+/// The sparse points as opaque round Gaussians of one size, about half the spacing that as many
+/// points would have on a surface. `None` without points.
+pub fn sparse_cloud(dataset: &Dataset) -> Option<GaussianCloud> {
+    let bounds = Bounds::robust(dataset.points.iter().map(|p| p.position))?;
+    let origin = bounds.center();
+    let points: Vec<_> = dataset.points.iter().filter(|p| p.position.is_finite()).collect();
+    let spacing = bounds.radius() / (points.len() as f64).sqrt();
+    let sigma = (0.35 * spacing).max(1e-9).ln() as f32;
+    let n = points.len();
+    let sh = |rgb: [u8; 3]| rgb.map(|c| ((f64::from(c) / 255.0 - 0.5) / SH_C0) as f32);
+    Some(GaussianCloud {
+        origin,
+        positions: points.iter().map(|p| DVec3::to_array(&(p.position - origin)).map(|v| v as f32)).collect(),
+        log_scales: vec![[sigma; 3]; n],
+        quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
+        opacity_logits: vec![3.0; n],
+        sh_degree: 0,
+        sh: points.iter().map(|p| sh(p.rgb)).collect(),
+        extras: Vec::new(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::SparsePoint;
+
+    #[test]
+    fn points_become_a_valid_cloud_of_their_colours() {
+        let points = (0..100)
+            .map(|i| SparsePoint { position: DVec3::new(1e6 + f64::from(i), 2.0, -3.0), rgb: [255, 0, 128] })
+            .collect();
+        let cloud = sparse_cloud(&Dataset { points, ..Dataset::default() }).expect("points");
+        cloud.validate().expect("valid");
+        assert_eq!(cloud.len(), 100);
+        assert!((cloud.world_position(7).x - 1_000_007.0).abs() < 1e-3);
+        let red = 0.5 + SH_C0 * f64::from(cloud.sh[0][0]);
+        assert!((red - 1.0).abs() < 1e-6);
+        assert!(sparse_cloud(&Dataset::default()).is_none());
+    }
+}

@@ -1,0 +1,153 @@
+//! Asking a scene where something is: the answer, its pixels in a view, and the relevancy of all others.
+
+use std::path::Path;
+use std::time::Instant;
+
+use image::ColorType;
+
+use super::{JobError, Scene, export};
+use crate::math::colormap::Colormap;
+use crate::pipeline::semantics::answer::Answered;
+use crate::pipeline::semantics::code_map::CodeMap;
+use crate::pipeline::semantics::matching::{self, MatchMode};
+use crate::pipeline::semantics::query_engine::QueryEngine;
+use crate::pipeline::semantics::stages::ms_since;
+use crate::pipeline::semantics::view_map::ViewMap;
+use crate::render::{Features, RenderSettings, Renderer};
+use crate::scene::{Camera, GaussianCloud, IdentityId, LevelFilter, Mask, SemanticMap};
+
+/// What the pixels of a view belong to, drawn once for all questions.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ViewMaps {
+    /// By identity of largest weight.
+    pub identities: ViewMap,
+    /// Blended codes, if they were wanted.
+    pub codes: Option<CodeMap>,
+}
+
+impl ViewMaps {
+    /// Draws them; codes where they are `wanted`, those of parts too if `parts` are.
+    ///
+    /// # Errors
+    /// If the view cannot be drawn.
+    pub fn draw(
+        renderer: &mut Renderer,
+        (cloud, settings): (&GaussianCloud, &RenderSettings),
+        map: &SemanticMap,
+        camera: &Camera,
+        wanted: bool,
+        parts: bool,
+    ) -> Result<Self, crate::render::RenderError> {
+        let identities = ViewMap::render(renderer, cloud, &map.of, &map.identities, camera, settings)?;
+        let codes = match wanted {
+            true => Some(CodeMap::render(renderer, cloud, &map.codes, parts, camera, settings)?),
+            false => None,
+        };
+        Ok(Self { identities, codes })
+    }
+
+    /// The pixels of an identity; a match differs by at most `tolerance` per channel.
+    pub fn mask(&self, map: &SemanticMap, id: IdentityId, mode: MatchMode, tolerance: f32) -> Mask {
+        match (&self.codes, mode) {
+            (Some(codes), MatchMode::Blend) => matching::blend(codes, &map.identities, id, tolerance),
+            _ => matching::exact(&self.identities, &map.identities, id, tolerance),
+        }
+    }
+}
+
+/// A question about a scene in a view.
+#[derive(Clone, Debug)]
+pub struct Request<'a> {
+    /// As it was typed.
+    pub text: &'a str,
+    /// Which level is asked for.
+    pub level: LevelFilter,
+    /// The view.
+    pub camera: &'a Camera,
+    /// How pixels are matched.
+    pub mode: MatchMode,
+    /// Largest difference per channel of a match.
+    pub tolerance: f32,
+    /// Answers whose pixels go into the mask at most.
+    pub top: usize,
+}
+
+/// A question with its answer.
+#[derive(Clone, Debug)]
+pub struct QueryResult {
+    /// What is meant, and how long that took.
+    pub answered: Answered,
+    /// Its pixels.
+    pub mask: Mask,
+    /// Words that nothing here knows.
+    pub unknown_words: Vec<String>,
+    /// Milliseconds from the text to the mask, the view there.
+    pub query_ms: f64,
+    /// What the view's pixels belong to.
+    pub maps: ViewMaps,
+}
+
+/// Answers a question.
+///
+/// # Errors
+/// If there is nothing in it, the encoder fails, or the view cannot be drawn.
+pub fn run(scene: &Scene, map: &SemanticMap, request: &Request<'_>) -> Result<QueryResult, JobError> {
+    let drawn = (&*scene.cloud, &scene.settings);
+    let blend = request.mode == MatchMode::Blend;
+    let maps = ViewMaps::draw(&mut Renderer::new(), drawn, map, request.camera, blend, map.has_parts())?;
+    let mut engine = QueryEngine::new(map.language.as_ref())?;
+    let start = Instant::now();
+    let mut answered = engine.ask(map, request.text, request.level)?.ok_or(JobError::EmptyQuery)?;
+    let matching_since = Instant::now();
+    let mut mask = Mask::empty(maps.identities.width_px, maps.identities.height_px);
+    for id in answered.chosen(request.top) {
+        mask.add(&maps.mask(map, id, request.mode, request.tolerance));
+    }
+    answered.stages.mask = ms_since(matching_since);
+    let query_ms = ms_since(start);
+    let unknown_words = engine.unknown_words(&map.identities, request.text);
+    Ok(QueryResult { answered, mask, unknown_words, query_ms, maps })
+}
+
+/// The identities that are meant, at most `top` of them.
+///
+/// # Errors
+/// If none is, or the encoder fails.
+pub fn identities(map: &SemanticMap, text: &str, level: LevelFilter, top: usize) -> Result<Vec<IdentityId>, JobError> {
+    let answered = QueryEngine::new(map.language.as_ref())?.ask(map, text, level)?;
+    let found = answered.map(|a| a.chosen(top)).unwrap_or_default();
+    if found.is_empty() { Err(JobError::NoMatch(text.to_owned())) } else { Ok(found) }
+}
+
+/// Writes the mask, white on black.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn write_mask(path: &Path, mask: &Mask) -> Result<(), JobError> {
+    let (width, height) = (mask.width_px(), mask.height_px());
+    let pixels: Vec<u8> = (0..width * height).map(|i| if mask.contains(i) { 255 } else { 0 }).collect();
+    export::make_parent(path)?;
+    Ok(export::png(path, &pixels, [width as u32, height as u32], ColorType::L8)?)
+}
+
+/// Writes the relevancy of every pixel over the picture in gray.
+///
+/// # Errors
+/// If the picture cannot be drawn or the file not be written.
+pub fn write_heat(
+    path: &Path,
+    (cloud, settings): (&GaussianCloud, &RenderSettings),
+    camera: &Camera,
+    relevancy: &[f32],
+) -> Result<(), JobError> {
+    let frame = Renderer::new().render(cloud, Features::NONE, camera, settings)?;
+    let mixed = frame.to_rgb8().into_iter().zip(relevancy).map(|(rgb, &relevancy)| {
+        let heat = Colormap::Turbo.color(relevancy);
+        let gray = (u32::from(rgb[0]) + u32::from(rgb[1]) + u32::from(rgb[2])) / 3;
+        std::array::from_fn::<u8, 3, _>(|c| ((u32::from(heat[c]) * 6 + gray * 4) / 10) as u8)
+    });
+    let pixels: Vec<[u8; 3]> = mixed.collect();
+    export::make_parent(path)?;
+    let size = [camera.width_px, camera.height_px];
+    Ok(export::png(path, pixels.as_flattened(), size, ColorType::Rgb8)?)
+}

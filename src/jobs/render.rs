@@ -1,0 +1,111 @@
+//! Drawing a scene from a camera, and writing what was drawn.
+
+use std::path::Path;
+use std::time::Instant;
+
+use image::ColorType;
+
+use super::{JobError, Scene, export, plan, video};
+use crate::io::IoError;
+use crate::pipeline::observer::{Observer, Severity};
+use crate::render::{BackendChoice, Frame, RenderSettings, Renderer, normals};
+use crate::scene::{Camera, Overrides};
+
+/// What of a scene is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Quantity {
+    /// Colors
+    Picture,
+    /// Distance along the camera's axis at which half of the light is spent
+    Depth,
+    /// The mean of that distance over the light
+    ExpectedDepth,
+    /// Normals of the surface that median depth describes, world axes, -1 to 1 as 0 to 255
+    Normals,
+    /// Accumulated opacity
+    Alpha,
+}
+
+impl Quantity {
+    /// How a file name for it may end.
+    pub fn endings(self) -> &'static [&'static str] {
+        match self {
+            Self::Picture | Self::Normals => &[".png"],
+            Self::Depth | Self::ExpectedDepth | Self::Alpha => &[".png", ".npy"],
+        }
+    }
+}
+
+/// A drawn view.
+pub struct Rendered {
+    /// It.
+    pub frame: Frame<f32>,
+    /// What drew it: "CPU", or the name of the GPU.
+    pub backend: String,
+    /// Milliseconds that drawing took.
+    pub millis: f64,
+    /// Degree of the spherical harmonics that were drawn.
+    pub sh_degree: u8,
+    /// Whether surfels were drawn as flat Gaussians: only the CPU draws them as such.
+    pub flat: bool,
+}
+
+/// Draws `what` of a scene.
+///
+/// # Errors
+/// If the renderer that is demanded is not there, or fails.
+pub fn run(
+    scene: &Scene,
+    camera: &Camera,
+    what: Quantity,
+    wanted: BackendChoice,
+    overrides: &Overrides,
+    observer: &mut dyn Observer,
+) -> Result<Rendered, JobError> {
+    let plan = plan::of_scene(scene, overrides);
+    let depth = matches!(what, Quantity::Depth | Quantity::ExpectedDepth | Quantity::Normals);
+    let settings = RenderSettings { depth, sh_degree: plan.sh_degree, ..scene.settings.clone() };
+    let choice = video::backend(wanted, &settings, plan.on_cpu);
+    let mut renderer = Renderer::choose(choice, |why| observer.note(Severity::Warning, why))?;
+    let flat = settings.surfels && renderer.is_gpu();
+    let start = Instant::now();
+    let frame = renderer.draw(&scene.cloud, camera, &settings)?;
+    let millis = start.elapsed().as_secs_f64() * 1e3;
+    Ok(Rendered { frame, backend: renderer.name().to_owned(), millis, sh_degree: settings.sh_degree, flat })
+}
+
+/// Writes a frame as a `.png`, or as an array where the name ends in `.npy`. Returns the depth that 65535 stands
+/// for, where that is how it is stored.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn write(path: &Path, frame: &Frame<f32>, camera: &Camera, what: Quantity) -> Result<Option<f32>, IoError> {
+    export::make_parent(path)?;
+    let size = [frame.width_px as u32, frame.height_px as u32];
+    let array = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy"));
+    let depth = match what {
+        Quantity::Picture => {
+            return export::png(path, frame.to_rgb8().as_flattened(), size, ColorType::Rgb8).map(|()| None);
+        }
+        Quantity::Normals => {
+            // Where there is none it is 0, which is the gray in the middle.
+            let code = |n: [f32; 3]| n.map(|c| (c * 127.5 + 128.0) as u8);
+            let rgb: Vec<[u8; 3]> = normals::of_depth(&frame.median_depth, camera).into_iter().map(code).collect();
+            return export::png(path, rgb.as_flattened(), size, ColorType::Rgb8).map(|()| None);
+        }
+        Quantity::Alpha if array => return export::npy(path, &frame.alpha, size).map(|()| None),
+        Quantity::Alpha => {
+            let bytes: Vec<u8> = frame.alpha.iter().map(|a| (a.clamp(0.0, 1.0) * 255.0 + 0.5) as u8).collect();
+            return export::png(path, &bytes, size, ColorType::L8).map(|()| None);
+        }
+        Quantity::Depth => frame.median_depth.clone(),
+        Quantity::ExpectedDepth => frame.expected_depth(),
+    };
+    if array {
+        return export::npy(path, &depth, size).map(|()| None);
+    }
+    let far = depth.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+    let code = |d: &f32| ((d / far * 65535.0 + 0.5) as u16).to_ne_bytes();
+    let bytes: Vec<u8> = depth.iter().flat_map(code).collect();
+    export::png(path, &bytes, size, ColorType::L16).map(|()| Some(far))
+}

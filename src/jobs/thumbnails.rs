@@ -1,0 +1,22 @@
+//! Small pictures of a scene's objects and parts, as its first view sees them.
+
+use super::JobError;
+use crate::pipeline::semantics::portraits::{Gallery, portraits};
+use crate::render::RenderSettings;
+use crate::scene::trace::{self, Sort};
+use crate::scene::{GaussianCloud, HomeView, SemanticMap};
+
+/// Draws every object and part alone, by number less one.
+///
+/// # Errors
+/// If one cannot be drawn.
+pub fn draw(
+    cloud: &GaussianCloud,
+    map: &SemanticMap,
+    settings: &RenderSettings,
+    home: &HomeView,
+) -> Result<Gallery, JobError> {
+    let from = home.camera.as_ref().map_or(home.bounds.center() + home.up, |c| c.center);
+    trace::record(Sort::Portraits, "portraits of objects and parts", "a list of them is shown", 0);
+    Ok(portraits(cloud, map, settings, from, home.up)?)
+}

@@ -1,0 +1,83 @@
+//! Training Gaussians on posed photos.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::{JobError, Scene, open};
+use crate::io::{splat_ply, trained};
+use crate::pipeline::observer::{Observer, Severity};
+use crate::pipeline::train::checkpoint::CheckpointError;
+use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainError, TrainOutcome};
+use crate::scene::{Dataset, SemanticMap};
+
+/// A training that has ended.
+#[derive(Clone, Debug)]
+pub struct Trained {
+    /// What came of it.
+    pub outcome: TrainOutcome,
+    /// Folder of the trained scene.
+    pub out: PathBuf,
+    /// Id of its save.
+    pub state: Option<String>,
+    /// Objects and parts that were carried over from the scene before.
+    pub semantics: Option<Arc<SemanticMap>>,
+}
+
+impl Trained {
+    /// Whether all steps are done; else the observer has stopped it.
+    pub fn is_finished(&self) -> bool {
+        self.outcome.end == TrainEnd::Finished
+    }
+}
+
+/// Trains into the first of these `folders` that holds no training with other settings: that is another training,
+/// and the earlier one stays. A training that was stopped there goes on.
+///
+/// # Errors
+/// If the photos cannot be read, training fails, or all folders hold something else.
+pub fn run(
+    dataset: &Dataset,
+    config: &TrainConfig,
+    folders: impl IntoIterator<Item = PathBuf>,
+    observer: &mut dyn Observer,
+) -> Result<Trained, JobError> {
+    let mut folders = folders.into_iter().peekable();
+    let mut earlier: Option<PathBuf> = None;
+    while let Some(out) = folders.next() {
+        if let Some(earlier) = earlier.take() {
+            let kept = earlier.display();
+            let text = format!("The settings changed, so this is a new training; the earlier one stays in {kept}");
+            observer.note(Severity::Info, text);
+        }
+        match train::run(dataset, config, Some(&out), observer) {
+            Err(TrainError::Checkpoint(CheckpointError::OtherRun { .. } | CheckpointError::Missing { .. }))
+                if folders.peek().is_some() =>
+            {
+                earlier = Some(out);
+            }
+            result => return finished(result?, out, observer),
+        }
+    }
+    Err(TrainError::Config("there is no folder to train into".into()).into())
+}
+
+/// Objects are carried over to Gaussians that went on, and have to be read with their state.
+fn finished(outcome: TrainOutcome, out: PathBuf, observer: &mut dyn Observer) -> Result<Trained, JobError> {
+    let mut done = Trained { outcome, out, state: None, semantics: None };
+    if trained::is_scene(&done.out) {
+        done.state = splat_ply::state(&done.out.join(trained::CLOUD_FILE))?;
+        let scene = Scene {
+            path: done.out.clone(),
+            folder: Some(done.out.clone()),
+            cloud: Arc::clone(&done.outcome.cloud),
+            state: done.state.clone(),
+            ..Scene::default()
+        };
+        done.semantics = open::known_objects(&scene, observer);
+    }
+    if !done.is_finished() && done.semantics.is_some() {
+        let text = "Its objects are stored with the Gaussians as they are now; open the scene again to see them";
+        observer.note(Severity::Info, text.into());
+    }
+    Ok(done)
+}

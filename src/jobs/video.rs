@@ -1,0 +1,68 @@
+//! Drawing a video of a scene along a path.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::{JobError, export};
+use crate::io::animation::{Settings, Summary};
+use crate::pipeline::film::{self, Marked};
+use crate::pipeline::observer::{Observer, Severity};
+use crate::render::{BackendChoice, RenderSettings, Renderer};
+use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
+
+/// The color of what is marked.
+const MARK: [u8; 3] = [255, 64, 160];
+
+/// A video to be made.
+#[derive(Clone, Debug)]
+pub struct VideoRequest {
+    /// The Gaussians.
+    pub cloud: Arc<GaussianCloud>,
+    /// How they are drawn.
+    pub draw: RenderSettings,
+    /// One per frame.
+    pub cameras: Vec<Camera>,
+    /// What is marked in every frame.
+    pub marked: Option<(Arc<SemanticMap>, Vec<IdentityId>)>,
+    /// Where it goes.
+    pub out: PathBuf,
+    /// How it is written.
+    pub settings: Settings,
+    /// Which renderer draws.
+    pub backend: BackendChoice,
+}
+
+/// A video that was made.
+#[derive(Clone, Debug)]
+pub struct Video {
+    /// The file or folder.
+    pub summary: Summary,
+    /// What drew it: "CPU", or the name of the GPU.
+    pub backend: String,
+    /// Seconds that it took.
+    pub secs: f64,
+}
+
+/// Which renderer draws with these settings: only the CPU draws surfels as such, so it is chosen for them, as it
+/// is where a plan wants it, unless somebody demands another.
+pub fn backend(wanted: BackendChoice, settings: &RenderSettings, on_cpu: bool) -> BackendChoice {
+    let cpu = (settings.surfels || on_cpu) && wanted == BackendChoice::Auto;
+    if cpu { BackendChoice::Cpu } else { wanted }
+}
+
+/// Draws a video.
+///
+/// # Errors
+/// If the renderer that is demanded is not there, a frame cannot be drawn or written, or the observer asks to
+/// stop; nothing is left of the video then.
+pub fn run(request: VideoRequest, observer: &mut dyn Observer) -> Result<Video, JobError> {
+    let VideoRequest { cloud, draw, cameras, marked, out, settings, backend } = request;
+    let marked = marked.as_ref().map(|(map, ids)| Marked { map, ids, color: MARK });
+    let choice = self::backend(backend, &draw, false);
+    let mut renderer = Renderer::choose(choice, |why| observer.note(Severity::Warning, why))?;
+    let start = Instant::now();
+    export::make_parent(&out)?;
+    let summary = film::write(&cloud, &draw, &cameras, marked, &mut renderer, (&out, &settings), observer)?;
+    Ok(Video { summary, backend: renderer.name().to_owned(), secs: start.elapsed().as_secs_f64() })
+}

@@ -1,0 +1,161 @@
+//! Asking a scene: from a typed text to an answer, with the encoder that looked at the scene's identities,
+//! if one has, and the phrases that it has read so far.
+
+use std::time::Instant;
+
+use super::answer::{Answered, Language, answer, by_meaning, phrases_of};
+use super::grammar::Phrase;
+use super::meaning::{MeaningOptions, Phrasebook};
+use super::names;
+use super::stages::{StagesMs, ms_since};
+use crate::models::{self, Encoder, ModelError};
+use crate::scene::{Identities, LanguageFeatures, LevelFilter, SemanticMap};
+
+/// What answers questions about a scene; without an encoder, by names alone.
+#[derive(Default)]
+pub struct QueryEngine {
+    encoder: Option<Box<dyn Encoder>>,
+    phrases: Phrasebook,
+}
+
+impl QueryEngine {
+    /// With this encoder.
+    pub fn with(encoder: Box<dyn Encoder>) -> Self {
+        Self { encoder: Some(encoder), ..Self::default() }
+    }
+
+    /// With the encoder that looked at the scene's identities, if one has.
+    ///
+    /// # Errors
+    /// If it cannot be loaded.
+    pub fn new(language: Option<&LanguageFeatures>) -> Result<Self, ModelError> {
+        let encoder = language.map(|language| models::encoder(&language.encoder)).transpose()?;
+        Ok(Self { encoder, ..Self::default() })
+    }
+
+    /// Answers a question; `None` if there is nothing in it.
+    ///
+    /// # Errors
+    /// If the encoder fails.
+    pub fn ask(&mut self, map: &SemanticMap, text: &str, level: LevelFilter) -> Result<Option<Answered>, ModelError> {
+        let start = Instant::now();
+        let Some(phrase) = Phrase::parse(text) else { return Ok(None) };
+        let known = match &mut self.encoder {
+            Some(encoder) => match self.phrases.learn(&phrases_of(&phrase), |p| encoder.text(p)) {
+                Ok(()) => true,
+                // Words that nobody knows are no failure: names may know them.
+                Err(ModelError::NoKnownWord { .. }) => false,
+                Err(other) => return Err(other),
+            },
+            None => false,
+        };
+        let encode = ms_since(start);
+        let answered = answer_encoded(map, text, level, known.then_some(&self.phrases));
+        Ok(answered.map(|a| Answered { stages: StagesMs { encode, ..a.stages }, ..a }))
+    }
+
+    /// The words of a question that nothing here knows.
+    pub fn unknown_words(&self, identities: &Identities, text: &str) -> Vec<String> {
+        let to_encoder = self.encoder.as_ref().map(|e| e.unknown_words(text));
+        names::unknown_to_all(identities, text, to_encoder.as_deref())
+    }
+}
+
+/// Answers a question whose phrases are among those that were encoded, or by names alone without them; `None` if
+/// there is nothing in it.
+pub fn answer_encoded(
+    map: &SemanticMap,
+    text: &str,
+    level: LevelFilter,
+    phrases: Option<&Phrasebook>,
+) -> Option<Answered> {
+    let phrase = Phrase::parse(text)?;
+    let language = map.language.as_ref().zip(phrases);
+    let language =
+        language.map(|(features, phrases)| Language { features, phrases, options: MeaningOptions::default() });
+    Some(answer(&map.identities, &phrase, level, language))
+}
+
+/// Answers a question by these `features` alone, whatever identities are called; `None` if there is nothing in
+/// it. `encode` gives the embedding of a phrase, and `phrases` keeps it.
+///
+/// # Errors
+/// What `encode` fails with.
+pub fn ask_by_embedding<E>(
+    identities: &Identities,
+    (features, options): (&LanguageFeatures, MeaningOptions),
+    text: &str,
+    phrases: &mut Phrasebook,
+    encode: impl FnMut(&str) -> Result<Vec<f32>, E>,
+) -> Result<Option<Answered>, E> {
+    let start = Instant::now();
+    let Some(phrase) = Phrase::parse(text) else { return Ok(None) };
+    phrases.learn(&phrases_of(&phrase), encode)?;
+    let encode = ms_since(start);
+    let language = Language { features, phrases, options };
+    let mut answered = by_meaning(identities, &phrase, LevelFilter::Auto, language);
+    answered.stages.encode = encode;
+    Ok(Some(answered))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::models::Tile;
+    use crate::pipeline::semantics::answer::Basis;
+    use crate::scene::{Level, NOBODY, ViewFeatures};
+
+    /// Knows "red" and the canonical phrases; fails as a damaged network does on "broken".
+    struct Small;
+
+    impl Encoder for Small {
+        fn name(&self) -> &str {
+            "small"
+        }
+
+        fn dimension(&self) -> usize {
+            2
+        }
+
+        fn tile_side_px(&self) -> Option<usize> {
+            None
+        }
+
+        fn images(&mut self, _: &[Tile]) -> Result<Vec<Vec<f32>>, ModelError> {
+            Ok(Vec::new())
+        }
+
+        fn text(&mut self, phrase: &str) -> Result<Vec<f32>, ModelError> {
+            match phrase {
+                "red" => Ok(vec![1.0, 0.0]),
+                "giraffe" => Err(ModelError::NoKnownWord { unknown: vec!["giraffe".into()] }),
+                "broken" => Err(ModelError::Run { model: "text.onnx".into(), problem: "out of memory".into() }),
+                _ => Ok(vec![0.0, 1.0]),
+            }
+        }
+
+        fn unknown_words(&self, phrase: &str) -> Vec<String> {
+            phrase.split(' ').filter(|w| *w == "giraffe").map(str::to_owned).collect()
+        }
+    }
+
+    #[test]
+    fn words_that_nobody_knows_are_no_failure_and_a_broken_encoder_is() {
+        let mut map = SemanticMap::default();
+        map.identities.add(Level::Object, NOBODY, vec!["lamp".into()]);
+        let red = ViewFeatures { raw: vec![vec![1.0, 0.0]], deviated: vec![vec![1.0, 0.0]] };
+        map.language = Some(LanguageFeatures { encoder: "small".into(), dimension: 2, of: vec![red] });
+        let mut engine = QueryEngine::with(Box::new(Small));
+        let mut ask = |text: &str| engine.ask(&map, text, LevelFilter::Auto);
+        let answered = ask("red").expect("encodes").expect("words");
+        assert_eq!((answered.basis, answered.chosen(1)), (Basis::Meaning, vec![1]));
+        assert!(ask("giraffe").expect("no failure").expect("words").chosen(1).is_empty());
+        assert!(matches!(ask("broken"), Err(ModelError::Run { .. })));
+        assert!(ask("  ").expect("no failure").is_none());
+        assert_eq!(engine.unknown_words(&map.identities, "lamp giraffe"), ["giraffe"]);
+        // Without an encoder, by names alone.
+        let mut names = QueryEngine::default();
+        assert!(names.ask(&map, "red", LevelFilter::Auto).expect("no encoder").expect("words").chosen(1).is_empty());
+        assert_eq!(names.ask(&map, "lamp", LevelFilter::Auto).expect("names").expect("words").chosen(1), [1]);
+    }
+}
