@@ -162,7 +162,7 @@ fn as_call(line: &str) -> Option<(String, String)> {
     Some((name.into(), arguments.to_string()))
 }
 
-/// What a model would say in a dialogue of the table to do what is wanted; `None` where the table leaves
+/// What a model would say in a dialog of the table to do what is wanted; `None` where the table leaves
 /// that open, or the words of the built-in planner are what counts.
 fn script(turns: &[Turn]) -> Option<Vec<Say>> {
     let model_call = |line: &String| as_call(line).filter(|_| !line.contains(['*', '|'])).map(|c| Say::Calls(vec![c]));
@@ -194,11 +194,11 @@ fn the_tables_go_through_the_same_checks() {
         Table::of_commands(include_str!("data/agent_commands.toml")),
     ];
     let mut asked = 0;
-    for dialogue in tables.iter().flat_map(|t| &t.dialogue) {
-        let Some(says) = script(&dialogue.turns) else { continue };
+    for dialog in tables.iter().flat_map(|t| &t.dialog) {
+        let Some(says) = script(&dialog.turns) else { continue };
         let server = Server::new(says);
         let (mut session, mut room) = (session(&server), Room::new());
-        for turn in &dialogue.turns {
+        for turn in &dialog.turns {
             let (say, calls, outcome) = (turn.say.clone(), turn.calls.clone(), turn.outcome.clone());
             // A model answers in its own words.
             let turn = Turn { say, calls, outcome, reply: Vec::new() };

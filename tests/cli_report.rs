@@ -1,4 +1,4 @@
-//! The real binary measures error against run time: every stage, stopped and gone on with, refused
+//! The real binary measures error against run time: every stage, stopped and resumed, refused
 //! where it must be.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 

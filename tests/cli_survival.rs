@@ -294,7 +294,7 @@ fn a_finished_training_is_left_alone_and_objects_survive_one_that_goes_on() {
     let find = || fmlgs(&["preprocess", scene, "--masks", photos, "--encoder", "none", "--max-seeds", "1"]);
     let names = || fmlgs(&["info", scene, "--json"]).ok().json()["identities"].clone();
 
-    // Stopped, labelled, gone on with: the objects are carried over, and kept as they were.
+    // Stopped, labeled, resumed: the objects are carried over, and kept as they were.
     let mut child = start(&train_arguments(photos, scene, "600"));
     wait_for_checkpoints(&mut child, &out.join("checkpoint.bin"), 2);
     send(&child, "-INT");

@@ -7,7 +7,7 @@ const GEOMETRY_STRIDE: u32 = 12u;
 
 struct Projection {
     ok: bool,
-    // Centre relative to the camera's, along the world's axes and along the camera's.
+    // Center relative to the camera's, along the world's axes and along the camera's.
     world: vec3<f32>,
     camera: vec3<f32>,
     // Viewing tangents, clamped.
@@ -54,7 +54,7 @@ fn rotation_columns(q: vec4<f32>) -> mat3x3<f32> {
 
 // Fills everything from the raw parameters of Gaussian `i`. `ok` is false behind the near plane;
 // degenerate numbers are left for the caller to find in `determinant`.
-fn linearise(i: u32) -> Projection {
+fn linearize(i: u32) -> Projection {
     var p: Projection;
     let at = i * GEOMETRY_STRIDE;
     let position = vec3<f32>(geometry[at], geometry[at + 1u], geometry[at + 2u]);

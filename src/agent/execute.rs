@@ -278,7 +278,7 @@ fn act(
         }
         ToolCall::Move { direction, distance } => {
             let (distance, note) = match distance {
-                Distance::Metres(m) if world.metres_per_unit().is_none() => {
+                Distance::Meters(m) if world.metres_per_unit().is_none() => {
                     let note = " This scene's scale in metres is not known, so I took a step for a metre.";
                     (Distance::Relative(*m), note)
                 }
@@ -286,7 +286,7 @@ fn act(
             };
             let moved = world.move_eye(*direction, distance).map_err(|e| unreachable(world, "there", &e))?;
             let far = length(world, moved.distance_done);
-            if moved.stopped_by_matter {
+            if moved.stopped_by_obstacle {
                 format!(
                     "Moved {} {far}, and stopped there: something is in the way, or nothing is known beyond.{note}",
                     direction.text()

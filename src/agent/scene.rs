@@ -12,18 +12,18 @@ use super::view_shares::{ViewShares, is_drawn};
 use super::world::{Arrival, Facts, Moved, Unreachable, World, WorldError};
 use crate::io;
 use crate::navigate::target::{self, Wish};
-use crate::navigate::visit::{NoVisit, Place, Visit};
+use crate::navigate::approach::{ApproachError, Place, Approach};
 use crate::navigate::{FRAMES, Flight, Pose, Speed};
-use crate::pipeline::semantics::answer::Answered;
+use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::asker::Asker;
-use crate::pipeline::semantics::grammar::Kind;
+use crate::pipeline::semantics::parse::Kind;
 use crate::scene::undo::UndoHistory;
 use crate::scene::{Bounds, Identities, IdentityId, SemanticMap, text};
 use crate::worker::Explored;
 
 /// Points of a thing that its size is measured by, at most.
 const MEASURED_POINTS: usize = 2048;
-/// A step, as a multiple of the distance that flights keep to matter.
+/// A step, as a multiple of the distance that flights keep to occupied space.
 const STEP: f64 = 6.0;
 
 /// A change of what is shown, for whoever shows the scene.
@@ -38,7 +38,7 @@ pub enum Effect {
     Renamed(IdentityId, String),
     /// The last change of a name was undone: it is called this again.
     RenameUndone(IdentityId, String),
-    /// The scene was looked at: where matter is is known.
+    /// The scene was looked at: where occupied space is is known.
     Explored(Arc<Explored>),
 }
 
@@ -87,7 +87,7 @@ impl SceneWorld {
         })
     }
 
-    /// Takes over what a person has done since: where the eye is, what is hidden, and what things are
+    /// Takes over what the user has done since: where the eye is, what is hidden, and what things are
     /// called.
     pub fn keep_up(&mut self, eye: Pose, aspect: f64, hidden: &[IdentityId], map: &Arc<SemanticMap>) {
         (self.eye, self.aspect) = (eye, aspect);
@@ -117,7 +117,7 @@ impl SceneWorld {
         new
     }
 
-    /// Whether a person sees an identity's Gaussians.
+    /// Whether the user sees an identity's Gaussians.
     fn drawn(&self, id: IdentityId) -> bool {
         is_drawn(&self.parts.map.identities, &self.hidden, id)
     }
@@ -199,7 +199,7 @@ impl World for SceneWorld {
         &self.parts.map.identities
     }
 
-    fn locate(&mut self, query: &str, kind: Kind) -> Result<Answered, WorldError> {
+    fn locate(&mut self, query: &str, kind: Kind) -> Result<QueryAnswer, WorldError> {
         let answered = self.asker.ask(&self.parts.map, query, kind).map_err(|e| WorldError(e.to_string()))?;
         Ok(answered.unwrap_or_else(|| super::world::locate_by_names(&self.parts.map.identities, query, kind)))
     }
@@ -230,7 +230,7 @@ impl World for SceneWorld {
     }
 
     fn metres_per_unit(&self) -> Option<f64> {
-        self.parts.metres
+        self.parts.meters
     }
 
     fn go_to(&mut self, id: IdentityId, from: Side, closeness: f64) -> Result<Arrival, Unreachable> {
@@ -248,14 +248,14 @@ impl World for SceneWorld {
             visit = go(target::Side::Best);
         }
         match visit {
-            Ok(Visit { view, target, flight }) => {
+            Ok(Approach { view, target, flight }) => {
                 let arrival = Arrival { distance: flight.length, in_view: view.covers };
                 let what = format!("going to {}", self.name(id));
                 (self.emit)(Effect::Mark(vec![id]));
                 self.fly(flight, Some(target), what);
                 Ok(arrival)
             }
-            Err(NoVisit::NoWay { why, nearest }) => {
+            Err(ApproachError::NoRoute { why, nearest }) => {
                 let center = self.bounds.get(id as usize).copied().flatten().map(|b| b.center());
                 let nearest = nearest.and_then(|n| Some(n.view.pose.center.distance(center?)));
                 Err(Unreachable { reason: why.to_string(), nearest })
@@ -278,10 +278,10 @@ impl World for SceneWorld {
     fn move_eye(&mut self, direction: Direction, distance: Distance) -> Result<Moved, Unreachable> {
         let explored = self.explored();
         let step = STEP * explored.navigator.clearance;
-        let wanted = match (distance, self.parts.metres) {
-            (Distance::Metres(m), Some(metres)) => m / metres.max(1e-9),
-            // Nobody knows what a metre is here: the agent asks for steps then.
-            (Distance::Metres(n), None) | (Distance::Relative(n), _) => n * step,
+        let wanted = match (distance, self.parts.meters) {
+            (Distance::Meters(m), Some(meters)) => m / meters.max(1e-9),
+            // Nobody knows what a meter is here: the agent asks for steps then.
+            (Distance::Meters(n), None) | (Distance::Relative(n), _) => n * step,
             (Distance::Default, _) => step,
         };
         let axis = match direction {
@@ -292,10 +292,10 @@ impl World for SceneWorld {
             Direction::Up => DVec3::NEG_Y,
             Direction::Down => DVec3::Y,
         };
-        let (center, stopped_by_matter) = explored.navigator.step(&self.eye, axis, wanted);
+        let (center, stopped_by_obstacle) = explored.navigator.step(&self.eye, axis, wanted);
         let to = Pose { center, ..self.eye };
         let distance_done = self.straight(to, format!("moving {}", direction.text()))?;
-        Ok(Moved { distance_done, stopped_by_matter })
+        Ok(Moved { distance_done, stopped_by_obstacle })
     }
 
     fn turn(&mut self, direction: Direction, degrees: f64) -> Result<(), Unreachable> {

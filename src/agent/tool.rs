@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::camera_args::{self, Direction, Distance, Side};
 use super::relation::Relation;
-use crate::pipeline::semantics::grammar::Kind;
+use crate::pipeline::semantics::parse::Kind;
 use crate::scene::{IdentityId, Level};
 
 /// Longest text in a call, in characters.
@@ -317,7 +317,7 @@ mod tests {
         assert_eq!(ToolCall::parse("undo", ""), Ok(ToolCall::Undo {}));
         assert_eq!(
             ToolCall::parse("move", r#"{"direction": "back", "distance": {"metres": 0.5}}"#),
-            Ok(ToolCall::Move { direction: Direction::Back, distance: Distance::Metres(0.5) })
+            Ok(ToolCall::Move { direction: Direction::Back, distance: Distance::Meters(0.5) })
         );
     }
 

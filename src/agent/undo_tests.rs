@@ -30,7 +30,7 @@ fn renamed() -> (SceneWorld, Arc<Mutex<Vec<Effect>>>) {
         map: map(None),
         cameras: Vec::new(),
         up: DVec3::Z,
-        metres: None,
+        meters: None,
         exports: PathBuf::new(),
         explored: None,
     };

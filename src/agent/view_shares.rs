@@ -19,8 +19,8 @@ pub struct Parts {
     pub map: Arc<SemanticMap>,
     pub cameras: Vec<Camera>,
     pub up: DVec3,
-    /// Length of a unit in metres, if that is known.
-    pub metres: Option<f64>,
+    /// Length of a unit in meters, if that is known.
+    pub meters: Option<f64>,
     pub exports: PathBuf,
     /// What is known of moving about, if the scene was looked at before.
     pub explored: Option<Arc<Explored>>,

@@ -1,10 +1,10 @@
 //! Files: one per format, and one [`open()`] that sniffs.
 //!
-//! Readers never trust a length field: what a file claims is held against the file's real size
+//! Readers never trust a length field: what a file claims is compared with the file's real size
 //! before memory is set aside for it, and paths inside a dataset may not leave its folder. Every
 //! error names the file and the place in it.
 
-pub mod animation;
+pub mod video;
 pub mod atomic;
 pub mod camera_file;
 pub mod camera_path;
@@ -19,7 +19,7 @@ pub mod gltf_mesh;
 pub mod http;
 pub mod khr_gltf;
 pub mod labels;
-mod listing;
+mod photo_list;
 pub mod llff;
 pub mod memory;
 pub mod npy;
@@ -27,7 +27,7 @@ mod open;
 pub mod photo;
 mod ply;
 pub mod points_ply;
-mod quantised;
+mod quantized;
 mod reader;
 mod resample;
 pub mod scene_files;

@@ -1,4 +1,4 @@
-//! Numbers as a person reads them: one form per quantity, in the window, on the command line and in reports.
+//! Numbers as the user reads them: one form per quantity, in the window, on the command line and in reports.
 
 /// What stands where there is no number.
 pub const NONE: &str = "–";

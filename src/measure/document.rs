@@ -24,7 +24,7 @@ pub enum StageName {
     Features,
     /// Answers to typed queries against labels.
     Query,
-    /// Flights against matter and their own length.
+    /// Flights against occupied space and their own length.
     Path,
     /// Drawn depth against true depth.
     Depth,
@@ -199,7 +199,7 @@ pub struct Rule {
     pub times: f64,
     /// So is any error below this.
     pub floor: f64,
-    /// Times that are no further apart than this, in seconds, are the same time to a person.
+    /// Times that are no further apart than this, in seconds, are the same time to the user.
     #[serde(default)]
     pub spare_secs: f64,
 }

@@ -3,7 +3,7 @@
 
 pub mod depth;
 pub mod evaluate;
-pub mod film;
+pub mod video;
 pub mod metrics;
 pub mod observer;
 pub mod semantics;

@@ -14,7 +14,7 @@ pub mod photo;
 pub mod plan;
 pub mod semantic_map;
 pub mod text;
-pub mod trace;
+pub mod resource_log;
 pub mod undo;
 
 pub use bounds::Bounds;

@@ -28,7 +28,7 @@ enum Asked<T> {
     #[default]
     Not,
     Waiting(Receiver<T>),
-    Answered(T),
+    QueryAnswer(T),
 }
 
 impl<T: Send + 'static> Asked<T> {
@@ -48,9 +48,9 @@ impl<T: Send + 'static> Asked<T> {
         if let Self::Waiting(receive) = self
             && let Ok(answer) = receive.try_recv()
         {
-            *self = Self::Answered(answer);
+            *self = Self::QueryAnswer(answer);
         }
-        if let Self::Answered(answer) = self { Some(answer) } else { None }
+        if let Self::QueryAnswer(answer) = self { Some(answer) } else { None }
     }
 }
 

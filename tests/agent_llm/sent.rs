@@ -1,4 +1,4 @@
-//! All that is sent to a chat model, held against what the guide says is sent.
+//! All that is sent to a chat model, compared with what the guide says is sent.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -45,7 +45,7 @@ fn kettle(exports: &Path) -> SceneWorld {
         map: Arc::new(SemanticMap::of_identities(identities, of, vec![1.0; 64], Vec::new())),
         cameras: vec![camera.clone()],
         up: DVec3::NEG_Y,
-        metres: Some(1.0),
+        meters: Some(1.0),
         exports: exports.into(),
         explored: None,
     };

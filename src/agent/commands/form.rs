@@ -266,7 +266,7 @@ fn distance(words: &[&str]) -> Option<Distance> {
         return Some(Distance::Relative(steps));
     }
     let amount = amount(before)?;
-    let meters = find(&language.units, unit).map(|meters| Distance::Metres(amount * meters));
+    let meters = find(&language.units, unit).map(|meters| Distance::Meters(amount * meters));
     meters.or_else(|| matches!(*unit, "step" | "steps").then_some(Distance::Relative(amount)))
 }
 

@@ -12,7 +12,7 @@ use crate::measure::sweep::failed;
 use crate::measure::{Rule, Stage, StageName, Study, Trial};
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::codes::{self, TOLERANCE};
-use crate::pipeline::semantics::find::centers;
+use crate::pipeline::semantics::build_map::centers;
 use crate::pipeline::semantics::matching;
 use crate::pipeline::semantics::train_codes::{CodeTraining, CodeView, decode, train_codes};
 use crate::pipeline::semantics::view_map::ViewMap;

@@ -1,4 +1,4 @@
-//! The camera pane: the keys of a path, a timeline to play and retime them, and films of it.
+//! The camera pane: the keys of a path, a timeline to play and retime them, and videos of it.
 
 mod keys;
 pub mod player;
@@ -12,8 +12,8 @@ use egui::{Button, ComboBox, DragValue, RichText, Slider, Ui};
 use self::player::{Clip, Player};
 use super::state::AppState;
 use super::theme;
-use crate::io::animation::Settings;
-use crate::navigate::film::{MOST_PICTURES, steps_of};
+use crate::io::video::Settings;
+use crate::navigate::camera_spline::{MOST_PICTURES, steps_of};
 use crate::navigate::{Film, Flight, Pose, Speed};
 use crate::scene::undo::UndoHistory;
 use crate::scene::{Camera, CameraPath, PathKey};
@@ -30,13 +30,13 @@ pub struct CameraPane {
     /// The key that was chosen.
     selected: Option<usize>,
     edits: UndoHistory<CameraPath>,
-    /// The path as it was last made a film of.
+    /// The path as it was last made a video of.
     filmed: Option<(CameraPath, Speed)>,
-    /// Height of films, px.
+    /// Height of videos, px.
     film_height: u32,
-    /// Quality of films, 0 to 100.
+    /// Quality of videos, 0 to 100.
     quality: u8,
-    /// Whether what was found is marked in films.
+    /// Whether what was found is marked in videos.
     pub mark: bool,
     /// Flights that follow the one that is played.
     next: VecDeque<Flight>,
@@ -153,7 +153,7 @@ impl CameraPane {
         }
     }
 
-    /// The film of the path as it is.
+    /// The video of the path as it is.
     fn keep_up(&mut self) {
         let is_path = matches!(self.player.clip(), Some(Clip::Path(_)) | None);
         let current = self.filmed.as_ref().is_some_and(|(path, speed)| *path == self.path && *speed == self.speed);
@@ -162,7 +162,7 @@ impl CameraPane {
         }
     }
 
-    /// The cameras of a film of what is played, and how it is written; `None` if there is nothing.
+    /// The cameras of a video of what is played, and how it is written; `None` if there is nothing.
     pub fn film(&self, out: &Path, aspect: f64) -> Option<(Vec<Camera>, Settings)> {
         let height = self.film_height;
         let width = (((f64::from(height) * aspect) / 2.0).round().max(1.0) * 2.0) as u32;

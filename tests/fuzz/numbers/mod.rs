@@ -56,9 +56,9 @@ const AREAS: [(&str, Trial); 7] = [
     ("drawing", scenes::drawing),
     ("gradients", scenes::gradients),
     ("training", scenes::training),
-    ("relevancy", meaning::relevancy),
-    ("codes", meaning::codes),
-    ("localising", meaning::localising),
+    ("relevancy", by_embedding::relevancy),
+    ("codes", by_embedding::codes),
+    ("localising", by_embedding::localizing),
     ("moving", ways::moving),
 ];
 
