@@ -7,9 +7,9 @@ mod common;
 
 use fmlgs::math::stats;
 use fmlgs::math::vector::{dot, unit};
-use fmlgs::pipeline::semantics::parse::{Kind, ParsedQuery};
+use fmlgs::pipeline::semantics::by_embedding::{EmbeddingOptions, EmbeddingScorer, TextEmbeddings};
 use fmlgs::pipeline::semantics::localize::{Answer, localize};
-use fmlgs::pipeline::semantics::by_embedding::{EmbeddingScorer, EmbeddingOptions, TextEmbeddings};
+use fmlgs::pipeline::semantics::parse::{Kind, ParsedQuery};
 use fmlgs::pipeline::semantics::relevancy::{CANONICAL, PART_WEIGHT, advantage, deviate, score};
 use fmlgs::scene::{Identities, IdentityId, LanguageFeatures, Level, NOBODY, ViewFeatures};
 

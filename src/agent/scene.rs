@@ -11,8 +11,8 @@ pub use super::view_shares::Parts;
 use super::view_shares::{ViewShares, is_drawn};
 use super::world::{Arrival, Facts, Moved, Unreachable, World, WorldError};
 use crate::io;
+use crate::navigate::approach::{Approach, ApproachError, Place};
 use crate::navigate::target::{self, Wish};
-use crate::navigate::approach::{ApproachError, Place, Approach};
 use crate::navigate::{FRAMES, Flight, Pose, Speed};
 use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::asker::Asker;
@@ -38,7 +38,7 @@ pub enum Effect {
     Renamed(IdentityId, String),
     /// The last change of a name was undone: it is called this again.
     RenameUndone(IdentityId, String),
-    /// The scene was looked at: where occupied space is is known.
+    /// The scene was looked at: which space is occupied is known.
     Explored(Arc<Explored>),
 }
 

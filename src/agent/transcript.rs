@@ -1,4 +1,4 @@
-//! Everything that was said, checked and done, for display to read.
+//! Everything that was said, checked and done, for people to read.
 
 use std::time::Instant;
 

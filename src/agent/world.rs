@@ -4,8 +4,8 @@
 use super::camera_args::{Direction, Distance, Side};
 use super::relation::{Extent, View};
 use crate::pipeline::semantics::answer::{QueryAnswer, by_name};
-use crate::pipeline::semantics::parse::{Kind, ParsedQuery};
 use crate::pipeline::semantics::localize::Answer;
+use crate::pipeline::semantics::parse::{Kind, ParsedQuery};
 use crate::pipeline::semantics::timing::StagesMs;
 use crate::scene::{Bounds, Identities, IdentityId, Level};
 
@@ -17,7 +17,7 @@ pub struct Facts {
     pub level: Level,
     /// What it is a piece of; `NOBODY` for objects.
     pub parent: IdentityId,
-    /// Its box in world space, in scene units, if it has any occupied space.
+    /// Its box in world space, in scene units, if it fills any space.
     pub bounds: Option<Bounds>,
     /// The share of the present view that it covers, 0 to 1.
     pub in_view: f64,
@@ -65,7 +65,7 @@ pub trait World {
     /// What is known of an identity; `None` if it is not (or no more) in the scene.
     fn facts(&self, id: IdentityId) -> Option<Facts>;
 
-    /// The size of an identity, if it has any occupied space: that of its box, unless more is known.
+    /// The size of an identity, if it fills any space: that of its box, unless more is known.
     fn extent(&self, id: IdentityId) -> Option<Extent> {
         Extent::of_box(&self.facts(id)?.bounds?, self.view().up)
     }

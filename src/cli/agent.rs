@@ -65,7 +65,7 @@ pub struct Args {
     /// Write the picture at the end
     #[arg(long)]
     view: Option<PathBuf>,
-    /// Write everything that was said and done: .json, or .md for display
+    /// Write everything that was said and done: .json, or .md to be read
     #[arg(long)]
     transcript: Option<PathBuf>,
     /// Print one JSON document

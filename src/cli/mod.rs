@@ -42,7 +42,7 @@ pub use error::CliError;
 
 use self::plan::PlanArgs;
 use crate::scene::plan::PlanOverride;
-use crate::scene::{text, resource_log};
+use crate::scene::{resource_log, text};
 use crate::worker::Start;
 
 /// What each exit code means; part of `--help`.

@@ -7,7 +7,7 @@ use std::time::Instant;
 use serde_json::json;
 
 use super::{CliError, number, output, view};
-use crate::jobs::go_to::{self, Explored, ApproachRequest};
+use crate::jobs::go_to::{self, ApproachRequest, Explored};
 use crate::jobs::{Scene, export, open, query};
 use crate::measure::survey::{self, smoothness};
 use crate::measure::table::rows;

@@ -14,7 +14,7 @@ use crate::jobs::render::{self, Quantity};
 use crate::jobs::video::{self, Video, VideoRequest};
 use crate::jobs::{Scene, open, plan, query};
 use crate::navigate::camera_spline::MOST_PICTURES;
-use crate::navigate::{Film, Speed};
+use crate::navigate::{CameraSpline, Speed};
 use crate::render::{BackendChoice, RenderSettings};
 use crate::scene::{Camera, CameraPath, LevelFilter};
 
@@ -104,7 +104,7 @@ impl Args {
 
 pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     if let Some(path) = args.path.clone() {
-        return film(&args, &path, quiet);
+        return video(&args, &path, quiet);
     }
     let (scene, camera) = args.check()?;
     let overrides = args.plan.overrides();
@@ -135,10 +135,10 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
 }
 
 /// Draws a video along the camera path in `path`.
-fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
+fn video(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
     let keys = io::camera_path::open(path)?;
-    let film = Film::new(&keys, Speed::Constant);
-    let film = film.ok_or_else(|| CliError::failed(format!("{}: there are no keys in it", path.display())))?;
+    let spline = CameraSpline::new(&keys, Speed::Constant);
+    let spline = spline.ok_or_else(|| CliError::failed(format!("{}: there are no keys in it", path.display())))?;
     let scene = open::scene(&args.scene)?;
     let reads: Vec<&Path> = scene.reads().into_iter().chain([path]).collect();
     if args.out.is_dir() {
@@ -159,7 +159,7 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
     if let Some(program) = &args.ffmpeg {
         settings.encoder = Encoder::Ffmpeg { program: program.clone(), args: Vec::new() };
     }
-    let cameras: Vec<Camera> = film.pictures(fps, MOST_PICTURES).iter().map(|p| p.camera(width, height)).collect();
+    let cameras: Vec<Camera> = spline.pictures(fps, MOST_PICTURES).iter().map(|p| p.camera(width, height)).collect();
     let marked = match &args.mark {
         Some(query) => {
             let map = scene.semantics()?;

@@ -4,7 +4,6 @@
 //! before memory is set aside for it, and paths inside a dataset may not leave its folder. Every
 //! error names the file and the place in it.
 
-pub mod video;
 pub mod atomic;
 pub mod camera_file;
 pub mod camera_path;
@@ -19,12 +18,12 @@ pub mod gltf_mesh;
 pub mod http;
 pub mod khr_gltf;
 pub mod labels;
-mod photo_list;
 pub mod llff;
 pub mod memory;
 pub mod npy;
 mod open;
 pub mod photo;
+mod photo_list;
 mod ply;
 pub mod points_ply;
 mod quantized;
@@ -39,6 +38,7 @@ pub mod splat_ply;
 mod temporary;
 pub mod trained;
 pub mod transforms;
+pub mod video;
 
 pub use error::{IoError, OpenError};
 pub use open::{Opened, open};

@@ -8,14 +8,14 @@ use crate::models::ModelError;
 use crate::models::catalog::InstallError;
 use crate::models::fetch::FetchError;
 use crate::pipeline::depth::DepthError;
-use crate::pipeline::video::VideoError;
 use crate::pipeline::observer::Interrupted;
-use crate::pipeline::semantics::edit::EditError;
 use crate::pipeline::semantics::build_map::FindError;
+use crate::pipeline::semantics::edit::EditError;
 use crate::pipeline::semantics::segmenter::SegmentError;
 use crate::pipeline::synth::SynthError;
 use crate::pipeline::train::TrainError;
 use crate::pipeline::train::config::UnreadableConfig;
+use crate::pipeline::video::VideoError;
 use crate::render::{DrawError, GpuError, RenderError};
 
 /// Why a job did not do what was asked.

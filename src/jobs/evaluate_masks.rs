@@ -12,8 +12,8 @@ use crate::math::stats::mean;
 use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::protocols::{
-    AskedScene, Category, LabeledView, Unit, categories, fastlgs_ex, langsplat, masks, means, multi_class,
-    part_recall, selection_3d, spin_nerf,
+    AskedScene, Category, LabeledView, Unit, categories, fastlgs_ex, langsplat, masks, means, multi_class, part_recall,
+    selection_3d, spin_nerf,
 };
 use crate::pipeline::semantics::query_engine::QueryEngine;
 use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use crate::navigate::approach::{Approach, ApproachError, Place};
 use crate::navigate::flight::Smoothness;
 use crate::navigate::target::Wish;
-use crate::navigate::approach::{ApproachError, Place, Approach};
 use crate::navigate::{Flight, Navigator, NoRoute, Pose, Speed};
 use crate::render::RenderSettings;
 use crate::scene::resource_log::{self, Sort};
@@ -32,7 +32,12 @@ impl Explored {
     /// Looks at a scene.
     pub fn new(cloud: Arc<GaussianCloud>, cameras: &[Camera], up: DVec3) -> Self {
         let navigator = Navigator::new(&cloud, cameras, up);
-        resource_log::record(Sort::Paths, "occupancy grid, graph of keypoints", "the camera is to fly", navigator.bytes());
+        resource_log::record(
+            Sort::Paths,
+            "occupancy grid, graph of keypoints",
+            "the camera is to fly",
+            navigator.bytes(),
+        );
         let parts = navigator.graph.parts(&navigator.occupancy);
         Self { navigator, cloud, parts }
     }
@@ -97,7 +102,9 @@ pub fn visit(request: ApproachRequest) -> (Arc<Explored>, Approached) {
     let name = map.identities.full_name(id);
     let visit = match explored.navigator.visit(place, id, wish, &from, aspect, frames) {
         Ok(visit) => Approached { name, flight: Some(Box::new(visit)), problem: None },
-        Err(ApproachError::NoRoute { why, nearest }) => Approached { name, flight: nearest, problem: Some(explored.no_route(&why)) },
+        Err(ApproachError::NoRoute { why, nearest }) => {
+            Approached { name, flight: nearest, problem: Some(explored.no_route(&why)) }
+        }
         Err(e) => Approached { name, flight: None, problem: Some(e.to_string()) },
     };
     (explored, visit)

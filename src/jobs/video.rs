@@ -6,8 +6,8 @@ use std::time::Instant;
 
 use super::{JobError, export};
 use crate::io::video::{Settings, Summary};
-use crate::pipeline::video::{self, Marked};
 use crate::pipeline::observer::{Observer, Severity};
+use crate::pipeline::video::{self, Marked};
 use crate::render::{BackendChoice, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 

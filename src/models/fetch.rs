@@ -1,4 +1,4 @@
-//! Downloads of model files: resumed, checked, cancellable. Nothing is fetched that the user has not
+//! Downloads of model files: resumed, checked, cancellable. Nothing is fetched that nobody has
 //! asked for.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -108,7 +108,7 @@ pub enum FetchError {
         /// Most bytes.
         most: u64,
     },
-    /// A page for display in place of the file.
+    /// A page for people in place of the file.
     #[error("{url} is a web page, not a file (a sign-in, or an error page?)")]
     WebPage {
         /// From where.

@@ -14,9 +14,9 @@ pub mod fetch;
 pub mod manifest;
 pub mod network;
 pub mod preprocess;
-pub mod session_cache;
 pub mod sam;
 pub mod sam2;
+pub mod session_cache;
 mod tile;
 mod vocabulary;
 

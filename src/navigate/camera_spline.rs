@@ -17,7 +17,7 @@ pub const MOST_PICTURES: f64 = 1e6;
 
 /// A path that can be asked for the pose at any time.
 #[derive(Clone, Debug)]
-pub struct Film {
+pub struct CameraSpline {
     stretches: Vec<Stretch>,
     /// When the camera arrives at each key, and when it leaves.
     pub times: Vec<[f64; 2]>,
@@ -51,7 +51,7 @@ struct Spline {
     turning: RotationSpline,
 }
 
-impl Film {
+impl CameraSpline {
     /// The video of a path; `None` if it has no keys, or is not valid.
     pub fn new(path: &CameraPath, speed: Speed) -> Option<Self> {
         path.validate().ok()?;
@@ -305,14 +305,14 @@ mod tests {
     #[test]
     fn a_film_passes_its_keys_in_its_time_without_jumps() {
         let p = path([0.0, 1.0, 1.3, 3.0].iter().enumerate().map(|(i, x)| key(*x, 0.7 * i as f64)).collect());
-        let film = Film::new(&p, Speed::Constant).expect("a video");
-        assert!((film.seconds() - 6.0).abs() < 1e-9);
-        for (k, [arrives, _]) in p.keys.iter().zip(&film.times) {
+        let spline = CameraSpline::new(&p, Speed::Constant).expect("a spline");
+        assert!((spline.seconds() - 6.0).abs() < 1e-9);
+        for (k, [arrives, _]) in p.keys.iter().zip(&spline.times) {
             // Even speed shifts arrivals a little from their share of the straight distances.
-            let nearest = (-40..=40).map(|i| film.at(arrives + 0.01 * f64::from(i)).center.distance(k.center));
+            let nearest = (-40..=40).map(|i| spline.at(arrives + 0.01 * f64::from(i)).center.distance(k.center));
             assert!(nearest.fold(f64::INFINITY, f64::min) < 0.02, "key at {arrives}");
         }
-        let poses: Vec<Pose> = (0..=6000).map(|i| film.at(f64::from(i) * 1e-3)).collect();
+        let poses: Vec<Pose> = (0..=6000).map(|i| spline.at(f64::from(i) * 1e-3)).collect();
         let steps: Vec<DVec3> = poses.windows(2).map(|w| w[1].center - w[0].center).collect();
         let mean = steps.iter().map(|s| s.length()).sum::<f64>() / steps.len() as f64;
         for w in steps.windows(2) {
@@ -325,19 +325,19 @@ mod tests {
     fn waits_and_fixed_times_are_kept() {
         let mut keys: Vec<PathKey> = (0..4).map(|i| key(f64::from(i), 0.3 * f64::from(i))).collect();
         keys[1].dwell_secs = 1.0;
-        let film = Film::new(&path(keys.clone()), Speed::Eased).expect("a video");
-        let [arrives, leaves] = film.times[1];
+        let spline = CameraSpline::new(&path(keys.clone()), Speed::Eased).expect("a spline");
+        let [arrives, leaves] = spline.times[1];
         assert!((leaves - arrives - 1.0).abs() < 1e-9);
         for t in [arrives, 0.5 * (arrives + leaves), leaves] {
-            assert!(film.at(t).center.distance(keys[1].center) < 1e-9, "it waits");
+            assert!(spline.at(t).center.distance(keys[1].center) < 1e-9, "it waits");
         }
         keys[1].dwell_secs = 0.0;
         (keys[1].time_secs, keys[2].time_secs) = (Some(4.0), Some(4.5));
-        let film = Film::new(&path(keys.clone()), Speed::Constant).expect("a video");
-        assert!(film.at(4.0).center.distance(keys[1].center) < 1e-9);
-        assert!(film.at(4.5).center.distance(keys[2].center) < 1e-9);
-        assert!(film.at(99.0).center.distance(keys[3].center) < 1e-9);
-        assert!(film.at(-1.0).center.distance(keys[0].center) < 1e-9);
+        let spline = CameraSpline::new(&path(keys.clone()), Speed::Constant).expect("a spline");
+        assert!(spline.at(4.0).center.distance(keys[1].center) < 1e-9);
+        assert!(spline.at(4.5).center.distance(keys[2].center) < 1e-9);
+        assert!(spline.at(99.0).center.distance(keys[3].center) < 1e-9);
+        assert!(spline.at(-1.0).center.distance(keys[0].center) < 1e-9);
     }
 
     #[test]
@@ -347,37 +347,37 @@ mod tests {
             PathKey { center: DVec3::new(a.cos(), a.sin(), 0.0), ..key(0.0, a) }
         };
         let p = CameraPath { closed: true, ..path((0..5).map(ring).collect()) };
-        let film = Film::new(&p, Speed::Constant).expect("a video");
-        let (a, b) = (film.at(0.0), film.at(film.seconds()));
+        let spline = CameraSpline::new(&p, Speed::Constant).expect("a spline");
+        let (a, b) = (spline.at(0.0), spline.at(spline.seconds()));
         assert!(a.center.distance(b.center) < 1e-9 && angle(&a.world_from_camera, &b.world_from_camera) < 1e-6);
         let h = 1e-3;
-        let leaving = (film.at(h).center - a.center) / h;
-        let arriving = (b.center - film.at(film.seconds() - h).center) / h;
+        let leaving = (spline.at(h).center - a.center) / h;
+        let arriving = (b.center - spline.at(spline.seconds() - h).center) / h;
         assert!((leaving - arriving).length() < 0.05 * leaving.length(), "{leaving} {arriving}");
     }
 
     #[test]
     fn degenerate_paths_are_defined() {
-        assert!(Film::new(&path(vec![]), Speed::Eased).is_none());
-        let one = Film::new(&path(vec![key(1.0, 0.2)]), Speed::Eased).expect("one key");
+        assert!(CameraSpline::new(&path(vec![]), Speed::Eased).is_none());
+        let one = CameraSpline::new(&path(vec![key(1.0, 0.2)]), Speed::Eased).expect("one key");
         assert_eq!(one.at(3.0).center, key(1.0, 0.0).center);
         assert_eq!(one.seconds(), 6.0);
         let turning = path(vec![key(0.0, 0.0), key(0.0, 1.0), key(0.0, 4.0)]);
-        let film = Film::new(&turning, Speed::Constant).expect("in one place");
+        let spline = CameraSpline::new(&turning, Speed::Constant).expect("in one place");
         let rates: Vec<f64> = (10..590)
             .map(|i| {
-                let [a, b] = [i, i + 1].map(|i| film.at(0.01 * f64::from(i)).world_from_camera);
+                let [a, b] = [i, i + 1].map(|i| spline.at(0.01 * f64::from(i)).world_from_camera);
                 angle(&a, &b)
             })
             .collect();
         assert!(rates.iter().all(|r| *r > 0.0 && *r < 0.03), "it turns evenly");
-        let same = Film::new(&path(vec![key(0.0, 0.0); 3]), Speed::Eased).expect("all the same");
+        let same = CameraSpline::new(&path(vec![key(0.0, 0.0); 3]), Speed::Eased).expect("all the same");
         assert!(same.at(2.0).center.is_finite());
         let mut bad = path(vec![key(0.0, 0.0)]);
         bad.keys[0].fov_y_rad = f64::NAN;
-        assert!(Film::new(&bad, Speed::Eased).is_none());
+        assert!(CameraSpline::new(&bad, Speed::Eased).is_none());
         let many = path((0..10_000).map(|i| key(f64::from(i % 97) * 0.1, f64::from(i))).collect());
-        let film = Film::new(&many, Speed::Constant).expect("many");
-        assert!(film.at(3.0).center.is_finite());
+        let spline = CameraSpline::new(&many, Speed::Constant).expect("many");
+        assert!(spline.at(3.0).center.is_finite());
     }
 }

@@ -160,7 +160,12 @@ impl Graph {
 
     /// The shortest way from any of some keypoints to any of others, when it costs so much (scene
     /// units) to come to each, and to go on from it. One search, however many there are.
-    pub fn route_between(&self, starts: &[(usize, f64)], goals: &[(usize, f64)], occupancy: &OccupancyGrid) -> Option<Route> {
+    pub fn route_between(
+        &self,
+        starts: &[(usize, f64)],
+        goals: &[(usize, f64)],
+        occupancy: &OccupancyGrid,
+    ) -> Option<Route> {
         const START: usize = usize::MAX;
         const GOAL: usize = usize::MAX - 1;
         let unit = UNIT * occupancy.voxel();

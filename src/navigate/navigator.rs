@@ -20,7 +20,7 @@ const SPARE: f64 = 1.05;
 
 /// All that is needed to move about in a scene.
 pub struct Navigator {
-    /// Where occupied space is.
+    /// Which space is occupied.
     pub occupancy: OccupancyGrid,
     /// Where one can go.
     pub graph: Graph,

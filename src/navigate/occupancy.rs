@@ -1,4 +1,4 @@
-//! Where occupied space is: how opaque every voxel of a scene is, and how far every point is from what is.
+//! Which space is occupied: how opaque every voxel of a scene is, and how far every point is from what is.
 //!
 //! A Gaussian of opacity `a` is spread over space with the extinction whose integral along its
 //! thinnest axis is `-ln(1 - a)`, so that a ray through it loses what the renderer says it does. A

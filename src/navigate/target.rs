@@ -107,7 +107,7 @@ pub struct Search<'a> {
     pub cloud: &'a GaussianCloud,
     /// How they are drawn.
     pub settings: &'a RenderSettings,
-    /// Where occupied space is.
+    /// Which space is occupied.
     pub occupancy: &'a OccupancyGrid,
     /// The photos' cameras.
     pub cameras: &'a [Camera],

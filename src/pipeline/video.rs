@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::observer::{Interrupted, Observer, Ticker};
 use super::semantics::view_map::ViewMap;
-use crate::io::video::{VideoFileError, VideoWriter, Settings, Summary};
+use crate::io::video::{Settings, Summary, VideoFileError, VideoWriter};
 
 use crate::render::{DrawError, RenderError, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
@@ -116,18 +116,18 @@ mod tests {
         cloud.sh.push([1.0; 3]);
         let cloud = Arc::new(cloud);
         let mut backend = Renderer::new();
-        let mut film = |name: &str, observer: &mut dyn Observer| {
+        let mut video = |name: &str, observer: &mut dyn Observer| {
             let path = folder.path().join(name);
             let settings = Settings::new(32, 16, 10.0);
             let made =
                 write(&cloud, &RenderSettings::default(), &cameras, None, &mut backend, (&path, &settings), observer);
             (made, path)
         };
-        let (made, path) = film("a.gif", &mut Silent);
+        let (made, path) = video("a.gif", &mut Silent);
         let summary = made.expect("a video");
         assert_eq!((summary.frames, summary.size_px), (5, (32, 16)));
         assert!(path.is_file());
-        let (stopped, path) = film("b.gif", &mut Impatient);
+        let (stopped, path) = video("b.gif", &mut Impatient);
         assert!(matches!(stopped, Err(VideoError::Interrupted(_))) && !path.exists());
         assert_eq!(std::fs::read_dir(folder.path()).expect("lists").count(), 1, "no half file");
     }

@@ -21,7 +21,7 @@ use crate::pipeline::train::TrainConfig;
 use crate::scene::IdentityId;
 use crate::scene::plan::When;
 use crate::ui::actions::{Action, Pane};
-use crate::worker::{Command, EditRequest, JobId, JobKind, ApproachRequest, Approached};
+use crate::worker::{ApproachRequest, Approached, Command, EditRequest, JobId, JobKind};
 
 impl App {
     /// Does what a user asked for.

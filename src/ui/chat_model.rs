@@ -28,7 +28,7 @@ enum Asked<T> {
     #[default]
     Not,
     Waiting(Receiver<T>),
-    QueryAnswer(T),
+    Answered(T),
 }
 
 impl<T: Send + 'static> Asked<T> {
@@ -48,9 +48,9 @@ impl<T: Send + 'static> Asked<T> {
         if let Self::Waiting(receive) = self
             && let Ok(answer) = receive.try_recv()
         {
-            *self = Self::QueryAnswer(answer);
+            *self = Self::Answered(answer);
         }
-        if let Self::QueryAnswer(answer) = self { Some(answer) } else { None }
+        if let Self::Answered(answer) = self { Some(answer) } else { None }
     }
 }
 

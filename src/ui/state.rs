@@ -13,7 +13,7 @@ use crate::pipeline::semantics::thumbnails::Thumbnails;
 use crate::render::RenderSettings;
 use crate::scene::undo::UndoHistory;
 use crate::scene::{Facts, Limits, Overrides, PhotoPixels, ScenePlan, SemanticMap, text};
-use crate::worker::{Event, Explored, Failure, JobId, JobKind, Lane, OpenedScene, Outcome, Versioned, Approached};
+use crate::worker::{Approached, Event, Explored, Failure, JobId, JobKind, Lane, OpenedScene, Outcome, Versioned};
 
 /// Lines kept in the log.
 const MAX_LOG: usize = 1_000;

@@ -127,7 +127,7 @@ impl Jobs for PipelineJobs {
             Command::Explore { cloud, cameras, up } => {
                 Outcome::Explored(Arc::new(go_to::Explored::new(cloud, &cameras, up)))
             }
-            Command::Film(request) => Outcome::Written(video::run(*request, observer)?.summary.path),
+            Command::CameraSpline(request) => Outcome::Written(video::run(*request, observer)?.summary.path),
             Command::Measure(request) => return measuring::run(*request, observer),
             Command::ReadReport { path, second } => return measuring::read(path, second),
             Command::Thumbnails { cloud, map, settings, home } => {

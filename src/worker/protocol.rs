@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::failure::Failure;
 use super::measure::MeasureRequest;
 use crate::jobs::edit::EditRequest;
-use crate::jobs::go_to::{Explored, ApproachRequest, Approached};
+use crate::jobs::go_to::{ApproachRequest, Approached, Explored};
 use crate::jobs::models::ModelList;
 use crate::jobs::video::VideoRequest;
 use crate::jobs::{OpenedScene, find_objects};
@@ -68,7 +68,7 @@ pub enum JobKind {
     /// Finds the way to an identity.
     Approach,
     /// Draws a video.
-    Film,
+    CameraSpline,
     /// Measures drawing, knob by knob.
     Measure,
     /// Reads a report.
@@ -85,7 +85,7 @@ impl JobKind {
             | Self::Evaluate
             | Self::Objects
             | Self::Model
-            | Self::Film
+            | Self::CameraSpline
             | Self::Measure => Lane::Long,
             Self::Edit
             | Self::Export
@@ -198,7 +198,7 @@ pub enum Command {
     /// Find the way to where an identity is seen best.
     Approach(Box<ApproachRequest>),
     /// Draw a video.
-    Film(Box<VideoRequest>),
+    CameraSpline(Box<VideoRequest>),
     /// Measure error against run time of drawing, and write it as a report.
     Measure(Box<MeasureRequest>),
     /// Read a report.
@@ -239,7 +239,7 @@ impl Command {
             Self::Explore { .. } => JobKind::Explore,
             Self::InstallModel { .. } => JobKind::Model,
             Self::Approach(_) => JobKind::Approach,
-            Self::Film(_) => JobKind::Film,
+            Self::CameraSpline(_) => JobKind::CameraSpline,
             Self::Measure(_) => JobKind::Measure,
             Self::ReadReport { .. } => JobKind::Report,
         }
@@ -262,8 +262,10 @@ impl Command {
             Self::ListModels => "Listing models".into(),
             Self::Explore { .. } => "Exploring where one can go".into(),
             Self::InstallModel { id, .. } => format!("Installing the model {id}"),
-            Self::Approach(request) => format!("Planning the flight to {}", request.map.identities.full_name(request.id)),
-            Self::Film(request) => format!("Rendering {}", name(&request.out)),
+            Self::Approach(request) => {
+                format!("Planning the flight to {}", request.map.identities.full_name(request.id))
+            }
+            Self::CameraSpline(request) => format!("Rendering {}", name(&request.out)),
             Self::Measure(_) => "Benchmarking rendering".into(),
             Self::ReadReport { path, .. } => format!("Opening the report {}", name(path)),
         }

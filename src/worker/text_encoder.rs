@@ -9,8 +9,8 @@ use crossbeam_channel::{Sender, bounded};
 use super::{Repaint, Slot};
 use crate::models::{self, Encoder, ModelError};
 use crate::pipeline::semantics::answer::phrases_of;
-use crate::pipeline::semantics::parse::ParsedQuery;
 use crate::pipeline::semantics::by_embedding::TextEmbeddings;
+use crate::pipeline::semantics::parse::ParsedQuery;
 use crate::pipeline::semantics::relevancy::CANONICAL;
 use crate::pipeline::semantics::timing::ms_since;
 

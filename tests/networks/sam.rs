@@ -3,10 +3,10 @@
 use fmlgs::math::resize::{Filter, resize};
 use fmlgs::models::network::Array;
 use fmlgs::models::preprocess::{Side, enlarge};
-use fmlgs::models::session_cache::close_idle;
-use fmlgs::models::sam::automatic::{AutomaticOptions, Collector, AutomaticMask, crops, everything};
+use fmlgs::models::sam::automatic::{AutomaticMask, AutomaticOptions, Collector, crops, everything};
 use fmlgs::models::sam::{PromptedMasks, Sam};
 use fmlgs::models::sam2::Sam2;
+use fmlgs::models::session_cache::close_idle;
 use fmlgs::scene::Mask;
 use serde_json::Value;
 

@@ -27,7 +27,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::resample::{Pixels, resample};
-use super::{IoError, files, photo_list, memory};
+use super::{IoError, files, memory, photo_list};
 use crate::scene::{Camera, Level, Mask, Photo, text};
 
 /// How many times longer than the photo's the sides of a mask may be.

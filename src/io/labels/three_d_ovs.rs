@@ -7,7 +7,7 @@ use std::path::Path;
 
 use super::pictures::{Pictures, png_stem};
 use super::{entries, stem};
-use crate::io::{IoError, files, photo_list, llff};
+use crate::io::{IoError, files, llff, photo_list};
 use crate::scene::Level;
 
 /// Folder of the masks.

@@ -8,7 +8,7 @@ use std::thread::JoinHandle;
 
 use tempfile::NamedTempFile;
 
-use super::{VideoFileError, Result, Settings, Sink};
+use super::{Result, Settings, Sink, VideoFileError};
 use crate::io::atomic::put;
 use crate::io::error::write_error;
 use crate::io::temporary::temporary_file;

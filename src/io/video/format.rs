@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{VideoFileError, Result, Settings};
+use super::{Result, Settings, VideoFileError};
 
 /// A format that is written without other programs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder, ImageError};
 
-use super::{VideoFileError, Result, Settings, Sink};
+use super::{Result, Settings, Sink, VideoFileError};
 use crate::io::error::write_error;
 use crate::io::files::{folder_of, sync_folder};
 use crate::io::temporary::{TemporaryFolder, temporary_folder};

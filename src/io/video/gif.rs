@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use gif::{DisposalMethod, EncodingError, Frame, Repeat};
 
-use super::{VideoFileError, Result, Settings, Sink};
+use super::{Result, Settings, Sink, VideoFileError};
 use crate::io::atomic::Draft;
 use crate::io::error::write_error;
 

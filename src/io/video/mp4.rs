@@ -21,7 +21,7 @@ use shiguredo_mp4::boxes::SampleEntry;
 use shiguredo_mp4::mux::{Mp4FileMuxer, Sample};
 
 use super::yuv::Planes;
-use super::{VideoFileError, Result, Settings, Sink};
+use super::{Result, Settings, Sink, VideoFileError};
 use crate::io::atomic::Draft;
 use crate::io::error::write_error;
 

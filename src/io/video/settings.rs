@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{VideoFileError, Result};
+use super::{Result, VideoFileError};
 use crate::scene::Camera;
 
 /// Size, rate and quality of a video.

@@ -11,7 +11,7 @@ use std::thread::JoinHandle;
 use crossbeam_channel::{Receiver, Sender, bounded};
 use webp_animation::{ColorMode, EncoderOptions, EncodingConfig, EncodingType, Error};
 
-use super::{VideoFileError, Result, Settings, Sink};
+use super::{Result, Settings, Sink, VideoFileError};
 use crate::io::atomic::Draft;
 use crate::io::error::write_error;
 

@@ -6,8 +6,8 @@ use super::{Case, Finding};
 use crate::math::stats::worst;
 use crate::math::vector::unit;
 use crate::pipeline::semantics::codes::{self, TOLERANCE};
-use crate::pipeline::semantics::parse::{Kind, ParsedQuery};
 use crate::pipeline::semantics::localize::{Scorer, localize};
+use crate::pipeline::semantics::parse::{Kind, ParsedQuery};
 use crate::pipeline::semantics::relevancy::{advantage, deviate, score};
 use crate::scene::{Identities, Level, NOBODY};
 

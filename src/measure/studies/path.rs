@@ -50,7 +50,10 @@ pub fn study(cloud: &GaussianCloud, cameras: &[Camera], repeats: u32, mut input:
     input.insert("keypoints".into(), navigator.graph.keypoints.len().to_string());
     input.insert("flights".into(), FLIGHTS.to_string());
     let measures = vec![
-        error("faults", "share of steps from pose to pose that come too near to occupied space or turn by more than 3 degrees"),
+        error(
+            "faults",
+            "share of steps from pose to pose that come too near to occupied space or turn by more than 3 degrees",
+        ),
         error("arc-length error", "by how much the way from pose to pose is off the length of the way, relative"),
         error("too near", "share of places along flights that are nearer to occupied space than wanted"),
         error("largest turn", "largest turn from one pose to the next, degrees"),

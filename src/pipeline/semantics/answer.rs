@@ -4,10 +4,10 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::parse::ParsedQuery;
+use super::by_embedding::{EmbeddingOptions, EmbeddingScorer, TextEmbeddings};
 use super::localize::{Answer, Scorer, Strategy, localize};
-use super::by_embedding::{EmbeddingScorer, EmbeddingOptions, TextEmbeddings};
 use super::names::{self, ByName};
+use super::parse::ParsedQuery;
 use super::timing::{StagesMs, ms_since};
 use super::view_map::ViewMap;
 use crate::scene::{Identities, IdentityId, LanguageFeatures, LevelFilter, Mask};
@@ -135,7 +135,12 @@ pub fn by_name(identities: &Identities, phrase: &ParsedQuery, level: LevelFilter
 }
 
 /// Answers by meaning alone.
-pub fn by_meaning(identities: &Identities, phrase: &ParsedQuery, level: LevelFilter, language: Language<'_>) -> QueryAnswer {
+pub fn by_meaning(
+    identities: &Identities,
+    phrase: &ParsedQuery,
+    level: LevelFilter,
+    language: Language<'_>,
+) -> QueryAnswer {
     let Language { features, phrases, options } = language;
     let mut scorer = EmbeddingScorer::new(features, phrases, options);
     judged((identities, phrase, level), Basis::Meaning, &mut scorer, |_, scorer| {

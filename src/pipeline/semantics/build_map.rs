@@ -6,12 +6,12 @@ use std::time::Instant;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+use super::associate::Disagreement;
 use super::codes;
 use super::embed::{EmbedError, embed};
 use super::network_segmenter::NetworkMasks;
-use super::sam2_tracker::Sam2Tracker;
-use super::associate::Disagreement;
 use super::regions::Regions;
+use super::sam2_tracker::Sam2Tracker;
 use super::segmenter::{FileMasks, SegmentError, Segmenter};
 use super::tracker::{TrackError, TrackOptions, Tracked, ViewReport, track};
 use super::train_codes::{CodeTraining, CodeView, decode, train_codes};

@@ -6,13 +6,13 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use super::answer::{QueryAnswer, Language, by_meaning, by_name, phrases_of};
-use super::code_map::CodeMap;
+use super::answer::{Language, QueryAnswer, by_meaning, by_name, phrases_of};
 use super::build_map::{FindOptions, Lifting, Tools, find_objects};
-use super::parse::{Kind, ParsedQuery};
-use super::localize::Answer;
 use super::by_embedding::{EmbeddingOptions, TextEmbeddings};
+use super::code_map::CodeMap;
+use super::localize::Answer;
 use super::names;
+use super::parse::{Kind, ParsedQuery};
 use super::protocols::part_recall::{self, Components};
 use super::protocols::{AskedScene, Category, LabeledView, categories, masks};
 use super::relevancy::{CANONICAL, PART_WEIGHT, deviate};

@@ -8,30 +8,30 @@
 //! meant, and [`answer`] puts it together, with the time of each of the [`stages`].
 
 pub mod answer;
+mod associate;
+pub mod build_map;
+pub mod by_embedding;
 pub mod carry;
 pub mod code_map;
 pub mod codes;
 pub mod edit;
 pub mod embed;
-pub mod network_segmenter;
-pub mod propagate;
 pub mod filters;
-pub mod build_map;
-pub mod sam2_tracker;
-pub mod parse;
 #[cfg(test)]
 mod heart;
-mod associate;
 pub mod localize;
 pub mod matching;
-pub mod by_embedding;
 pub mod names;
-pub mod thumbnails;
+pub mod network_segmenter;
+pub mod parse;
+pub mod propagate;
 pub mod protocols;
 pub mod query_engine;
 pub mod regions;
 pub mod relevancy;
+pub mod sam2_tracker;
 pub mod segmenter;
+pub mod thumbnails;
 pub mod timing;
 pub mod tracker;
 pub mod train_codes;

@@ -5,7 +5,7 @@ use super::filters::{self, FilterOptions};
 use super::segmenter::{FoundMask, SegmentError, Segmenter};
 use crate::io;
 use crate::models::catalog::{self, Role};
-use crate::models::sam::automatic::{AutomaticOptions, AutomaticMask, everything};
+use crate::models::sam::automatic::{AutomaticMask, AutomaticOptions, everything};
 use crate::models::sam::{PromptedMasks, Sam};
 use crate::models::sam2::Sam2;
 use crate::models::{ModelError, manifest};

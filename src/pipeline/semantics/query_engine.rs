@@ -3,10 +3,10 @@
 
 use std::time::Instant;
 
-use super::answer::{QueryAnswer, Language, answer, by_meaning, phrases_of};
-use super::parse::ParsedQuery;
+use super::answer::{Language, QueryAnswer, answer, by_meaning, phrases_of};
 use super::by_embedding::{EmbeddingOptions, TextEmbeddings};
 use super::names;
+use super::parse::ParsedQuery;
 use super::timing::{StagesMs, ms_since};
 use crate::models::{self, Encoder, ModelError};
 use crate::scene::{Identities, LanguageFeatures, LevelFilter, SemanticMap};
@@ -37,7 +37,12 @@ impl QueryEngine {
     ///
     /// # Errors
     /// If the encoder fails.
-    pub fn ask(&mut self, map: &SemanticMap, text: &str, level: LevelFilter) -> Result<Option<QueryAnswer>, ModelError> {
+    pub fn ask(
+        &mut self,
+        map: &SemanticMap,
+        text: &str,
+        level: LevelFilter,
+    ) -> Result<Option<QueryAnswer>, ModelError> {
         let start = Instant::now();
         let Some(phrase) = ParsedQuery::parse(text) else { return Ok(None) };
         let known = match &mut self.encoder {

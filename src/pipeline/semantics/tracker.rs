@@ -4,9 +4,9 @@
 
 use std::time::Instant;
 
-use super::propagate::extend;
-use super::sam2_tracker::{Sam2TrackError, Sam2Tracker, LABEL_SIDE_PX};
 use super::associate::{Disagreement, Link, disagreements, link};
+use super::propagate::extend;
+use super::sam2_tracker::{LABEL_SIDE_PX, Sam2TrackError, Sam2Tracker};
 use super::segmenter::{FoundMask, SegmentError, Segmenter};
 use super::view_map::ViewMap;
 use super::votes::{Assignment, UNKNOWN, Votes};

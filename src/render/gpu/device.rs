@@ -97,7 +97,12 @@ impl Device {
 
     /// Opens a device on an adapter of the caller's choice.
     pub fn open(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
-        resource_log::record(Sort::Device, format!("device on {}", adapter.get_info().name), "something is drawn on it", 0);
+        resource_log::record(
+            Sort::Device,
+            format!("device on {}", adapter.get_info().name),
+            "something is drawn on it",
+            0,
+        );
         let (device, queue) = pollster::block_on(adapter.request_device(&Self::device_descriptor(adapter)))
             .map_err(|e| GpuError::Device { adapter: adapter.get_info().name, reason: e.to_string() })?;
         Ok(Self::from_parts(adapter.get_info(), device, queue))

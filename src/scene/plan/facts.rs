@@ -228,7 +228,7 @@ pub fn resolved_side_px(cloud: &GaussianCloud, cameras: &[Camera]) -> Option<u32
 }
 
 /// Standard deviation of a Gaussian's picture along its narrower axis in px; `None` where it is not
-/// in the picture or too faint to occupied space.
+/// in the picture or too faint to matter.
 fn footprint_px(cloud: &GaussianCloud, i: usize, camera: &Camera) -> Option<f64> {
     let g = cloud.gaussian(i);
     if 1.0 / (1.0 + (-f64::from(g.opacity_logit)).exp()) < FAINT {

@@ -14,7 +14,7 @@ use super::state::AppState;
 use super::theme;
 use crate::io::video::Settings;
 use crate::navigate::camera_spline::{MOST_PICTURES, steps_of};
-use crate::navigate::{Film, Flight, Pose, Speed};
+use crate::navigate::{CameraSpline, Flight, Pose, Speed};
 use crate::scene::undo::UndoHistory;
 use crate::scene::{Camera, CameraPath, PathKey};
 use crate::ui::actions::Action;
@@ -144,11 +144,11 @@ impl CameraPane {
     /// Makes the path what is played.
     fn put_path_in(&mut self) {
         self.filmed = Some((self.path.clone(), self.speed));
-        match Film::new(&self.path, self.speed) {
-            Some(film) if matches!(self.player.clip(), Some(Clip::Path(_))) => {
-                self.player.replace(Some(Clip::Path(Box::new(film))));
+        match CameraSpline::new(&self.path, self.speed) {
+            Some(spline) if matches!(self.player.clip(), Some(Clip::Path(_))) => {
+                self.player.replace(Some(Clip::Path(Box::new(spline))));
             }
-            Some(film) => self.player.load(Clip::Path(Box::new(film)), false),
+            Some(spline) => self.player.load(Clip::Path(Box::new(spline)), false),
             None => self.player.replace(None),
         }
     }
@@ -163,7 +163,7 @@ impl CameraPane {
     }
 
     /// The cameras of a video of what is played, and how it is written; `None` if there is nothing.
-    pub fn film(&self, out: &Path, aspect: f64) -> Option<(Vec<Camera>, Settings)> {
+    pub fn video(&self, out: &Path, aspect: f64) -> Option<(Vec<Camera>, Settings)> {
         let height = self.film_height;
         let width = (((f64::from(height) * aspect) / 2.0).round().max(1.0) * 2.0) as u32;
         let clip = self.player.clip()?;
@@ -301,9 +301,9 @@ impl CameraPane {
         self.speed = if eased { Speed::Eased } else { Speed::Constant };
         ui.separator();
         let idle = state.job.is_none() && self.player.clip().is_some();
-        let film = ui.add_enabled(idle, Button::new("Export video\u{2026}"));
+        let button = ui.add_enabled(idle, Button::new("Export video\u{2026}"));
         let why = if state.job.is_some() { "Another job is running." } else { "There is nothing to export." };
-        if film.on_hover_text(Action::ExportVideo.tooltip()).on_disabled_hover_text(why).clicked() {
+        if button.on_hover_text(Action::ExportVideo.tooltip()).on_disabled_hover_text(why).clicked() {
             actions.push(Action::ExportVideo);
         }
         ComboBox::from_id_salt("video height").selected_text(format!("{} px", self.film_height)).width(72.0).show_ui(

@@ -6,8 +6,8 @@ use super::source::Numbers;
 use super::{Verdict, promise};
 use fmlgs::math::vector::{dot, unit};
 use fmlgs::pipeline::semantics::codes::{RADIUS, assign, matches};
-use fmlgs::pipeline::semantics::parse::{Kind, ParsedQuery};
 use fmlgs::pipeline::semantics::localize::{Answer, Scorer, Strategy, localize};
+use fmlgs::pipeline::semantics::parse::{Kind, ParsedQuery};
 use fmlgs::pipeline::semantics::relevancy::{advantage, deviate, score};
 use fmlgs::scene::{Identities, Level};
 

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::{FRAMES, SIZE, decode, entries, film, picture, settings};
 use crate::io::IoError;
-use crate::io::video::{VideoFileError, VideoWriter, Encoder, Format, Settings};
+use crate::io::video::{Encoder, Format, Settings, VideoFileError, VideoWriter};
 
 fn refused(path: &Path, settings: &Settings) -> String {
     VideoWriter::create(path, settings).err().expect("refused").to_string()

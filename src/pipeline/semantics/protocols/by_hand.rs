@@ -7,8 +7,8 @@ use glam::DVec3;
 use super::part_recall::Components;
 use super::*;
 use crate::pipeline::semantics::answer::{Basis, by_name};
-use crate::pipeline::semantics::parse::{Kind, ParsedQuery};
 use crate::pipeline::semantics::localize::{Answer, Hit};
+use crate::pipeline::semantics::parse::{Kind, ParsedQuery};
 use crate::pipeline::semantics::relevancy::{PART_WEIGHT, deviate};
 use crate::pipeline::semantics::timing::StagesMs;
 use crate::render::RenderSettings;
@@ -138,8 +138,7 @@ fn fastlgs_ex_pools_over_categories_and_views() {
     let planes = std::array::from_fn(|c| map.codes.iter().map(|codes| codes[c]).collect());
     let blended = CodeMap { width_px: 10, height_px: 1, planes };
     let camera = camera(10, 1);
-    let labeled =
-        |name, categories| LabeledView { name, camera: &camera, exact: &view, blended: &blended, categories };
+    let labeled = |name, categories| LabeledView { name, camera: &camera, exact: &view, blended: &blended, categories };
     let first = labeled(
         "a",
         vec![

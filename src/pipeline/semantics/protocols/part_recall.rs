@@ -4,8 +4,8 @@
 
 use super::{LabeledView, Unit};
 use crate::math::stats::mean;
-use crate::pipeline::semantics::localize::Strategy;
 use crate::pipeline::semantics::by_embedding::{EmbeddingOptions, PartFeatures, TextEmbeddings};
+use crate::pipeline::semantics::localize::Strategy;
 use crate::pipeline::semantics::query_engine::ask_by_embedding;
 use crate::scene::{Identities, LanguageFeatures, Level, Mask, SemanticMap};
 
