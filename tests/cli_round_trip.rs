@@ -9,7 +9,10 @@ use std::path::Path;
 
 use cli_support::{first_version, fmlgs, folder, tiny_dataset, tiny_splat};
 use fmlgs::io::splat_ply;
-use fmlgs::jobs::{self, Folders, find_objects::FindSettings};
+use fmlgs::jobs::{
+    self, Folders,
+    find_objects::{FindSettings, Request},
+};
 use fmlgs::pipeline::observer::Silent;
 use fmlgs::pipeline::train::TrainConfig;
 use fmlgs::scene::Camera;
@@ -157,8 +160,9 @@ fn the_window_and_the_command_line_do_the_same() {
     let with = FindSettings { encoder: Some("none".into()), ..FindSettings::default() };
     let holdout_every = config.holdout_every;
     let masks = Some(photos.into());
-    let command =
-        Job::FindObjects { dataset, cloud, holdout_every, settings, side_px: 64, masks, with, out: out.clone() };
+    let folder = out.clone();
+    let request = Request { folder, cloud, settings, dataset, holdout_every, masks, side_px: 64, with };
+    let command = Job::FindObjects(Box::new(request));
     let Outcome::Objects(found) = window(command) else { panic!("no objects") };
     let told = fmlgs(&["preprocess", &trained, "--masks", photos, "--encoder", "none"]).ok();
     let stored = jobs::open::scene(&out).unwrap().semantics().unwrap();

@@ -242,7 +242,8 @@ fn act(
     let it = if id == NOBODY { String::new() } else { the(world, id) };
     Ok(match call {
         ToolCall::Locate { .. } | ToolCall::Highlight { .. } => {
-            world.highlight(&[id]).map_err(failed)?;
+            dialog.marked.push(id);
+            world.highlight(&dialog.marked).map_err(failed)?;
             let place = describe::place(world, id);
             let facts = world.facts(id);
             let seen = facts.as_ref().is_some_and(|f| f.in_view > SEEN && !f.hidden);

@@ -1,13 +1,14 @@
-//! A scene on this machine as the agent's [`World`]: what it asks is answered here, what it does is
-//! done to a copy and emitted to whoever shows the scene.
+//! A scene on this machine as the agent's [`World`]: what it does is emitted to whoever shows the scene.
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
 use super::camera_args::{Direction, Distance, NORMAL, Side};
 use super::relation::{Extent, View};
+pub use super::view_shares::Parts;
+use super::view_shares::{ViewShares, is_drawn};
 use super::world::{Arrival, Facts, Moved, Unreachable, World, WorldError};
 use crate::io;
 use crate::navigate::approach::{Approach, ApproachError, Place};
@@ -16,16 +17,12 @@ use crate::navigate::{FRAMES, Flight, Pose, Speed};
 use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::asker::Asker;
 use crate::pipeline::semantics::parse::Kind;
-use crate::pipeline::semantics::view_map::ViewMap;
-use crate::render::{RenderSettings, Renderer};
 use crate::scene::undo::UndoHistory;
-use crate::scene::{Bounds, Camera, GaussianCloud, Identities, IdentityId, SemanticMap, text};
+use crate::scene::{Bounds, Identities, IdentityId, SemanticMap, text};
 use crate::worker::Explored;
 
-/// Longer side of the picture in which pixels of identities are counted, px.
-const COUNT_SIDE_PX: u32 = 256;
 /// Points of a thing that its size is measured by, at most.
-const MEASURED_POINTS: usize = 4096;
+const MEASURED_POINTS: usize = 2048;
 /// A step, as a multiple of the distance that flights keep to occupied space.
 const STEP: f64 = 6.0;
 
@@ -45,20 +42,6 @@ pub enum Effect {
     Explored(Arc<Explored>),
 }
 
-/// What a scene is made of.
-pub struct Parts {
-    pub cloud: Arc<GaussianCloud>,
-    pub settings: RenderSettings,
-    pub map: Arc<SemanticMap>,
-    pub cameras: Vec<Camera>,
-    pub up: DVec3,
-    /// Length of a unit in meters, if that is known.
-    pub meters: Option<f64>,
-    pub exports: PathBuf,
-    /// What is known of moving about, if the scene was looked at before.
-    pub explored: Option<Arc<Explored>>,
-}
-
 /// Receives the effects.
 pub type Emit = Box<dyn FnMut(Effect) + Send>;
 
@@ -70,23 +53,9 @@ pub struct SceneWorld {
     aspect: f64,
     hidden: Vec<bool>,
     bounds: Vec<Option<Bounds>>,
-    shares: Mutex<Option<Counted>>,
+    shares: ViewShares,
     done: UndoHistory<Before>,
     emit: Emit,
-}
-
-/// Share of a view that each identity covers, by number, with the view.
-struct Counted {
-    eye: Pose,
-    hidden: Vec<bool>,
-    shares: Vec<f64>,
-}
-
-impl Counted {
-    /// The share of an identity; 0 of one that is not known.
-    fn of(&self, id: IdentityId) -> f64 {
-        self.shares.get(id as usize).copied().unwrap_or(0.0)
-    }
 }
 
 /// How it was before something was done.
@@ -112,7 +81,7 @@ impl SceneWorld {
             aspect,
             hidden: vec![false; n],
             bounds,
-            shares: Mutex::new(None),
+            shares: ViewShares::default(),
             done: UndoHistory::default(),
             emit,
         })
@@ -148,41 +117,14 @@ impl SceneWorld {
         new
     }
 
-    /// The Gaussians that the user sees.
+    /// Whether the user sees an identity's Gaussians.
     fn drawn(&self, id: IdentityId) -> bool {
-        !self.parts.map.identities.line(id).any(|i| self.hidden.get(i as usize).copied().unwrap_or(false))
+        is_drawn(&self.parts.map.identities, &self.hidden, id)
     }
 
-    /// Share of the present view that an identity covers, pieces included. All are counted together, once
-    /// per view.
+    /// Share of the present view that an identity covers, pieces included.
     fn share_of(&self, id: IdentityId) -> f64 {
-        let mut known = self.shares.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(counted) = known.as_ref().filter(|k| k.eye == self.eye && k.hidden == self.hidden) {
-            return counted.of(id);
-        }
-        let Parts { cloud, settings, map, .. } = &self.parts;
-        let (w, h) = if self.aspect >= 1.0 {
-            (COUNT_SIDE_PX, (f64::from(COUNT_SIDE_PX) / self.aspect).max(1.0) as u32)
-        } else {
-            ((f64::from(COUNT_SIDE_PX) * self.aspect).max(1.0) as u32, COUNT_SIDE_PX)
-        };
-        let camera = self.eye.camera(w, h);
-        let identities = &map.identities;
-        let mut shares = vec![0.0; identities.len() + 1];
-        let view = if self.hidden.contains(&true) {
-            let kept: Vec<usize> =
-                (0..cloud.len()).filter(|i| map.of.get(*i).is_none_or(|id| self.drawn(*id))).collect();
-            let of: Vec<IdentityId> = kept.iter().map(|i| map.of[*i]).collect();
-            ViewMap::render(&mut Renderer::new(), &cloud.select(&kept), &of, identities, &camera, settings)
-        } else {
-            ViewMap::render(&mut Renderer::new(), cloud, &map.of, identities, &camera, settings)
-        };
-        // A view that cannot be drawn shows nothing.
-        for id in view.map(|v| v.identity).unwrap_or_default() {
-            identities.line(id).for_each(|i| shares[i as usize] += 1.0);
-        }
-        shares.iter_mut().for_each(|s| *s /= f64::from(w * h));
-        known.insert(Counted { eye: self.eye, hidden: self.hidden.clone(), shares }).of(id)
+        self.shares.of(&self.parts, self.eye, self.aspect, &self.hidden, id)
     }
 
     fn fly(&mut self, flight: Flight, about: Option<DVec3>, what: String) {

@@ -1,6 +1,7 @@
 //! `fmlgs preprocess`: objects and parts of a trained scene.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use serde_json::json;
 
@@ -106,17 +107,16 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let folder = scene.folder.clone().ok_or_else(|| JobError::NoScene(args.scene.clone()))?;
     let dataset = open::dataset(&scene.photos(args.photos.as_deref())?)?;
     let request = Request {
-        folder: &folder,
-        known: scene.state.as_deref(),
-        cloud: &scene.cloud,
-        settings: &scene.settings,
-        dataset: &dataset,
+        folder,
+        cloud: scene.cloud.clone(),
+        settings: scene.settings.clone(),
+        dataset: Arc::new(dataset),
         holdout_every: scene.config.holdout_every,
-        masks: args.masks.as_deref(),
+        masks: args.masks.clone(),
         side_px: plan::of_scene(&scene, &args.plan.overrides()).object_side_px,
-        with: &args.settings(),
+        with: args.settings(),
     };
-    let done = find_objects::run(request, &mut observer);
+    let done = find_objects::run(&request, scene.state.as_deref(), &mut observer);
     let FoundObjects { found, photos, secs, .. } = done.map_err(|e| CliError::of_work(e, "nothing was stored"))?;
     let Found { map, views, disagreements, secs: stages } = found;
     let count = |level: Level| map.identities.iter().filter(|(_, i)| i.level == level).count();

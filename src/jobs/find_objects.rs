@@ -1,6 +1,7 @@
 //! Finding the objects and parts of a trained scene, and storing them with it.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
@@ -64,26 +65,24 @@ impl Default for FindSettings {
 }
 
 /// A scene whose objects are to be found.
-#[derive(Clone, Copy)]
-pub struct Request<'a> {
+#[derive(Clone, Debug)]
+pub struct Request {
     /// Folder of the trained scene.
-    pub folder: &'a Path,
-    /// The state in which it is known.
-    pub known: Option<&'a str>,
+    pub folder: PathBuf,
     /// Its Gaussians.
-    pub cloud: &'a GaussianCloud,
+    pub cloud: Arc<GaussianCloud>,
     /// How they are drawn.
-    pub settings: &'a RenderSettings,
+    pub settings: RenderSettings,
     /// The photos.
-    pub dataset: &'a Dataset,
+    pub dataset: Arc<Dataset>,
     /// Every how-manieth photo is held out, if the scene does not say which.
     pub holdout_every: usize,
     /// Where masks are; `None` = they are found.
-    pub masks: Option<&'a Path>,
+    pub masks: Option<PathBuf>,
     /// Longer side of the pictures that are looked at, px.
     pub side_px: u32,
     /// How.
-    pub with: &'a FindSettings,
+    pub with: FindSettings,
 }
 
 /// Objects and parts that were found and stored.
@@ -101,13 +100,14 @@ pub struct FoundObjects {
     pub secs: f64,
 }
 
-/// Finds objects and parts, and stores them. Held-out photos are never used.
+/// Finds objects and parts of the scene in the state `known`, and stores them. Held-out photos are never used.
 ///
 /// # Errors
 /// If the folder cannot be written or has changed, a model or photo cannot be read, no mask is found, or the
 /// observer asks to stop.
-pub fn run(request: Request<'_>, observer: &mut dyn Observer) -> Result<FoundObjects, JobError> {
-    let Request { folder, known, cloud, settings, dataset, with, .. } = request;
+pub fn run(request: &Request, known: Option<&str>, observer: &mut dyn Observer) -> Result<FoundObjects, JobError> {
+    let Request { folder, cloud, settings, dataset, with, .. } = request;
+    let masks = request.masks.as_deref();
     if !trained::is_scene(folder) {
         return Err(JobError::NoScene(folder.into()));
     }
@@ -134,12 +134,12 @@ pub fn run(request: Request<'_>, observer: &mut dyn Observer) -> Result<FoundObj
         code_steps: with.code_steps,
     };
     let mut warn = |text: String| observer.note(Severity::Warning, text);
-    let network = match (request.masks, with.segmenter.as_deref()) {
+    let network = match (masks, with.segmenter.as_deref()) {
         (Some(_), _) | (None, Some(REGIONS)) => None,
         (None, Some(name)) => Some(name.to_owned()),
         (None, None) => catalog::usable(Role::Segmenter, &mut warn)?.into_iter().next(),
     };
-    let mut segmenter = segmenter(request.masks, cloud, settings, network.as_deref())?;
+    let mut segmenter = segmenter(masks, cloud, settings, network.as_deref())?;
     let mut encoder = match with.encoder.as_deref() {
         Some(NO_ENCODER) => None,
         Some(name) => Some(models::encoder(name)?),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::{JobError, Scene, open};
-use crate::io::{splat_ply, trained};
+use crate::io::{semantic_map, splat_ply, trained};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::train::checkpoint::CheckpointError;
 use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainError, TrainOutcome};
@@ -66,13 +66,12 @@ fn finished(outcome: TrainOutcome, out: PathBuf, observer: &mut dyn Observer) ->
     let mut done = Trained { outcome, out, state: None, semantics: None };
     if trained::is_scene(&done.out) {
         done.state = splat_ply::state(&done.out.join(trained::CLOUD_FILE))?;
-        let scene = Scene {
-            path: done.out.clone(),
-            folder: Some(done.out.clone()),
-            cloud: Arc::clone(&done.outcome.cloud),
-            state: done.state.clone(),
-            ..Scene::default()
-        };
+    }
+    if done.out.join(semantic_map::FILE).exists() {
+        // Whose each Gaussian is stands in their file.
+        let cloud = Arc::new(trained::load(&done.out)?.cloud);
+        let (folder, state) = (Some(done.out.clone()), done.state.clone());
+        let scene = Scene { path: done.out.clone(), folder, cloud, state, ..Scene::default() };
         done.semantics = open::known_objects(&scene, observer);
     }
     if !done.is_finished() && done.semantics.is_some() {

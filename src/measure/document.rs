@@ -46,7 +46,7 @@ impl StageName {
         }
     }
 
-    /// For people.
+    /// As it is shown.
     pub fn title(self) -> &'static str {
         match self {
             Self::Render => "Drawing",
@@ -150,7 +150,7 @@ impl FromIterator<f64> for Sample {
 pub struct Point {
     /// The knob that was turned: "alpha cut-off". Points of one method make one series.
     pub method: String,
-    /// Where it was turned to, for display.
+    /// Where it was turned to, in words.
     pub setting: String,
     /// The same for the program: fields of the stage's settings.
     pub knobs: Knobs,

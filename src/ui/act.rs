@@ -12,6 +12,7 @@ use super::state::Tone;
 use super::viewport::brush::Brush;
 use super::viewport::overrides::RenderOverrides;
 use crate::agent::scene::{Effect, Parts};
+use crate::jobs::find_objects::Request;
 use crate::measure::is_report;
 use crate::navigate::FRAMES;
 use crate::navigate::target::Wish;
@@ -203,16 +204,16 @@ impl App {
         let masks = masks.or_else(|| scene.masks.clone());
         match self.viewport.cloud().cloned().filter(|_| self.state.is_trained()) {
             Some(cloud) => {
-                self.submit(Command::FindObjects {
-                    dataset,
+                self.submit(Command::FindObjects(Box::new(Request {
+                    folder: scene.out.clone(),
                     cloud: Arc::clone(&cloud),
-                    holdout_every: self.layout.config.holdout_every,
                     settings: self.state.render_settings(),
-                    side_px: self.state.plan.object_side_px,
+                    dataset,
+                    holdout_every: self.layout.config.holdout_every,
                     masks,
+                    side_px: self.state.plan.object_side_px,
                     with: self.layout.finding.clone(),
-                    out: scene.out.clone(),
-                });
+                })));
             }
             None => self.state.toast(Tone::Warning, "Train first: objects consist of trained Gaussians."),
         }

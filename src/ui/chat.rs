@@ -26,7 +26,7 @@ use crate::worker::Repaint;
 const NEWS: usize = 1024;
 /// Lines that are kept.
 const MAX_LINES: usize = 400;
-/// Ways to go on that are shown at once.
+/// Ways to continue that are shown at once.
 const CONTINUATIONS: usize = 4;
 /// Side of a candidate's thumbnail, points.
 const THUMBNAIL_PX: f32 = 34.0;

@@ -4,8 +4,9 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use super::failure::{Failure, Stop};
 use super::measure as measuring;
-use super::protocol::{Command, Failure, Outcome, Stop};
+use super::protocol::{Command, Outcome};
 use super::thread::Jobs;
 use crate::io::{self, trained};
 use crate::jobs::evaluate::{self, Comparison, Options};
@@ -86,22 +87,10 @@ impl Jobs for PipelineJobs {
             Command::Evaluate { dataset, cloud, config, out } => {
                 Outcome::Evaluated(measured(dataset, cloud, config, &out, observer)?)
             }
-            Command::FindObjects { dataset, cloud, holdout_every, settings, side_px, masks, with, out } => {
-                let done = find_objects::run(
-                    find_objects::Request {
-                        folder: &out,
-                        known: self.known(&out).as_deref(),
-                        cloud: &cloud,
-                        settings: &settings,
-                        dataset: &dataset,
-                        holdout_every,
-                        masks: masks.as_deref(),
-                        side_px,
-                        with: &with,
-                    },
-                    observer,
-                )?;
-                self.knows(&out, Some(done.state));
+            Command::FindObjects(request) => {
+                let known = self.known(&request.folder);
+                let done = find_objects::run(&request, known.as_deref(), observer)?;
+                self.knows(&request.folder, Some(done.state));
                 Outcome::Objects(Arc::new(done.found.map))
             }
             Command::EditObjects { cloud, map, settings, request, out } => {

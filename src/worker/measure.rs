@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::protocol::{Failure, Outcome, Stop};
+use super::failure::{Failure, Stop};
+use super::protocol::Outcome;
 use crate::measure::studies::Input;
 use crate::measure::studies::render;
 use crate::measure::studies::views::{View, held_out};

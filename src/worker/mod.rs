@@ -4,6 +4,7 @@
 //! [`Event`]s (what happened). Bulk data never queues: it is published in a [`Slot`].
 
 pub mod control;
+pub mod failure;
 pub mod jobs;
 mod low_priority_pool;
 pub mod measure;
@@ -14,10 +15,12 @@ pub mod text_encoder;
 pub mod thread;
 pub mod view;
 pub mod view_modes;
+mod view_renderer;
 
 pub use control::Control;
+pub use failure::{Failure, Stop};
 pub use measure::MeasureRequest;
-pub use protocol::{Command, Event, Failure, JobId, JobKind, Lane, Outcome, Start, Stop};
+pub use protocol::{Command, Event, JobId, JobKind, Lane, Outcome, Start};
 pub use slot::{Slot, Versioned};
 pub use thread::{CloudSnapshot, Jobs, QueueFull, Repaint, Worker};
 pub use view_modes::ViewMode;

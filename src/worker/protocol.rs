@@ -5,17 +5,15 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::failure::Failure;
 use super::measure::MeasureRequest;
-use crate::io::OpenError;
 use crate::jobs::edit::EditRequest;
-use crate::jobs::error::chain;
-use crate::jobs::find_objects::FindSettings;
 use crate::jobs::go_to::{ApproachRequest, Approached, Explored};
 use crate::jobs::models::ModelList;
 use crate::jobs::video::VideoRequest;
-use crate::jobs::{JobError, OpenedScene};
+use crate::jobs::{OpenedScene, find_objects};
 use crate::measure::Report;
-use crate::pipeline::observer::{Evaluation, Interrupted, Progress, Severity, StepMetrics};
+use crate::pipeline::observer::{Evaluation, Progress, Severity, StepMetrics};
 use crate::pipeline::semantics::thumbnails::Thumbnails;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
@@ -142,24 +140,7 @@ pub enum Command {
         out: PathBuf,
     },
     /// Find the objects and parts of a trained scene, and store them with it.
-    FindObjects {
-        /// The photos.
-        dataset: Arc<Dataset>,
-        /// The Gaussians.
-        cloud: Arc<GaussianCloud>,
-        /// Every how-manieth photo is held out.
-        holdout_every: usize,
-        /// How the Gaussians are drawn.
-        settings: RenderSettings,
-        /// Longer side of the pictures that are looked at, px.
-        side_px: u32,
-        /// Where the masks are; `None` = regions of the photos are found.
-        masks: Option<PathBuf>,
-        /// With which models.
-        with: FindSettings,
-        /// Folder of the trained scene.
-        out: PathBuf,
-    },
+    FindObjects(Box<find_objects::Request>),
     /// Change the objects and parts of a scene, and store them with it.
     EditObjects {
         /// The Gaussians.
@@ -248,7 +229,7 @@ impl Command {
             Self::Demo => JobKind::Demo,
             Self::Train { .. } => JobKind::Train,
             Self::Evaluate { .. } => JobKind::Evaluate,
-            Self::FindObjects { .. } => JobKind::Objects,
+            Self::FindObjects(_) => JobKind::Objects,
             Self::EditObjects { .. } => JobKind::Edit,
             Self::Export { .. } => JobKind::Export,
             Self::Photo { .. } => JobKind::Photo,
@@ -273,7 +254,7 @@ impl Command {
             Self::Demo => "Rendering the demo scene".into(),
             Self::Train { dataset, .. } => format!("Training {}", dataset.name),
             Self::Evaluate { dataset, .. } => format!("Evaluating {}", dataset.name),
-            Self::FindObjects { dataset, .. } => format!("Finding objects in {}", dataset.name),
+            Self::FindObjects(request) => format!("Finding objects in {}", request.dataset.name),
             Self::EditObjects { .. } => "Editing objects".into(),
             Self::Export { path, .. } | Self::Picture { path, .. } => format!("Writing {}", name(path)),
             Self::Photo { photo, .. } => format!("Loading {}", photo.name),
@@ -343,53 +324,6 @@ pub enum Outcome {
         /// Its pixels.
         pixels: Arc<PhotoPixels>,
     },
-}
-
-/// Why a job failed, for display: what went wrong where, and what to do.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Failure {
-    /// What went wrong, with file and place.
-    pub message: String,
-    /// What the user can do about it; empty if the message already says so.
-    pub remedy: String,
-}
-
-impl Failure {
-    /// The failure of an error and all its causes.
-    pub fn of(error: &dyn std::error::Error, remedy: impl Into<String>) -> Self {
-        Self { message: chain(error), remedy: remedy.into() }
-    }
-}
-
-/// How a job ends short of its outcome.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Stop {
-    /// It was asked to.
-    Cancelled,
-    /// Something went wrong.
-    Failed(Failure),
-}
-
-impl<E: std::error::Error + 'static> From<E> for Stop {
-    fn from(error: E) -> Self {
-        let job = (&error as &dyn std::error::Error).downcast_ref::<JobError>();
-        if Interrupted::is_cause_of(&error) || job.is_some_and(JobError::is_cancelled) {
-            return Self::Cancelled;
-        }
-        Self::Failed(Failure::of(&error, job.map_or("", remedy)))
-    }
-}
-
-/// What the user can do in the window, where the error does not say that itself.
-fn remedy(error: &JobError) -> &'static str {
-    match error {
-        JobError::Open(OpenError::NotFound { .. }) => "Check the path: the file may have been moved or renamed.",
-        JobError::Open(OpenError::Unrecognized { .. }) => {
-            "Open the folder that holds the photos and their poses, or a splat .ply."
-        }
-        JobError::NothingHeldOut(_) => "Choose how many to hold out in the Training pane.",
-        _ => "",
-    }
 }
 
 /// What happened. For each job: first `Started`, then any of the middle ones, at last exactly one of

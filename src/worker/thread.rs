@@ -10,8 +10,9 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, Sender, bounded};
 
+use super::failure::{Failure, Stop};
 use super::observer::JobObserver;
-use super::protocol::{Command, Event, Failure, JobId, JobKind, Lane, Outcome, Stop};
+use super::protocol::{Command, Event, JobId, JobKind, Lane, Outcome};
 use super::{Control, Slot};
 use crate::pipeline::observer::{Observer, Signal};
 use crate::scene::GaussianCloud;

@@ -7,39 +7,19 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::Slot;
-use super::protocol::Failure;
+use super::failure::Failure;
 use super::thread::{Repaint, panic_failure};
-use super::view_modes::{self, ViewMode};
+use super::view_modes::ViewMode;
+pub use super::view_renderer::QualityBudget;
+use super::view_renderer::ViewRenderer;
 use crate::jobs::query::ViewMaps;
-use crate::render::{self, BackendChoice, Frame, RenderError, RenderSettings, Renderer, StageTimes};
+use crate::render::{RenderError, RenderSettings, Renderer, StageTimes};
 use crate::scene::plan::When;
 use crate::scene::resource_log::{self, Sort};
 use crate::scene::{Camera, GaussianCloud, PhotoPixels, ScenePlan, SemanticMap};
 
 /// How long the eye rests before working memory is given back.
 const REST: Duration = Duration::from_secs(2);
-
-/// How much time a frame may take; decides its resolution.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum QualityBudget {
-    /// The eye moves: keep up with it.
-    Moving,
-    /// The eye rests while something else needs the processor.
-    Shared,
-    /// The eye rests: full resolution, and depth to pick from.
-    Full,
-}
-
-impl QualityBudget {
-    /// Seconds a frame should take at most; `None` = as long as it takes.
-    fn secs(self) -> Option<f64> {
-        match self {
-            Self::Moving => Some(0.030),
-            Self::Shared => Some(0.120),
-            Self::Full => None,
-        }
-    }
-}
 
 /// What to draw.
 #[derive(Clone, Debug)]
@@ -157,7 +137,7 @@ impl ViewLane {
         let (box_, out, mapped) = (Arc::clone(&mailbox), Arc::clone(&pictures), Arc::clone(&maps));
         let (mut mapper, mut mapped_before) = (Renderer::new(), false);
         let work = move || {
-            let mut painter: Option<Painter> = None;
+            let mut painter: Option<ViewRenderer> = None;
             let mut patience = None;
             loop {
                 let request = match next(&box_, patience.take()) {
@@ -173,7 +153,7 @@ impl ViewLane {
                 // Looking for a GPU takes a moment; here no one waits for it.
                 let painter = match painter.take().filter(|p| p.without_gpu == request.skip.gpu) {
                     Some(known) => painter.insert(known),
-                    None => painter.insert(Painter::without_gpu(request.skip.gpu)),
+                    None => painter.insert(ViewRenderer::without_gpu(request.skip.gpu)),
                 };
                 out.publish(painter.draw(&request));
                 repaint();
@@ -283,122 +263,6 @@ fn maps_of(renderer: &mut Renderer, request: &ViewRequest) -> Option<Result<View
     })
 }
 
-/// Draws requests, and learns how fast it can.
-struct Painter {
-    renderer: Renderer,
-    /// Whether no GPU was to be used.
-    without_gpu: bool,
-    /// Why the CPU draws though there is a GPU.
-    instead_of_gpu: Option<String>,
-    /// What frames cost lately; `None` before the first.
-    cost: Option<Speed>,
-}
-
-/// What a frame costs: the part that every Gaussian has at any size, and that of each pixel.
-#[derive(Clone, Copy, Debug)]
-struct Speed {
-    fixed_secs: f64,
-    secs_per_px: f64,
-}
-
-impl Painter {
-    /// Draws with a real GPU if there is one and it is to be used, else with the CPU.
-    fn without_gpu(without_gpu: bool) -> Self {
-        let choice = if without_gpu { BackendChoice::Cpu } else { BackendChoice::Auto };
-        let mut instead_of_gpu = None;
-        let renderer = Renderer::choose(choice, |why| instead_of_gpu = Some(why)).unwrap_or_default();
-        Self { renderer, without_gpu, instead_of_gpu, cost: None }
-    }
-
-    /// Goes on with the CPU: a GPU has failed, or buffers may be in any state.
-    fn fall_back(&mut self, why: &str) {
-        if self.renderer.is_gpu() {
-            self.instead_of_gpu = Some(render::instead_of_gpu(&why));
-        }
-        (self.renderer, self.cost) = (Renderer::new(), None);
-    }
-
-    fn draw(&mut self, request: &ViewRequest) -> ViewResult {
-        let camera = self.fitting_camera(&request.camera, request.budget);
-        let full = camera == request.camera;
-        // Without times there is still a frame.
-        let _ = self.renderer.time_stages(request.timed);
-        let start = Instant::now();
-        let frame = match self.try_render(request, &camera) {
-            // A GPU that fails (lost, out of memory) leaves the CPU to draw from then on.
-            Err(failure) if self.renderer.is_gpu() => {
-                self.fall_back(&failure.message);
-                self.try_render(request, &camera)?
-            }
-            result => result?,
-        };
-        let secs = start.elapsed().as_secs_f64();
-        self.learn(secs, f64::from(camera.width_px * camera.height_px));
-        let stages = self.renderer.stage_times();
-        let start = Instant::now();
-        let drawn = view_modes::paint(&frame, request.mode, request.photo.as_deref());
-        let paint_secs = start.elapsed().as_secs_f64();
-        let median_depth = (!frame.median_depth.is_empty()).then_some(frame.median_depth);
-        Ok(Arc::new(ViewPicture {
-            ticket: request.ticket,
-            full,
-            camera,
-            rgb: drawn.rgb,
-            median_depth,
-            depth_range: drawn.depth_range,
-            psnr: drawn.psnr,
-            secs,
-            stages,
-            paint_secs,
-            drawn_by: self.renderer.name().to_owned(),
-            instead_of_gpu: self.instead_of_gpu.clone(),
-        }))
-    }
-
-    fn try_render(&mut self, request: &ViewRequest, camera: &Camera) -> Result<Frame<f32>, Failure> {
-        let depth = request.budget == QualityBudget::Full || request.mode == ViewMode::Depth || !request.skip.depth;
-        let settings = RenderSettings { depth, ..request.settings.clone() };
-        match catch_unwind(AssertUnwindSafe(|| self.renderer.draw(&request.cloud, camera, &settings))) {
-            Ok(result) => result.map_err(|e| Failure::of(&e, "Reset the view (Home), or open the scene again.")),
-            Err(payload) => {
-                let failure = panic_failure(payload.as_ref());
-                self.fall_back(&failure.message);
-                Err(failure)
-            }
-        }
-    }
-
-    /// Takes in what the last frame cost.
-    fn learn(&mut self, secs: f64, pixels: f64) {
-        let cost = self.renderer.cost(secs);
-        let now = Speed { fixed_secs: cost.fixed_secs, secs_per_px: cost.pixels_secs / pixels };
-        let old = self.cost.unwrap_or(now);
-        let mix = |old: f64, new: f64| 0.6 * old + 0.4 * new;
-        self.cost = Some(Speed {
-            fixed_secs: mix(old.fixed_secs, now.fixed_secs),
-            secs_per_px: mix(old.secs_per_px, now.secs_per_px),
-        });
-    }
-
-    /// The camera at a resolution that is likely to keep to the budget.
-    fn fitting_camera(&self, camera: &Camera, budget: QualityBudget) -> Camera {
-        let pixels = f64::from(camera.width_px) * f64::from(camera.height_px);
-        // The first frame says how fast this machine is with this scene; it must be quick itself.
-        let cost = self.cost.unwrap_or(Speed { fixed_secs: 0.0, secs_per_px: 4e-7 });
-        let Some(secs) = budget.secs() else { return camera.clone() };
-        // Where the fixed part alone breaks the budget, smaller frames would help no one.
-        let left = (secs - cost.fixed_secs).max(0.4 * secs);
-        let scale = (left / (cost.secs_per_px * pixels)).sqrt().clamp(0.2, 1.0);
-        // In quarter-octave steps, so that the frame does not change its grain all the time.
-        let scale = 2.0_f64.powf((scale.log2() * 4.0).floor() / 4.0);
-        if scale >= 1.0 {
-            return camera.clone();
-        }
-        let side = |s: u32| ((f64::from(s) * scale).round() as u32).max(1);
-        camera.resized(side(camera.width_px), side(camera.height_px))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -451,25 +315,5 @@ mod tests {
         // The lane goes on.
         map.codes.push(Default::default());
         assert!(mapped(3, &map).maps.is_ok());
-    }
-
-    #[test]
-    fn a_slow_machine_draws_smaller_while_the_eye_moves() {
-        let camera = Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 1000, 600).expect("valid");
-        let of = |fixed_secs, secs_per_px| Painter {
-            renderer: Renderer::new(),
-            without_gpu: true,
-            instead_of_gpu: None,
-            cost: Some(Speed { fixed_secs, secs_per_px }),
-        };
-        let slow = of(0.0, 1e-6);
-        let moving = slow.fitting_camera(&camera, QualityBudget::Moving);
-        assert!(moving.width_px < 300, "{}", moving.width_px);
-        assert!((f64::from(moving.width_px) / f64::from(moving.height_px) - 5.0 / 3.0).abs() < 0.02);
-        assert!(slow.fitting_camera(&camera, QualityBudget::Shared).width_px > moving.width_px);
-        assert_eq!(slow.fitting_camera(&camera, QualityBudget::Full), camera);
-        assert_eq!(of(0.0, 1e-9).fitting_camera(&camera, QualityBudget::Moving), camera);
-        // A scene whose Gaussians alone take longer than the budget is not drawn any smaller for it.
-        assert_eq!(of(5.0, 1e-9).fitting_camera(&camera, QualityBudget::Moving), camera);
     }
 }

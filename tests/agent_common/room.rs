@@ -1,7 +1,7 @@
 //! A room with some forty things and parts, on boxes only, that remembers what was done to it.
 
 use fmlgs::agent::camera_args::{Direction, Distance, Side};
-use fmlgs::agent::relation::{View, gap};
+use fmlgs::agent::relation::View;
 use fmlgs::agent::world::{Arrival, Facts, Moved, Unreachable, World, WorldError, locate_by_names};
 use fmlgs::pipeline::semantics::answer::QueryAnswer;
 use fmlgs::pipeline::semantics::parse::Kind;
@@ -272,9 +272,4 @@ impl World for Room {
     fn export_replaces(&self, id: IdentityId) -> Option<String> {
         self.exported[id as usize].then(|| format!("{}.ply", self.name(id)))
     }
-}
-
-/// Distance of two things' boxes, for tests of the room itself.
-pub fn apart(room: &Room, a: IdentityId, b: IdentityId) -> f64 {
-    gap(&room.boxes[a as usize].expect("a box"), &room.boxes[b as usize].expect("a box"))
 }

@@ -39,10 +39,6 @@ impl Table {
         toml::from_str(text).expect("a table of requests")
     }
 
-    pub fn turns(&self) -> usize {
-        self.dialog.iter().map(|d| d.turns.len()).sum()
-    }
-
     /// The documented commands' wordings as requests of their own, where nothing must be said before.
     pub fn of_commands(text: &str) -> Self {
         let wordings: Wordings = toml::from_str(text).expect("a table of wordings");

@@ -118,7 +118,7 @@ fn what_is_sent_is_what_the_readme_says() {
         assert_eq!(seen.head[0], "POST /v1/chat/completions HTTP/1.1");
     }
     // What was asked for came through, and no more of the scene than is said to.
-    assert!(traffic[1].contains("cm wide") && traffic[1].contains("written to a file"), "{}", traffic[1]);
+    assert!(traffic[1].contains("on its longer side") && traffic[1].contains("written to a file"), "{}", traffic[1]);
     let last = seen.last().expect("a request").json();
     let mut outer: Vec<&String> = last.as_object().expect("an object").keys().collect();
     outer.sort();
