@@ -192,7 +192,7 @@ fn one(request: &Request<'_>, is_first: bool) -> Option<Vec<Task>> {
     beginning_with(request.words.first()?).find_map(|sequence| {
         // A name alone is a command only if it is one, and the first: "hide the lamp and the mug from above".
         let begins_with_word = matches!(sequence.items.first(), Some(Item::Word(_)));
-        if !begins_with_word && !(request.strict && is_first) {
+        if !(begins_with_word || request.strict && is_first) {
             return None;
         }
         let mut slots = request.fit(&sequence.items)?;
