@@ -233,7 +233,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("folder");
         let first = folder.path().join("fox");
         let second = PathBuf::from(format!("{}-2", first.display()));
-        assert_eq!(usual_folders(&first), [first.clone()]);
+        assert_eq!(usual_folders(&first), std::slice::from_ref(&first));
         std::fs::create_dir(&first).expect("create");
         assert_eq!(usual_folders(&first), [first, second]);
     }
