@@ -7,7 +7,7 @@
 #include "shared/reach.wgsl"
 #include "shared/scan.wgsl"
 
-// Splats that one workgroup handles: 4 neighbours a thread.
+// Splats that one workgroup handles: 4 neighbors a thread.
 const BLOCK: u32 = 1024u;
 const EACH: u32 = 4u;
 

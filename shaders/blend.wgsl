@@ -12,7 +12,7 @@
 @group(0) @binding(4) var<storage, read> splats: array<Splat>;
 // [Gaussian][channel]
 @group(0) @binding(5) var<storage, read> features: array<f32>;
-// Colour over the background, and what transmittance is left.
+// Color over the background, and what transmittance is left.
 @group(0) @binding(6) var<storage, read_write> pixels: array<vec4<f32>>;
 // Bits of the transmittance, and the end of the part of the tile's list that was blended.
 @group(0) @binding(7) var<storage, read_write> ends: array<vec2<u32>>;

@@ -18,7 +18,7 @@
 @group(0) @binding(4) var<storage, read> splats: array<Splat>;
 @group(0) @binding(5) var<storage, read> features: array<f32>;
 @group(0) @binding(6) var<storage, read> ends: array<vec2<u32>>;
-// [pixel] with respect to colour and alpha, then, where the loss has one, [pixel] to depth in x.
+// [pixel] with respect to color and alpha, then, where the loss has one, [pixel] to depth in x.
 @group(0) @binding(7) var<storage, read> pixel_gradient: array<vec4<f32>>;
 // [pixel][channel]
 @group(0) @binding(8) var<storage, read> feature_pixel_gradient: array<f32>;
@@ -32,7 +32,7 @@ const BATCH: u32 = 64u;
 // Each pixel's transmittance behind the splats done so far, and what everything behind adds to
 // the loss along the pixel's gradient.
 var<workgroup> state: array<vec2<f32>, 256>;
-// Gradient with respect to colour and depth.
+// Gradient with respect to color and depth.
 var<workgroup> wanted: array<vec4<f32>, 256>;
 // End of the pixel's part of the tile's list.
 var<workgroup> pixel_end: array<u32, 256>;

@@ -1,4 +1,4 @@
-// Raw Gaussians to splats in the picture: EWA projection, activation, colour towards the camera,
+// Raw Gaussians to splats in the picture: EWA projection, activation, color towards the camera,
 // and how many tiles each one reaches. One thread a Gaussian.
 #include "constants"
 #include "shared/view.wgsl"
@@ -21,7 +21,7 @@
 @group(0) @binding(7) var<storage, read_write> tile_counts: array<u32>;
 @group(0) @binding(8) var<storage, read_write> counters: array<atomic<u32>>;
 
-#include "shared/linearise.wgsl"
+#include "shared/linearize.wgsl"
 
 var<workgroup> drawn_here: atomic<u32>;
 var<workgroup> degenerate_here: atomic<u32>;
@@ -43,7 +43,7 @@ fn color_towards(i: u32, world: vec3<f32>) -> vec3<f32> {
 // The splat of Gaussian `i`; radius 0 where it is not drawn.
 fn splat_of(i: u32) -> Splat {
     var splat: Splat;
-    let p = linearise(i);
+    let p = linearize(i);
     if !p.ok {
         return splat;
     }

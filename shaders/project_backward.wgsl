@@ -25,7 +25,7 @@
 @group(0) @binding(9) var<storage, read_write> growth: array<vec4<f32>>;
 @group(0) @binding(10) var<storage, read_write> counters: array<atomic<u32>>;
 
-#include "shared/linearise.wgsl"
+#include "shared/linearize.wgsl"
 
 const NOT_DRAWN: f32 = -1.0;
 const NOT_FINITE: f32 = -2.0;
@@ -44,7 +44,7 @@ fn store_coefficient(i: u32, k: u32, value: vec3<f32>) {
     }
 }
 
-// Gradient with respect to the coefficients, and, through the viewing direction, to the centre.
+// Gradient with respect to the coefficients, and, through the viewing direction, to the center.
 fn color_backward(i: u32, world: vec3<f32>, color: vec3<f32>, to_color: vec3<f32>) -> vec3<f32> {
     // A channel at its floor of 0 does not move.
     let g = select(vec3<f32>(0.0), to_color, color > vec3<f32>(0.0));
@@ -96,7 +96,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         store_zero(i, NOT_DRAWN);
         return;
     }
-    let p = linearise(i);
+    let p = linearize(i);
     let start_at = i * (GRADIENT_BASE + view.channels);
     let to_mean = vec2<f32>(gradient[start_at], gradient[start_at + 1u]);
     let to_covariance = vec3<f32>(gradient[start_at + 2u], gradient[start_at + 3u], gradient[start_at + 4u]);

@@ -18,7 +18,7 @@ struct Loss {
 }
 
 @group(0) @binding(0) var<uniform> loss: Loss;
-// Rendered colour in xyz.
+// Rendered color in xyz.
 @group(0) @binding(1) var<storage, read> pixels: array<vec4<f32>>;
 // Photo: red, green, blue, coverage from the low byte up.
 @group(0) @binding(2) var<storage, read> photo: array<u32>;

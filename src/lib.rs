@@ -2,7 +2,7 @@
 //!
 //! The data flow, one module per arrow (a module uses only those above it):
 //!
-//! * [`math`]: spherical harmonics, rotations, stable scalar functions, statistics, colour maps;
+//! * [`math`]: spherical harmonics, rotations, stable scalar functions, statistics, color maps;
 //! * [`scene`]: what a scene is made of: cameras, photos, Gaussians, masks; no I/O;
 //! * [`io`]: one file per format, and one `open(path)` that sniffs;
 //! * [`models`]: neural networks: pictures and phrases as vectors that can be compared;

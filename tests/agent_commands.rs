@@ -174,6 +174,15 @@ fn a_size_is_the_same_wherever_one_stands() {
 }
 
 #[test]
+fn several_things_are_marked_together_and_the_next_request_marks_anew() {
+    let (mut session, mut room) = (session(), Room::new());
+    say(&mut session, &mut room, "mark both bottles");
+    assert_eq!(room.log.last().map(String::as_str), Some("highlight green bottle, brown bottle"));
+    say(&mut session, &mut room, "mark the lamp");
+    assert_eq!(room.log.last().map(String::as_str), Some("highlight lamp"));
+}
+
+#[test]
 fn completions_lead_to_commands() {
     let room = Room::new();
     let all = room.identities();

@@ -97,7 +97,7 @@ fn text(t: &str) -> Say {
 fn a_good_model_is_heard_step_by_step() {
     let script = vec![
         calls(&[("go_to", json!({ "target": "the handle of the kettle", "side": "other" }))]),
-        calls(&[("move", json!({ "direction": "back", "distance": { "metres": 0.5 } }))]),
+        calls(&[("move", json!({ "direction": "back", "distance": { "meters": 0.5 } }))]),
         text("Here is the handle, from half a metre farther back."),
     ];
     let t = talk(script, "Show me the handle of the kettle from the other side, then step back half a metre.");
@@ -149,7 +149,7 @@ fn as_call(line: &str) -> Option<(String, String)> {
             if let Some(far) = parts.get(1) {
                 let (n, unit) = far.split_once(' ')?;
                 let n: f64 = n.parse().ok()?;
-                a["distance"] = if unit == "m" { json!({ "metres": n }) } else { json!({ "relative": n }) };
+                a["distance"] = if unit == "m" { json!({ "meters": n }) } else { json!({ "relative": n }) };
             }
             a
         }
@@ -162,7 +162,7 @@ fn as_call(line: &str) -> Option<(String, String)> {
     Some((name.into(), arguments.to_string()))
 }
 
-/// What a model would say in a dialogue of the table to do what is wanted; `None` where the table leaves
+/// What a model would say in a dialog of the table to do what is wanted; `None` where the table leaves
 /// that open, or the words of the built-in planner are what counts.
 fn script(turns: &[Turn]) -> Option<Vec<Say>> {
     let model_call = |line: &String| as_call(line).filter(|_| !line.contains(['*', '|'])).map(|c| Say::Calls(vec![c]));
@@ -194,11 +194,11 @@ fn the_tables_go_through_the_same_checks() {
         Table::of_commands(include_str!("data/agent_commands.toml")),
     ];
     let mut asked = 0;
-    for dialogue in tables.iter().flat_map(|t| &t.dialogue) {
-        let Some(says) = script(&dialogue.turns) else { continue };
+    for dialog in tables.iter().flat_map(|t| &t.dialog) {
+        let Some(says) = script(&dialog.turns) else { continue };
         let server = Server::new(says);
         let (mut session, mut room) = (session(&server), Room::new());
-        for turn in &dialogue.turns {
+        for turn in &dialog.turns {
             let (say, calls, outcome) = (turn.say.clone(), turn.calls.clone(), turn.outcome.clone());
             // A model answers in its own words.
             let turn = Turn { say, calls, outcome, reply: Vec::new() };

@@ -21,7 +21,7 @@ fn the_schemas_know_every_word_and_bound_of_the_calls() {
     assert_eq!(of("locate", "query/maxLength"), json!(MAX_TEXT));
     let (least, most) = (CLOSENESS.start(), CLOSENESS.end());
     assert_eq!(of("go_to", "closeness/anyOf/1"), json!({ "type": "number", "minimum": least, "maximum": most }));
-    let meters = of("move", "distance/anyOf/0/properties/metres/maximum");
+    let meters = of("move", "distance/anyOf/0/properties/meters/maximum");
     assert_eq!(meters.as_f64(), Some(FARTHEST));
 }
 

@@ -1,4 +1,4 @@
-//! The real binary moves about: flights to photos and targets, films of them, and the agent.
+//! The real binary moves about: flights to photos and targets, videos of them, and the agent.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod cli_support;

@@ -1,4 +1,4 @@
-//! The real binary measures error against run time: every stage, stopped and gone on with, refused
+//! The real binary measures error against run time: every stage, stopped and resumed, refused
 //! where it must be.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -36,7 +36,7 @@ fn points<'a>(report: &'a Value, stage: &str) -> &'a [Value] {
 }
 
 #[test]
-fn every_stage_is_measured_and_gone_on_with() {
+fn every_stage_is_measured_and_resumed() {
     let folder = folder();
     let photos = tiny_dataset(folder.path());
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();

@@ -7,7 +7,7 @@ mod cli_support;
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::{Duration, Instant};
 
 use cli_support::{Done, Server, command, first_version, fmlgs, folder, tiny_dataset};
@@ -266,7 +266,7 @@ fn a_full_disk_is_named_and_ends_nothing() {
 
 /// What a process tells on standard error, line by line.
 fn lines_of(child: &mut Child) -> Receiver<String> {
-    let (told, lines) = channel();
+    let (told, lines) = sync_channel(10_000);
     let stderr = BufReader::new(child.stderr.take().unwrap());
     let read = move || stderr.lines().map_while(Result::ok).try_for_each(|line| told.send(line));
     std::thread::Builder::new().name("lines".into()).spawn(read).unwrap();
@@ -294,7 +294,7 @@ fn a_finished_training_is_left_alone_and_objects_survive_one_that_goes_on() {
     let find = || fmlgs(&["preprocess", scene, "--masks", photos, "--encoder", "none", "--max-seeds", "1"]);
     let names = || fmlgs(&["info", scene, "--json"]).ok().json()["identities"].clone();
 
-    // Stopped, labelled, gone on with: the objects are carried over, and kept as they were.
+    // Stopped, labeled, resumed: the objects are carried over, and kept as they were.
     let mut child = start(&train_arguments(photos, scene, "600"));
     wait_for_checkpoints(&mut child, &out.join("checkpoint.bin"), 2);
     send(&child, "-INT");

@@ -10,7 +10,7 @@ use fmlgs::render::{ALPHA_MAX, ALPHA_MIN, BLUR_PX2, Features, RenderSettings, TR
 use fmlgs::scene::{Camera, GaussianCloud};
 use glam::{DMat2, DMat3, DVec2, DVec3};
 
-/// Colour, alpha, expected depth and median depth of every pixel, one pixel at a time, one Gaussian
+/// Color, alpha, expected depth and median depth of every pixel, one pixel at a time, one Gaussian
 /// at a time, with textbook formulas.
 fn brute_force(cloud: &GaussianCloud<f64>, camera: &Camera, s: &RenderSettings) -> Vec<[f64; 6]> {
     struct Flat {

@@ -145,7 +145,7 @@ fn every_tile_lists_what_its_pixels_need_in_order_of_depth() {
         // The exact test must leave out most of what the bounding boxes hold at this size.
         let pairs = found.list.len();
         assert!((300..6_000).contains(&pairs), "{pairs} pairs");
-        // Negative controls: two neighbours swapped, one dropped.
+        // Negative controls: two neighbors swapped, one dropped.
         let full = found.ranges.iter().position(|r| r[1] - r[0] > 3).unwrap();
         let at = found.ranges[full][0] as usize;
         found.list.swap(at, at + 2);
@@ -183,7 +183,7 @@ fn pictures_match_the_oracle() {
 }
 
 #[test]
-fn lower_degree_than_stored_is_honoured() {
+fn lower_degree_than_stored_is_honored() {
     with_context(|context| {
         let mut renderer = Renderer::new(context).unwrap();
         let mut scene = Scene::new(150, 3, 0, [48, 40]);

@@ -1,4 +1,4 @@
-//! Loss, optimiser and whole training steps on the GPU against the CPU.
+//! Loss, optimizer and whole training steps on the GPU against the CPU.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod common;

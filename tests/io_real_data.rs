@@ -150,7 +150,7 @@ fn assert_same(a: &GaussianCloud, b: &GaussianCloud) {
     }
 }
 
-/// The coarser level of detail was turned into a `.ply` by other software: box, colour and
+/// The coarser level of detail was turned into a `.ply` by other software: box, color and
 /// opacity of the whole agree, though no single Gaussian does.
 fn assert_same_object(fine: &GaussianCloud, coarse: &Path) {
     let coarse = cloud(coarse);

@@ -1,4 +1,4 @@
-//! The catalogue: what is here, bringing files, fetching them from a folder on a server, and refusing
+//! The catalog: what is here, bringing files, fetching them from a folder on a server, and refusing
 //! what is not what it should be. With the reduced networks of the fixtures in place of real ones.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 #![allow(clippy::disallowed_methods)] // A server for a second needs no name.
@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use fmlgs::math::stats;
-use fmlgs::models::catalogue::{self, Entry, InstallError, State};
+use fmlgs::models::catalog::{self, Entry, InstallError, State};
 use fmlgs::models::fetch::{FetchError, Patience};
 
 mod cli_support;
@@ -60,10 +60,10 @@ fn impatient() -> Patience {
 
 #[test]
 fn the_list_is_sound() {
-    let all = catalogue::entries().expect("the list");
+    let all = catalog::entries().expect("the list");
     assert!(all.len() >= 4);
     for e in &all {
-        assert!(!e.title.is_empty() && e.adds.ends_with('.') && !e.licence.is_empty(), "{}", e.id);
+        assert!(!e.title.is_empty() && e.adds.ends_with('.') && !e.license.is_empty(), "{}", e.id);
         assert_eq!(e.built_in, e.description.is_empty(), "{}", e.id);
         assert_eq!(e.built_in, e.file.is_empty(), "{}", e.id);
         if !e.built_in {
@@ -74,8 +74,8 @@ fn the_list_is_sound() {
             assert!(e.megabytes() > 100 && e.description == format!("{}.json", e.id));
         }
     }
-    assert!(matches!(catalogue::entry("no-such-model"), Err(InstallError::Unknown(_))));
-    assert!(matches!(catalogue::entry("demo").expect("listed").state(Path::new("/nowhere")), State::BuiltIn));
+    assert!(matches!(catalog::entry("no-such-model"), Err(InstallError::Unknown(_))));
+    assert!(matches!(catalog::entry("demo").expect("listed").state(Path::new("/nowhere")), State::BuiltIn));
 }
 
 #[test]

@@ -24,7 +24,7 @@ enum Turn {
     StallAfter(usize),
     /// Claims to send so many bytes.
     Claim(usize),
-    /// A page for people.
+    /// A page for display.
     Page,
     /// This status and nothing else.
     Status(u16),

@@ -1,4 +1,4 @@
-//! Relevancy and localisation on real OpenCLIP embeddings of a LERF scene: 36 identities, seen once
+//! Relevancy and localization on real OpenCLIP embeddings of a LERF scene: 36 identities, seen once
 //! and in many further views, and the scene's queries.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
@@ -7,9 +7,9 @@ mod common;
 
 use fmlgs::math::stats;
 use fmlgs::math::vector::{dot, unit};
-use fmlgs::pipeline::semantics::grammar::{Kind, Phrase};
-use fmlgs::pipeline::semantics::localise::{Answer, localise};
-use fmlgs::pipeline::semantics::meaning::{ByMeaning, MeaningOptions, Phrasebook};
+use fmlgs::pipeline::semantics::by_embedding::{EmbeddingOptions, EmbeddingScorer, TextEmbeddings};
+use fmlgs::pipeline::semantics::localize::{Answer, localize};
+use fmlgs::pipeline::semantics::parse::{Kind, ParsedQuery};
 use fmlgs::pipeline::semantics::relevancy::{CANONICAL, PART_WEIGHT, advantage, deviate, score};
 use fmlgs::scene::{Identities, IdentityId, LanguageFeatures, Level, NOBODY, ViewFeatures};
 
@@ -159,12 +159,12 @@ fn answers_say_when_nothing_or_several_fit() {
     language.of.iter().for_each(|_| {
         identities.add(Level::Object, NOBODY, Vec::new());
     });
-    let mut phrases = Phrasebook::default();
+    let mut phrases = TextEmbeddings::default();
     phrases.learn(&QUERIES, |p| Ok::<_, ()>(scene.text(p))).expect("known");
     let ask = |query: &str| {
-        let phrase = Phrase { text: query.into(), target: query.into(), whole: None };
-        let options = MeaningOptions::default();
-        localise(&identities, &phrase, Kind::Auto, &mut ByMeaning::new(&language, &phrases, options))
+        let phrase = ParsedQuery { text: query.into(), target: query.into(), whole: None };
+        let options = EmbeddingOptions::default();
+        localize(&identities, &phrase, Kind::Auto, &mut EmbeddingScorer::new(&language, &phrases, options))
     };
     assert!(matches!(ask("dall-e brand"), Answer::NotFound(_)), "less relevant than a canonical phrase");
     assert!(matches!(ask("spoon"), Answer::Ambiguous(_)), "two within 0.005");
@@ -199,7 +199,7 @@ fn parts_are_moved_towards_their_whole_and_made_unit_again() {
 #[test]
 fn an_identity_counts_by_its_best_view() {
     let Some(scene) = load() else { return };
-    let mut phrases = Phrasebook::default();
+    let mut phrases = TextEmbeddings::default();
     phrases.learn(&QUERIES, |p| Ok::<_, ()>(scene.text(p))).expect("known");
     type Views = Vec<Vec<f32>>;
     let language = |views: &dyn Fn(&[Vec<f32>]) -> Views| {
@@ -214,7 +214,7 @@ fn an_identity_counts_by_its_best_view() {
     let (all, first) = (language(&<[_]>::to_vec), language(&|v| v.iter().take(1).cloned().collect()));
     let mean = language(&mean);
     let advantage_of = |features: &LanguageFeatures, query: &str, target: usize| {
-        ByMeaning::new(features, &phrases, MeaningOptions::default()).advantages(query, None)[target]
+        EmbeddingScorer::new(features, &phrases, EmbeddingOptions::default()).advantages(query, None)[target]
     };
     let (mut compared, mut over_mean, mut over_first) = (0, 0, 0);
     for query in QUERIES {

@@ -26,7 +26,7 @@ fn dataset(path: &Path) -> Dataset {
     }
 }
 
-/// Share of the labelled objects, and of the parts, with which some region has an IoU of 0.5.
+/// Share of the labeled objects, and of the parts, with which some region has an IoU of 0.5.
 fn recall(found: &[FoundMask], labels: &[Region]) -> [f64; 2] {
     [Level::Object, Level::Part].map(|level| {
         let asked = labels.iter().filter(|l| l.level == Some(level) && l.mask.area() >= LEAST_PX);

@@ -17,7 +17,7 @@ use fmlgs::pipeline::semantics::view_map::ViewMap;
 use fmlgs::render::gpu::cloud::Packed;
 use fmlgs::render::{BackendChoice, Features, Frame, RenderSettings, Renderer};
 use fmlgs::scene::plan::{Item, NOISE_FLOOR, PlanOverride, When};
-use fmlgs::scene::trace::{self, Sort};
+use fmlgs::scene::resource_log::{self, Sort};
 use fmlgs::scene::{
     Camera, Facts, GaussianCloud, Identities, Level, Limits, Machine, NOBODY, Overrides, ScenePlan, SemanticMap,
 };
@@ -224,7 +224,7 @@ fn working_memory_is_given_back_and_the_next_picture_is_the_same() {
 
 #[test]
 fn without_a_gpu_no_device_is_opened() {
-    let devices = || trace::since(0).iter().filter(|l| l.sort == Sort::Device).count();
+    let devices = || resource_log::since(0).iter().filter(|l| l.sort == Sort::Device).count();
     let before = devices();
     let mut chosen = Renderer::choose(BackendChoice::Auto, |why| panic!("{why}")).expect("one that works");
     let real = fmlgs::render::real_gpu().is_some();

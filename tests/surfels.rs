@@ -28,7 +28,7 @@ fn settings() -> RenderSettings {
     }
 }
 
-/// One pixel by the definition: rays meet planes in world space, in the order of the centres.
+/// One pixel by the definition: rays meet planes in world space, in the order of the centers.
 struct Pixel {
     alpha: f64,
     color: [f64; 3],

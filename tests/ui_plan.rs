@@ -15,7 +15,7 @@ use fmlgs::pipeline::observer::Silent;
 use fmlgs::pipeline::synth::{self, SynthOptions};
 use fmlgs::scene::IdentityId;
 use fmlgs::scene::plan::PlanOverride;
-use fmlgs::scene::trace::{self, Sort};
+use fmlgs::scene::resource_log::{self, Sort};
 use fmlgs::ui::actions::{Action, Pane};
 use fmlgs::ui::app::App;
 
@@ -28,7 +28,7 @@ struct Window {
 impl Window {
     /// A window without the panes that list objects, for which `overrides` are made.
     fn new(data: &Path, first: PathBuf, overrides: &[&str]) -> Self {
-        let traced = trace::since(0).len();
+        let traced = resource_log::since(0).len();
         let mut harness = ui_common::window(Folders { data: data.to_path_buf() }, Some(Action::Open(first)));
         let app = harness.state_mut();
         app.layout.hidden.extend([Pane::Objects, Pane::Chat]);
@@ -57,12 +57,12 @@ impl Window {
     }
 
     fn loaded(&self, sort: Sort) -> usize {
-        trace::since(self.traced).iter().filter(|l| l.sort == sort).count()
+        resource_log::since(self.traced).iter().filter(|l| l.sort == sort).count()
     }
 
     fn until_loaded(&mut self, sort: Sort) {
         let traced = self.traced;
-        self.until(&format!("{sort:?} to be loaded"), |_| trace::since(traced).iter().any(|l| l.sort == sort));
+        self.until(&format!("{sort:?} to be loaded"), |_| resource_log::since(traced).iter().any(|l| l.sort == sort));
     }
 
     /// After how long the window wants to be drawn again by itself.
@@ -77,7 +77,7 @@ impl Window {
 }
 
 /// What is loaded only once it is used.
-const LATER: [Sort; 5] = [Sort::Maps, Sort::Portraits, Sort::Model, Sort::Paths, Sort::Agent];
+const LATER: [Sort; 5] = [Sort::Maps, Sort::Thumbnails, Sort::Model, Sort::Paths, Sort::Agent];
 
 /// A trained scene with objects and their looks, and its photos.
 fn trained(folder: &Path) -> PathBuf {
@@ -122,7 +122,7 @@ fn nothing_is_loaded_or_drawn_before_it_is_used() {
     w.until("the first view", |a| a.viewport.photo_index().is_none() && a.viewport.picture().is_some_and(|p| p.full));
     w.rest();
     let too_early: Vec<Sort> = LATER.into_iter().filter(|s| w.loaded(*s) > 0).collect();
-    assert!(too_early.is_empty(), "{too_early:?}: {:#?}", trace::since(w.traced));
+    assert!(too_early.is_empty(), "{too_early:?}: {:#?}", resource_log::since(w.traced));
     assert_eq!((w.loaded(Sort::Gaussians), w.loaded(Sort::Objects)), (1, 1));
 
     // An idle window draws nothing.
@@ -135,9 +135,9 @@ fn nothing_is_loaded_or_drawn_before_it_is_used() {
     assert!(w.loaded(Sort::Maps) == 1 && lazy.1 > 0, "{lazy:?}");
     w.until_loaded(Sort::Model);
     assert_eq!(w.loaded(Sort::Model), 1, "one network understands phrases");
-    assert_eq!([Sort::Paths, Sort::Portraits, Sort::Agent].map(|s| w.loaded(s)), [0; 3]);
+    assert_eq!([Sort::Paths, Sort::Thumbnails, Sort::Agent].map(|s| w.loaded(s)), [0; 3]);
     w.ask(Action::TogglePane(Pane::Objects));
-    w.until_loaded(Sort::Portraits);
+    w.until_loaded(Sort::Thumbnails);
     assert_eq!(w.loaded(Sort::Paths), 0);
     w.ask(Action::GoToTarget(lazy.0[0], Side::default()));
     w.until("the graph", |a| a.state.explored.is_some());
@@ -149,7 +149,7 @@ fn nothing_is_loaded_or_drawn_before_it_is_used() {
     let mut all = Window::new(&data, scene, &overrides);
     all.until("a picture at rest", |a| a.viewport.picture().is_some_and(|p| p.full));
     all.until("the graph", |a| a.state.explored.is_some());
-    [Sort::Maps, Sort::Portraits, Sort::Model].into_iter().for_each(|sort| all.until_loaded(sort));
+    [Sort::Maps, Sort::Thumbnails, Sort::Model].into_iter().for_each(|sort| all.until_loaded(sort));
     let ticket = all.ticket();
     all.harness.state_mut().override_plan(["redraw=always".parse::<PlanOverride>().expect("an override")]);
     all.rest();

@@ -1,4 +1,4 @@
-//! The whole window, headless: what a person sees and does, with the software adapter.
+//! The whole window, headless: what the user sees and does, with the software adapter.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod ui_common;
@@ -60,7 +60,7 @@ impl Window {
         self.harness.query_all_by_label_contains(text).next().is_some()
     }
 
-    /// Whether a picture of the window has more than one colour.
+    /// Whether a picture of the window has more than one color.
     fn is_drawn(&mut self) -> bool {
         let image = self.harness.render().expect("the software adapter draws");
         let first = *image.get_pixel(0, 0);
@@ -250,7 +250,7 @@ fn training_moves_the_plot_pauses_resumes_and_is_cancelled() {
 
     w.click("Start training");
     w.until("going on from the checkpoint", |a| last_step(a) > reached);
-    assert!(w.app().state.history.steps.iter().any(|s| s.step < reached), "the curve goes on where it was");
+    assert!(w.app().state.history.steps.iter().any(|s| s.step < reached), "the curve resumes where it was");
     w.ask(Action::Cancel);
     w.until("the end", |a| a.state.job.is_none());
 }
@@ -312,7 +312,7 @@ fn a_photo_that_is_broken_is_marked_and_the_rest_stays_usable() {
     std::fs::write(&broken, &bytes[..bytes.len() / 2]).expect("write");
     let mut w = Window::new(Some(Action::Open(photos)));
     w.until("the warning", |a| a.state.log.iter().any(|l| l.text.contains("0003.png")));
-    assert!(w.app().state.error.is_none(), "it is no reason to stop a person");
+    assert!(w.app().state.error.is_none(), "it is no reason to stop the user");
     assert!(w.app().state.scene.is_some());
 }
 

@@ -3,7 +3,7 @@
 struct Chunk {
     // Channels per Gaussian in the buffers.
     channels: u32,
-    // First channel of this pass. Pass 0 also handles colour, alpha and depth.
+    // First channel of this pass. Pass 0 also handles color, alpha and depth.
     first: u32,
     // Whether the loss has a gradient with respect to expected depth.
     depth_gradient: u32,

@@ -74,7 +74,7 @@ fn harmonics_gradient(degree: u32, d: vec3<f32>) -> array<vec3<f32>, 16> {
     return g;
 }
 
-// Unit direction of a centre relative to the camera. Scaled first: the square of what is far away overflows.
+// Unit direction of a center relative to the camera. Scaled first: the square of what is far away overflows.
 fn towards(world: vec3<f32>) -> vec3<f32> {
     return normalize(world / max(abs(world.x), max(abs(world.y), abs(world.z))));
 }

@@ -13,7 +13,7 @@ fn tile_bounds(mean: vec2<f32>, factor: vec3<f32>, reach: f32, tiles: vec2<u32>)
     return vec4<u32>(vec2<u32>(lo), vec2<u32>(max(hi, lo)));
 }
 
-// Whether the smallest q over the rectangle of the tile's pixel centres is within reach. A little
+// Whether the smallest q over the rectangle of the tile's pixel centers is within reach. A little
 // slack, so that rounding never leaves out a pixel that blending would have drawn.
 fn reaches_tile(mean: vec2<f32>, factor: vec3<f32>, reach: f32, tile: vec2<u32>) -> bool {
     let lo = vec2<f32>(tile * TILE_PX) + 0.5 - mean;
@@ -22,8 +22,8 @@ fn reaches_tile(mean: vec2<f32>, factor: vec3<f32>, reach: f32, tile: vec2<u32>)
     if all(nearest == vec2<f32>(0.0)) {
         return true;
     }
-    // A convex function whose minimiser lies outside a rectangle is smallest on an edge that
-    // faces the minimiser: at most one upright and one level edge.
+    // A convex function whose minimizer lies outside a rectangle is smallest on an edge that
+    // faces the minimizer: at most one upright and one level edge.
     var q = 3.0e38;
     if nearest.x != 0.0 {
         let along = factor.y * factor.y + factor.z * factor.z;

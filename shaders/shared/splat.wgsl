@@ -1,6 +1,6 @@
 // A Gaussian in the picture. Twin of `layout::Splat`.
 struct Splat {
-    // Centre in px, depth along the viewing axis.
+    // Center in px, depth along the viewing axis.
     mean: vec2<f32>,
     depth: f32,
     // After the sigmoid and the anti-aliasing compensation.
@@ -16,10 +16,10 @@ struct Splat {
 }
 
 // Gradient of one splat, ahead of its extra channels: mean 2, covariance xx xy yy, opacity,
-// colour 3, depth.
+// color 3, depth.
 const GRADIENT_BASE: u32 = 10u;
 
-// The splat's squared Mahalanobis distance at `d` px from its centre.
+// The splat's squared Mahalanobis distance at `d` px from its center.
 fn distance2(factor: vec3<f32>, d: vec2<f32>) -> f32 {
     let a = factor.x * d.x + factor.y * d.y;
     let b = factor.z * d.y;

@@ -4,7 +4,7 @@ struct View {
     right: vec4<f32>,
     down: vec4<f32>,
     forward: vec4<f32>,
-    // Cloud origin minus camera centre, formed in f64 and split, so that far scenes stay exact.
+    // Cloud origin minus camera center, formed in f64 and split, so that far scenes stay exact.
     offset_hi: vec4<f32>,
     offset_lo: vec4<f32>,
     background: vec4<f32>,

@@ -73,8 +73,9 @@ impl Direction {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Distance {
-    /// So many metres, which needs a scene whose scale is known.
-    Metres(f64),
+    /// So many meters, which needs a scene whose scale is known.
+    #[serde(alias = "metres")]
+    Meters(f64),
     /// So many steps; a step is what suits the scene.
     Relative(f64),
     /// One step.
@@ -82,14 +83,14 @@ pub enum Distance {
     Default,
 }
 
-/// Longest way that is walked at once, in metres or steps.
+/// Longest way that is walked at once, in meters or steps.
 pub const FARTHEST: f64 = 1000.0;
 
 impl Distance {
     /// Whether it can be walked: finite, above 0 and at most [`FARTHEST`].
     pub fn is_sound(self) -> bool {
         match self {
-            Self::Metres(d) | Self::Relative(d) => d > 0.0 && d <= FARTHEST,
+            Self::Meters(d) | Self::Relative(d) => d > 0.0 && d <= FARTHEST,
             Self::Default => true,
         }
     }

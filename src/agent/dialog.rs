@@ -10,6 +10,8 @@ pub struct DialogState {
     pub last: Option<IdentityId>,
     /// What "the left one" and "the second one" choose from: the candidates of the last question.
     pub group: Vec<IdentityId>,
+    /// What the present request has marked.
+    pub marked: Vec<IdentityId>,
     /// The last movement or flight, for "again" and "a bit more".
     pub moved: Option<ToolCall>,
     /// How close the last target was looked at.
@@ -18,6 +20,6 @@ pub struct DialogState {
 
 impl Default for DialogState {
     fn default() -> Self {
-        Self { last: None, group: Vec::new(), moved: None, closeness: NORMAL }
+        Self { last: None, group: Vec::new(), marked: Vec::new(), moved: None, closeness: NORMAL }
     }
 }

@@ -242,7 +242,8 @@ fn act(
     let it = if id == NOBODY { String::new() } else { the(world, id) };
     Ok(match call {
         ToolCall::Locate { .. } | ToolCall::Highlight { .. } => {
-            world.highlight(&[id]).map_err(failed)?;
+            dialog.marked.push(id);
+            world.highlight(&dialog.marked).map_err(failed)?;
             let place = describe::place(world, id);
             let facts = world.facts(id);
             let seen = facts.as_ref().is_some_and(|f| f.in_view > SEEN && !f.hidden);
@@ -277,15 +278,15 @@ fn act(
         }
         ToolCall::Move { direction, distance } => {
             let (distance, note) = match distance {
-                Distance::Metres(m) if world.metres_per_unit().is_none() => {
-                    let note = " This scene's scale in metres is not known, so I took a step for a metre.";
+                Distance::Meters(m) if world.metres_per_unit().is_none() => {
+                    let note = " This scene's scale in meters is not known, so I took a step for a meter.";
                     (Distance::Relative(*m), note)
                 }
                 known => (*known, ""),
             };
             let moved = world.move_eye(*direction, distance).map_err(|e| unreachable(world, "there", &e))?;
             let far = length(world, moved.distance_done);
-            if moved.stopped_by_matter {
+            if moved.stopped_by_obstacle {
                 format!(
                     "Moved {} {far}, and stopped there: something is in the way, or nothing is known beyond.{note}",
                     direction.text()

@@ -56,6 +56,7 @@ pub(super) struct Language {
     pub least: Vec<(String, Key)>,
     pub more: Vec<(String, Key)>,
     pub less: Vec<(String, Key)>,
+    pub amounts: Vec<(String, f64)>,
     pub units: Vec<(String, f64)>,
     pub steps: Vec<(String, f64)>,
     pub angles: Vec<(String, f64)>,

@@ -3,7 +3,7 @@
 use super::describe::{self, capital, length, the};
 use super::dialog::DialogState;
 use super::refusal::{Refusal, RefusalKind};
-use super::relation::{Relation, gap};
+use super::relation::{Relation, fit, gap};
 use super::resolve::resolve_all;
 use super::tool::{LevelFilter, Reference};
 use super::world::World;
@@ -12,28 +12,34 @@ use crate::scene::{IdentityId, NOBODY};
 /// What is listed or counted.
 pub(super) fn list_ids(
     world: &mut dyn World,
-    level: LevelFilter,
+    filter: LevelFilter,
     of: IdentityId,
     relation: Relation,
     named: Option<&str>,
 ) -> Result<Vec<IdentityId>, Refusal> {
-    let mut ids: Vec<IdentityId> = if of == NOBODY {
-        let wanted = world.identities().iter().filter(|(_, i)| level.accepts(i.level)).map(|(id, _)| id);
-        let all: Vec<IdentityId> = wanted.collect();
-        all.into_iter().filter(|id| world.facts(*id).is_some()).collect()
-    } else if relation == Relation::PartOf {
-        let inside = world.identities().within(of);
-        let is_in = |id: &IdentityId| *id != of && inside.get(*id as usize) == Some(&true);
-        let all: Vec<IdentityId> = world.identities().iter().map(|(id, _)| id).filter(is_in).collect();
-        all.into_iter().filter(|id| world.facts(*id).is_some()).collect()
-    } else {
-        describe::neighbors(world, of, relation)
+    let named = match named {
+        Some(name) => Some(resolve_all(world, name, LevelFilter::Any, &DialogState::default())?),
+        None => None,
     };
-    if let Some(name) = named {
-        let fit = resolve_all(world, name, LevelFilter::Any, &DialogState::default())?;
-        ids.retain(|id| fit.contains(id));
+    let all = world.identities();
+    let inside = all.within(of);
+    let is_piece = |id: &IdentityId| *id != of && inside.get(*id as usize) == Some(&true);
+    if of != NOBODY && relation != Relation::PartOf {
+        // What is called so may be a part: the buttons on a controller, the handles on the table.
+        let Some(named) = named else { return Ok(describe::neighbors(world, of, relation)) };
+        let bounds = |id: IdentityId| world.facts(id).and_then(|f| f.bounds);
+        let (frame, anchor) = (world.view().frame(), bounds(of));
+        let stands = |id: &IdentityId| {
+            let bearer = all.line(of).any(|whole| whole == *id);
+            let fits = || fit(relation, &bounds(*id)?, anchor.as_ref()?, &frame);
+            !bearer && if is_piece(id) { matches!(relation, Relation::On | Relation::In) } else { fits().is_some() }
+        };
+        return Ok(named.into_iter().filter(stands).collect());
     }
-    Ok(ids)
+    let is_listed = |id: &IdentityId, level| if of == NOBODY { filter.accepts(level) } else { is_piece(id) };
+    let ids = all.iter().filter(|(id, i)| is_listed(id, i.level)).map(|(id, _)| id);
+    let is_named = |id: &IdentityId| named.as_ref().is_none_or(|named| named.contains(id));
+    Ok(ids.filter(|id| is_named(id) && world.facts(*id).is_some()).collect())
 }
 
 /// The list in words.

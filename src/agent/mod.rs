@@ -35,6 +35,7 @@ pub mod tool;
 pub mod transcript;
 #[cfg(test)]
 mod undo_tests;
+mod view_shares;
 pub mod words;
 pub mod world;
 

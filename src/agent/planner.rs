@@ -41,7 +41,7 @@ pub struct PlannerContext<'a> {
 
 /// Turns a request into a sequence of calls that may change after each result.
 pub trait Planner: Send {
-    /// Its name for people.
+    /// Its name for display.
     fn name(&self) -> &'static str;
 
     /// A new request. What was left of the last one is forgotten.

@@ -118,7 +118,7 @@ impl Extent {
     /// That of a thing's points: the box that stands upright and has the smallest footprint, without stray
     /// points. It depends on the thing and on what is up alone, never on a view.
     pub fn new(points: &[DVec3], up: DVec3) -> Option<Self> {
-        const STEP_DEG: f64 = 2.0;
+        const STEP_DEG: f64 = 3.0;
         let up = up.try_normalize().unwrap_or(DVec3::Z);
         let axes = [DVec3::X, DVec3::Y, DVec3::Z].into_iter();
         let level = axes.min_by(|a, b| a.dot(up).abs().total_cmp(&b.dot(up).abs()))?;

@@ -1,32 +1,29 @@
-//! A scene on this machine as the agent's [`World`]: what it asks is answered here, what it does is
-//! done to a copy and emitted to whoever shows the scene.
+//! A scene on this machine as the agent's [`World`]: what it does is emitted to whoever shows the scene.
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
 use super::camera_args::{Direction, Distance, NORMAL, Side};
 use super::relation::{Extent, View};
+pub use super::view_shares::Parts;
+use super::view_shares::{ViewShares, is_drawn};
 use super::world::{Arrival, Facts, Moved, Unreachable, World, WorldError};
 use crate::io;
+use crate::navigate::approach::{Approach, ApproachError, Place};
 use crate::navigate::target::{self, Wish};
-use crate::navigate::visit::{NoVisit, Place, Visit};
 use crate::navigate::{FRAMES, Flight, Pose, Speed};
-use crate::pipeline::semantics::answer::Answered;
+use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::asker::Asker;
-use crate::pipeline::semantics::grammar::Kind;
-use crate::pipeline::semantics::view_map::ViewMap;
-use crate::render::{RenderSettings, Renderer};
+use crate::pipeline::semantics::parse::Kind;
 use crate::scene::undo::UndoHistory;
-use crate::scene::{Bounds, Camera, GaussianCloud, Identities, IdentityId, SemanticMap, text};
+use crate::scene::{Bounds, Identities, IdentityId, SemanticMap, text};
 use crate::worker::Explored;
 
-/// Longer side of the picture in which pixels of identities are counted, px.
-const COUNT_SIDE_PX: u32 = 256;
 /// Points of a thing that its size is measured by, at most.
-const MEASURED_POINTS: usize = 4096;
-/// A step, as a multiple of the distance that flights keep to matter.
+const MEASURED_POINTS: usize = 2048;
+/// A step, as a multiple of the distance that flights keep to occupied space.
 const STEP: f64 = 6.0;
 
 /// A change of what is shown, for whoever shows the scene.
@@ -41,22 +38,8 @@ pub enum Effect {
     Renamed(IdentityId, String),
     /// The last change of a name was undone: it is called this again.
     RenameUndone(IdentityId, String),
-    /// The scene was looked at: where matter is is known.
+    /// The scene was looked at: which space is occupied is known.
     Explored(Arc<Explored>),
-}
-
-/// What a scene is made of.
-pub struct Parts {
-    pub cloud: Arc<GaussianCloud>,
-    pub settings: RenderSettings,
-    pub map: Arc<SemanticMap>,
-    pub cameras: Vec<Camera>,
-    pub up: DVec3,
-    /// Length of a unit in metres, if that is known.
-    pub metres: Option<f64>,
-    pub exports: PathBuf,
-    /// What is known of moving about, if the scene was looked at before.
-    pub explored: Option<Arc<Explored>>,
 }
 
 /// Receives the effects.
@@ -70,23 +53,9 @@ pub struct SceneWorld {
     aspect: f64,
     hidden: Vec<bool>,
     bounds: Vec<Option<Bounds>>,
-    shares: Mutex<Option<Counted>>,
+    shares: ViewShares,
     done: UndoHistory<Before>,
     emit: Emit,
-}
-
-/// Share of a view that each identity covers, by number, with the view.
-struct Counted {
-    eye: Pose,
-    hidden: Vec<bool>,
-    shares: Vec<f64>,
-}
-
-impl Counted {
-    /// The share of an identity; 0 of one that is not known.
-    fn of(&self, id: IdentityId) -> f64 {
-        self.shares.get(id as usize).copied().unwrap_or(0.0)
-    }
 }
 
 /// How it was before something was done.
@@ -112,13 +81,13 @@ impl SceneWorld {
             aspect,
             hidden: vec![false; n],
             bounds,
-            shares: Mutex::new(None),
+            shares: ViewShares::default(),
             done: UndoHistory::default(),
             emit,
         })
     }
 
-    /// Takes over what a person has done since: where the eye is, what is hidden, and what things are
+    /// Takes over what the user has done since: where the eye is, what is hidden, and what things are
     /// called.
     pub fn keep_up(&mut self, eye: Pose, aspect: f64, hidden: &[IdentityId], map: &Arc<SemanticMap>) {
         (self.eye, self.aspect) = (eye, aspect);
@@ -148,41 +117,14 @@ impl SceneWorld {
         new
     }
 
-    /// The Gaussians that a person sees.
+    /// Whether the user sees an identity's Gaussians.
     fn drawn(&self, id: IdentityId) -> bool {
-        !self.parts.map.identities.line(id).any(|i| self.hidden.get(i as usize).copied().unwrap_or(false))
+        is_drawn(&self.parts.map.identities, &self.hidden, id)
     }
 
-    /// Share of the present view that an identity covers, pieces included. All are counted together, once
-    /// per view.
+    /// Share of the present view that an identity covers, pieces included.
     fn share_of(&self, id: IdentityId) -> f64 {
-        let mut known = self.shares.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(counted) = known.as_ref().filter(|k| k.eye == self.eye && k.hidden == self.hidden) {
-            return counted.of(id);
-        }
-        let Parts { cloud, settings, map, .. } = &self.parts;
-        let (w, h) = if self.aspect >= 1.0 {
-            (COUNT_SIDE_PX, (f64::from(COUNT_SIDE_PX) / self.aspect).max(1.0) as u32)
-        } else {
-            ((f64::from(COUNT_SIDE_PX) * self.aspect).max(1.0) as u32, COUNT_SIDE_PX)
-        };
-        let camera = self.eye.camera(w, h);
-        let identities = &map.identities;
-        let mut shares = vec![0.0; identities.len() + 1];
-        let view = if self.hidden.contains(&true) {
-            let kept: Vec<usize> =
-                (0..cloud.len()).filter(|i| map.of.get(*i).is_none_or(|id| self.drawn(*id))).collect();
-            let of: Vec<IdentityId> = kept.iter().map(|i| map.of[*i]).collect();
-            ViewMap::render(&mut Renderer::new(), &cloud.select(&kept), &of, identities, &camera, settings)
-        } else {
-            ViewMap::render(&mut Renderer::new(), cloud, &map.of, identities, &camera, settings)
-        };
-        // A view that cannot be drawn shows nothing.
-        for id in view.map(|v| v.identity).unwrap_or_default() {
-            identities.line(id).for_each(|i| shares[i as usize] += 1.0);
-        }
-        shares.iter_mut().for_each(|s| *s /= f64::from(w * h));
-        known.insert(Counted { eye: self.eye, hidden: self.hidden.clone(), shares }).of(id)
+        self.shares.of(&self.parts, self.eye, self.aspect, &self.hidden, id)
     }
 
     fn fly(&mut self, flight: Flight, about: Option<DVec3>, what: String) {
@@ -257,7 +199,7 @@ impl World for SceneWorld {
         &self.parts.map.identities
     }
 
-    fn locate(&mut self, query: &str, kind: Kind) -> Result<Answered, WorldError> {
+    fn locate(&mut self, query: &str, kind: Kind) -> Result<QueryAnswer, WorldError> {
         let answered = self.asker.ask(&self.parts.map, query, kind).map_err(|e| WorldError(e.to_string()))?;
         Ok(answered.unwrap_or_else(|| super::world::locate_by_names(&self.parts.map.identities, query, kind)))
     }
@@ -288,7 +230,7 @@ impl World for SceneWorld {
     }
 
     fn metres_per_unit(&self) -> Option<f64> {
-        self.parts.metres
+        self.parts.meters
     }
 
     fn go_to(&mut self, id: IdentityId, from: Side, closeness: f64) -> Result<Arrival, Unreachable> {
@@ -306,14 +248,14 @@ impl World for SceneWorld {
             visit = go(target::Side::Best);
         }
         match visit {
-            Ok(Visit { view, target, flight }) => {
+            Ok(Approach { view, target, flight }) => {
                 let arrival = Arrival { distance: flight.length, in_view: view.covers };
                 let what = format!("going to {}", self.name(id));
                 (self.emit)(Effect::Mark(vec![id]));
                 self.fly(flight, Some(target), what);
                 Ok(arrival)
             }
-            Err(NoVisit::NoWay { why, nearest }) => {
+            Err(ApproachError::NoRoute { why, nearest }) => {
                 let center = self.bounds.get(id as usize).copied().flatten().map(|b| b.center());
                 let nearest = nearest.and_then(|n| Some(n.view.pose.center.distance(center?)));
                 Err(Unreachable { reason: why.to_string(), nearest })
@@ -336,10 +278,10 @@ impl World for SceneWorld {
     fn move_eye(&mut self, direction: Direction, distance: Distance) -> Result<Moved, Unreachable> {
         let explored = self.explored();
         let step = STEP * explored.navigator.clearance;
-        let wanted = match (distance, self.parts.metres) {
-            (Distance::Metres(m), Some(metres)) => m / metres.max(1e-9),
-            // Nobody knows what a metre is here: the agent asks for steps then.
-            (Distance::Metres(n), None) | (Distance::Relative(n), _) => n * step,
+        let wanted = match (distance, self.parts.meters) {
+            (Distance::Meters(m), Some(meters)) => m / meters.max(1e-9),
+            // Nobody knows what a meter is here: the agent asks for steps then.
+            (Distance::Meters(n), None) | (Distance::Relative(n), _) => n * step,
             (Distance::Default, _) => step,
         };
         let axis = match direction {
@@ -350,10 +292,10 @@ impl World for SceneWorld {
             Direction::Up => DVec3::NEG_Y,
             Direction::Down => DVec3::Y,
         };
-        let (center, stopped_by_matter) = explored.navigator.step(&self.eye, axis, wanted);
+        let (center, stopped_by_obstacle) = explored.navigator.step(&self.eye, axis, wanted);
         let to = Pose { center, ..self.eye };
         let distance_done = self.straight(to, format!("moving {}", direction.text()))?;
-        Ok(Moved { distance_done, stopped_by_matter })
+        Ok(Moved { distance_done, stopped_by_obstacle })
     }
 
     fn turn(&mut self, direction: Direction, degrees: f64) -> Result<(), Unreachable> {

@@ -1,4 +1,4 @@
-//! The tools as JSON schemas, as chat models take them: `assets/agent_tools.json`, which a test holds against
+//! The tools as JSON schemas, as chat models take them: `assets/agent_tools.json`, which a test compares with
 //! [`ToolCall`](super::tool::ToolCall).
 
 use serde_json::Value;

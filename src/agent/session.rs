@@ -162,6 +162,7 @@ impl Session {
 
     /// A new request: the outer loop.
     fn plan(&mut self, world: &mut dyn World, text: &str, sink: &mut ProgressSink<'_>) -> Reply {
+        self.dialog.marked.clear();
         let (dialog, policy) = (&self.dialog, &self.policy);
         self.planner.start(
             text,

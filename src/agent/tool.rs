@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::camera_args::{self, Direction, Distance, Side};
 use super::relation::Relation;
-use crate::pipeline::semantics::grammar::Kind;
+use crate::pipeline::semantics::parse::Kind;
 use crate::scene::{IdentityId, Level};
 
 /// Longest text in a call, in characters.
@@ -315,10 +315,12 @@ mod tests {
         let text = serde_json::to_string(&wanted).expect("JSON");
         assert_eq!(serde_json::from_str::<ToolCall>(&text).expect("read"), wanted);
         assert_eq!(ToolCall::parse("undo", ""), Ok(ToolCall::Undo {}));
-        assert_eq!(
-            ToolCall::parse("move", r#"{"direction": "back", "distance": {"metres": 0.5}}"#),
-            Ok(ToolCall::Move { direction: Direction::Back, distance: Distance::Metres(0.5) })
-        );
+        // The second spelling is that of older transcripts.
+        for unit in ["meters", "metres"] {
+            let text = format!(r#"{{"direction": "back", "distance": {{"{unit}": 0.5}}}}"#);
+            let wanted = ToolCall::Move { direction: Direction::Back, distance: Distance::Meters(0.5) };
+            assert_eq!(ToolCall::parse("move", &text), Ok(wanted));
+        }
     }
 
     #[test]
@@ -336,7 +338,7 @@ mod tests {
             ("turn", r#"{"direction": "left", "degrees": -5}"#),
             ("turn", r#"{"direction": "left", "degrees": "many"}"#),
             ("move", r#"{"direction": "sideways"}"#),
-            ("move", r#"{"direction": "up", "distance": {"metres": 1e30}}"#),
+            ("move", r#"{"direction": "up", "distance": {"meters": 1e30}}"#),
         ] {
             assert!(ToolCall::parse(name, arguments).is_err(), "{name} {arguments}");
         }

@@ -117,7 +117,7 @@ impl Transcript {
 }
 
 impl ToolCall {
-    /// In one line for people, with names in place of numbers.
+    /// In one line for display, with names in place of numbers.
     pub fn line(&self, identities: &Identities) -> String {
         let name = |target: &Target| match target {
             Target::Identity(id) => identities.full_name(*id),
@@ -146,7 +146,7 @@ impl ToolCall {
             Self::Move { direction, distance } => {
                 parts.push(direction.text().into());
                 match distance {
-                    Distance::Metres(m) => parts.push(format!("{} m", short(*m))),
+                    Distance::Meters(m) => parts.push(format!("{} m", short(*m))),
                     Distance::Relative(r) => parts.push(format!("{} steps", short(*r))),
                     Distance::Default => {}
                 }

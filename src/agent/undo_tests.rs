@@ -30,13 +30,13 @@ fn renamed() -> (SceneWorld, Arc<Mutex<Vec<Effect>>>) {
         map: map(None),
         cameras: Vec::new(),
         up: DVec3::Z,
-        metres: None,
+        meters: None,
         exports: PathBuf::new(),
         explored: None,
     };
     let said = Arc::clone(&effects);
-    let tell = Box::new(move |effect| said.lock().expect("no panic").push(effect));
-    let mut world = SceneWorld::new(parts, EYE, 1.0, tell).expect("no encoder is needed");
+    let emit = Box::new(move |effect| said.lock().expect("no panic").push(effect));
+    let mut world = SceneWorld::new(parts, EYE, 1.0, emit).expect("no encoder is needed");
     world.rename(1, "torch").expect("it is there");
     (world, effects)
 }

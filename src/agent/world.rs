@@ -3,10 +3,10 @@
 
 use super::camera_args::{Direction, Distance, Side};
 use super::relation::{Extent, View};
-use crate::pipeline::semantics::answer::{Answered, by_name};
-use crate::pipeline::semantics::grammar::{Kind, Phrase};
-use crate::pipeline::semantics::localise::Answer;
-use crate::pipeline::semantics::stages::StagesMs;
+use crate::pipeline::semantics::answer::{QueryAnswer, by_name};
+use crate::pipeline::semantics::localize::Answer;
+use crate::pipeline::semantics::parse::{Kind, ParsedQuery};
+use crate::pipeline::semantics::timing::StagesMs;
 use crate::scene::{Bounds, Identities, IdentityId, Level};
 
 /// What is known of one identity.
@@ -17,7 +17,7 @@ pub struct Facts {
     pub level: Level,
     /// What it is a piece of; `NOBODY` for objects.
     pub parent: IdentityId,
-    /// Its box in world space, in scene units, if it has any matter.
+    /// Its box in world space, in scene units, if it fills any space.
     pub bounds: Option<Bounds>,
     /// The share of the present view that it covers, 0 to 1.
     pub in_view: f64,
@@ -46,7 +46,7 @@ pub struct Unreachable {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Moved {
     pub distance_done: f64,
-    pub stopped_by_matter: bool,
+    pub stopped_by_obstacle: bool,
 }
 
 /// Why the scene could not do something, in plain words.
@@ -60,12 +60,12 @@ pub trait World {
     fn identities(&self) -> &Identities;
 
     /// What a query means. Errors if the scene cannot be asked.
-    fn locate(&mut self, query: &str, kind: Kind) -> Result<Answered, WorldError>;
+    fn locate(&mut self, query: &str, kind: Kind) -> Result<QueryAnswer, WorldError>;
 
     /// What is known of an identity; `None` if it is not (or no more) in the scene.
     fn facts(&self, id: IdentityId) -> Option<Facts>;
 
-    /// The size of an identity, if it has any matter: that of its box, unless more is known.
+    /// The size of an identity, if it fills any space: that of its box, unless more is known.
     fn extent(&self, id: IdentityId) -> Option<Extent> {
         Extent::of_box(&self.facts(id)?.bounds?, self.view().up)
     }
@@ -73,7 +73,7 @@ pub trait World {
     /// The present view.
     fn view(&self) -> View;
 
-    /// Length of a scene unit in metres, if that is known.
+    /// Length of a scene unit in meters, if that is known.
     fn metres_per_unit(&self) -> Option<f64>;
 
     /// Flies to an identity, to see it from `side`: 1 as close as usual, 2 twice as close.
@@ -82,7 +82,7 @@ pub trait World {
     /// Turns towards an identity.
     fn look_at(&mut self, id: IdentityId) -> Result<Arrival, Unreachable>;
 
-    /// Moves the eye; stops before matter.
+    /// Moves the eye; stops before occupied space.
     fn move_eye(&mut self, direction: Direction, distance: Distance) -> Result<Moved, Unreachable>;
 
     /// Turns the eye by degrees.
@@ -100,7 +100,7 @@ pub trait World {
     /// Draws everything again.
     fn show_all(&mut self) -> Result<(), WorldError>;
 
-    /// Leaves an identity out for a person who wants it gone, so that [`Self::undo`] can bring it back. What is
+    /// Leaves an identity out for the user who wants it gone, so that [`Self::undo`] can bring it back. What is
     /// said of it is that it is hidden: files keep it.
     fn remove(&mut self, id: IdentityId) -> Result<(), WorldError>;
 
@@ -118,10 +118,10 @@ pub trait World {
 }
 
 /// Answers a query by names alone: a [`World::locate`] for scenes without an encoder.
-pub fn locate_by_names(identities: &Identities, query: &str, kind: Kind) -> Answered {
-    match Phrase::parse(query) {
+pub fn locate_by_names(identities: &Identities, query: &str, kind: Kind) -> QueryAnswer {
+    match ParsedQuery::parse(query) {
         Some(phrase) => by_name(identities, &phrase, kind),
-        None => Answered {
+        None => QueryAnswer {
             answer: Answer::NotFound(Vec::new()),
             basis: crate::pipeline::semantics::answer::Basis::Names,
             relevancy: vec![0.0; identities.len() + 1],

@@ -17,7 +17,7 @@ use crate::jobs::open;
 use crate::navigate::Pose;
 
 const EXAMPLES: &str = "Examples:\n  \
-    fmlgs agent scene/ \"show me the handle of the kettle from the other side\" \"step back half a metre\"\n  \
+    fmlgs agent scene/ \"show me the handle of the kettle from the other side\" \"step back half a meter\"\n  \
     fmlgs agent scene/ \"what is on the table?\" --json\n  \
     fmlgs agent scene/ \"go to the lamp\" --view lamp.png --transcript talk.md\n  \
     fmlgs agent scene/ --planner llm --url http://127.0.0.1:11434/v1 --model qwen3 \"find something to cut with\"";
@@ -59,13 +59,13 @@ pub struct Args {
     /// What may be done: a policy file [default: FMLGS_POLICY, else the built-in one]
     #[arg(long)]
     policy: Option<PathBuf>,
-    /// Length of a scene unit in metres [default: the scene's own, if that is known]
-    #[arg(long, value_parser = number::within(1e-9..=1e9))]
-    metres: Option<f64>,
+    /// Length of a scene unit in meters [default: the scene's own, if that is known]
+    #[arg(long, alias = "metres", value_parser = number::within(1e-9..=1e9))]
+    meters: Option<f64>,
     /// Write the picture at the end
     #[arg(long)]
     view: Option<PathBuf>,
-    /// Write everything that was said and done: .json, or .md for people
+    /// Write everything that was said and done: .json, or .md to be read
     #[arg(long)]
     transcript: Option<PathBuf>,
     /// Print one JSON document
@@ -151,7 +151,7 @@ pub fn run(args: Args) -> Result<(), CliError> {
         cloud: scene.cloud,
         settings: scene.settings,
         map: Arc::new(map),
-        metres: args.metres.or(scene.metres_per_unit),
+        meters: args.meters.or(scene.metres_per_unit),
         exports: folder.join("exports"),
         explored: None,
     };
@@ -286,7 +286,7 @@ impl Talk {
     }
 }
 
-/// An effect for people; `None` where there is nothing to say.
+/// An effect for display; `None` where there is nothing to say.
 fn line(effect: &Effect) -> Option<String> {
     match effect {
         Effect::Fly(flight, _) => {

@@ -34,10 +34,10 @@ pub struct Args {
     /// Splats or trained scenes to draw, posed photos to train on
     #[arg(required_unless_present = "queries")]
     paths: Vec<PathBuf>,
-    /// Size of the drawn pictures; may be given several times [default: 640x480 1280x720]
+    /// Size of the drawn images; may be given several times [default: 640x480 1280x720]
     #[arg(long, value_parser = view::parse_size)]
     size: Vec<[u32; 2]>,
-    /// Longer side of the training pictures in px
+    /// Longer side of the training images in px
     #[arg(long, default_value_t = TrainConfig::default().max_side_px, value_parser = clap::value_parser!(u32).range(16..=16384))]
     max_side: u32,
     /// Repeats of each measurement

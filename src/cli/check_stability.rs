@@ -1,11 +1,11 @@
-//! `fmlgs check-stability`: the catalogue of extreme cases, run here and now.
+//! `fmlgs check-stability`: the catalog of extreme cases, run here and now.
 
 use serde_json::json;
 
 use super::{CliError, output};
-use crate::measure::stability::{self, Checked, Verdict, catalogue};
+use crate::measure::stability::{self, Checked, Verdict, catalog};
 
-/// Run the catalogue of extreme cases
+/// Run the catalog of extreme cases
 ///
 /// Each case says what happened, how far it is from double precision (or from what it should be), and
 /// whether the promise holds: finite numbers in, finite numbers out, or a clear refusal. What no precision
@@ -24,7 +24,7 @@ pub struct Args {
 }
 
 pub fn run(args: Args) -> Result<(), CliError> {
-    let all = catalogue();
+    let all = catalog();
     let wanted = |area: &str, name: &str| args.only.as_ref().is_none_or(|o| area.contains(o) || name.contains(o));
     let checked: Vec<Checked> = all.iter().filter(|c| wanted(c.area, &c.name)).map(|c| c.check()).collect();
     if checked.is_empty() {

@@ -24,22 +24,22 @@ use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainOutcome};
 use crate::render::{Features, RenderSettings, Renderer};
 use crate::scene::{Camera, Dataset, GaussianCloud, Machine};
 
-/// Pictures of the flight around the scene.
+/// Images of the flight around the scene.
 const FLIGHT_PICTURES: usize = 24;
 
 /// Show the program on the demo scene: make photos, train, look around
 ///
 /// Opens the window and trains there. With --headless it needs no display: it renders the demo
 /// scene's photos, trains on them, measures the result on held-out photos, asks for objects and
-/// parts, flies around the scene, and leaves pictures and a report in the folder given by --out.
-/// Run again, it goes on where it was and reuses the photos.
+/// parts, flies around the scene, and leaves images and a report in the folder given by --out.
+/// Run again, it resumes where it was and reuses the photos.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs demo\n  \
     fmlgs demo --headless\n  \
     fmlgs demo --headless --steps 300 --out quick/      a first look in a fraction of the time")]
 pub struct Args {
-    /// Do it without a window, and write pictures and a report
+    /// Do it without a window, and write images and a report
     #[arg(long)]
     pub headless: bool,
     /// Folder for everything the headless demo makes
@@ -92,9 +92,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let outcome = train::run(&dataset, &config, Some(&scene), &mut console)?;
     if outcome.end == TrainEnd::Cancelled {
         let (done, all) = (outcome.steps, config.steps);
-        return Err(CliError::Cancelled(format!(
-            "{done} of {all} steps are saved; the same command goes on from there"
-        )));
+        return Err(CliError::Cancelled(format!("{done} of {all} steps are saved; the same command resumes there")));
     }
     let options = Options { pictures: Some(compare), ..Options::default() };
     let job = Comparison::new(opened::drawable(&scene)?, &photos, options)?;
@@ -165,14 +163,14 @@ fn make_photos(folder: &Path, console: &mut Console) -> Result<Option<f64>, CliE
     Ok(Some(report.secs))
 }
 
-/// Draws a circle around what the photos look at; returns the median milliseconds per picture.
+/// Draws a circle around what the photos look at; returns the median milliseconds per image.
 fn fly(cloud: &GaussianCloud, settings: &RenderSettings, dataset: &Dataset, folder: &Path) -> Result<f64, CliError> {
     output::make_folder(folder)?;
     let mut renderer = Renderer::new();
     let mut millis = Vec::with_capacity(FLIGHT_PICTURES);
     for (i, camera) in circle(dataset).iter().enumerate() {
         if interrupt::asked_to_stop() {
-            return Err(CliError::Cancelled(format!("{i} of {FLIGHT_PICTURES} pictures of the flight were drawn")));
+            return Err(CliError::Cancelled(format!("{i} of {FLIGHT_PICTURES} images of the flight were drawn")));
         }
         let start = Instant::now();
         let frame = renderer.render(cloud, Features::NONE, camera, settings)?;
@@ -205,7 +203,7 @@ fn circle(dataset: &Dataset) -> Vec<Camera> {
 fn summary(r: &DemoReport) -> String {
     format!(
         "{} steps in {:.0} s: {} Gaussians, held-out PSNR {:.2} dB, SSIM {:.3} over {} views; asked by name, objects \
-         {:.3} and parts {:.3} mean IoU; {:.0} ms per picture",
+         {:.3} and parts {:.3} mean IoU; {:.0} ms per image",
         r.steps,
         r.train_secs,
         r.gaussians,
@@ -218,7 +216,7 @@ fn summary(r: &DemoReport) -> String {
     )
 }
 
-/// Writes `report.json` and, for people, `report.md`.
+/// Writes `report.json`, and `report.md` to be read.
 fn write_report(r: &DemoReport, folder: &Path) -> Result<(), CliError> {
     let json = serde_json::to_vec_pretty(r)?;
     io::atomic::write(&folder.join("report.json"), |w| w.write_all(&json))?;
@@ -236,7 +234,7 @@ fn write_report(r: &DemoReport, folder: &Path) -> Result<(), CliError> {
          {curve}\n## Held-out views\n\n`compare/` holds photo, render and difference (x 4) side by side.\n\n{}\n\
          ## Questions\n\n`queries/` holds relevancy maps in a held-out view. Objects were found in {:.0} s from the masks of \
          {}.\n\n{}\n\
-         ## Flight\n\n`flight/` holds {} pictures on a circle around the scene, {:.0} ms each.\n\n\
+         ## Flight\n\n`flight/` holds {} images on a circle around the scene, {:.0} ms each.\n\n\
          ## To look at it\n\n`scene/` is a trained scene: `fmlgs scene`, or open `scene/point_cloud.ply` in any splat viewer.\n",
         summary(r),
         r.document.computer.words(),

@@ -1,4 +1,4 @@
-//! The demo's questions: objects found from one labelled photo, asked for in a held-out view.
+//! The demo's questions: objects found from one labeled photo, asked for in a held-out view.
 
 use std::path::Path;
 use std::time::Instant;
@@ -13,9 +13,9 @@ use crate::jobs::evaluate::Comparison;
 use crate::jobs::query;
 use crate::models;
 use crate::pipeline::observer::{Observer, Severity, Silent};
+use crate::pipeline::semantics::build_map::{FindOptions, Found, Tools, find_objects};
 use crate::pipeline::semantics::code_map::CodeMap;
-use crate::pipeline::semantics::find::{FindOptions, Found, Tools, find_objects};
-use crate::pipeline::semantics::protocols::{AskedScene, LabelledView, categories, masks};
+use crate::pipeline::semantics::protocols::{AskedScene, LabeledView, categories, masks};
 use crate::pipeline::semantics::query_engine::QueryEngine;
 use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
 use crate::pipeline::semantics::tracker::TrackOptions;
@@ -106,7 +106,7 @@ pub fn run(
         let photo = &job.dataset.photos[i];
         let camera = photo.camera.limited_to(job.max_side_px);
         let view = ViewMap::render(&mut renderer, &job.cloud, &map.of, &map.identities, &camera, &job.settings)?;
-        let labelled = LabelledView {
+        let labeled = LabeledView {
             name: &photo.name,
             camera: &camera,
             exact: &view,
@@ -120,7 +120,7 @@ pub fn run(
                 None
             })
         };
-        units.extend(masks::compare(&mut AskedScene { map: &map, ask: &mut by_name }, &labelled));
+        units.extend(masks::compare(&mut AskedScene { map: &map, ask: &mut by_name }, &labeled));
         if let Some(error) = failed {
             return Err(error.into());
         }

@@ -1,4 +1,4 @@
-//! `fmlgs eval --masks`: objects and parts against labelled photos, by one of the protocols.
+//! `fmlgs eval --masks`: objects and parts against labeled photos, by one of the protocols.
 
 use std::path::Path;
 
@@ -61,7 +61,7 @@ fn summary(summary: &Summary) -> String {
         Summary::Masks { object_miou, part_miou } => {
             format!("mean IoU: objects {object_miou:.4}, parts {part_miou:.4}")
         }
-        Summary::Langsplat { localisation } => format!("localization accuracy {localisation:.4}"),
+        Summary::Langsplat { localization } => format!("localization accuracy {localization:.4}"),
         Summary::FastlgsEx {} => {
             "values are running pooled IoUs; not comparable with those of other protocols".to_owned()
         }
@@ -88,7 +88,7 @@ fn ablation(rows: &[part_recall::Row]) -> Vec<Vec<String>> {
         vec![
             tick(c.extraction),
             tick(c.deviation),
-            if c.joint { "joint".into() } else { tick(c.localisation) },
+            if c.joint { "joint".into() } else { tick(c.localization) },
             format!("{:.1}", 100.0 * r.recall),
             format!("{:.3}", r.mean_iou),
             format!("{:.2}", 1e3 * r.mean_secs),

@@ -8,13 +8,13 @@ use crate::jobs::{export, open};
 
 /// Write the Gaussians of a scene as a .ply for other splat viewers
 ///
-/// The layout is that of the original 3D Gaussian Splatting. Reads whatever 'fmlgs info' recognises
+/// The layout is that of the original 3D Gaussian Splatting. Reads whatever 'fmlgs info' recognizes
 /// as Gaussians, compressed formats too; properties that the program does not know are kept.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs export scene/ --out scene.ply\n  \
     fmlgs export big.compressed.ply --out big.ply\n  \
-    fmlgs export scene.ply --out flat.ply --sh-degree 0      smaller, same colour from everywhere")]
+    fmlgs export scene.ply --out flat.ply --sh-degree 0      smaller, same color from everywhere")]
 pub struct Args {
     /// Trained scene or splat file
     scene: PathBuf,

@@ -34,7 +34,7 @@ pub struct Args {
     json: bool,
 }
 
-/// Facts in two forms: label and text for people, and a JSON object.
+/// Facts in two forms: label and text for display, and a JSON object.
 struct Facts {
     lines: Vec<(&'static str, String)>,
     json: serde_json::Map<String, Value>,

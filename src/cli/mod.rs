@@ -42,7 +42,7 @@ pub use error::CliError;
 
 use self::plan::PlanArgs;
 use crate::scene::plan::PlanOverride;
-use crate::scene::{text, trace};
+use crate::scene::{resource_log, text};
 use crate::worker::Start;
 
 /// What each exit code means; part of `--help`.
@@ -59,13 +59,13 @@ Examples:
   fmlgs photos/                         open the window with a folder of posed photos
   fmlgs demo                            open the window with the demo scene and train it
   fmlgs info photos/                    say what a folder or file is
-  fmlgs train photos/ --out scene/      train; the same command again goes on where it stopped
+  fmlgs train photos/ --out scene/      train; the same command again resumes where it stopped
   fmlgs eval scene/ --pictures cmp/     PSNR and SSIM on held-out photos, pictures side by side
   fmlgs render scene/ --camera 12 --out view.png
   fmlgs preprocess scene/ --masks photos/   find objects and parts
   fmlgs query scene/ \"the lid of the kettle\" --mask lid.png
   fmlgs path scene/ --to \"the lid of the kettle\" --out path.json
-  fmlgs render scene/ --path path.json --out film.mp4
+  fmlgs render scene/ --path path.json --out video.mp4
   fmlgs agent scene/ \"what is on the table?\"
   fmlgs export scene/ --out scene.ply   for any other splat viewer
   fmlgs models                          neural networks: what is here, what each adds";
@@ -143,7 +143,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
     let quiet = cli.quiet;
     let wishes = cli.plan.wishes;
     if cli.trace {
-        trace::listen(|load| output::note(&load.line()));
+        resource_log::listen(|load| output::note(&load.line()));
     }
     let Some(command) = cli.command else {
         if cli.report.len() > 2 {

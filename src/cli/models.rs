@@ -8,7 +8,7 @@ use super::progress::Console;
 use super::{CliError, output};
 use crate::jobs::models::{self, Source};
 use crate::models::Role;
-use crate::models::catalogue::{self, Entry, State};
+use crate::models::catalog::{self, Entry, State};
 use crate::models::engine::engine;
 use crate::pipeline::observer::Silent;
 
@@ -33,7 +33,7 @@ pub struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Command {
-    /// Fetch the files of a model; goes on where it was stopped
+    /// Fetch the files of a model; resumes where it was stopped
     Fetch {
         /// Its name
         id: String,
@@ -68,11 +68,11 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
 }
 
 fn list(as_json: bool) -> Result<(), CliError> {
-    let (engine, folder) = (engine()?, catalogue::folder());
-    let all = catalogue::entries()?;
+    let (engine, folder) = (engine()?, catalog::folder());
+    let all = catalog::entries()?;
     if as_json {
         let one = |e: &Entry| {
-            json!({ "id": e.id, "role": e.role, "title": e.title, "adds": e.adds, "licence": e.licence, "source": e.source,
+            json!({ "id": e.id, "role": e.role, "title": e.title, "adds": e.adds, "license": e.license, "source": e.source,
                 "megabytes": e.megabytes(), "state": e.state(&folder) })
         };
         return output::print_json(&json!({
@@ -80,7 +80,7 @@ fn list(as_json: bool) -> Result<(), CliError> {
             "models": all.iter().map(one).collect::<Vec<_>>(),
         }));
     }
-    let mut rows = vec![["model", "for", "state", "MB", "licence"].map(str::to_owned).to_vec()];
+    let mut rows = vec![["model", "for", "state", "MB", "license"].map(str::to_owned).to_vec()];
     let mut notes = String::new();
     for e in &all {
         let (state, how) = state_text(e, &e.state(&folder));
@@ -89,7 +89,7 @@ fn list(as_json: bool) -> Result<(), CliError> {
             Role::Encoder => "looks",
             Role::Segmenter => "masks",
         };
-        rows.push(vec![e.id.clone(), role.into(), state, size, e.licence.clone()]);
+        rows.push(vec![e.id.clone(), role.into(), state, size, e.license.clone()]);
         notes.push_str(&format!("\n{}: {} {how}", e.id, e.adds));
     }
     let note = engine.note().map(|n| format!("\nNote: {n}")).unwrap_or_default();

@@ -7,7 +7,7 @@ use std::time::Instant;
 use serde_json::json;
 
 use super::{CliError, number, output, view};
-use crate::jobs::go_to::{self, Explored, VisitRequest};
+use crate::jobs::go_to::{self, ApproachRequest, Explored};
 use crate::jobs::{Scene, export, open, query};
 use crate::measure::survey::{self, smoothness};
 use crate::measure::table::rows;
@@ -18,14 +18,14 @@ use crate::scene::LevelFilter;
 
 /// Find a way through a scene, to what is asked for or to a photo
 ///
-/// The way leads over the photos' cameras and places around them, keeps clear of matter, and ends
+/// The way leads over the photos' cameras and places around them, keeps clear of occupied space, and ends
 /// where the target is seen best. Exit code 1 if there is none.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs path scene/ --to \"the handle of the kettle\" --side other --out path.json\n  \
     fmlgs path scene/ --from 0 --to-photo 24 --compare\n  \
     fmlgs path scene/ --survey 100 --cameras 50 --cameras 200\n  \
-    fmlgs render scene/ --path path.json --out film.mp4")]
+    fmlgs render scene/ --path path.json --out video.mp4")]
 pub struct Args {
     /// Trained scene
     scene: PathBuf,
@@ -101,14 +101,14 @@ pub fn run(args: Args) -> Result<(), CliError> {
         (None, photo) => {
             let to = Pose::of(&view::choose(photo.as_deref(), &scene)?);
             let flight = explored.fly(&from, &to, args.frames as usize);
-            (flight.map_err(|e| CliError::failed(explored.no_way(&e)))?, "the photo".to_owned())
+            (flight.map_err(|e| CliError::failed(explored.no_route(&e)))?, "the photo".to_owned())
         }
     };
     let route_ms = start.elapsed().as_secs_f64() * 1e3;
     if let Some(out) = &args.out {
         export::camera_path(out, &flight.camera_path(), args.aspect)?;
     }
-    let ours = flight.smoothness(&navigator.matter, navigator.clearance);
+    let ours = flight.smoothness(&navigator.occupancy, navigator.clearance);
     let [paper, through] = if args.compare { explored.of_paper(&flight) } else { [None, None] };
     if args.json {
         return output::print_json(&json!({
@@ -120,7 +120,7 @@ pub fn run(args: Args) -> Result<(), CliError> {
             "poses_repaired": flight.repaired,
             "clearance": navigator.clearance,
             "keypoints": navigator.graph.keypoints.len(),
-            "keypoints_in_matter": navigator.in_matter,
+            "keypoints_in_matter": navigator.in_occupied,
             "smoothness": smoothness(&ours),
             "paper": paper.as_ref().map(smoothness),
             "paper_through_keypoints": through.as_ref().map(smoothness),
@@ -150,7 +150,7 @@ fn to_target(
 ) -> Result<(Flight, String), CliError> {
     let map = scene.semantics()?;
     let id = query::identities(&map, query, LevelFilter::Auto, 1)?[0];
-    let (_, visited) = go_to::visit(VisitRequest {
+    let (_, visited) = go_to::visit(ApproachRequest {
         explored: Some(Arc::clone(explored)),
         cloud: Arc::clone(&scene.cloud),
         cameras: scene.views(),

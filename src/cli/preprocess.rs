@@ -10,8 +10,8 @@ use super::progress::Console;
 use super::{CliError, number, output};
 use crate::jobs::find_objects::{self, FindSettings, FoundObjects, Request};
 use crate::jobs::{JobError, open, plan};
-use crate::models::catalogue;
-use crate::pipeline::semantics::find::{CODE_STEPS, Carry, Found, Lifting};
+use crate::models::catalog;
+use crate::pipeline::semantics::build_map::{CODE_STEPS, Carry, Found, Lifting};
 use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::scene::Level;
 
@@ -24,7 +24,7 @@ use crate::scene::Level;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs preprocess scene/ --masks photos/               masks that came with the photos\n  \
-    fmlgs preprocess scene/ --masks labels/ --max-seeds 1  one labelled photo is enough to begin\n  \
+    fmlgs preprocess scene/ --masks labels/ --max-seeds 1  one labeled photo is enough to begin\n  \
     fmlgs preprocess scene/ --segmenter regions           no masks: regions of the photos, unnamed and rough")]
 pub struct Args {
     /// Trained scene
@@ -42,7 +42,7 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = Carry::Gaussians)]
     tracker: Carry,
     /// The SAM 2 that follows masks: a model of 'fmlgs models', or the path of a model's .json
-    #[arg(long, default_value = catalogue::SAM2)]
+    #[arg(long, default_value = catalog::SAM2)]
     tracker_model: String,
     /// Dataset with the photos [default: where the scene's photos are]
     #[arg(long)]

@@ -13,7 +13,7 @@ use crate::scene::text;
 /// Time between lines where standard error is no terminal.
 const LINE_INTERVAL: Duration = Duration::from_secs(5);
 
-/// Shows work to a person at a terminal or reading a log.
+/// Shows work to a user at a terminal or reading a log.
 pub struct Console {
     quiet: bool,
     terminal: bool,

@@ -10,9 +10,9 @@ use crate::jobs::open;
 use crate::jobs::query::{self, QueryResult, Request};
 use crate::pipeline::semantics::answer::Basis;
 use crate::pipeline::semantics::codes::TOLERANCE;
-use crate::pipeline::semantics::localise::{Answer, Hit};
+use crate::pipeline::semantics::localize::{Answer, Hit};
 use crate::pipeline::semantics::matching::MatchMode;
-use crate::pipeline::semantics::stages::ms_since;
+use crate::pipeline::semantics::timing::ms_since;
 use crate::scene::{LevelFilter, SemanticMap};
 
 /// Ask a scene for an object or a part

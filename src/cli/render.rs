@@ -9,12 +9,12 @@ use super::plan::PlanArgs;
 use super::progress::Console;
 use super::{CliError, number, output, view};
 use crate::io;
-use crate::io::animation::{Encoder, Settings};
+use crate::io::video::{Encoder, Settings};
 use crate::jobs::render::{self, Quantity};
 use crate::jobs::video::{self, Video, VideoRequest};
 use crate::jobs::{Scene, open, plan, query};
-use crate::navigate::film::MOST_PICTURES;
-use crate::navigate::{Film, Speed};
+use crate::navigate::camera_spline::MOST_PICTURES;
+use crate::navigate::{CameraSpline, Speed};
 use crate::render::{BackendChoice, RenderSettings};
 use crate::scene::{Camera, CameraPath, LevelFilter};
 
@@ -30,7 +30,7 @@ use crate::scene::{Camera, CameraPath, LevelFilter};
     fmlgs render scene/ --what depth --out depth.npy\n  \
     fmlgs render splat.ply --camera camera.json --out view.png\n  \
     fmlgs render splat.ply --photos photos/ --camera 0 --out view.png\n  \
-    fmlgs render scene/ --path path.json --size 1280x720 --out film.mp4\n\n\
+    fmlgs render scene/ --path path.json --size 1280x720 --out video.mp4\n\n\
     A camera file holds one entry of 'cameras' in the output of 'fmlgs info photos/ --json'.")]
 pub struct Args {
     /// Trained scene or splat file
@@ -53,19 +53,19 @@ pub struct Args {
     /// The file to write: .png, or .npy for depth and alpha
     #[arg(long, default_value = "render.png")]
     out: PathBuf,
-    /// Draw a film along this camera path instead: .mp4, .gif, .webp, or a folder of frames
+    /// Draw a video along this camera path instead: .mp4, .gif, .webp, or a folder of frames
     #[arg(long, conflicts_with_all = ["camera", "what"])]
     path: Option<PathBuf>,
-    /// Pictures per second of the film [default: the path's own]
+    /// Pictures per second of the video [default: the path's own]
     #[arg(long, requires = "path", value_parser = number::within(0.01..=CameraPath::MAX_FPS))]
     fps: Option<f64>,
-    /// Quality of the film, 0 to 100
+    /// Quality of the video, 0 to 100
     #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u8).range(0..=100))]
     quality: u8,
-    /// Mark what is asked for in every picture of the film
+    /// Mark what is asked for in every picture of the video
     #[arg(long, requires = "path")]
     mark: Option<String>,
-    /// Let this ffmpeg write the film
+    /// Let this ffmpeg write the video
     #[arg(long, requires = "path")]
     ffmpeg: Option<PathBuf>,
     /// Which renderer draws: auto takes a GPU if it is a real one
@@ -104,7 +104,7 @@ impl Args {
 
 pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     if let Some(path) = args.path.clone() {
-        return film(&args, &path, quiet);
+        return video(&args, &path, quiet);
     }
     let (scene, camera) = args.check()?;
     let overrides = args.plan.overrides();
@@ -134,11 +134,11 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     ))
 }
 
-/// Draws a film along the camera path in `path`.
-fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
+/// Draws a video along the camera path in `path`.
+fn video(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
     let keys = io::camera_path::open(path)?;
-    let film = Film::new(&keys, Speed::Constant);
-    let film = film.ok_or_else(|| CliError::failed(format!("{}: there are no keys in it", path.display())))?;
+    let spline = CameraSpline::new(&keys, Speed::Constant);
+    let spline = spline.ok_or_else(|| CliError::failed(format!("{}: there are no keys in it", path.display())))?;
     let scene = open::scene(&args.scene)?;
     let reads: Vec<&Path> = scene.reads().into_iter().chain([path]).collect();
     if args.out.is_dir() {
@@ -159,7 +159,7 @@ fn film(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
     if let Some(program) = &args.ffmpeg {
         settings.encoder = Encoder::Ffmpeg { program: program.clone(), args: Vec::new() };
     }
-    let cameras: Vec<Camera> = film.pictures(fps, MOST_PICTURES).iter().map(|p| p.camera(width, height)).collect();
+    let cameras: Vec<Camera> = spline.pictures(fps, MOST_PICTURES).iter().map(|p| p.camera(width, height)).collect();
     let marked = match &args.mark {
         Some(query) => {
             let map = scene.semantics()?;

@@ -161,8 +161,8 @@ fn printed(stage: &Stage) -> String {
 fn write(folder: &Path, report: &Report) -> Result<(), CliError> {
     let mut files = vec![("report.csv".to_owned(), report.csv()), ("report.html".to_owned(), page::html(report))];
     for stage in &report.stages {
-        let pictures = stage.measures.first().map(|m| plot::svg(stage, m));
-        files.extend(pictures.and_then(Result::ok).map(|p| (format!("{}.svg", stage.name.name()), p)));
+        let plot = stage.measures.first().and_then(|m| plot::svg(stage, m).ok());
+        files.extend(plot.map(|p| (format!("{}.svg", stage.name.name()), p)));
     }
     for (name, text) in files {
         io::atomic::write(&folder.join(name), |w| w.write_all(text.as_bytes()))?;

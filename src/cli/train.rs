@@ -17,7 +17,7 @@ use crate::scene::Dataset;
 /// Train 3D Gaussians from posed photos
 ///
 /// Writes a trained scene: a folder with scene.json, point_cloud.ply and a checkpoint. The same
-/// command run again goes on where it stopped, also after a crash; at most the checkpoint interval
+/// command run again resumes where it stopped, also after a crash; at most the checkpoint interval
 /// is lost. Every eighth photo is held out and used to measure quality.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
@@ -44,7 +44,7 @@ pub struct Args {
 /// Settings of a run as given; those left out keep their defaults.
 #[derive(Debug, Default, clap::Args)]
 pub struct Settings {
-    /// Optimiser steps in all; every schedule scales with it [default: 7000]
+    /// Optimizer steps in all; every schedule scales with it [default: 7000]
     #[arg(long, value_parser = number::within(1..=1_000_000_000_u64))]
     pub steps: Option<u64>,
     /// Longer side of the training pictures in px; photos are never enlarged [default: 512]
@@ -56,7 +56,7 @@ pub struct Settings {
     /// Highest degree of the spherical harmonics [default: 3]
     #[arg(long, value_parser = clap::value_parser!(u8).range(0..=3))]
     pub sh_degree: Option<u8>,
-    /// Open all bands of colour from the first step on
+    /// Open all bands of color from the first step on
     #[arg(long)]
     pub sh_at_once: bool,
     /// Share of the steps, from the first on, that see the photos at half their size [default: 0]

@@ -56,7 +56,7 @@ fn ends_with_path(name: &str, wanted: &str) -> bool {
     [name, stem].iter().any(|n| *n == wanted || n.strip_suffix(wanted).is_some_and(|front| front.ends_with('/')))
 }
 
-/// Bytes that drawing a pixel takes: colour, depth and opacity, their copies on the way to the file.
+/// Bytes that drawing a pixel takes: color, depth and opacity, their copies on the way to the file.
 const BYTES_PER_PX: u64 = 64;
 
 /// Whether a picture of this size can be drawn in the memory that is free.

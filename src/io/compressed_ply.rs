@@ -1,11 +1,11 @@
-//! Splats as PlayCanvas's and SuperSplat's `.compressed.ply`: 16 bytes a Gaussian, quantised
+//! Splats as PlayCanvas's and SuperSplat's `.compressed.ply`: 16 bytes a Gaussian, quantized
 //! within chunks of 256 whose bounds come first, and harmonics of 8 bits a coefficient.
 
 use rayon::prelude::*;
 
 use super::IoError;
 use super::ply::{Column, Ply, Table};
-use super::quantised::{logit, unit_quaternion, unorm};
+use super::quantized::{logit, unit_quaternion, unorm};
 use crate::math::sh::{SH_C0, coefficients};
 use crate::scene::GaussianCloud;
 
@@ -54,7 +54,7 @@ pub(super) fn decode(ply: &Ply<'_>) -> Result<GaussianCloud, IoError> {
     Ok(cloud)
 }
 
-/// Bounds of a chunk: minimum and extent of position, log-scale and colour.
+/// Bounds of a chunk: minimum and extent of position, log-scale and color.
 struct Chunk {
     position: [[f32; 3]; 2],
     scale: [[f32; 3]; 2],
@@ -71,7 +71,7 @@ impl Chunks {
         let position = columns(["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"])?;
         let scale =
             columns(["min_scale_x", "min_scale_y", "min_scale_z", "max_scale_x", "max_scale_y", "max_scale_z"])?;
-        // Files of the first version have no colour bounds: colours fill 0 to 1.
+        // Files of the first version have no color bounds: colors fill 0 to 1.
         let color = match table.column("min_r") {
             Some(_) => Some(columns(["min_r", "min_g", "min_b", "max_r", "max_g", "max_b"])?),
             None => None,
@@ -109,7 +109,7 @@ impl Chunk {
         within(&self.scale, three(packed))
     }
 
-    /// Colour and opacity.
+    /// Color and opacity.
     fn color(&self, packed: u32) -> [f32; 4] {
         let [r, g, b, a] = [24, 16, 8, 0].map(|shift| unorm(packed >> shift, 8));
         let [r, g, b] = within(&self.color, [r, g, b]);

@@ -257,7 +257,7 @@ pub enum OpenError {
     },
     /// Nothing that the program knows.
     #[error("{path} is nothing that can be opened. Looked for: {looked_for}. Found: {found}.")]
-    Unrecognised {
+    Unrecognized {
         /// The path.
         path: PathBuf,
         /// Every layout or format tried.
@@ -275,7 +275,7 @@ pub fn write_error(path: &Path, cause: io::Error) -> IoError {
     IoError::Write { path: path.into(), remedy: remedy(cause.kind()), cause }
 }
 
-/// What a person can do about a failed write.
+/// What the user can do about a failed write.
 fn remedy(kind: io::ErrorKind) -> &'static str {
     use io::ErrorKind as K;
     match kind {

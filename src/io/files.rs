@@ -116,7 +116,7 @@ pub fn json_error(path: &Path, e: &serde_json::Error) -> IoError {
 }
 
 /// A path that a dataset's file `source` refers to, relative to the dataset's folder `root`:
-/// normalised, with `/` between its parts. Absolute paths and `..` are refused.
+/// normalized, with `/` between its parts. Absolute paths and `..` are refused.
 pub fn relative(root: &Path, entry: &str, source: &Path) -> Result<String, IoError> {
     let outside = || IoError::Outside { path: source.into(), entry: entry.into(), folder: root.into() };
     // A backslash parts names on Windows only; refused everywhere, so that a dataset means the
@@ -163,7 +163,7 @@ pub fn photo_name(name: &str, source: &Path) -> Result<(), IoError> {
     }
 }
 
-/// The name of a folder for people, also where its path ends in `.` or `..`.
+/// The name of a folder for display, also where its path ends in `.` or `..`.
 pub fn folder_name(folder: &Path) -> String {
     let real = fs::canonicalize(folder).unwrap_or_else(|_| folder.into());
     text::name(&real.file_name().unwrap_or(real.as_os_str()).to_string_lossy())

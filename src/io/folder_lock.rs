@@ -40,7 +40,7 @@ impl FolderLock {
                     let holder = if holder.is_empty() { "another process".into() } else { holder };
                     return Err(IoError::Busy { folder: folder.into(), holder });
                 }
-                // Some network file systems have no locks; a person there has to take care.
+                // Some network file systems have no locks; users there have to take care.
                 Err(TryLockError::Error(e)) if e.kind() != io::ErrorKind::Unsupported => return Err(failed(e)),
                 _ => {}
             }

@@ -1,8 +1,8 @@
 //! Triangle meshes with named nodes from glTF 2.0 (`.gltf` and `.glb`).
 //!
 //! Read: the node tree with its transforms, triangles of every index type and of lists, strips and
-//! fans, sparse and quantised accessors, normals, all texture coordinate sets, vertex colours, base
-//! colour and emission (factor and texture, `KHR_texture_transform`), alpha modes, unlit materials.
+//! fans, sparse and quantized accessors, normals, all texture coordinate sets, vertex colors, base
+//! color and emission (factor and texture, `KHR_texture_transform`), alpha modes, unlit materials.
 //! Left out: animation, skinning, morph targets, cameras and lights.
 //!
 //! Nothing in a file is believed: every index is looked up, every byte range is checked against the

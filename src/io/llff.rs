@@ -9,7 +9,7 @@ use std::path::Path;
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::listing::{self, Focal, Lens, Listed, photos};
+use super::photo_list::{self, Focal, Lens, Listed, photos};
 use super::{IoError, files, npy};
 use crate::scene::{Camera, Dataset, Distortion};
 
@@ -24,7 +24,7 @@ const ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
 pub fn read(root: &Path) -> Result<Dataset, IoError> {
     let file = root.join(POSES_FILE);
     let rows = poses(&files::read(&file, u64::MAX)?, &file)?;
-    let folder = listing::photo_folder(root, &file)?;
+    let folder = photo_list::photo_folder(root, &file)?;
     let names = names(&root.join(&folder))?;
     if names.len() != rows.len() {
         return Err(IoError::Count {

@@ -1,10 +1,9 @@
 //! Files: one per format, and one [`open()`] that sniffs.
 //!
-//! Readers never trust a length field: what a file claims is held against the file's real size
+//! Readers never trust a length field: what a file claims is compared with the file's real size
 //! before memory is set aside for it, and paths inside a dataset may not leave its folder. Every
 //! error names the file and the place in it.
 
-pub mod animation;
 pub mod atomic;
 pub mod camera_file;
 pub mod camera_path;
@@ -19,15 +18,15 @@ pub mod gltf_mesh;
 pub mod http;
 pub mod khr_gltf;
 pub mod labels;
-mod listing;
 pub mod llff;
 pub mod memory;
 pub mod npy;
 mod open;
 pub mod photo;
+mod photo_list;
 mod ply;
 pub mod points_ply;
-mod quantised;
+mod quantized;
 mod reader;
 mod resample;
 pub mod scene_files;
@@ -39,6 +38,7 @@ pub mod splat_ply;
 mod temporary;
 pub mod trained;
 pub mod transforms;
+pub mod video;
 
 pub use error::{IoError, OpenError};
 pub use open::{Opened, open};

@@ -1,4 +1,4 @@
-//! NumPy arrays of floating-point numbers, with every claim of the header held against the file.
+//! NumPy arrays of floating-point numbers, with every claim of the header compared with the file.
 
 use std::path::Path;
 

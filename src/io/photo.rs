@@ -47,7 +47,7 @@ pub fn size(path: &Path) -> Result<(u32, u32), IoError> {
     match decoder(&start, path) {
         Ok(d) => Ok(d.dimensions()),
         Err(e) if complete => Err(e),
-        // A large colour profile or preview can push the size past the start.
+        // A large color profile or preview can push the size past the start.
         Err(_) => Ok(decoder(&files::read(path, files::MAX_PICTURE_BYTES)?, path)?.dimensions()),
     }
 }
@@ -92,26 +92,26 @@ pub(super) fn decode_rgba(bytes: &[u8], limit_px: u64, path: &Path) -> Result<Rg
     Ok(DynamicImage::from_decoder(decoder).map_err(|e| failed(path, &e))?.into_rgba8())
 }
 
-/// Decodes the bytes of a grey picture, 8 or 16 bits a pixel; `path` is for errors.
+/// Decodes the bytes of a gray picture, 8 or 16 bits a pixel; `path` is for errors.
 pub(super) fn decode_grey16(bytes: &[u8], path: &Path) -> Result<ImageBuffer<Luma<u16>, Vec<u16>>, IoError> {
     match DynamicImage::from_decoder(decoder(bytes, path)?).map_err(|e| failed(path, &e))? {
-        DynamicImage::ImageLuma16(grey) => Ok(grey),
-        DynamicImage::ImageLuma8(grey) => {
-            let (width, height) = grey.dimensions();
-            Ok(ImageBuffer::from_fn(width, height, |x, y| Luma([u16::from(grey.get_pixel(x, y).0[0])])))
+        DynamicImage::ImageLuma16(gray) => Ok(gray),
+        DynamicImage::ImageLuma8(gray) => {
+            let (width, height) = gray.dimensions();
+            Ok(ImageBuffer::from_fn(width, height, |x, y| Luma([u16::from(gray.get_pixel(x, y).0[0])])))
         }
-        _ => Err(IoError::Picture { path: path.into(), reason: "a map of ids has one grey channel".into() }),
+        _ => Err(IoError::Picture { path: path.into(), reason: "a map of ids has one gray channel".into() }),
     }
 }
 
-/// Width, height and the brightest colour channel of every pixel, of 255, of the bytes of a picture.
+/// Width, height and the brightest color channel of every pixel, of 255, of the bytes of a picture.
 /// What is not black stays at least 1.
 pub(super) fn decode_brightest(bytes: &[u8], path: &Path) -> Result<(usize, usize, Vec<u8>), IoError> {
     let picture = DynamicImage::from_decoder(decoder(bytes, path)?).map_err(|e| failed(path, &e))?;
     let (width, height) = (picture.width() as usize, picture.height() as usize);
     let values = match picture {
-        DynamicImage::ImageLuma8(grey) => grey.into_raw(),
-        DynamicImage::ImageLumaA8(grey) => grey.pixels().map(|p| p.0[0]).collect(),
+        DynamicImage::ImageLuma8(gray) => gray.into_raw(),
+        DynamicImage::ImageLumaA8(gray) => gray.pixels().map(|p| p.0[0]).collect(),
         DynamicImage::ImageRgb8(rgb) => rgb.pixels().map(|p| p.0[0].max(p.0[1]).max(p.0[2])).collect(),
         DynamicImage::ImageRgba8(rgb) => rgb.pixels().map(|p| p.0[0].max(p.0[1]).max(p.0[2])).collect(),
         other => {
@@ -147,7 +147,7 @@ fn failed(path: &Path, e: &ImageError) -> IoError {
     IoError::Picture { path: path.into(), reason: e.to_string() }
 }
 
-/// Whether this is a JPEG without its end marker. The decoder fills what is missing with grey.
+/// Whether this is a JPEG without its end marker. The decoder fills what is missing with gray.
 fn is_cut_jpeg(bytes: &[u8]) -> bool {
     // Inside the coded data every 0xFF is followed by 0 or a restart marker, so the end marker
     // cannot occur by chance; a preview embedded before the coded data can contain one, which is
@@ -175,7 +175,7 @@ fn jpeg_scan(bytes: &[u8]) -> Option<&[u8]> {
     }
 }
 
-/// Transparent pixels over a colour.
+/// Transparent pixels over a color.
 fn over(mut pixels: Pixels, background: [f32; 3]) -> Pixels {
     if pixels.channels == 3 {
         return pixels;

@@ -6,10 +6,10 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::ply::{Ply, Scalar, Table};
-use super::{IoError, files, listing};
+use super::{IoError, files, photo_list};
 use crate::scene::{Camera, SparsePoint};
 
-/// Colour of points that have none.
+/// Color of points that have none.
 const GREY: u8 = 128;
 
 /// Reads the points of a `.ply`.
@@ -40,7 +40,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Vec<SparsePoint>, IoError> {
     Ok(points)
 }
 
-/// A colour channel as 8 bits: floating-point colours are 0 to 1, 16-bit ones fill their range.
+/// A color channel as 8 bits: floating-point colors are 0 to 1, 16-bit ones fill their range.
 fn byte(scalar: Scalar, value: f64) -> u8 {
     let scaled = match scalar {
         Scalar::F32 | Scalar::F64 => value * 255.0,
@@ -55,7 +55,7 @@ fn first_bad(points: &[SparsePoint], table: &Table<'_>, path: &Path) -> Result<(
     let is_bad = |p: &SparsePoint| p.position.to_array().iter().any(|v| !(v.abs() <= Camera::FARTHEST));
     match points.par_iter().position_first(is_bad) {
         None => Ok(()),
-        Some(index) => listing::place(points[index].position, "vertex", index, path).map(drop),
+        Some(index) => photo_list::place(points[index].position, "vertex", index, path).map(drop),
     }
 }
 

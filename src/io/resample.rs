@@ -22,7 +22,7 @@ pub(super) struct Pixels {
     pub data: Vec<u8>,
 }
 
-/// Colour times weight, and weight.
+/// Color times weight, and weight.
 type Sum = [f32; 4];
 
 /// `pixels`, taken through a lens of `distortion` with `camera`'s intrinsics, as `target` (the
@@ -57,7 +57,7 @@ pub(super) fn resample(
     PhotoPixels { width_px, height_px, rgb, coverage: partial.then_some(coverage) }
 }
 
-/// Colour (0 to 255) times alpha, and alpha, of the pixel at `index`.
+/// Color (0 to 255) times alpha, and alpha, of the pixel at `index`.
 #[inline(always)]
 fn texel<const C: usize>(data: &[u8], index: usize) -> Sum {
     let p = &data[index * C..index * C + C];
@@ -145,7 +145,7 @@ impl Lens {
     }
 
     /// Where the row of pinhole positions `((i + 0.5) * step, v)` lies in the picture on disk;
-    /// NaN beyond the fold. No branches, so that the loop vectorises.
+    /// NaN beyond the fold. No branches, so that the loop vectorizes.
     fn source_row(&self, v: f32, step: f32, out: &mut [Vec2]) {
         let y = (v - self.principal.y) / self.focal.y;
         let yy = y * y;
@@ -183,7 +183,7 @@ fn bilinear<const C: usize>(pixels: &Pixels, p: Vec2) -> Option<Sum> {
     if !(p.x >= 0.0 && p.x <= w && p.y >= 0.0 && p.y <= h) {
         return None;
     }
-    // Pixel centres are at halves; the outermost half pixel repeats the border.
+    // Pixel centers are at halves; the outermost half pixel repeats the border.
     let x = (p.x - 0.5).clamp(0.0, w - 1.0);
     let y = (p.y - 0.5).clamp(0.0, h - 1.0);
     let (x0, y0) = (x as usize, y as usize);

@@ -27,10 +27,10 @@ pub struct SceneInfo {
     /// The photos' cameras, in the dataset's order.
     #[serde(default)]
     pub cameras: Vec<SceneCamera>,
-    /// Length of a scene unit in metres, if that is known.
+    /// Length of a scene unit in meters, if that is known.
     #[serde(default)]
     pub metres_per_unit: Option<f64>,
-    /// Colour behind everything.
+    /// Color behind everything.
     #[serde(default)]
     pub background: Option<[f32; 3]>,
     /// Settings of the training run.
@@ -49,7 +49,7 @@ pub struct SceneInfo {
 pub struct DatasetReference {
     /// Path of the dataset's folder or file, relative to the scene's folder where it can be.
     pub path: PathBuf,
-    /// Which layout it has, for people.
+    /// Which layout it has, for display.
     pub format: String,
 }
 

@@ -9,7 +9,7 @@ use std::path::Path;
 use glam::{DMat3, DVec2, DVec3};
 use serde::Deserialize;
 
-use super::listing::{Focal, Lens, Listed, photos};
+use super::photo_list::{Focal, Lens, Listed, photos};
 use super::{IoError, files, points_ply};
 use crate::scene::{Camera, Dataset, Distortion};
 
@@ -33,9 +33,9 @@ struct File {
 /// See [`File::fmlgs`].
 #[derive(Default, Deserialize)]
 struct Own {
-    /// sRGB colour behind everything, 0 to 1.
+    /// sRGB color behind everything, 0 to 1.
     background: Option<[f32; 3]>,
-    /// Length of a unit in metres.
+    /// Length of a unit in meters.
     metres_per_unit: Option<f64>,
 }
 
@@ -152,7 +152,7 @@ impl Frame {
     }
 }
 
-/// Rotation (columns right, down, forward) and centre of an OpenGL world_from_camera matrix.
+/// Rotation (columns right, down, forward) and center of an OpenGL world_from_camera matrix.
 fn pose(m: &[Vec<f64>]) -> Result<(DMat3, DVec3), &'static str> {
     let rows: Vec<[f64; 4]> = m.iter().filter_map(|r| r.as_slice().try_into().ok()).collect();
     if rows.len() != m.len() || !(3..=4).contains(&rows.len()) {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::JobError;
 use crate::io::{SceneFolder, trained};
 use crate::pipeline::semantics::edit::{self, Edit};
-use crate::pipeline::semantics::extend::extend;
+use crate::pipeline::semantics::propagate::extend;
 use crate::pipeline::semantics::votes::Votes;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, Level, Mask, NOBODY, SemanticMap};
@@ -84,9 +84,9 @@ fn painted(
         (0..mask.width_px() * mask.height_px()).map(|i| if mask.contains(i) { inside } else { NOBODY }).collect();
     let mut votes = Votes::new(cloud.len());
     votes.add_view(&mut Renderer::new(), cloud, camera, settings, &labels)?;
-    let mut belongings = votes.decide(&identities, 0.05);
-    extend(cloud, &mut belongings);
-    Ok((0..cloud.len() as u32).filter(|&i| belongings[i as usize].identity == inside).collect())
+    let mut assignments = votes.decide(&identities, 0.05);
+    extend(cloud, &mut assignments);
+    Ok((0..cloud.len() as u32).filter(|&i| assignments[i as usize].identity == inside).collect())
 }
 
 #[cfg(test)]

@@ -5,17 +5,17 @@ use std::path::PathBuf;
 
 use crate::io::{IoError, OpenError};
 use crate::models::ModelError;
-use crate::models::catalogue::InstallError;
+use crate::models::catalog::InstallError;
 use crate::models::fetch::FetchError;
 use crate::pipeline::depth::DepthError;
-use crate::pipeline::film::FilmError;
 use crate::pipeline::observer::Interrupted;
+use crate::pipeline::semantics::build_map::FindError;
 use crate::pipeline::semantics::edit::EditError;
-use crate::pipeline::semantics::find::FindError;
 use crate::pipeline::semantics::segmenter::SegmentError;
 use crate::pipeline::synth::SynthError;
 use crate::pipeline::train::TrainError;
 use crate::pipeline::train::config::UnreadableConfig;
+use crate::pipeline::video::VideoError;
 use crate::render::{DrawError, GpuError, RenderError};
 
 /// Why a job did not do what was asked.
@@ -98,7 +98,7 @@ pub enum JobError {
     Draw(#[from] DrawError),
     /// A video could not be made.
     #[error(transparent)]
-    Video(#[from] FilmError),
+    Video(#[from] VideoError),
     /// Synthetic photos could not be made.
     #[error(transparent)]
     Synth(#[from] SynthError),

@@ -1,4 +1,4 @@
-//! Objects and parts against labelled photos, by one of the protocols of the literature.
+//! Objects and parts against labeled photos, by one of the protocols of the literature.
 
 use std::path::Path;
 
@@ -12,8 +12,8 @@ use crate::math::stats::mean;
 use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::protocols::{
-    AskedScene, Category, LabelledView, Unit, categories, fastlgs_ex, langsplat, masks, means, multi_class,
-    part_recall, selection_3d, spin_nerf,
+    AskedScene, Category, LabeledView, Unit, categories, fastlgs_ex, langsplat, masks, means, multi_class, part_recall,
+    selection_3d, spin_nerf,
 };
 use crate::pipeline::semantics::query_engine::QueryEngine;
 use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
@@ -56,7 +56,7 @@ pub enum Summary {
     /// Of the protocol [`Protocol::Langsplat`].
     Langsplat {
         /// Share of queries whose most relevant pixel lies in their box.
-        localisation: f64,
+        localization: f64,
     },
     /// Of the protocol [`Protocol::FastlgsEx`]: nothing.
     FastlgsEx {},
@@ -122,7 +122,7 @@ pub fn run(
     query: Option<&str>,
 ) -> Result<MaskScores, JobError> {
     let mut known = FileMasks(Labels::open(labels)?);
-    let views = labelled(comparison, map, &mut known)?;
+    let views = labeled(comparison, map, &mut known)?;
     if views.is_empty() {
         let text = format!("{}: no photo to compare with has labels", labels.display());
         return Err(JobError::Protocol(text));
@@ -130,7 +130,7 @@ pub fn run(
     if let Some(folder) = &comparison.pictures {
         pictures(folder, comparison, map, &views)?;
     }
-    let list: Vec<LabelledView<'_>> = views.iter().map(Drawn::labelled).collect();
+    let list: Vec<LabeledView<'_>> = views.iter().map(Drawn::labeled).collect();
     let (units, summary) = match protocol {
         Protocol::PartRecall => recall(map, &list)?,
         _ => {
@@ -156,7 +156,7 @@ fn compare(
     query: Option<&str>,
     comparison: &Comparison,
     scene: &mut AskedScene<'_>,
-    views: &[LabelledView<'_>],
+    views: &[LabeledView<'_>],
 ) -> Result<(Vec<Unit>, Summary), JobError> {
     let mut units: Vec<Unit> = Vec::new();
     let summary = match protocol {
@@ -168,7 +168,7 @@ fn compare(
         Protocol::Langsplat => {
             views.iter().for_each(|v| units.extend(langsplat::compare(scene, v)));
             let hits = units.iter().filter(|u| u.hit == Some(true)).count();
-            Summary::Langsplat { localisation: hits as f64 / units.len().max(1) as f64 }
+            Summary::Langsplat { localization: hits as f64 / units.len().max(1) as f64 }
         }
         Protocol::FastlgsEx | Protocol::PartRecall => {
             let mut pool = fastlgs_ex::Pool::default();
@@ -207,7 +207,7 @@ fn compare(
 }
 
 /// The paper's ablation.
-fn recall(map: &SemanticMap, views: &[LabelledView<'_>]) -> Result<(Vec<Unit>, Summary), JobError> {
+fn recall(map: &SemanticMap, views: &[LabeledView<'_>]) -> Result<(Vec<Unit>, Summary), JobError> {
     let language = map.language.as_ref().ok_or_else(|| {
         let text = "no encoder has looked at this scene; run 'fmlgs preprocess' on it with --encoder demo";
         JobError::Protocol(text.into())
@@ -218,11 +218,11 @@ fn recall(map: &SemanticMap, views: &[LabelledView<'_>]) -> Result<(Vec<Unit>, S
         rows.push(part_recall::row(components, map, language, views, |p| encoder.text(p))?);
     }
     // The paper's full method, not ours, is what others can compare with.
-    let units = rows.iter().rfind(|r| r.components.localisation).map(|r| r.units.clone()).unwrap_or_default();
+    let units = rows.iter().rfind(|r| r.components.localization).map(|r| r.units.clone()).unwrap_or_default();
     Ok((units, Summary::PartRecall { encoder: language.encoder.clone(), rows }))
 }
 
-/// A labelled photo and what is drawn of its view.
+/// A labeled photo and what is drawn of its view.
 struct Drawn {
     index: usize,
     name: String,
@@ -234,8 +234,8 @@ struct Drawn {
 }
 
 impl Drawn {
-    fn labelled(&self) -> LabelledView<'_> {
-        LabelledView {
+    fn labeled(&self) -> LabeledView<'_> {
+        LabeledView {
             name: &self.name,
             camera: &self.camera,
             exact: &self.exact,
@@ -247,7 +247,7 @@ impl Drawn {
 
 /// The held-out photos with labels; else those that were trained on, as long as no mask of theirs was
 /// used.
-fn labelled(comparison: &Comparison, map: &SemanticMap, labels: &mut FileMasks) -> Result<Vec<Drawn>, JobError> {
+fn labeled(comparison: &Comparison, map: &SemanticMap, labels: &mut FileMasks) -> Result<Vec<Drawn>, JobError> {
     let Comparison { cloud, settings, max_side_px, .. } = comparison;
     let photos = &comparison.dataset.photos;
     let held: Vec<usize> = comparison.views.iter().copied().filter(|&i| labels.covers(&photos[i])).collect();

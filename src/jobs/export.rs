@@ -8,7 +8,7 @@ use image::{ColorType, ImageEncoder};
 use npyz::WriterBuilder;
 
 use crate::io::{self, IoError, atomic, splat_ply};
-use crate::navigate::{Film, Pose, Speed};
+use crate::navigate::{CameraSpline, Pose, Speed};
 use crate::scene::{CameraPath, GaussianCloud, PathKey, PhotoPixels};
 
 /// Writes Gaussians as a `.ply`.
@@ -61,8 +61,8 @@ pub fn camera_path(file: &Path, path: &CameraPath, aspect: f64) -> Result<(), Io
     if !file.to_string_lossy().ends_with(".nerfstudio.json") {
         return io::camera_path::write(file, path);
     }
-    let film = Film::new(path, Speed::Constant);
-    let poses = film.map_or_else(Vec::new, |film| film.pictures(path.fps, CameraPath::MAX_KEYS as f64));
+    let spline = CameraSpline::new(path, Speed::Constant);
+    let poses = spline.map_or_else(Vec::new, |spline| spline.pictures(path.fps, CameraPath::MAX_KEYS as f64));
     let frames: Vec<PathKey> = poses.iter().map(Pose::key).collect();
     io::camera_path::nerfstudio::write(file, path, &frames, (1280, (1280.0 / aspect.max(0.01)) as u32))
 }

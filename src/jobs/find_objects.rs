@@ -10,12 +10,12 @@ use super::{JobError, evaluate};
 use crate::io::trained::{self, CLOUD_FILE};
 use crate::io::{IoError, SceneFolder, splat_ply};
 use crate::models;
-use crate::models::catalogue::{self, Role, SAM2};
+use crate::models::catalog::{self, Role, SAM2};
 use crate::pipeline::observer::{Observer, Severity};
-use crate::pipeline::semantics::find::{
+use crate::pipeline::semantics::build_map::{
     CODE_STEPS, Carry, FindOptions, Found, Lifting, REGIONS, Tools, find_objects, segmenter,
 };
-use crate::pipeline::semantics::follow::Follower;
+use crate::pipeline::semantics::sam2_tracker::Sam2Tracker;
 use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::render::RenderSettings;
 use crate::scene::{Dataset, GaussianCloud, Photo};
@@ -137,7 +137,7 @@ pub fn run(request: &Request, known: Option<&str>, observer: &mut dyn Observer) 
     let network = match (masks, with.segmenter.as_deref()) {
         (Some(_), _) | (None, Some(REGIONS)) => None,
         (None, Some(name)) => Some(name.to_owned()),
-        (None, None) => catalogue::usable(Role::Segmenter, &mut warn)?.into_iter().next(),
+        (None, None) => catalog::usable(Role::Segmenter, &mut warn)?.into_iter().next(),
     };
     let mut segmenter = segmenter(masks, cloud, settings, network.as_deref())?;
     let mut encoder = match with.encoder.as_deref() {
@@ -150,7 +150,7 @@ pub fn run(request: &Request, known: Option<&str>, observer: &mut dyn Observer) 
     };
     let mut follower = match with.carry {
         Carry::Gaussians => None,
-        _ => Some(Follower::open(&with.tracker, Some(folder.join("cache")))?),
+        _ => Some(Sam2Tracker::open(&with.tracker, Some(folder.join("cache")))?),
     };
     let start = Instant::now();
     let tools = Tools { segmenter: &mut *segmenter, follower: follower.as_mut(), encoder: encoder.as_deref_mut() };

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use crate::navigate::approach::{Approach, ApproachError, Place};
 use crate::navigate::flight::Smoothness;
 use crate::navigate::target::Wish;
-use crate::navigate::visit::{NoVisit, Place, Visit};
-use crate::navigate::{Flight, Navigator, NoWay, Pose, Speed};
+use crate::navigate::{Flight, Navigator, NoRoute, Pose, Speed};
 use crate::render::RenderSettings;
-use crate::scene::trace::{self, Sort};
+use crate::scene::resource_log::{self, Sort};
 use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 
 /// A scene in which one can move about.
@@ -32,8 +32,13 @@ impl Explored {
     /// Looks at a scene.
     pub fn new(cloud: Arc<GaussianCloud>, cameras: &[Camera], up: DVec3) -> Self {
         let navigator = Navigator::new(&cloud, cameras, up);
-        trace::record(Sort::Paths, "grid of matter, graph of keypoints", "the camera is to fly", navigator.bytes());
-        let parts = navigator.graph.parts(&navigator.matter);
+        resource_log::record(
+            Sort::Paths,
+            "occupancy grid, graph of keypoints",
+            "the camera is to fly",
+            navigator.bytes(),
+        );
+        let parts = navigator.graph.parts(&navigator.occupancy);
         Self { navigator, cloud, parts }
     }
 
@@ -41,7 +46,7 @@ impl Explored {
     ///
     /// # Errors
     /// If there is no way.
-    pub fn fly(&self, from: &Pose, to: &Pose, frames: usize) -> Result<Flight, NoWay> {
+    pub fn fly(&self, from: &Pose, to: &Pose, frames: usize) -> Result<Flight, NoRoute> {
         self.navigator.fly(from, to, None, frames, Speed::Eased)
     }
 
@@ -51,11 +56,11 @@ impl Explored {
         let (navigator, frames) = (&self.navigator, flight.poses.len());
         let keys = navigator.keys(first, last).unwrap_or_default();
         [Flight::of_paper(&[*first, *last], frames), Flight::of_paper_through(&keys, frames)]
-            .map(|p| p.map(|p| p.smoothness(&navigator.matter, navigator.clearance)))
+            .map(|p| p.map(|p| p.smoothness(&navigator.occupancy, navigator.clearance)))
     }
 
     /// Why there is no way, with how much of the scene hangs together.
-    pub fn no_way(&self, why: &NoWay) -> String {
+    pub fn no_route(&self, why: &NoRoute) -> String {
         let count = self.parts.iter().max().map_or(0, |m| m + 1);
         format!("{why} ({} keypoints in {count} parts that are not connected)", self.parts.len())
     }
@@ -63,7 +68,7 @@ impl Explored {
 
 /// What is to be visited.
 #[derive(Clone, Debug)]
-pub struct VisitRequest {
+pub struct ApproachRequest {
     /// The scene, if it was looked at before.
     pub explored: Option<Arc<Explored>>,
     /// The Gaussians.
@@ -89,27 +94,29 @@ pub struct VisitRequest {
 }
 
 /// Finds the flight to an identity. What was learned about the scene comes back with it.
-pub fn visit(request: VisitRequest) -> (Arc<Explored>, Visited) {
-    let VisitRequest { explored, cloud, cameras, up, settings, map, id, wish, from, aspect, frames } = request;
+pub fn visit(request: ApproachRequest) -> (Arc<Explored>, Approached) {
+    let ApproachRequest { explored, cloud, cameras, up, settings, map, id, wish, from, aspect, frames } = request;
     let known = explored.filter(|e| Arc::ptr_eq(&e.cloud, &cloud));
     let explored = known.unwrap_or_else(|| Arc::new(Explored::new(Arc::clone(&cloud), &cameras, up)));
     let place = Place { cloud: &cloud, settings: &settings, map: &map };
     let name = map.identities.full_name(id);
     let visit = match explored.navigator.visit(place, id, wish, &from, aspect, frames) {
-        Ok(visit) => Visited { name, flight: Some(Box::new(visit)), problem: None },
-        Err(NoVisit::NoWay { why, nearest }) => Visited { name, flight: nearest, problem: Some(explored.no_way(&why)) },
-        Err(e) => Visited { name, flight: None, problem: Some(e.to_string()) },
+        Ok(visit) => Approached { name, flight: Some(Box::new(visit)), problem: None },
+        Err(ApproachError::NoRoute { why, nearest }) => {
+            Approached { name, flight: nearest, problem: Some(explored.no_route(&why)) }
+        }
+        Err(e) => Approached { name, flight: None, problem: Some(e.to_string()) },
     };
     (explored, visit)
 }
 
 /// What came of a visit.
 #[derive(Clone, Debug)]
-pub struct Visited {
+pub struct Approached {
     /// What was to be visited.
     pub name: String,
     /// The flight there, or to the nearest place that can be reached.
-    pub flight: Option<Box<Visit>>,
+    pub flight: Option<Box<Approach>>,
     /// Why it does not lead there.
     pub problem: Option<String>,
 }

@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use super::JobError;
 use crate::math::stats::median;
-use crate::models::catalogue;
-pub use crate::models::catalogue::{Entry as ModelEntry, Role as ModelRole, SAM2, State as ModelState};
+use crate::models::catalog;
+pub use crate::models::catalog::{Entry as ModelEntry, Role as ModelRole, SAM2, State as ModelState};
 use crate::models::engine::engine;
 use crate::models::fetch::Patience;
 use crate::models::{self, ModelError, Tile};
@@ -29,8 +29,8 @@ pub fn list() -> ModelList {
         Ok(engine) => (format!("{}, {}", engine.name(), engine.device()), engine.note().map(str::to_owned)),
         Err(e) => ("none".to_owned(), Some(e.to_string())),
     };
-    let folder = catalogue::folder();
-    let models = catalogue::entries().unwrap_or_else(|e| {
+    let folder = catalog::folder();
+    let models = catalog::entries().unwrap_or_else(|e| {
         note = Some(e.to_string());
         Vec::new()
     });
@@ -51,8 +51,8 @@ pub enum Source<'a> {
 /// # Errors
 /// If there is none, its files cannot be had or are not right, or the observer asks to stop.
 pub fn install(id: &str, source: Source<'_>, observer: &mut dyn Observer) -> Result<ModelEntry, JobError> {
-    let (folder, mut ticker) = (catalogue::folder(), Ticker::new("", 0));
-    let entry = catalogue::entry(id)?;
+    let (folder, mut ticker) = (catalog::folder(), Ticker::new("", 0));
+    let entry = catalog::entry(id)?;
     match source {
         Source::Folder(brought) => entry.add(&folder, brought)?,
         Source::Fetch(from) => entry.fetch(&folder, from, Patience::default(), &mut |name, there, all| {
@@ -68,10 +68,10 @@ pub fn install(id: &str, source: Source<'_>, observer: &mut dyn Observer) -> Res
 /// # Errors
 /// If the list that came with the program is damaged.
 pub fn check() -> Result<Vec<(String, Option<String>)>, JobError> {
-    let folder = catalogue::folder();
+    let folder = catalog::folder();
     let here = |e: &ModelEntry| !matches!(e.state(&folder), ModelState::Missing(_));
     let check = |e: ModelEntry| (e.id.clone(), e.verify(&folder).err().map(|e| e.to_string()));
-    Ok(catalogue::entries()?.into_iter().filter(here).map(check).collect())
+    Ok(catalog::entries()?.into_iter().filter(here).map(check).collect())
 }
 
 /// How long an encoder takes.
@@ -108,7 +108,7 @@ pub fn time_encoders(runs: usize, told: &mut dyn FnMut(String)) -> Result<Vec<En
         Ok(median(&ms))
     };
     let mut list = Vec::new();
-    for id in catalogue::usable(ModelRole::Encoder, told)? {
+    for id in catalog::usable(ModelRole::Encoder, told)? {
         let start = Instant::now();
         let mut encoder = models::encoder(&id)?;
         let side_px = encoder.tile_side_px().unwrap_or(224);

@@ -15,7 +15,7 @@ use crate::pipeline::synth::demo;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::plan::used_degree;
-use crate::scene::trace::{self, Sort};
+use crate::scene::resource_log::{self, Sort};
 use crate::scene::{Bounds, Camera, Dataset, Facts, GaussianCloud, HomeView, Machine, SemanticMap};
 
 /// Gaussians that can be drawn, and what came with them.
@@ -39,11 +39,11 @@ pub struct Scene {
     pub config: TrainConfig,
     /// Measurements of its training.
     pub history: History,
-    /// Where its photos were, for people.
+    /// Where its photos were, for display.
     pub photos: Option<PathBuf>,
     /// Where its photos are, if they are still there.
     pub dataset_path: Option<PathBuf>,
-    /// Length of a scene unit in metres, if that is known.
+    /// Length of a scene unit in meters, if that is known.
     pub metres_per_unit: Option<f64>,
     /// Id of the save that its files are of, if it has one.
     pub state: Option<String>,
@@ -189,7 +189,7 @@ pub struct OpenedScene {
     pub out: PathBuf,
     /// Measurements of earlier training.
     pub history: History,
-    /// Length of a scene unit in metres, if that is known.
+    /// Length of a scene unit in meters, if that is known.
     pub metres_per_unit: Option<f64>,
     /// How to look at it at first.
     pub home: HomeView,
@@ -284,7 +284,7 @@ pub fn known_objects(scene: &Scene, observer: &mut dyn Observer) -> Option<Arc<S
     match scene.semantics() {
         Ok(map) => {
             let what = format!("{} objects and parts", map.identities.len());
-            trace::record(Sort::Objects, what, "the scene was opened", map.bytes());
+            resource_log::record(Sort::Objects, what, "the scene was opened", map.bytes());
             Some(Arc::new(map))
         }
         Err(JobError::NoObjects(_)) => None,
@@ -344,7 +344,7 @@ fn compact(cloud: GaussianCloud) -> (Arc<GaussianCloud>, u8) {
     let stored = cloud.sh_degree;
     let used = used_degree(&cloud);
     let cloud = cloud.up_to_degree(used);
-    trace::record(Sort::Gaussians, format!("{} Gaussians", cloud.len()), "the scene was opened", cloud.bytes());
+    resource_log::record(Sort::Gaussians, format!("{} Gaussians", cloud.len()), "the scene was opened", cloud.bytes());
     (Arc::new(cloud), stored)
 }
 
@@ -376,7 +376,7 @@ mod tests {
     use crate::scene::SparsePoint;
 
     #[test]
-    fn points_become_a_valid_cloud_of_their_colours() {
+    fn points_become_a_valid_cloud_of_their_colors() {
         let points = (0..100)
             .map(|i| SparsePoint { position: DVec3::new(1e6 + f64::from(i), 2.0, -3.0), rgb: [255, 0, 128] })
             .collect();

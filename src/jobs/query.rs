@@ -7,11 +7,11 @@ use image::ColorType;
 
 use super::{JobError, Scene, export};
 use crate::math::colormap::Colormap;
-use crate::pipeline::semantics::answer::Answered;
+use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::matching::{self, MatchMode};
 use crate::pipeline::semantics::query_engine::QueryEngine;
-use crate::pipeline::semantics::stages::ms_since;
+use crate::pipeline::semantics::timing::ms_since;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{Features, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, IdentityId, LevelFilter, Mask, SemanticMap};
@@ -76,7 +76,7 @@ pub struct Request<'a> {
 #[derive(Clone, Debug)]
 pub struct QueryResult {
     /// What is meant, and how long that took.
-    pub answered: Answered,
+    pub answered: QueryAnswer,
     /// Its pixels.
     pub mask: Mask,
     /// Words that nothing here knows.

@@ -1,9 +1,9 @@
 //! Small pictures of a scene's objects and parts, as its first view sees them.
 
 use super::JobError;
-use crate::pipeline::semantics::portraits::{Gallery, portraits};
+use crate::pipeline::semantics::thumbnails::{Thumbnails, portraits};
 use crate::render::RenderSettings;
-use crate::scene::trace::{self, Sort};
+use crate::scene::resource_log::{self, Sort};
 use crate::scene::{GaussianCloud, HomeView, SemanticMap};
 
 /// Draws every object and part alone, by number less one.
@@ -15,8 +15,8 @@ pub fn draw(
     map: &SemanticMap,
     settings: &RenderSettings,
     home: &HomeView,
-) -> Result<Gallery, JobError> {
+) -> Result<Thumbnails, JobError> {
     let from = home.camera.as_ref().map_or(home.bounds.center() + home.up, |c| c.center);
-    trace::record(Sort::Portraits, "portraits of objects and parts", "a list of them is shown", 0);
+    resource_log::record(Sort::Thumbnails, "portraits of objects and parts", "a list of them is shown", 0);
     Ok(portraits(cloud, map, settings, from, home.up)?)
 }

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::{JobError, export};
-use crate::io::animation::{Settings, Summary};
-use crate::pipeline::film::{self, Marked};
+use crate::io::video::{Settings, Summary};
 use crate::pipeline::observer::{Observer, Severity};
+use crate::pipeline::video::{self, Marked};
 use crate::render::{BackendChoice, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 
@@ -63,6 +63,6 @@ pub fn run(request: VideoRequest, observer: &mut dyn Observer) -> Result<Video, 
     let mut renderer = Renderer::choose(choice, |why| observer.note(Severity::Warning, why))?;
     let start = Instant::now();
     export::make_parent(&out)?;
-    let summary = film::write(&cloud, &draw, &cameras, marked, &mut renderer, (&out, &settings), observer)?;
+    let summary = video::write(&cloud, &draw, &cameras, marked, &mut renderer, (&out, &settings), observer)?;
     Ok(Video { summary, backend: renderer.name().to_owned(), secs: start.elapsed().as_secs_f64() })
 }

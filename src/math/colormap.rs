@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn viridis_and_grey_get_evenly_brighter() {
+    fn viridis_and_gray_get_evenly_brighter() {
         for map in [Colormap::Viridis, Colormap::Gray] {
             let brightness = |t: f32| {
                 let [r, g, b] = map.color(t).map(f32::from);

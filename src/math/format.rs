@@ -1,4 +1,4 @@
-//! Numbers as a person reads them: one form per quantity, in the window, on the command line and in reports.
+//! Numbers as the user reads them: one form per quantity, in the window, on the command line and in reports.
 
 /// What stands where there is no number.
 pub const NONE: &str = "–";
@@ -59,6 +59,7 @@ pub fn millis(secs: f64) -> String {
     match secs * 1e3 {
         ms if ms < 0.1 => format!("{ms:.3} ms"),
         ms if ms < 10.0 => format!("{ms:.2} ms"),
+        ms if ms >= 1e4 => format!("{:.1} s", ms / 1e3),
         ms => format!("{ms:.0} ms"),
     }
 }
@@ -136,7 +137,7 @@ mod tests {
     fn durations_and_rates() {
         assert_eq!([8.4, 125.0, 3725.0, f64::NAN].map(duration), ["8 s", "2:05", "1:02:05", "–"]);
         assert_eq!([12.345, 1234.0, 0.0].map(|r| rate(r, "steps")), ["12.3 steps/s", "1,234 steps/s", "–"]);
-        assert_eq!([1.234e-5, 1.234e-3, 0.1234].map(millis), ["0.012 ms", "1.23 ms", "123 ms"]);
+        assert_eq!([1.234e-5, 1.234e-3, 0.1234, 16.0].map(millis), ["0.012 ms", "1.23 ms", "123 ms", "16.0 s"]);
         assert_eq!([23.412, f64::INFINITY].map(decibel), ["23.41 dB", "–"]);
     }
 

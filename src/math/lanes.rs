@@ -241,7 +241,7 @@ mod avx2 {
         }
         #[inline(always)]
         fn sums(self, v: [f32x8; LANES]) -> f32x8 {
-            // Neighbours are added three times over; what is left are two halves.
+            // Neighbors are added three times over; what is left are two halves.
             let pairs = |a: f32x8, b: f32x8| -> f32x8 {
                 bytemuck::cast(self.avx._mm256_hadd_ps(bytemuck::cast(a), bytemuck::cast(b)))
             };

@@ -41,7 +41,7 @@ pub trait Real:
     fn sqrt(self) -> Self;
     /// Natural exponential, correctly rounded to a few ulp.
     fn exp(self) -> Self;
-    /// Natural exponential of `x <= 0`, free of branches so that loops over it vectorise.
+    /// Natural exponential of `x <= 0`, free of branches so that loops over it vectorize.
     /// Below -87 it returns a value under 2e-38. Relative error under 3e-7 in `f32`.
     fn exp_neg(self) -> Self;
     /// Natural logarithm.

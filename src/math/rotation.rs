@@ -54,7 +54,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn scale_of_a_quaternion_does_not_matter() {
+    fn scale_of_a_quaternion_does_not_occupancy() {
         let q = [0.3_f32, -0.2, 0.7, 0.1];
         let a = matrix_from_quaternion(q).expect("valid");
         for s in [1e-30_f32, 1e-3, 1e30] {

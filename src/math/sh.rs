@@ -8,7 +8,7 @@ pub const fn coefficients(degree: u8) -> usize {
     d * d
 }
 
-/// The constant harmonic; `colour = 0.5 + SH_C0 * dc`.
+/// The constant harmonic; `color = 0.5 + SH_C0 * dc`.
 pub const SH_C0: f64 = 0.282_094_791_773_878_14;
 const C1: f64 = 0.488_602_511_902_919_9;
 const C2: [f64; 5] = [

@@ -81,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_same_settings_are_compare_images_each_other() {
+    fn the_same_settings_are_compared() {
         let one = example();
         let mut other = example();
         let stage = &mut other.stages[0];

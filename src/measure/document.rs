@@ -24,7 +24,7 @@ pub enum StageName {
     Features,
     /// Answers to typed queries against labels.
     Query,
-    /// Flights against matter and their own length.
+    /// Flights against occupied space and their own length.
     Path,
     /// Drawn depth against true depth.
     Depth,
@@ -46,7 +46,7 @@ impl StageName {
         }
     }
 
-    /// For people.
+    /// As it is shown.
     pub fn title(self) -> &'static str {
         match self {
             Self::Render => "Drawing",
@@ -150,7 +150,7 @@ impl FromIterator<f64> for Sample {
 pub struct Point {
     /// The knob that was turned: "alpha cut-off". Points of one method make one series.
     pub method: String,
-    /// Where it was turned to, for people.
+    /// Where it was turned to, in words.
     pub setting: String,
     /// The same for the program: fields of the stage's settings.
     pub knobs: Knobs,
@@ -199,7 +199,7 @@ pub struct Rule {
     pub times: f64,
     /// So is any error below this.
     pub floor: f64,
-    /// Times that are no further apart than this, in seconds, are the same time to a person.
+    /// Times that are no further apart than this, in seconds, are the same time to the user.
     #[serde(default)]
     pub spare_secs: f64,
 }

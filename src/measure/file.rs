@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn a_report_is_gone_on_with_where_it_is_the_same_measurement() {
+    fn a_report_is_resumed_where_it_is_the_same_measurement() {
         let folder = tempfile::tempdir().expect("folder");
         let report = Report { program: env!("CARGO_PKG_VERSION").into(), ..example() };
         let here = report.computer.clone();

@@ -5,7 +5,7 @@
 //! [`subject`] opens those that a scene allows, [`sweep`] goes through their settings; [`front`] says which are worth
 //! having, [`order`] how errors fall, [`compare`] what another report has of the same. [`bench`] times drawing,
 //! training and queries, [`plan`] what a scene's plan saves, [`survey`] how well flights do; [`stability`] is the
-//! catalogue of extreme cases. [`table`], [`plot`] and [`page`] show all of it, [`defaults`] justifies the program's
+//! catalog of extreme cases. [`table`], [`plot`] and [`page`] show all of it, [`defaults`] justifies the program's
 //! defaults.
 
 pub mod bench;

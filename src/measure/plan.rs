@@ -15,11 +15,11 @@ use crate::math::format::bytes;
 use crate::models;
 use crate::navigate::Navigator;
 use crate::pipeline::semantics::code_map::CodeMap;
-use crate::pipeline::semantics::portraits::portraits;
+use crate::pipeline::semantics::thumbnails::portraits;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{BackendChoice, Device, RenderSettings, Renderer, real_gpu};
 use crate::scene::plan::{Overrides, ScenePlan, When};
-use crate::scene::{Camera, Facts, GaussianCloud, SemanticMap, trace};
+use crate::scene::{Camera, Facts, GaussianCloud, SemanticMap, resource_log};
 
 /// Size of the images, px.
 pub const SIZE: [u32; 2] = [1_008, 567];
@@ -120,7 +120,7 @@ pub fn cost(
     }
     let resident_bytes = resident().saturating_sub(before) as f64;
     let peak_bytes = peak().saturating_sub(before) as f64;
-    let mut loaded: Vec<String> = trace::since(0).iter().map(|l| l.what.clone()).collect();
+    let mut loaded: Vec<String> = resource_log::since(0).iter().map(|l| l.what.clone()).collect();
     loaded.extend(maps.is_some().then(|| "maps of the view".to_owned()));
     loaded.extend(kept.navigator.is_some().then(|| "navigation".to_owned()));
     loaded.extend(kept.thumbnails.is_some().then(|| "thumbnails".to_owned()));
@@ -167,7 +167,7 @@ fn maps(
 /// What a plan wants at opening.
 struct AtOpening {
     navigator: Option<Navigator>,
-    thumbnails: Option<crate::pipeline::semantics::portraits::Gallery>,
+    thumbnails: Option<crate::pipeline::semantics::thumbnails::Thumbnails>,
     _encoder: Option<Box<dyn models::Encoder>>,
 }
 
@@ -175,7 +175,7 @@ fn at_opening(scene: &OpenScene, plan: &ScenePlan, settings: &RenderSettings) ->
     let navigator = (plan.navigation == When::Always).then(|| {
         let navigator = Navigator::new(&scene.cloud, &scene.cameras, scene.up);
         // The connected parts are what the window asks for first.
-        navigator.graph.parts(&navigator.matter);
+        navigator.graph.parts(&navigator.occupancy);
         navigator
     });
     let map = scene.map.as_deref();

@@ -23,7 +23,7 @@ const SEED: u64 = 1;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sum {
     pub flights: usize,
-    /// Flights of which a pose has less distance to matter than wanted.
+    /// Flights of which a pose has less distance to occupied space than wanted.
     pub flights_too_near: usize,
     pub poses_too_near: usize,
     /// The worst of each over all flights.
@@ -39,7 +39,7 @@ pub struct Survey {
     /// The paper's through all keypoints of the route, between the same ends.
     pub paper_through: Sum,
     /// Pairs of keypoints that are not connected.
-    pub no_way: usize,
+    pub no_route: usize,
     /// Seconds that a route took to find.
     pub secs: Sample,
 }
@@ -64,11 +64,11 @@ impl Sum {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ends {
     Keypoints,
-    /// Places close to matter: from under the table to behind the lamp.
+    /// Places close to occupied space: from under the table to behind the lamp.
     CloseToMatter,
 }
 
-/// Poses that flights begin and end with. Places close to matter look as the nearest keypoint does.
+/// Poses that flights begin and end with. Places close to occupied space look as the nearest keypoint does.
 fn ends(navigator: &Navigator, which: Ends, count: usize, rng: &mut Pcg64) -> Vec<Pose> {
     let points = &navigator.graph.keypoints;
     let pose = |k: &Keypoint, center: DVec3| Pose { center, world_from_camera: k.world_from_camera, fov_y_rad: 0.8 };
@@ -78,12 +78,12 @@ fn ends(navigator: &Navigator, which: Ends, count: usize, rng: &mut Pcg64) -> Ve
     if which == Ends::Keypoints {
         return (0..count).map(|_| &points[rng.random_range(0..points.len())]).map(|k| pose(k, k.center)).collect();
     }
-    let bounds = navigator.matter.bounds();
+    let bounds = navigator.occupancy.bounds();
     let mut found = Vec::with_capacity(count);
     for _ in 0..1000 * count {
         let share = DVec3::from_array([0, 0, 0].map(|_: i32| rng.random::<f64>()));
         let center = bounds.min + bounds.size() * share;
-        let clearance = navigator.matter.clearance(center);
+        let clearance = navigator.occupancy.clearance(center);
         if (navigator.clearance..3.0 * navigator.clearance).contains(&clearance)
             && let Some(near) = navigator.graph.nearest(center).next()
         {
@@ -108,14 +108,14 @@ pub fn survey(navigator: &Navigator, which: Ends, count: usize, frames: usize, s
         found.secs.add(start.elapsed().as_secs_f64());
         match flight {
             Ok(flight) => {
-                let smoothness = |f: &Flight| f.smoothness(&navigator.matter, navigator.clearance);
+                let smoothness = |f: &Flight| f.smoothness(&navigator.occupancy, navigator.clearance);
                 found.ours.add(&smoothness(&flight));
                 let paper = Flight::of_paper(&[from, to], frames);
                 paper.iter().for_each(|p| found.paper.add(&smoothness(p)));
                 let through = navigator.keys(&from, &to).and_then(|keys| Flight::of_paper_through(&keys, frames));
                 through.iter().for_each(|p| found.paper_through.add(&smoothness(p)));
             }
-            Err(_) => found.no_way += 1,
+            Err(_) => found.no_route += 1,
         }
     }
     found
@@ -139,7 +139,7 @@ pub struct Surveyed {
     cameras: usize,
     navigator: Navigator,
     parts: usize,
-    matter_secs: f64,
+    occupancy_secs: f64,
     build_secs: f64,
     found: [(&'static str, Survey); 2],
 }
@@ -149,13 +149,13 @@ pub fn surveyed(cloud: &GaussianCloud, own: &[Camera], count: usize, flights: us
     let cameras = more_cameras(own, count, 2.0 * spacing(own), SEED);
     let start = Instant::now();
     let navigator = Navigator::new(cloud, &cameras, Camera::up_of(cameras.iter()).unwrap_or(DVec3::NEG_Y));
-    let matter_secs = start.elapsed().as_secs_f64();
-    navigator.graph.look_at_all(&navigator.matter);
+    let occupancy_secs = start.elapsed().as_secs_f64();
+    navigator.graph.look_at_all(&navigator.occupancy);
     let build_secs = start.elapsed().as_secs_f64();
-    let parts = navigator.graph.parts(&navigator.matter).into_iter().max().map_or(0, |p| p + 1);
-    let kinds = [("keypoints", Ends::Keypoints), ("close to matter", Ends::CloseToMatter)];
+    let parts = navigator.graph.parts(&navigator.occupancy).into_iter().max().map_or(0, |p| p + 1);
+    let kinds = [("keypoints", Ends::Keypoints), ("close to occupied space", Ends::CloseToMatter)];
     let found = kinds.map(|(between, ends)| (between, survey(&navigator, ends, flights, frames, SEED)));
-    Surveyed { cameras: count, navigator, parts, matter_secs, build_secs, found }
+    Surveyed { cameras: count, navigator, parts, occupancy_secs, build_secs, found }
 }
 
 /// A row for each kind of flight.
@@ -216,15 +216,15 @@ pub fn documents(all: &[Surveyed]) -> Value {
             "cameras": s.cameras,
             "between": between,
             "keypoints": s.navigator.graph.keypoints.len(),
-            "keypoints_in_matter": s.navigator.in_matter,
+            "keypoints_in_matter": s.navigator.in_occupied,
             "parts": s.parts,
             "edges": s.navigator.graph.looked_at().1,
-            "voxel": s.navigator.matter.voxel(),
+            "voxel": s.navigator.occupancy.voxel(),
             "clearance": s.navigator.clearance,
-            "matter_secs": s.matter_secs,
+            "matter_secs": s.occupancy_secs,
             "build_secs": s.build_secs,
             "route_secs": { "least": found.secs.least, "median": found.secs.median, "most": found.secs.most },
-            "no_way": found.no_way,
+            "no_way": found.no_route,
             "ours": sum(&found.ours),
             "paper": sum(&found.paper),
             "paper_through_keypoints": sum(&found.paper_through),
@@ -269,6 +269,6 @@ mod tests {
         assert!(paper.rotation_error > 0.1 && through.rotation_error > 1e-3, "{paper:?} {through:?}");
         assert!(through.largest_turn > 1.5 * ours.largest_turn, "{through:?} {ours:?}");
         let close = self::survey(&navigator, Ends::CloseToMatter, 10, 60, 7);
-        assert!(close.ours.flights + close.no_way == 10 && close.ours.poses_too_near == 0, "{close:?}");
+        assert!(close.ours.flights + close.no_route == 10 && close.ours.poses_too_near == 0, "{close:?}");
     }
 }

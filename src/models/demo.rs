@@ -3,7 +3,7 @@
 
 use super::engine::engine;
 use super::network::{Array, Network};
-use super::words::Vocabulary;
+use super::vocabulary::Vocabulary;
 use super::{Encoder, ModelError, Tile};
 
 const IMAGE: (&str, &[u8]) = ("demo_image.onnx", include_bytes!("../../assets/models/demo_image.onnx"));

@@ -18,8 +18,8 @@ use ort::session::builder::GraphOptimizationLevel;
 
 use super::ModelError;
 use super::network::Network;
-use super::room;
-use crate::scene::trace::{self, Sort};
+use super::session_cache;
+use crate::scene::resource_log::{self, Sort};
 
 /// Why networks are loaded, for the trace.
 const MODEL_USE: &str = "it is about to run for the first time";
@@ -163,12 +163,12 @@ impl Engine {
         Ok(Self { environment, name, device, note })
     }
 
-    /// Which engine it is, for people.
+    /// Which engine it is, for display.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// What it computes on, for people.
+    /// What it computes on, for display.
     pub fn device(&self) -> &'static str {
         self.device.map_or("processor", Device::text)
     }
@@ -183,7 +183,7 @@ impl Engine {
     /// # Errors
     /// If it is no network, or one that this engine cannot run.
     pub fn load(&self, bytes: &[u8], name: &str) -> Result<Network, ModelError> {
-        trace::record(Sort::Model, format!("network {name}"), MODEL_USE, bytes.len() as u64);
+        resource_log::record(Sort::Model, format!("network {name}"), MODEL_USE, bytes.len() as u64);
         Ok(Network::new(self.prepare(name, |builder| builder.commit_from_memory(bytes))?, name))
     }
 
@@ -198,8 +198,8 @@ impl Engine {
     /// A session of a network in a file, for which room is made.
     pub(super) fn session(&self, path: &Path) -> Result<Session, ModelError> {
         let bytes = std::fs::metadata(path).map_or(0, |m| m.len());
-        trace::record(Sort::Model, format!("network {}", path.display()), MODEL_USE, bytes);
-        room::make(bytes);
+        resource_log::record(Sort::Model, format!("network {}", path.display()), MODEL_USE, bytes);
+        session_cache::make(bytes);
         self.prepare(&path.display().to_string(), |builder| builder.commit_from_file(path))
     }
 
@@ -210,7 +210,7 @@ impl Engine {
     ) -> Result<Session, ModelError> {
         let load = |device: Option<Device>| -> ort::Result<Session> {
             let builder = Session::builder(&self.environment)?;
-            // Not asked to optimise, the built-in engine prepares nothing and is ten times slower.
+            // Not asked to optimize, the built-in engine prepares nothing and is ten times slower.
             let mut builder = builder.with_optimization_level(GraphOptimizationLevel::Level3)?;
             if let Some(device) = device {
                 builder = builder.with_execution_providers([device.provider()])?;
@@ -220,7 +220,7 @@ impl Engine {
         // A device that refuses a network is no reason to do without it, but is told among what was loaded.
         let refused = |device: Device, e: ort::Error| {
             let what = format!("network {name}, on the processor, because {} refused it: {e}", device.text());
-            trace::record(Sort::Model, what, MODEL_USE, 0);
+            resource_log::record(Sort::Model, what, MODEL_USE, 0);
             load(None)
         };
         let session = guarded(name, || match self.device {

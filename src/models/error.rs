@@ -117,8 +117,8 @@ pub enum ModelError {
         /// The side it should have.
         expected_px: usize,
     },
-    /// A tile with a colour that is no number.
-    #[error("the tile has a colour that is no number at pixel {pixel}")]
+    /// A tile with a color that is no number.
+    #[error("the tile has a color that is no number at pixel {pixel}")]
     TileColor {
         /// Which, row-major.
         pixel: usize,

@@ -1,4 +1,4 @@
-//! Downloads of model files: resumed, checked, cancellable. Nothing is fetched that a person has not
+//! Downloads of model files: resumed, checked, cancellable. Nothing is fetched that nobody has
 //! asked for.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -38,7 +38,7 @@ pub struct Wanted<'a> {
 pub struct Patience {
     /// How long a server may say nothing.
     pub stall: Duration,
-    /// How often a download that broke off is gone on with.
+    /// How often a download that broke off is resumed.
     pub attempts: u32,
     /// Wait before the second attempt; doubled before each further one.
     pub pause: Duration,
@@ -50,7 +50,7 @@ impl Default for Patience {
     }
 }
 
-/// Why a file could not be fetched. What arrived before stays, and is gone on with the next time,
+/// Why a file could not be fetched. What arrived before stays, and is resumed the next time,
 /// unless it was wrong.
 #[derive(Debug, thiserror::Error)]
 pub enum FetchError {
@@ -90,7 +90,7 @@ pub enum FetchError {
         /// Bytes that were promised.
         expected: u64,
     },
-    /// Another size than the catalogue's.
+    /// Another size than the catalog's.
     #[error("{url} offers {offered} bytes, but the file has {expected}; it is another file, and was not taken")]
     OtherSize {
         /// From where.
@@ -230,7 +230,7 @@ struct Part {
     path: PathBuf,
     /// Holds the tag that the server gave this version of the file.
     tag: PathBuf,
-    /// Whether what arrived can be gone on with if the server gives no tag: a checksum will tell.
+    /// Whether what arrived can be resumed if the server gives no tag: a checksum will tell.
     is_checked: bool,
 }
 
@@ -251,7 +251,7 @@ impl Part {
         if tag.is_some() || self.is_checked { (bytes, tag) } else { (0, None) }
     }
 
-    /// The file with the first `there` bytes of it, to be gone on with, for this process alone.
+    /// The file with the first `there` bytes of it, to be resumed, for this process alone.
     fn open(&self, there: u64) -> Result<File, FetchError> {
         let mut file =
             OpenOptions::new().create(true).write(true).truncate(false).open(&self.path).map_err(|e| self.failed(e))?;

@@ -2,25 +2,25 @@
 //!
 //! A network is an ONNX file, run by [`engine`]. [`Encoder`] compares pictures with phrases:
 //! [`DemoEncoder`] is the small one that comes with the program (made by `tools/encoder`),
-//! [`ClipEncoder`] the one of the paper. [`sam`] and [`sam2`] find masks. [`catalogue`] knows which
+//! [`ClipEncoder`] the one of the paper. [`sam`] and [`sam2`] find masks. [`catalog`] knows which
 //! there are, and [`fetch`] brings them.
 
-pub mod catalogue;
+pub mod catalog;
 pub mod clip;
 mod demo;
 pub mod engine;
 mod error;
 pub mod fetch;
-pub mod metadata;
+pub mod manifest;
 pub mod network;
-pub mod prepare;
-pub mod room;
+pub mod preprocess;
 pub mod sam;
 pub mod sam2;
+pub mod session_cache;
 mod tile;
-mod words;
+mod vocabulary;
 
-pub use catalogue::Role;
+pub use catalog::Role;
 pub use clip::ClipEncoder;
 pub use demo::DemoEncoder;
 pub use error::ModelError;
@@ -30,7 +30,7 @@ pub use error::ModelError;
 pub struct Tile {
     /// Side in px.
     pub side_px: usize,
-    /// Colours.
+    /// Colors.
     pub rgb: Vec<[f32; 3]>,
 }
 
@@ -70,17 +70,17 @@ pub const DEMO: &str = "demo";
 /// # Errors
 /// If it cannot be loaded.
 pub fn best_encoder(told: &mut dyn FnMut(String)) -> Result<Box<dyn Encoder>, ModelError> {
-    let best = catalogue::usable(Role::Encoder, told)?.into_iter().next();
+    let best = catalog::usable(Role::Encoder, told)?.into_iter().next();
     encoder(best.as_deref().unwrap_or(DEMO))
 }
 
-/// The encoder of this name: 'demo', a model of the catalogue, or the path of a model's description.
+/// The encoder of this name: 'demo', a model of the catalog, or the path of a model's description.
 ///
 /// # Errors
 /// If there is none, or it cannot be loaded.
 pub fn encoder(name: &str) -> Result<Box<dyn Encoder>, ModelError> {
     match name {
         DEMO => Ok(Box::new(DemoEncoder::new()?)),
-        name => Ok(Box::new(ClipEncoder::open(&catalogue::find(name, Role::Encoder)?)?.called(name))),
+        name => Ok(Box::new(ClipEncoder::open(&catalog::find(name, Role::Encoder)?)?.called(name))),
     }
 }

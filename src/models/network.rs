@@ -10,7 +10,7 @@ use ort::value::Tensor;
 
 use super::ModelError;
 use super::engine::{engine, guarded};
-use super::room::{self, Place};
+use super::session_cache::{self, Place};
 
 /// Numbers with a shape, row-major.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -119,7 +119,7 @@ impl Network {
 
     /// The same, known to lie in a file: it may be closed where memory is short.
     pub(super) fn in_file(self, path: &Path) -> Self {
-        room::register(&self.place);
+        session_cache::register(&self.place);
         Self { file: Some(path.into()), ..self }
     }
 

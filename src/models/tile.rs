@@ -31,11 +31,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_masked_box_is_centred_on_black() {
+    fn the_masked_box_is_centered_on_black() {
         let rgb: Vec<[f32; 3]> = (0..200).map(|i| [i as f32 / 200.0, 0.5, 1.0]).collect();
         let inside = |i: usize| (3..11).contains(&(i % 20)) && (2..6).contains(&(i / 20)) && i != 2 * 20 + 3;
         let tile = Tile::cut(&rgb, &Mask::from_fn(20, 10, inside), 8).expect("not empty");
-        // 8 x 4 px from row 2 on, centred in 8 x 8: row 2 again.
+        // 8 x 4 px from row 2 on, centered in 8 x 8: row 2 again.
         for i in 0..64_usize {
             let (x, y) = (i % 8, i / 8);
             let seen = (2..6).contains(&y) && (x, y) != (0, 2);
@@ -45,7 +45,7 @@ mod tests {
     }
 
     #[test]
-    fn flat_colour_keeps_its_value_at_any_size() {
+    fn flat_color_keeps_its_value_at_any_size() {
         let rgb = vec![[0.25, 0.5, 0.75]; 37 * 37];
         for side_px in [1, 5, 37, 64] {
             let tile = Tile::cut(&rgb, &Mask::from_fn(37, 37, |_| true), side_px).expect("not empty");

@@ -1,10 +1,10 @@
-//! A smooth way along straight legs: corners are rounded as far as matter allows, and the way is
+//! A smooth way along straight legs: corners are rounded as far as occupied space allows, and the way is
 //! measured, so that it can be gone at even speed.
 
 use glam::DVec3;
 
 use super::is_place;
-use super::matter::Matter;
+use super::occupancy::OccupancyGrid;
 
 /// Pieces that a rounded corner is measured in.
 pub const PIECES: usize = 24;
@@ -23,7 +23,7 @@ pub struct Curve {
 
 /// Legs without detours: every point is dropped that one can do without, going straight with this
 /// clearance. First and last stay.
-pub fn shortened(legs: &[DVec3], matter: &Matter, clearance: f64) -> Vec<DVec3> {
+pub fn shortened(legs: &[DVec3], occupancy: &OccupancyGrid, clearance: f64) -> Vec<DVec3> {
     let legs: Vec<DVec3> = distinct(legs);
     let mut out: Vec<DVec3> = Vec::new();
     let mut at = 0;
@@ -34,12 +34,12 @@ pub fn shortened(legs: &[DVec3], matter: &Matter, clearance: f64) -> Vec<DVec3> 
         }
         // The farthest that can be seen, looked for in growing, then in shrinking strides.
         let (mut best, mut stride) = (at + 1, 1);
-        while best + stride < legs.len() && matter.is_free(legs[at], legs[best + stride], clearance) {
+        while best + stride < legs.len() && occupancy.is_free(legs[at], legs[best + stride], clearance) {
             best += stride;
             stride *= 2;
         }
         while stride > 0 {
-            if best + stride < legs.len() && matter.is_free(legs[at], legs[best + stride], clearance) {
+            if best + stride < legs.len() && occupancy.is_free(legs[at], legs[best + stride], clearance) {
                 best += stride;
             }
             stride /= 2;
@@ -58,7 +58,7 @@ fn distinct(points: &[DVec3]) -> Vec<DVec3> {
 
 impl Curve {
     /// Along `legs`, corners rounded where `clearance` can be kept. `None` for no point.
-    pub fn new(legs: &[DVec3], matter: Option<&Matter>, clearance: f64) -> Option<Self> {
+    pub fn new(legs: &[DVec3], occupancy: Option<&OccupancyGrid>, clearance: f64) -> Option<Self> {
         let legs = distinct(legs);
         let mut curve = Self { points: vec![*legs.first()?], gone: vec![0.0], sharp: 0 };
         for i in 1..legs.len() {
@@ -75,8 +75,8 @@ impl Curve {
             let mut rounding = reach;
             let mut bend = bend(corner, sides, rounding, PIECES);
             for _ in 0..HALVINGS {
-                let free = |m: &Matter| bend.windows(2).all(|w| m.is_free(w[0], w[1], clearance));
-                if matter.is_none_or(free) {
+                let free = |m: &OccupancyGrid| bend.windows(2).all(|w| m.is_free(w[0], w[1], clearance));
+                if occupancy.is_none_or(free) {
                     break;
                 }
                 rounding *= 0.5;
@@ -149,17 +149,17 @@ mod tests {
     }
 
     #[test]
-    fn rounding_gives_way_to_matter() {
+    fn rounding_gives_way_to_occupancy() {
         // Around the rim of a hole: a wide bend would cut into the wall.
         let eyes = [DVec3::new(0.0, 0.0, -1.0), DVec3::new(0.0, 0.0, 1.0)];
-        let matter = Matter::of(&wall_with_hole(0.0, 0.4), &eyes, 0.05);
+        let occupancy = OccupancyGrid::of(&wall_with_hole(0.0, 0.4), &eyes, 0.05);
         let legs = [DVec3::new(1.2, 0.0, -0.3), DVec3::new(0.0, 0.0, 0.0), DVec3::new(1.2, 0.0, 0.3)];
         let clear = |clearance: f64| {
-            let curve = Curve::new(&legs, Some(&matter), clearance).expect("points");
-            (0..=500).map(|i| matter.clearance(curve.at(f64::from(i) / 500.0))).fold(f64::INFINITY, f64::min)
+            let curve = Curve::new(&legs, Some(&occupancy), clearance).expect("points");
+            (0..=500).map(|i| occupancy.clearance(curve.at(f64::from(i) / 500.0))).fold(f64::INFINITY, f64::min)
         };
         let wide = Curve::new(&legs, None, 0.0).expect("points");
-        let least = (0..=500).map(|i| matter.clearance(wide.at(f64::from(i) / 500.0))).fold(f64::INFINITY, f64::min);
+        let least = (0..=500).map(|i| occupancy.clearance(wide.at(f64::from(i) / 500.0))).fold(f64::INFINITY, f64::min);
         assert!(least < 0.03, "the control: without looking it cuts into the wall, {least}");
         assert!(clear(0.05) >= 0.05, "{}", clear(0.05));
     }
@@ -167,11 +167,11 @@ mod tests {
     #[test]
     fn detours_are_left_out_where_one_sees_through() {
         let eyes = [DVec3::new(0.0, 0.0, -1.0), DVec3::new(0.0, 0.0, 1.0)];
-        let empty = Matter::of(&GaussianCloud::default(), &eyes, 0.1);
+        let empty = OccupancyGrid::of(&GaussianCloud::default(), &eyes, 0.1);
         let zigzag: Vec<DVec3> =
             (0..30).map(|i| DVec3::new(0.05 * f64::from(i % 2), 0.0, -0.9 + 0.06 * f64::from(i))).collect();
         assert_eq!(shortened(&zigzag, &empty, 0.0).len(), 2);
-        let wall = Matter::of(&wall_with_hole(0.0, 0.4), &eyes, 0.05);
+        let wall = OccupancyGrid::of(&wall_with_hole(0.0, 0.4), &eyes, 0.05);
         let through = [DVec3::new(1.0, 0.0, -0.6), DVec3::new(0.0, 0.0, 0.0), DVec3::new(1.0, 0.0, 0.6)];
         assert_eq!(shortened(&through, &wall, 0.1).len(), 3, "the wall is in the way");
     }

@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-/// Squared distance from each voxel's centre to that of the nearest marked one, in voxels, x fastest.
+/// Squared distance from each voxel's center to that of the nearest marked one, in voxels, x fastest.
 /// Without any marked voxel, the squared diagonal of the grid.
 pub fn squared_distances(marked: &[bool], size: [usize; 3]) -> Vec<f32> {
     let [nx, ny, nz] = size;

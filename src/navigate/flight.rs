@@ -1,10 +1,10 @@
 //! From a route to pictures' poses: along the rounded way at eased speed, turning on SO(3), every
-//! pose held against matter. And the paper's formula, for comparison.
+//! pose compared with occupied space. And the paper's formula, for comparison.
 
 use glam::{DMat3, DVec3};
 
 use super::curve::Curve;
-use super::matter::Matter;
+use super::occupancy::OccupancyGrid;
 use super::pose::{Pose, RotationSpline, angle};
 use crate::math::stats::worst;
 use crate::scene::{CameraPath, PathKey};
@@ -44,11 +44,11 @@ pub struct Flight {
     pub length: f64,
     /// Corners that had to stay sharp.
     pub sharp: usize,
-    /// Poses that were moved away from matter.
+    /// Poses that were moved away from occupied space.
     pub repaired: usize,
 }
 
-/// How smooth a flight is, and how near it comes to matter.
+/// How smooth a flight is, and how near it comes to occupied space.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Smoothness {
     /// Longest step from one pose to the next, scene units.
@@ -59,7 +59,7 @@ pub struct Smoothness {
     pub largest_jolt: f64,
     /// Least distance to matter of a pose, scene units.
     pub least_clearance: f64,
-    /// Poses with less distance to matter than wanted.
+    /// Poses with less distance to occupied space than wanted.
     pub violations: usize,
     /// Largest deviation of a pose's rotation from being one.
     pub rotation_error: f64,
@@ -80,11 +80,11 @@ impl Flight {
         legs: &[DVec3],
         ends: [&Pose; 2],
         look_at: Option<(DVec3, DVec3)>,
-        matter: Option<(&Matter, f64)>,
+        occupancy: Option<(&OccupancyGrid, f64)>,
         frames: usize,
         speed: Speed,
     ) -> Option<Self> {
-        let curve = Curve::new(legs, matter.map(|m| m.0), matter.map_or(0.0, |m| m.1))?;
+        let curve = Curve::new(legs, occupancy.map(|m| m.0), occupancy.map_or(0.0, |m| m.1))?;
         let [from, to] = ends;
         let mut keys = vec![(0.0, from.world_from_camera)];
         if let Some((target, up)) = look_at.filter(|_| curve.length() > 0.0) {
@@ -105,11 +105,11 @@ impl Flight {
         };
         let mut poses: Vec<Pose> = (0..=last).map(pose).collect();
         let mut repaired = 0;
-        if let Some((matter, clearance)) = matter {
+        if let Some((occupancy, clearance)) = occupancy {
             // Both ends are where they were asked to be.
             for pose in &mut poses[1..last] {
-                if matter.clearance(pose.center) < clearance
-                    && let Some(out) = matter.pushed_out(pose.center, clearance)
+                if occupancy.clearance(pose.center) < clearance
+                    && let Some(out) = occupancy.pushed_out(pose.center, clearance)
                 {
                     pose.center = out;
                     repaired += 1;
@@ -142,11 +142,11 @@ impl Flight {
         Some(Self { poses: (0..=m).map(pose).collect(), seconds: 3.0, length, sharp: 0, repaired: 0 })
     }
 
-    /// How smooth it is, and how it keeps `clearance` to matter.
-    pub fn smoothness(&self, matter: &Matter, clearance: f64) -> Smoothness {
+    /// How smooth it is, and how it keeps `clearance` to occupied space.
+    pub fn smoothness(&self, occupancy: &OccupancyGrid, clearance: f64) -> Smoothness {
         let mut s = Smoothness { least_clearance: f64::INFINITY, ..Smoothness::default() };
         for pose in &self.poses {
-            let c = matter.clearance(pose.center);
+            let c = occupancy.clearance(pose.center);
             s.least_clearance = s.least_clearance.min(c);
             s.violations += usize::from(!(c >= clearance));
             let m = &pose.world_from_camera;

@@ -1,7 +1,7 @@
 //! Which keypoints are connected, and the shortest way from one to another.
 //!
-//! Every keypoint looks at its nearest neighbours; an edge is there if one can go straight along it
-//! with enough distance to all matter. Edges are looked at when a route first asks for them, and
+//! Every keypoint looks at its nearest neighbors; an edge is there if one can go straight along it
+//! with enough distance to all occupied space. Edges are looked at when a route first asks for them, and
 //! remembered.
 
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -11,9 +11,9 @@ use pathfinding::prelude::dijkstra;
 use rayon::prelude::*;
 
 use super::keypoints::{Keypoint, Places, places};
-use super::matter::Matter;
+use super::occupancy::OccupancyGrid;
 
-/// Neighbours that a keypoint is tried to be connected with: more than the six of its own star, so
+/// Neighbors that a keypoint is tried to be connected with: more than the six of its own star, so
 /// that stars hang together.
 const NEIGHBOURS: usize = 14;
 /// Unit in which lengths are counted, as a share of a voxel: the search adds whole numbers, so that
@@ -28,7 +28,7 @@ const BLOCKED: u8 = 2;
 pub struct Graph {
     /// Where the eye may stand.
     pub keypoints: Vec<Keypoint>,
-    /// Distance to matter that every point of an edge has.
+    /// Distance to occupied space that every point of an edge has.
     pub clearance: f64,
     places: Places,
     /// Both ends of each edge that is tried; the lower one first.
@@ -49,7 +49,7 @@ pub struct Route {
 }
 
 impl Graph {
-    /// Keypoints with their neighbours, no edge looked at yet.
+    /// Keypoints with their neighbors, no edge looked at yet.
     pub fn new(keypoints: Vec<Keypoint>, clearance: f64) -> Self {
         let places = places(&keypoints);
         let near = |i: usize| {
@@ -72,13 +72,13 @@ impl Graph {
     }
 
     /// Whether one can go along edge `e`.
-    fn is_free(&self, e: usize, matter: &Matter) -> bool {
+    fn is_free(&self, e: usize, occupancy: &OccupancyGrid) -> bool {
         let known = self.state[e].load(Ordering::Relaxed);
         if known != UNSEEN {
             return known == FREE;
         }
         let [a, b] = self.pairs[e].map(|i| self.keypoints[i as usize].center);
-        let free = matter.is_free(a, b, self.clearance);
+        let free = occupancy.is_free(a, b, self.clearance);
         self.state[e].store(if free { FREE } else { BLOCKED }, Ordering::Relaxed);
         free
     }
@@ -90,8 +90,8 @@ impl Graph {
     }
 
     /// Looks at all edges that were not looked at; how many edges are free and how many blocked.
-    pub fn look_at_all(&self, matter: &Matter) -> (usize, usize) {
-        let free = (0..self.pairs.len()).into_par_iter().filter(|e| self.is_free(*e, matter)).count();
+    pub fn look_at_all(&self, occupancy: &OccupancyGrid) -> (usize, usize) {
+        let free = (0..self.pairs.len()).into_par_iter().filter(|e| self.is_free(*e, occupancy)).count();
         (free, self.pairs.len() - free)
     }
 
@@ -116,8 +116,8 @@ impl Graph {
     }
 
     /// The number of the connected part that each keypoint belongs to, the largest part first.
-    pub fn parts(&self, matter: &Matter) -> Vec<usize> {
-        self.look_at_all(matter);
+    pub fn parts(&self, occupancy: &OccupancyGrid) -> Vec<usize> {
+        self.look_at_all(occupancy);
         let mut part = vec![usize::MAX; self.keypoints.len()];
         let mut sizes = Vec::new();
         for start in 0..part.len() {
@@ -132,7 +132,7 @@ impl Graph {
                 size += 1;
                 for &e in &self.of[at] {
                     let next = self.other(e as usize, at);
-                    if part[next] == usize::MAX && self.is_free(e as usize, matter) {
+                    if part[next] == usize::MAX && self.is_free(e as usize, occupancy) {
                         part[next] = number;
                         stack.push(next);
                     }
@@ -154,16 +154,21 @@ impl Graph {
     }
 
     /// The shortest way from one keypoint to another (Dijkstra); `None` if they are not connected.
-    pub fn route(&self, from: usize, to: usize, matter: &Matter) -> Option<Route> {
-        self.route_between(&[(from, 0.0)], &[(to, 0.0)], matter)
+    pub fn route(&self, from: usize, to: usize, occupancy: &OccupancyGrid) -> Option<Route> {
+        self.route_between(&[(from, 0.0)], &[(to, 0.0)], occupancy)
     }
 
     /// The shortest way from any of some keypoints to any of others, when it costs so much (scene
     /// units) to come to each, and to go on from it. One search, however many there are.
-    pub fn route_between(&self, starts: &[(usize, f64)], goals: &[(usize, f64)], matter: &Matter) -> Option<Route> {
+    pub fn route_between(
+        &self,
+        starts: &[(usize, f64)],
+        goals: &[(usize, f64)],
+        occupancy: &OccupancyGrid,
+    ) -> Option<Route> {
         const START: usize = usize::MAX;
         const GOAL: usize = usize::MAX - 1;
-        let unit = UNIT * matter.voxel();
+        let unit = UNIT * occupancy.voxel();
         let cost = |length: f64| (length / unit).round() as u64;
         let known = |i: &usize| *i < self.keypoints.len();
         let next = |&at: &usize| -> Vec<(usize, u64)> {
@@ -174,7 +179,7 @@ impl Graph {
                 return Vec::new();
             }
             let here = self.keypoints[at].center;
-            let free = self.of[at].iter().filter(|e| self.is_free(**e as usize, matter));
+            let free = self.of[at].iter().filter(|e| self.is_free(**e as usize, occupancy));
             let step = |e: &u32| {
                 let other = self.other(*e as usize, at);
                 (other, cost(here.distance(self.keypoints[other].center)))
@@ -197,11 +202,11 @@ mod tests {
     use crate::navigate::testing::{camera_at, cloud_of_wall, joined, wall_with_hole};
     use crate::scene::{Camera, GaussianCloud};
 
-    fn graph(cloud: &GaussianCloud, cameras: &[Camera]) -> (Graph, Matter) {
+    fn graph(cloud: &GaussianCloud, cameras: &[Camera]) -> (Graph, OccupancyGrid) {
         let eyes: Vec<DVec3> = cameras.iter().map(|c| c.center).collect();
-        let matter = Matter::of(cloud, &eyes, 0.05);
-        let (all, _) = keypoints(cameras, &matter, 0.05);
-        (Graph::new(all, 0.05), matter)
+        let occupancy = OccupancyGrid::of(cloud, &eyes, 0.05);
+        let (all, _) = keypoints(cameras, &occupancy, 0.05);
+        (Graph::new(all, 0.05), occupancy)
     }
 
     fn lattice(step: f64) -> Vec<Camera> {
@@ -210,12 +215,12 @@ mod tests {
     }
 
     /// Floyd and Warshall's, on the same edges.
-    fn all_distances(g: &Graph, matter: &Matter) -> Vec<Vec<f64>> {
+    fn all_distances(g: &Graph, occupancy: &OccupancyGrid) -> Vec<Vec<f64>> {
         let n = g.keypoints.len();
         let mut d = vec![vec![f64::INFINITY; n]; n];
         (0..n).for_each(|i| d[i][i] = 0.0);
         for (e, [a, b]) in g.pairs.iter().enumerate() {
-            if g.is_free(e, matter) {
+            if g.is_free(e, occupancy) {
                 let (a, b) = (*a as usize, *b as usize);
                 let length = g.keypoints[a].center.distance(g.keypoints[b].center);
                 (d[a][b], d[b][a]) = (length, length);
@@ -233,13 +238,13 @@ mod tests {
 
     #[test]
     fn routes_are_as_short_as_brute_force_says() {
-        let (g, matter) = graph(&wall_with_hole(0.0, 0.5), &lattice(0.5));
-        let truth = all_distances(&g, &matter);
+        let (g, occupancy) = graph(&wall_with_hole(0.0, 0.5), &lattice(0.5));
+        let truth = all_distances(&g, &occupancy);
         let n = g.keypoints.len();
         let (mut found, mut none) = (0, 0);
         for from in (0..n).step_by(7) {
             for to in (0..n).step_by(5) {
-                match g.route(from, to, &matter) {
+                match g.route(from, to, &occupancy) {
                     Some(route) => {
                         assert!((route.length - truth[from][to]).abs() < 1e-6, "{from} to {to}");
                         assert_eq!((route.through[0], *route.through.last().expect("one")), (from, to));
@@ -259,27 +264,27 @@ mod tests {
     fn a_wall_parts_the_graph_and_a_hole_joins_it() {
         let cameras = lattice(0.5);
         // A wall wide enough that nobody gets around it within the grid.
-        let (closed, matter) = graph(&cloud_of_wall(0.0), &cameras);
-        let parts = closed.parts(&matter);
+        let (closed, occupancy) = graph(&cloud_of_wall(0.0), &cameras);
+        let parts = closed.parts(&occupancy);
         let side = |i: usize| closed.keypoints[i].center.z > 0.0;
         let largest = parts.iter().position(|p| *p == 0).expect("one");
         assert!((0..parts.len()).filter(|i| parts[*i] == 0).all(|i| side(i) == side(largest)), "both sides in one");
         let other = (0..parts.len()).find(|i| side(*i) != side(largest)).expect("other side");
-        assert_eq!(closed.route(largest, other, &matter), None);
-        let (open, matter) = graph(&wall_with_hole(0.0, 0.6), &cameras);
-        let parts = open.parts(&matter);
+        assert_eq!(closed.route(largest, other, &occupancy), None);
+        let (open, occupancy) = graph(&wall_with_hole(0.0, 0.6), &cameras);
+        let parts = open.parts(&occupancy);
         let side = |i: usize| open.keypoints[i].center.z > 0.0;
         let (near, far) = (0..parts.len()).fold((None, None), |(n, f), i| match (parts[i], side(i)) {
             (0, true) => (Some(i), f),
             (0, false) => (n, Some(i)),
             _ => (n, f),
         });
-        let route = open.route(near.expect("near"), far.expect("far"), &matter).expect("through the hole");
+        let route = open.route(near.expect("near"), far.expect("far"), &occupancy).expect("through the hole");
         for pair in route.through.windows(2) {
             let [a, b] = [pair[0], pair[1]].map(|i| open.keypoints[i].center);
             for k in 0..=200 {
-                let c = matter.clearance(a.lerp(b, f64::from(k) / 200.0));
-                assert!(c >= 0.05 - 0.05 * matter.voxel(), "clearance {c} on an edge");
+                let c = occupancy.clearance(a.lerp(b, f64::from(k) / 200.0));
+                assert!(c >= 0.05 - 0.05 * occupancy.voxel(), "clearance {c} on an edge");
             }
         }
     }
@@ -288,12 +293,12 @@ mod tests {
     fn edges_are_looked_at_when_they_are_needed_and_remembered() {
         let cameras = lattice(0.5);
         let cloud = joined(&cloud_of_wall(3.0), &cloud_of_wall(-3.0));
-        let (g, matter) = graph(&cloud, &cameras);
-        let near = g.nearest(g.keypoints[0].center).nth(1).expect("a neighbour");
-        g.route(0, near, &matter).expect("beside it");
+        let (g, occupancy) = graph(&cloud, &cameras);
+        let near = g.nearest(g.keypoints[0].center).nth(1).expect("a neighbor");
+        g.route(0, near, &occupancy).expect("beside it");
         let (seen, all) = g.looked_at();
         assert!(seen > 0 && seen < all / 2, "{seen} of {all}");
-        g.look_at_all(&matter);
+        g.look_at_all(&occupancy);
         let (other, _) = graph(&cloud, &cameras);
         assert!(other.remember(&g.known()) && other.looked_at() == (all, all));
         assert!(!other.remember(&[1, 2]) && !other.remember(&vec![9; all]));
@@ -301,8 +306,8 @@ mod tests {
 
     #[test]
     fn no_keypoints_no_routes() {
-        let (g, matter) = graph(&GaussianCloud::default(), &[]);
-        assert_eq!(g.route(0, 0, &matter), None);
-        assert!(g.parts(&matter).is_empty());
+        let (g, occupancy) = graph(&GaussianCloud::default(), &[]);
+        assert_eq!(g.route(0, 0, &occupancy), None);
+        assert!(g.parts(&occupancy).is_empty());
     }
 }

@@ -6,7 +6,7 @@ use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
 use super::is_place;
-use super::matter::Matter;
+use super::occupancy::OccupancyGrid;
 use crate::scene::Camera;
 
 /// A place where the eye may stand.
@@ -20,7 +20,7 @@ pub struct Keypoint {
     pub camera: usize,
     /// Whether it is the camera's own place.
     pub original: bool,
-    /// Distance to matter, scene units.
+    /// Distance to occupied space, scene units.
     pub clearance: f64,
 }
 
@@ -47,9 +47,9 @@ fn distinct(cameras: &[Camera]) -> Vec<DVec3> {
     places
 }
 
-/// The places of `cameras`, dilated by six neighbours along each camera's own axes, less those with
-/// less than `clearance` to matter; and how many those are.
-pub fn keypoints(cameras: &[Camera], matter: &Matter, clearance: f64) -> (Vec<Keypoint>, usize) {
+/// The places of `cameras`, dilated by six neighbors along each camera's own axes, less those with
+/// less than `clearance` to occupied space; and how many those are.
+pub fn keypoints(cameras: &[Camera], occupancy: &OccupancyGrid, clearance: f64) -> (Vec<Keypoint>, usize) {
     let half = 0.5 * spacing(cameras);
     let mut all = Vec::with_capacity(7 * cameras.len());
     for (camera, c) in cameras.iter().enumerate().filter(|(_, c)| is_place(c.center)) {
@@ -63,7 +63,7 @@ pub fn keypoints(cameras: &[Camera], matter: &Matter, clearance: f64) -> (Vec<Ke
                 world_from_camera: c.world_from_camera,
                 camera,
                 original: offset == DVec3::ZERO,
-                clearance: matter.clearance(center),
+                clearance: occupancy.clearance(center),
             }
         }));
     }
@@ -88,12 +88,12 @@ mod tests {
     use crate::navigate::testing::{camera_at, cloud_of_wall};
 
     #[test]
-    fn six_neighbours_half_the_spacing_away() {
+    fn six_neighbors_half_the_spacing_away() {
         let cameras: Vec<Camera> = (0..4).map(|i| camera_at(DVec3::new(0.4 * f64::from(i), 0.0, 1.5))).collect();
         assert!((spacing(&cameras) - 0.4).abs() < 1e-12);
         let eyes: Vec<DVec3> = cameras.iter().map(|c| c.center).collect();
-        let matter = Matter::of(&cloud_of_wall(0.0), &eyes, 0.1);
-        let (all, left_out) = keypoints(&cameras, &matter, 0.05);
+        let occupancy = OccupancyGrid::of(&cloud_of_wall(0.0), &eyes, 0.1);
+        let (all, left_out) = keypoints(&cameras, &occupancy, 0.05);
         assert_eq!((all.len(), left_out), (28, 0));
         assert_eq!(all.iter().filter(|k| k.original).count(), 4);
         for k in all.iter().filter(|k| !k.original) {
@@ -103,11 +103,11 @@ mod tests {
 
     #[test]
     fn keypoints_inside_matter_are_rejected() {
-        // The neighbours of the second camera towards the wall would stand in it.
+        // The neighbors of the second camera towards the wall would stand in it.
         let cameras = [camera_at(DVec3::new(0.0, 0.0, 0.9)), camera_at(DVec3::new(0.0, 0.0, 0.3))];
         let eyes: Vec<DVec3> = cameras.iter().map(|c| c.center).collect();
-        let matter = Matter::of(&cloud_of_wall(0.0), &eyes, 0.05);
-        let (all, left_out) = keypoints(&cameras, &matter, 0.1);
+        let occupancy = OccupancyGrid::of(&cloud_of_wall(0.0), &eyes, 0.05);
+        let (all, left_out) = keypoints(&cameras, &occupancy, 0.1);
         assert_eq!((all.len(), left_out), (13, 1));
         assert!(all.iter().all(|k| k.center.z > 0.1), "the one in the wall is gone");
     }
@@ -117,7 +117,7 @@ mod tests {
         let one = camera_at(DVec3::new(0.0, 0.0, 1.0));
         assert_eq!(spacing(&[one.clone(), one.clone()]), 0.0);
         assert_eq!(spacing(&[]), 0.0);
-        let matter = Matter::of(&cloud_of_wall(0.0), &[one.center], 0.1);
-        assert_eq!(keypoints(&[one.clone(), one], &matter, 0.1).0.len(), 2);
+        let occupancy = OccupancyGrid::of(&cloud_of_wall(0.0), &[one.center], 0.1);
+        assert_eq!(keypoints(&[one.clone(), one], &occupancy, 0.1).0.len(), 2);
     }
 }

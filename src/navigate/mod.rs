@@ -1,29 +1,29 @@
-//! Ways through a scene: where matter is, where one may stand, how to get from here to there, and
+//! Ways through a scene: which space is occupied, where one may stand, how to get from here to there, and
 //! from where a target is seen best (the paper's Interactive Agent; Scene Initialization and Visible
 //! Interaction).
 //!
-//! In the order of the data: [`matter`] from the Gaussians, [`keypoints`] from the cameras, [`graph`]
+//! In the order of the data: [`occupancy`] from the Gaussians, [`keypoints`] from the cameras, [`graph`]
 //! of both; [`target`] chooses a view, [`navigator`] finds the way to it, [`curve`] rounds it, and
-//! [`visit`] does all of that for an identity; [`flight`] makes pictures' poses of it. [`film`] does the same for a path that a person has put together.
+//! [`visit`] does all of that for an identity; [`flight`] makes pictures' poses of it. [`video`] does the same for a path that the user has put together.
 
+pub mod approach;
+pub mod camera_spline;
 pub mod curve;
 mod distance;
-pub mod film;
 pub mod flight;
 pub mod graph;
 pub mod keypoints;
-pub mod matter;
 pub mod navigator;
+pub mod occupancy;
 pub mod pose;
 pub mod target;
 #[cfg(test)]
 pub(crate) mod testing;
-pub mod visit;
 
-pub use film::Film;
+pub use camera_spline::CameraSpline;
 pub use flight::{FRAMES, Flight, Speed};
-pub use matter::Matter;
-pub use navigator::{Navigator, NoWay};
+pub use navigator::{Navigator, NoRoute};
+pub use occupancy::OccupancyGrid;
 pub use pose::Pose;
 
 use glam::DVec3;

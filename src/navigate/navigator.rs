@@ -7,11 +7,11 @@ use super::flight::{Flight, Speed};
 use super::graph::{Graph, Route};
 use super::is_place;
 use super::keypoints::{keypoints, spacing};
-use super::matter::Matter;
+use super::occupancy::OccupancyGrid;
 use super::pose::Pose;
 use crate::scene::{Bounds, Camera, GaussianCloud};
 
-/// Distance kept to matter, as a share of how far the cameras are spread.
+/// Distance kept to occupied space, as a share of how far the cameras are spread.
 const CLEARANCE: f64 = 0.02;
 /// Keypoints that the eye and its goal are tried to be joined to.
 const ENTRIES: usize = 48;
@@ -20,34 +20,34 @@ const SPARE: f64 = 1.05;
 
 /// All that is needed to move about in a scene.
 pub struct Navigator {
-    /// Where matter is.
-    pub matter: Matter,
+    /// Which space is occupied.
+    pub occupancy: OccupancyGrid,
     /// Where one can go.
     pub graph: Graph,
     /// The photos' cameras.
     pub cameras: Vec<Camera>,
     /// Mean distance between cameras, scene units.
     pub spacing: f64,
-    /// Distance that flights keep to matter, scene units.
+    /// Distance that flights keep to occupied space, scene units.
     pub clearance: f64,
     /// Which way is up.
     pub up: DVec3,
-    /// Keypoints that were left out because they are in matter.
-    pub in_matter: usize,
+    /// Keypoints that were left out because they are in occupied space.
+    pub in_occupied: usize,
 }
 
 /// Why there is no way.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum NoWay {
+pub enum NoRoute {
     /// There are no keypoints.
-    #[error("there is nowhere to stand: the scene came without cameras, or all of them are inside matter")]
+    #[error("there is nowhere to stand: the scene came without cameras, or all of them are inside occupied space")]
     NoKeypoints,
     /// The eye cannot get away from where it is.
-    #[error("there is no way out of where the eye is: matter is all around it")]
+    #[error("there is no way out of where the eye is: occupied space is all around it")]
     Enclosed,
     /// The goal lies in a part that cannot be reached.
     #[error(
-        "there is no way there that keeps clear of matter; the nearest that can be reached is {distance:.2} units away from it"
+        "there is no way there that keeps clear of occupied space; the nearest that can be reached is {distance:.2} units away from it"
     )]
     Parted {
         /// The nearest keypoint to it that can be reached.
@@ -55,8 +55,8 @@ pub enum NoWay {
         /// Its distance from the goal, scene units.
         distance: f64,
     },
-    /// The goal is inside matter, or outside of what is known.
-    #[error("one cannot stand there: it is inside matter or outside of the scene")]
+    /// The goal is inside occupied space, or outside of what is known.
+    #[error("one cannot stand there: it is inside occupied space or outside of the scene")]
     Inside,
 }
 
@@ -68,31 +68,31 @@ impl Navigator {
         let scene = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i))).map_or(1.0, |b| b.radius());
         let spacing = spacing(cameras);
         let wanted = CLEARANCE * if spread > 0.01 * scene { spread } else { scene };
-        let matter = Matter::of(cloud, &eyes, (0.5 * spacing).min(2.0 * wanted));
-        let clearance = wanted.max(matter.voxel());
-        let (keypoints, in_matter) = keypoints(cameras, &matter, SPARE * clearance);
+        let occupancy = OccupancyGrid::of(cloud, &eyes, (0.5 * spacing).min(2.0 * wanted));
+        let clearance = wanted.max(occupancy.voxel());
+        let (keypoints, in_occupied) = keypoints(cameras, &occupancy, SPARE * clearance);
         let graph = Graph::new(keypoints, SPARE * clearance);
         let up = up.try_normalize().unwrap_or(DVec3::NEG_Y);
-        Self { matter, graph, cameras: cameras.to_vec(), spacing, clearance, up, in_matter }
+        Self { occupancy, graph, cameras: cameras.to_vec(), spacing, clearance, up, in_occupied }
     }
 
-    /// Bytes that its grid of matter takes, by far the largest part.
+    /// Bytes that its occupancy grid takes, by far the largest part.
     pub fn bytes(&self) -> u64 {
-        self.matter.bytes()
+        self.occupancy.bytes()
     }
 
     /// Keypoints that can be gone to straight from a place, nearest first. A place with less
     /// clearance than wanted is left without losing any more of it.
     fn entries(&self, place: DVec3) -> Vec<usize> {
-        let here = self.matter.clearance(place);
-        let keep = self.clearance.min(here - 0.01 * self.matter.voxel());
+        let here = self.occupancy.clearance(place);
+        let keep = self.clearance.min(here - 0.01 * self.occupancy.voxel());
         let near: Vec<usize> = self.graph.nearest(place).take(ENTRIES).collect();
         let all = near.iter().copied();
-        if keep < 0.5 * self.matter.voxel() {
-            // Inside matter: any way out is better than none.
+        if keep < 0.5 * self.occupancy.voxel() {
+            // Inside occupied space: any way out is better than none.
             return all.take(4).collect();
         }
-        all.filter(|i| self.matter.is_free(place, self.graph.keypoints[*i].center, keep)).take(8).collect()
+        all.filter(|i| self.occupancy.is_free(place, self.graph.keypoints[*i].center, keep)).take(8).collect()
     }
 
     /// The keypoints of the shortest way through the graph from one pose to another, both ends with it: what
@@ -115,41 +115,41 @@ impl Navigator {
             all.iter().map(|i| (*i, place(*i).distance(end))).collect()
         };
         let (near_start, near_goal) = (with_way(entries[0], ends[0]), with_way(entries[1], ends[1]));
-        self.graph.route_between(&near_start, &near_goal, &self.matter)
+        self.graph.route_between(&near_start, &near_goal, &self.occupancy)
     }
 
-    /// The straight legs of the shortest way from one place to another that keeps clear of matter.
+    /// The straight legs of the shortest way from one place to another that keeps clear of occupied space.
     ///
     /// # Errors
     /// If there is none.
-    pub fn legs(&self, from: DVec3, to: DVec3) -> Result<Vec<DVec3>, NoWay> {
-        if self.matter.is_inside(to) {
-            return Err(NoWay::Inside);
+    pub fn legs(&self, from: DVec3, to: DVec3) -> Result<Vec<DVec3>, NoRoute> {
+        if self.occupancy.is_inside(to) {
+            return Err(NoRoute::Inside);
         }
         if !is_place(from) {
-            return Err(NoWay::Enclosed);
+            return Err(NoRoute::Enclosed);
         }
-        let ends = self.matter.clearance(from).min(self.matter.clearance(to));
-        if !self.matter.is_inside(from) && self.matter.is_free(from, to, self.clearance.min(0.99 * ends)) {
+        let ends = self.occupancy.clearance(from).min(self.occupancy.clearance(to));
+        if !self.occupancy.is_inside(from) && self.occupancy.is_free(from, to, self.clearance.min(0.99 * ends)) {
             return Ok(vec![from, to]);
         }
         if self.graph.keypoints.is_empty() {
-            return Err(NoWay::NoKeypoints);
+            return Err(NoRoute::NoKeypoints);
         }
         let (starts, goals) = (self.entries(from), self.entries(to));
         if starts.is_empty() {
-            return Err(NoWay::Enclosed);
+            return Err(NoRoute::Enclosed);
         }
         let place = |i: usize| self.graph.keypoints[i].center;
         if let Some(route) = self.route([from, to], [&starts, &goals]) {
             let legs: Vec<DVec3> =
                 std::iter::once(from).chain(route.through.iter().map(|i| place(*i))).chain([to]).collect();
-            return Ok(shortened(&legs, &self.matter, self.clearance.min(0.99 * ends)));
+            return Ok(shortened(&legs, &self.occupancy, self.clearance.min(0.99 * ends)));
         }
-        let parts = self.graph.parts(&self.matter);
+        let parts = self.graph.parts(&self.occupancy);
         let reached = |i: &usize| starts.iter().any(|s| parts[*s] == parts[*i]);
         let nearest = self.graph.nearest(to).find(reached).unwrap_or(starts[0]);
-        Err(NoWay::Parted { nearest, distance: place(nearest).distance(to) })
+        Err(NoRoute::Parted { nearest, distance: place(nearest).distance(to) })
     }
 
     /// A way around a target instead of over it, where there is room for that: it can be kept in sight
@@ -173,9 +173,9 @@ impl Navigator {
             target + turned * (ra + (rb - ra) * u) + self.up * height
         };
         let legs: Vec<DVec3> = std::iter::once(from).chain((1..PIECES).map(at)).chain([to]).collect();
-        let ends = self.matter.clearance(from).min(self.matter.clearance(to));
+        let ends = self.occupancy.clearance(from).min(self.occupancy.clearance(to));
         let keep = self.clearance.min(0.99 * ends);
-        let free = !self.matter.is_inside(from) && legs.windows(2).all(|w| self.matter.is_free(w[0], w[1], keep));
+        let free = !self.occupancy.is_inside(from) && legs.windows(2).all(|w| self.occupancy.is_free(w[0], w[1], keep));
         free.then_some(legs)
     }
 
@@ -190,32 +190,32 @@ impl Navigator {
         look_at: Option<DVec3>,
         frames: usize,
         speed: Speed,
-    ) -> Result<Flight, NoWay> {
+    ) -> Result<Flight, NoRoute> {
         let around = look_at.and_then(|target| self.around(from.center, to.center, target));
         let legs = match around {
             Some(legs) => legs,
             None => self.legs(from.center, to.center)?,
         };
-        let ends = self.matter.clearance(from.center).min(self.matter.clearance(to.center));
+        let ends = self.occupancy.clearance(from.center).min(self.occupancy.clearance(to.center));
         let clearance = self.clearance.min(0.99 * ends);
         let look_at = look_at.map(|target| (target, self.up));
-        let flight = Flight::new(&legs, [from, to], look_at, Some((&self.matter, clearance)), frames, speed);
-        flight.ok_or(NoWay::Inside)
+        let flight = Flight::new(&legs, [from, to], look_at, Some((&self.occupancy, clearance)), frames, speed);
+        flight.ok_or(NoRoute::Inside)
     }
 
     /// How far one can go from a pose in a direction of its own (right, down, forward), at most
-    /// `distance` scene units, and whether matter ends it.
+    /// `distance` scene units, and whether occupied space ends it.
     pub fn step(&self, from: &Pose, direction: DVec3, distance: f64) -> (DVec3, bool) {
         let Some(direction) = (from.world_from_camera * direction).try_normalize() else { return (from.center, false) };
         let goal = from.center + direction * distance.max(0.0);
-        let here = self.matter.clearance(from.center);
-        // Who is too near already may go away from matter, not nearer.
-        let keep = self.clearance.min(here - 0.01 * self.matter.voxel());
-        if keep < 0.5 * self.matter.voxel() {
-            let out = self.matter.clearance(goal) > here;
+        let here = self.occupancy.clearance(from.center);
+        // Who is too near already may go away from occupied space, not nearer.
+        let keep = self.clearance.min(here - 0.01 * self.occupancy.voxel());
+        if keep < 0.5 * self.occupancy.voxel() {
+            let out = self.occupancy.clearance(goal) > here;
             return if out { (goal, false) } else { (from.center, true) };
         }
-        let share = self.matter.free_share(from.center, goal, keep);
+        let share = self.occupancy.free_share(from.center, goal, keep);
         (from.center.lerp(goal, share), share < 1.0)
     }
 }
@@ -244,10 +244,10 @@ mod tests {
         let n = Navigator::new(&wall_with_hole(0.0, 0.6), &cameras(), DVec3::NEG_Y);
         let (from, to) = (pose(DVec3::new(0.9, 0.1, -1.0)), pose(DVec3::new(1.0, 0.0, 1.0)));
         let flight = n.fly(&from, &to, None, FRAMES, Speed::Eased).expect("through the hole");
-        let ours = flight.smoothness(&n.matter, n.clearance);
+        let ours = flight.smoothness(&n.occupancy, n.clearance);
         assert_eq!(ours.violations, 0, "{ours:?}");
         let keys = [from, to];
-        let paper = Flight::of_paper(&keys, FRAMES).expect("a line").smoothness(&n.matter, n.clearance);
+        let paper = Flight::of_paper(&keys, FRAMES).expect("a line").smoothness(&n.occupancy, n.clearance);
         assert!(paper.violations > 0, "straight through the wall: {paper:?}");
     }
 
@@ -262,25 +262,25 @@ mod tests {
         let n = Navigator::new(&walls, &close, DVec3::NEG_Y);
         let (from, to) = (DVec3::new(0.0, 0.0, -0.7), DVec3::new(0.0, 0.0, 0.7));
         match n.legs(from, to) {
-            Err(NoWay::Parted { nearest, distance }) => {
+            Err(NoRoute::Parted { nearest, distance }) => {
                 let place = n.graph.keypoints[nearest].center;
                 assert!(place.z < 0.0 && (place.distance(to) - distance).abs() < 1e-9);
             }
             other => panic!("{other:?}"),
         }
-        assert_eq!(n.legs(from, DVec3::ZERO), Err(NoWay::Inside));
-        assert_eq!(n.legs(from, DVec3::splat(99.0)), Err(NoWay::Inside));
+        assert_eq!(n.legs(from, DVec3::ZERO), Err(NoRoute::Inside));
+        assert_eq!(n.legs(from, DVec3::splat(99.0)), Err(NoRoute::Inside));
     }
 
     #[test]
-    fn steps_end_before_matter() {
+    fn steps_end_before_occupancy() {
         let n = Navigator::new(&cloud_of_wall(0.0), &cameras(), DVec3::NEG_Y);
         let from = pose(DVec3::new(0.0, 0.0, -1.0));
         let (short, stopped) = n.step(&from, DVec3::Z, 0.2);
         assert!((short.z + 0.8).abs() < 1e-9 && !stopped);
         let (long, stopped) = n.step(&from, DVec3::Z, 5.0);
         assert!(stopped && long.z < 0.0 && long.z > -0.3, "{long}");
-        assert!(n.matter.clearance(long) >= 0.9 * n.clearance);
+        assert!(n.occupancy.clearance(long) >= 0.9 * n.clearance);
         let (back, stopped) = n.step(&pose(long), DVec3::NEG_Z, 0.2);
         assert!(!stopped && back.z < long.z, "away from the wall");
         assert_eq!(n.step(&from, DVec3::ZERO, 1.0), (from.center, false));
@@ -291,9 +291,9 @@ mod tests {
         let n = Navigator::new(&cloud_of_wall(0.0), &[], DVec3::ZERO);
         // On either side of the wall, and both where nothing is.
         let ends = [-0.5, 0.5].map(|z| DVec3::new(0.0, 0.0, z));
-        assert!(ends.iter().all(|p| !n.matter.is_inside(*p)), "{:?}", ends.map(|p| n.matter.clearance(p)));
-        assert_eq!(n.legs(ends[0], ends[1]), Err(NoWay::NoKeypoints));
-        assert_eq!(n.legs(ends[0], DVec3::ZERO), Err(NoWay::Inside));
+        assert!(ends.iter().all(|p| !n.occupancy.is_inside(*p)), "{:?}", ends.map(|p| n.occupancy.clearance(p)));
+        assert_eq!(n.legs(ends[0], ends[1]), Err(NoRoute::NoKeypoints));
+        assert_eq!(n.legs(ends[0], DVec3::ZERO), Err(NoRoute::Inside));
         let one = Navigator::new(&cloud_of_wall(0.0), &[camera_at(DVec3::Z)], DVec3::Y);
         assert_eq!(one.graph.keypoints.len(), 1);
     }

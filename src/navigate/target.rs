@@ -5,7 +5,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use strum::{IntoStaticStr, VariantArray};
 
-use super::matter::Matter;
+use super::occupancy::OccupancyGrid;
 use super::pose::Pose;
 use crate::render::{Features, RenderError, RenderSettings, Renderer};
 use crate::scene::{Bounds, Camera, GaussianCloud};
@@ -95,7 +95,7 @@ pub struct View {
     pub visible: f64,
     /// Share of the picture that it covers, 0 to 1.
     pub covers: f64,
-    /// Distance of the eye to matter, scene units.
+    /// Distance of the eye to occupied space, scene units.
     pub clearance: f64,
     /// How good it is, all things taken together; comparable within one search.
     pub score: f64,
@@ -107,13 +107,13 @@ pub struct Search<'a> {
     pub cloud: &'a GaussianCloud,
     /// How they are drawn.
     pub settings: &'a RenderSettings,
-    /// Where matter is.
-    pub matter: &'a Matter,
+    /// Which space is occupied.
+    pub occupancy: &'a OccupancyGrid,
     /// The photos' cameras.
     pub cameras: &'a [Camera],
     /// Which way is up.
     pub up: DVec3,
-    /// Distance to matter that the eye keeps.
+    /// Distance to occupied space that the eye keeps.
     pub clearance: f64,
 }
 
@@ -133,10 +133,10 @@ impl Search<'_> {
         let points: Vec<DVec3> = members.into_iter().step_by(stride).collect();
         let half = 0.5 * eye.fov_y_rad;
         let narrow = half.min((half.tan() * aspect).atan());
-        let radius = bounds.radius().max(0.5 * self.matter.voxel());
+        let radius = bounds.radius().max(0.5 * self.occupancy.voxel());
         let usual = radius / (FILL * narrow.tan());
         // Nobody can stand nearer than this.
-        let least = self.clearance + 0.5 * self.matter.voxel();
+        let least = self.clearance + 0.5 * self.occupancy.voxel();
         let now = (eye.center - center).try_normalize().unwrap_or(-eye.forward());
         let front = self.front(target, center);
         let wanted = wanted(wish.side, now, front, self.up);
@@ -149,12 +149,12 @@ impl Search<'_> {
             .filter_map(|(direction, distance)| {
                 let at = center + direction * distance;
                 let fits = fit(wish.side, wanted, now, direction)?;
-                let clearance = self.matter.clearance(at);
+                let clearance = self.occupancy.clearance(at);
                 if clearance < self.clearance {
                     return None;
                 }
-                let skip = 1.5 * self.matter.voxel();
-                let light = |p: &DVec3| self.matter.transmittance(at, *p, skip);
+                let skip = 1.5 * self.occupancy.voxel();
+                let light = |p: &DVec3| self.occupancy.transmittance(at, *p, skip);
                 let visible = points.iter().map(light).sum::<f64>() / points.len() as f64;
                 let size = usual * wish.distance / distance;
                 let size = size.min(1.0 / size);
@@ -183,7 +183,7 @@ impl Search<'_> {
             let (visible, covers) = drawing.look(&pose.camera(width, height))?;
             // What the grid is too coarse for, the picture knows.
             let score = score * (0.05 + visible);
-            views.push(View { pose, visible, covers, clearance: self.matter.clearance(at), score });
+            views.push(View { pose, visible, covers, clearance: self.occupancy.clearance(at), score });
         }
         views.sort_by(|a, b| b.score.total_cmp(&a.score));
         Ok(views)
@@ -335,12 +335,12 @@ mod tests {
     fn best(wish: Wish, from: DVec3) -> View {
         let (cloud, target, cameras) = scene();
         let eyes: Vec<DVec3> = cameras.iter().map(|c| c.center).collect();
-        let matter = Matter::of(&cloud, &eyes, 0.05);
+        let occupancy = OccupancyGrid::of(&cloud, &eyes, 0.05);
         let settings = RenderSettings::default();
         let search = Search {
             cloud: &cloud,
             settings: &settings,
-            matter: &matter,
+            occupancy: &occupancy,
             cameras: &cameras,
             up: DVec3::NEG_Y,
             clearance: 0.05,
@@ -377,12 +377,12 @@ mod tests {
     #[test]
     fn a_target_without_gaussians_has_no_view() {
         let (cloud, _, cameras) = scene();
-        let matter = Matter::of(&cloud, &[DVec3::Z], 0.05);
+        let occupancy = OccupancyGrid::of(&cloud, &[DVec3::Z], 0.05);
         let settings = RenderSettings::default();
         let search = Search {
             cloud: &cloud,
             settings: &settings,
-            matter: &matter,
+            occupancy: &occupancy,
             cameras: &cameras,
             up: DVec3::Z,
             clearance: 0.05,

@@ -6,7 +6,7 @@ use crate::math::stats::psnr_of;
 use crate::render::{Frame, ssim};
 use crate::scene::PhotoPixels;
 
-/// The colour planes of a photo, 0 to 1.
+/// The color planes of a photo, 0 to 1.
 pub fn planes<R: Real>(photo: &PhotoPixels) -> [Vec<R>; 3] {
     std::array::from_fn(|c| photo.rgb.iter().map(|p| R::of(f64::from(p[c]) / 255.0)).collect())
 }

@@ -3,9 +3,9 @@
 
 pub mod depth;
 pub mod evaluate;
-pub mod film;
 pub mod metrics;
 pub mod observer;
 pub mod semantics;
 pub mod synth;
 pub mod train;
+pub mod video;

@@ -24,7 +24,7 @@ pub enum Signal {
 /// Where a piece of long work stands.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Progress {
-    /// What is being done, for people: "Training", "Loading photos".
+    /// What is being done, for display: "Training", "Loading photos".
     pub stage: String,
     /// Units done so far.
     pub done: u64,
@@ -128,7 +128,7 @@ impl Progress {
     }
 }
 
-/// Something a person should see in a log.
+/// Something the user should see in a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Severity {
     /// For the record.

@@ -3,8 +3,8 @@
 //! EWA splatting as in 3D Gaussian Splatting, with three rules that both backends share:
 //!
 //! * a Gaussian touches a pixel where `alpha = min(ALPHA_MAX, opacity * exp(-q / 2)) >= ALPHA_MIN`,
-//!   `q` the squared Mahalanobis distance of the pixel's centre in the picture plane;
-//! * it reaches a tile if the smallest `q` over the tile's pixel centres allows that;
+//!   `q` the squared Mahalanobis distance of the pixel's center in the picture plane;
+//! * it reaches a tile if the smallest `q` over the tile's pixel centers allows that;
 //! * a pixel is closed before the splat that would bring its transmittance under
 //!   `TRANSMITTANCE_MIN`.
 
@@ -35,16 +35,16 @@ pub const ALPHA_MIN: f64 = 1.0 / 255.0;
 pub const ALPHA_MAX: f64 = 0.999;
 /// A pixel stops before its transmittance falls under this.
 pub const TRANSMITTANCE_MIN: f64 = 1e-4;
-/// Brightest colour of a splat, far above any display. Its fourth power, of which SSIM is made, is
+/// Brightest color of a splat, far above any display. Its fourth power, of which SSIM is made, is
 /// still a number in `f32`.
 pub const COLOR_MAX: f64 = 1e9;
 /// Variance in px² added along both picture axes (3DGS's low-pass filter).
 pub const BLUR_PX2: f64 = 0.3;
 /// Tangents of the viewing angle are clamped to this multiple of the picture's half extent before
-/// the projection is linearised, so that splats far outside do not blow up.
+/// the projection is linearized, so that splats far outside do not blow up.
 pub const TANGENT_CLAMP: f64 = 1.3;
 
-/// Most channels that one pass composites, colour and depth included.
+/// Most channels that one pass composites, color and depth included.
 pub const MAX_CHANNELS: usize = 32;
 
 /// Why a picture could not be drawn.
@@ -93,9 +93,9 @@ impl Default for Cutoffs {
 pub struct RenderSettings {
     /// Highest spherical-harmonics degree used; the cloud's own if lower.
     pub sh_degree: u8,
-    /// Colour behind the Gaussians. Extra channels have 0 behind them.
+    /// Color behind the Gaussians. Extra channels have 0 behind them.
     pub background: [f32; 3],
-    /// Distance of the near plane in scene units: Gaussians whose centre is nearer are left out.
+    /// Distance of the near plane in scene units: Gaussians whose center is nearer are left out.
     pub near: f64,
     /// Scale opacities so that [`BLUR_PX2`] keeps a splat's energy (Mip-Splatting's 2-D filter).
     pub antialias: bool,
@@ -128,7 +128,7 @@ impl Default for RenderSettings {
     }
 }
 
-/// Values per Gaussian that are composited like colours, in the same pass.
+/// Values per Gaussian that are composited like colors, in the same pass.
 #[derive(Clone, Copy, Debug)]
 pub struct Features<'a, R> {
     /// Channels per Gaussian.
@@ -218,8 +218,8 @@ pub struct CloudGradient<R> {
     pub sh: Vec<[R; 3]>,
     /// With respect to the features' values.
     pub features: Vec<R>,
-    /// Length of the gradient with respect to the centre's position in the picture, in loss per
-    /// half picture side (normalised device coordinates, as 3DGS thresholds it); 0 where unseen.
+    /// Length of the gradient with respect to the center's position in the picture, in loss per
+    /// half picture side (normalized device coordinates, as 3DGS thresholds it); 0 where unseen.
     pub screen: Vec<R>,
     /// Radius in px at which each Gaussian was drawn (3 sigma along its longer axis); 0 = not drawn.
     pub radius_px: Vec<f32>,

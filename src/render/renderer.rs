@@ -126,7 +126,7 @@ impl Renderer {
         self.gpu.is_some()
     }
 
-    /// Name of what draws the pictures, for people.
+    /// Name of what draws the pictures, for display.
     pub fn name(&self) -> &str {
         self.gpu.as_ref().map_or(Self::CPU, |gpu| &gpu.name)
     }

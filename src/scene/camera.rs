@@ -1,7 +1,7 @@
 //! A calibrated pinhole camera.
 //!
 //! Camera axes: x right, y down, z forward (COLMAP's). Pixel `(i, j)` covers
-//! `[i, i+1) x [j, j+1)`, so its centre is at `(i + 0.5, j + 0.5)` px.
+//! `[i, i+1) x [j, j+1)`, so its center is at `(i + 0.5, j + 0.5)` px.
 
 use std::ops::RangeInclusive;
 
@@ -23,7 +23,7 @@ pub struct Camera {
     pub principal_px: DVec2,
     /// Rotation of the pose: columns are the camera's right, down and forward axes in the world.
     pub world_from_camera: DMat3,
-    /// Camera centre in the world, in scene units.
+    /// Camera center in the world, in scene units.
     pub center: DVec3,
 }
 
@@ -51,8 +51,8 @@ pub enum CameraError {
     /// A principal point far outside of the picture.
     #[error("principal point ({0:e}, {1:e}) px is over {max:e} picture sides away from the picture", max = Camera::PRINCIPAL_SIDES)]
     Off(f64, f64),
-    /// A camera centre so far out that distances lose their meaning.
-    #[error("the camera centre ({0:e}, {1:e}, {2:e}) is farther than {max:e} units from the origin", max = Camera::FARTHEST)]
+    /// A camera center so far out that distances lose their meaning.
+    #[error("the camera center ({0:e}, {1:e}, {2:e}) is farther than {max:e} units from the origin", max = Camera::FARTHEST)]
     Far(f64, f64, f64),
     /// A principal point that is not finite.
     #[error("principal point ({0}, {1}) px is not finite")]
@@ -60,8 +60,8 @@ pub enum CameraError {
     /// A pose whose 3x3 part is no rotation.
     #[error("the pose's 3x3 part is not a rotation (deviation {0:.2e}; scale, shear, reflection or NaN)")]
     Rotation(f64),
-    /// A camera centre that is not finite.
-    #[error("the camera centre ({0}, {1}, {2}) is not finite")]
+    /// A camera center that is not finite.
+    #[error("the camera center ({0}, {1}, {2}) is not finite")]
     Center(f64, f64, f64),
 }
 
@@ -239,7 +239,7 @@ impl Camera {
         (q.z > 0.0).then(|| DVec2::new(q.x, q.y) / q.z * self.focal_px + self.principal_px)
     }
 
-    /// Direction in the world (not normalised, camera-space depth 1) of the ray through the
+    /// Direction in the world (not normalized, camera-space depth 1) of the ray through the
     /// pixel position.
     pub fn ray(&self, pixel: DVec2) -> DVec3 {
         let q = (pixel - self.principal_px) / self.focal_px;

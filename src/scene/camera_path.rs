@@ -14,7 +14,7 @@ pub struct CameraPath {
     pub keys: Vec<PathKey>,
     /// Whether the flight goes on from the last key to the first.
     pub closed: bool,
-    /// Frames per second of a film of the flight.
+    /// Frames per second of a video of the flight.
     pub fps: f64,
     /// Seconds that the whole flight takes, waits included.
     pub seconds: f64,
@@ -23,7 +23,7 @@ pub struct CameraPath {
 /// One camera that a flight passes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PathKey {
-    /// Camera centre in the world, in scene units.
+    /// Camera center in the world, in scene units.
     pub center: DVec3,
     /// Rotation of the pose before the roll: columns are the camera's right, down and forward axes in the world.
     pub world_from_camera: DMat3,
@@ -35,7 +35,7 @@ pub struct PathKey {
     pub dwell_secs: f64,
     /// When the camera arrives, in seconds from the start, where that is fixed.
     pub time_secs: Option<f64>,
-    /// What a person calls this key.
+    /// What the user calls this key.
     pub name: Option<String>,
 }
 

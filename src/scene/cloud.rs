@@ -5,13 +5,13 @@ use glam::DVec3;
 use crate::math::{Real, sh};
 
 /// `n` Gaussians. Parameters are stored raw: the renderer applies `exp` to log-scales, the
-/// sigmoid to opacity logits, and normalises quaternions.
+/// sigmoid to opacity logits, and normalizes quaternions.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GaussianCloud<R = f32> {
     /// World position of the local origin, in scene units: `world = origin + positions[i]`, added
     /// in f64. Keeps scenes far from zero exact.
     pub origin: DVec3,
-    /// Centres relative to `origin`, `[n]`.
+    /// Centers relative to `origin`, `[n]`.
     pub positions: Vec<[R; 3]>,
     /// Natural logarithms of the standard deviations along the local axes, `[n]`.
     pub log_scales: Vec<[R; 3]>,
@@ -39,7 +39,7 @@ pub struct ExtraProperty {
 /// The raw parameters of one Gaussian; see [`GaussianCloud`] for the units.
 #[derive(Clone, Copy, Debug)]
 pub struct Gaussian<'a, R = f32> {
-    /// Centre relative to the cloud's origin.
+    /// Center relative to the cloud's origin.
     pub position: [R; 3],
     /// Logarithms of the standard deviations.
     pub log_scale: [R; 3],

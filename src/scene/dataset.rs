@@ -13,17 +13,17 @@ pub struct Dataset {
     pub name: String,
     /// The folder.
     pub root: PathBuf,
-    /// Which layout it was read from, for people: "COLMAP binary", "transforms.json", ...
+    /// Which layout it was read from, for display: "COLMAP binary", "transforms.json", ...
     pub format: String,
     /// The photos that exist, sorted by name.
     pub photos: Vec<Photo>,
     /// Sparse points, possibly none.
     pub points: Vec<SparsePoint>,
-    /// The colour behind everything (Blender's renders are composited over it); `None` = unknown.
+    /// The color behind everything (Blender's renders are composited over it); `None` = unknown.
     pub background: Option<[f32; 3]>,
-    /// Length of a scene unit in metres, if that is known; photos alone do not tell.
+    /// Length of a scene unit in meters, if that is known; photos alone do not tell.
     pub metres_per_unit: Option<f64>,
-    /// Things a person should know: photos that are listed but missing, and so on.
+    /// Things the user should know: photos that are listed but missing, and so on.
     pub warnings: Vec<String>,
 }
 
@@ -32,7 +32,7 @@ pub struct Dataset {
 pub struct SparsePoint {
     /// World position, scene units.
     pub position: DVec3,
-    /// sRGB colour.
+    /// sRGB color.
     pub rgb: [u8; 3],
 }
 
@@ -54,7 +54,7 @@ impl Dataset {
         self.photos.iter().map(|p| p.camera.clone()).collect()
     }
 
-    /// Mean camera centre, and 1.1 times the largest distance from it: the `extent` that
+    /// Mean camera center, and 1.1 times the largest distance from it: the `extent` that
     /// position learning rates and densification thresholds scale with (3DGS `getNerfppNorm`).
     pub fn camera_extent(&self) -> (DVec3, f64) {
         let n = self.photos.len().max(1) as f64;

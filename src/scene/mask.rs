@@ -47,15 +47,15 @@ impl Mask {
         Self { width_px, height_px, words }
     }
 
-    /// The pixels whose centres are inside a polygon (even-odd rule), vertices in px. With vertices
-    /// on whole numbers, as in label files, a pixel centre is at its whole coordinates.
+    /// The pixels whose centers are inside a polygon (even-odd rule), vertices in px. With vertices
+    /// on whole numbers, as in label files, a pixel center is at its whole coordinates.
     pub fn from_polygon(width_px: usize, height_px: usize, vertices: &[[f64; 2]]) -> Self {
         let mut mask = Self::empty(width_px, height_px);
         mask.add_polygon(vertices);
         mask
     }
 
-    /// Adds the pixels whose centres are inside a polygon, as [`Self::from_polygon`] has them.
+    /// Adds the pixels whose centers are inside a polygon, as [`Self::from_polygon`] has them.
     pub fn add_polygon(&mut self, vertices: &[[f64; 2]]) {
         let rows = |end: fn(f64, f64) -> f64, none: f64| vertices.iter().map(|v| v[1]).fold(none, end);
         let (top, bottom) = (rows(f64::min, f64::INFINITY), rows(f64::max, f64::NEG_INFINITY));
@@ -158,7 +158,7 @@ impl Mask {
         found
     }
 
-    /// The same region in a picture of another size: each pixel takes the value at its centre.
+    /// The same region in a picture of another size: each pixel takes the value at its center.
     pub fn resized(&self, width_px: usize, height_px: usize) -> Self {
         Self::from_fn(width_px, height_px, |i| {
             let (x, y) = (i % width_px, i / width_px);
@@ -227,7 +227,7 @@ mod tests {
             rows(&triangle)
         );
         assert_eq!(rows(&triangle)[5..], [0; 4]);
-        // 3 pixels of 2: the centres are at 1/3, 1 and 5/3, that is pixels 0, 1 and 1.
+        // 3 pixels of 2: the centers are at 1/3, 1 and 5/3, that is pixels 0, 1 and 1.
         let two = Mask::from_fn(2, 2, |i| i == 0);
         assert_eq!(two.resized(3, 3), Mask::from_fn(3, 3, |i| i == 0));
         assert_eq!(two.resized(4, 2), Mask::from_fn(4, 2, |i| i < 2));

@@ -12,9 +12,9 @@ pub mod language;
 pub mod mask;
 pub mod photo;
 pub mod plan;
+pub mod resource_log;
 pub mod semantic_map;
 pub mod text;
-pub mod trace;
 pub mod undo;
 
 pub use bounds::Bounds;

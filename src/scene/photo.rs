@@ -20,7 +20,7 @@ pub struct Photo {
     pub distortion: Option<Distortion>,
     /// Whether the dataset itself says that this photo is for testing (Blender's `test` split).
     pub test_split: bool,
-    /// Colour that the file's transparent pixels are composited over; `None` = they count for
+    /// Color that the file's transparent pixels are composited over; `None` = they count for
     /// nothing (coverage 0).
     pub background: Option<[f32; 3]>,
 }

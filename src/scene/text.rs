@@ -1,5 +1,5 @@
 //! Foreign text (names, paths, headers of files, words of servers and models) as it may be shown: nothing in
-//! it moves a cursor, recolours a terminal, reverses a line or makes a line of its own.
+//! it moves a cursor, recolors a terminal, reverses a line or makes a line of its own.
 
 use std::borrow::Cow;
 

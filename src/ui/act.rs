@@ -21,7 +21,7 @@ use crate::pipeline::train::TrainConfig;
 use crate::scene::IdentityId;
 use crate::scene::plan::When;
 use crate::ui::actions::{Action, Pane};
-use crate::worker::{Command, EditRequest, JobId, JobKind, VisitRequest, Visited};
+use crate::worker::{ApproachRequest, Approached, Command, EditRequest, JobId, JobKind};
 
 impl App {
     /// Does what a user asked for.
@@ -246,13 +246,13 @@ impl App {
         };
         let (cloud, map, from) = (Arc::clone(&cloud), Arc::clone(&map), eye);
         let frames = FRAMES;
-        let request = VisitRequest { explored, cloud, cameras, up, settings, map, id, wish, from, aspect, frames };
-        self.submit(Command::Visit(Box::new(request)));
+        let request = ApproachRequest { explored, cloud, cameras, up, settings, map, id, wish, from, aspect, frames };
+        self.submit(Command::Approach(Box::new(request)));
     }
 
     /// Begins the flight that was found, or says why there is none.
     pub(super) fn visited(&mut self) {
-        let Some(Visited { name, flight, problem }) = self.state.visited.take() else { return };
+        let Some(Approached { name, flight, problem }) = self.state.visited.take() else { return };
         match (&problem, &flight) {
             (Some(problem), Some(_)) => {
                 self.state.toast(Tone::Warning, format!("{name}: {problem}. Going to the nearest place instead."));
@@ -283,7 +283,7 @@ impl App {
                 map: Arc::clone(&map),
                 cameras,
                 up,
-                metres: scene.metres_per_unit.or_else(|| scene.dataset.as_ref().and_then(|d| d.metres_per_unit)),
+                meters: scene.metres_per_unit.or_else(|| scene.dataset.as_ref().and_then(|d| d.metres_per_unit)),
                 exports: scene.out.join("exports"),
                 explored,
             },

@@ -79,14 +79,22 @@ impl App {
     /// Exports a video of what is played.
     fn export_video(&mut self, out: PathBuf) {
         let Some(SceneContext { cloud, map, settings: draw, aspect, .. }) = self.context() else { return };
-        let Some((cameras, settings)) = self.camera.film(&out, aspect) else {
+        let Some((cameras, settings)) = self.camera.video(&out, aspect) else {
             self.state.toast(Tone::Warning, "There is nothing to export: add keyframes, or go to something first.");
             return;
         };
         let found = self.viewport.queries.found();
         let marked = map.filter(|_| self.camera.mark).map(|map| (Arc::clone(&map), found));
         let (cloud, backend) = (Arc::clone(&cloud), BackendChoice::Auto);
-        self.submit(Command::Film(Box::new(VideoRequest { cloud, draw, cameras, marked, out, settings, backend })));
+        self.submit(Command::CameraSpline(Box::new(VideoRequest {
+            cloud,
+            draw,
+            cameras,
+            marked,
+            out,
+            settings,
+            backend,
+        })));
     }
 
     fn save_chat(&mut self, path: &Path) {

@@ -92,10 +92,12 @@ pub struct Shortcut {
 }
 
 macro_rules! actions {
-    (@plain $all:ident $name:ident) => {
-        $all.push(Self::$name);
+    (@plain $name:ident) => {
+        Some(Self::$name)
     };
-    (@plain $all:ident $name:ident ($($ty:ty),+)) => {};
+    (@plain $name:ident ($($ty:ty),+)) => {
+        None
+    };
     ($($name:ident $(($($arg:ident: $ty:ty),+))?: $text:expr, $tip:literal $(, $key:literal)?;)*) => {
         /// What a user wants.
         #[derive(Clone, Debug, PartialEq, Eq)]
@@ -121,9 +123,7 @@ macro_rules! actions {
 
             /// Those that need nothing else to be known, in the order of the table.
             fn plain() -> Vec<Self> {
-                let mut all = Vec::new();
-                $(actions!(@plain all $name $(($($ty),+))?);)*
-                all
+                [$(actions!(@plain $name $(($($ty),+))?)),*].into_iter().flatten().collect()
             }
         }
     };

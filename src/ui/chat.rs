@@ -17,7 +17,7 @@ use crate::agent::llm::Llm;
 use crate::agent::scene::{Effect, Parts, SceneWorld};
 use crate::agent::{AgentEvent, Planner, Policy, Refusal, Session};
 use crate::navigate::Pose;
-use crate::scene::trace::{self, Sort};
+use crate::scene::resource_log::{self, Sort};
 use crate::scene::{Identities, IdentityId, SemanticMap, text};
 use crate::ui::actions::Action;
 use crate::worker::Repaint;
@@ -26,7 +26,7 @@ use crate::worker::Repaint;
 const NEWS: usize = 1024;
 /// Lines that are kept.
 const MAX_LINES: usize = 400;
-/// Ways to go on that are shown at once.
+/// Ways to continue that are shown at once.
 const CONTINUATIONS: usize = 4;
 /// Side of a candidate's thumbnail, points.
 const THUMBNAIL_PX: f32 = 34.0;
@@ -378,7 +378,7 @@ impl Agent {
             } else {
                 Box::new(Commands::default())
             };
-            trace::record(Sort::Agent, "agent with its policy", "a message was sent to it", 0);
+            resource_log::record(Sort::Agent, "agent with its policy", "a message was sent to it", 0);
             self.session = Some((settings, Session::new(policy, planner)));
         }
         Ok(())

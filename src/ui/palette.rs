@@ -116,15 +116,19 @@ pub fn shortcut_sheet(ctx: &egui::Context, open: &mut bool) {
         ui.set_width(640.0);
         ui.heading("Keyboard and mouse");
         ui.add_space(8.0);
-        ui.columns_const(|[left, right]| {
-            let bound: Vec<(String, String)> = Action::all()
-                .into_iter()
-                .filter(|a| a.shortcut().is_some())
-                .map(|a| (keys::label(left.ctx(), &a), a.text()))
-                .collect();
-            let gestures = keys::GESTURES.map(|(k, t)| (k.to_owned(), t.to_owned()));
-            sheet_grid(left, "Actions", &bound);
-            sheet_grid(right, "In the viewport", &gestures);
+        // A small window has no room for all of them.
+        let height = (ctx.content_rect().height() - 150.0).max(200.0);
+        ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, |ui| {
+            ui.columns_const(|[left, right]| {
+                let bound: Vec<(String, String)> = Action::all()
+                    .into_iter()
+                    .filter(|a| a.shortcut().is_some())
+                    .map(|a| (keys::label(left.ctx(), &a), a.text()))
+                    .collect();
+                let gestures = keys::GESTURES.map(|(k, t)| (k.to_owned(), t.to_owned()));
+                sheet_grid(left, "Actions", &bound);
+                sheet_grid(right, "In the viewport", &gestures);
+            });
         });
         ui.add_space(8.0);
         ui.horizontal(|ui| {

@@ -9,11 +9,11 @@ pub use super::train_history::TrainHistory;
 use crate::jobs::models::ModelList;
 use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Progress, Severity};
-use crate::pipeline::semantics::portraits::Gallery;
+use crate::pipeline::semantics::thumbnails::Thumbnails;
 use crate::render::RenderSettings;
 use crate::scene::undo::UndoHistory;
 use crate::scene::{Facts, Limits, Overrides, PhotoPixels, ScenePlan, SemanticMap, text};
-use crate::worker::{Event, Explored, Failure, JobId, JobKind, Lane, OpenedScene, Outcome, Versioned, Visited};
+use crate::worker::{Approached, Event, Explored, Failure, JobId, JobKind, Lane, OpenedScene, Outcome, Versioned};
 
 /// Lines kept in the log.
 const MAX_LOG: usize = 1_000;
@@ -102,11 +102,11 @@ pub struct AppState {
     /// Gaussians of each of them by number, pieces included.
     pub sizes: Vec<usize>,
     /// New thumbnails of objects and parts, until they are taken over.
-    pub thumbnails: Option<(Arc<SemanticMap>, Gallery)>,
+    pub thumbnails: Option<(Arc<SemanticMap>, Thumbnails)>,
     /// What is known of moving about in the scene.
     pub explored: Option<Arc<Explored>>,
     /// The way that was looked for last, until the window takes it.
-    pub visited: Option<Visited>,
+    pub visited: Option<Approached>,
     /// Models and the engine that runs them, once they were listed.
     pub models: Option<Arc<ModelList>>,
     /// Models that were put in place so far.
@@ -329,7 +329,7 @@ impl AppState {
                 self.models_installed += 1;
                 self.toast(Tone::Good, format!("The model {id} can be used now"));
             }
-            Outcome::Visited(explored, visited) => {
+            Outcome::Approached(explored, visited) => {
                 self.explored = Some(explored);
                 self.visited = Some(visited);
             }
@@ -341,7 +341,7 @@ impl AppState {
                     false => self.report = shown,
                 }
             }
-            Outcome::Portraits(map, pictures) => self.thumbnails = Some((map, pictures)),
+            Outcome::Thumbnails(map, pictures) => self.thumbnails = Some((map, pictures)),
             Outcome::Written(path) => self.toast(Tone::Good, format!("Wrote {}", path.display())),
             Outcome::Photo { index, max_side_px, pixels } => {
                 self.photos.insert((index, max_side_px), pixels);

@@ -5,12 +5,12 @@ use crate::jobs::JobError;
 use crate::jobs::error::chain;
 use crate::pipeline::observer::Interrupted;
 
-/// Why a job failed, for people: what went wrong where, and what to do.
+/// Why a job failed, for display: what went wrong where, and what to do.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Failure {
     /// What went wrong, with file and place.
     pub message: String,
-    /// What a person can do about it; empty if the message already says so.
+    /// What the user can do about it; empty if the message already says so.
     pub remedy: String,
 }
 
@@ -40,11 +40,11 @@ impl<E: std::error::Error + 'static> From<E> for Stop {
     }
 }
 
-/// What a person can do in the window, where the error does not say that itself.
+/// What the user can do in the window, where the error does not say that itself.
 fn remedy(error: &JobError) -> &'static str {
     match error {
         JobError::Open(OpenError::NotFound { .. }) => "Check the path: the file may have been moved or renamed.",
-        JobError::Open(OpenError::Unrecognised { .. }) => {
+        JobError::Open(OpenError::Unrecognized { .. }) => {
             "Open the folder that holds the photos and their poses, or a splat .ply."
         }
         JobError::NothingHeldOut(_) => "Choose how many to hold out in the Training pane.",

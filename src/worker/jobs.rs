@@ -119,20 +119,20 @@ impl Jobs for PipelineJobs {
                 models::install(&id, source, observer)?;
                 Outcome::ModelInstalled(id)
             }
-            Command::Visit(request) => {
+            Command::Approach(request) => {
                 let (explored, visited) = go_to::visit(*request);
-                Outcome::Visited(explored, visited)
+                Outcome::Approached(explored, visited)
             }
             Command::ListModels => Outcome::Models(Arc::new(models::list())),
             Command::Explore { cloud, cameras, up } => {
                 Outcome::Explored(Arc::new(go_to::Explored::new(cloud, &cameras, up)))
             }
-            Command::Film(request) => Outcome::Written(video::run(*request, observer)?.summary.path),
+            Command::CameraSpline(request) => Outcome::Written(video::run(*request, observer)?.summary.path),
             Command::Measure(request) => return measuring::run(*request, observer),
             Command::ReadReport { path, second } => return measuring::read(path, second),
-            Command::Portraits { cloud, map, settings, home } => {
+            Command::Thumbnails { cloud, map, settings, home } => {
                 let drawn = thumbnails::draw(&cloud, &map, &settings, &home)?;
-                Outcome::Portraits(map, drawn)
+                Outcome::Thumbnails(map, drawn)
             }
         })
     }

@@ -23,7 +23,7 @@ const REPEATS: u32 = 3;
 /// What is to be drawn in many ways.
 #[derive(Clone, Debug)]
 pub struct MeasureRequest {
-    /// The scene, for people.
+    /// The scene, for display.
     pub scene: String,
     /// Its Gaussians.
     pub cloud: Arc<GaussianCloud>,
@@ -35,7 +35,7 @@ pub struct MeasureRequest {
     pub holdout_every: usize,
     /// From where it is drawn without held-out photos.
     pub camera: Camera,
-    /// Folder of the report. What is measured there already is gone on with.
+    /// Folder of the report. What is measured there already is resumed.
     pub out: PathBuf,
 }
 

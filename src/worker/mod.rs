@@ -6,10 +6,10 @@
 pub mod control;
 pub mod failure;
 pub mod jobs;
+mod low_priority_pool;
 pub mod measure;
 pub mod observer;
 pub mod protocol;
-mod quiet;
 pub mod slot;
 pub mod text_encoder;
 pub mod thread;
@@ -27,7 +27,7 @@ pub use view_modes::ViewMode;
 
 pub use crate::jobs::OpenedScene;
 pub use crate::jobs::edit::EditRequest;
-pub use crate::jobs::go_to::{Explored, VisitRequest, Visited};
+pub use crate::jobs::go_to::{ApproachRequest, Approached, Explored};
 pub use crate::jobs::query::ViewMaps;
 pub use crate::jobs::video::VideoRequest;
 pub use crate::scene::HomeView;

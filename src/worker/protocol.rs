@@ -8,13 +8,13 @@ use glam::DVec3;
 use super::failure::Failure;
 use super::measure::MeasureRequest;
 use crate::jobs::edit::EditRequest;
-use crate::jobs::go_to::{Explored, VisitRequest, Visited};
+use crate::jobs::go_to::{ApproachRequest, Approached, Explored};
 use crate::jobs::models::ModelList;
 use crate::jobs::video::VideoRequest;
 use crate::jobs::{OpenedScene, find_objects};
 use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Progress, Severity, StepMetrics};
-use crate::pipeline::semantics::portraits::Gallery;
+use crate::pipeline::semantics::thumbnails::Thumbnails;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::{Camera, Dataset, Facts, GaussianCloud, HomeView, Photo, PhotoPixels, SemanticMap};
@@ -58,7 +58,7 @@ pub enum JobKind {
     /// Writes a picture.
     Picture,
     /// Draws objects and parts alone.
-    Portraits,
+    Thumbnails,
     /// Lists models.
     Models,
     /// Looks at where one can go.
@@ -66,9 +66,9 @@ pub enum JobKind {
     /// Puts a model in place.
     Model,
     /// Finds the way to an identity.
-    Visit,
-    /// Draws a film.
-    Film,
+    Approach,
+    /// Draws a video.
+    CameraSpline,
     /// Measures drawing, knob by knob.
     Measure,
     /// Reads a report.
@@ -85,16 +85,16 @@ impl JobKind {
             | Self::Evaluate
             | Self::Objects
             | Self::Model
-            | Self::Film
+            | Self::CameraSpline
             | Self::Measure => Lane::Long,
             Self::Edit
             | Self::Export
             | Self::Photo
             | Self::Picture
-            | Self::Portraits
+            | Self::Thumbnails
             | Self::Models
             | Self::Explore
-            | Self::Visit
+            | Self::Approach
             | Self::Report => Lane::Short,
         }
     }
@@ -177,7 +177,7 @@ pub enum Command {
         /// The file.
         path: PathBuf,
     },
-    /// Fetch a model of the catalogue, or take over files that somebody brings.
+    /// Fetch a model of the catalog, or take over files that somebody brings.
     InstallModel {
         /// Its name.
         id: String,
@@ -196,9 +196,9 @@ pub enum Command {
         up: DVec3,
     },
     /// Find the way to where an identity is seen best.
-    Visit(Box<VisitRequest>),
-    /// Draw a film.
-    Film(Box<VideoRequest>),
+    Approach(Box<ApproachRequest>),
+    /// Draw a video.
+    CameraSpline(Box<VideoRequest>),
     /// Measure error against run time of drawing, and write it as a report.
     Measure(Box<MeasureRequest>),
     /// Read a report.
@@ -209,7 +209,7 @@ pub enum Command {
         second: bool,
     },
     /// Draw every object and part alone, small.
-    Portraits {
+    Thumbnails {
         /// The Gaussians.
         cloud: Arc<GaussianCloud>,
         /// Objects and parts.
@@ -234,12 +234,12 @@ impl Command {
             Self::Export { .. } => JobKind::Export,
             Self::Photo { .. } => JobKind::Photo,
             Self::Picture { .. } => JobKind::Picture,
-            Self::Portraits { .. } => JobKind::Portraits,
+            Self::Thumbnails { .. } => JobKind::Thumbnails,
             Self::ListModels => JobKind::Models,
             Self::Explore { .. } => JobKind::Explore,
             Self::InstallModel { .. } => JobKind::Model,
-            Self::Visit(_) => JobKind::Visit,
-            Self::Film(_) => JobKind::Film,
+            Self::Approach(_) => JobKind::Approach,
+            Self::CameraSpline(_) => JobKind::CameraSpline,
             Self::Measure(_) => JobKind::Measure,
             Self::ReadReport { .. } => JobKind::Report,
         }
@@ -258,12 +258,14 @@ impl Command {
             Self::EditObjects { .. } => "Editing objects".into(),
             Self::Export { path, .. } | Self::Picture { path, .. } => format!("Writing {}", name(path)),
             Self::Photo { photo, .. } => format!("Loading {}", photo.name),
-            Self::Portraits { .. } => "Rendering thumbnails".into(),
+            Self::Thumbnails { .. } => "Rendering thumbnails".into(),
             Self::ListModels => "Listing models".into(),
             Self::Explore { .. } => "Exploring where one can go".into(),
             Self::InstallModel { id, .. } => format!("Installing the model {id}"),
-            Self::Visit(request) => format!("Planning the flight to {}", request.map.identities.full_name(request.id)),
-            Self::Film(request) => format!("Rendering {}", name(&request.out)),
+            Self::Approach(request) => {
+                format!("Planning the flight to {}", request.map.identities.full_name(request.id))
+            }
+            Self::CameraSpline(request) => format!("Rendering {}", name(&request.out)),
             Self::Measure(_) => "Benchmarking rendering".into(),
             Self::ReadReport { path, .. } => format!("Opening the report {}", name(path)),
         }
@@ -304,7 +306,7 @@ pub enum Outcome {
         second: bool,
     },
     /// Portraits of objects and parts by number less one, as `semantics::portraits` draws them.
-    Portraits(Arc<SemanticMap>, Gallery),
+    Thumbnails(Arc<SemanticMap>, Thumbnails),
     /// The models were listed.
     Models(Arc<ModelList>),
     /// A model can be used now.
@@ -312,7 +314,7 @@ pub enum Outcome {
     /// The scene was looked at.
     Explored(Arc<Explored>),
     /// The way to an identity, or why there is none; and what was learnt about the scene.
-    Visited(Arc<Explored>, Visited),
+    Approached(Arc<Explored>, Approached),
     /// A photo was loaded.
     Photo {
         /// Its index in the dataset.
@@ -334,7 +336,7 @@ pub enum Event {
         job: JobId,
         /// Its sort.
         kind: JobKind,
-        /// What it does, for people.
+        /// What it does, for display.
         title: String,
     },
     /// Where it stands. May be dropped when events are not taken fast enough.

@@ -9,10 +9,10 @@ use crossbeam_channel::{Sender, bounded};
 use super::{Repaint, Slot};
 use crate::models::{self, Encoder, ModelError};
 use crate::pipeline::semantics::answer::phrases_of;
-use crate::pipeline::semantics::grammar::Phrase;
-use crate::pipeline::semantics::meaning::Phrasebook;
+use crate::pipeline::semantics::by_embedding::TextEmbeddings;
+use crate::pipeline::semantics::parse::ParsedQuery;
 use crate::pipeline::semantics::relevancy::CANONICAL;
-use crate::pipeline::semantics::stages::ms_since;
+use crate::pipeline::semantics::timing::ms_since;
 
 /// Requests that may wait; only the newest is read.
 const QUEUED: usize = 16;
@@ -21,7 +21,7 @@ const QUEUED: usize = 16;
 #[derive(Debug, Default)]
 pub struct Encoded {
     /// Embeddings of their phrases.
-    pub phrases: Phrasebook,
+    pub phrases: TextEmbeddings,
     /// Each text.
     pub texts: BTreeMap<String, EncodedText>,
     /// Why the encoder cannot be used, if it cannot.
@@ -65,7 +65,7 @@ impl TextEncoder {
             };
             slot.publish(Encoded::default());
             repaint();
-            let mut known = Phrasebook::default();
+            let mut known = TextEmbeddings::default();
             while let Ok(mut newest) = texts.recv() {
                 // Each request has all texts on screen, so that older ones need no answer.
                 while let Ok(newer) = texts.try_recv() {
@@ -91,10 +91,10 @@ impl TextEncoder {
 }
 
 /// Encodes the phrases of these texts, as far as they are not `known` from before.
-fn encode(encoder: &mut dyn Encoder, known: &mut Phrasebook, texts: Vec<String>) -> Encoded {
+fn encode(encoder: &mut dyn Encoder, known: &mut TextEmbeddings, texts: Vec<String>) -> Encoded {
     let mut encoded = Encoded::default();
     for text in texts {
-        let Some(phrase) = Phrase::parse(&text) else { continue };
+        let Some(phrase) = ParsedQuery::parse(&text) else { continue };
         let start = Instant::now();
         let phrases = phrases_of(&phrase);
         let learned = known.learn(&phrases, |p| encoder.text(p));
@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn texts_are_encoded_once_and_failures_are_reported() {
-        let (mut script, mut known) = (Script::default(), Phrasebook::default());
+        let (mut script, mut known) = (Script::default(), TextEmbeddings::default());
         let texts = || ["lamp", "giraffe", "broken", " "].map(str::to_owned).to_vec();
         let encoded = encode(&mut script, &mut known, texts());
         let of = |text: &str| encoded.texts[text].clone();

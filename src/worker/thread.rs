@@ -95,7 +95,7 @@ impl Worker {
             threads.push(std::thread::Builder::new().name(name.to_owned()).spawn(work)?);
             Ok::<_, std::io::Error>(Some(sender))
         };
-        let (long, short) = (lane("long jobs", super::quiet::pool())?, lane("short jobs", None)?);
+        let (long, short) = (lane("long jobs", super::low_priority_pool::pool())?, lane("short jobs", None)?);
         Ok(Self { long, short, events: Some(events), clouds, controls, next: AtomicU64::new(1), threads })
     }
 
@@ -200,7 +200,7 @@ fn run_one(
     });
 }
 
-/// What a panic says, for people.
+/// What a panic says, for display.
 pub(super) fn panic_failure(payload: &(dyn Any + Send)) -> Failure {
     let text = payload
         .downcast_ref::<&str>()

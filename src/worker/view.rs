@@ -15,7 +15,7 @@ use super::view_renderer::ViewRenderer;
 use crate::jobs::query::ViewMaps;
 use crate::render::{RenderError, RenderSettings, Renderer, StageTimes};
 use crate::scene::plan::When;
-use crate::scene::trace::{self, Sort};
+use crate::scene::resource_log::{self, Sort};
 use crate::scene::{Camera, GaussianCloud, PhotoPixels, ScenePlan, SemanticMap};
 
 /// How long the eye rests before working memory is given back.
@@ -167,7 +167,7 @@ impl ViewLane {
                         && !std::mem::replace(&mut mapped_before, true)
                     {
                         let pixels = maps.identities.identity.len() as u64;
-                        trace::record(Sort::Maps, "maps of the view", "something is asked of it", pixels * 12);
+                        resource_log::record(Sort::Maps, "maps of the view", "something is asked of it", pixels * 12);
                     }
                     if maps.is_err() {
                         // Buffers may be in any state.

@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn a_photo_of_another_size_is_sampled_at_pixel_centres() {
+    fn a_photo_of_another_size_is_sampled_at_pixel_centers() {
         let big = PhotoPixels { width_px: 4, height_px: 4, rgb: (0..16).map(|i| [i; 3]).collect(), coverage: None };
         let drawn = paint(&frame(0.0), ViewMode::Difference, Some(&big));
         assert_eq!(drawn.rgb.iter().map(|p| p[0] / 4).collect::<Vec<_>>(), vec![5, 7, 13, 15]);

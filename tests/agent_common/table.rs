@@ -11,16 +11,16 @@ use super::room::Room;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Table {
-    pub dialogue: Vec<Dialogue>,
+    pub dialog: Vec<Dialog>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Dialogue {
+pub struct Dialog {
     pub turns: Vec<Turn>,
 }
 
-/// One request and what a person would want of it.
+/// One request and what the user would want of it.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Turn {
@@ -39,22 +39,18 @@ impl Table {
         toml::from_str(text).expect("a table of requests")
     }
 
-    pub fn turns(&self) -> usize {
-        self.dialogue.iter().map(|d| d.turns.len()).sum()
-    }
-
     /// The documented commands' wordings as requests of their own, where nothing must be said before.
     pub fn of_commands(text: &str) -> Self {
         let wordings: Wordings = toml::from_str(text).expect("a table of wordings");
         let alone = wordings.command.into_iter().filter(|c| c.after.is_empty());
-        let dialogue = alone.flat_map(|c| {
+        let dialog = alone.flat_map(|c| {
             let last = c.calls.len() - 1;
             c.say.into_iter().enumerate().map(move |(i, say)| {
                 let calls = c.calls[i.min(last)].clone();
-                Dialogue { turns: vec![Turn { say, calls, outcome: "done".into(), reply: Vec::new() }] }
+                Dialog { turns: vec![Turn { say, calls, outcome: "done".into(), reply: Vec::new() }] }
             })
         });
-        Self { dialogue: dialogue.collect() }
+        Self { dialog: dialog.collect() }
     }
 }
 
@@ -152,12 +148,12 @@ pub fn ask(session: &mut Session, room: &mut Room, turn: &Turn) -> (Result<(), S
     (Err(problem), is_unsafe)
 }
 
-/// Asks all dialogues, each in a session and a room of its own.
+/// Asks all dialogs, each in a session and a room of its own.
 pub fn tally(table: &Table, session: &dyn Fn() -> Session) -> Tally {
     let mut tally = Tally::default();
-    for dialogue in &table.dialogue {
+    for dialog in &table.dialog {
         let (mut session, mut room) = (session(), Room::new());
-        for turn in &dialogue.turns {
+        for turn in &dialog.turns {
             let (right, is_unsafe) = ask(&mut session, &mut room, turn);
             tally.all += 1;
             tally.unsafe_ones += usize::from(is_unsafe);

@@ -1,4 +1,4 @@
-//! All that is sent to a chat model, held against what the guide says is sent.
+//! All that is sent to a chat model, compared with what the guide says is sent.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -45,7 +45,7 @@ fn kettle(exports: &Path) -> SceneWorld {
         map: Arc::new(SemanticMap::of_identities(identities, of, vec![1.0; 64], Vec::new())),
         cameras: vec![camera.clone()],
         up: DVec3::NEG_Y,
-        metres: Some(1.0),
+        meters: Some(1.0),
         exports: exports.into(),
         explored: None,
     };
@@ -118,7 +118,7 @@ fn what_is_sent_is_what_the_readme_says() {
         assert_eq!(seen.head[0], "POST /v1/chat/completions HTTP/1.1");
     }
     // What was asked for came through, and no more of the scene than is said to.
-    assert!(traffic[1].contains("cm wide") && traffic[1].contains("written to a file"), "{}", traffic[1]);
+    assert!(traffic[1].contains("on its longer side") && traffic[1].contains("written to a file"), "{}", traffic[1]);
     let last = seen.last().expect("a request").json();
     let mut outer: Vec<&String> = last.as_object().expect("an object").keys().collect();
     outer.sort();

@@ -86,7 +86,7 @@ pub fn tiny_splat(path: &Path) -> PathBuf {
     path.to_owned()
 }
 
-/// Writes a scene of three coloured boxes as .glb, each under its own named node, by hand.
+/// Writes a scene of three colored boxes as .glb, each under its own named node, by hand.
 pub fn tiny_glb(path: &Path) -> PathBuf {
     let corners: Vec<[f32; 3]> = (0..8).map(|i| [i & 1, i >> 1 & 1, i >> 2 & 1].map(|b| b as f32 - 0.5)).collect();
     let faces: [[u16; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];

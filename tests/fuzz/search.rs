@@ -18,7 +18,7 @@ const LONGEST: Duration = Duration::from_secs(5);
 const MOST_KEPT: usize = 200;
 /// Longest of them.
 const LONGEST_KEPT: usize = 4096;
-/// One input of so many is held against the front door.
+/// One input of so many is compared with the front door.
 const SAMPLED: u64 = 16;
 /// Different finds that are kept of a reader.
 const MOST_FINDS: usize = 20;

@@ -282,9 +282,9 @@ fn labels() -> Vec<Seed> {
     let rle = |counts: serde_json::Value| json!({ "size": [12, 16], "counts": counts });
     let masklets = json!({ "video_frame_count": 8, "masklet": [
         [rle(json!([30, 40, 122])), rle(json!("n0X1j3"))], [rle(json!([192])), rle(json!([0, 192]))]] });
-    let grey = RgbaImage::from_fn(16, 12, |x, y| if x + y > 9 { Rgba([255; 4]) } else { Rgba([1, 1, 1, 255]) });
-    let deep = image::DynamicImage::from(grey.clone()).into_luma16();
-    let luma = image::DynamicImage::from(grey.clone()).into_luma8();
+    let gray = RgbaImage::from_fn(16, 12, |x, y| if x + y > 9 { Rgba([255; 4]) } else { Rgba([1, 1, 1, 255]) });
+    let deep = image::DynamicImage::from(gray.clone()).into_luma16();
+    let luma = image::DynamicImage::from(gray.clone()).into_luma8();
     let png = |picture: &dyn Fn(&mut Cursor<Vec<u8>>)| {
         let mut out = Cursor::new(Vec::new());
         picture(&mut out);
@@ -298,7 +298,7 @@ fn labels() -> Vec<Seed> {
         ("label_id_map", "grey16.png", png(&|w| deep.write_to(w, ImageFormat::Png).expect("encode"))),
         ("label_classes", "classes.txt", b"photo\nwall\n".to_vec()),
         ("label_picture", "grey8.png", png(&|w| luma.write_to(w, ImageFormat::Png).expect("encode"))),
-        ("label_picture", "rgba.png", encode(&grey, ImageFormat::Png)),
+        ("label_picture", "rgba.png", encode(&gray, ImageFormat::Png)),
     ]
 }
 

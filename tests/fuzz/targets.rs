@@ -169,7 +169,7 @@ pub fn all() -> Vec<Target> {
             "label_picture",
             Door::Picture,
             "test_mask/photo/a.png",
-            |f| grey(f, "test_mask/photo"),
+            |f| gray(f, "test_mask/photo"),
             labels,
         ),
     ];
@@ -199,21 +199,21 @@ fn labels(folder: &Path) -> Result<Vec<io::labels::Region>, IoError> {
     Ok([regions, found.of(&photo, 16)?].concat())
 }
 
-fn grey(folder: &Path, inner: &str) {
+fn gray(folder: &Path, inner: &str) {
     fs::create_dir_all(folder.join(inner)).expect("create");
     let at = |x, _| image::Luma([if x < 8 { 255 } else { 1 }]);
     GrayImage::from_fn(16, 12, at).save(folder.join(inner).join("photo.png")).expect("save");
 }
 
 fn id_maps(folder: &Path) {
-    grey(folder, "object_ids");
-    grey(folder, "part_ids");
+    gray(folder, "object_ids");
+    gray(folder, "part_ids");
     fs::write(folder.join("identities.json"), super::seeds::identities().to_string()).expect("write");
 }
 
 fn classes(folder: &Path) {
-    grey(folder, "images");
-    grey(folder, "segmentations/00");
+    gray(folder, "images");
+    gray(folder, "segmentations/00");
 }
 
 fn photo(folder: &Path) -> Photo {

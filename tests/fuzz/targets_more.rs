@@ -10,9 +10,9 @@ use fmlgs::io::{self, IoError};
 use fmlgs::measure::{self, Report};
 use fmlgs::models::sam::Sam;
 use fmlgs::models::sam2::Sam2;
-use fmlgs::models::{ClipEncoder, ModelError, metadata};
-use fmlgs::pipeline::semantics::follow;
-use fmlgs::pipeline::semantics::grammar::Phrase;
+use fmlgs::models::{ClipEncoder, ModelError, manifest};
+use fmlgs::pipeline::semantics::parse::ParsedQuery;
+use fmlgs::pipeline::semantics::sam2_tracker;
 use fmlgs::pipeline::train::checkpoint;
 
 use super::seeds_more as seeds;
@@ -91,7 +91,7 @@ pub fn all() -> Vec<Target> {
             |_| {},
             |f| checkpoint::load(&f.join(checkpoint::FILE)),
         ),
-        Target::new("followed_frame", Door::Any, |b| follow::parse(b).ok_or("damaged")),
+        Target::new("followed_frame", Door::Any, |b| sam2_tracker::parse(b).ok_or("damaged")),
     ]
 }
 
@@ -141,8 +141,8 @@ fn gltf(folder: &Path) {
 
 /// Every use of a model's description.
 fn model(path: &Path) -> Result<(), ModelError> {
-    let kind = metadata::kind(path)?;
-    for graph in metadata::graphs(path)? {
+    let kind = manifest::kind(path)?;
+    for graph in manifest::graphs(path)? {
         let _ = graph.check_size(path.parent().unwrap_or(path));
     }
     match kind.as_str() {
@@ -163,12 +163,12 @@ fn answer(bytes: &[u8], is_stream: bool) -> Result<(), String> {
     Ok(())
 }
 
-/// What a person types.
+/// What the user types.
 fn query(text: &str) -> Result<(), Infallible> {
     thread_local! {
         static TOKENS: fmlgs::models::clip::tokens::Tokens = fmlgs::models::clip::tokens::Tokens::new(77);
     }
-    let _ = Phrase::parse(text);
+    let _ = ParsedQuery::parse(text);
     let row = TOKENS.with(|t| t.row(text));
     assert_eq!(row.len(), 77, "a row of tokens has a fixed length");
     Ok(())

@@ -5,7 +5,7 @@ use fmlgs::math::vector::{dot, unit};
 use fmlgs::models::clip::ClipEncoder;
 use fmlgs::models::clip::tokens::{Tokens, clean};
 use fmlgs::models::network::Array;
-use fmlgs::models::prepare::{Prepare, Side};
+use fmlgs::models::preprocess::{Prepare, Side};
 use fmlgs::models::{Encoder, ModelError, Tile};
 use fmlgs::scene::PhotoPixels;
 

@@ -2,11 +2,11 @@
 
 use fmlgs::math::resize::{Filter, resize};
 use fmlgs::models::network::Array;
-use fmlgs::models::prepare::{Side, enlarge};
-use fmlgs::models::room::close_idle;
-use fmlgs::models::sam::automatic::{AutomaticOptions, Collector, Something, crops, everything};
+use fmlgs::models::preprocess::{Side, enlarge};
+use fmlgs::models::sam::automatic::{AutomaticMask, AutomaticOptions, Collector, crops, everything};
 use fmlgs::models::sam::{PromptedMasks, Sam};
 use fmlgs::models::sam2::Sam2;
+use fmlgs::models::session_cache::close_idle;
 use fmlgs::scene::Mask;
 use serde_json::Value;
 
@@ -127,7 +127,7 @@ fn options(settings: &Value, area: &Value, per_side: &Value) -> AutomaticOptions
 }
 
 /// What is kept of the stored logits.
-fn kept(known: &Value, t: &Tensors, kind: &str, options: &AutomaticOptions) -> Vec<Something> {
+fn kept(known: &Value, t: &Tensors, kind: &str, options: &AutomaticOptions) -> Vec<AutomaticMask> {
     let size = (known["width"].as_u64().expect("w") as usize, known["height"].as_u64().expect("h") as usize);
     let (step, shift) = (known["step"].as_f64().expect("step") as f32, known["shift"].as_f64().expect("shift") as f32);
     let (shape, logits) = t.bytes(&format!("{kind}.logits"));

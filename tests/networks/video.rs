@@ -1,4 +1,4 @@
-//! SAM 2 on a film: 12 frames, three objects, forward and backward, against the official predictor.
+//! SAM 2 on a video: 12 frames, three objects, forward and backward, against the official predictor.
 
 use std::collections::BTreeMap;
 

@@ -15,7 +15,7 @@ pub fn complete(text: &str, identities: &Identities, most: usize) -> Vec<String>
     let starts = |at: usize| {
         let before = Request { tokens: &tokens[..at], words: &words[..at], known: &known, strict: true };
         let opens = Language::get().openers.contains(&words[..at].join(" "));
-        at == 0 || opens || (SEPARATORS.contains(&words[at - 1]) && clauses(&before).is_some())
+        at == 0 || opens || (SEPARATORS.contains(&words[at - 1]) && clauses(&before, true).is_some())
     };
     let ends_word = text.is_empty() || text.ends_with(char::is_whitespace);
     let mut found = Vec::new();

@@ -248,36 +248,30 @@ pub(super) fn many<'a, 'b>(words: &'b [&'a str]) -> Option<&'b [&'a str]> {
     Some(rest.strip_prefix(&["the"]).unwrap_or(rest)).filter(|r| !r.is_empty())
 }
 
+/// "20", "half a", "thirty five".
+fn amount(words: &[&str]) -> Option<f64> {
+    match words {
+        [only] => number(only).or_else(|| find(&Language::get().amounts, only)),
+        [tens, ones] if number(ones).is_some_and(|n| n < 10.0) => {
+            Some(number(tens).filter(|n| *n >= 20.0)? + number(ones)?)
+        }
+        _ => find(&Language::get().amounts, &words.join(" ")),
+    }
+}
+
 /// "20 cm", "half a meter", "two steps", "a bit".
 fn distance(words: &[&str]) -> Option<Distance> {
-    let language = Language::get();
+    let (language, (unit, before)) = (Language::get(), words.split_last()?);
     if let Some(steps) = find(&language.steps, &words.join(" ")) {
         return Some(Distance::Relative(steps));
     }
-    let (unit, amount) = words.split_last()?;
-    let amount = match amount {
-        ["a" | "an" | "one"] => 1.0,
-        ["half", "a"] | ["half", "an"] | ["half"] | ["a", "half"] => 0.5,
-        ["a", "quarter", "of", "a"] => 0.25,
-        ["a", "couple", "of"] => 2.0,
-        ["one", "and", "a", "half"] => 1.5,
-        [number_word] => number(number_word)?,
-        [tens, ones] => number(tens).filter(|n| *n >= 20.0)? + number(ones).filter(|n| *n < 10.0)?,
-        _ => return None,
-    };
-    if matches!(*unit, "step" | "steps") {
-        return Some(Distance::Relative(amount));
-    }
-    find(&language.units, unit).map(|meters| Distance::Metres(amount * meters))
+    let amount = amount(before)?;
+    let meters = find(&language.units, unit).map(|meters| Distance::Meters(amount * meters));
+    meters.or_else(|| matches!(*unit, "step" | "steps").then_some(Distance::Relative(amount)))
 }
 
 /// "90 degrees".
 fn angle(words: &[&str]) -> Option<f64> {
-    let (unit, amount) = words.split_last()?;
-    let is_degrees = matches!(*unit, "°" | "deg" | "degree" | "degrees");
-    match amount {
-        [only] if is_degrees => number(only),
-        [tens, ones] if is_degrees => Some(number(tens).filter(|n| *n >= 20.0)? + number(ones).filter(|n| *n < 10.0)?),
-        _ => None,
-    }
+    let (unit, before) = words.split_last()?;
+    if matches!(*unit, "°" | "deg" | "degree" | "degrees") { amount(before) } else { None }
 }

@@ -130,7 +130,7 @@ fn request_tokens(request: &str) -> Vec<Token> {
 pub(crate) fn parse(request: &str, identities: &Identities) -> Option<Vec<Task>> {
     let (tokens, known) = (request_tokens(request), Vocabulary::new(identities));
     let words: Vec<&str> = tokens.iter().map(|t| t.low.as_str()).collect();
-    let with = |strict| clauses(&Request { tokens: &tokens, words: &words, known: &known, strict });
+    let with = |strict| clauses(&Request { tokens: &tokens, words: &words, known: &known, strict }, true);
     with(true).or_else(|| with(false)).filter(|tasks| tasks.len() <= MOST_TASKS)
 }
 
@@ -142,19 +142,19 @@ pub(crate) fn is_command(text: &str, identities: &Identities) -> bool {
 }
 
 /// A request as one command, or as several in a row.
-fn clauses(request: &Request<'_>) -> Option<Vec<Task>> {
+fn clauses(request: &Request<'_>, is_first: bool) -> Option<Vec<Task>> {
     let request = trimmed(request);
-    if let Some(tasks) = one(&request) {
+    if let Some(tasks) = one(&request, is_first) {
         return Some(tasks);
     }
     // What a question asks is asked without its mark, too; "the lamp?" wants to know, "the lamp" to go there.
     if let Some(("?", rest)) = request.words.split_last().map(|(last, rest)| (*last, rest)) {
-        return clauses(&part(&request, 0, rest.len()));
+        return clauses(&part(&request, 0, rest.len()), is_first);
     }
     let parts = (1..request.words.len()).filter(|i| SEPARATORS.contains(&request.words[*i]));
     parts.take(MOST_TASKS).find_map(|i| {
-        let mut tasks = one(&trimmed(&part(&request, 0, i)))?;
-        tasks.extend(clauses(&part(&request, i + 1, request.words.len()))?);
+        let mut tasks = one(&trimmed(&part(&request, 0, i)), is_first)?;
+        tasks.extend(clauses(&part(&request, i + 1, request.words.len()), false)?);
         Some(tasks)
     })
 }
@@ -188,10 +188,11 @@ fn opens(words: &[&str], phrase: &str) -> Option<usize> {
 }
 
 /// One command: the first that fits.
-fn one(request: &Request<'_>) -> Option<Vec<Task>> {
+fn one(request: &Request<'_>, is_first: bool) -> Option<Vec<Task>> {
     beginning_with(request.words.first()?).find_map(|sequence| {
-        // A name alone is a command only if it is one.
-        if !request.strict && !matches!(sequence.items.first(), Some(Item::Word(_))) {
+        // A name alone is a command only if it is one, and the first: "hide the lamp and the mug from above".
+        let begins_with_word = matches!(sequence.items.first(), Some(Item::Word(_)));
+        if !begins_with_word && !(request.strict && is_first) {
             return None;
         }
         let mut slots = request.fit(&sequence.items)?;

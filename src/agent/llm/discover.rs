@@ -53,7 +53,7 @@ fn models(settings: &LlmSettings, patience: &Patience, cancel: &AtomicBool) -> R
     Ok(list.iter().filter_map(name).collect())
 }
 
-/// Whether the model of the settings answers and knows tools; the answer is for people.
+/// Whether the model of the settings answers and knows tools; the answer is for display.
 ///
 /// # Errors
 /// What is wrong, and what helps.

@@ -31,8 +31,6 @@ use crate::scene::text;
 
 /// How often the same call may be asked for in one request.
 const MOST_ALIKE: usize = 3;
-/// Letters of the talk that go back to the model; older turns are left out.
-const LONGEST_TALK: usize = 80_000;
 /// Longest piece of a server's error that is shown, in characters.
 const LONGEST_ERROR: usize = 200;
 
@@ -146,33 +144,13 @@ impl Llm {
         Ok(None)
     }
 
-    /// The messages that go to the model: the task, and as much of the talk as fits, from a request on.
-    fn messages(&self) -> Vec<Value> {
-        let mut length = 0;
-        let mut start = self.talk.len();
-        for (i, message) in self.talk.iter().enumerate().rev() {
-            length += message.to_string().len();
-            let is_request = message["role"] == "user";
-            // The present request always goes.
-            if length > LONGEST_TALK && start < self.talk.len() {
-                break;
-            }
-            if is_request {
-                start = i;
-            }
-        }
-        std::iter::once(json!({ "role": "system", "content": prompt::TASK }))
-            .chain(self.talk[start..].iter().cloned())
-            .collect()
-    }
-
     fn body(&self, context: &PlannerContext<'_>) -> String {
         let usable: Vec<&str> = context.policy.usable().collect();
         let is_usable = |tool: &Value| tool["function"]["name"].as_str().is_some_and(|n| usable.contains(&n));
         let tools: Vec<Value> = schema::tools().into_iter().filter(is_usable).collect();
         let body = json!({
             "model": self.settings.model,
-            "messages": self.messages(),
+            "messages": prompt::messages(&self.talk),
             "tools": tools,
             "tool_choice": "auto",
             "temperature": 0,

@@ -16,8 +16,8 @@ use super::tool::LevelFilter;
 use super::words::{alike, singular};
 use super::world::World;
 use crate::pipeline::semantics::answer::Basis;
-use crate::pipeline::semantics::grammar::Kind;
-use crate::pipeline::semantics::localise::Answer;
+use crate::pipeline::semantics::localize::Answer;
+use crate::pipeline::semantics::parse::Kind;
 use crate::scene::{Bounds, IdentityId, Level};
 
 /// What words come to.

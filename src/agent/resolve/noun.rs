@@ -97,6 +97,11 @@ pub(super) fn readings(words: &[&str], known: &Vocabulary, strict: bool) -> Vec<
         [first, rest @ ..] if is_determiner(first) && !rest.is_empty() && !known.is_name(words) => rest,
         other => other,
     };
+    // Everything is in the scene.
+    let words = match words {
+        [thing @ .., "in", "the" | "this", last @ ("scene" | "room")] if !known.has(last) => thing,
+        other => other,
+    };
     match words {
         _ if words.len() > MOST_WORDS => return found,
         [] => return found,

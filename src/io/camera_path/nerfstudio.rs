@@ -18,7 +18,7 @@ use crate::io::{IoError, atomic, files};
 use crate::math::rotation::{nearest_rotation, rotation_error};
 use crate::scene::{CameraPath, PathKey};
 
-/// What of a file is read. `camera_path` are the frames of the film, `keyframes` what they were made from.
+/// What of a file is read. `camera_path` are the frames of the video, `keyframes` what they were made from.
 #[derive(Deserialize)]
 struct File {
     camera_type: Option<String>,
@@ -65,7 +65,7 @@ fn frames<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Frame>, D::Error> {
     members(from, "frame")
 }
 
-/// The path in `bytes`: its keyframes, or else every frame of the film as a key. Values are not all checked yet.
+/// The path in `bytes`: its keyframes, or else every frame of the video as a key. Values are not all checked yet.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<CameraPath, IoError> {
     let file: File = serde_json::from_slice(bytes).map_err(|e| files::json_error(path, &e))?;
     if let Some(kind) = file.camera_type.as_deref().filter(|k| !k.eq_ignore_ascii_case("perspective")) {
@@ -102,7 +102,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<CameraPath, IoError> {
     Ok(CameraPath { keys, closed, fps, seconds: file.seconds.unwrap_or(film) })
 }
 
-/// Writes a path for nerfstudio: `keys` as keyframes, `frames` (the interpolated film at the path's
+/// Writes a path for nerfstudio: `keys` as keyframes, `frames` (the interpolated video at the path's
 /// `fps`, which is what `ns-render` renders) as `camera_path`, for pictures of `size_px`. Waits and
 /// names have no place in the format and are left out; the roll goes into the matrices.
 ///

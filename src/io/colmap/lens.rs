@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::DVec2;
 
 use crate::io::IoError;
-use crate::io::listing::{Focal, Lens};
+use crate::io::photo_list::{Focal, Lens};
 use crate::scene::{Camera, Distortion};
 
 /// Name and number of parameters of each model, by its number in binary files.

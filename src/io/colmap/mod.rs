@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
 
-use super::listing::{Lens, Listed, photos};
-use super::{IoError, files, listing};
+use super::photo_list::{Lens, Listed, photos};
+use super::{IoError, files, photo_list};
 use crate::math::rotation::matrix_from_quaternion;
 use crate::scene::{CameraError, Dataset, SparsePoint};
 
@@ -77,7 +77,7 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
     if points.is_empty() {
         warnings.push("the reconstruction has no sparse points; training starts from random points".into());
     }
-    let photo_folder = listing::photo_folder(root, &images_file)?;
+    let photo_folder = photo_list::photo_folder(root, &images_file)?;
     let listed =
         images.iter().map(|i| listed(i, &cameras, root, &photo_folder, &images_file)).collect::<Result<_, _>>()?;
     Ok(Dataset {
@@ -118,7 +118,7 @@ fn listed(image: &Image, cameras: &Cameras, root: &Path, folder: &str, source: &
 
 /// A point, checked.
 fn point(position: DVec3, rgb: [u8; 3], index: usize, path: &Path) -> Result<SparsePoint, IoError> {
-    listing::place(position, "point", index, path).map(|position| SparsePoint { position, rgb })
+    photo_list::place(position, "point", index, path).map(|position| SparsePoint { position, rgb })
 }
 
 /// An error where a number that names one thing names two.

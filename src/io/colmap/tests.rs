@@ -159,7 +159,7 @@ fn every_model_up_to_opencv_is_read_and_others_are_named() {
     ];
     for (number, params, [k1, k2, p1, p2]) in models {
         let lens = &binary::cameras(&cameras_bin(number, params), path).expect("read")[&7];
-        assert!(matches!(lens.focal, listing::Focal::Px(f) if f == DVec2::splat(50.0)), "{number}");
+        assert!(matches!(lens.focal, photo_list::Focal::Px(f) if f == DVec2::splat(50.0)), "{number}");
         assert_eq!(lens.principal_px, Some(DVec2::new(30.0, 25.0)));
         assert_eq!(lens.distortion, Distortion { k1, k2, p1, p2 });
     }
@@ -291,7 +291,7 @@ fn lenses_and_places_that_cannot_be_are_refused_on_reading() {
     for (file, from, to, what) in [
         ("cameras.txt", "50.0", "1e-30", "focal length"),
         ("cameras.txt", " 0.1 ", " 1e10 ", "leaves nothing"),
-        ("images.txt", "-1.0 ", "1e308 ", "camera centre"),
+        ("images.txt", "-1.0 ", "1e308 ", "camera center"),
         ("points3D.txt", "3.5", "1e308", "z = 1e308"),
     ] {
         let e = with(file, from, to).expect_err(what);

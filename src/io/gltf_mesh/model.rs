@@ -15,7 +15,7 @@ pub struct MeshScene {
     pub materials: Vec<Material>,
     /// Decoded images, indexed by [`TextureUse::image`].
     pub images: Vec<TextureImage>,
-    /// What was left out, for people.
+    /// What was left out, for display.
     pub warnings: Vec<String>,
 }
 
@@ -30,7 +30,7 @@ pub struct MeshNode {
     pub children: Vec<usize>,
     /// Index of its own mesh.
     pub mesh: Option<usize>,
-    /// Points of the node to world points (glTF axes: y up, metres).
+    /// Points of the node to world points (glTF axes: y up, meters).
     pub world_from_node: DMat4,
 }
 
@@ -52,7 +52,7 @@ pub struct Primitive {
     pub normals: Vec<Vec3>,
     /// Texture coordinates by set number; a set that is absent is empty.
     pub uv_sets: Vec<Vec<Vec2>>,
-    /// Linear vertex colours with alpha; empty means white.
+    /// Linear vertex colors with alpha; empty means white.
     pub colors: Vec<Vec4>,
     /// Vertex indices, each below `positions.len()`.
     pub triangles: Vec<[u32; 3]>,
@@ -63,11 +63,11 @@ pub struct Primitive {
 /// How a surface looks, as far as it is used.
 #[derive(Clone, Debug)]
 pub struct Material {
-    /// Linear base colour and alpha.
+    /// Linear base color and alpha.
     pub base_color: Vec4,
-    /// Texture multiplied with the base colour.
+    /// Texture multiplied with the base color.
     pub base_texture: Option<TextureUse>,
-    /// Linear emitted colour.
+    /// Linear emitted color.
     pub emission: Vec3,
     /// Texture multiplied with the emission.
     pub emission_texture: Option<TextureUse>,
@@ -77,7 +77,7 @@ pub struct Material {
     pub roughness: f32,
     /// What alpha means.
     pub alpha: AlphaMode,
-    /// Shown in its own colour whatever the light.
+    /// Shown in its own color whatever the light.
     pub unlit: bool,
 }
 

@@ -122,9 +122,9 @@ fn index_types_are_equivalent() {
 }
 
 #[test]
-fn sparse_and_normalised_accessors() {
+fn sparse_and_normalized_accessors() {
     let (mut root, mut bin) = one_cube();
-    // Vertex 7 moved to (2, 3, 4); vertex colours as normalised bytes.
+    // Vertex 7 moved to (2, 3, 4); vertex colors as normalized bytes.
     let at = bin.len();
     bin.extend(7_u16.to_le_bytes());
     bin.extend([0, 0]);

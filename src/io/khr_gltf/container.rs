@@ -77,7 +77,7 @@ impl<'a> Gltf<'a> {
         node.mesh.and_then(|mesh| self.meshes.meshes.get(mesh)).map_or(&[], |mesh| &mesh.primitives)
     }
 
-    /// The values of accessor `index`, integers as the accessor says: normalised or as they are.
+    /// The values of accessor `index`, integers as the accessor says: normalized or as they are.
     pub fn values<const N: usize>(&self, index: usize) -> Result<Values<N>, IoError> {
         let values = self.file.values(index, "a splat primitive")?;
         if values.width != N {

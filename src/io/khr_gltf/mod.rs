@@ -1,7 +1,7 @@
 //! Splats in glTF 2.0 (`.gltf`, `.glb`): the extension `KHR_gaussian_splatting`.
 //!
 //! Scales are linear since the extension's draft of April 2026; earlier files hold logarithms.
-//! A negative value or a signed integer type gives the latter away. Colours of the linear colour
+//! A negative value or a signed integer type gives the latter away. Colors of the linear color
 //! space are carried over to the display's: the constant harmonic exactly, the higher ones to
 //! first order around it.
 

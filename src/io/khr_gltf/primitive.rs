@@ -5,7 +5,7 @@ use glam::{DMat3, DMat4, DQuat, DVec3};
 use super::EXTENSION;
 use super::container::{Gltf, Primitive};
 use crate::io::IoError;
-use crate::io::quantised::logit;
+use crate::io::quantized::logit;
 use crate::math::rotation::{nearest_rotation, rotation_error};
 use crate::math::sh::{SH_C0, coefficients};
 use crate::math::srgb;
@@ -28,7 +28,7 @@ pub(super) fn cloud(
     let linear = match setting("colorSpace") {
         "srgb_rec709_display" => false,
         "lin_rec709_display" => true,
-        other => return Err(gltf.unsupported(format!("the colour space '{other}'"), "convert the colours to sRGB")),
+        other => return Err(gltf.unsupported(format!("the color space '{other}'"), "convert the colors to sRGB")),
     };
     let find = |name: &str| primitive.attributes.get(name).copied();
     let extended = |name: &str| {
@@ -63,7 +63,7 @@ pub(super) fn cloud(
     let (turn, scale) = similarity(gltf, world)?;
     if degree > 0 && turn.is_some() {
         return Err(
-            gltf.unsupported("a rotated node with view-dependent colours".into(), "apply the rotation to the splats")
+            gltf.unsupported("a rotated node with view-dependent colors".into(), "apply the rotation to the splats")
         );
     }
     let grown = scale.ln() as f32;

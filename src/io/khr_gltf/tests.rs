@@ -45,7 +45,7 @@ fn values_arrive_in_our_units() {
 }
 
 #[test]
-fn linear_colours_become_display_colours() {
+fn linear_colors_become_display_colors() {
     let mut g = gltf();
     g["meshes"][0]["primitives"][0]["extensions"]["KHR_gaussian_splatting"]["colorSpace"] = json!("lin_rec709_display");
     let c = read_json(&g).expect("read");

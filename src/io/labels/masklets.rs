@@ -1,7 +1,7 @@
 //! Masklets of a video as in SA-V: one JSON file with `masklet`, a list of frames, each a list of
 //! run-length masks, the n-th of every frame the same thing.
 //!
-//! SA-V labels every fourth frame; how many lie between labelled ones follows from
+//! SA-V labels every fourth frame; how many lie between labeled ones follows from
 //! `video_frame_count`. The photo of frame n has n as the last number in its name.
 
 use std::path::{Path, PathBuf};
@@ -22,9 +22,9 @@ struct File {
 /// The masklets of one video.
 pub struct Masklets {
     path: PathBuf,
-    /// Labelled frames, each with a mask for every masklet.
+    /// Labeled frames, each with a mask for every masklet.
     frames: Vec<Vec<Rle>>,
-    /// Frames of the video for each labelled one.
+    /// Frames of the video for each labeled one.
     stride: u64,
 }
 
@@ -36,7 +36,7 @@ impl Masklets {
         }
         let File { masklet, video_frame_count } =
             serde_json::from_value(file).map_err(|e| files::json_error(path, &e))?;
-        // 483 frames of which 121 are labelled: every fourth, the last of them frame 480.
+        // 483 frames of which 121 are labeled: every fourth, the last of them frame 480.
         let ratio = video_frame_count.unwrap_or(0.0) / masklet.len().max(1) as f64;
         let stride = if ratio >= 1.0 { ratio.round().min(1e6) as u64 } else { 1 };
         Ok(Some(Self { path: path.into(), frames: masklet, stride }))
@@ -50,12 +50,12 @@ impl Masklets {
         (number % self.stride == 0 && frame < self.frames.len()).then_some(frame)
     }
 
-    /// Whether the photo `stem` is a labelled frame.
+    /// Whether the photo `stem` is a labeled frame.
     pub fn has(&self, stem: &str) -> bool {
         self.frame(stem).is_some()
     }
 
-    /// The masks in the photo `stem`, nameless; none if it is no labelled frame.
+    /// The masks in the photo `stem`, nameless; none if it is no labeled frame.
     pub fn regions(&self, stem: &str, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
         let Some(frame) = self.frame(stem) else { return Ok(Vec::new()) };
         let masks = &self.frames[frame];

@@ -27,7 +27,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::resample::{Pixels, resample};
-use super::{IoError, files, listing, memory};
+use super::{IoError, files, memory, photo_list};
 use crate::scene::{Camera, Level, Mask, Photo, text};
 
 /// How many times longer than the photo's the sides of a mask may be.
@@ -38,7 +38,7 @@ const MOST_MASKS: usize = 4096;
 /// Most memory that the masks of one photo take, bytes: a thousand of eight million pixels.
 const MOST_BYTES: u64 = 1 << 30;
 
-/// A labelled region of one photo.
+/// A labeled region of one photo.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Region {
     /// What it is called; empty = not named.
@@ -165,7 +165,7 @@ impl Sheet<'_> {
         }
         let expected = (self.0.camera.width_px, self.0.camera.height_px);
         let larger = f64::from(w.max(h)) / f64::from(expected.0.max(expected.1));
-        if !listing::is_scaled(expected, size_px) || larger > MOST_LARGER {
+        if !photo_list::is_scaled(expected, size_px) || larger > MOST_LARGER {
             return Err(IoError::PhotoSize { path: path.into(), found: size_px, expected });
         }
         if masks > MOST_MASKS {
@@ -196,8 +196,8 @@ fn as_photo(mask: &Mask, photo: &Photo, max_side_px: u32) -> Mask {
     if photo.distortion.is_none() {
         return mask.resized(w, h);
     }
-    let grey = |i| if mask.contains(i) { [u8::MAX; 3] } else { [0; 3] };
-    let data = (0..size.0 * size.1).flat_map(grey).collect();
+    let gray = |i| if mask.contains(i) { [u8::MAX; 3] } else { [0; 3] };
+    let data = (0..size.0 * size.1).flat_map(gray).collect();
     let picture = Pixels { width: size.0, height: size.1, channels: 3, data };
     let camera = photo.camera.resized(size.0 as u32, size.1 as u32);
     let straight = resample(&picture, &camera, photo.distortion.as_ref(), &target);
@@ -212,7 +212,7 @@ fn entries(folder: &Path) -> Vec<String> {
     names
 }
 
-/// A picture file's id per pixel: 8- or 16-bit grey, of the photo's shape; `masks` are made of it.
+/// A picture file's id per pixel: 8- or 16-bit gray, of the photo's shape; `masks` are made of it.
 fn read_ids(path: &Path, sheet: Sheet<'_>, masks: usize) -> Result<(usize, usize, Vec<u16>), IoError> {
     sheet.check(path, super::photo::size(path)?, masks)?;
     let bytes = files::read(path, files::MAX_PICTURE_BYTES)?;

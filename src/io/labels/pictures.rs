@@ -35,7 +35,7 @@ impl Pictures {
     }
 }
 
-/// The pixels of a picture that are at least `least` of 255 in any colour; `masks` such are held
+/// The pixels of a picture that are at least `least` of 255 in any color; `masks` such are held
 /// at once.
 fn read(path: &Path, least: u8, sheet: Sheet<'_>, masks: usize) -> Result<Mask, IoError> {
     sheet.check(path, photo::size(path)?, masks)?;

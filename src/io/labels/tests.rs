@@ -103,7 +103,7 @@ fn spin_nerf_masks_are_anything_but_black() {
         assert!(area.abs_diff(12 * 24) <= 24, "{area}");
         assert!(matches!(labels.of(&photo("a.jpg", 12, 6), 99), Err(IoError::PhotoSize { .. })));
     }
-    // A 16-bit picture in colour.
+    // A 16-bit picture in color.
     let deep = image::ImageBuffer::from_fn(8, 6, |x, _| image::Rgb([0, 0, u16::from(x == 3)]));
     deep.save(label.join("a.png")).expect("save");
     let labels = Labels::open(folder.path()).expect("labels");
@@ -171,7 +171,7 @@ fn masklets_belong_to_numbered_photos() {
     fs::write(&at, video(&frames)).expect("write");
     for path in [folder.path(), &at] {
         let labels = Labels::open(path).expect("labels");
-        // Seven frames, two labelled: every fourth.
+        // Seven frames, two labeled: every fourth.
         assert_eq!(summary(&labels, "v/00000.jpg"), [(String::new(), None, 6)]);
         assert_eq!(summary(&labels, "\u{e9}4\u{e9}.jpg"), [(String::new(), None, 48), (String::new(), None, 6)]);
         for other in ["1.jpg", "8.jpg", "none.jpg", "99999999999999999999999.jpg"] {

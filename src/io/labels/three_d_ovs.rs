@@ -7,7 +7,7 @@ use std::path::Path;
 
 use super::pictures::{Pictures, png_stem};
 use super::{entries, stem};
-use crate::io::{IoError, files, listing, llff};
+use crate::io::{IoError, files, llff, photo_list};
 use crate::scene::Level;
 
 /// Folder of the masks.
@@ -33,7 +33,7 @@ pub fn find(root: &Path) -> Result<Option<Pictures>, IoError> {
     }
     let text = files::read_text(&list)?;
     let classes: BTreeSet<&str> = text.lines().map(str::trim).filter(|l| !l.is_empty()).collect();
-    let photos = llff::names(&root.join(listing::photo_folder(root, &list)?))?;
+    let photos = llff::names(&root.join(photo_list::photo_folder(root, &list)?))?;
     let mut of = BTreeMap::new();
     for name in entries(&folder) {
         let Ok(index) = name.parse::<usize>() else { continue };

@@ -72,8 +72,8 @@ const MAGIC_BYTES: u64 = 4;
 /// Opens a dataset's folder or its `transforms.json`, a splat file, or a trained scene.
 ///
 /// # Errors
-/// [`OpenError::Unrecognised`] says what was looked for and what was found instead; what is
-/// recognised but broken arrives as [`OpenError::Io`] from its reader.
+/// [`OpenError::Unrecognized`] says what was looked for and what was found instead; what is
+/// recognized but broken arrives as [`OpenError::Io`] from its reader.
 pub fn open(path: &Path) -> Result<Opened> {
     let meta = fs::metadata(path).map_err(|cause| match cause.kind() {
         std::io::ErrorKind::NotFound => OpenError::NotFound { path: path.into() },
@@ -86,7 +86,7 @@ fn open_folder(path: &Path) -> Result<Opened> {
     if let Some(layout) = FOLDERS.iter().find(|l| (l.is)(path)) {
         return Ok((layout.open)(path)?);
     }
-    Err(OpenError::Unrecognised {
+    Err(OpenError::Unrecognized {
         path: path.into(),
         looked_for: FOLDERS.map(|l| l.name).join("; "),
         found: contents(path)?,
@@ -117,7 +117,7 @@ fn open_file(path: &Path) -> Result<Opened> {
         [b'p', b'l', b'y', b'\n' | b'\r'] => Ok(Opened::Cloud(splat_ply::read(path)?)),
         start if khr_gltf::is_gltf(start, &name) => Ok(Opened::Cloud(khr_gltf::read(path)?)),
         b"PK\x03\x04" => Ok(Opened::Cloud(sog::read_archive(path)?)),
-        start => Err(OpenError::Unrecognised {
+        start => Err(OpenError::Unrecognized {
             path: path.into(),
             looked_for: FILES.into(),
             found: format!("a file that starts with '{}'", start.escape_ascii()),
@@ -125,7 +125,7 @@ fn open_file(path: &Path) -> Result<Opened> {
     }
 }
 
-/// The first few names in a folder, for people.
+/// The first few names in a folder, for display.
 fn contents(folder: &Path) -> Result<String> {
     const SHOWN: usize = 8;
     let failed = |cause| IoError::Read { path: folder.into(), cause };

@@ -11,10 +11,10 @@ fn folder() -> (tempfile::TempDir, PathBuf) {
 }
 
 #[test]
-fn what_is_not_recognised_says_what_was_looked_for_and_found() {
+fn what_is_not_recognized_says_what_was_looked_for_and_found() {
     let (_guard, path) = folder();
     let e = open(&path).expect_err("empty");
-    assert!(matches!(&e, OpenError::Unrecognised { found, .. } if found == "an empty folder"), "{e}");
+    assert!(matches!(&e, OpenError::Unrecognized { found, .. } if found == "an empty folder"), "{e}");
     for i in 0..10 {
         fs::write(path.join(format!("note{i}.txt")), "hello").expect("write");
     }

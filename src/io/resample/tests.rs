@@ -155,7 +155,7 @@ fn same_size_without_distortion_is_the_identity() {
 }
 
 #[test]
-fn transparent_pixels_do_not_bleed_their_colour() {
+fn transparent_pixels_do_not_bleed_their_color() {
     let data = vec![200, 100, 50, 255, 0, 255, 0, 0];
     let p = Pixels { width: 2, height: 1, channels: 4, data };
     let out = resample(&p, &camera(2, 1, 2.0), None, &camera(1, 1, 1.0));

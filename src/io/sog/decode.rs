@@ -5,7 +5,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::meta::{Meta, Opacity, Rest};
-use crate::io::quantised::{logit, unit_quaternion};
+use crate::io::quantized::{logit, unit_quaternion};
 use crate::io::{IoError, photo};
 use crate::math::sh::coefficients;
 use crate::scene::GaussianCloud;

@@ -8,7 +8,7 @@ use crate::io::{IoError, files};
 
 /// What a file says, checked: every number is finite, every list has its length.
 pub(super) struct Meta {
-    /// Number of Gaussians, not yet held against the pictures.
+    /// Number of Gaussians, not yet compared with the pictures.
     pub count: u64,
     /// Bounds of the positions' logarithms.
     pub means: ([f32; 3], [f32; 3]),

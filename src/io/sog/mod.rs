@@ -1,8 +1,8 @@
-//! SOG: splats quantised into WebP pictures beside a `meta.json`, in a folder or in one `.sog`
+//! SOG: splats quantized into WebP pictures beside a `meta.json`, in a folder or in one `.sog`
 //! archive (PlayCanvas). Versions 1 and 2.
 //!
 //! Pixel `i` of each picture belongs to Gaussian `i`. Positions have 16 bits an axis, in two
-//! pictures, on a logarithmic scale; version 2 looks scales and colours up in codebooks where
+//! pictures, on a logarithmic scale; version 2 looks scales and colors up in codebooks where
 //! version 1 interpolates between bounds; higher harmonics are entries of a palette.
 
 mod archive;

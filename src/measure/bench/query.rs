@@ -11,11 +11,11 @@ use super::super::table::{Rows, rows};
 use crate::math::stats::quantile;
 use crate::math::vector::unit;
 use crate::models::{Encoder, ModelError};
+use crate::pipeline::semantics::by_embedding::{EmbeddingOptions, TextEmbeddings};
 use crate::pipeline::semantics::codes::{self, TOLERANCE};
 use crate::pipeline::semantics::matching;
-use crate::pipeline::semantics::meaning::{MeaningOptions, Phrasebook};
 use crate::pipeline::semantics::query_engine::ask_by_embedding;
-use crate::pipeline::semantics::stages::{Stages, StagesMs, ms_since};
+use crate::pipeline::semantics::timing::{Stages, StagesMs, ms_since};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::language::MAX_VIEWS;
 use crate::scene::{Identities, IdentityId, LanguageFeatures, Level, NOBODY, ViewFeatures};
@@ -51,7 +51,7 @@ impl QueryTiming {
         let stages = [
             ("text encoding", self.stages.encode),
             ("relevancy", self.stages.relevancy),
-            ("localisation", self.stages.localise),
+            ("localization", self.stages.localize),
             ("mask", self.stages.mask),
             ("heat map", self.stages.draw),
             ("without text encoding", self.without_encoding),
@@ -87,7 +87,7 @@ pub fn time(
     let map = view(&mut rng, identities, size);
     let mut each: Vec<StagesMs> = Vec::with_capacity(queries);
     // Canonical phrases are encoded when a scene opens, once.
-    let mut canonical = Phrasebook::default();
+    let mut canonical = TextEmbeddings::default();
     canonical.learn(&[], |p| encoder.text(p))?;
     for _ in 0..queries {
         let word = |list: &[&str], rng: &mut Pcg64Mcg| list.choose(rng).copied().unwrap_or("mug").to_owned();
@@ -97,7 +97,7 @@ pub fn time(
             false => format!("a {color} {thing}"),
         };
         let mut phrases = canonical.clone();
-        let how = (&features, MeaningOptions::default());
+        let how = (&features, EmbeddingOptions::default());
         let Some(answered) = ask_by_embedding(&all, how, &text, &mut phrases, |p| encoder.text(p))? else { continue };
         let target = answered.answer.hits().first().map_or(NOBODY, |h| h.identity);
         let start = Instant::now();

@@ -6,8 +6,8 @@ use super::{Case, Finding};
 use crate::math::stats::worst;
 use crate::math::vector::unit;
 use crate::pipeline::semantics::codes::{self, TOLERANCE};
-use crate::pipeline::semantics::grammar::{Kind, Phrase};
-use crate::pipeline::semantics::localise::{Scorer, localise};
+use crate::pipeline::semantics::localize::{Scorer, localize};
+use crate::pipeline::semantics::parse::{Kind, ParsedQuery};
 use crate::pipeline::semantics::relevancy::{advantage, deviate, score};
 use crate::scene::{Identities, Level, NOBODY};
 
@@ -107,9 +107,9 @@ pub fn cases() -> Vec<Case> {
             Finding::is(format!("{} different codes", codes.len()), finite && codes.len() == 4_096)
         }),
         language("a score that is NaN hides nothing", |faulty| {
-            let Some(phrase) = Phrase::parse("lamp") else { return Finding::is("no phrase", false) };
+            let Some(phrase) = ParsedQuery::parse("lamp") else { return Finding::is("no phrase", false) };
             let best = if faulty { f32::NAN } else { 0.9 };
-            let answer = localise(&identities(4), &phrase, Kind::Auto, &mut Fixed([f32::NAN, best, f32::NAN, 0.2]));
+            let answer = localize(&identities(4), &phrase, Kind::Auto, &mut Fixed([f32::NAN, best, f32::NAN, 0.2]));
             let first = answer.hits().first().map(|h| h.identity);
             Finding::is(format!("{}, {} answers", answer.verdict(), answer.hits().len()), first == Some(2))
         }),

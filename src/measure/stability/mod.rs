@@ -1,4 +1,4 @@
-//! The catalogue of extreme cases: what happens in each, how far it is from double precision, and
+//! The catalog of extreme cases: what happens in each, how far it is from double precision, and
 //! whether the promise of the numerics holds (finite in, finite out, or a clear refusal).
 //!
 //! Every case can be run with a fault planted in its input or in what is found, and must then be seen to
@@ -137,7 +137,7 @@ pub fn table(checked: &[Checked]) -> Rows {
 }
 
 /// All cases, in the order of the areas.
-pub fn catalogue() -> Vec<Case> {
+pub fn catalog() -> Vec<Case> {
     let mut all = drawing::cases();
     all.extend(invariance::cases());
     all.extend(training::cases());
@@ -153,7 +153,7 @@ mod tests {
 
     #[test]
     fn every_promise_holds() {
-        let all = catalogue();
+        let all = catalog();
         assert!(all.len() >= 60, "{} cases", all.len());
         let broken: Vec<Checked> = all.iter().map(Case::check).filter(|c| c.finding.is_broken()).collect();
         let lines: Vec<String> = broken
@@ -170,7 +170,7 @@ mod tests {
 
     #[test]
     fn every_promise_can_be_broken() {
-        let blind: Vec<String> = catalogue()
+        let blind: Vec<String> = catalog()
             .iter()
             .map(|c| (c, c.control()))
             .filter(|(_, f)| !f.is_broken())
@@ -181,7 +181,7 @@ mod tests {
 
     #[test]
     fn names_are_unique_and_broken_promises_are_seen() {
-        let all = catalogue();
+        let all = catalog();
         let names: std::collections::HashSet<(&str, String)> = all.iter().map(|c| (c.area, c.name.clone())).collect();
         assert_eq!(names.len(), all.len());
         let lengths: Vec<usize> = Vec::new();

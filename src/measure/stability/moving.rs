@@ -6,7 +6,7 @@ use super::drawing::{camera, one};
 use super::{Case, Finding};
 use crate::math::stats::worst;
 use crate::navigate::pose::{RotationSpline, angle};
-use crate::navigate::{FRAMES, Flight, Navigator, NoWay, Pose, Speed};
+use crate::navigate::{FRAMES, Flight, Navigator, NoRoute, Pose, Speed};
 use crate::scene::{Camera, GaussianCloud};
 
 fn cameras(places: &[[f64; 3]]) -> Vec<Camera> {
@@ -62,7 +62,7 @@ pub fn cases() -> Vec<Case> {
             // Where cameras are is known to be free.
             let places: &[[f64; 3]] = if faulty { &[[0.0, 0.0, -2.0], [1.0, 0.0, -2.0]] } else { &[] };
             let way = navigator(places).legs(DVec3::new(0.0, 0.0, -2.0), DVec3::new(1.0, 0.0, -2.0));
-            Finding::is(format!("{:?}", way.as_ref().err()), way == Err(NoWay::Inside))
+            Finding::is(format!("{:?}", way.as_ref().err()), way == Err(NoRoute::Inside))
         }),
         moving("a graph in two parts", |faulty| {
             // Cameras on both sides of a wall that ends nowhere in the known box.
@@ -74,22 +74,22 @@ pub fn cases() -> Vec<Case> {
                 .collect();
             let hole = wall().select(&[0]);
             let n = Navigator::new(&if faulty { hole } else { wall() }, &cameras(&places), DVec3::NEG_Y);
-            let parts = n.graph.parts(&n.matter);
+            let parts = n.graph.parts(&n.occupancy);
             let way = n.legs(DVec3::new(0.0, 0.0, -1.0), DVec3::new(0.0, 0.0, 1.0));
-            let parted = matches!(way, Err(NoWay::Parted { .. }));
+            let parted = matches!(way, Err(NoRoute::Parted { .. }));
             let same = n.legs(DVec3::new(0.0, 0.0, -1.0), DVec3::new(1.0, 0.0, -1.0));
             let count = parts.iter().max().map_or(0, |m| m + 1);
             Finding::is(format!("{count} parts; between them: {:?}", way.err()), parted && same.is_ok() && count >= 2)
         }),
-        moving("a goal inside matter", |faulty| {
+        moving("a goal inside occupied space", |faulty| {
             let goal = if faulty { DVec3::new(1.0, 0.0, -2.0) } else { DVec3::ZERO };
             let way = navigator(&[[0.0, 0.0, -2.0], [1.0, 0.0, -2.0]]).legs(DVec3::new(0.0, 0.0, -2.0), goal);
-            Finding::is("refused", way == Err(NoWay::Inside))
+            Finding::is("refused", way == Err(NoRoute::Inside))
         }),
         moving("a goal that is NaN", |faulty| {
             let goal = DVec3::new(if faulty { 1.0 } else { f64::NAN }, 0.0, -2.0);
             let way = navigator(&[[0.0, 0.0, -2.0], [1.0, 0.0, -2.0]]).legs(DVec3::NEG_Z * 2.0, goal);
-            Finding::is("refused", way == Err(NoWay::Inside))
+            Finding::is("refused", way == Err(NoRoute::Inside))
         }),
         moving("a flight of no length", |faulty| {
             let p = pose(0.0, 0.4);
@@ -109,9 +109,9 @@ pub fn cases() -> Vec<Case> {
             let (from, far) = (Pose { center: DVec3::splat(50.0), ..pose(0.0, 0.0) }, DVec3::new(1e30, -3e29, 7.0));
             let goal = Pose { center: DVec3::new(-60.0, 0.0, 0.0), ..pose(0.0, 0.0) };
             let way = n.fly(&from, &goal, Some(far), FRAMES, Speed::Eased);
-            let share = n.matter.free_share(DVec3::NEG_Z * 2.0, DVec3::splat(if faulty { -1.9 } else { 1e30 }), 0.0);
+            let share = n.occupancy.free_share(DVec3::NEG_Z * 2.0, DVec3::splat(if faulty { -1.9 } else { 1e30 }), 0.0);
             let outcome = format!("{:?}; {share:.0e} of the way is free", way.as_ref().err());
-            Finding::is(outcome, way == Err(NoWay::Inside) && share < 1e-20)
+            Finding::is(outcome, way == Err(NoRoute::Inside) && share < 1e-20)
         }),
         moving("cameras 1e300 units apart", |faulty| {
             // The fault: one of them is somewhere after all.

@@ -50,9 +50,12 @@ pub fn study(cloud: &GaussianCloud, cameras: &[Camera], repeats: u32, mut input:
     input.insert("keypoints".into(), navigator.graph.keypoints.len().to_string());
     input.insert("flights".into(), FLIGHTS.to_string());
     let measures = vec![
-        error("faults", "share of steps from pose to pose that come too near to matter or turn by more than 3 degrees"),
+        error(
+            "faults",
+            "share of steps from pose to pose that come too near to occupied space or turn by more than 3 degrees",
+        ),
         error("arc-length error", "by how much the way from pose to pose is off the length of the way, relative"),
-        error("too near", "share of places along flights that are nearer to matter than wanted"),
+        error("too near", "share of places along flights that are nearer to occupied space than wanted"),
         error("largest turn", "largest turn from one pose to the next, degrees"),
         error("no way", "share of pairs of keypoints between which none was found"),
     ];
@@ -65,13 +68,13 @@ pub fn study(cloud: &GaussianCloud, cameras: &[Camera], repeats: u32, mut input:
     let study = Study::new(stage, variants().0, move |variant: &Variant, seed, observer| {
         let n = navigator.graph.keypoints.len();
         if n == 0 {
-            return Err(failed("all cameras are inside matter: there is nowhere to fly from"));
+            return Err(failed("all cameras are inside occupied space: there is nowhere to fly from"));
         }
         let mut rng = Pcg64::seed_from_u64(seed);
         let pairs: Vec<[usize; 2]> = (0..FLIGHTS).map(|_| [rng.random_range(0..n), rng.random_range(0..n)]).collect();
         // Edges are looked at anew, as after opening a scene.
         navigator.graph = Graph::new(navigator.graph.keypoints.clone(), navigator.graph.clearance);
-        navigator.matter.samples = variant.samples;
+        navigator.occupancy.samples = variant.samples;
         let start = Instant::now();
         let mut flights = Vec::new();
         for pair in &pairs {
@@ -81,7 +84,7 @@ pub fn study(cloud: &GaussianCloud, cameras: &[Camera], repeats: u32, mut input:
             flights.extend(fly(&navigator, *variant, *pair));
         }
         let secs = start.elapsed().as_secs_f64() / pairs.len() as f64;
-        navigator.matter.samples = None;
+        navigator.occupancy.samples = None;
         let found: Vec<Faults> = flights.iter().map(|f| faults(f, &navigator)).collect();
         let of = |value: fn(&Faults) -> f64| mean(&found.iter().map(value).collect::<Vec<_>>());
         let values = vec![
@@ -133,9 +136,9 @@ fn variants() -> Variants<Variant> {
 
 /// What is wrong with a flight.
 struct Faults {
-    /// Share of its steps that come too near to matter or turn too far.
+    /// Share of its steps that come too near to occupied space or turn too far.
     steps: f64,
-    /// Share of the places along it that are nearer to matter than wanted.
+    /// Share of the places along it that are nearer to occupied space than wanted.
     near: f64,
     /// By how much the way from pose to pose is shorter than the way itself, relative.
     short: f64,
@@ -149,7 +152,7 @@ fn faults(flight: &Flight, navigator: &Navigator) -> Faults {
         gone += pair[0].center.distance(pair[1].center);
         let too_near = |k: &usize| {
             let place = pair[0].center.lerp(pair[1].center, *k as f64 / BETWEEN as f64);
-            navigator.matter.clearance(place) < 0.99 * navigator.clearance
+            navigator.occupancy.clearance(place) < 0.99 * navigator.clearance
         };
         let here = (0..BETWEEN).filter(too_near).count();
         let turn = angle(&pair[0].world_from_camera, &pair[1].world_from_camera);
@@ -236,7 +239,7 @@ mod tests {
         let mut ring = study(&ring_of_cameras());
         let mut value = |method: &str, setting: &str, name: &str| measured(&mut ring, method, setting, name);
         let (default, once) = (value("default", "", "too near"), value("samples along legs", "1 along", "too near"));
-        // Poses in matter are pushed out of it, so what is left is little, but there.
+        // Poses in occupied space are pushed out of it, so what is left is little, but there.
         assert!(default == 0.0 && once > 0.0, "{default} {once}");
         let (few, many) = (value("frames", "15", "arc-length error"), value("frames", "600", "arc-length error"));
         assert!(few > 4.0 * many, "{few} {many}");

@@ -9,15 +9,15 @@ use crate::math::stats::mean;
 use crate::measure::sweep::failed;
 use crate::measure::{Rule, Stage, StageName, Study, StudyError, Trial};
 use crate::models::{Encoder, ModelError};
-use crate::pipeline::semantics::answer::{Answered, by_name};
+use crate::pipeline::semantics::answer::{QueryAnswer, by_name};
+use crate::pipeline::semantics::by_embedding::{EmbeddingOptions, PartFeatures, TextEmbeddings};
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::codes::TOLERANCE;
-use crate::pipeline::semantics::grammar::Phrase;
-use crate::pipeline::semantics::localise::Strategy;
+use crate::pipeline::semantics::localize::Strategy;
 use crate::pipeline::semantics::matching;
-use crate::pipeline::semantics::meaning::{MeaningOptions, PartFeatures, Phrasebook};
+use crate::pipeline::semantics::parse::ParsedQuery;
 use crate::pipeline::semantics::protocols::part_recall::HIT_IOU;
-use crate::pipeline::semantics::protocols::{AskedScene, Category, LabelledView, langsplat};
+use crate::pipeline::semantics::protocols::{AskedScene, Category, LabeledView, langsplat};
 use crate::pipeline::semantics::query_engine::ask_by_embedding;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderSettings, Renderer};
@@ -41,7 +41,7 @@ enum Precision {
 #[derive(Clone, Copy)]
 struct Variant {
     /// `None` asks by names alone.
-    options: Option<MeaningOptions>,
+    options: Option<EmbeddingOptions>,
     /// Maps of the view are smaller by this factor.
     smaller: u32,
     blend: bool,
@@ -81,7 +81,7 @@ pub fn study<'a>(
     let stage = Stage::new(StageName::Query, words, (input, repeats), rule, measures);
     Ok(Study::new(stage, variants().0, move |variant: &Variant, _seed, observer| {
         let features = reduced(language, map, variant);
-        let mut canonical = Phrasebook::default();
+        let mut canonical = TextEmbeddings::default();
         canonical.learn(&[], |p| encoder.text(p)).map_err(failed)?;
         let mut renderer = Renderer::new();
         let (mut secs, mut ious, mut hits) = (Vec::new(), [Vec::new(), Vec::new()], Vec::new());
@@ -116,7 +116,7 @@ pub fn study<'a>(
                 })
             };
             let full = ViewMap::render(&mut renderer, cloud, of, all, &view.camera, settings).map_err(failed)?;
-            let labeled = LabelledView {
+            let labeled = LabeledView {
                 name: &view.name,
                 camera: &view.camera,
                 exact: &full,
@@ -172,7 +172,7 @@ fn round(v: &mut [f32], precision: Precision) {
 }
 
 fn variants() -> Variants<Variant> {
-    let options = MeaningOptions::default();
+    let options = EmbeddingOptions::default();
     let base = Variant { options: Some(options), smaller: 1, blend: false, precision: Precision::Stored, share: 1.0 };
     let mut all = Variants::new("part and whole at once, exact masks", base);
     let mut add = |method: &str, setting: &str, knob: (&str, Value), variant: Variant| {
@@ -183,10 +183,10 @@ fn variants() -> Variants<Variant> {
         (Strategy::OneStep, "one step"),
         (Strategy::WholeFirst, "whole first"),
     ] {
-        let options = Some(MeaningOptions { strategy, ..options });
+        let options = Some(EmbeddingOptions { strategy, ..options });
         add("localisation", words, ("strategy", json!(words)), Variant { options, ..base });
     }
-    let raw = Some(MeaningOptions { parts: PartFeatures::Raw, ..options });
+    let raw = Some(EmbeddingOptions { parts: PartFeatures::Raw, ..options });
     add("part features", "without deviation", ("parts", json!("raw")), Variant { options: raw, ..base });
     add("encoder", "none: names alone", ("encoder", json!("names")), Variant { options: None, ..base });
     for (smaller, words) in [(2, "1/2 of the size"), (4, "1/4 of the size")] {
@@ -207,11 +207,11 @@ fn ask(
     map: &SemanticMap,
     features: &LanguageFeatures,
     variant: &Variant,
-    mut phrases: Phrasebook,
+    mut phrases: TextEmbeddings,
     encoder: &mut dyn Encoder,
-) -> Result<Option<Answered>, StudyError> {
+) -> Result<Option<QueryAnswer>, StudyError> {
     let Some(options) = variant.options else {
-        return Ok(Phrase::parse(text).map(|phrase| by_name(&map.identities, &phrase, LevelFilter::Auto)));
+        return Ok(ParsedQuery::parse(text).map(|phrase| by_name(&map.identities, &phrase, LevelFilter::Auto)));
     };
     match ask_by_embedding(&map.identities, (features, options), text, &mut phrases, |p| encoder.text(p)) {
         Err(ModelError::NoKnownWord { .. }) => Ok(None),
@@ -220,7 +220,7 @@ fn ask(
 }
 
 /// The pixels of the best answer, whatever its score: it is asked where, not whether.
-fn found(answered: &Answered, exact: &ViewMap, blended: &CodeMap, map: &SemanticMap, variant: &Variant) -> Mask {
+fn found(answered: &QueryAnswer, exact: &ViewMap, blended: &CodeMap, map: &SemanticMap, variant: &Variant) -> Mask {
     let Some(best) = answered.answer.hits().first().map(|h| h.identity) else {
         return Mask::empty(exact.width_px, exact.height_px);
     };

@@ -9,8 +9,8 @@ use serde::Deserialize;
 
 use self::tokens::Tokens;
 use super::network::{Array, Network};
-use super::prepare::{Prepare, Side};
-use super::{Encoder, ModelError, Tile, metadata};
+use super::preprocess::{Prepare, Side};
+use super::{Encoder, ModelError, Tile, manifest};
 use crate::math::resize::Filter;
 use crate::scene::PhotoPixels;
 
@@ -40,8 +40,8 @@ struct TokenizerKind {
 
 #[derive(Clone, Debug, Deserialize)]
 struct Graphs {
-    image: metadata::Graph,
-    text: metadata::Graph,
+    image: manifest::Graph,
+    text: manifest::Graph,
 }
 
 /// Tokens that CLIP's own vocabulary has.
@@ -63,18 +63,18 @@ impl ClipEncoder {
     /// # Errors
     /// If the file cannot be read, or describes what this program cannot do.
     pub fn open(path: &Path) -> Result<Self, ModelError> {
-        let about: Metadata = metadata::read(path, "clip")?;
+        let about: Metadata = manifest::read(path, "clip")?;
         let refused = |problem: String| ModelError::Metadata { path: path.into(), problem };
         let [height, width] = about.image_size;
-        metadata::check_pictures(path, width, about.mean, about.std)?;
-        metadata::check_length(path, "embed_dim", about.embed_dim, 1 << 16)?;
-        metadata::check_length(path, "context_length", about.context_length, 1 << 12)?;
+        manifest::check_pictures(path, width, about.mean, about.std)?;
+        manifest::check_length(path, "embed_dim", about.embed_dim, 1 << 16)?;
+        manifest::check_length(path, "context_length", about.context_length, 1 << 12)?;
         if height != width {
             return Err(refused(format!("pictures of {width} x {height} px; only square ones are supported")));
         }
         if about.tokenizer.kind != "clip-bpe" || about.vocab_size > VOCABULARY {
             return Err(refused(format!(
-                "its tokeniser is '{}' with {} tokens; only CLIP's own (clip-bpe) is built in",
+                "its tokenizer is '{}' with {} tokens; only CLIP's own (clip-bpe) is built in",
                 about.tokenizer.kind, about.vocab_size
             )));
         }

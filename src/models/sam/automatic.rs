@@ -8,7 +8,7 @@ use super::PromptedMasks;
 use crate::math::grid::regions;
 use crate::models::ModelError;
 use crate::models::network::Array;
-use crate::models::prepare::{Side, enlarge};
+use crate::models::preprocess::{Side, enlarge};
 use crate::scene::{Mask, PhotoPixels};
 
 /// Settings; the defaults are LangSplat's.
@@ -60,7 +60,7 @@ const CROP_OVERLAP: f64 = 512.0 / 1500.0;
 
 /// A mask of something in the picture.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Something {
+pub struct AutomaticMask {
     /// Its pixels.
     pub mask: Mask,
     /// Left, top, right and bottom pixel.
@@ -109,7 +109,7 @@ pub fn everything(
     picture: &PhotoPixels,
     options: &AutomaticOptions,
     go_on: &mut dyn FnMut(f64) -> bool,
-) -> Result<Vec<Something>, ModelError> {
+) -> Result<Vec<AutomaticMask>, ModelError> {
     let size = (picture.width_px as usize, picture.height_px as usize);
     let boxes = crops(size.0, size.1, options.crop_layers);
     let (side, fit) = (network.side_px(), network.fit());
@@ -171,7 +171,7 @@ pub struct Collector<'a> {
     /// Settings.
     pub options: &'a AutomaticOptions,
     /// What is kept so far.
-    pub found: Vec<Something>,
+    pub found: Vec<AutomaticMask>,
 }
 
 impl Collector<'_> {
@@ -180,14 +180,14 @@ impl Collector<'_> {
         let judged = answers.par_iter().flat_map_iter(|(planes, iou, point)| {
             planes.iter().zip(iou).filter_map(|(plane, iou)| self.judge(plane, *iou, *point, crop)).collect::<Vec<_>>()
         });
-        let found: Vec<Something> = judged.collect();
+        let found: Vec<AutomaticMask> = judged.collect();
         let boxes: Vec<[f64; 4]> = found.iter().map(|f| f.bounds).collect();
         let scores: Vec<f32> = found.iter().map(|f| f.predicted_iou).collect();
         let kept = suppress(&boxes, &scores, self.options.box_nms);
         self.found.extend(kept.into_iter().map(|i| found[i].clone()));
     }
 
-    fn judge(&self, plane: &[f32], iou: f32, point: [f64; 2], crop: [usize; 4]) -> Option<Something> {
+    fn judge(&self, plane: &[f32], iou: f32, point: [f64; 2], crop: [usize; 4]) -> Option<AutomaticMask> {
         let options = self.options;
         if options.predicted_iou > 0.0 && !(iou > options.predicted_iou) {
             return None;
@@ -219,16 +219,16 @@ impl Collector<'_> {
         }
         let mut mask = Mask::empty(self.size.0, self.size.1);
         inside.pixels().for_each(|i| mask.insert((y0 + i / w) * self.size.0 + x0 + i % w));
-        Some(Something { mask, bounds, predicted_iou: iou, stability, point, crop })
+        Some(AutomaticMask { mask, bounds, predicted_iou: iou, stability, point, crop })
     }
 
     /// What is left when crops are compared with one another and small regions are cleaned.
-    pub fn finish(self, with_crops: bool) -> Vec<Something> {
+    pub fn finish(self, with_crops: bool) -> Vec<AutomaticMask> {
         let Self { options, mut found, fit, .. } = self;
-        let boxes = |found: &[Something]| found.iter().map(|f| f.bounds).collect::<Vec<_>>();
+        let boxes = |found: &[AutomaticMask]| found.iter().map(|f| f.bounds).collect::<Vec<_>>();
         if with_crops {
             // Smaller crops see more.
-            let area = |f: &Something| ((f.crop[2] - f.crop[0]) * (f.crop[3] - f.crop[1])) as f32;
+            let area = |f: &AutomaticMask| ((f.crop[2] - f.crop[0]) * (f.crop[3] - f.crop[1])) as f32;
             let scores: Vec<f32> = found.iter().map(|f| 1.0 / area(f)).collect();
             found = suppress(&boxes(&found), &scores, options.crop_nms).into_iter().map(|i| found[i].clone()).collect();
         }

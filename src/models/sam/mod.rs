@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::network::{Array, Network};
-use super::prepare::{Prepare, Side};
-use super::{ModelError, metadata};
+use super::preprocess::{Prepare, Side};
+use super::{ModelError, manifest};
 use crate::math::resize::Filter;
 use crate::scene::PhotoPixels;
 
@@ -60,8 +60,8 @@ struct Metadata {
 
 #[derive(Clone, Debug, Deserialize)]
 struct Graphs {
-    encoder: metadata::Graph,
-    decoder: metadata::Graph,
+    encoder: manifest::Graph,
+    decoder: manifest::Graph,
 }
 
 /// SAM of the first generation.
@@ -80,9 +80,9 @@ impl Sam {
     /// # Errors
     /// If the file cannot be read, or describes another kind of model.
     pub fn open(path: &Path) -> Result<Self, ModelError> {
-        let about: Metadata = metadata::read(path, "sam")?;
+        let about: Metadata = manifest::read(path, "sam")?;
         let Metadata { image_size, mean, std, .. } = about;
-        metadata::check_pictures(path, image_size, mean, std)?;
+        manifest::check_pictures(path, image_size, mean, std)?;
         let prepare = Prepare { side_px: image_size, filter: Filter::Bilinear, side: Side::Longer, mean, std };
         let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
         Ok(Self { folder, about, prepare, encoder: None, decoder: None, embeddings: None })

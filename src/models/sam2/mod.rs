@@ -11,9 +11,9 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::network::{Array, Network};
-use super::prepare::{Prepare, Side};
+use super::preprocess::{Prepare, Side};
 use super::sam::{Prompted, PromptedMasks, prompt_inputs};
-use super::{ModelError, metadata};
+use super::{ModelError, manifest};
 use crate::math::resize::{Filter, resize};
 use crate::scene::PhotoPixels;
 
@@ -63,11 +63,11 @@ pub struct Metadata {
 
 #[derive(Clone, Debug, Deserialize)]
 struct Graphs {
-    encoder: metadata::Graph,
-    decoder: metadata::Graph,
-    mask_prompt: metadata::Graph,
-    memory_encoder: metadata::Graph,
-    memory_attention: metadata::Graph,
+    encoder: manifest::Graph,
+    decoder: manifest::Graph,
+    mask_prompt: manifest::Graph,
+    memory_encoder: manifest::Graph,
+    memory_attention: manifest::Graph,
 }
 
 /// What the encoder makes of a frame.
@@ -115,11 +115,11 @@ impl Sam2 {
     /// # Errors
     /// If the file cannot be read, or describes another kind of model.
     pub fn open(path: &Path) -> Result<Self, ModelError> {
-        let about: Metadata = metadata::read(path, "sam2")?;
+        let about: Metadata = manifest::read(path, "sam2")?;
         let Metadata { image_size, mean, std, .. } = about;
-        metadata::check_pictures(path, image_size, mean, std)?;
-        metadata::check_length(path, "memories", about.memories, 1 << 10)?;
-        metadata::check_length(path, "pointers", about.pointers, 1 << 16)?;
+        manifest::check_pictures(path, image_size, mean, std)?;
+        manifest::check_length(path, "memories", about.memories, 1 << 10)?;
+        manifest::check_length(path, "pointers", about.pointers, 1 << 16)?;
         if image_size % 16 != 0 || about.memories < 2 {
             let problem = format!("a side of {image_size} px and {} memories make no sense", about.memories);
             return Err(ModelError::Metadata { path: path.into(), problem });

@@ -1,7 +1,7 @@
 //! How far drawn depth is from true depth, on the views of a synthetic data set.
 //!
 //! The true depths are what `fmlgs synth` wrote beside its photos: distances along the camera's
-//! axis at pixel centres, found by casting rays. A drawn pixel has a depth where at least half of
+//! axis at pixel centers, found by casting rays. A drawn pixel has a depth where at least half of
 //! its light comes from the scene: the expected depth `sum(w z) / sum(w)`, and the median depth,
 //! at which half of the light is spent.
 //!

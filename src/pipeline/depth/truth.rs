@@ -3,15 +3,15 @@
 use std::path::Path;
 
 use crate::io::{IoError, npy};
-use crate::math::grid::neighbours;
+use crate::math::grid::neighbors;
 use crate::math::resize::between;
 
-/// Neighbouring depths whose ratio is larger belong to different surfaces.
+/// Neighboring depths whose ratio is larger belong to different surfaces.
 pub const EDGE_JUMP: f32 = 1.05;
 /// Pixels within this distance of a jump, along rows and columns, are edges.
 pub const EDGE_PX: usize = 2;
 
-/// Depths along the camera's axis at pixel centres, row by row; 0 where nothing is.
+/// Depths along the camera's axis at pixel centers, row by row; 0 where nothing is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrueDepth {
     /// Pixels per row.
@@ -32,7 +32,7 @@ impl TrueDepth {
         Ok(Self { width, height, values })
     }
 
-    /// The depths at the pixel centres of a smaller (or larger) picture. Between four pixels of one
+    /// The depths at the pixel centers of a smaller (or larger) picture. Between four pixels of one
     /// surface inverse depth is interpolated, which is exact on planes; next to a jump the nearest
     /// pixel counts.
     pub fn resampled(&self, width: usize, height: usize) -> Self {
@@ -59,11 +59,11 @@ impl TrueDepth {
     pub fn edges(&self) -> Vec<bool> {
         let n = self.values.len();
         let jump = |a: f32, b: f32| a.max(b) > a.min(b) * EDGE_JUMP;
-        let beside = |i: usize| neighbours(i, self.width, n).any(|j| jump(self.values[i], self.values[j]));
+        let beside = |i: usize| neighbors(i, self.width, n).any(|j| jump(self.values[i], self.values[j]));
         // Both pixels at a jump are 1 px from it or nearer.
         let mut edge: Vec<bool> = (0..n).map(beside).collect();
         for _ in 1..EDGE_PX {
-            edge = (0..n).map(|i| edge[i] || neighbours(i, self.width, n).any(|j| edge[j])).collect();
+            edge = (0..n).map(|i| edge[i] || neighbors(i, self.width, n).any(|j| edge[j])).collect();
         }
         edge
     }
@@ -75,7 +75,7 @@ mod tests {
 
     #[test]
     fn planes_survive_resampling_and_jumps_stay_sharp() {
-        // 1 / z = 0.2 + 0.01 x, seen at pixel centres; from column 12 on something far.
+        // 1 / z = 0.2 + 0.01 x, seen at pixel centers; from column 12 on something far.
         let inverse = |x: f32| 0.2 + 0.01 * x;
         let depth = |x: f32| if x < 12.0 { inverse(x).recip() } else { 90.0 };
         let map = |width: usize| {
@@ -87,7 +87,7 @@ mod tests {
         for (a, b) in small.values.iter().zip(&map(8).values) {
             assert!((a / b - 1.0).abs() < 1e-5, "{a} {b}");
         }
-        // Two sizes whose pixel centres differ.
+        // Two sizes whose pixel centers differ.
         for (i, z) in map(24).resampled(10, 5).values.iter().enumerate() {
             let x = (i % 10) as f32 * 2.4 + 1.2;
             let expected = depth(x);

@@ -4,11 +4,11 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::grammar::Phrase;
-use super::localise::{Answer, Scorer, Strategy, localise};
-use super::meaning::{ByMeaning, MeaningOptions, Phrasebook};
+use super::by_embedding::{EmbeddingOptions, EmbeddingScorer, TextEmbeddings};
+use super::localize::{Answer, Scorer, Strategy, localize};
 use super::names::{self, ByName};
-use super::stages::{StagesMs, ms_since};
+use super::parse::ParsedQuery;
+use super::timing::{StagesMs, ms_since};
 use super::view_map::ViewMap;
 use crate::scene::{Identities, IdentityId, LanguageFeatures, LevelFilter, Mask};
 
@@ -23,7 +23,7 @@ pub enum Basis {
 
 /// An answered query.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Answered {
+pub struct QueryAnswer {
     /// What is meant.
     pub answer: Answer,
     /// What that rests on.
@@ -31,7 +31,7 @@ pub struct Answered {
     /// Relevancy of every identity by number, 0 to 1; a piece is at least as relevant as its whole
     /// where names decide.
     pub relevancy: Vec<f32>,
-    /// How long that took: relevancy and localisation here, the other stages by those who go on.
+    /// How long that took: relevancy and localization here, the other stages by those who go on.
     pub stages: StagesMs,
 }
 
@@ -41,23 +41,23 @@ pub struct Language<'a> {
     /// Of the scene's identities.
     pub features: &'a LanguageFeatures,
     /// With the query's phrases learnt; see [`phrases_of`].
-    pub phrases: &'a Phrasebook,
+    pub phrases: &'a TextEmbeddings,
     /// How to score.
-    pub options: MeaningOptions,
+    pub options: EmbeddingOptions,
 }
 
 /// The phrases of a query that answers by meaning need: all of it, and the whole's.
-pub fn phrases_of(phrase: &Phrase) -> Vec<&str> {
+pub fn phrases_of(phrase: &ParsedQuery) -> Vec<&str> {
     std::iter::once(phrase.text.as_str()).chain(phrase.whole.as_deref()).collect()
 }
 
 /// Answers by names where all words are known, else by meaning where that finds something.
 pub fn answer(
     identities: &Identities,
-    phrase: &Phrase,
+    phrase: &ParsedQuery,
     level: LevelFilter,
     language: Option<Language<'_>>,
-) -> Answered {
+) -> QueryAnswer {
     let named = by_name(identities, phrase, level);
     let Some(language) = language else { return named };
     let known = names::unknown_words(identities, &phrase.text).is_empty();
@@ -69,7 +69,7 @@ pub fn answer(
     let stages = named.stages.and(meant.stages);
     let nothing = |a: &Answer| matches!(a, Answer::NotFound(_));
     let taken = if nothing(&meant.answer) && !nothing(&named.answer) { named } else { meant };
-    Answered { stages, ..taken }
+    QueryAnswer { stages, ..taken }
 }
 
 /// Counts the time that scores take.
@@ -99,28 +99,28 @@ impl<S: Scorer> Scorer for Timed<'_, S> {
     }
 }
 
-/// Localises by `scorer`, then makes the relevancy of every identity by `relevancy`.
+/// Localizes by `scorer`, then makes the relevancy of every identity by `relevancy`.
 fn judged<S: Scorer>(
-    (identities, phrase, level): (&Identities, &Phrase, LevelFilter),
+    (identities, phrase, level): (&Identities, &ParsedQuery, LevelFilter),
     basis: Basis,
     scorer: &mut S,
     relevancy: impl FnOnce(&Answer, &mut S) -> Vec<f32>,
-) -> Answered {
+) -> QueryAnswer {
     let start = Instant::now();
     let mut timed = Timed { scorer, ms: 0.0 };
-    let answer = localise(identities, phrase, level, &mut timed);
-    let (scored_ms, localised_ms) = (timed.ms, ms_since(start));
+    let answer = localize(identities, phrase, level, &mut timed);
+    let (scored_ms, localized_ms) = (timed.ms, ms_since(start));
     let relevancy = relevancy(&answer, scorer);
     let stages = StagesMs {
-        relevancy: scored_ms + ms_since(start) - localised_ms,
-        localise: localised_ms - scored_ms,
+        relevancy: scored_ms + ms_since(start) - localized_ms,
+        localize: localized_ms - scored_ms,
         ..StagesMs::default()
     };
-    Answered { answer, basis, relevancy, stages }
+    QueryAnswer { answer, basis, relevancy, stages }
 }
 
 /// Answers by names alone.
-pub fn by_name(identities: &Identities, phrase: &Phrase, level: LevelFilter) -> Answered {
+pub fn by_name(identities: &Identities, phrase: &ParsedQuery, level: LevelFilter) -> QueryAnswer {
     judged((identities, phrase, level), Basis::Names, &mut ByName(identities), |answer, _| {
         let alone = names::scores(identities, &phrase.target);
         let mut relevancy = vec![0.0; identities.len() + 1];
@@ -135,9 +135,14 @@ pub fn by_name(identities: &Identities, phrase: &Phrase, level: LevelFilter) -> 
 }
 
 /// Answers by meaning alone.
-pub fn by_meaning(identities: &Identities, phrase: &Phrase, level: LevelFilter, language: Language<'_>) -> Answered {
+pub fn by_meaning(
+    identities: &Identities,
+    phrase: &ParsedQuery,
+    level: LevelFilter,
+    language: Language<'_>,
+) -> QueryAnswer {
     let Language { features, phrases, options } = language;
-    let mut scorer = ByMeaning::new(features, phrases, options);
+    let mut scorer = EmbeddingScorer::new(features, phrases, options);
     judged((identities, phrase, level), Basis::Meaning, &mut scorer, |_, scorer| {
         let mut relevancy = vec![0.0];
         relevancy.extend(scorer.scores(&phrase.text, None));
@@ -146,7 +151,7 @@ pub fn by_meaning(identities: &Identities, phrase: &Phrase, level: LevelFilter, 
     })
 }
 
-impl Answered {
+impl QueryAnswer {
     /// The best identities: none if nothing was found, all that fit alike if the answer is
     /// ambiguous, else up to `top` that fit.
     pub fn chosen(&self, top: usize) -> Vec<IdentityId> {
@@ -164,14 +169,14 @@ impl Answered {
     pub fn threshold(&self) -> f32 {
         match self.basis {
             Basis::Names => names::THRESHOLD,
-            Basis::Meaning => super::meaning::THRESHOLD,
+            Basis::Meaning => super::by_embedding::THRESHOLD,
         }
     }
 
     fn resolution(&self) -> f32 {
         match self.basis {
             Basis::Names => names::RESOLUTION,
-            Basis::Meaning => super::meaning::resolution(super::relevancy::TEMPERATURE),
+            Basis::Meaning => super::by_embedding::resolution(super::relevancy::TEMPERATURE),
         }
     }
 
@@ -194,7 +199,7 @@ impl Answered {
 
 #[cfg(test)]
 mod tests {
-    use super::super::localise::Hit;
+    use super::super::localize::Hit;
     use super::*;
     use crate::scene::{Level, NOBODY, ViewFeatures};
 
@@ -208,10 +213,10 @@ mod tests {
         (all, LanguageFeatures { encoder: "test".into(), dimension: 3, of })
     }
 
-    fn ask(text: &str, with_meaning: bool) -> Answered {
+    fn ask(text: &str, with_meaning: bool) -> QueryAnswer {
         let (all, features) = scene();
-        let phrase = Phrase::parse(text).expect("a phrase");
-        let mut phrases = Phrasebook::default();
+        let phrase = ParsedQuery::parse(text).expect("a phrase");
+        let mut phrases = TextEmbeddings::default();
         let encode = |p: &str| {
             Ok::<_, ()>(match p {
                 "cup" => vec![1.0, 0.0, 0.0],
@@ -220,7 +225,7 @@ mod tests {
             })
         };
         phrases.learn(&phrases_of(&phrase), encode).expect("encodes");
-        let language = Language { features: &features, phrases: &phrases, options: MeaningOptions::default() };
+        let language = Language { features: &features, phrases: &phrases, options: EmbeddingOptions::default() };
         answer(&all, &phrase, LevelFilter::Auto, with_meaning.then_some(language))
     }
 
@@ -237,8 +242,8 @@ mod tests {
         assert!(ask("cup", false).chosen(1).is_empty());
         assert!(ask("giraffe", true).chosen(3).is_empty());
         let stages = a.stages;
-        assert!(stages.relevancy >= 0.0 && stages.localise >= 0.0, "{stages:?}");
-        assert_eq!(stages.whole(), stages.relevancy + stages.localise, "nothing else happens here");
+        assert!(stages.relevancy >= 0.0 && stages.localize >= 0.0, "{stages:?}");
+        assert_eq!(stages.whole(), stages.relevancy + stages.localize, "nothing else happens here");
         let a = ask("lamp", true);
         assert_eq!(a.chosen(2), [1], "only what fits");
         let map =
@@ -252,11 +257,11 @@ mod tests {
     fn meaning_comes_first_where_a_word_is_unknown_and_names_where_it_finds_nothing() {
         let (all, features) = scene();
         let ask = |text: &str, to: [f32; 3]| {
-            let phrase = Phrase::parse(text).expect("a phrase");
-            let mut phrases = Phrasebook::default();
+            let phrase = ParsedQuery::parse(text).expect("a phrase");
+            let mut phrases = TextEmbeddings::default();
             let encode = |p: &str| Ok::<_, ()>(if p == text { to.to_vec() } else { vec![0.5, 0.5, 0.5] });
             phrases.learn(&phrases_of(&phrase), encode).expect("encodes");
-            let language = Language { features: &features, phrases: &phrases, options: MeaningOptions::default() };
+            let language = Language { features: &features, phrases: &phrases, options: EmbeddingOptions::default() };
             answer(&all, &phrase, LevelFilter::Auto, Some(language))
         };
         let a = ask("beige lamp", [1.0, 0.0, 0.0]);
@@ -270,7 +275,7 @@ mod tests {
 
     #[test]
     fn those_that_fit_alike_are_all_chosen_and_top_is_a_limit() {
-        let answered = |answer: fn(Vec<Hit>) -> Answer, scores: &[f32]| Answered {
+        let answered = |answer: fn(Vec<Hit>) -> Answer, scores: &[f32]| QueryAnswer {
             answer: answer(
                 scores
                     .iter()

@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_get_distant_codes() {
+    fn neighbors_get_distant_codes() {
         let mut all = Identities::default();
         (0..60).for_each(|_| {
             all.add(Level::Object, NOBODY, vec![]);

@@ -188,10 +188,10 @@ fn pieces(cloud: &GaussianCloud, own: &[usize]) -> Option<Vec<Vec<usize>>> {
         let mut members = Vec::new();
         while let Some(k) = open.pop() {
             members.push(own[k]);
-            for neighbour in tree.locate_within_distance(place(own[k]), reach * reach).map(|p| p.data) {
-                if component[neighbour] == usize::MAX {
-                    component[neighbour] = found.len();
-                    open.push(neighbour);
+            for neighbor in tree.locate_within_distance(place(own[k]), reach * reach).map(|p| p.data) {
+                if component[neighbor] == usize::MAX {
+                    component[neighbor] = found.len();
+                    open.push(neighbor);
                 }
             }
         }

@@ -6,15 +6,15 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use super::answer::{Answered, Language, by_meaning, by_name, phrases_of};
+use super::answer::{Language, QueryAnswer, by_meaning, by_name, phrases_of};
+use super::build_map::{FindOptions, Lifting, Tools, find_objects};
+use super::by_embedding::{EmbeddingOptions, TextEmbeddings};
 use super::code_map::CodeMap;
-use super::find::{FindOptions, Lifting, Tools, find_objects};
-use super::grammar::{Kind, Phrase};
-use super::localise::Answer;
-use super::meaning::{MeaningOptions, Phrasebook};
+use super::localize::Answer;
 use super::names;
+use super::parse::{Kind, ParsedQuery};
 use super::protocols::part_recall::{self, Components};
-use super::protocols::{AskedScene, Category, LabelledView, categories, masks};
+use super::protocols::{AskedScene, Category, LabeledView, categories, masks};
 use super::relevancy::{CANONICAL, PART_WEIGHT, deviate};
 use super::segmenter::{FileMasks, Segmenter};
 use super::view_map::ViewMap;
@@ -45,7 +45,7 @@ const STEPS: u64 = 150;
 const CODE_STEPS: u64 = 100;
 /// Sparse points, each of which becomes a Gaussian.
 const POINTS: usize = 16_000;
-/// Colours that things of these scenes may have.
+/// Colors that things of these scenes may have.
 const COLORS: [&str; 12] =
     ["black", "blue", "brown", "green", "grey", "orange", "pink", "purple", "red", "turquoise", "white", "yellow"];
 /// What is in neither scene: things, and parts of them.
@@ -84,7 +84,7 @@ const ABSENT: [&str; 32] = [
     "leaves of the pot plant",
 ];
 
-/// A trained scene with labelled photos.
+/// A trained scene with labeled photos.
 struct Scene {
     cloud: GaussianCloud,
     settings: RenderSettings,
@@ -106,11 +106,11 @@ struct Figures {
     objects: f64,
     /// Share of names of things that are there that are answered at all, by looks.
     answered: f64,
-    /// The same of what is not there, and of things in a wrong colour.
+    /// The same of what is not there, and of things in a wrong color.
     false_finds: [f64; 2],
     /// The same by names.
     false_names: [f64; 2],
-    /// Highest score of a thing in a wrong colour, by names.
+    /// Highest score of a thing in a wrong color, by names.
     wrong_color: f64,
 }
 
@@ -157,14 +157,14 @@ fn open(name: &str, seed: u64, folder: &Path) -> Scene {
     let mut masks = FileMasks(Labels::open(folder).expect("labels"));
     let (training, held) = dataset.split(config.holdout_every);
     let of = |i: &usize| dataset.photos[*i].clone();
-    let mut labelled = |photo: Photo| {
+    let mut labeled = |photo: Photo| {
         let found = masks.segment(&photo, COMPARE_PX, &mut Silent).expect("labels");
         (photo.name.clone(), photo.camera.limited_to(COMPARE_PX), categories(&found))
     };
     Scene {
         settings: config.render_settings(dataset.background),
         training: training.iter().map(of).collect(),
-        held: held.iter().map(of).map(&mut labelled).collect(),
+        held: held.iter().map(of).map(&mut labeled).collect(),
         masks,
         cloud: std::sync::Arc::unwrap_or_clone(trained.cloud),
     }
@@ -188,9 +188,9 @@ impl Scene {
         self.held.iter().map(|h| draw(&h.1)).collect()
     }
 
-    fn views<'a>(&'a self, drawn: &'a [ViewMap], blended: &'a CodeMap) -> Vec<LabelledView<'a>> {
+    fn views<'a>(&'a self, drawn: &'a [ViewMap], blended: &'a CodeMap) -> Vec<LabeledView<'a>> {
         let view = |((name, camera, categories), exact): (&'a (String, Camera, Vec<Category>), &'a ViewMap)| {
-            LabelledView { name, camera, exact, blended, categories: categories.clone() }
+            LabeledView { name, camera, exact, blended, categories: categories.clone() }
         };
         self.held.iter().zip(drawn).map(view).collect()
     }
@@ -242,7 +242,7 @@ fn harmed(map: &SemanticMap, harm: Harm) -> SemanticMap {
 fn by_names(scene: &Scene, map: &SemanticMap) -> [f64; 2] {
     let drawn = scene.drawn(map);
     let blended = CodeMap::default();
-    let mut ask = |text: &str| Phrase::parse(text).map(|p| by_name(&map.identities, &p, Kind::Auto));
+    let mut ask = |text: &str| ParsedQuery::parse(text).map(|p| by_name(&map.identities, &p, Kind::Auto));
     let mut asked = AskedScene { map, ask: &mut ask };
     let views = scene.views(&drawn, &blended);
     masks::by_level(&views.iter().flat_map(|v| masks::compare(&mut asked, v)).collect::<Vec<_>>())
@@ -252,17 +252,17 @@ fn by_names(scene: &Scene, map: &SemanticMap) -> [f64; 2] {
 fn by_looks(
     map: &SemanticMap,
     features: &LanguageFeatures,
-    book: &mut Phrasebook,
+    book: &mut TextEmbeddings,
     encoder: &mut Known<'_>,
     text: &str,
-) -> Option<Answered> {
-    let phrase = Phrase::parse(text)?;
+) -> Option<QueryAnswer> {
+    let phrase = ParsedQuery::parse(text)?;
     book.learn(&phrases_of(&phrase), |p| encoder.text(p)).ok()?;
-    let language = Language { features, phrases: book, options: MeaningOptions::default() };
+    let language = Language { features, phrases: book, options: EmbeddingOptions::default() };
     Some(by_meaning(&map.identities, &phrase, Kind::Auto, language))
 }
 
-/// Objects of the scene in colours that no object of their kind has.
+/// Objects of the scene in colors that no object of their kind has.
 fn wrong_colors(identities: &Identities) -> Vec<String> {
     let objects = identities.iter().filter(|(_, i)| i.level == Level::Object).flat_map(|(_, i)| &i.names);
     let names: Vec<&String> = objects.collect();
@@ -333,7 +333,7 @@ fn figures(scene: &Scene, map: &SemanticMap, trained: &SemanticMap, encoder: &mu
     let views = scene.views(&drawn, &blended);
     let recall = Components::ROWS
         .map(|row| part_recall::row(row, map, features, &views, |p| encoder.text(p)).expect("encodes").recall);
-    let mut book = Phrasebook::default();
+    let mut book = TextEmbeddings::default();
     let (mut objects, mut present) = (Vec::new(), Vec::new());
     for view in &views {
         for category in &view.categories {
@@ -347,9 +347,9 @@ fn figures(scene: &Scene, map: &SemanticMap, trained: &SemanticMap, encoder: &mu
     }
     let share = |list: &[bool]| list.iter().filter(|found| **found).count() as f64 / list.len() as f64;
     let not_there = [ABSENT.map(str::to_owned).to_vec(), wrong_colors(&map.identities)];
-    let is_found = |answered: Answered| !matches!(answered.answer, Answer::NotFound(_));
+    let is_found = |answered: QueryAnswer| !matches!(answered.answer, Answer::NotFound(_));
     let mut seen = |name: &String| by_looks(map, features, &mut book, encoder, name).map(is_found);
-    let named = |name: &String| Phrase::parse(name).map(|p| is_found(by_name(&map.identities, &p, Kind::Auto)));
+    let named = |name: &String| ParsedQuery::parse(name).map(|p| is_found(by_name(&map.identities, &p, Kind::Auto)));
     let found = |list: &Vec<String>, ask: &mut dyn FnMut(&String) -> Option<bool>| {
         share(&list.iter().map(|name| ask(name).expect("its words are known")).collect::<Vec<_>>())
     };
@@ -394,7 +394,7 @@ impl Figures {
             ("answers for what is absent, by looks", self.false_finds[0], 0.54),
             ("answers in a wrong color, by looks", self.false_finds[1], 0.59),
             ("answers for what is absent, by name", self.false_names[0], 0.15),
-            // Half of the words fit, and "grey" is spelled much like "green": always answered, never in full.
+            // Half of the words fit, and "gray" is spelled much like "green": always answered, never in full.
             ("score of a wrong color, by name", self.wrong_color, 0.96),
         ];
         let low = floors.into_iter().filter(|(_, v, bar)| !(v >= bar));

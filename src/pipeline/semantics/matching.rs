@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn the_usual_tolerance_is_the_identity_and_a_wide_one_its_neighbours() {
+    fn the_usual_tolerance_is_the_identity_and_a_wide_one_its_neighbors() {
         let map = scene();
         for mode in [MatchMode::Exact, MatchMode::Blend] {
             let found = |target, tolerance| gaussians(&map, target, mode, tolerance);

@@ -4,35 +4,35 @@
 //! In the order of the data: [`segmenter`] finds masks ([`regions`] without any model; [`filters`]
 //! tell objects from parts), [`tracker`] makes them identities over all views, [`votes`] gives every Gaussian its identity, [`codes`] every identity its point in code
 //! space, [`view_map`] draws identities into a view; [`grammar`] takes a query apart, [`names`] and
-//! [`meaning`] score identities for it by words and by looks, [`localise`] picks those that are
+//! [`meaning`] score identities for it by words and by looks, [`localize`] picks those that are
 //! meant, and [`answer`] puts it together, with the time of each of the [`stages`].
 
 pub mod answer;
+mod associate;
+pub mod build_map;
+pub mod by_embedding;
 pub mod carry;
 pub mod code_map;
 pub mod codes;
 pub mod edit;
 pub mod embed;
-pub mod everything;
-pub mod extend;
 pub mod filters;
-pub mod find;
-pub mod follow;
-pub mod grammar;
 #[cfg(test)]
 mod heart;
-mod link;
-pub mod localise;
+pub mod localize;
 pub mod matching;
-pub mod meaning;
 pub mod names;
-pub mod portraits;
+pub mod network_segmenter;
+pub mod parse;
+pub mod propagate;
 pub mod protocols;
 pub mod query_engine;
 pub mod regions;
 pub mod relevancy;
+pub mod sam2_tracker;
 pub mod segmenter;
-pub mod stages;
+pub mod thumbnails;
+pub mod timing;
 pub mod tracker;
 pub mod train_codes;
 pub mod view_map;

@@ -3,8 +3,8 @@
 
 use std::collections::HashSet;
 
-use super::grammar::{MAX_CHARS, is_glue};
-use super::localise::Scorer;
+use super::localize::Scorer;
+use super::parse::{MAX_CHARS, is_glue};
 use crate::scene::{Identities, IdentityId};
 
 /// Similarity under which two words have nothing to do with each other.

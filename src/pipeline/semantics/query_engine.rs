@@ -3,11 +3,11 @@
 
 use std::time::Instant;
 
-use super::answer::{Answered, Language, answer, by_meaning, phrases_of};
-use super::grammar::Phrase;
-use super::meaning::{MeaningOptions, Phrasebook};
+use super::answer::{Language, QueryAnswer, answer, by_meaning, phrases_of};
+use super::by_embedding::{EmbeddingOptions, TextEmbeddings};
 use super::names;
-use super::stages::{StagesMs, ms_since};
+use super::parse::ParsedQuery;
+use super::timing::{StagesMs, ms_since};
 use crate::models::{self, Encoder, ModelError};
 use crate::scene::{Identities, LanguageFeatures, LevelFilter, SemanticMap};
 
@@ -15,7 +15,7 @@ use crate::scene::{Identities, LanguageFeatures, LevelFilter, SemanticMap};
 #[derive(Default)]
 pub struct QueryEngine {
     encoder: Option<Box<dyn Encoder>>,
-    phrases: Phrasebook,
+    phrases: TextEmbeddings,
 }
 
 impl QueryEngine {
@@ -37,9 +37,14 @@ impl QueryEngine {
     ///
     /// # Errors
     /// If the encoder fails.
-    pub fn ask(&mut self, map: &SemanticMap, text: &str, level: LevelFilter) -> Result<Option<Answered>, ModelError> {
+    pub fn ask(
+        &mut self,
+        map: &SemanticMap,
+        text: &str,
+        level: LevelFilter,
+    ) -> Result<Option<QueryAnswer>, ModelError> {
         let start = Instant::now();
-        let Some(phrase) = Phrase::parse(text) else { return Ok(None) };
+        let Some(phrase) = ParsedQuery::parse(text) else { return Ok(None) };
         let known = match &mut self.encoder {
             Some(encoder) => match self.phrases.learn(&phrases_of(&phrase), |p| encoder.text(p)) {
                 Ok(()) => true,
@@ -51,7 +56,7 @@ impl QueryEngine {
         };
         let encode = ms_since(start);
         let answered = answer_encoded(map, text, level, known.then_some(&self.phrases));
-        Ok(answered.map(|a| Answered { stages: StagesMs { encode, ..a.stages }, ..a }))
+        Ok(answered.map(|a| QueryAnswer { stages: StagesMs { encode, ..a.stages }, ..a }))
     }
 
     /// The words of a question that nothing here knows.
@@ -67,12 +72,12 @@ pub fn answer_encoded(
     map: &SemanticMap,
     text: &str,
     level: LevelFilter,
-    phrases: Option<&Phrasebook>,
-) -> Option<Answered> {
-    let phrase = Phrase::parse(text)?;
+    phrases: Option<&TextEmbeddings>,
+) -> Option<QueryAnswer> {
+    let phrase = ParsedQuery::parse(text)?;
     let language = map.language.as_ref().zip(phrases);
     let language =
-        language.map(|(features, phrases)| Language { features, phrases, options: MeaningOptions::default() });
+        language.map(|(features, phrases)| Language { features, phrases, options: EmbeddingOptions::default() });
     Some(answer(&map.identities, &phrase, level, language))
 }
 
@@ -83,13 +88,13 @@ pub fn answer_encoded(
 /// What `encode` fails with.
 pub fn ask_by_embedding<E>(
     identities: &Identities,
-    (features, options): (&LanguageFeatures, MeaningOptions),
+    (features, options): (&LanguageFeatures, EmbeddingOptions),
     text: &str,
-    phrases: &mut Phrasebook,
+    phrases: &mut TextEmbeddings,
     encode: impl FnMut(&str) -> Result<Vec<f32>, E>,
-) -> Result<Option<Answered>, E> {
+) -> Result<Option<QueryAnswer>, E> {
     let start = Instant::now();
-    let Some(phrase) = Phrase::parse(text) else { return Ok(None) };
+    let Some(phrase) = ParsedQuery::parse(text) else { return Ok(None) };
     phrases.learn(&phrases_of(&phrase), encode)?;
     let encode = ms_since(start);
     let language = Language { features, phrases, options };

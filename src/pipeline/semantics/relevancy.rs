@@ -30,7 +30,7 @@ pub fn score(advantage: f32, temperature: f32) -> f32 {
 }
 
 /// A part's feature moved towards its whole's (the paper's semantic deviation), of unit length
-/// again: the sum of two unit vectors is shorter, which would penalise parts. `None` if the two
+/// again: the sum of two unit vectors is shorter, which would penalize parts. `None` if the two
 /// cancel out.
 pub fn deviate(part: &[f32], whole: &[f32], part_weight: f32) -> Option<Vec<f32>> {
     unit(&part.iter().zip(whole).map(|(p, o)| (1.0 - part_weight) * o + part_weight * p).collect::<Vec<_>>())

@@ -21,7 +21,7 @@ pub struct FoundMask {
 
 /// Finds the objects and parts of a photo.
 pub trait Segmenter {
-    /// Name for people.
+    /// Name for display.
     fn name(&self) -> &str;
 
     /// Whether it can say anything about a photo.

@@ -4,12 +4,12 @@
 
 use std::time::Instant;
 
-use super::extend::extend;
-use super::follow::{FollowError, Follower, LABEL_SIDE_PX};
-use super::link::{Disagreement, Link, disagreements, link};
+use super::associate::{Disagreement, Link, disagreements, link};
+use super::propagate::extend;
+use super::sam2_tracker::{LABEL_SIDE_PX, Sam2TrackError, Sam2Tracker};
 use super::segmenter::{FoundMask, SegmentError, Segmenter};
 use super::view_map::ViewMap;
-use super::votes::{Belonging, UNKNOWN, Votes};
+use super::votes::{Assignment, UNKNOWN, Votes};
 use crate::pipeline::observer::{Interrupted, Observer, Severity, Ticker};
 use crate::render::{RenderError, RenderSettings, Renderer};
 use crate::scene::{GaussianCloud, Identities, IdentityId, NOBODY, Photo};
@@ -71,7 +71,7 @@ pub struct Tracked {
     /// Objects and parts.
     pub identities: Identities,
     /// Per Gaussian.
-    pub belongings: Vec<Belonging>,
+    pub assignments: Vec<Assignment>,
     /// The photos that were segmented, in order.
     pub seeds: Vec<usize>,
     /// Every photo, before identities were extended to Gaussians that no photo voted for.
@@ -93,7 +93,7 @@ pub enum TrackError {
     Masks(#[from] SegmentError),
     /// Masks could not be followed.
     #[error(transparent)]
-    Follow(#[from] FollowError),
+    Follow(#[from] Sam2TrackError),
     /// A view could not be drawn.
     #[error("photo {0}: {1}")]
     Render(String, RenderError),
@@ -109,7 +109,7 @@ pub fn track(
     photos: &[Photo],
     settings: &RenderSettings,
     segmenter: &mut dyn Segmenter,
-    follower: Option<&mut Follower>,
+    follower: Option<&mut Sam2Tracker>,
     options: &TrackOptions,
     observer: &mut dyn Observer,
 ) -> Result<Tracked, TrackError> {
@@ -152,8 +152,8 @@ pub fn track(
             seeds.push(next);
         }
     };
-    let mut belongings = t.votes.decide(&t.identities, LEAST_VOTES);
-    extend(cloud, &mut belongings);
+    let mut assignments = t.votes.decide(&t.identities, LEAST_VOTES);
+    extend(cloud, &mut assignments);
     let carry_secs = start.elapsed().as_secs_f64() - t.segment_secs - encode_secs - follow_secs;
     let secs = vec![
         ("segment", t.segment_secs),
@@ -161,7 +161,7 @@ pub fn track(
         ("follow masks", follow_secs),
         ("carry by Gaussians", carry_secs),
     ];
-    Ok(Tracked { identities: t.identities, belongings, seeds, views, disagreements: t.disagreements, secs })
+    Ok(Tracked { identities: t.identities, assignments, seeds, views, disagreements: t.disagreements, secs })
 }
 
 /// Masks of a photo, and whose they are.
@@ -225,7 +225,7 @@ impl Tracker<'_> {
     /// Follows the masks of a photo to all others, where they vote.
     fn follow(
         &mut self,
-        follower: &mut Follower,
+        follower: &mut Sam2Tracker,
         seed: usize,
         found: &[FoundMask],
         ids: &[IdentityId],
@@ -251,7 +251,7 @@ impl Tracker<'_> {
         Ok(())
     }
 
-    /// A disagreement, for people.
+    /// A disagreement, for display.
     fn told(&self, what: &Disagreement) -> String {
         let name = |id: &IdentityId| self.identities.full_name(*id);
         match what {

@@ -31,7 +31,7 @@ pub struct CodeView {
 /// Settings of a training of codes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CodeTraining {
-    /// Optimiser steps.
+    /// Optimizer steps.
     pub steps: u64,
     /// Seed of the order of the views.
     pub seed: u64,
@@ -162,7 +162,7 @@ mod tests {
     use crate::pipeline::observer::Silent;
     use crate::scene::{Level, NOBODY};
 
-    /// Two Gaussians side by side, one of them a part, with the masks that a person would draw: a disc of 4 px
+    /// Two Gaussians side by side, one of them a part, with the masks that the user would draw: a disc of 4 px
     /// around where each is seen, half a length to either side at 51.7 px a length and three lengths away.
     fn scene() -> (GaussianCloud, Identities, Vec<CodeView>) {
         let mut all = Identities::default();

@@ -23,7 +23,7 @@ pub struct Votes {
 
 /// What a Gaussian belongs to.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Belonging {
+pub struct Assignment {
     /// The innermost identity; `NOBODY` if none claims it, `UNKNOWN` without a vote.
     pub identity: IdentityId,
     /// Share of its votes that went to that identity's object minus the share of the runner-up;
@@ -84,7 +84,7 @@ impl Votes {
 
     /// What each Gaussian belongs to: the object with most votes, then within it the innermost
     /// identity with most. Gaussians with less than `least` px of votes count as unseen.
-    pub fn decide(&self, identities: &Identities, least: f32) -> Vec<Belonging> {
+    pub fn decide(&self, identities: &Identities, least: f32) -> Vec<Assignment> {
         let objects: Vec<IdentityId> = (0..=identities.len() as IdentityId).map(|i| identities.object_of(i)).collect();
         self.of.par_iter().map(|votes| decide(votes, &objects, least)).collect()
     }
@@ -100,10 +100,10 @@ fn add(votes: &mut Vec<(IdentityId, f32)>, identity: IdentityId, weight: f32) {
     }
 }
 
-fn decide(votes: &[(IdentityId, f32)], objects: &[IdentityId], least: f32) -> Belonging {
+fn decide(votes: &[(IdentityId, f32)], objects: &[IdentityId], least: f32) -> Assignment {
     let total: f32 = votes.iter().map(|v| v.1).sum();
     if !(total > 0.0 && total >= least) {
-        return Belonging { identity: UNKNOWN, margin: 0.0 };
+        return Assignment { identity: UNKNOWN, margin: 0.0 };
     }
     let object_of = |id: IdentityId| objects.get(id as usize).copied().unwrap_or(NOBODY);
     let mut sums: Vec<(IdentityId, f32)> = Vec::with_capacity(votes.len());
@@ -119,7 +119,7 @@ fn decide(votes: &[(IdentityId, f32)], objects: &[IdentityId], least: f32) -> Be
     let inner = votes.iter().filter(|v| object_of(v.0) == object);
     let identity = inner.max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0))).map_or(object, |v| v.0);
     let second = sums.get(1).map_or(0.0, |s| s.1);
-    Belonging { identity, margin: (sums[0].1 - second) / total }
+    Assignment { identity, margin: (sums[0].1 - second) / total }
 }
 
 /// Collects the votes of one row of tiles.
@@ -181,7 +181,7 @@ mod tests {
 
     #[test]
     fn pixels_vote_for_what_they_show() {
-        // Two Gaussians side by side, labelled left and right; the middle columns say nothing.
+        // Two Gaussians side by side, labeled left and right; the middle columns say nothing.
         let cloud = GaussianCloud {
             positions: vec![[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]],
             log_scales: vec![[-2.0; 3]; 2],
@@ -240,10 +240,10 @@ mod tests {
         let b = votes.decide(&all, 0.05);
         assert_eq!(
             (b[0], b[1].identity),
-            (Belonging { identity: 2, margin: 0.0 }, 2),
+            (Assignment { identity: 2, margin: 0.0 }, 2),
             "as much as is needed is enough"
         );
-        assert_eq!(b[2], Belonging { identity: UNKNOWN, margin: 0.0 });
+        assert_eq!(b[2], Assignment { identity: UNKNOWN, margin: 0.0 });
         assert_eq!(b[1].margin, 1.0);
         // A row of tiles that ends within a vector: what hangs over is nobody's.
         let labels = [1, 1, 2, UNKNOWN];

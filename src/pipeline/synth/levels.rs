@@ -38,9 +38,9 @@ pub struct Identity {
     pub parent: Option<u16>,
     /// Names from the root to the node, joined by `/`.
     pub path: String,
-    /// A colour of its own for showing id maps, sRGB.
+    /// A color of its own for showing id maps, sRGB.
     pub color: [u8; 3],
-    /// Pixels of all photos together whose centre shows it (for an object: with its parts).
+    /// Pixels of all photos together whose center shows it (for an object: with its parts).
     pub pixels: u64,
     /// Photos that show it.
     pub views: u32,
@@ -184,7 +184,7 @@ fn path(scene: &MeshScene, node: usize) -> String {
     names.join("/")
 }
 
-/// Hues a golden angle apart, in three brightnesses: neighbours in number differ most.
+/// Hues a golden angle apart, in three brightnesses: neighbors in number differ most.
 fn color(index: usize) -> [u8; 3] {
     let hue = (index as f64 * 0.618_033_988_75).fract() * 6.0;
     let value = [0.95, 0.7, 0.85][index % 3];

@@ -28,7 +28,7 @@ const KEY_SPREAD: f32 = 0.09;
 const KEY_COLOR: Vec3A = Vec3A::new(0.60, 0.56, 0.49);
 /// Brightness of the sky straight up, at the horizon, and of the unseen ground.
 const SKY: [Vec3A; 3] = [Vec3A::new(0.56, 0.60, 0.66), Vec3A::new(0.44, 0.45, 0.46), Vec3A::new(0.20, 0.18, 0.165)];
-/// Light on a surface that hides the sky, when its own colour is white.
+/// Light on a surface that hides the sky, when its own color is white.
 const BOUNCE: f32 = 0.42;
 /// Rays start this far above the surface, in the frame's units.
 const LIFT: f32 = 2e-4;
@@ -43,17 +43,17 @@ struct Face {
 }
 
 impl Face {
-    /// First word of a face that is not known yet: no colour is this NaN.
+    /// First word of a face that is not known yet: no color is this NaN.
     const UNKNOWN: u32 = u32::MAX;
 }
 
 /// Light on every vertex, as far as it has been asked for.
 pub struct Light {
-    /// Mean colour of each triangle.
+    /// Mean color of each triangle.
     albedo: Vec<Vec3A>,
     sky: Vec<Vec3A>,
     key: Vec<Vec3A>,
-    /// Bits of each face: colour and visibility of the key light. Whoever needs an unknown one
+    /// Bits of each face: color and visibility of the key light. Whoever needs an unknown one
     /// computes it; two threads that do so at once store the same bits.
     faces: Vec<[[AtomicU32; 4]; 2]>,
 }
@@ -136,7 +136,7 @@ pub struct Lit<'a> {
 }
 
 /// Highlight of the key light: normal, direction towards the eye, roughness, reflectance at normal
-/// incidence. Normalised Blinn-Phong.
+/// incidence. Normalized Blinn-Phong.
 pub fn highlight(normal: Vec3A, to_eye: Vec3A, roughness: f32, reflectance: Vec3A) -> Vec3A {
     let towards = KEY.normalize_or_zero();
     let half = (towards + to_eye).normalize_or_zero();

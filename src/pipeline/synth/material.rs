@@ -1,4 +1,4 @@
-//! Colour of the surface at a point.
+//! Color of the surface at a point.
 
 use glam::{Vec2, Vec3, Vec3A, Vec4};
 
@@ -9,7 +9,7 @@ use crate::io::gltf_mesh::{AlphaMode, Material, MeshScene, TextureUse};
 /// The look of a point, linear.
 #[derive(Clone, Copy, Debug)]
 pub struct Look {
-    /// Diffuse colour.
+    /// Diffuse color.
     pub albedo: Vec3A,
     /// Emitted light.
     pub emission: Vec3A,
@@ -40,7 +40,7 @@ impl Materials {
         &self.list[index as usize]
     }
 
-    /// Mean base colour of a material.
+    /// Mean base color of a material.
     pub fn mean(&self, index: usize) -> Vec4 {
         let m = &self.list[index];
         m.base_color * m.base_texture.as_ref().map_or(Vec4::ONE, |t| self.textures[t.image].mean())

@@ -8,14 +8,14 @@
 //! |---|---|
 //! | `transforms.json` | nerfstudio layout, OpenGL camera axes, world axes of the glTF (y up); `train_filenames` and `test_filenames` list the split |
 //! | `images/NNNN.png` | photos, sRGB |
-//! | `object_ids/NNNN.png`, `part_ids/NNNN.png` | 16-bit ids at the pixels' centres, 0 = background (or, for parts, none) |
-//! | `identities.json` | what each id is: name, level, parent, path in the node tree, colour, pixels, views |
-//! | `depth/NNNN.npy` | f32 depth along the camera's axis at the pixels' centres, scene units, 0 = background |
+//! | `object_ids/NNNN.png`, `part_ids/NNNN.png` | 16-bit ids at the pixels' centers, 0 = background (or, for parts, none) |
+//! | `identities.json` | what each id is: name, level, parent, path in the node tree, color, pixels, views |
+//! | `depth/NNNN.npy` | f32 depth along the camera's axis at the pixels' centers, scene units, 0 = background |
 //! | `points3D.ply` | sparse points on surfaces that training photos see, with a reconstruction's noise |
 //! | `synth.json` | the settings, and a fingerprint of the scene |
 //!
 //! Modules: [`levels`] finds objects and parts, `surface` flattens the node tree, `trace` casts rays,
-//! `material` and `texture` colour them, `light` lights them, `rig` places cameras, `view` renders
+//! `material` and `texture` color them, `light` lights them, `rig` places cameras, `view` renders
 //! one photo, `points` and `write` put it all on disk, [`demo`] is the scene that ships with the
 //! program.
 
@@ -51,7 +51,7 @@ use crate::io::memory;
 use crate::pipeline::observer::{self, Interrupted, Observer, Ticker};
 use crate::scene::Camera;
 
-/// Bytes that a pixel of a photo takes while it is rendered and written: colour, depth and ids, and
+/// Bytes that a pixel of a photo takes while it is rendered and written: color, depth and ids, and
 /// their copies in files' formats.
 const BYTES_PER_PX: u64 = 48;
 

@@ -55,7 +55,7 @@ pub struct SynthOptions {
     pub radius: Option<f64>,
     /// Objects and parts.
     pub levels: Levels,
-    /// sRGB colour where there is no surface.
+    /// sRGB color where there is no surface.
     pub background: [u8; 3],
     /// Strength of the highlights, 0 (purely diffuse, the same from everywhere) to 1.
     pub specular: f32,

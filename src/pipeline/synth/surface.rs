@@ -29,9 +29,9 @@ pub struct Vertex {
     pub position: Vec3A,
     /// Unit normal.
     pub normal: Vec3A,
-    /// Texture coordinates of the base colour and of the emission, transformed.
+    /// Texture coordinates of the base color and of the emission, transformed.
     pub uv: [Vec2; 2],
-    /// Linear vertex colour.
+    /// Linear vertex color.
     pub color: Vec4,
 }
 
@@ -172,7 +172,7 @@ impl Surface {
     }
 
     /// Splits every edge that is too long for light that is stored at vertices. Whether an edge is
-    /// split depends on the edge alone, so neighbours agree and no gaps open.
+    /// split depends on the edge alone, so neighbors agree and no gaps open.
     fn split_for_light(&mut self) {
         let area: f64 = self.triangles.iter().map(|t| self.area(t)).sum();
         // An edge of length 2 becomes shorter than any useful limit in 14 halvings.
@@ -229,7 +229,7 @@ impl Surface {
         true
     }
 
-    /// Whether a triangle is so thin that nobody sees how light changes along it. Its neighbours' new
+    /// Whether a triangle is so thin that nobody sees how light changes along it. Its neighbors' new
     /// corners lie on its edges, so no gap opens.
     fn is_thin(&self, t: &Triangle) -> bool {
         let [a, b, c] = self.corners(t);

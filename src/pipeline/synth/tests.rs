@@ -156,7 +156,7 @@ fn textured_square(info: Value, sampler: Value) -> MeshScene {
     gltf_mesh::read_slice(&glb(&root, &bin), "square.glb").unwrap()
 }
 
-/// Colours in the middle of the square's quarters: top left, top right, bottom left, bottom right.
+/// Colors in the middle of the square's quarters: top left, top right, bottom left, bottom right.
 fn quarters(scene: &MeshScene) -> [[u8; 3]; 4] {
     let stage = stage_of(scene);
     let camera = Camera::look_at(DVec3::new(0.5, 0.5, 2.0), DVec3::new(0.5, 0.5, 0.0), DVec3::Y, 0.6, 80, 80).unwrap();

@@ -46,12 +46,12 @@ impl Texture {
         self.levels[0].width_px as f32 * self.levels[0].height_px as f32
     }
 
-    /// Mean colour, linear.
+    /// Mean color, linear.
     pub fn mean(&self) -> Vec4 {
         self.texel(self.levels.len() - 1, 0, 0)
     }
 
-    /// Linear colour and alpha at `uv`, seen so that one sample covers `footprint` texels of the
+    /// Linear color and alpha at `uv`, seen so that one sample covers `footprint` texels of the
     /// full resolution along a side.
     pub fn sample(&self, usage: &TextureUse, uv: Vec2, footprint: f32) -> Vec4 {
         if !uv.is_finite() {

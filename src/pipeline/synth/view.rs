@@ -1,4 +1,4 @@
-//! One photo: colours, depth and ids.
+//! One photo: colors, depth and ids.
 
 use glam::{DVec2, Vec3A};
 use rayon::prelude::*;
@@ -23,11 +23,11 @@ const MAX_DIFFERENCE: f32 = 0.02;
 pub struct View {
     /// sRGB.
     pub rgb: Vec<[u8; 3]>,
-    /// Depth along the camera's axis at the pixel's centre in scene units; 0 = nothing there.
+    /// Depth along the camera's axis at the pixel's center in scene units; 0 = nothing there.
     pub depth: Vec<f32>,
-    /// Object at the pixel's centre; 0 = none.
+    /// Object at the pixel's center; 0 = none.
     pub object: Vec<u16>,
-    /// Part at the pixel's centre; 0 = none.
+    /// Part at the pixel's center; 0 = none.
     pub part: Vec<u16>,
 }
 
@@ -63,7 +63,7 @@ impl Stage {
         Lit { surface: &self.surface, tracer: &self.tracer, materials: &self.materials }
     }
 
-    /// Ids and depth at the centre; colour as the mean of `samples` x `samples` stratified samples,
+    /// Ids and depth at the center; color as the mean of `samples` x `samples` stratified samples,
     /// of five where those are alike.
     fn pixel(&self, camera: &Camera, x: usize, y: usize, view: usize, options: &SynthOptions) -> Pixel {
         let origin = self.surface.local(camera.center);
@@ -121,7 +121,7 @@ impl Stage {
         out
     }
 
-    /// Colour and cover of a point.
+    /// Color and cover of a point.
     fn shade(&self, hit: &Hit, direction: Vec3A, step: f32, specular: f32) -> (Vec3A, f32) {
         let triangle = &self.surface.triangles[hit.triangle];
         let material = self.materials.get(triangle.material);
@@ -191,7 +191,7 @@ fn jitter(seed: u64, view: usize, pixel: usize, sample: u32) -> [f64; 2] {
     [first, h >> 11].map(|v| v as f64 / (1_u64 << 53) as f64)
 }
 
-/// SplitMix64's finaliser: every bit of the input reaches every bit of the output.
+/// SplitMix64's finalizer: every bit of the input reaches every bit of the output.
 fn mix(x: u64) -> u64 {
     let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

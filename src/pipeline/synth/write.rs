@@ -113,7 +113,7 @@ impl Writer {
             "fl_x": c.focal_px.x, "fl_y": c.focal_px.y,
             "cx": c.principal_px.x, "cy": c.principal_px.y,
             "k1": 0.0, "k2": 0.0, "p1": 0.0, "p2": 0.0,
-            // glTF is in metres.
+            // glTF is in meters.
             "fmlgs": { "background": options.background.map(|b| f32::from(b) / 255.0), "metres_per_unit": 1.0 },
             "train_filenames": listed(false),
             "val_filenames": listed(true),
@@ -152,7 +152,7 @@ fn png(f: &mut BufWriter<File>, bytes: &[u8], w: u32, h: u32, color: ExtendedCol
     PngEncoder::new(f).write_image(bytes, w, h, color).map_err(std::io::Error::other)
 }
 
-/// Binary PLY of coloured points.
+/// Binary PLY of colored points.
 fn ply(f: &mut BufWriter<File>, points: &[SparsePoint]) -> std::io::Result<()> {
     writeln!(f, "ply\nformat binary_little_endian 1.0\nelement vertex {}", points.len())?;
     writeln!(f, "property float x\nproperty float y\nproperty float z")?;

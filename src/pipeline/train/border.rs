@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, VecDeque};
 use rayon::prelude::*;
 
 use crate::io::{IoError, photo};
-use crate::math::grid::neighbours;
+use crate::math::grid::neighbors;
 use crate::math::stats::median;
 use crate::scene::{Camera, Dataset, Photo, PhotoPixels};
 
@@ -127,7 +127,7 @@ fn connected_to_edge(width: usize, height: usize, is: impl Fn(usize) -> bool) ->
     let mut queue: VecDeque<usize> = (0..width * height).filter(|&i| edge(i) && is(i)).collect();
     queue.iter().for_each(|&i| reached[i] = true);
     while let Some(i) = queue.pop_front() {
-        for j in neighbours(i, width, width * height) {
+        for j in neighbors(i, width, width * height) {
             if !reached[j] && is(j) {
                 reached[j] = true;
                 queue.push_back(j);

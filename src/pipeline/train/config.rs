@@ -19,7 +19,7 @@ const SURFEL_DISTORTION: f64 = 0.1;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct TrainConfig {
-    /// Optimiser steps in all.
+    /// Optimizer steps in all.
     pub steps: u64,
     /// Longest side of the training pictures in px; photos are never enlarged.
     pub max_side_px: u32,
@@ -27,7 +27,7 @@ pub struct TrainConfig {
     pub holdout_every: usize,
     /// Highest spherical-harmonics degree, 0 to 3.
     pub sh_degree: u8,
-    /// Open all bands of colour from the first step on instead of one after the other.
+    /// Open all bands of color from the first step on instead of one after the other.
     pub sh_at_once: bool,
     /// Share of the steps, from the first on, that see the photos at half their size; 0 = none.
     pub coarse_share: f64,

@@ -35,7 +35,7 @@ pub struct DensityReport {
     pub refused: usize,
 }
 
-/// Runs density control on the cloud and its optimiser moments. `extent` as in
+/// Runs density control on the cloud and its optimizer moments. `extent` as in
 /// `Dataset::camera_extent`; `budget` is the most Gaussians allowed; large ones are removed only
 /// if `prune_large`.
 pub fn control(

@@ -1,4 +1,4 @@
-//! The folder for a training's result: what is there already is gone on with, carried over or left alone.
+//! The folder for a training's result: what is there already is resumed, carried over or left alone.
 
 use std::path::Path;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! What training asks of the scene's geometry beside its colours: normals that agree with depth,
+//! What training asks of the scene's geometry beside its colors: normals that agree with depth,
 //! and surfels that lie together along each ray.
 
 use super::{TrainConfig, TrainView};
@@ -61,7 +61,7 @@ impl Geometry {
         Features { channels: 3, values: &self.values }
     }
 
-    /// Sets the gradient of everything but colours for a frame drawn at `step`; returns the loss.
+    /// Sets the gradient of everything but colors for a frame drawn at `step`; returns the loss.
     pub fn compare(
         &mut self,
         frame: &Frame<f32>,

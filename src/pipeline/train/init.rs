@@ -22,7 +22,7 @@ const HOLE_CELL_PX: usize = 8;
 const HOLE_DEPTH: f64 = 1.3;
 
 /// A cloud at the dataset's sparse points or, where it has fewer than a hundred, at `random`
-/// points in front of the cameras, coloured by the photos they were shot from.
+/// points in front of the cameras, colored by the photos they were shot from.
 pub fn initial_cloud(
     dataset: &Dataset,
     views: &[TrainView],
@@ -40,7 +40,7 @@ pub fn initial_cloud(
 }
 
 /// Puts Gaussians where photos show something but no sparse point is: walls, sky, the rest of the
-/// room. They stand a little behind what the view shows otherwise, in its photo's colours, and
+/// room. They stand a little behind what the view shows otherwise, in its photo's colors, and
 /// training moves them from there. Views that already see such a Gaussian add none.
 fn fill_holes(cloud: &mut GaussianCloud, dataset: &Dataset, views: &[TrainView]) {
     let stride = cloud.sh_stride();
@@ -96,7 +96,7 @@ fn constant_color(rgb: [u8; 3]) -> [f32; 3] {
     rgb.map(|c| ((f64::from(c) / 255.0 - 0.5) / SH_C0) as f32)
 }
 
-/// One Gaussian per point, as wide as the mean distance to its three nearest neighbours.
+/// One Gaussian per point, as wide as the mean distance to its three nearest neighbors.
 pub fn from_points(points: &[SparsePoint], degree: u8) -> GaussianCloud {
     let origin = Bounds::robust(points.iter().map(|p| p.position)).map_or(DVec3::ZERO, |b| b.center());
     let local: Vec<[f64; 3]> = points.iter().map(|p| (p.position - origin).to_array()).collect();
@@ -104,7 +104,7 @@ pub fn from_points(points: &[SparsePoint], degree: u8) -> GaussianCloud {
     let spacing: Vec<f64> = local
         .par_iter()
         .map(|p| {
-            // The first neighbour is the point itself.
+            // The first neighbor is the point itself.
             let near: Vec<f64> =
                 tree.nearest_neighbor_iter_with_distance_2(*p).skip(1).take(3).map(|(_, d)| d).collect();
             (near.iter().sum::<f64>() / near.len().max(1) as f64).sqrt()

@@ -310,7 +310,7 @@ struct Update {
     stride: usize,
     active: usize,
     radius_scale: f32,
-    /// Centre of the camera relative to the cloud's origin, where Gaussians carry their normals as
+    /// Center of the camera relative to the cloud's origin, where Gaussians carry their normals as
     /// extra channels.
     eye: Option<[f32; 3]>,
 }

@@ -18,13 +18,13 @@ pub struct Rates {
     pub quaternion: f32,
     /// Opacity logits.
     pub opacity_logit: f32,
-    /// Constant colour.
+    /// Constant color.
     pub sh_constant: f32,
     /// Other coefficients.
     pub sh_rest: f32,
 }
 
-/// Constants of one optimiser step.
+/// Constants of one optimizer step.
 #[derive(Clone, Copy, Debug)]
 pub struct AdamStep {
     /// `1 / (1 - beta1^t)`.

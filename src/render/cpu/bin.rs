@@ -24,7 +24,7 @@ pub struct Tiles {
     pub places: Vec<u32>,
 }
 
-/// Inclusive tile rectangle `[x0, y0, x1, y1]` of the tiles with a pixel centre inside the splat's
+/// Inclusive tile rectangle `[x0, y0, x1, y1]` of the tiles with a pixel center inside the splat's
 /// bounding box; `None` if there is none.
 #[inline(always)]
 fn rectangle<R: Real>(s: &Splat<R>, size: [usize; 2]) -> Option<[usize; 4]> {
@@ -43,11 +43,11 @@ fn rectangle<R: Real>(s: &Splat<R>, size: [usize; 2]) -> Option<[usize; 4]> {
     Some(r)
 }
 
-/// Smallest squared Mahalanobis distance over the rectangle of pixel centres `[lo, hi]`.
+/// Smallest squared Mahalanobis distance over the rectangle of pixel centers `[lo, hi]`.
 #[inline(always)]
 pub fn nearest<R: Real>(s: &Splat<R>, lo: [R; 2], hi: [R; 2]) -> R {
     let [a, b, c] = s.conic;
-    // Offsets of the rectangle from the centre; the minimum lies on the edges that face it.
+    // Offsets of the rectangle from the center; the minimum lies on the edges that face it.
     let (x0, x1) = (lo[0] - s.mean[0], hi[0] - s.mean[0]);
     let (y0, y1) = (lo[1] - s.mean[1], hi[1] - s.mean[1]);
     let inside_x = x0 <= R::ZERO && x1 >= R::ZERO;

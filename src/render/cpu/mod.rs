@@ -1,4 +1,4 @@
-//! The CPU renderer: at `f64` the oracle that every kernel and gradient is held against, at `f32`
+//! The CPU renderer: at `f64` the oracle that every kernel and gradient is compared with, at `f32`
 //! (tile-parallel, eight pixels a register) the fast path where there is no GPU.
 //!
 //! Stages, one file each: [`project`], [`sort`], [`bin`], [`blend`]; backward: [`blend_backward`],

@@ -28,7 +28,7 @@ fn thinnest<R: Real>(log_scale: [R; 3]) -> usize {
 }
 
 /// The thinnest axis of a Gaussian, its number and the sign that turns it towards `eye`, which is
-/// the camera's centre relative to the cloud's origin; `None` for a degenerate rotation.
+/// the camera's center relative to the cloud's origin; `None` for a degenerate rotation.
 #[inline(always)]
 fn facing<R: Real>(gaussian: &Gaussian<'_, R>, eye: [R; 3]) -> Option<([R; 3], usize, R)> {
     let rotation = rotation::matrix_from_quaternion(gaussian.quaternion)?;
@@ -39,7 +39,7 @@ fn facing<R: Real>(gaussian: &Gaussian<'_, R>, eye: [R; 3]) -> Option<([R; 3], u
     Some((axis.map(|c| c * sign), k, sign))
 }
 
-/// A camera's centre relative to a cloud's origin.
+/// A camera's center relative to a cloud's origin.
 pub fn eye<R: Real>(camera: &Camera, cloud: &GaussianCloud<R>) -> [R; 3] {
     (camera.center - cloud.origin).to_array().map(R::of)
 }
@@ -74,7 +74,7 @@ fn surface<R: Real>(frame: &Frame<R>, depth: SurfaceDepth) -> Vec<R> {
     }
 }
 
-/// Direction of the ray through each pixel's centre, world axes, depth 1.
+/// Direction of the ray through each pixel's center, world axes, depth 1.
 struct Rays<R> {
     first: [R; 3],
     right: [R; 3],
@@ -106,7 +106,7 @@ fn cross<R: Real>(a: [R; 3], b: [R; 3]) -> [R; 3] {
 }
 
 /// Central differences of the points that `depth` describes, along x and y, at an inner pixel whose
-/// four neighbours all have a depth.
+/// four neighbors all have a depth.
 #[inline(always)]
 fn differences<R: Real>(depth: &[R], rays: &Rays<R>, width: usize, x: usize, y: usize) -> Option<[[R; 3]; 2]> {
     let height = depth.len() / width;
@@ -123,7 +123,7 @@ fn differences<R: Real>(depth: &[R], rays: &Rays<R>, width: usize, x: usize, y: 
 }
 
 /// Unit normals of the surface that `depth` describes, towards the camera in world axes, row by
-/// row; 0 at the picture's border and where a neighbour has no depth.
+/// row; 0 at the picture's border and where a neighbor has no depth.
 pub fn of_depth<R: Real>(depth: &[R], camera: &Camera) -> Vec<[R; 3]> {
     let (width, rays) = (camera.width_px as usize, Rays::new(camera));
     let normal = |i: usize| {

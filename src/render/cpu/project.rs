@@ -1,4 +1,4 @@
-//! Projection: Gaussians to splats (mean, conic, reach, colour) in the picture of one camera.
+//! Projection: Gaussians to splats (mean, conic, reach, color) in the picture of one camera.
 
 use rayon::prelude::*;
 
@@ -15,13 +15,13 @@ pub const CHUNK: usize = 2_048;
 pub struct View<R> {
     /// Rows of camera_from_world.
     pub rows: [[R; 3]; 3],
-    /// Cloud origin minus camera centre in world axes; kept in f64 so that far-off scenes stay exact.
+    /// Cloud origin minus camera center in world axes; kept in f64 so that far-off scenes stay exact.
     pub offset: [f64; 3],
     /// Focal lengths, px.
     pub focal: [R; 2],
     /// Principal point, px.
     pub principal: [R; 2],
-    /// Largest tangent of the viewing angle at which the projection is linearised, per axis.
+    /// Largest tangent of the viewing angle at which the projection is linearized, per axis.
     pub clamp: [R; 2],
     /// Near plane.
     pub near: R,
@@ -49,7 +49,7 @@ impl<R: Real> View<R> {
         }
     }
 
-    /// A position relative to the camera centre, in world axes.
+    /// A position relative to the camera center, in world axes.
     #[inline(always)]
     pub fn relative(&self, p: [R; 3]) -> [R; 3] {
         [R::of(p[0].f64() + self.offset[0]), R::of(p[1].f64() + self.offset[1]), R::of(p[2].f64() + self.offset[2])]
@@ -67,7 +67,7 @@ impl<R: Real> View<R> {
 /// A Gaussian as it appears in the picture.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Splat<R> {
-    /// Centre, px.
+    /// Center, px.
     pub mean: [R; 2],
     /// Inverse covariance `[xx, xy, yy]`, 1/px².
     pub conic: [R; 3],
@@ -85,15 +85,15 @@ pub struct Splat<R> {
 
 /// Everything between a Gaussian's raw parameters and its splat that the backward pass needs too.
 pub struct Geometry<R> {
-    /// Centre relative to the camera, world axes.
+    /// Center relative to the camera, world axes.
     pub relative: [R; 3],
-    /// Centre in camera axes.
+    /// Center in camera axes.
     pub local: [R; 3],
     /// Tangents `x/z`, `y/z` after clamping, and whether they were clamped.
     pub tangent: [R; 2],
     /// Whether each tangent was clamped.
     pub clamped: [bool; 2],
-    /// Rows of the linearised projection in world axes, `J W`.
+    /// Rows of the linearized projection in world axes, `J W`.
     pub jacobian: [[R; 3]; 2],
     /// Rotation world_from_local.
     pub rotation: [[R; 3]; 3],
@@ -171,7 +171,7 @@ pub fn geometry<R: Real>(gaussian: &Gaussian<'_, R>, view: &View<R>) -> Option<G
     })
 }
 
-/// Unit viewing direction of a centre relative to the camera; forward if they coincide.
+/// Unit viewing direction of a center relative to the camera; forward if they coincide.
 #[inline(always)]
 pub fn direction<R: Real>(relative: [R; 3]) -> [R; 3] {
     let largest = relative.iter().fold(R::ZERO, |m, c| m.max(c.abs()));
@@ -184,7 +184,7 @@ pub fn direction<R: Real>(relative: [R; 3]) -> [R; 3] {
     scaled.map(|c| c / length)
 }
 
-/// Colour before the clamp at zero: `0.5 + sum(basis * sh)`.
+/// Color before the clamp at zero: `0.5 + sum(basis * sh)`.
 #[inline(always)]
 pub fn raw_color<R: Real>(coefficients: &[[R; 3]], basis: &[R; 16], degree: u8) -> [R; 3] {
     let mut c = [R::HALF; 3];
@@ -196,7 +196,7 @@ pub fn raw_color<R: Real>(coefficients: &[[R; 3]], basis: &[R; 16], degree: u8) 
     c
 }
 
-/// The colour as it is composited, between black and `COLOR_MAX`. Coefficients whose sum is no number
+/// The color as it is composited, between black and `COLOR_MAX`. Coefficients whose sum is no number
 /// give black.
 #[inline(always)]
 pub fn color<R: Real>(coefficients: &[[R; 3]], basis: &[R; 16], degree: u8) -> [R; 3] {
@@ -212,9 +212,9 @@ pub fn compensation<R: Real>(g: &Geometry<R>) -> R {
 /// The splats of some consecutive Gaussians with their composited values, in the cloud's order.
 #[derive(Debug, Default)]
 pub struct Chunk<R> {
-    /// The Gaussians that reach at least one pixel centre.
+    /// The Gaussians that reach at least one pixel center.
     pub splats: Vec<Splat<R>>,
-    /// `[splats * channels]`: colour, extra channels, depth if asked for, padding zeros.
+    /// `[splats * channels]`: color, extra channels, depth if asked for, padding zeros.
     pub values: Vec<R>,
     /// Gaussians left out because their covariance or rotation is degenerate.
     pub degenerate: usize,

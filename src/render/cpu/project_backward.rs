@@ -17,18 +17,18 @@ pub struct GaussianGradient<R> {
     pub quaternion: [R; 4],
     /// With respect to its opacity logit.
     pub opacity_logit: R,
-    /// With respect to its colour before the clamp; the gradient of SH coefficient `k` is
+    /// With respect to its color before the clamp; the gradient of SH coefficient `k` is
     /// `basis[k]` times this.
     pub color: [R; 3],
     /// SH basis in the viewing direction.
     pub basis: [R; 16],
-    /// Length of the gradient with respect to the projected centre, per half picture side.
+    /// Length of the gradient with respect to the projected center, per half picture side.
     pub screen: R,
     /// Three standard deviations along the splat's longer axis, px.
     pub radius_px: R,
 }
 
-/// Backward of the projection. `record` is the sum of the splat's tile records: moments, colour,
+/// Backward of the projection. `record` is the sum of the splat's tile records: moments, color,
 /// features, depth. `depth_channel` is the channel that carries depth, if any does.
 #[inline(always)]
 pub fn project_backward<R: Real>(
@@ -110,9 +110,9 @@ pub(super) fn radius<R: Real>([xx, xy, yy]: [R; 3]) -> R {
     R::of(3.0) * (R::HALF * (xx + yy) + unit * (apart * apart + across * across).sqrt()).sqrt()
 }
 
-/// What the gradient of a Gaussian's colour comes to.
+/// What the gradient of a Gaussian's color comes to.
 pub(super) struct ColorGradient<R> {
-    /// With respect to the colour before the clamp.
+    /// With respect to the color before the clamp.
     pub color: [R; 3],
     /// SH basis in the viewing direction.
     pub basis: [R; 16],
@@ -120,8 +120,8 @@ pub(super) struct ColorGradient<R> {
     pub position: [R; 3],
 }
 
-/// Backward of the colour: `color` is the gradient with respect to the clamped one, `relative` the
-/// centre relative to the camera in world axes.
+/// Backward of the color: `color` is the gradient with respect to the clamped one, `relative` the
+/// center relative to the camera in world axes.
 #[inline(always)]
 pub(super) fn color_gradient<R: Real>(
     gaussian: &Gaussian<'_, R>,
@@ -134,7 +134,7 @@ pub(super) fn color_gradient<R: Real>(
     let basis = sh::basis(degree, toward);
     let raw = raw_color(gaussian.sh, &basis, degree);
     for (d, r) in color.iter_mut().zip(raw) {
-        // Above the brightest colour it stays, so that training leads back.
+        // Above the brightest color it stays, so that training leads back.
         if !(r >= R::ZERO) {
             *d = R::ZERO;
         }
@@ -206,7 +206,7 @@ fn factor_gradient<R: Real>(
     d
 }
 
-/// Gradient of the colour along the viewing direction.
+/// Gradient of the color along the viewing direction.
 #[inline(always)]
 fn direction_gradient<R: Real>(coefficients: &[[R; 3]], degree: u8, toward: [R; 3], color: [R; 3]) -> [R; 3] {
     let slopes = sh::basis_gradient(degree, toward);

@@ -16,7 +16,7 @@ fn splats<R: Real>(stage: &'static str, splats: &[Splat<R>], values: &[R]) -> Re
         let bad = splats.iter().position(|s| of(s).iter().any(|v| !v.is_finite()));
         bad.map_or(Ok(()), |i| Err(NotFinite { stage, field, index: splats[i].gaussian as usize }))
     };
-    each("the centre and depth of Gaussian", |s| [s.mean[0], s.mean[1], s.depth])?;
+    each("the center and depth of Gaussian", |s| [s.mean[0], s.mean[1], s.depth])?;
     each("the conic of Gaussian", |s| s.conic)?;
     each("the opacity and reach of Gaussian", |s| [s.opacity, s.reach, s.half[0] + s.half[1]])?;
     all_finite(stage, "value", values)
@@ -50,7 +50,7 @@ pub fn binned(tiles: &Tiles, splats: usize) -> Result<(), NotFinite> {
 /// After blending.
 pub fn drawn<R: Real>(frame: &Frame<R>) -> Result<(), NotFinite> {
     let plane = |field, plane: &[R]| all_finite("blending", field, plane);
-    frame.color.iter().try_for_each(|p| plane("the colour of pixel", p))?;
+    frame.color.iter().try_for_each(|p| plane("the color of pixel", p))?;
     frame.features.iter().try_for_each(|p| plane("a feature of pixel", p))?;
     plane("alpha of pixel", &frame.alpha)?;
     plane("depth of pixel", &frame.depth)?;

@@ -1,4 +1,4 @@
-//! The optimiser; `shaders/adam.wgsl`.
+//! The optimizer; `shaders/adam.wgsl`.
 
 use super::cloud::{Parameters, strides};
 use super::kernel::{Access, Kernel, Module, Stage};

@@ -14,7 +14,7 @@ pub fn blend_backward(float_atomics: bool) -> TileKernel {
 /// Gradients that go into the pass and come out of it.
 #[derive(Debug)]
 pub struct BlendGradients {
-    /// Of the picture's colour and alpha, and, behind those, of its depth.
+    /// Of the picture's color and alpha, and, behind those, of its depth.
     pub pixels: wgpu::Buffer,
     /// Of its extra channels.
     pub features: wgpu::Buffer,

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 
 use super::GpuError;
-use crate::scene::trace::{self, Sort};
+use crate::scene::resource_log::{self, Sort};
 
 /// Features that are used where an adapter offers them. Everything works without any of them.
 const WANTED: wgpu::Features =
@@ -74,7 +74,7 @@ impl Device {
         if !suits || held.is_some() {
             return false;
         }
-        trace::record(Sort::Device, format!("the window's device on {}", info.name), "the window was opened", 0);
+        resource_log::record(Sort::Device, format!("the window's device on {}", info.name), "the window was opened", 0);
         *held = Some(Self::from_parts(info, device.clone(), queue.clone()));
         true
     }
@@ -97,7 +97,12 @@ impl Device {
 
     /// Opens a device on an adapter of the caller's choice.
     pub fn open(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
-        trace::record(Sort::Device, format!("device on {}", adapter.get_info().name), "something is drawn on it", 0);
+        resource_log::record(
+            Sort::Device,
+            format!("device on {}", adapter.get_info().name),
+            "something is drawn on it",
+            0,
+        );
         let (device, queue) = pollster::block_on(adapter.request_device(&Self::device_descriptor(adapter)))
             .map_err(|e| GpuError::Device { adapter: adapter.get_info().name, reason: e.to_string() })?;
         Ok(Self::from_parts(adapter.get_info(), device, queue))
@@ -165,7 +170,7 @@ impl Device {
         self.device.features().contains(wgpu::Features::TIMESTAMP_QUERY)
     }
 
-    /// One line for people: name, kind, interface, features in use, largest binding.
+    /// One line for display: name, kind, interface, features in use, largest binding.
     pub fn describe(&self) -> String {
         let kind = match self.info.device_type {
             wgpu::DeviceType::DiscreteGpu => "discrete GPU",

@@ -42,17 +42,17 @@ twins! {
         down: [f32; 4],
         /// Its forward axis.
         forward: [f32; 4],
-        /// Cloud origin minus camera centre, leading part.
+        /// Cloud origin minus camera center, leading part.
         offset_hi: [f32; 4],
         /// The rest of it.
         offset_lo: [f32; 4],
-        /// Colour behind everything.
+        /// Color behind everything.
         background: [f32; 4],
         /// Focal lengths in px.
         focal: [f32; 2],
         /// Principal point in px.
         principal: [f32; 2],
-        /// Smallest viewing tangents at which the projection is linearised.
+        /// Smallest viewing tangents at which the projection is linearized.
         tangent_min: [f32; 2],
         /// Largest ones.
         tangent_max: [f32; 2],
@@ -80,7 +80,7 @@ twins! {
 
     /// A Gaussian in the picture; see `shaders/shared/splat.wgsl`.
     struct Splat {
-        /// Centre in px.
+        /// Center in px.
         mean: [f32; 2],
         /// Camera-space depth.
         depth: f32,
@@ -90,7 +90,7 @@ twins! {
         factor: [f32; 3],
         /// Largest squared Mahalanobis distance that is drawn.
         reach: f32,
-        /// Colour towards the camera.
+        /// Color towards the camera.
         color: [f32; 3],
         /// 3 sigma along the longer axis in px; 0 = not drawn.
         radius: f32,

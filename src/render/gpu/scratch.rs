@@ -78,7 +78,7 @@ pub struct PerPicture {
     pub channels: usize,
     /// Each tile's part of the pairs.
     pub ranges: wgpu::Buffer,
-    /// Colour and transmittance.
+    /// Color and transmittance.
     pub colors: wgpu::Buffer,
     /// Transmittance and end of each pixel's list.
     pub ends: wgpu::Buffer,

@@ -28,7 +28,7 @@ pub const FILES: &[(&str, &str)] = files![
     "shared/counters.wgsl",
     "shared/finite.wgsl",
     "shared/harmonics.wgsl",
-    "shared/linearise.wgsl",
+    "shared/linearize.wgsl",
     "shared/reach.wgsl",
     "shared/scan.wgsl",
     "shared/splat.wgsl",

@@ -139,7 +139,7 @@ impl Ssim {
         stage.run(&self.gradient, &[&self.loss, colors, &photo.pixels, &self.maps, pixel_gradient], [w, h, 1]);
     }
 
-    /// Records the last sums into the ring, with the frame's counters and the optimiser's number of
+    /// Records the last sums into the ring, with the frame's counters and the optimizer's number of
     /// outliers as they then are.
     pub fn encode_sums(&self, stage: &mut Stage<'_>, counters: &wgpu::Buffer, outliers: &wgpu::Buffer) {
         stage.run(&self.reduce, &[&self.loss, &self.partials, &self.ring, counters, outliers], [1, 1, 1]);

@@ -21,7 +21,7 @@ pub struct Machine {
     pub gpu: Option<String>,
 }
 
-/// What a person has set that a plan starts from.
+/// What the user has set that a plan starts from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Limits {
     /// Longer side of training pictures at most, px.
@@ -89,7 +89,7 @@ pub struct Facts {
     pub semantics: Option<SemanticFacts>,
     /// The machine.
     pub machine: Machine,
-    /// What a person has set.
+    /// What the user has set.
     pub limits: Limits,
 }
 
@@ -123,7 +123,7 @@ impl Facts {
         self
     }
 
-    /// The same facts for other settings of a person.
+    /// The same facts for other settings of the user.
     pub fn with_limits(mut self, limits: Limits, dataset: Option<&Dataset>) -> Self {
         if let (Some(dataset), true) = (dataset, limits.train_side_px != self.limits.train_side_px) {
             self.photos = PhotoFacts::of(&dataset.cameras(), limits.train_side_px);
@@ -162,7 +162,7 @@ pub const NOISE_FLOOR: f64 = 0.5 / 255.0;
 
 /// The lowest degree from which on no band can change any pixel by half an 8-bit step.
 ///
-/// A band of degree `l` adds at most `|c| sqrt((2l + 1) / 4 pi)` to a colour, `c` its coefficients
+/// A band of degree `l` adds at most `|c| sqrt((2l + 1) / 4 pi)` to a color, `c` its coefficients
 /// of one channel (Cauchy-Schwarz and the addition theorem). Blending weights sum to at most 1, so
 /// the largest such bound over the Gaussians bounds the change of every pixel.
 pub fn visible_degree<R: Real>(cloud: &GaussianCloud<R>) -> u8 {

@@ -209,7 +209,7 @@ mod tests {
             assert_eq!(former.parse::<PlanOverride>(), now.parse(), "{former}");
             assert!(now.parse::<PlanOverride>().is_ok());
         }
-        let stored: Overrides = serde_json::from_str(r#"["colour", "maps", "portraits", "held"]"#).expect("read");
+        let stored: Overrides = serde_json::from_str(r#"["color", "maps", "portraits", "held"]"#).expect("read");
         assert!([Item::Color, Item::FeatureMaps, Item::Thumbnails, Item::Holdout].iter().all(|i| stored.has(*i)));
     }
 

@@ -64,7 +64,7 @@ fn bands_under_the_noise_floor_are_dropped_and_others_kept() {
 }
 
 #[test]
-fn dropped_bands_change_no_colour_by_half_a_step() {
+fn dropped_bands_change_no_color_by_half_a_step() {
     let worst = |c: &GaussianCloud, kept: u8| {
         let change = |i: u32| {
             let z = 1.0 - (2.0 * f64::from(i) + 1.0) / 500.0;

@@ -1,4 +1,4 @@
-//! The camera pane: the keys of a path, a timeline to play and retime them, and films of it.
+//! The camera pane: the keys of a path, a timeline to play and retime them, and videos of it.
 
 mod keys;
 pub mod player;
@@ -12,9 +12,9 @@ use egui::{Button, ComboBox, DragValue, RichText, Slider, Ui};
 use self::player::{Clip, Player};
 use super::state::AppState;
 use super::theme;
-use crate::io::animation::Settings;
-use crate::navigate::film::{MOST_PICTURES, steps_of};
-use crate::navigate::{Film, Flight, Pose, Speed};
+use crate::io::video::Settings;
+use crate::navigate::camera_spline::{MOST_PICTURES, steps_of};
+use crate::navigate::{CameraSpline, Flight, Pose, Speed};
 use crate::scene::undo::UndoHistory;
 use crate::scene::{Camera, CameraPath, PathKey};
 use crate::ui::actions::Action;
@@ -30,13 +30,13 @@ pub struct CameraPane {
     /// The key that was chosen.
     selected: Option<usize>,
     edits: UndoHistory<CameraPath>,
-    /// The path as it was last made a film of.
+    /// The path as it was last made a video of.
     filmed: Option<(CameraPath, Speed)>,
-    /// Height of films, px.
+    /// Height of videos, px.
     film_height: u32,
-    /// Quality of films, 0 to 100.
+    /// Quality of videos, 0 to 100.
     quality: u8,
-    /// Whether what was found is marked in films.
+    /// Whether what was found is marked in videos.
     pub mark: bool,
     /// Flights that follow the one that is played.
     next: VecDeque<Flight>,
@@ -144,16 +144,16 @@ impl CameraPane {
     /// Makes the path what is played.
     fn put_path_in(&mut self) {
         self.filmed = Some((self.path.clone(), self.speed));
-        match Film::new(&self.path, self.speed) {
-            Some(film) if matches!(self.player.clip(), Some(Clip::Path(_))) => {
-                self.player.replace(Some(Clip::Path(Box::new(film))));
+        match CameraSpline::new(&self.path, self.speed) {
+            Some(spline) if matches!(self.player.clip(), Some(Clip::Path(_))) => {
+                self.player.replace(Some(Clip::Path(Box::new(spline))));
             }
-            Some(film) => self.player.load(Clip::Path(Box::new(film)), false),
+            Some(spline) => self.player.load(Clip::Path(Box::new(spline)), false),
             None => self.player.replace(None),
         }
     }
 
-    /// The film of the path as it is.
+    /// The video of the path as it is.
     fn keep_up(&mut self) {
         let is_path = matches!(self.player.clip(), Some(Clip::Path(_)) | None);
         let current = self.filmed.as_ref().is_some_and(|(path, speed)| *path == self.path && *speed == self.speed);
@@ -162,8 +162,8 @@ impl CameraPane {
         }
     }
 
-    /// The cameras of a film of what is played, and how it is written; `None` if there is nothing.
-    pub fn film(&self, out: &Path, aspect: f64) -> Option<(Vec<Camera>, Settings)> {
+    /// The cameras of a video of what is played, and how it is written; `None` if there is nothing.
+    pub fn video(&self, out: &Path, aspect: f64) -> Option<(Vec<Camera>, Settings)> {
         let height = self.film_height;
         let width = (((f64::from(height) * aspect) / 2.0).round().max(1.0) * 2.0) as u32;
         let clip = self.player.clip()?;
@@ -301,9 +301,9 @@ impl CameraPane {
         self.speed = if eased { Speed::Eased } else { Speed::Constant };
         ui.separator();
         let idle = state.job.is_none() && self.player.clip().is_some();
-        let film = ui.add_enabled(idle, Button::new("Export video\u{2026}"));
+        let button = ui.add_enabled(idle, Button::new("Export video\u{2026}"));
         let why = if state.job.is_some() { "Another job is running." } else { "There is nothing to export." };
-        if film.on_hover_text(Action::ExportVideo.tooltip()).on_disabled_hover_text(why).clicked() {
+        if button.on_hover_text(Action::ExportVideo.tooltip()).on_disabled_hover_text(why).clicked() {
             actions.push(Action::ExportVideo);
         }
         ComboBox::from_id_salt("video height").selected_text(format!("{} px", self.film_height)).width(72.0).show_ui(

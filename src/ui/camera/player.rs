@@ -1,6 +1,6 @@
 //! Plays a flight or a path, and counts the frames that are shown while it runs.
 
-use crate::navigate::{Film, Flight, Pose};
+use crate::navigate::{CameraSpline, Flight, Pose};
 
 /// Seconds over which frames are counted.
 const COUNTED_SECS: f64 = 1.0;
@@ -11,7 +11,7 @@ pub enum Clip {
     /// A flight to a target.
     Flight(Box<Flight>),
     /// The path that is being edited.
-    Path(Box<Film>),
+    Path(Box<CameraSpline>),
 }
 
 impl Clip {
@@ -19,14 +19,14 @@ impl Clip {
     pub fn seconds(&self) -> f64 {
         match self {
             Self::Flight(flight) => flight.seconds,
-            Self::Path(film) => film.seconds(),
+            Self::Path(spline) => spline.seconds(),
         }
     }
 
     /// The pose at a time. Between the poses of a flight the nearest is taken.
     pub fn at(&self, time: f64) -> Option<Pose> {
         match self {
-            Self::Path(film) => Some(film.at(time)),
+            Self::Path(spline) => Some(spline.at(time)),
             Self::Flight(flight) => {
                 let last = flight.poses.len().checked_sub(1)?;
                 let share = if flight.seconds > 0.0 { time / flight.seconds } else { 1.0 };

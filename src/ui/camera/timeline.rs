@@ -24,7 +24,7 @@ pub fn show(ui: &mut Ui, pane: &mut CameraPane) -> Option<Pose> {
     let time = |x: f32| f64::from(((x - line.left()) / line.width().max(1.0)).clamp(0.0, 1.0)) * seconds;
     ticks(&painter, line, seconds, x);
     let times: Vec<[f64; 2]> = match pane.player.clip() {
-        Some(Clip::Path(film)) => film.times.clone(),
+        Some(Clip::Path(spline)) => spline.times.clone(),
         _ => Vec::new(),
     };
     let count = pane.path.keys.len();

@@ -6,7 +6,7 @@ use super::super::state::AppState;
 use super::super::theme;
 use crate::jobs::find_objects::FindSettings;
 use crate::jobs::models::{ModelEntry, ModelRole, ModelState, SAM2};
-use crate::pipeline::semantics::find::{Carry, Lifting, REGIONS};
+use crate::pipeline::semantics::build_map::{Carry, Lifting, REGIONS};
 use crate::ui::actions::Action;
 use crate::worker::{Command, Worker};
 
@@ -155,7 +155,7 @@ fn one(ui: &mut Ui, entry: &ModelEntry, model: &ModelState, idle: bool, actions:
             let text = format!(
                 "Its files are not hosted yet ({} MB, {}). tools/export creates them from the official checkpoint.",
                 entry.megabytes(),
-                entry.licence
+                entry.license
             );
             ui.label(RichText::new(text).small().color(theme::WEAK));
         }

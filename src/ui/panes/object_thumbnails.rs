@@ -6,7 +6,7 @@ use std::sync::Arc;
 use egui::{ColorImage, Rect, TextureHandle, TextureOptions, Ui, pos2, vec2};
 
 use super::super::state::AppState;
-use crate::pipeline::semantics::portraits::SIDE_PX;
+use crate::pipeline::semantics::thumbnails::SIDE_PX;
 use crate::scene::{GaussianCloud, IdentityId, SemanticMap};
 use crate::worker::{Command, Worker};
 
@@ -39,7 +39,7 @@ impl ObjectThumbnails {
         };
         let wanted = state.plan.thumbnails.now(self.used.take());
         if wanted && self.asked.as_ref().is_none_or(|a| !Arc::ptr_eq(a, map)) && map.of.len() == cloud.len() {
-            let command = Command::Portraits {
+            let command = Command::Thumbnails {
                 cloud: Arc::clone(cloud),
                 map: Arc::clone(map),
                 settings: state.render_settings(),

@@ -5,7 +5,7 @@ use egui::{Align2, Area, Color32, ColorImage, Id, Order, Rect, Slider, TextEdit,
 use super::super::state::AppState;
 use super::super::theme;
 use super::Viewport;
-use crate::math::grid::neighbours;
+use crate::math::grid::neighbors;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::{Camera, Identities, IdentityId, Mask, NOBODY};
 use crate::ui::actions::Action;
@@ -86,7 +86,7 @@ impl Brush {
                 continue;
             }
             seen.insert(i);
-            open.extend(neighbours(i, w, w * h).filter(|j| alike(i, *j)));
+            open.extend(neighbors(i, w, w * h).filter(|j| alike(i, *j)));
         }
         self.mask.add(&seen);
         self.changed = true;

@@ -34,8 +34,9 @@ impl Viewport {
         let has_photos = scene.dataset.as_ref().is_some_and(|d| !d.photos.is_empty());
         card("modes", Align2::LEFT_TOP, 0.0, &mut |ui| self.modes(ui, layout, has_photos, actions));
         if has_photos {
-            // Beside the modes where there is room, else below them.
-            let (align, down) = if rect.width() > 860.0 { (Align2::RIGHT_TOP, 0.0) } else { (Align2::LEFT_TOP, 46.0) };
+            // Beside the modes where there is room and no query box, else below them.
+            let beside = rect.width() > 860.0 && state.semantics.is_none();
+            let (align, down) = if beside { (Align2::RIGHT_TOP, 0.0) } else { (Align2::LEFT_TOP, 46.0) };
             card("photo", align, down, &mut |ui| self.photo_bar(ui, scene, layout, actions));
         }
         if let Some(facts) = self.facts(layout, state) {

@@ -80,7 +80,7 @@ impl Requests {
         let moved = !self.last.as_ref().is_some_and(same);
         self.last = Some(key);
         self.ticket += 1;
-        let (cloud, semantics) = (Arc::clone(&cloud), semantics.as_ref().map(|s| Arc::clone(s)));
+        let (cloud, semantics) = (Arc::clone(&cloud), semantics.as_deref().cloned());
         let ticket = self.ticket;
         let request =
             ViewRequest { cloud, camera, mode, settings, budget, photo, semantics, codes, skip, timed, ticket };

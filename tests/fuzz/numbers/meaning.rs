@@ -6,8 +6,8 @@ use super::source::Numbers;
 use super::{Verdict, promise};
 use fmlgs::math::vector::{dot, unit};
 use fmlgs::pipeline::semantics::codes::{RADIUS, assign, matches};
-use fmlgs::pipeline::semantics::grammar::{Kind, Phrase};
-use fmlgs::pipeline::semantics::localise::{Answer, Scorer, Strategy, localise};
+use fmlgs::pipeline::semantics::localize::{Answer, Scorer, Strategy, localize};
+use fmlgs::pipeline::semantics::parse::{Kind, ParsedQuery};
 use fmlgs::pipeline::semantics::relevancy::{advantage, deviate, score};
 use fmlgs::scene::{Identities, Level};
 
@@ -100,14 +100,14 @@ impl Scorer for Anything<'_> {
 
 /// Answers are ordered, of identities that there are, and a score that is no number never hides one that
 /// is.
-pub fn localising(n: &mut Numbers) -> Verdict {
+pub fn localizing(n: &mut Numbers) -> Verdict {
     let all = identities(n, 30);
     let query = n.pick(&["lamp", "lid of the kettle", "the doll's eye", "a of b of c"]);
     let kind = n.pick(&[Kind::Auto, Kind::Object, Kind::Part]);
     let strategy = n.pick(&[Strategy::WholeFirst, Strategy::Paper, Strategy::OneStep, Strategy::Joint]);
-    let Some(phrase) = Phrase::parse(query) else { return Verdict::Broken("the phrase is none".into()) };
+    let Some(phrase) = ParsedQuery::parse(query) else { return Verdict::Broken("the phrase is none".into()) };
     let mut scorer = Anything { n, count: all.len(), strategy, asked: Vec::new() };
-    let answer = localise(&all, &phrase, kind, &mut scorer);
+    let answer = localize(&all, &phrase, kind, &mut scorer);
     let hits = answer.hits();
     promise!(hits.iter().all(|h| all.get(h.identity).is_some()), "an identity that there is not");
     let ordered = hits.windows(2).all(|w| w[0].score >= w[1].score || w[1].score.is_nan());

@@ -146,7 +146,7 @@ impl Drawn {
         (a.visible, a.degenerate) == (b.visible, b.degenerate)
     }
 
-    /// By how much a colour may deviate: a sum of spherical harmonics is as exact as its largest term, of
+    /// By how much a color may deviate: a sum of spherical harmonics is as exact as its largest term, of
     /// those that are drawn.
     fn color_slack(&self, cloud: &GaussianCloud) -> f64 {
         let stride = fmlgs::math::sh::coefficients(cloud.sh_degree);

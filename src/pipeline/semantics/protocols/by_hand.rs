@@ -1,4 +1,4 @@
-//! Every protocol on masks made by hand, held against values worked out by hand in the comments.
+//! Every protocol on masks made by hand, compared with values worked out by hand in the comments.
 
 use std::convert::Infallible;
 
@@ -7,10 +7,10 @@ use glam::DVec3;
 use super::part_recall::Components;
 use super::*;
 use crate::pipeline::semantics::answer::{Basis, by_name};
-use crate::pipeline::semantics::grammar::{Kind, Phrase};
-use crate::pipeline::semantics::localise::{Answer, Hit};
+use crate::pipeline::semantics::localize::{Answer, Hit};
+use crate::pipeline::semantics::parse::{Kind, ParsedQuery};
 use crate::pipeline::semantics::relevancy::{PART_WEIGHT, deviate};
-use crate::pipeline::semantics::stages::StagesMs;
+use crate::pipeline::semantics::timing::StagesMs;
 use crate::render::RenderSettings;
 use crate::scene::{GaussianCloud, Identities, IdentityId, LanguageFeatures, NOBODY, ViewFeatures};
 
@@ -47,14 +47,14 @@ fn label(name: &str, level: Level, size: [usize; 2], inside: impl Fn(usize) -> b
 }
 
 /// Asks a scene by the names of its identities.
-fn named(map: &SemanticMap) -> impl FnMut(&str) -> Option<Answered> + '_ {
-    |text| Phrase::parse(text).map(|phrase| by_name(&map.identities, &phrase, Kind::Auto))
+fn named(map: &SemanticMap) -> impl FnMut(&str) -> Option<QueryAnswer> + '_ {
+    |text| ParsedQuery::parse(text).map(|phrase| by_name(&map.identities, &phrase, Kind::Auto))
 }
 
 /// An answer whose relevancies are given, best identity first.
-fn answered(best: IdentityId, relevancy: &[f32]) -> Answered {
+fn answered(best: IdentityId, relevancy: &[f32]) -> QueryAnswer {
     let hit = Hit { identity: best, score: relevancy[best as usize], margin: 0.5 };
-    Answered {
+    QueryAnswer {
         answer: Answer::Found(vec![hit]),
         basis: Basis::Meaning,
         relevancy: relevancy.to_vec(),
@@ -85,7 +85,7 @@ fn masks_are_intersection_over_union_by_level() {
         // Nobody is called so: nothing of 3 pixels.
         label("giraffe", Level::Object, [10, 1], |i| i < 3),
     ];
-    let view = LabelledView { name: "a", camera: &camera, exact: &view, blended: &blended, categories };
+    let view = LabeledView { name: "a", camera: &camera, exact: &view, blended: &blended, categories };
     let units = masks::compare(&mut AskedScene { map: &map, ask: &mut named(&map) }, &view);
     close(&ious(&units), &[5.0 / 6.0, 0.25, 0.0]);
     // Objects: (5/6 + 0) / 2; parts: 1/4.
@@ -112,14 +112,14 @@ fn langsplat_smooths_scales_and_cuts() {
     // up to x = 169. Fourth: at most 0.2. A majority of 7 x 7 leaves straight edges where they are.
     // So the mask is columns 0..67 and 120..170: 67 + 50 of them.
     let categories = vec![
-        // Columns 0..120 are labelled: 67 in both, 120 + 50 in either. The largest mean is 1, first at
+        // Columns 0..120 are labeled: 67 in both, 120 + 50 in either. The largest mean is 1, first at
         // column 0, which is in the label's box.
         label("a", Level::Object, [w, h], |i| i % w < 120),
         // Columns 100..200: 50 in both, 100 + 67 in either; column 0 is not in the box.
         label("a", Level::Object, [w, h], |i| (100..200).contains(&(i % w))),
     ];
     let (camera, blended) = (camera(w as u32, h as u32), CodeMap::default());
-    let view = LabelledView { name: "a", camera: &camera, exact: &view, blended: &blended, categories };
+    let view = LabeledView { name: "a", camera: &camera, exact: &view, blended: &blended, categories };
     let mut ask = |_: &str| Some(answered(1, &[0.0, 1.0, 0.65, 0.76, 0.0]));
     let units = langsplat::compare(&mut AskedScene { map: &map, ask: &mut ask }, &view);
     close(&ious(&units), &[67.0 / 170.0, 50.0 / 167.0]);
@@ -138,9 +138,8 @@ fn fastlgs_ex_pools_over_categories_and_views() {
     let planes = std::array::from_fn(|c| map.codes.iter().map(|codes| codes[c]).collect());
     let blended = CodeMap { width_px: 10, height_px: 1, planes };
     let camera = camera(10, 1);
-    let labelled =
-        |name, categories| LabelledView { name, camera: &camera, exact: &view, blended: &blended, categories };
-    let first = labelled(
+    let labeled = |name, categories| LabeledView { name, camera: &camera, exact: &view, blended: &blended, categories };
+    let first = labeled(
         "a",
         vec![
             // Doll with eye 0..5, label 3..7: 2 in both, 7 in either. Pool 2/7.
@@ -149,8 +148,8 @@ fn fastlgs_ex_pools_over_categories_and_views() {
             label("cat", Level::Object, [10, 1], |i| (5..8).contains(&i)),
         ],
     );
-    // In the next view, nobody is called so, and 10 px are labelled: 0 of 10. Pool 5/20.
-    let second = labelled("b", vec![label("giraffe", Level::Object, [10, 1], |_| true)]);
+    // In the next view, nobody is called so, and 10 px are labeled: 0 of 10. Pool 5/20.
+    let second = labeled("b", vec![label("giraffe", Level::Object, [10, 1], |_| true)]);
     let mut ask = named(&map);
     let (mut scene, mut pool) = (AskedScene { map: &map, ask: &mut ask }, fastlgs_ex::Pool::default());
     close(&ious(&fastlgs_ex::compare(&mut scene, &first, &mut pool)), &[2.0 / 7.0, 0.5]);
@@ -187,7 +186,7 @@ fn a_selection_is_drawn_alone_and_cut_at_seven_tenths() {
         label("doll", Level::Object, size, |i| disc(i) && off(i)[0] < 0.0),
         label("giraffe", Level::Object, size, disc),
     ];
-    let view = LabelledView { name: "a", camera: &camera, exact: &view, blended: &blended, categories };
+    let view = LabeledView { name: "a", camera: &camera, exact: &view, blended: &blended, categories };
     let mut ask = named(&map);
     let mut asked = AskedScene { map: &map, ask: &mut ask };
     let units = selection_3d::compare(&mut asked, &view, &cloud, &RenderSettings::default()).expect("drawn");
@@ -210,7 +209,7 @@ fn spin_nerf_joins_the_labels_and_counts_all_pixels() {
     // 0..2 and 4..6: 6 of 10 columns are right.
     let piece = |from: usize| label("x", Level::Object, [10, 10], move |i| (from..from + 2).contains(&(i % 10)));
     let categories = vec![piece(2), piece(4)];
-    let view = LabelledView { name: "a", camera: &camera, exact: &view, blended: &blended, categories };
+    let view = LabeledView { name: "a", camera: &camera, exact: &view, blended: &blended, categories };
     let mut ask = named(&map);
     let mut asked = AskedScene { map: &map, ask: &mut ask };
     let found = spin_nerf::compare(&mut asked, &view, "the doll").expect("has labels");
@@ -219,7 +218,7 @@ fn spin_nerf_joins_the_labels_and_counts_all_pixels() {
     // Not found: no pixel is right but those that are no foreground, 6 of 10 columns.
     let found = spin_nerf::compare(&mut asked, &view, "giraffe").expect("has labels");
     assert!(found.unit.iou == 0.0 && (found.accuracy - 0.6).abs() < 2e-3, "{found:?}");
-    let empty = LabelledView { categories: vec![], ..view };
+    let empty = LabeledView { categories: vec![], ..view };
     assert_eq!(spin_nerf::compare(&mut asked, &empty, "the doll"), None);
 }
 
@@ -231,7 +230,7 @@ fn classes_have_their_own_masks_or_compete_for_pixels() {
     let (camera, blended) = (camera(10, 1), CodeMap::default());
     let categories =
         vec![label("cat", Level::Object, [10, 1], |i| i >= 6), label("toy", Level::Object, [10, 1], |i| i < 6)];
-    let view = LabelledView { name: "a", camera: &camera, exact: &view, blended: &blended, categories };
+    let view = LabeledView { name: "a", camera: &camera, exact: &view, blended: &blended, categories };
     // "cat" is most relevant for the cat, 0.9, where "toy" has 0.95; "toy" is most relevant for the
     // doll, 0.97, but for its eye "cat" has 0.6 against 0.5.
     let mut ask = |text: &str| match text {
@@ -242,7 +241,7 @@ fn classes_have_their_own_masks_or_compete_for_pixels() {
     let mut asked = AskedScene { map: &map, ask: &mut ask };
     let classes = ["cat", "sofa", "toy"].map(str::to_owned);
     let [own, winner] = multi_class::compare(&mut asked, &view, &classes);
-    // Own masks: the cat is 6..10, 4 of 4; the toy is the doll with its eye, 6 of 6. Nobody labelled a sofa.
+    // Own masks: the cat is 6..10, 4 of 4; the toy is the doll with its eye, 6 of 6. Nobody labeled a sofa.
     close(&ious(&own), &[1.0, 1.0]);
     // Arg-max: "cat" wins the eye only, 4..6: 0 of 6. "toy" wins doll and cat, 0..4 and 6..10: 4 of 10.
     close(&ious(&winner), &[0.0, 0.4]);
@@ -310,7 +309,7 @@ fn part_recall_rises_with_every_component() {
         label("mug", Level::Object, [20, 1], |i| i < 10),
     ];
     let (camera, blended) = (camera(20, 1), CodeMap::default());
-    let views = [LabelledView { name: "a", camera: &camera, exact: &view, blended: &blended, categories }];
+    let views = [LabeledView { name: "a", camera: &camera, exact: &view, blended: &blended, categories }];
     let encode = |phrase: &str| {
         Ok::<_, Infallible>(match phrase {
             "mug" => mixed(&[(MUG, 1.0)]),
@@ -365,7 +364,7 @@ fn an_overlap_of_a_half_is_a_hit_and_less_is_none() {
     // The handle is pixels 0 and 1: half of four, and of what begins at pixel 1, 1 of 4.
     for (from, recall, iou) in [(0, 1.0, 0.5), (1, 0.0, 0.25)] {
         let categories = vec![label("handle of the mug", Level::Part, [4, 1], move |i| i >= from)];
-        let view = LabelledView { name: "a", camera: &camera, exact: &view, blended: &blended, categories };
+        let view = LabeledView { name: "a", camera: &camera, exact: &view, blended: &blended, categories };
         let row = part_recall::row(Components::ROWS[4], &map, &language, &[view], encode).expect("encodes");
         close(&[row.recall, row.mean_iou], &[recall, iou]);
     }

@@ -3,7 +3,7 @@
 //! its values is that of all categories so far. Printed for comparison with published numbers, never
 //! beside other protocols without its name.
 
-use super::{AskedScene, LabelledView, Unit};
+use super::{AskedScene, LabeledView, Unit};
 use crate::pipeline::semantics::codes::TOLERANCE;
 use crate::pipeline::semantics::matching;
 use crate::scene::Mask;
@@ -16,7 +16,7 @@ pub struct Pool {
 }
 
 /// Compares all categories of a view; `pool` goes from view to view.
-pub fn compare(scene: &mut AskedScene<'_>, view: &LabelledView<'_>, pool: &mut Pool) -> Vec<Unit> {
+pub fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>, pool: &mut Pool) -> Vec<Unit> {
     let mut units = Vec::new();
     for category in &view.categories {
         // One target per query, the best.

@@ -1,11 +1,11 @@
-//! `langsplat`: relevancy maps of both levels, smoothed, normalised and cut at 0.4.
+//! `langsplat`: relevancy maps of both levels, smoothed, normalized and cut at 0.4.
 //!
 //! `avg` = 30 x 30 box filter (window x-15..x+14, edges mirrored); `v = (avg + relevancy) / 2`; `o` =
 //! `v` scaled to 0..1, then `clip(2 o - 1, 0, 1)`; mask = `o > 0.4`, then a 7 x 7 majority. The level
 //! with the largest `v` counts. The arg-max of `avg` is a hit inside any of the category's boxes.
 
-use super::{AskedScene, LabelledView, Unit};
-use crate::pipeline::semantics::answer::Answered;
+use super::{AskedScene, LabeledView, Unit};
+use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::{Identities, IdentityId, Level, Mask};
 
@@ -13,11 +13,11 @@ use crate::scene::{Identities, IdentityId, Level, Mask};
 const BOX: usize = 30;
 /// Half the side of the majority filter, px.
 const MAJORITY: usize = 3;
-/// What is kept after normalisation.
+/// What is kept after normalization.
 const CUT: f32 = 0.4;
 
 /// Compares all categories of a view.
-pub fn compare(scene: &mut AskedScene<'_>, view: &LabelledView<'_>) -> Vec<Unit> {
+pub fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>) -> Vec<Unit> {
     let (w, h) = (view.exact.width_px, view.exact.height_px);
     let identities = &scene.map.identities;
     let one = |category: &super::Category| {
@@ -33,7 +33,7 @@ pub fn compare(scene: &mut AskedScene<'_>, view: &LabelledView<'_>) -> Vec<Unit>
 }
 
 /// Mask and index of the most relevant pixel.
-fn answer(answered: &Answered, map: &ViewMap, identities: &Identities) -> (Mask, usize) {
+fn answer(answered: &QueryAnswer, map: &ViewMap, identities: &Identities) -> (Mask, usize) {
     let (w, h) = (map.width_px, map.height_px);
     let levels = [Level::Object, Level::Part].map(|level| {
         let relevancy: Vec<f32> = map.identity.iter().map(|id| at_level(answered, identities, *id, level)).collect();
@@ -50,7 +50,7 @@ fn answer(answered: &Answered, map: &ViewMap, identities: &Identities) -> (Mask,
 }
 
 /// Relevancy of a pixel's object, or of its part.
-fn at_level(answered: &Answered, identities: &Identities, id: IdentityId, level: Level) -> f32 {
+fn at_level(answered: &QueryAnswer, identities: &Identities, id: IdentityId, level: Level) -> f32 {
     let of = match level {
         Level::Object => identities.object_of(id),
         Level::Part if identities.get(id).is_some_and(|i| i.level == Level::Part) => id,
@@ -93,7 +93,7 @@ fn box_filter(v: &[f32], w: usize, h: usize) -> Vec<f32> {
     pass(&pass(&wide, w, h), h, w).into_iter().map(|x| x as f32).collect()
 }
 
-/// Pixels most of whose neighbourhood is in the mask.
+/// Pixels most of whose neighborhood is in the mask.
 fn majority(mask: &Mask) -> Mask {
     let (w, h) = (mask.width_px(), mask.height_px());
     Mask::from_fn(w, h, |i| {
@@ -114,8 +114,8 @@ mod tests {
     use super::*;
     use crate::pipeline::semantics::answer::Basis;
     use crate::pipeline::semantics::code_map::CodeMap;
-    use crate::pipeline::semantics::localise::Answer;
-    use crate::pipeline::semantics::stages::StagesMs;
+    use crate::pipeline::semantics::localize::Answer;
+    use crate::pipeline::semantics::timing::StagesMs;
     use crate::scene::{Camera, NOBODY, SemanticMap};
     use glam::DVec3;
 
@@ -167,7 +167,7 @@ mod tests {
         let blended = CodeMap::default();
         let compare_with = |relevancy: Vec<f32>| {
             let mut ask = |_: &str| {
-                Some(Answered {
+                Some(QueryAnswer {
                     answer: Answer::NotFound(vec![]),
                     basis: Basis::Meaning,
                     relevancy: relevancy.clone(),
@@ -176,7 +176,7 @@ mod tests {
             };
             let boxes = truth.bounds().into_iter().collect();
             let categories = vec![Category { name: "eye".into(), level: Level::Object, mask: truth.clone(), boxes }];
-            let view = LabelledView { name: "v", camera: &camera, exact: &exact, blended: &blended, categories };
+            let view = LabeledView { name: "v", camera: &camera, exact: &exact, blended: &blended, categories };
             compare(&mut AskedScene { map: &map, ask: &mut ask }, &view).remove(0)
         };
         let right = compare_with(vec![0.1, 0.3, 0.9]);

@@ -1,10 +1,10 @@
 //! `masks`: the pixels of the answer to every name against the region, objects and parts apart.
 
-use super::{AskedScene, Category, LabelledView, Unit, means};
+use super::{AskedScene, Category, LabeledView, Unit, means};
 use crate::scene::Level;
 
 /// Asks for all categories of a view.
-pub fn compare(scene: &mut AskedScene<'_>, view: &LabelledView<'_>) -> Vec<Unit> {
+pub fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>) -> Vec<Unit> {
     let unit = |c: &Category| {
         let mask = (scene.ask)(&c.name).map(|a| a.mask(view.exact, &scene.map.identities, 1));
         c.unit(view.name, mask.map_or(0.0, |m| m.iou(&c.mask)), None)

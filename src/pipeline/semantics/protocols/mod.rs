@@ -1,6 +1,6 @@
 //! Evaluation protocols of the literature, one per file, each under the name that it is printed with.
 //!
-//! Every protocol asks a scene for the categories of labelled views and compares. Views are matched
+//! Every protocol asks a scene for the categories of labeled views and compares. Views are matched
 //! with labels by name, never by index.
 
 #[cfg(test)]
@@ -15,7 +15,7 @@ pub mod spin_nerf;
 
 use std::collections::BTreeMap;
 
-use super::answer::Answered;
+use super::answer::QueryAnswer;
 use super::code_map::CodeMap;
 use super::segmenter::FoundMask;
 use super::view_map::ViewMap;
@@ -26,11 +26,11 @@ pub struct AskedScene<'a> {
     /// What it consists of.
     pub map: &'a SemanticMap,
     /// Answers a phrase; `None` for one with nothing in it.
-    pub ask: &'a mut dyn FnMut(&str) -> Option<Answered>,
+    pub ask: &'a mut dyn FnMut(&str) -> Option<QueryAnswer>,
 }
 
-/// A labelled view of it.
-pub struct LabelledView<'a> {
+/// A labeled view of it.
+pub struct LabeledView<'a> {
     /// The photo's name.
     pub name: &'a str,
     /// From where.

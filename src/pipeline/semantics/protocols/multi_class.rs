@@ -1,17 +1,17 @@
 //! `3d-ovs`: every pixel's class, both ways of counting: the IoU of each class's own mask, as the
 //! LangSplat family reports it, and that of an arg-max over all classes, the original's.
 
-use super::{AskedScene, LabelledView, Unit};
+use super::{AskedScene, LabeledView, Unit};
 use crate::scene::Mask;
 
 /// Compares all classes of a view: by their own masks, and by the arg-max of relevancy.
-pub fn compare(scene: &mut AskedScene<'_>, view: &LabelledView<'_>, classes: &[String]) -> [Vec<Unit>; 2] {
+pub fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>, classes: &[String]) -> [Vec<Unit>; 2] {
     let (w, h) = (view.exact.width_px, view.exact.height_px);
     let identities = &scene.map.identities;
     let answers: Vec<_> = classes.iter().map(|c| (scene.ask)(c)).collect();
     // Classes compete by identity: all pixels of one agree.
     let relevancy = |class: usize, id: u32| {
-        let of = |a: &super::Answered| a.relevancy.get(id as usize).copied().unwrap_or(0.0);
+        let of = |a: &super::QueryAnswer| a.relevancy.get(id as usize).copied().unwrap_or(0.0);
         answers[class].as_ref().map_or(f32::NEG_INFINITY, of)
     };
     let best_of =

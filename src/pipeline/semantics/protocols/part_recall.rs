@@ -1,11 +1,11 @@
 //! `part-recall`, the paper's ablation: how many part queries are answered with a mask of IoU 0.5 or
-//! more, as multilevel extraction (ME), semantic deviation (SD) and multilevel localisation (ML) are
+//! more, as multilevel extraction (ME), semantic deviation (SD) and multilevel localization (ML) are
 //! switched on one after another.
 
-use super::{LabelledView, Unit};
+use super::{LabeledView, Unit};
 use crate::math::stats::mean;
-use crate::pipeline::semantics::localise::Strategy;
-use crate::pipeline::semantics::meaning::{MeaningOptions, PartFeatures, Phrasebook};
+use crate::pipeline::semantics::by_embedding::{EmbeddingOptions, PartFeatures, TextEmbeddings};
+use crate::pipeline::semantics::localize::Strategy;
 use crate::pipeline::semantics::query_engine::ask_by_embedding;
 use crate::scene::{Identities, LanguageFeatures, Level, Mask, SemanticMap};
 
@@ -19,8 +19,8 @@ pub struct Components {
     pub extraction: bool,
     /// Parts' features are moved towards their objects'.
     pub deviation: bool,
-    /// Localisation in the paper's two steps.
-    pub localisation: bool,
+    /// Localization in the paper's two steps.
+    pub localization: bool,
     /// Instead of those, part and whole at once, which is this program's default.
     pub joint: bool,
 }
@@ -35,19 +35,19 @@ impl Components {
         Self::of(true, true, false, true),
     ];
 
-    const fn of(extraction: bool, deviation: bool, localisation: bool, joint: bool) -> Self {
-        Self { extraction, deviation, localisation, joint }
+    const fn of(extraction: bool, deviation: bool, localization: bool, joint: bool) -> Self {
+        Self { extraction, deviation, localization, joint }
     }
 
-    fn options(self) -> MeaningOptions {
-        MeaningOptions {
+    fn options(self) -> EmbeddingOptions {
+        EmbeddingOptions {
             parts: if self.deviation { PartFeatures::Deviated } else { PartFeatures::Raw },
             strategy: match self {
                 Self { joint: true, .. } => Strategy::Joint,
-                Self { localisation: true, .. } => Strategy::Paper,
+                Self { localization: true, .. } => Strategy::Paper,
                 _ => Strategy::OneStep,
             },
-            ..MeaningOptions::default()
+            ..EmbeddingOptions::default()
         }
     }
 }
@@ -76,14 +76,14 @@ pub fn row<E>(
     components: Components,
     map: &SemanticMap,
     language: &LanguageFeatures,
-    views: &[LabelledView<'_>],
+    views: &[LabeledView<'_>],
     mut encode: impl FnMut(&str) -> Result<Vec<f32>, E>,
 ) -> Result<Row, E> {
     let objects = objects_alone(language, &map.identities);
     let features = if components.extraction { language } else { &objects };
     let (mut units, mut secs) = (Vec::new(), Vec::new());
     // Canonical phrases are encoded once for all queries.
-    let mut phrases = Phrasebook::default();
+    let mut phrases = TextEmbeddings::default();
     phrases.learn(&[], &mut encode)?;
     for view in views {
         for category in view.categories.iter().filter(|c| c.level == Level::Part) {

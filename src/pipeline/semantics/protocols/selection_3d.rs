@@ -1,6 +1,6 @@
 //! `3d-selection`: Gaussians chosen by text, their silhouette rendered alone, cut at 0.7.
 
-use super::{AskedScene, LabelledView, Unit};
+use super::{AskedScene, LabeledView, Unit};
 use crate::pipeline::semantics::codes::TOLERANCE;
 use crate::pipeline::semantics::matching::{MatchMode, gaussians};
 use crate::render::{Features, RenderError, RenderSettings, Renderer};
@@ -15,7 +15,7 @@ const CUT: f32 = 0.7;
 /// If the view cannot be drawn.
 pub fn compare(
     scene: &mut AskedScene<'_>,
-    view: &LabelledView<'_>,
+    view: &LabeledView<'_>,
     cloud: &GaussianCloud,
     settings: &RenderSettings,
 ) -> Result<Vec<Unit>, RenderError> {

@@ -1,7 +1,7 @@
 //! `spin-nerf`: IoU of the foreground and share of pixels that are right, at 1008 x 567, plain means
-//! over labelled views.
+//! over labeled views.
 
-use super::{AskedScene, LabelledView, Unit};
+use super::{AskedScene, LabeledView, Unit};
 use crate::scene::Mask;
 
 /// Size at which masks are compared, px.
@@ -17,7 +17,7 @@ pub struct Foreground {
 }
 
 /// Compares the one category of a view with the answer to `query`; `None` if the view has no labels.
-pub fn compare(scene: &mut AskedScene<'_>, view: &LabelledView<'_>, query: &str) -> Option<Foreground> {
+pub fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>, query: &str) -> Option<Foreground> {
     let first = view.categories.first()?;
     let mut truth = Mask::empty(first.mask.width_px(), first.mask.height_px());
     view.categories.iter().for_each(|c| truth.add(&c.mask));

@@ -1,6 +1,6 @@
 //! The smallest pieces: the basins of the edge map, as water would fill them (watershed).
 
-use crate::math::grid::neighbours;
+use crate::math::grid::neighbors;
 
 /// The piece of pixels outside the domain.
 pub const OUTSIDE: u32 = u32::MAX;
@@ -29,7 +29,7 @@ pub fn basins(strength: &[f32], domain: &[bool], width: usize, step: f32) -> (Ve
             continue;
         };
         let own = label[i as usize];
-        for j in neighbours(i as usize, width, label.len()) {
+        for j in neighbors(i as usize, width, label.len()) {
             if label[j] == DRY {
                 label[j] = own;
                 queue[usize::from(levels[j]).max(at)].push_back(j as u32);
@@ -47,7 +47,7 @@ pub fn basins(strength: &[f32], domain: &[bool], width: usize, step: f32) -> (Ve
 /// Steps of strength told apart.
 const LEVELS: usize = 1024;
 
-/// Gives every plateau without a lower neighbour a label; how many there are.
+/// Gives every plateau without a lower neighbor a label; how many there are.
 fn minima(levels: &[u16], label: &mut [u32], width: usize) -> u32 {
     let n = levels.len();
     let mut seen = vec![false; n];
@@ -64,7 +64,7 @@ fn minima(levels: &[u16], label: &mut [u32], width: usize) -> u32 {
         let mut next = 0;
         while let Some(&i) = plateau.get(next) {
             next += 1;
-            for j in neighbours(i, width, n).filter(|&j| label[j] != OUTSIDE) {
+            for j in neighbors(i, width, n).filter(|&j| label[j] != OUTSIDE) {
                 if levels[j] < levels[i] {
                     lowest = false;
                 } else if levels[j] == levels[i] && !seen[j] {

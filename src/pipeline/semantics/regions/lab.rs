@@ -1,4 +1,4 @@
-//! Colours as people tell them apart: CIELAB, D65.
+//! Colors as people tell them apart: CIELAB, D65.
 
 use crate::math::srgb::linear as linear_light;
 
@@ -27,7 +27,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn known_colours() {
+    fn known_colors() {
         let found = lab(&[[255, 255, 255], [0, 0, 0], [255, 0, 0], [0, 0, 255]]);
         let want = [[100.0, 0.0, 0.0], [0.0, 0.0, 0.0], [53.24, 80.09, 67.2], [32.3, 79.19, -107.86]];
         for (found, want) in found.iter().flatten().zip(want.iter().flatten()) {

@@ -1,10 +1,10 @@
-//! Regions of one photo without any network: pieces of even colour grow together into a tree, and
+//! Regions of one photo without any network: pieces of even color grow together into a tree, and
 //! what is still apart where only large differences are left is taken for an object; inside an
-//! object the same, once more, gives its parts. Where Gaussians are trained already, neighbours on
-//! one unbroken surface go together sooner. Nothing has a name, and borders are where colours
+//! object the same, once more, gives its parts. Where Gaussians are trained already, neighbors on
+//! one unbroken surface go together sooner. Nothing has a name, and borders are where colors
 //! change: rough, but there is no scene for which it says nothing.
 //!
-//! [`lab`] colours, [`edges`] between them, [`shape`] of the scene, [`basins`] of the edges, the
+//! [`lab`] colors, [`edges`] between them, [`shape`] of the scene, [`basins`] of the edges, the
 //! [`tree`] of the basins, and [`mod@segment`] from it.
 
 pub mod basins;

@@ -26,7 +26,7 @@ pub struct Picture<'a> {
 /// Settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RegionOptions {
-    /// Unlikeness, in steps of Lab colour between pieces of a thousandth of the whole, from which
+    /// Unlikeness, in steps of Lab color between pieces of a thousandth of the whole, from which
     /// things are different things.
     pub object_step: f64,
     /// The same between the parts of an object; the whole is the object then.
@@ -43,7 +43,7 @@ impl Default for RegionOptions {
     }
 }
 
-/// Weight of lightness beside the two colour axes: shadows change it within a thing.
+/// Weight of lightness beside the two color axes: shadows change it within a thing.
 const LIGHTNESS: f32 = 0.7;
 /// Edge strength that basins are told apart by, Lab steps.
 const BASIN_STEP: f32 = 0.3;
@@ -51,7 +51,7 @@ const BASIN_STEP: f32 = 0.3;
 const EDGE: f64 = 0.2;
 /// Power of the smaller piece's size: how much longer large pieces stay apart.
 const SIZE_POWER: f64 = 0.25;
-/// What remains of the unlikeness of two neighbours on one unbroken surface, and how many steps the
+/// What remains of the unlikeness of two neighbors on one unbroken surface, and how many steps the
 /// end of a surface between them adds.
 const UNBROKEN: f64 = 0.3;
 const END: f64 = 3.0;
@@ -104,7 +104,7 @@ impl Mosaic {
         let channels = [0, 1, 2].map(|c| colors.iter().map(|p| weights[c] * p[c]).collect::<Vec<f32>>());
         let strength = strength(&Planes { width, channels: &channels });
         let domain: Vec<bool> = (0..n).map(|i| picture.coverage.is_none_or(|c| c[i] > 0)).collect();
-        // Where a surface ends there is an edge, whatever the colours.
+        // Where a surface ends there is an edge, whatever the colors.
         let end = |i: usize| picture.ends.map_or(0.0, |e| e[i]);
         let walls: Vec<f32> = (0..n).map(|i| strength[i] + 10.0 * end(i)).collect();
         let (label, count) = basins(&walls, &domain, width, BASIN_STEP);

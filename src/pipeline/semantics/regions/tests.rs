@@ -5,7 +5,7 @@ use super::*;
 const W: usize = 320;
 const H: usize = 240;
 
-/// A red plate with a white and a dark button, and a green ball that touches it, before a grey wall
+/// A red plate with a white and a dark button, and a green ball that touches it, before a gray wall
 /// that gets darker downwards; some noise everywhere.
 fn scene() -> (Vec<[u8; 3]>, Vec<u8>) {
     let mut random = 1_u32;
@@ -41,7 +41,7 @@ fn best(found: &[FoundMask], ids: &[u8], wanted: &[u8]) -> f64 {
 }
 
 #[test]
-fn things_of_one_colour_are_found_and_noise_is_not() {
+fn things_of_one_color_are_found_and_noise_is_not() {
     let (rgb, ids) = scene();
     let found = find(&rgb, None);
     for wanted in [&[1][..], &[2], &[3], &[4]] {

@@ -1,4 +1,4 @@
-//! Pieces that grow together: the two neighbours that differ least become one, until one is left
+//! Pieces that grow together: the two neighbors that differ least become one, until one is left
 //! (a binary partition tree).
 
 use std::cmp::Reverse;
@@ -13,7 +13,7 @@ pub struct Piece {
     pub sums: Vec<f64>,
 }
 
-/// What lies between two neighbours.
+/// What lies between two neighbors.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Border {
     /// Pairs of pixels.
@@ -33,7 +33,7 @@ impl Border {
     }
 }
 
-/// How unlike two neighbours are.
+/// How unlike two neighbors are.
 pub type Unlike = dyn Fn(&Piece, &Piece, &Border) -> f64 + Sync;
 
 /// A node: a leaf, or two nodes made one.
@@ -81,7 +81,7 @@ pub fn grow(pieces: Vec<Piece>, borders: BTreeMap<(u32, u32), Border>, unlike: &
     Tree { nodes: g.nodes, leaves: g.leaves }
 }
 
-/// Pieces that are merged in place: the one with more neighbours takes up the other.
+/// Pieces that are merged in place: the one with more neighbors takes up the other.
 struct Growing<'a> {
     unlike: &'a Unlike,
     leaves: usize,
@@ -110,7 +110,7 @@ impl<'a> Growing<'a> {
         }
     }
 
-    /// How unlike two pieces are now; `None` if they are no neighbours any more.
+    /// How unlike two pieces are now; `None` if they are no neighbors any more.
     fn unlikeness(&self, a: u32, b: u32) -> Option<f64> {
         let border = self.near[a as usize].get(&b)?;
         Some((self.unlike)(&self.pieces[a as usize], &self.pieces[b as usize], border).max(0.0))

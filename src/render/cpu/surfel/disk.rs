@@ -1,7 +1,7 @@
 //! Where the rays of eight pixels meet a surfel's plane, and what the surfel gives them.
 //!
 //! A point `(u, v)` of the disk has the depth `Z + a u + b v` and lies `(A u + A' v) / depth` px to
-//! the right of the projected centre and `(B u + B' v) / depth` px below it. Solved for the point
+//! the right of the projected center and `(B u + B' v) / depth` px below it. Solved for the point
 //! that a pixel at offset `(dx, dy)` sees:
 //!
 //! ```text
@@ -27,7 +27,7 @@ pub struct Disk<R: Real, L: Lanes<R>> {
     pub across: [[L::V; 2]; 2],
     /// `a, b`.
     pub along: [L::V; 2],
-    /// Depth of the centre.
+    /// Depth of the center.
     pub z: L::V,
     /// `D`, not negative.
     pub determinant: L::V,

@@ -6,14 +6,14 @@ use crate::math::{Real, rotation};
 use crate::scene::Gaussian;
 
 /// Numbers per splat in front of the composited channels: derivatives of the picture's x by the
-/// disk's two coordinates and of its y, both times depth, and of depth; the projected centre in px.
+/// disk's two coordinates and of its y, both times depth, and of depth; the projected center in px.
 pub const SHAPE: usize = 8;
 
 /// Everything between a surfel's raw parameters and its splat that the backward pass needs too.
 pub struct Geometry<R> {
-    /// Centre relative to the camera, world axes.
+    /// Center relative to the camera, world axes.
     pub relative: [R; 3],
-    /// Centre in camera axes.
+    /// Center in camera axes.
     pub local: [R; 3],
     /// The disk's two half axes in camera axes, lengths one standard deviation; the second one
     /// turned such that the determinant of `across` is not negative.
@@ -26,7 +26,7 @@ pub struct Geometry<R> {
     pub across: [[R; 2]; 2],
     /// Determinant of `across`, not negative.
     pub determinant: R,
-    /// Projected centre, px.
+    /// Projected center, px.
     pub center: [R; 2],
     /// Unit normal towards the camera, world axes.
     pub normal: [R; 3],
@@ -86,7 +86,7 @@ pub fn geometry<R: Real>(gaussian: &Gaussian<'_, R>, view: &View<R>) -> Option<G
 
 /// An ellipse around all pixels that get alpha from a surfel.
 pub struct Bound<R> {
-    /// Its centre, relative to the projected centre, px.
+    /// Its center, relative to the projected center, px.
     pub offset: [R; 2],
     /// `[xx, xy, yy]` such that the ellipse is `d' inverse(this) d <= 1`.
     pub squared: [R; 3],
@@ -99,7 +99,7 @@ pub struct Bound<R> {
 #[inline(always)]
 pub fn bound<R: Real>(g: &Geometry<R>, reach: R) -> Option<Bound<R>> {
     let (along, z) = ([g.axes[0][2], g.axes[1][2]], g.local[2]);
-    // How far depth changes across the disk, as a share of the centre's depth, squared.
+    // How far depth changes across the disk, as a share of the center's depth, squared.
     let slope = reach * (along[0] * along[0] + along[1] * along[1]) / (z * z);
     let rest = R::ONE - slope;
     if !(rest > R::of(1e-6)) {
@@ -114,7 +114,7 @@ pub fn bound<R: Real>(g: &Geometry<R>, reach: R) -> Option<Bound<R>> {
     let yy = offset[1] * offset[1] + size * (y[0] * y[0] + y[1] * y[1]);
     let area = size * g.determinant;
     let sharp = area * area / rest;
-    // Around it and the least disk about the projected centre, which lies off the ellipse's centre
+    // Around it and the least disk about the projected center, which lies off the ellipse's center
     // by the share sqrt(slope): (t s + r)² <= (1 + t)(t s² + r²).
     let t = slope.sqrt();
     let (wide, blur) = ((t * (R::ONE + t)).max(R::ONE), (R::ONE + t) * reach / R::of(INVERSE_BLUR));

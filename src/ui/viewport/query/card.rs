@@ -6,7 +6,7 @@ use strum::VariantArray;
 use super::{OverlaySettings, Queries, times};
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::answer::Basis;
-use crate::pipeline::semantics::localise::Answer;
+use crate::pipeline::semantics::localize::Answer;
 use crate::pipeline::semantics::matching::{self, MatchMode};
 use crate::pipeline::semantics::names;
 use crate::scene::{Bounds, GaussianCloud, IdentityId, SemanticMap, text};

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::pipeline::semantics::meaning::Phrasebook;
+use crate::pipeline::semantics::by_embedding::TextEmbeddings;
 use crate::worker::text_encoder::{Encoded, EncodedText, TextEncoder};
 
 /// What is known of the texts on screen.
@@ -47,7 +47,7 @@ impl Embeddings {
     }
 
     /// Embeddings of the phrases of a text, if the encoder knows its words.
-    pub(super) fn phrases(&self, text: &str) -> Option<&Phrasebook> {
+    pub(super) fn phrases(&self, text: &str) -> Option<&TextEmbeddings> {
         self.of(text).filter(|t| t.known).map(|_| &self.known.phrases)
     }
 

@@ -19,11 +19,11 @@ use egui::{Color32, Rect, TextureHandle, TextureOptions, Ui};
 
 use self::embeddings::Embeddings;
 pub use self::settings::{ColorBy, OverlaySettings};
-use crate::pipeline::semantics::answer::Answered;
+use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::matching::MatchMode;
 use crate::pipeline::semantics::names;
 use crate::pipeline::semantics::query_engine::answer_encoded;
-use crate::pipeline::semantics::stages::{StagesMs, ms_since};
+use crate::pipeline::semantics::timing::{StagesMs, ms_since};
 use crate::scene::{IdentityId, Mask, ScenePlan, SemanticMap};
 use crate::worker::{Versioned, ViewMaps};
 
@@ -39,7 +39,7 @@ pub struct Asked {
     /// As it was typed.
     pub text: String,
     /// What it comes to.
-    pub answered: Answered,
+    pub answered: QueryAnswer,
     /// Whether the text encoder has yet to read it: names alone have answered so far.
     pub pending: bool,
     /// A hit that was chosen among the others; else the best are shown.

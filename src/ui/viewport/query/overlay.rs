@@ -4,7 +4,7 @@ use egui::{Color32, ColorImage};
 use rayon::prelude::*;
 
 use super::settings::{ColorBy, OverlaySettings};
-use crate::math::grid::neighbours;
+use crate::math::grid::neighbors;
 use crate::math::vector::dot;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::matching::MatchMode;
@@ -114,13 +114,13 @@ fn with_alpha([r, g, b]: [u8; 3], alpha: f32) -> Color32 {
 
 /// Whether a pixel outside of the mask has a neighbor in it.
 fn is_beside(mask: &Mask, i: usize) -> bool {
-    neighbours(i, mask.width_px(), mask.width_px() * mask.height_px()).any(|j| mask.contains(j))
+    neighbors(i, mask.width_px(), mask.width_px() * mask.height_px()).any(|j| mask.contains(j))
 }
 
 /// Whether a pixel of the mask has a neighbor outside of it.
 fn is_edge(mask: &Mask, i: usize) -> bool {
     let (w, h) = (mask.width_px(), mask.height_px());
-    mask.contains(i) && neighbours(i, w, w * h).any(|j| !mask.contains(j))
+    mask.contains(i) && neighbors(i, w, w * h).any(|j| !mask.contains(j))
 }
 
 /// Colors of vectors by their three main directions (principal components), by number from 0; gray

@@ -4,7 +4,7 @@ use egui::{Color32, Rect, RichText, Sense, Ui, pos2, vec2};
 
 use super::super::super::theme;
 use crate::math::format::millis;
-use crate::pipeline::semantics::stages::{STAGES, StagesMs};
+use crate::pipeline::semantics::timing::{STAGES, StagesMs};
 
 /// Colors of the stages, in their order.
 const COLORS: [Color32; 5] = [
@@ -18,7 +18,7 @@ const COLORS: [Color32; 5] = [
 /// What each stage is, for the user.
 const MEANING: &str = "encode: the words become vectors; nothing to do where they were typed before\n\
     relevancy: every object and part is scored\n\
-    localise: those that are meant are chosen\n\
+    localize: those that are meant are chosen\n\
     mask: their pixels in this view are found\n\
     draw: the pixels become an overlay";
 

@@ -1,0 +1,79 @@
+//! What a scene is made of, and which share of a view each identity covers: drawn small and counted, once per
+//! view.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use glam::DVec3;
+
+use crate::navigate::Pose;
+use crate::pipeline::semantics::view_map::ViewMap;
+use crate::render::{RenderSettings, Renderer};
+use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, SemanticMap};
+use crate::worker::Explored;
+
+/// What a scene is made of.
+pub struct Parts {
+    pub cloud: Arc<GaussianCloud>,
+    pub settings: RenderSettings,
+    pub map: Arc<SemanticMap>,
+    pub cameras: Vec<Camera>,
+    pub up: DVec3,
+    /// Length of a unit in meters, if that is known.
+    pub meters: Option<f64>,
+    pub exports: PathBuf,
+    /// What is known of moving about, if the scene was looked at before.
+    pub explored: Option<Arc<Explored>>,
+}
+
+/// Longer side of the picture in which pixels of identities are counted, px.
+const COUNT_SIDE_PX: f64 = 256.0;
+
+/// The shares of the last view that was asked about.
+#[derive(Default)]
+pub(super) struct ViewShares(Mutex<Option<Counted>>);
+
+/// Shares by number, with their view.
+struct Counted {
+    eye: Pose,
+    hidden: Vec<bool>,
+    shares: Vec<f64>,
+}
+
+/// Whether neither an identity nor what it is a piece of is hidden.
+pub(super) fn is_drawn(identities: &Identities, hidden: &[bool], id: IdentityId) -> bool {
+    !identities.line(id).any(|i| hidden.get(i as usize).copied().unwrap_or(false))
+}
+
+impl ViewShares {
+    /// The share of the view from `eye` that an identity covers, pieces included; 0 of one that is not known.
+    pub fn of(&self, parts: &Parts, eye: Pose, aspect: f64, hidden: &[bool], id: IdentityId) -> f64 {
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_new = known.as_ref().is_none_or(|k| k.eye != eye || k.hidden != hidden);
+        if is_new {
+            *known = Some(Counted { eye, hidden: hidden.to_vec(), shares: count(parts, eye, aspect, hidden) });
+        }
+        known.as_ref().and_then(|k| k.shares.get(id as usize)).copied().unwrap_or(0.0)
+    }
+}
+
+fn count(parts: &Parts, eye: Pose, aspect: f64, hidden: &[bool]) -> Vec<f64> {
+    let Parts { cloud, settings, map, .. } = parts;
+    let [w, h] = [aspect.min(1.0), 1.0 / aspect.max(1.0)].map(|s| (COUNT_SIDE_PX * s).max(1.0) as u32);
+    let (camera, identities) = (eye.camera(w, h), &map.identities);
+    let mut shares = vec![0.0; identities.len() + 1];
+    let view = if hidden.contains(&true) {
+        let is_kept = |i: &usize| map.of.get(*i).is_none_or(|id| is_drawn(identities, hidden, *id));
+        let kept: Vec<usize> = (0..cloud.len()).filter(is_kept).collect();
+        let of: Vec<IdentityId> = kept.iter().map(|i| map.of[*i]).collect();
+        ViewMap::render(&mut Renderer::new(), &cloud.select(&kept), &of, identities, &camera, settings)
+    } else {
+        ViewMap::render(&mut Renderer::new(), cloud, &map.of, identities, &camera, settings)
+    };
+    // A view that cannot be drawn shows nothing.
+    for id in view.map(|v| v.identity).unwrap_or_default() {
+        identities.line(id).for_each(|i| shares[i as usize] += 1.0);
+    }
+    shares.iter_mut().for_each(|s| *s /= f64::from(w * h));
+    shares
+}

@@ -1,0 +1,162 @@
+//! Videos of pictures: MP4, GIF, WebP, or PNG frames in a folder; or whatever an ffmpeg program writes.
+//!
+//! ```no_run
+//! use fmlgs::io::animation::{AnimationWriter, Settings};
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let mut video = VideoWriter::create("flight.mp4".as_ref(), &Settings::new(640, 480, 30.0))?;
+//! for _ in 0..90 {
+//!     video.push(&[0; 640 * 480 * 3])?; // sRGB, row by row from the top
+//! }
+//! let summary = video.finish()?;
+//! assert_eq!((summary.frames, summary.secs), (90, 3.0));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Frames go through one at a time and are not kept. What is written lies in a temporary place and
+//! appears under its name when [`VideoWriter::finish`] succeeds; a writer that is dropped before
+//! leaves nothing behind. Two formats keep more than a frame in memory: WebP all *compressed* frames
+//! (its container begins with the whole size), MP4 about 16 bytes per frame for its index.
+
+mod error;
+mod ffmpeg;
+mod format;
+mod frames;
+mod gif;
+mod mp4;
+mod settings;
+mod webp;
+mod yuv;
+
+use std::path::{Path, PathBuf};
+
+pub use error::VideoFileError;
+pub use format::Format;
+pub use settings::{Encoder, Settings};
+
+/// Result of this module's functions.
+pub type Result<T> = std::result::Result<T, VideoFileError>;
+
+/// What was written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Summary {
+    /// The file, or the folder of PNG frames.
+    pub path: PathBuf,
+    /// Its format; `None` where ffmpeg chose it by the file's name.
+    pub format: Option<Format>,
+    /// Frames pushed.
+    pub frames: u64,
+    /// Bytes on disk.
+    pub bytes: u64,
+    /// Playing time in seconds.
+    pub secs: f64,
+    /// Width and height of the video in px: those of the frames, less a last column or row of odd
+    /// number where the format (MP4) has even sides only.
+    pub size_px: (u32, u32),
+}
+
+/// Writes a video frame by frame.
+pub struct VideoWriter {
+    path: PathBuf,
+    format: Option<Format>,
+    settings: Settings,
+    size_px: (u32, u32),
+    frames: u64,
+    /// `None` once a frame has failed.
+    sink: Option<Box<dyn Sink>>,
+}
+
+/// Where the frames of one format go. Dropped without `finish`, it removes what it wrote.
+trait Sink: Send {
+    /// Width and height of the video in px.
+    fn size_px(&self) -> (u32, u32);
+    /// Takes the next frame: sRGB, `width * height * 3` bytes.
+    fn push(&mut self, rgb: &[u8]) -> Result<()>;
+    /// Completes the video, puts it in its place and returns its bytes.
+    fn finish(self: Box<Self>) -> Result<u64>;
+}
+
+impl VideoWriter {
+    /// Starts a video at `path`, in the format that the path's ending names (see [`Format::of`]);
+    /// with [`Encoder::Ffmpeg`] any ending that the program knows.
+    ///
+    /// # Errors
+    /// [`VideoFileError`]: an ending that no format has, a size or rate that the format cannot hold,
+    /// a file that exists (unless [`Settings::overwrite`]), a folder that cannot be written to, a
+    /// program that is missing.
+    pub fn create(path: &Path, settings: &Settings) -> Result<Self> {
+        settings.check(path)?;
+        let (format, sink): (_, Box<dyn Sink>) = match &settings.encoder {
+            Encoder::Ffmpeg { program, args } => {
+                settings.check_free(path)?;
+                (None, Box::new(ffmpeg::Ffmpeg::create(path, settings, program, args)?))
+            }
+            Encoder::BuiltIn => {
+                let format = Format::of(path)?;
+                format.check(path, settings)?;
+                if format != Format::Frames {
+                    settings.check_free(path)?;
+                }
+                let sink: Box<dyn Sink> = match format {
+                    Format::Mp4 => Box::new(mp4::Mp4::create(path, settings)?),
+                    Format::Gif => Box::new(gif::Gif::create(path, settings)?),
+                    Format::WebP => Box::new(webp::WebP::create(path, settings)?),
+                    Format::Frames => Box::new(frames::Frames::create(path, settings)?),
+                };
+                (Some(format), sink)
+            }
+        };
+        let size_px = sink.size_px();
+        Ok(Self { path: path.into(), format, settings: settings.clone(), size_px, frames: 0, sink: Some(sink) })
+    }
+
+    /// Width and height of the video in px; see [`Summary::size_px`].
+    pub fn size_px(&self) -> (u32, u32) {
+        self.size_px
+    }
+
+    /// Frames pushed so far.
+    pub fn frames(&self) -> u64 {
+        self.frames
+    }
+
+    /// Adds the next frame: sRGB, `width * height * 3` bytes, row by row from the top. After an error of
+    /// the encoder or the disk the video is lost: every further call fails, and nothing is left on disk.
+    ///
+    /// # Errors
+    /// [`VideoFileError`]: wrong length, an encoder that gives up, a full disk.
+    pub fn push(&mut self, rgb: &[u8]) -> Result<()> {
+        let expected = self.settings.frame_bytes();
+        if rgb.len() as u64 != expected {
+            return Err(VideoFileError::FrameBytes { frame: self.frames, found: rgb.len() as u64, expected });
+        }
+        if self.frames == self.settings.most_frames() {
+            let most = self.settings.most_frames();
+            return Err(VideoFileError::TooManyFrames { path: self.path.clone(), most });
+        }
+        let Some(sink) = &mut self.sink else { return Err(VideoFileError::Broken { path: self.path.clone() }) };
+        if let Err(e) = sink.push(rgb) {
+            self.sink = None;
+            return Err(e);
+        }
+        self.frames += 1;
+        Ok(())
+    }
+
+    /// Completes the video and puts it in its place.
+    ///
+    /// # Errors
+    /// [`VideoFileError`]: no frames, a frame that failed before, a full disk. Nothing is left then.
+    pub fn finish(mut self) -> Result<Summary> {
+        let Some(sink) = self.sink.take() else { return Err(VideoFileError::Broken { path: self.path }) };
+        if self.frames == 0 {
+            return Err(VideoFileError::NoFrames { path: self.path });
+        }
+        let bytes = sink.finish()?;
+        let secs = self.frames as f64 / self.settings.fps;
+        Ok(Summary { path: self.path, format: self.format, frames: self.frames, bytes, secs, size_px: self.size_px })
+    }
+}
+
+#[cfg(test)]
+mod tests;

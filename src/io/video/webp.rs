@@ -1,0 +1,110 @@
+//! Animated WebP, with loss (without at quality 100), by libwebp.
+//!
+//! libwebp's encoder belongs to one thread, so it gets one. It keeps the compressed frames until the
+//! end. A frame equal to the one before it makes that one longer; a video of equal frames becomes a
+//! still picture.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::thread::JoinHandle;
+
+use crossbeam_channel::{Receiver, Sender, bounded};
+use webp_animation::{ColorMode, EncoderOptions, EncodingConfig, EncodingType, Error};
+
+use super::{Result, Settings, Sink, VideoFileError};
+use crate::io::atomic::Draft;
+use crate::io::error::write_error;
+
+/// See the module.
+pub(super) struct WebP {
+    path: PathBuf,
+    size_px: (u32, u32),
+    draft: Draft,
+    encoder: Option<(Sender<Message>, JoinHandle<Film>)>,
+}
+
+/// The file, or why there is none.
+type Film = std::result::Result<Vec<u8>, Error>;
+
+/// What the encoder's thread is told. Without an end, it throws everything away.
+enum Message {
+    Frame(Vec<u8>),
+    End,
+}
+
+impl WebP {
+    pub(super) fn create(path: &Path, settings: &Settings) -> Result<Self> {
+        let draft = Draft::create(path)?;
+        // One frame waits while another is being encoded.
+        let (to_encoder, inbox) = bounded(1);
+        let of_thread = settings.clone();
+        let thread = std::thread::Builder::new()
+            .name("webp".into())
+            .spawn(move || encode(&of_thread, &inbox))
+            .map_err(|e| VideoFileError::Encoder { path: path.into(), reason: e.to_string() })?;
+        let size_px = (settings.width_px, settings.height_px);
+        Ok(Self { path: path.into(), size_px, draft, encoder: Some((to_encoder, thread)) })
+    }
+
+    /// Waits for the encoder's result.
+    fn result(&mut self) -> Result<Vec<u8>> {
+        let failed = |reason: String| VideoFileError::Encoder { path: self.path.clone(), reason };
+        let Some((to_encoder, thread)) = self.encoder.take() else { return Err(failed("it has ended".into())) };
+        drop(to_encoder);
+        match thread.join() {
+            Ok(result) => result.map_err(|e| failed(e.to_string())),
+            Err(_) => Err(failed("it panicked".into())),
+        }
+    }
+}
+
+impl Sink for WebP {
+    fn size_px(&self) -> (u32, u32) {
+        self.size_px
+    }
+
+    fn push(&mut self, rgb: &[u8]) -> Result<()> {
+        let sent = self.encoder.as_ref().is_some_and(|(to, _)| to.send(Message::Frame(rgb.to_vec())).is_ok());
+        if sent { Ok(()) } else { self.result().map(drop) }
+    }
+
+    fn finish(mut self: Box<Self>) -> Result<u64> {
+        if let Some((to_encoder, _)) = &self.encoder {
+            // A thread that has failed does not listen; its result says why.
+            let _ = to_encoder.send(Message::End);
+        }
+        let film = self.result()?;
+        let Self { path, mut draft, .. } = *self;
+        draft.write_all(&film).map_err(|cause| write_error(&path, cause))?;
+        Ok(draft.commit()?)
+    }
+}
+
+/// Encodes frames until the end and returns the file.
+fn encode(settings: &Settings, inbox: &Receiver<Message>) -> Film {
+    let encoding_type = if settings.quality == 100 { EncodingType::Lossless } else { EncodingType::new_lossy() };
+    let options = EncoderOptions {
+        // Every frame whole: in a flight nothing stays the same from frame to frame.
+        kmin: 0,
+        kmax: 1,
+        color_mode: ColorMode::Rgb,
+        encoding_config: Some(EncodingConfig {
+            encoding_type,
+            quality: f32::from(settings.quality),
+            ..EncodingConfig::default()
+        }),
+        ..EncoderOptions::default()
+    };
+    let mut encoder = webp_animation::Encoder::new_with_options((settings.width_px, settings.height_px), options)?;
+    let time = |frame| i32::try_from(settings.time(frame, 1000.0)).unwrap_or(i32::MAX);
+    let mut frames = 0;
+    while let Ok(message) = inbox.recv() {
+        match message {
+            Message::Frame(rgb) => encoder.add_frame(&rgb, time(frames))?,
+            Message::End => return Ok(encoder.finalize(time(frames))?.to_vec()),
+        }
+        frames += 1;
+    }
+    // Cancelled: nobody waits for the result.
+    Ok(Vec::new())
+}

@@ -1,0 +1,104 @@
+//! RGB to the planes of video: BT.709, limited range, color at half the size.
+
+/// The planes of a picture of even sides, each row by row.
+pub(super) struct Planes {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) y: Vec<u8>,
+    pub(super) u: Vec<u8>,
+    pub(super) v: Vec<u8>,
+}
+
+/// BT.709's weights of red and blue in luma (ITU-R BT.709-6, 3.2); green has the rest.
+const RED: f32 = 0.2126;
+const BLUE: f32 = 0.0722;
+
+impl Planes {
+    /// Black planes.
+    pub(super) fn new(width: usize, height: usize) -> Self {
+        let color = vec![128; width / 2 * (height / 2)];
+        Self { width, height, y: vec![16; width * height], u: color.clone(), v: color }
+    }
+
+    /// Takes over the picture `rgb` with `row_px` pixels a row, as much of it as the planes hold.
+    ///
+    /// A color sample lies on the left column of its four pixels, halfway between their rows (where
+    /// H.264 has it unless told otherwise), so the columns weigh 1 : 2 : 1 about it.
+    pub(super) fn fill(&mut self, rgb: &[u8], row_px: usize) {
+        let color_row = self.width / 2;
+        let pixel = |row: usize, column: usize| {
+            let at = (row * row_px + column) * 3;
+            [f32::from(rgb[at]), f32::from(rgb[at + 1]), f32::from(rgb[at + 2])]
+        };
+        for row in 0..self.height {
+            for column in 0..self.width {
+                // 219 steps from 16 to 235.
+                self.y[row * self.width + column] = byte(16.0 + luma(pixel(row, column)) * (219.0 / 255.0));
+            }
+        }
+        for row in 0..self.height / 2 {
+            for column in 0..color_row {
+                let middle = 2 * column;
+                let columns = [(middle.saturating_sub(1), 0.125), (middle, 0.25), (middle + 1, 0.125)];
+                let mut mean = [0.0_f32; 3];
+                for (c, weight) in columns {
+                    for r in [2 * row, 2 * row + 1] {
+                        for (sum, value) in mean.iter_mut().zip(pixel(r, c)) {
+                            *sum += weight * value;
+                        }
+                    }
+                }
+                let y = luma(mean);
+                // 224 steps from 16 to 240.
+                let color =
+                    |value: f32, weight: f32| byte(128.0 + (value - y) / (2.0 - 2.0 * weight) * (224.0 / 255.0));
+                self.u[row * color_row + column] = color(mean[2], BLUE);
+                self.v[row * color_row + column] = color(mean[0], RED);
+            }
+        }
+    }
+}
+
+/// Luma of a pixel, on its scale.
+fn luma([r, g, b]: [f32; 3]) -> f32 {
+    RED * r + (1.0 - RED - BLUE) * g + BLUE * b
+}
+
+/// The nearest byte.
+fn byte(value: f32) -> u8 {
+    (value + 0.5) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colors_are_those_of_the_standard() {
+        // Y, Cb, Cr of 8-bit BT.709 limited range.
+        let cases = [
+            ([0, 0, 0], [16, 128, 128]),
+            ([255, 255, 255], [235, 128, 128]),
+            ([255, 0, 0], [63, 102, 240]),
+            ([0, 255, 0], [173, 42, 26]),
+            ([0, 0, 255], [32, 240, 118]),
+            ([128, 128, 128], [126, 128, 128]),
+        ];
+        for (rgb, [y, u, v]) in cases {
+            let mut planes = Planes::new(4, 2);
+            planes.fill(&rgb.repeat(8), 4);
+            assert_eq!((planes.y, planes.u, planes.v), (vec![y; 8], vec![u; 2], vec![v; 2]), "{rgb:?}");
+        }
+    }
+
+    #[test]
+    fn a_last_odd_column_and_row_are_left_out() {
+        let mut rgb = vec![0; 5 * 3 * 3];
+        for (i, px) in rgb.chunks_exact_mut(3).enumerate() {
+            px.fill(if i % 5 == 4 || i >= 10 { 255 } else { 90 });
+        }
+        let mut planes = Planes::new(4, 2);
+        planes.fill(&rgb, 5);
+        assert_eq!(planes.y, vec![93; 8]);
+    }
+}

@@ -1,0 +1,343 @@
+//! The networks that the program can use (`assets/models.toml`), and which of them are on this
+//! machine.
+//!
+//! They lie in one folder: `FMLGS_MODELS`, else `models` in the user's data folder. Each model has a
+//! description (JSON) that holds the SHA-256 of its graphs; a graph that differs is refused.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::fetch::{self, FetchError, Patience, Wanted};
+use super::{ModelError, manifest};
+use crate::io::data_folder::data_folder;
+
+/// The list that comes with the program.
+const LIST: &str = include_str!("../../assets/models.toml");
+
+/// Name of the model that follows masks.
+pub const SAM2: &str = "sam2.1-tiny";
+
+/// What a model is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Role {
+    /// Compares pictures with phrases.
+    Encoder,
+    /// Finds masks.
+    Segmenter,
+}
+
+/// A model of the list.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Entry {
+    /// Its name in commands.
+    pub id: String,
+    /// What it is for.
+    pub role: Role,
+    /// Its name for display.
+    pub title: String,
+    /// What it adds, in plain words.
+    pub adds: String,
+    /// License of its weights.
+    #[serde(alias = "licence")]
+    pub license: String,
+    /// Where its weights come from.
+    pub source: String,
+    /// The command that makes its files, of those in `tools/export`.
+    #[serde(default)]
+    pub export: String,
+    /// Whether it is part of the program.
+    #[serde(default)]
+    pub built_in: bool,
+    /// Name of the file that describes it; empty if it is built in.
+    #[serde(default)]
+    pub description: String,
+    /// Address of the folder with its files, where there is one.
+    #[serde(default)]
+    pub url: Option<String>,
+    /// Its graphs.
+    #[serde(default)]
+    pub file: Vec<ListedFile>,
+}
+
+/// A graph of a listed model.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ListedFile {
+    /// Its name.
+    pub name: String,
+    /// About how large it is.
+    pub megabytes: u64,
+    /// Its SHA-256, if that is fixed.
+    #[serde(default)]
+    pub sha256: Option<String>,
+}
+
+#[derive(Deserialize)]
+struct List {
+    model: Vec<Entry>,
+}
+
+/// Whether a model can be used.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum State {
+    /// Part of the program.
+    BuiltIn,
+    /// All files are here.
+    Here,
+    /// These files are not.
+    Missing(Vec<String>),
+    /// Something is wrong with a file.
+    Broken(String),
+}
+
+/// Why a model could not be put in place.
+#[derive(Debug, thiserror::Error)]
+pub enum InstallError {
+    /// Not in the list.
+    #[error("there is no model called '{0}'; 'fmlgs models' lists them")]
+    Unknown(String),
+    /// Nothing to fetch.
+    #[error("'{0}' is part of the program")]
+    BuiltIn(String),
+    /// Nobody hosts its files.
+    #[error(
+        "no address is known for '{id}'. Make its files of the official checkpoint ({source_page}): python tools/export/{export} \
+         --out FOLDER, then 'fmlgs models add {id} FOLDER'; or give the address of a folder that has them with --from"
+    )]
+    NoAddress {
+        /// Which model.
+        id: String,
+        /// Where its weights are.
+        source_page: String,
+        /// The command that makes its files.
+        export: String,
+    },
+    /// A file could not be fetched or written.
+    #[error(transparent)]
+    Fetch(#[from] FetchError),
+    /// A file does not fit.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+}
+
+/// All models of the list, in its order.
+///
+/// # Errors
+/// If the list that came with the program is damaged.
+pub fn entries() -> Result<Vec<Entry>, ModelError> {
+    let damaged =
+        |e: toml::de::Error| ModelError::Metadata { path: "assets/models.toml".into(), problem: e.to_string() };
+    toml::from_str::<List>(LIST).map(|list| list.model).map_err(damaged)
+}
+
+/// The model with this name.
+///
+/// # Errors
+/// If there is none.
+pub fn entry(id: &str) -> Result<Entry, InstallError> {
+    entries()?.into_iter().find(|e| e.id == id).ok_or_else(|| InstallError::Unknown(id.to_owned()))
+}
+
+/// Where models lie on this machine.
+pub fn folder() -> PathBuf {
+    let set = std::env::var_os("FMLGS_MODELS").filter(|p| !p.is_empty());
+    set.map_or_else(|| data_folder().join("models"), PathBuf::from)
+}
+
+impl Entry {
+    /// The file that describes it, if it were in `folder`.
+    pub fn description_in(&self, folder: &Path) -> PathBuf {
+        folder.join(&self.description)
+    }
+
+    /// Names of all its files: the description first.
+    fn files(&self) -> Vec<&str> {
+        std::iter::once(self.description.as_str()).chain(self.file.iter().map(|f| f.name.as_str())).collect()
+    }
+
+    /// About how large it is, MB.
+    pub fn megabytes(&self) -> u64 {
+        self.file.iter().map(|f| f.megabytes).sum()
+    }
+
+    /// Whether it can be used from `folder`. Sizes are compared, contents are not: see
+    /// [`Self::verify`].
+    pub fn state(&self, folder: &Path) -> State {
+        if self.built_in {
+            return State::BuiltIn;
+        }
+        let missing = |name: &&str| !folder.join(name).is_file();
+        let missing: Vec<String> = self.files().into_iter().filter(missing).map(str::to_owned).collect();
+        if !missing.is_empty() {
+            return State::Missing(missing);
+        }
+        let sizes = manifest::graphs(&self.description_in(folder))
+            .and_then(|graphs| graphs.iter().try_for_each(|graph| graph.check_size(folder)));
+        match sizes {
+            Ok(()) => State::Here,
+            Err(e) => State::Broken(e.to_string()),
+        }
+    }
+
+    /// Compares all its graphs in `folder` with their SHA-256.
+    ///
+    /// # Errors
+    /// If one differs, or cannot be read.
+    pub fn verify(&self, folder: &Path) -> Result<(), InstallError> {
+        if self.built_in {
+            return Ok(());
+        }
+        let graphs = manifest::graphs(&self.description_in(folder))?;
+        for graph in graphs {
+            graph.check(folder)?;
+        }
+        for file in &self.file {
+            if let Some(sha256) = &file.sha256 {
+                fetch::check(&folder.join(&file.name), sha256)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Fetches what is not here yet from its address, or from that of another `from` folder, into
+    /// `folder`, and checks it. `progress` is told the file, its bytes that are there and those that
+    /// there will be, and says whether to go on.
+    ///
+    /// # Errors
+    /// If there is no address, a download fails, or a file is not what its description says.
+    pub fn fetch(
+        &self,
+        folder: &Path,
+        from: Option<&str>,
+        patience: Patience,
+        progress: &mut dyn FnMut(&str, u64, Option<u64>) -> bool,
+    ) -> Result<(), InstallError> {
+        if self.built_in {
+            return Err(InstallError::BuiltIn(self.id.clone()));
+        }
+        let base = from.or(self.url.as_deref()).ok_or_else(|| InstallError::NoAddress {
+            id: self.id.clone(),
+            source_page: self.source.clone(),
+            export: self.export.clone(),
+        })?;
+        let address = |name: &str| format!("{}/{name}", base.trim_end_matches('/'));
+        let mut get = |name: &str, bytes: Option<u64>, sha256: Option<&str>| {
+            let to = folder.join(name);
+            let wanted = Wanted { url: &address(name), to: &to, bytes, sha256 };
+            fetch::fetch(&wanted, patience, &mut |there, all| progress(name, there, all))
+        };
+        // The description says what the graphs must be; fetched anew, it is that of these graphs.
+        let description = self.description_in(folder);
+        if manifest::graphs(&description).is_err() {
+            get(&self.description, None, None)?;
+        }
+        for graph in manifest::graphs(&description)? {
+            if graph.check(folder).is_err() {
+                get(&graph.file, Some(graph.bytes), Some(&graph.sha256))?;
+            }
+        }
+        self.verify(folder)
+    }
+
+    /// Takes over its files from a folder that somebody brings. They are checked there before
+    /// anything here changes.
+    ///
+    /// # Errors
+    /// If files are missing there or are not what the description says, or cannot be copied.
+    pub fn add(&self, folder: &Path, brought: &Path) -> Result<(), InstallError> {
+        if self.built_in {
+            return Err(InstallError::BuiltIn(self.id.clone()));
+        }
+        self.verify(brought)?;
+        let failed = |path: &Path, source| FetchError::File { path: path.into(), source };
+        fs::create_dir_all(folder).map_err(|e| failed(folder, e))?;
+        let graphs = manifest::graphs(&self.description_in(brought))?;
+        // The description last: without it, the model is not here.
+        let names = graphs.iter().map(|g| g.file.as_str()).chain([self.description.as_str()]);
+        for name in names {
+            let (from, to) = (brought.join(name), folder.join(name));
+            let part = folder.join(format!("{name}.part"));
+            fs::copy(&from, &part).map_err(|e| failed(&from, e))?;
+            fs::rename(&part, &to).map_err(|e| failed(&to, e))?;
+        }
+        self.verify(folder)
+    }
+}
+
+/// The description of a model that is here, by its name in the list; of any other, by the path of
+/// its description.
+///
+/// # Errors
+/// If it is neither.
+pub fn find(name: &str, role: Role) -> Result<PathBuf, ModelError> {
+    let listed = entries()?.into_iter().find(|e| e.id == name && e.role == role && !e.built_in);
+    if let Some(entry) = listed {
+        let folder = folder();
+        return match entry.state(&folder) {
+            State::Missing(_) => Err(ModelError::NotHere { id: entry.id }),
+            State::Broken(problem) => Err(ModelError::Metadata { path: entry.description_in(&folder), problem }),
+            _ => Ok(entry.description_in(&folder)),
+        };
+    }
+    let path = PathBuf::from(name);
+    if path.extension().is_some_and(|e| e == "json") && path.is_file() {
+        Ok(path)
+    } else {
+        Err(ModelError::Unknown(name.to_owned()))
+    }
+}
+
+/// Names of the models of a role that can be used now, best first; the built-in ones last. `told` hears of
+/// each that is here and cannot be used.
+///
+/// # Errors
+/// If the list that came with the program is damaged.
+pub fn usable(role: Role, told: &mut dyn FnMut(String)) -> Result<Vec<String>, ModelError> {
+    Ok(usable_of(&entries()?, role, &folder(), told))
+}
+
+fn usable_of(all: &[Entry], role: Role, folder: &Path, told: &mut dyn FnMut(String)) -> Vec<String> {
+    let (mut here, mut built_in) = (Vec::new(), Vec::new());
+    for entry in all.iter().filter(|e| e.role == role) {
+        match entry.state(folder) {
+            State::BuiltIn => built_in.push(entry.id.clone()),
+            State::Here => here.push(entry.id.clone()),
+            State::Missing(_) => {}
+            State::Broken(problem) => {
+                let id = &entry.id;
+                told(format!("the model '{id}' is here but broken and is not used: {problem}; fetch or add it again"));
+            }
+        }
+    }
+    here.append(&mut built_in);
+    here
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_broken_model_is_told() {
+        let folder = tempfile::tempdir().expect("folder");
+        let all = entries().expect("the list");
+        let listed = all.iter().find(|e| e.role == Role::Encoder && !e.built_in).expect("an encoder");
+        let told = |folder: &Path| {
+            let mut told = Vec::new();
+            let usable = usable_of(&all, Role::Encoder, folder, &mut |text| told.push(text));
+            assert_eq!(usable, ["demo"]);
+            told
+        };
+        assert!(told(folder.path()).is_empty(), "what is not here is no trouble");
+        for name in listed.files() {
+            fs::write(folder.path().join(name), "{").expect("written");
+        }
+        let told = told(folder.path());
+        assert!(told.len() == 1 && told[0].contains(&listed.id) && told[0].contains("broken"), "{told:?}");
+    }
+}

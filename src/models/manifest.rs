@@ -1,0 +1,160 @@
+//! The JSON file that describes an exported model, beside its graphs.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+
+use super::ModelError;
+use super::engine::engine;
+use super::network::Network;
+
+/// Version of the file that this program reads.
+const VERSION: u64 = 1;
+/// Largest file that is read, bytes.
+pub const MAX_BYTES: u64 = super::fetch::MOST_UNPROMISED;
+
+/// A graph of a model.
+#[derive(Clone, Debug, Deserialize)]
+pub struct Graph {
+    /// Its file, in the same folder.
+    pub file: String,
+    /// Its size.
+    pub bytes: u64,
+    /// Its SHA-256, in hexadecimal digits.
+    pub sha256: String,
+}
+
+impl Graph {
+    /// The network in the slot; loaded from a folder if it is not there yet, and only if the file is
+    /// what its description says.
+    ///
+    /// # Errors
+    /// If it is missing, broken or another file, or the engine cannot run it.
+    pub fn ready<'a>(&self, slot: &'a mut Option<Network>, folder: &Path) -> Result<&'a mut Network, ModelError> {
+        let loaded = match slot.take() {
+            Some(network) => network,
+            None => {
+                self.check(folder)?;
+                engine()?.load_file(&folder.join(&self.file))?
+            }
+        };
+        Ok(slot.insert(loaded))
+    }
+
+    /// Compares its size with what the description says.
+    ///
+    /// # Errors
+    /// If it is missing, or of another size.
+    pub fn check_size(&self, folder: &Path) -> Result<(), ModelError> {
+        let path = folder.join(&self.file);
+        let refused = |problem: String| ModelError::Metadata { path: path.clone(), problem };
+        let about = std::fs::metadata(&path).map_err(|e| refused(e.to_string()))?;
+        if !about.is_file() {
+            return Err(refused("it is not a regular file".into()));
+        }
+        let bytes = about.len();
+        if bytes != self.bytes {
+            let wanted = self.bytes;
+            return Err(refused(format!("{bytes} bytes, its description says {wanted}; it is broken or another file")));
+        }
+        Ok(())
+    }
+
+    /// Compares its content with what the description says.
+    ///
+    /// # Errors
+    /// If it is missing, broken or another file.
+    pub fn check(&self, folder: &Path) -> Result<(), ModelError> {
+        self.check_size(folder)?;
+        let path = folder.join(&self.file);
+        let wrong = |e: super::fetch::FetchError| ModelError::Metadata { path: path.clone(), problem: e.to_string() };
+        super::fetch::check(&path, &self.sha256).map_err(wrong)
+    }
+}
+
+/// Largest side of a picture that a network takes, px: four times that of the largest there are.
+const MAX_SIDE_PX: usize = 4096;
+
+/// Checks what a description says of the pictures that a network takes.
+///
+/// # Errors
+/// If their side is none, or a color would be divided by nothing.
+pub fn check_pictures(path: &Path, side_px: usize, mean: [f32; 3], std: [f32; 3]) -> Result<(), ModelError> {
+    let refused = |problem: String| Err(ModelError::Metadata { path: path.into(), problem });
+    if !(1..=MAX_SIDE_PX).contains(&side_px) {
+        return refused(format!("image_size is {side_px} px; networks take 1 to {MAX_SIDE_PX}"));
+    }
+    if !mean.iter().all(|v| v.abs() < 1e6) || !std.iter().all(|v| (1e-6..1e6).contains(v)) {
+        return refused(format!("mean {mean:?} and std {std:?} do not turn colors into numbers"));
+    }
+    Ok(())
+}
+
+/// Checks a length that a description gives.
+///
+/// # Errors
+/// If it is 0, or over `most`.
+pub fn check_length(path: &Path, name: &str, length: usize, most: usize) -> Result<(), ModelError> {
+    match (1..=most).contains(&length) {
+        true => Ok(()),
+        false => Err(ModelError::Metadata {
+            path: path.into(),
+            problem: format!("{name} is {length}; 1 to {most} is possible"),
+        }),
+    }
+}
+
+#[derive(Deserialize)]
+struct AnyModel {
+    graphs: BTreeMap<String, Graph>,
+}
+
+/// The graphs that a description names.
+///
+/// # Errors
+/// If the file cannot be read, or is no description.
+pub fn graphs(path: &Path) -> Result<Vec<Graph>, ModelError> {
+    let kind = kind(path)?;
+    let graphs: AnyModel = read(path, &kind)?;
+    let all: Vec<Graph> = graphs.graphs.into_values().collect();
+    // A name with a path in it would reach out of the folder.
+    match all.iter().find(|g| Path::new(&g.file).file_name() != Some(std::ffi::OsStr::new(&g.file))) {
+        Some(g) => Err(ModelError::Metadata { path: path.into(), problem: format!("'{}' is no file name", g.file) }),
+        None => Ok(all),
+    }
+}
+
+#[derive(Deserialize)]
+struct Head {
+    version: u64,
+    kind: String,
+}
+
+/// Reads the metadata of a model of a `kind`: "clip", "sam" or "sam2".
+///
+/// # Errors
+/// If the file cannot be read, is of another kind or version, or lacks something.
+pub fn read<T: DeserializeOwned>(path: &Path, kind: &str) -> Result<T, ModelError> {
+    let refused = |problem: String| ModelError::Metadata { path: path.into(), problem };
+    let bytes = crate::io::files::read(path, MAX_BYTES).map_err(|e| refused(e.to_string()))?;
+    let head: Head = serde_json::from_slice(&bytes).map_err(|e| refused(e.to_string()))?;
+    if head.version != VERSION {
+        return Err(refused(format!("version {}, this program reads {VERSION}; export the model anew", head.version)));
+    }
+    if head.kind != kind {
+        return Err(refused(format!("it describes a '{}' model where '{kind}' is wanted", head.kind)));
+    }
+    serde_json::from_slice(&bytes).map_err(|e| refused(e.to_string()))
+}
+
+/// The kind of model that a metadata file describes.
+///
+/// # Errors
+/// If the file cannot be read or is no metadata.
+pub fn kind(path: &Path) -> Result<String, ModelError> {
+    let refused = |problem: String| ModelError::Metadata { path: path.into(), problem };
+    let bytes = crate::io::files::read(path, MAX_BYTES).map_err(|e| refused(e.to_string()))?;
+    serde_json::from_slice::<Head>(&bytes).map(|head| head.kind).map_err(|e| refused(e.to_string()))
+}

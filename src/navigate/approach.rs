@@ -1,0 +1,120 @@
+//! Going to see an identity: the best view of it that can be reached, and the flight there.
+
+use glam::DVec3;
+
+use super::flight::{Flight, Speed};
+use super::navigator::{Navigator, NoRoute};
+use super::pose::Pose;
+use super::target::{Search, Target, View, Wish};
+use crate::render::{RenderError, RenderSettings};
+use crate::scene::{Bounds, GaussianCloud, IdentityId, SemanticMap};
+
+/// Share of a target that has to be seen for a view to be one of it.
+const LEAST_VISIBLE: f64 = 0.05;
+
+/// A scene with what is known of it.
+#[derive(Clone, Copy)]
+pub struct Place<'a> {
+    /// The Gaussians.
+    pub cloud: &'a GaussianCloud,
+    /// How they are drawn.
+    pub settings: &'a RenderSettings,
+    /// Objects and parts.
+    pub map: &'a SemanticMap,
+}
+
+/// A flight to a target, and what is seen there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Approach {
+    /// The view at its end.
+    pub view: View,
+    /// The middle of the target.
+    pub target: DVec3,
+    /// The way there.
+    pub flight: Flight,
+}
+
+/// Why a target cannot be visited.
+#[derive(Debug, thiserror::Error)]
+pub enum ApproachError {
+    /// It has no Gaussians.
+    #[error("nothing in the scene belongs to it, so there is no place to look at")]
+    Nothing,
+    /// It is hidden from wherever one could stand.
+    #[error("it cannot be seen from any place where the camera may be")]
+    Unseen,
+    /// There is no way; the nearest view that can be reached is offered, if it is seen from there.
+    #[error("{why}")]
+    NoRoute {
+        /// Why.
+        why: NoRoute,
+        /// A flight to the nearest place.
+        nearest: Option<Box<Approach>>,
+    },
+    /// A view cannot be drawn.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+}
+
+/// The Gaussians of an identity as a target; `None` if it has none.
+pub fn target(place: Place<'_>, id: IdentityId) -> Option<(Target, Bounds)> {
+    let bounds = |id: IdentityId| {
+        let members = place.map.members(id);
+        let inside = members.iter().filter(|i| **i < place.cloud.len());
+        let bounds = Bounds::robust(inside.map(|i| place.cloud.world_position(*i)))?;
+        Some((members, bounds))
+    };
+    let (members, own) = bounds(id)?;
+    let object = place.map.identities.object_of(id);
+    let whole = (object != id).then(|| bounds(object)).flatten().map(|(_, b)| b.center());
+    Some((Target { members, whole }, own))
+}
+
+impl Navigator {
+    /// Flies from `eye` to where an identity is seen best; `aspect` is the picture's width by height.
+    ///
+    /// # Errors
+    /// If it cannot be seen or reached.
+    pub fn visit(
+        &self,
+        place: Place<'_>,
+        id: IdentityId,
+        wish: Wish,
+        eye: &Pose,
+        aspect: f64,
+        frames: usize,
+    ) -> Result<Approach, ApproachError> {
+        let (target, bounds) = target(place, id).ok_or(ApproachError::Nothing)?;
+        let search = Search {
+            cloud: place.cloud,
+            settings: place.settings,
+            occupancy: &self.occupancy,
+            cameras: &self.cameras,
+            up: self.up,
+            clearance: self.clearance,
+        };
+        let center = bounds.center();
+        let views = search.views(&target, wish, eye, aspect)?;
+        let seen: Vec<View> = views.into_iter().filter(|v| v.visible >= LEAST_VISIBLE).collect();
+        let mut first = None;
+        for view in seen {
+            match self.fly(eye, &view.pose, Some(center), frames, Speed::Eased) {
+                Ok(flight) => return Ok(Approach { view, target: center, flight }),
+                Err(why) => first = first.or(Some(why)),
+            }
+        }
+        let why = first.ok_or(ApproachError::Unseen)?;
+        let nearest = match &why {
+            NoRoute::Parted { nearest, .. } => {
+                let at = self.graph.keypoints[*nearest].center;
+                let pose = Pose::looking_at(at, center, self.up, eye.fov_y_rad, &eye.world_from_camera);
+                let flight = self.fly(eye, &pose, Some(center), frames, Speed::Eased).ok();
+                let clearance = self.occupancy.clearance(at);
+                let view = View { pose, visible: 0.0, covers: 0.0, clearance, score: 0.0 };
+                flight.map(|flight| Box::new(Approach { view, target: center, flight }))
+            }
+            _ => None,
+        };
+        Err(ApproachError::NoRoute { why, nearest })
+    }
+}

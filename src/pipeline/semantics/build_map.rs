@@ -1,0 +1,424 @@
+//! The whole way from trained Gaussians and masks to a semantic map.
+
+use std::path::Path;
+use std::time::Instant;
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use super::associate::Disagreement;
+use super::codes;
+use super::embed::{EmbedError, embed};
+use super::network_segmenter::NetworkMasks;
+use super::regions::Regions;
+use super::sam2_tracker::Sam2Tracker;
+use super::segmenter::{FileMasks, SegmentError, Segmenter};
+use super::tracker::{TrackError, TrackOptions, Tracked, ViewReport, track};
+use super::train_codes::{CodeTraining, CodeView, decode, train_codes};
+use super::view_map::ViewMap;
+use crate::io::labels::Labels;
+use crate::models::Encoder;
+use crate::pipeline::observer::{Observer, Severity};
+use crate::render::{RenderError, RenderSettings, Renderer};
+use crate::scene::semantic_map::{BACKGROUND_CODE, CODE_CHANNELS};
+use crate::scene::{GaussianCloud, Identities, IdentityId, Photo, SemanticMap};
+
+/// Longer side of the masks that codes are trained on, px.
+const CODE_SIDE_PX: u32 = 256;
+/// Steps of training codes.
+pub const CODE_STEPS: u64 = 1_000;
+/// Seed of the order in which views are trained on.
+const SEED: u64 = 0;
+
+/// How Gaussians get their codes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+pub enum Lifting {
+    /// Those of the identities they voted for
+    #[default]
+    Votes,
+    /// The same, refined by training
+    Refined,
+    /// By training alone, as in the paper; identities are read off the trained codes
+    Paper,
+}
+
+/// How masks are carried to the other photos.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+pub enum Carry {
+    /// By the trained Gaussians; no network
+    #[default]
+    #[value(name = "geometry")]
+    Gaussians,
+    /// By SAM 2 from photo to photo, as in the paper; photos have to be in the order of a walk
+    Sam2,
+    /// By both, each correcting the other
+    Both,
+}
+
+/// Name of the masks that need no model.
+pub const REGIONS: &str = "regions";
+
+/// Settings of the whole way.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FindOptions {
+    /// How masks become identities.
+    pub track: TrackOptions,
+    /// How identities become codes of Gaussians.
+    pub lifting: Lifting,
+    /// Steps of training codes, where they are trained.
+    pub code_steps: u64,
+}
+
+impl Default for FindOptions {
+    fn default() -> Self {
+        Self { track: TrackOptions::default(), lifting: Lifting::default(), code_steps: CODE_STEPS }
+    }
+}
+
+/// What was found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Found {
+    /// Objects and parts of the scene.
+    pub map: SemanticMap,
+    /// What masks of the first photos explain of each photo.
+    pub views: Vec<ViewReport>,
+    /// Photos whose masks disagreed with what was known before, and how.
+    pub disagreements: Vec<(usize, Disagreement)>,
+    /// Seconds that each stage took, in order.
+    pub secs: Vec<(&'static str, f64)>,
+}
+
+/// Why objects could not be found.
+#[derive(Debug, thiserror::Error)]
+pub enum FindError {
+    /// In making identities of masks.
+    #[error(transparent)]
+    Track(#[from] TrackError),
+    /// In training codes.
+    #[error("training codes: {0}")]
+    Lift(#[from] RenderError),
+    /// In looking at the identities.
+    #[error(transparent)]
+    Embed(#[from] EmbedError),
+}
+
+/// What finds the masks of photos that `cloud` was trained on: files, where there are any, else the
+/// network of this name, else regions of the photos.
+///
+/// # Errors
+/// If there are no masks at `files`, or the network cannot be used.
+pub fn segmenter<'a>(
+    files: Option<&Path>,
+    cloud: &'a GaussianCloud,
+    settings: &'a RenderSettings,
+    network: Option<&str>,
+) -> Result<Box<dyn Segmenter + 'a>, SegmentError> {
+    Ok(match (files, network) {
+        (Some(files), _) => Box::new(FileMasks(Labels::open(files)?)),
+        (None, Some(network)) => Box::new(NetworkMasks::open(network)?),
+        (None, None) => Box::new(Regions { trained: Some((cloud, settings)), ..Regions::default() }),
+    })
+}
+
+/// What finds masks, carries them on, and looks at what they are of.
+pub struct Tools<'a> {
+    /// Finds masks.
+    pub segmenter: &'a mut dyn Segmenter,
+    /// Follows them through the photos, besides what the Gaussians carry.
+    pub follower: Option<&'a mut Sam2Tracker>,
+    /// Looks at the identities, so that they are found by their looks.
+    pub encoder: Option<&'a mut (dyn Encoder + 'static)>,
+}
+
+/// Finds the objects and parts of `cloud`, which was trained on `photos`, gives them codes, and lets
+/// an encoder look at them, if there is one.
+///
+/// # Errors
+/// If masks or photos cannot be read, a view cannot be drawn, the encoder fails, or the observer asks
+/// to stop.
+pub fn find_objects(
+    cloud: &GaussianCloud,
+    photos: &[Photo],
+    settings: &RenderSettings,
+    tools: Tools<'_>,
+    options: &FindOptions,
+    observer: &mut dyn Observer,
+) -> Result<Found, FindError> {
+    let Tools { segmenter, follower, encoder } = tools;
+    let tracked = track(cloud, photos, settings, segmenter, follower, &options.track, observer)?;
+    if let Some(text) = unknown(&tracked.views, photos, options.track.reseed_share) {
+        observer.note(Severity::Info, text);
+    }
+    let mut identities = tracked.identities.clone();
+    let of: Vec<IdentityId> = tracked.assignments.iter().map(|b| b.identity).collect();
+    let centers = centers(cloud, &of, &identities);
+    codes::assign(&mut identities, &centers);
+    let margin = tracked.assignments.iter().map(|b| b.margin).collect();
+    let seeds = tracked.seeds.iter().map(|&i| photos[i].name.clone()).collect();
+    let mut map = SemanticMap::of_identities(identities, of, margin, seeds);
+    let Tracked { views, disagreements, mut secs, .. } = tracked;
+    let mut timed = |stage: &'static str, start: Instant| secs.push((stage, start.elapsed().as_secs_f64()));
+    let start = Instant::now();
+    lift(&mut map, cloud, photos, settings, options, observer)?;
+    timed("train codes", start);
+    if let Some(encoder) = encoder {
+        let start = Instant::now();
+        map.language = Some(embed(cloud, &map, photos, settings, encoder, observer)?);
+        timed("look at identities", start);
+    }
+    Ok(Found { map, views, disagreements, secs })
+}
+
+/// Trains the codes of the Gaussians, where that is wanted, on the masks as they were tracked.
+fn lift(
+    map: &mut SemanticMap,
+    cloud: &GaussianCloud,
+    photos: &[Photo],
+    settings: &RenderSettings,
+    options: &FindOptions,
+    observer: &mut dyn Observer,
+) -> Result<(), FindError> {
+    if options.lifting == Lifting::Votes {
+        return Ok(());
+    }
+    let mut renderer = Renderer::new();
+    let mut views = Vec::with_capacity(photos.len());
+    for photo in photos {
+        let camera = photo.camera.limited_to(CODE_SIDE_PX);
+        let seen = ViewMap::render(&mut renderer, cloud, &map.of, &map.identities, &camera, settings)?;
+        views.push(CodeView { camera, labels: seen.identity });
+    }
+    if options.lifting == Lifting::Paper {
+        let nothing: [f32; CODE_CHANNELS] = std::array::from_fn(|c| BACKGROUND_CODE[c % 3]);
+        map.codes.fill(nothing);
+    }
+    let training = CodeTraining { steps: options.code_steps, seed: SEED };
+    train_codes(cloud, &mut map.codes, &views, &map.identities, settings, training, observer)?;
+    observer.proceed().map_err(TrackError::from)?;
+    if options.lifting == Lifting::Paper {
+        map.of = decode(&map.codes, &map.identities);
+    }
+    Ok(())
+}
+
+/// What to say about views that masks did not explain; `None` if there is no need.
+fn unknown(views: &[ViewReport], photos: &[Photo], share: f64) -> Option<String> {
+    let many: Vec<&ViewReport> = views.iter().filter(|v| v.unknown > share).collect();
+    let worst = many.iter().max_by(|a, b| a.unknown.total_cmp(&b.unknown))?;
+    Some(format!(
+        "{} of {} photos show more than {:.0}% that no mask has reached (most: {}, {:.0}%); what is there goes to what \
+         it hangs together with",
+        many.len(),
+        photos.len(),
+        100.0 * share,
+        photos[worst.photo].name,
+        100.0 * worst.unknown
+    ))
+}
+
+/// Mean position of each identity's Gaussians, pieces included, by number less one.
+pub fn centers(cloud: &GaussianCloud, of: &[IdentityId], identities: &Identities) -> Vec<DVec3> {
+    let mut sums = vec![(DVec3::ZERO, 0.0); identities.len()];
+    for (i, &id) in of.iter().enumerate() {
+        for id in identities.line(id) {
+            let sum = &mut sums[id as usize - 1];
+            *sum = (sum.0 + cloud.world_position(i), sum.1 + 1.0);
+        }
+    }
+    sums.iter().map(|(sum, n)| if *n > 0.0 { *sum / *n } else { DVec3::ZERO }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use super::*;
+    use crate::pipeline::observer::{Interrupted, Signal, Silent};
+    use crate::pipeline::semantics::segmenter::FoundMask;
+    use crate::scene::{Camera, Level as Of, Mask, NOBODY};
+
+    /// A doll with an eye on the left, a cat on the right: whose the Gaussians are.
+    const TRUTH: [IdentityId; 15] = [1, 1, 1, 1, 1, 1, 2, 2, 2, 3, 3, 3, 3, 3, 3];
+
+    fn cloud() -> GaussianCloud {
+        let place = |i: usize| {
+            let (x, of) = if i < 6 {
+                (-0.8, 0)
+            } else if i < 9 {
+                (-0.45, 6)
+            } else {
+                (0.5, 9)
+            };
+            [x + 0.02 * (i % 2) as f32, 0.1 * (i - of) as f32 - 0.2, 0.0]
+        };
+        let color = |i: usize| if i < 9 { [10.0, 0.0, 0.0] } else { [0.0, 0.0, 10.0] };
+        GaussianCloud {
+            positions: (0..15).map(place).collect(),
+            log_scales: vec![[-2.4; 3]; 15],
+            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 15],
+            opacity_logits: vec![5.0; 15],
+            sh: (0..15).map(color).collect(),
+            ..GaussianCloud::default()
+        }
+    }
+
+    /// The first photo shows the doll alone, the second everything.
+    fn photos() -> Vec<Photo> {
+        let photo = |name: &str, x: f64, away: f64| Photo {
+            name: name.into(),
+            path: PathBuf::new(),
+            camera: Camera::look_at(DVec3::new(x, 0.0, -away), DVec3::new(x, 0.0, 0.0), DVec3::NEG_Y, 0.7, 96, 64)
+                .expect("valid"),
+            distortion: None,
+            test_split: false,
+            background: None,
+        };
+        vec![photo("near", -0.75, 1.6), photo("far", 0.0, 3.2)]
+    }
+
+    /// Knows the truth, and says it with names or without.
+    struct Told {
+        named: bool,
+        covers: bool,
+    }
+
+    impl Segmenter for Told {
+        fn name(&self) -> &str {
+            "told"
+        }
+
+        fn covers(&self, _: &Photo) -> bool {
+            self.covers
+        }
+
+        fn segment(
+            &mut self,
+            photo: &Photo,
+            max_side_px: u32,
+            _: &mut dyn Observer,
+        ) -> Result<Vec<FoundMask>, SegmentError> {
+            let mut all = Identities::default();
+            let doll = all.add(Of::Object, NOBODY, vec![]);
+            all.add(Of::Part, doll, vec![]);
+            all.add(Of::Object, NOBODY, vec![]);
+            let camera = photo.camera.limited_to(max_side_px);
+            let settings = RenderSettings::default();
+            let view = ViewMap::render(&mut Renderer::new(), &cloud(), &TRUTH, &all, &camera, &settings);
+            let view = view.expect("drawn");
+            let mask = |id: IdentityId| -> Mask { view.mask(&all, id) };
+            let list = [("doll", 1, Of::Object, None), ("eye", 2, Of::Part, Some(0)), ("cat", 3, Of::Object, None)];
+            let told = list.map(|(name, id, level, parent)| FoundMask {
+                level,
+                parent,
+                name: self.named.then(|| name.to_owned()),
+                mask: mask(id),
+            });
+            Ok(told.into_iter().filter(|m| !m.mask.is_empty()).collect())
+        }
+    }
+
+    fn find(
+        told: Told,
+        (lifting, code_steps): (Lifting, u64),
+        max_seeds: usize,
+        observer: &mut dyn Observer,
+    ) -> Result<Found, FindError> {
+        let mut told = told;
+        let tools = Tools { segmenter: &mut told, follower: None, encoder: None };
+        let track = TrackOptions { max_seeds, ..TrackOptions::default() };
+        let options = FindOptions { track, lifting, code_steps };
+        find_objects(&cloud(), &photos(), &RenderSettings::default(), tools, &options, observer)
+    }
+
+    #[test]
+    fn what_a_second_photo_shows_is_found_too() {
+        for named in [true, false] {
+            let found = find(Told { named, covers: true }, (Lifting::Votes, 0), 12, &mut Silent).expect("found");
+            let map = &found.map;
+            assert_eq!((map.of.as_slice(), map.seeds.as_slice()), (&TRUTH[..], &["near".into(), "far".to_owned()][..]));
+            let list: Vec<_> = map.identities.iter().map(|(_, i)| (i.level, i.parent, i.names.clone())).collect();
+            let names = |name: &str| if named { vec![name.to_owned()] } else { vec![] };
+            let expected = [(Of::Object, 0, names("doll")), (Of::Part, 1, names("eye")), (Of::Object, 0, names("cat"))];
+            assert_eq!(list, expected);
+            assert!(found.disagreements.is_empty(), "{:?}", found.disagreements);
+            assert!(map.margin.iter().all(|m| *m > 0.0), "{:?}", map.margin);
+            let codes: Vec<_> = map.of.iter().map(|id| map.identities.codes(*id)).collect();
+            assert_eq!(map.codes, codes);
+            let seen = |k: usize| found.views[k].seen.iter().map(|s| s.identity).collect::<Vec<_>>();
+            assert_eq!((seen(0), seen(1)), (vec![1, 2], vec![1, 2, 3]));
+            assert!(found.views.iter().all(|v| v.unknown == 0.0), "{:?}", found.views);
+            let stages: Vec<&str> = found.secs.iter().map(|s| s.0).collect();
+            assert_eq!(stages, ["segment", "encode frames", "follow masks", "carry by Gaussians", "train codes"]);
+        }
+    }
+
+    #[test]
+    fn what_no_mask_reached_is_nobodys_and_told() {
+        struct Notes(Vec<String>);
+        impl Observer for Notes {
+            fn note(&mut self, _: Severity, text: String) {
+                self.0.push(text);
+            }
+        }
+        let mut notes = Notes(vec![]);
+        let found = find(Told { named: true, covers: true }, (Lifting::Votes, 0), 1, &mut notes).expect("found");
+        assert_eq!(found.map.identities.len(), 2);
+        assert_eq!((&found.map.of[..9], &found.map.of[9..]), (&TRUTH[..9], &[NOBODY; 6][..]));
+        // The far photo shows the cat, too different in color to be taken for a piece of what is near.
+        assert!((0.01..0.3).contains(&found.views[1].unknown) && found.views[0].unknown == 0.0);
+        assert!(
+            notes.0.iter().any(|n| n.starts_with("1 of 2 photos show more than 0%") && n.contains("far")),
+            "{:?}",
+            notes.0
+        );
+        let views = [0.2, 0.5].map(|unknown| ViewReport { photo: 0, unknown, seen: vec![] });
+        let text = unknown(&views, &photos(), 0.1).expect("two");
+        assert!(text.starts_with("2 of 2 photos show more than 10%") && text.contains("most: near, 50%"), "{text}");
+        assert_eq!(unknown(&views, &photos(), 0.5), None, "as much is not more");
+    }
+
+    #[test]
+    fn every_way_of_lifting_ends_at_the_same_identities() {
+        let told = || Told { named: true, covers: true };
+        let votes = find(told(), (Lifting::Votes, 0), 12, &mut Silent).expect("found").map;
+        for lifting in [(Lifting::Refined, 20), (Lifting::Paper, 120)] {
+            let map = find(told(), lifting, 12, &mut Silent).expect("found").map;
+            assert_eq!(map.of, TRUTH, "{lifting:?}");
+            assert_ne!(map.codes, votes.codes, "{lifting:?} trains");
+            let far = |a: &[f32; 6], b: &[f32; 6]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            let worst = map.codes.iter().zip(&votes.codes).map(|(a, b)| far(a, b)).fold(0.0, f32::max);
+            assert!(worst < 0.25, "{lifting:?}: {worst}");
+        }
+    }
+
+    #[test]
+    fn nothing_to_begin_with_and_a_stop_are_told() {
+        struct Stop;
+        impl Observer for Stop {
+            fn signal(&self) -> Signal {
+                Signal::Cancel
+            }
+        }
+        let nothing =
+            find(Told { named: true, covers: false }, (Lifting::Votes, 0), 12, &mut Silent).expect_err("no masks");
+        assert!(!Interrupted::is_cause_of(&nothing) && nothing.to_string().contains("'told'"), "{nothing}");
+        let stopped =
+            find(Told { named: true, covers: true }, (Lifting::Votes, 0), 12, &mut Stop).expect_err("stopped");
+        assert!(Interrupted::is_cause_of(&stopped), "{stopped}");
+    }
+
+    #[test]
+    fn centers_are_means_and_wholes_count_their_pieces() {
+        let mut all = Identities::default();
+        let doll = all.add(Of::Object, NOBODY, vec![]);
+        let eye = all.add(Of::Part, doll, vec![]);
+        all.add(Of::Object, NOBODY, vec![]);
+        let cloud = GaussianCloud {
+            origin: DVec3::new(10.0, 0.0, 0.0),
+            positions: vec![[1.0, 0.0, 0.0], [3.0, 6.0, 0.0], [5.0, 0.0, 3.0], [9.0; 3]],
+            ..GaussianCloud::default()
+        };
+        let found = centers(&cloud, &[doll, eye, eye, NOBODY], &all);
+        assert_eq!(found, [DVec3::new(13.0, 2.0, 1.0), DVec3::new(14.0, 3.0, 1.5), DVec3::ZERO]);
+    }
+}

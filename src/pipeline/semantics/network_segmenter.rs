@@ -1,0 +1,203 @@
+//! Masks found by a network (SAM, SAM 2) that is asked for everything in a photo, sorted into objects
+//! and parts by the paper's filters.
+
+use super::filters::{self, FilterOptions};
+use super::segmenter::{FoundMask, SegmentError, Segmenter};
+use crate::io;
+use crate::models::catalog::{self, Role};
+use crate::models::sam::automatic::{AutomaticMask, AutomaticOptions, everything};
+use crate::models::sam::{PromptedMasks, Sam};
+use crate::models::sam2::Sam2;
+use crate::models::{ModelError, manifest};
+use crate::pipeline::observer::{Interrupted, Observer, Ticker};
+use crate::scene::{Level, Mask, Photo, PhotoPixels};
+
+/// Masks by a network.
+pub struct NetworkMasks {
+    network: Box<dyn PromptedMasks>,
+    /// Which of its answers are taken.
+    pub options: AutomaticOptions,
+    /// Which of those are objects, and parts.
+    pub filters: FilterOptions,
+    /// Whether each object's own tile is segmented for its parts, as the paper does: finer, for the time
+    /// of one more look per object.
+    pub tiles: bool,
+}
+
+/// Overlap from which the less sure of two masks is left out (LangSplat's).
+const MASK_NMS: f64 = 0.8;
+/// Predicted IoU times stability from which a mask is taken (LangSplat's).
+const LEAST_SCORE: f32 = 0.7;
+/// Side of an object's box from which its tile is worth a look of its own, px.
+const LEAST_TILE_PX: usize = 32;
+
+impl NetworkMasks {
+    /// The network of this name: a model of the catalog, or the path of a model's description.
+    ///
+    /// # Errors
+    /// If it is not on this machine, or finds no masks.
+    pub fn open(name: &str) -> Result<Self, ModelError> {
+        let path = catalog::find(name, Role::Segmenter)?;
+        let mut options = AutomaticOptions::default();
+        let network: Box<dyn PromptedMasks> = match manifest::kind(&path)?.as_str() {
+            "sam" => Box::new(Sam::open(&path)?),
+            "sam2" => {
+                // Its small regions are those of low-resolution masks, 16 times as coarse.
+                options.least_region_px /= 16;
+                Box::new(Sam2::open(&path)?)
+            }
+            other => return Err(ModelError::Metadata { path, problem: format!("a '{other}' model finds no masks") }),
+        };
+        Ok(Self { network, options, filters: FilterOptions::default(), tiles: true })
+    }
+
+    /// What the network finds in a picture, told as a share of `of` looks of which `done` are done.
+    fn look(
+        &mut self,
+        picture: &PhotoPixels,
+        options: &AutomaticOptions,
+        watch: &mut Watch<'_>,
+    ) -> Result<Vec<Mask>, SegmentError> {
+        let mut end = Ok(());
+        let found = everything(&mut *self.network, picture, options, &mut |share| {
+            end = watch.tick(share);
+            end.is_ok()
+        })?;
+        end?;
+        watch.done += 1.0;
+        Ok(distinct(found))
+    }
+
+    /// Masks inside an object's tile, in px of the whole picture.
+    fn look_closer(
+        &mut self,
+        picture: &PhotoPixels,
+        object: &Mask,
+        watch: &mut Watch<'_>,
+    ) -> Result<Vec<Mask>, SegmentError> {
+        let Some(at) = object.bounds().filter(|b| b.x.len().min(b.y.len()) >= LEAST_TILE_PX) else {
+            return Ok(Vec::new());
+        };
+        let width = picture.width_px as usize;
+        let pixel = |i: usize| if object.contains(i) { picture.rgb[i] } else { [0; 3] };
+        let rgb = at.y.clone().flat_map(|y| at.x.clone().map(move |x| y * width + x)).map(pixel).collect();
+        let tile = PhotoPixels { width_px: at.x.len() as u32, height_px: at.y.len() as u32, rgb, coverage: None };
+        let options = AutomaticOptions { crop_layers: 0, ..self.options };
+        let masks = self.look(&tile, &options, watch)?;
+        let place = |mask: Mask| {
+            let mut placed = Mask::empty(width, picture.height_px as usize);
+            let w = at.x.len();
+            mask.pixels().for_each(|i| placed.insert((at.y.start + i / w) * width + at.x.start + i % w));
+            placed
+        };
+        Ok(masks.into_iter().map(place).collect())
+    }
+}
+
+/// Passes progress on, and the wish to stop.
+struct Watch<'a> {
+    observer: &'a mut dyn Observer,
+    ticker: Ticker,
+    /// Looks that are done, and all of them.
+    done: f64,
+    all: f64,
+}
+
+impl Watch<'_> {
+    /// Reports that this share of a look is done, and asks whether to go on.
+    fn tick(&mut self, share: f64) -> Result<(), Interrupted> {
+        // In hundredths of a look.
+        let [done, all] = [self.done + share, self.all].map(|looks| (100.0 * looks) as u64);
+        self.ticker.total = all;
+        self.ticker.tick(done as usize, self.observer)
+    }
+}
+
+/// Masks that are sure enough, without those that all but repeat a surer one. Masks inside others
+/// stay, other than LangSplat's: they are what parts are made of.
+fn distinct(mut found: Vec<AutomaticMask>) -> Vec<Mask> {
+    let score = |f: &AutomaticMask| f.predicted_iou * f.stability;
+    found.retain(|f| score(f) >= LEAST_SCORE);
+    found.sort_by(|a, b| score(b).total_cmp(&score(a)));
+    let mut kept: Vec<Mask> = Vec::new();
+    for mask in found.into_iter().map(|f| f.mask) {
+        if kept.iter().all(|k| k.iou(&mask) <= MASK_NMS) {
+            kept.push(mask);
+        }
+    }
+    kept
+}
+
+impl Segmenter for NetworkMasks {
+    fn name(&self) -> &str {
+        self.network.name()
+    }
+
+    fn covers(&self, _: &Photo) -> bool {
+        true
+    }
+
+    fn segment(
+        &mut self,
+        photo: &Photo,
+        max_side_px: u32,
+        observer: &mut dyn Observer,
+    ) -> Result<Vec<FoundMask>, SegmentError> {
+        let picture = io::photo::load(photo, max_side_px)?;
+        let ticker = Ticker::new(format!("Finding masks in {}", photo.name), 0);
+        let mut watch = Watch { observer, ticker, done: 0.0, all: 1.0 };
+        let options = self.options;
+        let mut masks = self.look(&picture, &options, &mut watch)?;
+        let objects = filters::objects(&masks, &self.filters);
+        if self.tiles {
+            watch.all += objects.len() as f64;
+            for object in &objects {
+                masks.extend(self.look_closer(&picture, &object.mask, &mut watch)?);
+            }
+        }
+        Ok(sorted(objects, &masks, &self.filters))
+    }
+}
+
+/// Objects, largest first, then their parts among all masks; none has a name.
+fn sorted(objects: Vec<filters::Kept>, masks: &[Mask], options: &FilterOptions) -> Vec<FoundMask> {
+    let (mut found, mut parts) = (Vec::new(), Vec::new());
+    for (parent, object) in objects.into_iter().enumerate() {
+        let pieces = filters::parts(&object.mask, masks, options);
+        parts.extend(pieces.into_iter().map(|p| (parent, p.mask)));
+        found.push(FoundMask { level: Level::Object, parent: None, name: None, mask: object.mask });
+    }
+    let part = |(parent, mask)| FoundMask { level: Level::Part, parent: Some(parent), name: None, mask };
+    found.extend(parts.into_iter().map(part));
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_lies_inside_something_is_its_part() {
+        let mask = |from: usize, to: usize| Mask::from_fn(100, 1, |i| (from..to).contains(&i));
+        let (options, masks) = (FilterOptions::default(), [mask(10, 20), mask(0, 50), mask(60, 90), mask(61, 90)]);
+        let found = sorted(filters::objects(&masks, &options), &masks, &options);
+        let list: Vec<_> = found.iter().map(|f| (f.level, f.parent, f.mask.area())).collect();
+        // What is nearly all of something is that thing.
+        assert_eq!(list, [(Level::Object, None, 50), (Level::Object, None, 30), (Level::Part, Some(0), 10)]);
+    }
+
+    #[test]
+    fn of_masks_that_repeat_each_other_the_surest_stays() {
+        let something = |from: usize, to: usize, predicted_iou: f32| AutomaticMask {
+            mask: Mask::from_fn(100, 1, |i| (from..to).contains(&i)),
+            bounds: [0.0; 4],
+            predicted_iou,
+            stability: 1.0,
+            point: [0.0; 2],
+            crop: [0; 4],
+        };
+        let found = [something(0, 50, 0.8), something(0, 52, 0.9), something(0, 30, 0.95), something(60, 90, 0.6)];
+        let kept: Vec<usize> = distinct(found.to_vec()).iter().map(Mask::area).collect();
+        assert_eq!(kept, [30, 52], "one repeats, one is not sure; one inside another stays");
+    }
+}

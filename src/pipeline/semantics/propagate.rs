@@ -1,0 +1,137 @@
+//! Identities of Gaussians that no labeled photo saw: those of the Gaussians they hang together
+//! with.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use rayon::prelude::*;
+use rstar::RTree;
+use rstar::primitives::GeomWithData;
+
+use super::votes::{Assignment, UNKNOWN};
+use crate::math::sh::SH_C0;
+use crate::math::stats::median;
+use crate::scene::{GaussianCloud, NOBODY};
+
+/// Neighbors of a Gaussian.
+const NEIGHBOURS: usize = 8;
+/// How many usual distances between neighbors a full step in color is as far as.
+const COLOR_WEIGHT: f64 = 12.0;
+/// Path length, in usual distances between neighbors, beyond which nothing is inherited.
+const FARTHEST: f64 = 40.0;
+
+/// Every Gaussian without a vote inherits from the one with a vote that is nearest along the
+/// graph of neighbors, where a step is longer the more the colors differ. What is nobody's is
+/// inherited like the rest, and is what is left where nothing is near.
+pub fn extend(cloud: &GaussianCloud, assignments: &mut [Assignment]) {
+    if assignments.iter().all(|b| b.identity != UNKNOWN) {
+        return;
+    }
+    let points: Vec<GeomWithData<[f64; 3], usize>> =
+        cloud.positions.iter().enumerate().map(|(i, p)| GeomWithData::new(p.map(f64::from), i)).collect();
+    let tree = RTree::bulk_load(points.clone());
+    let near: Vec<Vec<(usize, f64)>> = points
+        .par_iter()
+        .map(|p| {
+            let around = tree.nearest_neighbor_iter_with_distance_2(*p.geom()).skip(1).take(NEIGHBOURS);
+            around.map(|(q, d)| (q.data, d.sqrt())).collect()
+        })
+        .collect();
+    let spacing = median(&near.iter().filter_map(|n| n.first()).map(|n| n.1).filter(|d| *d > 0.0).collect::<Vec<_>>());
+    let spacing = if spacing.is_finite() { spacing } else { 1.0 };
+    let stride = cloud.sh_stride();
+    let color = |i: usize| cloud.sh[i * stride].map(|c| f64::from(c) * SH_C0);
+    let step = |i: usize, j: usize, d: f64| {
+        let (a, b) = (color(i), color(j));
+        d / spacing + COLOR_WEIGHT * a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+    };
+
+    // Neighborship counts in both directions: lonely Gaussians know others that do not know them.
+    let mut edges: Vec<Vec<(usize, f64)>> = vec![Vec::new(); points.len()];
+    for (i, neighbors) in near.iter().enumerate() {
+        for &(j, d) in neighbors {
+            let length = step(i, j, d);
+            edges[i].push((j, length));
+            edges[j].push((i, length));
+        }
+    }
+    let mut distance: Vec<f64> =
+        assignments.iter().map(|b| if b.identity == UNKNOWN { f64::INFINITY } else { 0.0 }).collect();
+    // Non-negative floats order like their bits.
+    let mut open: BinaryHeap<Reverse<(u64, usize)>> =
+        (0..points.len()).filter(|&i| distance[i] == 0.0).map(|i| Reverse((0, i))).collect();
+    while let Some(Reverse((bits, i))) = open.pop() {
+        if f64::from_bits(bits) > distance[i] {
+            continue;
+        }
+        for &(j, length) in &edges[i] {
+            let far = distance[i] + length;
+            if far < distance[j] && far <= FARTHEST {
+                distance[j] = far;
+                assignments[j] = Assignment { identity: assignments[i].identity, margin: 0.0 };
+                open.push(Reverse((far.to_bits(), j)));
+            }
+        }
+    }
+    for b in assignments.iter_mut().filter(|b| b.identity == UNKNOWN) {
+        b.identity = NOBODY;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A row of Gaussians, red up to `edge`, blue from there.
+    fn row(n: usize, edge: usize) -> GaussianCloud {
+        GaussianCloud {
+            positions: (0..n).map(|i| [i as f32 * 0.01, 0.0, 0.0]).collect(),
+            log_scales: vec![[-5.0; 3]; n],
+            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
+            opacity_logits: vec![2.0; n],
+            sh: (0..n).map(|i| if i < edge { [1.5, -1.5, -1.5] } else { [-1.5, -1.5, 1.5] }).collect(),
+            ..GaussianCloud::default()
+        }
+    }
+
+    #[test]
+    fn identities_spread_up_to_a_change_of_color() {
+        let cloud = row(30, 18);
+        let mut b = vec![Assignment { identity: UNKNOWN, margin: 0.0 }; 30];
+        b[0].identity = 1;
+        b[29].identity = NOBODY;
+        extend(&cloud, &mut b);
+        assert!(b[..18].iter().all(|b| b.identity == 1), "{b:?}");
+        assert!(b[18..].iter().all(|b| b.identity == NOBODY));
+    }
+
+    #[test]
+    fn nothing_is_inherited_from_afar_or_overwritten() {
+        let mut cloud = row(30, 30);
+        for p in &mut cloud.positions[15..] {
+            p[0] += 9.0;
+        }
+        let mut b = vec![Assignment { identity: UNKNOWN, margin: 0.0 }; 30];
+        b[3] = Assignment { identity: 2, margin: 0.5 };
+        extend(&cloud, &mut b);
+        assert!(b[..15].iter().all(|b| b.identity == 2) && b[15..].iter().all(|b| b.identity == NOBODY));
+        assert_eq!((b[3].margin, b[4].margin), (0.5, 0.0));
+        extend(&GaussianCloud::default(), &mut []);
+    }
+
+    #[test]
+    fn inheritance_ends_after_forty_steps_and_a_change_of_color_costs_some() {
+        // One step a Gaussian; half of red more costs six.
+        for (jump, reach) in [(0.0, 40), (0.5, 34)] {
+            let mut cloud = row(60, 60);
+            cloud.sh[5..].iter_mut().for_each(|c| c[0] += (jump / SH_C0) as f32);
+            let mut b = vec![Assignment { identity: UNKNOWN, margin: 0.0 }; 60];
+            b[0].identity = 3;
+            extend(&cloud, &mut b);
+            let reached = b.iter().filter(|b| b.identity == 3).count();
+            // Half a step either way for rounding; the first one counts.
+            assert!((reach..=reach + 1).contains(&reached), "{jump}: {reached}");
+            assert!(b[..reached].iter().all(|b| b.identity == 3) && b[reached..].iter().all(|b| b.identity == NOBODY));
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! Videos: a scene drawn from one camera after another, with what was asked for marked if wanted.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::observer::{Interrupted, Observer, Ticker};
+use super::semantics::view_map::ViewMap;
+use crate::io::video::{Settings, Summary, VideoFileError, VideoWriter};
+
+use crate::render::{DrawError, RenderError, RenderSettings, Renderer};
+use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
+
+/// How much of a marked pixel is the mark, of 8.
+const MARK: u32 = 3;
+
+/// Identities that are marked in every picture.
+#[derive(Clone, Copy)]
+pub struct Marked<'a> {
+    /// Objects and parts.
+    pub map: &'a SemanticMap,
+    /// Which of them.
+    pub ids: &'a [IdentityId],
+    /// With which color.
+    pub color: [u8; 3],
+}
+
+/// Why a video could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum VideoError {
+    /// A picture could not be drawn.
+    #[error(transparent)]
+    Draw(#[from] DrawError),
+    /// Identities could not be drawn.
+    #[error(transparent)]
+    Identities(#[from] RenderError),
+    /// It could not be written.
+    #[error(transparent)]
+    Animation(#[from] VideoFileError),
+    /// The observer asked to stop; nothing is left of the video.
+    #[error("cancelled")]
+    Interrupted(#[from] Interrupted),
+}
+
+/// Draws the scene from every camera into a video at `out`.
+///
+/// # Errors
+/// If a picture cannot be drawn or written, or the observer asks to stop.
+pub fn write(
+    cloud: &Arc<GaussianCloud>,
+    draw: &RenderSettings,
+    cameras: &[Camera],
+    marked: Option<Marked<'_>>,
+    renderer: &mut Renderer,
+    out: (&Path, &Settings),
+    observer: &mut dyn Observer,
+) -> Result<Summary, VideoError> {
+    let mut ticker = Ticker::new("Drawing the video", cameras.len());
+    observer.proceed()?;
+    let mut writer = VideoWriter::create(out.0, out.1)?;
+    for (done, camera) in cameras.iter().enumerate() {
+        let mut pixels = renderer.draw(cloud, camera, draw)?.to_rgb8();
+        if let Some(marked) = marked.filter(|m| !m.ids.is_empty()) {
+            let Marked { map, ids, .. } = marked;
+            let view = ViewMap::render(renderer, cloud, &map.of, &map.identities, camera, draw)?;
+            for id in ids {
+                let mask = view.mask(&map.identities, *id);
+                mark(&mut pixels, camera.width_px as usize, |i| mask.contains(i), marked.color);
+            }
+        }
+        writer.push(pixels.as_flattened())?;
+        ticker.tick(done + 1, observer)?;
+    }
+    Ok(writer.finish()?)
+}
+
+/// Tints the pixels of a mask, its border strongest.
+fn mark(pixels: &mut [[u8; 3]], width: usize, inside: impl Fn(usize) -> bool, color: [u8; 3]) {
+    let height = pixels.len() / width.max(1);
+    for y in 0..height {
+        for x in 0..width {
+            let i = y * width + x;
+            if !inside(i) {
+                continue;
+            }
+            let edge = x == 0 || y == 0 || x + 1 == width || y + 1 == height;
+            let border = edge || [i - 1, i + 1, i - width, i + width].iter().any(|n| !inside(*n));
+            let weight = if border { 8 } else { MARK };
+            let mix = |c: usize| ((u32::from(pixels[i][c]) * (8 - weight) + u32::from(color[c]) * weight) / 8) as u8;
+            pixels[i] = [mix(0), mix(1), mix(2)];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::observer::{Signal, Silent};
+
+    #[test]
+    fn a_film_has_a_frame_per_camera_and_a_cancelled_one_leaves_nothing() {
+        struct Impatient;
+        impl Observer for Impatient {
+            fn signal(&self) -> Signal {
+                Signal::Cancel
+            }
+        }
+        let folder = tempfile::tempdir().expect("folder");
+        let eye =
+            |x: f64| Camera::look_at(glam::DVec3::new(x, 0.0, -2.0), glam::DVec3::ZERO, glam::DVec3::Y, 0.8, 32, 16);
+        let cameras: Vec<Camera> = (0..5).filter_map(|i| eye(f64::from(i) * 0.1)).collect();
+        let mut cloud = GaussianCloud::default();
+        cloud.positions.push([0.0; 3]);
+        cloud.log_scales.push([-2.0; 3]);
+        cloud.quaternions.push([1.0, 0.0, 0.0, 0.0]);
+        cloud.opacity_logits.push(3.0);
+        cloud.sh.push([1.0; 3]);
+        let cloud = Arc::new(cloud);
+        let mut backend = Renderer::new();
+        let mut video = |name: &str, observer: &mut dyn Observer| {
+            let path = folder.path().join(name);
+            let settings = Settings::new(32, 16, 10.0);
+            let made =
+                write(&cloud, &RenderSettings::default(), &cameras, None, &mut backend, (&path, &settings), observer);
+            (made, path)
+        };
+        let (made, path) = video("a.gif", &mut Silent);
+        let summary = made.expect("a video");
+        assert_eq!((summary.frames, summary.size_px), (5, (32, 16)));
+        assert!(path.is_file());
+        let (stopped, path) = video("b.gif", &mut Impatient);
+        assert!(matches!(stopped, Err(VideoError::Interrupted(_))) && !path.exists());
+        assert_eq!(std::fs::read_dir(folder.path()).expect("lists").count(), 1, "no half file");
+    }
+
+    #[test]
+    fn marks_are_strongest_at_their_border() {
+        let mut pixels = vec![[0; 3]; 49];
+        mark(&mut pixels, 7, |i| (1..6).contains(&(i % 7)) && (1..6).contains(&(i / 7)), [255, 0, 0]);
+        assert_eq!((pixels[0], pixels[8], pixels[24]), ([0; 3], [255, 0, 0], [95, 0, 0]));
+    }
+}
