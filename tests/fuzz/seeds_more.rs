@@ -172,21 +172,6 @@ allowed = ["locate", "go_to", "remove", "export"]
 confirm = ["remove"]
 confirm_overwrite = ["export"]
 forbidden = []
-[[class]]
-name = "liquid"
-words = ["water", "tea"]
-[[class]]
-name = "electronics"
-words = ["laptop"]
-[[action]]
-name = "pour"
-words = ["pour", "spill"]
-[[rule]]
-actions = ["pour"]
-of = "liquid"
-with = "electronics"
-verdict = "refuse"
-reason = "water and electricity"
 "#;
 
 fn answer() -> Value {

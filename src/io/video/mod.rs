@@ -1,7 +1,7 @@
 //! Videos of pictures: MP4, GIF, WebP, or PNG frames in a folder; or whatever an ffmpeg program writes.
 //!
 //! ```no_run
-//! use fmlgs::io::animation::{AnimationWriter, Settings};
+//! use fmlgs::io::video::{Settings, VideoWriter};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let mut video = VideoWriter::create("flight.mp4".as_ref(), &Settings::new(640, 480, 30.0))?;
 //! for _ in 0..90 {
