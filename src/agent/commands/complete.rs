@@ -6,7 +6,8 @@ use crate::agent::language::Language;
 use crate::agent::resolve::{Vocabulary, is_thing};
 use crate::scene::Identities;
 
-/// The texts that `text` can become with its next words, at most `most`, in the order of the commands.
+/// The texts that `text` can become with its next words, at most `most`: names of things first, else in the order of
+/// the commands.
 pub fn complete(text: &str, identities: &Identities, most: usize) -> Vec<String> {
     let tokens = request_tokens(text);
     let words: Vec<&str> = tokens.iter().map(|t| t.low.as_str()).collect();
@@ -26,10 +27,11 @@ pub fn complete(text: &str, identities: &Identities, most: usize) -> Vec<String>
             _ => (typed, ""),
         };
         let kept = Kept { identities, known: &known, begun };
-        let mut next = Vec::new();
+        let (things, mut next) = (kept.options(Slot::Thing), Vec::new());
         for sequence in sequences() {
             kept.follow(&sequence.items, whole, &mut next);
         }
+        next.sort_by_key(|n| !things.iter().any(|t| t.ends_with(n.as_str())));
         for end in next {
             let all: Vec<&str> = words[..at].iter().chain(whole).copied().chain([end.as_str()]).collect();
             let text = all.join(" ").replace(" 's", "'s").replace(" ,", ",");
