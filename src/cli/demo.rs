@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::demo_queries::{self, Queries};
 use super::progress::{Console, evaluation_line};
 use super::train::Settings;
-use super::{CliError, eval, interrupt, opened, output, synth};
+use super::{CliError, interrupt, opened, output, synth};
 use crate::io;
 use crate::jobs::evaluate::{self, Comparison, Options};
 use crate::jobs::plan;
@@ -96,7 +96,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     }
     let options = Options { pictures: Some(compare), ..Options::default() };
     let job = Comparison::new(opened::drawable(&scene)?, &photos, options)?;
-    let Evaluation { psnr, ssim, views, .. } = evaluate::photometric(&job, &mut console).map_err(eval::stopped)?;
+    let Evaluation { psnr, ssim, views, .. } = evaluate::photometric(&job, &mut console).map_err(CliError::of_views)?;
     let queries = demo_queries::run(&scene, &photos, &job, &queries, &mut console)?;
     let millis = fly(&job.cloud, &job.settings, &dataset, &flight)?;
 

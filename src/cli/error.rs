@@ -46,6 +46,11 @@ impl CliError {
         if Interrupted::is_cause_of(&error) { Self::Cancelled(saved.into()) } else { error.into() }
     }
 
+    /// Of a measurement of views: without all of them there is no result.
+    pub fn of_views(error: JobError) -> Self {
+        Self::of_work(error, "not all views were measured")
+    }
+
     /// Prints the error to standard error and returns its exit code.
     pub fn report(&self) -> ExitCode {
         match self {

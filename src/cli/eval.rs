@@ -6,7 +6,6 @@ use serde_json::json;
 
 use super::progress::Console;
 use super::{CliError, eval_depth, eval_masks, number, output};
-use crate::jobs::JobError;
 use crate::jobs::evaluate::{self, Comparison, Options};
 use crate::jobs::evaluate_masks::Protocol;
 use crate::jobs::open;
@@ -77,11 +76,6 @@ impl Args {
     }
 }
 
-/// Without all views there is no result.
-pub fn stopped(error: JobError) -> CliError {
-    CliError::of_work(error, "not all views were measured")
-}
-
 pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let comparison = args.check()?;
     if let Some(labels) = &args.masks {
@@ -91,7 +85,7 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     if args.depth {
         return eval_depth::run(&args.scene, &comparison, args.json, &mut console);
     }
-    let found = evaluate::photometric(&comparison, &mut console).map_err(stopped)?;
+    let found = evaluate::photometric(&comparison, &mut console).map_err(CliError::of_views)?;
     drop(console);
     if args.json {
         return output::print_json(&json!({

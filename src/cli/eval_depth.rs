@@ -10,7 +10,7 @@ use crate::pipeline::depth::{self, DepthErrors};
 use crate::pipeline::observer::Observer;
 
 pub fn run(scene: &Path, job: &Comparison, as_json: bool, observer: &mut dyn Observer) -> Result<(), CliError> {
-    let (scores, median_render_ms) = evaluate::depth(job, observer).map_err(super::eval::stopped)?;
+    let (scores, median_render_ms) = evaluate::depth(job, observer).map_err(CliError::of_views)?;
     if as_json {
         return output::print_json(&json!({
             "scene": scene,

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::front;
 use super::knobs::Knobs;
 use crate::math::stats::median;
 
@@ -306,12 +305,6 @@ impl Stage {
     /// Whether every setting was measured at every seed.
     pub fn complete(&self) -> bool {
         self.points.len() == self.planned && self.points.iter().all(|p| p.secs.each.len() >= self.seeds.len())
-    }
-
-    /// Indices of the points that no other point beats in both time and error, fastest first.
-    pub fn front(&self, measure: &Measure) -> Vec<usize> {
-        let at = |p: &Point| (p.secs.median, p.error(measure).unwrap_or(f64::NAN));
-        front::pareto(&self.points.iter().map(at).collect::<Vec<_>>())
     }
 }
 

@@ -1,6 +1,6 @@
 //! Which points are worth having: the Pareto front of time and error, and the choice of a default.
 
-use super::document::{Point, Rule, Stage};
+use super::document::{Measure, Point, Rule, Stage};
 
 /// Indices of the `(seconds, error)` that no other beats in both, fastest first. Points that are no
 /// numbers are left out; of equal ones the first stays.
@@ -17,6 +17,14 @@ pub fn pareto(points: &[(f64, f64)]) -> Vec<usize> {
         better
     });
     order
+}
+
+impl Stage {
+    /// Indices of the points that no other point beats in both time and error, fastest first.
+    pub fn front(&self, measure: &Measure) -> Vec<usize> {
+        let at = |p: &Point| (p.secs.median, p.error(measure).unwrap_or(f64::NAN));
+        pareto(&self.points.iter().map(at).collect::<Vec<_>>())
+    }
 }
 
 /// What a rule makes of one knob.

@@ -1,9 +1,9 @@
 //! Measuring: error against run time (every knob that trades accuracy for time is measured, not guessed), speed, and
 //! extreme cases.
 //!
-//! [`document`] is what a report holds, [`file`] reads and writes it; [`studies`] measure the stages of the program,
+//! [`document`] is what a report holds, [`mod@file`] reads and writes it; [`studies`] measure the stages of the program,
 //! [`subject`] opens those that a scene allows, [`sweep`] goes through their settings; [`front`] says which are worth
-//! having, [`order`] how errors fall, [`compare`] what another report has of the same. [`bench`] times drawing,
+//! having, [`order`] how errors fall, [`compare`] what another report has of the same. [`mod@bench`] times drawing,
 //! training and queries, [`plan`] what a scene's plan saves, [`survey`] how well flights do; [`stability`] is the
 //! catalog of extreme cases. [`table`], [`plot`] and [`page`] show all of it, [`defaults`] justifies the program's
 //! defaults.

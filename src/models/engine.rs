@@ -7,7 +7,6 @@
 //! [`Engine::note`] says so. `FMLGS_DEVICE` chooses what it computes on (`cpu`, `cuda`, `tensorrt`,
 //! `coreml`, `directml`); otherwise the first of CUDA, Core ML and DirectML that it offers.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -17,7 +16,7 @@ use ort::session::Session;
 use ort::session::builder::GraphOptimizationLevel;
 
 use super::ModelError;
-use super::network::Network;
+use super::network::{Network, guarded};
 use super::session_cache;
 use crate::scene::resource_log::{self, Sort};
 
@@ -192,7 +191,9 @@ impl Engine {
     /// # Errors
     /// If it is no network, or one that this engine cannot run.
     pub fn load_file(&self, path: &Path) -> Result<Network, ModelError> {
-        Ok(Network::new(self.session(path)?, &path.display().to_string()).in_file(path))
+        let file = path.to_path_buf();
+        let network = Network::new(self.session(path)?, &path.display().to_string());
+        Ok(network.in_file(move || engine()?.session(&file)))
     }
 
     /// A session of a network in a file, for which room is made.
@@ -239,14 +240,6 @@ fn loaded(path: &Path) -> Result<ort::environment::EnvironmentBuilder, String> {
         return Err("there is no such file".into());
     }
     ort::init_from(path).map_err(|e| e.to_string())
-}
-
-/// What an engine makes of a model; a panic in it is an error as any other.
-pub(super) fn guarded<T>(name: &str, work: impl FnOnce() -> ort::Result<T>) -> Result<T, String> {
-    match catch_unwind(AssertUnwindSafe(work)) {
-        Ok(done) => done.map_err(|e| e.to_string()),
-        Err(_) => Err(format!("the engine gave up on {name}; its file is damaged, or made for another engine")),
-    }
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! A network: named arrays in, named arrays out.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
@@ -9,7 +9,6 @@ use ort::session::{Session, SessionInputValue};
 use ort::value::Tensor;
 
 use super::ModelError;
-use super::engine::{engine, guarded};
 use super::session_cache::{self, Place};
 
 /// Numbers with a shape, row-major.
@@ -103,24 +102,27 @@ impl Outputs {
     }
 }
 
+/// Opens a network's file.
+type Reopen = Box<dyn Fn() -> Result<Session, ModelError> + Send + Sync>;
+
 /// A network that is ready to run.
 pub struct Network {
     place: Arc<Mutex<Place>>,
     name: String,
-    /// Its file, if it has one; without, it stays open.
-    file: Option<PathBuf>,
+    /// What opens its file again, if it has one; without, it stays open.
+    reopen: Option<Reopen>,
 }
 
 impl Network {
     /// Of a session, with the file name for messages.
     pub(super) fn new(session: Session, name: &str) -> Self {
-        Self { place: Place::of(session), name: name.into(), file: None }
+        Self { place: Place::of(session), name: name.into(), reopen: None }
     }
 
-    /// The same, known to lie in a file: it may be closed where memory is short.
-    pub(super) fn in_file(self, path: &Path) -> Self {
+    /// The same, known to lie in a file that `reopen` opens: it may be closed where memory is short.
+    pub(super) fn in_file(self, reopen: impl Fn() -> Result<Session, ModelError> + Send + Sync + 'static) -> Self {
         session_cache::register(&self.place);
-        Self { file: Some(path.into()), ..self }
+        Self { reopen: Some(Box::new(reopen)), ..self }
     }
 
     /// Its file's name.
@@ -136,8 +138,8 @@ impl Network {
         let name = self.name.clone();
         // A panic while it ran leaves a session that runs again.
         let mut place = self.place.lock().unwrap_or_else(PoisonError::into_inner);
-        if let (None, Some(file)) = (&place.session, &self.file) {
-            place.session = Some(engine()?.session(file)?);
+        if let (None, Some(reopen)) = (&place.session, &self.reopen) {
+            place.session = Some(reopen()?);
         }
         place.used = Instant::now();
         let Some(session) = &mut place.session else {
@@ -203,6 +205,14 @@ where
 {
     let shape: Vec<i64> = array.shape.iter().map(|n| *n as i64).collect();
     Ok(SessionInputValue::from(Tensor::from_array((shape, array.values))?))
+}
+
+/// What an engine makes of a model; a panic in it is an error as any other.
+pub(super) fn guarded<T>(name: &str, work: impl FnOnce() -> ort::Result<T>) -> Result<T, String> {
+    match catch_unwind(AssertUnwindSafe(work)) {
+        Ok(done) => done.map_err(|e| e.to_string()),
+        Err(_) => Err(format!("the engine gave up on {name}; its file is damaged, or made for another engine")),
+    }
 }
 
 /// A row scaled to unit length, if it has a direction.

@@ -1,10 +1,11 @@
-//! Ways through a scene: which space is occupied, where one may stand, how to get from here to there, and
+//! Routes through a scene: which space is occupied, what is reachable, how to get from here to there, and
 //! from where a target is seen best (the paper's Interactive Agent; Scene Initialization and Visible
 //! Interaction).
 //!
 //! In the order of the data: [`occupancy`] from the Gaussians, [`keypoints`] from the cameras, [`graph`]
 //! of both; [`target`] chooses a view, [`navigator`] finds the way to it, [`curve`] rounds it, and
-//! [`visit`] does all of that for an identity; [`flight`] makes pictures' poses of it. [`video`] does the same for a path that the user has put together.
+//! [`approach`] does all of that for an identity; [`flight`] makes poses of frames of it. [`camera_spline`] does the
+//! same for a path that the user has put together.
 
 pub mod approach;
 pub mod camera_spline;

@@ -4,14 +4,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::failure::{Failure, Stop};
-use super::protocol::Outcome;
+use super::protocol::{MeasureRequest, Outcome};
 use crate::measure::studies::Input;
 use crate::measure::studies::render;
 use crate::measure::studies::views::{View, held_out};
 use crate::measure::{End, FILE, Report, computer, is_report};
 use crate::pipeline::observer::{Observer, Severity};
-use crate::render::RenderSettings;
-use crate::scene::{Camera, Dataset, GaussianCloud};
 
 /// Most views that are compared.
 const VIEWS: usize = 4;
@@ -19,25 +17,6 @@ const VIEWS: usize = 4;
 const MAX_SIDE_PX: u32 = 256;
 /// How often every setting is measured.
 const REPEATS: u32 = 3;
-
-/// What is to be drawn in many ways.
-#[derive(Clone, Debug)]
-pub struct MeasureRequest {
-    /// The scene, for display.
-    pub scene: String,
-    /// Its Gaussians.
-    pub cloud: Arc<GaussianCloud>,
-    /// How they are drawn.
-    pub settings: RenderSettings,
-    /// Its photos; those that are held out are compared with, too.
-    pub dataset: Option<Arc<Dataset>>,
-    /// Every how-manieth photo is held out.
-    pub holdout_every: usize,
-    /// From where it is drawn without held-out photos.
-    pub camera: Camera,
-    /// Folder of the report. What is measured there already is resumed.
-    pub out: PathBuf,
-}
 
 /// Reads a report; the `second` is one to compare with.
 pub fn read(path: PathBuf, second: bool) -> Result<Outcome, Stop> {
@@ -99,6 +78,8 @@ fn views(request: &MeasureRequest, observer: &mut dyn Observer) -> Result<Vec<Vi
 mod tests {
     use super::*;
     use crate::pipeline::observer::Silent;
+    use crate::render::RenderSettings;
+    use crate::scene::Camera;
     use glam::DVec3;
 
     #[test]

@@ -19,10 +19,10 @@ mod view_renderer;
 
 pub use control::Control;
 pub use failure::{Failure, Stop};
-pub use measure::MeasureRequest;
-pub use protocol::{Command, Event, JobId, JobKind, Lane, Outcome, Start};
+pub use observer::{CloudSnapshot, Repaint};
+pub use protocol::{Command, Event, JobId, JobKind, Lane, MeasureRequest, Outcome, Start};
 pub use slot::{Slot, Versioned};
-pub use thread::{CloudSnapshot, Jobs, QueueFull, Repaint, Worker};
+pub use thread::{Jobs, QueueFull, Worker};
 pub use view_modes::ViewMode;
 
 pub use crate::jobs::OpenedScene;

@@ -7,10 +7,23 @@ use std::time::{Duration, Instant};
 use crossbeam_channel::Sender;
 
 use super::protocol::{Event, JobId};
-use super::thread::{CloudSnapshot, Repaint};
 use super::{Control, Slot};
 use crate::pipeline::observer::{Evaluation, Observer, Progress, Severity, Signal, StepMetrics};
 use crate::scene::GaussianCloud;
+
+/// Called after every event, from the worker's threads: asks the window to look.
+pub type Repaint = Arc<dyn Fn() + Send + Sync>;
+
+/// A copy of the Gaussians in training.
+#[derive(Clone, Debug)]
+pub struct CloudSnapshot {
+    /// Whose they are.
+    pub job: JobId,
+    /// The Gaussians.
+    pub cloud: Arc<GaussianCloud>,
+    /// After how many steps.
+    pub step: u64,
+}
 
 /// Least time between two copies of the cloud: three a second keep the picture alive and cost
 /// training little.

@@ -6,7 +6,6 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::failure::Failure;
-use super::measure::MeasureRequest;
 use crate::jobs::edit::EditRequest;
 use crate::jobs::go_to::{ApproachRequest, Approached, Explored};
 use crate::jobs::models::ModelList;
@@ -377,4 +376,23 @@ impl Event {
     pub fn is_end(&self) -> bool {
         matches!(self, Self::Finished(..) | Self::Cancelled(_) | Self::Failed(..))
     }
+}
+
+/// What is to be drawn in many ways.
+#[derive(Clone, Debug)]
+pub struct MeasureRequest {
+    /// The scene, for display.
+    pub scene: String,
+    /// Its Gaussians.
+    pub cloud: Arc<GaussianCloud>,
+    /// How they are drawn.
+    pub settings: RenderSettings,
+    /// Its photos; those that are held out are compared with, too.
+    pub dataset: Option<Arc<Dataset>>,
+    /// Every how-manieth photo is held out.
+    pub holdout_every: usize,
+    /// From where it is drawn without held-out photos.
+    pub camera: Camera,
+    /// Folder of the report. What is measured there already is resumed.
+    pub out: PathBuf,
 }

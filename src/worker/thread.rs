@@ -11,14 +11,10 @@ use std::time::{Duration, Instant};
 use crossbeam_channel::{Receiver, Sender, bounded};
 
 use super::failure::{Failure, Stop};
-use super::observer::JobObserver;
+use super::observer::{CloudSnapshot, JobObserver, Repaint};
 use super::protocol::{Command, Event, JobId, JobKind, Lane, Outcome};
 use super::{Control, Slot};
 use crate::pipeline::observer::{Observer, Signal};
-use crate::scene::GaussianCloud;
-
-/// Called after every event, from the worker's threads: asks the window to look.
-pub type Repaint = Arc<dyn Fn() + Send + Sync>;
 
 /// Events that may wait to be taken.
 const EVENTS: usize = 1024;
@@ -26,17 +22,6 @@ const EVENTS: usize = 1024;
 const QUEUED: usize = 64;
 /// How long the end of the program waits for a job to reach a consistent state.
 const FAREWELL: Duration = Duration::from_secs(5);
-
-/// A copy of the Gaussians in training.
-#[derive(Clone, Debug)]
-pub struct CloudSnapshot {
-    /// Whose they are.
-    pub job: JobId,
-    /// The Gaussians.
-    pub cloud: Arc<GaussianCloud>,
-    /// After how many steps.
-    pub step: u64,
-}
 
 /// Does the work of a command. The program has one implementation ([`super::jobs::PipelineJobs`]);
 /// tests of the contract have others.

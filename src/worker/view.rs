@@ -8,7 +8,8 @@ use std::time::{Duration, Instant};
 
 use super::Slot;
 use super::failure::Failure;
-use super::thread::{Repaint, panic_failure};
+use super::observer::Repaint;
+use super::thread::panic_failure;
 use super::view_modes::ViewMode;
 pub use super::view_renderer::QualityBudget;
 use super::view_renderer::ViewRenderer;

@@ -4,12 +4,12 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use glam::DVec3;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
 
 use super::gpu::{Measurement, Timing, frame, timing};
+use super::views_of;
 use crate::math::lanes::{LANES, LaneOp, Lanes};
 use crate::math::stats::{mean, median};
 use crate::math::{Real, lanes::Lane};
@@ -17,7 +17,7 @@ use crate::pipeline::train::init;
 use crate::pipeline::train::trainer::{StepError, Trainer};
 use crate::pipeline::train::{TrainConfig, TrainView};
 use crate::render::{DrawError, RenderSettings, Renderer};
-use crate::scene::{Bounds, Camera, Dataset, GaussianCloud};
+use crate::scene::{Dataset, GaussianCloud};
 
 /// Timing of one scene at one size.
 #[derive(Clone, Debug, Serialize)]
@@ -47,19 +47,6 @@ pub struct StepTiming {
     pub step_ms: f64,
     /// Steps per second, from the median.
     pub steps_per_sec: f64,
-}
-
-/// Three cameras around a cloud, at different heights and distances, y downwards.
-pub fn views_of<R: Real>(cloud: &GaussianCloud<R>, width: u32, height: u32) -> Vec<Camera> {
-    let Some(bounds) = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i))) else { return Vec::new() };
-    let (center, radius) = (bounds.center(), bounds.radius());
-    [(0.3_f64, -0.3, 2.2), (2.4, -0.9, 1.6), (4.4, 0.2, 3.0)]
-        .into_iter()
-        .filter_map(|(angle, height_over, distance)| {
-            let eye = center + DVec3::new(angle.cos(), height_over, angle.sin()) * radius * distance;
-            Camera::look_at(eye, center, -DVec3::Y, 0.8, width, height)
-        })
-        .collect()
 }
 
 /// Times the CPU renderer on a cloud.

@@ -7,7 +7,7 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
 
-use super::cpu::views_of;
+use super::views_of;
 use crate::math::stats::median;
 use crate::pipeline::train::{TrainConfig, TrainView, init};
 use crate::render::{

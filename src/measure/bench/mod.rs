@@ -5,14 +5,30 @@ pub(crate) mod cpu;
 pub mod gpu;
 pub(crate) mod query;
 
-pub use cpu::{label, one_core_limit, views_of};
+pub use cpu::{label, one_core_limit};
 
+use glam::DVec3;
 use serde::Serialize;
 
 use self::cpu::{RenderTiming, StepTiming};
 use self::gpu::Timing;
 use self::query::QueryTiming;
 use super::table::{Rows, rows};
+use crate::math::Real;
+use crate::scene::{Bounds, Camera, GaussianCloud};
+
+/// Three cameras around a cloud, at different heights and distances, y downwards.
+pub fn views_of<R: Real>(cloud: &GaussianCloud<R>, width: u32, height: u32) -> Vec<Camera> {
+    let Some(bounds) = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i))) else { return Vec::new() };
+    let (center, radius) = (bounds.center(), bounds.radius());
+    [(0.3_f64, -0.3, 2.2), (2.4, -0.9, 1.6), (4.4, 0.2, 3.0)]
+        .into_iter()
+        .filter_map(|(angle, height_over, distance)| {
+            let eye = center + DVec3::new(angle.cos(), height_over, angle.sin()) * radius * distance;
+            Camera::look_at(eye, center, -DVec3::Y, 0.8, width, height)
+        })
+        .collect()
+}
 
 /// Everything that one run has measured.
 #[derive(Debug, Default, Serialize)]

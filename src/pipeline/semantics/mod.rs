@@ -2,10 +2,10 @@
 //! for (the paper's Method).
 //!
 //! In the order of the data: [`segmenter`] finds masks ([`regions`] without any model; [`filters`]
-//! tell objects from parts), [`tracker`] makes them identities over all views, [`votes`] gives every Gaussian its identity, [`codes`] every identity its point in code
-//! space, [`view_map`] draws identities into a view; [`grammar`] takes a query apart, [`names`] and
-//! [`meaning`] score identities for it by words and by looks, [`localize`] picks those that are
-//! meant, and [`answer`] puts it together, with the time of each of the [`stages`].
+//! tell objects from parts), [`tracker`] makes them identities over all views, [`votes`] gives every Gaussian its
+//! identity, [`codes`] every identity its point in code space, [`view_map`] draws identities into a view; [`parse`] takes a query apart, [`names`] and
+//! [`by_embedding`] score identities for it by name and by embedding, [`localize`] picks those that are
+//! meant, and [`answer`] puts it together, with the time of each of the [`timing`] stages.
 
 pub mod answer;
 mod associate;

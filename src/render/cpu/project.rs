@@ -1,8 +1,5 @@
 //! Projection: Gaussians to splats (mean, conic, reach, color) in the picture of one camera.
 
-use rayon::prelude::*;
-
-use super::walk::Primitive;
 use crate::math::{Real, rotation, sh};
 use crate::render::{BLUR_PX2, COLOR_MAX, Features, RenderSettings, TANGENT_CLAMP};
 use crate::scene::{Camera, Gaussian, GaussianCloud};
@@ -107,8 +104,9 @@ pub struct Geometry<R> {
     pub determinants: [R; 2],
 }
 
+/// The inner product.
 #[inline(always)]
-fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
+pub fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
@@ -229,69 +227,6 @@ pub struct Scene<'a, R> {
     pub features: Features<'a, R>,
     /// How.
     pub settings: &'a RenderSettings,
-}
-
-/// Projects the whole cloud, in parts of [`CHUNK`] Gaussians: `P::SHAPE + channels` values per splat, the channels
-/// being color, extra channels, what depth needs, padding zeros.
-pub fn project<R: Real, P: Primitive<R>>(
-    parts: &mut Vec<Chunk<R>>,
-    scene: Scene<'_, R>,
-    view: &View<R>,
-    primitive: P,
-    channels: usize,
-) {
-    let n = scene.cloud.len();
-    parts.resize_with(n.div_ceil(CHUNK), Chunk::default);
-    parts.par_iter_mut().enumerate().for_each(|(c, part)| {
-        part.splats.clear();
-        part.values.clear();
-        part.degenerate = 0;
-        project_chunk(part, scene, view, primitive, channels, c * CHUNK..((c + 1) * CHUNK).min(n));
-    });
-}
-
-#[multiversion::multiversion(targets("x86_64+avx2+fma"))]
-fn project_chunk<R: Real, P: Primitive<R>>(
-    part: &mut Chunk<R>,
-    scene: Scene<'_, R>,
-    view: &View<R>,
-    primitive: P,
-    channels: usize,
-    range: std::ops::Range<usize>,
-) {
-    let Scene { cloud, features, settings } = scene;
-    let degree = settings.sh_degree.min(cloud.sh_degree);
-    for i in range {
-        // Cheap tests first: most Gaussians of a scene are outside the picture.
-        let relative = view.relative(cloud.positions[i]);
-        if !(dot(view.rows[2], relative) > view.near) {
-            continue;
-        }
-        let opacity = cloud.opacity_logits[i].sigmoid();
-        if opacity < primitive.alpha_min() {
-            continue;
-        }
-        let gaussian = cloud.gaussian(i);
-        let (mut splat, shape, depth) = match primitive.project(&gaussian, opacity, view, settings) {
-            Projected::Splat(splat, shape, depth) => (splat, shape, depth),
-            Projected::Outside => continue,
-            Projected::Degenerate => {
-                part.degenerate += 1;
-                continue;
-            }
-        };
-        splat.gaussian = i as u32;
-        let basis = sh::basis(degree, direction(relative));
-        let first = part.values.len();
-        part.values.extend_from_slice(shape.as_ref());
-        part.values.extend_from_slice(&color(gaussian.sh, &basis, degree));
-        part.values.extend_from_slice(&features.values[i * features.channels..(i + 1) * features.channels]);
-        if settings.depth {
-            part.values.extend_from_slice(depth.as_ref());
-        }
-        part.values.resize(first + shape.as_ref().len() + channels, R::ZERO);
-        part.splats.push(splat);
-    }
 }
 
 /// What becomes of a Gaussian in front of the near plane.

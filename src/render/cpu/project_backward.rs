@@ -1,10 +1,13 @@
 //! From the moments of a splat back to the raw parameters of its Gaussian.
 
 use super::project::{Geometry, Splat, View, direction, geometry, raw_color};
-use super::splat::MOMENTS;
 use crate::math::{Real, rotation::unit_quaternion, sh};
 use crate::render::RenderSettings;
 use crate::scene::Gaussian;
+
+/// Sums in front of the channels in a tile entry's record: `dL/dpower` (power = -q/2) times
+/// `1, dx, dy, dx², dx dy, dy²`.
+pub const MOMENTS: usize = 6;
 
 /// Gradient with respect to the raw parameters of one Gaussian.
 #[derive(Clone, Copy, Debug)]

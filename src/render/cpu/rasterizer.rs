@@ -8,13 +8,13 @@ use super::bin::{self, Tiles};
 use super::blend::{BlendRow, RowOut};
 use super::blend_backward::{BlendRowBackward, RowIn};
 use super::contributions::{ContributionRow, ContributionSink};
-use super::project::{self, Chunk, Scene, Splat, View};
+use super::project::{CHUNK, Chunk, Projected, Scene, Splat, View, color, direction, dot};
 use super::project_backward::GaussianGradient;
 use super::sort::{self, Ordered};
 use super::walk::{Primitive, TileRow, Values};
 use super::{RenderStats, validate};
-use crate::math::Real;
 use crate::math::finite::{CHECKED, NotFinite};
+use crate::math::{Real, sh};
 use crate::render::{Features, Frame, FrameGradient, MAX_CHANNELS, RenderSettings, TILE_PX};
 use crate::scene::{Camera, Gaussian, GaussianCloud};
 
@@ -135,7 +135,7 @@ impl<R: Real, P: Primitive<R>> Rasterizer<R, P> {
         let Lists { parts, ordered, tiles } = &mut self.lists;
         let mut clock = Instant::now();
         let primitive = P::new(&view, settings);
-        project::project(parts, Scene { cloud, features, settings }, &view, primitive, channels);
+        project(parts, Scene { cloud, features, settings }, &view, primitive, channels);
         let project = lap(&mut clock);
         sort::sort(ordered, parts, P::SHAPE + channels, settings.keep_order);
         let sort = lap(&mut clock);
@@ -341,4 +341,67 @@ fn finish<R: Real>(frame: &mut Frame<R>, transmittance: &[R], background: [f32; 
         }
     }
     frame.alpha.iter_mut().zip(transmittance).for_each(|(a, t)| *a = R::ONE - *t);
+}
+
+/// Projects the whole cloud, in parts of [`CHUNK`] Gaussians: `P::SHAPE + channels` values per splat, the channels
+/// being color, extra channels, what depth needs, padding zeros.
+pub fn project<R: Real, P: Primitive<R>>(
+    parts: &mut Vec<Chunk<R>>,
+    scene: Scene<'_, R>,
+    view: &View<R>,
+    primitive: P,
+    channels: usize,
+) {
+    let n = scene.cloud.len();
+    parts.resize_with(n.div_ceil(CHUNK), Chunk::default);
+    parts.par_iter_mut().enumerate().for_each(|(c, part)| {
+        part.splats.clear();
+        part.values.clear();
+        part.degenerate = 0;
+        project_chunk(part, scene, view, primitive, channels, c * CHUNK..((c + 1) * CHUNK).min(n));
+    });
+}
+
+#[multiversion::multiversion(targets("x86_64+avx2+fma"))]
+fn project_chunk<R: Real, P: Primitive<R>>(
+    part: &mut Chunk<R>,
+    scene: Scene<'_, R>,
+    view: &View<R>,
+    primitive: P,
+    channels: usize,
+    range: std::ops::Range<usize>,
+) {
+    let Scene { cloud, features, settings } = scene;
+    let degree = settings.sh_degree.min(cloud.sh_degree);
+    for i in range {
+        // Cheap tests first: most Gaussians of a scene are outside the picture.
+        let relative = view.relative(cloud.positions[i]);
+        if !(dot(view.rows[2], relative) > view.near) {
+            continue;
+        }
+        let opacity = cloud.opacity_logits[i].sigmoid();
+        if opacity < primitive.alpha_min() {
+            continue;
+        }
+        let gaussian = cloud.gaussian(i);
+        let (mut splat, shape, depth) = match primitive.project(&gaussian, opacity, view, settings) {
+            Projected::Splat(splat, shape, depth) => (splat, shape, depth),
+            Projected::Outside => continue,
+            Projected::Degenerate => {
+                part.degenerate += 1;
+                continue;
+            }
+        };
+        splat.gaussian = i as u32;
+        let basis = sh::basis(degree, direction(relative));
+        let first = part.values.len();
+        part.values.extend_from_slice(shape.as_ref());
+        part.values.extend_from_slice(&color(gaussian.sh, &basis, degree));
+        part.values.extend_from_slice(&features.values[i * features.channels..(i + 1) * features.channels]);
+        if settings.depth {
+            part.values.extend_from_slice(depth.as_ref());
+        }
+        part.values.resize(first + shape.as_ref().len() + channels, R::ZERO);
+        part.splats.push(splat);
+    }
 }

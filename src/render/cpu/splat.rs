@@ -1,16 +1,12 @@
 //! Gaussians drawn as splats: ellipses in the picture plane, each of one depth.
 
 use super::project::{Projected, Splat, View, splat};
-use super::project_backward::{GaussianGradient, project_backward};
+use super::project_backward::{GaussianGradient, MOMENTS, project_backward};
 use super::walk::{GROUPS, Planes, Primitive, Reach, RowPass, With, with_channels};
 use crate::math::Real;
 use crate::math::lanes::Lanes;
 use crate::render::{ALPHA_MAX, Frame, FrameGradient, MAX_CHANNELS, RenderSettings, TILE_PX};
 use crate::scene::Gaussian;
-
-/// Sums in front of the channels in a tile entry's record: `dL/dpower` (power = -q/2) times
-/// `1, dx, dy, dx², dx dy, dy²`.
-pub const MOMENTS: usize = 6;
 
 /// Gaussians as splats.
 #[derive(Clone, Copy, Debug)]

@@ -13,13 +13,10 @@
 
 use super::super::project::Splat;
 use super::super::walk::{GROUPS, Reach};
-use super::project::SHAPE;
+use super::project::{INVERSE_BLUR, SHAPE};
 use crate::math::Real;
 use crate::math::lanes::Lanes;
 use crate::render::{ALPHA_MAX, ALPHA_MIN, TILE_PX};
-
-/// One over the variance, in px², below which no surfel is drawn in the picture.
-pub const INVERSE_BLUR: f64 = 2.0;
 
 /// A surfel's constants in vector registers.
 pub struct Disk<R: Real, L: Lanes<R>> {

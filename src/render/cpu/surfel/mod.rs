@@ -14,7 +14,8 @@ pub mod disk;
 pub mod project;
 pub mod project_backward;
 
-use self::disk::{Disk, Hit, INVERSE_BLUR};
+use self::disk::{Disk, Hit};
+use self::project::INVERSE_BLUR;
 use self::project::{SHAPE, surfel};
 use self::project_backward::project_backward;
 use super::project::{Projected, Splat, View};

@@ -1,9 +1,11 @@
 //! Projection of surfels: what the compositing needs of each, and an ellipse around what it touches.
 
 use super::super::project::{Projected, Splat, View};
-use super::disk::INVERSE_BLUR;
 use crate::math::{Real, rotation};
 use crate::scene::Gaussian;
+
+/// One over the variance, in px², below which no surfel is drawn in the picture.
+pub const INVERSE_BLUR: f64 = 2.0;
 
 /// Numbers per splat in front of the composited channels: derivatives of the picture's x by the
 /// disk's two coordinates and of its y, both times depth, and of depth; the projected center in px.
