@@ -15,7 +15,9 @@ mod source;
 
 use std::path::Path;
 
-use rules::{Complaint, dependencies, headers, kernels, module_order, printing, render_doors, size_caps};
+use rules::{
+    Complaint, cycles, dependencies, habits, headers, kernels, module_order, printing, render_doors, size_caps,
+};
 use source::{SourceFile, read_tree};
 
 fn tree() -> Vec<SourceFile> {
@@ -56,6 +58,16 @@ fn every_kernel_has_its_launcher_and_its_cpu_counterpart() {
 #[test]
 fn only_the_command_line_prints() {
     check(printing(&tree()));
+}
+
+#[test]
+fn no_file_uses_one_that_uses_it() {
+    check(cycles(&tree()));
+}
+
+#[test]
+fn channels_are_bounded_addresses_are_no_keys_and_progress_is_a_tickers() {
+    check(habits(&tree()));
 }
 
 #[test]
@@ -163,4 +175,30 @@ fn dependencies_catch_missing_and_stale_rows() {
     assert_eq!(dependencies(manifest, &document("| `a` | uses `b` |\n")).len(), 1);
     assert_eq!(dependencies(manifest, &document("| `a`, `b` | x |\n| `old` | x |\n")).len(), 1);
     assert_eq!(dependencies(manifest, "").len(), 2);
+}
+
+#[test]
+fn cycles_are_caught_on_whatever_detour() {
+    let a = |text| file("src/io/a.rs", text);
+    let b = |text| file("src/io/deep/b.rs", text);
+    let parent = file("src/io/mod.rs", "//! x\npub use self::a::A;\nmod a;");
+    assert!(cycles(&[a("use super::deep::b::B;"), b("use crate::math::Real;"), parent]).is_empty());
+    assert_eq!(cycles(&[a("use super::deep::b::B;"), b("use crate::io::{a::A, c};")]).len(), 2);
+    assert_eq!(cycles(&[a("use super::{deep::{b::B}, c};"), b("fn f() { super::super::a::g() }")]).len(), 2);
+    let c = file("src/math/c.rs", "use crate::io::a::A;");
+    assert_eq!(cycles(&[a("use super::deep::b::B;"), b("use crate::math::c::C;"), c]).len(), 3);
+    let test = "#[cfg(test)]\nmod tests {\n    use crate::io::a::A;\n}\n";
+    assert!(cycles(&[a("use super::deep::b::B;"), b(test)]).is_empty());
+}
+
+#[test]
+fn habits_are_caught() {
+    let n = |text| complaints(habits, "src/io/a.rs", text);
+    assert_eq!(n("let (a, b) = crossbeam_channel::unbounded();"), 1);
+    assert_eq!(n("let (a, b) = mpsc::channel();"), 1);
+    assert_eq!(n("let (a, b) = bounded(4);"), 0);
+    assert_eq!(n("let key = Arc::as_ptr(&cloud) as usize;"), 1);
+    assert_eq!(n("observer.progress(Progress { stage, done });"), 1);
+    assert_eq!(n("let p = Progress { stage, ..p };"), 0);
+    assert_eq!(complaints(habits, "src/pipeline/observer.rs", "f(Progress { stage })"), 0);
 }

@@ -401,5 +401,4 @@ impl AppState {
 }
 
 #[cfg(test)]
-#[path = "state_tests.rs"]
 mod tests;

@@ -16,6 +16,7 @@ pub mod thread;
 pub mod view;
 pub mod view_modes;
 mod view_renderer;
+mod view_request;
 
 pub use control::Control;
 pub use failure::{Failure, Stop};

@@ -10,69 +10,14 @@ use super::Slot;
 use super::failure::Failure;
 use super::observer::Repaint;
 use super::thread::panic_failure;
-use super::view_modes::ViewMode;
-pub use super::view_renderer::QualityBudget;
 use super::view_renderer::ViewRenderer;
+pub use super::view_request::{QualityBudget, SkipPasses, ViewPicture, ViewRequest, ViewResult};
 use crate::jobs::query::ViewMaps;
-use crate::render::{RenderError, RenderSettings, Renderer, StageTimes};
-use crate::scene::plan::When;
+use crate::render::{RenderError, Renderer};
 use crate::scene::resource_log::{self, Sort};
-use crate::scene::{Camera, GaussianCloud, PhotoPixels, ScenePlan, SemanticMap};
 
 /// How long the eye rests before working memory is given back.
 const REST: Duration = Duration::from_secs(2);
-
-/// What to draw.
-#[derive(Clone, Debug)]
-pub struct ViewRequest {
-    /// The Gaussians.
-    pub cloud: Arc<GaussianCloud>,
-    /// From where, at full resolution.
-    pub camera: Camera,
-    /// What of it.
-    pub mode: ViewMode,
-    /// How: degree of the colors, background, filter. Depth is drawn where it is needed.
-    pub settings: RenderSettings,
-    /// How long it may take.
-    pub budget: QualityBudget,
-    /// The photo taken from this camera, for the difference and for PSNR.
-    pub photo: Option<Arc<PhotoPixels>>,
-    /// Objects and parts of the Gaussians, to be drawn too once the eye rests.
-    pub semantics: Option<Arc<SemanticMap>>,
-    /// Whether blended codes are wanted too.
-    pub codes: bool,
-    /// What is left out.
-    pub skip: SkipPasses,
-    /// Whether the stages are to be timed, where that is not free.
-    pub timed: bool,
-    /// Comes back with the frame.
-    pub ticket: u64,
-}
-
-/// Passes that the scene's plan skips.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SkipPasses {
-    /// Depth of frames from which no one picks points.
-    pub depth: bool,
-    /// Codes of parts.
-    pub parts: bool,
-    /// The GPU.
-    pub gpu: bool,
-    /// Working memory, while the eye rests.
-    pub buffers: bool,
-}
-
-impl SkipPasses {
-    /// What `plan` leaves out.
-    pub fn of(plan: &ScenePlan) -> Self {
-        Self {
-            depth: plan.depth != When::Always,
-            parts: !plan.parts,
-            gpu: plan.on_cpu,
-            buffers: plan.buffers != When::Always,
-        }
-    }
-}
 
 /// What the pixels of a view belong to.
 #[derive(Clone, Debug)]
@@ -84,38 +29,6 @@ pub struct MappedView {
     /// Seconds that drawing them took.
     pub secs: f64,
 }
-
-/// A drawn view.
-#[derive(Clone, Debug)]
-pub struct ViewPicture {
-    /// The request's.
-    pub ticket: u64,
-    /// Whether this is the request's full resolution.
-    pub full: bool,
-    /// The camera at the size that was drawn.
-    pub camera: Camera,
-    /// Row-major sRGB.
-    pub rgb: Vec<[u8; 3]>,
-    /// Median depth in scene units, row-major, 0 where there is none; `None` if not drawn.
-    pub median_depth: Option<Vec<f32>>,
-    /// Depths at the two ends of the color scale, in the depth mode.
-    pub depth_range: Option<(f32, f32)>,
-    /// PSNR in dB against the photo, if the request had one.
-    pub psnr: Option<f64>,
-    /// Seconds that rendering took.
-    pub secs: f64,
-    /// The same by stage, where that is known.
-    pub stages: StageTimes,
-    /// Seconds from colors to bytes: depth scales, differences.
-    pub paint_secs: f64,
-    /// What drew it: "CPU", or the name of the GPU.
-    pub drawn_by: String,
-    /// Why the CPU drew it though there is a GPU.
-    pub instead_of_gpu: Option<String>,
-}
-
-/// The result of a request.
-pub type ViewResult = Result<Arc<ViewPicture>, Failure>;
 
 #[derive(Default)]
 struct Mailbox {
@@ -267,7 +180,10 @@ fn maps_of(renderer: &mut Renderer, request: &ViewRequest) -> Option<Result<View
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::RenderSettings;
+    use crate::scene::{Camera, GaussianCloud, SemanticMap};
     use crate::scene::{Identities, Level, NOBODY};
+    use crate::worker::view_modes::ViewMode;
     use glam::DVec3;
 
     #[test]

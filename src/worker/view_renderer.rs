@@ -6,32 +6,10 @@ use std::time::Instant;
 
 use super::failure::Failure;
 use super::thread::panic_failure;
-use super::view::{ViewPicture, ViewRequest, ViewResult};
 use super::view_modes::{self, ViewMode};
+use super::view_request::{QualityBudget, ViewPicture, ViewRequest, ViewResult};
 use crate::render::{self, BackendChoice, Frame, RenderSettings, Renderer};
 use crate::scene::Camera;
-
-/// How much time a frame may take; decides its resolution.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum QualityBudget {
-    /// The eye moves: keep up with it.
-    Moving,
-    /// The eye rests while something else needs the processor.
-    Shared,
-    /// The eye rests: full resolution, and depth to pick from.
-    Full,
-}
-
-impl QualityBudget {
-    /// Seconds a frame should take at most; `None` = as long as it takes.
-    fn secs(self) -> Option<f64> {
-        match self {
-            Self::Moving => Some(0.030),
-            Self::Shared => Some(0.120),
-            Self::Full => None,
-        }
-    }
-}
 
 /// Draws requests, and learns how fast it can.
 pub(super) struct ViewRenderer {

@@ -225,3 +225,131 @@ fn first_names(rest: &str) -> Vec<String> {
 fn words_ending_in_bang(code: &str) -> impl Iterator<Item = &str> {
     code.split(|c: char| !(c.is_alphanumeric() || c == '_' || c == '!')).filter(|w| w.ends_with('!'))
 }
+
+/// No channel without a bound, no address as a key that outlives what lies there, no progress but a ticker's.
+pub fn habits(files: &[SourceFile]) -> Vec<Complaint> {
+    let mut complaints = Vec::new();
+    for file in library_files(files) {
+        let code = library_code(&file.text);
+        let flat: String = code.split_whitespace().collect::<Vec<_>>().join(" ");
+        let mut forbid = |found: bool, what: &str| {
+            if found {
+                complaints.push(format!("{}: {what}", file.path));
+            }
+        };
+        forbid(flat.contains("unbounded(") || flat.contains("mpsc::channel"), "a channel without a bound");
+        // The difference of two addresses is a place in a text.
+        let kept = flat.match_indices("as_ptr(").any(|(at, _)| {
+            let rest: String = flat[at..].chars().take(40).collect();
+            rest.contains("as usize") && !rest.contains("as usize -") && !flat[..at].ends_with("- line.")
+        });
+        forbid(kept, "an address as a key: count generations");
+        let makes =
+            flat.match_indices("Progress {").any(|(at, _)| flat[..at].ends_with([' ', '(']) && is_literal(&flat, at));
+        forbid(makes && file.path != "src/pipeline/observer.rs", "progress is reported by a Ticker");
+    }
+    complaints
+}
+
+/// Whether the braces after a type's name at `at` make a new value: no definition, no change of another one's fields.
+fn is_literal(flat: &str, at: usize) -> bool {
+    let before = flat[..at].trim_end();
+    let inside = flat[at..].split('}').next().unwrap_or_default();
+    !["struct", "impl", "for", "->"].iter().any(|word| before.ends_with(word)) && !inside.contains("..")
+}
+
+/// No two files of the library use each other, on whatever detour. A folder's `mod.rs` and the files in the folder
+/// are one thing here: what they share, the folder defines.
+pub fn cycles(files: &[SourceFile]) -> Vec<Complaint> {
+    let files: Vec<&SourceFile> = library_files(files).collect();
+    let place = |path: &str| -> Vec<String> {
+        let inside = path.strip_prefix("src/").unwrap_or(path).trim_end_matches(".rs").trim_end_matches("/mod");
+        inside.split('/').map(str::to_owned).collect()
+    };
+    let places: Vec<Vec<String>> = files.iter().map(|f| place(&f.path)).collect();
+    let find =
+        |path: &[String]| (0..=path.len()).rev().find_map(|n| places.iter().position(|p| p[..] == path[..n] && n > 0));
+    let uses = |i: usize| -> Vec<usize> {
+        let used = used_paths(&library_code(&files[i].text), &places[i]);
+        let all = used.iter().filter_map(|path| find(path));
+        // Along one line of folders nothing counts: parents name their children.
+        all.filter(|&j| !places[j].starts_with(&places[i]) && !places[i].starts_with(&places[j])).collect()
+    };
+    let graph: Vec<Vec<usize>> = (0..files.len()).map(uses).collect();
+    let reaches = |from: usize, to: usize| {
+        let (mut seen, mut open) = (vec![false; graph.len()], vec![from]);
+        while let Some(i) = open.pop() {
+            for &j in &graph[i] {
+                if j == to {
+                    return true;
+                }
+                if !std::mem::replace(&mut seen[j], true) {
+                    open.push(j);
+                }
+            }
+        }
+        false
+    };
+    let mut complaints = Vec::new();
+    for (i, used) in graph.iter().enumerate() {
+        for &j in used.iter().filter(|&&j| reaches(j, i)) {
+            complaints.push(format!("{} uses {}, which comes back to it", files[i].path, files[j].path));
+        }
+    }
+    complaints.sort();
+    complaints.dedup();
+    complaints
+}
+
+/// Paths below the crate's root that `code`, which stands at `place`, names by `crate::` or `super::`.
+fn used_paths(code: &str, place: &[String]) -> Vec<Vec<String>> {
+    let flat: String = code.split_whitespace().collect::<Vec<_>>().join(" ");
+    let mut paths = Vec::new();
+    let starts = |at: usize| !flat[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ':');
+    for (at, _) in flat.match_indices("crate::").filter(|(at, _)| starts(*at)) {
+        expand(&flat[at + 7..], Vec::new(), &mut paths);
+    }
+    for (at, _) in flat.match_indices("super::").filter(|(at, _)| starts(*at)) {
+        let (mut rest, mut base) = (&flat[at..], place.to_vec());
+        while let Some(after) = rest.strip_prefix("super::") {
+            base.pop();
+            rest = after;
+        }
+        expand(rest, base, &mut paths);
+    }
+    paths
+}
+
+/// The paths of `a::{b, c::d}` after `base`, as far as they are names.
+fn expand(rest: &str, base: Vec<String>, paths: &mut Vec<Vec<String>>) {
+    let rest = rest.trim_start();
+    if let Some(group) = rest.strip_prefix('{') {
+        let (mut level, mut start) = (0_usize, 0);
+        for (i, c) in group.char_indices() {
+            match c {
+                '{' => level += 1,
+                '}' if level > 0 => level -= 1,
+                ',' | '}' if level == 0 => {
+                    expand(&group[start..i], base.clone(), paths);
+                    start = i + 1;
+                    if c == '}' {
+                        return;
+                    }
+                }
+                _ => {}
+            }
+        }
+        return;
+    }
+    let name: String = rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+    if name.is_empty() {
+        return;
+    }
+    let mut path = base;
+    let after = &rest[name.len()..];
+    path.push(name);
+    match after.strip_prefix("::") {
+        Some(more) if !more.starts_with('<') && !more.starts_with('*') => expand(more, path, paths),
+        _ => paths.push(path),
+    }
+}

@@ -1,0 +1,115 @@
+//! What the drawing thread is asked for, and what it answers.
+
+use std::sync::Arc;
+
+use super::failure::Failure;
+use super::view_modes::ViewMode;
+use crate::render::{RenderSettings, StageTimes};
+use crate::scene::plan::When;
+use crate::scene::{Camera, GaussianCloud, PhotoPixels, ScenePlan, SemanticMap};
+
+/// What to draw.
+#[derive(Clone, Debug)]
+pub struct ViewRequest {
+    /// The Gaussians.
+    pub cloud: Arc<GaussianCloud>,
+    /// From where, at full resolution.
+    pub camera: Camera,
+    /// What of it.
+    pub mode: ViewMode,
+    /// How: degree of the colors, background, filter. Depth is drawn where it is needed.
+    pub settings: RenderSettings,
+    /// How long it may take.
+    pub budget: QualityBudget,
+    /// The photo taken from this camera, for the difference and for PSNR.
+    pub photo: Option<Arc<PhotoPixels>>,
+    /// Objects and parts of the Gaussians, to be drawn too once the eye rests.
+    pub semantics: Option<Arc<SemanticMap>>,
+    /// Whether blended codes are wanted too.
+    pub codes: bool,
+    /// What is left out.
+    pub skip: SkipPasses,
+    /// Whether the stages are to be timed, where that is not free.
+    pub timed: bool,
+    /// Comes back with the frame.
+    pub ticket: u64,
+}
+
+/// Passes that the scene's plan skips.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SkipPasses {
+    /// Depth of frames from which no one picks points.
+    pub depth: bool,
+    /// Codes of parts.
+    pub parts: bool,
+    /// The GPU.
+    pub gpu: bool,
+    /// Working memory, while the eye rests.
+    pub buffers: bool,
+}
+
+impl SkipPasses {
+    /// What `plan` leaves out.
+    pub fn of(plan: &ScenePlan) -> Self {
+        Self {
+            depth: plan.depth != When::Always,
+            parts: !plan.parts,
+            gpu: plan.on_cpu,
+            buffers: plan.buffers != When::Always,
+        }
+    }
+}
+
+/// How much time a frame may take; decides its resolution.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum QualityBudget {
+    /// The eye moves: keep up with it.
+    Moving,
+    /// The eye rests while something else needs the processor.
+    Shared,
+    /// The eye rests: full resolution, and depth to pick from.
+    Full,
+}
+
+impl QualityBudget {
+    /// Seconds a frame should take at most; `None` = as long as it takes.
+    pub(super) fn secs(self) -> Option<f64> {
+        match self {
+            Self::Moving => Some(0.030),
+            Self::Shared => Some(0.120),
+            Self::Full => None,
+        }
+    }
+}
+
+/// A drawn view.
+#[derive(Clone, Debug)]
+pub struct ViewPicture {
+    /// The request's.
+    pub ticket: u64,
+    /// Whether this is the request's full resolution.
+    pub full: bool,
+    /// The camera at the size that was drawn.
+    pub camera: Camera,
+    /// Row-major sRGB.
+    pub rgb: Vec<[u8; 3]>,
+    /// Median depth in scene units, row-major, 0 where there is none; `None` if not drawn.
+    pub median_depth: Option<Vec<f32>>,
+    /// Depths at the two ends of the color scale, in the depth mode.
+    pub depth_range: Option<(f32, f32)>,
+    /// PSNR in dB against the photo, if the request had one.
+    pub psnr: Option<f64>,
+    /// Seconds that rendering took.
+    pub secs: f64,
+    /// The same by stage, where that is known.
+    pub stages: StageTimes,
+    /// Seconds from colors to bytes: depth scales, differences.
+    pub paint_secs: f64,
+    /// What drew it: "CPU", or the name of the GPU.
+    pub drawn_by: String,
+    /// Why the CPU drew it though there is a GPU.
+    pub instead_of_gpu: Option<String>,
+}
+
+/// The result of a request.
+pub type ViewResult = Result<Arc<ViewPicture>, Failure>;
