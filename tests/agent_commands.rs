@@ -192,7 +192,11 @@ fn completions_lead_to_commands() {
     assert!(starts("what is on the table le").contains(&"what is on the table left of".to_owned()));
     assert!(starts("turn left 90 ").contains(&"turn left 90 degrees".to_owned()) && !starts("").is_empty());
     assert!(starts("please hi").contains(&"please hide".to_owned()));
-    assert!(starts("show me ")[0].starts_with("show me the "), "names of the scene come first");
+    assert!(
+        starts("show me ")[0].starts_with("show me the "),
+        "names of the scene come first: {:?}",
+        starts("show me ")
+    );
     assert!(starts("paint the c").is_empty(), "nothing goes on from what is no command");
     // Taking the first again and again comes to a command that is understood.
     for begin in ["sh", "hide th", "how b", "where ", "measure the wi"] {

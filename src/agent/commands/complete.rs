@@ -27,12 +27,12 @@ pub fn complete(text: &str, identities: &Identities, most: usize) -> Vec<String>
             _ => (typed, ""),
         };
         let kept = Kept { identities, known: &known, begun };
-        let (things, mut next) = (kept.options(Slot::Thing), Vec::new());
+        let mut next = Vec::new();
         for sequence in sequences() {
             kept.follow(&sequence.items, whole, &mut next);
         }
-        next.sort_by_key(|n| !things.iter().any(|t| t.ends_with(n.as_str())));
-        for end in next {
+        next.sort_by_key(|(is_name, _)| !is_name);
+        for (_, end) in next {
             let all: Vec<&str> = words[..at].iter().chain(whole).copied().chain([end.as_str()]).collect();
             let text = all.join(" ").replace(" 's", "'s").replace(" ,", ",");
             if !found.contains(&text) && found.len() < most {
@@ -51,11 +51,11 @@ struct Kept<'a> {
 }
 
 impl Kept<'_> {
-    /// Adds what may stand after `words` in a sequence.
-    fn follow(&self, items: &[Item], words: &[&str], next: &mut Vec<String>) {
+    /// Adds what may stand after `words` in a sequence, and whether it is a name.
+    fn follow(&self, items: &[Item], words: &[&str], next: &mut Vec<(bool, String)>) {
         match (items.split_first(), words) {
             (None, _) => {}
-            (Some((Item::Word(word), _)), []) => self.offer(word, next),
+            (Some((Item::Word(word), _)), []) => self.offer(word, false, next),
             (Some((Item::Word(word), items)), [first, words @ ..]) => {
                 if word == first {
                     self.follow(items, words, next);
@@ -63,12 +63,13 @@ impl Kept<'_> {
             }
             (Some((Item::Slot(slot), items)), words) => {
                 let options = self.options(*slot);
+                let is_name = matches!(slot, Slot::Thing | Slot::Things);
                 let typed = words.join(" ");
                 for option in &options {
                     // "the left stick" after "the left".
                     let rest = if typed.is_empty() { Some(option.as_str()) } else { option.strip_prefix(&typed) };
                     let rest = rest.filter(|r| typed.is_empty() || r.starts_with(' ')).map(str::trim_start);
-                    rest.into_iter().for_each(|r| self.offer(r, next));
+                    rest.into_iter().for_each(|r| self.offer(r, is_name, next));
                 }
                 for end in 1..=words.len() {
                     let said = words[..end].join(" ");
@@ -83,16 +84,16 @@ impl Kept<'_> {
                         self.follow(items, &words[end..], next);
                     }
                     if fits && names && end == words.len() {
-                        Language::get().relations.iter().for_each(|(r, _)| self.offer(r, next));
+                        Language::get().relations.iter().for_each(|(r, _)| self.offer(r, false, next));
                     }
                 }
             }
         }
     }
 
-    fn offer(&self, text: &str, next: &mut Vec<String>) {
-        if text != "?" && text.starts_with(self.begun) && text != self.begun && !next.iter().any(|n| n == text) {
-            next.push(text.to_owned());
+    fn offer(&self, text: &str, is_name: bool, next: &mut Vec<(bool, String)>) {
+        if text != "?" && text.starts_with(self.begun) && text != self.begun && !next.iter().any(|(_, n)| n == text) {
+            next.push((is_name, text.to_owned()));
         }
     }
 
