@@ -225,7 +225,11 @@ fn write_report(r: &DemoReport, folder: &Path) -> Result<(), CliError> {
     let views = rows(&["view", "PSNR dB", "SSIM"], r.views.iter().map(view));
     let asked = r.queries.asked.iter().map(|q| {
         let answer = q.answer.join(", ");
-        vec![q.question.clone(), q.verdict.into(), answer, q.pixels.to_string(), format!("{:.1}", q.millis)]
+        let verdict = match (q.verdict, q.pixels) {
+            ("found", 0) => "found, not in this view",
+            (verdict, _) => verdict,
+        };
+        vec![q.question.clone(), verdict.into(), answer, q.pixels.to_string(), format!("{:.1}", q.millis)]
     });
     let asked = rows(&["question", "verdict", "answer", "px", "ms"], asked);
     let synth = r.synth_secs.map_or("reused".to_owned(), |s| format!("made in {s:.1} s"));
