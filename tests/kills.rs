@@ -16,10 +16,11 @@ use std::time::{Duration, Instant};
 use cli_support::{Done, Server, command, fmlgs, folder, tiny_dataset};
 use fmlgs::io::{SceneFolder, semantic_map, trained};
 use fmlgs::jobs::Folders;
+use fmlgs::jobs::edit::EditRequest;
 use fmlgs::pipeline::train::checkpoint;
 use fmlgs::scene::SemanticMap;
 use fmlgs::worker::jobs::PipelineJobs;
-use fmlgs::worker::{Command as Job, EditRequest, Event, Outcome, Worker};
+use fmlgs::worker::{Command as Job, Event, Outcome, Worker};
 use rand::{RngExt, SeedableRng};
 
 /// Kills of each command.

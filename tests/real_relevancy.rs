@@ -9,9 +9,9 @@ use fmlgs::math::stats;
 use fmlgs::math::vector::{dot, unit};
 use fmlgs::pipeline::semantics::by_embedding::{EmbeddingOptions, EmbeddingScorer, TextEmbeddings};
 use fmlgs::pipeline::semantics::localize::{Answer, localize};
-use fmlgs::pipeline::semantics::parse::{Kind, ParsedQuery};
+use fmlgs::pipeline::semantics::parse::ParsedQuery;
 use fmlgs::pipeline::semantics::relevancy::{CANONICAL, PART_WEIGHT, advantage, deviate, score};
-use fmlgs::scene::{Identities, IdentityId, LanguageFeatures, Level, NOBODY, ViewFeatures};
+use fmlgs::scene::{Identities, IdentityId, LanguageFeatures, Level, LevelFilter, NOBODY, ViewFeatures};
 
 /// Queries of the LERF evaluation that have an embedding.
 const QUERIES: [&str; 17] = [
@@ -164,7 +164,7 @@ fn answers_say_when_nothing_or_several_fit() {
     let ask = |query: &str| {
         let phrase = ParsedQuery { text: query.into(), target: query.into(), whole: None };
         let options = EmbeddingOptions::default();
-        localize(&identities, &phrase, Kind::Auto, &mut EmbeddingScorer::new(&language, &phrases, options))
+        localize(&identities, &phrase, LevelFilter::Auto, &mut EmbeddingScorer::new(&language, &phrases, options))
     };
     assert!(matches!(ask("dall-e brand"), Answer::NotFound(_)), "less relevant than a canonical phrase");
     assert!(matches!(ask("spoon"), Answer::Ambiguous(_)), "two within 0.005");

@@ -4,10 +4,9 @@ use super::commands::is_command;
 use super::dialog::DialogState;
 use super::language::Language;
 use super::resolve::{Resolved, name_words, resolve, words_of};
-use super::tool::LevelFilter;
 use super::words::{number, ordinal};
 use super::world::World;
-use crate::scene::IdentityId;
+use crate::scene::{IdentityId, LevelFilter};
 
 /// An answer to "shall I?".
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,7 +71,7 @@ pub fn choice(world: &mut dyn World, text: &str, candidates: &[IdentityId], dial
     }
     let among = DialogState { group: candidates.to_vec(), ..dialog.clone() };
     for phrase in [words.join(" "), format!("{} one", words.join(" "))] {
-        if let Resolved::One { id, .. } = resolve(world, &phrase, LevelFilter::Any, &among)
+        if let Resolved::One { id, .. } = resolve(world, &phrase, LevelFilter::Auto, &among)
             && candidates.contains(&id)
         {
             return Choice::One(id);

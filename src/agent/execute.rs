@@ -8,9 +8,9 @@ use super::listing::{list_ids, measure, say_list};
 use super::policy::{Permission, Policy};
 use super::refusal::{Refusal, RefusalKind};
 use super::resolve::{Resolved, resolve};
-use super::tool::{LevelFilter, Reference, Target, ToolCall};
+use super::tool::{Reference, Target, ToolCall};
 use super::world::{Unreachable, World, WorldError};
-use crate::scene::{IdentityId, NOBODY};
+use crate::scene::{IdentityId, LevelFilter, NOBODY};
 
 /// What became of a call.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,7 +91,7 @@ pub fn check(
     let wanted = match &call {
         ToolCall::Locate { query, kind } => Some((Target::Query(query.clone()), *kind)),
         // "The part of" may be asked of parts, too.
-        other => other.target().map(|t| (t.clone(), LevelFilter::Any)),
+        other => other.target().map(|t| (t.clone(), LevelFilter::Auto)),
     };
     if let Some((target, level)) = wanted {
         match find(world, &target, level, dialog) {
@@ -110,7 +110,7 @@ pub fn check(
         }
     }
     if let ToolCall::Measure { to: Some(Reference::Thing(other)), .. } = &mut call {
-        match find(world, &other.clone(), LevelFilter::Any, dialog) {
+        match find(world, &other.clone(), LevelFilter::Auto, dialog) {
             Resolved::One { id, .. } => {
                 ids.push(id);
                 *other = Target::Identity(id);

@@ -5,9 +5,9 @@ use super::dialog::DialogState;
 use super::refusal::{Refusal, RefusalKind};
 use super::relation::{Relation, fit, gap};
 use super::resolve::resolve_all;
-use super::tool::{LevelFilter, Reference};
+use super::tool::Reference;
 use super::world::World;
-use crate::scene::{IdentityId, NOBODY};
+use crate::scene::{IdentityId, LevelFilter, NOBODY};
 
 /// What is listed or counted.
 pub(super) fn list_ids(
@@ -18,7 +18,7 @@ pub(super) fn list_ids(
     named: Option<&str>,
 ) -> Result<Vec<IdentityId>, Refusal> {
     let named = match named {
-        Some(name) => Some(resolve_all(world, name, LevelFilter::Any, &DialogState::default())?),
+        Some(name) => Some(resolve_all(world, name, LevelFilter::Auto, &DialogState::default())?),
         None => None,
     };
     let all = world.identities();

@@ -11,15 +11,14 @@ pub use super::view_shares::Parts;
 use super::view_shares::{ViewShares, is_drawn};
 use super::world::{Arrival, Facts, Moved, Unreachable, World, WorldError};
 use crate::io;
+use crate::jobs::go_to::Explored;
 use crate::navigate::approach::{Approach, ApproachError, Place};
 use crate::navigate::target::{self, Wish};
 use crate::navigate::{FRAMES, Flight, Pose, Speed};
 use crate::pipeline::semantics::answer::QueryAnswer;
-use crate::pipeline::semantics::asker::Asker;
-use crate::pipeline::semantics::parse::Kind;
+use crate::pipeline::semantics::query_engine::QueryEngine;
 use crate::scene::undo::UndoHistory;
-use crate::scene::{Bounds, Identities, IdentityId, SemanticMap, text};
-use crate::worker::Explored;
+use crate::scene::{Bounds, Identities, IdentityId, LevelFilter, SemanticMap, text};
 
 /// Points of a thing that its size is measured by, at most.
 const MEASURED_POINTS: usize = 2048;
@@ -48,7 +47,7 @@ pub type Emit = Box<dyn FnMut(Effect) + Send>;
 /// A scene that the agent acts in.
 pub struct SceneWorld {
     parts: Parts,
-    asker: Asker,
+    engine: QueryEngine,
     eye: Pose,
     aspect: f64,
     hidden: Vec<bool>,
@@ -71,12 +70,12 @@ impl SceneWorld {
     /// # Errors
     /// If the encoder that looked at it cannot be loaded.
     pub fn new(parts: Parts, eye: Pose, aspect: f64, emit: Emit) -> Result<Self, WorldError> {
-        let asker = Asker::new(parts.map.language.as_ref()).map_err(|e| WorldError(e.to_string()))?;
+        let engine = QueryEngine::new(parts.map.language.as_ref()).map_err(|e| WorldError(e.to_string()))?;
         let n = parts.map.identities.len() + 1;
         let bounds = bounds(&parts);
         Ok(Self {
             parts,
-            asker,
+            engine,
             eye,
             aspect,
             hidden: vec![false; n],
@@ -199,8 +198,8 @@ impl World for SceneWorld {
         &self.parts.map.identities
     }
 
-    fn locate(&mut self, query: &str, kind: Kind) -> Result<QueryAnswer, WorldError> {
-        let answered = self.asker.ask(&self.parts.map, query, kind).map_err(|e| WorldError(e.to_string()))?;
+    fn locate(&mut self, query: &str, kind: LevelFilter) -> Result<QueryAnswer, WorldError> {
+        let answered = self.engine.ask(&self.parts.map, query, kind).map_err(|e| WorldError(e.to_string()))?;
         Ok(answered.unwrap_or_else(|| super::world::locate_by_names(&self.parts.map.identities, query, kind)))
     }
 

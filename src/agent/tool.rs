@@ -4,8 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::camera_args::{self, Direction, Distance, Side};
 use super::relation::Relation;
-use crate::pipeline::semantics::parse::Kind;
-use crate::scene::{IdentityId, Level};
+use crate::scene::{IdentityId, LevelFilter};
 
 /// Longest text in a call, in characters.
 pub const MAX_TEXT: usize = 300;
@@ -23,37 +22,6 @@ impl Target {
     /// In words.
     pub fn query(words: impl Into<String>) -> Self {
         Self::Query(words.into())
-    }
-}
-
-/// Which level to look at.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum LevelFilter {
-    /// Objects and parts.
-    #[default]
-    Any,
-    Object,
-    Part,
-}
-
-impl LevelFilter {
-    /// As queries have it.
-    pub fn kind(self) -> Kind {
-        match self {
-            Self::Any => Kind::Auto,
-            Self::Object => Kind::Object,
-            Self::Part => Kind::Part,
-        }
-    }
-
-    /// Whether an identity of `level` is asked for.
-    pub fn accepts(self, level: Level) -> bool {
-        match self {
-            Self::Any => true,
-            Self::Object => level == Level::Object,
-            Self::Part => level == Level::Part,
-        }
     }
 }
 

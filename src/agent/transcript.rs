@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use super::camera_args::{self, Distance, Side};
 use super::relation::Relation;
-use super::tool::{LevelFilter, Reference, Target, ToolCall};
+use super::tool::{Reference, Target, ToolCall};
 use crate::math::format::short;
-use crate::scene::{Identities, text};
+use crate::scene::{Identities, LevelFilter, text};
 
 /// Entries that are kept; the oldest go first.
 const MOST: usize = 4000;
@@ -128,7 +128,7 @@ impl ToolCall {
             Self::Locate { query, kind } => {
                 parts.push(format!("\"{query}\""));
                 match kind {
-                    LevelFilter::Any => {}
+                    LevelFilter::Auto => {}
                     LevelFilter::Object => parts.push("object".into()),
                     LevelFilter::Part => parts.push("part".into()),
                 }
@@ -160,7 +160,7 @@ impl ToolCall {
                     parts.insert(0, relation.text().into());
                 }
                 match level {
-                    LevelFilter::Any => {}
+                    LevelFilter::Auto => {}
                     LevelFilter::Object => parts.insert(0, "objects".into()),
                     LevelFilter::Part => parts.insert(0, "parts".into()),
                 }

@@ -6,11 +6,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::DVec3;
 
+use crate::jobs::go_to::Explored;
 use crate::navigate::Pose;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, SemanticMap};
-use crate::worker::Explored;
 
 /// What a scene is made of.
 pub struct Parts {

@@ -5,9 +5,9 @@ use super::camera_args::{Direction, Distance, Side};
 use super::relation::{Extent, View};
 use crate::pipeline::semantics::answer::{QueryAnswer, by_name};
 use crate::pipeline::semantics::localize::Answer;
-use crate::pipeline::semantics::parse::{Kind, ParsedQuery};
+use crate::pipeline::semantics::parse::ParsedQuery;
 use crate::pipeline::semantics::timing::StagesMs;
-use crate::scene::{Bounds, Identities, IdentityId, Level};
+use crate::scene::{Bounds, Identities, IdentityId, Level, LevelFilter};
 
 /// What is known of one identity.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,7 +60,7 @@ pub trait World {
     fn identities(&self) -> &Identities;
 
     /// What a query means. Errors if the scene cannot be asked.
-    fn locate(&mut self, query: &str, kind: Kind) -> Result<QueryAnswer, WorldError>;
+    fn locate(&mut self, query: &str, kind: LevelFilter) -> Result<QueryAnswer, WorldError>;
 
     /// What is known of an identity; `None` if it is not (or no more) in the scene.
     fn facts(&self, id: IdentityId) -> Option<Facts>;
@@ -118,7 +118,7 @@ pub trait World {
 }
 
 /// Answers a query by names alone: a [`World::locate`] for scenes without an encoder.
-pub fn locate_by_names(identities: &Identities, query: &str, kind: Kind) -> QueryAnswer {
+pub fn locate_by_names(identities: &Identities, query: &str, kind: LevelFilter) -> QueryAnswer {
     match ParsedQuery::parse(query) {
         Some(phrase) => by_name(identities, &phrase, kind),
         None => QueryAnswer {

@@ -10,9 +10,10 @@ use serde::Serialize;
 use super::demo_queries::{self, Queries};
 use super::progress::{Console, evaluation_line};
 use super::train::Settings;
-use super::{CliError, interrupt, opened, output, synth};
+use super::{CliError, interrupt, output, synth};
 use crate::io;
 use crate::jobs::evaluate::{self, Comparison, Options};
+use crate::jobs::open;
 use crate::jobs::plan;
 use crate::math::stats::median;
 use crate::measure::studies::Input;
@@ -88,14 +89,14 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         ["photos", "scene", "compare", "queries", "flight"].map(|f| args.out.join(f));
 
     let synth_secs = make_photos(&photos, &mut console)?;
-    let dataset = opened::dataset(&photos)?;
+    let dataset = open::dataset(&photos)?;
     let outcome = train::run(&dataset, &config, Some(&scene), &mut console)?;
     if outcome.end == TrainEnd::Cancelled {
         let (done, all) = (outcome.steps, config.steps);
         return Err(CliError::Cancelled(format!("{done} of {all} steps are saved; the same command resumes there")));
     }
     let options = Options { pictures: Some(compare), ..Options::default() };
-    let job = Comparison::new(opened::drawable(&scene)?, &photos, options)?;
+    let job = Comparison::new(open::scene(&scene)?, &photos, options)?;
     let Evaluation { psnr, ssim, views, .. } = evaluate::photometric(&job, &mut console).map_err(CliError::of_views)?;
     let queries = demo_queries::run(&scene, &photos, &job, &queries, &mut console)?;
     let millis = fly(&job.cloud, &job.settings, &dataset, &flight)?;

@@ -18,7 +18,6 @@ mod info;
 mod interrupt;
 mod models;
 mod number;
-mod opened;
 mod output;
 mod path;
 mod plan;

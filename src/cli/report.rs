@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use super::progress::Console;
-use super::{CliError, number, opened, output};
+use super::{CliError, number, output};
 use crate::io;
+use crate::jobs::open;
 use crate::measure::subject::{Options, Subject};
 use crate::measure::{BeginError, End, FILE, Report, Stage, StageName, computer, defaults, page, plot};
 use crate::pipeline::observer::{Observer, Severity};
@@ -132,8 +133,8 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
 
 /// A trained scene with its photos, if they are there.
 fn subject(path: &Path, options: Options) -> Result<Subject, CliError> {
-    let scene = opened::drawable(path)?;
-    let dataset = scene.dataset_path.as_ref().filter(|p| p.exists()).map(|p| opened::dataset(p)).transpose()?;
+    let scene = open::scene(path)?;
+    let dataset = scene.dataset_path.as_ref().filter(|p| p.exists()).map(|p| open::dataset(p)).transpose()?;
     let map = if path.is_dir() { io::semantic_map::load(path, scene.state.as_deref(), &scene.cloud)? } else { None };
     Ok(Subject {
         name: path.display().to_string(),

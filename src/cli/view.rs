@@ -3,14 +3,14 @@
 use std::path::Path;
 
 use super::CliError;
-use super::opened::DrawableScene;
 use crate::io;
 use crate::io::trained::SceneCamera;
+use crate::jobs::Scene;
 use crate::scene::Camera;
 
 /// The camera that `wanted` names: an index from 0, a photo's name (its end is enough where that
 /// is unambiguous), or a JSON file. Without a wish it is the scene's first view.
-pub fn choose(wanted: Option<&str>, scene: &DrawableScene) -> Result<Camera, CliError> {
+pub fn choose(wanted: Option<&str>, scene: &Scene) -> Result<Camera, CliError> {
     let Some(wanted) = wanted else {
         if scene.cameras.is_empty() && scene.cloud.is_empty() {
             return Err(CliError::failed("the splat holds no Gaussians, so there is nothing to look at"));
@@ -79,14 +79,14 @@ mod tests {
     use super::*;
     use glam::DVec3;
 
-    fn scene(names: &[&str]) -> DrawableScene {
+    fn scene(names: &[&str]) -> Scene {
         let camera = |i: usize| {
             let eye = DVec3::new(1.0 + i as f64, -3.0, 1.0);
             Camera::look_at(eye, DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid")
         };
         let named =
             |(i, name): (usize, &&str)| SceneCamera { name: (*name).to_owned(), camera: camera(i), held_out: false };
-        DrawableScene { cameras: names.iter().enumerate().map(named).collect(), ..DrawableScene::default() }
+        Scene { cameras: names.iter().enumerate().map(named).collect(), ..Scene::default() }
     }
 
     #[test]

@@ -116,11 +116,14 @@ impl SceneFolder {
     fn has(&self, map: &SemanticMap) -> Result<Option<String>, IoError> {
         let path = self.path().join(semantic_map::FILE);
         let cloud = self.path().join(CLOUD_FILE);
-        let (Ok(bytes), Ok(info), Ok(cloud)) = (fs::read(&path), load_info(self.path()), splat_ply::read(&cloud))
+        let (Ok(bytes), Ok(info), Ok(of_cloud)) = (fs::read(&path), load_info(self.path()), splat_ply::state(&cloud))
         else {
             return Ok(None);
         };
-        let Some(state) = info.state else { return Ok(None) };
+        let (Some(state), Ok(cloud)) = (info.state.filter(|s| Some(s) == of_cloud.as_ref()), splat_ply::read(&cloud))
+        else {
+            return Ok(None);
+        };
         let stored = semantic_map::load(self.path(), Some(&state), &cloud).ok().flatten();
         let gaussians = |m: &SemanticMap| (m.of.clone(), m.margin.clone(), m.codes.clone());
         let same = stored.is_some_and(|s| gaussians(&s) == gaussians(map));

@@ -16,15 +16,28 @@ pub enum Level {
 }
 
 /// Which level is asked for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "snake_case")]
 pub enum LevelFilter {
     /// As the words say, else whatever fits better
     #[default]
+    #[serde(rename = "any")]
     Auto,
     /// A whole object
     Object,
     /// A part
     Part,
+}
+
+impl LevelFilter {
+    /// Whether an identity of `level` is asked for.
+    pub fn accepts(self, level: Level) -> bool {
+        match self {
+            Self::Auto => true,
+            Self::Object => level == Level::Object,
+            Self::Part => level == Level::Part,
+        }
+    }
 }
 
 /// Number of an identity: its place in the list plus one; 0 is nobody.

@@ -12,7 +12,9 @@ use super::state::Tone;
 use super::viewport::brush::Brush;
 use super::viewport::overrides::RenderOverrides;
 use crate::agent::scene::{Effect, Parts};
+use crate::jobs::edit::EditRequest;
 use crate::jobs::find_objects::Request;
+use crate::jobs::go_to::{ApproachRequest, Approached};
 use crate::measure::is_report;
 use crate::navigate::FRAMES;
 use crate::navigate::target::Wish;
@@ -21,7 +23,7 @@ use crate::pipeline::train::TrainConfig;
 use crate::scene::IdentityId;
 use crate::scene::plan::When;
 use crate::ui::actions::{Action, Pane};
-use crate::worker::{ApproachRequest, Approached, Command, EditRequest, JobId, JobKind};
+use crate::worker::{Command, JobId, JobKind};
 
 impl App {
     /// Does what a user asked for.

@@ -9,8 +9,9 @@ use super::camera;
 use super::context::SceneContext;
 use super::dialogs::Chosen;
 use super::state::Tone;
+use crate::jobs::video::VideoRequest;
 use crate::render::BackendChoice;
-use crate::worker::{Command, Failure, VideoRequest};
+use crate::worker::{Command, Failure};
 
 impl App {
     pub(super) fn choose(&mut self, action: Action) {

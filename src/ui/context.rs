@@ -5,10 +5,12 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::app::App;
+use crate::jobs::OpenedScene;
+use crate::jobs::go_to::Explored;
 use crate::navigate::Pose;
 use crate::render::RenderSettings;
 use crate::scene::{Camera, GaussianCloud, SemanticMap};
-use crate::worker::{Explored, OpenedScene, Versioned};
+use crate::worker::Versioned;
 
 /// The scene as it is now.
 pub(super) struct SceneContext {

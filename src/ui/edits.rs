@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
+use crate::jobs::edit::EditRequest;
 use crate::pipeline::semantics::edit::Edit;
 use crate::scene::undo::UndoHistory;
 use crate::scene::{IdentityId, SemanticMap};
-use crate::worker::EditRequest;
 
 /// A step that waits for those before it: what it comes to depends on where they lead.
 pub(super) enum EditStep {

@@ -6,6 +6,8 @@ use std::sync::Arc;
 
 use super::actions::Action;
 pub use super::train_history::TrainHistory;
+use crate::jobs::OpenedScene;
+use crate::jobs::go_to::{Approached, Explored};
 use crate::jobs::models::ModelList;
 use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Progress, Severity};
@@ -13,7 +15,7 @@ use crate::pipeline::semantics::thumbnails::Thumbnails;
 use crate::render::RenderSettings;
 use crate::scene::undo::UndoHistory;
 use crate::scene::{Facts, Limits, Overrides, PhotoPixels, ScenePlan, SemanticMap, text};
-use crate::worker::{Approached, Event, Explored, Failure, JobId, JobKind, Lane, OpenedScene, Outcome, Versioned};
+use crate::worker::{Event, Failure, JobId, JobKind, Lane, Outcome, Versioned};
 
 /// Lines kept in the log.
 const MAX_LOG: usize = 1_000;

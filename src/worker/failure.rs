@@ -33,7 +33,7 @@ pub enum Stop {
 impl<E: std::error::Error + 'static> From<E> for Stop {
     fn from(error: E) -> Self {
         let job = (&error as &dyn std::error::Error).downcast_ref::<JobError>();
-        if Interrupted::is_cause_of(&error) || job.is_some_and(JobError::is_cancelled) {
+        if job.map_or_else(|| Interrupted::is_cause_of(&error), JobError::is_cancelled) {
             return Self::Cancelled;
         }
         Self::Failed(Failure::of(&error, job.map_or("", remedy)))

@@ -25,10 +25,3 @@ pub use protocol::{Command, Event, JobId, JobKind, Lane, MeasureRequest, Outcome
 pub use slot::{Slot, Versioned};
 pub use thread::{Jobs, QueueFull, Worker};
 pub use view_modes::ViewMode;
-
-pub use crate::jobs::OpenedScene;
-pub use crate::jobs::edit::EditRequest;
-pub use crate::jobs::go_to::{ApproachRequest, Approached, Explored};
-pub use crate::jobs::query::ViewMaps;
-pub use crate::jobs::video::VideoRequest;
-pub use crate::scene::HomeView;

@@ -4,7 +4,7 @@ use fmlgs::agent::camera_args::{Direction, Distance, Side};
 use fmlgs::agent::relation::View;
 use fmlgs::agent::world::{Arrival, Facts, Moved, Unreachable, World, WorldError, locate_by_names};
 use fmlgs::pipeline::semantics::answer::QueryAnswer;
-use fmlgs::pipeline::semantics::parse::Kind;
+use fmlgs::scene::LevelFilter;
 use fmlgs::scene::{Bounds, Identities, IdentityId, Level, NOBODY};
 use glam::{DQuat, DVec3};
 
@@ -126,7 +126,7 @@ impl World for Room {
         &self.identities
     }
 
-    fn locate(&mut self, query: &str, kind: Kind) -> Result<QueryAnswer, WorldError> {
+    fn locate(&mut self, query: &str, kind: LevelFilter) -> Result<QueryAnswer, WorldError> {
         Ok(locate_by_names(&self.identities, query, kind))
     }
 

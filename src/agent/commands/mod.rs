@@ -19,10 +19,10 @@ use super::language::Language;
 use super::planner::{Planner, PlannerContext, Step};
 use super::refusal::{Refusal, RefusalKind};
 use super::resolve::{Resolved, Vocabulary, is_thing, name_words, resolve, resolve_all, words_of};
-use super::tool::{LevelFilter, Reference, Target, ToolCall};
+use super::tool::{Reference, Target, ToolCall};
 use super::words::{Token, alike, is_mark, tokens};
 use super::world::World;
-use crate::scene::Identities;
+use crate::scene::{Identities, LevelFilter};
 
 /// Most tasks of one request.
 const MOST_TASKS: usize = 16;
@@ -237,7 +237,7 @@ fn settled(tasks: Vec<Task>, context: &mut PlannerContext<'_>) -> Result<Vec<Tas
             continue;
         }
         for phrase in phrases(&task).iter().filter(|_| !is_alone) {
-            match resolve(context.world, phrase, LevelFilter::Any, &dialog) {
+            match resolve(context.world, phrase, LevelFilter::Auto, &dialog) {
                 Resolved::One { id, .. } => dialog.last = Some(id),
                 Resolved::Several(some) => {
                     let names: Vec<String> = some.iter().map(|id| context.world.identities().full_name(*id)).collect();
@@ -265,7 +265,7 @@ fn all_of(phrase: &str, world: &mut dyn World, dialog: &DialogState) -> Result<O
     let words: Vec<&str> = phrase.split(' ').collect();
     let said = many(&words);
     let Some(rest) = said else { return Ok(None) };
-    let ids = resolve_all(world, &rest.join(" "), LevelFilter::Any, dialog)?;
+    let ids = resolve_all(world, &rest.join(" "), LevelFilter::Auto, dialog)?;
     let is_both = words[0] == "both";
     if is_both && ids.len() != 2 {
         let text = format!("There are {} of them here, not two.", ids.len());

@@ -3,7 +3,8 @@
 use super::form::Slots;
 use crate::agent::camera_args::{CLOSER, Direction, FARTHER, NORMAL, Side};
 use crate::agent::relation::Relation;
-use crate::agent::tool::{LevelFilter, Reference, Target, ToolCall};
+use crate::agent::tool::{Reference, Target, ToolCall};
+use crate::scene::LevelFilter;
 
 /// One step of a plan.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,7 +66,7 @@ pub(super) fn task(id: &str, slots: &Slots) -> Option<Task> {
         "nearest_of" => describe(format!("the {} nearest to {}", text(0)?, text(1)?)),
         "nearest" => describe(format!("the thing nearest to {}", text(0)?)),
         "describe" => describe(text(0)?.to_owned()),
-        "where" => ToolCall::Locate { query: text(0)?.to_owned(), kind: LevelFilter::Any },
+        "where" => ToolCall::Locate { query: text(0)?.to_owned(), kind: LevelFilter::Auto },
         "look_at" => ToolCall::LookAt { target: thing(0)? },
         "approach" => go(CLOSER)?,
         "retreat" => go(FARTHER)?,
@@ -87,7 +88,7 @@ fn list(kind: Option<&str>, of: Option<Target>, relation: Relation) -> ToolCall 
         }
         ["part" | "parts" | "piece" | "pieces"] => (LevelFilter::Part, None),
         words if of.is_some() && relation == Relation::PartOf => (LevelFilter::Part, Some(words.join(" "))),
-        words => (LevelFilter::Any, Some(words.join(" "))),
+        words => (LevelFilter::Auto, Some(words.join(" "))),
     };
     ToolCall::List { level, of, relation, named }
 }

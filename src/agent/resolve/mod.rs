@@ -12,13 +12,11 @@ use super::dialog::DialogState;
 use super::language::Key;
 use super::refusal::{Refusal, RefusalKind};
 use super::relation::{Relation, fit, gap};
-use super::tool::LevelFilter;
 use super::words::{alike, singular};
 use super::world::World;
 use crate::pipeline::semantics::answer::Basis;
 use crate::pipeline::semantics::localize::Answer;
-use crate::pipeline::semantics::parse::Kind;
-use crate::scene::{Bounds, IdentityId, Level};
+use crate::scene::{Bounds, IdentityId, Level, LevelFilter};
 
 /// What words come to.
 #[derive(Clone, Debug, PartialEq)]
@@ -224,18 +222,18 @@ impl Resolver<'_> {
             return Ok(Set { ids, exact });
         }
         let text = words.join(" ");
-        match self.by_embedding(&text, self.level.kind())? {
+        match self.by_embedding(&text, self.level)? {
             Some(ids) => Ok(Set::new(ids)),
             None => Err(self.not_found(&text, words)),
         }
     }
 
     /// What the scene's encoder says, where it has one and that finds something.
-    fn by_embedding(&mut self, text: &str, kind: Kind) -> Result<Option<Vec<IdentityId>>, Lost> {
+    fn by_embedding(&mut self, text: &str, kind: LevelFilter) -> Result<Option<Vec<IdentityId>>, Lost> {
         let found = self.world.locate(text, kind).map_err(|e| Lost::new(RefusalKind::Failed, e.0, Vec::new()))?;
         let ids = match (&found.basis, &found.answer) {
-            (Basis::Meaning, Answer::Found(_)) => found.chosen(1),
-            (Basis::Meaning, Answer::Ambiguous(_)) => found.chosen(2),
+            (Basis::Embedding, Answer::Found(_)) => found.chosen(1),
+            (Basis::Embedding, Answer::Ambiguous(_)) => found.chosen(2),
             _ => Vec::new(),
         };
         let ids: Vec<IdentityId> = ids.into_iter().filter(|id| self.world.facts(*id).is_some()).take(12).collect();
@@ -286,7 +284,7 @@ impl Resolver<'_> {
             Noun::Named(words) => words.join(" "),
             _ => "such piece".into(),
         };
-        let level = std::mem::replace(&mut self.level, LevelFilter::Any);
+        let level = std::mem::replace(&mut self.level, LevelFilter::Auto);
         let set = self.set(piece);
         self.level = level;
         if let Ok(set) = set {
@@ -296,7 +294,7 @@ impl Resolver<'_> {
                 return Ok(set);
             }
         }
-        let meant = self.by_embedding(&format!("{said} of the {name}"), Kind::Part)?.unwrap_or_default();
+        let meant = self.by_embedding(&format!("{said} of the {name}"), LevelFilter::Part)?.unwrap_or_default();
         let meant: Vec<IdentityId> = meant.into_iter().filter(is_in).collect();
         if !meant.is_empty() {
             return Ok(Set::new(meant));

@@ -18,7 +18,7 @@ pub enum Basis {
     /// Names that people or label files gave.
     Names,
     /// What identities look like to an encoder.
-    Meaning,
+    Embedding,
 }
 
 /// An answered query.
@@ -64,7 +64,7 @@ pub fn answer(
     if known && !matches!(named.answer, Answer::NotFound(_)) {
         return named;
     }
-    let meant = by_meaning(identities, phrase, level, language);
+    let meant = by_embedding(identities, phrase, level, language);
     // Both were looked at, whichever is taken.
     let stages = named.stages.and(meant.stages);
     let nothing = |a: &Answer| matches!(a, Answer::NotFound(_));
@@ -135,7 +135,7 @@ pub fn by_name(identities: &Identities, phrase: &ParsedQuery, level: LevelFilter
 }
 
 /// Answers by meaning alone.
-pub fn by_meaning(
+pub fn by_embedding(
     identities: &Identities,
     phrase: &ParsedQuery,
     level: LevelFilter,
@@ -143,7 +143,7 @@ pub fn by_meaning(
 ) -> QueryAnswer {
     let Language { features, phrases, options } = language;
     let mut scorer = EmbeddingScorer::new(features, phrases, options);
-    judged((identities, phrase, level), Basis::Meaning, &mut scorer, |_, scorer| {
+    judged((identities, phrase, level), Basis::Embedding, &mut scorer, |_, scorer| {
         let mut relevancy = vec![0.0];
         relevancy.extend(scorer.scores(&phrase.text, None));
         relevancy.resize(identities.len() + 1, 0.0);
@@ -169,14 +169,14 @@ impl QueryAnswer {
     pub fn threshold(&self) -> f32 {
         match self.basis {
             Basis::Names => names::THRESHOLD,
-            Basis::Meaning => super::by_embedding::THRESHOLD,
+            Basis::Embedding => super::by_embedding::THRESHOLD,
         }
     }
 
     fn resolution(&self) -> f32 {
         match self.basis {
             Basis::Names => names::RESOLUTION,
-            Basis::Meaning => super::by_embedding::resolution(super::relevancy::TEMPERATURE),
+            Basis::Embedding => super::by_embedding::resolution(super::relevancy::TEMPERATURE),
         }
     }
 
@@ -237,7 +237,7 @@ mod tests {
         let a = ask("a shade on the lamp", true);
         assert_eq!((a.basis, a.chosen(1)), (Basis::Names, vec![2]), "words between names are nothing unknown");
         let a = ask("cup", true);
-        assert_eq!((a.basis, a.chosen(1)), (Basis::Meaning, vec![3]));
+        assert_eq!((a.basis, a.chosen(1)), (Basis::Embedding, vec![3]));
         assert!(a.relevancy[3] > 0.9 && a.relevancy[1] < 0.5);
         assert!(ask("cup", false).chosen(1).is_empty());
         assert!(ask("giraffe", true).chosen(3).is_empty());
@@ -265,7 +265,7 @@ mod tests {
             answer(&all, &phrase, LevelFilter::Auto, Some(language))
         };
         let a = ask("beige lamp", [1.0, 0.0, 0.0]);
-        assert_eq!((a.basis, a.chosen(1)), (Basis::Meaning, vec![3]), "by name it would be the lamp");
+        assert_eq!((a.basis, a.chosen(1)), (Basis::Embedding, vec![3]), "by name it would be the lamp");
         let a = ask("beige lamp", [0.0, 0.0, -1.0]);
         assert_eq!((a.basis, a.chosen(1)), (Basis::Names, vec![1]));
         let a = ask("mug", [0.0, 1.0, 0.0]);

@@ -6,13 +6,13 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use super::answer::{Language, QueryAnswer, by_meaning, by_name, phrases_of};
+use super::answer::{Language, QueryAnswer, by_embedding, by_name, phrases_of};
 use super::build_map::{FindOptions, Lifting, Tools, find_objects};
 use super::by_embedding::{EmbeddingOptions, TextEmbeddings};
 use super::code_map::CodeMap;
 use super::localize::Answer;
 use super::names;
-use super::parse::{Kind, ParsedQuery};
+use super::parse::ParsedQuery;
 use super::protocols::part_recall::{self, Components};
 use super::protocols::{AskedScene, Category, LabeledView, categories, masks};
 use super::relevancy::{CANONICAL, PART_WEIGHT, deviate};
@@ -25,7 +25,9 @@ use crate::pipeline::observer::Silent;
 use crate::pipeline::synth::{self, Rig, SynthOptions};
 use crate::pipeline::train::{self, TrainConfig};
 use crate::render::{BackendChoice, RenderSettings, Renderer};
-use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, LanguageFeatures, Level, Photo, SemanticMap};
+use crate::scene::{
+    Camera, GaussianCloud, Identities, IdentityId, LanguageFeatures, Level, LevelFilter, Photo, SemanticMap,
+};
 
 /// What is measured on.
 const SCENES: [&str; 2] = ["desk", "kitchen"];
@@ -242,7 +244,7 @@ fn harmed(map: &SemanticMap, harm: Harm) -> SemanticMap {
 fn by_names(scene: &Scene, map: &SemanticMap) -> [f64; 2] {
     let drawn = scene.drawn(map);
     let blended = CodeMap::default();
-    let mut ask = |text: &str| ParsedQuery::parse(text).map(|p| by_name(&map.identities, &p, Kind::Auto));
+    let mut ask = |text: &str| ParsedQuery::parse(text).map(|p| by_name(&map.identities, &p, LevelFilter::Auto));
     let mut asked = AskedScene { map, ask: &mut ask };
     let views = scene.views(&drawn, &blended);
     masks::by_level(&views.iter().flat_map(|v| masks::compare(&mut asked, v)).collect::<Vec<_>>())
@@ -259,7 +261,7 @@ fn by_looks(
     let phrase = ParsedQuery::parse(text)?;
     book.learn(&phrases_of(&phrase), |p| encoder.text(p)).ok()?;
     let language = Language { features, phrases: book, options: EmbeddingOptions::default() };
-    Some(by_meaning(&map.identities, &phrase, Kind::Auto, language))
+    Some(by_embedding(&map.identities, &phrase, LevelFilter::Auto, language))
 }
 
 /// Objects of the scene in colors that no object of their kind has.
@@ -349,7 +351,8 @@ fn figures(scene: &Scene, map: &SemanticMap, trained: &SemanticMap, encoder: &mu
     let not_there = [ABSENT.map(str::to_owned).to_vec(), wrong_colors(&map.identities)];
     let is_found = |answered: QueryAnswer| !matches!(answered.answer, Answer::NotFound(_));
     let mut seen = |name: &String| by_looks(map, features, &mut book, encoder, name).map(is_found);
-    let named = |name: &String| ParsedQuery::parse(name).map(|p| is_found(by_name(&map.identities, &p, Kind::Auto)));
+    let named =
+        |name: &String| ParsedQuery::parse(name).map(|p| is_found(by_name(&map.identities, &p, LevelFilter::Auto)));
     let found = |list: &Vec<String>, ask: &mut dyn FnMut(&String) -> Option<bool>| {
         share(&list.iter().map(|name| ask(name).expect("its words are known")).collect::<Vec<_>>())
     };

@@ -37,8 +37,3 @@ pub mod tracker;
 pub mod train_codes;
 pub mod view_map;
 pub mod votes;
-
-/// The name of [`query_engine`] until now.
-pub mod asker {
-    pub use super::query_engine::QueryEngine as Asker;
-}

@@ -1,7 +1,5 @@
 //! What a typed query asks for: a thing, or a piece of a thing.
 
-pub use crate::scene::LevelFilter as Kind;
-
 /// Longest query that is looked at, in characters.
 pub const MAX_CHARS: usize = 300;
 

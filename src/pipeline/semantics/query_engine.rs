@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 
-use super::answer::{Language, QueryAnswer, answer, by_meaning, phrases_of};
+use super::answer::{Language, QueryAnswer, answer, by_embedding, phrases_of};
 use super::by_embedding::{EmbeddingOptions, TextEmbeddings};
 use super::names;
 use super::parse::ParsedQuery;
@@ -98,7 +98,7 @@ pub fn ask_by_embedding<E>(
     phrases.learn(&phrases_of(&phrase), encode)?;
     let encode = ms_since(start);
     let language = Language { features, phrases, options };
-    let mut answered = by_meaning(identities, &phrase, LevelFilter::Auto, language);
+    let mut answered = by_embedding(identities, &phrase, LevelFilter::Auto, language);
     answered.stages.encode = encode;
     Ok(Some(answered))
 }
@@ -153,7 +153,7 @@ mod tests {
         let mut engine = QueryEngine::with(Box::new(Small));
         let mut ask = |text: &str| engine.ask(&map, text, LevelFilter::Auto);
         let answered = ask("red").expect("encodes").expect("words");
-        assert_eq!((answered.basis, answered.chosen(1)), (Basis::Meaning, vec![1]));
+        assert_eq!((answered.basis, answered.chosen(1)), (Basis::Embedding, vec![1]));
         assert!(ask("giraffe").expect("no failure").expect("words").chosen(1).is_empty());
         assert!(matches!(ask("broken"), Err(ModelError::Run { .. })));
         assert!(ask("  ").expect("no failure").is_none());

@@ -5,11 +5,11 @@ use egui::{Align2, Area, Color32, ColorImage, Id, Order, Rect, Slider, TextEdit,
 use super::super::state::AppState;
 use super::super::theme;
 use super::Viewport;
+use crate::jobs::edit::EditRequest;
 use crate::math::grid::neighbors;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::{Camera, Identities, IdentityId, Mask, NOBODY};
 use crate::ui::actions::Action;
-use crate::worker::EditRequest;
 
 /// Largest difference of color, per channel, over which a click spreads.
 const SAME_COLOR: u8 = 14;

@@ -9,9 +9,10 @@ use glam::{DVec2, DVec3};
 use super::super::theme;
 use super::eye::Eye;
 use super::frame_times::FrameTimes;
+use crate::jobs::query::ViewMaps;
 use crate::scene::resource_log::{self, Sort};
 use crate::worker::view::{MappedView, ViewPicture, ViewResult};
-use crate::worker::{Failure, Slot, Versioned, ViewMaps};
+use crate::worker::{Failure, Slot, Versioned};
 
 /// What is on screen.
 #[derive(Default)]

@@ -6,9 +6,9 @@ use glam::{DVec2, DVec3};
 use super::super::layout::Layout;
 use super::super::theme;
 use super::Viewport;
+use crate::jobs::OpenedScene;
 use crate::scene::Camera;
 use crate::ui::actions::Action;
-use crate::worker::OpenedScene;
 
 /// How near the cursor must come to a camera to point at it, in points.
 const REACH: f32 = 12.0;

@@ -4,7 +4,7 @@ use egui::{Key, PointerButton, Rect, Response, Ui};
 use glam::{DVec2, DVec3};
 
 use super::Viewport;
-use crate::worker::OpenedScene;
+use crate::jobs::OpenedScene;
 
 /// Radians of orbit per point of mouse travel.
 const ORBIT_RAD: f64 = 0.006;

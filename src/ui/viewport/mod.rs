@@ -30,13 +30,14 @@ use self::visible::Visibility;
 use super::camera::CameraPane;
 use super::layout::Layout;
 use super::state::{AppState, Tone};
+use crate::jobs::OpenedScene;
 use crate::navigate::Pose;
 use crate::render::Renderer;
 use crate::scene::plan::When;
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
 use crate::ui::actions::Action;
 use crate::worker::view::{QualityBudget, SkipPasses, ViewLane, ViewPicture};
-use crate::worker::{CloudSnapshot, OpenedScene, Repaint, Versioned, Worker};
+use crate::worker::{CloudSnapshot, Repaint, Versioned, Worker};
 
 /// The eye counts as moving until it has rested this long.
 const REST_SECS: f64 = 0.15;

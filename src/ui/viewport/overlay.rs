@@ -7,10 +7,11 @@ use super::super::layout::Layout;
 use super::super::state::AppState;
 use super::super::{keys, theme};
 use super::Viewport;
+use crate::jobs::OpenedScene;
 use crate::math::format;
 use crate::scene::text;
 use crate::ui::actions::Action;
-use crate::worker::{OpenedScene, ViewMode};
+use crate::worker::ViewMode;
 
 impl Viewport {
     pub(super) fn show_overlay(

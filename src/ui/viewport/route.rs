@@ -6,7 +6,7 @@ use glam::DVec3;
 use super::super::camera::CameraPane;
 use super::super::theme;
 use super::Viewport;
-use crate::worker::Explored;
+use crate::jobs::go_to::Explored;
 
 impl Viewport {
     /// Draws the way that is played, the keys of the path, and the keypoints of the scene.

@@ -7,9 +7,9 @@ use super::{Verdict, promise};
 use fmlgs::math::vector::{dot, unit};
 use fmlgs::pipeline::semantics::codes::{RADIUS, assign, matches};
 use fmlgs::pipeline::semantics::localize::{Answer, Scorer, Strategy, localize};
-use fmlgs::pipeline::semantics::parse::{Kind, ParsedQuery};
+use fmlgs::pipeline::semantics::parse::ParsedQuery;
 use fmlgs::pipeline::semantics::relevancy::{advantage, deviate, score};
-use fmlgs::scene::{Identities, Level};
+use fmlgs::scene::{Identities, Level, LevelFilter};
 
 /// Directions have unit length or are refused; scores of them are between 0 and 1.
 pub fn relevancy(n: &mut Numbers) -> Verdict {
@@ -103,7 +103,7 @@ impl Scorer for Anything<'_> {
 pub fn localizing(n: &mut Numbers) -> Verdict {
     let all = identities(n, 30);
     let query = n.pick(&["lamp", "lid of the kettle", "the doll's eye", "a of b of c"]);
-    let kind = n.pick(&[Kind::Auto, Kind::Object, Kind::Part]);
+    let kind = n.pick(&[LevelFilter::Auto, LevelFilter::Object, LevelFilter::Part]);
     let strategy = n.pick(&[Strategy::WholeFirst, Strategy::Paper, Strategy::OneStep, Strategy::Joint]);
     let Some(phrase) = ParsedQuery::parse(query) else { return Verdict::Broken("the phrase is none".into()) };
     let mut scorer = Anything { n, count: all.len(), strategy, asked: Vec::new() };
@@ -116,7 +116,7 @@ pub fn localizing(n: &mut Numbers) -> Verdict {
         promise!(hits[0].score >= 0.5, "found with a score of {}", hits[0].score);
     }
     // Where one list of scores decides: the best number among the candidates is the answer's.
-    if phrase.whole.is_none() && kind == Kind::Auto {
+    if phrase.whole.is_none() && kind == LevelFilter::Auto {
         let best = scorer.asked.iter().flat_map(|a| &a.2).copied().filter(|s| !s.is_nan()).fold(f32::NAN, f32::max);
         let first = hits.first().map_or(f32::NAN, |h| h.score);
         promise!(best.is_nan() || first == best, "the best score is {best}, the first answer's {first}");

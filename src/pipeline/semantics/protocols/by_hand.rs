@@ -8,11 +8,11 @@ use super::part_recall::Components;
 use super::*;
 use crate::pipeline::semantics::answer::{Basis, by_name};
 use crate::pipeline::semantics::localize::{Answer, Hit};
-use crate::pipeline::semantics::parse::{Kind, ParsedQuery};
+use crate::pipeline::semantics::parse::ParsedQuery;
 use crate::pipeline::semantics::relevancy::{PART_WEIGHT, deviate};
 use crate::pipeline::semantics::timing::StagesMs;
 use crate::render::RenderSettings;
-use crate::scene::{GaussianCloud, Identities, IdentityId, LanguageFeatures, NOBODY, ViewFeatures};
+use crate::scene::{GaussianCloud, Identities, IdentityId, LanguageFeatures, LevelFilter, NOBODY, ViewFeatures};
 
 const DOLL: IdentityId = 1;
 const EYE: IdentityId = 2;
@@ -48,7 +48,7 @@ fn label(name: &str, level: Level, size: [usize; 2], inside: impl Fn(usize) -> b
 
 /// Asks a scene by the names of its identities.
 fn named(map: &SemanticMap) -> impl FnMut(&str) -> Option<QueryAnswer> + '_ {
-    |text| ParsedQuery::parse(text).map(|phrase| by_name(&map.identities, &phrase, Kind::Auto))
+    |text| ParsedQuery::parse(text).map(|phrase| by_name(&map.identities, &phrase, LevelFilter::Auto))
 }
 
 /// An answer whose relevancies are given, best identity first.
@@ -56,7 +56,7 @@ fn answered(best: IdentityId, relevancy: &[f32]) -> QueryAnswer {
     let hit = Hit { identity: best, score: relevancy[best as usize], margin: 0.5 };
     QueryAnswer {
         answer: Answer::Found(vec![hit]),
-        basis: Basis::Meaning,
+        basis: Basis::Embedding,
         relevancy: relevancy.to_vec(),
         stages: StagesMs::default(),
     }

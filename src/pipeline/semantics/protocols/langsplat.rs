@@ -169,7 +169,7 @@ mod tests {
             let mut ask = |_: &str| {
                 Some(QueryAnswer {
                     answer: Answer::NotFound(vec![]),
-                    basis: Basis::Meaning,
+                    basis: Basis::Embedding,
                     relevancy: relevancy.clone(),
                     stages: StagesMs::default(),
                 })

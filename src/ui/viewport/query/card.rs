@@ -52,7 +52,7 @@ impl Queries {
         }
         let basis = match newest.answered.basis {
             Basis::Names => "by name",
-            Basis::Meaning => "by embedding",
+            Basis::Embedding => "by embedding",
         };
         times::show(ui, basis, &newest.answered.stages.and(self.paint_ms));
         if newest.answered.answer.hits().iter().all(|h| h.score <= 0.0) {
