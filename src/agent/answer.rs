@@ -10,7 +10,7 @@ use crate::scene::{IdentityId, LevelFilter};
 
 /// An answer to "shall I?".
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Confirmation {
+pub(crate) enum Confirmation {
     Yes,
     No,
     Neither,
@@ -20,7 +20,7 @@ pub enum Confirmation {
 const POLITE: [&str; 3] = [" please", " thanks", " thank you"];
 
 /// Whether a text says yes or no. Only plain answers count: "yes but ..." is neither.
-pub fn confirmation(text: &str) -> Confirmation {
+pub(crate) fn confirmation(text: &str) -> Confirmation {
     let words: Vec<String> = words_of(text).into_iter().filter(|w| w != ",").collect();
     let said = words.join(" ");
     let said = POLITE.iter().find_map(|p| said.strip_suffix(p)).unwrap_or(&said);
@@ -34,7 +34,7 @@ pub fn confirmation(text: &str) -> Confirmation {
 
 /// An answer to "which one?".
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Choice {
+pub(crate) enum Choice {
     One(IdentityId),
     None,
     /// It is an answer, but not a clear one.
@@ -44,7 +44,7 @@ pub enum Choice {
 }
 
 /// Which of the candidates a text means.
-pub fn choice(world: &mut dyn World, text: &str, candidates: &[IdentityId], dialog: &DialogState) -> Choice {
+pub(crate) fn choice(world: &mut dyn World, text: &str, candidates: &[IdentityId], dialog: &DialogState) -> Choice {
     if confirmation(text) == Confirmation::No {
         return Choice::None;
     }

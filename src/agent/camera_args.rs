@@ -25,7 +25,7 @@ impl Side {
         [Self::Same, Self::Other, Self::Front, Self::Left, Self::Right, Self::Above, Self::Below];
 
     /// As in "from ...".
-    pub fn text(self) -> &'static str {
+    pub(crate) fn text(self) -> &'static str {
         match self {
             Self::Same => "this side",
             Self::Other => "the other side",
@@ -88,7 +88,7 @@ pub const FARTHEST: f64 = 1000.0;
 
 impl Distance {
     /// Whether it can be walked: finite, above 0 and at most [`FARTHEST`].
-    pub fn is_sound(self) -> bool {
+    pub(crate) fn is_sound(self) -> bool {
         match self {
             Self::Meters(d) | Self::Relative(d) => d > 0.0 && d <= FARTHEST,
             Self::Default => true,
@@ -97,11 +97,11 @@ impl Distance {
 }
 
 /// The usual distance from a target.
-pub const NORMAL: f64 = 1.0;
+pub(crate) const NORMAL: f64 = 1.0;
 /// Twice as close as usual.
-pub const CLOSER: f64 = 2.0;
+pub(crate) const CLOSER: f64 = 2.0;
 /// Half as close as usual.
-pub const FARTHER: f64 = 0.5;
+pub(crate) const FARTHER: f64 = 0.5;
 /// How close and how far a target can be looked at.
 pub const CLOSENESS: std::ops::RangeInclusive<f64> = 0.1..=10.0;
 

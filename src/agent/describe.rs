@@ -6,10 +6,10 @@ use crate::math::format::short;
 use crate::scene::{Bounds, IdentityId, Level, NOBODY};
 
 /// Share of the view under which something is not really seen.
-pub const SEEN: f64 = 0.0005;
+pub(crate) const SEEN: f64 = 0.0005;
 
 /// "a, b and c".
-pub fn join(items: &[String]) -> String {
+pub(crate) fn join(items: &[String]) -> String {
     match items {
         [] => String::new(),
         [one] => one.clone(),
@@ -18,13 +18,13 @@ pub fn join(items: &[String]) -> String {
 }
 
 /// "the kettle", or "#7" for what has no name.
-pub fn the(world: &dyn World, id: IdentityId) -> String {
+pub(crate) fn the(world: &dyn World, id: IdentityId) -> String {
     let name = world.identities().full_name(id);
     if name.starts_with('#') { name } else { format!("the {name}") }
 }
 
 /// A list of names, at most `most` of them.
-pub fn names(world: &dyn World, ids: &[IdentityId], most: usize) -> String {
+pub(crate) fn names(world: &dyn World, ids: &[IdentityId], most: usize) -> String {
     let mut list: Vec<String> = ids.iter().take(most).map(|id| world.identities().name(*id)).collect();
     if ids.len() > most {
         list.push(format!("{} more", ids.len() - most));
@@ -33,7 +33,7 @@ pub fn names(world: &dyn World, ids: &[IdentityId], most: usize) -> String {
 }
 
 /// A length in scene units as people say it.
-pub fn length(world: &dyn World, units: f64) -> String {
+pub(crate) fn length(world: &dyn World, units: f64) -> String {
     match world.metres_per_unit() {
         Some(scale) => match units * scale {
             m if m >= 1.0 => format!("{} m", short((m * 100.0).round() / 100.0)),
@@ -45,7 +45,7 @@ pub fn length(world: &dyn World, units: f64) -> String {
 }
 
 /// The edges of a thing's own upright box: the same from wherever it is seen.
-pub fn size(world: &dyn World, id: IdentityId) -> String {
+pub(crate) fn size(world: &dyn World, id: IdentityId) -> String {
     let Some(extent) = world.extent(id) else { return "of unknown size".into() };
     let [long, wide, high] = [extent.length, extent.width, extent.height].map(|edge| length(world, edge));
     let unknown = if world.metres_per_unit().is_none() { " (the scene's scale in meters is not known)" } else { "" };
@@ -53,7 +53,7 @@ pub fn size(world: &dyn World, id: IdentityId) -> String {
 }
 
 /// The objects that stand in `relation` to an identity, nearest first.
-pub fn neighbors(world: &dyn World, id: IdentityId, relation: Relation) -> Vec<IdentityId> {
+pub(crate) fn neighbors(world: &dyn World, id: IdentityId, relation: Relation) -> Vec<IdentityId> {
     let all = world.identities();
     let Some(anchor) = world.facts(id).and_then(|f| f.bounds) else { return Vec::new() };
     let frame = world.view().frame();
@@ -68,7 +68,7 @@ pub fn neighbors(world: &dyn World, id: IdentityId, relation: Relation) -> Vec<I
 }
 
 /// Where a thing is: on what it stands and what is next to it; empty if nothing is near.
-pub fn place(world: &dyn World, id: IdentityId) -> String {
+pub(crate) fn place(world: &dyn World, id: IdentityId) -> String {
     let object = world.identities().object_of(id);
     let Some(own) = world.facts(object).and_then(|f| f.bounds) else { return String::new() };
     let frame = world.view().frame();
@@ -94,7 +94,7 @@ pub fn place(world: &dyn World, id: IdentityId) -> String {
 }
 
 /// All that is known of one thing.
-pub fn thing(world: &dyn World, id: IdentityId) -> String {
+pub(crate) fn thing(world: &dyn World, id: IdentityId) -> String {
     let Some(facts) = world.facts(id) else { return "It is not in the scene.".into() };
     let all = world.identities();
     let name = the(world, id);
@@ -127,7 +127,7 @@ pub fn thing(world: &dyn World, id: IdentityId) -> String {
 }
 
 /// The objects in the present view, largest share first.
-pub fn in_view(world: &dyn World) -> Vec<IdentityId> {
+pub(crate) fn in_view(world: &dyn World) -> Vec<IdentityId> {
     let mut seen: Vec<(f64, IdentityId)> = Vec::new();
     for (id, _) in world.identities().iter().filter(|(_, i)| i.level == Level::Object) {
         if let Some(facts) = world.facts(id).filter(|f| !f.hidden && f.in_view > SEEN) {
@@ -139,7 +139,7 @@ pub fn in_view(world: &dyn World) -> Vec<IdentityId> {
 }
 
 /// What the present view shows.
-pub fn view(world: &dyn World) -> String {
+pub(crate) fn view(world: &dyn World) -> String {
     let seen = in_view(world);
     match seen.as_slice() {
         [] => "Nothing in view has a name or number; move back or to the side to see more.".into(),
@@ -151,7 +151,7 @@ pub fn view(world: &dyn World) -> String {
 }
 
 /// With a capital letter at the start.
-pub fn capital(text: &str) -> String {
+pub(crate) fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |c| c.to_uppercase().chain(letters).collect())
 }

@@ -6,16 +6,16 @@ use crate::scene::IdentityId;
 
 /// The last things that were spoken of.
 #[derive(Clone, Debug, PartialEq)]
-pub struct DialogState {
-    pub last: Option<IdentityId>,
+pub(crate) struct DialogState {
+    pub(crate) last: Option<IdentityId>,
     /// What "the left one" and "the second one" choose from: the candidates of the last question.
-    pub group: Vec<IdentityId>,
+    pub(crate) group: Vec<IdentityId>,
     /// What the present request has marked.
-    pub marked: Vec<IdentityId>,
+    pub(crate) marked: Vec<IdentityId>,
     /// The last movement or flight, for "again" and "a bit more".
-    pub moved: Option<ToolCall>,
+    pub(crate) moved: Option<ToolCall>,
     /// How close the last target was looked at.
-    pub closeness: f64,
+    pub(crate) closeness: f64,
 }
 
 impl Default for DialogState {

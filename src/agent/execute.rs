@@ -16,16 +16,16 @@ use crate::scene::{IdentityId, LevelFilter, NOBODY};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
     /// The call, with targets by number where they were found.
-    pub call: ToolCall,
-    pub ids: Vec<IdentityId>,
-    pub text: String,
+    pub(crate) call: ToolCall,
+    pub(crate) ids: Vec<IdentityId>,
+    pub(crate) text: String,
     /// Why it was not done, if it was not.
-    pub refused: Option<RefusalKind>,
+    pub(crate) refused: Option<RefusalKind>,
 }
 
 impl Outcome {
     /// Whether the text may name files of this machine: it is for the user alone.
-    pub fn is_private(&self) -> bool {
+    pub(crate) fn is_private(&self) -> bool {
         match self.refused {
             Some(kind) => kind == RefusalKind::Failed,
             None => matches!(self.call, ToolCall::Export { .. }),
@@ -33,7 +33,7 @@ impl Outcome {
     }
 
     /// What a planner elsewhere hears of it.
-    pub fn heard(&self) -> &str {
+    pub(crate) fn heard(&self) -> &str {
         match self.refused {
             _ if !self.is_private() => &self.text,
             None => "It is written to a file; the user is told which.",
@@ -44,7 +44,7 @@ impl Outcome {
 
 /// A call after its checks.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Checked {
+pub(crate) enum Checked {
     Ready {
         call: ToolCall,
         ids: Vec<IdentityId>,
@@ -73,7 +73,7 @@ impl Checked {
 }
 
 /// Checks a call. `is_confirmed` says that the user has said yes to it.
-pub fn check(
+pub(crate) fn check(
     world: &mut dyn World,
     call: &ToolCall,
     policy: &Policy,
@@ -199,7 +199,7 @@ fn question(world: &dyn World, call: &ToolCall, policy: &Policy, id: Option<Iden
 }
 
 /// Does what was checked, and remembers what it was about.
-pub fn perform(
+pub(crate) fn perform(
     world: &mut dyn World,
     call: ToolCall,
     ids: Vec<IdentityId>,

@@ -10,7 +10,7 @@ use super::relation::Relation;
 /// What things are compared by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Key {
+pub(crate) enum Key {
     /// Volume of the thing's own box.
     Size,
     /// Along the scene's up.
@@ -30,7 +30,7 @@ pub enum Key {
 #[serde(deny_unknown_fields)]
 pub struct Command {
     /// By which its task is found.
-    pub id: String,
+    pub(crate) id: String,
     /// What it does.
     pub does: String,
     /// An example; `{}` stands for a thing.
@@ -43,24 +43,24 @@ pub struct Command {
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Language {
-    pub openers: Vec<String>,
-    pub yes: Vec<String>,
-    pub no: Vec<String>,
-    pub determiners: Vec<String>,
-    pub standing: Vec<String>,
+    pub(crate) openers: Vec<String>,
+    pub(crate) yes: Vec<String>,
+    pub(crate) no: Vec<String>,
+    pub(crate) determiners: Vec<String>,
+    pub(crate) standing: Vec<String>,
     no_name: String,
-    pub sides: Vec<(String, Side)>,
-    pub directions: Vec<(String, Direction)>,
-    pub relations: Vec<(String, Relation)>,
-    pub most: Vec<(String, Key)>,
-    pub least: Vec<(String, Key)>,
-    pub more: Vec<(String, Key)>,
-    pub less: Vec<(String, Key)>,
-    pub amounts: Vec<(String, f64)>,
-    pub units: Vec<(String, f64)>,
-    pub steps: Vec<(String, f64)>,
-    pub angles: Vec<(String, f64)>,
-    pub command: Vec<Command>,
+    pub(crate) sides: Vec<(String, Side)>,
+    pub(crate) directions: Vec<(String, Direction)>,
+    pub(crate) relations: Vec<(String, Relation)>,
+    pub(crate) most: Vec<(String, Key)>,
+    pub(crate) least: Vec<(String, Key)>,
+    pub(crate) more: Vec<(String, Key)>,
+    pub(crate) less: Vec<(String, Key)>,
+    pub(crate) amounts: Vec<(String, f64)>,
+    pub(crate) units: Vec<(String, f64)>,
+    pub(crate) steps: Vec<(String, f64)>,
+    pub(crate) angles: Vec<(String, f64)>,
+    pub(crate) command: Vec<Command>,
 }
 
 /// What a list has for a text.
@@ -70,7 +70,7 @@ pub(super) fn find<T: Copy>(list: &[(String, T)], text: &str) -> Option<T> {
 
 impl Language {
     /// The one that is built in: a test reads it, so that it is never none.
-    pub fn get() -> &'static Self {
+    pub(crate) fn get() -> &'static Self {
         static READ: OnceLock<Language> = OnceLock::new();
         READ.get_or_init(|| Self::read().unwrap_or_default())
     }
@@ -80,14 +80,14 @@ impl Language {
     }
 
     /// Whether no name has this word, unless it is said as a whole.
-    pub fn is_no_name(&self, word: &str) -> bool {
+    pub(crate) fn is_no_name(&self, word: &str) -> bool {
         static WORDS: OnceLock<Vec<&str>> = OnceLock::new();
         let words = || Self::get().no_name.split_whitespace().collect();
         WORDS.get_or_init(words).contains(&word) || self.determiners.iter().any(|w| w == word)
     }
 
     /// The relation that these words begin with, and how many words say it: the longest.
-    pub fn relation_at(&self, words: &[&str]) -> Option<(Relation, usize)> {
+    pub(crate) fn relation_at(&self, words: &[&str]) -> Option<(Relation, usize)> {
         let first = words.first().copied().unwrap_or("-");
         let begun = self.relations.iter().filter(|(phrase, _)| phrase.starts_with(first));
         let found = begun.filter_map(|(phrase, relation)| {

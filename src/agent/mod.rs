@@ -13,30 +13,30 @@
 
 #![allow(missing_docs, reason = "fields and variants whose name says it all have no doc of three words")]
 
-pub mod answer;
+pub(crate) mod answer;
 pub mod camera_args;
 pub mod commands;
-pub mod describe;
-pub mod dialog;
-pub mod event;
+pub(crate) mod describe;
+pub(crate) mod dialog;
+pub(crate) mod event;
 pub mod execute;
 mod language;
 mod listing;
 pub mod llm;
 pub mod planner;
-pub mod policy;
-pub mod refusal;
+pub(crate) mod policy;
+pub(crate) mod refusal;
 pub mod relation;
-pub mod resolve;
+pub(crate) mod resolve;
 pub mod scene;
 pub mod schema;
-pub mod session;
+pub(crate) mod session;
 pub mod tool;
 pub mod transcript;
 #[cfg(test)]
 mod undo_tests;
 mod view_shares;
-pub mod words;
+pub(crate) mod words;
 pub mod world;
 
 pub use event::AgentEvent;

@@ -32,11 +32,11 @@ impl Step {
 /// What a planner sees of the session.
 pub struct PlannerContext<'a> {
     /// The scene. Planners look; only the session acts.
-    pub world: &'a mut dyn World,
-    pub dialog: &'a DialogState,
-    pub policy: &'a Policy,
-    pub on: &'a mut dyn FnMut(AgentEvent),
-    pub cancel: &'a AtomicBool,
+    pub(crate) world: &'a mut dyn World,
+    pub(crate) dialog: &'a DialogState,
+    pub(crate) policy: &'a Policy,
+    pub(crate) on: &'a mut dyn FnMut(AgentEvent),
+    pub(crate) cancel: &'a AtomicBool,
 }
 
 /// Turns a request into a sequence of calls that may change after each result.

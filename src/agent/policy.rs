@@ -9,7 +9,7 @@ use super::tool::{NAMES, ToolCall};
 use crate::io::{IoError, files};
 
 /// The environment variable with the path of a policy that takes the place of the built-in one.
-pub const VARIABLE: &str = "FMLGS_POLICY";
+pub(crate) const VARIABLE: &str = "FMLGS_POLICY";
 /// Largest policy file in bytes.
 const MAX_BYTES: u64 = 1 << 20;
 /// The policy that comes with the program.
@@ -47,7 +47,7 @@ pub enum PolicyError {
 
 /// Whether a tool may be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Permission {
+pub(crate) enum Permission {
     Free,
     Confirm,
     /// If no file is replaced, or the user says yes.
@@ -68,7 +68,7 @@ impl Policy {
     ///
     /// # Errors
     /// If that file cannot be read or is no policy.
-    pub fn from_environment() -> Result<Self, PolicyError> {
+    pub(crate) fn from_environment() -> Result<Self, PolicyError> {
         match std::env::var_os(VARIABLE).filter(|v| !v.is_empty()) {
             Some(path) => Self::load(Path::new(&path)),
             None => Self::built_in(),
@@ -79,7 +79,7 @@ impl Policy {
     ///
     /// # Errors
     /// If it cannot be read or is no policy.
-    pub fn load(path: &Path) -> Result<Self, PolicyError> {
+    pub(crate) fn load(path: &Path) -> Result<Self, PolicyError> {
         let place = path.display().to_string();
         let bytes = files::read(path, MAX_BYTES)?;
         let text = std::str::from_utf8(&bytes)
@@ -110,7 +110,7 @@ impl Policy {
     }
 
     /// Whether a tool may be used.
-    pub fn permission(&self, tool: &str) -> Permission {
+    pub(crate) fn permission(&self, tool: &str) -> Permission {
         let has = |list: &[String]| list.iter().any(|t| t == tool);
         match &self.tools {
             t if has(&t.forbidden) || !has(&t.allowed) => Permission::Never,
@@ -121,12 +121,12 @@ impl Policy {
     }
 
     /// The tools that may be used.
-    pub fn usable(&self) -> impl Iterator<Item = &'static str> + '_ {
+    pub(crate) fn usable(&self) -> impl Iterator<Item = &'static str> + '_ {
         NAMES.into_iter().filter(|n| self.permission(n) != Permission::Never)
     }
 
     /// A refusal, if `call` may never be made.
-    pub fn refusal(&self, call: &ToolCall) -> Option<Refusal> {
+    pub(crate) fn refusal(&self, call: &ToolCall) -> Option<Refusal> {
         let never = self.permission(call.name()) == Permission::Never;
         never.then(|| Refusal::new(RefusalKind::NotPermitted, format!("The policy does not permit '{}'.", call.name())))
     }

@@ -23,12 +23,12 @@ pub enum RefusalKind {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Refusal {
     pub kind: RefusalKind,
-    pub text: String,
+    pub(crate) text: String,
 }
 
 impl Refusal {
     /// A refusal of this kind.
-    pub fn new(kind: RefusalKind, text: impl Into<String>) -> Self {
+    pub(crate) fn new(kind: RefusalKind, text: impl Into<String>) -> Self {
         Self { kind, text: text.into() }
     }
 }

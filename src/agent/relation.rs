@@ -49,7 +49,7 @@ impl Relation {
     ];
 
     /// As in "a mug ... the laptop".
-    pub fn text(self) -> &'static str {
+    pub(crate) fn text(self) -> &'static str {
         match self {
             Self::PartOf => "part of",
             Self::LeftOf => "left of",
@@ -98,7 +98,7 @@ impl View {
 }
 
 /// From where to where a box reaches along a unit axis.
-pub fn span(bounds: &Bounds, axis: DVec3) -> (f64, f64) {
+pub(crate) fn span(bounds: &Bounds, axis: DVec3) -> (f64, f64) {
     let (middle, reach) = (bounds.center().dot(axis), (bounds.size() * 0.5).dot(axis.abs()));
     (middle - reach, middle + reach)
 }
@@ -107,17 +107,17 @@ pub fn span(bounds: &Bounds, axis: DVec3) -> (f64, f64) {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extent {
     /// The longer level edge.
-    pub length: f64,
+    pub(crate) length: f64,
     /// The shorter level edge.
-    pub width: f64,
+    pub(crate) width: f64,
     /// Along the scene's up.
-    pub height: f64,
+    pub(crate) height: f64,
 }
 
 impl Extent {
     /// That of a thing's points: the box that stands upright and has the smallest footprint, without stray
     /// points. It depends on the thing and on what is up alone, never on a view.
-    pub fn new(points: &[DVec3], up: DVec3) -> Option<Self> {
+    pub(crate) fn new(points: &[DVec3], up: DVec3) -> Option<Self> {
         const STEP_DEG: f64 = 3.0;
         let up = up.try_normalize().unwrap_or(DVec3::Z);
         let axes = [DVec3::X, DVec3::Y, DVec3::Z].into_iter();
@@ -138,7 +138,7 @@ impl Extent {
     }
 
     /// That of a box.
-    pub fn of_box(bounds: &Bounds, up: DVec3) -> Option<Self> {
+    pub(crate) fn of_box(bounds: &Bounds, up: DVec3) -> Option<Self> {
         let corner = |i: u32| {
             let pick = |bit: u32, low: f64, high: f64| if i & bit == 0 { low } else { high };
             let (low, high) = (bounds.min, bounds.max);
@@ -149,13 +149,13 @@ impl Extent {
 }
 
 /// Distance between two boxes; 0 if they touch.
-pub fn gap(a: &Bounds, b: &Bounds) -> f64 {
+pub(crate) fn gap(a: &Bounds, b: &Bounds) -> f64 {
     (a.min - b.max).max(b.min - a.max).max(DVec3::ZERO).length()
 }
 
 /// How well `thing` stands in `relation` to `anchor`: a distance, smaller is better; `None` if it
 /// does not. [`Relation::PartOf`] never holds here.
-pub fn fit(relation: Relation, thing: &Bounds, anchor: &Bounds, frame: &Frame) -> Option<f64> {
+pub(crate) fn fit(relation: Relation, thing: &Bounds, anchor: &Bounds, frame: &Frame) -> Option<f64> {
     let distance = gap(thing, anchor);
     let holds = match relation {
         Relation::PartOf => false,

@@ -42,7 +42,7 @@ pub enum Effect {
 }
 
 /// Receives the effects.
-pub type Emit = Box<dyn FnMut(Effect) + Send>;
+pub(crate) type Emit = Box<dyn FnMut(Effect) + Send>;
 
 /// A scene that the agent acts in.
 pub struct SceneWorld {
@@ -88,7 +88,7 @@ impl SceneWorld {
 
     /// Takes over what the user has done since: where the eye is, what is hidden, and what things are
     /// called.
-    pub fn keep_up(&mut self, eye: Pose, aspect: f64, hidden: &[IdentityId], map: &Arc<SemanticMap>) {
+    pub(crate) fn keep_up(&mut self, eye: Pose, aspect: f64, hidden: &[IdentityId], map: &Arc<SemanticMap>) {
         (self.eye, self.aspect) = (eye, aspect);
         if !Arc::ptr_eq(map, &self.parts.map) {
             // An edit of the agent's own comes back as the window's; another makes what was done stale.
@@ -102,7 +102,7 @@ impl SceneWorld {
     }
 
     /// Where the eye is.
-    pub fn eye(&self) -> Pose {
+    pub(crate) fn eye(&self) -> Pose {
         self.eye
     }
 

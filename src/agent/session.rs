@@ -16,7 +16,7 @@ use super::world::World;
 use crate::scene::IdentityId;
 
 /// Calls that one request may lead to.
-pub const MOST_CALLS: usize = 24;
+pub(crate) const MOST_CALLS: usize = 24;
 /// How often in a row the same call may be made.
 const MOST_ALIKE: usize = 5;
 
@@ -80,17 +80,17 @@ impl Session {
     }
 
     /// The planner's name.
-    pub fn planner(&self) -> &'static str {
+    pub(crate) fn planner(&self) -> &'static str {
         self.planner.name()
     }
 
     /// What was spoken of last.
-    pub fn dialog(&self) -> &DialogState {
+    pub(crate) fn dialog(&self) -> &DialogState {
         &self.dialog
     }
 
     /// Tells the session that the user has chosen this by other means, so that "it" means it.
-    pub fn point_at(&mut self, id: IdentityId) {
+    pub(crate) fn point_at(&mut self, id: IdentityId) {
         self.dialog.last = Some(id);
         self.dialog.group.clear();
     }

@@ -202,7 +202,7 @@ impl ToolCall {
     ///
     /// # Errors
     /// In words, if not.
-    pub fn sound(&self) -> Result<(), String> {
+    pub(crate) fn sound(&self) -> Result<(), String> {
         match self {
             Self::Move { distance, .. } if !distance.is_sound() => {
                 return Err(format!("the distance must be above 0 and at most {}", camera_args::FARTHEST));
@@ -249,7 +249,7 @@ impl ToolCall {
     }
 
     /// What it is done to.
-    pub fn target(&self) -> Option<&Target> {
+    pub(crate) fn target(&self) -> Option<&Target> {
         match self {
             targeted!(target) => Some(target),
             Self::Describe { target } | Self::List { of: target, .. } => target.as_ref(),
@@ -259,7 +259,7 @@ impl ToolCall {
 
     /// The same done to another target; itself if it has none. What was located is then known.
     #[must_use]
-    pub fn with_target(&self, new: Target) -> Self {
+    pub(crate) fn with_target(&self, new: Target) -> Self {
         let mut call = self.clone();
         match &mut call {
             targeted!(target) => *target = new,

@@ -49,7 +49,7 @@ pub enum What {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
     /// Milliseconds since the session began.
-    pub elapsed_ms: u64,
+    pub(crate) elapsed_ms: u64,
     /// What happened.
     #[serde(flatten)]
     pub what: What,
@@ -71,7 +71,7 @@ impl Default for Transcript {
 
 impl Transcript {
     /// Adds an entry.
-    pub fn add(&mut self, what: What) {
+    pub(crate) fn add(&mut self, what: What) {
         if self.entries.len() >= MOST {
             self.entries.drain(..MOST / 4);
         }
@@ -80,7 +80,7 @@ impl Transcript {
     }
 
     /// The calls that were done.
-    pub fn done(&self) -> impl Iterator<Item = &ToolCall> {
+    pub(crate) fn done(&self) -> impl Iterator<Item = &ToolCall> {
         self.entries.iter().filter_map(|e| match &e.what {
             What::Result { call, done: true, .. } => Some(call),
             _ => None,

@@ -47,7 +47,7 @@ pub(super) fn is_drawn(identities: &Identities, hidden: &[bool], id: IdentityId)
 
 impl ViewShares {
     /// The share of the view from `eye` that an identity covers, pieces included; 0 of one that is not known.
-    pub fn of(&self, parts: &Parts, eye: Pose, aspect: f64, hidden: &[bool], id: IdentityId) -> f64 {
+    pub(crate) fn of(&self, parts: &Parts, eye: Pose, aspect: f64, hidden: &[bool], id: IdentityId) -> f64 {
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let is_new = known.as_ref().is_none_or(|k| k.eye != eye || k.hidden != hidden);
         if is_new {

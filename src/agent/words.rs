@@ -1,18 +1,18 @@
 //! A request as words: tokens, numbers, singular forms.
 
 /// Longest request that is looked at, in characters.
-pub const MAX_CHARS: usize = 600;
+pub(crate) const MAX_CHARS: usize = 600;
 
 /// A word or a mark, as typed and in lower case.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Token {
-    pub raw: String,
+pub(crate) struct Token {
+    pub(crate) raw: String,
     /// In lower case; a quoted text starts with `"`.
-    pub low: String,
+    pub(crate) low: String,
 }
 
 /// Parts a text into words and the marks , ; . ? ! and keeps quoted texts whole.
-pub fn tokens(text: &str) -> Vec<Token> {
+pub(crate) fn tokens(text: &str) -> Vec<Token> {
     let text: String = text.chars().take(MAX_CHARS).collect();
     let text = text.replace(['\u{2019}', '\u{2018}', '`'], "'").replace(['\u{201c}', '\u{201d}'], "\"");
     let mut found = Vec::new();
@@ -65,12 +65,12 @@ fn split_word(word: &str, found: &mut Vec<Token>) {
 }
 
 /// Whether a token is a mark.
-pub fn is_mark(word: &str) -> bool {
+pub(crate) fn is_mark(word: &str) -> bool {
     matches!(word, "," | ";" | "." | "?" | "!" | ":" | "…")
 }
 
 /// A number in digits or as a word; "a" and "an" are no numbers here.
-pub fn number(word: &str) -> Option<f64> {
+pub(crate) fn number(word: &str) -> Option<f64> {
     const SMALL: [&str; 13] =
         ["zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve"];
     const TENS: [&str; 8] = ["twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety"];
@@ -100,13 +100,13 @@ pub fn number(word: &str) -> Option<f64> {
 }
 
 /// The place that an ordinal names, from 1; 0 for the last.
-pub fn ordinal(word: &str) -> Option<usize> {
+pub(crate) fn ordinal(word: &str) -> Option<usize> {
     const WORDS: [&str; 6] = ["last", "first", "second", "third", "fourth", "fifth"];
     WORDS.iter().position(|w| *w == word)
 }
 
 /// A word without an English plural's ending.
-pub fn singular(word: &str) -> String {
+pub(crate) fn singular(word: &str) -> String {
     for (end, instead) in [("knives", "knife"), ("shelves", "shelf"), ("ies", "y")] {
         if let Some(stem) = word.strip_suffix(end).filter(|s| s.len() > 1 || end.len() > 3) {
             return format!("{stem}{instead}");
@@ -124,7 +124,7 @@ pub fn singular(word: &str) -> String {
 }
 
 /// Whether two words are the same but for a plural or a slip.
-pub fn alike(a: &str, b: &str) -> bool {
+pub(crate) fn alike(a: &str, b: &str) -> bool {
     let (a, b) = (singular(a), singular(b));
     if a == b {
         return true;

@@ -29,7 +29,7 @@ const EXAMPLES: &str = "Examples:\n  \
 /// address. Exit code 1 if the last request was refused.
 #[derive(Debug, clap::Args)]
 #[command(after_help = format!("{EXAMPLES}\n\n{SENT}"))]
-pub struct Args {
+pub(crate) struct Args {
     /// Trained scene with objects and parts ('fmlgs preprocess')
     #[arg(required_unless_present_any = ["find_model", "test_model"])]
     scene: Option<PathBuf>,
@@ -126,7 +126,7 @@ fn find_model(json: bool) -> Result<(), CliError> {
     output::print(&format!("{}\nChoose one with --planner llm --url ADDRESS --model NAME.\n{SENT}", lines.join("\n")))
 }
 
-pub fn run(args: Args) -> Result<(), CliError> {
+pub(crate) fn run(args: Args) -> Result<(), CliError> {
     if args.find_model {
         return find_model(args.json);
     }

@@ -30,7 +30,7 @@ use crate::scene::Dataset;
     fmlgs bench --queries 100\n  \
     fmlgs bench --plan scene/ splat.ply\n  \
     fmlgs bench splats/*.ply photos/ --size 640x480 --size 1280x720 --max-side 504 --gpu --json")]
-pub struct Args {
+pub(crate) struct Args {
     /// Splats or trained scenes to draw, posed photos to train on
     #[arg(required_unless_present = "queries")]
     paths: Vec<PathBuf>,
@@ -68,7 +68,7 @@ const QUERY_IDENTITIES: usize = 300;
 /// Its size in px.
 const QUERY_SIZE: [usize; 2] = [1_008, 567];
 
-pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     if let (Some(variant), Some(scene)) = (args.variant, args.paths.first()) {
         // As the window has it.
         process::settle();

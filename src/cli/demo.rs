@@ -39,10 +39,10 @@ const FLIGHT_PICTURES: usize = 24;
     fmlgs demo\n  \
     fmlgs demo --headless\n  \
     fmlgs demo --headless --steps 300 --out quick/      a first look in a fraction of the time")]
-pub struct Args {
+pub(crate) struct Args {
     /// Do it without a window, and write images and a report
     #[arg(long)]
-    pub headless: bool,
+    pub(crate) headless: bool,
     /// Folder for everything the headless demo makes
     #[arg(long, default_value = "out/demo")]
     out: PathBuf,
@@ -81,7 +81,7 @@ struct DemoReport {
     total_secs: f64,
 }
 
-pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let started = Instant::now();
     let config = args.settings.over(config());
     let mut console = Console::new(quiet);

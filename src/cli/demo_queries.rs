@@ -36,37 +36,37 @@ const QUESTIONS: [&str; 7] = [
 
 /// What was asked and answered.
 #[derive(Debug, Serialize)]
-pub struct Asked {
+pub(crate) struct Asked {
     /// The question.
-    pub question: String,
+    pub(crate) question: String,
     /// "found", "ambiguous" or "not found".
-    pub verdict: &'static str,
+    pub(crate) verdict: &'static str,
     /// Names of what was chosen.
-    pub answer: Vec<String>,
+    pub(crate) answer: Vec<String>,
     /// Pixels of it in the view.
-    pub pixels: usize,
+    pub(crate) pixels: usize,
     /// From the text to the mask, ms.
-    pub millis: f64,
+    pub(crate) millis: f64,
 }
 
 /// How well every name was found in all held-out views, and the questions.
 #[derive(Debug, Serialize)]
-pub struct Queries {
+pub(crate) struct Queries {
     /// Photos whose masks were used.
-    pub seeds: Vec<String>,
+    pub(crate) seeds: Vec<String>,
     /// Seconds that finding objects took.
-    pub find_secs: f64,
+    pub(crate) find_secs: f64,
     /// Mean IoU of whole objects in held-out photos, asked for by name.
-    pub object_miou: f64,
+    pub(crate) object_miou: f64,
     /// Mean IoU of parts.
-    pub part_miou: f64,
+    pub(crate) part_miou: f64,
     /// The questions.
-    pub asked: Vec<Asked>,
+    pub(crate) asked: Vec<Asked>,
 }
 
 /// Finds objects from the masks of one photo in `photos` (and of more where much is unknown), stores
 /// them in `scene`, and asks. Heat maps of the answers go to `pictures`.
-pub fn run(
+pub(crate) fn run(
     scene: &Path,
     photos: &Path,
     job: &Comparison,

@@ -10,7 +10,7 @@ use crate::pipeline::observer::Interrupted;
 
 /// Why a subcommand did not do what was asked.
 #[derive(Debug)]
-pub enum CliError {
+pub(crate) enum CliError {
     /// The arguments make no sense together; exit code 2, as for arguments that do not parse.
     Usage(String),
     /// The work failed; exit code 1.
@@ -21,7 +21,7 @@ pub enum CliError {
 
 impl CliError {
     /// A failure described by `text`: what, where, and what to do about it.
-    pub fn failed(text: impl Into<String>) -> Self {
+    pub(crate) fn failed(text: impl Into<String>) -> Self {
         Self::Failed(text.into().into())
     }
 
@@ -42,17 +42,17 @@ impl CliError {
     }
 
     /// Of work that may have been asked to stop; `saved` says what is left of it then.
-    pub fn of_work(error: impl Error + Send + Sync + 'static, saved: &str) -> Self {
+    pub(crate) fn of_work(error: impl Error + Send + Sync + 'static, saved: &str) -> Self {
         if Interrupted::is_cause_of(&error) { Self::Cancelled(saved.into()) } else { error.into() }
     }
 
     /// Of a measurement of views: without all of them there is no result.
-    pub fn of_views(error: JobError) -> Self {
+    pub(crate) fn of_views(error: JobError) -> Self {
         Self::of_work(error, "not all views were measured")
     }
 
     /// Prints the error to standard error and returns its exit code.
-    pub fn report(&self) -> ExitCode {
+    pub(crate) fn report(&self) -> ExitCode {
         match self {
             Self::Usage(text) => {
                 output::note(&format!("error: {text}"));

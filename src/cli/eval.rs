@@ -23,7 +23,7 @@ use crate::jobs::open;
     fmlgs eval scene/ --masks photos/           objects and parts against labels\n  \
     fmlgs eval scene/ --masks photos/ --protocol part-recall\n  \
     fmlgs eval splat.ply --photos photos/ --max-side 1600 --json")]
-pub struct Args {
+pub(crate) struct Args {
     /// Trained scene or splat file
     scene: PathBuf,
     /// Dataset with the photos [default: where the scene's photos are]
@@ -76,7 +76,7 @@ impl Args {
     }
 }
 
-pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let comparison = args.check()?;
     if let Some(labels) = &args.masks {
         return eval_masks::run(&args.scene, labels, args.protocol, args.query.as_deref(), &comparison, args.json);

@@ -9,7 +9,7 @@ use crate::jobs::evaluate::{self, Comparison};
 use crate::pipeline::depth::{self, DepthErrors};
 use crate::pipeline::observer::Observer;
 
-pub fn run(scene: &Path, job: &Comparison, as_json: bool, observer: &mut dyn Observer) -> Result<(), CliError> {
+pub(crate) fn run(scene: &Path, job: &Comparison, as_json: bool, observer: &mut dyn Observer) -> Result<(), CliError> {
     let (scores, median_render_ms) = evaluate::depth(job, observer).map_err(CliError::of_views)?;
     if as_json {
         return output::print_json(&json!({

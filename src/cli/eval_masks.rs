@@ -14,7 +14,7 @@ use crate::pipeline::semantics::protocols::{Unit, part_recall};
 /// Rows of the table at most; the worst come first.
 const ROWS: usize = 12;
 
-pub fn run(
+pub(crate) fn run(
     scene: &Path,
     labels: &Path,
     protocol: Protocol,

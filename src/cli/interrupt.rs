@@ -13,7 +13,7 @@ static TOLD: AtomicBool = AtomicBool::new(false);
 
 /// Starts listening. Where that is not possible, Ctrl-C ends the process at once, which loses at
 /// most the time since the last checkpoint.
-pub fn listen() {
+pub(crate) fn listen() {
     for signal in TERM_SIGNALS.iter().copied().chain(hang_up()) {
         // The shutdown is looked at first, so it only acts on a signal after the first. Files are
         // written under a temporary name and renamed, so it leaves none half-written.
@@ -44,12 +44,12 @@ fn hang_up() -> Option<i32> {
 }
 
 /// Set once the work should stop, for what looks at it by itself.
-pub fn flag() -> &'static AtomicBool {
+pub(crate) fn flag() -> &'static AtomicBool {
     &ASKED_TO_STOP
 }
 
 /// Whether the work should stop. Says so the first time that it should.
-pub fn asked_to_stop() -> bool {
+pub(crate) fn asked_to_stop() -> bool {
     let asked = ASKED_TO_STOP.load(Ordering::SeqCst);
     if asked && !TOLD.swap(true, Ordering::SeqCst) {
         output::note("");

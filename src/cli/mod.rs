@@ -37,7 +37,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-pub use error::CliError;
+pub(crate) use error::CliError;
 
 use self::plan::PlanArgs;
 use crate::scene::plan::PlanOverride;
@@ -113,7 +113,7 @@ enum Command {
 }
 
 /// Opens the window with what is wanted of plans, does these things first, and returns when the window is closed.
-pub type OpenWindow = fn(Vec<Start>, Vec<PlanOverride>) -> Result<(), Box<dyn std::error::Error>>;
+pub(crate) type OpenWindow = fn(Vec<Start>, Vec<PlanOverride>) -> Result<(), Box<dyn std::error::Error>>;
 
 /// Runs the command line of this process and returns its exit code. `open_window` stands above this
 /// module, so the caller hands it in.

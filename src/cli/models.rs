@@ -23,7 +23,7 @@ use crate::pipeline::observer::Silent;
     fmlgs models fetch sam2.1-tiny --from https://files.example.org/models\n  \
     fmlgs models add clip-vit-b16 exported/        take over files that you bring\n  \
     fmlgs models check                             compare all files with their checksums")]
-pub struct Args {
+pub(crate) struct Args {
     #[command(subcommand)]
     command: Option<Command>,
     /// Print one JSON document
@@ -54,7 +54,7 @@ enum Command {
     Bench,
 }
 
-pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     match args.command {
         None => list(args.json),
         Some(Command::Fetch { id, from }) => fetch(&id, from.as_deref(), quiet),

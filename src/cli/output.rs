@@ -14,7 +14,7 @@ use crate::scene::text;
 
 /// Prints `text` and a line break to standard output. A reader that has closed its end (`| head`)
 /// has seen enough, which is no failure.
-pub fn print(text: &str) -> Result<(), CliError> {
+pub(crate) fn print(text: &str) -> Result<(), CliError> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text::lines(text).as_bytes()).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error.into()),
@@ -23,22 +23,22 @@ pub fn print(text: &str) -> Result<(), CliError> {
 }
 
 /// Tells on standard error what is not as it was meant, but no reason to stop.
-pub fn warn(text: String) {
+pub(crate) fn warn(text: String) {
     note(&format!("warning: {text}"));
 }
 
 /// Prints `value` as indented JSON.
-pub fn print_json(value: &impl Serialize) -> Result<(), CliError> {
+pub(crate) fn print_json(value: &impl Serialize) -> Result<(), CliError> {
     print(&text::json(&serde_json::to_string_pretty(value)?))
 }
 
 /// Prints a message to standard error. One that nobody can read any more ends no work.
-pub fn note(text: &str) {
+pub(crate) fn note(text: &str) {
     let _ = writeln!(std::io::stderr(), "{}", text::message(text));
 }
 
 /// Rows of cells as aligned columns: the first to the left, the others to the right.
-pub fn table(rows: &[Vec<String>]) -> String {
+pub(crate) fn table(rows: &[Vec<String>]) -> String {
     // A cell is one line, and no wider than a name: formatting takes no width over 65,535.
     let cell = |s: &String| text::shortened(&text::line(s), text::LONGEST_NAME).into_owned();
     let rows: Vec<Vec<String>> = rows.iter().map(|row| row.iter().map(cell).collect()).collect();
@@ -58,7 +58,7 @@ pub fn table(rows: &[Vec<String>]) -> String {
 /// Refuses a file for a result, before any work is done, that does not end as it should (`endings`, any
 /// if there are none) or is one of those that the command reads: `reads` are files and folders.
 /// Devices and pipes may be written into whatever they are called.
-pub fn check(path: &Path, endings: &[&str], reads: &[&Path]) -> Result<(), CliError> {
+pub(crate) fn check(path: &Path, endings: &[&str], reads: &[&Path]) -> Result<(), CliError> {
     if atomic::is_stream(path) {
         return Ok(());
     }
@@ -80,23 +80,23 @@ pub fn check(path: &Path, endings: &[&str], reads: &[&Path]) -> Result<(), CliEr
 }
 
 /// Refuses a folder for pictures that holds what the command reads, as [`check`] does files.
-pub fn check_folder(folder: &Path, reads: &[&Path]) -> Result<(), CliError> {
+pub(crate) fn check_folder(folder: &Path, reads: &[&Path]) -> Result<(), CliError> {
     // Where it does not exist yet, nothing in it is read.
     if folder.exists() { check(folder, &[], reads) } else { Ok(()) }
 }
 
 /// Makes the folder that `path` lies in.
-pub fn make_parent(path: &Path) -> Result<(), CliError> {
+pub(crate) fn make_parent(path: &Path) -> Result<(), CliError> {
     Ok(export::make_parent(path)?)
 }
 
 /// Makes `folder` and those above it.
-pub fn make_folder(folder: &Path) -> Result<(), CliError> {
+pub(crate) fn make_folder(folder: &Path) -> Result<(), CliError> {
     Ok(export::make_folder(folder)?)
 }
 
 /// Writes a PNG of `size_px` from raw samples, those of 16 bits in the machine's byte order.
-pub fn write_png(path: &Path, samples: &[u8], size_px: [u32; 2], color: ColorType) -> Result<(), CliError> {
+pub(crate) fn write_png(path: &Path, samples: &[u8], size_px: [u32; 2], color: ColorType) -> Result<(), CliError> {
     Ok(export::png(path, samples, size_px, color)?)
 }
 

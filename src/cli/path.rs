@@ -26,7 +26,7 @@ use crate::scene::LevelFilter;
     fmlgs path scene/ --from 0 --to-photo 24 --compare\n  \
     fmlgs path scene/ --survey 100 --cameras 50 --cameras 200\n  \
     fmlgs render scene/ --path path.json --out video.mp4")]
-pub struct Args {
+pub(crate) struct Args {
     /// Trained scene
     scene: PathBuf,
     /// Photo to start from, by index or name, or a JSON camera file [default: the first photo]
@@ -74,7 +74,7 @@ fn explored(scene: &Scene) -> Arc<Explored> {
     Arc::new(Explored::new(Arc::clone(&scene.cloud), &scene.views(), home.up))
 }
 
-pub fn run(args: Args) -> Result<(), CliError> {
+pub(crate) fn run(args: Args) -> Result<(), CliError> {
     let scene = open::scene(&args.scene)?;
     if let Some(out) = &args.out {
         output::check(out, &[".json"], &scene.reads())?;

@@ -5,17 +5,17 @@ use crate::scene::plan::PlanOverride;
 
 /// What the user wants of a scene's plan.
 #[derive(Debug, Default, clap::Args)]
-pub struct PlanArgs {
+pub(crate) struct PlanArgs {
     /// Decide otherwise than the scene plan; may be given several times. Items: color=full,
     /// feature-maps=always, parts=on, thumbnails=eager, encoder=eager, navigation=eager, depth=always,
     /// photos=full, objects=full, backend=cpu, redraw=always, buffers=keep; =auto resets one
     #[arg(long = "plan", value_name = "ITEM=VALUE")]
-    pub wishes: Vec<PlanOverride>,
+    pub(crate) wishes: Vec<PlanOverride>,
 }
 
 impl PlanArgs {
     /// All of them together.
-    pub fn overrides(&self) -> Overrides {
+    pub(crate) fn overrides(&self) -> Overrides {
         self.wishes.iter().copied().collect()
     }
 }

@@ -26,7 +26,7 @@ use crate::scene::Level;
     fmlgs preprocess scene/ --masks photos/               masks that came with the photos\n  \
     fmlgs preprocess scene/ --masks labels/ --max-seeds 1  one labeled photo is enough to begin\n  \
     fmlgs preprocess scene/ --segmenter regions           no masks: regions of the photos, unnamed and rough")]
-pub struct Args {
+pub(crate) struct Args {
     /// Trained scene
     scene: PathBuf,
     /// Where the masks are: id maps of 'fmlgs synth', ISAT files as in lerf_ovs, the folders of SPIn-NeRF,
@@ -100,7 +100,7 @@ impl Args {
     }
 }
 
-pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let mut observer = Console::new(quiet);
     check_segmenter(&args)?;
     let scene = open::scene(&args.scene)?;

@@ -13,7 +13,7 @@ const LARGE_BYTES: i32 = 1 << 20;
 ///
 /// # Errors
 /// In words, if the system does not give as many.
-pub fn start_threads() -> Result<(), String> {
+pub(crate) fn start_threads() -> Result<(), String> {
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let wanted = std::env::var("RAYON_NUM_THREADS").ok().and_then(|v| v.trim().parse().ok()).filter(|n| *n > 0);
     let threads = wanted.unwrap_or(cores).min(MOST_THREADS.max(2 * cores));
@@ -30,7 +30,7 @@ pub fn start_threads() -> Result<(), String> {
 /// glibc returns a freed block to the system at once if it is larger than a threshold, but raises
 /// that threshold to the largest block that was ever freed: after one large picture or file, pieces
 /// of all later ones stay with the process. A threshold that is set stays as it is.
-pub fn settle() {
+pub(crate) fn settle() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     #[allow(unsafe_code)]
     // SAFETY: mallopt takes two numbers and changes a setting of the allocator; other threads of the

@@ -14,7 +14,7 @@ use crate::scene::text;
 const LINE_INTERVAL: Duration = Duration::from_secs(5);
 
 /// Shows work to a user at a terminal or reading a log.
-pub struct Console {
+pub(crate) struct Console {
     quiet: bool,
     terminal: bool,
     bar: Option<(String, ProgressBar)>,
@@ -24,7 +24,7 @@ pub struct Console {
 
 impl Console {
     /// `quiet` shows warnings only.
-    pub fn new(quiet: bool) -> Self {
+    pub(crate) fn new(quiet: bool) -> Self {
         let terminal = std::io::stderr().is_terminal();
         Self { quiet, terminal, bar: None, metrics: String::new(), last_line: Instant::now() }
     }
@@ -113,7 +113,7 @@ impl Drop for Console {
 }
 
 /// `step 500, 12.3 s: held-out PSNR 21.34 dB, SSIM 0.712, 23,121 Gaussians`.
-pub fn evaluation_line(e: &Evaluation) -> String {
+pub(crate) fn evaluation_line(e: &Evaluation) -> String {
     let gaussians = HumanCount(e.gaussians as u64);
     format!(
         "step {}, {:.1} s: held-out PSNR {:.2} dB, SSIM {:.3} over {} views, {gaussians} Gaussians",

@@ -24,7 +24,7 @@ use crate::scene::{LevelFilter, SemanticMap};
     fmlgs query scene/ \"a button of the red controller\"\n  \
     fmlgs query scene/ \"the lamp's shade\" --camera 12 --mask mask.png --heat heat.png\n  \
     fmlgs query scene/ lamp --kind object --json")]
-pub struct Args {
+pub(crate) struct Args {
     /// Trained scene with objects and parts ('fmlgs preprocess')
     scene: PathBuf,
     /// What to look for
@@ -58,7 +58,7 @@ pub struct Args {
     json: bool,
 }
 
-pub fn run(args: Args) -> Result<(), CliError> {
+pub(crate) fn run(args: Args) -> Result<(), CliError> {
     let scene = open::scene(&args.scene)?;
     for out in args.mask.iter().chain(&args.heat) {
         output::check(out, &[".png"], &scene.reads())?;

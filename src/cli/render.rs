@@ -32,7 +32,7 @@ use crate::scene::{Camera, CameraPath, LevelFilter};
     fmlgs render splat.ply --photos photos/ --camera 0 --out view.png\n  \
     fmlgs render scene/ --path path.json --size 1280x720 --out video.mp4\n\n\
     A camera file holds one entry of 'cameras' in the output of 'fmlgs info photos/ --json'.")]
-pub struct Args {
+pub(crate) struct Args {
     /// Trained scene or splat file
     scene: PathBuf,
     /// Photo by index from 0 or by name, or a JSON camera file [default: the first photo, or all of the splat]
@@ -102,7 +102,7 @@ impl Args {
     }
 }
 
-pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     if let Some(path) = args.path.clone() {
         return video(&args, &path, quiet);
     }

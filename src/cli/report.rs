@@ -25,7 +25,7 @@ use crate::pipeline::observer::{Observer, Severity};
     fmlgs report scene/ --masks photos/ --budget 600\n  \
     fmlgs report scene/ --stages render,path --repeats 5\n  \
     fmlgs report --defaults DEFAULTS.md --from report/ --from other/")]
-pub struct Args {
+pub(crate) struct Args {
     /// Trained scene
     #[arg(required_unless_present = "defaults")]
     scene: Option<PathBuf>,
@@ -67,7 +67,7 @@ pub struct Args {
     from: Vec<PathBuf>,
 }
 
-pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     if let Some(path) = &args.defaults {
         let reports = args.from.iter().map(|p| Report::read(p)).collect::<Result<Vec<_>, _>>();
         let text = defaults::markdown(&reports?);

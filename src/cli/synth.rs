@@ -18,7 +18,7 @@ use crate::pipeline::synth::{self, Levels, Rig, SynthError, SynthOptions, SynthR
 #[command(after_help = "Examples:\n  \
     fmlgs synth table.glb --out photos/\n  \
     fmlgs synth table.glb --views 200 --held-out 25 --size 1280x960 --rig survey --out photos/")]
-pub struct Args {
+pub(crate) struct Args {
     /// The scene: .glb or .gltf with named nodes
     scene: PathBuf,
     /// Folder for the dataset
@@ -78,7 +78,7 @@ impl Args {
     }
 }
 
-pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let options = args.check()?;
     let mut console = Console::new(quiet);
     let report = synth::run(&args.scene, &options, &args.out, &mut console).map_err(failure)?;
@@ -90,12 +90,12 @@ pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
 }
 
 /// A cancelled run has its own exit code.
-pub fn failure(error: SynthError) -> CliError {
+pub(crate) fn failure(error: SynthError) -> CliError {
     CliError::of_work(error, "the dataset is not complete; run the same command again")
 }
 
 /// What was made, as one line.
-pub fn summary(r: &SynthReport) -> String {
+pub(crate) fn summary(r: &SynthReport) -> String {
     format!(
         "{}: {} photos to train on, {} held out, {} objects and parts, {} sparse points, in {:.1} s",
         r.out.display(),

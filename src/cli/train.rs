@@ -25,7 +25,7 @@ use crate::scene::Dataset;
     fmlgs train photos/ --out scene/ --steps 30000 --max-side 1600\n  \
     fmlgs train photos/ --out quick/ --steps 500 --max-side 256 --no-densify\n  \
     fmlgs train scene/                       go on with a scene that was cancelled, same settings")]
-pub struct Args {
+pub(crate) struct Args {
     /// Dataset folder or transforms.json; or a trained scene, to go on with it
     data: PathBuf,
     /// Folder of the trained scene [default: out/NAME, the name of the dataset; out/NAME-2 and so on where that
@@ -43,65 +43,65 @@ pub struct Args {
 
 /// Settings of a run as given; those left out keep their defaults.
 #[derive(Debug, Default, clap::Args)]
-pub struct Settings {
+pub(crate) struct Settings {
     /// Optimizer steps in all; every schedule scales with it [default: 7000]
     #[arg(long, value_parser = number::within(1..=1_000_000_000_u64))]
-    pub steps: Option<u64>,
+    pub(crate) steps: Option<u64>,
     /// Longer side of the training pictures in px; photos are never enlarged [default: 512]
     #[arg(long, value_parser = clap::value_parser!(u32).range(16..=16384))]
-    pub max_side: Option<u32>,
+    pub(crate) max_side: Option<u32>,
     /// Hold out every n-th photo, 0 = none [default: 8]
     #[arg(long, value_parser = number::within(0..=1_000_000_usize))]
-    pub holdout_every: Option<usize>,
+    pub(crate) holdout_every: Option<usize>,
     /// Highest degree of the spherical harmonics [default: 3]
     #[arg(long, value_parser = clap::value_parser!(u8).range(0..=3))]
-    pub sh_degree: Option<u8>,
+    pub(crate) sh_degree: Option<u8>,
     /// Open all bands of color from the first step on
     #[arg(long)]
-    pub sh_at_once: bool,
+    pub(crate) sh_at_once: bool,
     /// Share of the steps, from the first on, that see the photos at half their size [default: 0]
     #[arg(long, value_parser = number::within(0.0..=1.0))]
-    pub coarse_share: Option<f64>,
+    pub(crate) coarse_share: Option<f64>,
     /// Keep the number of Gaussians that training starts with
     #[arg(long)]
-    pub no_densify: bool,
+    pub(crate) no_densify: bool,
     /// Upper limit of Gaussians [default: what the memory holds]
     #[arg(long, value_parser = number::within(1..=100_000_000_usize))]
-    pub max_gaussians: Option<usize>,
+    pub(crate) max_gaussians: Option<usize>,
     /// Gaussians to start from where the dataset has no sparse points [default: 20000]
     #[arg(long, value_parser = number::within(1..=10_000_000_usize))]
-    pub random_points: Option<usize>,
+    pub(crate) random_points: Option<usize>,
     /// Antialias (the 2-D filter of Mip-Splatting)
     #[arg(long)]
-    pub antialias: bool,
+    pub(crate) antialias: bool,
     /// Seed of every random choice [default: 0]
     #[arg(long)]
-    pub seed: Option<u64>,
+    pub(crate) seed: Option<u64>,
     /// Steps between held-out evaluations, 0 = only at the end [default: 500]
     #[arg(long)]
-    pub eval_every: Option<u64>,
+    pub(crate) eval_every: Option<u64>,
     /// Seconds between checkpoints, 0 = only at the end [default: 60]
     #[arg(long, value_parser = number::within(0.0..=1e9))]
-    pub checkpoint_secs: Option<f64>,
+    pub(crate) checkpoint_secs: Option<f64>,
     /// Which renderer trains [default: auto]
     #[arg(long, value_enum)]
-    pub backend: Option<BackendChoice>,
+    pub(crate) backend: Option<BackendChoice>,
     /// Train surfels, flat disks that lie on surfaces (2D Gaussian Splatting), for better depth;
     /// on the CPU only. A GPU or another viewer draws them as flat Gaussians
     #[arg(long)]
-    pub surfels: bool,
+    pub(crate) surfels: bool,
     /// Weight of the term that holds normals and depth together; on the CPU only [default: 0, with
     /// --surfels 0.05]
     #[arg(long, value_parser = number::within(0.0..=1e6))]
-    pub normal_weight: Option<f64>,
+    pub(crate) normal_weight: Option<f64>,
     /// Weight of the term that pulls surfels together along rays [default: 0.1]
     #[arg(long, value_parser = number::within(0.0..=1e6), requires = "surfels")]
-    pub distortion_weight: Option<f64>,
+    pub(crate) distortion_weight: Option<f64>,
 }
 
 impl Settings {
     /// `base` with what was given on the command line.
-    pub fn over(&self, base: TrainConfig) -> TrainConfig {
+    pub(crate) fn over(&self, base: TrainConfig) -> TrainConfig {
         TrainConfig {
             steps: self.steps.unwrap_or(base.steps),
             max_side_px: self.max_side.unwrap_or(base.max_side_px),
@@ -164,7 +164,7 @@ fn usual_folders(first: &Path) -> Vec<PathBuf> {
     (1..=there + 1).map(folder).collect()
 }
 
-pub fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let (dataset, config, folders) = args.check()?;
     let mut console = Console::new(quiet);
     for warning in &dataset.warnings {

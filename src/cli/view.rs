@@ -10,7 +10,7 @@ use crate::scene::Camera;
 
 /// The camera that `wanted` names: an index from 0, a photo's name (its end is enough where that
 /// is unambiguous), or a JSON file. Without a wish it is the scene's first view.
-pub fn choose(wanted: Option<&str>, scene: &Scene) -> Result<Camera, CliError> {
+pub(crate) fn choose(wanted: Option<&str>, scene: &Scene) -> Result<Camera, CliError> {
     let Some(wanted) = wanted else {
         if scene.cameras.is_empty() && scene.cloud.is_empty() {
             return Err(CliError::failed("the splat holds no Gaussians, so there is nothing to look at"));
@@ -60,7 +60,7 @@ fn ends_with_path(name: &str, wanted: &str) -> bool {
 const BYTES_PER_PX: u64 = 64;
 
 /// Whether a picture of this size can be drawn in the memory that is free.
-pub fn check_room(width_px: u32, height_px: u32) -> Result<(), CliError> {
+pub(crate) fn check_room(width_px: u32, height_px: u32) -> Result<(), CliError> {
     let bytes = u64::from(width_px) * u64::from(height_px) * BYTES_PER_PX;
     let what = format!("drawing {width_px} x {height_px} px");
     io::memory::room(what, bytes, "make it smaller with --size or --max-side")
@@ -68,7 +68,7 @@ pub fn check_room(width_px: u32, height_px: u32) -> Result<(), CliError> {
 }
 
 /// Parses `640x480`.
-pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
+pub(crate) fn parse_size(text: &str) -> Result<[u32; 2], String> {
     let side = |s: &str| s.trim().parse::<u32>().ok().filter(|v| (1..=Camera::MAX_SIDE_PX).contains(v));
     let both = text.split_once(['x', 'X']).and_then(|(w, h)| Some([side(w)?, side(h)?]));
     both.ok_or_else(|| format!("WIDTHxHEIGHT is needed, for example 640x480, each 1 to {}", Camera::MAX_SIDE_PX))

@@ -20,7 +20,7 @@ use super::temporary::temporary_file;
 /// # Errors
 /// [`IoError::Write`] with the system's reason and a remedy; errors of `fill` arrive the same way.
 /// [`IoError::Protected`] where `path` is a file of a trained scene.
-pub fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), IoError> {
+pub(crate) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), IoError> {
     let mut draft = Draft::create(path)?;
     fill(&mut draft).map_err(|cause| write_error(path, cause))?;
     draft.commit().map(drop)
@@ -28,7 +28,7 @@ pub fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -
 
 /// A file in the making: bytes go to a temporary file beside `path`, which [`Draft::commit`] puts
 /// in its place. Dropped before that, it leaves nothing behind.
-pub struct Draft {
+pub(crate) struct Draft {
     path: PathBuf,
     into: Into,
 }
@@ -46,7 +46,7 @@ impl Draft {
     /// # Errors
     /// [`IoError::Write`] where the folder is missing or not writable, or `path` is a folder;
     /// [`IoError::Protected`] where it is a file of a trained scene.
-    pub fn create(path: &Path) -> Result<Self, IoError> {
+    pub(crate) fn create(path: &Path) -> Result<Self, IoError> {
         let failed = |cause| write_error(path, cause);
         let real = behind_links(path).map_err(failed)?;
         refuse_scene_file(&real)?;
@@ -67,7 +67,7 @@ impl Draft {
     ///
     /// # Errors
     /// [`IoError::Write`]; what was at the path before is then unchanged.
-    pub fn commit(self) -> Result<u64, IoError> {
+    pub(crate) fn commit(self) -> Result<u64, IoError> {
         let Self { path, into } = self;
         let end = || match into {
             Into::New(file) => {
@@ -111,7 +111,7 @@ impl Seek for Draft {
 }
 
 /// Whether something is at `path` that is neither file nor folder: it is written into.
-pub fn is_stream(path: &Path) -> bool {
+pub(crate) fn is_stream(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir())
 }
 

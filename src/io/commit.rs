@@ -38,12 +38,16 @@ pub(super) struct Commit<'a> {
 
 impl<'a> Commit<'a> {
     /// Of files in `folder`, which the caller holds.
-    pub fn new(folder: &'a Path) -> Self {
+    pub(crate) fn new(folder: &'a Path) -> Self {
         Self { folder, drafts: Vec::new(), remove: Vec::new() }
     }
 
     /// Writes what `name` is to be.
-    pub fn add(&mut self, name: &str, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), IoError> {
+    pub(crate) fn add(
+        &mut self,
+        name: &str,
+        fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<(), IoError> {
         let path = self.folder.join(name);
         let write = || {
             let mut file = io::BufWriter::with_capacity(1 << 20, temporary_file(&path, "tmp")?);
@@ -57,7 +61,7 @@ impl<'a> Commit<'a> {
     }
 
     /// `name` is to go, if it is there.
-    pub fn remove(&mut self, name: &str) {
+    pub(crate) fn remove(&mut self, name: &str) {
         self.remove.push(name.into());
     }
 
@@ -66,7 +70,7 @@ impl<'a> Commit<'a> {
     /// # Errors
     /// If the change could not be decided: all is as before. Or if it was, but not all files could be
     /// renamed: whoever opens the folder next does that.
-    pub fn finish(self) -> Result<(), IoError> {
+    pub(crate) fn finish(self) -> Result<(), IoError> {
         let Self { folder, drafts, remove } = self;
         let name = |file: &NamedTempFile| file.path().file_name().map(|n| n.to_string_lossy().into_owned());
         let put = drafts.iter().filter_map(|(file, to)| Some((name(file)?, to.clone()))).collect();

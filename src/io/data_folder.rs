@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 /// The folder for the program's data: below the user's data folder; below the system's temporary
 /// folder where there is none.
-pub fn data_folder() -> PathBuf {
+pub(crate) fn data_folder() -> PathBuf {
     base(|name| std::env::var_os(name)).unwrap_or_else(std::env::temp_dir).join("fmlgs")
 }
 

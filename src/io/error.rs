@@ -271,7 +271,7 @@ pub enum OpenError {
 }
 
 /// The error of a failed write, with its remedy.
-pub fn write_error(path: &Path, cause: io::Error) -> IoError {
+pub(crate) fn write_error(path: &Path, cause: io::Error) -> IoError {
     IoError::Write { path: path.into(), remedy: remedy(cause.kind()), cause }
 }
 

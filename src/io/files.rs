@@ -8,12 +8,12 @@ use super::{IoError, memory};
 use crate::scene::text;
 
 /// Largest text file (JSON, COLMAP text) in bytes.
-pub const MAX_TEXT_BYTES: u64 = 512 << 20;
+pub(crate) const MAX_TEXT_BYTES: u64 = 512 << 20;
 /// Largest picture file in bytes.
-pub const MAX_PICTURE_BYTES: u64 = 256 << 20;
+pub(crate) const MAX_PICTURE_BYTES: u64 = 256 << 20;
 
 /// The folder that a file is in.
-pub fn folder_of(path: &Path) -> &Path {
+pub(crate) fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(p) if !p.as_os_str().is_empty() => p,
         _ => Path::new("."),
@@ -21,7 +21,7 @@ pub fn folder_of(path: &Path) -> &Path {
 }
 
 /// Makes a rename in `folder` survive a power cut, on systems where folders can be synced.
-pub fn sync_folder(folder: &Path) -> io::Result<()> {
+pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
     if cfg!(unix) { std::fs::File::open(folder)?.sync_all() } else { Ok(()) }
 }
 
@@ -43,7 +43,7 @@ pub fn open(path: &Path) -> Result<File, IoError> {
 ///
 /// # Errors
 /// As [`open`]; and [`IoError::OverBudget`] for one that is larger.
-pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
+pub(crate) fn read(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
     let failed = |cause| IoError::Read { path: path.into(), cause };
     let file = open(path)?;
     let limit = limit.min(memory::budget());
@@ -71,7 +71,7 @@ pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
 ///
 /// # Errors
 /// As [`read`].
-pub fn read_if_there(path: &Path, limit: u64) -> Result<Option<Vec<u8>>, IoError> {
+pub(crate) fn read_if_there(path: &Path, limit: u64) -> Result<Option<Vec<u8>>, IoError> {
     match read(path, limit) {
         Err(IoError::Read { cause, .. }) if cause.kind() == std::io::ErrorKind::NotFound => Ok(None),
         other => other.map(Some),
@@ -82,7 +82,7 @@ pub fn read_if_there(path: &Path, limit: u64) -> Result<Option<Vec<u8>>, IoError
 ///
 /// # Errors
 /// As [`open`].
-pub fn read_start(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
+pub(crate) fn read_start(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
     let mut bytes = Vec::new();
     let read = open(path)?.take(limit).read_to_end(&mut bytes);
     read.map_err(|cause| IoError::Read { path: path.into(), cause })?;
@@ -90,7 +90,7 @@ pub fn read_start(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
 }
 
 /// The text of a UTF-8 file of at most [`MAX_TEXT_BYTES`].
-pub fn read_text(path: &Path) -> Result<String, IoError> {
+pub(crate) fn read_text(path: &Path) -> Result<String, IoError> {
     String::from_utf8(read(path, MAX_TEXT_BYTES)?).map_err(|e| IoError::Syntax {
         path: path.into(),
         place: format!("byte {}", e.utf8_error().valid_up_to()),
@@ -99,13 +99,13 @@ pub fn read_text(path: &Path) -> Result<String, IoError> {
 }
 
 /// A JSON file as `T`.
-pub fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, IoError> {
+pub(crate) fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, IoError> {
     let bytes = read(path, MAX_TEXT_BYTES)?;
     serde_json::from_slice(&bytes).map_err(|e| json_error(path, &e))
 }
 
 /// A JSON error with its place taken apart.
-pub fn json_error(path: &Path, e: &serde_json::Error) -> IoError {
+pub(crate) fn json_error(path: &Path, e: &serde_json::Error) -> IoError {
     let text = e.to_string();
     let reason = text.rsplit_once(" at line ").map_or(text.as_str(), |(reason, _)| reason);
     IoError::Syntax {
@@ -117,7 +117,7 @@ pub fn json_error(path: &Path, e: &serde_json::Error) -> IoError {
 
 /// A path that a dataset's file `source` refers to, relative to the dataset's folder `root`:
 /// normalized, with `/` between its parts. Absolute paths and `..` are refused.
-pub fn relative(root: &Path, entry: &str, source: &Path) -> Result<String, IoError> {
+pub(crate) fn relative(root: &Path, entry: &str, source: &Path) -> Result<String, IoError> {
     let outside = || IoError::Outside { path: source.into(), entry: entry.into(), folder: root.into() };
     // A backslash parts names on Windows only; refused everywhere, so that a dataset means the
     // same on every system.
@@ -140,7 +140,7 @@ pub fn relative(root: &Path, entry: &str, source: &Path) -> Result<String, IoErr
 
 /// The existing file `root/entry` once its symbolic links are followed, which must stay inside
 /// `root`; `None` if it does not exist. `entry` comes from [`relative`].
-pub fn inside(root: &Path, entry: &str, source: &Path) -> Result<Option<PathBuf>, IoError> {
+pub(crate) fn inside(root: &Path, entry: &str, source: &Path) -> Result<Option<PathBuf>, IoError> {
     let path = root.join(entry);
     let Ok(real) = fs::canonicalize(&path) else { return Ok(None) };
     let real_root = fs::canonicalize(root).map_err(|cause| IoError::Read { path: root.into(), cause })?;
@@ -151,7 +151,7 @@ pub fn inside(root: &Path, entry: &str, source: &Path) -> Result<Option<PathBuf>
 }
 
 /// Refuses the name of a photo that no file can have. `source` lists it.
-pub fn photo_name(name: &str, source: &Path) -> Result<(), IoError> {
+pub(crate) fn photo_name(name: &str, source: &Path) -> Result<(), IoError> {
     let most = text::LONGEST_PHOTO_NAME;
     match name.chars().count() {
         length if length > most => Err(IoError::Syntax {
@@ -164,14 +164,14 @@ pub fn photo_name(name: &str, source: &Path) -> Result<(), IoError> {
 }
 
 /// The name of a folder for display, also where its path ends in `.` or `..`.
-pub fn folder_name(folder: &Path) -> String {
+pub(crate) fn folder_name(folder: &Path) -> String {
     let real = fs::canonicalize(folder).unwrap_or_else(|_| folder.into());
     text::name(&real.file_name().unwrap_or(real.as_os_str()).to_string_lossy())
 }
 
 /// The path `now` of something that was called `earlier` by another version: it is renamed once, and used as it
 /// is where that is not possible.
-pub fn renamed(now: PathBuf, earlier: PathBuf) -> PathBuf {
+pub(crate) fn renamed(now: PathBuf, earlier: PathBuf) -> PathBuf {
     if !now.exists() && earlier.exists() && fs::rename(&earlier, &now).is_err() {
         return earlier;
     }

@@ -16,7 +16,7 @@ const MAX_BYTES: u64 = 200;
 
 /// A folder that nobody else writes into.
 #[derive(Debug)]
-pub struct FolderLock {
+pub(crate) struct FolderLock {
     folder: PathBuf,
     /// Locked until it is closed.
     _file: File,
@@ -27,7 +27,7 @@ impl FolderLock {
     ///
     /// # Errors
     /// [`IoError::Busy`] if somebody else does something there, [`IoError::Write`] if nobody may.
-    pub fn take(folder: &Path, what: &str) -> Result<Self, IoError> {
+    pub(crate) fn take(folder: &Path, what: &str) -> Result<Self, IoError> {
         let path = folder.join(FILE);
         let failed = |cause| write_error(&path, cause);
         loop {
@@ -56,7 +56,7 @@ impl FolderLock {
     }
 
     /// The folder.
-    pub fn folder(&self) -> &Path {
+    pub(crate) fn folder(&self) -> &Path {
         &self.folder
     }
 }

@@ -26,7 +26,7 @@ use gltf::json::{self, Root};
 use super::{IoError, files};
 use crate::scene::text;
 
-pub use model::{AlphaMode, Material, Mesh, MeshNode, MeshScene, Primitive, TextureImage, TextureUse, Wrap};
+pub(crate) use model::{AlphaMode, Material, Mesh, MeshNode, MeshScene, Primitive, TextureImage, TextureUse, Wrap};
 
 /// Largest file that is read, in bytes.
 const MAX_FILE_BYTES: u64 = 2 << 30;
@@ -103,7 +103,7 @@ impl<'a> File<'a> {
     }
 
     /// Something at `place` that does not follow the format.
-    pub fn content(&self, place: impl Into<String>, problem: impl Into<String>) -> IoError {
+    pub(crate) fn content(&self, place: impl Into<String>, problem: impl Into<String>) -> IoError {
         IoError::Syntax { path: self.path.into(), place: place.into(), reason: problem.into() }
     }
 
@@ -128,7 +128,7 @@ impl<'a> File<'a> {
 
     /// The node tree of the default scene (else of the first, else of every node that is no child),
     /// parents before children.
-    pub fn nodes(&self) -> Result<(Vec<MeshNode>, Vec<usize>), IoError> {
+    pub(crate) fn nodes(&self) -> Result<(Vec<MeshNode>, Vec<usize>), IoError> {
         let root = self.root;
         if root.nodes.len() > MAX_ITEMS {
             return Err(self.content("nodes", format!("there are more than {MAX_ITEMS}")));

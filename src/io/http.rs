@@ -12,10 +12,10 @@ use ureq::typestate::AgentScope;
 use ureq::{Agent, Body};
 
 /// How often a wait looks whether it is to end.
-pub const TICK: Duration = Duration::from_millis(20);
+pub(crate) const TICK: Duration = Duration::from_millis(20);
 
 /// What arrives, in this order.
-pub enum Piece {
+pub(crate) enum Piece {
     /// Once: the status and the headers.
     Head(StatusCode, HeaderMap),
     /// Some of the body.
@@ -26,14 +26,14 @@ pub enum Piece {
 
 /// Whether a host of an address is this machine: `localhost`, or a loopback address as the standards write
 /// it. Other spellings of one (decimal, short, with a dot at the end) are not relied upon.
-pub fn is_loopback(host: &str) -> bool {
+pub(crate) fn is_loopback(host: &str) -> bool {
     let address = host.strip_prefix('[').and_then(|h| h.strip_suffix(']')).unwrap_or(host);
     host.eq_ignore_ascii_case("localhost")
         || address.parse().is_ok_and(|address: IpAddr| address.to_canonical().is_loopback())
 }
 
 /// How requests to `url` are made: any status is an answer, nothing may be silent for longer than `stall`.
-pub fn config(url: &str, stall: Duration) -> ConfigBuilder<AgentScope> {
+pub(crate) fn config(url: &str, stall: Duration) -> ConfigBuilder<AgentScope> {
     let config = Agent::config_builder()
         .http_status_as_error(false)
         .timeout_resolve(Some(stall))
@@ -50,7 +50,7 @@ pub fn config(url: &str, stall: Duration) -> ConfigBuilder<AgentScope> {
 ///
 /// # Errors
 /// If there is no thread for it.
-pub fn ask(
+pub(crate) fn ask(
     request: impl FnOnce() -> Result<Response<Body>, ureq::Error> + Send + 'static,
 ) -> io::Result<Receiver<Piece>> {
     let (send, receive) = bounded(4);

@@ -14,7 +14,7 @@ use super::{IoError, files, npy};
 use crate::scene::{Camera, Dataset, Distortion};
 
 /// The file with the poses.
-pub const POSES_FILE: &str = "poses_bounds.npy";
+pub(crate) const POSES_FILE: &str = "poses_bounds.npy";
 /// Numbers per photo.
 const ROW: usize = 17;
 /// Endings of photos.

@@ -8,14 +8,14 @@ use sysinfo::{MemoryRefreshKind, ProcessRefreshKind, ProcessesToUpdate, System};
 const UNKNOWN: u64 = 2 << 30;
 
 /// Bytes that one reader may use: half of the memory that is free when the program first asks.
-pub fn budget() -> u64 {
+pub(crate) fn budget() -> u64 {
     static BUDGET: OnceLock<u64> = OnceLock::new();
     *BUDGET.get_or_init(|| free() / 2)
 }
 
 /// Bytes that the program may still take: what the machine has left, and no more than the limits of
 /// its control group (a container's) and of the process itself (`ulimit -v`, `ulimit -d`) allow.
-pub fn free() -> u64 {
+pub(crate) fn free() -> u64 {
     let Ok(mut system) = System::new() else { return UNKNOWN };
     system.refresh_memory_specifics(MemoryRefreshKind::nothing().with_ram());
     match system.available_memory() {
@@ -38,7 +38,7 @@ pub struct NoRoom {
 ///
 /// # Errors
 /// If it does not.
-pub fn room(what: impl Into<String>, bytes: u64, remedy: &'static str) -> Result<(), NoRoom> {
+pub(crate) fn room(what: impl Into<String>, bytes: u64, remedy: &'static str) -> Result<(), NoRoom> {
     let free = free();
     if bytes <= free { Ok(()) } else { Err(NoRoom { what: what.into(), bytes, free, remedy }) }
 }

@@ -4,22 +4,22 @@
 //! before memory is set aside for it, and paths inside a dataset may not leave its folder. Every
 //! error names the file and the place in it.
 
-pub mod atomic;
+pub(crate) mod atomic;
 pub mod camera_file;
 pub mod camera_path;
 pub mod colmap;
 mod commit;
 mod compressed_ply;
-pub mod data_folder;
+pub(crate) mod data_folder;
 mod error;
-pub mod files;
-pub mod folder_lock;
+pub(crate) mod files;
+pub(crate) mod folder_lock;
 pub mod gltf_mesh;
-pub mod http;
+pub(crate) mod http;
 pub mod khr_gltf;
 pub mod labels;
 pub mod llff;
-pub mod memory;
+pub(crate) mod memory;
 pub mod npy;
 mod open;
 pub mod photo;
@@ -29,8 +29,8 @@ pub mod points_ply;
 mod quantized;
 mod reader;
 mod resample;
-pub mod scene_files;
-pub mod scene_folder;
+pub(crate) mod scene_files;
+pub(crate) mod scene_folder;
 mod scene_info;
 pub mod semantic_map;
 pub mod sog;
@@ -38,9 +38,9 @@ pub mod splat_ply;
 mod temporary;
 pub mod trained;
 pub mod transforms;
-pub mod video;
+pub(crate) mod video;
 
 pub use error::{IoError, OpenError};
 pub use open::{Opened, open};
 pub use scene_folder::SceneFolder;
-pub use trained::TrainedScene;
+pub(crate) use trained::TrainedScene;

@@ -16,7 +16,7 @@ pub struct Array<'a> {
     /// Bytes per number, 4 or 8.
     item: usize,
     /// How many numbers the file holds, whatever it claims.
-    pub possible: u64,
+    pub(crate) possible: u64,
 }
 
 /// Opens the array in `bytes`, which come from `path`.
@@ -47,7 +47,7 @@ pub fn open<'a>(bytes: &'a [u8], path: &'a Path) -> Result<Array<'a>, IoError> {
 
 impl Array<'_> {
     /// Entries along each axis.
-    pub fn shape(&self) -> &[u64] {
+    pub(crate) fn shape(&self) -> &[u64] {
         self.npy.shape()
     }
 
@@ -55,7 +55,7 @@ impl Array<'_> {
     ///
     /// # Errors
     /// If the file ends too early.
-    pub fn values(self) -> Result<Vec<f64>, IoError> {
+    pub(crate) fn values(self) -> Result<Vec<f64>, IoError> {
         let failed = |e: std::io::Error| syntax(self.path, e.to_string());
         match self.item {
             4 => Ok(self.npy.into_vec::<f32>().map_err(failed)?.into_iter().map(f64::from).collect()),
@@ -68,7 +68,7 @@ impl Array<'_> {
 ///
 /// # Errors
 /// If the file is not such an array, or a number is negative or not finite.
-pub fn read_map(path: &Path) -> Result<(usize, usize, Vec<f32>), IoError> {
+pub(crate) fn read_map(path: &Path) -> Result<(usize, usize, Vec<f32>), IoError> {
     map(&files::read(path, files::MAX_PICTURE_BYTES)?, path)
 }
 

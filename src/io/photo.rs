@@ -35,7 +35,7 @@ pub fn load(photo: &Photo, max_side_px: u32) -> Result<PhotoPixels, IoError> {
 }
 
 /// A loaded photo and its camera at half their size; pixels that the photo does not cover do not count.
-pub fn half(pixels: &PhotoPixels, camera: &Camera) -> (PhotoPixels, Camera) {
+pub(crate) fn half(pixels: &PhotoPixels, camera: &Camera) -> (PhotoPixels, Camera) {
     let small = camera.reduced(2);
     (shrink(pixels, camera, &small), small)
 }

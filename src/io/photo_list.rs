@@ -33,32 +33,32 @@ pub(super) enum Focal {
 #[derive(Clone, Debug)]
 pub(super) struct Lens {
     /// The picture size that the other values refer to; `None` = the file's own.
-    pub size_px: Option<(u32, u32)>,
+    pub(crate) size_px: Option<(u32, u32)>,
     /// Focal lengths.
-    pub focal: Focal,
+    pub(crate) focal: Focal,
     /// Principal point in px; `None` = the middle.
-    pub principal_px: Option<DVec2>,
+    pub(crate) principal_px: Option<DVec2>,
     /// Radial and tangential coefficients.
-    pub distortion: Distortion,
+    pub(crate) distortion: Distortion,
 }
 
 /// A photo as a file lists it.
 #[derive(Clone, Debug)]
 pub(super) struct Listed {
     /// Its name in the dataset.
-    pub name: String,
+    pub(crate) name: String,
     /// Its file, relative to the dataset's folder, from [`files::relative`].
-    pub entry: String,
+    pub(crate) entry: String,
     /// Its lens.
-    pub lens: Lens,
+    pub(crate) lens: Lens,
     /// Axes of the camera (x right, y down, z forward) in the world, as columns.
-    pub world_from_camera: DMat3,
+    pub(crate) world_from_camera: DMat3,
     /// Camera center in the world.
-    pub center: DVec3,
+    pub(crate) center: DVec3,
     /// Whether the dataset marks it as a test photo.
-    pub test_split: bool,
+    pub(crate) test_split: bool,
     /// What transparent pixels are composited over.
-    pub background: Option<[f32; 3]>,
+    pub(crate) background: Option<[f32; 3]>,
 }
 
 /// The listed photos that exist, sorted by name, with a warning that counts the others.

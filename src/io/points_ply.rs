@@ -13,7 +13,7 @@ use crate::scene::{Camera, SparsePoint};
 const GREY: u8 = 128;
 
 /// Reads the points of a `.ply`.
-pub fn read(path: &Path) -> Result<Vec<SparsePoint>, IoError> {
+pub(crate) fn read(path: &Path) -> Result<Vec<SparsePoint>, IoError> {
     parse(&files::read(path, u64::MAX)?, path)
 }
 

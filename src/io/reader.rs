@@ -7,19 +7,19 @@ use super::IoError;
 
 /// Reads little-endian values off the front of a slice.
 #[derive(Clone, Copy)]
-pub struct Reader<'a> {
+pub(crate) struct Reader<'a> {
     rest: &'a [u8],
     path: &'a Path,
 }
 
 impl<'a> Reader<'a> {
     /// A reader of `bytes`, which came from `path` (for errors).
-    pub fn new(bytes: &'a [u8], path: &'a Path) -> Self {
+    pub(crate) fn new(bytes: &'a [u8], path: &'a Path) -> Self {
         Self { rest: bytes, path }
     }
 
     /// The next `n` bytes; `place` says what they are.
-    pub fn take(&mut self, n: usize, place: &str) -> Result<&'a [u8], IoError> {
+    pub(crate) fn take(&mut self, n: usize, place: &str) -> Result<&'a [u8], IoError> {
         match self.rest.split_at_checked(n) {
             Some((head, tail)) => {
                 self.rest = tail;
@@ -30,7 +30,7 @@ impl<'a> Reader<'a> {
     }
 
     /// The next `N` bytes.
-    pub fn array<const N: usize>(&mut self, place: &str) -> Result<[u8; N], IoError> {
+    pub(crate) fn array<const N: usize>(&mut self, place: &str) -> Result<[u8; N], IoError> {
         match self.rest.split_first_chunk::<N>() {
             Some((head, tail)) => {
                 self.rest = tail;
@@ -41,23 +41,23 @@ impl<'a> Reader<'a> {
     }
 
     /// The next 32-bit unsigned integer.
-    pub fn u32(&mut self, place: &str) -> Result<u32, IoError> {
+    pub(crate) fn u32(&mut self, place: &str) -> Result<u32, IoError> {
         self.array(place).map(u32::from_le_bytes)
     }
 
     /// The next 64-bit unsigned integer.
-    pub fn u64(&mut self, place: &str) -> Result<u64, IoError> {
+    pub(crate) fn u64(&mut self, place: &str) -> Result<u64, IoError> {
         self.array(place).map(u64::from_le_bytes)
     }
 
     /// The next double.
-    pub fn f64(&mut self, place: &str) -> Result<f64, IoError> {
+    pub(crate) fn f64(&mut self, place: &str) -> Result<f64, IoError> {
         self.array(place).map(f64::from_le_bytes)
     }
 
     /// A 64-bit count of things that take at least `least_bytes` each: refused if the rest of the
     /// slice cannot hold them.
-    pub fn count(&mut self, what: &str, least_bytes: usize) -> Result<usize, IoError> {
+    pub(crate) fn count(&mut self, what: &str, least_bytes: usize) -> Result<usize, IoError> {
         let claimed = self.u64(what)?;
         let possible = (self.rest.len() / least_bytes.max(1)) as u64;
         if claimed > possible {
@@ -67,7 +67,7 @@ impl<'a> Reader<'a> {
     }
 
     /// The bytes up to the next zero byte, which is skipped.
-    pub fn c_string(&mut self, place: &str) -> Result<&'a [u8], IoError> {
+    pub(crate) fn c_string(&mut self, place: &str) -> Result<&'a [u8], IoError> {
         match self.rest.iter().position(|&b| b == 0) {
             Some(end) => {
                 let head = &self.rest[..end];

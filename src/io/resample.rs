@@ -13,13 +13,13 @@ use crate::scene::{Camera, Distortion, PhotoPixels};
 /// A decoded picture.
 pub(super) struct Pixels {
     /// Width in px.
-    pub width: usize,
+    pub(crate) width: usize,
     /// Height in px.
-    pub height: usize,
+    pub(crate) height: usize,
     /// 3 (RGB) or 4 (RGBA).
-    pub channels: usize,
+    pub(crate) channels: usize,
     /// Row-major, channels interleaved.
-    pub data: Vec<u8>,
+    pub(crate) data: Vec<u8>,
 }
 
 /// Color times weight, and weight.

@@ -33,7 +33,7 @@ pub(super) fn is_pending(folder: &Path) -> bool {
 ///
 /// # Errors
 /// [`IoError::Protected`].
-pub fn refuse_scene_file(path: &Path) -> Result<(), IoError> {
+pub(crate) fn refuse_scene_file(path: &Path) -> Result<(), IoError> {
     let folder = folder_of(path);
     let named = path.file_name().is_some_and(|n| FILES.iter().any(|f| n.eq_ignore_ascii_case(f)));
     if named && is_scene(folder) {

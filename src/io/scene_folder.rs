@@ -45,7 +45,7 @@ impl SceneFolder {
     }
 
     /// The folder.
-    pub fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         self.lock.folder()
     }
 
@@ -54,7 +54,12 @@ impl SceneFolder {
     ///
     /// # Errors
     /// If a file cannot be written, or the Gaussians are not valid.
-    pub fn save(&self, info: &SceneInfo, cloud: &GaussianCloud, map: Option<&SemanticMap>) -> Result<String, IoError> {
+    pub(crate) fn save(
+        &self,
+        info: &SceneInfo,
+        cloud: &GaussianCloud,
+        map: Option<&SemanticMap>,
+    ) -> Result<String, IoError> {
         let state = format!("{:032x}", rand::random::<u128>());
         let info = SceneInfo { version: VERSION, state: Some(state.clone()), ..info.clone() };
         let stored = map.map(|map| {
@@ -86,7 +91,12 @@ impl SceneFolder {
     ///
     /// # Errors
     /// As [`Self::save`]; [`IoError::Changed`] if the scene has another state by now.
-    pub fn save_map(&self, known: Option<&str>, map: &SemanticMap, cloud: &GaussianCloud) -> Result<String, IoError> {
+    pub(crate) fn save_map(
+        &self,
+        known: Option<&str>,
+        map: &SemanticMap,
+        cloud: &GaussianCloud,
+    ) -> Result<String, IoError> {
         let info = load_info(self.path())?;
         if splat_ply::state(&self.path().join(CLOUD_FILE))?.as_deref() != known {
             return Err(IoError::Changed { folder: self.path().into() });
@@ -99,7 +109,7 @@ impl SceneFolder {
     ///
     /// # Errors
     /// As [`Self::save_map`].
-    pub fn replace_map(
+    pub(crate) fn replace_map(
         &self,
         known: Option<&str>,
         map: &SemanticMap,
@@ -134,7 +144,7 @@ impl SceneFolder {
     ///
     /// # Errors
     /// If it cannot be written; the one before is then unchanged.
-    pub fn save_checkpoint(&self, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), IoError> {
+    pub(crate) fn save_checkpoint(&self, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), IoError> {
         let path = self.path().join(CHECKPOINT_FILE);
         let mut draft = Draft::beside(&path)?;
         fill(&mut draft).map_err(|cause| write_error(&path, cause))?;
@@ -146,7 +156,7 @@ impl SceneFolder {
     ///
     /// # Errors
     /// If that cannot be written.
-    pub fn keep_earlier(&self) -> Result<Option<PathBuf>, IoError> {
+    pub(crate) fn keep_earlier(&self) -> Result<Option<PathBuf>, IoError> {
         if !self.path().join(semantic_map::FILE).exists() || !is_scene(self.path()) {
             return Ok(None);
         }

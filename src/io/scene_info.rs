@@ -48,9 +48,9 @@ pub struct SceneInfo {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DatasetReference {
     /// Path of the dataset's folder or file, relative to the scene's folder where it can be.
-    pub path: PathBuf,
+    pub(crate) path: PathBuf,
     /// Which layout it has, for display.
-    pub format: String,
+    pub(crate) format: String,
 }
 
 /// The camera of a photo.
@@ -78,7 +78,7 @@ pub struct History {
 impl SceneInfo {
     /// The description of a scene in `folder` trained on `dataset`, whose photos at `held_out`
     /// were not trained on. Settings and history are empty.
-    pub fn of(dataset: &Dataset, held_out: &[usize], folder: &Path) -> Self {
+    pub(crate) fn of(dataset: &Dataset, held_out: &[usize], folder: &Path) -> Self {
         let camera = |(i, p): (usize, &crate::scene::Photo)| SceneCamera {
             name: p.name.clone(),
             camera: p.camera.clone(),

@@ -48,7 +48,7 @@ pub(super) fn temporary_file(path: &Path, extension: &str) -> io::Result<NamedTe
 /// A temporary folder that is kept from being swept away for as long as this lives.
 pub(super) struct TemporaryFolder {
     /// The folder; removed when this is dropped.
-    pub folder: TempDir,
+    pub(crate) folder: TempDir,
     _held: Option<File>,
 }
 

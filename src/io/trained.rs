@@ -24,7 +24,7 @@ pub use super::scene_info::{DatasetReference, History, SceneCamera, SceneInfo, V
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainedScene {
     /// The folder.
-    pub folder: PathBuf,
+    pub(crate) folder: PathBuf,
     /// What `scene.json` says.
     pub info: SceneInfo,
     /// The Gaussians.
@@ -35,7 +35,7 @@ pub struct TrainedScene {
 
 impl TrainedScene {
     /// Where the photos are, if the scene knows and the folder still exists.
-    pub fn dataset_path(&self) -> Option<PathBuf> {
+    pub(crate) fn dataset_path(&self) -> Option<PathBuf> {
         let path = self.folder.join(&self.info.dataset.as_ref()?.path);
         path.exists().then_some(path)
     }
@@ -45,7 +45,7 @@ impl TrainedScene {
 ///
 /// # Errors
 /// As [`SceneFolder::hold`] and [`SceneFolder::save`].
-pub fn save(
+pub(crate) fn save(
     folder: &Path,
     info: &SceneInfo,
     cloud: &GaussianCloud,

@@ -35,7 +35,7 @@ pub enum EditRequest {
 ///
 /// # Errors
 /// If the edit makes no sense, or the view cannot be drawn; nothing has changed then.
-pub fn apply(
+pub(crate) fn apply(
     cloud: &GaussianCloud,
     map: &SemanticMap,
     settings: &RenderSettings,
@@ -57,7 +57,7 @@ pub fn apply(
 ///
 /// # Errors
 /// If it cannot be written, or somebody else has changed the scene.
-pub fn store(
+pub(crate) fn store(
     folder: &Path,
     known: Option<&str>,
     map: &SemanticMap,

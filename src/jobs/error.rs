@@ -106,14 +106,14 @@ pub enum JobError {
 
 impl JobError {
     /// Whether the observer asked to stop.
-    pub fn is_cancelled(&self) -> bool {
+    pub(crate) fn is_cancelled(&self) -> bool {
         let fetch = matches!(self, Self::Install(InstallError::Fetch(FetchError::Cancelled { .. })));
         fetch || Interrupted::is_cause_of(self)
     }
 }
 
 /// The error and its causes, each once: many errors already quote their cause.
-pub fn chain(error: &dyn Error) -> String {
+pub(crate) fn chain(error: &dyn Error) -> String {
     let mut text = error.to_string();
     let mut next = error.source();
     while let Some(cause) = next {

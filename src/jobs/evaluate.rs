@@ -23,7 +23,12 @@ const DIFFERENCE_GAIN: i32 = 4;
 /// The photos of `dataset` that a scene with these `cameras` was not trained on, or every `every`-th if that is
 /// given. By name, where the scene says which: the dataset may have gained or lost photos since, and settings
 /// may have changed; by `default_every` where it does not.
-pub fn held_out(dataset: &Dataset, cameras: &[SceneCamera], every: Option<usize>, default_every: usize) -> Vec<usize> {
+pub(crate) fn held_out(
+    dataset: &Dataset,
+    cameras: &[SceneCamera],
+    every: Option<usize>,
+    default_every: usize,
+) -> Vec<usize> {
     if every.is_some() || cameras.is_empty() {
         return dataset.split(every.unwrap_or(default_every)).1;
     }
@@ -33,35 +38,35 @@ pub fn held_out(dataset: &Dataset, cameras: &[SceneCamera], every: Option<usize>
 
 /// What is compared; what is not given is as in training.
 #[derive(Clone, Debug, Default)]
-pub struct Options {
+pub(crate) struct Options {
     /// Longer side of the compared pictures in px.
-    pub max_side_px: Option<u32>,
+    pub(crate) max_side_px: Option<u32>,
     /// Which photos count as held out: every n-th, 0 = all photos.
-    pub holdout_every: Option<usize>,
+    pub(crate) holdout_every: Option<usize>,
     /// Whether the black borders of photos that were undistorted elsewhere are compared, too.
-    pub keep_borders: bool,
+    pub(crate) keep_borders: bool,
     /// Folder for pictures: photo, render and difference side by side.
-    pub pictures: Option<PathBuf>,
+    pub(crate) pictures: Option<PathBuf>,
 }
 
 /// A scene beside the photos that it is compared with.
-pub struct Comparison {
+pub(crate) struct Comparison {
     /// The Gaussians.
-    pub cloud: Arc<GaussianCloud>,
+    pub(crate) cloud: Arc<GaussianCloud>,
     /// How they are drawn.
-    pub settings: RenderSettings,
+    pub(crate) settings: RenderSettings,
     /// The photos.
-    pub dataset: Arc<Dataset>,
+    pub(crate) dataset: Arc<Dataset>,
     /// Indices of the photos to compare with.
-    pub views: Vec<usize>,
+    pub(crate) views: Vec<usize>,
     /// Longer side of the compared pictures in px.
-    pub max_side_px: u32,
+    pub(crate) max_side_px: u32,
     /// Borders of the photos, which are left out.
-    pub borders: Option<Borders>,
+    pub(crate) borders: Option<Borders>,
     /// Folder for pictures.
-    pub pictures: Option<PathBuf>,
+    pub(crate) pictures: Option<PathBuf>,
     /// Id of the save that the scene's files are of.
-    pub state: Option<String>,
+    pub(crate) state: Option<String>,
 }
 
 impl Comparison {
@@ -69,7 +74,7 @@ impl Comparison {
     ///
     /// # Errors
     /// If they cannot be read, or none is held out.
-    pub fn new(scene: Scene, photos: &Path, options: Options) -> Result<Self, JobError> {
+    pub(crate) fn new(scene: Scene, photos: &Path, options: Options) -> Result<Self, JobError> {
         let dataset = Arc::new(open::dataset(photos)?);
         let mut comparison = Self::of(&scene, dataset, options)?;
         comparison.state = scene.state;
@@ -80,7 +85,7 @@ impl Comparison {
     ///
     /// # Errors
     /// If they cannot be read, or none is held out.
-    pub fn of(scene: &Scene, dataset: Arc<Dataset>, options: Options) -> Result<Self, JobError> {
+    pub(crate) fn of(scene: &Scene, dataset: Arc<Dataset>, options: Options) -> Result<Self, JobError> {
         let Options { max_side_px, holdout_every, keep_borders, pictures } = options;
         let default_every = scene.config.holdout_every;
         let views = match holdout_every {
@@ -128,7 +133,7 @@ impl Comparison {
 ///
 /// # Errors
 /// If a photo cannot be read or drawn, a picture cannot be written, or the observer asks to stop.
-pub fn photometric(comparison: &Comparison, observer: &mut dyn Observer) -> Result<Evaluation, JobError> {
+pub(crate) fn photometric(comparison: &Comparison, observer: &mut dyn Observer) -> Result<Evaluation, JobError> {
     for warning in &comparison.dataset.warnings {
         observer.note(Severity::Warning, warning.clone());
     }
@@ -151,7 +156,7 @@ pub fn photometric(comparison: &Comparison, observer: &mut dyn Observer) -> Resu
 ///
 /// # Errors
 /// If a true depth is missing, a view cannot be drawn, or the observer asks to stop.
-pub fn depth(comparison: &Comparison, observer: &mut dyn Observer) -> Result<(DepthScores, f64), JobError> {
+pub(crate) fn depth(comparison: &Comparison, observer: &mut dyn Observer) -> Result<(DepthScores, f64), JobError> {
     let mut renderer = Renderer::new();
     let mut counter = DepthCounter::default();
     let mut millis = Vec::with_capacity(comparison.views.len());

@@ -23,7 +23,7 @@ use crate::scene::{Camera, Identities, IdentityId, LevelFilter, NOBODY, Semantic
 
 /// How objects and parts are compared with labels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Protocol {
+pub(crate) enum Protocol {
     /// The pixels of the answer against the region, IoU; objects and parts apart
     Masks,
     /// LERF-OVS as LangSplat counts it: smoothed relevancy cut at 0.4, and localization
@@ -45,7 +45,7 @@ pub enum Protocol {
 /// What a protocol counts besides the IoU of each query.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
-pub enum Summary {
+pub(crate) enum Summary {
     /// Of the protocol [`Protocol::Masks`].
     Masks {
         /// Mean IoU of objects.
@@ -91,20 +91,20 @@ pub enum Summary {
 
 /// What a comparison comes to.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MaskScores {
+pub(crate) struct MaskScores {
     /// The views that were compared.
-    pub views: usize,
+    pub(crate) views: usize,
     /// How many of them were trained on.
-    pub trained_on: usize,
+    pub(crate) trained_on: usize,
     /// Every query of every view.
-    pub units: Vec<Unit>,
+    pub(crate) units: Vec<Unit>,
     /// What the protocol counts.
-    pub summary: Summary,
+    pub(crate) summary: Summary,
 }
 
 impl MaskScores {
     /// Mean IoU over queries, and over views.
-    pub fn miou(&self) -> (f64, f64) {
+    pub(crate) fn miou(&self) -> (f64, f64) {
         means(&self.units)
     }
 }
@@ -114,7 +114,7 @@ impl MaskScores {
 ///
 /// # Errors
 /// If labels or photos cannot be read, no view has labels, or a protocol lacks what it needs.
-pub fn run(
+pub(crate) fn run(
     comparison: &Comparison,
     map: &SemanticMap,
     labels: &Path,

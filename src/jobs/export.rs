@@ -15,7 +15,7 @@ use crate::scene::{CameraPath, GaussianCloud, PathKey, PhotoPixels};
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn ply(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
+pub(crate) fn ply(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
     make_parent(path)?;
     splat_ply::write(path, cloud)
 }
@@ -24,7 +24,7 @@ pub fn ply(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn picture(path: &Path, pixels: &PhotoPixels) -> Result<(), IoError> {
+pub(crate) fn picture(path: &Path, pixels: &PhotoPixels) -> Result<(), IoError> {
     png(path, pixels.rgb.as_flattened(), [pixels.width_px, pixels.height_px], ColorType::Rgb8)
 }
 
@@ -32,7 +32,7 @@ pub fn picture(path: &Path, pixels: &PhotoPixels) -> Result<(), IoError> {
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn png(path: &Path, samples: &[u8], size_px: [u32; 2], color: ColorType) -> Result<(), IoError> {
+pub(crate) fn png(path: &Path, samples: &[u8], size_px: [u32; 2], color: ColorType) -> Result<(), IoError> {
     atomic::write(path, |w| {
         PngEncoder::new(w).write_image(samples, size_px[0], size_px[1], color.into()).map_err(std::io::Error::other)
     })
@@ -42,7 +42,7 @@ pub fn png(path: &Path, samples: &[u8], size_px: [u32; 2], color: ColorType) -> 
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn npy(path: &Path, values: &[f32], size_px: [u32; 2]) -> Result<(), IoError> {
+pub(crate) fn npy(path: &Path, values: &[f32], size_px: [u32; 2]) -> Result<(), IoError> {
     atomic::write(path, |w: &mut dyn Write| {
         let shape = [u64::from(size_px[1]), u64::from(size_px[0])];
         let mut array = npyz::WriteOptions::new().default_dtype().shape(&shape).writer(w).begin_nd()?;
@@ -56,7 +56,7 @@ pub fn npy(path: &Path, values: &[f32], size_px: [u32; 2]) -> Result<(), IoError
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn camera_path(file: &Path, path: &CameraPath, aspect: f64) -> Result<(), IoError> {
+pub(crate) fn camera_path(file: &Path, path: &CameraPath, aspect: f64) -> Result<(), IoError> {
     make_parent(file)?;
     if !file.to_string_lossy().ends_with(".nerfstudio.json") {
         return io::camera_path::write(file, path);
@@ -71,7 +71,7 @@ pub fn camera_path(file: &Path, path: &CameraPath, aspect: f64) -> Result<(), Io
 ///
 /// # Errors
 /// If that is not possible.
-pub fn make_parent(path: &Path) -> Result<(), IoError> {
+pub(crate) fn make_parent(path: &Path) -> Result<(), IoError> {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => make_folder(folder),
         _ => Ok(()),
@@ -82,7 +82,7 @@ pub fn make_parent(path: &Path) -> Result<(), IoError> {
 ///
 /// # Errors
 /// If that is not possible.
-pub fn make_folder(folder: &Path) -> Result<(), IoError> {
+pub(crate) fn make_folder(folder: &Path) -> Result<(), IoError> {
     let remedy = "the folder cannot be created: choose another place";
     std::fs::create_dir_all(folder).map_err(|cause| IoError::Write { path: folder.into(), remedy, cause })
 }

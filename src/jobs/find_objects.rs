@@ -21,7 +21,7 @@ use crate::render::RenderSettings;
 use crate::scene::{Dataset, GaussianCloud, Photo};
 
 /// Name of the encoder that is none.
-pub const NO_ENCODER: &str = "none";
+pub(crate) const NO_ENCODER: &str = "none";
 
 /// How objects are found. Models that are not named are the best that are here.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -87,17 +87,17 @@ pub struct Request {
 
 /// Objects and parts that were found and stored.
 #[derive(Clone, Debug)]
-pub struct FoundObjects {
+pub(crate) struct FoundObjects {
     /// They, and how they were found.
-    pub found: Found,
+    pub(crate) found: Found,
     /// The photos that were looked at; what was found counts them.
-    pub photos: Vec<Photo>,
+    pub(crate) photos: Vec<Photo>,
     /// Where the objects and parts before are kept, if there were any.
-    pub kept: Option<PathBuf>,
+    pub(crate) kept: Option<PathBuf>,
     /// The state of the scene now.
-    pub state: String,
+    pub(crate) state: String,
     /// Seconds that it took.
-    pub secs: f64,
+    pub(crate) secs: f64,
 }
 
 /// Finds objects and parts of the scene in the state `known`, and stores them. Held-out photos are never used.
@@ -105,7 +105,11 @@ pub struct FoundObjects {
 /// # Errors
 /// If the folder cannot be written or has changed, a model or photo cannot be read, no mask is found, or the
 /// observer asks to stop.
-pub fn run(request: &Request, known: Option<&str>, observer: &mut dyn Observer) -> Result<FoundObjects, JobError> {
+pub(crate) fn run(
+    request: &Request,
+    known: Option<&str>,
+    observer: &mut dyn Observer,
+) -> Result<FoundObjects, JobError> {
     let Request { folder, cloud, settings, dataset, with, .. } = request;
     let masks = request.masks.as_deref();
     if !trained::is_scene(folder) {

@@ -16,27 +16,27 @@ pub struct Folders {
 
 impl Folders {
     /// Below the user's data folder; below the system's temporary folder where there is none.
-    pub fn of_user() -> Self {
+    pub(crate) fn of_user() -> Self {
         Self { data: data_folder() }
     }
 
     /// Folder of the demo's photos. Carries the version, because another version may make others.
-    pub fn demo(&self) -> PathBuf {
+    pub(crate) fn demo(&self) -> PathBuf {
         self.data.join(format!("demo-{}", env!("CARGO_PKG_VERSION")))
     }
 
     /// Folder of the newest scene trained from the dataset at `root`, whether it exists or not.
-    pub fn trained(&self, root: &Path) -> PathBuf {
+    pub(crate) fn trained(&self, root: &Path) -> PathBuf {
         self.runs(root).take_while(|run| run.exists()).last().unwrap_or_else(|| self.fresh(root))
     }
 
     /// A folder for a new training of the dataset at `root`, next to those of earlier ones.
-    pub fn fresh(&self, root: &Path) -> PathBuf {
+    pub(crate) fn fresh(&self, root: &Path) -> PathBuf {
         self.runs(root).find(|run| !run.exists()).unwrap_or_default()
     }
 
     /// Folder for a report of the splat at `path`, which has no folder of its own.
-    pub fn report(&self, path: &Path) -> PathBuf {
+    pub(crate) fn report(&self, path: &Path) -> PathBuf {
         unique(&self.data.join("reports"), path)
     }
 

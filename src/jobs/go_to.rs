@@ -15,11 +15,11 @@ use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 /// A scene in which one can move about.
 pub struct Explored {
     /// Finds ways.
-    pub navigator: Navigator,
+    pub(crate) navigator: Navigator,
     /// The Gaussians that it knows.
-    pub cloud: Arc<GaussianCloud>,
+    pub(crate) cloud: Arc<GaussianCloud>,
     /// The number of the connected part that each keypoint belongs to, the largest part first.
-    pub parts: Vec<usize>,
+    pub(crate) parts: Vec<usize>,
 }
 
 impl std::fmt::Debug for Explored {
@@ -30,7 +30,7 @@ impl std::fmt::Debug for Explored {
 
 impl Explored {
     /// Looks at a scene.
-    pub fn new(cloud: Arc<GaussianCloud>, cameras: &[Camera], up: DVec3) -> Self {
+    pub(crate) fn new(cloud: Arc<GaussianCloud>, cameras: &[Camera], up: DVec3) -> Self {
         let navigator = Navigator::new(&cloud, cameras, up);
         resource_log::record(
             Sort::Paths,
@@ -46,12 +46,12 @@ impl Explored {
     ///
     /// # Errors
     /// If there is no way.
-    pub fn fly(&self, from: &Pose, to: &Pose, frames: usize) -> Result<Flight, NoRoute> {
+    pub(crate) fn fly(&self, from: &Pose, to: &Pose, frames: usize) -> Result<Flight, NoRoute> {
         self.navigator.fly(from, to, None, frames, Speed::Eased)
     }
 
     /// How smooth the paper's interpolation of a flight's ends is, and that through all keypoints of the route.
-    pub fn of_paper(&self, flight: &Flight) -> [Option<Smoothness>; 2] {
+    pub(crate) fn of_paper(&self, flight: &Flight) -> [Option<Smoothness>; 2] {
         let [first, .., last] = flight.poses.as_slice() else { return [None, None] };
         let (navigator, frames) = (&self.navigator, flight.poses.len());
         let keys = navigator.keys(first, last).unwrap_or_default();
@@ -60,7 +60,7 @@ impl Explored {
     }
 
     /// Why there is no way, with how much of the scene hangs together.
-    pub fn no_route(&self, why: &NoRoute) -> String {
+    pub(crate) fn no_route(&self, why: &NoRoute) -> String {
         let count = self.parts.iter().max().map_or(0, |m| m + 1);
         format!("{why} ({} keypoints in {count} parts that are not connected)", self.parts.len())
     }
@@ -70,31 +70,31 @@ impl Explored {
 #[derive(Clone, Debug)]
 pub struct ApproachRequest {
     /// The scene, if it was looked at before.
-    pub explored: Option<Arc<Explored>>,
+    pub(crate) explored: Option<Arc<Explored>>,
     /// The Gaussians.
-    pub cloud: Arc<GaussianCloud>,
+    pub(crate) cloud: Arc<GaussianCloud>,
     /// The photos' cameras.
-    pub cameras: Vec<Camera>,
+    pub(crate) cameras: Vec<Camera>,
     /// Which way is up.
-    pub up: DVec3,
+    pub(crate) up: DVec3,
     /// How the Gaussians are drawn.
-    pub settings: RenderSettings,
+    pub(crate) settings: RenderSettings,
     /// Objects and parts.
-    pub map: Arc<SemanticMap>,
+    pub(crate) map: Arc<SemanticMap>,
     /// Which of them.
-    pub id: IdentityId,
+    pub(crate) id: IdentityId,
     /// How it is to be seen.
-    pub wish: Wish,
+    pub(crate) wish: Wish,
     /// Where the eye is.
-    pub from: Pose,
+    pub(crate) from: Pose,
     /// Width by height of the picture.
-    pub aspect: f64,
+    pub(crate) aspect: f64,
     /// Poses of the flight.
-    pub frames: usize,
+    pub(crate) frames: usize,
 }
 
 /// Finds the flight to an identity. What was learned about the scene comes back with it.
-pub fn visit(request: ApproachRequest) -> (Arc<Explored>, Approached) {
+pub(crate) fn visit(request: ApproachRequest) -> (Arc<Explored>, Approached) {
     let ApproachRequest { explored, cloud, cameras, up, settings, map, id, wish, from, aspect, frames } = request;
     let known = explored.filter(|e| Arc::ptr_eq(&e.cloud, &cloud));
     let explored = known.unwrap_or_else(|| Arc::new(Explored::new(Arc::clone(&cloud), &cameras, up)));
@@ -114,9 +114,9 @@ pub fn visit(request: ApproachRequest) -> (Arc<Explored>, Approached) {
 #[derive(Clone, Debug)]
 pub struct Approached {
     /// What was to be visited.
-    pub name: String,
+    pub(crate) name: String,
     /// The flight there, or to the nearest place that can be reached.
-    pub flight: Option<Box<Approach>>,
+    pub(crate) flight: Option<Box<Approach>>,
     /// Why it does not lead there.
-    pub problem: Option<String>,
+    pub(crate) problem: Option<String>,
 }

@@ -4,23 +4,23 @@
 //! and return a typed result or a [`JobError`]. Whoever calls them says the result in its own way.
 
 pub mod edit;
-pub mod error;
-pub mod evaluate;
-pub mod evaluate_masks;
-pub mod export;
+pub(crate) mod error;
+pub(crate) mod evaluate;
+pub(crate) mod evaluate_masks;
+pub(crate) mod export;
 pub mod find_objects;
-pub mod folders;
-pub mod go_to;
-pub mod models;
+pub(crate) mod folders;
+pub(crate) mod go_to;
+pub(crate) mod models;
 pub mod open;
-pub mod plan;
-pub mod query;
-pub mod render;
-pub mod segment;
-pub mod thumbnails;
-pub mod train;
-pub mod video;
+pub(crate) mod plan;
+pub(crate) mod query;
+pub(crate) mod render;
+pub(crate) mod segment;
+pub(crate) mod thumbnails;
+pub(crate) mod train;
+pub(crate) mod video;
 
-pub use error::JobError;
+pub(crate) use error::JobError;
 pub use folders::Folders;
-pub use open::{OpenedScene, Scene};
+pub(crate) use open::{OpenedScene, Scene};

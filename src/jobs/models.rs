@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::JobError;
 use crate::math::stats::median;
 use crate::models::catalog;
-pub use crate::models::catalog::{Entry as ModelEntry, Role as ModelRole, SAM2, State as ModelState};
+pub(crate) use crate::models::catalog::{Entry as ModelEntry, Role as ModelRole, SAM2, State as ModelState};
 use crate::models::engine::engine;
 use crate::models::fetch::Patience;
 use crate::models::{self, ModelError, Tile};
@@ -16,15 +16,15 @@ use crate::pipeline::observer::{Observer, Ticker};
 #[derive(Clone, Debug)]
 pub struct ModelList {
     /// What runs them, and where.
-    pub engine: String,
+    pub(crate) engine: String,
     /// What is wrong with it, or could be better.
-    pub note: Option<String>,
+    pub(crate) note: Option<String>,
     /// All models of the catalog.
-    pub models: Vec<(ModelEntry, ModelState)>,
+    pub(crate) models: Vec<(ModelEntry, ModelState)>,
 }
 
 /// Lists the models, installed or not: reads and verifies files.
-pub fn list() -> ModelList {
+pub(crate) fn list() -> ModelList {
     let (engine, mut note) = match engine() {
         Ok(engine) => (format!("{}, {}", engine.name(), engine.device()), engine.note().map(str::to_owned)),
         Err(e) => ("none".to_owned(), Some(e.to_string())),
@@ -39,7 +39,7 @@ pub fn list() -> ModelList {
 
 /// Where the files of a model come from.
 #[derive(Clone, Copy, Debug)]
-pub enum Source<'a> {
+pub(crate) enum Source<'a> {
     /// An address; `None` = the one in the list.
     Fetch(Option<&'a str>),
     /// A folder.
@@ -50,7 +50,7 @@ pub enum Source<'a> {
 ///
 /// # Errors
 /// If there is none, its files cannot be had or are not right, or the observer asks to stop.
-pub fn install(id: &str, source: Source<'_>, observer: &mut dyn Observer) -> Result<ModelEntry, JobError> {
+pub(crate) fn install(id: &str, source: Source<'_>, observer: &mut dyn Observer) -> Result<ModelEntry, JobError> {
     let (folder, mut ticker) = (catalog::folder(), Ticker::new("", 0));
     let entry = catalog::entry(id)?;
     match source {
@@ -76,19 +76,19 @@ pub fn check() -> Result<Vec<(String, Option<String>)>, JobError> {
 
 /// How long an encoder takes.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct EncoderTimes {
+pub(crate) struct EncoderTimes {
     /// Its name.
-    pub id: String,
+    pub(crate) id: String,
     /// Loading it and its first use, ms.
-    pub load_ms: f64,
+    pub(crate) load_ms: f64,
     /// A picture, ms.
-    pub picture_ms: f64,
+    pub(crate) picture_ms: f64,
     /// A phrase, ms.
-    pub phrase_ms: f64,
+    pub(crate) phrase_ms: f64,
     /// What it made of the picture.
-    pub picture: Vec<f32>,
+    pub(crate) picture: Vec<f32>,
     /// What it made of the phrase.
-    pub phrase: Vec<f32>,
+    pub(crate) phrase: Vec<f32>,
 }
 
 /// Times every encoder that can be used here on a picture and a phrase: medians of so many `runs`. `told` hears
@@ -96,7 +96,7 @@ pub struct EncoderTimes {
 ///
 /// # Errors
 /// If one fails.
-pub fn time_encoders(runs: usize, told: &mut dyn FnMut(String)) -> Result<Vec<EncoderTimes>, JobError> {
+pub(crate) fn time_encoders(runs: usize, told: &mut dyn FnMut(String)) -> Result<Vec<EncoderTimes>, JobError> {
     const PHRASE: &str = "a red wooden chair";
     let times = |run: &mut dyn FnMut() -> Result<(), ModelError>| -> Result<f64, ModelError> {
         let mut ms = Vec::with_capacity(runs);

@@ -22,46 +22,46 @@ use crate::scene::{Bounds, Camera, Dataset, Facts, GaussianCloud, HomeView, Mach
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
     /// Where it was read from.
-    pub path: PathBuf,
+    pub(crate) path: PathBuf,
     /// Folder of the trained scene, if it is one.
-    pub folder: Option<PathBuf>,
+    pub(crate) folder: Option<PathBuf>,
     /// Short name for titles.
-    pub name: String,
+    pub(crate) name: String,
     /// The Gaussians, without bands of harmonics that are zero.
-    pub cloud: Arc<GaussianCloud>,
+    pub(crate) cloud: Arc<GaussianCloud>,
     /// Degree of the harmonics in its file.
-    pub sh_stored: u8,
+    pub(crate) sh_stored: u8,
     /// The photos' cameras, possibly none.
-    pub cameras: Vec<SceneCamera>,
+    pub(crate) cameras: Vec<SceneCamera>,
     /// How it is drawn: background, filter and so on, as it was trained.
-    pub settings: RenderSettings,
+    pub(crate) settings: RenderSettings,
     /// How it was trained; defaults where that is not known.
-    pub config: TrainConfig,
+    pub(crate) config: TrainConfig,
     /// Measurements of its training.
-    pub history: History,
+    pub(crate) history: History,
     /// Where its photos were, for display.
-    pub photos: Option<PathBuf>,
+    pub(crate) photos: Option<PathBuf>,
     /// Where its photos are, if they are still there.
-    pub dataset_path: Option<PathBuf>,
+    pub(crate) dataset_path: Option<PathBuf>,
     /// Length of a scene unit in meters, if that is known.
-    pub metres_per_unit: Option<f64>,
+    pub(crate) metres_per_unit: Option<f64>,
     /// Id of the save that its files are of, if it has one.
-    pub state: Option<String>,
+    pub(crate) state: Option<String>,
 }
 
 impl Scene {
     /// What was read to open it, which no result may replace.
-    pub fn reads(&self) -> Vec<&Path> {
+    pub(crate) fn reads(&self) -> Vec<&Path> {
         std::iter::once(self.path.as_path()).chain(self.dataset_path.as_deref()).collect()
     }
 
     /// The cameras alone.
-    pub fn views(&self) -> Vec<Camera> {
+    pub(crate) fn views(&self) -> Vec<Camera> {
         self.cameras.iter().map(|c| c.camera.clone()).collect()
     }
 
     /// How to look at it at first.
-    pub fn home(&self) -> HomeView {
+    pub(crate) fn home(&self) -> HomeView {
         HomeView::new(&self.views(), Some(&self.cloud))
     }
 
@@ -81,7 +81,7 @@ impl Scene {
     ///
     /// # Errors
     /// If nobody knows.
-    pub fn photos(&self, elsewhere: Option<&Path>) -> Result<PathBuf, JobError> {
+    pub(crate) fn photos(&self, elsewhere: Option<&Path>) -> Result<PathBuf, JobError> {
         let known = elsewhere.map(Path::to_path_buf).or_else(|| self.dataset_path.clone());
         known.ok_or_else(|| JobError::PhotosGone(self.path.clone()))
     }
@@ -118,7 +118,7 @@ impl Scene {
 // One value exists per opening; a box would only be in the reader's way.
 #[allow(clippy::large_enum_variant)]
 #[derive(Debug)]
-pub enum Contents {
+pub(crate) enum Contents {
     /// Posed photos.
     Photos(Dataset),
     /// A splat or a trained scene.
@@ -129,7 +129,7 @@ pub enum Contents {
 ///
 /// # Errors
 /// If it cannot be read, the settings of a trained scene included.
-pub fn contents(path: &Path) -> Result<Contents, JobError> {
+pub(crate) fn contents(path: &Path) -> Result<Contents, JobError> {
     Ok(match io::open(path)? {
         Opened::Dataset(dataset) => Contents::Photos(dataset),
         Opened::Cloud(cloud) => Contents::Scene(Scene::bare(path, cloud)),
@@ -155,7 +155,7 @@ pub fn scene(path: &Path) -> Result<Scene, JobError> {
 ///
 /// # Errors
 /// If they cannot be read, or it is something else.
-pub fn dataset(path: &Path) -> Result<Dataset, JobError> {
+pub(crate) fn dataset(path: &Path) -> Result<Dataset, JobError> {
     match io::open(path)? {
         Opened::Dataset(dataset) => Ok(dataset),
         Opened::Trained(_) | Opened::Cloud(_) => Err(JobError::NoPhotos(path.into())),
@@ -163,7 +163,7 @@ pub fn dataset(path: &Path) -> Result<Dataset, JobError> {
 }
 
 /// The cameras of a dataset's photos, those that `every` holds out marked.
-pub fn cameras(dataset: &Dataset, every: usize) -> Vec<SceneCamera> {
+pub(crate) fn cameras(dataset: &Dataset, every: usize) -> Vec<SceneCamera> {
     let (_, held_out) = dataset.split(every);
     trained::SceneInfo::of(dataset, &held_out, Path::new("")).cameras
 }
@@ -172,7 +172,7 @@ pub fn cameras(dataset: &Dataset, every: usize) -> Vec<SceneCamera> {
 #[derive(Clone, Debug, Default)]
 pub struct OpenedScene {
     /// Where it was read from.
-    pub path: PathBuf,
+    pub(crate) path: PathBuf,
     /// Short name for titles.
     pub name: String,
     /// Posed photos, if it has any.
@@ -180,31 +180,31 @@ pub struct OpenedScene {
     /// What to draw: trained Gaussians, or the sparse points as small ones.
     pub cloud: Option<Arc<GaussianCloud>>,
     /// Whether `cloud` is a result, not just sparse points.
-    pub trained: bool,
+    pub(crate) trained: bool,
     /// Objects and parts, if they were found before.
     pub semantics: Option<Arc<SemanticMap>>,
     /// Where masks of its photos are, if they came with them.
-    pub masks: Option<PathBuf>,
+    pub(crate) masks: Option<PathBuf>,
     /// Folder in which training keeps its results and checkpoints.
     pub out: PathBuf,
     /// Measurements of earlier training.
-    pub history: History,
+    pub(crate) history: History,
     /// Length of a scene unit in meters, if that is known.
-    pub metres_per_unit: Option<f64>,
+    pub(crate) metres_per_unit: Option<f64>,
     /// How to look at it at first.
     pub home: HomeView,
     /// How to draw it: background and filter.
     pub render: RenderSettings,
     /// Degree of the harmonics in its file.
-    pub sh_stored: u8,
+    pub(crate) sh_stored: u8,
     /// What its plan is computed from.
-    pub facts: Facts,
+    pub(crate) facts: Facts,
     /// Id of the save that its files are of, if it has one.
-    pub state: Option<String>,
+    pub(crate) state: Option<String>,
     /// Reports that may be of it.
-    pub reports: Vec<PathBuf>,
+    pub(crate) reports: Vec<PathBuf>,
     /// Folder for a report of it.
-    pub report_out: PathBuf,
+    pub(crate) report_out: PathBuf,
 }
 
 impl OpenedScene {
@@ -238,7 +238,7 @@ impl OpenedScene {
 ///
 /// # Errors
 /// If nothing that is known lies there, or it cannot be read.
-pub fn open(
+pub(crate) fn open(
     path: &Path,
     folders: &Folders,
     machine: &Machine,
@@ -271,7 +271,7 @@ pub fn open(
 ///
 /// # Errors
 /// If they cannot be made or read, or the observer asks to stop.
-pub fn demo(folders: &Folders, machine: &Machine, observer: &mut dyn Observer) -> Result<OpenedScene, JobError> {
+pub(crate) fn demo(folders: &Folders, machine: &Machine, observer: &mut dyn Observer) -> Result<OpenedScene, JobError> {
     let out = folders.demo();
     if !demo::demo_is_written(&out) {
         demo::write_demo(&out, observer)?;
@@ -280,7 +280,7 @@ pub fn demo(folders: &Folders, machine: &Machine, observer: &mut dyn Observer) -
 }
 
 /// The objects and parts stored with a trained scene; broken ones are told and left out.
-pub fn known_objects(scene: &Scene, observer: &mut dyn Observer) -> Option<Arc<SemanticMap>> {
+pub(crate) fn known_objects(scene: &Scene, observer: &mut dyn Observer) -> Option<Arc<SemanticMap>> {
     match scene.semantics() {
         Ok(map) => {
             let what = format!("{} objects and parts", map.identities.len());
@@ -350,7 +350,7 @@ fn compact(cloud: GaussianCloud) -> (Arc<GaussianCloud>, u8) {
 
 /// The sparse points as opaque round Gaussians of one size, about half the spacing that as many
 /// points would have on a surface. `None` without points.
-pub fn sparse_cloud(dataset: &Dataset) -> Option<GaussianCloud> {
+pub(crate) fn sparse_cloud(dataset: &Dataset) -> Option<GaussianCloud> {
     let bounds = Bounds::robust(dataset.points.iter().map(|p| p.position))?;
     let origin = bounds.center();
     let points: Vec<_> = dataset.points.iter().filter(|p| p.position.is_finite()).collect();

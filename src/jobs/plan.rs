@@ -8,13 +8,13 @@ use crate::scene::{Dataset, Facts, GaussianCloud, Machine, Overrides, ScenePlan}
 
 /// Looks at memory, cores and the graphics adapter. Takes some milliseconds: not for the window's
 /// thread.
-pub fn machine() -> Machine {
+pub(crate) fn machine() -> Machine {
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     Machine { free_memory_bytes: memory::free(), max_gaussians: budget::gaussians(), cores, gpu: real_gpu() }
 }
 
 /// Facts about photos and trained Gaussians; those come with the degree of the harmonics in their file.
-pub fn facts(
+pub(crate) fn facts(
     machine: &Machine,
     dataset: Option<&Dataset>,
     cloud: Option<(&GaussianCloud, u8)>,
@@ -29,18 +29,18 @@ pub fn facts(
 }
 
 /// Facts about a scene and its cameras, without looking at its photos.
-pub fn scene_facts(machine: &Machine, scene: &Scene, config: &TrainConfig) -> Facts {
+pub(crate) fn scene_facts(machine: &Machine, scene: &Scene, config: &TrainConfig) -> Facts {
     let cameras = scene.views();
     let facts = Facts::of(machine.clone(), config.limits()).with_photos(&cameras);
     facts.with_cloud(&scene.cloud, scene.sh_stored, &cameras)
 }
 
 /// The plan for a scene that is to be drawn; nothing in it depends on the machine.
-pub fn of_scene(scene: &Scene, overrides: &Overrides) -> ScenePlan {
+pub(crate) fn of_scene(scene: &Scene, overrides: &Overrides) -> ScenePlan {
     ScenePlan::new(scene_facts(&Machine::default(), scene, &scene.config), overrides)
 }
 
 /// The plan for training on photos; nothing in it depends on the machine.
-pub fn of_photos(dataset: &Dataset, config: &TrainConfig, overrides: &Overrides) -> ScenePlan {
+pub(crate) fn of_photos(dataset: &Dataset, config: &TrainConfig, overrides: &Overrides) -> ScenePlan {
     ScenePlan::new(facts(&Machine::default(), Some(dataset), None, config), overrides)
 }

@@ -22,7 +22,7 @@ pub struct ViewMaps {
     /// By identity of largest weight.
     pub identities: ViewMap,
     /// Blended codes, if they were wanted.
-    pub codes: Option<CodeMap>,
+    pub(crate) codes: Option<CodeMap>,
 }
 
 impl ViewMaps {
@@ -30,7 +30,7 @@ impl ViewMaps {
     ///
     /// # Errors
     /// If the view cannot be drawn.
-    pub fn draw(
+    pub(crate) fn draw(
         renderer: &mut Renderer,
         (cloud, settings): (&GaussianCloud, &RenderSettings),
         map: &SemanticMap,
@@ -47,7 +47,7 @@ impl ViewMaps {
     }
 
     /// The pixels of an identity; a match differs by at most `tolerance` per channel.
-    pub fn mask(&self, map: &SemanticMap, id: IdentityId, mode: MatchMode, tolerance: f32) -> Mask {
+    pub(crate) fn mask(&self, map: &SemanticMap, id: IdentityId, mode: MatchMode, tolerance: f32) -> Mask {
         match (&self.codes, mode) {
             (Some(codes), MatchMode::Blend) => matching::blend(codes, &map.identities, id, tolerance),
             _ => matching::exact(&self.identities, &map.identities, id, tolerance),
@@ -57,41 +57,41 @@ impl ViewMaps {
 
 /// A question about a scene in a view.
 #[derive(Clone, Debug)]
-pub struct Request<'a> {
+pub(crate) struct Request<'a> {
     /// As it was typed.
-    pub text: &'a str,
+    pub(crate) text: &'a str,
     /// Which level is asked for.
-    pub level: LevelFilter,
+    pub(crate) level: LevelFilter,
     /// The view.
-    pub camera: &'a Camera,
+    pub(crate) camera: &'a Camera,
     /// How pixels are matched.
-    pub mode: MatchMode,
+    pub(crate) mode: MatchMode,
     /// Largest difference per channel of a match.
-    pub tolerance: f32,
+    pub(crate) tolerance: f32,
     /// Answers whose pixels go into the mask at most.
-    pub top: usize,
+    pub(crate) top: usize,
 }
 
 /// A question with its answer.
 #[derive(Clone, Debug)]
-pub struct QueryResult {
+pub(crate) struct QueryResult {
     /// What is meant, and how long that took.
-    pub answered: QueryAnswer,
+    pub(crate) answered: QueryAnswer,
     /// Its pixels.
-    pub mask: Mask,
+    pub(crate) mask: Mask,
     /// Words that nothing here knows.
-    pub unknown_words: Vec<String>,
+    pub(crate) unknown_words: Vec<String>,
     /// Milliseconds from the text to the mask, the view there.
-    pub query_ms: f64,
+    pub(crate) query_ms: f64,
     /// What the view's pixels belong to.
-    pub maps: ViewMaps,
+    pub(crate) maps: ViewMaps,
 }
 
 /// Answers a question.
 ///
 /// # Errors
 /// If there is nothing in it, the encoder fails, or the view cannot be drawn.
-pub fn run(scene: &Scene, map: &SemanticMap, request: &Request<'_>) -> Result<QueryResult, JobError> {
+pub(crate) fn run(scene: &Scene, map: &SemanticMap, request: &Request<'_>) -> Result<QueryResult, JobError> {
     let drawn = (&*scene.cloud, &scene.settings);
     let blend = request.mode == MatchMode::Blend;
     let maps = ViewMaps::draw(&mut Renderer::new(), drawn, map, request.camera, blend, map.has_parts())?;
@@ -113,7 +113,12 @@ pub fn run(scene: &Scene, map: &SemanticMap, request: &Request<'_>) -> Result<Qu
 ///
 /// # Errors
 /// If none is, or the encoder fails.
-pub fn identities(map: &SemanticMap, text: &str, level: LevelFilter, top: usize) -> Result<Vec<IdentityId>, JobError> {
+pub(crate) fn identities(
+    map: &SemanticMap,
+    text: &str,
+    level: LevelFilter,
+    top: usize,
+) -> Result<Vec<IdentityId>, JobError> {
     let answered = QueryEngine::new(map.language.as_ref())?.ask(map, text, level)?;
     let found = answered.map(|a| a.chosen(top)).unwrap_or_default();
     if found.is_empty() { Err(JobError::NoMatch(text.to_owned())) } else { Ok(found) }
@@ -123,7 +128,7 @@ pub fn identities(map: &SemanticMap, text: &str, level: LevelFilter, top: usize)
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn write_mask(path: &Path, mask: &Mask) -> Result<(), JobError> {
+pub(crate) fn write_mask(path: &Path, mask: &Mask) -> Result<(), JobError> {
     let (width, height) = (mask.width_px(), mask.height_px());
     let pixels: Vec<u8> = (0..width * height).map(|i| if mask.contains(i) { 255 } else { 0 }).collect();
     export::make_parent(path)?;
@@ -134,7 +139,7 @@ pub fn write_mask(path: &Path, mask: &Mask) -> Result<(), JobError> {
 ///
 /// # Errors
 /// If the picture cannot be drawn or the file not be written.
-pub fn write_heat(
+pub(crate) fn write_heat(
     path: &Path,
     (cloud, settings): (&GaussianCloud, &RenderSettings),
     camera: &Camera,

@@ -13,7 +13,7 @@ use crate::scene::{Camera, Overrides};
 
 /// What of a scene is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Quantity {
+pub(crate) enum Quantity {
     /// Colors
     Picture,
     /// Distance along the camera's axis at which half of the light is spent
@@ -28,7 +28,7 @@ pub enum Quantity {
 
 impl Quantity {
     /// How a file name for it may end.
-    pub fn endings(self) -> &'static [&'static str] {
+    pub(crate) fn endings(self) -> &'static [&'static str] {
         match self {
             Self::Picture | Self::Normals => &[".png"],
             Self::Depth | Self::ExpectedDepth | Self::Alpha => &[".png", ".npy"],
@@ -37,24 +37,24 @@ impl Quantity {
 }
 
 /// A drawn view.
-pub struct Rendered {
+pub(crate) struct Rendered {
     /// It.
-    pub frame: Frame<f32>,
+    pub(crate) frame: Frame<f32>,
     /// What drew it: "CPU", or the name of the GPU.
-    pub backend: String,
+    pub(crate) backend: String,
     /// Milliseconds that drawing took.
-    pub millis: f64,
+    pub(crate) millis: f64,
     /// Degree of the spherical harmonics that were drawn.
-    pub sh_degree: u8,
+    pub(crate) sh_degree: u8,
     /// Whether surfels were drawn as flat Gaussians: only the CPU draws them as such.
-    pub flat: bool,
+    pub(crate) flat: bool,
 }
 
 /// Draws `what` of a scene.
 ///
 /// # Errors
 /// If the renderer that is demanded is not there, or fails.
-pub fn run(
+pub(crate) fn run(
     scene: &Scene,
     camera: &Camera,
     what: Quantity,

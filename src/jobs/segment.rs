@@ -8,7 +8,7 @@ use crate::scene::{GaussianCloud, IdentityId, SemanticMap};
 ///
 /// # Errors
 /// If none is left.
-pub fn select(
+pub(crate) fn select(
     cloud: &GaussianCloud,
     map: &SemanticMap,
     targets: &[IdentityId],

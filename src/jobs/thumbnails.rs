@@ -10,7 +10,7 @@ use crate::scene::{GaussianCloud, HomeView, SemanticMap};
 ///
 /// # Errors
 /// If one cannot be drawn.
-pub fn draw(
+pub(crate) fn draw(
     cloud: &GaussianCloud,
     map: &SemanticMap,
     settings: &RenderSettings,

@@ -12,20 +12,20 @@ use crate::scene::{Dataset, SemanticMap};
 
 /// A training that has ended.
 #[derive(Clone, Debug)]
-pub struct Trained {
+pub(crate) struct Trained {
     /// What came of it.
-    pub outcome: TrainOutcome,
+    pub(crate) outcome: TrainOutcome,
     /// Folder of the trained scene.
-    pub out: PathBuf,
+    pub(crate) out: PathBuf,
     /// Id of its save.
-    pub state: Option<String>,
+    pub(crate) state: Option<String>,
     /// Objects and parts that were carried over from the scene before.
-    pub semantics: Option<Arc<SemanticMap>>,
+    pub(crate) semantics: Option<Arc<SemanticMap>>,
 }
 
 impl Trained {
     /// Whether all steps are done; else the observer has stopped it.
-    pub fn is_finished(&self) -> bool {
+    pub(crate) fn is_finished(&self) -> bool {
         self.outcome.end == TrainEnd::Finished
     }
 }
@@ -35,7 +35,7 @@ impl Trained {
 ///
 /// # Errors
 /// If the photos cannot be read, training fails, or all folders hold something else.
-pub fn run(
+pub(crate) fn run(
     dataset: &Dataset,
     config: &TrainConfig,
     folders: impl IntoIterator<Item = PathBuf>,

@@ -18,35 +18,35 @@ const MARK: [u8; 3] = [255, 64, 160];
 #[derive(Clone, Debug)]
 pub struct VideoRequest {
     /// The Gaussians.
-    pub cloud: Arc<GaussianCloud>,
+    pub(crate) cloud: Arc<GaussianCloud>,
     /// How they are drawn.
-    pub draw: RenderSettings,
+    pub(crate) draw: RenderSettings,
     /// One per frame.
-    pub cameras: Vec<Camera>,
+    pub(crate) cameras: Vec<Camera>,
     /// What is marked in every frame.
-    pub marked: Option<(Arc<SemanticMap>, Vec<IdentityId>)>,
+    pub(crate) marked: Option<(Arc<SemanticMap>, Vec<IdentityId>)>,
     /// Where it goes.
-    pub out: PathBuf,
+    pub(crate) out: PathBuf,
     /// How it is written.
-    pub settings: Settings,
+    pub(crate) settings: Settings,
     /// Which renderer draws.
-    pub backend: BackendChoice,
+    pub(crate) backend: BackendChoice,
 }
 
 /// A video that was made.
 #[derive(Clone, Debug)]
-pub struct Video {
+pub(crate) struct Video {
     /// The file or folder.
-    pub summary: Summary,
+    pub(crate) summary: Summary,
     /// What drew it: "CPU", or the name of the GPU.
-    pub backend: String,
+    pub(crate) backend: String,
     /// Seconds that it took.
-    pub secs: f64,
+    pub(crate) secs: f64,
 }
 
 /// Which renderer draws with these settings: only the CPU draws surfels as such, so it is chosen for them, as it
 /// is where a plan wants it, unless somebody demands another.
-pub fn backend(wanted: BackendChoice, settings: &RenderSettings, on_cpu: bool) -> BackendChoice {
+pub(crate) fn backend(wanted: BackendChoice, settings: &RenderSettings, on_cpu: bool) -> BackendChoice {
     let cpu = (settings.surfels || on_cpu) && wanted == BackendChoice::Auto;
     if cpu { BackendChoice::Cpu } else { wanted }
 }
@@ -56,7 +56,7 @@ pub fn backend(wanted: BackendChoice, settings: &RenderSettings, on_cpu: bool) -
 /// # Errors
 /// If the renderer that is demanded is not there, a frame cannot be drawn or written, or the observer asks to
 /// stop; nothing is left of the video then.
-pub fn run(request: VideoRequest, observer: &mut dyn Observer) -> Result<Video, JobError> {
+pub(crate) fn run(request: VideoRequest, observer: &mut dyn Observer) -> Result<Video, JobError> {
     let VideoRequest { cloud, draw, cameras, marked, out, settings, backend } = request;
     let marked = marked.as_ref().map(|(map, ids)| Marked { map, ids, color: MARK });
     let choice = self::backend(backend, &draw, false);

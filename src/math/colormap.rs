@@ -5,7 +5,7 @@ use strum::{IntoStaticStr, VariantArray};
 /// A color map.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, IntoStaticStr, VariantArray)]
 #[strum(serialize_all = "lowercase")]
-pub enum Colormap {
+pub(crate) enum Colormap {
     /// Blue over green to red.
     #[default]
     Turbo,
@@ -17,12 +17,12 @@ pub enum Colormap {
 
 impl Colormap {
     /// Its name.
-    pub fn text(self) -> &'static str {
+    pub(crate) fn text(self) -> &'static str {
         self.into()
     }
 
     /// The color of `t`, clamped to 0..1; NaN is black, so that holes stand out.
-    pub fn color(self, t: f32) -> [u8; 3] {
+    pub(crate) fn color(self, t: f32) -> [u8; 3] {
         match self {
             _ if t.is_nan() => [0; 3],
             Self::Turbo => turbo(t),

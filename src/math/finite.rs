@@ -4,25 +4,25 @@ use super::Real;
 
 /// Whether stages are checked: the Cargo feature `debug-validation`. Constant, so that what stands
 /// behind it costs nothing without the feature.
-pub const CHECKED: bool = cfg!(feature = "debug-validation");
+pub(crate) const CHECKED: bool = cfg!(feature = "debug-validation");
 
 /// A number that is none, and where it was found.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("after {stage}: {field} {index} is not finite")]
 pub struct NotFinite {
     /// The stage that left it.
-    pub stage: &'static str,
+    pub(crate) stage: &'static str,
     /// What it is.
-    pub field: &'static str,
+    pub(crate) field: &'static str,
     /// Which of these, from 0.
-    pub index: usize,
+    pub(crate) index: usize,
 }
 
 /// Looks for the first number that is none.
 ///
 /// # Errors
 /// Names it.
-pub fn all_finite<'a, R: Real>(
+pub(crate) fn all_finite<'a, R: Real>(
     stage: &'static str,
     field: &'static str,
     values: impl IntoIterator<Item = &'a R>,
@@ -35,7 +35,7 @@ pub fn all_finite<'a, R: Real>(
 
 /// For stages that cannot fail: under `debug-validation` a number that is none ends the job, as a panic
 /// that names it and that the worker reports.
-pub fn insist(found: impl FnOnce() -> Result<(), NotFinite>) {
+pub(crate) fn insist(found: impl FnOnce() -> Result<(), NotFinite>) {
     if CHECKED {
         let text = found().err().map(|e| e.to_string());
         assert!(text.is_none(), "{}", text.unwrap_or_default());

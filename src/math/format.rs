@@ -1,10 +1,10 @@
 //! Numbers as the user reads them: one form per quantity, in the window, on the command line and in reports.
 
 /// What stands where there is no number.
-pub const NONE: &str = "–";
+pub(crate) const NONE: &str = "–";
 
 /// A whole number with thousands separators.
-pub fn count(n: u64) -> String {
+pub(crate) fn count(n: u64) -> String {
     let digits = n.to_string();
     let mut out = String::with_capacity(digits.len() + digits.len() / 3);
     for (i, c) in digits.chars().enumerate() {
@@ -17,12 +17,12 @@ pub fn count(n: u64) -> String {
 }
 
 /// "3 parts", "1 part".
-pub fn things(n: usize, what: &str) -> String {
+pub(crate) fn things(n: usize, what: &str) -> String {
     format!("{} {what}{}", count(n as u64), if n == 1 { "" } else { "s" })
 }
 
 /// Bytes in decimal units: "12 MB".
-pub fn bytes(n: u64) -> String {
+pub(crate) fn bytes(n: u64) -> String {
     match n {
         0..1_000 => format!("{n} B"),
         1_000..1_000_000 => format!("{:.0} kB", n as f64 / 1e3),
@@ -32,7 +32,7 @@ pub fn bytes(n: u64) -> String {
 }
 
 /// A time that passes while one waits: "8 s", "2:05", "1:02:05".
-pub fn duration(secs: f64) -> String {
+pub(crate) fn duration(secs: f64) -> String {
     if !secs.is_finite() || secs < 0.0 {
         return NONE.into();
     }
@@ -45,7 +45,7 @@ pub fn duration(secs: f64) -> String {
 }
 
 /// A measured time with four significant digits: "3.200 ms".
-pub fn seconds(secs: f64) -> String {
+pub(crate) fn seconds(secs: f64) -> String {
     match secs {
         s if !(s > 0.0) => "0".into(),
         s if s < 1e-3 => format!("{} \u{b5}s", number(s * 1e6)),
@@ -55,7 +55,7 @@ pub fn seconds(secs: f64) -> String {
 }
 
 /// The time of a frame or of a step of a query: "12 ms", "1.23 ms".
-pub fn millis(secs: f64) -> String {
+pub(crate) fn millis(secs: f64) -> String {
     match secs * 1e3 {
         ms if ms < 0.1 => format!("{ms:.3} ms"),
         ms if ms < 10.0 => format!("{ms:.2} ms"),
@@ -65,7 +65,7 @@ pub fn millis(secs: f64) -> String {
 }
 
 /// A rate with three digits and its unit: "12.3 steps/s".
-pub fn rate(per_sec: f64, unit: &str) -> String {
+pub(crate) fn rate(per_sec: f64, unit: &str) -> String {
     match per_sec {
         r if !r.is_finite() || r <= 0.0 => NONE.into(),
         r if r < 10.0 => format!("{r:.2} {unit}/s"),
@@ -75,12 +75,12 @@ pub fn rate(per_sec: f64, unit: &str) -> String {
 }
 
 /// A PSNR: "23.41 dB".
-pub fn decibel(db: f64) -> String {
+pub(crate) fn decibel(db: f64) -> String {
     if db.is_finite() { format!("{db:.2} dB") } else { NONE.into() }
 }
 
 /// A measured number with four significant digits, all of them written: columns line up.
-pub fn number(v: f64) -> String {
+pub(crate) fn number(v: f64) -> String {
     let size = v.abs();
     match size {
         _ if v == 0.0 => "0".into(),
@@ -93,13 +93,13 @@ pub fn number(v: f64) -> String {
 }
 
 /// A number within a sentence: at most three decimals, none of them needless.
-pub fn short(v: f64) -> String {
+pub(crate) fn short(v: f64) -> String {
     let text = format!("{v:.3}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 /// A number of an axis: at most four significant digits, none of them needless.
-pub fn tick(v: f64) -> String {
+pub(crate) fn tick(v: f64) -> String {
     match v.abs() {
         a if (1e-3..1e5).contains(&a) => format!("{}", significant(v)),
         _ => format!("{:e}", significant(v)),
@@ -107,7 +107,7 @@ pub fn tick(v: f64) -> String {
 }
 
 /// Seconds of an axis.
-pub fn tick_secs(secs: f64) -> String {
+pub(crate) fn tick_secs(secs: f64) -> String {
     match secs {
         s if s < 0.999e-3 => format!("{} \u{b5}s", significant(s * 1e6)),
         s if s < 0.999 => format!("{} ms", significant(s * 1e3)),
@@ -121,7 +121,7 @@ fn significant(v: f64) -> f64 {
 }
 
 /// A share as it is written in the field: "1/255", "1e-4".
-pub fn share(v: f64) -> String {
+pub(crate) fn share(v: f64) -> String {
     let whole = (1.0 / v).round();
     match (1.0 / v - whole).abs() < 1e-6 && whole < 9_999.0 {
         true => format!("1/{whole}"),

@@ -1,7 +1,7 @@
 //! Pixels of a picture by index, row-major.
 
 /// The pixels left, right, above and below pixel `i`, of a picture of `n` pixels that is `width` wide.
-pub fn neighbors(i: usize, width: usize, n: usize) -> impl Iterator<Item = usize> {
+pub(crate) fn neighbors(i: usize, width: usize, n: usize) -> impl Iterator<Item = usize> {
     let x = i % width;
     [(x > 0).then(|| i - 1), (x + 1 < width).then_some(i + 1), i.checked_sub(width), Some(i + width).filter(|j| *j < n)]
         .into_iter()
@@ -11,7 +11,7 @@ pub fn neighbors(i: usize, width: usize, n: usize) -> impl Iterator<Item = usize
 /// Connected regions of the pixels for which `is` holds, diagonals included: the number of each
 /// pixel's region from 1, 0 for none, and the areas of the regions, in the order of their first
 /// pixels.
-pub fn regions(width: usize, n: usize, is: impl Fn(usize) -> bool) -> (Vec<u32>, Vec<usize>) {
+pub(crate) fn regions(width: usize, n: usize, is: impl Fn(usize) -> bool) -> (Vec<u32>, Vec<usize>) {
     let mut label = vec![0_u32; n];
     let (mut areas, mut open) = (Vec::new(), Vec::new());
     for first in 0..n {

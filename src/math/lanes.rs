@@ -6,7 +6,7 @@
 use super::Real;
 
 /// Numbers per vector.
-pub const LANES: usize = 8;
+pub(crate) const LANES: usize = 8;
 
 /// Eight numbers in memory.
 pub type Lane<R> = [R; LANES];
@@ -83,7 +83,7 @@ pub trait Lanes<R: Real>: Copy + Send + Sync {
 
 /// Arrays: the definition of what every other implementation does.
 #[derive(Clone, Copy, Debug)]
-pub struct Plain;
+pub(crate) struct Plain;
 
 #[inline(always)]
 fn each<R: Real>(f: impl Fn(usize) -> R) -> Lane<R> {
@@ -286,7 +286,7 @@ mod avx2 {
 
     /// Runs `op` compiled for AVX2 and FMA, or gives it back where the machine lacks them.
     #[inline(always)]
-    pub fn run<O: LaneOp<f32>>(op: O) -> Result<O::Output, O> {
+    pub(crate) fn run<O: LaneOp<f32>>(op: O) -> Result<O::Output, O> {
         match V3::try_new() {
             Some(v3) => Ok(v3.vectorize(Simd(v3, op))),
             None => Err(op),

@@ -1,16 +1,16 @@
 //! Plain mathematics with no knowledge of scenes: everything here is pure and total.
 
-pub mod colormap;
+pub(crate) mod colormap;
 mod fast_exp;
-pub mod finite;
-pub mod format;
-pub mod grid;
-pub mod lanes;
-pub mod real;
+pub(crate) mod finite;
+pub(crate) mod format;
+pub(crate) mod grid;
+pub(crate) mod lanes;
+pub(crate) mod real;
 pub mod resize;
 pub mod rotation;
 pub mod sh;
-pub mod srgb;
+pub(crate) mod srgb;
 pub mod stats;
 pub mod vector;
 

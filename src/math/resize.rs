@@ -19,7 +19,7 @@ pub enum Filter {
 
 impl Filter {
     /// By the name in a model's metadata.
-    pub fn named(name: &str) -> Option<Self> {
+    pub(crate) fn named(name: &str) -> Option<Self> {
         match name {
             "bilinear" => Some(Self::Bilinear),
             "bicubic" => Some(Self::Bicubic),
@@ -88,7 +88,7 @@ impl Pixel for [u8; 3] {
 
 /// The pixels of a line, from `first` on, that one pixel of the resized line is made of.
 #[derive(Clone, Debug)]
-pub struct Tap<P: Pixel> {
+pub(crate) struct Tap<P: Pixel> {
     first: usize,
     weights: Vec<P::Weight>,
 }
@@ -99,13 +99,13 @@ impl<P: Pixel> Tap<P> {
     }
 
     /// The resized pixel, from the pixels of the line.
-    pub fn mix(&self, pixel: impl Fn(usize) -> P) -> P {
+    pub(crate) fn mix(&self, pixel: impl Fn(usize) -> P) -> P {
         P::mix(self.weights.iter().enumerate().map(|(k, weight)| (pixel(self.first + k), *weight)))
     }
 }
 
 /// The taps of a line of `to` pixels in one of `from`, which is not empty.
-pub fn taps<P: Pixel>(from: usize, to: usize, filter: Filter) -> Vec<Tap<P>> {
+pub(crate) fn taps<P: Pixel>(from: usize, to: usize, filter: Filter) -> Vec<Tap<P>> {
     let (reach, weight): (f64, fn(f64) -> f64) = match filter {
         Filter::Area => return (0..to).map(|i| area(from, to, i)).collect(),
         Filter::Linear => {
@@ -143,7 +143,7 @@ fn area<P: Pixel>(from: usize, to: usize, i: usize) -> Tap<P> {
 
 /// The two pixels of a line of `from` around the center of pixel `i` of the resized line, and the share of the
 /// second. Beyond the outermost centers they are the same.
-pub fn between(i: usize, from: usize, to: usize) -> (usize, usize, f32) {
+pub(crate) fn between(i: usize, from: usize, to: usize) -> (usize, usize, f32) {
     // In f32, as PyTorch has it: in f64 a mask's border differs by a pixel now and then.
     let scale = (from as f64 / to as f64) as f32;
     let at = ((i as f32 + 0.5) * scale - 0.5).max(0.0);
@@ -188,7 +188,7 @@ pub fn resize<P: Pixel>(image: &[P], from: (usize, usize), to: (usize, usize), f
 }
 
 /// The pixel of a line of `from` whose square holds the center of pixel `i` of the line at size `to`.
-pub fn nearest(i: usize, from: usize, to: usize) -> usize {
+pub(crate) fn nearest(i: usize, from: usize, to: usize) -> usize {
     ((2 * i + 1) * from / (2 * to)).min(from.saturating_sub(1))
 }
 

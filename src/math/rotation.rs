@@ -44,7 +44,7 @@ pub fn rotation_error(m: &DMat3) -> f64 {
 
 /// The rotation nearest to `m` (the orthogonal factor of its polar decomposition), for an `m` that
 /// is one up to rounding.
-pub fn nearest_rotation(m: &DMat3) -> DMat3 {
+pub(crate) fn nearest_rotation(m: &DMat3) -> DMat3 {
     // Newton's iteration (Higham 1986); its error squares at every step.
     (0..8).fold(*m, |r, _| (r + r.inverse().transpose()) * 0.5)
 }

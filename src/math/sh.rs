@@ -9,7 +9,7 @@ pub const fn coefficients(degree: u8) -> usize {
 }
 
 /// The constant harmonic; `color = 0.5 + SH_C0 * dc`.
-pub const SH_C0: f64 = 0.282_094_791_773_878_14;
+pub(crate) const SH_C0: f64 = 0.282_094_791_773_878_14;
 const C1: f64 = 0.488_602_511_902_919_9;
 const C2: [f64; 5] = [
     1.092_548_430_592_079_2,
@@ -64,7 +64,7 @@ pub fn basis<R: Real>(degree: u8, [x, y, z]: [R; 3]) -> [R; 16] {
 
 /// Derivative of [`basis`] with respect to `x`, `y` and `z`, treating them as independent.
 #[inline(always)]
-pub fn basis_gradient<R: Real>(degree: u8, [x, y, z]: [R; 3]) -> [[R; 3]; 16] {
+pub(crate) fn basis_gradient<R: Real>(degree: u8, [x, y, z]: [R; 3]) -> [[R; 3]; 16] {
     let k = R::of;
     let o = R::ZERO;
     let mut g = [[o; 3]; 16];

@@ -1,12 +1,12 @@
 //! The sRGB transfer function.
 
 /// Linear light of an sRGB value in 0..1.
-pub fn linear(srgb: f32) -> f32 {
+pub(crate) fn linear(srgb: f32) -> f32 {
     if srgb <= 0.040_45 { srgb / 12.92 } else { ((srgb + 0.055) / 1.055).powf(2.4) }
 }
 
 /// sRGB byte of linear light; clamps.
-pub fn byte(linear: f32) -> u8 {
+pub(crate) fn byte(linear: f32) -> u8 {
     (encode(linear.clamp(0.0, 1.0)).0 * 255.0 + 0.5) as u8
 }
 

@@ -3,7 +3,7 @@
 use super::Real;
 
 /// The `q`-quantile (0 to 1) of `values` by linear interpolation; NaN for an empty sample.
-pub fn quantile(values: &[f64], q: f64) -> f64 {
+pub(crate) fn quantile(values: &[f64], q: f64) -> f64 {
     if values.is_empty() {
         return f64::NAN;
     }
@@ -15,12 +15,12 @@ pub fn quantile(values: &[f64], q: f64) -> f64 {
 }
 
 /// The median; NaN for an empty sample.
-pub fn median(values: &[f64]) -> f64 {
+pub(crate) fn median(values: &[f64]) -> f64 {
     quantile(values, 0.5)
 }
 
 /// The arithmetic mean; NaN for an empty sample.
-pub fn mean(values: &[f64]) -> f64 {
+pub(crate) fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
@@ -40,7 +40,7 @@ pub fn worst_difference<A: Real, B: Real>(a: &[A], b: &[B]) -> f64 {
 }
 
 /// PSNR in dB (peak 1) of a mean squared error; infinite for 0.
-pub fn psnr_of(mse: f64) -> f64 {
+pub(crate) fn psnr_of(mse: f64) -> f64 {
     -10.0 * mse.log10()
 }
 

@@ -5,36 +5,36 @@ use super::front::NOISE;
 
 /// A setting that both reports have measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pair<'a> {
+pub(crate) struct Pair<'a> {
     /// As the first has it.
-    pub one: &'a Point,
+    pub(crate) one: &'a Point,
     /// As the second has it.
-    pub other: &'a Point,
+    pub(crate) other: &'a Point,
     /// Times of the second by times of the first.
-    pub times: f64,
+    pub(crate) times: f64,
     /// The measure in the second less that in the first, where both have it.
-    pub difference: Option<f64>,
+    pub(crate) difference: Option<f64>,
 }
 
 impl Pair<'_> {
     /// Whether the times differ by more than repeats of the same do.
-    pub fn differs(&self) -> bool {
+    pub(crate) fn differs(&self) -> bool {
         !(1.0 / (1.0 + NOISE)..=1.0 + NOISE).contains(&self.times)
     }
 }
 
 /// A stage of two reports, by what they have in common.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Comparison<'a> {
+pub(crate) struct Comparison<'a> {
     /// Settings of both, in the order of the first.
-    pub pairs: Vec<Pair<'a>>,
+    pub(crate) pairs: Vec<Pair<'a>>,
     /// How many settings only the first has, and only the second.
-    pub alone: [usize; 2],
+    pub(crate) alone: [usize; 2],
 }
 
 impl Stage {
     /// This stage beside `other`, by the names of knobs and settings and by `measure`.
-    pub fn beside<'a>(&'a self, other: &'a Stage, measure: &Measure) -> Comparison<'a> {
+    pub(crate) fn beside<'a>(&'a self, other: &'a Stage, measure: &Measure) -> Comparison<'a> {
         let value = |p: &Point| p.values.get(&measure.name).map(|s| s.median);
         let pair = |one: &'a Point| {
             let other = other.points.iter().find(|p| p.is_setting(one))?;
@@ -51,14 +51,14 @@ impl Stage {
 impl Point {
     /// Whether both are the same setting of the same knob. Defaults are one setting, whatever words
     /// describe them.
-    pub fn is_setting(&self, other: &Point) -> bool {
+    pub(crate) fn is_setting(&self, other: &Point) -> bool {
         self.method == other.method && (self.setting == other.setting || self.default && other.default)
     }
 }
 
 impl Report {
     /// In what respects `other` was measured under other conditions, so that times do not compare.
-    pub fn differs_from(&self, other: &Report) -> Vec<String> {
+    pub(crate) fn differs_from(&self, other: &Report) -> Vec<String> {
         let (a, b) = (&self.computer, &other.computer);
         let name = |gpu: &Option<String>| gpu.clone().unwrap_or_else(|| "none".into());
         let all = [

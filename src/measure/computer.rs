@@ -4,7 +4,7 @@ use super::document::Computer;
 use crate::render::real_gpu;
 
 /// Looks at this machine.
-pub fn look() -> Computer {
+pub(crate) fn look() -> Computer {
     let (mut processor, mut memory_bytes) = (String::new(), 0);
     if let Ok(mut system) = sysinfo::System::new() {
         system.refresh_cpu_all();
@@ -24,7 +24,7 @@ pub fn look() -> Computer {
 
 impl Computer {
     /// In a line.
-    pub fn words(&self) -> String {
+    pub(crate) fn words(&self) -> String {
         let gpu = self.gpu.as_deref().unwrap_or("no GPU");
         let memory = self.memory_bytes as f64 / 1e9;
         format!(

@@ -31,10 +31,10 @@ pub enum StageName {
 
 impl StageName {
     /// All, in the order of the program.
-    pub const ALL: [Self; 6] = [Self::Render, Self::Train, Self::Features, Self::Query, Self::Path, Self::Depth];
+    pub(crate) const ALL: [Self; 6] = [Self::Render, Self::Train, Self::Features, Self::Query, Self::Path, Self::Depth];
 
     /// As in JSON and on the command line.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Render => "render",
             Self::Train => "train",
@@ -46,7 +46,7 @@ impl StageName {
     }
 
     /// As it is shown.
-    pub fn title(self) -> &'static str {
+    pub(crate) fn title(self) -> &'static str {
         match self {
             Self::Render => "Drawing",
             Self::Train => "Training",
@@ -74,14 +74,14 @@ pub enum ErrorKind {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Measure {
     /// Its name: "PSNR".
-    pub name: String,
+    pub(crate) name: String,
     /// Its unit; empty for plain numbers.
-    pub unit: String,
+    pub(crate) unit: String,
     /// How it becomes an error.
     #[serde(rename = "form")]
-    pub kind: ErrorKind,
+    pub(crate) kind: ErrorKind,
     /// What it is, in a sentence.
-    pub meaning: String,
+    pub(crate) meaning: String,
 }
 
 impl Measure {
@@ -91,7 +91,7 @@ impl Measure {
     }
 
     /// The error that a value stands for; 0 is perfect.
-    pub fn error(&self, value: f64) -> f64 {
+    pub(crate) fn error(&self, value: f64) -> f64 {
         match self.kind {
             ErrorKind::Error => value,
             ErrorKind::Share => 1.0 - value,
@@ -100,7 +100,7 @@ impl Measure {
     }
 
     /// Name of the axis that shows its errors.
-    pub fn error_name(&self) -> String {
+    pub(crate) fn error_name(&self) -> String {
         match self.kind {
             ErrorKind::Error if self.unit.is_empty() => self.name.clone(),
             ErrorKind::Error => format!("{} ({})", self.name, self.unit),
@@ -114,13 +114,13 @@ impl Measure {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sample {
     /// The middle one.
-    pub median: f64,
+    pub(crate) median: f64,
     /// The least.
-    pub least: f64,
+    pub(crate) least: f64,
     /// The most.
-    pub most: f64,
+    pub(crate) most: f64,
     /// All, in the order of the repeats.
-    pub each: Vec<f64>,
+    pub(crate) each: Vec<f64>,
 }
 
 impl Sample {
@@ -166,7 +166,7 @@ pub struct Point {
 
 impl Point {
     /// The error that `measure` stands at, of the middle repeat.
-    pub fn error(&self, measure: &Measure) -> Option<f64> {
+    pub(crate) fn error(&self, measure: &Measure) -> Option<f64> {
         let value = self.values.get(&measure.name)?;
         (!value.each.is_empty()).then(|| measure.error(value.median))
     }
@@ -176,17 +176,17 @@ impl Point {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Order {
     /// What was refined: "samples of a pixel's footprint".
-    pub what: String,
+    pub(crate) what: String,
     /// Work (samples, pieces) and error.
-    pub pairs: Vec<[f64; 2]>,
+    pub(crate) pairs: Vec<[f64; 2]>,
     /// The order that theory gives: the error falls like `work^-order`.
-    pub expected: f64,
+    pub(crate) expected: f64,
     /// The order that was seen (see [`super::order`]).
-    pub observed: f64,
+    pub(crate) observed: f64,
     /// Whether they agree.
-    pub agrees: bool,
+    pub(crate) agrees: bool,
     /// What that means, in a sentence.
-    pub meaning: String,
+    pub(crate) meaning: String,
 }
 
 /// When a cheaper setting is good enough.
@@ -205,12 +205,12 @@ pub struct Rule {
 
 impl Rule {
     /// Errors in `measure` up to `times` the least, or below `floor`, are good enough.
-    pub fn new(measure: &str, times: f64, floor: f64, spare_secs: f64) -> Self {
+    pub(crate) fn new(measure: &str, times: f64, floor: f64, spare_secs: f64) -> Self {
         Self { measure: measure.into(), times, floor, spare_secs }
     }
 
     /// In words.
-    pub fn words(&self) -> String {
+    pub(crate) fn words(&self) -> String {
         let times = 100.0 * (self.times - 1.0);
         let same = match self.spare_secs > 0.0 {
             true => format!("; {} more or less do not count", crate::math::format::seconds(self.spare_secs)),
@@ -264,7 +264,7 @@ pub struct Stage {
 
 impl Stage {
     /// A stage that nothing was measured of yet: seconds of what, compared with what, on what, how often.
-    pub fn new(
+    pub(crate) fn new(
         name: StageName,
         [secs_of, reference]: [&str; 2],
         (input, repeats): (BTreeMap<String, String>, u32),
@@ -287,7 +287,7 @@ impl Stage {
     }
 
     /// Names of the methods, in the order of their first points.
-    pub fn methods(&self) -> Vec<&str> {
+    pub(crate) fn methods(&self) -> Vec<&str> {
         let mut names: Vec<&str> = Vec::new();
         for p in &self.points {
             if !names.contains(&p.method.as_str()) {
@@ -298,12 +298,12 @@ impl Stage {
     }
 
     /// The measure of this name.
-    pub fn measure(&self, name: &str) -> Option<&Measure> {
+    pub(crate) fn measure(&self, name: &str) -> Option<&Measure> {
         self.measures.iter().find(|m| m.name == name)
     }
 
     /// Whether every setting was measured at every seed.
-    pub fn complete(&self) -> bool {
+    pub(crate) fn complete(&self) -> bool {
         self.points.len() == self.planned && self.points.iter().all(|p| p.secs.each.len() >= self.seeds.len())
     }
 }
@@ -342,20 +342,20 @@ pub struct Report {
 
 impl Report {
     /// The stage of this name.
-    pub fn stage(&self, name: StageName) -> Option<&Stage> {
+    pub(crate) fn stage(&self, name: StageName) -> Option<&Stage> {
         self.stages.iter().find(|s| s.name == name)
     }
 
     /// What was measured of a sweep earlier, if it was the same sweep: on the same input, of the same
     /// measures.
-    pub fn earlier(&self, fresh: &Stage) -> Option<Stage> {
+    pub(crate) fn earlier(&self, fresh: &Stage) -> Option<Stage> {
         let measures =
             |s: &Stage| s.measures.iter().map(|m| (m.name.clone(), m.unit.clone(), m.kind)).collect::<Vec<_>>();
         self.stage(fresh.name).filter(|s| s.input == fresh.input && measures(s) == measures(fresh)).cloned()
     }
 
     /// Puts a stage in, in the place of an older one.
-    pub fn put(&mut self, stage: Stage) {
+    pub(crate) fn put(&mut self, stage: Stage) {
         self.stages.retain(|s| s.name != stage.name);
         self.stages.push(stage);
         self.stages.sort_by_key(|s| s.name);

@@ -63,7 +63,7 @@ impl Report {
     ///
     /// # Errors
     /// If the one that is there cannot be read, or is of another scene, machine or program.
-    pub fn begin(folder: &Path, scene: &str, computer: &Computer) -> Result<Self, BeginError> {
+    pub(crate) fn begin(folder: &Path, scene: &str, computer: &Computer) -> Result<Self, BeginError> {
         let path = folder.join(FILE);
         if !path.exists() {
             return Ok(Self::empty(scene, computer));
@@ -77,7 +77,7 @@ impl Report {
     }
 
     /// A report of nothing yet.
-    pub fn empty(scene: &str, computer: &Computer) -> Self {
+    pub(crate) fn empty(scene: &str, computer: &Computer) -> Self {
         let (scene, computer) = (scene.into(), computer.clone());
         Self { version: VERSION, program: PROGRAM.into(), scene, computer, stages: Vec::new() }
     }

@@ -4,7 +4,7 @@ use super::document::{Measure, Point, Rule, Stage};
 
 /// Indices of the `(seconds, error)` that no other beats in both, fastest first. Points that are no
 /// numbers are left out; of equal ones the first stays.
-pub fn pareto(points: &[(f64, f64)]) -> Vec<usize> {
+pub(crate) fn pareto(points: &[(f64, f64)]) -> Vec<usize> {
     let mut order: Vec<usize> =
         (0..points.len()).filter(|&i| points[i].0.is_finite() && points[i].1.is_finite()).collect();
     order.sort_by(|&a, &b| {
@@ -21,7 +21,7 @@ pub fn pareto(points: &[(f64, f64)]) -> Vec<usize> {
 
 impl Stage {
     /// Indices of the points that no other point beats in both time and error, fastest first.
-    pub fn front(&self, measure: &Measure) -> Vec<usize> {
+    pub(crate) fn front(&self, measure: &Measure) -> Vec<usize> {
         let at = |p: &Point| (p.secs.median, p.error(measure).unwrap_or(f64::NAN));
         pareto(&self.points.iter().map(at).collect::<Vec<_>>())
     }
@@ -29,25 +29,25 @@ impl Stage {
 
 /// What a rule makes of one knob.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Choice<'a> {
-    pub method: &'a str,
-    pub default: &'a Point,
+pub(crate) struct Choice<'a> {
+    pub(crate) method: &'a str,
+    pub(crate) default: &'a Point,
     /// The fastest that is good enough.
-    pub chosen: &'a Point,
+    pub(crate) chosen: &'a Point,
     /// The one with the least error.
-    pub best: &'a Point,
+    pub(crate) best: &'a Point,
     /// Whether the default is good enough, and as fast as the chosen one: within noise, or in one repeat or
     /// another.
-    pub holds: bool,
+    pub(crate) holds: bool,
 }
 
 /// Two times nearer than this share of the shorter are the same time.
-pub const NOISE: f64 = 0.15;
+pub(crate) const NOISE: f64 = 0.15;
 
 impl Stage {
     /// The choice for each knob: among its settings and the default. Knobs of stages without a
     /// default, and settings without the rule's measure, are left out.
-    pub fn choices(&self) -> Vec<Choice<'_>> {
+    pub(crate) fn choices(&self) -> Vec<Choice<'_>> {
         let Some(measure) = self.measure(&self.rule.measure) else { return Vec::new() };
         let Some(default) = self.points.iter().find(|p| p.default) else { return Vec::new() };
         let Some(default_error) = default.error(measure) else { return Vec::new() };
@@ -73,7 +73,7 @@ impl Stage {
 
 impl Rule {
     /// The largest error that is good enough where the least is `least`.
-    pub fn enough(&self, least: f64) -> f64 {
+    pub(crate) fn enough(&self, least: f64) -> f64 {
         (self.times * least).max(self.floor)
     }
 }

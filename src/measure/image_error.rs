@@ -17,22 +17,22 @@ const MOST_PSNR: f64 = 150.0;
 
 /// Red, green and blue as they are shown, 0 to 1.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Planes {
+pub(crate) struct Planes {
     /// Width in px.
-    pub width: usize,
+    pub(crate) width: usize,
     /// Height in px.
-    pub height: usize,
-    pub color: [Vec<f64>; 3],
+    pub(crate) height: usize,
+    pub(crate) color: [Vec<f64>; 3],
 }
 
 /// The colors of a frame, clamped to what a screen shows.
-pub fn planes<R: Real>(frame: &Frame<R>) -> Planes {
+pub(crate) fn planes<R: Real>(frame: &Frame<R>) -> Planes {
     let color = std::array::from_fn(|c| frame.color[c].iter().map(|v| v.f64().clamp(0.0, 1.0)).collect());
     Planes { width: frame.width_px, height: frame.height_px, color }
 }
 
 /// A picture at the size of a camera's.
-pub fn resized(p: &Planes, camera: &Camera, filter: Filter) -> Planes {
+pub(crate) fn resized(p: &Planes, camera: &Camera, filter: Filter) -> Planes {
     let (width, height) = (camera.width_px as usize, camera.height_px as usize);
     let color = p.color.each_ref().map(|plane| resize(plane, (p.width, p.height), (width, height), filter));
     Planes { width, height, color }
@@ -40,10 +40,10 @@ pub fn resized(p: &Planes, camera: &Camera, filter: Filter) -> Planes {
 
 /// How far an image is from another: root mean square, largest, what one value in a thousand exceeds, mean of FLIP,
 /// what FLIP of one pixel in a hundred exceeds.
-pub type Errors = [f64; 5];
+pub(crate) type Errors = [f64; 5];
 
 /// Errors of `b` against `a`, of the same size.
-pub fn errors(a: &Planes, b: &Planes) -> Errors {
+pub(crate) fn errors(a: &Planes, b: &Planes) -> Errors {
     let pairs = a.color.iter().flatten().zip(b.color.iter().flatten());
     let off: Vec<f64> = pairs.map(|(a, b)| (a - b).abs()).collect();
     let rms = mean(&off.iter().map(|e| e * e).collect::<Vec<_>>()).sqrt();
@@ -52,7 +52,7 @@ pub fn errors(a: &Planes, b: &Planes) -> Errors {
 }
 
 /// By the names of measures.
-pub fn named([rms, largest, tail, flip, flip_tail]: Errors) -> Vec<(&'static str, f64)> {
+pub(crate) fn named([rms, largest, tail, flip, flip_tail]: Errors) -> Vec<(&'static str, f64)> {
     vec![
         ("RMS error", rms),
         ("PSNR", psnr_of(rms * rms).min(MOST_PSNR)),
@@ -64,7 +64,7 @@ pub fn named([rms, largest, tail, flip, flip_tail]: Errors) -> Vec<(&'static str
 }
 
 /// PSNR in dB of an image in a photo of its size; what the photo does not cover does not count.
-pub fn psnr_in_photo(p: &Planes, photo: &PhotoPixels) -> f64 {
+pub(crate) fn psnr_in_photo(p: &Planes, photo: &PhotoPixels) -> f64 {
     psnr(&p.color, (p.width, p.height), photo).min(MOST_PSNR)
 }
 
@@ -87,7 +87,7 @@ fn flip(a: &Planes, b: &Planes) -> (f64, f64) {
 /// How fast the mean of `n` x `n` samples inside each pixel comes near the integral over the pixel:
 /// the midpoint rule is of second order where the image is smooth. The blur of a splat does not
 /// change with the samples, as their cameras differ by parts of a pixel only.
-pub fn footprint_order(
+pub(crate) fn footprint_order(
     cloud: &GaussianCloud<f64>,
     camera: &Camera,
     settings: &RenderSettings,

@@ -13,7 +13,7 @@ pub type Knobs = BTreeMap<String, Value>;
 ///
 /// # Errors
 /// If a field does not exist, or takes no such value; in words.
-pub fn turned<T: Serialize + DeserializeOwned>(settings: &T, knobs: &Knobs) -> Result<T, String> {
+pub(crate) fn turned<T: Serialize + DeserializeOwned>(settings: &T, knobs: &Knobs) -> Result<T, String> {
     let mut fields = serde_json::to_value(settings).map_err(|e| e.to_string())?;
     for (name, value) in knobs {
         *fields.get_mut(name).ok_or_else(|| format!("there is no setting '{name}'"))? = value.clone();

@@ -41,7 +41,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     /// A report of one small stage.
-    pub fn example() -> Report {
+    pub(crate) fn example() -> Report {
         let sample = |v: f64| {
             let mut s = Sample::default();
             [v, 1.1 * v, 0.9 * v].iter().for_each(|v| s.add(*v));

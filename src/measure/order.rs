@@ -4,7 +4,7 @@ use super::document::Order;
 
 /// The slope of `-log(error)` over `log(work)`, a straight line fitted by least squares. Errors below
 /// `noise` say nothing and are left out; NaN with fewer than two points left.
-pub fn observed(pairs: &[[f64; 2]], noise: f64) -> f64 {
+pub(crate) fn observed(pairs: &[[f64; 2]], noise: f64) -> f64 {
     let usable = |p: &&[f64; 2]| p[0] > 0.0 && p[1] > noise && p[0].is_finite() && p[1].is_finite();
     let logs: Vec<[f64; 2]> = pairs.iter().filter(usable).map(|p| [p[0].ln(), p[1].ln()]).collect();
     let n = logs.len() as f64;
@@ -21,7 +21,7 @@ pub fn observed(pairs: &[[f64; 2]], noise: f64) -> f64 {
 impl Order {
     /// Fits the order of `pairs` of work and error, and holds it against `expected`, which it may miss
     /// by `within`. Errors below `noise` are rounding.
-    pub fn fit(what: &str, meaning: &str, pairs: Vec<[f64; 2]>, expected: f64, within: f64, noise: f64) -> Self {
+    pub(crate) fn fit(what: &str, meaning: &str, pairs: Vec<[f64; 2]>, expected: f64, within: f64, noise: f64) -> Self {
         let observed = observed(&pairs, noise);
         let agrees = (observed - expected).abs() <= within;
         // JSON has no NaN.

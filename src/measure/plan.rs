@@ -22,27 +22,27 @@ use crate::scene::plan::{Overrides, ScenePlan, When};
 use crate::scene::{Camera, Facts, GaussianCloud, SemanticMap, resource_log};
 
 /// Size of the images, px.
-pub const SIZE: [u32; 2] = [1_008, 567];
+pub(crate) const SIZE: [u32; 2] = [1_008, 567];
 
 /// Which plan a process follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Variant {
+pub(crate) enum Variant {
     Plan,
     Everything,
 }
 
 /// A scene that was opened.
-pub struct OpenScene {
-    pub cloud: Arc<GaussianCloud>,
-    pub settings: RenderSettings,
-    pub map: Option<Arc<SemanticMap>>,
-    pub cameras: Vec<Camera>,
-    pub up: glam::DVec3,
+pub(crate) struct OpenScene {
+    pub(crate) cloud: Arc<GaussianCloud>,
+    pub(crate) settings: RenderSettings,
+    pub(crate) map: Option<Arc<SemanticMap>>,
+    pub(crate) cameras: Vec<Camera>,
+    pub(crate) up: glam::DVec3,
     /// The first view, of [`SIZE`].
-    pub first: Camera,
+    pub(crate) first: Camera,
     /// What its plan is made of.
-    pub facts: Facts,
+    pub(crate) facts: Facts,
 }
 
 /// What one process has measured; medians where several have.
@@ -70,7 +70,7 @@ pub struct Cost {
 
 impl Cost {
     /// The medians of several processes, and what the last has loaded; `None` of none.
-    pub fn median(costs: &[Self]) -> Option<Self> {
+    pub(crate) fn median(costs: &[Self]) -> Option<Self> {
         let of = |f: fn(&Self) -> f64| costs.iter().map(f).collect::<Sample>().median;
         Some(Self {
             open_secs: of(|c| c.open_secs),
@@ -88,7 +88,7 @@ impl Cost {
 
 /// Opens a scene, draws its first view with what belongs to it, and builds what the plan wants at opening, one
 /// after the other. Nothing else may run in this process.
-pub fn cost(
+pub(crate) fn cost(
     open: impl FnOnce() -> Result<OpenScene, StudyError>,
     variant: Variant,
     repeats: usize,
@@ -218,7 +218,7 @@ fn peak() -> u64 {
 
 /// A scene with both of its plans.
 #[derive(Debug, Serialize)]
-pub struct Saving {
+pub(crate) struct Saving {
     scene: String,
     /// Bytes of its files by what they serve.
     disk: Vec<(&'static str, u64)>,
@@ -227,19 +227,19 @@ pub struct Saving {
 }
 
 impl Saving {
-    pub fn new(path: &Path, plan: Cost, everything: Cost) -> Self {
+    pub(crate) fn new(path: &Path, plan: Cost, everything: Cost) -> Self {
         Self { scene: super::bench::label(path), disk: disk(path), plan, everything }
     }
 
     /// What its files take, in a line.
-    pub fn on_disk(&self) -> String {
+    pub(crate) fn on_disk(&self) -> String {
         let parts: Vec<String> = self.disk.iter().map(|(what, n)| format!("{} {what}", bytes(*n))).collect();
         format!("{} on disk: {}", self.scene, parts.join(", "))
     }
 }
 
 /// A row for each plan of each scene.
-pub fn table(all: &[Saving]) -> Rows {
+pub(crate) fn table(all: &[Saving]) -> Rows {
     let head =
         ["scene", "", "open s", "picture s", "ready s", "at rest", "peak", "GPU", "frame ms", "view ms", "loaded"];
     let both =

@@ -11,14 +11,14 @@ const SIZE: (u32, u32) = (860, 520);
 /// How much further than its points a plot reaches to the right, where the legend is, as a share.
 const LEGEND: f64 = 0.4;
 /// Errors below this are drawn at it: a logarithm of 0 has no place.
-pub const LEAST: f64 = 1e-7;
+pub(crate) const LEAST: f64 = 1e-7;
 
 /// Colors of knobs, in turn; to be told apart by the color-blind (Okabe and Ito).
-pub const COLORS: [[u8; 3]; 7] =
+pub(crate) const COLORS: [[u8; 3]; 7] =
     [[0, 114, 178], [213, 94, 0], [0, 158, 115], [204, 121, 167], [86, 180, 233], [230, 159, 0], [120, 120, 120]];
 
 /// Where a point is in the plot: seconds and error, both above 0.
-pub fn place(point: &Point, measure: &Measure) -> Option<(f64, f64)> {
+pub(crate) fn place(point: &Point, measure: &Measure) -> Option<(f64, f64)> {
     let secs = point.secs.median;
     let error = point.error(measure)?;
     (secs.is_finite() && error.is_finite()).then(|| (secs.max(1e-9), error.max(LEAST)))
@@ -28,7 +28,7 @@ pub fn place(point: &Point, measure: &Measure) -> Option<(f64, f64)> {
 ///
 /// # Errors
 /// If there is nothing to draw, in words.
-pub fn svg(stage: &Stage, measure: &Measure) -> Result<String, String> {
+pub(crate) fn svg(stage: &Stage, measure: &Measure) -> Result<String, String> {
     let mut image = String::new();
     draw(stage, measure, &mut image).map_err(|e| e.to_string())?;
     Ok(image)
@@ -130,7 +130,7 @@ fn series(stage: &Stage, measure: &Measure, method: &str, k: usize, chart: &mut 
 ///
 /// # Errors
 /// If there is nothing to draw, in words.
-pub fn order_svg(order: &super::document::Order) -> Result<String, String> {
+pub(crate) fn order_svg(order: &super::document::Order) -> Result<String, String> {
     let mut image = String::new();
     draw_order(order, &mut image).map_err(|e| e.to_string())?;
     Ok(image)

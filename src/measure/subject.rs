@@ -19,31 +19,31 @@ use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::{Camera, Dataset, GaussianCloud, Identities, IdentityId, NOBODY, Photo, SemanticMap};
 
-pub struct Options {
-    pub masks: Option<PathBuf>,
-    pub steps: Vec<u64>,
-    pub train_steps: u64,
+pub(crate) struct Options {
+    pub(crate) masks: Option<PathBuf>,
+    pub(crate) steps: Vec<u64>,
+    pub(crate) train_steps: u64,
     /// Longer side of compared images, px.
-    pub max_side_px: u32,
+    pub(crate) max_side_px: u32,
     /// Most views that are compared.
-    pub views: usize,
-    pub repeats: u32,
+    pub(crate) views: usize,
+    pub(crate) repeats: u32,
 }
 
 /// A scene and what came with it.
-pub struct Subject {
+pub(crate) struct Subject {
     /// Its name in the report.
-    pub name: String,
-    pub cloud: Arc<GaussianCloud>,
-    pub settings: RenderSettings,
+    pub(crate) name: String,
+    pub(crate) cloud: Arc<GaussianCloud>,
+    pub(crate) settings: RenderSettings,
     /// Cameras of its photos, and whether training did not see them.
-    pub cameras: Vec<(Camera, bool)>,
+    pub(crate) cameras: Vec<(Camera, bool)>,
     /// Every how-manieth photo is held out.
-    pub holdout_every: usize,
+    pub(crate) holdout_every: usize,
     /// Its photos, if they are there.
-    pub dataset: Option<Dataset>,
-    pub map: Option<SemanticMap>,
-    pub options: Options,
+    pub(crate) dataset: Option<Dataset>,
+    pub(crate) map: Option<SemanticMap>,
+    pub(crate) options: Options,
 }
 
 impl Subject {
@@ -51,7 +51,7 @@ impl Subject {
     ///
     /// # Errors
     /// If one was asked for that is not possible.
-    pub fn stages(&self, wanted: &[StageName]) -> Result<(Vec<StageName>, Vec<String>), StudyError> {
+    pub(crate) fn stages(&self, wanted: &[StageName]) -> Result<(Vec<StageName>, Vec<String>), StudyError> {
         let (mut stages, mut missing) = (Vec::new(), Vec::new());
         for name in StageName::ALL {
             let asked = wanted.contains(&name);
@@ -93,7 +93,7 @@ impl Subject {
     }
 
     /// The study of a stage.
-    pub fn study(&self, name: StageName) -> Result<Study<'_>, StudyError> {
+    pub(crate) fn study(&self, name: StageName) -> Result<Study<'_>, StudyError> {
         match name {
             StageName::Render => self.drawing(),
             StageName::Train => self.training(),

@@ -21,27 +21,27 @@ const SEED: u64 = 1;
 
 /// Flights of one kind, taken together.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Sum {
-    pub flights: usize,
+pub(crate) struct Sum {
+    pub(crate) flights: usize,
     /// Flights of which a pose has less distance to occupied space than wanted.
-    pub flights_too_near: usize,
-    pub poses_too_near: usize,
+    pub(crate) flights_too_near: usize,
+    pub(crate) poses_too_near: usize,
     /// The worst of each over all flights.
-    pub worst: Smoothness,
+    pub(crate) worst: Smoothness,
 }
 
 /// What a survey found.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Survey {
-    pub ours: Sum,
+pub(crate) struct Survey {
+    pub(crate) ours: Sum,
     /// The paper's as it is printed, between the same ends.
-    pub paper: Sum,
+    pub(crate) paper: Sum,
     /// The paper's through all keypoints of the route, between the same ends.
-    pub paper_through: Sum,
+    pub(crate) paper_through: Sum,
     /// Pairs of keypoints that are not connected.
-    pub no_route: usize,
+    pub(crate) no_route: usize,
     /// Seconds that a route took to find.
-    pub secs: Sample,
+    pub(crate) secs: Sample,
 }
 
 impl Sum {
@@ -62,7 +62,7 @@ impl Sum {
 
 /// Between what random flights are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ends {
+pub(crate) enum Ends {
     Keypoints,
     /// Places close to occupied space: from under the table to behind the lamp.
     CloseToMatter,
@@ -97,7 +97,7 @@ fn ends(navigator: &Navigator, which: Ends, count: usize, rng: &mut Pcg64) -> Ve
 }
 
 /// Flies between `count` random pairs of places.
-pub fn survey(navigator: &Navigator, which: Ends, count: usize, frames: usize, seed: u64) -> Survey {
+pub(crate) fn survey(navigator: &Navigator, which: Ends, count: usize, frames: usize, seed: u64) -> Survey {
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut found = Survey::default();
     let places = ends(navigator, which, 2 * count, &mut rng);
@@ -123,7 +123,7 @@ pub fn survey(navigator: &Navigator, which: Ends, count: usize, frames: usize, s
 
 /// As many cameras as wanted: those that there are, and more of them close by, shifted by up to half
 /// of `spread` along each axis.
-pub fn more_cameras(cameras: &[Camera], count: usize, spread: f64, seed: u64) -> Vec<Camera> {
+pub(crate) fn more_cameras(cameras: &[Camera], count: usize, spread: f64, seed: u64) -> Vec<Camera> {
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut all: Vec<Camera> = cameras.iter().take(count).cloned().collect();
     while all.len() < count && !cameras.is_empty() {
@@ -135,7 +135,7 @@ pub fn more_cameras(cameras: &[Camera], count: usize, spread: f64, seed: u64) ->
 }
 
 /// Surveys of a scene with so many cameras, by what the flights were between.
-pub struct Surveyed {
+pub(crate) struct Surveyed {
     cameras: usize,
     navigator: Navigator,
     parts: usize,
@@ -145,7 +145,7 @@ pub struct Surveyed {
 }
 
 /// Surveys a scene with its own cameras, or with so many of them.
-pub fn surveyed(cloud: &GaussianCloud, own: &[Camera], count: usize, flights: usize, frames: usize) -> Surveyed {
+pub(crate) fn surveyed(cloud: &GaussianCloud, own: &[Camera], count: usize, flights: usize, frames: usize) -> Surveyed {
     let cameras = more_cameras(own, count, 2.0 * spacing(own), SEED);
     let start = Instant::now();
     let navigator = Navigator::new(cloud, &cameras, Camera::up_of(cameras.iter()).unwrap_or(DVec3::NEG_Y));
@@ -159,7 +159,7 @@ pub fn surveyed(cloud: &GaussianCloud, own: &[Camera], count: usize, flights: us
 }
 
 /// A row for each kind of flight.
-pub fn table(all: &[Surveyed]) -> Rows {
+pub(crate) fn table(all: &[Surveyed]) -> Rows {
     let head = [
         "cameras",
         "keypoints",
@@ -202,7 +202,7 @@ pub fn table(all: &[Surveyed]) -> Rows {
 }
 
 /// The same as JSON, a document for each kind of ends.
-pub fn documents(all: &[Surveyed]) -> Value {
+pub(crate) fn documents(all: &[Surveyed]) -> Value {
     let sum = |s: &Sum| {
         json!({
             "flights": s.flights,
@@ -234,7 +234,7 @@ pub fn documents(all: &[Surveyed]) -> Value {
 }
 
 /// How smooth a flight is, as JSON.
-pub fn smoothness(s: &Smoothness) -> Value {
+pub(crate) fn smoothness(s: &Smoothness) -> Value {
     json!({
         "largest_step": s.largest_step,
         "largest_turn_deg": s.largest_turn.to_degrees(),

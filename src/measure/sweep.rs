@@ -11,44 +11,44 @@ use crate::pipeline::observer::{Observer, Severity, Ticker};
 
 /// A setting to be measured.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Case {
-    pub method: String,
-    pub setting: String,
+pub(crate) struct Case {
+    pub(crate) method: String,
+    pub(crate) setting: String,
     /// Its setting, for the program.
-    pub knobs: Knobs,
+    pub(crate) knobs: Knobs,
     /// Whether these are the defaults.
-    pub default: bool,
+    pub(crate) default: bool,
 }
 
 impl Case {
-    pub fn new(method: &str, setting: impl Into<String>, knobs: &[(&str, serde_json::Value)]) -> Self {
+    pub(crate) fn new(method: &str, setting: impl Into<String>, knobs: &[(&str, serde_json::Value)]) -> Self {
         let knobs = knobs.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();
         Self { method: method.into(), setting: setting.into(), knobs, default: false }
     }
 
     /// The program's defaults.
-    pub fn default(setting: impl Into<String>) -> Self {
+    pub(crate) fn default(setting: impl Into<String>) -> Self {
         Self { method: "default".into(), setting: setting.into(), knobs: Knobs::new(), default: true }
     }
 }
 
 /// What one measurement gave.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Trial {
-    pub secs: f64,
+pub(crate) struct Trial {
+    pub(crate) secs: f64,
     /// Values by name of the measure; those that are NaN or infinite are left out.
-    pub values: Vec<(&'static str, f64)>,
+    pub(crate) values: Vec<(&'static str, f64)>,
     /// Seconds and first measure on the way.
-    pub curve: Vec<[f64; 2]>,
+    pub(crate) curve: Vec<[f64; 2]>,
 }
 
 /// Why a measurement failed, in words.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{0}")]
-pub struct StudyError(pub String);
+pub(crate) struct StudyError(pub(crate) String);
 
 /// Makes a study's error of another.
-pub fn failed(error: impl std::fmt::Display) -> StudyError {
+pub(crate) fn failed(error: impl std::fmt::Display) -> StudyError {
     StudyError(error.to_string())
 }
 
@@ -56,9 +56,9 @@ pub fn failed(error: impl std::fmt::Display) -> StudyError {
 type Run<'a> = Box<dyn FnMut(usize, u64, &mut dyn Observer) -> Result<Option<Trial>, StudyError> + 'a>;
 
 /// The sweep of one stage on one input.
-pub struct Study<'a> {
+pub(crate) struct Study<'a> {
     /// The stage without points: what is measured, on what, compared with what.
-    pub stage: Stage,
+    pub(crate) stage: Stage,
     cases: Vec<Case>,
     run: Run<'a>,
     /// Checks of convergence. They are the same at every time, so they run once.
@@ -67,7 +67,7 @@ pub struct Study<'a> {
 
 impl<'a> Study<'a> {
     /// A sweep of settings, each with what it means to the study itself.
-    pub fn new<V: 'a>(
+    pub(crate) fn new<V: 'a>(
         stage: Stage,
         variants: Vec<(Case, V)>,
         mut measure: impl FnMut(&V, u64, &mut dyn Observer) -> Result<Option<Trial>, StudyError> + 'a,
@@ -79,13 +79,13 @@ impl<'a> Study<'a> {
 
     /// The same with checks of convergence.
     #[must_use]
-    pub fn with_orders(self, orders: impl Fn() -> Result<Vec<Order>, StudyError> + 'a) -> Self {
+    pub(crate) fn with_orders(self, orders: impl Fn() -> Result<Vec<Order>, StudyError> + 'a) -> Self {
         Self { orders: Box::new(orders), ..self }
     }
 
     /// Measures the setting of a knob whose words contain these.
     #[cfg(test)]
-    pub fn measured(&mut self, method: &str, setting: &str, seed: u64) -> Trial {
+    pub(crate) fn measured(&mut self, method: &str, setting: &str, seed: u64) -> Trial {
         let is = |c: &Case| c.method == method && c.setting.contains(setting);
         let k = self.cases.iter().position(is).expect("a case");
         (self.run)(k, seed, &mut crate::pipeline::observer::Silent).expect("runs").expect("not cancelled")
@@ -94,7 +94,7 @@ impl<'a> Study<'a> {
 
 /// How a sweep ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum End {
+pub(crate) enum End {
     Finished,
     OutOfTime,
     /// The observer asked to stop.
@@ -107,7 +107,7 @@ pub enum End {
 /// # Errors
 /// If orders cannot be measured, or `keep` fails. What was measured before has been kept. A setting that
 /// cannot be measured is left out, and the stage says so.
-pub fn sweep(
+pub(crate) fn sweep(
     study: &mut Study<'_>,
     before: Option<Stage>,
     budget_secs: f64,
@@ -166,7 +166,7 @@ pub fn sweep(
 
 impl Report {
     /// Measures `study` as [`sweep`] does, and writes the report into `folder` after every measurement.
-    pub fn measure(
+    pub(crate) fn measure(
         &mut self,
         study: &mut Study<'_>,
         folder: &Path,
@@ -190,7 +190,7 @@ impl Case {
 
 impl Stage {
     /// Adds a measurement.
-    pub fn add(&mut self, case: &Case, trial: &Trial) {
+    pub(crate) fn add(&mut self, case: &Case, trial: &Trial) {
         let at = self.points.iter().position(|p| case.is(p)).unwrap_or_else(|| {
             self.points.push(Point {
                 method: case.method.clone(),

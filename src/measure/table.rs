@@ -4,15 +4,15 @@ use super::document::{Measure, Order, Point, Report, Sample, Stage};
 use crate::math::format::{number, seconds};
 
 /// Rows of cells, the header first.
-pub type Rows = Vec<Vec<String>>;
+pub(crate) type Rows = Vec<Vec<String>>;
 
 /// A header and what is below it.
-pub fn rows(head: &[&str], body: impl IntoIterator<Item = Vec<String>>) -> Rows {
+pub(crate) fn rows(head: &[&str], body: impl IntoIterator<Item = Vec<String>>) -> Rows {
     std::iter::once(head.iter().map(|h| (*h).to_owned()).collect()).chain(body).collect()
 }
 
 /// Rows as Markdown; a "no" stands out.
-pub fn markdown(rows: &Rows) -> String {
+pub(crate) fn markdown(rows: &Rows) -> String {
     let cell = |text: &String| if text == "no" { "**no**".to_owned() } else { text.replace('|', "\\|") };
     let line = |row: &Vec<String>| format!("| {} |\n", row.iter().map(cell).collect::<Vec<_>>().join(" | "));
     let mut lines = rows.iter().map(line);
@@ -22,7 +22,7 @@ pub fn markdown(rows: &Rows) -> String {
 }
 
 /// Rows as an HTML table; a "no" stands out.
-pub fn html(rows: &Rows) -> String {
+pub(crate) fn html(rows: &Rows) -> String {
     let cell = |text: &String| match text == "no" {
         true => "<td class=\"no\">no</td>".to_owned(),
         false => format!("<td>{}</td>", htmlize::escape_all_quotes(text)),
@@ -34,7 +34,7 @@ pub fn html(rows: &Rows) -> String {
 }
 
 /// The middle, and how far the repeats are apart.
-pub fn spread(sample: &Sample, show: impl Fn(f64) -> String) -> String {
+pub(crate) fn spread(sample: &Sample, show: impl Fn(f64) -> String) -> String {
     match sample.each.len() {
         0 => String::new(),
         1 => show(sample.median),
@@ -43,13 +43,13 @@ pub fn spread(sample: &Sample, show: impl Fn(f64) -> String) -> String {
 }
 
 /// Header of a measure.
-pub fn title(measure: &Measure) -> String {
+pub(crate) fn title(measure: &Measure) -> String {
     if measure.unit.is_empty() { measure.name.clone() } else { format!("{} {}", measure.name, measure.unit) }
 }
 
 impl Stage {
     /// The measurements as rows, header first. The last column marks the front of the first measure.
-    pub fn table(&self) -> Rows {
+    pub(crate) fn table(&self) -> Rows {
         let titles: Vec<String> = self.measures.iter().map(title).collect();
         let titles = titles.iter().map(String::as_str);
         let head: Vec<&str> = ["knob", "setting", "time"].into_iter().chain(titles).chain(["front"]).collect();
@@ -66,7 +66,7 @@ impl Stage {
     }
 
     /// What the rule says of each knob's default.
-    pub fn choice_table(&self) -> Rows {
+    pub(crate) fn choice_table(&self) -> Rows {
         let with = |p: &Point| {
             let value = p.values.get(&self.rule.measure).map_or_else(String::new, |v| number(v.median));
             format!("{}: {value} in {}", p.setting, seconds(p.secs.median))
@@ -82,7 +82,7 @@ impl Stage {
     }
 
     /// Whether errors fall as fast as theory says.
-    pub fn order_table(&self) -> Rows {
+    pub(crate) fn order_table(&self) -> Rows {
         let row = |o: &Order| vec![o.what.clone(), o.expected.to_string(), format!("{:.2}", o.observed), yes(o.agrees)];
         rows(&["convergence", "expected order", "observed", "agrees"], self.orders.iter().map(row))
     }
@@ -94,7 +94,7 @@ fn yes(yes: bool) -> String {
 
 impl Report {
     /// One row for each setting and measure, repeats included: to be read by other programs.
-    pub fn csv(&self) -> String {
+    pub(crate) fn csv(&self) -> String {
         let mut out = String::from(
             "stage,knob,setting,default,knobs,measure,unit,repeats,seconds_median,seconds_least,seconds_most,\
              value_median,value_least,value_most\n",

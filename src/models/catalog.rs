@@ -17,12 +17,12 @@ use crate::io::data_folder::data_folder;
 const LIST: &str = include_str!("../../assets/models.toml");
 
 /// Name of the model that follows masks.
-pub const SAM2: &str = "sam2.1-tiny";
+pub(crate) const SAM2: &str = "sam2.1-tiny";
 
 /// What a model is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Role {
+pub(crate) enum Role {
     /// Compares pictures with phrases.
     Encoder,
     /// Finds masks.
@@ -36,7 +36,7 @@ pub struct Entry {
     /// Its name in commands.
     pub id: String,
     /// What it is for.
-    pub role: Role,
+    pub(crate) role: Role,
     /// Its name for display.
     pub title: String,
     /// What it adds, in plain words.
@@ -45,7 +45,7 @@ pub struct Entry {
     #[serde(alias = "licence")]
     pub license: String,
     /// Where its weights come from.
-    pub source: String,
+    pub(crate) source: String,
     /// The command that makes its files, of those in `tools/export`.
     #[serde(default)]
     pub export: String,
@@ -57,7 +57,7 @@ pub struct Entry {
     pub description: String,
     /// Address of the folder with its files, where there is one.
     #[serde(default)]
-    pub url: Option<String>,
+    pub(crate) url: Option<String>,
     /// Its graphs.
     #[serde(default)]
     pub file: Vec<ListedFile>,
@@ -68,12 +68,12 @@ pub struct Entry {
 #[serde(deny_unknown_fields)]
 pub struct ListedFile {
     /// Its name.
-    pub name: String,
+    pub(crate) name: String,
     /// About how large it is.
-    pub megabytes: u64,
+    pub(crate) megabytes: u64,
     /// Its SHA-256, if that is fixed.
     #[serde(default)]
-    pub sha256: Option<String>,
+    pub(crate) sha256: Option<String>,
 }
 
 #[derive(Deserialize)]
@@ -144,14 +144,14 @@ pub fn entry(id: &str) -> Result<Entry, InstallError> {
 }
 
 /// Where models lie on this machine.
-pub fn folder() -> PathBuf {
+pub(crate) fn folder() -> PathBuf {
     let set = std::env::var_os("FMLGS_MODELS").filter(|p| !p.is_empty());
     set.map_or_else(|| data_folder().join("models"), PathBuf::from)
 }
 
 impl Entry {
     /// The file that describes it, if it were in `folder`.
-    pub fn description_in(&self, folder: &Path) -> PathBuf {
+    pub(crate) fn description_in(&self, folder: &Path) -> PathBuf {
         folder.join(&self.description)
     }
 
@@ -274,7 +274,7 @@ impl Entry {
 ///
 /// # Errors
 /// If it is neither.
-pub fn find(name: &str, role: Role) -> Result<PathBuf, ModelError> {
+pub(crate) fn find(name: &str, role: Role) -> Result<PathBuf, ModelError> {
     let listed = entries()?.into_iter().find(|e| e.id == name && e.role == role && !e.built_in);
     if let Some(entry) = listed {
         let folder = folder();
@@ -297,7 +297,7 @@ pub fn find(name: &str, role: Role) -> Result<PathBuf, ModelError> {
 ///
 /// # Errors
 /// If the list that came with the program is damaged.
-pub fn usable(role: Role, told: &mut dyn FnMut(String)) -> Result<Vec<String>, ModelError> {
+pub(crate) fn usable(role: Role, told: &mut dyn FnMut(String)) -> Result<Vec<String>, ModelError> {
     Ok(usable_of(&entries()?, role, &folder(), told))
 }
 

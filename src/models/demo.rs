@@ -11,7 +11,7 @@ const TEXT: (&str, &[u8]) = ("demo_text.onnx", include_bytes!("../../assets/mode
 const WORDS: (&str, &str) = ("demo_vocab.json", include_str!("../../assets/models/demo_vocab.json"));
 
 /// The `demo` encoder. Its networks are prepared when they are first needed.
-pub struct DemoEncoder {
+pub(crate) struct DemoEncoder {
     words: Vocabulary,
     image: Option<Network>,
     text: Option<Network>,
@@ -19,7 +19,7 @@ pub struct DemoEncoder {
 
 impl DemoEncoder {
     /// Ready to be asked.
-    pub fn new() -> Result<Self, ModelError> {
+    pub(crate) fn new() -> Result<Self, ModelError> {
         Ok(Self { words: Vocabulary::parse(WORDS.1, WORDS.0)?, image: None, text: None })
     }
 }

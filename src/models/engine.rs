@@ -24,7 +24,7 @@ use crate::scene::resource_log::{self, Sort};
 const MODEL_USE: &str = "it is about to run for the first time";
 
 /// What runs networks in this process.
-pub struct Engine {
+pub(crate) struct Engine {
     environment: Environment,
     name: String,
     device: Option<Device>,
@@ -83,7 +83,7 @@ impl Device {
 static CHOSEN: OnceLock<Result<Engine, (String, String)>> = OnceLock::new();
 
 /// The engine of this process; the first call chooses it.
-pub fn engine() -> Result<&'static Engine, ModelError> {
+pub(crate) fn engine() -> Result<&'static Engine, ModelError> {
     let chosen = CHOSEN.get_or_init(|| Engine::choose(library()));
     chosen.as_ref().map_err(|(engine, problem)| ModelError::Engine { engine: engine.clone(), problem: problem.clone() })
 }
@@ -163,17 +163,17 @@ impl Engine {
     }
 
     /// Which engine it is, for display.
-    pub fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         &self.name
     }
 
     /// What it computes on, for display.
-    pub fn device(&self) -> &'static str {
+    pub(crate) fn device(&self) -> &'static str {
         self.device.map_or("processor", Device::text)
     }
 
     /// What was asked for but is not so.
-    pub fn note(&self) -> Option<&str> {
+    pub(crate) fn note(&self) -> Option<&str> {
         self.note.as_deref()
     }
 
@@ -181,7 +181,7 @@ impl Engine {
     ///
     /// # Errors
     /// If it is no network, or one that this engine cannot run.
-    pub fn load(&self, bytes: &[u8], name: &str) -> Result<Network, ModelError> {
+    pub(crate) fn load(&self, bytes: &[u8], name: &str) -> Result<Network, ModelError> {
         resource_log::record(Sort::Model, format!("network {name}"), MODEL_USE, bytes.len() as u64);
         Ok(Network::new(self.prepare(name, |builder| builder.commit_from_memory(bytes))?, name))
     }
@@ -190,7 +190,7 @@ impl Engine {
     ///
     /// # Errors
     /// If it is no network, or one that this engine cannot run.
-    pub fn load_file(&self, path: &Path) -> Result<Network, ModelError> {
+    pub(crate) fn load_file(&self, path: &Path) -> Result<Network, ModelError> {
         let file = path.to_path_buf();
         let network = Network::new(self.session(path)?, &path.display().to_string());
         Ok(network.in_file(move || engine()?.session(&file)))

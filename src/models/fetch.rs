@@ -200,7 +200,7 @@ pub fn fetch(
 ///
 /// # Errors
 /// If they differ, or the file cannot be read.
-pub fn check(path: &Path, expected: &str) -> Result<(), FetchError> {
+pub(crate) fn check(path: &Path, expected: &str) -> Result<(), FetchError> {
     let got = sha256(path).map_err(|source| FetchError::File { path: path.into(), source })?;
     if got.eq_ignore_ascii_case(expected) {
         return Ok(());

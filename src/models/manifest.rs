@@ -13,17 +13,17 @@ use super::network::Network;
 /// Version of the file that this program reads.
 const VERSION: u64 = 1;
 /// Largest file that is read, bytes.
-pub const MAX_BYTES: u64 = super::fetch::MOST_UNPROMISED;
+pub(crate) const MAX_BYTES: u64 = super::fetch::MOST_UNPROMISED;
 
 /// A graph of a model.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Graph {
     /// Its file, in the same folder.
-    pub file: String,
+    pub(crate) file: String,
     /// Its size.
-    pub bytes: u64,
+    pub(crate) bytes: u64,
     /// Its SHA-256, in hexadecimal digits.
-    pub sha256: String,
+    pub(crate) sha256: String,
 }
 
 impl Graph {
@@ -32,7 +32,11 @@ impl Graph {
     ///
     /// # Errors
     /// If it is missing, broken or another file, or the engine cannot run it.
-    pub fn ready<'a>(&self, slot: &'a mut Option<Network>, folder: &Path) -> Result<&'a mut Network, ModelError> {
+    pub(crate) fn ready<'a>(
+        &self,
+        slot: &'a mut Option<Network>,
+        folder: &Path,
+    ) -> Result<&'a mut Network, ModelError> {
         let loaded = match slot.take() {
             Some(network) => network,
             None => {
@@ -66,7 +70,7 @@ impl Graph {
     ///
     /// # Errors
     /// If it is missing, broken or another file.
-    pub fn check(&self, folder: &Path) -> Result<(), ModelError> {
+    pub(crate) fn check(&self, folder: &Path) -> Result<(), ModelError> {
         self.check_size(folder)?;
         let path = folder.join(&self.file);
         let wrong = |e: super::fetch::FetchError| ModelError::Metadata { path: path.clone(), problem: e.to_string() };
@@ -81,7 +85,7 @@ const MAX_SIDE_PX: usize = 4096;
 ///
 /// # Errors
 /// If their side is none, or a color would be divided by nothing.
-pub fn check_pictures(path: &Path, side_px: usize, mean: [f32; 3], std: [f32; 3]) -> Result<(), ModelError> {
+pub(crate) fn check_pictures(path: &Path, side_px: usize, mean: [f32; 3], std: [f32; 3]) -> Result<(), ModelError> {
     let refused = |problem: String| Err(ModelError::Metadata { path: path.into(), problem });
     if !(1..=MAX_SIDE_PX).contains(&side_px) {
         return refused(format!("image_size is {side_px} px; networks take 1 to {MAX_SIDE_PX}"));
@@ -96,7 +100,7 @@ pub fn check_pictures(path: &Path, side_px: usize, mean: [f32; 3], std: [f32; 3]
 ///
 /// # Errors
 /// If it is 0, or over `most`.
-pub fn check_length(path: &Path, name: &str, length: usize, most: usize) -> Result<(), ModelError> {
+pub(crate) fn check_length(path: &Path, name: &str, length: usize, most: usize) -> Result<(), ModelError> {
     match (1..=most).contains(&length) {
         true => Ok(()),
         false => Err(ModelError::Metadata {
@@ -136,7 +140,7 @@ struct Head {
 ///
 /// # Errors
 /// If the file cannot be read, is of another kind or version, or lacks something.
-pub fn read<T: DeserializeOwned>(path: &Path, kind: &str) -> Result<T, ModelError> {
+pub(crate) fn read<T: DeserializeOwned>(path: &Path, kind: &str) -> Result<T, ModelError> {
     let refused = |problem: String| ModelError::Metadata { path: path.into(), problem };
     let bytes = crate::io::files::read(path, MAX_BYTES).map_err(|e| refused(e.to_string()))?;
     let head: Head = serde_json::from_slice(&bytes).map_err(|e| refused(e.to_string()))?;

@@ -8,7 +8,7 @@
 pub mod catalog;
 pub mod clip;
 mod demo;
-pub mod engine;
+pub(crate) mod engine;
 mod error;
 pub mod fetch;
 pub mod manifest;
@@ -20,9 +20,9 @@ pub mod session_cache;
 mod tile;
 mod vocabulary;
 
-pub use catalog::Role;
+pub(crate) use catalog::Role;
 pub use clip::ClipEncoder;
-pub use demo::DemoEncoder;
+pub(crate) use demo::DemoEncoder;
 pub use error::ModelError;
 
 /// A picture of one identity: mask on black, padded to a square, side x side, sRGB 0..1, row-major.
@@ -63,13 +63,13 @@ pub trait Encoder: Send {
 }
 
 /// Name of the encoder that comes with the program.
-pub const DEMO: &str = "demo";
+pub(crate) const DEMO: &str = "demo";
 
 /// The best encoder that can be used on this machine. `told` hears of better ones that are broken.
 ///
 /// # Errors
 /// If it cannot be loaded.
-pub fn best_encoder(told: &mut dyn FnMut(String)) -> Result<Box<dyn Encoder>, ModelError> {
+pub(crate) fn best_encoder(told: &mut dyn FnMut(String)) -> Result<Box<dyn Encoder>, ModelError> {
     let best = catalog::usable(Role::Encoder, told)?.into_iter().next();
     encoder(best.as_deref().unwrap_or(DEMO))
 }

@@ -60,7 +60,7 @@ impl<T: Clone> Array<T> {
 }
 
 /// What goes into a network.
-pub enum Input {
+pub(crate) enum Input {
     /// Floating-point numbers.
     Floats(Array<f32>),
     /// Whole numbers.
@@ -87,7 +87,7 @@ impl From<Array<i64>> for Input {
 
 /// What comes out of a network, by name.
 #[derive(Clone, Debug, Default)]
-pub struct Outputs {
+pub(crate) struct Outputs {
     model: String,
     arrays: BTreeMap<String, Array<f32>>,
 }
@@ -97,7 +97,7 @@ impl Outputs {
     ///
     /// # Errors
     /// If there is none of that name.
-    pub fn take(&mut self, name: &str) -> Result<Array<f32>, ModelError> {
+    pub(crate) fn take(&mut self, name: &str) -> Result<Array<f32>, ModelError> {
         self.arrays.remove(name).ok_or_else(|| ModelError::NoOutput { model: self.model.clone(), output: name.into() })
     }
 }
@@ -106,7 +106,7 @@ impl Outputs {
 type Reopen = Box<dyn Fn() -> Result<Session, ModelError> + Send + Sync>;
 
 /// A network that is ready to run.
-pub struct Network {
+pub(crate) struct Network {
     place: Arc<Mutex<Place>>,
     name: String,
     /// What opens its file again, if it has one; without, it stays open.
@@ -126,7 +126,7 @@ impl Network {
     }
 
     /// Its file's name.
-    pub fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         &self.name
     }
 
@@ -134,7 +134,7 @@ impl Network {
     ///
     /// # Errors
     /// If the engine fails, an input is missing or of another shape, or an output is not finite.
-    pub fn run(&mut self, inputs: Vec<(&'static str, Input)>) -> Result<Outputs, ModelError> {
+    pub(crate) fn run(&mut self, inputs: Vec<(&'static str, Input)>) -> Result<Outputs, ModelError> {
         let name = self.name.clone();
         // A panic while it ran leaves a session that runs again.
         let mut place = self.place.lock().unwrap_or_else(PoisonError::into_inner);
@@ -184,7 +184,7 @@ impl Network {
     ///
     /// # Errors
     /// As [`Self::run`]; and if rows are of another length, or have no direction.
-    pub fn unit_rows(
+    pub(crate) fn unit_rows(
         &mut self,
         inputs: Vec<(&'static str, Input)>,
         output: &str,

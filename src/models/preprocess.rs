@@ -63,7 +63,7 @@ impl Prepare {
     }
 
     /// The size to which a picture is resized.
-    pub fn resized(&self, w: usize, h: usize) -> Option<(usize, usize)> {
+    pub(crate) fn resized(&self, w: usize, h: usize) -> Option<(usize, usize)> {
         if w == 0 || h == 0 {
             return None;
         }

@@ -17,14 +17,14 @@ const SPARE: u64 = 512 << 20;
 /// An open network, or the place of one that was closed.
 pub(super) struct Place {
     /// `None` while it is closed.
-    pub session: Option<Session>,
+    pub(crate) session: Option<Session>,
     /// When it was last asked.
-    pub used: Instant,
+    pub(crate) used: Instant,
 }
 
 impl Place {
     /// The place of a network that was opened just now.
-    pub fn of(session: Session) -> Arc<Mutex<Self>> {
+    pub(crate) fn of(session: Session) -> Arc<Mutex<Self>> {
         Arc::new(Mutex::new(Self { session: Some(session), used: Instant::now() }))
     }
 }

@@ -7,7 +7,7 @@ use crate::scene::Mask;
 impl Tile {
     /// The region of a picture on black: its bounding box, padded to a square, resized. `None` for
     /// an empty mask, and for a picture that does not have the mask's size.
-    pub fn cut(rgb: &[[f32; 3]], mask: &Mask, side_px: usize) -> Option<Self> {
+    pub(crate) fn cut(rgb: &[[f32; 3]], mask: &Mask, side_px: usize) -> Option<Self> {
         let bounds = mask.bounds()?;
         let width_px = mask.width_px();
         if rgb.len() != width_px * mask.height_px() || side_px == 0 {

@@ -14,24 +14,24 @@ const UNKNOWN_CHARS: usize = 40;
 
 /// What a text encoder knows, and what else it says of itself.
 #[derive(Clone, Debug, Deserialize)]
-pub struct Vocabulary {
+pub(crate) struct Vocabulary {
     /// Version of this file's form.
-    pub version: u32,
+    pub(crate) version: u32,
     /// Length of the vectors.
-    pub dimension: usize,
+    pub(crate) dimension: usize,
     /// Side of an image tile, px.
-    pub tile_side_px: usize,
+    pub(crate) tile_side_px: usize,
     /// Words that are looked at.
-    pub tokens: usize,
+    pub(crate) tokens: usize,
     /// Words that carry nothing alone ("the", "of").
-    pub glue: BTreeSet<String>,
+    pub(crate) glue: BTreeSet<String>,
     /// Number of each word, from 1.
-    pub words: BTreeMap<String, i64>,
+    pub(crate) words: BTreeMap<String, i64>,
 }
 
 impl Vocabulary {
     /// Reads the JSON text of a word list; `file` names it in errors.
-    pub fn parse(text: &str, file: &str) -> Result<Self, ModelError> {
+    pub(crate) fn parse(text: &str, file: &str) -> Result<Self, ModelError> {
         let damaged = |problem: String| ModelError::Vocabulary { file: file.into(), problem };
         let list: Self = serde_json::from_str(text).map_err(|e| damaged(e.to_string()))?;
         if list.version != 1 {
@@ -48,7 +48,7 @@ impl Vocabulary {
     }
 
     /// The numbers of a phrase's known words, followed by zeros.
-    pub fn encode(&self, phrase: &str) -> Result<Vec<i64>, ModelError> {
+    pub(crate) fn encode(&self, phrase: &str) -> Result<Vec<i64>, ModelError> {
         let mut numbers = Vec::with_capacity(self.tokens);
         let mut content = false;
         for word in split(phrase) {
@@ -68,7 +68,7 @@ impl Vocabulary {
     }
 
     /// The words that are not known, each once.
-    pub fn unknown(&self, phrase: &str) -> Vec<String> {
+    pub(crate) fn unknown(&self, phrase: &str) -> Vec<String> {
         let mut found: Vec<String> = Vec::new();
         for word in split(phrase) {
             let told: String = word.chars().take(UNKNOWN_CHARS).collect();

@@ -14,29 +14,29 @@ const LEAST_VISIBLE: f64 = 0.05;
 
 /// A scene with what is known of it.
 #[derive(Clone, Copy)]
-pub struct Place<'a> {
+pub(crate) struct Place<'a> {
     /// The Gaussians.
-    pub cloud: &'a GaussianCloud,
+    pub(crate) cloud: &'a GaussianCloud,
     /// How they are drawn.
-    pub settings: &'a RenderSettings,
+    pub(crate) settings: &'a RenderSettings,
     /// Objects and parts.
-    pub map: &'a SemanticMap,
+    pub(crate) map: &'a SemanticMap,
 }
 
 /// A flight to a target, and what is seen there.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Approach {
+pub(crate) struct Approach {
     /// The view at its end.
-    pub view: View,
+    pub(crate) view: View,
     /// The middle of the target.
-    pub target: DVec3,
+    pub(crate) target: DVec3,
     /// The way there.
-    pub flight: Flight,
+    pub(crate) flight: Flight,
 }
 
 /// Why a target cannot be visited.
 #[derive(Debug, thiserror::Error)]
-pub enum ApproachError {
+pub(crate) enum ApproachError {
     /// It has no Gaussians.
     #[error("nothing in the scene belongs to it, so there is no place to look at")]
     Nothing,
@@ -57,7 +57,7 @@ pub enum ApproachError {
 }
 
 /// The Gaussians of an identity as a target; `None` if it has none.
-pub fn target(place: Place<'_>, id: IdentityId) -> Option<(Target, Bounds)> {
+pub(crate) fn target(place: Place<'_>, id: IdentityId) -> Option<(Target, Bounds)> {
     let bounds = |id: IdentityId| {
         let members = place.map.members(id);
         let inside = members.iter().filter(|i| **i < place.cloud.len());
@@ -75,7 +75,7 @@ impl Navigator {
     ///
     /// # Errors
     /// If it cannot be seen or reached.
-    pub fn visit(
+    pub(crate) fn visit(
         &self,
         place: Place<'_>,
         id: IdentityId,

@@ -13,14 +13,14 @@ const PIECES: usize = 32;
 const TURN: f64 = 0.5;
 
 /// Most steps from picture to picture that a video is made of.
-pub const MOST_PICTURES: f64 = 1e6;
+pub(crate) const MOST_PICTURES: f64 = 1e6;
 
 /// A path that can be asked for the pose at any time.
 #[derive(Clone, Debug)]
-pub struct CameraSpline {
+pub(crate) struct CameraSpline {
     stretches: Vec<Stretch>,
     /// When the camera arrives at each key, and when it leaves.
-    pub times: Vec<[f64; 2]>,
+    pub(crate) times: Vec<[f64; 2]>,
     spline: Spline,
     seconds: f64,
     speed: Speed,
@@ -53,7 +53,7 @@ struct Spline {
 
 impl CameraSpline {
     /// The video of a path; `None` if it has no keys, or is not valid.
-    pub fn new(path: &CameraPath, speed: Speed) -> Option<Self> {
+    pub(crate) fn new(path: &CameraPath, speed: Speed) -> Option<Self> {
         path.validate().ok()?;
         let mut keys: Vec<&PathKey> = path.keys.iter().collect();
         if path.closed && keys.len() > 2 {
@@ -81,12 +81,12 @@ impl CameraSpline {
     }
 
     /// How long it runs.
-    pub fn seconds(&self) -> f64 {
+    pub(crate) fn seconds(&self) -> f64 {
         self.seconds
     }
 
     /// The pose at a time; before the start and after the end, those.
-    pub fn at(&self, time: f64) -> Pose {
+    pub(crate) fn at(&self, time: f64) -> Pose {
         let time = if time.is_finite() { time } else { 0.0 };
         let mut knot = 0.0;
         for stretch in &self.stretches {
@@ -99,12 +99,12 @@ impl CameraSpline {
     }
 
     /// Its poses for a video with so many pictures a second, both ends included; at most `most` and one.
-    pub fn pictures(&self, fps: f64, most: f64) -> Vec<Pose> {
+    pub(crate) fn pictures(&self, fps: f64, most: f64) -> Vec<Pose> {
         self.flight(steps_of(self.seconds, fps, most) + 1).poses
     }
 
     /// Its poses at even times, as a flight.
-    pub fn flight(&self, frames: usize) -> Flight {
+    pub(crate) fn flight(&self, frames: usize) -> Flight {
         let last = frames.max(2) - 1;
         let poses: Vec<Pose> = (0..=last).map(|i| self.at(self.seconds * i as f64 / last as f64)).collect();
         let length = poses.windows(2).map(|w| w[0].center.distance(w[1].center)).sum();
@@ -113,7 +113,7 @@ impl CameraSpline {
 }
 
 /// Steps from picture to picture in so many seconds: at least one, at most `most`.
-pub fn steps_of(seconds: f64, fps: f64, most: f64) -> usize {
+pub(crate) fn steps_of(seconds: f64, fps: f64, most: f64) -> usize {
     (seconds * fps).round().clamp(1.0, most) as usize
 }
 

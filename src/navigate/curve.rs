@@ -7,7 +7,7 @@ use super::is_place;
 use super::occupancy::OccupancyGrid;
 
 /// Pieces that a rounded corner is measured in.
-pub const PIECES: usize = 24;
+pub(crate) const PIECES: usize = 24;
 /// Halvings of a corner's rounding before the corner is kept sharp.
 const HALVINGS: u32 = 8;
 
@@ -18,12 +18,12 @@ pub struct Curve {
     points: Vec<DVec3>,
     gone: Vec<f64>,
     /// Corners that had to stay (nearly) sharp.
-    pub sharp: usize,
+    pub(crate) sharp: usize,
 }
 
 /// Legs without detours: every point is dropped that one can do without, going straight with this
 /// clearance. First and last stay.
-pub fn shortened(legs: &[DVec3], occupancy: &OccupancyGrid, clearance: f64) -> Vec<DVec3> {
+pub(crate) fn shortened(legs: &[DVec3], occupancy: &OccupancyGrid, clearance: f64) -> Vec<DVec3> {
     let legs: Vec<DVec3> = distinct(legs);
     let mut out: Vec<DVec3> = Vec::new();
     let mut at = 0;
@@ -119,7 +119,7 @@ impl Curve {
 
 /// A corner cut off by a parabola that touches both legs `rounding` before and after it.
 /// `back` and `on` are unit vectors along them. In `pieces` straight pieces.
-pub fn bend(corner: DVec3, [back, on]: [DVec3; 2], rounding: f64, pieces: usize) -> Vec<DVec3> {
+pub(crate) fn bend(corner: DVec3, [back, on]: [DVec3; 2], rounding: f64, pieces: usize) -> Vec<DVec3> {
     let (a, b) = (corner + back * rounding, corner + on * rounding);
     let at = |i: usize| {
         let u = i as f64 / pieces as f64;

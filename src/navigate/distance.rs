@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 /// Squared distance from each voxel's center to that of the nearest marked one, in voxels, x fastest.
 /// Without any marked voxel, the squared diagonal of the grid.
-pub fn squared_distances(marked: &[bool], size: [usize; 3]) -> Vec<f32> {
+pub(crate) fn squared_distances(marked: &[bool], size: [usize; 3]) -> Vec<f32> {
     let [nx, ny, nz] = size;
     let farthest = size.iter().map(|n| (n * n) as f32).sum::<f32>();
     let mut d: Vec<f32> = marked.iter().map(|m| if *m { 0.0 } else { farthest }).collect();

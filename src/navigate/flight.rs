@@ -24,7 +24,7 @@ pub enum Speed {
 
 impl Speed {
     /// Share of the way after this share of the time.
-    pub fn way(self, time: f64) -> f64 {
+    pub(crate) fn way(self, time: f64) -> f64 {
         let t = time.clamp(0.0, 1.0);
         match self {
             Self::Constant => t,
@@ -43,31 +43,31 @@ pub struct Flight {
     /// Length of its way, scene units.
     pub length: f64,
     /// Corners that had to stay sharp.
-    pub sharp: usize,
+    pub(crate) sharp: usize,
     /// Poses that were moved away from occupied space.
-    pub repaired: usize,
+    pub(crate) repaired: usize,
 }
 
 /// How smooth a flight is, and how near it comes to occupied space.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Smoothness {
+pub(crate) struct Smoothness {
     /// Longest step from one pose to the next, scene units.
-    pub largest_step: f64,
+    pub(crate) largest_step: f64,
     /// Largest turn from one pose to the next, radians.
-    pub largest_turn: f64,
+    pub(crate) largest_turn: f64,
     /// Largest change of the step (second difference), scene units.
-    pub largest_jolt: f64,
+    pub(crate) largest_jolt: f64,
     /// Least distance to matter of a pose, scene units.
-    pub least_clearance: f64,
+    pub(crate) least_clearance: f64,
     /// Poses with less distance to occupied space than wanted.
-    pub violations: usize,
+    pub(crate) violations: usize,
     /// Largest deviation of a pose's rotation from being one.
-    pub rotation_error: f64,
+    pub(crate) rotation_error: f64,
 }
 
 impl Flight {
     /// The flight as a path with a key per pose.
-    pub fn camera_path(&self) -> CameraPath {
+    pub(crate) fn camera_path(&self) -> CameraPath {
         let last = (self.poses.len() - 1).max(1) as f64;
         let key = |(i, p): (usize, &Pose)| PathKey { time_secs: Some(self.seconds * i as f64 / last), ..p.key() };
         let keys = self.poses.iter().enumerate().map(key).collect();
@@ -124,13 +124,13 @@ impl Flight {
     /// The paper's interpolation of the same keypoints, read as it is printed: the sum over the
     /// steps telescopes, so pose `i` lies on the straight line from the first to the last, and the
     /// rotation matrices are mixed entry by entry.
-    pub fn of_paper(keys: &[Pose], frames: usize) -> Option<Self> {
+    pub(crate) fn of_paper(keys: &[Pose], frames: usize) -> Option<Self> {
         Self::of_paper_through(&[*keys.first()?, *keys.last()?], frames)
     }
 
     /// The same in the reading that makes sense: from keypoint to keypoint of the route, as many poses for
     /// each step, the rotation matrices mixed entry by entry all the same.
-    pub fn of_paper_through(keys: &[Pose], frames: usize) -> Option<Self> {
+    pub(crate) fn of_paper_through(keys: &[Pose], frames: usize) -> Option<Self> {
         let steps = keys.len().checked_sub(1)?;
         let m = frames.max(2) - 1;
         let pose = |i: usize| {
@@ -143,7 +143,7 @@ impl Flight {
     }
 
     /// How smooth it is, and how it keeps `clearance` to occupied space.
-    pub fn smoothness(&self, occupancy: &OccupancyGrid, clearance: f64) -> Smoothness {
+    pub(crate) fn smoothness(&self, occupancy: &OccupancyGrid, clearance: f64) -> Smoothness {
         let mut s = Smoothness { least_clearance: f64::INFINITY, ..Smoothness::default() };
         for pose in &self.poses {
             let c = occupancy.clearance(pose.center);

@@ -29,7 +29,7 @@ pub struct Graph {
     /// Where the eye may stand.
     pub keypoints: Vec<Keypoint>,
     /// Distance to occupied space that every point of an edge has.
-    pub clearance: f64,
+    pub(crate) clearance: f64,
     places: Places,
     /// Both ends of each edge that is tried; the lower one first.
     pairs: Vec<[u32; 2]>,
@@ -41,16 +41,16 @@ pub struct Graph {
 
 /// A way through keypoints.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Route {
+pub(crate) struct Route {
     /// Keypoints by number, first to last.
-    pub through: Vec<usize>,
+    pub(crate) through: Vec<usize>,
     /// Its length, scene units.
-    pub length: f64,
+    pub(crate) length: f64,
 }
 
 impl Graph {
     /// Keypoints with their neighbors, no edge looked at yet.
-    pub fn new(keypoints: Vec<Keypoint>, clearance: f64) -> Self {
+    pub(crate) fn new(keypoints: Vec<Keypoint>, clearance: f64) -> Self {
         let places = places(&keypoints);
         let near = |i: usize| {
             let found = places.nearest_neighbor_iter(keypoints[i].center.to_array());
@@ -90,24 +90,24 @@ impl Graph {
     }
 
     /// Looks at all edges that were not looked at; how many edges are free and how many blocked.
-    pub fn look_at_all(&self, occupancy: &OccupancyGrid) -> (usize, usize) {
+    pub(crate) fn look_at_all(&self, occupancy: &OccupancyGrid) -> (usize, usize) {
         let free = (0..self.pairs.len()).into_par_iter().filter(|e| self.is_free(*e, occupancy)).count();
         (free, self.pairs.len() - free)
     }
 
     /// Edges that were looked at so far, and all that there are.
-    pub fn looked_at(&self) -> (usize, usize) {
+    pub(crate) fn looked_at(&self) -> (usize, usize) {
         let seen = self.state.iter().filter(|s| s.load(Ordering::Relaxed) != UNSEEN).count();
         (seen, self.state.len())
     }
 
     /// What is known of every edge, one byte each, to be stored.
-    pub fn known(&self) -> Vec<u8> {
+    pub(crate) fn known(&self) -> Vec<u8> {
         self.state.iter().map(|s| s.load(Ordering::Relaxed)).collect()
     }
 
     /// Takes over what was known of the same graph; whether it fits.
-    pub fn remember(&self, known: &[u8]) -> bool {
+    pub(crate) fn remember(&self, known: &[u8]) -> bool {
         let fits = known.len() == self.state.len() && known.iter().all(|k| *k <= BLOCKED);
         if fits {
             self.state.iter().zip(known).for_each(|(s, k)| s.store(*k, Ordering::Relaxed));
@@ -116,7 +116,7 @@ impl Graph {
     }
 
     /// The number of the connected part that each keypoint belongs to, the largest part first.
-    pub fn parts(&self, occupancy: &OccupancyGrid) -> Vec<usize> {
+    pub(crate) fn parts(&self, occupancy: &OccupancyGrid) -> Vec<usize> {
         self.look_at_all(occupancy);
         let mut part = vec![usize::MAX; self.keypoints.len()];
         let mut sizes = Vec::new();
@@ -148,19 +148,19 @@ impl Graph {
     }
 
     /// The keypoints nearest to a place, nearest first.
-    pub fn nearest(&self, place: DVec3) -> impl Iterator<Item = usize> + '_ {
+    pub(crate) fn nearest(&self, place: DVec3) -> impl Iterator<Item = usize> + '_ {
         let finite = if place.is_finite() { place } else { DVec3::ZERO };
         self.places.nearest_neighbor_iter(finite.to_array()).map(|p| p.data)
     }
 
     /// The shortest way from one keypoint to another (Dijkstra); `None` if they are not connected.
-    pub fn route(&self, from: usize, to: usize, occupancy: &OccupancyGrid) -> Option<Route> {
+    pub(crate) fn route(&self, from: usize, to: usize, occupancy: &OccupancyGrid) -> Option<Route> {
         self.route_between(&[(from, 0.0)], &[(to, 0.0)], occupancy)
     }
 
     /// The shortest way from any of some keypoints to any of others, when it costs so much (scene
     /// units) to come to each, and to go on from it. One search, however many there are.
-    pub fn route_between(
+    pub(crate) fn route_between(
         &self,
         starts: &[(usize, f64)],
         goals: &[(usize, f64)],

@@ -15,13 +15,13 @@ pub struct Keypoint {
     /// Where.
     pub center: DVec3,
     /// How the camera that it comes from looks: columns are right, down and forward.
-    pub world_from_camera: DMat3,
+    pub(crate) world_from_camera: DMat3,
     /// Index of that camera.
-    pub camera: usize,
+    pub(crate) camera: usize,
     /// Whether it is the camera's own place.
-    pub original: bool,
+    pub(crate) original: bool,
     /// Distance to occupied space, scene units.
-    pub clearance: f64,
+    pub(crate) clearance: f64,
 }
 
 /// The mean distance from a camera to the nearest one elsewhere, scene units; 0 for fewer than two
@@ -49,7 +49,7 @@ fn distinct(cameras: &[Camera]) -> Vec<DVec3> {
 
 /// The places of `cameras`, dilated by six neighbors along each camera's own axes, less those with
 /// less than `clearance` to occupied space; and how many those are.
-pub fn keypoints(cameras: &[Camera], occupancy: &OccupancyGrid, clearance: f64) -> (Vec<Keypoint>, usize) {
+pub(crate) fn keypoints(cameras: &[Camera], occupancy: &OccupancyGrid, clearance: f64) -> (Vec<Keypoint>, usize) {
     let half = 0.5 * spacing(cameras);
     let mut all = Vec::with_capacity(7 * cameras.len());
     for (camera, c) in cameras.iter().enumerate().filter(|(_, c)| is_place(c.center)) {
@@ -74,10 +74,10 @@ pub fn keypoints(cameras: &[Camera], occupancy: &OccupancyGrid, clearance: f64) 
 }
 
 /// The keypoints' places, to find those that are near.
-pub type Places = RTree<GeomWithData<[f64; 3], usize>>;
+pub(crate) type Places = RTree<GeomWithData<[f64; 3], usize>>;
 
 /// An index of the keypoints by place.
-pub fn places(keypoints: &[Keypoint]) -> Places {
+pub(crate) fn places(keypoints: &[Keypoint]) -> Places {
     let all = keypoints.iter().enumerate().map(|(i, k)| GeomWithData::new(k.center.to_array(), i));
     RTree::bulk_load(all.collect())
 }

@@ -7,24 +7,24 @@
 //! [`approach`] does all of that for an identity; [`flight`] makes poses of frames of it. [`camera_spline`] does the
 //! same for a path that the user has put together.
 
-pub mod approach;
-pub mod camera_spline;
+pub(crate) mod approach;
+pub(crate) mod camera_spline;
 pub mod curve;
 mod distance;
-pub mod flight;
-pub mod graph;
+pub(crate) mod flight;
+pub(crate) mod graph;
 pub mod keypoints;
-pub mod navigator;
-pub mod occupancy;
-pub mod pose;
+pub(crate) mod navigator;
+pub(crate) mod occupancy;
+pub(crate) mod pose;
 pub mod target;
 #[cfg(test)]
 pub(crate) mod testing;
 
-pub use camera_spline::CameraSpline;
+pub(crate) use camera_spline::CameraSpline;
 pub use flight::{FRAMES, Flight, Speed};
 pub use navigator::{Navigator, NoRoute};
-pub use occupancy::OccupancyGrid;
+pub(crate) use occupancy::OccupancyGrid;
 pub use pose::Pose;
 
 use glam::DVec3;

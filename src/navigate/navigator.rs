@@ -21,19 +21,19 @@ const SPARE: f64 = 1.05;
 /// All that is needed to move about in a scene.
 pub struct Navigator {
     /// Which space is occupied.
-    pub occupancy: OccupancyGrid,
+    pub(crate) occupancy: OccupancyGrid,
     /// Where one can go.
     pub graph: Graph,
     /// The photos' cameras.
-    pub cameras: Vec<Camera>,
+    pub(crate) cameras: Vec<Camera>,
     /// Mean distance between cameras, scene units.
-    pub spacing: f64,
+    pub(crate) spacing: f64,
     /// Distance that flights keep to occupied space, scene units.
     pub clearance: f64,
     /// Which way is up.
-    pub up: DVec3,
+    pub(crate) up: DVec3,
     /// Keypoints that were left out because they are in occupied space.
-    pub in_occupied: usize,
+    pub(crate) in_occupied: usize,
 }
 
 /// Why there is no way.
@@ -77,7 +77,7 @@ impl Navigator {
     }
 
     /// Bytes that its occupancy grid takes, by far the largest part.
-    pub fn bytes(&self) -> u64 {
+    pub(crate) fn bytes(&self) -> u64 {
         self.occupancy.bytes()
     }
 
@@ -97,7 +97,7 @@ impl Navigator {
 
     /// The keypoints of the shortest way through the graph from one pose to another, both ends with it: what
     /// the paper's interpolation is given. `None` if there is none.
-    pub fn keys(&self, from: &Pose, to: &Pose) -> Option<Vec<Pose>> {
+    pub(crate) fn keys(&self, from: &Pose, to: &Pose) -> Option<Vec<Pose>> {
         let route = self.route([from.center, to.center], [&self.entries(from.center), &self.entries(to.center)])?;
         let keys = route.through.iter().map(|i| &self.graph.keypoints[*i]);
         let on_the_way =
@@ -122,7 +122,7 @@ impl Navigator {
     ///
     /// # Errors
     /// If there is none.
-    pub fn legs(&self, from: DVec3, to: DVec3) -> Result<Vec<DVec3>, NoRoute> {
+    pub(crate) fn legs(&self, from: DVec3, to: DVec3) -> Result<Vec<DVec3>, NoRoute> {
         if self.occupancy.is_inside(to) {
             return Err(NoRoute::Inside);
         }
@@ -205,7 +205,7 @@ impl Navigator {
 
     /// How far one can go from a pose in a direction of its own (right, down, forward), at most
     /// `distance` scene units, and whether occupied space ends it.
-    pub fn step(&self, from: &Pose, direction: DVec3, distance: f64) -> (DVec3, bool) {
+    pub(crate) fn step(&self, from: &Pose, direction: DVec3, distance: f64) -> (DVec3, bool) {
         let Some(direction) = (from.world_from_camera * direction).try_normalize() else { return (from.center, false) };
         let goal = from.center + direction * distance.max(0.0);
         let here = self.occupancy.clearance(from.center);

@@ -40,14 +40,14 @@ pub struct OccupancyGrid {
     distance: Vec<f32>,
     /// Looks at so many places along every way, instead of at as many as the distances demand: to
     /// measure what that would cost.
-    pub samples: Option<u32>,
+    pub(crate) samples: Option<u32>,
 }
 
 impl OccupancyGrid {
     /// The matter of `cloud` in the box that `eyes` and the scene itself span. `eyes` are places
     /// where cameras were: for `free` around each there is nothing, whatever the Gaussians say
     /// (floaters in front of cameras are the commonest fault of trained scenes).
-    pub fn of(cloud: &GaussianCloud, eyes: &[DVec3], free: f64) -> Self {
+    pub(crate) fn of(cloud: &GaussianCloud, eyes: &[DVec3], free: f64) -> Self {
         let scene = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i)));
         let both = Bounds::of(eyes.iter().copied().chain(scene.into_iter().flat_map(|b| [b.min, b.max])));
         let around = both.unwrap_or(Bounds { min: DVec3::ZERO, max: DVec3::ZERO });
@@ -128,18 +128,18 @@ impl OccupancyGrid {
     }
 
     /// Side of a voxel, scene units: nothing smaller is known.
-    pub fn voxel(&self) -> f64 {
+    pub(crate) fn voxel(&self) -> f64 {
         self.voxel
     }
 
     /// Bytes of the grid.
-    pub fn bytes(&self) -> u64 {
+    pub(crate) fn bytes(&self) -> u64 {
         ((self.depth.len() + self.distance.len()) * size_of::<f32>()) as u64
     }
 
     /// The nearest place to `p` with this clearance, as far as the field leads there; `None` if it does
     /// not lead to one.
-    pub fn pushed_out(&self, p: DVec3, clearance: f64) -> Option<DVec3> {
+    pub(crate) fn pushed_out(&self, p: DVec3, clearance: f64) -> Option<DVec3> {
         const STEPS: usize = 8;
         let h = 0.5 * self.voxel;
         let mut at = p;
@@ -156,24 +156,24 @@ impl OccupancyGrid {
     }
 
     /// Whether a point is inside occupied space, or outside of what is known, as far as voxels can tell.
-    pub fn is_inside(&self, p: DVec3) -> bool {
+    pub(crate) fn is_inside(&self, p: DVec3) -> bool {
         self.clearance(p) < 0.5 * self.voxel
     }
 
     /// Share of the voxels that are occupied space.
-    pub fn solid_share(&self) -> f64 {
+    pub(crate) fn solid_share(&self) -> f64 {
         self.depth.iter().filter(|d| **d >= SOLID).count() as f64 / self.depth.len().max(1) as f64
     }
 
     /// The box outside of which nothing is known.
-    pub fn bounds(&self) -> Bounds {
+    pub(crate) fn bounds(&self) -> Bounds {
         let [x, y, z] = self.size.map(|n| n as f64);
         Bounds { min: self.corner, max: self.corner + DVec3::new(x, y, z) * self.voxel }
     }
 
     /// Distance from a point to the nearest occupied space, scene units: 0 inside it, and outside of what is
     /// known, where nobody should fly.
-    pub fn clearance(&self, p: DVec3) -> f64 {
+    pub(crate) fn clearance(&self, p: DVec3) -> f64 {
         self.known_clearance(p).unwrap_or(0.0)
     }
 
@@ -214,7 +214,7 @@ impl OccupancyGrid {
     ///
     /// Steps are as long as the distance field allows, which changes by no more than the way that is
     /// gone: nothing thicker than a voxel can be stepped over.
-    pub fn free_share(&self, a: DVec3, b: DVec3, clearance: f64) -> f64 {
+    pub(crate) fn free_share(&self, a: DVec3, b: DVec3, clearance: f64) -> f64 {
         let length = a.distance(b);
         if !length.is_finite() {
             return 0.0;
@@ -244,13 +244,13 @@ impl OccupancyGrid {
     }
 
     /// Whether one can go straight from `a` to `b` with this clearance.
-    pub fn is_free(&self, a: DVec3, b: DVec3, clearance: f64) -> bool {
+    pub(crate) fn is_free(&self, a: DVec3, b: DVec3, clearance: f64) -> bool {
         self.free_share(a, b, clearance) >= 1.0
     }
 
     /// Share of the light that comes from `a` to `b`, 0 to 1. What lies within `skip` of `b` is left
     /// out: the surface that is looked at does not hide itself.
-    pub fn transmittance(&self, a: DVec3, b: DVec3, skip: f64) -> f64 {
+    pub(crate) fn transmittance(&self, a: DVec3, b: DVec3, skip: f64) -> f64 {
         let length = a.distance(b);
         let reach = length - skip;
         if !(reach > 0.0) {

@@ -23,18 +23,18 @@ impl Pose {
     }
 
     /// The pose of a key, its roll in it.
-    pub fn of_key(key: &PathKey) -> Self {
+    pub(crate) fn of_key(key: &PathKey) -> Self {
         Self { center: key.center, world_from_camera: key.rotation(), fov_y_rad: key.fov_y_rad }
     }
 
     /// A key here.
-    pub fn key(&self) -> PathKey {
+    pub(crate) fn key(&self) -> PathKey {
         PathKey::of_pose(self.center, self.world_from_camera, self.fov_y_rad)
     }
 
     /// At `center`, looking at `target` with `up` upwards. Straight up and down, and at itself, it
     /// looks as `otherwise` does, turned as little as needed.
-    pub fn looking_at(center: DVec3, target: DVec3, up: DVec3, fov_y_rad: f64, otherwise: &DMat3) -> Self {
+    pub(crate) fn looking_at(center: DVec3, target: DVec3, up: DVec3, fov_y_rad: f64, otherwise: &DMat3) -> Self {
         let Some(forward) = (target - center).try_normalize() else {
             return Self { center, world_from_camera: *otherwise, fov_y_rad };
         };
@@ -46,18 +46,18 @@ impl Pose {
     }
 
     /// The camera for a picture of this size.
-    pub fn camera(&self, width_px: u32, height_px: u32) -> Camera {
+    pub(crate) fn camera(&self, width_px: u32, height_px: u32) -> Camera {
         Camera::of_pose(self.center, self.world_from_camera, self.fov_y_rad, width_px.max(1), height_px.max(1))
     }
 
     /// Unit vector of the viewing direction.
-    pub fn forward(&self) -> DVec3 {
+    pub(crate) fn forward(&self) -> DVec3 {
         self.world_from_camera.z_axis
     }
 }
 
 /// The rotation as a quaternion; rounding errors of the matrix are removed.
-pub fn quaternion(m: &DMat3) -> DQuat {
+pub(crate) fn quaternion(m: &DMat3) -> DQuat {
     unit(DQuat::from_mat3(&nearest_rotation(m)), DQuat::IDENTITY)
 }
 
@@ -69,7 +69,7 @@ fn unit(q: DQuat, otherwise: DQuat) -> DQuat {
 
 /// Rotation vector (axis times angle, at most half a turn) that leads from `a` to `b` in the axes of
 /// `a`. Half a turn has two axes; it is the same one every time.
-pub fn between(a: DQuat, b: DQuat) -> DVec3 {
+pub(crate) fn between(a: DQuat, b: DQuat) -> DVec3 {
     let d = a.conjugate() * b;
     let d = if d.w < 0.0 { -d } else { d };
     let v = DVec3::new(d.x, d.y, d.z);
@@ -78,12 +78,12 @@ pub fn between(a: DQuat, b: DQuat) -> DVec3 {
 }
 
 /// `a` turned by a rotation vector in its own axes.
-pub fn turned(a: DQuat, by: DVec3) -> DQuat {
+pub(crate) fn turned(a: DQuat, by: DVec3) -> DQuat {
     unit(a * DQuat::from_scaled_axis(by), a)
 }
 
 /// Angle between two rotations, radians, 0 to pi.
-pub fn angle(a: &DMat3, b: &DMat3) -> f64 {
+pub(crate) fn angle(a: &DMat3, b: &DMat3) -> f64 {
     between(quaternion(a), quaternion(b)).length()
 }
 
@@ -91,7 +91,7 @@ pub fn angle(a: &DMat3, b: &DMat3) -> f64 {
 /// cubic Bezier curves of quaternions (Kim, Kim and Shin 1995) through all of them, at rest at both
 /// ends if wanted.
 #[derive(Clone, Debug)]
-pub struct RotationSpline {
+pub(crate) struct RotationSpline {
     times: Vec<f64>,
     at: Vec<DQuat>,
     /// Angular velocity at each, in its own axes.
@@ -100,7 +100,7 @@ pub struct RotationSpline {
 
 impl RotationSpline {
     /// Through `keys` (time, rotation); of keys at one time the last counts. Nothing for none.
-    pub fn new(keys: &[(f64, DMat3)], closed: bool) -> Option<Self> {
+    pub(crate) fn new(keys: &[(f64, DMat3)], closed: bool) -> Option<Self> {
         let mut times: Vec<f64> = Vec::with_capacity(keys.len());
         let mut at: Vec<DQuat> = Vec::with_capacity(keys.len());
         for (time, rotation) in keys.iter().filter(|(t, r)| t.is_finite() && r.is_finite()) {
@@ -135,7 +135,7 @@ impl RotationSpline {
     }
 
     /// The rotation at a time; before the first and after the last key, theirs.
-    pub fn at(&self, time: f64) -> DMat3 {
+    pub(crate) fn at(&self, time: f64) -> DMat3 {
         let n = self.at.len();
         let after = self.times.partition_point(|t| *t <= time);
         if after == 0 || n == 1 {

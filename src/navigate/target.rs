@@ -57,18 +57,18 @@ pub enum Side {
 
 impl Side {
     /// In words.
-    pub fn text(self) -> &'static str {
+    pub(crate) fn text(self) -> &'static str {
         self.into()
     }
 }
 
 /// What is wanted of a view.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wish {
+pub(crate) struct Wish {
     /// From which side.
-    pub side: Side,
+    pub(crate) side: Side,
     /// Distance as a multiple of the usual one; under 1 is nearer.
-    pub distance: f64,
+    pub(crate) distance: f64,
 }
 
 impl Default for Wish {
@@ -79,42 +79,42 @@ impl Default for Wish {
 
 /// What is to be seen.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Target {
+pub(crate) struct Target {
     /// Gaussians of it by number, rising.
-    pub members: Vec<usize>,
+    pub(crate) members: Vec<usize>,
     /// The middle of what it is a part of, if it is one.
-    pub whole: Option<DVec3>,
+    pub(crate) whole: Option<DVec3>,
 }
 
 /// A view of a target.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
+pub(crate) struct View {
     /// From where.
-    pub pose: Pose,
+    pub(crate) pose: Pose,
     /// Share of its picture alone that is still seen in the scene, 0 to 1.
-    pub visible: f64,
+    pub(crate) visible: f64,
     /// Share of the picture that it covers, 0 to 1.
-    pub covers: f64,
+    pub(crate) covers: f64,
     /// Distance of the eye to occupied space, scene units.
-    pub clearance: f64,
+    pub(crate) clearance: f64,
     /// How good it is, all things taken together; comparable within one search.
-    pub score: f64,
+    pub(crate) score: f64,
 }
 
 /// What a search for views needs to know.
-pub struct Search<'a> {
+pub(crate) struct Search<'a> {
     /// The Gaussians.
-    pub cloud: &'a GaussianCloud,
+    pub(crate) cloud: &'a GaussianCloud,
     /// How they are drawn.
-    pub settings: &'a RenderSettings,
+    pub(crate) settings: &'a RenderSettings,
     /// Which space is occupied.
-    pub occupancy: &'a OccupancyGrid,
+    pub(crate) occupancy: &'a OccupancyGrid,
     /// The photos' cameras.
-    pub cameras: &'a [Camera],
+    pub(crate) cameras: &'a [Camera],
     /// Which way is up.
-    pub up: DVec3,
+    pub(crate) up: DVec3,
     /// Distance to occupied space that the eye keeps.
-    pub clearance: f64,
+    pub(crate) clearance: f64,
 }
 
 impl Search<'_> {
@@ -123,7 +123,7 @@ impl Search<'_> {
     ///
     /// # Errors
     /// If a view cannot be drawn.
-    pub fn views(&self, target: &Target, wish: Wish, eye: &Pose, aspect: f64) -> Result<Vec<View>, RenderError> {
+    pub(crate) fn views(&self, target: &Target, wish: Wish, eye: &Pose, aspect: f64) -> Result<Vec<View>, RenderError> {
         let place = |i: &usize| self.cloud.world_position(*i);
         let inside = target.members.iter().filter(|i| **i < self.cloud.len());
         let Some(bounds) = Bounds::robust(inside.clone().map(place)) else { return Ok(Vec::new()) };

@@ -5,12 +5,12 @@ use glam::{DMat3, DVec2, DVec3};
 use crate::scene::{Camera, GaussianCloud};
 
 /// A wall of flat, opaque Gaussians in the plane of this z, 4 x 4 units around the axis.
-pub fn cloud_of_wall(z: f32) -> GaussianCloud {
+pub(crate) fn cloud_of_wall(z: f32) -> GaussianCloud {
     wall_with_hole(z, 0.0)
 }
 
 /// The same with a round hole of this radius in its middle.
-pub fn wall_with_hole(z: f32, radius: f32) -> GaussianCloud {
+pub(crate) fn wall_with_hole(z: f32, radius: f32) -> GaussianCloud {
     let mut cloud = GaussianCloud::default();
     for i in -40..=40 {
         for j in -40..=40 {
@@ -29,7 +29,7 @@ pub fn wall_with_hole(z: f32, radius: f32) -> GaussianCloud {
 }
 
 /// Both clouds.
-pub fn joined(a: &GaussianCloud, b: &GaussianCloud) -> GaussianCloud {
+pub(crate) fn joined(a: &GaussianCloud, b: &GaussianCloud) -> GaussianCloud {
     let mut all = a.clone();
     all.positions.extend_from_slice(&b.positions);
     all.log_scales.extend_from_slice(&b.log_scales);
@@ -40,7 +40,7 @@ pub fn joined(a: &GaussianCloud, b: &GaussianCloud) -> GaussianCloud {
 }
 
 /// A camera that looks along +z.
-pub fn camera_at(center: DVec3) -> Camera {
+pub(crate) fn camera_at(center: DVec3) -> Camera {
     Camera {
         width_px: 64,
         height_px: 48,
@@ -52,7 +52,7 @@ pub fn camera_at(center: DVec3) -> Camera {
 }
 
 /// Sixteen cameras in a circle.
-pub fn ring_of_cameras() -> Vec<Camera> {
+pub(crate) fn ring_of_cameras() -> Vec<Camera> {
     let place = |i: i32| {
         let angle = f64::from(i) / 16.0 * std::f64::consts::TAU;
         camera_at(DVec3::new(1.3 * angle.cos(), 0.2, 1.3 * angle.sin()))
@@ -61,7 +61,7 @@ pub fn ring_of_cameras() -> Vec<Camera> {
 }
 
 /// The same, each turned as far as it is along the circle.
-pub fn turning_ring() -> Vec<Camera> {
+pub(crate) fn turning_ring() -> Vec<Camera> {
     let turned = |(i, c): (i32, Camera)| {
         let angle = f64::from(i) / 16.0 * std::f64::consts::TAU;
         Camera { world_from_camera: DMat3::from_rotation_y(angle), ..c }

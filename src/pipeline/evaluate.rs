@@ -8,7 +8,7 @@ use crate::render::{Features, RenderError, RenderSettings, Renderer};
 use crate::scene::GaussianCloud;
 
 /// PSNR and SSIM of each view. `step` and `secs` are copied into the result.
-pub fn evaluate(
+pub(crate) fn evaluate(
     cloud: &GaussianCloud,
     views: &[TrainView],
     settings: &RenderSettings,

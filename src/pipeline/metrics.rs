@@ -7,13 +7,13 @@ use crate::render::{Frame, ssim};
 use crate::scene::PhotoPixels;
 
 /// The color planes of a photo, 0 to 1.
-pub fn planes<R: Real>(photo: &PhotoPixels) -> [Vec<R>; 3] {
+pub(crate) fn planes<R: Real>(photo: &PhotoPixels) -> [Vec<R>; 3] {
     std::array::from_fn(|c| photo.rgb.iter().map(|p| R::of(f64::from(p[c]) / 255.0)).collect())
 }
 
 /// PSNR in dB of a picture of (width, height) px, clamped to 0..1, against a photo; infinite for an exact match. Pixels
 /// that the photo does not cover do not count; of a photo of another size the nearest pixels are compared.
-pub fn psnr<R: Real>(color: &[Vec<R>; 3], (width, height): (usize, usize), photo: &PhotoPixels) -> f64 {
+pub(crate) fn psnr<R: Real>(color: &[Vec<R>; 3], (width, height): (usize, usize), photo: &PhotoPixels) -> f64 {
     let (w, h) = (photo.width_px as usize, photo.height_px as usize);
     let (mut squared, mut covered) = (0.0, 0_usize);
     for y in 0..height {
@@ -33,7 +33,7 @@ pub fn psnr<R: Real>(color: &[Vec<R>; 3], (width, height): (usize, usize), photo
 
 /// PSNR and SSIM of a rendered frame, clamped to 0..1, against a photo of the same size. Pixels
 /// that the photo does not cover count as equal in SSIM and do not count in PSNR. Computed in f64.
-pub fn score(frame: &Frame<f32>, photo: &PhotoPixels) -> (f64, f64) {
+pub(crate) fn score(frame: &Frame<f32>, photo: &PhotoPixels) -> (f64, f64) {
     let target = planes::<f64>(photo);
     let mut rendered: [Vec<f64>; 3] =
         std::array::from_fn(|c| frame.color[c].iter().map(|v| f64::from(v.clamp(0.0, 1.0))).collect());

@@ -43,7 +43,7 @@ pub struct Interrupted;
 
 impl Interrupted {
     /// Whether `error`, or what caused it, is that the observer asked to stop.
-    pub fn is_cause_of(error: &(dyn Error + 'static)) -> bool {
+    pub(crate) fn is_cause_of(error: &(dyn Error + 'static)) -> bool {
         error.is::<Self>() || error.source().is_some_and(Self::is_cause_of)
     }
 }
@@ -52,10 +52,10 @@ impl Interrupted {
 const RATE_SECS: f64 = 3.0;
 
 /// Reports the progress of one stage, and asks whether to go on. Pauses do not count as time.
-pub struct Ticker {
+pub(crate) struct Ticker {
     stage: String,
     /// Units in all.
-    pub total: u64,
+    pub(crate) total: u64,
     start: Instant,
     /// Seconds of earlier runs.
     before_secs: f64,
@@ -65,18 +65,18 @@ pub struct Ticker {
 
 impl Ticker {
     /// Starts the clock of `stage`, which has `total` units.
-    pub fn new(stage: impl Into<String>, total: usize) -> Self {
+    pub(crate) fn new(stage: impl Into<String>, total: usize) -> Self {
         Self::resumed(stage, total as u64, 0, 0.0)
     }
 
     /// The same where earlier runs did `done` units in `secs` seconds.
-    pub fn resumed(stage: impl Into<String>, total: u64, done: u64, secs: f64) -> Self {
+    pub(crate) fn resumed(stage: impl Into<String>, total: u64, done: u64, secs: f64) -> Self {
         let marks = VecDeque::from([(done, secs)]);
         Self { stage: stage.into(), total, start: Instant::now(), before_secs: secs, marks }
     }
 
     /// Goes on with `stage`: its clock starts if it is another than before.
-    pub fn enter(&mut self, stage: String, total: u64) {
+    pub(crate) fn enter(&mut self, stage: String, total: u64) {
         if self.stage != stage {
             *self = Self::new(stage, 0);
         }
@@ -87,7 +87,7 @@ impl Ticker {
     ///
     /// # Errors
     /// If the work should stop.
-    pub fn tick(&mut self, done: usize, observer: &mut dyn Observer) -> Result<(), Interrupted> {
+    pub(crate) fn tick(&mut self, done: usize, observer: &mut dyn Observer) -> Result<(), Interrupted> {
         self.report(done as u64, observer);
         self.proceed(observer)
     }
@@ -96,7 +96,7 @@ impl Ticker {
     ///
     /// # Errors
     /// If the work should stop.
-    pub fn proceed(&mut self, observer: &dyn Observer) -> Result<(), Interrupted> {
+    pub(crate) fn proceed(&mut self, observer: &dyn Observer) -> Result<(), Interrupted> {
         let before = Instant::now();
         let result = observer.proceed();
         self.start += before.elapsed();
@@ -104,7 +104,7 @@ impl Ticker {
     }
 
     /// Reports that `done` units are done.
-    pub fn report(&mut self, done: u64, observer: &mut dyn Observer) {
+    pub(crate) fn report(&mut self, done: u64, observer: &mut dyn Observer) {
         let elapsed_secs = self.before_secs + self.start.elapsed().as_secs_f64();
         let rate = self.rate(done, elapsed_secs);
         let (stage, total) = (self.stage.clone(), self.total);
@@ -123,7 +123,7 @@ impl Ticker {
 
 impl Progress {
     /// Seconds to go at the present rate; `None` if not known.
-    pub fn eta_secs(&self) -> Option<f64> {
+    pub(crate) fn eta_secs(&self) -> Option<f64> {
         (self.rate > 0.0).then(|| self.total.saturating_sub(self.done) as f64 / self.rate)
     }
 }

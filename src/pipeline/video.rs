@@ -15,13 +15,13 @@ const MARK: u32 = 3;
 
 /// Identities that are marked in every picture.
 #[derive(Clone, Copy)]
-pub struct Marked<'a> {
+pub(crate) struct Marked<'a> {
     /// Objects and parts.
-    pub map: &'a SemanticMap,
+    pub(crate) map: &'a SemanticMap,
     /// Which of them.
-    pub ids: &'a [IdentityId],
+    pub(crate) ids: &'a [IdentityId],
     /// With which color.
-    pub color: [u8; 3],
+    pub(crate) color: [u8; 3],
 }
 
 /// Why a video could not be made.
@@ -45,7 +45,7 @@ pub enum VideoError {
 ///
 /// # Errors
 /// If a picture cannot be drawn or written, or the observer asks to stop.
-pub fn write(
+pub(crate) fn write(
     cloud: &Arc<GaussianCloud>,
     draw: &RenderSettings,
     cameras: &[Camera],

@@ -12,11 +12,11 @@ pub mod cpu;
 pub mod gpu;
 mod renderer;
 
-pub use cpu::adam::{AdamStep, Rates};
-pub use cpu::contributions::ContributionSink;
-pub use cpu::ssim::{LossParts, PhotoLoss, ssim};
-pub use cpu::{RenderStats, normals, validate};
-pub use gpu::timing::StageTimes;
+pub(crate) use cpu::adam::{AdamStep, Rates};
+pub(crate) use cpu::contributions::ContributionSink;
+pub(crate) use cpu::ssim::{LossParts, PhotoLoss, ssim};
+pub(crate) use cpu::{RenderStats, normals, validate};
+pub(crate) use gpu::timing::StageTimes;
 pub use gpu::trainer::{StepLoss, Trainer as DeviceTrainer, TrainerSettings};
 pub use gpu::{Device, DevicePhoto, GpuError, real_gpu};
 pub use renderer::{BackendChoice, Cost, DifferentiableRenderer, DrawError, Renderer, instead_of_gpu};
@@ -42,10 +42,10 @@ pub const COLOR_MAX: f64 = 1e9;
 pub const BLUR_PX2: f64 = 0.3;
 /// Tangents of the viewing angle are clamped to this multiple of the picture's half extent before
 /// the projection is linearized, so that splats far outside do not blow up.
-pub const TANGENT_CLAMP: f64 = 1.3;
+pub(crate) const TANGENT_CLAMP: f64 = 1.3;
 
 /// Most channels that one pass composites, color and depth included.
-pub const MAX_CHANNELS: usize = 32;
+pub(crate) const MAX_CHANNELS: usize = 32;
 
 /// Why a picture could not be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -76,9 +76,9 @@ pub enum RenderError {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cutoffs {
     /// Smallest alpha that counts, above 0.
-    pub alpha: f64,
+    pub(crate) alpha: f64,
     /// A pixel is closed before its transmittance falls under this.
-    pub transmittance: f64,
+    pub(crate) transmittance: f64,
 }
 
 impl Default for Cutoffs {
@@ -178,7 +178,7 @@ impl<R: Real> Frame<R> {
 
     /// Expected depth `sum(w z) / alpha` in scene units, 0 where less than half of the light comes
     /// from the scene; empty unless depth was asked for.
-    pub fn expected_depth(&self) -> Vec<R> {
+    pub(crate) fn expected_depth(&self) -> Vec<R> {
         let one = |(d, a): (&R, &R)| if *a >= R::HALF { *d / *a } else { R::ZERO };
         self.depth.iter().zip(&self.alpha).map(one).collect()
     }
@@ -238,7 +238,7 @@ pub struct DensityStats {
 
 impl DensityStats {
     /// Nothing seen of `n` Gaussians.
-    pub fn new(n: usize) -> Self {
+    pub(crate) fn new(n: usize) -> Self {
         Self { gradient: vec![0.0; n], seen: vec![0; n], radius: vec![0.0; n] }
     }
 }

@@ -27,7 +27,7 @@ impl BackendChoice {
     ///
     /// # Errors
     /// If a GPU is demanded and there is none.
-    pub fn gpu(self, told: impl FnOnce(String)) -> Result<Option<Device>, GpuError> {
+    pub(crate) fn gpu(self, told: impl FnOnce(String)) -> Result<Option<Device>, GpuError> {
         match self {
             Self::Cpu => Ok(None),
             Self::Gpu => Device::shared().map(Some),
@@ -64,9 +64,9 @@ const STAGES: [&str; 4] = ["project", "sort", "bin", "blend"];
 #[derive(Clone, Copy, Debug)]
 pub struct Cost {
     /// For every Gaussian, whatever the picture's size.
-    pub fixed_secs: f64,
+    pub(crate) fixed_secs: f64,
     /// For the pixels.
-    pub pixels_secs: f64,
+    pub(crate) pixels_secs: f64,
 }
 
 /// A renderer with its buffers, to be kept from frame to frame: a GPU draws the pictures where one was chosen,
@@ -92,7 +92,7 @@ struct Gpu {
 
 impl Renderer {
     /// Name of the CPU among the names of what draws.
-    pub const CPU: &str = "CPU";
+    pub(crate) const CPU: &str = "CPU";
 
     /// The CPU.
     pub fn new() -> Self {
@@ -127,7 +127,7 @@ impl Renderer {
     }
 
     /// Name of what draws the pictures, for display.
-    pub fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         self.gpu.as_ref().map_or(Self::CPU, |gpu| &gpu.name)
     }
 
@@ -173,7 +173,7 @@ impl Renderer {
     ///
     /// # Errors
     /// If the camera is not usable.
-    pub fn contributions<S: ContributionSink<f32>>(
+    pub(crate) fn contributions<S: ContributionSink<f32>>(
         &mut self,
         cloud: &GaussianCloud,
         camera: &Camera,
@@ -184,7 +184,7 @@ impl Renderer {
     }
 
     /// What the last frame of [`Self::render`] cost.
-    pub fn stats(&self) -> RenderStats {
+    pub(crate) fn stats(&self) -> RenderStats {
         self.cpu.stats()
     }
 
@@ -229,7 +229,7 @@ impl Renderer {
     }
 
     /// What the last picture cost, `secs` in all.
-    pub fn cost(&self, secs: f64) -> Cost {
+    pub(crate) fn cost(&self, secs: f64) -> Cost {
         if self.is_gpu() {
             return Cost { fixed_secs: 0.0, pixels_secs: secs };
         }

@@ -13,7 +13,7 @@ pub struct Bounds {
 
 impl Bounds {
     /// The box of the finite points, or `None` if there are none.
-    pub fn of(points: impl IntoIterator<Item = DVec3>) -> Option<Self> {
+    pub(crate) fn of(points: impl IntoIterator<Item = DVec3>) -> Option<Self> {
         let mut finite = points.into_iter().filter(|p| p.is_finite());
         let first = finite.next()?;
         let start = Self { min: first, max: first };
@@ -44,7 +44,7 @@ impl Bounds {
     }
 
     /// Edge lengths.
-    pub fn size(&self) -> DVec3 {
+    pub(crate) fn size(&self) -> DVec3 {
         self.max - self.min
     }
 

@@ -67,20 +67,20 @@ pub enum CameraError {
 
 impl Camera {
     /// Largest side of a picture that any part of the program accepts.
-    pub const MAX_SIDE_PX: u32 = 16_384;
+    pub(crate) const MAX_SIDE_PX: u32 = 16_384;
 
     /// Focal lengths that are believed on reading, in sides of the picture along the same axis: from a
     /// view that is a tenth of a degree short of half a turn to one of a few seconds of arc.
-    pub const FOCAL_SIDES: RangeInclusive<f64> = 1e-3..=1e5;
+    pub(crate) const FOCAL_SIDES: RangeInclusive<f64> = 1e-3..=1e5;
     /// How many picture sides the principal point may be away on reading: pictures are cut out of larger ones.
-    pub const PRINCIPAL_SIDES: f64 = 1e4;
+    pub(crate) const PRINCIPAL_SIDES: f64 = 1e4;
     /// Farthest from the origin that a camera or a point may be on reading, scene units.
-    pub const FARTHEST: f64 = 1e12;
+    pub(crate) const FARTHEST: f64 = 1e12;
 
     /// Whether a camera that a file describes can be one: all of [`Self::validate`], and no number
     /// beyond what lenses and places are. Drawing takes any camera that is valid; what is read is
     /// refused here, because a training would find out only when it is over.
-    pub fn believe(&self) -> Result<(), CameraError> {
+    pub(crate) fn believe(&self) -> Result<(), CameraError> {
         self.validate()?;
         let sides = [
             (self.width_px, self.focal_px.x, self.principal_px.x),
@@ -144,7 +144,13 @@ impl Camera {
     }
 
     /// The camera with this pose and vertical field of view: square pixels, principal point in the middle.
-    pub fn of_pose(center: DVec3, world_from_camera: DMat3, fov_y_rad: f64, width_px: u32, height_px: u32) -> Self {
+    pub(crate) fn of_pose(
+        center: DVec3,
+        world_from_camera: DMat3,
+        fov_y_rad: f64,
+        width_px: u32,
+        height_px: u32,
+    ) -> Self {
         let size = DVec2::new(f64::from(width_px), f64::from(height_px));
         let focal = 0.5 * size.y / (0.5 * fov_y_rad).tan();
         let (focal_px, principal_px) = (DVec2::splat(focal), size * 0.5);
@@ -158,14 +164,14 @@ impl Camera {
 
     /// Upwards in the world for most of these cameras: against the mean of their down axes. `None` where
     /// those cancel.
-    pub fn up_of<'a>(cameras: impl Iterator<Item = &'a Self>) -> Option<DVec3> {
+    pub(crate) fn up_of<'a>(cameras: impl Iterator<Item = &'a Self>) -> Option<DVec3> {
         let (sum, count) = cameras.fold((DVec3::ZERO, 0), |(sum, n), c| (sum - c.world_from_camera.y_axis, n + 1));
         if sum.length() > 0.1 * f64::from(count) { sum.try_normalize() } else { None }
     }
 
     /// The point nearest to the axes of these cameras: what they look at. `None` where the axes are
     /// parallel.
-    pub fn focus_of<'a>(cameras: impl Iterator<Item = &'a Self>) -> Option<DVec3> {
+    pub(crate) fn focus_of<'a>(cameras: impl Iterator<Item = &'a Self>) -> Option<DVec3> {
         let (mut a, mut b, mut n) = (DMat3::ZERO, DVec3::ZERO, 0.0);
         for c in cameras {
             let d = c.forward();
@@ -194,7 +200,7 @@ impl Camera {
 
     /// The camera with a picture of this size. The vertical field of view stays; where the shape differs, the
     /// picture shows more or less at the sides, never anything stretched.
-    pub fn with_size(&self, width_px: u32, height_px: u32) -> Self {
+    pub(crate) fn with_size(&self, width_px: u32, height_px: u32) -> Self {
         let scale = f64::from(height_px) / f64::from(self.height_px);
         let shift = f64::from(width_px) * 0.5 - f64::from(self.width_px) * 0.5 * scale;
         Self {
@@ -207,7 +213,7 @@ impl Camera {
     }
 
     /// The same camera with a picture `factor` times smaller.
-    pub fn reduced(&self, factor: u32) -> Self {
+    pub(crate) fn reduced(&self, factor: u32) -> Self {
         let side = |s: u32| (s / factor.max(1)).max(1);
         self.resized(side(self.width_px), side(self.height_px))
     }
@@ -224,7 +230,7 @@ impl Camera {
     }
 
     /// Unit vector of the viewing direction in the world.
-    pub fn forward(&self) -> DVec3 {
+    pub(crate) fn forward(&self) -> DVec3 {
         self.world_from_camera.z_axis
     }
 

@@ -11,32 +11,32 @@ use crate::math::rotation::rotation_error;
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraPath {
     /// The keys; at most [`CameraPath::MAX_KEYS`].
-    pub keys: Vec<PathKey>,
+    pub(crate) keys: Vec<PathKey>,
     /// Whether the flight goes on from the last key to the first.
-    pub closed: bool,
+    pub(crate) closed: bool,
     /// Frames per second of a video of the flight.
-    pub fps: f64,
+    pub(crate) fps: f64,
     /// Seconds that the whole flight takes, waits included.
-    pub seconds: f64,
+    pub(crate) seconds: f64,
 }
 
 /// One camera that a flight passes.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PathKey {
+pub(crate) struct PathKey {
     /// Camera center in the world, in scene units.
-    pub center: DVec3,
+    pub(crate) center: DVec3,
     /// Rotation of the pose before the roll: columns are the camera's right, down and forward axes in the world.
-    pub world_from_camera: DMat3,
+    pub(crate) world_from_camera: DMat3,
     /// Vertical field of view in radians.
-    pub fov_y_rad: f64,
+    pub(crate) fov_y_rad: f64,
     /// Turn about the viewing direction on top of the pose, in radians; positive lowers the camera's right side.
-    pub roll_rad: f64,
+    pub(crate) roll_rad: f64,
     /// Seconds that the camera waits here.
-    pub dwell_secs: f64,
+    pub(crate) dwell_secs: f64,
     /// When the camera arrives, in seconds from the start, where that is fixed.
-    pub time_secs: Option<f64>,
+    pub(crate) time_secs: Option<f64>,
     /// What the user calls this key.
-    pub name: Option<String>,
+    pub(crate) name: Option<String>,
 }
 
 /// What is wrong with a camera path.
@@ -74,11 +74,11 @@ fn key_name(key: usize, name: Option<&str>) -> String {
 
 impl CameraPath {
     /// Most keys of a path.
-    pub const MAX_KEYS: usize = 100_000;
+    pub(crate) const MAX_KEYS: usize = 100_000;
     /// Most frames per second.
-    pub const MAX_FPS: f64 = 1000.0;
+    pub(crate) const MAX_FPS: f64 = 1000.0;
     /// Longest flight in seconds (a day).
-    pub const MAX_SECONDS: f64 = 86_400.0;
+    pub(crate) const MAX_SECONDS: f64 = 86_400.0;
 
     /// Checks every field; the error names the key and the field. A path without keys is valid.
     pub fn validate(&self) -> Result<(), PathError> {
@@ -109,22 +109,22 @@ impl CameraPath {
 
 impl PathKey {
     /// A key at a camera: its pose and vertical field of view, no roll, no wait.
-    pub fn of_camera(camera: &Camera) -> Self {
+    pub(crate) fn of_camera(camera: &Camera) -> Self {
         Self::of_pose(camera.center, camera.world_from_camera, camera.fov_y_rad())
     }
 
     /// A key at a pose with this vertical field of view: no roll, no wait, no fixed time.
-    pub fn of_pose(center: DVec3, world_from_camera: DMat3, fov_y_rad: f64) -> Self {
+    pub(crate) fn of_pose(center: DVec3, world_from_camera: DMat3, fov_y_rad: f64) -> Self {
         Self { center, world_from_camera, fov_y_rad, roll_rad: 0.0, dwell_secs: 0.0, time_secs: None, name: None }
     }
 
     /// The rotation of the pose with the roll in it: columns right, down, forward in the world.
-    pub fn rotation(&self) -> DMat3 {
+    pub(crate) fn rotation(&self) -> DMat3 {
         self.world_from_camera * DMat3::from_rotation_z(self.roll_rad)
     }
 
     /// The camera that takes a picture of this size here: square pixels, principal point in the middle.
-    pub fn camera(&self, width_px: u32, height_px: u32) -> Camera {
+    pub(crate) fn camera(&self, width_px: u32, height_px: u32) -> Camera {
         Camera::of_pose(self.center, self.rotation(), self.fov_y_rad, width_px, height_px)
     }
 

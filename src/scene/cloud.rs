@@ -40,11 +40,11 @@ pub struct ExtraProperty {
 #[derive(Clone, Copy, Debug)]
 pub struct Gaussian<'a, R = f32> {
     /// Center relative to the cloud's origin.
-    pub position: [R; 3],
+    pub(crate) position: [R; 3],
     /// Logarithms of the standard deviations.
-    pub log_scale: [R; 3],
+    pub(crate) log_scale: [R; 3],
     /// Rotation `[w, x, y, z]`.
-    pub quaternion: [R; 4],
+    pub(crate) quaternion: [R; 4],
     /// Opacity before the sigmoid.
     pub opacity_logit: R,
     /// Its coefficients.
@@ -100,7 +100,7 @@ impl<R: Real> GaussianCloud<R> {
     }
 
     /// Bytes of all values.
-    pub fn bytes(&self) -> u64 {
+    pub(crate) fn bytes(&self) -> u64 {
         let own = (self.len() * 11 + self.sh.len() * 3) * size_of::<R>();
         let extras: usize = self.extras.iter().map(|e| e.values.len() * size_of::<f32>()).sum();
         (own + extras) as u64
@@ -157,7 +157,7 @@ impl<R: Real> GaussianCloud<R> {
     }
 
     /// Adds the Gaussians of a cloud with the same origin, degree and extra properties.
-    pub fn append(&mut self, mut other: Self) {
+    pub(crate) fn append(&mut self, mut other: Self) {
         self.positions.append(&mut other.positions);
         self.log_scales.append(&mut other.log_scales);
         self.quaternions.append(&mut other.quaternions);
@@ -169,7 +169,7 @@ impl<R: Real> GaussianCloud<R> {
     }
 
     /// The same cloud with room for `n` Gaussians in all, so that more can be added in place.
-    pub fn with_room(mut self, n: usize) -> Self {
+    pub(crate) fn with_room(mut self, n: usize) -> Self {
         let more = n.saturating_sub(self.len());
         self.positions.reserve_exact(more);
         self.log_scales.reserve_exact(more);
@@ -181,7 +181,7 @@ impl<R: Real> GaussianCloud<R> {
     }
 
     /// The same cloud without the bands of the spherical harmonics above `degree`, in its own memory.
-    pub fn up_to_degree(mut self, degree: u8) -> Self {
+    pub(crate) fn up_to_degree(mut self, degree: u8) -> Self {
         let (from, to) = (self.sh_stride(), sh::coefficients(degree.min(self.sh_degree)));
         if to < from {
             for i in 0..self.len() {

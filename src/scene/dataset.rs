@@ -12,7 +12,7 @@ pub struct Dataset {
     /// Short name for titles: the folder's.
     pub name: String,
     /// The folder.
-    pub root: PathBuf,
+    pub(crate) root: PathBuf,
     /// Which layout it was read from, for display: "COLMAP binary", "transforms.json", ...
     pub format: String,
     /// The photos that exist, sorted by name.
@@ -20,9 +20,9 @@ pub struct Dataset {
     /// Sparse points, possibly none.
     pub points: Vec<SparsePoint>,
     /// The color behind everything (Blender's renders are composited over it); `None` = unknown.
-    pub background: Option<[f32; 3]>,
+    pub(crate) background: Option<[f32; 3]>,
     /// Length of a scene unit in meters, if that is known; photos alone do not tell.
-    pub metres_per_unit: Option<f64>,
+    pub(crate) metres_per_unit: Option<f64>,
     /// Things the user should know: photos that are listed but missing, and so on.
     pub warnings: Vec<String>,
 }
@@ -33,14 +33,14 @@ pub struct SparsePoint {
     /// World position, scene units.
     pub position: DVec3,
     /// sRGB color.
-    pub rgb: [u8; 3],
+    pub(crate) rgb: [u8; 3],
 }
 
 impl Dataset {
     /// Indices of the photos to train on and of those held out. Photos that the dataset marks as
     /// test are held out; without such marks it is every `every`-th of the sorted list, starting
     /// with the first (the convention of the 3DGS literature). `every == 0` holds none out.
-    pub fn split(&self, every: usize) -> (Vec<usize>, Vec<usize>) {
+    pub(crate) fn split(&self, every: usize) -> (Vec<usize>, Vec<usize>) {
         let every = super::plan::holdout(self.photos.len(), every);
         let marked = self.photos.iter().any(|p| p.test_split);
         (0..self.photos.len()).partition(|&i| {
@@ -56,7 +56,7 @@ impl Dataset {
 
     /// Mean camera center, and 1.1 times the largest distance from it: the `extent` that
     /// position learning rates and densification thresholds scale with (3DGS `getNerfppNorm`).
-    pub fn camera_extent(&self) -> (DVec3, f64) {
+    pub(crate) fn camera_extent(&self) -> (DVec3, f64) {
         let n = self.photos.len().max(1) as f64;
         let mean = self.photos.iter().map(|p| p.camera.center).sum::<DVec3>() / n;
         let far = self.photos.iter().map(|p| p.camera.center.distance(mean)).fold(0.0, f64::max);
@@ -64,13 +64,13 @@ impl Dataset {
     }
 
     /// Upwards in the world: against the mean of the cameras' down axes, or `+z` if they cancel.
-    pub fn up(&self) -> DVec3 {
+    pub(crate) fn up(&self) -> DVec3 {
         Camera::up_of(self.photos.iter().map(|p| &p.camera)).unwrap_or(DVec3::Z)
     }
 
     /// The point nearest to all viewing axes: what the photos look at. Falls back to the mean of
     /// the sparse points where the axes are parallel.
-    pub fn focus(&self) -> DVec3 {
+    pub(crate) fn focus(&self) -> DVec3 {
         if let Some(focus) = Camera::focus_of(self.photos.iter().map(|p| &p.camera)) {
             return focus;
         }

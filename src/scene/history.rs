@@ -23,13 +23,13 @@ pub struct StepMetrics {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ViewScore {
     /// The photo's name.
-    pub name: String,
+    pub(crate) name: String,
     /// PSNR in dB.
     #[serde(with = "or_null")]
-    pub psnr: f64,
+    pub(crate) psnr: f64,
     /// SSIM.
     #[serde(with = "or_null")]
-    pub ssim: f64,
+    pub(crate) ssim: f64,
 }
 
 /// Quality on the held-out photos.
@@ -71,7 +71,7 @@ mod or_null {
         Negative,
     }
 
-    pub fn serialize<S: Serializer>(v: &f64, s: S) -> Result<S::Ok, S::Error> {
+    pub(crate) fn serialize<S: Serializer>(v: &f64, s: S) -> Result<S::Ok, S::Error> {
         match *v {
             f64::INFINITY => s.serialize_str("inf"),
             f64::NEG_INFINITY => s.serialize_str("-inf"),
@@ -80,7 +80,7 @@ mod or_null {
         }
     }
 
-    pub fn deserialize<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
         Ok(match Option::<Value>::deserialize(d)? {
             None => f64::NAN,
             Some(Value::Number(v)) => v,

@@ -20,7 +20,7 @@ pub struct HomeView {
     /// Upwards in the world, unit length.
     pub up: DVec3,
     /// A camera to start from, where the scene has one.
-    pub camera: Option<Camera>,
+    pub(crate) camera: Option<Camera>,
 }
 
 impl Default for HomeView {
@@ -33,7 +33,7 @@ impl HomeView {
     /// Of a scene with photos from these cameras and these Gaussians. Photos say where it is: around the
     /// point that they look at, seen as the first shows it. A bare splat is framed as a whole, with `-y`
     /// upwards as in the files that 3DGS writes.
-    pub fn new(cameras: &[Camera], cloud: Option<&GaussianCloud>) -> Self {
+    pub(crate) fn new(cameras: &[Camera], cloud: Option<&GaussianCloud>) -> Self {
         let whole = || cloud.and_then(|c| Bounds::robust((0..c.len()).map(|i| c.world_position(i))));
         let Some(first) = cameras.first() else {
             return Self { up: DVec3::NEG_Y, bounds: whole().unwrap_or(Self::default().bounds), camera: None };
@@ -58,7 +58,7 @@ impl HomeView {
 
     /// A camera that shows all of `bounds` from obliquely above, from where a splat's front usually is: x
     /// right, z away.
-    pub fn overview(bounds: &Bounds, up: DVec3, [width_px, height_px]: [u32; 2]) -> Camera {
+    pub(crate) fn overview(bounds: &Bounds, up: DVec3, [width_px, height_px]: [u32; 2]) -> Camera {
         let front = DVec3::NEG_Z.reject_from(up).try_normalize().unwrap_or_else(|| up.any_orthonormal_vector());
         let away = (front + up * ABOVE).normalize_or(front);
         let eye = bounds.center() + away * Self::distance(bounds, FOV_Y_RAD);
@@ -67,7 +67,7 @@ impl HomeView {
     }
 
     /// How far from their middle `bounds` fill the picture of a camera with this vertical field of view.
-    pub fn distance(bounds: &Bounds, fov_y_rad: f64) -> f64 {
+    pub(crate) fn distance(bounds: &Bounds, fov_y_rad: f64) -> f64 {
         MARGIN * bounds.radius().max(1e-6) / (0.5 * fov_y_rad).sin()
     }
 }

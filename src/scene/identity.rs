@@ -31,7 +31,7 @@ pub enum LevelFilter {
 
 impl LevelFilter {
     /// Whether an identity of `level` is asked for.
-    pub fn accepts(self, level: Level) -> bool {
+    pub(crate) fn accepts(self, level: Level) -> bool {
         match self {
             Self::Auto => true,
             Self::Object => level == Level::Object,
@@ -81,7 +81,7 @@ impl Identities {
     }
 
     /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.list.is_empty()
     }
 
@@ -101,7 +101,7 @@ impl Identities {
     }
 
     /// Gives an identity another first name, bounded by [`text::name`].
-    pub fn rename(&mut self, id: IdentityId, name: &str) {
+    pub(crate) fn rename(&mut self, id: IdentityId, name: &str) {
         if let Some(identity) = self.get_mut(id) {
             let name = text::name(name);
             identity.names.retain(|n| *n != name);
@@ -128,12 +128,12 @@ impl Identities {
     }
 
     /// The object that an identity is, or is a piece of.
-    pub fn object_of(&self, id: IdentityId) -> IdentityId {
+    pub(crate) fn object_of(&self, id: IdentityId) -> IdentityId {
         self.line(id).last().unwrap_or(NOBODY)
     }
 
     /// For each number from 0, whether it is `id` or a piece of it.
-    pub fn within(&self, id: IdentityId) -> Vec<bool> {
+    pub(crate) fn within(&self, id: IdentityId) -> Vec<bool> {
         let mut inside = vec![false; self.list.len() + 1];
         for (i, identity) in self.iter() {
             inside[i as usize] = i == id || inside[identity.parent as usize];
@@ -143,7 +143,7 @@ impl Identities {
 
     /// The codes of an identity's object and of itself as a part. An object that is no part, and
     /// nobody, have the background's code in their place.
-    pub fn codes(&self, id: IdentityId) -> [f32; CODE_CHANNELS] {
+    pub(crate) fn codes(&self, id: IdentityId) -> [f32; CODE_CHANNELS] {
         let code = |id: IdentityId, level: Level| {
             self.get(id).filter(|i| i.level == level).map_or(BACKGROUND_CODE, |i| i.code)
         };
@@ -152,7 +152,7 @@ impl Identities {
     }
 
     /// The direct pieces of an identity.
-    pub fn pieces(&self, id: IdentityId) -> impl Iterator<Item = IdentityId> + '_ {
+    pub(crate) fn pieces(&self, id: IdentityId) -> impl Iterator<Item = IdentityId> + '_ {
         self.iter().filter(move |(_, i)| i.parent == id && id != NOBODY).map(|(i, _)| i)
     }
 }

@@ -4,7 +4,7 @@ use super::{Identities, IdentityId};
 
 /// Views of an identity whose features are kept at most. Averaging views blurs what they mean, so a
 /// few are kept and the best one counts.
-pub const MAX_VIEWS: usize = 4;
+pub(crate) const MAX_VIEWS: usize = 4;
 
 /// Embeddings of all identities.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -28,7 +28,7 @@ pub struct ViewFeatures {
 
 impl LanguageFeatures {
     /// Features of an identity; `None` if it has none.
-    pub fn get(&self, id: IdentityId) -> Option<&ViewFeatures> {
+    pub(crate) fn get(&self, id: IdentityId) -> Option<&ViewFeatures> {
         self.of.get((id as usize).checked_sub(1)?).filter(|f| !f.raw.is_empty())
     }
 

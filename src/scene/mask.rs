@@ -21,14 +21,14 @@ pub struct Mask {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PixelBox {
     /// Columns.
-    pub x: Range<usize>,
+    pub(crate) x: Range<usize>,
     /// Rows.
-    pub y: Range<usize>,
+    pub(crate) y: Range<usize>,
 }
 
 impl PixelBox {
     /// Whether a pixel is inside.
-    pub fn contains(&self, x: usize, y: usize) -> bool {
+    pub(crate) fn contains(&self, x: usize, y: usize) -> bool {
         self.x.contains(&x) && self.y.contains(&y)
     }
 }
@@ -49,14 +49,14 @@ impl Mask {
 
     /// The pixels whose centers are inside a polygon (even-odd rule), vertices in px. With vertices
     /// on whole numbers, as in label files, a pixel center is at its whole coordinates.
-    pub fn from_polygon(width_px: usize, height_px: usize, vertices: &[[f64; 2]]) -> Self {
+    pub(crate) fn from_polygon(width_px: usize, height_px: usize, vertices: &[[f64; 2]]) -> Self {
         let mut mask = Self::empty(width_px, height_px);
         mask.add_polygon(vertices);
         mask
     }
 
     /// Adds the pixels whose centers are inside a polygon, as [`Self::from_polygon`] has them.
-    pub fn add_polygon(&mut self, vertices: &[[f64; 2]]) {
+    pub(crate) fn add_polygon(&mut self, vertices: &[[f64; 2]]) {
         let rows = |end: fn(f64, f64) -> f64, none: f64| vertices.iter().map(|v| v[1]).fold(none, end);
         let (top, bottom) = (rows(f64::min, f64::INFINITY), rows(f64::max, f64::NEG_INFINITY));
         let (width_px, height_px) = (self.width_px, self.height_px);
@@ -97,7 +97,7 @@ impl Mask {
     }
 
     /// Whether the pixel with this index is in it.
-    pub fn contains(&self, index: usize) -> bool {
+    pub(crate) fn contains(&self, index: usize) -> bool {
         self.words[index / 64] >> (index % 64) & 1 == 1
     }
 
@@ -112,7 +112,7 @@ impl Mask {
     }
 
     /// Indices of its pixels, ascending.
-    pub fn pixels(&self) -> impl Iterator<Item = usize> + '_ {
+    pub(crate) fn pixels(&self) -> impl Iterator<Item = usize> + '_ {
         self.words.iter().enumerate().flat_map(|(k, &word)| {
             std::iter::successors((word != 0).then_some(word), |w| Some(w & (w - 1)).filter(|w| *w != 0))
                 .map(move |w| k * 64 + w.trailing_zeros() as usize)
@@ -120,22 +120,22 @@ impl Mask {
     }
 
     /// Adds the pixels of another mask of the same size.
-    pub fn add(&mut self, other: &Self) {
+    pub(crate) fn add(&mut self, other: &Self) {
         self.words.iter_mut().zip(&other.words).for_each(|(a, b)| *a |= b);
     }
 
     /// Takes the pixels of another mask of the same size away.
-    pub fn subtract(&mut self, other: &Self) {
+    pub(crate) fn subtract(&mut self, other: &Self) {
         self.words.iter_mut().zip(&other.words).for_each(|(a, b)| *a &= !b);
     }
 
     /// Keeps the pixels that are in another mask of the same size too.
-    pub fn intersect(&mut self, other: &Self) {
+    pub(crate) fn intersect(&mut self, other: &Self) {
         self.words.iter_mut().zip(&other.words).for_each(|(a, b)| *a &= b);
     }
 
     /// Pixels in both masks.
-    pub fn overlap(&self, other: &Self) -> usize {
+    pub(crate) fn overlap(&self, other: &Self) -> usize {
         self.words.iter().zip(&other.words).map(|(a, b)| (a & b).count_ones() as usize).sum()
     }
 
@@ -147,7 +147,7 @@ impl Mask {
     }
 
     /// The smallest box around it; `None` if it is empty.
-    pub fn bounds(&self) -> Option<PixelBox> {
+    pub(crate) fn bounds(&self) -> Option<PixelBox> {
         let mut found: Option<PixelBox> = None;
         for i in self.pixels() {
             let (x, y) = (i % self.width_px, i / self.width_px);
@@ -159,7 +159,7 @@ impl Mask {
     }
 
     /// The same region in a picture of another size: each pixel takes the value at its center.
-    pub fn resized(&self, width_px: usize, height_px: usize) -> Self {
+    pub(crate) fn resized(&self, width_px: usize, height_px: usize) -> Self {
         Self::from_fn(width_px, height_px, |i| {
             let (x, y) = (i % width_px, i / width_px);
             self.contains(nearest(y, self.height_px, height_px) * self.width_px + nearest(x, self.width_px, width_px))

@@ -1,29 +1,29 @@
 //! What a scene is made of. Pure data: nothing here reads or writes files.
 
-pub mod bounds;
-pub mod camera;
-pub mod camera_path;
-pub mod cloud;
-pub mod dataset;
-pub mod history;
-pub mod home_view;
-pub mod identity;
-pub mod language;
-pub mod mask;
-pub mod photo;
+pub(crate) mod bounds;
+pub(crate) mod camera;
+pub(crate) mod camera_path;
+pub(crate) mod cloud;
+pub(crate) mod dataset;
+pub(crate) mod history;
+pub(crate) mod home_view;
+pub(crate) mod identity;
+pub(crate) mod language;
+pub(crate) mod mask;
+pub(crate) mod photo;
 pub mod plan;
 pub mod resource_log;
-pub mod semantic_map;
-pub mod text;
-pub mod undo;
+pub(crate) mod semantic_map;
+pub(crate) mod text;
+pub(crate) mod undo;
 
 pub use bounds::Bounds;
 pub use camera::{Camera, CameraError};
-pub use camera_path::{CameraPath, PathError, PathKey};
+pub(crate) use camera_path::{CameraPath, PathError, PathKey};
 pub use cloud::{CloudError, ExtraProperty, Gaussian, GaussianCloud};
 pub use dataset::{Dataset, SparsePoint};
 pub use history::{Evaluation, StepMetrics, ViewScore};
-pub use home_view::HomeView;
+pub(crate) use home_view::HomeView;
 pub use identity::{Identities, Identity, IdentityId, Level, LevelFilter, NOBODY};
 pub use language::{LanguageFeatures, ViewFeatures};
 pub use mask::{Mask, PixelBox};

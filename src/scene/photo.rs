@@ -27,7 +27,7 @@ pub struct Photo {
 
 impl Photo {
     /// Its name as it may be shown.
-    pub fn title(&self) -> Cow<'_, str> {
+    pub(crate) fn title(&self) -> Cow<'_, str> {
         text::line(&self.name)
     }
 }
@@ -39,11 +39,11 @@ pub struct Distortion {
     /// Quadratic radial coefficient.
     pub k1: f64,
     /// Quartic radial coefficient.
-    pub k2: f64,
+    pub(crate) k2: f64,
     /// First tangential coefficient.
-    pub p1: f64,
+    pub(crate) p1: f64,
     /// Second tangential coefficient.
-    pub p2: f64,
+    pub(crate) p2: f64,
 }
 
 /// A loaded, undistorted photo.
@@ -62,12 +62,12 @@ pub struct PhotoPixels {
 
 impl PhotoPixels {
     /// Number of pixels.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.rgb.len()
     }
 
     /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.rgb.is_empty()
     }
 }

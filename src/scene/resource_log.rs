@@ -39,20 +39,20 @@ pub enum Sort {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Load {
     /// Seconds since the trace began.
-    pub at_secs: f64,
+    pub(crate) at_secs: f64,
     /// Its sort.
     pub sort: Sort,
     /// What exactly.
-    pub what: String,
+    pub(crate) what: String,
     /// What it was needed for.
-    pub why: &'static str,
+    pub(crate) why: &'static str,
     /// Bytes that it takes in memory; 0 where that is not known.
-    pub bytes: u64,
+    pub(crate) bytes: u64,
 }
 
 impl Load {
     /// As a line: "2.31 s  loaded the network demo, 1.2 MB: a phrase is compared with looks".
-    pub fn line(&self) -> String {
+    pub(crate) fn line(&self) -> String {
         let size = if self.bytes > 0 { format!(", {}", bytes(self.bytes)) } else { String::new() };
         format!("{:7.2} s  {}{size}: {}", self.at_secs, self.what, self.why)
     }
@@ -76,7 +76,7 @@ fn lock() -> MutexGuard<'static, Trace> {
 }
 
 /// Adds to the trace.
-pub fn record(sort: Sort, what: impl Into<String>, why: &'static str, bytes: u64) {
+pub(crate) fn record(sort: Sort, what: impl Into<String>, why: &'static str, bytes: u64) {
     let at_secs = START.get_or_init(Instant::now).elapsed().as_secs_f64();
     let load = Load { at_secs, sort, what: what.into(), why, bytes };
     let mut trace = lock();
@@ -87,7 +87,7 @@ pub fn record(sort: Sort, what: impl Into<String>, why: &'static str, bytes: u64
 }
 
 /// Begins the clock, and has `listener` called with everything that is traced.
-pub fn listen(listener: Listener) {
+pub(crate) fn listen(listener: Listener) {
     START.get_or_init(Instant::now);
     lock().listener = Some(listener);
 }

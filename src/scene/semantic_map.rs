@@ -3,13 +3,13 @@
 use super::{ExtraProperty, GaussianCloud, Identities, IdentityId, LanguageFeatures, NOBODY};
 
 /// Channels of a Gaussian's codes: those of its object, then those of its part.
-pub const CODE_CHANNELS: usize = 6;
+pub(crate) const CODE_CHANNELS: usize = 6;
 
 /// The code of what is nobody's: the middle of code space.
-pub const BACKGROUND_CODE: [f32; 3] = [0.5; 3];
+pub(crate) const BACKGROUND_CODE: [f32; 3] = [0.5; 3];
 
 /// Per-Gaussian properties that carry the map in a `.ply`: identity, margin of its votes, codes.
-pub const IDENTITY: &str = "fmlgs_identity";
+pub(crate) const IDENTITY: &str = "fmlgs_identity";
 const MARGIN: &str = "fmlgs_margin";
 const CODES: [&str; CODE_CHANNELS] = [
     "fmlgs_object_code_0",
@@ -60,7 +60,7 @@ impl SemanticMap {
 
     /// The map of a cloud that [`Self::store`] has written to, with these identities. `None` if
     /// the cloud carries none, or refers to identities that are not there.
-    pub fn restore(identities: Identities, seeds: Vec<String>, cloud: &GaussianCloud) -> Option<Self> {
+    pub(crate) fn restore(identities: Identities, seeds: Vec<String>, cloud: &GaussianCloud) -> Option<Self> {
         let values = |name: &str| cloud.extras.iter().find(|e| e.name == name).map(|e| e.values.as_slice());
         let id = |v: &f32| {
             let whole = *v >= 0.0 && v.fract() == 0.0 && *v <= identities.len() as f32;
@@ -77,7 +77,7 @@ impl SemanticMap {
     }
 
     /// Indices of the Gaussians of an identity and its pieces, rising.
-    pub fn members(&self, id: IdentityId) -> Vec<usize> {
+    pub(crate) fn members(&self, id: IdentityId) -> Vec<usize> {
         let inside = self.identities.within(id);
         let is_in = |i: &usize| inside.get(self.of[*i] as usize) == Some(&true);
         (0..self.of.len()).filter(is_in).collect()
@@ -85,7 +85,7 @@ impl SemanticMap {
 
     /// The map of these Gaussians alone, as [`GaussianCloud::select`] has them. Without language
     /// features: it is for drawing.
-    pub fn select(&self, gaussians: &[usize]) -> Self {
+    pub(crate) fn select(&self, gaussians: &[usize]) -> Self {
         Self {
             identities: self.identities.clone(),
             of: gaussians.iter().map(|&i| self.of[i]).collect(),
@@ -97,7 +97,7 @@ impl SemanticMap {
     }
 
     /// Bytes of what is stored by Gaussian and by identity.
-    pub fn bytes(&self) -> u64 {
+    pub(crate) fn bytes(&self) -> u64 {
         let each = size_of::<IdentityId>() + size_of::<f32>() * (1 + CODE_CHANNELS);
         let numbers = |l: &LanguageFeatures| {
             l.dimension * l.of.iter().map(|f| f.raw.len() + f.deviated.len()).sum::<usize>() * size_of::<f32>()
@@ -106,12 +106,12 @@ impl SemanticMap {
     }
 
     /// Whether any identity is a part.
-    pub fn has_parts(&self) -> bool {
+    pub(crate) fn has_parts(&self) -> bool {
         self.identities.iter().any(|(_, i)| i.level == super::Level::Part)
     }
 
     /// Number of Gaussians of each identity, pieces included, by number; those of nobody first.
-    pub fn sizes(&self) -> Vec<usize> {
+    pub(crate) fn sizes(&self) -> Vec<usize> {
         let mut sizes = vec![0; self.identities.len() + 1];
         for &id in &self.of {
             if id == NOBODY {

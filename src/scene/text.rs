@@ -8,11 +8,11 @@ use serde::{Deserialize, Deserializer};
 /// Longest name of an identity or a scene, in letters; what is longer is cut, with an ellipsis. A label
 /// is shown in lists and typed in questions, and one absurd label is no reason to refuse an afternoon's
 /// work.
-pub const LONGEST_NAME: usize = 256;
+pub(crate) const LONGEST_NAME: usize = 256;
 
 /// Longest name of a photo, in letters; what is longer is refused. It is a path that files and labels are
 /// matched by, so it cannot be cut.
-pub const LONGEST_PHOTO_NAME: usize = 1024;
+pub(crate) const LONGEST_PHOTO_NAME: usize = 1024;
 
 /// What a character of foreign text is replaced by; `None` if it stays.
 fn instead(c: char, one_line: bool) -> Option<&'static str> {
@@ -44,22 +44,22 @@ fn clean(text: &str, one_line: bool) -> Cow<'_, str> {
 }
 
 /// Text of any number of lines, without other control characters and marks of direction.
-pub fn lines(text: &str) -> Cow<'_, str> {
+pub(crate) fn lines(text: &str) -> Cow<'_, str> {
     clean(text, false)
 }
 
 /// Text of one line, without control characters and marks of direction.
-pub fn line(text: &str) -> Cow<'_, str> {
+pub(crate) fn line(text: &str) -> Cow<'_, str> {
     clean(text, true)
 }
 
 /// [`lines()`], with every line after the first set in, so that none can pass for a message of its own.
-pub fn message(text: &str) -> String {
+pub(crate) fn message(text: &str) -> String {
     lines(text).trim_end().replace('\n', "\n  ").replace("\n  \n", "\n\n")
 }
 
 /// At most `most` letters of a text, the last an ellipsis if some are left out.
-pub fn shortened(text: &str, most: usize) -> Cow<'_, str> {
+pub(crate) fn shortened(text: &str, most: usize) -> Cow<'_, str> {
     if text.char_indices().nth(most).is_none() {
         return Cow::Borrowed(text);
     }
@@ -68,7 +68,7 @@ pub fn shortened(text: &str, most: usize) -> Cow<'_, str> {
 }
 
 /// A text on one line, cut in the middle so that it has at most `most` letters.
-pub fn elided(text: &str, most: usize) -> String {
+pub(crate) fn elided(text: &str, most: usize) -> String {
     let text = &*line(text);
     let n = text.chars().count();
     if n <= most {
@@ -80,12 +80,12 @@ pub fn elided(text: &str, most: usize) -> String {
 }
 
 /// A path on one line.
-pub fn path(path: &std::path::Path) -> String {
+pub(crate) fn path(path: &std::path::Path) -> String {
     line(&path.to_string_lossy()).into_owned()
 }
 
 /// The name of an identity or a scene as it is kept: one line of at most [`LONGEST_NAME`] letters.
-pub fn name(text: &str) -> String {
+pub(crate) fn name(text: &str) -> String {
     // The rest of an endless name need not be looked at.
     let start = shortened(text, 2 * LONGEST_NAME);
     shortened(line(&start).trim(), LONGEST_NAME).into_owned()
@@ -93,7 +93,7 @@ pub fn name(text: &str) -> String {
 
 /// JSON text in which no character acts on a terminal: those that JSON leaves as they are become escapes,
 /// so that readers of the JSON get them unchanged.
-pub fn json(text: &str) -> Cow<'_, str> {
+pub(crate) fn json(text: &str) -> Cow<'_, str> {
     // Line breaks between values are JSON's own; those within texts are escaped already.
     let acts = |c: char| c != '\n' && instead(c, true).is_some();
     if !text.chars().any(acts) {
@@ -113,7 +113,7 @@ pub fn json(text: &str) -> Cow<'_, str> {
 ///
 /// # Errors
 /// If it is no text.
-pub fn read_name<'de, D: Deserializer<'de>>(from: D) -> Result<String, D::Error> {
+pub(crate) fn read_name<'de, D: Deserializer<'de>>(from: D) -> Result<String, D::Error> {
     String::deserialize(from).map(|text| name(&text))
 }
 
@@ -121,7 +121,7 @@ pub fn read_name<'de, D: Deserializer<'de>>(from: D) -> Result<String, D::Error>
 ///
 /// # Errors
 /// If it is no text.
-pub fn read_optional_name<'de, D: Deserializer<'de>>(from: D) -> Result<Option<String>, D::Error> {
+pub(crate) fn read_optional_name<'de, D: Deserializer<'de>>(from: D) -> Result<Option<String>, D::Error> {
     Ok(Option::<String>::deserialize(from)?.map(|text| name(&text)))
 }
 
@@ -129,7 +129,7 @@ pub fn read_optional_name<'de, D: Deserializer<'de>>(from: D) -> Result<Option<S
 ///
 /// # Errors
 /// If it is no list of texts.
-pub fn read_names<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
+pub(crate) fn read_names<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
     Ok(Vec::<String>::deserialize(from)?.iter().map(|text| name(text)).collect())
 }
 

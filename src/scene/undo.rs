@@ -5,7 +5,7 @@ const MOST: usize = 200;
 
 /// Undo and redo of a value that lives elsewhere.
 #[derive(Clone, Debug)]
-pub struct UndoHistory<T> {
+pub(crate) struct UndoHistory<T> {
     past: Vec<T>,
     future: Vec<T>,
 }
@@ -18,7 +18,7 @@ impl<T> Default for UndoHistory<T> {
 
 impl<T> UndoHistory<T> {
     /// Takes in how it was before a change. What could be redone is gone.
-    pub fn record(&mut self, before: T) {
+    pub(crate) fn record(&mut self, before: T) {
         self.future.clear();
         self.past.push(before);
         if self.past.len() > MOST {
@@ -27,33 +27,33 @@ impl<T> UndoHistory<T> {
     }
 
     /// What undoing brings back.
-    pub fn last(&self) -> Option<&T> {
+    pub(crate) fn last(&self) -> Option<&T> {
         self.past.last()
     }
 
     /// What redoing brings back.
-    pub fn next(&self) -> Option<&T> {
+    pub(crate) fn next(&self) -> Option<&T> {
         self.future.last()
     }
 
     /// Exchanges `now` for the state before it. Whether there is one.
-    pub fn undo(&mut self, now: &mut T) -> bool {
+    pub(crate) fn undo(&mut self, now: &mut T) -> bool {
         Self::step(&mut self.past, &mut self.future, now)
     }
 
     /// Exchanges `now` for the state that was undone last. Whether there is one.
-    pub fn redo(&mut self, now: &mut T) -> bool {
+    pub(crate) fn redo(&mut self, now: &mut T) -> bool {
         Self::step(&mut self.future, &mut self.past, now)
     }
 
     /// Takes the state before out: what is undone cannot be redone.
-    pub fn take(&mut self) -> Option<T> {
+    pub(crate) fn take(&mut self) -> Option<T> {
         self.past.pop()
     }
 
     /// Takes in that `old` has given way to a state that [`Self::last`] or [`Self::next`] may be, as `is_it` says:
     /// then this was an undo or a redo, else a change.
-    pub fn replaced(&mut self, mut old: T, is_it: impl Fn(&T) -> bool) {
+    pub(crate) fn replaced(&mut self, mut old: T, is_it: impl Fn(&T) -> bool) {
         if self.last().is_some_and(&is_it) {
             self.undo(&mut old);
         } else if self.next().is_some_and(&is_it) {

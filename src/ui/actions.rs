@@ -41,7 +41,7 @@ pub enum Pane {
 
 impl Pane {
     /// Its title.
-    pub fn text(self) -> &'static str {
+    pub(crate) fn text(self) -> &'static str {
         self.into()
     }
 }
@@ -71,12 +71,12 @@ pub enum Axis {
 
 impl Axis {
     /// Its name.
-    pub fn text(self) -> &'static str {
+    pub(crate) fn text(self) -> &'static str {
         self.into()
     }
 
     /// Its unit vector.
-    pub fn vector(self) -> DVec3 {
+    pub(crate) fn vector(self) -> DVec3 {
         let axis = [DVec3::X, DVec3::Y, DVec3::Z][self as usize / 2];
         if (self as usize).is_multiple_of(2) { axis } else { -axis }
     }
@@ -84,11 +84,11 @@ impl Axis {
 
 /// A key with modifiers. Keys are named as on the keyboard: "F", "Home", "F1", "[".
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Shortcut {
+pub(crate) struct Shortcut {
     /// Control (Command on a Mac).
-    pub ctrl: bool,
+    pub(crate) ctrl: bool,
     /// The key's name.
-    pub key: &'static str,
+    pub(crate) key: &'static str,
 }
 
 macro_rules! actions {
@@ -108,7 +108,7 @@ macro_rules! actions {
         impl Action {
             /// Its name in menus and in the palette.
             #[allow(unused_variables, clippy::useless_conversion)]
-            pub fn text(&self) -> String {
+            pub(crate) fn text(&self) -> String {
                 match self {
                     $(Self::$name $(($($arg),+))? => String::from($text),)*
                 }
@@ -215,7 +215,7 @@ actions! {
 
 impl Action {
     /// Every action that needs no further input, in the order of the palette.
-    pub fn all() -> Vec<Self> {
+    pub(crate) fn all() -> Vec<Self> {
         let mut all = Self::plain();
         // Without a brush there is nothing to add.
         all.retain(|a| *a != Self::AddPainted);
@@ -227,7 +227,7 @@ impl Action {
     }
 
     /// One sentence on what it does.
-    pub fn tooltip(&self) -> &'static str {
+    pub(crate) fn tooltip(&self) -> &'static str {
         match self {
             Self::Isolate(Some(_)) => "Draw nothing else.",
             Self::Show(ViewMode::Rgb) => "The rendered image.",
@@ -241,7 +241,7 @@ impl Action {
     }
 
     /// The key that runs it, if it has one.
-    pub fn shortcut(&self) -> Option<Shortcut> {
+    pub(crate) fn shortcut(&self) -> Option<Shortcut> {
         let key = match self {
             Self::Show(ViewMode::Rgb) => "1",
             Self::Show(ViewMode::Depth) => "5",

@@ -44,11 +44,11 @@ pub struct App {
     object_thumbnails: ObjectThumbnails,
     models: Models,
     /// Error against run time.
-    pub report: ReportPane,
+    pub(crate) report: ReportPane,
     /// The camera's path and its player.
-    pub camera: CameraPane,
+    pub(crate) camera: CameraPane,
     /// The conversation with the agent.
-    pub chat: Chat,
+    pub(crate) chat: Chat,
     toasts: Toasts,
     actions: Vec<Action>,
     /// Window time of the last frame.

@@ -8,7 +8,7 @@ use crossbeam_channel::{Receiver, Sender, bounded};
 use egui::text::{CCursor, CCursorRange};
 use egui::{Button, Key, Modifiers, Response, RichText, ScrollArea, TextEdit, Ui};
 
-pub use super::chat_model::ChatSettings;
+pub(crate) use super::chat_model::ChatSettings;
 use super::chat_model::ModelChooser;
 use super::panes::object_thumbnails::ObjectThumbnails;
 use super::theme;
@@ -32,19 +32,19 @@ const CONTINUATIONS: usize = 4;
 const THUMBNAIL_PX: f32 = 34.0;
 
 /// What the agent is to work on, as the window has it now.
-pub struct Snapshot {
+pub(crate) struct Snapshot {
     /// The scene.
-    pub parts: Parts,
+    pub(crate) parts: Parts,
     /// Generation of its Gaussians.
-    pub cloud: u64,
+    pub(crate) cloud: u64,
     /// Counts the scenes shown so far.
-    pub scene: u64,
+    pub(crate) scene: u64,
     /// Where the eye is.
-    pub eye: Pose,
+    pub(crate) eye: Pose,
     /// Width by height of the frame.
-    pub aspect: f64,
+    pub(crate) aspect: f64,
     /// What is left out of the frame.
-    pub hidden: Vec<IdentityId>,
+    pub(crate) hidden: Vec<IdentityId>,
 }
 
 /// A line of the conversation.
@@ -70,7 +70,7 @@ enum News {
 
 /// The conversation with the agent.
 #[derive(Default)]
-pub struct Chat {
+pub(crate) struct Chat {
     typed: String,
     lines: Vec<Line>,
     thread: Option<(Sender<Request>, Receiver<News>)>,
@@ -89,7 +89,7 @@ pub struct Chat {
 
 impl Chat {
     /// Effects that came in since.
-    pub fn news(&mut self) -> Vec<Effect> {
+    pub(crate) fn news(&mut self) -> Vec<Effect> {
         let mut effects = Vec::new();
         let Some((_, news)) = &self.thread else { return effects };
         for news in news.try_iter() {
@@ -113,17 +113,17 @@ impl Chat {
     }
 
     /// The talk as text: JSON if the file is called so, else Markdown.
-    pub fn transcript(&self, json: bool) -> Option<&str> {
+    pub(crate) fn transcript(&self, json: bool) -> Option<&str> {
         self.transcript.as_ref().map(|t| t[usize::from(!json)].as_str())
     }
 
     /// What is to be sent, once a snapshot of the scene is there.
-    pub fn wants(&mut self) -> Option<String> {
+    pub(crate) fn wants(&mut self) -> Option<String> {
         self.waiting.take()
     }
 
     /// Sends a sentence to the agent.
-    pub fn send(&mut self, text: String, snapshot: Snapshot, settings: ChatSettings, repaint: &Repaint) {
+    pub(crate) fn send(&mut self, text: String, snapshot: Snapshot, settings: ChatSettings, repaint: &Repaint) {
         let cancel = Arc::new(AtomicBool::new(false));
         let request = Request { text: text.clone(), snapshot, settings, cancel: Arc::clone(&cancel) };
         if self.thread.is_none() {
@@ -139,18 +139,18 @@ impl Chat {
     }
 
     /// An answer of the window's own.
-    pub fn answer(&mut self, text: &str) {
+    pub(crate) fn answer(&mut self, text: &str) {
         let text = text::lines(text).into_owned();
         self.lines.push(Line::Answer { text, candidates: Vec::new(), refused: None });
     }
 
     /// Makes the box take the keyboard.
-    pub fn start_typing(&mut self) {
+    pub(crate) fn start_typing(&mut self) {
         self.focus = true;
     }
 
     /// Draws the pane.
-    pub fn show(
+    pub(crate) fn show(
         &mut self,
         ui: &mut Ui,
         settings: &mut ChatSettings,

@@ -15,11 +15,11 @@ use crate::agent::llm::settings::{LlmSettings, Patience};
 /// Which planner is used; kept from one run to the next.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
-pub struct ChatSettings {
+pub(crate) struct ChatSettings {
     /// Whether a chat model plans, instead of the built-in commands.
-    pub use_model: bool,
+    pub(crate) use_model: bool,
     /// Where it is.
-    pub model: LlmSettings,
+    pub(crate) model: LlmSettings,
 }
 
 /// An answer that is waited for, or there.
@@ -56,14 +56,14 @@ impl<T: Send + 'static> Asked<T> {
 
 /// What is known of chat models while their settings are open.
 #[derive(Default)]
-pub struct ModelChooser {
+pub(crate) struct ModelChooser {
     found: Asked<Vec<LocalServer>>,
     tested: Asked<Result<String, String>>,
 }
 
 impl ModelChooser {
     /// Draws the choice.
-    pub fn show(&mut self, ui: &mut Ui, settings: &mut ChatSettings) {
+    pub(crate) fn show(&mut self, ui: &mut Ui, settings: &mut ChatSettings) {
         let text = if settings.use_model { "Chat model" } else { "Built-in" };
         ComboBox::from_id_salt("planner").selected_text(text).width(90.0).show_ui(ui, |ui| {
             ui.selectable_value(&mut settings.use_model, false, "Built-in")

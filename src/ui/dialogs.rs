@@ -14,7 +14,7 @@ use crate::ui::actions::Action;
 use crate::worker::Repaint;
 
 /// The system's answer.
-pub enum Chosen {
+pub(crate) enum Chosen {
     /// This path, for the action that asked for one.
     Path(Action, PathBuf),
     /// A user closed the dialog.
@@ -24,7 +24,7 @@ pub enum Chosen {
 }
 
 /// Asks the system for paths, off the window's thread.
-pub struct FileDialogs {
+pub(crate) struct FileDialogs {
     sender: Sender<Chosen>,
     answers: Receiver<Chosen>,
     open: bool,
@@ -39,7 +39,7 @@ impl Default for FileDialogs {
 
 impl FileDialogs {
     /// Shows the system's dialog for an action that needs a path, unless one is open already.
-    pub fn ask(&mut self, action: Action, name: &str, repaint: Repaint) -> std::io::Result<()> {
+    pub(crate) fn ask(&mut self, action: Action, name: &str, repaint: Repaint) -> std::io::Result<()> {
         let Some((title, dialog)) = dialog(&action, name).filter(|_| !self.open) else { return Ok(()) };
         let title = AsyncFileDialog::new().set_title(title);
         // Some systems want the dialog made on the window's thread; waiting for it is what must not happen here.
@@ -67,7 +67,7 @@ impl FileDialogs {
     }
 
     /// The answer, if one has come.
-    pub fn answer(&mut self) -> Option<Chosen> {
+    pub(crate) fn answer(&mut self) -> Option<Chosen> {
         let answer = self.answers.try_recv().ok()?;
         self.open = false;
         Some(answer)
@@ -104,19 +104,19 @@ fn dialog(action: &Action, name: &str) -> Option<(String, Dialog)> {
 }
 
 /// A question before something is given up.
-pub struct Question {
+pub(crate) struct Question {
     /// What is asked.
-    pub text: String,
+    pub(crate) text: String,
     /// The button that goes ahead.
-    pub yes: &'static str,
+    pub(crate) yes: &'static str,
     /// The button that does not.
-    pub no: &'static str,
+    pub(crate) no: &'static str,
     /// What then happens.
-    pub action: Action,
+    pub(crate) action: Action,
 }
 
 /// Shows an error until it is read. Returns whether it was.
-pub fn show_error(ctx: &egui::Context, error: &ErrorBox) -> bool {
+pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox) -> bool {
     let response = Modal::new(Id::unique("error")).frame(theme::dialog()).show(ctx, |ui| {
         ui.set_width(480.0);
         ui.horizontal(|ui| {
@@ -146,7 +146,7 @@ pub fn show_error(ctx: &egui::Context, error: &ErrorBox) -> bool {
 }
 
 /// Asks a question. `Some(true)` to go ahead, `Some(false)` not to, `None` while no one answered.
-pub fn show_question(ctx: &egui::Context, question: &Question) -> Option<bool> {
+pub(crate) fn show_question(ctx: &egui::Context, question: &Question) -> Option<bool> {
     let response = Modal::new(Id::unique("question")).frame(theme::dialog()).show(ctx, |ui| {
         ui.set_width(420.0);
         ui.label(&question.text);

@@ -5,7 +5,7 @@ use egui::{Key, KeyboardShortcut, Modifiers};
 use crate::ui::actions::{Action, Shortcut};
 
 /// Mouse gestures and held keys in the viewport, which are no actions: for the shortcut sheet.
-pub const GESTURES: [(&str, &str); 8] = [
+pub(crate) const GESTURES: [(&str, &str); 8] = [
     ("W A S D", "Fly forward, left, back, right"),
     ("Q  E", "Fly down, up"),
     ("Shift  Alt", "Fly faster, slower (held)"),
@@ -17,13 +17,13 @@ pub const GESTURES: [(&str, &str); 8] = [
 ];
 
 /// The binding in the window toolkit's terms; `None` if it has no key of that name.
-pub fn binding(shortcut: Shortcut) -> Option<KeyboardShortcut> {
+pub(crate) fn binding(shortcut: Shortcut) -> Option<KeyboardShortcut> {
     let modifiers = if shortcut.ctrl { Modifiers::COMMAND } else { Modifiers::NONE };
     Some(KeyboardShortcut::new(modifiers, Key::from_name(shortcut.key)?))
 }
 
 /// The action's key for the user: "Ctrl+P"; empty if it has none.
-pub fn label(ctx: &egui::Context, action: &Action) -> String {
+pub(crate) fn label(ctx: &egui::Context, action: &Action) -> String {
     let Some(shortcut) = action.shortcut() else { return String::new() };
     // Symbols such as "[" read better as they stand on the key than by the toolkit's name.
     if shortcut.key.len() == 1 && !shortcut.ctrl {
@@ -34,7 +34,7 @@ pub fn label(ctx: &egui::Context, action: &Action) -> String {
 
 /// Takes every bound key that was pressed off the input, as often as it was pressed. Plain keys
 /// belong to a text field while one has the focus.
-pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
+pub(crate) fn pressed(ctx: &egui::Context) -> Vec<Action> {
     let typing = ctx.text_edit_focused();
     let mut found = Vec::new();
     for action in Action::all() {

@@ -16,7 +16,7 @@ const KEY: &str = "layout";
 
 /// What the plots run over.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum PlotAxis {
+pub(crate) enum PlotAxis {
     /// Seconds of training.
     #[default]
     Seconds,
@@ -31,27 +31,27 @@ pub struct Layout {
     /// Panes that are hidden.
     pub hidden: Vec<Pane>,
     /// Whether cameras are drawn into the view.
-    pub cameras: bool,
+    pub(crate) cameras: bool,
     /// Whether the photo is shown beside the frame.
     pub compare: bool,
     /// Where the split between frame and photo is, 0 to 1.
-    pub split: f32,
+    pub(crate) split: f32,
     /// What the viewport shows.
     pub mode: ViewMode,
     /// What the plots run over.
-    pub plot_axis: PlotAxis,
+    pub(crate) plot_axis: PlotAxis,
     /// Whether the times of a frame's stages are shown.
     pub times: bool,
     /// Settings of the next training.
     pub config: TrainConfig,
     /// What of the scene plan is wanted otherwise.
-    pub plan: Overrides,
+    pub(crate) plan: Overrides,
     /// Models that find objects.
-    pub finding: FindSettings,
+    pub(crate) finding: FindSettings,
     /// What plans for the agent.
-    pub chat: ChatSettings,
+    pub(crate) chat: ChatSettings,
     /// Files and folders opened lately.
-    pub recent: Vec<PathBuf>,
+    pub(crate) recent: Vec<PathBuf>,
 }
 
 impl Default for Layout {
@@ -75,14 +75,14 @@ impl Default for Layout {
 
 impl Layout {
     /// The stored layout, or the default one.
-    pub fn load(storage: Option<&dyn eframe::Storage>) -> Self {
+    pub(crate) fn load(storage: Option<&dyn eframe::Storage>) -> Self {
         let mut layout: Self = storage.and_then(|s| eframe::get_value(s, KEY)).unwrap_or_default();
         layout.split = if layout.split.is_finite() { layout.split.clamp(0.02, 0.98) } else { 0.5 };
         layout
     }
 
     /// Stores the layout.
-    pub fn save(&self, storage: &mut dyn eframe::Storage) {
+    pub(crate) fn save(&self, storage: &mut dyn eframe::Storage) {
         eframe::set_value(storage, KEY, self);
     }
 
@@ -92,7 +92,7 @@ impl Layout {
     }
 
     /// Shows a hidden pane or hides a shown one.
-    pub fn toggle(&mut self, pane: Pane) {
+    pub(crate) fn toggle(&mut self, pane: Pane) {
         if self.shows(pane) {
             self.hidden.push(pane);
         } else {

@@ -9,19 +9,19 @@ mod act_file;
 mod act_report;
 pub mod actions;
 pub mod app;
-pub mod camera;
-pub mod chat;
-pub mod chat_model;
+pub(crate) mod camera;
+pub(crate) mod chat;
+pub(crate) mod chat_model;
 mod context;
-pub mod dialogs;
+pub(crate) mod dialogs;
 mod edits;
-pub mod keys;
-pub mod layout;
-pub mod palette;
-pub mod panes;
-pub mod state;
-pub mod theme;
-pub mod toasts;
+pub(crate) mod keys;
+pub(crate) mod layout;
+pub(crate) mod palette;
+pub(crate) mod panes;
+pub(crate) mod state;
+pub(crate) mod theme;
+pub(crate) mod toasts;
 mod train_history;
 pub mod viewport;
 
@@ -29,7 +29,7 @@ use std::sync::Arc;
 
 use eframe::egui_wgpu::WgpuSetup;
 
-pub use self::actions::Action;
+pub(crate) use self::actions::Action;
 
 use crate::jobs::Folders;
 use crate::render::Device;

@@ -8,7 +8,7 @@ use crate::ui::actions::Action;
 
 /// The command palette.
 #[derive(Default)]
-pub struct Palette {
+pub(crate) struct Palette {
     open: bool,
     query: String,
     selected: usize,
@@ -16,22 +16,22 @@ pub struct Palette {
 
 impl Palette {
     /// Opens it with an empty query, or closes it.
-    pub fn toggle(&mut self) {
+    pub(crate) fn toggle(&mut self) {
         *self = Self { open: !self.open, ..Self::default() };
     }
 
     /// Whether it is on screen.
-    pub fn is_open(&self) -> bool {
+    pub(crate) fn is_open(&self) -> bool {
         self.open
     }
 
     /// Closes it.
-    pub fn close(&mut self) {
+    pub(crate) fn close(&mut self) {
         self.open = false;
     }
 
     /// Draws it, and returns the action that was chosen.
-    pub fn show(&mut self, ctx: &egui::Context) -> Option<Action> {
+    pub(crate) fn show(&mut self, ctx: &egui::Context) -> Option<Action> {
         if !self.open {
             return None;
         }
@@ -108,7 +108,7 @@ fn matches(query: &str) -> Vec<Action> {
 }
 
 /// Draws the shortcut sheet while `open`.
-pub fn shortcut_sheet(ctx: &egui::Context, open: &mut bool) {
+pub(crate) fn shortcut_sheet(ctx: &egui::Context, open: &mut bool) {
     if !*open {
         return;
     }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::actions::Action;
-pub use super::train_history::TrainHistory;
+pub(crate) use super::train_history::TrainHistory;
 use crate::jobs::OpenedScene;
 use crate::jobs::go_to::{Approached, Explored};
 use crate::jobs::models::ModelList;
@@ -24,7 +24,7 @@ const MAX_RECENT: usize = 8;
 
 /// How a message is meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Tone {
+pub(crate) enum Tone {
     /// For the record.
     Info,
     /// Something was done.
@@ -39,33 +39,33 @@ pub enum Tone {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LogLine {
     /// How it is meant.
-    pub tone: Tone,
+    pub(crate) tone: Tone,
     /// What it says.
     pub text: String,
 }
 
 /// A message that goes away by itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Toast {
+pub(crate) struct Toast {
     /// Names it, so that the window can time it.
-    pub id: u64,
+    pub(crate) id: u64,
     /// How it is meant.
-    pub tone: Tone,
+    pub(crate) tone: Tone,
     /// What it says.
-    pub text: String,
+    pub(crate) text: String,
 }
 
 /// The long job that runs now.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunningJob {
     /// Which.
-    pub id: JobId,
+    pub(crate) id: JobId,
     /// Its sort.
-    pub kind: JobKind,
+    pub(crate) kind: JobKind,
     /// What it does, for the user.
-    pub title: String,
+    pub(crate) title: String,
     /// Where it stands, once it says.
-    pub progress: Option<Progress>,
+    pub(crate) progress: Option<Progress>,
     /// Whether it waits.
     pub paused: bool,
 }
@@ -74,18 +74,18 @@ pub struct RunningJob {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ErrorBox {
     /// What was being done: "Opening fox".
-    pub doing: String,
+    pub(crate) doing: String,
     /// What went wrong, and what to do.
-    pub failure: Failure,
+    pub(crate) failure: Failure,
 }
 
 /// A report on screen.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShownReport {
     /// Where it was read from.
-    pub path: PathBuf,
+    pub(crate) path: PathBuf,
     /// What it holds.
-    pub report: Arc<Report>,
+    pub(crate) report: Arc<Report>,
 }
 
 /// Everything the window knows of the world.
@@ -94,47 +94,47 @@ pub struct AppState {
     /// The scene on screen.
     pub scene: Option<Arc<OpenedScene>>,
     /// Counts the scenes shown so far; changes when `scene` does.
-    pub scene_number: u64,
+    pub(crate) scene_number: u64,
     /// What is left out for the scene, and why.
-    pub plan: ScenePlan,
+    pub(crate) plan: ScenePlan,
     /// Whether the Gaussians on screen want the 2-D filter of Mip-Splatting.
-    pub antialias: bool,
+    pub(crate) antialias: bool,
     /// Objects and parts of the Gaussians on screen.
     pub semantics: Option<Versioned<SemanticMap>>,
     /// Gaussians of each of them by number, pieces included.
-    pub sizes: Vec<usize>,
+    pub(crate) sizes: Vec<usize>,
     /// New thumbnails of objects and parts, until they are taken over.
-    pub thumbnails: Option<(Arc<SemanticMap>, Thumbnails)>,
+    pub(crate) thumbnails: Option<(Arc<SemanticMap>, Thumbnails)>,
     /// What is known of moving about in the scene.
     pub explored: Option<Arc<Explored>>,
     /// The way that was looked for last, until the window takes it.
-    pub visited: Option<Approached>,
+    pub(crate) visited: Option<Approached>,
     /// Models and the engine that runs them, once they were listed.
-    pub models: Option<Arc<ModelList>>,
+    pub(crate) models: Option<Arc<ModelList>>,
     /// Models that were put in place so far.
-    pub models_installed: u64,
+    pub(crate) models_installed: u64,
     /// Earlier states of objects and parts, whoever changed them.
-    pub edits: UndoHistory<Arc<SemanticMap>>,
+    pub(crate) edits: UndoHistory<Arc<SemanticMap>>,
     /// The newest short job that is over; they end in order.
-    pub short_jobs_done: JobId,
+    pub(crate) short_jobs_done: JobId,
     /// The long job that runs.
     pub job: Option<RunningJob>,
     /// Training of the present scene.
     pub history: TrainHistory,
     /// Job whose Gaussians are those of the present scene.
-    pub training_job: Option<JobId>,
+    pub(crate) training_job: Option<JobId>,
     /// The log, oldest first.
     pub log: VecDeque<LogLine>,
     /// Messages on screen, oldest first.
-    pub toasts: Vec<Toast>,
+    pub(crate) toasts: Vec<Toast>,
     /// The error on screen.
     pub error: Option<ErrorBox>,
     /// Files and folders opened lately, newest first.
     pub recent: Vec<PathBuf>,
     /// Photos loaded lately, by index and size limit; the window takes them out.
-    pub photos: BTreeMap<(usize, u32), Arc<PhotoPixels>>,
+    pub(crate) photos: BTreeMap<(usize, u32), Arc<PhotoPixels>>,
     /// Photos that could not be loaded, by job, for the window to mark; the window takes them out.
-    pub failed_photos: Vec<JobId>,
+    pub(crate) failed_photos: Vec<JobId>,
     /// Error against run time, if a report is open.
     pub report: Option<ShownReport>,
     /// The report that it is compared with.
@@ -146,12 +146,12 @@ pub struct AppState {
 
 impl AppState {
     /// A window with nothing open.
-    pub fn new(recent: Vec<PathBuf>) -> Self {
+    pub(crate) fn new(recent: Vec<PathBuf>) -> Self {
         Self { recent, ..Self::default() }
     }
 
     /// Takes in one event; what the window is to do next because of it.
-    pub fn apply(&mut self, event: Event) -> Vec<Action> {
+    pub(crate) fn apply(&mut self, event: Event) -> Vec<Action> {
         match event {
             Event::Started { job, kind, title } if kind.lane() == Lane::Short => {
                 self.short_jobs.insert(job, (kind, text::line(&title).into_owned()));
@@ -195,7 +195,7 @@ impl AppState {
     }
 
     /// Adds a line to the log.
-    pub fn say(&mut self, tone: Tone, text: impl Into<String>) {
+    pub(crate) fn say(&mut self, tone: Tone, text: impl Into<String>) {
         if self.log.len() == MAX_LOG {
             self.log.pop_front();
         }
@@ -203,7 +203,7 @@ impl AppState {
     }
 
     /// Shows a message that goes away by itself, and logs it.
-    pub fn toast(&mut self, tone: Tone, text: impl Into<String>) {
+    pub(crate) fn toast(&mut self, tone: Tone, text: impl Into<String>) {
         let text = text::lines(&text.into()).into_owned();
         self.say(tone, text.clone());
         self.toasts.push(Toast { id: self.next_toast, tone, text });
@@ -211,7 +211,7 @@ impl AppState {
     }
 
     /// Shows an error until it is dismissed, and logs it.
-    pub fn fail(&mut self, doing: impl Into<String>, failure: Failure) {
+    pub(crate) fn fail(&mut self, doing: impl Into<String>, failure: Failure) {
         let doing = text::line(&doing.into()).into_owned();
         let [message, remedy] = [&failure.message, &failure.remedy].map(|t| text::lines(t).into_owned());
         let failure = Failure { message, remedy };
@@ -220,14 +220,14 @@ impl AppState {
     }
 
     /// Puts a path on top of the recent list.
-    pub fn remember(&mut self, path: PathBuf) {
+    pub(crate) fn remember(&mut self, path: PathBuf) {
         self.recent.retain(|p| *p != path);
         self.recent.insert(0, path);
         self.recent.truncate(MAX_RECENT);
     }
 
     /// Whether the Gaussians on screen are a result.
-    pub fn is_trained(&self) -> bool {
+    pub(crate) fn is_trained(&self) -> bool {
         !self.is_training() && (self.training_job.is_some() || self.scene.as_ref().is_some_and(|s| s.trained))
     }
 
@@ -237,7 +237,7 @@ impl AppState {
     }
 
     /// Follows what a user wants otherwise, and the settings of the next training.
-    pub fn replan(&mut self, overrides: &Overrides, limits: Limits) {
+    pub(crate) fn replan(&mut self, overrides: &Overrides, limits: Limits) {
         if self.plan.overrides != *overrides || self.plan.facts.limits != limits {
             let dataset = self.scene.as_ref().and_then(|s| s.dataset.as_deref());
             let facts = self.plan.facts.clone().with_limits(limits, dataset);
@@ -246,7 +246,7 @@ impl AppState {
     }
 
     /// How the Gaussians on screen are drawn: as they were trained, without what the plan leaves out.
-    pub fn render_settings(&self) -> RenderSettings {
+    pub(crate) fn render_settings(&self) -> RenderSettings {
         let scene = self.scene.as_ref().map(|s| s.render.clone()).unwrap_or_default();
         let sh_degree = if self.is_training() { scene.sh_degree } else { self.plan.sh_degree };
         RenderSettings { sh_degree, antialias: self.antialias, ..scene }

@@ -5,30 +5,30 @@ use egui::{Color32, CornerRadius, FontId, Margin, RichText, Stroke, Style, TextS
 use super::state::Tone;
 
 /// The one color that asks for attention.
-pub const ACCENT: Color32 = Color32::from_rgb(0x6c, 0xb2, 0xf0);
+pub(crate) const ACCENT: Color32 = Color32::from_rgb(0x6c, 0xb2, 0xf0);
 /// Text on the accent.
-pub const ON_ACCENT: Color32 = Color32::from_rgb(0x0c, 0x14, 0x1c);
+pub(crate) const ON_ACCENT: Color32 = Color32::from_rgb(0x0c, 0x14, 0x1c);
 /// Behind the panes.
-pub const PANEL: Color32 = Color32::from_rgb(0x18, 0x1a, 0x1f);
+pub(crate) const PANEL: Color32 = Color32::from_rgb(0x18, 0x1a, 0x1f);
 /// Behind the viewport.
-pub const CANVAS: Color32 = Color32::from_rgb(0x0e, 0x0f, 0x12);
+pub(crate) const CANVAS: Color32 = Color32::from_rgb(0x0e, 0x0f, 0x12);
 /// Cards and fields on a pane.
-pub const SURFACE: Color32 = Color32::from_rgb(0x22, 0x25, 0x2b);
+pub(crate) const SURFACE: Color32 = Color32::from_rgb(0x22, 0x25, 0x2b);
 /// Lines between things.
-pub const LINE: Color32 = Color32::from_rgb(0x2e, 0x32, 0x3a);
+pub(crate) const LINE: Color32 = Color32::from_rgb(0x2e, 0x32, 0x3a);
 /// Text.
-pub const TEXT: Color32 = Color32::from_rgb(0xd9, 0xdc, 0xe2);
+pub(crate) const TEXT: Color32 = Color32::from_rgb(0xd9, 0xdc, 0xe2);
 /// Text of less weight; still 5.5 : 1 on a pane.
-pub const WEAK: Color32 = Color32::from_rgb(0x93, 0x99, 0xa5);
+pub(crate) const WEAK: Color32 = Color32::from_rgb(0x93, 0x99, 0xa5);
 /// Done.
-pub const GOOD: Color32 = Color32::from_rgb(0x7f, 0xc7, 0x9a);
+pub(crate) const GOOD: Color32 = Color32::from_rgb(0x7f, 0xc7, 0x9a);
 /// Left out or changed; also held-out photos.
-pub const WARNING: Color32 = Color32::from_rgb(0xe3, 0xb3, 0x5f);
+pub(crate) const WARNING: Color32 = Color32::from_rgb(0xe3, 0xb3, 0x5f);
 /// Failed.
-pub const ERROR: Color32 = Color32::from_rgb(0xee, 0x82, 0x79);
+pub(crate) const ERROR: Color32 = Color32::from_rgb(0xee, 0x82, 0x79);
 
 /// The color of a message.
-pub fn tone_color(tone: Tone) -> Color32 {
+pub(crate) fn tone_color(tone: Tone) -> Color32 {
     match tone {
         Tone::Info => TEXT,
         Tone::Good => GOOD,
@@ -38,7 +38,7 @@ pub fn tone_color(tone: Tone) -> Color32 {
 }
 
 /// Puts the theme on the window.
-pub fn install(ctx: &egui::Context) {
+pub(crate) fn install(ctx: &egui::Context) {
     ctx.set_theme(Theme::Dark);
     ctx.style_mut_of(Theme::Dark, |style| {
         style.visuals = visuals();
@@ -109,23 +109,23 @@ fn visuals() -> Visuals {
 }
 
 /// The frame of a dialog.
-pub fn dialog() -> egui::Frame {
+pub(crate) fn dialog() -> egui::Frame {
     egui::Frame::new().fill(PANEL).stroke(Stroke::new(1.0, LINE)).corner_radius(10).inner_margin(18)
 }
 
 /// The one button of a group that a user most likely wants.
-pub fn primary_button(text: &str) -> egui::Button<'static> {
+pub(crate) fn primary_button(text: &str) -> egui::Button<'static> {
     egui::Button::new(RichText::new(text.to_owned()).color(ON_ACCENT).strong()).fill(ACCENT).stroke(Stroke::NONE)
 }
 
 /// A small title over a group of things.
-pub fn section(ui: &mut egui::Ui, title: &str) {
+pub(crate) fn section(ui: &mut egui::Ui, title: &str) {
     ui.add_space(6.0);
     ui.label(RichText::new(title).small().strong().color(WEAK));
 }
 
 /// A round mark in the color of a message.
-pub fn mark(ui: &mut egui::Ui, tone: Tone, size: f32) {
+pub(crate) fn mark(ui: &mut egui::Ui, tone: Tone, size: f32) {
     let (rect, _) = ui.allocate_exact_size(egui::Vec2::splat(size), egui::Sense::hover());
     let (color, c, r) = (tone_color(tone), rect.center(), 0.5 * size);
     ui.painter().circle_filled(c, r, color.gamma_multiply(0.22));
@@ -150,7 +150,7 @@ pub fn mark(ui: &mut egui::Ui, tone: Tone, size: f32) {
 }
 
 /// A translucent card, for what lies over the viewport.
-pub fn overlay() -> egui::Frame {
+pub(crate) fn overlay() -> egui::Frame {
     egui::Frame::new()
         .fill(Color32::from_rgba_unmultiplied(0x14, 0x16, 0x1a, 225))
         .stroke(Stroke::new(1.0, LINE))

@@ -15,13 +15,13 @@ const MOST: usize = 4;
 
 /// Times the messages.
 #[derive(Default)]
-pub struct Toasts {
+pub(crate) struct Toasts {
     since: HashMap<u64, f64>,
 }
 
 impl Toasts {
     /// Draws the newest messages at the lower right of `area` and drops those whose time is up.
-    pub fn show(&mut self, ctx: &egui::Context, state: &mut AppState, area: egui::Rect) {
+    pub(crate) fn show(&mut self, ctx: &egui::Context, state: &mut AppState, area: egui::Rect) {
         let now = ctx.input(|i| i.time);
         let stay = |tone| if matches!(tone, Tone::Info | Tone::Good) { STAY_SECS } else { STAY_LONG_SECS };
         state.toasts.retain(|t| now - *self.since.entry(t.id).or_insert(now) < stay(t.tone));

@@ -11,7 +11,7 @@ pub struct TrainHistory {
     /// Measurements, oldest first, thinned out when there are many.
     pub steps: Vec<StepMetrics>,
     /// Held-out evaluations, oldest first.
-    pub evaluations: Vec<Evaluation>,
+    pub(crate) evaluations: Vec<Evaluation>,
 }
 
 impl TrainHistory {

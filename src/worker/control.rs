@@ -6,24 +6,24 @@ use crate::pipeline::observer::Signal;
 
 /// The flags of one job.
 #[derive(Debug, Default)]
-pub struct Control {
+pub(crate) struct Control {
     cancel: AtomicBool,
     pause: AtomicBool,
 }
 
 impl Control {
     /// Asks the job to end. Cannot be taken back.
-    pub fn cancel(&self) {
+    pub(crate) fn cancel(&self) {
         self.cancel.store(true, Ordering::Release);
     }
 
     /// Asks the job to wait, or to go on.
-    pub fn set_paused(&self, paused: bool) {
+    pub(crate) fn set_paused(&self, paused: bool) {
         self.pause.store(paused, Ordering::Release);
     }
 
     /// What the job is to do now; cancelling goes before pausing.
-    pub fn signal(&self) -> Signal {
+    pub(crate) fn signal(&self) -> Signal {
         if self.cancel.load(Ordering::Acquire) {
             Signal::Cancel
         } else if self.pause.load(Ordering::Acquire) {

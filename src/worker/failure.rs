@@ -16,7 +16,7 @@ pub struct Failure {
 
 impl Failure {
     /// The failure of an error and all its causes.
-    pub fn of(error: &dyn std::error::Error, remedy: impl Into<String>) -> Self {
+    pub(crate) fn of(error: &dyn std::error::Error, remedy: impl Into<String>) -> Self {
         Self { message: chain(error), remedy: remedy.into() }
     }
 }

@@ -19,14 +19,14 @@ const MAX_SIDE_PX: u32 = 256;
 const REPEATS: u32 = 3;
 
 /// Reads a report; the `second` is one to compare with.
-pub fn read(path: PathBuf, second: bool) -> Result<Outcome, Stop> {
+pub(crate) fn read(path: PathBuf, second: bool) -> Result<Outcome, Stop> {
     let report = Report::read(&path)?;
     Ok(Outcome::Report { path, report: Arc::new(report), second })
 }
 
 /// Where reports of a scene may lie: where this program writes them, beside it, and where the command
 /// line writes them.
-pub fn known(scene: &Path, own: &Path) -> Vec<PathBuf> {
+pub(crate) fn known(scene: &Path, own: &Path) -> Vec<PathBuf> {
     let usual = Path::new("out/report");
     let mut found = Vec::new();
     for folder in [own.to_owned(), scene.join("report"), usual.to_owned()] {
@@ -38,7 +38,7 @@ pub fn known(scene: &Path, own: &Path) -> Vec<PathBuf> {
 }
 
 /// Measures the drawing of a scene and writes the report after every measurement.
-pub fn run(request: MeasureRequest, observer: &mut dyn Observer) -> Result<Outcome, Stop> {
+pub(crate) fn run(request: MeasureRequest, observer: &mut dyn Observer) -> Result<Outcome, Stop> {
     let failed = |e: &dyn std::error::Error| Stop::Failed(Failure::of(e, ""));
     let mut report = Report::begin(&request.out, &request.scene, &computer::look()).map_err(|e| failed(&e))?;
     let folder = request.out.display().to_string();

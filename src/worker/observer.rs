@@ -12,7 +12,7 @@ use crate::pipeline::observer::{Evaluation, Observer, Progress, Severity, Signal
 use crate::scene::GaussianCloud;
 
 /// Called after every event, from the worker's threads: asks the window to look.
-pub type Repaint = Arc<dyn Fn() + Send + Sync>;
+pub(crate) type Repaint = Arc<dyn Fn() + Send + Sync>;
 
 /// A copy of the Gaussians in training.
 #[derive(Clone, Debug)]
@@ -20,7 +20,7 @@ pub struct CloudSnapshot {
     /// Whose they are.
     pub job: JobId,
     /// The Gaussians.
-    pub cloud: Arc<GaussianCloud>,
+    pub(crate) cloud: Arc<GaussianCloud>,
     /// After how many steps.
     pub step: u64,
 }

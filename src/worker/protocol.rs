@@ -20,7 +20,7 @@ use crate::scene::{Camera, Dataset, Facts, GaussianCloud, HomeView, Photo, Photo
 
 /// Names one job of one worker.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct JobId(pub u64);
+pub struct JobId(pub(crate) u64);
 
 /// What the window does first.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -76,7 +76,7 @@ pub enum JobKind {
 
 impl JobKind {
     /// Which thread runs it.
-    pub fn lane(self) -> Lane {
+    pub(crate) fn lane(self) -> Lane {
         match self {
             Self::Open
             | Self::Demo
@@ -222,7 +222,7 @@ pub enum Command {
 
 impl Command {
     /// What sort of job this is.
-    pub fn kind(&self) -> JobKind {
+    pub(crate) fn kind(&self) -> JobKind {
         match self {
             Self::Open { .. } => JobKind::Open,
             Self::Demo => JobKind::Demo,
@@ -245,7 +245,7 @@ impl Command {
     }
 
     /// What it does, as a title: "Opening fox".
-    pub fn title(&self) -> String {
+    pub(crate) fn title(&self) -> String {
         let name =
             |p: &PathBuf| p.file_name().map_or_else(|| p.display().to_string(), |n| n.to_string_lossy().into_owned());
         match self {
@@ -382,17 +382,17 @@ impl Event {
 #[derive(Clone, Debug)]
 pub struct MeasureRequest {
     /// The scene, for display.
-    pub scene: String,
+    pub(crate) scene: String,
     /// Its Gaussians.
-    pub cloud: Arc<GaussianCloud>,
+    pub(crate) cloud: Arc<GaussianCloud>,
     /// How they are drawn.
-    pub settings: RenderSettings,
+    pub(crate) settings: RenderSettings,
     /// Its photos; those that are held out are compared with, too.
-    pub dataset: Option<Arc<Dataset>>,
+    pub(crate) dataset: Option<Arc<Dataset>>,
     /// Every how-manieth photo is held out.
-    pub holdout_every: usize,
+    pub(crate) holdout_every: usize,
     /// From where it is drawn without held-out photos.
-    pub camera: Camera,
+    pub(crate) camera: Camera,
     /// Folder of the report. What is measured there already is resumed.
-    pub out: PathBuf,
+    pub(crate) out: PathBuf,
 }

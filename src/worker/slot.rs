@@ -20,7 +20,7 @@ impl<T> Default for Slot<T> {
 
 impl<T> Slot<T> {
     /// Replaces the value and returns its generation.
-    pub fn publish(&self, value: T) -> u64 {
+    pub(crate) fn publish(&self, value: T) -> u64 {
         let value = Arc::new(value);
         let (generation, old) = {
             let mut latest = self.lock();
@@ -58,12 +58,12 @@ pub struct Versioned<T> {
 
 impl<T> Versioned<T> {
     /// A value that is new.
-    pub fn new(value: Arc<T>) -> Self {
+    pub(crate) fn new(value: Arc<T>) -> Self {
         Self { generation: NEXT.fetch_add(1, Ordering::Relaxed), value }
     }
 
     /// Its generation, from 1.
-    pub fn generation(&self) -> u64 {
+    pub(crate) fn generation(&self) -> u64 {
         self.generation
     }
 }

@@ -19,37 +19,37 @@ const QUEUED: usize = 16;
 
 /// What is known of the texts that were asked for last.
 #[derive(Debug, Default)]
-pub struct Encoded {
+pub(crate) struct Encoded {
     /// Embeddings of their phrases.
-    pub phrases: TextEmbeddings,
+    pub(crate) phrases: TextEmbeddings,
     /// Each text.
-    pub texts: BTreeMap<String, EncodedText>,
+    pub(crate) texts: BTreeMap<String, EncodedText>,
     /// Why the encoder cannot be used, if it cannot.
-    pub problem: Option<String>,
+    pub(crate) problem: Option<String>,
 }
 
 /// What is known of one text.
 #[derive(Clone, Debug, Default)]
-pub struct EncodedText {
+pub(crate) struct EncodedText {
     /// Whether its phrases have embeddings; not if the encoder knows none of its words.
-    pub known: bool,
+    pub(crate) known: bool,
     /// The words that the encoder does not know.
-    pub unknown: Vec<String>,
+    pub(crate) unknown: Vec<String>,
     /// Why it could not be encoded, if the encoder failed.
-    pub problem: Option<String>,
+    pub(crate) problem: Option<String>,
     /// Milliseconds that this took.
-    pub encode_ms: f64,
+    pub(crate) encode_ms: f64,
 }
 
 /// Handle of the thread. Dropping it ends the thread.
-pub struct TextEncoder {
+pub(crate) struct TextEncoder {
     texts: Sender<Vec<String>>,
     encoded: Arc<Slot<Encoded>>,
 }
 
 impl TextEncoder {
     /// Loads the encoder of this name and waits for texts. Fails only if the system gives no thread.
-    pub fn start(name: String, repaint: Repaint) -> std::io::Result<Self> {
+    pub(crate) fn start(name: String, repaint: Repaint) -> std::io::Result<Self> {
         let (sender, texts) = bounded::<Vec<String>>(QUEUED);
         let encoded = Arc::new(Slot::default());
         let slot = Arc::clone(&encoded);
@@ -80,12 +80,12 @@ impl TextEncoder {
     }
 
     /// Asks for all texts that are on screen. Whether there was room for that.
-    pub fn request(&self, texts: Vec<String>) -> bool {
+    pub(crate) fn request(&self, texts: Vec<String>) -> bool {
         self.texts.try_send(texts).is_ok()
     }
 
     /// Where the embeddings are published, empty ones as soon as the encoder is loaded.
-    pub fn encoded(&self) -> &Slot<Encoded> {
+    pub(crate) fn encoded(&self) -> &Slot<Encoded> {
         &self.encoded
     }
 }

@@ -116,7 +116,7 @@ impl Worker {
     }
 
     /// The next event, if one waits.
-    pub fn next_event(&self) -> Option<Event> {
+    pub(crate) fn next_event(&self) -> Option<Event> {
         self.events.as_ref()?.try_recv().ok()
     }
 

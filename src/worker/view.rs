@@ -23,11 +23,11 @@ const REST: Duration = Duration::from_secs(2);
 #[derive(Clone, Debug)]
 pub struct MappedView {
     /// The request's.
-    pub ticket: u64,
+    pub(crate) ticket: u64,
     /// The pixels, or why they could not be drawn.
-    pub maps: Result<Arc<ViewMaps>, Failure>,
+    pub(crate) maps: Result<Arc<ViewMaps>, Failure>,
     /// Seconds that drawing them took.
-    pub secs: f64,
+    pub(crate) secs: f64,
 }
 
 #[derive(Default)]

@@ -28,13 +28,13 @@ pub enum ViewMode {
 
 impl ViewMode {
     /// Its name.
-    pub fn text(self) -> &'static str {
+    pub(crate) fn text(self) -> &'static str {
         self.into()
     }
 }
 
 /// How many times the difference from the photo is amplified, so that an error of 1/4 is white.
-pub const DIFFERENCE_GAIN: u16 = 4;
+pub(crate) const DIFFERENCE_GAIN: u16 = 4;
 
 /// A frame as pixels.
 #[derive(Debug, Default, PartialEq)]

@@ -39,13 +39,13 @@ pub struct ViewRequest {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SkipPasses {
     /// Depth of frames from which no one picks points.
-    pub depth: bool,
+    pub(crate) depth: bool,
     /// Codes of parts.
-    pub parts: bool,
+    pub(crate) parts: bool,
     /// The GPU.
-    pub gpu: bool,
+    pub(crate) gpu: bool,
     /// Working memory, while the eye rests.
-    pub buffers: bool,
+    pub(crate) buffers: bool,
 }
 
 impl SkipPasses {
@@ -96,19 +96,19 @@ pub struct ViewPicture {
     /// Median depth in scene units, row-major, 0 where there is none; `None` if not drawn.
     pub median_depth: Option<Vec<f32>>,
     /// Depths at the two ends of the color scale, in the depth mode.
-    pub depth_range: Option<(f32, f32)>,
+    pub(crate) depth_range: Option<(f32, f32)>,
     /// PSNR in dB against the photo, if the request had one.
     pub psnr: Option<f64>,
     /// Seconds that rendering took.
-    pub secs: f64,
+    pub(crate) secs: f64,
     /// The same by stage, where that is known.
-    pub stages: StageTimes,
+    pub(crate) stages: StageTimes,
     /// Seconds from colors to bytes: depth scales, differences.
-    pub paint_secs: f64,
+    pub(crate) paint_secs: f64,
     /// What drew it: "CPU", or the name of the GPU.
-    pub drawn_by: String,
+    pub(crate) drawn_by: String,
     /// Why the CPU drew it though there is a GPU.
-    pub instead_of_gpu: Option<String>,
+    pub(crate) instead_of_gpu: Option<String>,
 }
 
 /// The result of a request.

@@ -42,13 +42,13 @@ impl Item {
 
 /// A form without choices, and the command it is of.
 pub(super) struct Sequence {
-    pub items: Vec<Item>,
-    pub command: &'static Command,
+    pub(crate) items: Vec<Item>,
+    pub(crate) command: &'static Command,
 }
 
 /// What the slots of a form hold.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Slots {
+pub(crate) struct Slots {
     pub(super) texts: Vec<String>,
     /// Several things in place of the text with this number.
     pub(super) several: Option<(usize, Vec<String>)>,
@@ -146,11 +146,11 @@ fn item(word: &str) -> Item {
 
 /// A request that is matched.
 pub(super) struct Request<'a> {
-    pub tokens: &'a [Token],
-    pub words: &'a [&'a str],
-    pub known: &'a Vocabulary,
+    pub(crate) tokens: &'a [Token],
+    pub(crate) words: &'a [&'a str],
+    pub(crate) known: &'a Vocabulary,
     /// Whether things must be called by words that names in the scene have.
-    pub strict: bool,
+    pub(crate) strict: bool,
 }
 
 impl Request<'_> {

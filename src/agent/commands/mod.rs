@@ -283,7 +283,7 @@ fn example(command: &Command, identities: &Identities, request: &[&str]) -> Stri
 }
 
 /// The commands that are nearest to a request: those that share its first word, then other words.
-pub fn nearest(request: &str, identities: &Identities) -> Vec<String> {
+pub(crate) fn nearest(request: &str, identities: &Identities) -> Vec<String> {
     let tokens = request_tokens(request);
     let words: Vec<&str> = tokens.iter().map(|t| t.low.as_str()).filter(|w| *w != ",").collect();
     let common = ["the", "a", "is", "to", "of", "in", "it", "me", "and"];
@@ -348,7 +348,7 @@ fn not_understood(request: &str, identities: &Identities) -> Refusal {
 }
 
 /// All commands, by their examples.
-pub fn help(identities: &Identities) -> String {
+pub(crate) fn help(identities: &Identities) -> String {
     let mut lines: Vec<String> = Vec::new();
     for command in commands() {
         let line = format!("'{}': {}", example(command, identities, &[]), command.does);

@@ -11,7 +11,8 @@ use super::settings::{LlmSettings, Patience};
 use super::wire::Collector;
 
 /// Servers of the usual kind and their ports.
-pub const PORTS: [(&str, u16); 4] = [("Ollama", 11434), ("llama.cpp", 8080), ("LM Studio", 1234), ("vLLM", 8000)];
+pub(crate) const PORTS: [(&str, u16); 4] =
+    [("Ollama", 11434), ("llama.cpp", 8080), ("LM Studio", 1234), ("vLLM", 8000)];
 /// Longest list of models that is read, in bytes.
 const MAX_LIST_BYTES: usize = 1 << 20;
 

@@ -13,7 +13,7 @@ use crate::io::http::{self, Piece, TICK};
 
 /// Why there is no answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Broken {
+pub(crate) enum Broken {
     Connection(String),
     Stall,
     TooLong,
@@ -28,7 +28,7 @@ pub enum Broken {
 
 impl Broken {
     /// Whether another attempt may help.
-    pub fn is_passing(&self) -> bool {
+    pub(crate) fn is_passing(&self) -> bool {
         match self {
             Self::Connection(_) | Self::Stall => true,
             Self::Status { code, .. } => *code == 429 || *code == 408 || *code >= 500,
@@ -38,8 +38,8 @@ impl Broken {
 }
 
 /// What arrived: whether it is a stream of events.
-pub struct Head {
-    pub is_stream: bool,
+pub(crate) struct Head {
+    pub(crate) is_stream: bool,
 }
 
 /// Sends `body`, or asks without one, and hands each piece of the answer to `take`, which says whether it has all it
@@ -47,7 +47,7 @@ pub struct Head {
 ///
 /// # Errors
 /// See [`Broken`].
-pub fn exchange(
+pub(crate) fn exchange(
     url: &str,
     key: Option<&Secret>,
     body: Option<String>,
@@ -129,7 +129,7 @@ fn ask(url: &str, key: Option<&Secret>, body: Option<String>, patience: &Patienc
 }
 
 /// Waits, unless the user wants it to end; says whether the wait was over.
-pub fn wait(time: Duration, cancel: &AtomicBool) -> bool {
+pub(crate) fn wait(time: Duration, cancel: &AtomicBool) -> bool {
     let begin = Instant::now();
     while begin.elapsed() < time {
         if cancel.load(Ordering::Relaxed) {

@@ -3,11 +3,11 @@
 //! session, whose checks are the same as for every planner. Its key leaves in one header only.
 
 pub mod discover;
-pub mod http;
+pub(crate) mod http;
 mod prompt;
 pub mod secret;
 pub mod settings;
-pub mod sse;
+pub(crate) mod sse;
 pub mod wire;
 
 pub use prompt::SENT;

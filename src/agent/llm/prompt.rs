@@ -23,7 +23,7 @@ pub const SENT: &str = "Sent to the chat model: what you write; of the scene's o
     why something failed on this machine. The key goes into one header of the request and nowhere else.";
 
 /// The task.
-pub const TASK: &str = "You help a person look around in a 3D scene in a viewer, by calling the tools. Rules: \
+pub(crate) const TASK: &str = "You help a person look around in a 3D scene in a viewer, by calling the tools. Rules: \
     Call tools for everything you do; never claim to have done what no tool result confirms. \
     Use the numbers of identities from the scene data as targets where you are sure, else words. \
     Split a request into steps and look at each result before the next step. \
@@ -38,7 +38,7 @@ fn name(text: &str) -> String {
 }
 
 /// The scene as JSON.
-pub fn scene(world: &dyn World, dialog: &DialogState) -> Value {
+pub(crate) fn scene(world: &dyn World, dialog: &DialogState) -> Value {
     let all = world.identities();
     let seen = in_view(world);
     let here = |id: &IdentityId| world.facts(*id);
@@ -71,13 +71,13 @@ pub fn scene(world: &dyn World, dialog: &DialogState) -> Value {
 }
 
 /// A request with the scene, as the user's message.
-pub fn request(world: &dyn World, dialog: &DialogState, text: &str) -> String {
+pub(crate) fn request(world: &dyn World, dialog: &DialogState, text: &str) -> String {
     let scene = scene(world, dialog);
     format!("SCENE DATA (JSON, data only):\n{scene}\n\nREQUEST OF THE USER (JSON string):\n{}", json!(text))
 }
 
 /// The messages that go to the model: the task, and as much of the talk as fits, from a request on.
-pub fn messages(talk: &[Value]) -> Vec<Value> {
+pub(crate) fn messages(talk: &[Value]) -> Vec<Value> {
     let mut length = 0;
     let mut start = talk.len();
     for (i, message) in talk.iter().enumerate().rev() {

@@ -1,7 +1,7 @@
 //! The key of a chat endpoint: it goes into one header, and nowhere else.
 
 /// What stands in the key's place.
-pub const BLANK: &str = "[key]";
+pub(crate) const BLANK: &str = "[key]";
 
 /// Shortest key that is looked for in texts; what is shorter is no secret.
 const SHORTEST: usize = 6;
@@ -29,7 +29,7 @@ impl Secret {
     }
 
     /// A text without the key, in whatever case, as it is and as in addresses.
-    pub fn redact(&self, text: &str) -> String {
+    pub(crate) fn redact(&self, text: &str) -> String {
         if self.0.len() < SHORTEST {
             return text.to_owned();
         }

@@ -59,14 +59,14 @@ impl Default for Patience {
 /// How much one request may take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    pub answers: u32,
+    pub(crate) answers: u32,
     /// Calls in an answer that are looked at.
     pub calls: usize,
     /// Calls that are none: unknown tools, wrong arguments, the same again and again.
-    pub wrong: u32,
+    pub(crate) wrong: u32,
     /// Tokens, as the server counts them, or as a quarter of the letters.
-    pub tokens: u64,
-    pub bytes: usize,
+    pub(crate) tokens: u64,
+    pub(crate) bytes: usize,
 }
 
 impl Default for Limits {
@@ -97,7 +97,7 @@ impl LlmSettings {
     ///
     /// # Errors
     /// If the variable is not set or what it holds cannot be a key.
-    pub fn key(&self) -> Result<Option<Secret>, LlmError> {
+    pub(crate) fn key(&self) -> Result<Option<Secret>, LlmError> {
         if self.key_variable.is_empty() {
             return Ok(None);
         }
@@ -109,7 +109,7 @@ impl LlmSettings {
     ///
     /// # Errors
     /// If the base address is none, no model is named, or a key would travel unencrypted.
-    pub fn endpoint(&self, has_key: bool) -> Result<String, LlmError> {
+    pub(crate) fn endpoint(&self, has_key: bool) -> Result<String, LlmError> {
         let base = self.base_url.trim().trim_end_matches('/');
         let wrong = || LlmError::Address(base.chars().take(200).collect());
         let uri: Uri = base.parse().map_err(|_| wrong())?;

@@ -2,14 +2,14 @@
 
 /// Reads events from bytes as they arrive.
 #[derive(Default)]
-pub struct Events {
+pub(crate) struct Events {
     line: Vec<u8>,
     data: String,
 }
 
 impl Events {
     /// The data of the events that these bytes complete.
-    pub fn feed(&mut self, bytes: &[u8]) -> Vec<String> {
+    pub(crate) fn feed(&mut self, bytes: &[u8]) -> Vec<String> {
         let mut complete = Vec::new();
         for byte in bytes {
             if *byte == b'\n' {
@@ -22,7 +22,7 @@ impl Events {
     }
 
     /// The data of a last event that was not ended by an empty line.
-    pub fn end(&mut self) -> Option<String> {
+    pub(crate) fn end(&mut self) -> Option<String> {
         let mut complete = Vec::new();
         self.end_of_line(&mut complete);
         complete.pop().or_else(|| Some(std::mem::take(&mut self.data))).filter(|d| !d.is_empty())

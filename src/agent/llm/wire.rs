@@ -10,7 +10,7 @@ const MOST_CALLS: usize = 64;
 /// A call as the model wrote it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RawCall {
-    pub id: String,
+    pub(crate) id: String,
     pub name: String,
     /// Its arguments, JSON if the model kept to it.
     pub arguments: String,
@@ -19,12 +19,12 @@ pub struct RawCall {
 /// An answer.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Answer {
-    pub text: String,
+    pub(crate) text: String,
     pub calls: Vec<RawCall>,
     /// Tokens, as the server counted them.
-    pub tokens: Option<u64>,
+    pub(crate) tokens: Option<u64>,
     /// Whether the answer came to its end.
-    pub is_whole: bool,
+    pub(crate) is_whole: bool,
 }
 
 /// Arguments are JSON in a string; some servers send the object itself.
@@ -61,7 +61,7 @@ impl Collector {
     }
 
     /// What has been said so far.
-    pub fn text(&self) -> &str {
+    pub(crate) fn text(&self) -> &str {
         &self.answer.text
     }
 
@@ -138,7 +138,7 @@ impl Collector {
 }
 
 /// The model's turn as it goes back to it.
-pub fn assistant(answer: &Answer) -> Value {
+pub(crate) fn assistant(answer: &Answer) -> Value {
     let mut message = json!({ "role": "assistant", "content": answer.text });
     if !answer.calls.is_empty() {
         let calls = answer.calls.iter().map(

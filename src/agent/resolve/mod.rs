@@ -20,7 +20,7 @@ use crate::scene::{Bounds, IdentityId, Level, LevelFilter};
 
 /// What words come to.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Resolved {
+pub(crate) enum Resolved {
     /// This one is meant. The note says how it was found, if not by its name.
     One {
         id: IdentityId,
@@ -34,7 +34,7 @@ pub enum Resolved {
 }
 
 /// Finds what `phrase` means.
-pub fn resolve(world: &mut dyn World, phrase: &str, level: LevelFilter, dialog: &DialogState) -> Resolved {
+pub(crate) fn resolve(world: &mut dyn World, phrase: &str, level: LevelFilter, dialog: &DialogState) -> Resolved {
     let mut resolver = Resolver { world, dialog, level, note: String::new() };
     match resolver.phrase(phrase) {
         Ok(set) => match set.settled() {
@@ -49,7 +49,7 @@ pub fn resolve(world: &mut dyn World, phrase: &str, level: LevelFilter, dialog: 
 ///
 /// # Errors
 /// If the scene cannot be asked, or the phrase needs something that is not clear.
-pub fn resolve_all(
+pub(crate) fn resolve_all(
     world: &mut dyn World,
     phrase: &str,
     level: LevelFilter,

@@ -8,19 +8,19 @@ use serde::{Deserialize, Deserializer};
 use super::{IoError, files};
 use crate::scene::{CameraPath, PathError};
 
-pub mod nerfstudio;
+pub(crate) mod nerfstudio;
 mod own;
 
 pub use own::{FORMAT, VERSION, write};
 
 /// Largest file of a camera path in bytes; a path of [`CameraPath::MAX_KEYS`] keys fits.
-pub const MAX_BYTES: u64 = 128 << 20;
+pub(crate) const MAX_BYTES: u64 = 128 << 20;
 
 /// Reads a camera path, of the program's own format or of nerfstudio's, whichever the file is.
 ///
 /// # Errors
 /// [`IoError`] names the file, the key and the field.
-pub fn open(path: &Path) -> Result<CameraPath, IoError> {
+pub(crate) fn open(path: &Path) -> Result<CameraPath, IoError> {
     parse(&files::read(path, MAX_BYTES)?, path)
 }
 

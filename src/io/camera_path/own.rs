@@ -69,7 +69,7 @@ pub fn write(path: &Path, camera_path: &CameraPath) -> Result<(), IoError> {
 }
 
 /// The path in `bytes`, whose head says `version`; its values are not checked yet.
-pub fn parse(bytes: &[u8], version: Option<u64>, path: &Path) -> Result<CameraPath, IoError> {
+pub(crate) fn parse(bytes: &[u8], version: Option<u64>, path: &Path) -> Result<CameraPath, IoError> {
     match version {
         Some(VERSION) => {}
         Some(found) if found > VERSION => {

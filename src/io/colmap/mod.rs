@@ -47,7 +47,7 @@ fn find(root: &Path) -> Option<(PathBuf, bool)> {
 }
 
 /// Whether `root` holds a reconstruction.
-pub fn is_colmap(root: &Path) -> bool {
+pub(crate) fn is_colmap(root: &Path) -> bool {
     find(root).is_some()
 }
 

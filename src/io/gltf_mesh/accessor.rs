@@ -7,25 +7,25 @@ use super::File;
 use crate::io::IoError;
 
 /// Values of an accessor as `f32`, those of one element together.
-pub struct Values {
+pub(crate) struct Values {
     /// Components per element.
-    pub width: usize,
+    pub(crate) width: usize,
     /// `[count * width]`, finite.
-    pub data: Vec<f32>,
+    pub(crate) data: Vec<f32>,
     /// Whether the type is a signed integer.
-    pub signed_integer: bool,
+    pub(crate) signed_integer: bool,
 }
 
 impl Values {
     /// Elements as arrays, filled up with `fill` where the accessor has fewer components.
-    pub fn arrays<const N: usize>(&self, fill: f32) -> impl Iterator<Item = [f32; N]> + '_ {
+    pub(crate) fn arrays<const N: usize>(&self, fill: f32) -> impl Iterator<Item = [f32; N]> + '_ {
         self.data.chunks_exact(self.width).map(move |c| std::array::from_fn(|i| c.get(i).copied().unwrap_or(fill)))
     }
 }
 
 impl File<'_> {
     /// Reads a numeric accessor; integers are scaled to 0..1 or -1..1 where it says `normalized`.
-    pub fn values(&self, index: usize, place: &str) -> Result<Values, IoError> {
+    pub(crate) fn values(&self, index: usize, place: &str) -> Result<Values, IoError> {
         let root = self.root;
         let accessor = self.item(&root.accessors, index, "accessors", place)?;
         let place = format!("accessors[{index}]");

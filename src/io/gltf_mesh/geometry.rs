@@ -99,7 +99,7 @@ impl File<'_> {
 }
 
 /// Triangles of a list, strip or fan; incomplete ones at the end are dropped.
-pub fn triangles(order: &[u32], mode: Mode) -> Vec<[u32; 3]> {
+pub(crate) fn triangles(order: &[u32], mode: Mode) -> Vec<[u32; 3]> {
     match mode {
         Mode::TriangleStrip => order
             .windows(3)

@@ -12,7 +12,7 @@ const HEADER: usize = 12;
 const CHUNK_HEADER: usize = 8;
 
 /// The JSON text and the binary chunk of a `.glb`, or the whole of a `.gltf`.
-pub fn split_container<'a>(bytes: &'a [u8], path: &Path) -> Result<(&'a [u8], Option<&'a [u8]>), IoError> {
+pub(crate) fn split_container<'a>(bytes: &'a [u8], path: &Path) -> Result<(&'a [u8], Option<&'a [u8]>), IoError> {
     if !bytes.starts_with(b"glTF") {
         return Ok((bytes, None));
     }
@@ -47,7 +47,7 @@ fn word(bytes: &[u8], at: usize) -> Option<u32> {
 }
 
 /// Every buffer, each at least as long as it says, together at most `limit` bytes.
-pub fn load_buffers<'a>(
+pub(crate) fn load_buffers<'a>(
     root: &Root,
     path: &Path,
     folder: Option<&Path>,
@@ -77,7 +77,13 @@ pub fn load_buffers<'a>(
 }
 
 /// The bytes behind a URI: `data:` or a file inside `folder`, links resolved.
-pub fn load_uri(uri: &str, place: &str, path: &Path, folder: Option<&Path>, limit: u64) -> Result<Vec<u8>, IoError> {
+pub(crate) fn load_uri(
+    uri: &str,
+    place: &str,
+    path: &Path,
+    folder: Option<&Path>,
+    limit: u64,
+) -> Result<Vec<u8>, IoError> {
     if uri.starts_with("data:") {
         // Without a base path this decodes `data:` URIs only.
         return gltf::buffer::Data::from_source(gltf::buffer::Source::Uri(uri), None).map(|d| d.0).map_err(|e| {

@@ -10,7 +10,7 @@ use super::geometry::triangles;
 use super::*;
 
 /// A binary glTF file of a JSON part and a binary part.
-pub fn glb(json: &Value, bin: &[u8]) -> Vec<u8> {
+pub(crate) fn glb(json: &Value, bin: &[u8]) -> Vec<u8> {
     let mut text = json.to_string().into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
     let mut bin = bin.to_vec();
@@ -27,7 +27,7 @@ pub fn glb(json: &Value, bin: &[u8]) -> Vec<u8> {
 
 /// A cube of side 1 about the origin as mesh 0, without normals; `nodes` refer to it, and the
 /// materials are the caller's. The cube's material is 0 if there are any.
-pub fn cubes(nodes: Value, roots: Value, materials: Value) -> (Value, Vec<u8>) {
+pub(crate) fn cubes(nodes: Value, roots: Value, materials: Value) -> (Value, Vec<u8>) {
     let mut bin = Vec::new();
     for i in 0..8_u32 {
         for axis in 0..3 {
@@ -71,7 +71,7 @@ fn read_changed(change: impl FnOnce(&mut Value)) -> Result<MeshScene, IoError> {
 }
 
 /// The folder with the real scenes, where it is at hand.
-pub fn real_scenes() -> Option<PathBuf> {
+pub(crate) fn real_scenes() -> Option<PathBuf> {
     let data = std::env::var_os("FMLGS_DATA").map(PathBuf::from);
     let data = data.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"));
     let folder = data.join("gltf");

@@ -24,16 +24,16 @@ struct Mesh {
 
 #[derive(Deserialize)]
 pub(super) struct Primitive {
-    pub attributes: BTreeMap<String, usize>,
+    pub(crate) attributes: BTreeMap<String, usize>,
     #[serde(default)]
-    pub extensions: BTreeMap<String, serde_json::Value>,
+    pub(crate) extensions: BTreeMap<String, serde_json::Value>,
 }
 
 /// The values of an accessor.
 pub(super) struct Values<const N: usize> {
-    pub rows: Vec<[f32; N]>,
+    pub(crate) rows: Vec<[f32; N]>,
     /// Whether the type is a signed integer.
-    pub signed_integer: bool,
+    pub(crate) signed_integer: bool,
 }
 
 /// A glTF file.
@@ -44,7 +44,7 @@ pub(super) struct Gltf<'a> {
 }
 
 /// Whether the first bytes of a file are those of a `.glb`, or its name is that of a `.gltf`.
-pub fn is_gltf(start: &[u8], name: &str) -> bool {
+pub(crate) fn is_gltf(start: &[u8], name: &str) -> bool {
     start.starts_with(b"glTF") || name.ends_with(".gltf")
 }
 
@@ -54,31 +54,35 @@ pub(super) fn json(text: &[u8], path: &Path) -> Result<(Root, Meshes), IoError> 
 }
 
 impl<'a> Gltf<'a> {
-    pub fn open((root, meshes): &'a (Root, Meshes), blob: Option<&'a [u8]>, path: &'a Path) -> Result<Self, IoError> {
+    pub(crate) fn open(
+        (root, meshes): &'a (Root, Meshes),
+        blob: Option<&'a [u8]>,
+        path: &'a Path,
+    ) -> Result<Self, IoError> {
         let folder = path.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p });
         Ok(Self { meshes, file: File::open(root, path, folder, blob, [u64::MAX; 2])?, path })
     }
 
-    pub fn bad(&self, place: &str, reason: String) -> IoError {
+    pub(crate) fn bad(&self, place: &str, reason: String) -> IoError {
         self.file.content(place, reason)
     }
 
-    pub fn unsupported(&self, what: String, remedy: &'static str) -> IoError {
+    pub(crate) fn unsupported(&self, what: String, remedy: &'static str) -> IoError {
         IoError::Unsupported { path: self.path.into(), what, remedy }
     }
 
     /// The nodes of the scene.
-    pub fn nodes(&self) -> Result<Vec<MeshNode>, IoError> {
+    pub(crate) fn nodes(&self) -> Result<Vec<MeshNode>, IoError> {
         Ok(self.file.nodes()?.0)
     }
 
     /// What a node shows.
-    pub fn primitives(&self, node: &MeshNode) -> &[Primitive] {
+    pub(crate) fn primitives(&self, node: &MeshNode) -> &[Primitive] {
         node.mesh.and_then(|mesh| self.meshes.meshes.get(mesh)).map_or(&[], |mesh| &mesh.primitives)
     }
 
     /// The values of accessor `index`, integers as the accessor says: normalized or as they are.
-    pub fn values<const N: usize>(&self, index: usize) -> Result<Values<N>, IoError> {
+    pub(crate) fn values<const N: usize>(&self, index: usize) -> Result<Values<N>, IoError> {
         let values = self.file.values(index, "a splat primitive")?;
         if values.width != N {
             let reason = format!("it has {} components, expected {N}", values.width);

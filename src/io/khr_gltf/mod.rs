@@ -10,7 +10,7 @@ mod primitive;
 
 use std::path::Path;
 
-pub use container::is_gltf;
+pub(crate) use container::is_gltf;
 
 use super::gltf_mesh::resource::split_container;
 use super::{IoError, files};
@@ -21,7 +21,7 @@ use container::Gltf;
 /// Name of the extension, and prefix of its attributes.
 const EXTENSION: &str = "KHR_gaussian_splatting";
 /// Reads every splat of a glTF file's scene.
-pub fn read(path: &Path) -> Result<GaussianCloud, IoError> {
+pub(crate) fn read(path: &Path) -> Result<GaussianCloud, IoError> {
     parse(&files::read(path, u64::MAX)?, path)
 }
 

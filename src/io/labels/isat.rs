@@ -37,12 +37,12 @@ struct Polygon {
 }
 
 /// The photo that a label file belongs to; `None` if it is JSON of another kind.
-pub fn photo_of(file: &serde_json::Value) -> Option<&str> {
+pub(crate) fn photo_of(file: &serde_json::Value) -> Option<&str> {
     file["info"]["name"].as_str().filter(|_| file["objects"].is_array())
 }
 
 /// The regions of a label file: polygons of one category together, objects before parts.
-pub fn read(path: &Path, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
+pub(crate) fn read(path: &Path, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
     let file: File = files::read_json(path)?;
     let Info { width, height, .. } = file.info;
     let names: HashSet<&str> = file.objects.iter().map(|p| p.category.as_str()).collect();

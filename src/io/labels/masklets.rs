@@ -30,7 +30,7 @@ pub struct Masklets {
 
 impl Masklets {
     /// Takes a JSON file apart; `None` if it is of another kind.
-    pub fn parse(file: serde_json::Value, path: &Path) -> Result<Option<Self>, IoError> {
+    pub(crate) fn parse(file: serde_json::Value, path: &Path) -> Result<Option<Self>, IoError> {
         if !file["masklet"].is_array() {
             return Ok(None);
         }
@@ -51,12 +51,12 @@ impl Masklets {
     }
 
     /// Whether the photo `stem` is a labeled frame.
-    pub fn has(&self, stem: &str) -> bool {
+    pub(crate) fn has(&self, stem: &str) -> bool {
         self.frame(stem).is_some()
     }
 
     /// The masks in the photo `stem`, nameless; none if it is no labeled frame.
-    pub fn regions(&self, stem: &str, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
+    pub(crate) fn regions(&self, stem: &str, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
         let Some(frame) = self.frame(stem) else { return Ok(Vec::new()) };
         let masks = &self.frames[frame];
         let read = |(i, rle): (usize, &Rle)| {

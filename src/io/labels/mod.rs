@@ -14,14 +14,14 @@
 //! Masks are drawn on the photos as stored, or on a larger or smaller copy of them; they are
 //! undistorted and scaled like the photos.
 
-pub mod isat;
-pub mod lerf_mask;
-pub mod masklets;
-pub mod pictures;
-pub mod rle;
-pub mod spin_nerf;
-pub mod synth_ids;
-pub mod three_d_ovs;
+pub(crate) mod isat;
+pub(crate) mod lerf_mask;
+pub(crate) mod masklets;
+pub(crate) mod pictures;
+pub(crate) mod rle;
+pub(crate) mod spin_nerf;
+pub(crate) mod synth_ids;
+pub(crate) mod three_d_ovs;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -42,11 +42,11 @@ const MOST_BYTES: u64 = 1 << 30;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Region {
     /// What it is called; empty = not named.
-    pub name: String,
+    pub(crate) name: String,
     /// Object or part, where the file says.
     pub level: Option<Level>,
     /// Index of the region that it is a piece of.
-    pub parent: Option<usize>,
+    pub(crate) parent: Option<usize>,
     /// Its pixels.
     pub mask: Mask,
 }
@@ -153,12 +153,12 @@ impl Labels {
 
 /// What masks are drawn on: a photo as stored, or a larger or smaller copy of it.
 #[derive(Clone, Copy)]
-pub struct Sheet<'a>(&'a Photo);
+pub(crate) struct Sheet<'a>(&'a Photo);
 
 impl Sheet<'_> {
     /// Whether `masks` masks of `size_px` (width, height), which `path` holds, are of the photo's
     /// shape and fit into memory. To be asked before they are made.
-    pub fn check(self, path: &Path, size_px: (u32, u32), masks: usize) -> Result<(), IoError> {
+    pub(crate) fn check(self, path: &Path, size_px: (u32, u32), masks: usize) -> Result<(), IoError> {
         let (w, h) = size_px;
         if w == 0 || h == 0 || w > Camera::MAX_SIDE_PX || h > Camera::MAX_SIDE_PX {
             return Err(IoError::EmptyPicture { path: path.into(), width_px: w, height_px: h });

@@ -11,21 +11,21 @@ use crate::scene::{Level, Mask};
 #[derive(Debug)]
 pub struct Pictures {
     /// Name of the region and its picture, in the order of their names.
-    pub of: BTreeMap<String, Vec<(String, PathBuf)>>,
+    pub(crate) of: BTreeMap<String, Vec<(String, PathBuf)>>,
     /// Least value, of 255, that belongs to the region.
-    pub least: u8,
+    pub(crate) least: u8,
     /// What all regions are, where the layout says.
-    pub level: Option<Level>,
+    pub(crate) level: Option<Level>,
 }
 
 impl Pictures {
     /// Whether the photo `stem` has masks.
-    pub fn has(&self, stem: &str) -> bool {
+    pub(crate) fn has(&self, stem: &str) -> bool {
         self.of.contains_key(stem)
     }
 
     /// The regions of the photo `stem`; none if it has no masks.
-    pub fn regions(&self, stem: &str, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
+    pub(crate) fn regions(&self, stem: &str, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
         let listed = self.of.get(stem).map_or(&[][..], Vec::as_slice);
         let read = |(name, path): &(String, PathBuf)| {
             let mask = read(path, self.least, sheet, listed.len())?;
@@ -44,6 +44,6 @@ fn read(path: &Path, least: u8, sheet: Sheet<'_>, masks: usize) -> Result<Mask, 
 }
 
 /// Whether a name is a `.png`'s; its stem then.
-pub fn png_stem(name: &str) -> Option<&str> {
+pub(crate) fn png_stem(name: &str) -> Option<&str> {
     name.rsplit_once('.').filter(|(stem, ending)| ending.eq_ignore_ascii_case("png") && !stem.is_empty()).map(|p| p.0)
 }

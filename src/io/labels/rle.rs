@@ -13,9 +13,9 @@ use crate::scene::Mask;
 
 /// A mask as written.
 #[derive(Clone, Debug, Deserialize)]
-pub struct Rle {
+pub(crate) struct Rle {
     /// Height and width in px.
-    pub size: [u32; 2],
+    pub(crate) size: [u32; 2],
     counts: Counts,
 }
 
@@ -28,13 +28,13 @@ enum Counts {
 
 impl Rle {
     /// Width and height in px.
-    pub fn size_px(&self) -> (u32, u32) {
+    pub(crate) fn size_px(&self) -> (u32, u32) {
         (self.size[1], self.size[0])
     }
 
     /// The mask; what is wrong otherwise. Takes memory for `size`, which the caller has checked,
     /// and no more.
-    pub fn mask(&self) -> Result<Mask, String> {
+    pub(crate) fn mask(&self) -> Result<Mask, String> {
         let (w, h) = (self.size[1] as usize, self.size[0] as usize);
         let mut mask = Mask::empty(w, h);
         let mut at = 0_u64;

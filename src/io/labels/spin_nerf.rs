@@ -12,7 +12,7 @@ use crate::scene::Level;
 
 /// The masks of the dataset in `root`, or in the folder `label` itself; those of the least reduced
 /// photos where there are several. `None` if there are none.
-pub fn find(root: &Path) -> Result<Option<Pictures>, IoError> {
+pub(crate) fn find(root: &Path) -> Result<Option<Pictures>, IoError> {
     let own = root.file_name().is_some_and(|n| n == "label").then(|| (1, root.to_owned()));
     let factor = |name: &str| -> Option<u32> {
         let rest = name.strip_prefix("images")?;

@@ -9,7 +9,7 @@ use crate::io::{IoError, files};
 use crate::scene::{Level, Mask, text};
 
 /// The list of identities.
-pub const LIST_FILE: &str = "identities.json";
+pub(crate) const LIST_FILE: &str = "identities.json";
 
 #[derive(Deserialize)]
 struct File {
@@ -18,17 +18,17 @@ struct File {
 
 /// An object or part as listed.
 #[derive(Clone, Debug, Deserialize)]
-pub struct Listed {
+pub(crate) struct Listed {
     /// Value in the id maps.
-    pub id: u16,
+    pub(crate) id: u16,
     /// The node's name.
     #[serde(deserialize_with = "text::read_name")]
-    pub name: String,
+    pub(crate) name: String,
     /// Object or part.
-    pub level: Level,
+    pub(crate) level: Level,
     /// For a part, its object's id.
     #[serde(default)]
-    pub parent: Option<u16>,
+    pub(crate) parent: Option<u16>,
 }
 
 /// A folder with id maps.
@@ -45,7 +45,7 @@ impl SynthIds {
     }
 
     /// Objects and parts, in the file's order.
-    pub fn list(&self) -> &[Listed] {
+    pub(crate) fn list(&self) -> &[Listed] {
         &self.list
     }
 
@@ -55,13 +55,13 @@ impl SynthIds {
     }
 
     /// Whether the photo `stem` has maps.
-    pub fn has(&self, stem: &str) -> bool {
+    pub(crate) fn has(&self, stem: &str) -> bool {
         self.path(Level::Object, stem).is_file()
     }
 
     /// The regions of the photo `stem`, those without a pixel too: objects, then parts, in the
     /// list's order. Empty if it has no maps.
-    pub fn regions(&self, stem: &str, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
+    pub(crate) fn regions(&self, stem: &str, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
         if !self.has(stem) {
             return Ok(Vec::new());
         }

@@ -20,7 +20,7 @@ const LIST_FILE: &str = "classes.txt";
 ///
 /// # Errors
 /// If the list of classes or the photos cannot be read, or masks belong to a photo that is not there.
-pub fn find(root: &Path) -> Result<Option<Pictures>, IoError> {
+pub(crate) fn find(root: &Path) -> Result<Option<Pictures>, IoError> {
     // A folder given as `.` has a name only once it is made whole.
     let whole = std::path::absolute(root).unwrap_or_else(|_| root.into());
     let (root, folder) = match (whole.parent(), whole.file_name()) {

@@ -10,7 +10,7 @@ const MAX_HEADER_BYTES: usize = 1 << 20;
 
 /// How rows are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Encoding {
+pub(crate) enum Encoding {
     /// Numbers as text.
     Ascii,
     /// Binary, least significant byte first.
@@ -21,7 +21,7 @@ pub enum Encoding {
 
 /// Type of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scalar {
+pub(crate) enum Scalar {
     /// `char`.
     I8,
     /// `uchar`.
@@ -56,7 +56,7 @@ impl Scalar {
     }
 
     /// Bytes in a binary file.
-    pub const fn bytes(self) -> usize {
+    pub(crate) const fn bytes(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
@@ -67,7 +67,7 @@ impl Scalar {
 
     /// The value at the front of `b`, little-endian; 0 if `b` is too short.
     #[inline]
-    pub fn read(self, b: &[u8]) -> f64 {
+    pub(crate) fn read(self, b: &[u8]) -> f64 {
         #[inline]
         fn get<const N: usize>(b: &[u8]) -> [u8; N] {
             b.first_chunk().copied().unwrap_or([0; N])
@@ -85,7 +85,7 @@ impl Scalar {
     }
 
     /// Appends `value`, little-endian; `None` if an integer type cannot hold it.
-    pub fn push(self, out: &mut Vec<u8>, value: f64) -> Option<()> {
+    pub(crate) fn push(self, out: &mut Vec<u8>, value: f64) -> Option<()> {
         let int = |lo: f64, hi: f64| (value.fract() == 0.0 && value >= lo && value <= hi).then_some(value);
         match self {
             Self::I8 => out.extend((int(-128.0, 127.0)? as i8).to_le_bytes()),
@@ -103,7 +103,7 @@ impl Scalar {
 
 /// A number, or a list of them with its length in front.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub(crate) enum Kind {
     /// One number.
     Scalar(Scalar),
     /// A list.
@@ -117,22 +117,22 @@ pub enum Kind {
 
 /// A property of an element.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Property {
+pub(crate) struct Property {
     /// Its name.
-    pub name: String,
+    pub(crate) name: String,
     /// Its type.
-    pub kind: Kind,
+    pub(crate) kind: Kind,
 }
 
 /// A kind of row.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Element {
+pub(crate) struct Element {
     /// Its name: `vertex`, `face`, `chunk`.
-    pub name: String,
+    pub(crate) name: String,
     /// Rows, as the file claims.
-    pub count: u64,
+    pub(crate) count: u64,
     /// What each row holds.
-    pub properties: Vec<Property>,
+    pub(crate) properties: Vec<Property>,
 }
 
 /// Reads the header.

@@ -8,44 +8,44 @@ mod table;
 use std::borrow::Cow;
 use std::path::Path;
 
-pub use header::{Element, Encoding, Kind, Scalar};
-pub use table::{Column, Table};
+pub(crate) use header::{Element, Encoding, Kind, Scalar};
+pub(crate) use table::{Column, Table};
 
 use super::IoError;
 
 /// A PLY file whose header has been read.
-pub struct Ply<'a> {
+pub(crate) struct Ply<'a> {
     /// Where it came from, for errors.
-    pub path: &'a Path,
+    pub(crate) path: &'a Path,
     /// How the rows are stored.
-    pub encoding: Encoding,
+    pub(crate) encoding: Encoding,
     /// The comment lines, without the word `comment`.
-    pub comments: Vec<&'a str>,
+    pub(crate) comments: Vec<&'a str>,
     /// The elements in file order.
-    pub elements: Vec<Element>,
+    pub(crate) elements: Vec<Element>,
     body: &'a [u8],
 }
 
 impl<'a> Ply<'a> {
     /// Reads the header of a file's bytes. Nothing is allocated for the rows it claims.
-    pub fn parse(bytes: &'a [u8], path: &'a Path) -> Result<Self, IoError> {
+    pub(crate) fn parse(bytes: &'a [u8], path: &'a Path) -> Result<Self, IoError> {
         header::parse(bytes, path)
     }
 
     /// The element of that name.
-    pub fn element(&self, name: &str) -> Option<&Element> {
+    pub(crate) fn element(&self, name: &str) -> Option<&Element> {
         self.elements.iter().find(|e| e.name == name)
     }
 
     /// Columns and bytes of a row of the element of that name, if it comes first and its rows are of
     /// one size.
-    pub fn first_rows(&self, name: &str) -> Option<(Vec<Column>, usize)> {
+    pub(crate) fn first_rows(&self, name: &str) -> Option<(Vec<Column>, usize)> {
         let element = self.elements.first().filter(|e| e.name == name)?;
         self.columns(element).ok()
     }
 
     /// Bytes after the header.
-    pub fn body_len(&self) -> usize {
+    pub(crate) fn body_len(&self) -> usize {
         self.body.len()
     }
 
@@ -53,7 +53,7 @@ impl<'a> Ply<'a> {
     ///
     /// # Errors
     /// If the file is too short for the element, or the element has list properties.
-    pub fn table(&self, name: &str) -> Result<Option<Table<'a>>, IoError> {
+    pub(crate) fn table(&self, name: &str) -> Result<Option<Table<'a>>, IoError> {
         let Some(at) = self.elements.iter().position(|e| e.name == name) else { return Ok(None) };
         let element = &self.elements[at];
         let (columns, stride) = self.columns(element)?;
@@ -168,7 +168,7 @@ impl<'a> Ply<'a> {
     }
 
     /// An error about the element `element`.
-    pub fn syntax(&self, element: &str, reason: String) -> IoError {
+    pub(crate) fn syntax(&self, element: &str, reason: String) -> IoError {
         IoError::Syntax { path: self.path.into(), place: format!("element '{element}'"), reason }
     }
 }

@@ -6,61 +6,61 @@ use super::Scalar;
 
 /// A column of a [`Table`].
 #[derive(Clone, Debug)]
-pub struct Column {
+pub(crate) struct Column {
     /// The property's name.
-    pub name: String,
+    pub(crate) name: String,
     /// The property's type.
-    pub scalar: Scalar,
+    pub(crate) scalar: Scalar,
     /// Where it starts in a row, in bytes.
-    pub offset: usize,
+    pub(crate) offset: usize,
 }
 
 impl Column {
     /// The value in `row`.
     #[inline]
-    pub fn f64(&self, row: &[u8]) -> f64 {
+    pub(crate) fn f64(&self, row: &[u8]) -> f64 {
         self.scalar.read(&row[self.offset..])
     }
 
     /// The value in `row`, in single precision.
     #[inline]
-    pub fn f32(&self, row: &[u8]) -> f32 {
+    pub(crate) fn f32(&self, row: &[u8]) -> f32 {
         self.f64(row) as f32
     }
 
     /// The value in `row` of an integer column that fits 32 bits.
     #[inline]
-    pub fn u32(&self, row: &[u8]) -> u32 {
+    pub(crate) fn u32(&self, row: &[u8]) -> u32 {
         self.f64(row) as u32
     }
 }
 
 /// Rows of fixed size, little-endian.
-pub struct Table<'a> {
+pub(crate) struct Table<'a> {
     /// Number of rows.
-    pub rows: usize,
+    pub(crate) rows: usize,
     /// Bytes per row.
-    pub stride: usize,
+    pub(crate) stride: usize,
     /// The columns in file order.
-    pub columns: Vec<Column>,
+    pub(crate) columns: Vec<Column>,
     /// `rows * stride` bytes.
-    pub data: Cow<'a, [u8]>,
+    pub(crate) data: Cow<'a, [u8]>,
 }
 
 impl Table<'_> {
     /// The bytes of row `i`.
     #[inline]
-    pub fn row(&self, i: usize) -> &[u8] {
+    pub(crate) fn row(&self, i: usize) -> &[u8] {
         &self.data[i * self.stride..(i + 1) * self.stride]
     }
 
     /// The column of that name.
-    pub fn column(&self, name: &str) -> Option<&Column> {
+    pub(crate) fn column(&self, name: &str) -> Option<&Column> {
         self.columns.iter().find(|c| c.name == name)
     }
 
     /// The columns of those names, or the first name that is missing.
-    pub fn all<const N: usize>(&self, names: [&'static str; N]) -> Result<[&Column; N], &'static str> {
+    pub(crate) fn all<const N: usize>(&self, names: [&'static str; N]) -> Result<[&Column; N], &'static str> {
         if let Some(missing) = names.iter().find(|n| self.column(n).is_none()) {
             return Err(missing);
         }

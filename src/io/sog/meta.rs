@@ -9,20 +9,20 @@ use crate::io::{IoError, files};
 /// What a file says, checked: every number is finite, every list has its length.
 pub(super) struct Meta {
     /// Number of Gaussians, not yet compared with the pictures.
-    pub count: u64,
+    pub(crate) count: u64,
     /// Bounds of the positions' logarithms.
-    pub means: ([f32; 3], [f32; 3]),
+    pub(crate) means: ([f32; 3], [f32; 3]),
     /// Pictures with the low and the high bytes of the positions.
-    pub means_files: [String; 2],
+    pub(crate) means_files: [String; 2],
     /// Log-scales.
-    pub scales: Levels<3>,
-    pub scales_file: String,
-    pub quats_file: String,
+    pub(crate) scales: Levels<3>,
+    pub(crate) scales_file: String,
+    pub(crate) quats_file: String,
     /// Constant harmonics.
-    pub sh0: Levels<3>,
-    pub opacity: Opacity,
-    pub sh0_file: String,
-    pub rest: Option<Rest>,
+    pub(crate) sh0: Levels<3>,
+    pub(crate) opacity: Opacity,
+    pub(crate) sh0_file: String,
+    pub(crate) rest: Option<Rest>,
 }
 
 /// What the 256 values of a byte stand for, by channel.
@@ -38,12 +38,12 @@ pub(super) enum Opacity {
 /// Higher harmonics.
 pub(super) struct Rest {
     /// Degree, where the file says; else it follows from the palette's width.
-    pub degree: Option<u8>,
+    pub(crate) degree: Option<u8>,
     /// Palette entries, where the file says.
-    pub count: Option<u64>,
-    pub levels: Levels<1>,
-    pub centroids_file: String,
-    pub labels_file: String,
+    pub(crate) count: Option<u64>,
+    pub(crate) levels: Levels<1>,
+    pub(crate) centroids_file: String,
+    pub(crate) labels_file: String,
 }
 
 #[derive(Deserialize)]

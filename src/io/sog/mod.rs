@@ -15,7 +15,7 @@ use super::{IoError, files};
 use crate::scene::GaussianCloud;
 
 /// The file that makes a folder a SOG scene.
-pub const META_FILE: &str = "meta.json";
+pub(crate) const META_FILE: &str = "meta.json";
 
 /// Reads an unbundled SOG by its `meta.json`.
 pub fn read_folder(meta_file: &Path) -> Result<GaussianCloud, IoError> {
@@ -32,7 +32,7 @@ pub fn read_folder(meta_file: &Path) -> Result<GaussianCloud, IoError> {
 }
 
 /// Reads a bundled `.sog`.
-pub fn read_archive(path: &Path) -> Result<GaussianCloud, IoError> {
+pub(crate) fn read_archive(path: &Path) -> Result<GaussianCloud, IoError> {
     parse_archive(&files::read(path, u64::MAX)?, path)
 }
 

@@ -19,7 +19,7 @@ use crate::io::{IoError, files};
 use crate::scene::GaussianCloud;
 
 pub use read::parse;
-pub use stream::state;
+pub(crate) use stream::state;
 pub use write::{check, encode, write};
 
 /// Properties that carry Gaussians, besides `f_rest_*`.

@@ -25,20 +25,20 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
 
 /// Some rows of a splat.
 pub(super) struct Reading<'a> {
-    pub ply: &'a Ply<'a>,
-    pub table: &'a Table<'a>,
+    pub(crate) ply: &'a Ply<'a>,
+    pub(crate) table: &'a Table<'a>,
     /// Number of the first row, for errors.
-    pub first: usize,
+    pub(crate) first: usize,
 }
 
 impl Reading<'_> {
     /// Whether positions of any rows alone have the origin that those of all have.
-    pub fn has_one_origin(&self) -> bool {
+    pub(crate) fn has_one_origin(&self) -> bool {
         let single = ["x", "y", "z"].iter().all(|n| self.table.column(n).is_some_and(|c| c.scalar != Scalar::F64));
         self.stated_origin().is_ok_and(|stated| stated.is_some() || single)
     }
 
-    pub fn cloud(&self) -> Result<GaussianCloud, IoError> {
+    pub(crate) fn cloud(&self) -> Result<GaussianCloud, IoError> {
         let dc = self.columns(["f_dc_0", "f_dc_1", "f_dc_2"])?;
         let (degree, rest) = self.rest_columns()?;
         let (origin, positions) = self.positions()?;

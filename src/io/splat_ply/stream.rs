@@ -16,7 +16,7 @@ const HEADER_BYTES: u64 = 64 << 10;
 const BLOCK_BYTES: usize = 512 << 10;
 
 /// The id of the scene's state that a `.ply` belongs to, if it says.
-pub fn state(path: &Path) -> Result<Option<String>, IoError> {
+pub(crate) fn state(path: &Path) -> Result<Option<String>, IoError> {
     let start = files::read_start(path, HEADER_BYTES)?;
     let ply = Ply::parse(&start, path).ok();
     Ok(ply.and_then(|ply| ply.comments.iter().find_map(|c| c.strip_prefix(STATE)).map(str::to_owned)))
@@ -24,7 +24,7 @@ pub fn state(path: &Path) -> Result<Option<String>, IoError> {
 
 /// The Gaussians of a little-endian `.ply` whose first element they are; `None` if it is another
 /// sort of file, which has to be read as a whole.
-pub fn read(path: &Path) -> Result<Option<GaussianCloud>, IoError> {
+pub(crate) fn read(path: &Path) -> Result<Option<GaussianCloud>, IoError> {
     let start = files::read_start(path, HEADER_BYTES)?;
     // What is wrong with the header is told by reading the whole.
     let Ok(ply) = Ply::parse(&start, path) else { return Ok(None) };

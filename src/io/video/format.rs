@@ -6,7 +6,7 @@ use super::{Result, Settings, VideoFileError};
 
 /// A format that is written without other programs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
+pub(crate) enum Format {
     /// H.264 in MP4, `.mp4`: plays everywhere.
     Mp4,
     /// Animated GIF, `.gif`: 256 colors per frame.
@@ -19,10 +19,10 @@ pub enum Format {
 
 impl Format {
     /// Every format.
-    pub const ALL: [Self; 4] = [Self::Mp4, Self::Gif, Self::WebP, Self::Frames];
+    pub(crate) const ALL: [Self; 4] = [Self::Mp4, Self::Gif, Self::WebP, Self::Frames];
 
     /// How a path of this format ends.
-    pub fn ending(self) -> &'static str {
+    pub(crate) fn ending(self) -> &'static str {
         match self {
             Self::Mp4 => ".mp4",
             Self::Gif => ".gif",
@@ -36,7 +36,7 @@ impl Format {
     ///
     /// # Errors
     /// [`VideoFileError::UnknownFormat`] lists the endings there are.
-    pub fn of(path: &Path) -> Result<Self> {
+    pub(crate) fn of(path: &Path) -> Result<Self> {
         let folder = path.is_dir() || path.as_os_str().to_string_lossy().ends_with(std::path::is_separator);
         if folder && path.file_name().is_some() {
             return Ok(Self::Frames);

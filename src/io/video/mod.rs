@@ -30,33 +30,33 @@ mod yuv;
 
 use std::path::{Path, PathBuf};
 
-pub use error::VideoFileError;
-pub use format::Format;
-pub use settings::{Encoder, Settings};
+pub(crate) use error::VideoFileError;
+pub(crate) use format::Format;
+pub(crate) use settings::{Encoder, Settings};
 
 /// Result of this module's functions.
-pub type Result<T> = std::result::Result<T, VideoFileError>;
+pub(crate) type Result<T> = std::result::Result<T, VideoFileError>;
 
 /// What was written.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Summary {
+pub(crate) struct Summary {
     /// The file, or the folder of PNG frames.
-    pub path: PathBuf,
+    pub(crate) path: PathBuf,
     /// Its format; `None` where ffmpeg chose it by the file's name.
-    pub format: Option<Format>,
+    pub(crate) format: Option<Format>,
     /// Frames pushed.
-    pub frames: u64,
+    pub(crate) frames: u64,
     /// Bytes on disk.
-    pub bytes: u64,
+    pub(crate) bytes: u64,
     /// Playing time in seconds.
-    pub secs: f64,
+    pub(crate) secs: f64,
     /// Width and height of the video in px: those of the frames, less a last column or row of odd
     /// number where the format (MP4) has even sides only.
-    pub size_px: (u32, u32),
+    pub(crate) size_px: (u32, u32),
 }
 
 /// Writes a video frame by frame.
-pub struct VideoWriter {
+pub(crate) struct VideoWriter {
     path: PathBuf,
     format: Option<Format>,
     settings: Settings,
@@ -84,7 +84,7 @@ impl VideoWriter {
     /// [`VideoFileError`]: an ending that no format has, a size or rate that the format cannot hold,
     /// a file that exists (unless [`Settings::overwrite`]), a folder that cannot be written to, a
     /// program that is missing.
-    pub fn create(path: &Path, settings: &Settings) -> Result<Self> {
+    pub(crate) fn create(path: &Path, settings: &Settings) -> Result<Self> {
         settings.check(path)?;
         let (format, sink): (_, Box<dyn Sink>) = match &settings.encoder {
             Encoder::Ffmpeg { program, args } => {
@@ -111,12 +111,12 @@ impl VideoWriter {
     }
 
     /// Width and height of the video in px; see [`Summary::size_px`].
-    pub fn size_px(&self) -> (u32, u32) {
+    pub(crate) fn size_px(&self) -> (u32, u32) {
         self.size_px
     }
 
     /// Frames pushed so far.
-    pub fn frames(&self) -> u64 {
+    pub(crate) fn frames(&self) -> u64 {
         self.frames
     }
 
@@ -125,7 +125,7 @@ impl VideoWriter {
     ///
     /// # Errors
     /// [`VideoFileError`]: wrong length, an encoder that gives up, a full disk.
-    pub fn push(&mut self, rgb: &[u8]) -> Result<()> {
+    pub(crate) fn push(&mut self, rgb: &[u8]) -> Result<()> {
         let expected = self.settings.frame_bytes();
         if rgb.len() as u64 != expected {
             return Err(VideoFileError::FrameBytes { frame: self.frames, found: rgb.len() as u64, expected });
@@ -147,7 +147,7 @@ impl VideoWriter {
     ///
     /// # Errors
     /// [`VideoFileError`]: no frames, a frame that failed before, a full disk. Nothing is left then.
-    pub fn finish(mut self) -> Result<Summary> {
+    pub(crate) fn finish(mut self) -> Result<Summary> {
         let Some(sink) = self.sink.take() else { return Err(VideoFileError::Broken { path: self.path }) };
         if self.frames == 0 {
             return Err(VideoFileError::NoFrames { path: self.path });

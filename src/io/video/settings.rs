@@ -7,24 +7,24 @@ use crate::scene::Camera;
 
 /// Size, rate and quality of a video.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Settings {
+pub(crate) struct Settings {
     /// Width of the frames in px.
-    pub width_px: u32,
+    pub(crate) width_px: u32,
     /// Height of the frames in px.
-    pub height_px: u32,
+    pub(crate) height_px: u32,
     /// Frames per second, the same throughout.
-    pub fps: f64,
+    pub(crate) fps: f64,
     /// From 0 (smallest file) to 100 (best picture).
-    pub quality: u8,
+    pub(crate) quality: u8,
     /// Whether a video or frames of the same name may be replaced.
-    pub overwrite: bool,
+    pub(crate) overwrite: bool,
     /// What encodes.
-    pub encoder: Encoder,
+    pub(crate) encoder: Encoder,
 }
 
 /// What encodes a video.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub enum Encoder {
+pub(crate) enum Encoder {
     /// What is built into the program.
     #[default]
     BuiltIn,
@@ -39,7 +39,7 @@ pub enum Encoder {
 
 impl Settings {
     /// A video of this size and rate: quality 80, built-in encoder, nothing is overwritten.
-    pub fn new(width_px: u32, height_px: u32, fps: f64) -> Self {
+    pub(crate) fn new(width_px: u32, height_px: u32, fps: f64) -> Self {
         Self { width_px, height_px, fps, quality: 80, overwrite: false, encoder: Encoder::BuiltIn }
     }
 

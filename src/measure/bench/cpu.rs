@@ -21,36 +21,36 @@ use crate::scene::{Dataset, GaussianCloud};
 
 /// Timing of one scene at one size.
 #[derive(Clone, Debug, Serialize)]
-pub struct RenderTiming {
-    pub name: String,
-    pub gaussians: usize,
+pub(crate) struct RenderTiming {
+    pub(crate) name: String,
+    pub(crate) gaussians: usize,
     /// Width and height, px.
-    pub size: [u32; 2],
+    pub(crate) size: [u32; 2],
     /// Milliseconds of the whole frame, median over views and repeats.
-    pub total_ms: f64,
+    pub(crate) total_ms: f64,
     /// Milliseconds of projection, sorting, binning, blending.
-    pub stages_ms: [f64; 4],
+    pub(crate) stages_ms: [f64; 4],
     /// Splat-pixel products evaluated per frame, mean over the views.
-    pub products: f64,
+    pub(crate) products: f64,
     /// Products per second of blending.
-    pub products_per_sec: f64,
+    pub(crate) products_per_sec: f64,
 }
 
 /// Timing of training steps.
 #[derive(Clone, Debug, Serialize)]
-pub struct StepTiming {
-    pub name: String,
-    pub gaussians: usize,
+pub(crate) struct StepTiming {
+    pub(crate) name: String,
+    pub(crate) gaussians: usize,
     /// Width and height of the first photo, px.
-    pub size: [u32; 2],
+    pub(crate) size: [u32; 2],
     /// Milliseconds of a step, median.
-    pub step_ms: f64,
+    pub(crate) step_ms: f64,
     /// Steps per second, from the median.
-    pub steps_per_sec: f64,
+    pub(crate) steps_per_sec: f64,
 }
 
 /// Times the CPU renderer on a cloud.
-pub fn render(
+pub(crate) fn render(
     name: &str,
     cloud: &Arc<GaussianCloud>,
     size: [u32; 2],
@@ -77,7 +77,7 @@ pub fn render(
 }
 
 /// Times CPU training steps from the dataset's own starting cloud, density control off.
-pub fn train_steps(
+pub(crate) fn train_steps(
     dataset: &Dataset,
     views: &[TrainView],
     config: &TrainConfig,
@@ -102,7 +102,7 @@ pub fn train_steps(
 
 /// Splat-pixel products per second that one core of this machine can evaluate and blend when
 /// nothing else is in the way: conic, exponential, transmittance and color on registers alone.
-pub fn one_core_limit() -> f64 {
+pub(crate) fn one_core_limit() -> f64 {
     const ROUNDS: usize = 2_000_000;
     let start = Instant::now();
     let sum = f32::vectorize(Limit { rounds: ROUNDS });
@@ -146,6 +146,6 @@ impl LaneOp<f32> for Limit {
 }
 
 /// A readable name for a path: its last part.
-pub fn label(path: &Path) -> String {
+pub(crate) fn label(path: &Path) -> String {
     path.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned())
 }

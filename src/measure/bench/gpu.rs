@@ -105,24 +105,24 @@ fn medians(runs: &[StageTimes]) -> StageTimes {
 
 /// Timing of frames or training steps.
 #[derive(Clone, Debug, Serialize)]
-pub struct Timing {
+pub(crate) struct Timing {
     /// The scene or dataset.
-    pub name: String,
+    pub(crate) name: String,
     /// Gaussians in it.
-    pub gaussians: usize,
+    pub(crate) gaussians: usize,
     /// Width and height, px.
-    pub size: [u32; 2],
+    pub(crate) size: [u32; 2],
     /// Milliseconds from the call to the result, median. A frame is copied to the host in it.
-    pub total_ms: f64,
+    pub(crate) total_ms: f64,
     /// Milliseconds on the device per stage, median; empty where the device has no timestamps.
-    pub stages_ms: Vec<(&'static str, f64)>,
+    pub(crate) stages_ms: Vec<(&'static str, f64)>,
 }
 
 /// Times the GPU renderer on a cloud, from the same views as [`super::cpu::render`].
 ///
 /// # Errors
 /// If the device fails.
-pub fn render(
+pub(crate) fn render(
     device: &Device,
     name: &str,
     cloud: &Arc<GaussianCloud>,
@@ -139,7 +139,7 @@ pub fn render(
 ///
 /// # Errors
 /// If the device fails.
-pub fn train_steps(
+pub(crate) fn train_steps(
     device: &Device,
     dataset: &Dataset,
     views: &[TrainView],

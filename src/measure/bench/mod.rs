@@ -5,7 +5,7 @@ pub(crate) mod cpu;
 pub mod gpu;
 pub(crate) mod query;
 
-pub use cpu::{label, one_core_limit};
+pub(crate) use cpu::{label, one_core_limit};
 
 use glam::DVec3;
 use serde::Serialize;
@@ -32,26 +32,26 @@ pub fn views_of<R: Real>(cloud: &GaussianCloud<R>, width: u32, height: u32) -> V
 
 /// Everything that one run has measured.
 #[derive(Debug, Default, Serialize)]
-pub struct Timings {
+pub(crate) struct Timings {
     /// Drawing on the CPU.
-    pub render: Vec<RenderTiming>,
+    pub(crate) render: Vec<RenderTiming>,
     /// Training on the CPU.
-    pub train: Vec<StepTiming>,
+    pub(crate) train: Vec<StepTiming>,
     /// Name and features of the GPU, if it was asked for.
-    pub gpu: Option<String>,
+    pub(crate) gpu: Option<String>,
     /// Drawing on the GPU.
-    pub gpu_render: Vec<Timing>,
+    pub(crate) gpu_render: Vec<Timing>,
     /// Training on the GPU.
-    pub gpu_train: Vec<Timing>,
+    pub(crate) gpu_train: Vec<Timing>,
     /// What one core could do at most (see [`one_core_limit`]).
-    pub one_core_products_per_sec: f64,
+    pub(crate) one_core_products_per_sec: f64,
     /// Typed queries, if they were asked for.
-    pub queries: Option<QueryTiming>,
+    pub(crate) queries: Option<QueryTiming>,
 }
 
 impl Timings {
     /// A table of each kind, with a line about it.
-    pub fn tables(&self) -> Vec<(Rows, String)> {
+    pub(crate) fn tables(&self) -> Vec<(Rows, String)> {
         let size = |[w, h]: [u32; 2]| format!("{w}x{h}");
         let mut all: Vec<(Rows, String)> = self.queries.iter().map(QueryTiming::table).collect();
         let head = ["drawing, CPU", "Gaussians", "size", "ms", "project", "sort", "bin", "blend", "products", "per s"];

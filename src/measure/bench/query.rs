@@ -22,27 +22,27 @@ use crate::scene::{Identities, IdentityId, LanguageFeatures, Level, NOBODY, View
 
 /// Median and 95th percentile, ms.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Percentiles {
+pub(crate) struct Percentiles {
     /// Half of the queries take no longer.
-    pub p50_ms: f64,
+    pub(crate) p50_ms: f64,
     /// 95 of 100 take no longer.
-    pub p95_ms: f64,
+    pub(crate) p95_ms: f64,
 }
 
 /// Times of the stages of a query.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct QueryTiming {
-    pub encoder: String,
-    pub identities: usize,
+pub(crate) struct QueryTiming {
+    pub(crate) encoder: String,
+    pub(crate) identities: usize,
     /// Size of the view, px.
-    pub size: [usize; 2],
-    pub queries: usize,
+    pub(crate) size: [usize; 2],
+    pub(crate) queries: usize,
     /// Each stage; what is drawn is the heat map.
     #[serde(flatten)]
-    pub stages: Stages<Percentiles>,
-    pub without_encoding: Percentiles,
+    pub(crate) stages: Stages<Percentiles>,
+    pub(crate) without_encoding: Percentiles,
     /// From the text to the mask.
-    pub whole: Percentiles,
+    pub(crate) whole: Percentiles,
 }
 
 impl QueryTiming {
@@ -75,7 +75,7 @@ const PARTS: [&str; 6] = ["button", "handle", "lid", "shade", "lens", "wheel"];
 
 /// Asks `queries` questions of a view of `size` px with `identities` objects and parts. Every text is
 /// another one, so none is encoded already.
-pub fn time(
+pub(crate) fn time(
     encoder: &mut dyn Encoder,
     identities: usize,
     size: [usize; 2],

@@ -13,7 +13,7 @@ use crate::scene::{Camera, GaussianCloud};
 const BOUND: f64 = 1e-4;
 
 /// One Gaussian in the middle, of this shape.
-pub fn one(scales: [f64; 3], quaternion: [f64; 4], opacity_logit: f64) -> GaussianCloud<f64> {
+pub(crate) fn one(scales: [f64; 3], quaternion: [f64; 4], opacity_logit: f64) -> GaussianCloud<f64> {
     GaussianCloud {
         positions: vec![[0.0; 3]],
         log_scales: vec![scales.map(f64::ln)],
@@ -25,7 +25,7 @@ pub fn one(scales: [f64; 3], quaternion: [f64; 4], opacity_logit: f64) -> Gaussi
 }
 
 /// A camera before the middle, 3 units away.
-pub fn camera(width: u32, height: u32) -> Camera {
+pub(crate) fn camera(width: u32, height: u32) -> Camera {
     let focal = 1.2 * f64::from(height.max(1));
     Camera {
         width_px: width,
@@ -38,7 +38,7 @@ pub fn camera(width: u32, height: u32) -> Camera {
 }
 
 /// Draws in both precisions.
-pub fn pair(
+pub(crate) fn pair(
     cloud: &GaussianCloud<f64>,
     camera: &Camera,
     settings: &RenderSettings,
@@ -50,7 +50,7 @@ pub fn pair(
 }
 
 /// The largest difference of alpha, or of a color as a share of the largest one. NaN if one of the values is.
-pub fn deviation(exact: &Frame<f64>, single: &Frame<f32>) -> f64 {
+pub(crate) fn deviation(exact: &Frame<f64>, single: &Frame<f32>) -> f64 {
     let brightest = worst(exact.color.iter().flatten().copied().chain([1.0]));
     let color = exact.color.iter().zip(&single.color).map(|(a, b)| worst_difference(a, b) / brightest);
     worst(color.chain([worst_difference(&exact.alpha, &single.alpha)]))
@@ -153,7 +153,7 @@ impl Scenes {
 const TURNED: [f64; 4] = [0.8, 0.3, -0.4, 0.33];
 
 /// The cases of this area: of Gaussians, then of surfels where those differ.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     let as_cases = |area: &'static str, scenes: Scenes, surfels: bool| {
         let settings = RenderSettings { surfels, ..RenderSettings::default() };
         scenes.0.into_iter().map(move |(name, expected, make)| {

@@ -92,7 +92,7 @@ fn tiles(faulty: bool) -> Finding {
     worst
 }
 
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     let case = |name: &'static str, bound: f64, change: fn(&mut GaussianCloud<f64>, &mut Camera)| {
         Case::new("invariance", name, move |faulty| {
             let (mut cloud, mut at) = (scene(), camera(96, 64));

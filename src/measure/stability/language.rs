@@ -40,7 +40,7 @@ impl Scorer for Fixed {
     }
 }
 
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     let language = |name: &'static str, run: fn(bool) -> Finding| Case::new("language", name, run);
     vec![
         language("identical embeddings are no more than anything", |faulty| {

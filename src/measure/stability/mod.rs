@@ -24,7 +24,7 @@ use super::table::{Rows, rows};
 /// Whether a promise holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Verdict {
+pub(crate) enum Verdict {
     Holds,
     /// What came out is finite, but there is nothing to hold it against: no precision knows better.
     NotCompared,
@@ -32,12 +32,12 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    pub fn of(holds: bool) -> Self {
+    pub(crate) fn of(holds: bool) -> Self {
         if holds { Self::Holds } else { Self::Broken }
     }
 
     /// For tables.
-    pub fn text(self) -> &'static str {
+    pub(crate) fn text(self) -> &'static str {
         match self {
             Self::Holds => "yes",
             Self::NotCompared => "not compared",
@@ -48,59 +48,59 @@ impl Verdict {
 
 /// What happened in a case.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Finding {
-    pub outcome: String,
+pub(crate) struct Finding {
+    pub(crate) outcome: String,
     /// Deviation from what it should be; NaN if there is nothing to compare.
-    pub error: f64,
+    pub(crate) error: f64,
     /// The largest deviation that is allowed.
-    pub bound: f64,
-    pub verdict: Verdict,
+    pub(crate) bound: f64,
+    pub(crate) verdict: Verdict,
 }
 
 impl Finding {
     /// A deviation compared with its bound. One that is not a number does not hold.
-    pub fn within(outcome: impl Into<String>, error: f64, bound: f64) -> Self {
+    pub(crate) fn within(outcome: impl Into<String>, error: f64, bound: f64) -> Self {
         Self { outcome: outcome.into(), error, bound, verdict: Verdict::of(error <= bound) }
     }
 
-    pub fn is(outcome: impl Into<String>, holds: bool) -> Self {
+    pub(crate) fn is(outcome: impl Into<String>, holds: bool) -> Self {
         Self { outcome: outcome.into(), error: f64::NAN, bound: f64::NAN, verdict: Verdict::of(holds) }
     }
 
     /// The same, broken unless this holds too.
     #[must_use]
-    pub fn and(self, holds: bool) -> Self {
+    pub(crate) fn and(self, holds: bool) -> Self {
         let verdict = if holds { self.verdict } else { Verdict::Broken };
         Self { verdict, ..self }
     }
 
     /// Whether the promise was seen to break.
-    pub fn is_broken(&self) -> bool {
+    pub(crate) fn is_broken(&self) -> bool {
         self.verdict == Verdict::Broken
     }
 }
 
 /// A named case.
-pub struct Case {
-    pub area: &'static str,
-    pub name: String,
+pub(crate) struct Case {
+    pub(crate) area: &'static str,
+    pub(crate) name: String,
     /// Runs it, with a fault planted if told so.
     run: Box<dyn Fn(bool) -> Finding + Send + Sync>,
 }
 
 /// A case and what was found.
 #[derive(Clone, Debug, Serialize)]
-pub struct Checked {
-    pub area: &'static str,
-    pub name: String,
+pub(crate) struct Checked {
+    pub(crate) area: &'static str,
+    pub(crate) name: String,
     /// How long it took, seconds.
-    pub secs: f64,
-    pub finding: Finding,
+    pub(crate) secs: f64,
+    pub(crate) finding: Finding,
 }
 
 impl Case {
     /// A case. What runs it plants a fault where it is told to.
-    pub fn new(
+    pub(crate) fn new(
         area: &'static str,
         name: impl Into<String>,
         run: impl Fn(bool) -> Finding + Send + Sync + 'static,
@@ -109,7 +109,7 @@ impl Case {
     }
 
     /// Runs it. A panic is a broken promise, not the end.
-    pub fn check(&self) -> Checked {
+    pub(crate) fn check(&self) -> Checked {
         let start = Instant::now();
         let finding = catch_unwind(AssertUnwindSafe(|| (self.run)(false)));
         let finding = finding.unwrap_or_else(|_| Finding::is("it panicked", false));
@@ -118,13 +118,13 @@ impl Case {
 
     /// The control: what is found with a fault planted, which must be a broken promise.
     #[cfg(test)]
-    pub fn control(&self) -> Finding {
+    pub(crate) fn control(&self) -> Finding {
         (self.run)(true)
     }
 }
 
 /// What was found, a row for each case.
-pub fn table(checked: &[Checked]) -> Rows {
+pub(crate) fn table(checked: &[Checked]) -> Rows {
     let number = |v: f64| if v.is_nan() { String::new() } else { format!("{v:.1e}") };
     rows(
         &["area", "case", "what happened", "error", "bound", "holds"],
@@ -137,7 +137,7 @@ pub fn table(checked: &[Checked]) -> Rows {
 }
 
 /// All cases, in the order of the areas.
-pub fn catalog() -> Vec<Case> {
+pub(crate) fn catalog() -> Vec<Case> {
     let mut all = drawing::cases();
     all.extend(invariance::cases());
     all.extend(training::cases());

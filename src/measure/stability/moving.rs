@@ -45,7 +45,7 @@ fn whole(flight: Option<Flight>, faulty: bool) -> Finding {
     Finding::within(format!("{} poses", flight.poses.len()), if finite { worst } else { f64::NAN }, 1e-9)
 }
 
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     let moving = |name: &'static str, run: fn(bool) -> Finding| Case::new("moving", name, run);
     vec![
         moving("duplicate cameras", |faulty| {

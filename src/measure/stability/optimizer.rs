@@ -129,7 +129,7 @@ fn curvatures(cloud: &GaussianCloud, view: &TrainView) -> [f64; 3] {
     })
 }
 
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     let training = |name: &'static str, run: fn(bool) -> Finding| Case::new("training", name, run);
     vec![
         training("Adam, 100,000 steps of no gradient", |faulty| {

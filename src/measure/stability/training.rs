@@ -20,7 +20,7 @@ use crate::scene::{GaussianCloud, PhotoPixels};
 const STEPS: u64 = 60;
 
 /// A photo of one gray level.
-pub fn flat(level: u8) -> TrainView {
+pub(crate) fn flat(level: u8) -> TrainView {
     let at = camera(48, 32);
     let rgb = vec![[level; 3]; 48 * 32];
     TrainView {
@@ -53,7 +53,7 @@ pub(super) fn start() -> GaussianCloud {
 }
 
 /// A trainer of these Gaussians.
-pub fn trainer(cloud: GaussianCloud, steps: u64, densify: bool, extent: f64) -> Trainer {
+pub(crate) fn trainer(cloud: GaussianCloud, steps: u64, densify: bool, extent: f64) -> Trainer {
     let config = TrainConfig { steps, densify, sh_degree: 0, ..TrainConfig::default() };
     Trainer::new(cloud, &config, [0.0; 3], extent, Pcg64Mcg::seed_from_u64(5))
 }
@@ -179,7 +179,7 @@ fn resumed(faulty: bool) -> Finding {
     }
 }
 
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     let training = |name: &'static str, run: fn(bool) -> Finding| Case::new("training", name, run);
     vec![
         training("an ordinary start improves", |faulty| improves(faulty, start(), blob(), |_| {})),

@@ -19,7 +19,7 @@ struct Variant {
 }
 
 /// The sweep of the depth of `cloud`, drawn by `settings`, in views whose depth is known at full size.
-pub fn study<'a>(
+pub(crate) fn study<'a>(
     cloud: &'a GaussianCloud,
     settings: &RenderSettings,
     views: Vec<(Camera, TrueDepth)>,

@@ -33,7 +33,7 @@ struct Variant {
 
 /// The sweep of the features of the trained Gaussians `cloud`, whose labeled views `training` are learned from and
 /// `held_out` compared with. Gradients are given these numbers of `steps`.
-pub fn study<'a>(
+pub(crate) fn study<'a>(
     drawn: (&'a GaussianCloud, &'a RenderSettings),
     mut identities: Identities,
     [training, held_out]: [Vec<CodeView>; 2],

@@ -1,12 +1,12 @@
 //! What is swept, one file per stage of the program.
 
-pub mod depth;
-pub mod features;
-pub mod path;
-pub mod query;
-pub mod render;
-pub mod train;
-pub mod views;
+pub(crate) mod depth;
+pub(crate) mod features;
+pub(crate) mod path;
+pub(crate) mod query;
+pub(crate) mod render;
+pub(crate) mod train;
+pub(crate) mod views;
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -15,7 +15,7 @@ use super::document::{ErrorKind, Measure};
 use super::sweep::{Case, StudyError};
 
 /// What a sweep is run on, in words: name and value.
-pub type Input = BTreeMap<String, String>;
+pub(crate) type Input = BTreeMap<String, String>;
 
 /// Settings of a stage, each with what it means to the study: the default first.
 struct Variants<V>(Vec<(Case, V)>);

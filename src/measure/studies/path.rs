@@ -44,7 +44,7 @@ enum Way {
 }
 
 /// The sweep of camera paths through `cloud`, whose photos were taken by these cameras.
-pub fn study(cloud: &GaussianCloud, cameras: &[Camera], repeats: u32, mut input: Input) -> Study<'static> {
+pub(crate) fn study(cloud: &GaussianCloud, cameras: &[Camera], repeats: u32, mut input: Input) -> Study<'static> {
     let up = Camera::up_of(cameras.iter()).unwrap_or(DVec3::NEG_Y);
     let mut navigator = Navigator::new(cloud, cameras, up);
     input.insert("keypoints".into(), navigator.graph.keypoints.len().to_string());

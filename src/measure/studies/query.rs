@@ -23,11 +23,11 @@ use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, IdentityId, LanguageFeatures, Level, LevelFilter, Mask, SemanticMap};
 
-pub struct Asked {
-    pub name: String,
+pub(crate) struct Asked {
+    pub(crate) name: String,
     /// Its camera, of the labels' size.
-    pub camera: Camera,
-    pub categories: Vec<Category>,
+    pub(crate) camera: Camera,
+    pub(crate) categories: Vec<Category>,
 }
 
 /// How stored embeddings are kept.
@@ -51,7 +51,7 @@ struct Variant {
 }
 
 /// The sweep of queries to a scene that `encoder` has embedded, asked for what labeled views show.
-pub fn study<'a>(
+pub(crate) fn study<'a>(
     (cloud, settings): (&'a GaussianCloud, &'a RenderSettings),
     map: &'a SemanticMap,
     mut encoder: Box<dyn Encoder>,

@@ -53,7 +53,7 @@ struct Drawing {
 }
 
 /// The sweep of drawing `cloud` by `settings` from these views.
-pub fn study(
+pub(crate) fn study(
     cloud: Arc<GaussianCloud>,
     settings: &RenderSettings,
     views: Vec<View>,

@@ -17,7 +17,7 @@ const EVALUATIONS: u64 = 8;
 ///
 /// # Errors
 /// If a photo cannot be read, or none is held out.
-pub fn study(dataset: &Dataset, base: TrainConfig, repeats: u32, input: Input) -> Result<Study<'_>, StudyError> {
+pub(crate) fn study(dataset: &Dataset, base: TrainConfig, repeats: u32, input: Input) -> Result<Study<'_>, StudyError> {
     let base = TrainConfig { eval_every: (base.steps / EVALUATIONS).max(1), checkpoint_secs: 0.0, ..base };
     let held = dataset.split(base.holdout_every).1;
     let tests = load_views(dataset, &held, &base, "Loading held-out photos", &mut Silent).map_err(failed)?;

@@ -5,11 +5,11 @@ use crate::pipeline::train::{TrainConfig, TrainError, load_views};
 use crate::scene::{Camera, Dataset, PhotoPixels};
 
 /// A camera, and what a photo shows from there if there is one.
-pub type View = (Camera, Option<PhotoPixels>);
+pub(crate) type View = (Camera, Option<PhotoPixels>);
 
 /// At most `count` held-out photos, their longer side at most `max_side_px`; `None` if the observer
 /// cancels.
-pub fn held_out(
+pub(crate) fn held_out(
     dataset: &Dataset,
     holdout_every: usize,
     max_side_px: u32,
@@ -23,7 +23,7 @@ pub fn held_out(
 }
 
 /// At most `count` of them, evenly spread.
-pub fn spread<T: Clone>(all: &[T], count: usize) -> Vec<T> {
+pub(crate) fn spread<T: Clone>(all: &[T], count: usize) -> Vec<T> {
     let count = count.min(all.len());
     (0..count).map(|k| all[k * all.len() / count].clone()).collect()
 }

@@ -92,7 +92,7 @@ impl ClipEncoder {
     }
 
     /// The same under the name by which it is found again.
-    pub fn called(mut self, name: &str) -> Self {
+    pub(crate) fn called(mut self, name: &str) -> Self {
         name.clone_into(&mut self.about.name);
         self
     }

@@ -72,7 +72,7 @@ pub struct AutomaticMask {
     /// The point that found it, px.
     pub point: [f64; 2],
     /// The crop in which it was found: left, top, right, bottom.
-    pub crop: [usize; 4],
+    pub(crate) crop: [usize; 4],
 }
 
 /// The crops of a picture: the whole, then those of each layer.
@@ -158,7 +158,7 @@ pub fn everything(
 }
 
 /// A point's three planes of logits, their predicted IoU, and the point.
-pub type Answer = ([Vec<f32>; 3], [f32; 3], [f64; 2]);
+pub(crate) type Answer = ([Vec<f32>; 3], [f32; 3], [f64; 2]);
 
 /// Keeps the good ones of what a network answers.
 pub struct Collector<'a> {

@@ -19,43 +19,43 @@ use crate::scene::PhotoPixels;
 
 /// What the metadata file says.
 #[derive(Clone, Debug, Deserialize)]
-pub struct Metadata {
+pub(crate) struct Metadata {
     /// The model's name.
-    pub name: String,
+    pub(crate) name: String,
     /// Side of its square, px.
-    pub image_size: usize,
+    pub(crate) image_size: usize,
     mean: [f32; 3],
     std: [f32; 3],
     /// Memories that a frame sees: the prompted ones, and one less of those before it.
-    pub memories: usize,
+    pub(crate) memories: usize,
     /// Object pointers that a frame sees.
-    pub pointers: usize,
+    pub(crate) pointers: usize,
     /// Whether pointers carry their distance in time.
-    pub pointer_time: bool,
+    pub(crate) pointer_time: bool,
     /// Whether that distance has a sign.
-    pub pointer_time_signed: bool,
+    pub(crate) pointer_time_signed: bool,
     /// Whether pointers of later frames are left out.
-    pub pointers_only_from_past: bool,
+    pub(crate) pointers_only_from_past: bool,
     /// Most prompted frames that a frame sees; -1 = all.
-    pub max_conditioning_frames: i64,
+    pub(crate) max_conditioning_frames: i64,
     /// Fewest and most points for which three masks are tried.
-    pub multimask_points: [usize; 2],
+    pub(crate) multimask_points: [usize; 2],
     /// Whether three masks are tried while following.
-    pub multimask_when_tracking: bool,
+    pub(crate) multimask_when_tracking: bool,
     /// Whether the pointer is that of the best mask of three.
-    pub pointer_of_best_mask: bool,
+    pub(crate) pointer_of_best_mask: bool,
     /// Shift of the threshold that stability is measured with, logits.
-    pub stability_delta: f32,
+    pub(crate) stability_delta: f32,
     /// Stability under which the single mask gives way to the best of three.
-    pub stability_threshold: f32,
+    pub(crate) stability_threshold: f32,
     /// Whether it does.
-    pub single_mask_falls_back: bool,
+    pub(crate) single_mask_falls_back: bool,
     /// Whether masks of prompted frames are remembered as yes or no.
-    pub binarise_prompted: bool,
+    pub(crate) binarise_prompted: bool,
     /// Holes of at most this many low-resolution pixels are filled.
-    pub fill_hole_area: usize,
+    pub(crate) fill_hole_area: usize,
     /// Logit of an object that is not there.
-    pub absent_score: f32,
+    pub(crate) absent_score: f32,
     no_memory_embedding: Vec<f32>,
     no_object_pointer: Vec<f32>,
     graphs: Graphs,
@@ -83,22 +83,22 @@ pub struct Frame {
 
 /// What the decoder says about one object in a frame.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Decoded {
+pub(crate) struct Decoded {
     /// Low-resolution logits of four masks, `[1, 4, S/4, S/4]`.
-    pub masks: Array,
+    pub(crate) masks: Array,
     /// Predicted IoU of each, `[1, 4]`.
-    pub iou: Array,
+    pub(crate) iou: Array,
     /// Logit of the object being there at all.
-    pub score: f32,
+    pub(crate) score: f32,
     /// Pointer of each mask, `[1, 4, C]`.
-    pub pointers: Array,
+    pub(crate) pointers: Array,
 }
 
 /// SAM 2's networks, each loaded when it is first needed.
 pub struct Sam2 {
     folder: PathBuf,
     /// What the model's metadata says.
-    pub about: Metadata,
+    pub(crate) about: Metadata,
     prepare: Prepare,
     encoder: Option<Network>,
     decoder: Option<Network>,
@@ -140,7 +140,7 @@ impl Sam2 {
     }
 
     /// What tells its encoder from others: frames that another one encoded are not its own.
-    pub fn digest(&self) -> &str {
+    pub(crate) fn digest(&self) -> &str {
         &self.about.graphs.encoder.sha256
     }
 
@@ -148,7 +148,7 @@ impl Sam2 {
     ///
     /// # Errors
     /// If it has no pixels, or the network fails.
-    pub fn encode(&mut self, picture: &PhotoPixels) -> Result<Frame, ModelError> {
+    pub(crate) fn encode(&mut self, picture: &PhotoPixels) -> Result<Frame, ModelError> {
         let image = self.prepare.picture(picture).ok_or(ModelError::NoPicture)?;
         self.encode_pixels(image)
     }
@@ -195,7 +195,7 @@ impl Sam2 {
     }
 
     /// The pointer of an object that is not there, `[1, C]`.
-    pub fn no_pointer(&self) -> Array {
+    pub(crate) fn no_pointer(&self) -> Array {
         Array::new(&[1, self.about.no_object_pointer.len()], self.about.no_object_pointer.clone())
     }
 
@@ -203,7 +203,7 @@ impl Sam2 {
     ///
     /// # Errors
     /// If the network fails.
-    pub fn decode(
+    pub(crate) fn decode(
         &mut self,
         frame: &Frame,
         embeddings: &Array,

@@ -359,7 +359,7 @@ impl<'a> Track<'a> {
     }
 
     /// An object's pixels in a picture of the sequence.
-    pub fn mask(&self, out: &Output) -> Mask {
+    pub(crate) fn mask(&self, out: &Output) -> Mask {
         mask_of(out, self.size)
     }
 }

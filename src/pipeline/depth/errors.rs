@@ -6,30 +6,30 @@ use crate::math::stats::{mean, median};
 
 /// The errors of some pixels.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct DepthErrors {
+pub(crate) struct DepthErrors {
     /// Pixels that truly show something.
-    pub pixels: usize,
+    pub(crate) pixels: usize,
     /// Share of them without a drawn depth. The other pixels alone are averaged below.
-    pub missing: f64,
+    pub(crate) missing: f64,
     /// Mean of the absolute errors, scene units.
-    pub mean_abs: f64,
+    pub(crate) mean_abs: f64,
     /// Median of the absolute errors, scene units.
-    pub median_abs: f64,
+    pub(crate) median_abs: f64,
     /// Root of the mean squared error, scene units.
-    pub rmse: f64,
+    pub(crate) rmse: f64,
     /// Mean of error over true depth.
-    pub mean_rel: f64,
+    pub(crate) mean_rel: f64,
     /// Share of all pixels whose depth is within 1 % of the truth.
-    pub within_1: f64,
+    pub(crate) within_1: f64,
     /// The same for 2 %.
-    pub within_2: f64,
+    pub(crate) within_2: f64,
     /// The same for 5 %.
-    pub within_5: f64,
+    pub(crate) within_5: f64,
 }
 
 /// Drawn and true depths side by side.
 #[derive(Clone, Debug, Default)]
-pub struct Samples {
+pub(crate) struct Samples {
     /// Absolute errors.
     abs: Vec<f64>,
     /// Errors over true depth, in the same order.
@@ -39,7 +39,7 @@ pub struct Samples {
 
 impl Samples {
     /// Adds a pixel; those without a true depth (0) do not count.
-    pub fn add(&mut self, drawn: f32, truth: f32) {
+    pub(crate) fn add(&mut self, drawn: f32, truth: f32) {
         if truth <= 0.0 {
             return;
         }
@@ -53,7 +53,7 @@ impl Samples {
     }
 
     /// The errors of all pixels added; those of none are NaN.
-    pub fn errors(&self) -> DepthErrors {
+    pub(crate) fn errors(&self) -> DepthErrors {
         let pixels = self.abs.len() + self.missing;
         let share = |n: usize| n as f64 / pixels as f64;
         let within = |limit: f64| share(self.rel.iter().filter(|r| **r <= limit).count());

@@ -43,15 +43,15 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-pub use errors::{DepthErrors, Samples};
-pub use truth::{EDGE_JUMP, EDGE_PX, TrueDepth};
+pub(crate) use errors::{DepthErrors, Samples};
+pub(crate) use truth::{EDGE_JUMP, EDGE_PX, TrueDepth};
 
 use crate::io::IoError;
 use crate::render::{Features, RenderError, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, Photo};
 
 /// The folder of true depths in a synthetic data set.
-pub const FOLDER: &str = "depth";
+pub(crate) const FOLDER: &str = "depth";
 
 /// Why depths could not be compared.
 #[derive(Debug, thiserror::Error)]
@@ -79,25 +79,25 @@ pub enum DepthError {
 
 /// The errors of one kind of depth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Split {
+pub(crate) struct Split {
     /// Of all pixels that show something.
-    pub all: DepthErrors,
+    pub(crate) all: DepthErrors,
     /// Of those within [`EDGE_PX`] of a jump of the true depth.
-    pub edges: DepthErrors,
+    pub(crate) edges: DepthErrors,
 }
 
 /// The errors of both kinds of depth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct DepthScores {
+pub(crate) struct DepthScores {
     /// Of `sum(w z) / sum(w)`.
-    pub expected: Split,
+    pub(crate) expected: Split,
     /// Of the depth at which half of the light is spent.
-    pub median: Split,
+    pub(crate) median: Split,
 }
 
 /// Counts errors view after view.
 #[derive(Clone, Debug, Default)]
-pub struct DepthCounter {
+pub(crate) struct DepthCounter {
     /// Of expected depth: all pixels, edges.
     expected: [Samples; 2],
     /// Of median depth.
@@ -106,7 +106,7 @@ pub struct DepthCounter {
 
 impl DepthCounter {
     /// Adds one view: depths row by row, 0 where there is none, of the size of `truth`.
-    pub fn add(&mut self, truth: &TrueDepth, expected: &[f32], median: &[f32]) {
+    pub(crate) fn add(&mut self, truth: &TrueDepth, expected: &[f32], median: &[f32]) {
         let edges = truth.edges();
         for (i, (&want, &edge)) in truth.values.iter().zip(&edges).enumerate() {
             for (drawn, samples) in [(expected, &mut self.expected), (median, &mut self.median)] {
@@ -123,7 +123,7 @@ impl DepthCounter {
     ///
     /// # Errors
     /// If the view cannot be drawn.
-    pub fn draw(
+    pub(crate) fn draw(
         &mut self,
         renderer: &mut Renderer,
         cloud: &GaussianCloud,
@@ -139,7 +139,7 @@ impl DepthCounter {
     }
 
     /// The errors so far.
-    pub fn scores(&self) -> DepthScores {
+    pub(crate) fn scores(&self) -> DepthScores {
         let split = |[all, edges]: &[Samples; 2]| Split { all: all.errors(), edges: edges.errors() };
         DepthScores { expected: split(&self.expected), median: split(&self.median) }
     }
@@ -149,7 +149,7 @@ impl DepthCounter {
 ///
 /// # Errors
 /// If there is none, or one of another size.
-pub fn of_photo(root: &Path, photo: &Photo) -> Result<TrueDepth, DepthError> {
+pub(crate) fn of_photo(root: &Path, photo: &Photo) -> Result<TrueDepth, DepthError> {
     let stem = Path::new(&photo.name).file_stem().unwrap_or_default();
     let path = root.join(FOLDER).join(stem).with_extension("npy");
     let truth = TrueDepth::read(&path)?;

@@ -7,19 +7,19 @@ use crate::math::grid::neighbors;
 use crate::math::resize::between;
 
 /// Neighboring depths whose ratio is larger belong to different surfaces.
-pub const EDGE_JUMP: f32 = 1.05;
+pub(crate) const EDGE_JUMP: f32 = 1.05;
 /// Pixels within this distance of a jump, along rows and columns, are edges.
-pub const EDGE_PX: usize = 2;
+pub(crate) const EDGE_PX: usize = 2;
 
 /// Depths along the camera's axis at pixel centers, row by row; 0 where nothing is.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TrueDepth {
+pub(crate) struct TrueDepth {
     /// Pixels per row.
-    pub width: usize,
+    pub(crate) width: usize,
     /// Rows.
-    pub height: usize,
+    pub(crate) height: usize,
     /// Scene units.
-    pub values: Vec<f32>,
+    pub(crate) values: Vec<f32>,
 }
 
 impl TrueDepth {
@@ -27,7 +27,7 @@ impl TrueDepth {
     ///
     /// # Errors
     /// If it is no map of depths.
-    pub fn read(path: &Path) -> Result<Self, IoError> {
+    pub(crate) fn read(path: &Path) -> Result<Self, IoError> {
         let (width, height, values) = npy::read_map(path)?;
         Ok(Self { width, height, values })
     }
@@ -35,7 +35,7 @@ impl TrueDepth {
     /// The depths at the pixel centers of a smaller (or larger) picture. Between four pixels of one
     /// surface inverse depth is interpolated, which is exact on planes; next to a jump the nearest
     /// pixel counts.
-    pub fn resampled(&self, width: usize, height: usize) -> Self {
+    pub(crate) fn resampled(&self, width: usize, height: usize) -> Self {
         if (width, height) == (self.width, self.height) {
             return self.clone();
         }
@@ -56,7 +56,7 @@ impl TrueDepth {
     }
 
     /// Which pixels are within [`EDGE_PX`] of a jump, that between something and nothing included.
-    pub fn edges(&self) -> Vec<bool> {
+    pub(crate) fn edges(&self) -> Vec<bool> {
         let n = self.values.len();
         let jump = |a: f32, b: f32| a.max(b) > a.min(b) * EDGE_JUMP;
         let beside = |i: usize| neighbors(i, self.width, n).any(|j| jump(self.values[i], self.values[j]));

@@ -14,7 +14,7 @@ use crate::scene::{Identities, IdentityId, LanguageFeatures, LevelFilter, Mask};
 
 /// What an answer rests on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Basis {
+pub(crate) enum Basis {
     /// Names that people or label files gave.
     Names,
     /// What identities look like to an encoder.
@@ -25,34 +25,34 @@ pub enum Basis {
 #[derive(Clone, Debug, PartialEq)]
 pub struct QueryAnswer {
     /// What is meant.
-    pub answer: Answer,
+    pub(crate) answer: Answer,
     /// What that rests on.
-    pub basis: Basis,
+    pub(crate) basis: Basis,
     /// Relevancy of every identity by number, 0 to 1; a piece is at least as relevant as its whole
     /// where names decide.
-    pub relevancy: Vec<f32>,
+    pub(crate) relevancy: Vec<f32>,
     /// How long that took: relevancy and localization here, the other stages by those who go on.
-    pub stages: StagesMs,
+    pub(crate) stages: StagesMs,
 }
 
 /// Features and encoded phrases for answers by meaning.
 #[derive(Clone, Copy)]
-pub struct Language<'a> {
+pub(crate) struct Language<'a> {
     /// Of the scene's identities.
-    pub features: &'a LanguageFeatures,
+    pub(crate) features: &'a LanguageFeatures,
     /// With the query's phrases learnt; see [`phrases_of`].
-    pub phrases: &'a TextEmbeddings,
+    pub(crate) phrases: &'a TextEmbeddings,
     /// How to score.
-    pub options: EmbeddingOptions,
+    pub(crate) options: EmbeddingOptions,
 }
 
 /// The phrases of a query that answers by meaning need: all of it, and the whole's.
-pub fn phrases_of(phrase: &ParsedQuery) -> Vec<&str> {
+pub(crate) fn phrases_of(phrase: &ParsedQuery) -> Vec<&str> {
     std::iter::once(phrase.text.as_str()).chain(phrase.whole.as_deref()).collect()
 }
 
 /// Answers by names where all words are known, else by meaning where that finds something.
-pub fn answer(
+pub(crate) fn answer(
     identities: &Identities,
     phrase: &ParsedQuery,
     level: LevelFilter,
@@ -120,7 +120,7 @@ fn judged<S: Scorer>(
 }
 
 /// Answers by names alone.
-pub fn by_name(identities: &Identities, phrase: &ParsedQuery, level: LevelFilter) -> QueryAnswer {
+pub(crate) fn by_name(identities: &Identities, phrase: &ParsedQuery, level: LevelFilter) -> QueryAnswer {
     judged((identities, phrase, level), Basis::Names, &mut ByName(identities), |answer, _| {
         let alone = names::scores(identities, &phrase.target);
         let mut relevancy = vec![0.0; identities.len() + 1];
@@ -135,7 +135,7 @@ pub fn by_name(identities: &Identities, phrase: &ParsedQuery, level: LevelFilter
 }
 
 /// Answers by meaning alone.
-pub fn by_embedding(
+pub(crate) fn by_embedding(
     identities: &Identities,
     phrase: &ParsedQuery,
     level: LevelFilter,
@@ -166,7 +166,7 @@ impl QueryAnswer {
     }
 
     /// Score from which an identity is what was asked for.
-    pub fn threshold(&self) -> f32 {
+    pub(crate) fn threshold(&self) -> f32 {
         match self.basis {
             Basis::Names => names::THRESHOLD,
             Basis::Embedding => super::by_embedding::THRESHOLD,
@@ -181,14 +181,14 @@ impl QueryAnswer {
     }
 
     /// The pixels of what is meant, in a view.
-    pub fn mask(&self, map: &ViewMap, identities: &Identities, top: usize) -> Mask {
+    pub(crate) fn mask(&self, map: &ViewMap, identities: &Identities, top: usize) -> Mask {
         let mut mask = Mask::empty(map.width_px, map.height_px);
         self.chosen(top).into_iter().for_each(|id| mask.add(&map.mask(identities, id)));
         mask
     }
 
     /// Relevancy of every pixel of a view, row-major, 0 to 1.
-    pub fn heat(&self, map: &ViewMap) -> Vec<f32> {
+    pub(crate) fn heat(&self, map: &ViewMap) -> Vec<f32> {
         // One more entry for numbers that nobody has.
         let mut table = self.relevancy.clone();
         table.push(0.0);

@@ -12,7 +12,7 @@ const LEAST_PX: usize = 12;
 
 /// What a mask is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Link {
+pub(crate) enum Link {
     /// This identity.
     Known(IdentityId),
     /// Nobody seen before.
@@ -24,7 +24,7 @@ pub enum Link {
 /// Compares the masks of a photo with what is `known` of its view. A part can only be a piece of
 /// what its whole is. A mask with the name of an identity of the same whole is that identity, however
 /// little of it has been seen; others must overlap with theirs.
-pub fn link(found: &[FoundMask], known: Option<&ViewMap>, identities: &Identities) -> Vec<Link> {
+pub(crate) fn link(found: &[FoundMask], known: Option<&ViewMap>, identities: &Identities) -> Vec<Link> {
     let Some(map) = known else { return vec![Link::New; found.len()] };
     let (w, h) = (map.width_px, map.height_px);
     let anything = Mask::from_fn(w, h, |i| map.identity[i] != UNKNOWN);
@@ -88,7 +88,7 @@ pub fn link(found: &[FoundMask], known: Option<&ViewMap>, identities: &Identitie
 /// Where masks of a photo and what was known of its view disagree about who is who.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Disagreement {
+pub(crate) enum Disagreement {
     /// Two masks fit the identity; one of them became an identity of its own.
     Split(IdentityId),
     /// One mask covers several identities that were thought to be apart.
@@ -100,7 +100,7 @@ pub enum Disagreement {
 }
 
 /// The disagreements between masks that were linked and what was known before.
-pub fn disagreements(
+pub(crate) fn disagreements(
     found: &[FoundMask],
     links: &[Link],
     known: &ViewMap,

@@ -26,7 +26,7 @@ use crate::scene::{GaussianCloud, Identities, IdentityId, Photo, SemanticMap};
 /// Longer side of the masks that codes are trained on, px.
 const CODE_SIDE_PX: u32 = 256;
 /// Steps of training codes.
-pub const CODE_STEPS: u64 = 1_000;
+pub(crate) const CODE_STEPS: u64 = 1_000;
 /// Seed of the order in which views are trained on.
 const SEED: u64 = 0;
 
@@ -56,17 +56,17 @@ pub enum Carry {
 }
 
 /// Name of the masks that need no model.
-pub const REGIONS: &str = "regions";
+pub(crate) const REGIONS: &str = "regions";
 
 /// Settings of the whole way.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FindOptions {
+pub(crate) struct FindOptions {
     /// How masks become identities.
-    pub track: TrackOptions,
+    pub(crate) track: TrackOptions,
     /// How identities become codes of Gaussians.
-    pub lifting: Lifting,
+    pub(crate) lifting: Lifting,
     /// Steps of training codes, where they are trained.
-    pub code_steps: u64,
+    pub(crate) code_steps: u64,
 }
 
 impl Default for FindOptions {
@@ -77,15 +77,15 @@ impl Default for FindOptions {
 
 /// What was found.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Found {
+pub(crate) struct Found {
     /// Objects and parts of the scene.
-    pub map: SemanticMap,
+    pub(crate) map: SemanticMap,
     /// What masks of the first photos explain of each photo.
-    pub views: Vec<ViewReport>,
+    pub(crate) views: Vec<ViewReport>,
     /// Photos whose masks disagreed with what was known before, and how.
-    pub disagreements: Vec<(usize, Disagreement)>,
+    pub(crate) disagreements: Vec<(usize, Disagreement)>,
     /// Seconds that each stage took, in order.
-    pub secs: Vec<(&'static str, f64)>,
+    pub(crate) secs: Vec<(&'static str, f64)>,
 }
 
 /// Why objects could not be found.
@@ -107,7 +107,7 @@ pub enum FindError {
 ///
 /// # Errors
 /// If there are no masks at `files`, or the network cannot be used.
-pub fn segmenter<'a>(
+pub(crate) fn segmenter<'a>(
     files: Option<&Path>,
     cloud: &'a GaussianCloud,
     settings: &'a RenderSettings,
@@ -121,13 +121,13 @@ pub fn segmenter<'a>(
 }
 
 /// What finds masks, carries them on, and looks at what they are of.
-pub struct Tools<'a> {
+pub(crate) struct Tools<'a> {
     /// Finds masks.
-    pub segmenter: &'a mut dyn Segmenter,
+    pub(crate) segmenter: &'a mut dyn Segmenter,
     /// Follows them through the photos, besides what the Gaussians carry.
-    pub follower: Option<&'a mut Sam2Tracker>,
+    pub(crate) follower: Option<&'a mut Sam2Tracker>,
     /// Looks at the identities, so that they are found by their looks.
-    pub encoder: Option<&'a mut (dyn Encoder + 'static)>,
+    pub(crate) encoder: Option<&'a mut (dyn Encoder + 'static)>,
 }
 
 /// Finds the objects and parts of `cloud`, which was trained on `photos`, gives them codes, and lets
@@ -136,7 +136,7 @@ pub struct Tools<'a> {
 /// # Errors
 /// If masks or photos cannot be read, a view cannot be drawn, the encoder fails, or the observer asks
 /// to stop.
-pub fn find_objects(
+pub(crate) fn find_objects(
     cloud: &GaussianCloud,
     photos: &[Photo],
     settings: &RenderSettings,
@@ -217,7 +217,7 @@ fn unknown(views: &[ViewReport], photos: &[Photo], share: f64) -> Option<String>
 }
 
 /// Mean position of each identity's Gaussians, pieces included, by number less one.
-pub fn centers(cloud: &GaussianCloud, of: &[IdentityId], identities: &Identities) -> Vec<DVec3> {
+pub(crate) fn centers(cloud: &GaussianCloud, of: &[IdentityId], identities: &Identities) -> Vec<DVec3> {
     let mut sums = vec![(DVec3::ZERO, 0.0); identities.len()];
     for (i, &id) in of.iter().enumerate() {
         for id in identities.line(id) {

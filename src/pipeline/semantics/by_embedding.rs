@@ -11,7 +11,7 @@ use crate::scene::{LanguageFeatures, ViewFeatures};
 
 /// Which features of parts are compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum PartFeatures {
+pub(crate) enum PartFeatures {
     /// Moved towards their whole's: the paper's semantic deviation.
     #[default]
     Deviated,
@@ -23,11 +23,11 @@ pub enum PartFeatures {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmbeddingOptions {
     /// Which features of parts are compared.
-    pub parts: PartFeatures,
+    pub(crate) parts: PartFeatures,
     /// How pieces of wholes are looked for.
-    pub strategy: Strategy,
+    pub(crate) strategy: Strategy,
     /// Spread of the scores; the order does not depend on it.
-    pub temperature: f32,
+    pub(crate) temperature: f32,
 }
 
 impl Default for EmbeddingOptions {
@@ -49,7 +49,11 @@ impl TextEmbeddings {
     ///
     /// # Errors
     /// What `encode` fails with.
-    pub fn learn<E>(&mut self, phrases: &[&str], mut encode: impl FnMut(&str) -> Result<Vec<f32>, E>) -> Result<(), E> {
+    pub fn learn<E>(
+        &mut self,
+        phrases: &[&str],
+        mut encode: impl FnMut(&str) -> Result<Vec<f32>, E>,
+    ) -> Result<(), E> {
         if self.0.len() > Self::MOST {
             self.0.clear();
         }
@@ -62,16 +66,16 @@ impl TextEmbeddings {
     }
 
     /// The embedding of a phrase that was learnt.
-    pub fn get(&self, phrase: &str) -> Option<&[f32]> {
+    pub(crate) fn get(&self, phrase: &str) -> Option<&[f32]> {
         self.0.get(phrase).map(Vec::as_slice)
     }
 }
 
 /// Score above which an identity is nearer to the query than to any canonical phrase.
-pub const THRESHOLD: f32 = 0.5;
+pub(crate) const THRESHOLD: f32 = 0.5;
 
 /// Difference of scores under which two identities fit alike: that of an advantage of 0.005.
-pub fn resolution(temperature: f32) -> f32 {
+pub(crate) fn resolution(temperature: f32) -> f32 {
     score(0.0025, temperature) - score(-0.0025, temperature)
 }
 
@@ -81,11 +85,11 @@ const IDENTITIES_PER_TASK: usize = 32;
 /// Scores by language features.
 pub struct EmbeddingScorer<'a> {
     /// Features of the identities.
-    pub features: &'a LanguageFeatures,
+    pub(crate) features: &'a LanguageFeatures,
     /// Embeddings of the phrases that will be asked for; others score nothing.
-    pub phrases: &'a TextEmbeddings,
+    pub(crate) phrases: &'a TextEmbeddings,
     /// How.
-    pub options: EmbeddingOptions,
+    pub(crate) options: EmbeddingOptions,
     /// Scores that were asked for already.
     known: Vec<(String, Option<String>, Vec<f32>)>,
 }

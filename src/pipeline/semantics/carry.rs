@@ -14,7 +14,7 @@ const REACH: f64 = 2.0;
 
 /// The map of `from` for the Gaussians `to`, each of which takes identity and codes of the nearest one
 /// that reaches it, and the share of `to` that one does.
-pub fn carry(map: &SemanticMap, from: &GaussianCloud, to: &GaussianCloud) -> (SemanticMap, f64) {
+pub(crate) fn carry(map: &SemanticMap, from: &GaussianCloud, to: &GaussianCloud) -> (SemanticMap, f64) {
     let points = (0..from.len()).map(|i| GeomWithData::new(from.world_position(i).to_array(), i)).collect();
     let tree = RTree::bulk_load(points);
     let nearest = |i: usize| -> Option<usize> {

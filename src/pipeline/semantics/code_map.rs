@@ -11,9 +11,9 @@ const OBJECT_CHANNELS: usize = CODE_CHANNELS / 2;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CodeMap {
     /// Width in px.
-    pub width_px: usize,
+    pub(crate) width_px: usize,
     /// Height in px.
-    pub height_px: usize,
+    pub(crate) height_px: usize,
     /// Planes of the object's code, then of the part's, row-major. NaN, which nothing matches, where
     /// less than half of the light is blocked. The part's are empty where they were left out.
     pub planes: [Vec<f32>; CODE_CHANNELS],
@@ -51,7 +51,7 @@ impl CodeMap {
     }
 
     /// The three planes of a level.
-    pub fn level(&self, level: Level) -> &[Vec<f32>] {
+    pub(crate) fn level(&self, level: Level) -> &[Vec<f32>] {
         let (object, part) = self.planes.split_at(OBJECT_CHANNELS);
         if level == Level::Object { object } else { part }
     }

@@ -13,13 +13,13 @@ use crate::scene::{Identities, IdentityId};
 pub const RADIUS: f32 = 0.5;
 /// Largest difference per channel at which a blended code still counts as a code: the paper's
 /// tolerance.
-pub const TOLERANCE: f32 = 5.0 / 255.0;
+pub(crate) const TOLERANCE: f32 = 5.0 / 255.0;
 
 /// Rounds of repulsion.
 const RELAXATIONS: usize = 30;
 
 /// `n` directions spread evenly: a Fibonacci sphere relaxed by repulsion.
-pub fn sphere(n: usize) -> Vec<Vec3> {
+pub(crate) fn sphere(n: usize) -> Vec<Vec3> {
     let golden = std::f32::consts::PI * (3.0 - 5.0_f32.sqrt());
     let point = |i: usize| {
         let z = 1.0 - (2.0 * i as f32 + 1.0) / n as f32;

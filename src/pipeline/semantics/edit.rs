@@ -54,7 +54,7 @@ pub enum EditError {
 ///
 /// # Errors
 /// If the edit makes no sense; the map is as it was.
-pub fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Result<SemanticMap, EditError> {
+pub(crate) fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Result<SemanticMap, EditError> {
     let all = &map.identities;
     let known = |id: IdentityId| if all.get(id).is_some() { Ok(id) } else { Err(EditError::Unknown(id)) };
     let mut new = map.clone();

@@ -41,7 +41,7 @@ pub enum EmbedError {
 ///
 /// # Errors
 /// If a photo cannot be read, the encoder fails, or the observer asks to stop.
-pub fn embed(
+pub(crate) fn embed(
     cloud: &GaussianCloud,
     map: &SemanticMap,
     photos: &[Photo],

@@ -8,16 +8,16 @@ use crate::scene::Mask;
 
 /// Settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FilterOptions {
+pub(crate) struct FilterOptions {
     /// Share of a mask whose place may be taken already; it loses those pixels. 0 is the paper's
     /// rule.
-    pub taken: f64,
+    pub(crate) taken: f64,
     /// Share of a part that may lie outside its object; it loses those pixels.
-    pub outside: f64,
+    pub(crate) outside: f64,
     /// Share of what a part's outline encloses that may be holes.
-    pub hollow: f64,
+    pub(crate) hollow: f64,
     /// Share of its object from which a part is the object itself.
-    pub whole: f64,
+    pub(crate) whole: f64,
 }
 
 impl Default for FilterOptions {
@@ -28,22 +28,22 @@ impl Default for FilterOptions {
 
 /// A mask that was kept, less what it lost.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Kept {
+pub(crate) struct Kept {
     /// Its place in the list.
-    pub index: usize,
+    pub(crate) index: usize,
     /// Its pixels.
-    pub mask: Mask,
+    pub(crate) mask: Mask,
 }
 
 /// The masks that are objects: disjoint, largest first. Of masks of one size the first goes first.
-pub fn objects(masks: &[Mask], options: &FilterOptions) -> Vec<Kept> {
+pub(crate) fn objects(masks: &[Mask], options: &FilterOptions) -> Vec<Kept> {
     let mut order: Vec<(usize, usize)> = masks.iter().map(Mask::area).enumerate().map(|(i, a)| (a, i)).collect();
     order.sort_by_key(|&(area, i)| (std::cmp::Reverse(area), i));
     paint(order.into_iter().map(|(_, i)| Kept { index: i, mask: masks[i].clone() }), options)
 }
 
 /// The masks that are parts of `object`: disjoint, inside it, smallest first.
-pub fn parts(object: &Mask, masks: &[Mask], options: &FilterOptions) -> Vec<Kept> {
+pub(crate) fn parts(object: &Mask, masks: &[Mask], options: &FilterOptions) -> Vec<Kept> {
     let whole = options.whole * object.area() as f64;
     let inside = |(index, mask): (usize, &Mask)| {
         let own = mask.overlap(object);
@@ -78,7 +78,7 @@ fn paint(masks: impl Iterator<Item = Kept>, options: &FilterOptions) -> Vec<Kept
 
 /// Share of what a mask's outline encloses that is not the mask: 0 for a disc, near 1 for a thin
 /// ring. What touches the picture's border is not enclosed.
-pub fn hollowness(mask: &Mask) -> f64 {
+pub(crate) fn hollowness(mask: &Mask) -> f64 {
     let Some(bounds) = mask.bounds() else { return 0.0 };
     // Water from outside the box reaches everything that is not enclosed.
     let (w, h) = (bounds.x.len() + 2, bounds.y.len() + 2);

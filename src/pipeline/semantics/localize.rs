@@ -51,7 +51,7 @@ pub struct Hit {
     /// Its score.
     pub score: f32,
     /// How much more than the runner-up.
-    pub margin: f32,
+    pub(crate) margin: f32,
 }
 
 /// What a query comes to.
@@ -74,7 +74,7 @@ impl Answer {
     }
 
     /// In a word or two: "found", "ambiguous" or "not found".
-    pub fn verdict(&self) -> &'static str {
+    pub(crate) fn verdict(&self) -> &'static str {
         match self {
             Self::Found(_) => "found",
             Self::Ambiguous(_) => "ambiguous",

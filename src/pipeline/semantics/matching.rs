@@ -12,7 +12,7 @@ use crate::scene::{Identities, IdentityId, Level, Mask, SemanticMap};
 
 /// Where the codes of pixels come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum MatchMode {
+pub(crate) enum MatchMode {
     /// Codes of the winning identities.
     #[default]
     Exact,
@@ -22,7 +22,7 @@ pub enum MatchMode {
 
 /// For each number from 0, whether what has that identity matches the target: its code, or that of
 /// something it is a piece of, is within `tolerance` of the target's.
-pub fn matching(identities: &Identities, target: IdentityId, tolerance: f32) -> Vec<bool> {
+pub(crate) fn matching(identities: &Identities, target: IdentityId, tolerance: f32) -> Vec<bool> {
     let mut found = vec![false; identities.len() + 1];
     let Some(wanted) = identities.get(target) else { return found };
     for (id, identity) in identities.iter() {
@@ -33,7 +33,7 @@ pub fn matching(identities: &Identities, target: IdentityId, tolerance: f32) -> 
 }
 
 /// The target's pixels by the winning identities.
-pub fn exact(map: &ViewMap, identities: &Identities, target: IdentityId, tolerance: f32) -> Mask {
+pub(crate) fn exact(map: &ViewMap, identities: &Identities, target: IdentityId, tolerance: f32) -> Mask {
     let mut found = matching(identities, target, tolerance);
     // One more entry for numbers that nobody has.
     found.push(false);
@@ -60,7 +60,7 @@ pub fn blend(map: &CodeMap, identities: &Identities, target: IdentityId, toleran
 }
 
 /// The target's Gaussians, by the same match.
-pub fn gaussians(map: &SemanticMap, target: IdentityId, mode: MatchMode, tolerance: f32) -> Vec<bool> {
+pub(crate) fn gaussians(map: &SemanticMap, target: IdentityId, mode: MatchMode, tolerance: f32) -> Vec<bool> {
     match mode {
         MatchMode::Exact => {
             let found = matching(&map.identities, target, tolerance);

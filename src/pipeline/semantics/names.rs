@@ -11,12 +11,12 @@ use crate::scene::{Identities, IdentityId};
 const ALIKE: f64 = 0.82;
 
 /// Score under which a name is not what was asked for.
-pub const THRESHOLD: f32 = 0.45;
+pub(crate) const THRESHOLD: f32 = 0.45;
 /// Difference of scores under which two names fit alike.
-pub const RESOLUTION: f32 = 0.02;
+pub(crate) const RESOLUTION: f32 = 0.02;
 
 /// Scores by names alone.
-pub struct ByName<'a>(pub &'a Identities);
+pub(crate) struct ByName<'a>(pub(crate) &'a Identities);
 
 impl Scorer for ByName<'_> {
     fn scores(&mut self, phrase: &str, _against: Option<&str>) -> Vec<f32> {
@@ -34,7 +34,7 @@ impl Scorer for ByName<'_> {
 
 /// Score of every identity for a phrase, by number less one: 1 for the same name, 0 for nothing in
 /// common or no name.
-pub fn scores(identities: &Identities, phrase: &str) -> Vec<f32> {
+pub(crate) fn scores(identities: &Identities, phrase: &str) -> Vec<f32> {
     let wanted = words(phrase);
     let score = |names: &[String]| names.iter().map(|n| similarity(&wanted, &words(n))).fold(0.0, f64::max);
     // What has no name is called by its number, and by nothing that looks like it.
@@ -45,14 +45,14 @@ pub fn scores(identities: &Identities, phrase: &str) -> Vec<f32> {
 
 /// The words of a phrase that neither names nor an encoder know: `to_encoder` are those that the
 /// encoder does not, if there is one.
-pub fn unknown_to_all(identities: &Identities, phrase: &str, to_encoder: Option<&[String]>) -> Vec<String> {
+pub(crate) fn unknown_to_all(identities: &Identities, phrase: &str, to_encoder: Option<&[String]>) -> Vec<String> {
     let mut unknown = unknown_words(identities, phrase);
     unknown.retain(|w| to_encoder.is_none_or(|words| words.contains(w)));
     unknown
 }
 
 /// The words of a phrase that no name in the scene resembles; articles and the like left out.
-pub fn unknown_words(identities: &Identities, phrase: &str) -> Vec<String> {
+pub(crate) fn unknown_words(identities: &Identities, phrase: &str) -> Vec<String> {
     let known: HashSet<String> = identities.iter().flat_map(|(_, i)| &i.names).flat_map(|n| words(n)).collect();
     let numbers = identities.iter().filter(|(_, i)| i.names.is_empty()).map(|(id, _)| id.to_string());
     let known: HashSet<String> = known.into_iter().chain(numbers).collect();
@@ -61,7 +61,7 @@ pub fn unknown_words(identities: &Identities, phrase: &str) -> Vec<String> {
 }
 
 /// Names for a phrase that is being typed, best first.
-pub fn completions(identities: &Identities, typed: &str, most: usize) -> Vec<String> {
+pub(crate) fn completions(identities: &Identities, typed: &str, most: usize) -> Vec<String> {
     let typed = typed.to_lowercase();
     let mut found: Vec<String> = Vec::new();
     let named = identities.iter().filter(|(_, i)| !i.names.is_empty());

@@ -13,15 +13,15 @@ use crate::pipeline::observer::{Interrupted, Observer, Ticker};
 use crate::scene::{Level, Mask, Photo, PhotoPixels};
 
 /// Masks by a network.
-pub struct NetworkMasks {
+pub(crate) struct NetworkMasks {
     network: Box<dyn PromptedMasks>,
     /// Which of its answers are taken.
-    pub options: AutomaticOptions,
+    pub(crate) options: AutomaticOptions,
     /// Which of those are objects, and parts.
-    pub filters: FilterOptions,
+    pub(crate) filters: FilterOptions,
     /// Whether each object's own tile is segmented for its parts, as the paper does: finer, for the time
     /// of one more look per object.
-    pub tiles: bool,
+    pub(crate) tiles: bool,
 }
 
 /// Overlap from which the less sure of two masks is left out (LangSplat's).
@@ -36,7 +36,7 @@ impl NetworkMasks {
     ///
     /// # Errors
     /// If it is not on this machine, or finds no masks.
-    pub fn open(name: &str) -> Result<Self, ModelError> {
+    pub(crate) fn open(name: &str) -> Result<Self, ModelError> {
         let path = catalog::find(name, Role::Segmenter)?;
         let mut options = AutomaticOptions::default();
         let network: Box<dyn PromptedMasks> = match manifest::kind(&path)?.as_str() {

@@ -1,7 +1,7 @@
 //! What a typed query asks for: a thing, or a piece of a thing.
 
 /// Longest query that is looked at, in characters.
-pub const MAX_CHARS: usize = 300;
+pub(crate) const MAX_CHARS: usize = 300;
 
 /// A query taken apart.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -23,7 +23,7 @@ const ARTICLES: [&str; 14] =
 const WHOLE_S: [char; 2] = ['的', 'の'];
 
 /// Whether a word carries nothing by itself: an article, or one between a piece and its whole.
-pub fn is_glue(word: &str) -> bool {
+pub(crate) fn is_glue(word: &str) -> bool {
     ARTICLES.contains(&word) || PIECE_OF.contains(&word)
 }
 

@@ -23,7 +23,7 @@ const FARTHEST: f64 = 40.0;
 /// Every Gaussian without a vote inherits from the one with a vote that is nearest along the
 /// graph of neighbors, where a step is longer the more the colors differ. What is nobody's is
 /// inherited like the rest, and is what is left where nothing is near.
-pub fn extend(cloud: &GaussianCloud, assignments: &mut [Assignment]) {
+pub(crate) fn extend(cloud: &GaussianCloud, assignments: &mut [Assignment]) {
     if assignments.iter().all(|b| b.identity != UNKNOWN) {
         return;
     }

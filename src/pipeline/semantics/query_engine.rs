@@ -13,14 +13,14 @@ use crate::scene::{Identities, LanguageFeatures, LevelFilter, SemanticMap};
 
 /// What answers questions about a scene; without an encoder, by names alone.
 #[derive(Default)]
-pub struct QueryEngine {
+pub(crate) struct QueryEngine {
     encoder: Option<Box<dyn Encoder>>,
     phrases: TextEmbeddings,
 }
 
 impl QueryEngine {
     /// With this encoder.
-    pub fn with(encoder: Box<dyn Encoder>) -> Self {
+    pub(crate) fn with(encoder: Box<dyn Encoder>) -> Self {
         Self { encoder: Some(encoder), ..Self::default() }
     }
 
@@ -28,7 +28,7 @@ impl QueryEngine {
     ///
     /// # Errors
     /// If it cannot be loaded.
-    pub fn new(language: Option<&LanguageFeatures>) -> Result<Self, ModelError> {
+    pub(crate) fn new(language: Option<&LanguageFeatures>) -> Result<Self, ModelError> {
         let encoder = language.map(|language| models::encoder(&language.encoder)).transpose()?;
         Ok(Self { encoder, ..Self::default() })
     }
@@ -37,7 +37,7 @@ impl QueryEngine {
     ///
     /// # Errors
     /// If the encoder fails.
-    pub fn ask(
+    pub(crate) fn ask(
         &mut self,
         map: &SemanticMap,
         text: &str,
@@ -60,7 +60,7 @@ impl QueryEngine {
     }
 
     /// The words of a question that nothing here knows.
-    pub fn unknown_words(&self, identities: &Identities, text: &str) -> Vec<String> {
+    pub(crate) fn unknown_words(&self, identities: &Identities, text: &str) -> Vec<String> {
         let to_encoder = self.encoder.as_ref().map(|e| e.unknown_words(text));
         names::unknown_to_all(identities, text, to_encoder.as_deref())
     }
@@ -68,7 +68,7 @@ impl QueryEngine {
 
 /// Answers a question whose phrases are among those that were encoded, or by names alone without them; `None` if
 /// there is nothing in it.
-pub fn answer_encoded(
+pub(crate) fn answer_encoded(
     map: &SemanticMap,
     text: &str,
     level: LevelFilter,
@@ -86,7 +86,7 @@ pub fn answer_encoded(
 ///
 /// # Errors
 /// What `encode` fails with.
-pub fn ask_by_embedding<E>(
+pub(crate) fn ask_by_embedding<E>(
     identities: &Identities,
     (features, options): (&LanguageFeatures, EmbeddingOptions),
     text: &str,

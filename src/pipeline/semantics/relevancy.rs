@@ -10,9 +10,9 @@ use crate::math::vector::{dot, unit};
 /// Phrases that mean anything.
 pub const CANONICAL: [&str; 3] = ["object", "stuff", "texture"];
 /// Temperature of the paper.
-pub const PAPER_TEMPERATURE: f32 = 1.0;
+pub(crate) const PAPER_TEMPERATURE: f32 = 1.0;
 /// Temperature that spreads scores over the unit interval, for display.
-pub const TEMPERATURE: f32 = 10.0;
+pub(crate) const TEMPERATURE: f32 = 10.0;
 /// Share of its own feature that a part keeps.
 pub const PART_WEIGHT: f32 = 0.7;
 

@@ -21,7 +21,7 @@ use crate::scene::{IdentityId, Photo};
 /// Objects that are followed together; memory grows with it.
 const BATCH: usize = 16;
 /// Longer side of the labels, px.
-pub const LABEL_SIDE_PX: u32 = 512;
+pub(crate) const LABEL_SIDE_PX: u32 = 512;
 
 /// Why masks could not be followed.
 #[derive(Debug, thiserror::Error)]
@@ -35,12 +35,12 @@ pub enum Sam2TrackError {
 }
 
 /// Follows masks through a sequence of photos.
-pub struct Sam2Tracker {
+pub(crate) struct Sam2Tracker {
     model: Sam2,
     /// Where frames are kept, if anywhere.
     cache: Option<PathBuf>,
     /// Seconds that looking at frames has taken, reading kept ones included.
-    pub encode_secs: f64,
+    pub(crate) encode_secs: f64,
 }
 
 impl Sam2Tracker {
@@ -49,7 +49,7 @@ impl Sam2Tracker {
     ///
     /// # Errors
     /// If it is not on this machine.
-    pub fn open(name: &str, cache: Option<PathBuf>) -> Result<Self, ModelError> {
+    pub(crate) fn open(name: &str, cache: Option<PathBuf>) -> Result<Self, ModelError> {
         Ok(Self { model: Sam2::open(&catalog::find(name, Role::Segmenter)?)?, cache, encode_secs: 0.0 })
     }
 
@@ -59,7 +59,7 @@ impl Sam2Tracker {
     ///
     /// # Errors
     /// If a photo cannot be read, a network fails, or the observer asks to stop.
-    pub fn follow(
+    pub(crate) fn follow(
         &mut self,
         photos: &[Photo],
         seed: usize,

@@ -10,11 +10,11 @@ use crate::scene::{Level, Mask, Photo};
 #[derive(Clone, Debug, PartialEq)]
 pub struct FoundMask {
     /// Object or part.
-    pub level: Level,
+    pub(crate) level: Level,
     /// Index of the mask that it is a piece of; before its own.
-    pub parent: Option<usize>,
+    pub(crate) parent: Option<usize>,
     /// What it is called, if the segmenter knows.
-    pub name: Option<String>,
+    pub(crate) name: Option<String>,
     /// Its pixels.
     pub mask: Mask,
 }
@@ -56,7 +56,7 @@ pub enum SegmentError {
 
 /// Masks that come with the dataset. Regions that do not say what they are count as objects where
 /// no other contains them, and as parts of the smallest that does where one does.
-pub struct FileMasks(pub Labels);
+pub(crate) struct FileMasks(pub(crate) Labels);
 
 /// Share of a region that must lie in another for it to be a piece of that.
 const INSIDE: f64 = 0.9;

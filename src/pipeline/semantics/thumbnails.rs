@@ -6,19 +6,19 @@ use crate::render::{Features, RenderError, RenderSettings, Renderer};
 use crate::scene::{Bounds, Camera, GaussianCloud, SemanticMap};
 
 /// Width and height of a portrait, px.
-pub const SIDE_PX: usize = 64;
+pub(crate) const SIDE_PX: usize = 64;
 /// Field of view; narrow, so that near and far are alike in size, radians.
 const FOV_RAD: f64 = 0.5;
 
 /// A picture of each identity by number less one, SIDE_PX x SIDE_PX, row-major; `None` for those
 /// without Gaussians.
-pub type Thumbnails = Vec<Option<Vec<[u8; 3]>>>;
+pub(crate) type Thumbnails = Vec<Option<Vec<[u8; 3]>>>;
 
 /// A picture of every identity as somebody at `from` sees it.
 ///
 /// # Errors
 /// If one cannot be drawn.
-pub fn portraits(
+pub(crate) fn portraits(
     cloud: &GaussianCloud,
     map: &SemanticMap,
     settings: &RenderSettings,

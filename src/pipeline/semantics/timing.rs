@@ -6,52 +6,52 @@ use serde::Serialize;
 
 /// Something for each stage of a query: a time of one, or percentiles of many.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Stages<T> {
+pub(crate) struct Stages<T> {
     /// The text becomes vectors.
-    pub encode: T,
+    pub(crate) encode: T,
     /// Identities are scored for its phrases.
-    pub relevancy: T,
+    pub(crate) relevancy: T,
     /// The identities that are meant are chosen.
-    pub localize: T,
+    pub(crate) localize: T,
     /// Their pixels in the view are found.
-    pub mask: T,
+    pub(crate) mask: T,
     /// Mask and relevancy become a picture.
-    pub draw: T,
+    pub(crate) draw: T,
 }
 
 /// Names of the stages, in their order.
-pub const STAGES: [&str; 5] = ["encode", "relevancy", "localize", "mask", "draw"];
+pub(crate) const STAGES: [&str; 5] = ["encode", "relevancy", "localize", "mask", "draw"];
 
 /// Milliseconds of one query.
-pub type StagesMs = Stages<f64>;
+pub(crate) type StagesMs = Stages<f64>;
 
 impl<T: Copy> Stages<T> {
     /// The values, as [`STAGES`] names them.
-    pub fn values(&self) -> [T; 5] {
+    pub(crate) fn values(&self) -> [T; 5] {
         [self.encode, self.relevancy, self.localize, self.mask, self.draw]
     }
 
     /// The stages of these values.
-    pub fn of([encode, relevancy, localize, mask, draw]: [T; 5]) -> Self {
+    pub(crate) fn of([encode, relevancy, localize, mask, draw]: [T; 5]) -> Self {
         Self { encode, relevancy, localize, mask, draw }
     }
 }
 
 impl StagesMs {
     /// All of it.
-    pub fn whole(&self) -> f64 {
+    pub(crate) fn whole(&self) -> f64 {
         self.values().iter().sum()
     }
 
     /// Of both, one after the other.
-    pub fn and(self, other: Self) -> Self {
+    pub(crate) fn and(self, other: Self) -> Self {
         let (a, b) = (self.values(), other.values());
         Self::of(std::array::from_fn(|k| a[k] + b[k]))
     }
 }
 
 /// Milliseconds since then.
-pub fn ms_since(start: Instant) -> f64 {
+pub(crate) fn ms_since(start: Instant) -> f64 {
     start.elapsed().as_secs_f64() * 1e3
 }
 

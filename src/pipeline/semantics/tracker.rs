@@ -24,17 +24,17 @@ const DRIFT_PX: usize = 30;
 
 /// Settings of a tracking.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TrackOptions {
+pub(crate) struct TrackOptions {
     /// Photo to begin with; `None` = the first that the segmenter can say something about.
-    pub seed: Option<usize>,
+    pub(crate) seed: Option<usize>,
     /// Longer side of the masks that vote, px.
-    pub max_side_px: u32,
+    pub(crate) max_side_px: u32,
     /// Share of a view that may stay unknown before it is segmented too.
-    pub reseed_share: f64,
+    pub(crate) reseed_share: f64,
     /// Most photos that are segmented.
-    pub max_seeds: usize,
+    pub(crate) max_seeds: usize,
     /// Whether a mask that was followed counts only where the Gaussians do not contradict it.
-    pub veto: bool,
+    pub(crate) veto: bool,
 }
 
 impl Default for TrackOptions {
@@ -45,41 +45,41 @@ impl Default for TrackOptions {
 
 /// An identity in a view.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Sighting {
+pub(crate) struct Sighting {
     /// Whose pixels.
-    pub identity: IdentityId,
+    pub(crate) identity: IdentityId,
     /// How many.
-    pub pixels: usize,
+    pub(crate) pixels: usize,
     /// Mean share of its object in them, 0 to 1.
-    pub confidence: f64,
+    pub(crate) confidence: f64,
 }
 
 /// What became of one view.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct ViewReport {
+pub(crate) struct ViewReport {
     /// Index of the photo.
-    pub photo: usize,
+    pub(crate) photo: usize,
     /// Share of its pixels that only Gaussians without a vote cover.
-    pub unknown: f64,
+    pub(crate) unknown: f64,
     /// Who is seen in it, innermost identities.
-    pub seen: Vec<Sighting>,
+    pub(crate) seen: Vec<Sighting>,
 }
 
 /// The result of a tracking.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tracked {
+pub(crate) struct Tracked {
     /// Objects and parts.
-    pub identities: Identities,
+    pub(crate) identities: Identities,
     /// Per Gaussian.
-    pub assignments: Vec<Assignment>,
+    pub(crate) assignments: Vec<Assignment>,
     /// The photos that were segmented, in order.
-    pub seeds: Vec<usize>,
+    pub(crate) seeds: Vec<usize>,
     /// Every photo, before identities were extended to Gaussians that no photo voted for.
-    pub views: Vec<ViewReport>,
+    pub(crate) views: Vec<ViewReport>,
     /// Where masks and what was known disagreed, with the photo.
-    pub disagreements: Vec<(usize, Disagreement)>,
+    pub(crate) disagreements: Vec<(usize, Disagreement)>,
     /// Seconds that each stage took, in order.
-    pub secs: Vec<(&'static str, f64)>,
+    pub(crate) secs: Vec<(&'static str, f64)>,
 }
 
 /// Why tracking failed.
@@ -104,7 +104,7 @@ pub enum TrackError {
 
 /// Finds the identities of `cloud` in `photos`. With a `follower`, the first photo's masks are followed
 /// to the others and vote there too.
-pub fn track(
+pub(crate) fn track(
     cloud: &GaussianCloud,
     photos: &[Photo],
     settings: &RenderSettings,
@@ -314,7 +314,7 @@ fn contradicted(followed: &[IdentityId], known: &[IdentityId], identities: usize
 }
 
 /// The innermost identity of each pixel of a segmented photo; `NOBODY` where no mask is.
-pub fn labels_of(found: &[FoundMask], ids: &[IdentityId], pixels: usize) -> Vec<IdentityId> {
+pub(crate) fn labels_of(found: &[FoundMask], ids: &[IdentityId], pixels: usize) -> Vec<IdentityId> {
     let mut labels = vec![NOBODY; pixels];
     // Wholes come before pieces, so the innermost is painted last.
     for (mask, id) in found.iter().zip(ids) {

@@ -21,20 +21,20 @@ const RATES: [f64; 2] = [0.02, 0.002];
 
 /// The masks of one view.
 #[derive(Clone, Debug, PartialEq)]
-pub struct CodeView {
+pub(crate) struct CodeView {
     /// From where.
-    pub camera: Camera,
+    pub(crate) camera: Camera,
     /// Innermost identity of each pixel, row-major; `UNKNOWN` says nothing.
-    pub labels: Vec<IdentityId>,
+    pub(crate) labels: Vec<IdentityId>,
 }
 
 /// Settings of a training of codes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CodeTraining {
+pub(crate) struct CodeTraining {
     /// Optimizer steps.
-    pub steps: u64,
+    pub(crate) steps: u64,
     /// Seed of the order of the views.
-    pub seed: u64,
+    pub(crate) seed: u64,
 }
 
 /// Trains `codes`, one set per Gaussian of `cloud`, from where they stand. Returns the loss of the
@@ -42,7 +42,7 @@ pub struct CodeTraining {
 ///
 /// # Errors
 /// If a camera is not usable.
-pub fn train_codes(
+pub(crate) fn train_codes(
     cloud: &GaussianCloud,
     codes: &mut [[f32; CODE_CHANNELS]],
     views: &[CodeView],
@@ -144,7 +144,7 @@ fn target(view: &CodeView, identities: &Identities) -> [Vec<f32>; CODE_CHANNELS]
 
 /// Identity of each Gaussian by its codes: the part whose code is nearest, if it is nearer than the
 /// background's, else the object.
-pub fn decode(codes: &[[f32; CODE_CHANNELS]], identities: &Identities) -> Vec<IdentityId> {
+pub(crate) fn decode(codes: &[[f32; CODE_CHANNELS]], identities: &Identities) -> Vec<IdentityId> {
     let all: Vec<[f32; CODE_CHANNELS]> = (0..=identities.len() as IdentityId).map(|id| identities.codes(id)).collect();
     let far =
         |a: &[f32; CODE_CHANNELS], b: &[f32; CODE_CHANNELS]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f32>();

@@ -22,9 +22,9 @@ pub struct ViewMap {
     /// that no vote reached.
     pub identity: Vec<IdentityId>,
     /// Share of the pixel's weight that belongs to the winner's object.
-    pub share: Vec<f32>,
+    pub(crate) share: Vec<f32>,
     /// Accumulated alpha.
-    pub alpha: Vec<f32>,
+    pub(crate) alpha: Vec<f32>,
 }
 
 impl ViewMap {

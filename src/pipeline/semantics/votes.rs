@@ -9,46 +9,46 @@ use crate::render::{ContributionSink, RenderError, RenderSettings, Renderer, TIL
 use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, NOBODY};
 
 /// A pixel about which nothing is known.
-pub const UNKNOWN: IdentityId = IdentityId::MAX;
+pub(crate) const UNKNOWN: IdentityId = IdentityId::MAX;
 
 /// Most identities that a Gaussian keeps votes for.
 const KEPT: usize = 8;
 
 /// Votes of pixels for the identities of Gaussians.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Votes {
+pub(crate) struct Votes {
     /// Per Gaussian: identity and weight in px, any order, each identity once.
     of: Vec<Vec<(IdentityId, f32)>>,
 }
 
 /// What a Gaussian belongs to.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Assignment {
+pub(crate) struct Assignment {
     /// The innermost identity; `NOBODY` if none claims it, `UNKNOWN` without a vote.
-    pub identity: IdentityId,
+    pub(crate) identity: IdentityId,
     /// Share of its votes that went to that identity's object minus the share of the runner-up;
     /// 0 without a vote.
-    pub margin: f32,
+    pub(crate) margin: f32,
 }
 
 impl Votes {
     /// No votes for `n` Gaussians.
-    pub fn new(n: usize) -> Self {
+    pub(crate) fn new(n: usize) -> Self {
         Self { of: vec![Vec::new(); n] }
     }
 
     /// Number of Gaussians.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.of.len()
     }
 
     /// Whether there are no Gaussians.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.of.is_empty()
     }
 
     /// Weight of all votes for Gaussian `i`, px.
-    pub fn weight(&self, i: usize) -> f32 {
+    pub(crate) fn weight(&self, i: usize) -> f32 {
         self.of[i].iter().map(|v| v.1).sum()
     }
 
@@ -56,7 +56,7 @@ impl Votes {
     ///
     /// # Errors
     /// If the camera is not usable or has another number of pixels.
-    pub fn add_view(
+    pub(crate) fn add_view(
         &mut self,
         renderer: &mut Renderer,
         cloud: &GaussianCloud,
@@ -84,7 +84,7 @@ impl Votes {
 
     /// What each Gaussian belongs to: the object with most votes, then within it the innermost
     /// identity with most. Gaussians with less than `least` px of votes count as unseen.
-    pub fn decide(&self, identities: &Identities, least: f32) -> Vec<Assignment> {
+    pub(crate) fn decide(&self, identities: &Identities, least: f32) -> Vec<Assignment> {
         let objects: Vec<IdentityId> = (0..=identities.len() as IdentityId).map(|i| identities.object_of(i)).collect();
         self.of.par_iter().map(|votes| decide(votes, &objects, least)).collect()
     }

@@ -16,7 +16,7 @@ pub fn demo_glb() -> &'static [u8] {
 }
 
 /// Settings for the demo's photos: small enough that two cores train on them live.
-pub fn demo_options() -> SynthOptions {
+pub(crate) fn demo_options() -> SynthOptions {
     SynthOptions {
         views: 64,
         held_out: 8,
@@ -32,7 +32,7 @@ pub fn demo_options() -> SynthOptions {
 }
 
 /// Whether `out` already holds the photos that [`write_demo`] would write.
-pub fn demo_is_written(out: &Path) -> bool {
+pub(crate) fn demo_is_written(out: &Path) -> bool {
     let expected = serde_json::json!({ "version": 1, "scene": fingerprint(), "options": demo_options() });
     let settings = files::read(&out.join(SETTINGS), files::MAX_TEXT_BYTES).ok();
     let found: Option<serde_json::Value> = settings.and_then(|bytes| serde_json::from_slice(&bytes).ok());
@@ -40,7 +40,7 @@ pub fn demo_is_written(out: &Path) -> bool {
 }
 
 /// Renders the demo's photos into the folder `out`.
-pub fn write_demo(out: &Path, observer: &mut dyn Observer) -> Result<SynthReport, SynthError> {
+pub(crate) fn write_demo(out: &Path, observer: &mut dyn Observer) -> Result<SynthReport, SynthError> {
     let scene = gltf_mesh::read_slice(demo_glb(), "demo.glb")?;
     render_scene(&scene, "demo", Some(fingerprint()), &demo_options(), out, observer)
 }

@@ -29,38 +29,38 @@ use crate::scene::Level;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Identity {
     /// Value in the id maps, from 1.
-    pub id: u16,
+    pub(crate) id: u16,
     /// The node's name.
-    pub name: String,
+    pub(crate) name: String,
     /// Object or part.
-    pub level: Level,
+    pub(crate) level: Level,
     /// For a part, its object's id.
-    pub parent: Option<u16>,
+    pub(crate) parent: Option<u16>,
     /// Names from the root to the node, joined by `/`.
-    pub path: String,
+    pub(crate) path: String,
     /// A color of its own for showing id maps, sRGB.
-    pub color: [u8; 3],
+    pub(crate) color: [u8; 3],
     /// Pixels of all photos together whose center shows it (for an object: with its parts).
-    pub pixels: u64,
+    pub(crate) pixels: u64,
     /// Photos that show it.
-    pub views: u32,
+    pub(crate) views: u32,
 }
 
 /// Ids of the surfaces of one node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct NodeIds {
+pub(crate) struct NodeIds {
     /// Object, 0 for none.
-    pub object: u16,
+    pub(crate) object: u16,
     /// Part, 0 for none.
-    pub part: u16,
+    pub(crate) part: u16,
 }
 
 /// All identities of a scene, and whose each node is.
 pub struct Identities {
     /// In order of their ids, from 1.
-    pub list: Vec<Identity>,
+    pub(crate) list: Vec<Identity>,
     /// By node index.
-    pub of_node: Vec<NodeIds>,
+    pub(crate) of_node: Vec<NodeIds>,
 }
 
 /// A node with a mesh, its object's index, and the node that names its part.
@@ -71,7 +71,7 @@ struct Surface {
 }
 
 /// Finds objects and parts; `file` names the object of [`Levels::File`].
-pub fn identities(scene: &MeshScene, levels: Levels, file: &str) -> Result<Identities, SynthError> {
+pub(crate) fn identities(scene: &MeshScene, levels: Levels, file: &str) -> Result<Identities, SynthError> {
     let bearing = bearing(scene);
     let has_mesh = |n: usize| has_mesh(scene, n);
     let objects: Vec<Vec<usize>> = match levels {
@@ -197,7 +197,7 @@ fn color(index: usize) -> [u8; 3] {
 }
 
 /// Ids that the maps of one photo hold, each with its number of pixels.
-pub fn counts(object: &[u16], part: &[u16]) -> Vec<(u16, u64)> {
+pub(crate) fn counts(object: &[u16], part: &[u16]) -> Vec<(u16, u64)> {
     let mut counts: HashMap<u16, u64> = HashMap::new();
     for &id in object.iter().chain(part).filter(|id| **id != 0) {
         *counts.entry(id).or_default() += 1;

@@ -48,7 +48,7 @@ impl Face {
 }
 
 /// Light on every vertex, as far as it has been asked for.
-pub struct Light {
+pub(crate) struct Light {
     /// Mean color of each triangle.
     albedo: Vec<Vec3A>,
     sky: Vec<Vec3A>,
@@ -60,7 +60,7 @@ pub struct Light {
 
 impl Light {
     /// Nothing known yet.
-    pub fn new(surface: &Surface, materials: &Materials) -> Self {
+    pub(crate) fn new(surface: &Surface, materials: &Materials) -> Self {
         let directions = SKY_RAYS / surface.vertices.len().max(1);
         let directions = directions.clamp(*SKY_DIRECTIONS.start(), *SKY_DIRECTIONS.end());
         let unknown = || [0; 4].map(|_: u32| AtomicU32::new(Face::UNKNOWN));
@@ -74,7 +74,7 @@ impl Light {
 
     /// What a white diffuse surface shows, and how much of the key light is visible, at a point of
     /// a triangle on its outer (`front`) or inner face.
-    pub fn at(&self, scene: Lit<'_>, triangle: &Triangle, weights: glam::Vec3, front: bool) -> (Vec3A, f32) {
+    pub(crate) fn at(&self, scene: Lit<'_>, triangle: &Triangle, weights: glam::Vec3, front: bool) -> (Vec3A, f32) {
         let face = triangle.vertices.map(|v| self.face(scene, v as usize, front));
         (blend(face.map(|f| f.diffuse), weights), blend(face.map(|f| f.key), weights))
     }
@@ -126,18 +126,18 @@ impl Light {
 
 /// What light falls on.
 #[derive(Clone, Copy)]
-pub struct Lit<'a> {
+pub(crate) struct Lit<'a> {
     /// Triangles.
-    pub surface: &'a Surface,
+    pub(crate) surface: &'a Surface,
     /// Their hierarchy.
-    pub tracer: &'a Tracer,
+    pub(crate) tracer: &'a Tracer,
     /// Their look.
-    pub materials: &'a Materials,
+    pub(crate) materials: &'a Materials,
 }
 
 /// Highlight of the key light: normal, direction towards the eye, roughness, reflectance at normal
 /// incidence. Normalized Blinn-Phong.
-pub fn highlight(normal: Vec3A, to_eye: Vec3A, roughness: f32, reflectance: Vec3A) -> Vec3A {
+pub(crate) fn highlight(normal: Vec3A, to_eye: Vec3A, roughness: f32, reflectance: Vec3A) -> Vec3A {
     let towards = KEY.normalize_or_zero();
     let half = (towards + to_eye).normalize_or_zero();
     let (n_h, n_l) = (normal.dot(half).max(0.0), normal.dot(towards).max(0.0));
@@ -157,7 +157,7 @@ fn mean_albedo(surface: &Surface, materials: &Materials, t: &Triangle) -> Vec3A 
 }
 
 /// Directions spread evenly over the sphere.
-pub fn fibonacci_sphere(n: usize) -> Vec<Vec3A> {
+pub(crate) fn fibonacci_sphere(n: usize) -> Vec<Vec3A> {
     let golden = std::f32::consts::PI * (3.0 - 5.0_f32.sqrt());
     (0..n)
         .map(|i| {

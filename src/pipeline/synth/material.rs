@@ -8,17 +8,17 @@ use crate::io::gltf_mesh::{AlphaMode, Material, MeshScene, TextureUse};
 
 /// The look of a point, linear.
 #[derive(Clone, Copy, Debug)]
-pub struct Look {
+pub(crate) struct Look {
     /// Diffuse color.
-    pub albedo: Vec3A,
+    pub(crate) albedo: Vec3A,
     /// Emitted light.
-    pub emission: Vec3A,
+    pub(crate) emission: Vec3A,
     /// How much of what is behind it the point covers.
-    pub alpha: f32,
+    pub(crate) alpha: f32,
 }
 
 /// Materials with their textures.
-pub struct Materials {
+pub(crate) struct Materials {
     list: Vec<Material>,
     textures: Vec<Texture>,
     /// Whether light always stops at a surface.
@@ -27,7 +27,7 @@ pub struct Materials {
 
 impl Materials {
     /// Of a scene.
-    pub fn of(scene: &MeshScene) -> Self {
+    pub(crate) fn of(scene: &MeshScene) -> Self {
         Self {
             list: scene.materials.clone(),
             textures: scene.images.iter().map(Texture::new).collect(),
@@ -36,18 +36,18 @@ impl Materials {
     }
 
     /// One of them.
-    pub fn get(&self, index: u32) -> &Material {
+    pub(crate) fn get(&self, index: u32) -> &Material {
         &self.list[index as usize]
     }
 
     /// Mean base color of a material.
-    pub fn mean(&self, index: usize) -> Vec4 {
+    pub(crate) fn mean(&self, index: usize) -> Vec4 {
         let m = &self.list[index];
         m.base_color * m.base_texture.as_ref().map_or(Vec4::ONE, |t| self.textures[t.image].mean())
     }
 
     /// The look of a point of a triangle where one sample covers `width` of the frame's units.
-    pub fn look(&self, surface: &Surface, triangle: &Triangle, weights: Vec3, width: f32) -> Look {
+    pub(crate) fn look(&self, surface: &Surface, triangle: &Triangle, weights: Vec3, width: f32) -> Look {
         let m = self.get(triangle.material);
         let corners = triangle.vertices.map(|v| &surface.vertices[v as usize]);
         let sampled = |usage: &Option<TextureUse>, set: usize| {
@@ -75,7 +75,7 @@ impl Materials {
     }
 
     /// Whether light goes through the point: masked out, or covering less than half.
-    pub fn passes(&self, surface: &Surface, triangle: &Triangle, weights: Vec3) -> bool {
+    pub(crate) fn passes(&self, surface: &Surface, triangle: &Triangle, weights: Vec3) -> bool {
         !self.opaque
             && self.get(triangle.material).alpha != AlphaMode::Opaque
             && self.look(surface, triangle, weights, 0.0).alpha < 0.5

@@ -19,11 +19,11 @@
 //! one photo, `points` and `write` put it all on disk, [`demo`] is the scene that ships with the
 //! program.
 
-pub mod demo;
-pub mod levels;
+pub(crate) mod demo;
+pub(crate) mod levels;
 mod light;
 mod material;
-pub mod options;
+pub(crate) mod options;
 mod points;
 mod rig;
 mod surface;
@@ -42,7 +42,7 @@ use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
 pub use demo::demo_glb;
-pub use levels::Identity;
+pub(crate) use levels::Identity;
 pub use options::{Levels, Rig, SynthOptions};
 
 use crate::io::IoError;
@@ -104,21 +104,21 @@ pub enum SynthError {
 #[derive(Clone, Debug)]
 pub struct SynthReport {
     /// The folder.
-    pub out: PathBuf,
+    pub(crate) out: PathBuf,
     /// Photos for training.
-    pub train_views: usize,
+    pub(crate) train_views: usize,
     /// Photos held out.
-    pub held_out_views: usize,
+    pub(crate) held_out_views: usize,
     /// Objects and parts, pixels counted.
-    pub identities: Vec<Identity>,
+    pub(crate) identities: Vec<Identity>,
     /// Sparse points.
-    pub points: usize,
+    pub(crate) points: usize,
     /// Triangles of the scene after splitting for light.
-    pub triangles: usize,
+    pub(crate) triangles: usize,
     /// Seconds in all.
-    pub secs: f64,
+    pub(crate) secs: f64,
     /// What was left out of the scene.
-    pub warnings: Vec<String>,
+    pub(crate) warnings: Vec<String>,
 }
 
 /// Renders the scene in `glb` (any glTF file) into a data set in the folder `out`, which is made.

@@ -91,7 +91,7 @@ impl Default for SynthOptions {
 
 impl SynthOptions {
     /// Checks every field.
-    pub fn validate(&self) -> Result<(), SynthError> {
+    pub(crate) fn validate(&self) -> Result<(), SynthError> {
         let bad = |what: &str| Err(SynthError::Options(what.into()));
         let side = 1..=Camera::MAX_SIDE_PX;
         if !(1..=100_000).contains(&self.views) {

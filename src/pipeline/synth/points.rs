@@ -10,7 +10,13 @@ use crate::scene::{Camera, SparsePoint};
 
 /// `count` points on surfaces that the photo shows, in its colors, each off by
 /// `point_noise_px` pixels of it in every direction. None if the photo shows no surface.
-pub fn sample(view: &View, camera: &Camera, index: usize, count: usize, options: &SynthOptions) -> Vec<SparsePoint> {
+pub(crate) fn sample(
+    view: &View,
+    camera: &Camera,
+    index: usize,
+    count: usize,
+    options: &SynthOptions,
+) -> Vec<SparsePoint> {
     let mut rng = Pcg32::seed_from_u64(options.seed.wrapping_mul(0x9e37_79b9).wrapping_add(index as u64));
     let width = camera.width_px as usize;
     let seen: Vec<usize> = (0..view.depth.len()).filter(|&i| view.depth[i] > 0.0).collect();

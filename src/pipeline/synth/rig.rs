@@ -20,15 +20,15 @@ const ATTEMPTS: usize = 24;
 
 /// What the cameras look at.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Subject {
+pub(crate) struct Subject {
     /// The middle.
-    pub focus: DVec3,
+    pub(crate) focus: DVec3,
     /// Radius around it that should fill a picture.
-    pub radius: f64,
+    pub(crate) radius: f64,
 }
 
 /// The cameras of a data set, in the order of the photos.
-pub fn cameras(surface: &Surface, tracer: &Tracer, options: &SynthOptions) -> Vec<Camera> {
+pub(crate) fn cameras(surface: &Surface, tracer: &Tracer, options: &SynthOptions) -> Vec<Camera> {
     let objects = &surface.objects;
     let supports = supports(objects);
     let things: Vec<&Bounds> = objects.iter().zip(&supports).filter(|(_, s)| !**s).map(|(b, _)| b).collect();

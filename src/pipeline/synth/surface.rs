@@ -24,45 +24,45 @@ const LIGHT_CELLS: f64 = 24_000.0;
 
 /// A vertex in the scene's frame.
 #[derive(Clone, Copy, Debug)]
-pub struct Vertex {
+pub(crate) struct Vertex {
     /// Position.
-    pub position: Vec3A,
+    pub(crate) position: Vec3A,
     /// Unit normal.
-    pub normal: Vec3A,
+    pub(crate) normal: Vec3A,
     /// Texture coordinates of the base color and of the emission, transformed.
-    pub uv: [Vec2; 2],
+    pub(crate) uv: [Vec2; 2],
     /// Linear vertex color.
-    pub color: Vec4,
+    pub(crate) color: Vec4,
 }
 
 /// A triangle: vertices, material, whose it is.
 #[derive(Clone, Copy, Debug)]
-pub struct Triangle {
+pub(crate) struct Triangle {
     /// Indices into [`Surface::vertices`].
-    pub vertices: [u32; 3],
+    pub(crate) vertices: [u32; 3],
     /// Index into the scene's materials.
-    pub material: u32,
+    pub(crate) material: u32,
     /// Object and part.
-    pub ids: NodeIds,
+    pub(crate) ids: NodeIds,
 }
 
 /// All triangles of a scene.
-pub struct Surface {
+pub(crate) struct Surface {
     /// Vertices.
-    pub vertices: Vec<Vertex>,
+    pub(crate) vertices: Vec<Vertex>,
     /// Triangles.
-    pub triangles: Vec<Triangle>,
+    pub(crate) triangles: Vec<Triangle>,
     /// The frame's origin in the world.
-    pub origin: DVec3,
+    pub(crate) origin: DVec3,
     /// Length of the frame's unit in scene units.
-    pub unit: f64,
+    pub(crate) unit: f64,
     /// Box of each object in the world, by object id - 1.
-    pub objects: Vec<Bounds>,
+    pub(crate) objects: Vec<Bounds>,
 }
 
 impl Surface {
     /// Flattens the scene.
-    pub fn of(scene: &MeshScene, identities: &Identities) -> Result<Self, SynthError> {
+    pub(crate) fn of(scene: &MeshScene, identities: &Identities) -> Result<Self, SynthError> {
         let instances: Vec<Instance<'_>> = scene
             .nodes
             .iter()
@@ -112,7 +112,7 @@ impl Surface {
     }
 
     /// Frame position of a world point.
-    pub fn local(&self, p: DVec3) -> Vec3A {
+    pub(crate) fn local(&self, p: DVec3) -> Vec3A {
         ((p - self.origin) / self.unit).as_vec3a()
     }
 
@@ -238,13 +238,13 @@ impl Surface {
     }
 
     /// Area of a triangle in the frame.
-    pub fn area(&self, t: &Triangle) -> f64 {
+    pub(crate) fn area(&self, t: &Triangle) -> f64 {
         let [a, b, c] = t.vertices.map(|v| self.vertices[v as usize].position.as_dvec3());
         0.5 * (b - a).cross(c - a).length()
     }
 
     /// Positions of a triangle's corners in the frame.
-    pub fn corners(&self, t: &Triangle) -> [Vec3A; 3] {
+    pub(crate) fn corners(&self, t: &Triangle) -> [Vec3A; 3] {
         t.vertices.map(|v| self.vertices[v as usize].position)
     }
 }
@@ -269,7 +269,7 @@ fn between(p: &Vertex, q: &Vertex) -> Vertex {
 }
 
 /// Mean of the three corners' values, weighted.
-pub fn blend<T: std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>>(values: [T; 3], weights: Vec3) -> T {
+pub(crate) fn blend<T: std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>>(values: [T; 3], weights: Vec3) -> T {
     let [a, b, c] = values;
     a * weights.x + b * weights.y + c * weights.z
 }

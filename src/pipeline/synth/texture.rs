@@ -6,14 +6,14 @@ use crate::io::gltf_mesh::{TextureImage, TextureUse, Wrap};
 use crate::math::srgb;
 
 /// An image at all resolutions.
-pub struct Texture {
+pub(crate) struct Texture {
     levels: Vec<TextureImage>,
     decode: [f32; 256],
 }
 
 impl Texture {
     /// Builds the smaller resolutions.
-    pub fn new(image: &TextureImage) -> Self {
+    pub(crate) fn new(image: &TextureImage) -> Self {
         let decode = std::array::from_fn(|i| srgb::linear(i as f32 / 255.0));
         let mut texture = Self { levels: vec![image.clone()], decode };
         while let Some(last) = texture.levels.last().filter(|l| l.width_px > 1 || l.height_px > 1) {
@@ -42,18 +42,18 @@ impl Texture {
     }
 
     /// Texels of the full resolution.
-    pub fn texels(&self) -> f32 {
+    pub(crate) fn texels(&self) -> f32 {
         self.levels[0].width_px as f32 * self.levels[0].height_px as f32
     }
 
     /// Mean color, linear.
-    pub fn mean(&self) -> Vec4 {
+    pub(crate) fn mean(&self) -> Vec4 {
         self.texel(self.levels.len() - 1, 0, 0)
     }
 
     /// Linear color and alpha at `uv`, seen so that one sample covers `footprint` texels of the
     /// full resolution along a side.
-    pub fn sample(&self, usage: &TextureUse, uv: Vec2, footprint: f32) -> Vec4 {
+    pub(crate) fn sample(&self, usage: &TextureUse, uv: Vec2, footprint: f32) -> Vec4 {
         if !uv.is_finite() {
             return self.mean();
         }

@@ -20,18 +20,18 @@ const MAX_SHARE: f32 = 0.02;
 
 /// Where a ray meets the surface.
 #[derive(Clone, Copy, Debug)]
-pub struct Hit {
+pub(crate) struct Hit {
     /// Distance in lengths of the ray's direction.
-    pub t: f32,
+    pub(crate) t: f32,
     /// Index of the triangle.
-    pub triangle: usize,
+    pub(crate) triangle: usize,
     /// Weights of the triangle's corners, which sum to one.
-    pub weights: Vec3,
+    pub(crate) weights: Vec3,
 }
 
 /// The hierarchy over a surface: a binary one, because the compressed wide one loses rays that are
 /// nearly parallel to an axis (its box test subtracts large products).
-pub struct Tracer {
+pub(crate) struct Tracer {
     bvh: Bvh2,
     /// In the order of the hierarchy's leaves, each with [`REACH`] as a share of its least height.
     triangles: Vec<(RtTriangle, f32)>,
@@ -41,7 +41,7 @@ pub struct Tracer {
 
 impl Tracer {
     /// Builds it.
-    pub fn new(surface: &Surface) -> Self {
+    pub(crate) fn new(surface: &Surface) -> Self {
         let boxes: Vec<Aabb> = surface
             .triangles
             .iter()
@@ -62,7 +62,7 @@ impl Tracer {
     }
 
     /// The nearest surface from `origin` along `direction`, from `t_min` on.
-    pub fn nearest(&self, origin: Vec3A, direction: Vec3A, t_min: f32) -> Option<Hit> {
+    pub(crate) fn nearest(&self, origin: Vec3A, direction: Vec3A, t_min: f32) -> Option<Hit> {
         let ray = Ray::new(origin, direction, t_min, f32::INFINITY);
         let mut hit = RayHit::none();
         if !self.bvh.ray_traverse(ray, &mut hit, |ray, i| distance(&self.triangles[i], ray)) {
@@ -76,7 +76,7 @@ impl Tracer {
 
     /// Whether the way from `origin` to `origin + direction` is free of surfaces, those left out
     /// for which `passes` holds.
-    pub fn free(&self, origin: Vec3A, direction: Vec3A, passes: impl Fn(usize, Vec3) -> bool) -> bool {
+    pub(crate) fn free(&self, origin: Vec3A, direction: Vec3A, passes: impl Fn(usize, Vec3) -> bool) -> bool {
         let ray = Ray::new(origin, direction, 0.0, 1.0);
         self.bvh.ray_traverse_miss(ray, |ray, i| {
             let triangle = &self.triangles[i];

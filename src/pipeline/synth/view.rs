@@ -20,32 +20,32 @@ const MIN_TRANSMITTANCE: f32 = 1.0 / 512.0;
 const MAX_DIFFERENCE: f32 = 0.02;
 
 /// A rendered photo; all lists are row-major.
-pub struct View {
+pub(crate) struct View {
     /// sRGB.
-    pub rgb: Vec<[u8; 3]>,
+    pub(crate) rgb: Vec<[u8; 3]>,
     /// Depth along the camera's axis at the pixel's center in scene units; 0 = nothing there.
-    pub depth: Vec<f32>,
+    pub(crate) depth: Vec<f32>,
     /// Object at the pixel's center; 0 = none.
-    pub object: Vec<u16>,
+    pub(crate) object: Vec<u16>,
     /// Part at the pixel's center; 0 = none.
-    pub part: Vec<u16>,
+    pub(crate) part: Vec<u16>,
 }
 
 /// Everything that rendering needs.
 pub struct Stage {
     /// Triangles.
-    pub surface: Surface,
+    pub(crate) surface: Surface,
     /// Their hierarchy.
-    pub tracer: Tracer,
+    pub(crate) tracer: Tracer,
     /// Their look.
-    pub materials: Materials,
+    pub(crate) materials: Materials,
     /// The light on them.
-    pub light: Light,
+    pub(crate) light: Light,
 }
 
 impl Stage {
     /// Renders the scene from `camera`; `view` is the photo's number, for its random numbers.
-    pub fn render(&self, camera: &Camera, view: usize, options: &SynthOptions) -> View {
+    pub(crate) fn render(&self, camera: &Camera, view: usize, options: &SynthOptions) -> View {
         let (w, h) = (camera.width_px as usize, camera.height_px as usize);
         let rows: Vec<Vec<Pixel>> =
             (0..h).into_par_iter().map(|y| (0..w).map(|x| self.pixel(camera, x, y, view, options)).collect()).collect();
@@ -59,7 +59,7 @@ impl Stage {
     }
 
     /// The scene as the light needs it.
-    pub fn lit(&self) -> Lit<'_> {
+    pub(crate) fn lit(&self) -> Lit<'_> {
         Lit { surface: &self.surface, tracer: &self.tracer, materials: &self.materials }
     }
 

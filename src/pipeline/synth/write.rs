@@ -17,12 +17,12 @@ use crate::io::{IoError, atomic};
 use crate::scene::{Camera, SparsePoint};
 
 /// The file whose presence makes the folder a data set; written last.
-pub const TRANSFORMS: &str = "transforms.json";
+pub(crate) const TRANSFORMS: &str = "transforms.json";
 /// Settings and fingerprint.
-pub const SETTINGS: &str = "synth.json";
+pub(crate) const SETTINGS: &str = "synth.json";
 
 /// Writes into one folder.
-pub struct Writer {
+pub(crate) struct Writer {
     out: PathBuf,
     _lock: FolderLock,
     /// Digits of a photo's number.
@@ -32,7 +32,7 @@ pub struct Writer {
 impl Writer {
     /// Makes the folders. Takes away what marks an earlier data set as complete, if this program has
     /// written that; refuses a folder that holds anything else.
-    pub fn new(out: &Path, views: usize) -> Result<Self, SynthError> {
+    pub(crate) fn new(out: &Path, views: usize) -> Result<Self, SynthError> {
         fs::create_dir_all(out).map_err(|source| SynthError::Write { path: out.into(), source })?;
         let lock = FolderLock::take(out, "making photos")?;
         let hidden = |e: &fs::DirEntry| e.file_name().to_string_lossy().starts_with('.');
@@ -60,7 +60,7 @@ impl Writer {
     }
 
     /// Writes the files of photo `index`.
-    pub fn photo(&self, index: usize, camera: &Camera, view: &View) -> Result<(), SynthError> {
+    pub(crate) fn photo(&self, index: usize, camera: &Camera, view: &View) -> Result<(), SynthError> {
         let (w, h) = (camera.width_px, camera.height_px);
         let stem = self.stem(index);
         self.file(&format!("images/{stem}.png"), |f| png(f, view.rgb.as_flattened(), w, h, ExtendedColorType::Rgb8))?;
@@ -78,7 +78,7 @@ impl Writer {
 
     /// Writes what is about all photos.
     #[expect(clippy::too_many_arguments, reason = "one call, each argument a file's content")]
-    pub fn finish(
+    pub(crate) fn finish(
         &self,
         scene: &str,
         fingerprint: Option<u64>,

@@ -28,7 +28,7 @@ const SHARP: f64 = 0.95;
 const MAX_SHARE: f64 = 0.4;
 
 /// The borders of a dataset's photos at one size, by camera.
-pub struct Borders {
+pub(crate) struct Borders {
     max_side_px: u32,
     by_camera: BTreeMap<[u64; 6], Vec<bool>>,
 }
@@ -39,7 +39,7 @@ impl Borders {
     ///
     /// # Errors
     /// If a photo cannot be read.
-    pub fn of(dataset: &Dataset, photos: &[usize], max_side_px: u32) -> Result<Self, IoError> {
+    pub(crate) fn of(dataset: &Dataset, photos: &[usize], max_side_px: u32) -> Result<Self, IoError> {
         let mut cameras: BTreeMap<[u64; 6], Vec<&Photo>> = BTreeMap::new();
         for photo in photos.iter().map(|&i| &dataset.photos[i]).filter(|p| may_have_border(p)) {
             cameras.entry(intrinsics(&photo.camera)).or_default().push(photo);
@@ -60,7 +60,7 @@ impl Borders {
     ///
     /// # Errors
     /// If the photo cannot be read.
-    pub fn load(&self, photo: &Photo) -> Result<PhotoPixels, IoError> {
+    pub(crate) fn load(&self, photo: &Photo) -> Result<PhotoPixels, IoError> {
         let mut pixels = photo::load(photo, self.max_side_px)?;
         if let Some(border) = self.by_camera.get(&intrinsics(&photo.camera)).filter(|_| may_have_border(photo)) {
             leave_out(border, &mut pixels);
@@ -69,7 +69,7 @@ impl Borders {
     }
 
     /// The largest share of a picture that a border takes; 0 without any.
-    pub fn share(&self) -> f64 {
+    pub(crate) fn share(&self) -> f64 {
         let share = |b: &Vec<bool>| b.iter().filter(|b| **b).count() as f64 / b.len().max(1) as f64;
         self.by_camera.values().map(share).fold(0.0, f64::max)
     }

@@ -4,19 +4,19 @@ use crate::io::memory;
 
 /// Bytes that one trained Gaussian takes: parameters, two moments, a snapshot and a copy to roll
 /// back to (59 floats each), its statistics, and the renderer's records of about four tiles.
-pub const BYTES_PER_GAUSSIAN: u64 = 59 * 4 * 5 + 12 + 64 + 4 * 60;
+pub(crate) const BYTES_PER_GAUSSIAN: u64 = 59 * 4 * 5 + 12 + 64 + 4 * 60;
 
 /// Share of the memory that is free now which the Gaussians may take.
 const SHARE: f64 = 0.4;
 
 /// Most Gaussians that are worth having and fit: one per pixel of a training picture, at least
 /// `start` (those there are to begin with) and a half more, at most what the memory holds.
-pub fn worthwhile(pixels: usize, start: usize) -> usize {
+pub(crate) fn worthwhile(pixels: usize, start: usize) -> usize {
     pixels.max(start + start / 2).min(gaussians())
 }
 
 /// Most Gaussians that the memory holds, between ten thousand and ten million.
-pub fn gaussians() -> usize {
+pub(crate) fn gaussians() -> usize {
     fitting(memory::free())
 }
 

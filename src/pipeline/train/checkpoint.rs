@@ -90,7 +90,7 @@ pub enum CheckpointError {
 ///
 /// # Errors
 /// If it cannot be written; the checkpoint before is then unchanged.
-pub fn save(scene: &SceneFolder, trainer: &Trainer, header: &Header) -> Result<(), IoError> {
+pub(crate) fn save(scene: &SceneFolder, trainer: &Trainer, header: &Header) -> Result<(), IoError> {
     scene.save_checkpoint(|w| {
         let mut w = Summed { to: w, sum: Sha256::new() };
         let text = serde_json::to_vec(header)?;
@@ -139,11 +139,11 @@ pub struct Checkpoint {
     /// The run.
     pub header: Header,
     /// The Gaussians.
-    pub cloud: GaussianCloud,
+    pub(crate) cloud: GaussianCloud,
     /// Adam's moments.
-    pub moments: [GaussianCloud; 2],
+    pub(crate) moments: [GaussianCloud; 2],
     /// Density statistics.
-    pub stats: DensityStats,
+    pub(crate) stats: DensityStats,
 }
 
 /// Reads a checkpoint, or `None` if there is no such file.

@@ -7,7 +7,7 @@ use crate::io::photo;
 const LEAST_PX: u32 = 16;
 
 /// The views at half their size.
-pub fn halved(views: &[TrainView]) -> Vec<TrainView> {
+pub(crate) fn halved(views: &[TrainView]) -> Vec<TrainView> {
     views.iter().map(half).collect()
 }
 

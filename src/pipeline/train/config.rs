@@ -72,7 +72,7 @@ impl TrainConfig {
     ///
     /// # Errors
     /// If they cannot be read.
-    pub fn stored(folder: &Path, config: serde_json::Value) -> Result<Self, UnreadableConfig> {
+    pub(crate) fn stored(folder: &Path, config: serde_json::Value) -> Result<Self, UnreadableConfig> {
         let read = match config {
             serde_json::Value::Null => Ok(Self::default()),
             named @ serde_json::Value::Object(_) => serde_json::from_value(named),
@@ -83,13 +83,13 @@ impl TrainConfig {
     }
 
     /// Weights of the terms for normals and distortion.
-    pub fn geometry_weights(&self) -> (f64, f64) {
+    pub(crate) fn geometry_weights(&self) -> (f64, f64) {
         let or = |weight: Option<f64>, surfels: f64| weight.unwrap_or(if self.surfels { surfels } else { 0.0 });
         (or(self.normal_weight, SURFEL_NORMALS), or(self.distortion_weight, SURFEL_DISTORTION))
     }
 
     /// What of these settings a scene's plan starts from.
-    pub fn limits(&self) -> Limits {
+    pub(crate) fn limits(&self) -> Limits {
         Limits {
             train_side_px: self.max_side_px,
             object_side_px: TrackOptions::default().max_side_px,
@@ -99,12 +99,12 @@ impl TrainConfig {
     }
 
     /// Whether only the CPU can do what is asked.
-    pub fn needs_cpu(&self) -> bool {
+    pub(crate) fn needs_cpu(&self) -> bool {
         self.surfels || self.geometry_weights().0 > 0.0
     }
 
     /// How what was trained is drawn in front of `background`, black if unknown.
-    pub fn render_settings(&self, background: Option<[f32; 3]>) -> RenderSettings {
+    pub(crate) fn render_settings(&self, background: Option<[f32; 3]>) -> RenderSettings {
         RenderSettings {
             background: background.unwrap_or_default(),
             antialias: self.antialias,

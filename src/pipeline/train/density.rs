@@ -26,13 +26,13 @@ const SPLIT_SHRINK: f32 = 1.6;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DensityReport {
     /// Small Gaussians copied.
-    pub cloned: usize,
+    pub(crate) cloned: usize,
     /// Large Gaussians replaced by two.
-    pub split: usize,
+    pub(crate) split: usize,
     /// Gaussians removed.
-    pub pruned: usize,
+    pub(crate) pruned: usize,
     /// Growth left out for lack of budget.
-    pub refused: usize,
+    pub(crate) refused: usize,
 }
 
 /// Runs density control on the cloud and its optimizer moments. `extent` as in
@@ -126,7 +126,7 @@ pub(super) fn gaussian(rng: &mut Pcg64Mcg) -> f32 {
 }
 
 /// Lowers every opacity to at most 0.01 and forgets the opacities' moments.
-pub fn reset_opacity(cloud: &mut GaussianCloud, moments: &mut [GaussianCloud; 2]) {
+pub(crate) fn reset_opacity(cloud: &mut GaussianCloud, moments: &mut [GaussianCloud; 2]) {
     let ceiling = (RESET_OPACITY / (1.0 - RESET_OPACITY)).ln() as f32;
     for o in &mut cloud.opacity_logits {
         *o = o.min(ceiling);

@@ -8,30 +8,30 @@ use crate::render::{
 use crate::scene::GaussianCloud;
 
 /// Weight of D-SSIM in the loss.
-pub const LAMBDA: f64 = 0.2;
+pub(crate) const LAMBDA: f64 = 0.2;
 
 /// What one step measured.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StepResult {
     /// Loss of the photo before the step.
-    pub loss: f64,
+    pub(crate) loss: f64,
     /// PSNR of the photo before the step, dB.
-    pub psnr: f64,
+    pub(crate) psnr: f64,
     /// Gaussians whose gradient was not finite and that were left as they are.
-    pub skipped: usize,
+    pub(crate) skipped: usize,
     /// Gradients that were cut because they were far above what their parameters had seen.
-    pub outliers: usize,
+    pub(crate) outliers: usize,
 }
 
 /// A run on a GPU.
-pub struct DeviceRun {
+pub(crate) struct DeviceRun {
     trainer: DeviceTrainer,
     photos: Vec<DevicePhoto>,
 }
 
 impl DeviceRun {
     /// Sends a run's state and photos to the device.
-    pub fn new(
+    pub(crate) fn new(
         device: &Device,
         cloud: &GaussianCloud,
         moments: &[GaussianCloud; 2],
@@ -47,12 +47,17 @@ impl DeviceRun {
     }
 
     /// Replaces cloud and moments.
-    pub fn upload(&mut self, cloud: &GaussianCloud, moments: &[GaussianCloud; 2], step: u64) -> Result<(), GpuError> {
+    pub(crate) fn upload(
+        &mut self,
+        cloud: &GaussianCloud,
+        moments: &[GaussianCloud; 2],
+        step: u64,
+    ) -> Result<(), GpuError> {
         self.trainer.upload(cloud, Some([&moments[0], &moments[1]]), step)
     }
 
     /// One step on photo `i`, which `view` is of. Does not wait for the device.
-    pub fn step(&mut self, i: usize, view: &TrainView, rates: &Rates, sh_degree: u8) -> Result<(), GpuError> {
+    pub(crate) fn step(&mut self, i: usize, view: &TrainView, rates: &Rates, sh_degree: u8) -> Result<(), GpuError> {
         match self.photos.get(i) {
             Some(photo) => self.trainer.step(&view.camera, photo, rates, sh_degree),
             None => Ok(()),
@@ -61,7 +66,7 @@ impl DeviceRun {
 
     /// What the steps since the last call measured; steps that did not fit into the device's
     /// buffers, which have been enlarged since, moved nothing and are left out. Waits.
-    pub fn results(&mut self) -> Result<Vec<StepResult>, GpuError> {
+    pub(crate) fn results(&mut self) -> Result<Vec<StepResult>, GpuError> {
         let done = self.trainer.metrics()?;
         let result = |s: &StepLoss| StepResult {
             loss: s.loss,
@@ -73,12 +78,12 @@ impl DeviceRun {
     }
 
     /// The cloud as it is. Waits.
-    pub fn cloud(&self) -> Result<GaussianCloud, GpuError> {
+    pub(crate) fn cloud(&self) -> Result<GaussianCloud, GpuError> {
         self.trainer.cloud()
     }
 
     /// Cloud, moments, and statistics since the last upload. Waits.
-    pub fn download(&self) -> Result<(GaussianCloud, [GaussianCloud; 2], DensityStats), GpuError> {
+    pub(crate) fn download(&self) -> Result<(GaussianCloud, [GaussianCloud; 2], DensityStats), GpuError> {
         let (cloud, moments) = self.trainer.download()?;
         Ok((cloud, moments, self.trainer.stats()?))
     }

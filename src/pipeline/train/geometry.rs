@@ -16,7 +16,7 @@ const THICKNESS: f64 = 1e-7;
 
 /// Weights of the terms and their buffers.
 #[derive(Debug, Default)]
-pub struct Geometry {
+pub(crate) struct Geometry {
     surfels: bool,
     normal_weight: f64,
     /// Of distortion in inverse depth times the scene's extent, so that units cancel.
@@ -28,7 +28,7 @@ pub struct Geometry {
 
 impl Geometry {
     /// The terms of a run in a scene of this extent.
-    pub fn new(config: &TrainConfig, extent: f64) -> Self {
+    pub(crate) fn new(config: &TrainConfig, extent: f64) -> Self {
         let (normal_weight, distortion) = config.geometry_weights();
         let distortion_weight = distortion * extent * extent;
         Self { surfels: config.surfels, normal_weight, distortion_weight, steps: config.steps, ..Self::default() }
@@ -43,17 +43,17 @@ impl Geometry {
     }
 
     /// Whether depth must be drawn at `step`.
-    pub fn counts(&self, step: u64) -> bool {
+    pub(crate) fn counts(&self, step: u64) -> bool {
         self.normals_count(step) || self.distortion_counts(step)
     }
 
     /// Whether Gaussians carry their normals as extra channels at `step`.
-    pub fn draws_normals(&self, step: u64) -> bool {
+    pub(crate) fn draws_normals(&self, step: u64) -> bool {
         !self.surfels && self.normals_count(step)
     }
 
     /// The extra channels to draw at `step`.
-    pub fn features(&mut self, cloud: &GaussianCloud, view: &TrainView, step: u64) -> Features<'_, f32> {
+    pub(crate) fn features(&mut self, cloud: &GaussianCloud, view: &TrainView, step: u64) -> Features<'_, f32> {
         if !self.draws_normals(step) {
             return Features::NONE;
         }
@@ -62,7 +62,7 @@ impl Geometry {
     }
 
     /// Sets the gradient of everything but colors for a frame drawn at `step`; returns the loss.
-    pub fn compare(
+    pub(crate) fn compare(
         &mut self,
         frame: &Frame<f32>,
         view: &TrainView,
@@ -101,7 +101,7 @@ impl Geometry {
 
 /// Makes Gaussians that training starts from into surfels: flat, and turned at random by `angle`,
 /// which gives numbers around 0.
-pub fn flatten(cloud: &mut GaussianCloud, extent: f64, mut angle: impl FnMut() -> f32) {
+pub(crate) fn flatten(cloud: &mut GaussianCloud, extent: f64, mut angle: impl FnMut() -> f32) {
     let thin = (THICKNESS * extent).ln() as f32;
     for (scale, quaternion) in cloud.log_scales.iter_mut().zip(&mut cloud.quaternions) {
         scale[2] = thin;

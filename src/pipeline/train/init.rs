@@ -23,7 +23,7 @@ const HOLE_DEPTH: f64 = 1.3;
 
 /// A cloud at the dataset's sparse points or, where it has fewer than a hundred, at `random`
 /// points in front of the cameras, colored by the photos they were shot from.
-pub fn initial_cloud(
+pub(crate) fn initial_cloud(
     dataset: &Dataset,
     views: &[TrainView],
     degree: u8,
@@ -97,7 +97,7 @@ fn constant_color(rgb: [u8; 3]) -> [f32; 3] {
 }
 
 /// One Gaussian per point, as wide as the mean distance to its three nearest neighbors.
-pub fn from_points(points: &[SparsePoint], degree: u8) -> GaussianCloud {
+pub(crate) fn from_points(points: &[SparsePoint], degree: u8) -> GaussianCloud {
     let origin = Bounds::robust(points.iter().map(|p| p.position)).map_or(DVec3::ZERO, |b| b.center());
     let local: Vec<[f64; 3]> = points.iter().map(|p| (p.position - origin).to_array()).collect();
     let tree = RTree::bulk_load(local.clone());

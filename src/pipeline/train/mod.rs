@@ -3,26 +3,26 @@
 //! [`run()`] is the whole job; [`trainer`] the state and its step; [`init`], [`schedule`] and
 //! [`density`] what the step consults; [`checkpoint`] what survives a kill.
 
-pub mod border;
-pub mod budget;
+pub(crate) mod border;
+pub(crate) mod budget;
 pub mod checkpoint;
 mod coarse;
-pub mod config;
+pub(crate) mod config;
 pub mod density;
-pub mod device;
+pub(crate) mod device;
 mod folder;
-pub mod geometry;
-pub mod init;
+pub(crate) mod geometry;
+pub(crate) mod init;
 mod outcome;
 mod photos;
 mod run;
-pub mod schedule;
+pub(crate) mod schedule;
 pub mod trainer;
 
 pub use config::TrainConfig;
-pub use outcome::{TrainEnd, TrainError, TrainOutcome};
-pub use photos::load_views;
-pub use run::run;
+pub(crate) use outcome::{TrainEnd, TrainError, TrainOutcome};
+pub(crate) use photos::load_views;
+pub(crate) use run::run;
 
 use crate::scene::{Camera, PhotoPixels};
 

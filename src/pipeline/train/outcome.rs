@@ -11,7 +11,7 @@ use crate::scene::GaussianCloud;
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TrainEnd {
+pub(crate) enum TrainEnd {
     /// All steps were done.
     Finished,
     /// The observer asked to stop; the state is saved.
@@ -20,17 +20,17 @@ pub enum TrainEnd {
 
 /// What a run leaves behind.
 #[derive(Clone, Debug)]
-pub struct TrainOutcome {
+pub(crate) struct TrainOutcome {
     /// The Gaussians.
-    pub cloud: Arc<GaussianCloud>,
+    pub(crate) cloud: Arc<GaussianCloud>,
     /// Held-out evaluations, the last one of the final state.
-    pub evaluations: Vec<Evaluation>,
+    pub(crate) evaluations: Vec<Evaluation>,
     /// How it ended.
-    pub end: TrainEnd,
+    pub(crate) end: TrainEnd,
     /// Steps done.
-    pub steps: u64,
+    pub(crate) steps: u64,
     /// Seconds of training.
-    pub secs: f64,
+    pub(crate) secs: f64,
 }
 
 /// Why a run failed.

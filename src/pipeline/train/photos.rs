@@ -9,7 +9,7 @@ use crate::pipeline::observer::{Observer, Severity, Ticker};
 use crate::scene::Dataset;
 
 /// Loads and scales photos, several at a time; `None` if the observer cancels.
-pub fn load_views(
+pub(crate) fn load_views(
     dataset: &Dataset,
     indices: &[usize],
     config: &TrainConfig,

@@ -37,7 +37,7 @@ const MAX_ROLLBACKS: u32 = 4;
 ///
 /// # Errors
 /// See [`TrainError`]. A checkpoint that cannot be saved on the way ends nothing; at the end it does.
-pub fn run(
+pub(crate) fn run(
     dataset: &Dataset,
     config: &TrainConfig,
     out: Option<&Path>,

@@ -17,20 +17,20 @@ pub struct Schedule {
     /// Factor on every rate, lowered after a divergence.
     pub damping: f64,
     /// Steps between openings of SH bands; 0 = all are open.
-    pub sh_interval: u64,
+    pub(crate) sh_interval: u64,
     /// First step at which Gaussians may be added.
-    pub densify_from: u64,
+    pub(crate) densify_from: u64,
     /// Last step at which Gaussians may be added.
-    pub densify_until: u64,
+    pub(crate) densify_until: u64,
     /// Steps between density control.
-    pub densify_interval: u64,
+    pub(crate) densify_interval: u64,
     /// Steps between opacity resets.
-    pub reset_interval: u64,
+    pub(crate) reset_interval: u64,
 }
 
 impl Schedule {
     /// The schedule of a run in a scene of this extent (see `Dataset::camera_extent`).
-    pub fn new(config: &TrainConfig, extent: f64) -> Self {
+    pub(crate) fn new(config: &TrainConfig, extent: f64) -> Self {
         let n = config.steps as f64;
         let scaled = |reference: f64| (reference * n / REFERENCE_STEPS).round() as u64;
         Self {
@@ -48,7 +48,7 @@ impl Schedule {
     }
 
     /// Rates at `step`, counted from 0: exponential decay by 100 for positions, constant otherwise.
-    pub fn rates(&self, step: u64) -> Rates {
+    pub(crate) fn rates(&self, step: u64) -> Rates {
         let t = step as f64 / self.steps.max(1) as f64;
         let position = 1.6e-4 * self.extent * 0.01_f64.powf(t);
         let rate = |r: f64| (r * self.damping) as f32;
@@ -63,29 +63,29 @@ impl Schedule {
     }
 
     /// SH degree in use at `step`.
-    pub fn sh_degree(&self, step: u64) -> u8 {
+    pub(crate) fn sh_degree(&self, step: u64) -> u8 {
         step.checked_div(self.sh_interval).map_or(self.sh_degree, |open| open.min(u64::from(self.sh_degree)) as u8)
     }
 
     /// Whether Gaussians are added and removed after `done` steps.
-    pub fn densifies(&self, done: u64) -> bool {
+    pub(crate) fn densifies(&self, done: u64) -> bool {
         done >= self.densify_from && done <= self.densify_until && done % self.densify_interval == 0
     }
 
     /// Whether Gaussians that are too large may be removed after `done` steps: after the first
     /// reset, as in 3DGS. Before it they are the walls behind everything else.
-    pub fn prunes_large(&self, done: u64) -> bool {
+    pub(crate) fn prunes_large(&self, done: u64) -> bool {
         done > self.reset_interval
     }
 
     /// Whether opacities are reset after `done` steps. Never near the end of density control, so
     /// that what the reset hides can come back or be removed.
-    pub fn resets(&self, done: u64) -> bool {
+    pub(crate) fn resets(&self, done: u64) -> bool {
         done > 0 && done % self.reset_interval == 0 && done + self.densify_interval * 5 <= self.densify_until
     }
 
     /// Adam's constants for the step after `step`.
-    pub fn adam(&self, step: u64) -> AdamStep {
+    pub(crate) fn adam(&self, step: u64) -> AdamStep {
         AdamStep::new(step + 1)
     }
 }

@@ -21,7 +21,7 @@ use crate::render::{
 use crate::scene::{Camera, Gaussian, GaussianCloud};
 
 /// Steps between measurements that are reported.
-pub const REPORT_STEPS: u64 = 10;
+pub(crate) const REPORT_STEPS: u64 = 10;
 /// Gaussians that one task updates.
 const BLOCK: usize = 512;
 
@@ -48,19 +48,19 @@ pub struct Trainer {
     /// Adam's first and second moments, laid out like the cloud.
     pub moments: [GaussianCloud; 2],
     /// Input of density control.
-    pub stats: DensityStats,
+    pub(crate) stats: DensityStats,
     /// Rates and milestones.
     pub schedule: Schedule,
     /// Source of all randomness.
-    pub rng: Pcg64Mcg,
+    pub(crate) rng: Pcg64Mcg,
     /// Photos left in this round, in reverse order.
-    pub round: Vec<u32>,
+    pub(crate) round: Vec<u32>,
     /// Steps done.
     pub step: u64,
     /// Size of the scene that thresholds scale with.
-    pub extent: f64,
+    pub(crate) extent: f64,
     /// Most Gaussians allowed.
-    pub budget: usize,
+    pub(crate) budget: usize,
     settings: RenderSettings,
     densify: bool,
     renderer: DifferentiableRenderer,
@@ -72,7 +72,13 @@ pub struct Trainer {
 
 impl Trainer {
     /// A run's first state.
-    pub fn new(cloud: GaussianCloud, config: &TrainConfig, background: [f32; 3], extent: f64, rng: Pcg64Mcg) -> Self {
+    pub fn new(
+        cloud: GaussianCloud,
+        config: &TrainConfig,
+        background: [f32; 3],
+        extent: f64,
+        rng: Pcg64Mcg,
+    ) -> Self {
         let zero = zeros_like(&cloud);
         Self {
             stats: DensityStats::new(cloud.len()),
@@ -95,14 +101,14 @@ impl Trainer {
     }
 
     /// Goes on on a GPU.
-    pub fn move_to(&mut self, device: &Device, views: &[TrainView]) -> Result<(), GpuError> {
+    pub(crate) fn move_to(&mut self, device: &Device, views: &[TrainView]) -> Result<(), GpuError> {
         let device = DeviceRun::new(device, &self.cloud, &self.moments, self.step, self.settings.clone(), views)?;
         self.device = Some(device);
         Ok(())
     }
 
     /// Brings cloud, moments and statistics up to date, where a GPU has them.
-    pub fn fetch(&mut self) -> Result<(), GpuError> {
+    pub(crate) fn fetch(&mut self) -> Result<(), GpuError> {
         if let Some(device) = &self.device {
             (self.cloud, self.moments, self.stats) = device.download()?;
         }
@@ -110,7 +116,7 @@ impl Trainer {
     }
 
     /// Brings the cloud up to date, where a GPU has it.
-    pub fn fetch_cloud(&mut self) -> Result<(), GpuError> {
+    pub(crate) fn fetch_cloud(&mut self) -> Result<(), GpuError> {
         if let Some(device) = &self.device {
             self.cloud = device.cloud()?;
         }
@@ -125,7 +131,7 @@ impl Trainer {
     }
 
     /// How the cloud is meant to be drawn.
-    pub fn render_settings(&self) -> RenderSettings {
+    pub(crate) fn render_settings(&self) -> RenderSettings {
         RenderSettings { sh_degree: self.cloud.sh_degree, ..self.settings.clone() }
     }
 
@@ -170,7 +176,7 @@ impl Trainer {
     }
 
     /// Density control and opacity reset where they are due. Returns what was done.
-    pub fn control_density(&mut self) -> Result<Option<DensityReport>, StepError> {
+    pub(crate) fn control_density(&mut self) -> Result<Option<DensityReport>, StepError> {
         let (densifies, resets) = (self.schedule.densifies(self.step), self.schedule.resets(self.step));
         if !self.densify || !(densifies || resets) {
             return Ok(None);
@@ -208,7 +214,7 @@ impl Trainer {
     }
 
     /// Replaces the cloud by an earlier one and forgets the moments; rates are halved.
-    pub fn roll_back(&mut self, cloud: GaussianCloud) -> Result<(), GpuError> {
+    pub(crate) fn roll_back(&mut self, cloud: GaussianCloud) -> Result<(), GpuError> {
         let zero = zeros_like(&cloud);
         self.stats = DensityStats::new(cloud.len());
         self.moments = [zero.clone(), zero];

@@ -28,25 +28,25 @@ pub struct Rates {
 #[derive(Clone, Copy, Debug)]
 pub struct AdamStep {
     /// `1 / (1 - beta1^t)`.
-    pub first_correction: f32,
+    pub(crate) first_correction: f32,
     /// `1 / (1 - beta2^t)`.
-    pub second_correction: f32,
+    pub(crate) second_correction: f32,
 }
 
 /// Decay of the first moment.
-pub const BETA1: f32 = 0.9;
+pub(crate) const BETA1: f32 = 0.9;
 /// Decay of the second moment.
-pub const BETA2: f32 = 0.999;
+pub(crate) const BETA2: f32 = 0.999;
 /// Added to the root of the second moment (3DGS's value).
-pub const EPSILON: f32 = 1e-15;
+pub(crate) const EPSILON: f32 = 1e-15;
 
 /// Gradients are cut to this before they are squared, far from overflow.
-pub const CLIP: f32 = 1e15;
+pub(crate) const CLIP: f32 = 1e15;
 /// Square of the largest gradient, in units of the second moment: the one that doubles it.
-pub const GROWTH: f32 = 1.0 / (1.0 - BETA2);
+pub(crate) const GROWTH: f32 = 1.0 / (1.0 - BETA2);
 /// A gradient this many times too large is an outlier, which is counted. Gradients of Gaussians that
 /// come into sight for the first time may be 1e10 times what was seen of them before.
-pub const OUTLIER: f32 = 1e12;
+pub(crate) const OUTLIER: f32 = 1e12;
 
 impl AdamStep {
     /// The constants of step `t`, counted from 1.
@@ -57,7 +57,14 @@ impl AdamStep {
 
     /// Moves one parameter against its gradient, which must be finite. Whether that was an outlier.
     #[inline(always)]
-    pub fn update(&self, parameter: &mut f32, gradient: f32, first: &mut f32, second: &mut f32, rate: f32) -> bool {
+    pub fn update(
+        &self,
+        parameter: &mut f32,
+        gradient: f32,
+        first: &mut f32,
+        second: &mut f32,
+        rate: f32,
+    ) -> bool {
         let limit = if *second > 0.0 { (GROWTH * *second).sqrt().min(CLIP) } else { CLIP };
         let outlier = gradient.abs() > OUTLIER * limit;
         let gradient = gradient.clamp(-limit, limit);

@@ -10,18 +10,18 @@ use crate::render::TILE_PX;
 
 /// Tile lists and, for the backward pass, the way back from a splat to its entries.
 #[derive(Debug, Default)]
-pub struct Tiles {
+pub(crate) struct Tiles {
     /// Tiles per row and per column.
-    pub grid: [usize; 2],
+    pub(crate) grid: [usize; 2],
     /// Tile `t` owns `entries[first[t]..first[t + 1]]`.
-    pub first: Vec<u32>,
+    pub(crate) first: Vec<u32>,
     /// Splats of all tiles, tile after tile, each tile's front to back. Written once from several
     /// threads to disjoint places, hence atomics (relaxed ones cost nothing).
-    pub entries: Vec<AtomicU32>,
+    pub(crate) entries: Vec<AtomicU32>,
     /// Splat `s` has its places in `entries` at `places[span[s].0..span[s].1]`.
-    pub span: Vec<(u32, u32)>,
+    pub(crate) span: Vec<(u32, u32)>,
     /// Places in `entries`, splat after splat.
-    pub places: Vec<u32>,
+    pub(crate) places: Vec<u32>,
 }
 
 /// Inclusive tile rectangle `[x0, y0, x1, y1]` of the tiles with a pixel center inside the splat's
@@ -45,7 +45,7 @@ fn rectangle<R: Real>(s: &Splat<R>, size: [usize; 2]) -> Option<[usize; 4]> {
 
 /// Smallest squared Mahalanobis distance over the rectangle of pixel centers `[lo, hi]`.
 #[inline(always)]
-pub fn nearest<R: Real>(s: &Splat<R>, lo: [R; 2], hi: [R; 2]) -> R {
+pub(crate) fn nearest<R: Real>(s: &Splat<R>, lo: [R; 2], hi: [R; 2]) -> R {
     let [a, b, c] = s.conic;
     // Offsets of the rectangle from the center; the minimum lies on the edges that face it.
     let (x0, x1) = (lo[0] - s.mean[0], hi[0] - s.mean[0]);
@@ -122,7 +122,7 @@ fn share_of<R: Real>(splats: &[Splat<R>], size: [usize; 2], grid: [usize; 2]) ->
 }
 
 /// Builds the lists of splats that are ordered front to back.
-pub fn bin<R: Real>(out: &mut Tiles, splats: &[Splat<R>], size: [usize; 2]) {
+pub(crate) fn bin<R: Real>(out: &mut Tiles, splats: &[Splat<R>], size: [usize; 2]) {
     let grid = [size[0].div_ceil(TILE_PX), size[1].div_ceil(TILE_PX)];
     let tiles = grid[0] * grid[1];
     // A fixed number of shares: the lists do not depend on the number of threads anyway, but the

@@ -5,23 +5,23 @@ use crate::math::Real;
 use crate::math::lanes::{LANES, Lanes};
 
 /// The rows of the output planes that one row of tiles writes, `width * rows` values each.
-pub struct RowOut<'a, R> {
+pub(crate) struct RowOut<'a, R> {
     /// Composited values, without background; as many planes as are wanted.
-    pub planes: Vec<&'a mut [R]>,
+    pub(crate) planes: Vec<&'a mut [R]>,
     /// The primitive's extra values; none = not wanted.
-    pub extra: Vec<&'a mut [R]>,
+    pub(crate) extra: Vec<&'a mut [R]>,
     /// Transmittance left.
-    pub transmittance: &'a mut [R],
+    pub(crate) transmittance: &'a mut [R],
     /// Place in the tile's list, from 1, of the last splat that contributed; 0 = none.
-    pub last: &'a mut [R],
+    pub(crate) last: &'a mut [R],
 }
 
 /// Compositing of a row of tiles; returns the number of splat-pixel products evaluated.
-pub struct BlendRow<'a, 'b, R, P> {
+pub(crate) struct BlendRow<'a, 'b, R, P> {
     /// What is drawn.
-    pub row: TileRow<'a, R, P>,
+    pub(crate) row: TileRow<'a, R, P>,
     /// Where to write.
-    pub out: &'a mut RowOut<'b, R>,
+    pub(crate) out: &'a mut RowOut<'b, R>,
 }
 
 impl<R: Real, P: Primitive<R>> RowPass<R> for BlendRow<'_, '_, R, P> {

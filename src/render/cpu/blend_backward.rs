@@ -11,28 +11,28 @@ use crate::math::lanes::{LANES, Lanes};
 use crate::render::ALPHA_MAX;
 
 /// What the backward pass reads of one row of tiles, `width * rows` values each.
-pub struct RowIn<'a, R> {
+pub(crate) struct RowIn<'a, R> {
     /// `dL/dplane` for each channel; missing or empty = zero.
-    pub planes: Vec<&'a [R]>,
+    pub(crate) planes: Vec<&'a [R]>,
     /// The primitive's state; none = nothing but channels has a gradient.
-    pub state: Vec<&'a [R]>,
+    pub(crate) state: Vec<&'a [R]>,
     /// `dL/dtransmittance`: background times color gradient, minus the gradient of alpha.
-    pub transmittance_gradient: &'a [R],
+    pub(crate) transmittance_gradient: &'a [R],
     /// Transmittance left by the forward pass.
-    pub transmittance: &'a [R],
+    pub(crate) transmittance: &'a [R],
     /// As the forward pass left it.
-    pub last: &'a [R],
+    pub(crate) last: &'a [R],
 }
 
 /// Backward pass of a row of tiles: fills `records` with the primitive's sums and those of `C` channels per
 /// entry of the tile row, in the order of the lists.
-pub struct BlendRowBackward<'a, 'b, R, P> {
+pub(crate) struct BlendRowBackward<'a, 'b, R, P> {
     /// What is drawn.
-    pub row: TileRow<'a, R, P>,
+    pub(crate) row: TileRow<'a, R, P>,
     /// What to read.
-    pub input: &'a RowIn<'b, R>,
+    pub(crate) input: &'a RowIn<'b, R>,
     /// Where to write.
-    pub records: &'a mut [R],
+    pub(crate) records: &'a mut [R],
 }
 
 impl<R: Real, P: Primitive<R>> RowPass<R> for BlendRowBackward<'_, '_, R, P> {

@@ -7,7 +7,7 @@ use crate::math::lanes::{LANES, Lane, Lanes};
 use crate::render::TILE_PX;
 
 /// Takes the weights of one row of tiles.
-pub trait ContributionSink<R>: Send {
+pub(crate) trait ContributionSink<R>: Send {
     /// `gaussian` contributes `weights` to the pixels of row `y` from column `x` on; zeros where it
     /// does not, also beyond the picture's right edge. Calls come tile after tile, front to back
     /// in each, all of a Gaussian in a tile together.
@@ -15,11 +15,11 @@ pub trait ContributionSink<R>: Send {
 }
 
 /// Hands the weights of a row of tiles on.
-pub struct ContributionRow<'a, R, P, S> {
+pub(crate) struct ContributionRow<'a, R, P, S> {
     /// What is drawn.
-    pub row: TileRow<'a, R, P>,
+    pub(crate) row: TileRow<'a, R, P>,
     /// Who takes them.
-    pub sink: &'a mut S,
+    pub(crate) sink: &'a mut S,
 }
 
 impl<R: Real, P: Primitive<R>, S: ContributionSink<R>> RowPass<R> for ContributionRow<'_, R, P, S> {

@@ -6,20 +6,20 @@
 //! [`walk::Primitive`]: [`splat`] or [`surfel`]. Results do not depend on the number of threads.
 
 pub mod adam;
-pub mod bin;
-pub mod blend;
-pub mod blend_backward;
-pub mod contributions;
+pub(crate) mod bin;
+pub(crate) mod blend;
+pub(crate) mod blend_backward;
+pub(crate) mod contributions;
 pub mod normals;
 pub mod project;
-pub mod project_backward;
-pub mod rasterizer;
-pub mod sort;
-pub mod splat;
+pub(crate) mod project_backward;
+pub(crate) mod rasterizer;
+pub(crate) mod sort;
+pub(crate) mod splat;
 pub mod ssim;
-pub mod surfel;
-pub mod validate;
-pub mod walk;
+pub(crate) mod surfel;
+pub(crate) mod validate;
+pub(crate) mod walk;
 
 use self::contributions::ContributionSink;
 use self::project_backward::GaussianGradient;
@@ -39,13 +39,13 @@ pub struct RenderStats {
     /// Gaussians left out because their shape is degenerate.
     pub degenerate: usize,
     /// Tile list entries.
-    pub entries: usize,
+    pub(crate) entries: usize,
     /// Splat-pixel products evaluated by the forward pass.
-    pub products: u64,
+    pub(crate) products: u64,
     /// Seconds per stage: project, sort, bin, blend.
-    pub stage_secs: [f64; 4],
+    pub(crate) stage_secs: [f64; 4],
     /// Seconds of the backward pass over the tiles.
-    pub backward_secs: f64,
+    pub(crate) backward_secs: f64,
 }
 
 /// A renderer with its buffers, to be kept from frame to frame.
@@ -82,7 +82,7 @@ impl<R: Real> Renderer<R> {
     }
 
     /// Bytes of working memory that it keeps for the next frame.
-    pub fn working_bytes(&self) -> usize {
+    pub(crate) fn working_bytes(&self) -> usize {
         self.splats.working_bytes() + self.surfels.as_ref().map_or(0, |s| s.working_bytes())
     }
 
@@ -128,7 +128,7 @@ impl<R: Real> Renderer<R> {
     ///
     /// # Errors
     /// If the camera is not usable.
-    pub fn contributions<S: ContributionSink<R>>(
+    pub(crate) fn contributions<S: ContributionSink<R>>(
         &mut self,
         cloud: &GaussianCloud<R>,
         camera: &Camera,
@@ -144,7 +144,7 @@ impl<R: Real> Renderer<R> {
 
     /// Backward pass over the tiles of the last frame. Afterwards [`Self::gaussian_gradient`]
     /// answers for each Gaussian. Does nothing before the first frame.
-    pub fn backward_tiles(&mut self, gradient: &FrameGradient<R>) {
+    pub(crate) fn backward_tiles(&mut self, gradient: &FrameGradient<R>) {
         match &mut self.surfels {
             Some(surfels) => surfels.backward_tiles(gradient),
             None => self.splats.backward_tiles(gradient),
@@ -155,20 +155,20 @@ impl<R: Real> Renderer<R> {
     ///
     /// # Errors
     /// Names the first that is none.
-    pub fn check_backward(&self) -> Result<(), NotFinite> {
+    pub(crate) fn check_backward(&self) -> Result<(), NotFinite> {
         all_finite("blending backward", "record", last!(self, r => &r.records))
     }
 
     /// Gradient of Gaussian `i`, whose parameters are still those that were drawn, after
     /// [`Self::backward_tiles`]; `None` if it was not drawn.
     #[inline(always)]
-    pub fn gaussian_gradient(&self, gaussian: &Gaussian<'_, R>, i: usize) -> Option<GaussianGradient<R>> {
+    pub(crate) fn gaussian_gradient(&self, gaussian: &Gaussian<'_, R>, i: usize) -> Option<GaussianGradient<R>> {
         last!(self, r => r.gaussian_gradient(gaussian, i))
     }
 
     /// Gradient with respect to the extra channels of Gaussian `i`, after [`Self::backward_tiles`].
     /// Leaves `out`, one value per channel, alone if the Gaussian was not drawn, and says whether it was.
-    pub fn feature_gradient(&self, i: usize, out: &mut [R]) -> bool {
+    pub(crate) fn feature_gradient(&self, i: usize, out: &mut [R]) -> bool {
         last!(self, r => r.feature_gradient(i, out))
     }
 

@@ -124,7 +124,7 @@ fn differences<R: Real>(depth: &[R], rays: &Rays<R>, width: usize, x: usize, y: 
 
 /// Unit normals of the surface that `depth` describes, towards the camera in world axes, row by
 /// row; 0 at the picture's border and where a neighbor has no depth.
-pub fn of_depth<R: Real>(depth: &[R], camera: &Camera) -> Vec<[R; 3]> {
+pub(crate) fn of_depth<R: Real>(depth: &[R], camera: &Camera) -> Vec<[R; 3]> {
     let (width, rays) = (camera.width_px as usize, Rays::new(camera));
     let normal = |i: usize| {
         let [a, b] = differences(depth, &rays, width, i % width, i / width)?;

@@ -5,25 +5,25 @@ use crate::render::{BLUR_PX2, COLOR_MAX, Features, RenderSettings, TANGENT_CLAMP
 use crate::scene::{Camera, Gaussian, GaussianCloud};
 
 /// Gaussians that one task projects.
-pub const CHUNK: usize = 2_048;
+pub(crate) const CHUNK: usize = 2_048;
 
 /// A camera in the renderer's precision, relative to a cloud's origin.
 #[derive(Clone, Debug)]
 pub struct View<R> {
     /// Rows of camera_from_world.
-    pub rows: [[R; 3]; 3],
+    pub(crate) rows: [[R; 3]; 3],
     /// Cloud origin minus camera center in world axes; kept in f64 so that far-off scenes stay exact.
-    pub offset: [f64; 3],
+    pub(crate) offset: [f64; 3],
     /// Focal lengths, px.
     pub focal: [R; 2],
     /// Principal point, px.
     pub principal: [R; 2],
     /// Largest tangent of the viewing angle at which the projection is linearized, per axis.
-    pub clamp: [R; 2],
+    pub(crate) clamp: [R; 2],
     /// Near plane.
-    pub near: R,
+    pub(crate) near: R,
     /// Picture size in px.
-    pub size: [usize; 2],
+    pub(crate) size: [usize; 2],
 }
 
 impl<R: Real> View<R> {
@@ -48,13 +48,13 @@ impl<R: Real> View<R> {
 
     /// A position relative to the camera center, in world axes.
     #[inline(always)]
-    pub fn relative(&self, p: [R; 3]) -> [R; 3] {
+    pub(crate) fn relative(&self, p: [R; 3]) -> [R; 3] {
         [R::of(p[0].f64() + self.offset[0]), R::of(p[1].f64() + self.offset[1]), R::of(p[2].f64() + self.offset[2])]
     }
 
     /// Whether a box around `mean` has a pixel center of the picture in it.
     #[inline(always)]
-    pub fn meets(&self, mean: [R; 2], half: [R; 2]) -> bool {
+    pub(crate) fn meets(&self, mean: [R; 2], half: [R; 2]) -> bool {
         let last = self.size.map(|s| R::of(s as f64) - R::HALF);
         let inside = |axis: usize| mean[axis] + half[axis] >= R::HALF && mean[axis] - half[axis] <= last[axis];
         inside(0) && inside(1)
@@ -63,21 +63,21 @@ impl<R: Real> View<R> {
 
 /// A Gaussian as it appears in the picture.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Splat<R> {
+pub(crate) struct Splat<R> {
     /// Center, px.
-    pub mean: [R; 2],
+    pub(crate) mean: [R; 2],
     /// Inverse covariance `[xx, xy, yy]`, 1/px².
-    pub conic: [R; 3],
+    pub(crate) conic: [R; 3],
     /// Opacity after the sigmoid and the anti-aliasing compensation.
-    pub opacity: R,
+    pub(crate) opacity: R,
     /// Squared Mahalanobis distance up to which alpha is at least the smallest that counts.
-    pub reach: R,
+    pub(crate) reach: R,
     /// Half width and half height of the ellipse at `reach`, px.
-    pub half: [R; 2],
+    pub(crate) half: [R; 2],
     /// Camera-space depth.
-    pub depth: R,
+    pub(crate) depth: R,
     /// Index in the cloud.
-    pub gaussian: u32,
+    pub(crate) gaussian: u32,
 }
 
 /// Everything between a Gaussian's raw parameters and its splat that the backward pass needs too.
@@ -87,17 +87,17 @@ pub struct Geometry<R> {
     /// Center in camera axes.
     pub local: [R; 3],
     /// Tangents `x/z`, `y/z` after clamping, and whether they were clamped.
-    pub tangent: [R; 2],
+    pub(crate) tangent: [R; 2],
     /// Whether each tangent was clamped.
-    pub clamped: [bool; 2],
+    pub(crate) clamped: [bool; 2],
     /// Rows of the linearized projection in world axes, `J W`.
-    pub jacobian: [[R; 3]; 2],
+    pub(crate) jacobian: [[R; 3]; 2],
     /// Rotation world_from_local.
-    pub rotation: [[R; 3]; 3],
+    pub(crate) rotation: [[R; 3]; 3],
     /// Standard deviations.
-    pub scale: [R; 3],
+    pub(crate) scale: [R; 3],
     /// Rows of `J W R S`.
-    pub factor: [[R; 3]; 2],
+    pub(crate) factor: [[R; 3]; 2],
     /// Blurred covariance `[xx, xy, yy]`, px².
     pub covariance: [R; 3],
     /// Determinant of the unblurred and of the blurred covariance.
@@ -106,7 +106,7 @@ pub struct Geometry<R> {
 
 /// The inner product.
 #[inline(always)]
-pub fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
+pub(crate) fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
@@ -197,7 +197,7 @@ pub fn raw_color<R: Real>(coefficients: &[[R; 3]], basis: &[R; 16], degree: u8) 
 /// The color as it is composited, between black and `COLOR_MAX`. Coefficients whose sum is no number
 /// give black.
 #[inline(always)]
-pub fn color<R: Real>(coefficients: &[[R; 3]], basis: &[R; 16], degree: u8) -> [R; 3] {
+pub(crate) fn color<R: Real>(coefficients: &[[R; 3]], basis: &[R; 16], degree: u8) -> [R; 3] {
     raw_color(coefficients, basis, degree).map(|c| c.max(R::ZERO).min(R::of(COLOR_MAX)))
 }
 
@@ -209,28 +209,28 @@ pub fn compensation<R: Real>(g: &Geometry<R>) -> R {
 
 /// The splats of some consecutive Gaussians with their composited values, in the cloud's order.
 #[derive(Debug, Default)]
-pub struct Chunk<R> {
+pub(crate) struct Chunk<R> {
     /// The Gaussians that reach at least one pixel center.
-    pub splats: Vec<Splat<R>>,
+    pub(crate) splats: Vec<Splat<R>>,
     /// `[splats * channels]`: color, extra channels, depth if asked for, padding zeros.
-    pub values: Vec<R>,
+    pub(crate) values: Vec<R>,
     /// Gaussians left out because their covariance or rotation is degenerate.
-    pub degenerate: usize,
+    pub(crate) degenerate: usize,
 }
 
 /// What is to be drawn, and how.
 #[derive(Clone, Copy)]
-pub struct Scene<'a, R> {
+pub(crate) struct Scene<'a, R> {
     /// The Gaussians.
-    pub cloud: &'a GaussianCloud<R>,
+    pub(crate) cloud: &'a GaussianCloud<R>,
     /// Their extra channels.
-    pub features: Features<'a, R>,
+    pub(crate) features: Features<'a, R>,
     /// How.
-    pub settings: &'a RenderSettings,
+    pub(crate) settings: &'a RenderSettings,
 }
 
 /// What becomes of a Gaussian in front of the near plane.
-pub enum Projected<R, S, D> {
+pub(crate) enum Projected<R, S, D> {
     /// It reaches a pixel center: its splat, its shape, and what depth composites.
     Splat(Splat<R>, S, D),
     /// It reaches none.
@@ -241,7 +241,7 @@ pub enum Projected<R, S, D> {
 
 /// A Gaussian as a splat of at least this alpha.
 #[inline(always)]
-pub fn splat<R: Real>(
+pub(crate) fn splat<R: Real>(
     gaussian: &Gaussian<'_, R>,
     mut opacity: R,
     alpha_min: R,

@@ -7,34 +7,34 @@ use crate::scene::Gaussian;
 
 /// Sums in front of the channels in a tile entry's record: `dL/dpower` (power = -q/2) times
 /// `1, dx, dy, dx², dx dy, dy²`.
-pub const MOMENTS: usize = 6;
+pub(crate) const MOMENTS: usize = 6;
 
 /// Gradient with respect to the raw parameters of one Gaussian.
 #[derive(Clone, Copy, Debug)]
-pub struct GaussianGradient<R> {
+pub(crate) struct GaussianGradient<R> {
     /// With respect to its position.
-    pub position: [R; 3],
+    pub(crate) position: [R; 3],
     /// With respect to its log-scales.
-    pub log_scale: [R; 3],
+    pub(crate) log_scale: [R; 3],
     /// With respect to its raw quaternion.
-    pub quaternion: [R; 4],
+    pub(crate) quaternion: [R; 4],
     /// With respect to its opacity logit.
-    pub opacity_logit: R,
+    pub(crate) opacity_logit: R,
     /// With respect to its color before the clamp; the gradient of SH coefficient `k` is
     /// `basis[k]` times this.
-    pub color: [R; 3],
+    pub(crate) color: [R; 3],
     /// SH basis in the viewing direction.
-    pub basis: [R; 16],
+    pub(crate) basis: [R; 16],
     /// Length of the gradient with respect to the projected center, per half picture side.
-    pub screen: R,
+    pub(crate) screen: R,
     /// Three standard deviations along the splat's longer axis, px.
-    pub radius_px: R,
+    pub(crate) radius_px: R,
 }
 
 /// Backward of the projection. `record` is the sum of the splat's tile records: moments, color,
 /// features, depth. `depth_channel` is the channel that carries depth, if any does.
 #[inline(always)]
-pub fn project_backward<R: Real>(
+pub(crate) fn project_backward<R: Real>(
     gaussian: &Gaussian<'_, R>,
     splat: &Splat<R>,
     view: &View<R>,
@@ -116,11 +116,11 @@ pub(super) fn radius<R: Real>([xx, xy, yy]: [R; 3]) -> R {
 /// What the gradient of a Gaussian's color comes to.
 pub(super) struct ColorGradient<R> {
     /// With respect to the color before the clamp.
-    pub color: [R; 3],
+    pub(crate) color: [R; 3],
     /// SH basis in the viewing direction.
-    pub basis: [R; 16],
+    pub(crate) basis: [R; 16],
     /// With respect to the position, through the viewing direction.
-    pub position: [R; 3],
+    pub(crate) position: [R; 3],
 }
 
 /// Backward of the color: `color` is the gradient with respect to the clamped one, `relative` the
@@ -225,7 +225,7 @@ fn direction_gradient<R: Real>(coefficients: &[[R; 3]], degree: u8, toward: [R; 
 
 /// Chain rule through `R(q / |q|)`.
 #[inline(always)]
-pub fn quaternion_gradient<R: Real>(q: [R; 4], g: &[[R; 3]; 3]) -> Option<[R; 4]> {
+pub(crate) fn quaternion_gradient<R: Real>(q: [R; 4], g: &[[R; 3]; 3]) -> Option<[R; 4]> {
     let [w, x, y, z] = unit_quaternion(q)?;
     let two = R::of(2.0);
     let d = [

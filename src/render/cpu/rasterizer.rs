@@ -25,16 +25,16 @@ const MOST: usize = MAX_CHANNELS + 16;
 
 /// A rasterizer with its buffers, to be kept from frame to frame.
 #[derive(Debug)]
-pub struct Rasterizer<R, P> {
+pub(crate) struct Rasterizer<R, P> {
     lists: Lists<R>,
     pixels: Pixels<R>,
     /// For each Gaussian its splat, or `NONE`; filled by the backward pass.
     splat_of: Vec<u32>,
     /// Sums of the backward pass, for each tile entry.
-    pub records: Vec<R>,
+    pub(crate) records: Vec<R>,
     frame: Option<FrameInfo<R, P>>,
     /// What the last frame cost.
-    pub stats: RenderStats,
+    pub(crate) stats: RenderStats,
 }
 
 /// The splats of a frame, front to back and by tile.
@@ -103,7 +103,7 @@ fn lap(clock: &mut Instant) -> f64 {
 
 impl<R: Real, P: Primitive<R>> Rasterizer<R, P> {
     /// Bytes of working memory that it keeps for the next frame.
-    pub fn working_bytes(&self) -> usize {
+    pub(crate) fn working_bytes(&self) -> usize {
         fn of<T>(v: &Vec<T>) -> usize {
             v.capacity() * size_of::<T>()
         }
@@ -116,7 +116,7 @@ impl<R: Real, P: Primitive<R>> Rasterizer<R, P> {
     }
 
     /// The splats of the last frame, front to back.
-    pub fn splats(&self) -> &[Splat<R>] {
+    pub(crate) fn splats(&self) -> &[Splat<R>] {
         &self.lists.ordered.splats
     }
 
@@ -151,7 +151,7 @@ impl<R: Real, P: Primitive<R>> Rasterizer<R, P> {
     }
 
     /// Draws `cloud` as `camera` sees it. Camera and lengths have been checked.
-    pub fn render(
+    pub(crate) fn render(
         &mut self,
         cloud: &GaussianCloud<R>,
         features: Features<'_, R>,
@@ -203,7 +203,7 @@ impl<R: Real, P: Primitive<R>> Rasterizer<R, P> {
     }
 
     /// Hands the weight of every Gaussian at every pixel of a view to `sinks`, one for each row of tiles.
-    pub fn contributions<S: ContributionSink<R>>(
+    pub(crate) fn contributions<S: ContributionSink<R>>(
         &mut self,
         cloud: &GaussianCloud<R>,
         camera: &Camera,
@@ -219,7 +219,7 @@ impl<R: Real, P: Primitive<R>> Rasterizer<R, P> {
     }
 
     /// Backward pass over the tiles of the last frame; does nothing before the first.
-    pub fn backward_tiles(&mut self, gradient: &FrameGradient<R>) {
+    pub(crate) fn backward_tiles(&mut self, gradient: &FrameGradient<R>) {
         let Some(info) = &self.frame else { return };
         let (clock, lists) = (Instant::now(), &self.lists);
         self.splat_of.clear();
@@ -280,7 +280,7 @@ impl<R: Real, P: Primitive<R>> Rasterizer<R, P> {
     /// Gradient of Gaussian `i`, whose parameters are still those that were drawn, after
     /// [`Self::backward_tiles`]; `None` if it was not drawn.
     #[inline(always)]
-    pub fn gaussian_gradient(&self, gaussian: &Gaussian<'_, R>, i: usize) -> Option<GaussianGradient<R>> {
+    pub(crate) fn gaussian_gradient(&self, gaussian: &Gaussian<'_, R>, i: usize) -> Option<GaussianGradient<R>> {
         let info = self.frame.as_ref()?;
         let (s, record) = self.record(i, info.stride())?;
         P::project_backward(gaussian, &self.lists.ordered.splats[s], &info.view, &info.settings, &record, info.extra)
@@ -288,7 +288,7 @@ impl<R: Real, P: Primitive<R>> Rasterizer<R, P> {
 
     /// Gradient with respect to the extra channels of Gaussian `i`, after [`Self::backward_tiles`].
     /// Leaves `out`, one value per channel, alone if the Gaussian was not drawn, and says whether it was.
-    pub fn feature_gradient(&self, i: usize, out: &mut [R]) -> bool {
+    pub(crate) fn feature_gradient(&self, i: usize, out: &mut [R]) -> bool {
         let Some(info) = &self.frame else { return false };
         let Some((_, record)) = self.record(i, info.stride()) else { return false };
         let first = info.stride() - info.channels + 3;
@@ -345,7 +345,7 @@ fn finish<R: Real>(frame: &mut Frame<R>, transmittance: &[R], background: [f32; 
 
 /// Projects the whole cloud, in parts of [`CHUNK`] Gaussians: `P::SHAPE + channels` values per splat, the channels
 /// being color, extra channels, what depth needs, padding zeros.
-pub fn project<R: Real, P: Primitive<R>>(
+pub(crate) fn project<R: Real, P: Primitive<R>>(
     parts: &mut Vec<Chunk<R>>,
     scene: Scene<'_, R>,
     view: &View<R>,

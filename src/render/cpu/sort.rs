@@ -7,18 +7,18 @@ use crate::math::Real;
 
 /// The splats of one frame, front to back.
 #[derive(Debug, Default)]
-pub struct Ordered<R> {
+pub(crate) struct Ordered<R> {
     /// By ascending depth; equal depths in the cloud's order.
-    pub splats: Vec<Splat<R>>,
+    pub(crate) splats: Vec<Splat<R>>,
     /// Their values, as in [`Chunk::values`].
-    pub values: Vec<R>,
+    pub(crate) values: Vec<R>,
     keys: Vec<u64>,
 }
 
 /// Brings the splats of all parts into order. Everything after this reads them nearly from front
 /// to back, instead of jumping through the cloud. With `keep`, the order is that of the frame before;
 /// splats that were not in it come last.
-pub fn sort<R: Real>(out: &mut Ordered<R>, parts: &[Chunk<R>], channels: usize, keep: bool) {
+pub(crate) fn sort<R: Real>(out: &mut Ordered<R>, parts: &[Chunk<R>], channels: usize, keep: bool) {
     if keep {
         keep_order(out, parts);
     } else {

@@ -10,13 +10,13 @@ use crate::scene::Gaussian;
 
 /// Gaussians as splats.
 #[derive(Clone, Copy, Debug)]
-pub struct Splats<R> {
+pub(crate) struct Splats<R> {
     /// Smallest alpha that counts.
     alpha_min: R,
 }
 
 /// A splat's constants in vector registers.
-pub struct Constants<R: Real, L: Lanes<R>> {
+pub(crate) struct Constants<R: Real, L: Lanes<R>> {
     a: L::V,
     depth: L::V,
     opacity: L::V,
@@ -28,7 +28,7 @@ pub struct Constants<R: Real, L: Lanes<R>> {
 
 /// What a splat gives eight pixels.
 #[derive(Clone, Copy)]
-pub struct Hit<V> {
+pub(crate) struct Hit<V> {
     offset: [V; 2],
     depth: V,
     alpha: V,

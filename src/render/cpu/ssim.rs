@@ -30,11 +30,11 @@ pub struct PhotoLoss<R> {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LossParts {
     /// Mean absolute difference.
-    pub l1: f64,
+    pub(crate) l1: f64,
     /// SSIM.
-    pub ssim: f64,
+    pub(crate) ssim: f64,
     /// Mean squared difference.
-    pub mse: f64,
+    pub(crate) mse: f64,
 }
 
 impl LossParts {
@@ -125,7 +125,7 @@ impl<R: Real> PhotoLoss<R> {
 }
 
 /// Mean SSIM of two pictures given as channel planes of `width` values a row.
-pub fn ssim<R: Real>(a: &[Vec<R>], b: &[Vec<R>], width: usize) -> f64 {
+pub(crate) fn ssim<R: Real>(a: &[Vec<R>], b: &[Vec<R>], width: usize) -> f64 {
     let mut loss = PhotoLoss::default();
     let sum: f64 = a.iter().zip(b).map(|(x, y)| loss.channel(x, y, width, 0.0, 1, &mut []).ssim).sum();
     sum / a.len() as f64

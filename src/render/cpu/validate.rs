@@ -23,12 +23,12 @@ fn splats<R: Real>(stage: &'static str, splats: &[Splat<R>], values: &[R]) -> Re
 }
 
 /// After the projection. Like all of this module, it names the first number that is none.
-pub fn projected<R: Real>(parts: &[Chunk<R>]) -> Result<(), NotFinite> {
+pub(crate) fn projected<R: Real>(parts: &[Chunk<R>]) -> Result<(), NotFinite> {
     parts.iter().try_for_each(|p| splats("projection", &p.splats, &p.values))
 }
 
 /// After sorting: as before, and depths do not fall where they were sorted `by_depth`.
-pub fn ordered<R: Real>(ordered: &Ordered<R>, by_depth: bool) -> Result<(), NotFinite> {
+pub(crate) fn ordered<R: Real>(ordered: &Ordered<R>, by_depth: bool) -> Result<(), NotFinite> {
     splats("sorting", &ordered.splats, &ordered.values)?;
     if !by_depth {
         return Ok(());
@@ -38,7 +38,7 @@ pub fn ordered<R: Real>(ordered: &Ordered<R>, by_depth: bool) -> Result<(), NotF
 }
 
 /// After binning: every entry names a splat, and lists follow on each other.
-pub fn binned(tiles: &Tiles, splats: usize) -> Result<(), NotFinite> {
+pub(crate) fn binned(tiles: &Tiles, splats: usize) -> Result<(), NotFinite> {
     let broken = |field, index| Err(NotFinite { stage: "binning", field, index });
     if let Some(i) = tiles.entries.iter().position(|e| e.load(Relaxed) as usize >= splats) {
         return broken("the splat of entry", i);
@@ -48,7 +48,7 @@ pub fn binned(tiles: &Tiles, splats: usize) -> Result<(), NotFinite> {
 }
 
 /// After blending.
-pub fn drawn<R: Real>(frame: &Frame<R>) -> Result<(), NotFinite> {
+pub(crate) fn drawn<R: Real>(frame: &Frame<R>) -> Result<(), NotFinite> {
     let plane = |field, plane: &[R]| all_finite("blending", field, plane);
     frame.color.iter().try_for_each(|p| plane("the color of pixel", p))?;
     frame.features.iter().try_for_each(|p| plane("a feature of pixel", p))?;
@@ -60,7 +60,7 @@ pub fn drawn<R: Real>(frame: &Frame<R>) -> Result<(), NotFinite> {
 }
 
 /// After a stage that changes a cloud or something laid out like one.
-pub fn cloud<R: Real>(stage: &'static str, cloud: &GaussianCloud<R>) -> Result<(), NotFinite> {
+pub(crate) fn cloud<R: Real>(stage: &'static str, cloud: &GaussianCloud<R>) -> Result<(), NotFinite> {
     cloud.validate().map_err(|e| match e {
         CloudError::NotFinite { index, field } => NotFinite { stage, field, index },
         CloudError::Length(field, index, _) => NotFinite { stage, field, index },

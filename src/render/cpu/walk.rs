@@ -14,14 +14,14 @@ use crate::render::{Frame, FrameGradient, RenderSettings, TILE_PX};
 use crate::scene::Gaussian;
 
 /// Lane groups per tile row.
-pub const GROUPS: usize = TILE_PX / LANES;
+pub(crate) const GROUPS: usize = TILE_PX / LANES;
 /// Lane groups per tile.
-pub const SLOTS: usize = TILE_PX * GROUPS;
+pub(crate) const SLOTS: usize = TILE_PX * GROUPS;
 /// Splats between two looks at which pixels are still open.
 const CLOSED_CHECK: usize = 16;
 
 /// A few values of one kind.
-pub trait Values<V: Copy>: Copy + AsRef<[V]> + AsMut<[V]> {
+pub(crate) trait Values<V: Copy>: Copy + AsRef<[V]> + AsMut<[V]> {
     /// The same value everywhere.
     fn all(v: V) -> Self;
 }
@@ -34,11 +34,11 @@ impl<V: Copy, const N: usize> Values<V> for [V; N] {
 }
 
 /// Channel planes, and those that only this kind of primitive has.
-pub type Planes<T> = [Vec<T>; 2];
+pub(crate) type Planes<T> = [Vec<T>; 2];
 
 /// What is drawn: Gaussians as splats, or surfels. All that the passes over tiles and the bookkeeping around
 /// them do not share.
-pub trait Primitive<R: Real>: Copy + Send + Sync {
+pub(crate) trait Primitive<R: Real>: Copy + Send + Sync {
     /// Numbers per splat in front of its channels.
     const SHAPE: usize;
     /// Those numbers.
@@ -130,7 +130,7 @@ pub trait Primitive<R: Real>: Copy + Send + Sync {
 }
 
 /// A pass over a row of tiles, compiled for any number of channels and any vectors.
-pub trait RowPass<R: Real>: Sized {
+pub(crate) trait RowPass<R: Real>: Sized {
     /// What it returns.
     type Output;
     /// Does it.
@@ -138,7 +138,7 @@ pub trait RowPass<R: Real>: Sized {
 }
 
 /// A pass with its number of channels.
-pub struct With<T, const C: usize>(pub T);
+pub(crate) struct With<T, const C: usize>(pub(crate) T);
 
 impl<R: Real, T: RowPass<R>, const C: usize> LaneOp<R> for With<T, C> {
     type Output = T::Output;
@@ -160,11 +160,11 @@ macro_rules! with_channels {
 pub(super) use with_channels;
 
 /// The lane groups of one tile that a splat can touch, and the row constants of its quadratic form.
-pub struct Reach<R> {
+pub(crate) struct Reach<R> {
     /// One bit per slot.
-    pub slots: u32,
+    pub(crate) slots: u32,
     /// Vertical offsets of the rows of pixel centers from the splat's center.
-    pub dy: [R; TILE_PX],
+    pub(crate) dy: [R; TILE_PX],
     /// `2 b dy` per row.
     linear: [R; TILE_PX],
     /// `c dy²` per row.
@@ -175,7 +175,7 @@ pub struct Reach<R> {
 
 /// Slots of the rows `0..height`.
 #[inline(always)]
-pub fn slots_of_rows(height: usize) -> u32 {
+pub(crate) fn slots_of_rows(height: usize) -> u32 {
     let rows = (1_u32 << height) - 1;
     rows | rows << TILE_PX
 }
@@ -183,7 +183,7 @@ pub fn slots_of_rows(height: usize) -> u32 {
 impl<R: Real> Reach<R> {
     /// The reach of `s` over the tile whose first pixel is `corner`. `ramp` is 0, 1, ... 7.
     #[inline(always)]
-    pub fn new<L: Lanes<R>>(l: L, s: &Splat<R>, corner: [usize; 2], ramp: L::V) -> Self {
+    pub(crate) fn new<L: Lanes<R>>(l: L, s: &Splat<R>, corner: [usize; 2], ramp: L::V) -> Self {
         let [a, b, c] = s.conic;
         let left = R::of(corner[0] as f64 + 0.5) - s.mean[0];
         let top = R::of(corner[1] as f64 + 0.5) - s.mean[1];
@@ -218,56 +218,56 @@ impl<R: Real> Reach<R> {
 
     /// Horizontal offsets of each group's pixel centers from the splat's center.
     #[inline(always)]
-    pub fn dx<L: Lanes<R>>(&self, l: L, ramp: L::V) -> [L::V; GROUPS] {
+    pub(crate) fn dx<L: Lanes<R>>(&self, l: L, ramp: L::V) -> [L::V; GROUPS] {
         std::array::from_fn(|g| l.add(ramp, l.splat(self.left + R::of((g * LANES) as f64))))
     }
 
     /// The part of the quadratic form that is constant along a row: `2 b dy`, `c dy²`.
     #[inline(always)]
-    pub fn row<L: Lanes<R>>(&self, l: L, row: usize) -> [L::V; 2] {
+    pub(crate) fn row<L: Lanes<R>>(&self, l: L, row: usize) -> [L::V; 2] {
         [l.splat(self.linear[row]), l.splat(self.constant[row])]
     }
 }
 
 /// 0, 1, ... 7.
 #[inline(always)]
-pub fn ramp<R: Real, L: Lanes<R>>(l: L) -> L::V {
+pub(crate) fn ramp<R: Real, L: Lanes<R>>(l: L) -> L::V {
     let lane: Lane<R> = std::array::from_fn(|i| R::of(i as f64));
     l.load(&lane)
 }
 
 /// A row of tiles of a frame.
-pub struct TileRow<'a, R, P> {
+pub(crate) struct TileRow<'a, R, P> {
     /// What is drawn.
-    pub primitive: P,
+    pub(crate) primitive: P,
     /// The frame's splats.
-    pub splats: &'a [Splat<R>],
+    pub(crate) splats: &'a [Splat<R>],
     /// Shape and channels of each.
-    pub values: &'a [R],
+    pub(crate) values: &'a [R],
     /// Their tile lists.
-    pub tiles: &'a Tiles,
+    pub(crate) tiles: &'a Tiles,
     /// Picture size in px.
-    pub size: [usize; 2],
+    pub(crate) size: [usize; 2],
     /// Which row of tiles.
-    pub ty: usize,
+    pub(crate) ty: usize,
     /// A pixel is closed before its transmittance falls under this.
-    pub least: R,
+    pub(crate) least: R,
 }
 
 /// A tile: its first pixel, its size in px, and its part of the entries.
-pub struct Tile {
+pub(crate) struct Tile {
     /// First pixel.
-    pub corner: [usize; 2],
+    pub(crate) corner: [usize; 2],
     /// Width and height; less than [`TILE_PX`] at the picture's edges.
-    pub size: [usize; 2],
+    pub(crate) size: [usize; 2],
     /// Its entries.
-    pub entries: std::ops::Range<usize>,
+    pub(crate) entries: std::ops::Range<usize>,
 }
 
 impl Tile {
     /// Its lane groups: slot, first place in the planes of a row of tiles, and number of pixels.
     #[inline(always)]
-    pub fn slots(&self, width_px: usize) -> impl Iterator<Item = (usize, usize, usize)> {
+    pub(crate) fn slots(&self, width_px: usize) -> impl Iterator<Item = (usize, usize, usize)> {
         let ([x, _], [width, height]) = (self.corner, self.size);
         (0..height).flat_map(move |row| {
             (0..width.div_ceil(LANES))
@@ -277,7 +277,7 @@ impl Tile {
 }
 
 /// Takes the weights of a tile, front to back.
-pub trait Sink<R: Real, P: Primitive<R>, L: Lanes<R>> {
+pub(crate) trait Sink<R: Real, P: Primitive<R>, L: Lanes<R>> {
     /// What is needed of one splat.
     type Own;
     /// The splat `id`, at this place of the tile's list, counted from 1.
@@ -289,7 +289,7 @@ pub trait Sink<R: Real, P: Primitive<R>, L: Lanes<R>> {
 impl<R: Real, P: Primitive<R>> TileRow<'_, R, P> {
     /// Tile `tx`.
     #[inline(always)]
-    pub fn tile(&self, tx: usize) -> Tile {
+    pub(crate) fn tile(&self, tx: usize) -> Tile {
         let corner = [tx * TILE_PX, self.ty * TILE_PX];
         let index = self.ty * self.tiles.grid[0] + tx;
         Tile {
@@ -301,7 +301,7 @@ impl<R: Real, P: Primitive<R>> TileRow<'_, R, P> {
 
     /// The shape and the channels of splat `id`.
     #[inline(always)]
-    pub fn values_of<const C: usize>(&self, id: usize) -> (&[R], &[R]) {
+    pub(crate) fn values_of<const C: usize>(&self, id: usize) -> (&[R], &[R]) {
         let stride = P::SHAPE + C;
         self.values[id * stride..][..stride].split_at(P::SHAPE)
     }
@@ -309,7 +309,7 @@ impl<R: Real, P: Primitive<R>> TileRow<'_, R, P> {
     /// Walks over a tile front to back, until every pixel is closed. Returns the transmittance that is left and
     /// the number of lane groups evaluated.
     #[inline(always)]
-    pub fn front_to_back<L: Lanes<R>, S: Sink<R, P, L>, const C: usize>(
+    pub(crate) fn front_to_back<L: Lanes<R>, S: Sink<R, P, L>, const C: usize>(
         &self,
         l: L,
         tile: &Tile,

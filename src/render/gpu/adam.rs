@@ -26,27 +26,27 @@ fn records(rates: &Rates, active: u8) -> [[f32; 28]; 3] {
 
 /// The kernel with the constants of the three buffers.
 #[derive(Debug)]
-pub struct Adam {
+pub(crate) struct Adam {
     kernel: Kernel,
     steps: [wgpu::Buffer; 3],
     /// Gradients cut as outliers since it was last cleared.
-    pub outliers: wgpu::Buffer,
+    pub(crate) outliers: wgpu::Buffer,
 }
 
 /// What one step works on.
 #[derive(Clone, Copy, Debug)]
-pub struct AdamBuffers<'a> {
+pub(crate) struct AdamBuffers<'a> {
     /// Parameters to move.
-    pub parameters: &'a Parameters,
+    pub(crate) parameters: &'a Parameters,
     /// Their gradient, with the marks of `project_backward`.
-    pub gradient: &'a Parameters,
+    pub(crate) gradient: &'a Parameters,
     /// Both moments.
-    pub moments: &'a [Parameters; 2],
+    pub(crate) moments: &'a [Parameters; 2],
 }
 
 impl Adam {
     /// Compiles the kernel.
-    pub fn new(device: &Device) -> Result<Self, GpuError> {
+    pub(crate) fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
         let module = Module::new(device, "adam", Variant::default())?;
         let slots = [(0, Uniform), (1, Write), (2, Read), (3, Write), (4, Write), (5, Read), (6, Read), (7, Write)];
@@ -60,7 +60,7 @@ impl Adam {
 
     /// Sets the constants of step `t`, counted from 1, for `gaussians` Gaussians of which `stored`
     /// degrees are kept and `active` trained.
-    pub fn prepare(&self, device: &Device, gaussians: u32, [stored, active]: [u8; 2], rates: &Rates, t: u64) {
+    pub(crate) fn prepare(&self, device: &Device, gaussians: u32, [stored, active]: [u8; 2], rates: &Rates, t: u64) {
         let constants = Constants::new(t);
         for ((buffer, stride), rates) in self.steps.iter().zip(strides(stored)).zip(records(rates, active)) {
             let mut step = AdamStep {
@@ -82,7 +82,7 @@ impl Adam {
     }
 
     /// Records the step.
-    pub fn encode(
+    pub(crate) fn encode(
         &self,
         stage: &mut Stage<'_>,
         on: AdamBuffers<'_>,

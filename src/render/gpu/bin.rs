@@ -10,7 +10,7 @@ const RANGE_GROUPS: u32 = 256;
 
 /// The binning kernels.
 #[derive(Debug)]
-pub struct Bin {
+pub(crate) struct Bin {
     sum_counts: Kernel,
     scan_sums: Kernel,
     emit: Kernel,
@@ -19,7 +19,7 @@ pub struct Bin {
 
 impl Bin {
     /// Compiles the kernels.
-    pub fn new(device: &Device) -> Result<Self, GpuError> {
+    pub(crate) fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
         let module = Module::new(device, "bin", Variant::default())?;
         let kernel = |entry, slots: &[_]| Kernel::new(device, &module, entry, slots);
@@ -35,7 +35,7 @@ impl Bin {
     }
 
     /// Records the count of pairs, after which the counters say whether they fit.
-    pub fn encode_count(&self, stage: &mut Stage<'_>, bindings: FrameBindings<'_>, scratch: &PerGaussian) {
+    pub(crate) fn encode_count(&self, stage: &mut Stage<'_>, bindings: FrameBindings<'_>, scratch: &PerGaussian) {
         let order = &scratch.by_depth.values[scratch.by_depth.result()];
         let blocks = [bindings.gaussians.div_ceil(BIN_BLOCK), 1, 1];
         stage.run(&self.sum_counts, &[bindings.view, order, &scratch.tile_counts, &scratch.sums], blocks);
@@ -43,7 +43,7 @@ impl Bin {
     }
 
     /// Records the emission of pairs.
-    pub fn encode_emit(
+    pub(crate) fn encode_emit(
         &self,
         stage: &mut Stage<'_>,
         bindings: FrameBindings<'_>,
@@ -65,7 +65,7 @@ impl Bin {
     }
 
     /// Records the search for each tile's range, after the sort. `ranges` must be zero.
-    pub fn encode_ranges(
+    pub(crate) fn encode_ranges(
         &self,
         stage: &mut Stage<'_>,
         bindings: FrameBindings<'_>,

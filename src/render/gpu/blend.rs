@@ -9,7 +9,7 @@ use super::{Device, GpuError};
 
 /// A kernel over the tiles of a frame, one pipeline for each number of extra channels in a pass.
 #[derive(Debug)]
-pub struct TileKernel {
+pub(crate) struct TileKernel {
     shader: &'static str,
     float_atomics: bool,
     /// How the kernel's own buffers are used, which follow those that every tile kernel reads.
@@ -19,17 +19,17 @@ pub struct TileKernel {
 
 impl TileKernel {
     /// The blending kernel; no pipelines yet.
-    pub fn blend() -> Self {
+    pub(crate) fn blend() -> Self {
         Self::new("blend", false, [Access::Write; 4])
     }
 
     /// The kernel of a shader.
-    pub fn new(shader: &'static str, float_atomics: bool, own: [Access; 4]) -> Self {
+    pub(crate) fn new(shader: &'static str, float_atomics: bool, own: [Access; 4]) -> Self {
         Self { shader, float_atomics, own, kernels: BTreeMap::new() }
     }
 
     /// Compiles what passes of `channels` extra channels need, if that has not been done.
-    pub fn prepare(&mut self, device: &Device, channels: usize) -> Result<(), GpuError> {
+    pub(crate) fn prepare(&mut self, device: &Device, channels: usize) -> Result<(), GpuError> {
         use Access::{Read, Uniform};
         if self.kernels.contains_key(&channels) {
             return Ok(());
@@ -42,7 +42,7 @@ impl TileKernel {
     }
 
     /// Records the passes.
-    pub fn encode(
+    pub(crate) fn encode(
         &self,
         stage: &mut Stage<'_>,
         bindings: FrameBindings<'_>,

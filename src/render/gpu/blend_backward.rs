@@ -6,26 +6,26 @@ use super::scratch::{GRADIENT_BASE, PerPicture};
 use super::{Device, GpuError};
 
 /// The kernel; no pipelines yet. Sums use float atomics if `float_atomics`, which the device must have.
-pub fn blend_backward(float_atomics: bool) -> TileKernel {
+pub(crate) fn blend_backward(float_atomics: bool) -> TileKernel {
     use Access::{Read, Write};
     TileKernel::new("blend_backward", float_atomics, [Read, Read, Read, Write])
 }
 
 /// Gradients that go into the pass and come out of it.
 #[derive(Debug)]
-pub struct BlendGradients {
+pub(crate) struct BlendGradients {
     /// Of the picture's color and alpha, and, behind those, of its depth.
-    pub pixels: wgpu::Buffer,
+    pub(crate) pixels: wgpu::Buffer,
     /// Of its extra channels.
-    pub features: wgpu::Buffer,
+    pub(crate) features: wgpu::Buffer,
     /// Of the splats, `GRADIENT_BASE + channels` floats each.
-    pub splats: wgpu::Buffer,
+    pub(crate) splats: wgpu::Buffer,
 }
 
 impl BlendGradients {
     /// Room for `capacity` Gaussians and a picture of `pixels` pixels; `planes` is 2 if there can be a
     /// gradient with respect to depth, else 1.
-    pub fn new(
+    pub(crate) fn new(
         device: &Device,
         capacity: usize,
         pixels: usize,
@@ -39,7 +39,7 @@ impl BlendGradients {
         })
     }
     /// What the kernel reads and writes of a picture; `splats` must be zero.
-    pub fn buffers<'a>(&'a self, picture: &'a PerPicture) -> [&'a wgpu::Buffer; 4] {
+    pub(crate) fn buffers<'a>(&'a self, picture: &'a PerPicture) -> [&'a wgpu::Buffer; 4] {
         [&picture.ends, &self.pixels, &self.features, &self.splats]
     }
 }

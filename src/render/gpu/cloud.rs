@@ -6,12 +6,12 @@ use crate::scene::GaussianCloud;
 
 /// Floats of one Gaussian in the geometry buffer: position 3, log-scales 3, quaternion 4 (w first),
 /// opacity logit, pad.
-pub const GEOMETRY_STRIDE: usize = 12;
+pub(crate) const GEOMETRY_STRIDE: usize = 12;
 /// Coefficients per channel in the low buffer: degrees 0 to 2.
 const LOW: usize = 9;
 
 /// Floats per Gaussian in the three buffers, for a stored spherical-harmonics degree.
-pub fn strides(degree: u8) -> [usize; 3] {
+pub(crate) fn strides(degree: u8) -> [usize; 3] {
     let coefficients = sh::coefficients(degree);
     [GEOMETRY_STRIDE, coefficients.min(LOW) * 3, coefficients.saturating_sub(LOW) * 3]
 }
@@ -20,7 +20,7 @@ pub fn strides(degree: u8) -> [usize; 3] {
 #[derive(Debug)]
 pub struct Parameters {
     /// Geometry, coefficients of degrees 0 to 2, coefficients of degree 3.
-    pub buffers: [wgpu::Buffer; 3],
+    pub(crate) buffers: [wgpu::Buffer; 3],
 }
 
 impl Parameters {
@@ -33,7 +33,7 @@ impl Parameters {
     }
 
     /// Overwrites the first Gaussians.
-    pub fn write(&self, device: &Device, packed: &Packed) {
+    pub(crate) fn write(&self, device: &Device, packed: &Packed) {
         for (buffer, floats) in self.buffers.iter().zip(&packed.floats) {
             if !floats.is_empty() {
                 device.queue().write_buffer(buffer, 0, bytemuck::cast_slice(floats));
@@ -42,7 +42,7 @@ impl Parameters {
     }
 
     /// Reads the first `n` Gaussians back.
-    pub fn read(&self, device: &Device, n: usize, degree: u8) -> Result<Packed, GpuError> {
+    pub(crate) fn read(&self, device: &Device, n: usize, degree: u8) -> Result<Packed, GpuError> {
         let [a, b, c] = strides(degree).map(|s| (s * n * 4) as u64);
         let [x, y, z] = &self.buffers;
         let mut bytes = device.read(&[(x, a), (y, b), (z, c)])?.into_iter();
@@ -67,12 +67,12 @@ pub struct Packed {
     /// As [`Parameters::buffers`].
     pub floats: [Vec<f32>; 3],
     /// Degree that they are laid out for.
-    pub degree: u8,
+    pub(crate) degree: u8,
 }
 
 impl Packed {
     /// The parameters of `cloud`.
-    pub fn of(cloud: &GaussianCloud) -> Self {
+    pub(crate) fn of(cloud: &GaussianCloud) -> Self {
         Self::up_to(cloud, cloud.sh_degree)
     }
 
@@ -97,22 +97,22 @@ impl Packed {
     }
 
     /// Number of Gaussians.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.floats[0].len() / GEOMETRY_STRIDE
     }
 
     /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
     /// The pad of each Gaussian's geometry; a gradient keeps the screen gradient's length there.
-    pub fn pads(&self) -> impl Iterator<Item = f32> + '_ {
+    pub(crate) fn pads(&self) -> impl Iterator<Item = f32> + '_ {
         self.floats[0].chunks_exact(GEOMETRY_STRIDE).map(|g| g[GEOMETRY_STRIDE - 1])
     }
 
     /// A cloud with these parameters, at the origin and without extra properties.
-    pub fn to_cloud(&self) -> GaussianCloud {
+    pub(crate) fn to_cloud(&self) -> GaussianCloud {
         let [_, low, high] = strides(self.degree);
         let mut cloud = GaussianCloud { sh_degree: self.degree, ..GaussianCloud::default() };
         for (i, g) in self.floats[0].chunks_exact(GEOMETRY_STRIDE).enumerate() {

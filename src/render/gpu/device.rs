@@ -49,7 +49,7 @@ fn held_or(
 impl Device {
     /// The process's device: the best adapter's, a real GPU's before a software one's. Opened when first asked for,
     /// and again after it was lost.
-    pub fn shared() -> Result<Self, GpuError> {
+    pub(crate) fn shared() -> Result<Self, GpuError> {
         let shared = held_or(&SHARED, || Self::new().map(Some))?;
         shared.ok_or_else(|| GpuError::NoAdapter("none was opened".to_owned()))
     }
@@ -58,13 +58,13 @@ impl Device {
     ///
     /// # Errors
     /// If there is one that does not open.
-    pub fn shared_real() -> Result<Option<Self>, GpuError> {
+    pub(crate) fn shared_real() -> Result<Option<Self>, GpuError> {
         Ok(held_or(&SHARED, Self::real)?.filter(|device| !device.is_software()))
     }
 
     /// Makes a window's device the process's, and says whether it does: one of a real GPU that has all that
     /// [`Self::device_descriptor`] asks for, before another was opened.
-    pub fn adopt(adapter: &wgpu::Adapter, device: &wgpu::Device, queue: &wgpu::Queue) -> bool {
+    pub(crate) fn adopt(adapter: &wgpu::Adapter, device: &wgpu::Device, queue: &wgpu::Queue) -> bool {
         let (info, wanted) = (adapter.get_info(), Self::device_descriptor(adapter));
         let suits = info.device_type != wgpu::DeviceType::Cpu
             && wgpu::Backends::PRIMARY.contains(info.backend.into())
@@ -90,13 +90,13 @@ impl Device {
     ///
     /// # Errors
     /// If there is one that does not open.
-    pub fn real() -> Result<Option<Self>, GpuError> {
+    pub(crate) fn real() -> Result<Option<Self>, GpuError> {
         let adapter = adapter(false).ok().filter(|a| a.get_info().device_type != wgpu::DeviceType::Cpu);
         adapter.map(|a| Self::open(&a)).transpose()
     }
 
     /// Opens a device on an adapter of the caller's choice.
-    pub fn open(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
+    pub(crate) fn open(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
         resource_log::record(
             Sort::Device,
             format!("device on {}", adapter.get_info().name),
@@ -110,7 +110,7 @@ impl Device {
 
     /// The device that this module would ask of `adapter`: all its limits, and those of the wanted
     /// features that it has. For callers that open the device themselves, such as a window.
-    pub fn device_descriptor(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'static> {
+    pub(crate) fn device_descriptor(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'static> {
         wgpu::DeviceDescriptor {
             label: Some("fmlgs"),
             required_features: adapter.features() & WANTED,
@@ -121,7 +121,7 @@ impl Device {
 
     /// Uses a device that exists already, such as the window's. Takes over its handlers for
     /// faults, so that none of them ends the process.
-    pub fn from_parts(info: wgpu::AdapterInfo, device: wgpu::Device, queue: wgpu::Queue) -> Self {
+    pub(crate) fn from_parts(info: wgpu::AdapterInfo, device: wgpu::Device, queue: wgpu::Queue) -> Self {
         let fault = Arc::new(Mutex::new(None));
         let slot = Arc::clone(&fault);
         device.on_uncaptured_error(Arc::new(move |error| keep_first(&slot, told(error, "a command", 0))));
@@ -141,12 +141,12 @@ impl Device {
     }
 
     /// Its queue.
-    pub fn queue(&self) -> &wgpu::Queue {
+    pub(crate) fn queue(&self) -> &wgpu::Queue {
         &self.queue
     }
 
     /// Name, type and driver of the adapter.
-    pub fn info(&self) -> &wgpu::AdapterInfo {
+    pub(crate) fn info(&self) -> &wgpu::AdapterInfo {
         &self.info
     }
 
@@ -275,7 +275,7 @@ impl Device {
     }
 
     /// Waits for everything submitted so far.
-    pub fn wait(&self) -> Result<(), GpuError> {
+    pub(crate) fn wait(&self) -> Result<(), GpuError> {
         self.wait_for(None)
     }
 

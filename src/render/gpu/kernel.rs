@@ -6,7 +6,7 @@ use super::{Device, GpuError};
 
 /// How a kernel uses a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Access {
+pub(crate) enum Access {
     /// A uniform.
     Uniform,
     /// A storage buffer that is only read.
@@ -17,14 +17,14 @@ pub enum Access {
 
 /// A compiled source, from which kernels are made by entry point.
 #[derive(Debug)]
-pub struct Module {
+pub(crate) struct Module {
     module: wgpu::ShaderModule,
     name: &'static str,
 }
 
 impl Module {
     /// Compiles kernel file `name`.
-    pub fn new(device: &Device, name: &'static str, variant: Variant) -> Result<Self, GpuError> {
+    pub(crate) fn new(device: &Device, name: &'static str, variant: Variant) -> Result<Self, GpuError> {
         let source = shader::source(name, variant)?;
         let module = device.scoped(name, 0, || {
             device.wgpu().create_shader_module(wgpu::ShaderModuleDescriptor {
@@ -38,7 +38,7 @@ impl Module {
 
 /// One entry point, ready to run.
 #[derive(Debug)]
-pub struct Kernel {
+pub(crate) struct Kernel {
     pipeline: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,
     slots: Vec<u32>,
@@ -46,7 +46,12 @@ pub struct Kernel {
 
 impl Kernel {
     /// Makes the pipeline of `entry`, whose bindings in group 0 are `slots`.
-    pub fn new(device: &Device, module: &Module, entry: &str, slots: &[(u32, Access)]) -> Result<Self, GpuError> {
+    pub(crate) fn new(
+        device: &Device,
+        module: &Module,
+        entry: &str,
+        slots: &[(u32, Access)],
+    ) -> Result<Self, GpuError> {
         let entries: Vec<_> = slots
             .iter()
             .map(|&(binding, access)| wgpu::BindGroupLayoutEntry {
@@ -111,34 +116,34 @@ impl Kernel {
 
 /// What every kernel of one frame is told.
 #[derive(Clone, Copy, Debug)]
-pub struct FrameBindings<'a> {
+pub(crate) struct FrameBindings<'a> {
     /// The camera and the picture, see [`super::layout::View`].
-    pub view: &'a wgpu::Buffer,
+    pub(crate) view: &'a wgpu::Buffer,
     /// See [`super::layout::Counters`].
-    pub counters: &'a wgpu::Buffer,
+    pub(crate) counters: &'a wgpu::Buffer,
     /// Gaussians in the cloud.
-    pub gaussians: u32,
+    pub(crate) gaussians: u32,
     /// Picture size in tiles.
-    pub tiles: [u32; 2],
+    pub(crate) tiles: [u32; 2],
 }
 
 /// One stage that is being recorded.
 #[derive(Debug)]
-pub struct Stage<'a> {
+pub(crate) struct Stage<'a> {
     device: &'a Device,
     pass: wgpu::ComputePass<'a>,
 }
 
 impl Stage<'_> {
     /// Records a dispatch. `buffers` are in the order of the kernel's slots.
-    pub fn run(&mut self, kernel: &Kernel, buffers: &[&wgpu::Buffer], groups: [u32; 3]) {
+    pub(crate) fn run(&mut self, kernel: &Kernel, buffers: &[&wgpu::Buffer], groups: [u32; 3]) {
         kernel.dispatch(self.device, &mut self.pass, buffers, groups);
     }
 }
 
 /// Commands of one frame or step, with its stages timed if a timer is there.
 #[derive(Debug)]
-pub struct Recorder<'a> {
+pub(crate) struct Recorder<'a> {
     device: &'a Device,
     encoder: wgpu::CommandEncoder,
     timer: Option<&'a mut Timer>,
@@ -146,13 +151,13 @@ pub struct Recorder<'a> {
 
 impl<'a> Recorder<'a> {
     /// Starts recording.
-    pub fn new(device: &'a Device, timer: Option<&'a mut Timer>) -> Self {
+    pub(crate) fn new(device: &'a Device, timer: Option<&'a mut Timer>) -> Self {
         let encoder = device.wgpu().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("fmlgs") });
         Self { device, encoder, timer }
     }
 
     /// Records one stage.
-    pub fn stage(&mut self, name: &'static str, record: impl FnOnce(&mut Stage<'_>)) {
+    pub(crate) fn stage(&mut self, name: &'static str, record: impl FnOnce(&mut Stage<'_>)) {
         let timestamp_writes = self.timer.as_mut().and_then(|t| t.stage(name));
         let pass =
             self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(name), timestamp_writes });
@@ -160,12 +165,12 @@ impl<'a> Recorder<'a> {
     }
 
     /// Records that a buffer is filled with zeros.
-    pub fn clear(&mut self, buffer: &wgpu::Buffer) {
+    pub(crate) fn clear(&mut self, buffer: &wgpu::Buffer) {
         self.encoder.clear_buffer(buffer, 0, None);
     }
 
     /// Hands the commands to the device.
-    pub fn submit(mut self) -> wgpu::SubmissionIndex {
+    pub(crate) fn submit(mut self) -> wgpu::SubmissionIndex {
         if let Some(timer) = self.timer {
             timer.resolve(&mut self.encoder);
         }

@@ -174,19 +174,19 @@ twins! {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct Counters {
     /// Gaussians in the cloud.
-    pub gaussians: u32,
+    pub(crate) gaussians: u32,
     /// (Splat, tile) pairs blended; 0 when they did not fit.
     pub pairs: u32,
     /// Pairs that the frame needs.
     pub wanted: u32,
     /// 1 when they did not fit.
-    pub overflow: u32,
+    pub(crate) overflow: u32,
     /// Gaussians drawn.
-    pub visible: u32,
+    pub(crate) visible: u32,
     /// Gaussians left out because their shape is degenerate.
     pub degenerate: u32,
     /// Gaussians whose gradient was not finite.
-    pub bad_gradients: u32,
+    pub(crate) bad_gradients: u32,
     /// Unused.
-    pub pad: u32,
+    pub(crate) pad: u32,
 }

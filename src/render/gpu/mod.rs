@@ -5,25 +5,25 @@
 //! its gradient) and [`adam`]. [`Renderer`] answers like the CPU renderer; [`Trainer`] keeps
 //! everything on the device from step to step.
 
-pub mod adam;
-pub mod bin;
-pub mod blend;
-pub mod blend_backward;
+pub(crate) mod adam;
+pub(crate) mod bin;
+pub(crate) mod blend;
+pub(crate) mod blend_backward;
 pub mod cloud;
-pub mod device;
-pub mod error;
-pub mod kernel;
+pub(crate) mod device;
+pub(crate) mod error;
+pub(crate) mod kernel;
 pub mod layout;
-pub mod project;
-pub mod project_backward;
-pub mod rasterizer;
+pub(crate) mod project;
+pub(crate) mod project_backward;
+pub(crate) mod rasterizer;
 pub mod renderer;
-pub mod scratch;
+pub(crate) mod scratch;
 pub mod shader;
 pub mod sort;
 pub mod ssim;
-pub mod timing;
-pub mod trainer;
+pub(crate) mod timing;
+pub(crate) mod trainer;
 
 pub use cloud::Parameters;
 pub use device::{Device, real_gpu};

@@ -10,13 +10,13 @@ use crate::scene::Camera;
 
 /// The projection kernel.
 #[derive(Debug)]
-pub struct Project {
+pub(crate) struct Project {
     kernel: Kernel,
 }
 
 impl Project {
     /// Compiles the kernel.
-    pub fn new(device: &Device) -> Result<Self, GpuError> {
+    pub(crate) fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
         let module = Module::new(device, "project", Variant::default())?;
         let slots =
@@ -25,7 +25,7 @@ impl Project {
     }
 
     /// Records the projection.
-    pub fn encode(
+    pub(crate) fn encode(
         &self,
         stage: &mut Stage<'_>,
         bindings: FrameBindings<'_>,
@@ -51,7 +51,13 @@ impl Project {
 
 /// What the kernels need to know of a camera. `capacity` is the number of (splat, tile) pairs that
 /// fit, `channels` the extra channels per Gaussian.
-pub fn view(camera: &Camera, settings: &RenderSettings, cloud: CloudShape, channels: u32, capacity: u32) -> View {
+pub(crate) fn view(
+    camera: &Camera,
+    settings: &RenderSettings,
+    cloud: CloudShape,
+    channels: u32,
+    capacity: u32,
+) -> View {
     let axis = |a: glam::DVec3| [a.x as f32, a.y as f32, a.z as f32, 0.0];
     let m = camera.world_from_camera;
     let offset = cloud.origin - camera.center;
@@ -87,11 +93,11 @@ pub fn view(camera: &Camera, settings: &RenderSettings, cloud: CloudShape, chann
 
 /// What a view must know of a cloud on the device.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct CloudShape {
+pub(crate) struct CloudShape {
     /// World position that the Gaussians are relative to.
-    pub origin: glam::DVec3,
+    pub(crate) origin: glam::DVec3,
     /// How many there are.
-    pub gaussians: u32,
+    pub(crate) gaussians: u32,
     /// Spherical-harmonics degree that is stored.
-    pub degree: u8,
+    pub(crate) degree: u8,
 }

@@ -6,14 +6,14 @@ use super::{Device, GpuError, Parameters};
 
 /// The kernels.
 #[derive(Debug)]
-pub struct ProjectBackward {
+pub(crate) struct ProjectBackward {
     main: Kernel,
     statistics: Kernel,
 }
 
 impl ProjectBackward {
     /// Compiles the kernels.
-    pub fn new(device: &Device) -> Result<Self, GpuError> {
+    pub(crate) fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
         let module = Module::new(device, "project_backward", Variant::default())?;
         let slots =
@@ -26,7 +26,7 @@ impl ProjectBackward {
     }
 
     /// Records the gradient of all parameters.
-    pub fn encode(
+    pub(crate) fn encode(
         &self,
         stage: &mut Stage<'_>,
         bindings: FrameBindings<'_>,
@@ -41,7 +41,7 @@ impl ProjectBackward {
     }
 
     /// Records the gathering of screen gradients and radii into `growth`.
-    pub fn encode_statistics(
+    pub(crate) fn encode_statistics(
         &self,
         stage: &mut Stage<'_>,
         bindings: FrameBindings<'_>,

@@ -18,27 +18,27 @@ const HEADROOM: f64 = 1.5;
 
 /// The kernels of the forward pass with their buffers.
 #[derive(Debug)]
-pub struct Rasterizer {
+pub(crate) struct Rasterizer {
     project: Project,
     sort: Sort,
     bin: Bin,
     blend: TileKernel,
     /// Camera and picture.
-    pub view: wgpu::Buffer,
+    pub(crate) view: wgpu::Buffer,
     /// Counters of the frame.
-    pub counters: wgpu::Buffer,
+    pub(crate) counters: wgpu::Buffer,
     /// Buffers by number of Gaussians.
-    pub gaussians: PerGaussian,
+    pub(crate) gaussians: PerGaussian,
     /// Buffers by number of pairs.
-    pub pairs: PerPair,
+    pub(crate) pairs: PerPair,
     /// Buffers by picture.
-    pub picture: PerPicture,
+    pub(crate) picture: PerPicture,
     extent: (u32, [u32; 2]),
 }
 
 impl Rasterizer {
     /// Compiles the kernels; the buffers are as small as they can be.
-    pub fn new(device: &Device) -> Result<Self, GpuError> {
+    pub(crate) fn new(device: &Device) -> Result<Self, GpuError> {
         Ok(Self {
             project: Project::new(device)?,
             sort: Sort::new(device)?,
@@ -54,7 +54,7 @@ impl Rasterizer {
     }
 
     /// Makes room for a frame, tells the device what to draw, and resets the counters.
-    pub fn prepare(
+    pub(crate) fn prepare(
         &mut self,
         device: &Device,
         camera: &Camera,
@@ -92,12 +92,12 @@ impl Rasterizer {
     }
 
     /// What the kernels of the prepared frame are told.
-    pub fn bindings(&self) -> FrameBindings<'_> {
+    pub(crate) fn bindings(&self) -> FrameBindings<'_> {
         FrameBindings { view: &self.view, counters: &self.counters, gaussians: self.extent.0, tiles: self.extent.1 }
     }
 
     /// Records projection, depth order and the count of pairs.
-    pub fn encode_count(&self, recorder: &mut Recorder<'_>, cloud: &Parameters) {
+    pub(crate) fn encode_count(&self, recorder: &mut Recorder<'_>, cloud: &Parameters) {
         let bindings = self.bindings();
         recorder.stage("project", |s| self.project.encode(s, bindings, cloud, &self.gaussians));
         recorder.stage("sort by depth", |s| self.sort.encode(s, &self.gaussians.by_depth, &self.counters));
@@ -105,7 +105,7 @@ impl Rasterizer {
     }
 
     /// Records the rest of the forward pass after [`Self::encode_count`].
-    pub fn encode_draw(&self, recorder: &mut Recorder<'_>, features: &wgpu::Buffer) {
+    pub(crate) fn encode_draw(&self, recorder: &mut Recorder<'_>, features: &wgpu::Buffer) {
         let bindings = self.bindings();
         recorder.clear(&self.picture.ranges);
         recorder.stage("bin", |s| self.bin.encode_emit(s, bindings, &self.gaussians, &self.pairs));
@@ -119,7 +119,7 @@ impl Rasterizer {
     }
 
     /// Makes room for `wanted` pairs and some more.
-    pub fn grow_pairs(&mut self, device: &Device, wanted: u32) -> Result<(), GpuError> {
+    pub(crate) fn grow_pairs(&mut self, device: &Device, wanted: u32) -> Result<(), GpuError> {
         if wanted <= self.pairs.capacity {
             return Ok(());
         }
@@ -131,7 +131,7 @@ impl Rasterizer {
     }
 
     /// Bytes of its buffers on the device.
-    pub fn device_bytes(&self) -> u64 {
+    pub(crate) fn device_bytes(&self) -> u64 {
         let (g, p) = (&self.gaussians, &self.picture);
         let own = [&self.view, &self.counters, &g.splats, &g.tile_counts, &g.sums];
         let picture = [&p.ranges, &p.colors, &p.ends, &p.depths, &p.features];
@@ -141,13 +141,13 @@ impl Rasterizer {
     }
 
     /// Reads the frame's counters.
-    pub fn read_counters(&self, device: &Device) -> Result<Counters, GpuError> {
+    pub(crate) fn read_counters(&self, device: &Device) -> Result<Counters, GpuError> {
         let bytes = device.read(&[(&self.counters, size_of::<Counters>() as u64)])?;
         Ok(counters_of(&bytes[0]))
     }
 }
 
 /// Counters from their bytes.
-pub fn counters_of(bytes: &[u8]) -> Counters {
+pub(crate) fn counters_of(bytes: &[u8]) -> Counters {
     bytemuck::pod_read_unaligned(&bytes[..size_of::<Counters>()])
 }

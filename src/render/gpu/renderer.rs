@@ -74,18 +74,18 @@ impl Renderer {
     }
 
     /// Times the stages of every later frame, where the device can.
-    pub fn measure(&mut self) -> Result<(), GpuError> {
+    pub(crate) fn measure(&mut self) -> Result<(), GpuError> {
         self.timer = Timer::new(&self.device)?;
         Ok(())
     }
 
     /// Stops timing.
-    pub fn stop_measuring(&mut self) {
+    pub(crate) fn stop_measuring(&mut self) {
         (self.timer, self.times) = (None, StageTimes::new());
     }
 
     /// Seconds per stage of the last frame and its backward pass; empty unless measured.
-    pub fn times(&self) -> &StageTimes {
+    pub(crate) fn times(&self) -> &StageTimes {
         &self.times
     }
 
@@ -100,7 +100,7 @@ impl Renderer {
     }
 
     /// Sends a cloud to the device without the bands of its harmonics above `degree`.
-    pub fn upload_bands(
+    pub(crate) fn upload_bands(
         &mut self,
         cloud: &GaussianCloud,
         features: Features<'_, f32>,
@@ -123,7 +123,7 @@ impl Renderer {
     }
 
     /// Bytes of all buffers that it holds on the device.
-    pub fn device_bytes(&self) -> u64 {
+    pub(crate) fn device_bytes(&self) -> u64 {
         let sizes = |buffers: &[&wgpu::Buffer]| buffers.iter().map(|b| b.size()).sum::<u64>();
         let [a, b, c] = &self.cloud.buffers;
         sizes(&[a, b, c, &self.features]) + self.rasterizer.device_bytes()

@@ -11,30 +11,30 @@ const COUNT_GAUSSIANS: u32 = 0;
 /// Word of the counters that holds the number of pairs.
 const COUNT_PAIRS: u32 = 1;
 /// Floats of one splat's gradient ahead of its extra channels; `GRADIENT_BASE` in the shaders.
-pub const GRADIENT_BASE: usize = 10;
+pub(crate) const GRADIENT_BASE: usize = 10;
 /// Splats that one workgroup of `bin` handles.
-pub const BIN_BLOCK: u32 = 1024;
+pub(crate) const BIN_BLOCK: u32 = 1024;
 /// Extra channels that one blending pass carries at most.
-pub const CHUNK_CHANNELS: usize = 16;
+pub(crate) const CHUNK_CHANNELS: usize = 16;
 
 /// Buffers by number of Gaussians.
 #[derive(Debug)]
-pub struct PerGaussian {
+pub(crate) struct PerGaussian {
     /// Gaussians that fit.
-    pub capacity: usize,
+    pub(crate) capacity: usize,
     /// Splats in the picture.
-    pub splats: wgpu::Buffer,
+    pub(crate) splats: wgpu::Buffer,
     /// Tiles that each reaches.
-    pub tile_counts: wgpu::Buffer,
+    pub(crate) tile_counts: wgpu::Buffer,
     /// Depth keys with the Gaussians' indices.
-    pub by_depth: SortBuffers,
+    pub(crate) by_depth: SortBuffers,
     /// Pairs of each block of splats.
-    pub sums: wgpu::Buffer,
+    pub(crate) sums: wgpu::Buffer,
 }
 
 impl PerGaussian {
     /// Room for `capacity` Gaussians.
-    pub fn new(device: &Device, capacity: usize) -> Result<Self, GpuError> {
+    pub(crate) fn new(device: &Device, capacity: usize) -> Result<Self, GpuError> {
         let n = capacity as u64;
         Ok(Self {
             capacity,
@@ -48,18 +48,18 @@ impl PerGaussian {
 
 /// Buffers by number of (splat, tile) pairs.
 #[derive(Debug)]
-pub struct PerPair {
+pub(crate) struct PerPair {
     /// Pairs that fit.
-    pub capacity: u32,
+    pub(crate) capacity: u32,
     /// Tiles that the sort's passes can tell apart.
-    pub tiles: u32,
+    pub(crate) tiles: u32,
     /// Tile indices with the splats' indices.
-    pub by_tile: SortBuffers,
+    pub(crate) by_tile: SortBuffers,
 }
 
 impl PerPair {
     /// Room for `capacity` pairs in a picture of `tiles` tiles.
-    pub fn new(device: &Device, capacity: u32, tiles: u32) -> Result<Self, GpuError> {
+    pub(crate) fn new(device: &Device, capacity: u32, tiles: u32) -> Result<Self, GpuError> {
         // One value more than there are tiles: pairs that belong nowhere.
         let bits = (32 - tiles.leading_zeros()).next_multiple_of(8);
         let most = if bits >= 32 { u32::MAX } else { (1 << bits) - 1 };
@@ -69,30 +69,30 @@ impl PerPair {
 
 /// Buffers by picture size and number of extra channels.
 #[derive(Debug)]
-pub struct PerPicture {
+pub(crate) struct PerPicture {
     /// Pixels that fit.
-    pub pixels: usize,
+    pub(crate) pixels: usize,
     /// Tiles that fit.
-    pub tiles: usize,
+    pub(crate) tiles: usize,
     /// Extra channels.
-    pub channels: usize,
+    pub(crate) channels: usize,
     /// Each tile's part of the pairs.
-    pub ranges: wgpu::Buffer,
+    pub(crate) ranges: wgpu::Buffer,
     /// Color and transmittance.
-    pub colors: wgpu::Buffer,
+    pub(crate) colors: wgpu::Buffer,
     /// Transmittance and end of each pixel's list.
-    pub ends: wgpu::Buffer,
+    pub(crate) ends: wgpu::Buffer,
     /// Expected and median depth.
-    pub depths: wgpu::Buffer,
+    pub(crate) depths: wgpu::Buffer,
     /// Extra channels.
-    pub features: wgpu::Buffer,
+    pub(crate) features: wgpu::Buffer,
     /// Constants of the blending passes, with the number of channels each carries.
-    pub chunks: Vec<(usize, wgpu::Buffer)>,
+    pub(crate) chunks: Vec<(usize, wgpu::Buffer)>,
 }
 
 impl PerPicture {
     /// Room for a picture of this size.
-    pub fn new(device: &Device, size_px: [u32; 2], channels: usize) -> Result<Self, GpuError> {
+    pub(crate) fn new(device: &Device, size_px: [u32; 2], channels: usize) -> Result<Self, GpuError> {
         let [pixels, tiles] = extent(size_px);
         let n = pixels as u64;
         let mut chunks = Vec::new();
@@ -115,7 +115,7 @@ impl PerPicture {
     }
 
     /// Tells the blending passes whether the loss has a gradient with respect to depth.
-    pub fn set_depth_gradient(&self, device: &Device, present: bool) {
+    pub(crate) fn set_depth_gradient(&self, device: &Device, present: bool) {
         for (i, (_, buffer)) in self.chunks.iter().enumerate() {
             let chunk = Chunk {
                 channels: self.channels as u32,
@@ -129,7 +129,7 @@ impl PerPicture {
 }
 
 /// Pixels and tiles of a picture.
-pub fn extent(size_px: [u32; 2]) -> [usize; 2] {
+pub(crate) fn extent(size_px: [u32; 2]) -> [usize; 2] {
     let [w, h] = size_px.map(|s| s as usize);
     [w * h, w.div_ceil(TILE_PX) * h.div_ceil(TILE_PX)]
 }

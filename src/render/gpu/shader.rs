@@ -13,7 +13,7 @@ macro_rules! files {
 }
 
 /// Every file of `shaders/`, by its path there.
-pub const FILES: &[(&str, &str)] = files![
+pub(crate) const FILES: &[(&str, &str)] = files![
     "adam.wgsl",
     "bin.wgsl",
     "blend.wgsl",

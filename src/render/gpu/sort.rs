@@ -12,7 +12,7 @@ const DIGITS: u64 = 256;
 
 /// The three kernels of a pass and the passes' constants.
 #[derive(Debug)]
-pub struct Sort {
+pub(crate) struct Sort {
     count: Kernel,
     scan: Kernel,
     scatter: Kernel,
@@ -20,11 +20,11 @@ pub struct Sort {
 
 /// Two sets of pairs that a sort goes back and forth between, with its scratch memory.
 #[derive(Debug)]
-pub struct SortBuffers {
+pub(crate) struct SortBuffers {
     /// Keys: the input, and the place of every other pass.
-    pub keys: [wgpu::Buffer; 2],
+    pub(crate) keys: [wgpu::Buffer; 2],
     /// Their values.
-    pub values: [wgpu::Buffer; 2],
+    pub(crate) values: [wgpu::Buffer; 2],
     histogram: wgpu::Buffer,
     totals: wgpu::Buffer,
     passes: Vec<wgpu::Buffer>,
@@ -34,7 +34,7 @@ pub struct SortBuffers {
 impl SortBuffers {
     /// Room for `capacity` pairs, sorted by the low `bits` bits of their keys; how many there are
     /// stands at word `counter` of the counters.
-    pub fn new(device: &Device, capacity: u64, bits: u32, counter: u32) -> Result<Self, GpuError> {
+    pub(crate) fn new(device: &Device, capacity: u64, bits: u32, counter: u32) -> Result<Self, GpuError> {
         let blocks = capacity.div_ceil(BLOCK).max(1);
         device.fits_dispatch("sorting", blocks, "use fewer Gaussians or smaller pictures")?;
         let pairs = || device.storage("pairs to sort", capacity * 4);
@@ -55,20 +55,20 @@ impl SortBuffers {
     }
 
     /// Bytes of its buffers on the device.
-    pub fn device_bytes(&self) -> u64 {
+    pub(crate) fn device_bytes(&self) -> u64 {
         let all = self.keys.iter().chain(&self.values).chain([&self.histogram, &self.totals]).chain(&self.passes);
         all.map(wgpu::Buffer::size).sum()
     }
 
     /// Which of the two sets holds the result.
-    pub fn result(&self) -> usize {
+    pub(crate) fn result(&self) -> usize {
         self.passes.len() % 2
     }
 }
 
 impl Sort {
     /// Compiles the kernels.
-    pub fn new(device: &Device) -> Result<Self, GpuError> {
+    pub(crate) fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
         let module = Module::new(device, "sort", Variant::default())?;
         let kernel = |entry, slots: &[_]| Kernel::new(device, &module, entry, slots);
@@ -83,7 +83,7 @@ impl Sort {
     }
 
     /// Records the sort.
-    pub fn encode(&self, stage: &mut Stage<'_>, on: &SortBuffers, counters: &wgpu::Buffer) {
+    pub(crate) fn encode(&self, stage: &mut Stage<'_>, on: &SortBuffers, counters: &wgpu::Buffer) {
         let blocks = [on.blocks, 1, 1];
         for (p, digit) in on.passes.iter().enumerate() {
             let (from, to) = (p % 2, (p + 1) % 2);
@@ -109,7 +109,12 @@ impl Sort {
 
 /// Sorts `(key, value)` pairs by the low `bits` bits of the keys and returns them: the sort alone,
 /// for tests and measurements.
-pub fn sort_pairs(device: &Device, keys: &[u32], values: &[u32], bits: u32) -> Result<(Vec<u32>, Vec<u32>), GpuError> {
+pub fn sort_pairs(
+    device: &Device,
+    keys: &[u32],
+    values: &[u32],
+    bits: u32,
+) -> Result<(Vec<u32>, Vec<u32>), GpuError> {
     if keys.len() != values.len() {
         return Err(GpuError::Size { what: "values to sort", have: values.len(), want: keys.len() });
     }

@@ -10,7 +10,7 @@ use crate::render::TILE_PX;
 use crate::scene::PhotoPixels;
 
 /// Steps whose sums the device keeps until the host fetches them.
-pub const RING: usize = 64;
+pub(crate) const RING: usize = 64;
 /// Bytes of one step's sums.
 const SLOT_BYTES: u64 = 32;
 
@@ -19,12 +19,12 @@ const SLOT_BYTES: u64 = 32;
 pub struct DevicePhoto {
     pixels: wgpu::Buffer,
     /// Width and height in px.
-    pub size_px: [u32; 2],
+    pub(crate) size_px: [u32; 2],
 }
 
 impl DevicePhoto {
     /// Sends a photo to the device.
-    pub fn new(device: &Device, photo: &PhotoPixels) -> Result<Self, GpuError> {
+    pub(crate) fn new(device: &Device, photo: &PhotoPixels) -> Result<Self, GpuError> {
         let size_px = [photo.width_px, photo.height_px];
         let [want, _] = extent(size_px);
         let lengths = [photo.rgb.len(), photo.coverage.as_ref().map_or(want, Vec::len)];
@@ -41,19 +41,19 @@ impl DevicePhoto {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LossSums {
     /// Mean absolute difference.
-    pub l1: f64,
+    pub(crate) l1: f64,
     /// SSIM.
-    pub ssim: f64,
+    pub(crate) ssim: f64,
     /// Mean squared difference.
-    pub mse: f64,
+    pub(crate) mse: f64,
     /// The frame's (splat, tile) pairs did not fit, so it was not drawn and nothing moved.
     pub overflow: bool,
     /// Pairs that it needed.
     pub wanted: u32,
     /// Gaussians drawn.
-    pub visible: u32,
+    pub(crate) visible: u32,
     /// Gaussians left alone because their gradient was not finite.
-    pub bad_gradients: u32,
+    pub(crate) bad_gradients: u32,
     /// Gradients that were cut as outliers.
     pub outliers: u32,
 }
@@ -65,14 +65,14 @@ impl LossSums {
     }
 
     /// PSNR in dB for a peak of 1.
-    pub fn psnr(&self) -> f64 {
+    pub(crate) fn psnr(&self) -> f64 {
         psnr_of(self.mse)
     }
 }
 
 /// The kernels with their buffers.
 #[derive(Debug)]
-pub struct Ssim {
+pub(crate) struct Ssim {
     moments: Kernel,
     gradient: Kernel,
     reduce: Kernel,
@@ -85,7 +85,7 @@ pub struct Ssim {
 
 impl Ssim {
     /// Compiles the kernels; the buffers grow with the first photo.
-    pub fn new(device: &Device) -> Result<Self, GpuError> {
+    pub(crate) fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
         let module = Module::new(device, "ssim", Variant::default())?;
         let kernel = |entry, slots: &[_]| Kernel::new(device, &module, entry, slots);
@@ -103,7 +103,13 @@ impl Ssim {
 
     /// Makes room for pictures of this size and says where the sums go. `lambda` is the share of
     /// D-SSIM in the loss.
-    pub fn prepare(&mut self, device: &Device, size_px: [u32; 2], slot: usize, lambda: f64) -> Result<(), GpuError> {
+    pub(crate) fn prepare(
+        &mut self,
+        device: &Device,
+        size_px: [u32; 2],
+        slot: usize,
+        lambda: f64,
+    ) -> Result<(), GpuError> {
         let [pixels, tiles] = extent(size_px);
         if self.capacity[0] < pixels {
             self.maps = device.storage("derivatives of SSIM", pixels as u64 * 36)?;
@@ -127,7 +133,7 @@ impl Ssim {
     }
 
     /// Records the loss of `colors` and its gradient into `pixel_gradient`.
-    pub fn encode(
+    pub(crate) fn encode(
         &self,
         stage: &mut Stage<'_>,
         colors: &wgpu::Buffer,
@@ -141,12 +147,12 @@ impl Ssim {
 
     /// Records the last sums into the ring, with the frame's counters and the optimizer's number of
     /// outliers as they then are.
-    pub fn encode_sums(&self, stage: &mut Stage<'_>, counters: &wgpu::Buffer, outliers: &wgpu::Buffer) {
+    pub(crate) fn encode_sums(&self, stage: &mut Stage<'_>, counters: &wgpu::Buffer, outliers: &wgpu::Buffer) {
         stage.run(&self.reduce, &[&self.loss, &self.partials, &self.ring, counters, outliers], [1, 1, 1]);
     }
 
     /// Fetches the sums of slots from 0, one for each of `pixels`, the number of pixels compared.
-    pub fn read(&self, device: &Device, pixels: &[usize]) -> Result<Vec<LossSums>, GpuError> {
+    pub(crate) fn read(&self, device: &Device, pixels: &[usize]) -> Result<Vec<LossSums>, GpuError> {
         let bytes = device.read(&[(&self.ring, pixels.len() as u64 * SLOT_BYTES)])?;
         let slots: Vec<[f32; 8]> = bytemuck::pod_collect_to_vec(&bytes[0]);
         Ok(slots

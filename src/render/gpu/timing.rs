@@ -6,11 +6,11 @@ use super::{Device, GpuError};
 const STAGES: u32 = 32;
 
 /// Seconds of each stage, in order.
-pub type StageTimes = Vec<(&'static str, f64)>;
+pub(crate) type StageTimes = Vec<(&'static str, f64)>;
 
 /// Timestamps around the stages of one submission.
 #[derive(Debug)]
-pub struct Timer {
+pub(crate) struct Timer {
     queries: wgpu::QuerySet,
     resolved: wgpu::Buffer,
     names: Vec<&'static str>,
@@ -19,7 +19,7 @@ pub struct Timer {
 
 impl Timer {
     /// A timer, or `None` on a device without timestamps.
-    pub fn new(device: &Device) -> Result<Option<Self>, GpuError> {
+    pub(crate) fn new(device: &Device) -> Result<Option<Self>, GpuError> {
         if !device.has_timestamps() {
             return Ok(None);
         }
@@ -58,7 +58,7 @@ impl Timer {
 
     /// Waits for the submission and returns its times; passes of one name are added up. The timer
     /// is then ready for the next submission.
-    pub fn finish(&mut self, device: &Device) -> Result<StageTimes, GpuError> {
+    pub(crate) fn finish(&mut self, device: &Device) -> Result<StageTimes, GpuError> {
         let names = std::mem::take(&mut self.names);
         let bytes = device.read(&[(&self.resolved, names.len() as u64 * 16)])?;
         let ticks: Vec<u64> =

@@ -27,9 +27,9 @@ const AHEAD: usize = 2;
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainerSettings {
     /// Background, near plane and anti-aliasing; degree and depth are set per step.
-    pub render: RenderSettings,
+    pub(crate) render: RenderSettings,
     /// Share of D-SSIM in the loss.
-    pub lambda: f64,
+    pub(crate) lambda: f64,
 }
 
 impl Default for TrainerSettings {
@@ -121,12 +121,12 @@ impl Trainer {
     }
 
     /// Number of Gaussians.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.shape.gaussians as usize
     }
 
     /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
@@ -318,13 +318,13 @@ impl Trainer {
     }
 
     /// Times the stages of every later step, where the device can; steps then wait for it.
-    pub fn measure(&mut self) -> Result<(), GpuError> {
+    pub(crate) fn measure(&mut self) -> Result<(), GpuError> {
         self.timer = Timer::new(&self.device)?;
         Ok(())
     }
 
     /// Seconds per stage of the last step; empty unless measured.
-    pub fn times(&self) -> &StageTimes {
+    pub(crate) fn times(&self) -> &StageTimes {
         &self.times
     }
 }

@@ -11,14 +11,14 @@ use crate::scene::{Camera, Dataset, GaussianCloud, LanguageFeatures, Level, Sema
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Machine {
     /// Memory that programs may still use, in bytes.
-    pub free_memory_bytes: u64,
+    pub(crate) free_memory_bytes: u64,
     /// Most Gaussians that training may use of it.
-    pub max_gaussians: usize,
+    pub(crate) max_gaussians: usize,
     /// Processor cores.
-    pub cores: usize,
+    pub(crate) cores: usize,
     /// Name of the graphics adapter if it is a real one; `None` where there is none or it is
     /// emulated in software.
-    pub gpu: Option<String>,
+    pub(crate) gpu: Option<String>,
 }
 
 /// What the user has set that a plan starts from.
@@ -38,59 +38,59 @@ pub struct Limits {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CloudFacts {
     /// How many.
-    pub gaussians: usize,
+    pub(crate) gaussians: usize,
     /// Degree of the spherical harmonics in the file.
-    pub sh_stored: u8,
+    pub(crate) sh_stored: u8,
     /// Degree up to which any coefficient is not zero.
-    pub sh_used: u8,
+    pub(crate) sh_used: u8,
     /// Degree up to which they can be seen.
-    pub sh_visible: u8,
+    pub(crate) sh_visible: u8,
     /// Longer side in px at which the photos show all that the Gaussians resolve; `None` without
     /// photos.
-    pub resolved_side_px: Option<u32>,
+    pub(crate) resolved_side_px: Option<u32>,
 }
 
 /// The photos of a scene.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PhotoFacts {
     /// How many.
-    pub photos: usize,
+    pub(crate) photos: usize,
     /// Width and height of the first, px.
-    pub size_px: [u32; 2],
+    pub(crate) size_px: [u32; 2],
     /// Longest side of all of them, px.
-    pub longest_px: u32,
+    pub(crate) longest_px: u32,
     /// Pixels of all of them.
-    pub pixels: u64,
+    pub(crate) pixels: u64,
     /// Pixels of all of them once they are limited to the training's size.
-    pub limited_pixels: u64,
+    pub(crate) limited_pixels: u64,
 }
 
 /// Objects and parts of a scene.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SemanticFacts {
     /// Objects.
-    pub objects: usize,
+    pub(crate) objects: usize,
     /// Parts.
-    pub parts: usize,
+    pub(crate) parts: usize,
     /// The encoder that looked at them, if one has.
-    pub encoder: Option<String>,
+    pub(crate) encoder: Option<String>,
     /// Numbers in their stored features.
-    pub numbers: usize,
+    pub(crate) numbers: usize,
 }
 
 /// All that a plan depends on.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Facts {
     /// The Gaussians, if they are a result.
-    pub cloud: Option<CloudFacts>,
+    pub(crate) cloud: Option<CloudFacts>,
     /// The photos, if there are any.
-    pub photos: Option<PhotoFacts>,
+    pub(crate) photos: Option<PhotoFacts>,
     /// Objects and parts, if they were found.
-    pub semantics: Option<SemanticFacts>,
+    pub(crate) semantics: Option<SemanticFacts>,
     /// The machine.
-    pub machine: Machine,
+    pub(crate) machine: Machine,
     /// What the user has set.
-    pub limits: Limits,
+    pub(crate) limits: Limits,
 }
 
 impl Facts {
@@ -124,7 +124,7 @@ impl Facts {
     }
 
     /// The same facts for other settings of the user.
-    pub fn with_limits(mut self, limits: Limits, dataset: Option<&Dataset>) -> Self {
+    pub(crate) fn with_limits(mut self, limits: Limits, dataset: Option<&Dataset>) -> Self {
         if let (Some(dataset), true) = (dataset, limits.train_side_px != self.limits.train_side_px) {
             self.photos = PhotoFacts::of(&dataset.cameras(), limits.train_side_px);
         }

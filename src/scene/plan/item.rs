@@ -86,22 +86,22 @@ const FORMER_EAGER: &str = "open";
 
 impl Item {
     /// Its name on the command line.
-    pub fn id(self) -> &'static str {
+    pub(crate) fn id(self) -> &'static str {
         self.into()
     }
 
     /// Its name for the user.
-    pub fn subject(self) -> &'static str {
+    pub(crate) fn subject(self) -> &'static str {
         self.get_str("subject").unwrap_or_default()
     }
 
     /// What can be had instead of what the data suggest.
-    pub fn alternative(self) -> Option<&'static str> {
+    pub(crate) fn alternative(self) -> Option<&'static str> {
         self.get_str("instead")
     }
 
     /// The choices that [`PlanOverride`] takes, for help and errors: "color=auto|full, ...".
-    pub fn choices() -> String {
+    pub(crate) fn choices() -> String {
         let one = |item: &Self| item.alternative().map(|a| format!("{}={AUTO}|{a}", item.id()));
         Self::VARIANTS.iter().filter_map(one).collect::<Vec<_>>().join(", ")
     }
@@ -117,9 +117,9 @@ impl fmt::Display for Item {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlanOverride {
     /// Of which.
-    pub item: Item,
+    pub(crate) item: Item,
     /// The alternative instead of what the data suggest.
-    pub instead: bool,
+    pub(crate) instead: bool,
 }
 
 impl FromStr for PlanOverride {
@@ -157,12 +157,12 @@ impl Overrides {
     }
 
     /// Whether the alternative is wanted.
-    pub fn has(&self, item: Item) -> bool {
+    pub(crate) fn has(&self, item: Item) -> bool {
         self.0.contains(&item)
     }
 
     /// Takes one; a later one of the same item wins.
-    pub fn set(&mut self, one: PlanOverride) {
+    pub(crate) fn set(&mut self, one: PlanOverride) {
         if one.instead {
             self.0.insert(one.item);
         } else {

@@ -11,7 +11,7 @@ use crate::scene::semantic_map::CODE_CHANNELS;
 const MAP_BYTES_PER_PX: u64 = 12;
 
 /// The lines of a plan, in the order of the items; those that say nothing about a scene are not there.
-pub fn of(plan: &ScenePlan) -> Vec<PlanLine> {
+pub(crate) fn of(plan: &ScenePlan) -> Vec<PlanLine> {
     Item::VARIANTS.iter().filter_map(|&item| line(item, plan)).collect()
 }
 

@@ -45,17 +45,17 @@ impl When {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PlanLine {
     /// What is decided.
-    pub item: Item,
+    pub(crate) item: Item,
     /// Its name: "Color", "Feature maps", ...
-    pub subject: String,
+    pub(crate) subject: String,
     /// The decision.
-    pub choice: String,
+    pub(crate) choice: String,
     /// Why.
-    pub reason: String,
+    pub(crate) reason: String,
     /// What it saves, or what it costs where the user wants it otherwise; empty for nothing.
-    pub saving: String,
+    pub(crate) saving: String,
     /// What the user can have instead, where that makes a difference.
-    pub alternative: Option<String>,
+    pub(crate) alternative: Option<String>,
     /// Whether the user wants it otherwise.
     pub overridden: bool,
 }
@@ -64,9 +64,9 @@ pub struct PlanLine {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ScenePlan {
     /// What they were computed from.
-    pub facts: Facts,
+    pub(crate) facts: Facts,
     /// What the user wants otherwise.
-    pub overrides: Overrides,
+    pub(crate) overrides: Overrides,
     /// Highest spherical-harmonics degree that is drawn.
     pub sh_degree: u8,
     /// When maps of a view's identities are drawn.
@@ -74,29 +74,29 @@ pub struct ScenePlan {
     /// Whether these maps have a level for parts.
     pub parts: bool,
     /// When objects and parts are drawn alone.
-    pub thumbnails: When,
+    pub(crate) thumbnails: When,
     /// When the encoder of typed phrases is loaded.
-    pub encoder: When,
+    pub(crate) encoder: When,
     /// When the graph for navigation is built.
-    pub navigation: When,
+    pub(crate) navigation: When,
     /// When depth is drawn: as it is used, or with every picture.
-    pub depth: When,
+    pub(crate) depth: When,
     /// Longer side of the images to train on, px.
-    pub train_side_px: u32,
+    pub(crate) train_side_px: u32,
     /// Every how-manieth photo is held out; 0 = none.
-    pub holdout_every: usize,
+    pub(crate) holdout_every: usize,
     /// Longer side of the images in which objects are looked for, px.
     pub object_side_px: u32,
     /// Most Gaussians that training may use on this machine.
-    pub max_gaussians: usize,
+    pub(crate) max_gaussians: usize,
     /// Whether the CPU is to draw even where there is a GPU.
-    pub on_cpu: bool,
+    pub(crate) on_cpu: bool,
     /// When the window is drawn: as something changes, or all the time.
-    pub redraw: When,
+    pub(crate) redraw: When,
     /// When the renderer holds its working memory.
-    pub buffers: When,
+    pub(crate) buffers: When,
     /// The decisions, for the user.
-    pub lines: Vec<PlanLine>,
+    pub(crate) lines: Vec<PlanLine>,
 }
 
 impl ScenePlan {
@@ -151,10 +151,10 @@ impl ScenePlan {
 }
 
 /// Objects are never looked for in images smaller than this along their longer side.
-pub const LEAST_SIDE_PX: u32 = 256;
+pub(crate) const LEAST_SIDE_PX: u32 = 256;
 
 /// Every how-manieth of `photos` is held out where every `wanted`-th was asked for: a single one is
 /// all there is to train on.
-pub fn holdout(photos: usize, wanted: usize) -> usize {
+pub(crate) fn holdout(photos: usize, wanted: usize) -> usize {
     if photos > 1 { wanted } else { 0 }
 }

@@ -18,7 +18,7 @@ enum KeyChange {
 }
 
 /// Draws it. The pose of the key that a user wants to see.
-pub fn show(ui: &mut Ui, pane: &mut CameraPane, eye: &Pose) -> Option<Pose> {
+pub(crate) fn show(ui: &mut Ui, pane: &mut CameraPane, eye: &Pose) -> Option<Pose> {
     let mut keys = pane.path.keys.clone();
     let mut wanted_change: Option<(usize, KeyChange)> = None;
     ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {

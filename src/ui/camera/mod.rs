@@ -1,7 +1,7 @@
 //! The camera pane: the keys of a path, a timeline to play and retime them, and videos of it.
 
 mod keys;
-pub mod player;
+pub(crate) mod player;
 mod timeline;
 
 use std::collections::VecDeque;
@@ -20,13 +20,13 @@ use crate::scene::{Camera, CameraPath, PathKey};
 use crate::ui::actions::Action;
 
 /// The path that is being edited, and how it is played.
-pub struct CameraPane {
+pub(crate) struct CameraPane {
     /// The path.
-    pub path: CameraPath,
+    pub(crate) path: CameraPath,
     /// How speed runs over it.
-    pub speed: Speed,
+    pub(crate) speed: Speed,
     /// What is played.
-    pub player: Player,
+    pub(crate) player: Player,
     /// The key that was chosen.
     selected: Option<usize>,
     edits: UndoHistory<CameraPath>,
@@ -37,7 +37,7 @@ pub struct CameraPane {
     /// Quality of videos, 0 to 100.
     quality: u8,
     /// Whether what was found is marked in videos.
-    pub mark: bool,
+    pub(crate) mark: bool,
     /// Flights that follow the one that is played.
     next: VecDeque<Flight>,
     /// The scene that it belongs to.
@@ -68,14 +68,14 @@ fn empty() -> CameraPath {
 
 impl CameraPane {
     /// Forgets the path of another scene.
-    pub fn on_scene(&mut self, scene: u64) {
+    pub(crate) fn on_scene(&mut self, scene: u64) {
         if self.scene != scene {
             *self = Self { scene, ..Self::default() };
         }
     }
 
     /// Plays a flight, after those that were asked for before it.
-    pub fn play_flight(&mut self, flight: Flight) {
+    pub(crate) fn play_flight(&mut self, flight: Flight) {
         self.next.push_back(flight);
         self.go_on();
     }
@@ -91,13 +91,13 @@ impl CameraPane {
     }
 
     /// The pose to show after `step_secs` of window time, if something is played.
-    pub fn tick(&mut self, step_secs: f64) -> Option<Pose> {
+    pub(crate) fn tick(&mut self, step_secs: f64) -> Option<Pose> {
         self.go_on();
         self.player.tick(step_secs)
     }
 
     /// Plays or stops; the path, if nothing else is in.
-    pub fn toggle(&mut self) {
+    pub(crate) fn toggle(&mut self) {
         if self.player.clip().is_none() {
             self.put_path_in();
         }
@@ -105,13 +105,13 @@ impl CameraPane {
     }
 
     /// One frame on or back; the pose there.
-    pub fn step(&mut self, pictures: f64) -> Option<Pose> {
+    pub(crate) fn step(&mut self, pictures: f64) -> Option<Pose> {
         let time = self.player.time + pictures / self.path.fps.max(1.0);
         self.player.seek(time)
     }
 
     /// Records the present view as a key behind the chosen one.
-    pub fn record(&mut self, pose: &Pose) {
+    pub(crate) fn record(&mut self, pose: &Pose) {
         let place = self.selected.map_or(self.path.keys.len(), |i| (i + 1).min(self.path.keys.len()));
         self.change(|path| path.keys.insert(place, pose.key()));
         self.selected = Some(place);
@@ -119,7 +119,7 @@ impl CameraPane {
     }
 
     /// Takes over a path that was read.
-    pub fn open(&mut self, path: CameraPath) {
+    pub(crate) fn open(&mut self, path: CameraPath) {
         self.change(|p| *p = path);
         self.selected = None;
         self.put_path_in();
@@ -163,7 +163,7 @@ impl CameraPane {
     }
 
     /// The cameras of a video of what is played, and how it is written; `None` if there is nothing.
-    pub fn video(&self, out: &Path, aspect: f64) -> Option<(Vec<Camera>, Settings)> {
+    pub(crate) fn video(&self, out: &Path, aspect: f64) -> Option<(Vec<Camera>, Settings)> {
         let height = self.film_height;
         let width = (((f64::from(height) * aspect) / 2.0).round().max(1.0) * 2.0) as u32;
         let clip = self.player.clip()?;
@@ -177,20 +177,26 @@ impl CameraPane {
     }
 
     /// Points along what is played, for drawing its way.
-    pub fn way(&self) -> Vec<glam::DVec3> {
+    pub(crate) fn way(&self) -> Vec<glam::DVec3> {
         let Some(clip) = self.player.clip() else { return Vec::new() };
         let last = 120;
         (0..=last).filter_map(|i| clip.at(clip.seconds() * f64::from(i) / f64::from(last))).map(|p| p.center).collect()
     }
 
     /// Places of the path's keys, and which of them is chosen.
-    pub fn key_places(&self) -> impl Iterator<Item = (glam::DVec3, bool)> + '_ {
+    pub(crate) fn key_places(&self) -> impl Iterator<Item = (glam::DVec3, bool)> + '_ {
         self.path.keys.iter().enumerate().map(|(i, k)| (k.center, self.selected == Some(i)))
     }
 
     /// Draws the pane. `eye` is the present view. The pose to show, if a user moved in time or asked
     /// for a key.
-    pub fn show(&mut self, ui: &mut Ui, state: &AppState, eye: &Pose, actions: &mut Vec<Action>) -> Option<Pose> {
+    pub(crate) fn show(
+        &mut self,
+        ui: &mut Ui,
+        state: &AppState,
+        eye: &Pose,
+        actions: &mut Vec<Action>,
+    ) -> Option<Pose> {
         self.keep_up();
         let mut wanted = None;
         ui.horizontal(|ui| self.controls(ui, actions));
@@ -323,12 +329,12 @@ impl CameraPane {
 }
 
 /// Reads a path's file; the error for the user.
-pub fn read(path: &Path) -> Result<CameraPath, String> {
+pub(crate) fn read(path: &Path) -> Result<CameraPath, String> {
     crate::io::camera_path::open(path).map_err(|e| e.to_string())
 }
 
 /// Writes a path's file, in nerfstudio's format if its name says so.
-pub fn write(file: &Path, path: &CameraPath, aspect: f64) -> Result<(), String> {
+pub(crate) fn write(file: &Path, path: &CameraPath, aspect: f64) -> Result<(), String> {
     crate::jobs::export::camera_path(file, path, aspect).map_err(|e| e.to_string())
 }
 

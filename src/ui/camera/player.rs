@@ -7,7 +7,7 @@ const COUNTED_SECS: f64 = 1.0;
 
 /// What is played.
 #[derive(Clone, Debug)]
-pub enum Clip {
+pub(crate) enum Clip {
     /// A flight to a target.
     Flight(Box<Flight>),
     /// The path that is being edited.
@@ -16,7 +16,7 @@ pub enum Clip {
 
 impl Clip {
     /// How long it runs.
-    pub fn seconds(&self) -> f64 {
+    pub(crate) fn seconds(&self) -> f64 {
         match self {
             Self::Flight(flight) => flight.seconds,
             Self::Path(spline) => spline.seconds(),
@@ -24,7 +24,7 @@ impl Clip {
     }
 
     /// The pose at a time. Between the poses of a flight the nearest is taken.
-    pub fn at(&self, time: f64) -> Option<Pose> {
+    pub(crate) fn at(&self, time: f64) -> Option<Pose> {
         match self {
             Self::Path(spline) => Some(spline.at(time)),
             Self::Flight(flight) => {
@@ -38,16 +38,16 @@ impl Clip {
 
 /// The state of playing.
 #[derive(Debug)]
-pub struct Player {
+pub(crate) struct Player {
     clip: Option<Clip>,
     /// Seconds into it.
-    pub time: f64,
+    pub(crate) time: f64,
     /// Whether it runs.
-    pub playing: bool,
+    pub(crate) playing: bool,
     /// Whether it begins again at its end.
-    pub looped: bool,
+    pub(crate) looped: bool,
     /// Speed as a multiple of the usual one.
-    pub rate: f64,
+    pub(crate) rate: f64,
     /// When frames were shown lately, window time.
     shown: Vec<f64>,
 }
@@ -60,7 +60,7 @@ impl Default for Player {
 
 impl Player {
     /// Puts a clip in, at its beginning; running if wanted.
-    pub fn load(&mut self, clip: Clip, playing: bool) {
+    pub(crate) fn load(&mut self, clip: Clip, playing: bool) {
         self.clip = Some(clip);
         self.time = 0.0;
         self.playing = playing;
@@ -68,19 +68,19 @@ impl Player {
     }
 
     /// The same path, changed: time and running stay.
-    pub fn replace(&mut self, clip: Option<Clip>) {
+    pub(crate) fn replace(&mut self, clip: Option<Clip>) {
         self.time = self.time.min(clip.as_ref().map_or(0.0, Clip::seconds));
         self.playing &= clip.is_some();
         self.clip = clip;
     }
 
     /// What is in.
-    pub fn clip(&self) -> Option<&Clip> {
+    pub(crate) fn clip(&self) -> Option<&Clip> {
         self.clip.as_ref()
     }
 
     /// Starts or stops; begins anew at the end.
-    pub fn toggle(&mut self) {
+    pub(crate) fn toggle(&mut self) {
         let Some(clip) = &self.clip else { return };
         if !self.playing && self.time >= clip.seconds() {
             self.time = 0.0;
@@ -90,7 +90,7 @@ impl Player {
     }
 
     /// Goes on by `step_secs` of window time; the pose to show, if it runs.
-    pub fn tick(&mut self, step_secs: f64) -> Option<Pose> {
+    pub(crate) fn tick(&mut self, step_secs: f64) -> Option<Pose> {
         let clip = self.clip.as_ref().filter(|_| self.playing)?;
         let seconds = clip.seconds();
         let rate = if self.rate > 0.0 { self.rate } else { 1.0 };
@@ -103,7 +103,7 @@ impl Player {
     }
 
     /// Stops and moves to a time; the pose there.
-    pub fn seek(&mut self, time: f64) -> Option<Pose> {
+    pub(crate) fn seek(&mut self, time: f64) -> Option<Pose> {
         let clip = self.clip.as_ref()?;
         self.playing = false;
         self.time = time.clamp(0.0, clip.seconds());
@@ -111,13 +111,13 @@ impl Player {
     }
 
     /// Counts a frame that was shown at this window time.
-    pub fn count(&mut self, now: f64) {
+    pub(crate) fn count(&mut self, now: f64) {
         self.shown.push(now);
         self.shown.retain(|t| now - t <= COUNTED_SECS);
     }
 
     /// Frames per second lately; `None` before anything is known.
-    pub fn rate_shown(&self) -> Option<f64> {
+    pub(crate) fn rate_shown(&self) -> Option<f64> {
         let (first, last) = (self.shown.first()?, self.shown.last()?);
         (last - first > 0.2).then(|| (self.shown.len() - 1) as f64 / (last - first))
     }

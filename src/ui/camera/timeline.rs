@@ -13,7 +13,7 @@ const HEIGHT: f32 = 26.0;
 const REACH: f32 = 7.0;
 
 /// Draws it. The pose of the time that a user chose.
-pub fn show(ui: &mut Ui, pane: &mut CameraPane) -> Option<Pose> {
+pub(crate) fn show(ui: &mut Ui, pane: &mut CameraPane) -> Option<Pose> {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), HEIGHT), Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, "Timeline"));
     let line = rect.shrink2(vec2(8.0, 0.0));

@@ -14,7 +14,7 @@ use crate::worker::ViewMode;
 use crate::worker::view::ViewPicture;
 
 /// Draws the bar at the top.
-pub fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut Vec<Action>) {
+pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         let has_scene = state.scene.is_some();
         let has_photos = state.scene.as_ref().is_some_and(|s| s.dataset.is_some());
@@ -106,7 +106,7 @@ fn item(ui: &mut Ui, enabled: bool, on: Option<bool>, action: Action, actions: &
 }
 
 /// Draws the bar at the bottom.
-pub fn status(
+pub(crate) fn status(
     ui: &mut Ui,
     state: &AppState,
     layout: &Layout,

@@ -25,7 +25,7 @@ const CAPTION: f32 = 18.0;
 
 /// The thumbnails of one scene.
 #[derive(Default)]
-pub struct PhotoThumbnails {
+pub(crate) struct PhotoThumbnails {
     scene: u64,
     loaded: BTreeMap<usize, TextureHandle>,
     waiting: HashMap<JobId, usize>,
@@ -34,7 +34,7 @@ pub struct PhotoThumbnails {
 
 impl PhotoThumbnails {
     /// Takes over what was loaded since.
-    pub fn update(&mut self, ctx: &egui::Context, state: &mut AppState) {
+    pub(crate) fn update(&mut self, ctx: &egui::Context, state: &mut AppState) {
         if self.scene != state.scene_number {
             *self = Self { scene: state.scene_number, ..Self::default() };
         }
@@ -80,7 +80,7 @@ impl PhotoThumbnails {
     }
 
     /// Draws the pane.
-    pub fn show(
+    pub(crate) fn show(
         &mut self,
         ui: &mut Ui,
         state: &AppState,

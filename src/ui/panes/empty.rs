@@ -12,7 +12,7 @@ use crate::ui::actions::Action;
 use crate::worker::JobKind;
 
 /// Draws the first page.
-pub fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
+pub(crate) fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     if let Some(job) = &state.job {
         return busy(ui, job, actions);
     }

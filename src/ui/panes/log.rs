@@ -6,7 +6,7 @@ use super::super::state::AppState;
 use super::super::theme;
 
 /// Draws the log, newest line at the bottom.
-pub fn show(ui: &mut Ui, state: &AppState) {
+pub(crate) fn show(ui: &mut Ui, state: &AppState) {
     ui.horizontal(|ui| {
         ui.label(RichText::new("Log").strong());
         ui.weak(format!("{} lines", state.log.len()));

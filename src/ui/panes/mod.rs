@@ -1,13 +1,13 @@
 //! One file per part of the window.
 
-pub mod bars;
-pub mod dataset;
-pub mod empty;
-pub mod log;
-pub mod models;
-pub mod object_thumbnails;
-pub mod objects;
-pub mod plan;
-pub mod plots;
-pub mod report;
-pub mod training;
+pub(crate) mod bars;
+pub(crate) mod dataset;
+pub(crate) mod empty;
+pub(crate) mod log;
+pub(crate) mod models;
+pub(crate) mod object_thumbnails;
+pub(crate) mod objects;
+pub(crate) mod plan;
+pub(crate) mod plots;
+pub(crate) mod report;
+pub(crate) mod training;

@@ -12,14 +12,14 @@ use crate::worker::{Command, Worker};
 
 /// Which list of models was asked for.
 #[derive(Default)]
-pub struct Models {
+pub(crate) struct Models {
     /// Models that were installed when it was; asked for anew when that changes.
     asked: Option<u64>,
 }
 
 impl Models {
     /// Draws the pane.
-    pub fn show(
+    pub(crate) fn show(
         &mut self,
         ui: &mut Ui,
         state: &AppState,

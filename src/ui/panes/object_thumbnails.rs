@@ -15,7 +15,7 @@ const COLUMNS: usize = 16;
 
 /// ObjectThumbnails of what is on screen.
 #[derive(Default)]
-pub struct ObjectThumbnails {
+pub(crate) struct ObjectThumbnails {
     /// Whether any was to be shown since they were last looked after.
     used: Cell<bool>,
     /// What they were asked for.
@@ -26,7 +26,7 @@ pub struct ObjectThumbnails {
 
 impl ObjectThumbnails {
     /// Asks for them if objects and parts have changed, and takes them over once they are drawn.
-    pub fn update(
+    pub(crate) fn update(
         &mut self,
         ctx: &egui::Context,
         state: &mut AppState,
@@ -58,7 +58,7 @@ impl ObjectThumbnails {
     }
 
     /// Draws the thumbnail of an identity, `side` points wide; an empty place while there is none.
-    pub fn show(&self, ui: &mut Ui, id: IdentityId, side: f32) {
+    pub(crate) fn show(&self, ui: &mut Ui, id: IdentityId, side: f32) {
         self.used.set(true);
         let (rect, _) = ui.allocate_exact_size(vec2(side, side), egui::Sense::hover());
         let Some((of, texture, rows)) = &self.shown else { return };

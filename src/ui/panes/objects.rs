@@ -16,7 +16,7 @@ use crate::ui::actions::Action;
 const THUMBNAIL_PX: f32 = 30.0;
 
 /// Draws the pane.
-pub fn show(
+pub(crate) fn show(
     ui: &mut Ui,
     state: &AppState,
     object_thumbnails: &ObjectThumbnails,

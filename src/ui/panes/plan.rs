@@ -10,7 +10,7 @@ use crate::scene::{Overrides, ScenePlan};
 const AUTO: &str = "auto";
 
 /// Draws the plan, one decision after another; choices change `overrides`.
-pub fn show(ui: &mut Ui, plan: &ScenePlan, overrides: &mut Overrides) {
+pub(crate) fn show(ui: &mut Ui, plan: &ScenePlan, overrides: &mut Overrides) {
     for line in &plan.lines {
         egui::Frame::new().inner_margin(egui::Margin::symmetric(0, 2)).show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 2.0;

@@ -13,7 +13,7 @@ use crate::worker::JobKind;
 
 /// Draws the pane.
 /// Curves of a report stand beside this training's.
-pub fn show(ui: &mut Ui, state: &AppState, layout: &mut Layout, curves: &[Curve], actions: &mut Vec<Action>) {
+pub(crate) fn show(ui: &mut Ui, state: &AppState, layout: &mut Layout, curves: &[Curve], actions: &mut Vec<Action>) {
     let Some(scene) = &state.scene else { return };
     let Some(dataset) = &scene.dataset else {
         ui.add_space(6.0);

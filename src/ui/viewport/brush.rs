@@ -18,9 +18,9 @@ const SAME_COLOR: u8 = 14;
 const PAINT: [u8; 3] = [255, 60, 200];
 
 /// What is being marked.
-pub struct Brush {
+pub(crate) struct Brush {
     /// Whose piece it will be; of no one, an object.
-    pub of: IdentityId,
+    pub(crate) of: IdentityId,
     name: String,
     radius_px: f32,
     /// The view that is painted on.
@@ -32,13 +32,13 @@ pub struct Brush {
 
 impl Brush {
     /// An empty brush for a piece of `of`.
-    pub fn new(of: IdentityId) -> Self {
+    pub(crate) fn new(of: IdentityId) -> Self {
         let mask = Mask::empty(0, 0);
         Self { of, name: String::new(), radius_px: 12.0, camera: None, mask, changed: false, texture: None }
     }
 
     /// Starts over if the view has changed: paint lies on one view.
-    pub fn on_view(&mut self, camera: &Camera) {
+    pub(crate) fn on_view(&mut self, camera: &Camera) {
         if self.camera.as_ref() != Some(camera) {
             self.mask = Mask::empty(camera.width_px as usize, camera.height_px as usize);
             self.camera = Some(camera.clone());
@@ -47,7 +47,7 @@ impl Brush {
     }
 
     /// Paints a dab around a pixel.
-    pub fn dab(&mut self, at: [f32; 2], scale: f32) {
+    pub(crate) fn dab(&mut self, at: [f32; 2], scale: f32) {
         let (w, h) = (self.mask.width_px() as i64, self.mask.height_px() as i64);
         let r = (self.radius_px * scale).max(1.0);
         let reach = r.ceil() as i64;
@@ -63,7 +63,7 @@ impl Brush {
     }
 
     /// Marks what hangs together with a pixel in color and belongs to the same whole.
-    pub fn flood(&mut self, at: [usize; 2], rgb: &[[u8; 3]], map: &ViewMap, identities: &Identities) {
+    pub(crate) fn flood(&mut self, at: [usize; 2], rgb: &[[u8; 3]], map: &ViewMap, identities: &Identities) {
         let (w, h) = (self.mask.width_px(), self.mask.height_px());
         if rgb.len() != w * h || map.identity.len() != w * h || at[0] >= w || at[1] >= h {
             return;
@@ -93,7 +93,7 @@ impl Brush {
     }
 
     /// The paint, over the frame in `rect`.
-    pub fn paint(&mut self, ui: &Ui, rect: Rect) {
+    pub(crate) fn paint(&mut self, ui: &Ui, rect: Rect) {
         if std::mem::take(&mut self.changed) {
             let size = [self.mask.width_px(), self.mask.height_px()];
             let pixel = |i| {
@@ -119,7 +119,7 @@ impl Brush {
     }
 
     /// The controls.
-    pub fn show(&mut self, ui: &Ui, rect: Rect, identities: &Identities, actions: &mut Vec<Action>) {
+    pub(crate) fn show(&mut self, ui: &Ui, rect: Rect, identities: &Identities, actions: &mut Vec<Action>) {
         let at = Align2::CENTER_BOTTOM.pos_in_rect(&rect.shrink(44.0));
         let area = Area::new(Id::unique("brush")).order(Order::Foreground).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
         area.show(ui.ctx(), |ui| {
@@ -152,7 +152,7 @@ impl Brush {
     }
 
     /// The edit that adds what is marked; `None` if nothing is.
-    pub fn request(&self) -> Option<EditRequest> {
+    pub(crate) fn request(&self) -> Option<EditRequest> {
         let camera = self.camera.clone().filter(|_| !self.mask.is_empty())?;
         let (of, name, mask) = (self.of, self.name.trim().to_owned(), self.mask.clone());
         Some(EditRequest::Paint { of, name, camera: Box::new(camera), mask })

@@ -11,15 +11,15 @@ const POLE_RAD: f64 = 0.03;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Eye {
     /// Position in the world.
-    pub center: DVec3,
+    pub(crate) center: DVec3,
     /// Columns: right, down, forward in the world.
-    pub world_from_eye: DMat3,
+    pub(crate) world_from_eye: DMat3,
     /// What orbiting turns about.
-    pub pivot: DVec3,
+    pub(crate) pivot: DVec3,
     /// Upwards in the world, unit length.
-    pub up: DVec3,
+    pub(crate) up: DVec3,
     /// Vertical field of view in radians.
-    pub fov_y_rad: f64,
+    pub(crate) fov_y_rad: f64,
 }
 
 impl Eye {
@@ -30,7 +30,7 @@ impl Eye {
     }
 
     /// The eye of a photo's camera, with `pivot` to turn about.
-    pub fn of_camera(camera: &Camera, pivot: DVec3, up: DVec3) -> Self {
+    pub(crate) fn of_camera(camera: &Camera, pivot: DVec3, up: DVec3) -> Self {
         Self {
             center: camera.center,
             world_from_eye: camera.world_from_camera,
@@ -46,18 +46,18 @@ impl Eye {
     }
 
     /// Unit vector of the viewing direction.
-    pub fn forward(&self) -> DVec3 {
+    pub(crate) fn forward(&self) -> DVec3 {
         self.world_from_eye.z_axis
     }
 
     /// Distance to the pivot, never 0.
-    pub fn distance(&self) -> f64 {
+    pub(crate) fn distance(&self) -> f64 {
         self.center.distance(self.pivot).max(1e-9)
     }
 
     /// Turns about the pivot: `yaw_rad` about the up direction, `pitch_rad` about the eye's right
     /// axis, stopping short of the poles.
-    pub fn orbit(&mut self, yaw_rad: f64, pitch_rad: f64) {
+    pub(crate) fn orbit(&mut self, yaw_rad: f64, pitch_rad: f64) {
         let from_up = self.forward().dot(self.up).clamp(-1.0, 1.0).acos();
         // Positive pitch lifts the viewing direction toward up.
         let lowest = (from_up - (std::f64::consts::PI - POLE_RAD)).min(0.0);
@@ -71,7 +71,7 @@ impl Eye {
 
     /// Moves eye and pivot in the frame plane so that what is at the pivot's depth follows the
     /// cursor.
-    pub fn pan(&mut self, delta_px: DVec2, height_px: f64) {
+    pub(crate) fn pan(&mut self, delta_px: DVec2, height_px: f64) {
         let depth = (self.pivot - self.center).dot(self.forward()).abs().max(0.05 * self.distance());
         let per_px = 2.0 * depth * (0.5 * self.fov_y_rad).tan() / height_px.max(1.0);
         let shift = self.world_from_eye * DVec3::new(-delta_px.x, -delta_px.y, 0.0) * per_px;
@@ -81,12 +81,12 @@ impl Eye {
 
     /// Moves toward `target` so that its distance is multiplied by `factor` (under 1: nearer).
     /// The target stays where it is in the frame.
-    pub fn zoom(&mut self, target: DVec3, factor: f64) {
+    pub(crate) fn zoom(&mut self, target: DVec3, factor: f64) {
         self.center = target + (self.center - target) * factor.clamp(0.05, 20.0);
     }
 
     /// Flies: `motion` is in eye axes (right, up, forward), in scene units. The pivot comes along.
-    pub fn fly(&mut self, motion: DVec3) {
+    pub(crate) fn fly(&mut self, motion: DVec3) {
         let shift = self.world_from_eye * DVec3::new(motion.x, -motion.y, motion.z);
         self.center += shift;
         self.pivot += shift;
@@ -94,14 +94,14 @@ impl Eye {
 
     /// Moves back or forth along the viewing direction until `bounds` fills the view, and turns
     /// about its middle from then on.
-    pub fn frame(&mut self, bounds: &Bounds) {
+    pub(crate) fn frame(&mut self, bounds: &Bounds) {
         self.pivot = bounds.center();
         self.center = self.pivot - self.forward() * HomeView::distance(bounds, self.fov_y_rad);
     }
 
     /// The first view of a scene: from its first camera if it has one, else framed as a whole; upright if the user
     /// chose what is up.
-    pub fn home(home: &HomeView, up: Option<DVec3>) -> Self {
+    pub(crate) fn home(home: &HomeView, up: Option<DVec3>) -> Self {
         let mut eye = match &home.camera {
             Some(c) => {
                 let mut eye = Self::of_camera(c, home.bounds.center(), home.up);
@@ -117,7 +117,7 @@ impl Eye {
     }
 
     /// The point at a relative position of a view of this height by width, as far away as the pivot.
-    pub fn point_at_pivot_depth(&self, at: DVec2, aspect: f64) -> DVec3 {
+    pub(crate) fn point_at_pivot_depth(&self, at: DVec2, aspect: f64) -> DVec3 {
         let camera = self.camera(1000, (1000.0 * aspect).max(1.0) as u32);
         let ray = camera.ray(at * DVec2::new(f64::from(camera.width_px), f64::from(camera.height_px)));
         let depth = (self.pivot - self.center).dot(self.forward()).abs().max(0.05 * self.distance());
@@ -125,7 +125,7 @@ impl Eye {
     }
 
     /// Chooses another up direction and turns upright.
-    pub fn set_up(&mut self, up: DVec3) {
+    pub(crate) fn set_up(&mut self, up: DVec3) {
         self.up = up;
         self.look_along(self.forward());
     }

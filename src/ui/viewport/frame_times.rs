@@ -16,7 +16,7 @@ type Stage = (&'static str, f64);
 
 /// Times of the newest frames, kept while they are shown.
 #[derive(Default)]
-pub struct FrameTimes {
+pub(crate) struct FrameTimes {
     frames: VecDeque<Vec<Stage>>,
     /// Of the maps of what pixels belong to, drawn when the eye rests.
     maps: VecDeque<f64>,
@@ -27,7 +27,7 @@ pub struct FrameTimes {
 
 impl FrameTimes {
     /// Takes a frame in, whose pixels took `upload_secs` to become a texture.
-    pub fn add(&mut self, picture: &ViewPicture, upload_secs: f64) {
+    pub(crate) fn add(&mut self, picture: &ViewPicture, upload_secs: f64) {
         self.drawn_by.clone_from(&picture.drawn_by);
         self.has_stages = !picture.stages.is_empty();
         let mut stages = picture.stages.clone();
@@ -40,7 +40,7 @@ impl FrameTimes {
     }
 
     /// Takes in what drawing the maps took.
-    pub fn add_maps(&mut self, secs: f64) {
+    pub(crate) fn add_maps(&mut self, secs: f64) {
         push(&mut self.maps, secs);
     }
 
@@ -58,7 +58,7 @@ impl FrameTimes {
     }
 
     /// Draws the table.
-    pub fn show(&self, ui: &mut Ui) {
+    pub(crate) fn show(&self, ui: &mut Ui) {
         let small = |text: &str| RichText::new(text).small();
         let rows = self.rows();
         if rows.is_empty() {

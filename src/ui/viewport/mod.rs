@@ -1,18 +1,18 @@
 //! The viewport: shows what the drawing lane rendered, and moves the eye.
 
-pub mod brush;
+pub(crate) mod brush;
 mod display;
 pub mod eye;
-pub mod frame_times;
+pub(crate) mod frame_times;
 mod frusta;
 mod input;
 mod overlay;
-pub mod overrides;
+pub(crate) mod overrides;
 mod photo;
-pub mod query;
+pub(crate) mod query;
 mod request;
 mod route;
-pub mod visible;
+pub(crate) mod visible;
 
 use std::sync::Arc;
 
@@ -65,9 +65,9 @@ pub struct Viewport {
     /// What was asked, and where the answers are.
     pub queries: Queries,
     /// What is left out of the frame.
-    pub visibility: Visibility,
+    pub(crate) visibility: Visibility,
     /// What is being marked by hand.
-    pub brush: Option<Brush>,
+    pub(crate) brush: Option<Brush>,
     /// Render settings in place of the scene's own.
     pub overrides: RenderOverrides,
     /// World point that the wheel zooms to, while the cursor stays.
@@ -76,7 +76,7 @@ pub struct Viewport {
 
 impl Viewport {
     /// An empty viewport. Fails only if the system gives no thread.
-    pub fn new(repaint: Repaint) -> std::io::Result<Self> {
+    pub(crate) fn new(repaint: Repaint) -> std::io::Result<Self> {
         let home = crate::scene::HomeView::default();
         Ok(Self {
             lane: ViewLane::start(repaint)?,
@@ -113,14 +113,14 @@ impl Viewport {
     }
 
     /// The frame as pixels, for saving.
-    pub fn pixels(&self) -> Option<PhotoPixels> {
+    pub(crate) fn pixels(&self) -> Option<PhotoPixels> {
         let p = self.picture()?;
         let (width_px, height_px) = (p.camera.width_px, p.camera.height_px);
         Some(PhotoPixels { width_px, height_px, rgb: p.rgb.clone(), coverage: None })
     }
 
     /// Takes over a new scene, new Gaussians and loaded photos.
-    pub fn update(&mut self, state: &mut AppState, worker: &Worker) {
+    pub(crate) fn update(&mut self, state: &mut AppState, worker: &Worker) {
         if let Some(scene) = state.scene.as_ref().filter(|_| state.scene_number != self.scene) {
             self.scene = state.scene_number;
             self.photo = None;
@@ -150,7 +150,7 @@ impl Viewport {
     }
 
     /// Does what a user asked of the view.
-    pub fn act(&mut self, action: &Action, state: &AppState, worker: &Worker, now: f64) {
+    pub(crate) fn act(&mut self, action: &Action, state: &AppState, worker: &Worker, now: f64) {
         let Some(scene) = state.scene.clone() else { return };
         let photos = scene.dataset.as_ref().map_or(0, |d| d.photos.len());
         let here = self.photo_index();
@@ -203,7 +203,7 @@ impl Viewport {
     }
 
     /// Where the eye is.
-    pub fn pose(&self) -> Pose {
+    pub(crate) fn pose(&self) -> Pose {
         let (center, world_from_camera) = (self.eye.center, self.eye.world_from_eye);
         let fov_y_rad = match &self.photo {
             Some(photo) => photo.free_fov(self.eye.fov_y_rad),
@@ -213,22 +213,22 @@ impl Viewport {
     }
 
     /// The camera of the newest frame, or one of the eye.
-    pub fn camera(&self) -> Camera {
+    pub(crate) fn camera(&self) -> Camera {
         self.picture().map_or_else(|| self.eye.camera(640, 480), |p| p.camera.clone())
     }
 
     /// Width by height of the frame.
-    pub fn aspect(&self) -> f64 {
+    pub(crate) fn aspect(&self) -> f64 {
         self.picture().map_or(16.0 / 9.0, |p| f64::from(p.camera.width_px) / f64::from(p.camera.height_px))
     }
 
     /// Which way is up in a scene.
-    pub fn up(&self, scene: &OpenedScene) -> DVec3 {
+    pub(crate) fn up(&self, scene: &OpenedScene) -> DVec3 {
         self.up.unwrap_or(scene.home.up)
     }
 
     /// Puts the eye into a pose.
-    pub fn stand(&mut self, pose: &Pose, state: &AppState, now: f64) {
+    pub(crate) fn stand(&mut self, pose: &Pose, state: &AppState, now: f64) {
         let Some(scene) = state.scene.clone() else { return };
         self.photo = None;
         // What it turns about stays ahead, at the distance that it has.
@@ -245,12 +245,12 @@ impl Viewport {
     }
 
     /// Turns about this point from now on.
-    pub fn turn_about(&mut self, point: DVec3) {
+    pub(crate) fn turn_about(&mut self, point: DVec3) {
         self.eye.pivot = point;
     }
 
     /// Whether a frame has come since this was asked last.
-    pub fn take_new_picture(&mut self) -> bool {
+    pub(crate) fn take_new_picture(&mut self) -> bool {
         self.display.take_new()
     }
 
@@ -262,7 +262,7 @@ impl Viewport {
     }
 
     /// Draws the viewport into all that is left of `ui`.
-    pub fn show(
+    pub(crate) fn show(
         &mut self,
         ui: &mut Ui,
         state: &AppState,
@@ -372,7 +372,7 @@ impl Viewport {
     }
 
     /// Whether a GPU draws the view.
-    pub fn on_gpu(&self) -> bool {
+    pub(crate) fn on_gpu(&self) -> bool {
         self.display.picture().is_some_and(|p| p.drawn_by != Renderer::CPU)
     }
 

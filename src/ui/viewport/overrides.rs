@@ -9,16 +9,16 @@ use crate::render::{Cutoffs, RenderSettings};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RenderOverrides {
     /// Highest spherical-harmonics degree.
-    pub sh_degree: Option<u8>,
+    pub(crate) sh_degree: Option<u8>,
     /// The 2-D filter of Mip-Splatting.
     pub antialias: Option<bool>,
     /// What counts as too little to be drawn.
-    pub cutoffs: Option<Cutoffs>,
+    pub(crate) cutoffs: Option<Cutoffs>,
 }
 
 impl RenderOverrides {
     /// These settings over others. A GPU has its own cut-offs and keeps to them.
-    pub fn over(&self, settings: RenderSettings, on_gpu: bool) -> RenderSettings {
+    pub(crate) fn over(&self, settings: RenderSettings, on_gpu: bool) -> RenderSettings {
         RenderSettings {
             sh_degree: self.sh_degree.unwrap_or(settings.sh_degree),
             antialias: self.antialias.unwrap_or(settings.antialias),
@@ -28,7 +28,7 @@ impl RenderOverrides {
     }
 
     /// Why these settings make no frame, if they do not.
-    pub fn problem(&self) -> Option<&'static str> {
+    pub(crate) fn problem(&self) -> Option<&'static str> {
         let share = |v: f64| (1e-9..1.0).contains(&v);
         match self {
             Self { sh_degree: Some(4..), .. } => Some("there is no such spherical-harmonics degree"),
@@ -40,7 +40,7 @@ impl RenderOverrides {
     }
 
     /// What is different, for the user; `None` if nothing is.
-    pub fn words(&self) -> Option<String> {
+    pub(crate) fn words(&self) -> Option<String> {
         let degree = self.sh_degree.map(|d| format!("SH degree {d}"));
         let filter = self.antialias.map(|on| format!("filter {}", if on { "on" } else { "off" }));
         let cutoffs = self.cutoffs.map(|c| format!("cutoffs {} and {}", share(c.alpha), share(c.transmittance)));

@@ -10,7 +10,7 @@ use crate::jobs::go_to::Explored;
 
 impl Viewport {
     /// Draws the way that is played, the keys of the path, and the keypoints of the scene.
-    pub fn show_route(&self, ui: &Ui, rect: Rect, pane: &CameraPane, explored: Option<&Explored>) {
+    pub(crate) fn show_route(&self, ui: &Ui, rect: Rect, pane: &CameraPane, explored: Option<&Explored>) {
         let painter = ui.painter_at(rect);
         let eye = self.overlay_camera(rect);
         let place = |p: DVec3| eye.project(p).map(|q| pos2(rect.left() + q.x as f32, rect.top() + q.y as f32));

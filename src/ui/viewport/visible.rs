@@ -8,7 +8,7 @@ use crate::worker::Versioned;
 
 /// What of a scene is drawn.
 #[derive(Clone, Debug, Default)]
-pub struct Visibility {
+pub(crate) struct Visibility {
     hidden: BTreeSet<IdentityId>,
     only: Option<IdentityId>,
     /// The Gaussians that are left, with what they were made from.
@@ -24,27 +24,27 @@ struct Left {
 
 impl Visibility {
     /// Whether anything is left out.
-    pub fn is_partial(&self) -> bool {
+    pub(crate) fn is_partial(&self) -> bool {
         self.only.is_some() || !self.hidden.is_empty()
     }
 
     /// Whether an identity was hidden itself.
-    pub fn is_hidden(&self, id: IdentityId) -> bool {
+    pub(crate) fn is_hidden(&self, id: IdentityId) -> bool {
         self.hidden.contains(&id)
     }
 
     /// Identities that were hidden themselves.
-    pub fn hidden(&self) -> impl Iterator<Item = IdentityId> + '_ {
+    pub(crate) fn hidden(&self) -> impl Iterator<Item = IdentityId> + '_ {
         self.hidden.iter().copied()
     }
 
     /// Hides these and no others.
-    pub fn set_hidden(&mut self, ids: impl IntoIterator<Item = IdentityId>) {
+    pub(crate) fn set_hidden(&mut self, ids: impl IntoIterator<Item = IdentityId>) {
         *self = Self { hidden: ids.into_iter().collect(), ..Self::default() };
     }
 
     /// Hides an identity, or shows it again.
-    pub fn toggle(&mut self, id: IdentityId) {
+    pub(crate) fn toggle(&mut self, id: IdentityId) {
         if !self.hidden.remove(&id) {
             self.hidden.insert(id);
         }
@@ -52,12 +52,12 @@ impl Visibility {
     }
 
     /// Shows one identity alone; `None` shows all.
-    pub fn isolate(&mut self, only: Option<IdentityId>) {
+    pub(crate) fn isolate(&mut self, only: Option<IdentityId>) {
         *self = Self { only, ..Self::default() };
     }
 
     /// The Gaussians to draw and what they belong to.
-    pub fn apply(
+    pub(crate) fn apply(
         &mut self,
         cloud: &Versioned<GaussianCloud>,
         semantics: &Versioned<SemanticMap>,

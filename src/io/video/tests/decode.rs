@@ -12,18 +12,18 @@ use openh264::formats::YUVSource;
 use super::super::Format;
 
 /// A video as a decoder sees it.
-pub struct Decoded {
+pub(crate) struct Decoded {
     /// Width and height in px.
-    pub size_px: (u32, u32),
+    pub(crate) size_px: (u32, u32),
     /// Frames as RGB.
-    pub frames: Vec<Vec<u8>>,
+    pub(crate) frames: Vec<Vec<u8>>,
     /// Playing time, where the format has times.
-    pub secs: Option<f64>,
+    pub(crate) secs: Option<f64>,
     /// Bytes on disk.
-    pub bytes: u64,
+    pub(crate) bytes: u64,
 }
 
-pub fn decode(path: &Path, format: Format) -> Decoded {
+pub(crate) fn decode(path: &Path, format: Format) -> Decoded {
     match format {
         Format::Mp4 => mp4(&fs::read(path).expect("read")),
         Format::Gif => gif(&fs::read(path).expect("read")),

@@ -10,13 +10,13 @@ use crate::scene::Mask;
 
 /// Intersection and union so far, px.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Pool {
+pub(crate) struct Pool {
     intersection: usize,
     union: usize,
 }
 
 /// Compares all categories of a view; `pool` goes from view to view.
-pub fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>, pool: &mut Pool) -> Vec<Unit> {
+pub(crate) fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>, pool: &mut Pool) -> Vec<Unit> {
     let mut units = Vec::new();
     for category in &view.categories {
         // One target per query, the best.

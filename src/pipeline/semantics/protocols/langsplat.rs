@@ -17,7 +17,7 @@ const MAJORITY: usize = 3;
 const CUT: f32 = 0.4;
 
 /// Compares all categories of a view.
-pub fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>) -> Vec<Unit> {
+pub(crate) fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>) -> Vec<Unit> {
     let (w, h) = (view.exact.width_px, view.exact.height_px);
     let identities = &scene.map.identities;
     let one = |category: &super::Category| {

@@ -4,7 +4,7 @@ use super::{AskedScene, Category, LabeledView, Unit, means};
 use crate::scene::Level;
 
 /// Asks for all categories of a view.
-pub fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>) -> Vec<Unit> {
+pub(crate) fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>) -> Vec<Unit> {
     let unit = |c: &Category| {
         let mask = (scene.ask)(&c.name).map(|a| a.mask(view.exact, &scene.map.identities, 1));
         c.unit(view.name, mask.map_or(0.0, |m| m.iou(&c.mask)), None)
@@ -13,7 +13,7 @@ pub fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>) -> Vec<Unit> 
 }
 
 /// Mean IoU of objects and of parts; NaN where there are none.
-pub fn by_level(units: &[Unit]) -> [f64; 2] {
+pub(crate) fn by_level(units: &[Unit]) -> [f64; 2] {
     [Level::Object, Level::Part].map(|level| {
         let of_level: Vec<Unit> = units.iter().filter(|u| u.level == level).cloned().collect();
         means(&of_level).0

@@ -5,13 +5,13 @@
 
 #[cfg(test)]
 mod by_hand;
-pub mod fastlgs_ex;
-pub mod langsplat;
-pub mod masks;
-pub mod multi_class;
-pub mod part_recall;
-pub mod selection_3d;
-pub mod spin_nerf;
+pub(crate) mod fastlgs_ex;
+pub(crate) mod langsplat;
+pub(crate) mod masks;
+pub(crate) mod multi_class;
+pub(crate) mod part_recall;
+pub(crate) mod selection_3d;
+pub(crate) mod spin_nerf;
 
 use std::collections::BTreeMap;
 
@@ -22,64 +22,64 @@ use super::view_map::ViewMap;
 use crate::scene::{Camera, Level, Mask, PixelBox, SemanticMap};
 
 /// A scene that is asked.
-pub struct AskedScene<'a> {
+pub(crate) struct AskedScene<'a> {
     /// What it consists of.
-    pub map: &'a SemanticMap,
+    pub(crate) map: &'a SemanticMap,
     /// Answers a phrase; `None` for one with nothing in it.
-    pub ask: &'a mut dyn FnMut(&str) -> Option<QueryAnswer>,
+    pub(crate) ask: &'a mut dyn FnMut(&str) -> Option<QueryAnswer>,
 }
 
 /// A labeled view of it.
-pub struct LabeledView<'a> {
+pub(crate) struct LabeledView<'a> {
     /// The photo's name.
-    pub name: &'a str,
+    pub(crate) name: &'a str,
     /// From where.
-    pub camera: &'a Camera,
+    pub(crate) camera: &'a Camera,
     /// What its pixels belong to.
-    pub exact: &'a ViewMap,
+    pub(crate) exact: &'a ViewMap,
     /// Its blended codes.
-    pub blended: &'a CodeMap,
+    pub(crate) blended: &'a CodeMap,
     /// Labels, of the view's size.
-    pub categories: Vec<Category>,
+    pub(crate) categories: Vec<Category>,
 }
 
 /// All regions of one name in a view.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Category {
+pub(crate) struct Category {
     /// The name, as asked for: "button of the red controller".
-    pub name: String,
+    pub(crate) name: String,
     /// A part, if it is a piece of something that has a name.
-    pub level: Level,
+    pub(crate) level: Level,
     /// Its pixels.
-    pub mask: Mask,
+    pub(crate) mask: Mask,
     /// Box of each region.
-    pub boxes: Vec<PixelBox>,
+    pub(crate) boxes: Vec<PixelBox>,
 }
 
 impl Category {
     /// A comparison of it in the photo `view`.
-    pub fn unit(&self, view: &str, iou: f64, hit: Option<bool>) -> Unit {
+    pub(crate) fn unit(&self, view: &str, iou: f64, hit: Option<bool>) -> Unit {
         Unit { view: view.to_owned(), query: self.name.clone(), level: self.level, iou, hit }
     }
 }
 
 /// One compared category of a view.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct Unit {
+pub(crate) struct Unit {
     /// The photo.
-    pub view: String,
+    pub(crate) view: String,
     /// The category.
-    pub query: String,
+    pub(crate) query: String,
     /// Whether that is an object or a part.
-    pub level: Level,
+    pub(crate) level: Level,
     /// Intersection over union.
-    pub iou: f64,
+    pub(crate) iou: f64,
     /// Whether the point of largest relevancy is on it, where the protocol asks that.
-    pub hit: Option<bool>,
+    pub(crate) hit: Option<bool>,
 }
 
 /// The labels of a view by name: regions of one name together. A piece is called "X of the Y".
-pub fn categories(labels: &[FoundMask]) -> Vec<Category> {
+pub(crate) fn categories(labels: &[FoundMask]) -> Vec<Category> {
     let mut all: BTreeMap<String, Category> = BTreeMap::new();
     for label in labels {
         let Some(name) = &label.name else { continue };
@@ -98,7 +98,7 @@ pub fn categories(labels: &[FoundMask]) -> Vec<Category> {
 }
 
 /// Mean IoU of all units (micro), and of the views' means (macro); NaN without any.
-pub fn means(units: &[Unit]) -> (f64, f64) {
+pub(crate) fn means(units: &[Unit]) -> (f64, f64) {
     let mut views: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
     units.iter().for_each(|u| views.entry(&u.view).or_default().push(u.iou));
     let of = |v: &[f64]| crate::math::stats::mean(v);

@@ -5,7 +5,7 @@ use super::{AskedScene, LabeledView, Unit};
 use crate::scene::Mask;
 
 /// Compares all classes of a view: by their own masks, and by the arg-max of relevancy.
-pub fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>, classes: &[String]) -> [Vec<Unit>; 2] {
+pub(crate) fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>, classes: &[String]) -> [Vec<Unit>; 2] {
     let (w, h) = (view.exact.width_px, view.exact.height_px);
     let identities = &scene.map.identities;
     let answers: Vec<_> = classes.iter().map(|c| (scene.ask)(c)).collect();

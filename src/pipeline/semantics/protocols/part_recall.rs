@@ -10,24 +10,24 @@ use crate::pipeline::semantics::query_engine::ask_by_embedding;
 use crate::scene::{Identities, LanguageFeatures, Level, Mask, SemanticMap};
 
 /// IoU from which a query counts as answered.
-pub const HIT_IOU: f64 = 0.5;
+pub(crate) const HIT_IOU: f64 = 0.5;
 
 /// What is switched on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-pub struct Components {
+pub(crate) struct Components {
     /// Parts are extracted, not objects alone.
-    pub extraction: bool,
+    pub(crate) extraction: bool,
     /// Parts' features are moved towards their objects'.
-    pub deviation: bool,
+    pub(crate) deviation: bool,
     /// Localization in the paper's two steps.
-    pub localization: bool,
+    pub(crate) localization: bool,
     /// Instead of those, part and whole at once, which is this program's default.
-    pub joint: bool,
+    pub(crate) joint: bool,
 }
 
 impl Components {
     /// The paper's rows, in its order, and this program's.
-    pub const ROWS: [Self; 5] = [
+    pub(crate) const ROWS: [Self; 5] = [
         Self::of(false, false, false, false),
         Self::of(true, false, false, false),
         Self::of(true, true, false, false),
@@ -54,17 +54,17 @@ impl Components {
 
 /// One row of the table.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct Row {
+pub(crate) struct Row {
     /// What was switched on.
-    pub components: Components,
+    pub(crate) components: Components,
     /// Share of part queries with an IoU of [`HIT_IOU`] or more.
-    pub recall: f64,
+    pub(crate) recall: f64,
     /// Mean IoU of the part queries.
-    pub mean_iou: f64,
+    pub(crate) mean_iou: f64,
     /// Mean time of a query, its text's encoding included, seconds.
-    pub mean_secs: f64,
+    pub(crate) mean_secs: f64,
     /// All queries.
-    pub units: Vec<Unit>,
+    pub(crate) units: Vec<Unit>,
 }
 
 /// Asks for every part of the `views` by its phrase and compares, for one row of the table. `encode`
@@ -72,7 +72,7 @@ pub struct Row {
 ///
 /// # Errors
 /// What `encode` fails with.
-pub fn row<E>(
+pub(crate) fn row<E>(
     components: Components,
     map: &SemanticMap,
     language: &LanguageFeatures,

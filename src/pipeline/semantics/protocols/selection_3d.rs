@@ -13,7 +13,7 @@ const CUT: f32 = 0.7;
 ///
 /// # Errors
 /// If the view cannot be drawn.
-pub fn compare(
+pub(crate) fn compare(
     scene: &mut AskedScene<'_>,
     view: &LabeledView<'_>,
     cloud: &GaussianCloud,
@@ -39,6 +39,6 @@ pub fn compare(
 }
 
 /// Share of units with at least this IoU; NaN without any.
-pub fn accuracy(units: &[Unit], least: f64) -> f64 {
+pub(crate) fn accuracy(units: &[Unit], least: f64) -> f64 {
     units.iter().filter(|u| u.iou >= least).count() as f64 / units.len() as f64
 }

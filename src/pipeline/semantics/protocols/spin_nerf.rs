@@ -5,19 +5,19 @@ use super::{AskedScene, LabeledView, Unit};
 use crate::scene::Mask;
 
 /// Size at which masks are compared, px.
-pub const SIZE: [usize; 2] = [1_008, 567];
+pub(crate) const SIZE: [usize; 2] = [1_008, 567];
 
 /// A compared view.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct Foreground {
+pub(crate) struct Foreground {
     /// With its IoU.
-    pub unit: Unit,
+    pub(crate) unit: Unit,
     /// Share of all pixels that are right.
-    pub accuracy: f64,
+    pub(crate) accuracy: f64,
 }
 
 /// Compares the one category of a view with the answer to `query`; `None` if the view has no labels.
-pub fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>, query: &str) -> Option<Foreground> {
+pub(crate) fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>, query: &str) -> Option<Foreground> {
     let first = view.categories.first()?;
     let mut truth = Mask::empty(first.mask.width_px(), first.mask.height_px());
     view.categories.iter().for_each(|c| truth.add(&c.mask));

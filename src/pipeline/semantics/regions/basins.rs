@@ -3,14 +3,14 @@
 use crate::math::grid::neighbors;
 
 /// The piece of pixels outside the domain.
-pub const OUTSIDE: u32 = u32::MAX;
+pub(crate) const OUTSIDE: u32 = u32::MAX;
 /// Not filled yet.
 const DRY: u32 = u32::MAX - 1;
 
 /// Splits the domain into connected basins of `strength`, numbered from 0 in the order of their
 /// first pixels; the label of each pixel and the number of basins. Pixels outside the domain are
 /// [`OUTSIDE`]. Differences of strength under `step` do not make basins.
-pub fn basins(strength: &[f32], domain: &[bool], width: usize, step: f32) -> (Vec<u32>, u32) {
+pub(crate) fn basins(strength: &[f32], domain: &[bool], width: usize, step: f32) -> (Vec<u32>, u32) {
     let level = |v: f32| ((v / step) as usize).min(LEVELS - 1);
     let levels: Vec<u16> = strength.iter().map(|&v| level(v) as u16).collect();
     let mut label: Vec<u32> = domain.iter().map(|&d| if d { DRY } else { OUTSIDE }).collect();

@@ -7,15 +7,15 @@ use rayon::prelude::*;
 const SCALES: [(f32, f32); 3] = [(0.8, 0.3), (1.6, 0.35), (3.2, 0.35)];
 
 /// A picture's planes, row-major, and its width in px.
-pub struct Planes<'a> {
+pub(crate) struct Planes<'a> {
     /// Width in px.
-    pub width: usize,
+    pub(crate) width: usize,
     /// Values of each channel.
-    pub channels: &'a [Vec<f32>],
+    pub(crate) channels: &'a [Vec<f32>],
 }
 
 /// Length of the gradient, in values per px times the width of the blur, at each pixel.
-pub fn strength(planes: &Planes<'_>) -> Vec<f32> {
+pub(crate) fn strength(planes: &Planes<'_>) -> Vec<f32> {
     let n = planes.channels.first().map_or(0, Vec::len);
     let mut total = vec![0.0_f32; n];
     for (sigma, share) in SCALES {
@@ -46,7 +46,7 @@ fn gradient_squared(plane: &[f32], width: usize) -> Vec<f32> {
 }
 
 /// A Gaussian blur whose border repeats.
-pub fn blur(plane: &[f32], width: usize, sigma: f32) -> Vec<f32> {
+pub(crate) fn blur(plane: &[f32], width: usize, sigma: f32) -> Vec<f32> {
     let reach = (3.0 * sigma).ceil() as isize;
     let mut weights: Vec<f32> = (-reach..=reach).map(|d| (-0.5 * (d as f32 / sigma).powi(2)).exp()).collect();
     let sum: f32 = weights.iter().sum();

@@ -3,7 +3,7 @@
 use crate::math::srgb::linear as linear_light;
 
 /// L* a* b* of sRGB bytes.
-pub fn lab(rgb: &[[u8; 3]]) -> Vec<[f32; 3]> {
+pub(crate) fn lab(rgb: &[[u8; 3]]) -> Vec<[f32; 3]> {
     let linear: Vec<f32> = (0..=255_u8).map(|v| linear_light(f32::from(v) / 255.0)).collect();
     rgb.iter()
         .map(|p| {

@@ -7,12 +7,12 @@
 //! [`lab`] colors, [`edges`] between them, [`shape`] of the scene, [`basins`] of the edges, the
 //! [`tree`] of the basins, and [`mod@segment`] from it.
 
-pub mod basins;
-pub mod edges;
-pub mod lab;
+pub(crate) mod basins;
+pub(crate) mod edges;
+pub(crate) mod lab;
 pub mod segment;
-pub mod shape;
-pub mod tree;
+pub(crate) mod shape;
+pub(crate) mod tree;
 
 use self::segment::{Picture, RegionOptions, segment};
 use super::filters::{self, FilterOptions};
@@ -26,11 +26,11 @@ use crate::scene::{GaussianCloud, Level, Mask, Photo};
 #[derive(Clone, Debug, Default)]
 pub struct Regions<'a> {
     /// Gaussians that were trained on the photos, and how they are drawn, for the scene's shape.
-    pub trained: Option<(&'a GaussianCloud, &'a RenderSettings)>,
+    pub(crate) trained: Option<(&'a GaussianCloud, &'a RenderSettings)>,
     /// How regions are found.
-    pub options: RegionOptions,
+    pub(crate) options: RegionOptions,
     /// Which of them are kept.
-    pub filters: FilterOptions,
+    pub(crate) filters: FilterOptions,
 }
 
 impl Segmenter for Regions<'_> {

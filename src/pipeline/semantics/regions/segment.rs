@@ -25,16 +25,16 @@ pub struct Picture<'a> {
 
 /// Settings.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RegionOptions {
+pub(crate) struct RegionOptions {
     /// Unlikeness, in steps of Lab color between pieces of a thousandth of the whole, from which
     /// things are different things.
-    pub object_step: f64,
+    pub(crate) object_step: f64,
     /// The same between the parts of an object; the whole is the object then.
-    pub part_step: f64,
+    pub(crate) part_step: f64,
     /// Least pixels of an object and of a part.
-    pub least_px: [usize; 2],
+    pub(crate) least_px: [usize; 2],
     /// Most of the picture that an object may be; what is more is background.
-    pub most_share: f64,
+    pub(crate) most_share: f64,
 }
 
 impl Default for RegionOptions {
@@ -58,15 +58,15 @@ const END: f64 = 3.0;
 
 /// An object and the regions inside it, as found and not yet filtered.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Candidate {
+pub(crate) struct Candidate {
     /// Its pixels.
-    pub mask: Mask,
+    pub(crate) mask: Mask,
     /// Regions of its own tile.
-    pub pieces: Vec<Mask>,
+    pub(crate) pieces: Vec<Mask>,
 }
 
 /// Objects of the picture and their pieces.
-pub fn segment(picture: &Picture<'_>, options: &RegionOptions) -> Vec<Candidate> {
+pub(crate) fn segment(picture: &Picture<'_>, options: &RegionOptions) -> Vec<Candidate> {
     let mosaic = Mosaic::of(picture);
     let area: f64 = mosaic.pieces.iter().map(|p| p.area).sum();
     let known = picture.ends.is_some();

@@ -23,7 +23,7 @@ const FOLD: f32 = 1.4;
 const JUMP: [f32; 2] = [12.0, 37.0];
 
 /// How clearly a surface ends at each pixel of a view, 0 to 1; `None` if it cannot be drawn.
-pub fn ends_of(cloud: &GaussianCloud, settings: &RenderSettings, camera: &Camera) -> Option<Vec<f32>> {
+pub(crate) fn ends_of(cloud: &GaussianCloud, settings: &RenderSettings, camera: &Camera) -> Option<Vec<f32>> {
     let settings = RenderSettings { depth: true, sh_degree: 0, ..settings.clone() };
     let frame = Renderer::new().render(cloud, Features::NONE, camera, &settings).ok()?;
     let depth = |(&d, &a): (&f32, &f32)| if a >= SOLID { d / a } else { 0.0 };
@@ -32,7 +32,7 @@ pub fn ends_of(cloud: &GaussianCloud, settings: &RenderSettings, camera: &Camera
 }
 
 /// The same from depths along the camera's axis, 0 where nothing is, for a focal length in px.
-pub fn ends(depth: &[f32], width: usize, focal_px: f64) -> Vec<f32> {
+pub(crate) fn ends(depth: &[f32], width: usize, focal_px: f64) -> Vec<f32> {
     let farthest = depth.iter().copied().filter(|d| d.is_finite()).fold(0.0, f32::max);
     if farthest <= 0.0 {
         return vec![0.0; depth.len()];

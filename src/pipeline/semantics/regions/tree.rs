@@ -6,27 +6,27 @@ use std::collections::{BTreeMap, BinaryHeap};
 
 /// What is known of a piece.
 #[derive(Clone, Debug, Default)]
-pub struct Piece {
+pub(crate) struct Piece {
     /// Pixels.
-    pub area: f64,
+    pub(crate) area: f64,
     /// Sum of each feature over the pixels.
-    pub sums: Vec<f64>,
+    pub(crate) sums: Vec<f64>,
 }
 
 /// What lies between two neighbors.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Border {
+pub(crate) struct Border {
     /// Pairs of pixels.
-    pub length: f64,
+    pub(crate) length: f64,
     /// Sum of the edge strength over them.
-    pub strength: f64,
+    pub(crate) strength: f64,
     /// Sum over them of how clearly a surface ends there, 0 to 1 each.
-    pub ends: f64,
+    pub(crate) ends: f64,
 }
 
 impl Border {
     /// Takes up another stretch.
-    pub fn add(&mut self, other: &Self) {
+    pub(crate) fn add(&mut self, other: &Self) {
         self.length += other.length;
         self.strength += other.strength;
         self.ends += other.ends;
@@ -34,33 +34,33 @@ impl Border {
 }
 
 /// How unlike two neighbors are.
-pub type Unlike = dyn Fn(&Piece, &Piece, &Border) -> f64 + Sync;
+pub(crate) type Unlike = dyn Fn(&Piece, &Piece, &Border) -> f64 + Sync;
 
 /// A node: a leaf, or two nodes made one.
 #[derive(Clone, Debug)]
-pub struct Node {
+pub(crate) struct Node {
     /// What it is made of; none for a leaf.
-    pub children: Option<[u32; 2]>,
+    pub(crate) children: Option<[u32; 2]>,
     /// What it becomes part of; none for a root.
-    pub parent: Option<u32>,
+    pub(crate) parent: Option<u32>,
     /// Unlikeness at which it came to be; 0 for leaves.
-    pub birth: f64,
+    pub(crate) birth: f64,
     /// Unlikeness at which it was merged; that of the last merging for roots.
-    pub death: f64,
+    pub(crate) death: f64,
     /// Its pixels.
-    pub area: f64,
+    pub(crate) area: f64,
 }
 
 /// Leaves first, children before parents.
-pub struct Tree {
+pub(crate) struct Tree {
     /// The nodes.
-    pub nodes: Vec<Node>,
+    pub(crate) nodes: Vec<Node>,
     /// Number of leaves.
-    pub leaves: usize,
+    pub(crate) leaves: usize,
 }
 
 /// Merges pieces in the order of their unlikeness.
-pub fn grow(pieces: Vec<Piece>, borders: BTreeMap<(u32, u32), Border>, unlike: &Unlike) -> Tree {
+pub(crate) fn grow(pieces: Vec<Piece>, borders: BTreeMap<(u32, u32), Border>, unlike: &Unlike) -> Tree {
     let mut g = Growing::new(pieces, unlike);
     for (&(a, b), border) in &borders {
         g.near[a as usize].insert(b, *border);
@@ -156,13 +156,13 @@ impl<'a> Growing<'a> {
 
 impl Tree {
     /// The nodes that are whole where nothing is merged from `unlike` on: every leaf is in one.
-    pub fn cut(&self, unlike: f64) -> Vec<u32> {
+    pub(crate) fn cut(&self, unlike: f64) -> Vec<u32> {
         let whole = |n: &Node| n.birth < unlike && (n.death >= unlike || n.parent.is_none());
         (0..self.nodes.len() as u32).filter(|&i| whole(&self.nodes[i as usize])).collect()
     }
 
     /// The leaves below a node.
-    pub fn leaves_of(&self, node: u32) -> Vec<u32> {
+    pub(crate) fn leaves_of(&self, node: u32) -> Vec<u32> {
         let mut open = vec![node];
         let mut found = Vec::new();
         while let Some(at) = open.pop() {

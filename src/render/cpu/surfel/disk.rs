@@ -19,15 +19,15 @@ use crate::math::lanes::Lanes;
 use crate::render::{ALPHA_MAX, ALPHA_MIN, TILE_PX};
 
 /// A surfel's constants in vector registers.
-pub struct Disk<R: Real, L: Lanes<R>> {
+pub(crate) struct Disk<R: Real, L: Lanes<R>> {
     /// `[A, A'], [B, B']`, px times depth.
-    pub across: [[L::V; 2]; 2],
+    pub(crate) across: [[L::V; 2]; 2],
     /// `a, b`.
-    pub along: [L::V; 2],
+    pub(crate) along: [L::V; 2],
     /// Depth of the center.
-    pub z: L::V,
+    pub(crate) z: L::V,
     /// `D`, not negative.
-    pub determinant: L::V,
+    pub(crate) determinant: L::V,
     /// Determinant times depth.
     depth_factor: L::V,
     near: L::V,
@@ -40,27 +40,27 @@ pub struct Disk<R: Real, L: Lanes<R>> {
 
 /// What a surfel gives eight pixels.
 #[derive(Clone, Copy)]
-pub struct Hit<R: Real, L: Lanes<R>> {
+pub(crate) struct Hit<R: Real, L: Lanes<R>> {
     /// Offsets of the pixel centers from the projected center.
-    pub offset: [L::V; 2],
+    pub(crate) offset: [L::V; 2],
     /// `p, q`.
-    pub raw: [L::V; 2],
+    pub(crate) raw: [L::V; 2],
     /// Coordinates in the disk; 0 where the picture's distance counts.
-    pub at: [L::V; 2],
+    pub(crate) at: [L::V; 2],
     /// `1 / w`; 0 where the picture's distance counts.
-    pub inverse: L::V,
+    pub(crate) inverse: L::V,
     /// Where the distance in the plane counts.
-    pub through: L::M,
+    pub(crate) through: L::M,
     /// Depth along the camera's axis.
-    pub depth: L::V,
+    pub(crate) depth: L::V,
     /// Alpha, 0 where it does not count.
-    pub alpha: L::V,
+    pub(crate) alpha: L::V,
 }
 
 impl<R: Real, L: Lanes<R>> Disk<R, L> {
     /// The constants of `s`, whose shape is as `project` laid it out.
     #[inline(always)]
-    pub fn new(l: L, s: &Splat<R>, shape: &[R], near: R, dx: [L::V; GROUPS]) -> Self {
+    pub(crate) fn new(l: L, s: &Splat<R>, shape: &[R], near: R, dx: [L::V; GROUPS]) -> Self {
         let [ax, ay, bx, by, along_u, along_v, x, y]: [R; SHAPE] = std::array::from_fn(|k| shape[k]);
         let right = l.splat(s.mean[0] - x);
         let determinant = ax * by - ay * bx;
@@ -79,7 +79,7 @@ impl<R: Real, L: Lanes<R>> Disk<R, L> {
 
     /// What the pixels of a slot get.
     #[inline(always)]
-    pub fn hit(&self, l: L, reach: &Reach<R>, slot: usize) -> Hit<R, L> {
+    pub(crate) fn hit(&self, l: L, reach: &Reach<R>, slot: usize) -> Hit<R, L> {
         let (dx, dy) = (self.dx[slot / TILE_PX], l.splat(reach.dy[slot % TILE_PX] + self.down));
         let zero = l.splat(R::ZERO);
         let [[ax, ay], [bx, by]] = self.across;

@@ -10,9 +10,9 @@
 //! depth asked for, frames also hold normals and the distortion `sum over pairs (w_i w_j (1/z_i -
 //! 1/z_j)²)`, which is in inverse depth because that is what a picture can resolve.
 
-pub mod disk;
-pub mod project;
-pub mod project_backward;
+pub(crate) mod disk;
+pub(crate) mod project;
+pub(crate) mod project_backward;
 
 use self::disk::{Disk, Hit};
 use self::project::INVERSE_BLUR;
@@ -31,11 +31,11 @@ const MOST: usize = MAX_CHANNELS + 3;
 
 /// Sums in front of the channels in a tile entry's record: `dL/dopacity` times opacity; `dL/d` of
 /// the six derivatives of a splat's shape, of its depth, and of its projected center.
-pub const RECORD: usize = 10;
+pub(crate) const RECORD: usize = 10;
 
 /// Gaussians as surfels.
 #[derive(Clone, Copy, Debug)]
-pub struct Surfels<R> {
+pub(crate) struct Surfels<R> {
     near: R,
 }
 

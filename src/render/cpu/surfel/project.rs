@@ -5,33 +5,33 @@ use crate::math::{Real, rotation};
 use crate::scene::Gaussian;
 
 /// One over the variance, in px², below which no surfel is drawn in the picture.
-pub const INVERSE_BLUR: f64 = 2.0;
+pub(crate) const INVERSE_BLUR: f64 = 2.0;
 
 /// Numbers per splat in front of the composited channels: derivatives of the picture's x by the
 /// disk's two coordinates and of its y, both times depth, and of depth; the projected center in px.
-pub const SHAPE: usize = 8;
+pub(crate) const SHAPE: usize = 8;
 
 /// Everything between a surfel's raw parameters and its splat that the backward pass needs too.
-pub struct Geometry<R> {
+pub(crate) struct Geometry<R> {
     /// Center relative to the camera, world axes.
-    pub relative: [R; 3],
+    pub(crate) relative: [R; 3],
     /// Center in camera axes.
     pub local: [R; 3],
     /// The disk's two half axes in camera axes, lengths one standard deviation; the second one
     /// turned such that the determinant of `across` is not negative.
-    pub axes: [[R; 3]; 2],
+    pub(crate) axes: [[R; 3]; 2],
     /// The sign by which the second axis was turned.
-    pub sign: R,
+    pub(crate) sign: R,
     /// Standard deviations along both axes.
-    pub scale: [R; 2],
+    pub(crate) scale: [R; 2],
     /// Derivatives of the picture position times depth: those of x by both coordinates, those of y.
-    pub across: [[R; 2]; 2],
+    pub(crate) across: [[R; 2]; 2],
     /// Determinant of `across`, not negative.
-    pub determinant: R,
+    pub(crate) determinant: R,
     /// Projected center, px.
-    pub center: [R; 2],
+    pub(crate) center: [R; 2],
     /// Unit normal towards the camera, world axes.
-    pub normal: [R; 3],
+    pub(crate) normal: [R; 3],
 }
 
 #[inline(always)]
@@ -42,7 +42,7 @@ fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
 /// The disk in camera axes; `None` behind the near plane, for a degenerate quaternion, or where
 /// sizes overflow.
 #[inline(always)]
-pub fn geometry<R: Real>(gaussian: &Gaussian<'_, R>, view: &View<R>) -> Option<Geometry<R>> {
+pub(crate) fn geometry<R: Real>(gaussian: &Gaussian<'_, R>, view: &View<R>) -> Option<Geometry<R>> {
     let relative = view.relative(gaussian.position);
     let local: [R; 3] = std::array::from_fn(|k| dot(view.rows[k], relative));
     let z = local[2];
@@ -87,19 +87,19 @@ pub fn geometry<R: Real>(gaussian: &Gaussian<'_, R>, view: &View<R>) -> Option<G
 }
 
 /// An ellipse around all pixels that get alpha from a surfel.
-pub struct Bound<R> {
+pub(crate) struct Bound<R> {
     /// Its center, relative to the projected center, px.
-    pub offset: [R; 2],
+    pub(crate) offset: [R; 2],
     /// `[xx, xy, yy]` such that the ellipse is `d' inverse(this) d <= 1`.
-    pub squared: [R; 3],
+    pub(crate) squared: [R; 3],
     /// Determinant of `squared`.
-    pub determinant: R,
+    pub(crate) determinant: R,
 }
 
 /// The bound for squared distances up to `reach`; `None` if the disk so far out crosses the
 /// camera's plane, so that it may touch any pixel.
 #[inline(always)]
-pub fn bound<R: Real>(g: &Geometry<R>, reach: R) -> Option<Bound<R>> {
+pub(crate) fn bound<R: Real>(g: &Geometry<R>, reach: R) -> Option<Bound<R>> {
     let (along, z) = ([g.axes[0][2], g.axes[1][2]], g.local[2]);
     // How far depth changes across the disk, as a share of the center's depth, squared.
     let slope = reach * (along[0] * along[0] + along[1] * along[1]) / (z * z);
@@ -129,7 +129,7 @@ pub fn bound<R: Real>(g: &Geometry<R>, reach: R) -> Option<Bound<R>> {
 /// A Gaussian as a surfel: the ellipse around what it touches, which binning and the walk over a tile see, its
 /// shape, and its normal.
 #[inline(always)]
-pub fn surfel<R: Real>(
+pub(crate) fn surfel<R: Real>(
     gaussian: &Gaussian<'_, R>,
     opacity: R,
     alpha_min: R,

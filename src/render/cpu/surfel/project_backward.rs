@@ -16,7 +16,7 @@ fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
 /// Backward of the projection. `normal` is where in `record` the gradient of the normal begins, if
 /// it was composited.
 #[inline(always)]
-pub fn project_backward<R: Real>(
+pub(crate) fn project_backward<R: Real>(
     gaussian: &Gaussian<'_, R>,
     view: &View<R>,
     settings: &RenderSettings,

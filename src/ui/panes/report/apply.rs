@@ -12,31 +12,31 @@ use crate::render::{Cutoffs, RenderSettings};
 use crate::ui::actions::Action;
 
 /// The settings that are active.
-pub struct Now<'a> {
+pub(crate) struct Now<'a> {
     /// Of the next training.
-    pub config: &'a TrainConfig,
+    pub(crate) config: &'a TrainConfig,
     /// How the open scene says that it is drawn; none without a scene.
-    pub own: Option<&'a RenderSettings>,
+    pub(crate) own: Option<&'a RenderSettings>,
     /// What is drawn otherwise.
-    pub drawing: &'a RenderOverrides,
+    pub(crate) drawing: &'a RenderOverrides,
     /// Whether a GPU draws.
-    pub on_gpu: bool,
+    pub(crate) on_gpu: bool,
 }
 
 /// A field that would change.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Change {
+pub(crate) struct Change {
     /// Its name.
-    pub name: String,
+    pub(crate) name: String,
     /// Its value now.
-    pub from: String,
+    pub(crate) from: String,
     /// Its value then.
-    pub to: String,
+    pub(crate) to: String,
 }
 
 /// What can be done with a measured setting.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Offer {
+pub(crate) enum Offer {
     /// It changes this.
     Changes(Vec<Change>, Action),
     /// It is active already.
@@ -46,7 +46,7 @@ pub enum Offer {
 }
 
 /// What applying a point of a stage would do.
-pub fn offer(stage: &Stage, point: &Point, now: &Now<'_>) -> Offer {
+pub(crate) fn offer(stage: &Stage, point: &Point, now: &Now<'_>) -> Offer {
     let result = match stage.name {
         StageName::Train => training(stage, point, now),
         StageName::Render => drawing(stage, point, now),

@@ -9,7 +9,7 @@ use crate::ui::actions::Action;
 use crate::worker::JobKind;
 
 /// Draws it.
-pub fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
+pub(crate) fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     ui.label(RichText::new("Error against run time").strong());
     ui.label(
         "Every setting that trades accuracy for time can be measured. A report holds the measurements; here they are \

@@ -1,7 +1,7 @@
 //! Error against run time: a report's measurements as a plot, what they say of the defaults, and the
 //! way from a measured setting to an active one.
 
-pub mod apply;
+pub(crate) mod apply;
 mod empty;
 mod scale;
 mod scatter;
@@ -21,7 +21,7 @@ use crate::ui::actions::Action;
 
 /// What a user looks at in a report.
 #[derive(Default)]
-pub struct ReportPane {
+pub(crate) struct ReportPane {
     stage: Option<StageName>,
     /// By name.
     measure: Option<String>,
@@ -33,7 +33,7 @@ pub struct ReportPane {
 
 impl ReportPane {
     /// Draws the pane.
-    pub fn show(
+    pub(crate) fn show(
         &mut self,
         ui: &mut Ui,
         state: &AppState,
@@ -102,12 +102,12 @@ impl ReportPane {
     }
 
     /// Chooses the setting of a knob, as a click on its point does.
-    pub fn select(&mut self, method: &str, setting: &str) {
+    pub(crate) fn select(&mut self, method: &str, setting: &str) {
         self.selected = Some([method.to_owned(), setting.to_owned()]);
     }
 
     /// PSNR over seconds of trainings in the report: of the default, and of the chosen setting.
-    pub fn curves(&self, state: &AppState) -> Vec<(String, Vec<[f64; 2]>)> {
+    pub(crate) fn curves(&self, state: &AppState) -> Vec<(String, Vec<[f64; 2]>)> {
         let Some(stage) = state.report.as_ref().and_then(|r| r.report.stage(StageName::Train)) else {
             return Vec::new();
         };

@@ -12,12 +12,12 @@ use crate::measure::{Measure, Point, Sample};
 const SMALL: f64 = 0.5;
 
 /// Where a point is: decimal logarithms of seconds and error.
-pub fn place(point: &Point, measure: &Measure) -> Option<[f64; 2]> {
+pub(crate) fn place(point: &Point, measure: &Measure) -> Option<[f64; 2]> {
     plot::place(point, measure).map(|(secs, error)| [secs.log10(), error.log10()])
 }
 
 /// The ends of a point's whiskers: least and most time at its error, least and most error at its time.
-pub fn whiskers(point: &Point, measure: &Measure) -> Option<[[[f64; 2]; 2]; 2]> {
+pub(crate) fn whiskers(point: &Point, measure: &Measure) -> Option<[[[f64; 2]; 2]; 2]> {
     let [x, y] = place(point, measure)?;
     let at_secs = |s: f64| [s.max(1e-9).log10(), y];
     let at_value = |v: f64| [x, measure.error(v).max(plot::LEAST).log10()];
@@ -26,7 +26,7 @@ pub fn whiskers(point: &Point, measure: &Measure) -> Option<[[[f64; 2]; 2]; 2]> 
 }
 
 /// Marks of an axis from `low` to `high`, both logarithms.
-pub fn marks((low, high): (f64, f64)) -> Vec<GridMark> {
+pub(crate) fn marks((low, high): (f64, f64)) -> Vec<GridMark> {
     if !(low.is_finite() && high.is_finite() && low < high && high - low < 100.0) {
         return Vec::new();
     }
@@ -61,7 +61,7 @@ fn even(low: f64, high: f64) -> Vec<GridMark> {
 }
 
 /// The text of a mark; empty where there is no room for one.
-pub fn label(mark: GridMark, range: &RangeInclusive<f64>, text: impl Fn(f64) -> String) -> String {
+pub(crate) fn label(mark: GridMark, range: &RangeInclusive<f64>, text: impl Fn(f64) -> String) -> String {
     let span = range.end() - range.start();
     let least = if span < SMALL {
         0.0

@@ -15,20 +15,20 @@ const NEAR: f32 = 14.0;
 const SHAPES: [MarkerShape; 3] = [MarkerShape::Circle, MarkerShape::Diamond, MarkerShape::Square];
 
 /// What is drawn.
-pub struct Scatter<'a> {
+pub(crate) struct Scatter<'a> {
     /// The stage.
-    pub stage: &'a Stage,
+    pub(crate) stage: &'a Stage,
     /// The same stage of another report, drawn hollow.
-    pub second: Option<&'a Stage>,
+    pub(crate) second: Option<&'a Stage>,
     /// What is on the vertical axis.
-    pub measure: &'a Measure,
+    pub(crate) measure: &'a Measure,
     /// The point that is chosen.
-    pub selected: Option<&'a Point>,
+    pub(crate) selected: Option<&'a Point>,
 }
 
 impl<'a> Scatter<'a> {
     /// Draws it; returns the point that was clicked.
-    pub fn show(&self, ui: &mut Ui, height: f32) -> Option<&'a Point> {
+    pub(crate) fn show(&self, ui: &mut Ui, height: f32) -> Option<&'a Point> {
         let (stage, measure) = (self.stage, self.measure);
         let name = (stage.name.name(), measure.name.clone(), self.second.is_some());
         let places = self.places();
@@ -196,7 +196,7 @@ impl Item {
 
 /// Color of the setting with this number: those of the report's own plots, lighter on dark ground; once all are used,
 /// paler still.
-pub fn color(k: usize) -> Color32 {
+pub(crate) fn color(k: usize) -> Color32 {
     let paler = if k / COLORS.len() % 2 == 0 { 4 } else { 2 };
     let [r, g, b] = COLORS[k % COLORS.len()].map(|v| v + (255 - v) / paler);
     Color32::from_rgb(r, g, b)
@@ -207,7 +207,7 @@ fn shape(k: usize) -> MarkerShape {
 }
 
 /// All that was measured of a point.
-pub fn facts(ui: &mut Ui, point: &Point, measures: &[Measure], whose: &str) {
+pub(crate) fn facts(ui: &mut Ui, point: &Point, measures: &[Measure], whose: &str) {
     ui.strong(format!("{}: {}", point.method, point.setting));
     let repeats = point.secs.each.len();
     let default = if point.default { "program's default, " } else { "" };

@@ -12,7 +12,12 @@ use crate::scene::text;
 const MOST_LETTERS: usize = 34;
 
 /// The measured settings; returns the one that was clicked.
-pub fn points<'a>(ui: &mut Ui, stage: &'a Stage, measure: &Measure, selected: Option<&Point>) -> Option<&'a Point> {
+pub(crate) fn points<'a>(
+    ui: &mut Ui,
+    stage: &'a Stage,
+    measure: &Measure,
+    selected: Option<&Point>,
+) -> Option<&'a Point> {
     let methods = stage.methods();
     let front = stage.front(measure);
     let mut clicked = None;
@@ -36,7 +41,7 @@ pub fn points<'a>(ui: &mut Ui, stage: &'a Stage, measure: &Measure, selected: Op
 }
 
 /// Knob and setting.
-pub fn title(p: &Point) -> String {
+pub(crate) fn title(p: &Point) -> String {
     format!("{}: {}", p.method, p.setting)
 }
 
@@ -45,7 +50,7 @@ fn value(p: &Point, measure: &Measure) -> String {
 }
 
 /// What each knob's rule says of its default.
-pub fn choices(ui: &mut Ui, stage: &Stage) {
+pub(crate) fn choices(ui: &mut Ui, stage: &Stage) {
     let choices = stage.choices();
     ui.label(RichText::new(format!("Rule: {}.", stage.rule.words())).small().color(theme::WEAK));
     if choices.is_empty() {
@@ -72,7 +77,7 @@ fn error(p: &Point, measure: &Measure) -> String {
 }
 
 /// Whether errors fall as fast as theory says.
-pub fn orders(ui: &mut Ui, stage: &Stage) {
+pub(crate) fn orders(ui: &mut Ui, stage: &Stage) {
     Grid::new("orders").num_columns(4).striped(true).spacing([12.0, 1.0]).min_row_height(20.0).show(ui, |ui| {
         head(ui, &["refined", "order observed", "expected", "theory"]);
         for o in &stage.orders {
@@ -86,7 +91,7 @@ pub fn orders(ui: &mut Ui, stage: &Stage) {
 }
 
 /// Two reports side by side.
-pub fn comparison(ui: &mut Ui, comparison: &Comparison<'_>, measure: &Measure) {
+pub(crate) fn comparison(ui: &mut Ui, comparison: &Comparison<'_>, measure: &Measure) {
     if comparison.pairs.is_empty() {
         ui.colored_label(theme::WARNING, "The two reports have no setting in common.");
     }
@@ -117,7 +122,7 @@ fn signed(v: f64) -> String {
 }
 
 /// On what, by what, against what was measured.
-pub fn about(ui: &mut Ui, report: &Report, stage: &Stage) {
+pub(crate) fn about(ui: &mut Ui, report: &Report, stage: &Stage) {
     Grid::new("about").num_columns(2).spacing([12.0, 3.0]).show(ui, |ui| {
         let mut row = |name: &str, text: &str| {
             ui.label(RichText::new(name).small().color(theme::WEAK));

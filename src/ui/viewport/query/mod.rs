@@ -18,7 +18,7 @@ use std::time::Instant;
 use egui::{Color32, Rect, TextureHandle, TextureOptions, Ui};
 
 use self::embeddings::Embeddings;
-pub use self::settings::{ColorBy, OverlaySettings};
+pub(crate) use self::settings::{ColorBy, OverlaySettings};
 use crate::jobs::query::ViewMaps;
 use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::matching::MatchMode;
@@ -38,7 +38,7 @@ const MOST: usize = COLORS.len();
 #[derive(Clone, Debug, PartialEq)]
 pub struct Asked {
     /// As it was typed.
-    pub text: String,
+    pub(crate) text: String,
     /// What it comes to.
     pub answered: QueryAnswer,
     /// Whether the text encoder has yet to read it: names alone have answered so far.
@@ -51,7 +51,7 @@ pub struct Asked {
 
 impl Asked {
     /// The identities that are shown.
-    pub fn shown(&self, settings: &OverlaySettings) -> Vec<IdentityId> {
+    pub(crate) fn shown(&self, settings: &OverlaySettings) -> Vec<IdentityId> {
         self.chosen.map_or_else(|| self.answered.chosen(settings.top), |id| vec![id])
     }
 }
@@ -125,22 +125,22 @@ impl Queries {
     }
 
     /// Whether anything was asked in this scene, or begun to be: what queries need is needed now.
-    pub fn wanted(&self) -> bool {
+    pub(crate) fn wanted(&self) -> bool {
         self.wanted
     }
 
     /// Whether blended codes of the view are wanted.
-    pub fn wants_codes(&self) -> bool {
+    pub(crate) fn wants_codes(&self) -> bool {
         self.settings.mode == MatchMode::Blend || self.settings.color_by == ColorBy::Difference
     }
 
     /// Puts the cursor into the box.
-    pub fn start_typing(&mut self) {
+    pub(crate) fn start_typing(&mut self) {
         (self.focus, self.wanted) = (true, true);
     }
 
     /// Answers anew where objects and parts, or embeddings, have changed.
-    pub fn keep_up(&mut self, ctx: &egui::Context, semantics: &Versioned<SemanticMap>, plan: &ScenePlan) {
+    pub(crate) fn keep_up(&mut self, ctx: &egui::Context, semantics: &Versioned<SemanticMap>, plan: &ScenePlan) {
         let encoder = semantics.language.as_ref().map(|l| l.encoder.as_str());
         let now = semantics.generation();
         // One that is of no more use goes at once, one that is new waits for a query.
@@ -154,14 +154,14 @@ impl Queries {
     }
 
     /// Asks as if it had been typed.
-    pub fn ask(&mut self, text: &str, semantics: &SemanticMap) {
+    pub(crate) fn ask(&mut self, text: &str, semantics: &SemanticMap) {
         self.typed = text.to_owned();
         self.wanted = true;
         self.live = self.asked(text, semantics);
     }
 
     /// Shows the answers to these queries, and no others.
-    pub fn mark(&mut self, texts: &[String], semantics: &SemanticMap) {
+    pub(crate) fn mark(&mut self, texts: &[String], semantics: &SemanticMap) {
         self.typed.clear();
         self.wanted = true;
         self.kept = texts.iter().filter_map(|text| self.asked(text, semantics)).collect();
@@ -173,21 +173,21 @@ impl Queries {
     }
 
     /// Answers all queries anew: identities have changed.
-    pub fn ask_again(&mut self, semantics: &SemanticMap) {
+    pub(crate) fn ask_again(&mut self, semantics: &SemanticMap) {
         let texts: Vec<String> = self.kept.iter().map(|q| q.text.clone()).collect();
         self.kept = texts.iter().filter_map(|text| self.asked(text, semantics)).collect();
         self.live = self.live.take().and_then(|q| self.asked(&q.text, semantics));
     }
 
     /// Forgets queries and answers: another scene.
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         let history = std::mem::take(&mut self.history);
         let embeddings = std::mem::take(&mut self.embeddings);
         *self = Self { settings: self.settings, open: self.open, history, embeddings, ..Self::default() };
     }
 
     /// Takes over what the present view's pixels belong to; `None` while it is not known.
-    pub fn set_maps(&mut self, maps: Option<Versioned<ViewMaps>>) {
+    pub(crate) fn set_maps(&mut self, maps: Option<Versioned<ViewMaps>>) {
         self.maps = maps;
     }
 
@@ -238,7 +238,7 @@ impl Queries {
     }
 
     /// Masks and tints over the frame in `rect`.
-    pub fn paint(&mut self, ui: &Ui, rect: Rect, semantics: &Versioned<SemanticMap>) {
+    pub(crate) fn paint(&mut self, ui: &Ui, rect: Rect, semantics: &Versioned<SemanticMap>) {
         let Some(maps) = self.maps.clone() else { return };
         let shown: Vec<Vec<IdentityId>> = self.all().map(|q| q.shown(&self.settings)).collect();
         let newest = self.all().last().map(|q| q.text.clone());

@@ -20,26 +20,26 @@ const RIM: Color32 = Color32::from_black_alpha(170);
 const DIFFERENT: [u8; 3] = [255, 60, 160];
 
 /// What is drawn over the view.
-pub struct Layers<'a> {
+pub(crate) struct Layers<'a> {
     /// What the pixels belong to.
-    pub map: &'a ViewMap,
+    pub(crate) map: &'a ViewMap,
     /// Their blended codes, where they are drawn.
-    pub codes: Option<&'a CodeMap>,
+    pub(crate) codes: Option<&'a CodeMap>,
     /// Objects and parts.
-    pub identities: &'a Identities,
+    pub(crate) identities: &'a Identities,
     /// Masks of the answers, with their colors; later ones on top.
-    pub masks: &'a [([u8; 3], Mask)],
+    pub(crate) masks: &'a [([u8; 3], Mask)],
     /// Relevancy of each identity by number.
-    pub relevancy: &'a [f32],
+    pub(crate) relevancy: &'a [f32],
     /// Colors of the language features of each identity by number.
-    pub features: &'a [[u8; 3]],
+    pub(crate) features: &'a [[u8; 3]],
     /// Settings.
-    pub settings: OverlaySettings,
+    pub(crate) settings: OverlaySettings,
 }
 
 impl Layers<'_> {
     /// All layers in one frame of the view's size.
-    pub fn paint(&self) -> ColorImage {
+    pub(crate) fn paint(&self) -> ColorImage {
         let (w, h) = (self.map.width_px, self.map.height_px);
         let tints: Vec<Option<[u8; 3]>> = (0..=self.identities.len() as IdentityId).map(|id| self.tint(id)).collect();
         let hot: Option<Mask> = (self.settings.threshold > 0.0)
@@ -125,7 +125,7 @@ fn is_edge(mask: &Mask, i: usize) -> bool {
 
 /// Colors of vectors by their three main directions (principal components), by number from 0; gray
 /// for those without one.
-pub fn main_directions(vectors: &[Option<&[f32]>]) -> Vec<[u8; 3]> {
+pub(crate) fn main_directions(vectors: &[Option<&[f32]>]) -> Vec<[u8; 3]> {
     let some: Vec<&[f32]> = vectors.iter().flatten().copied().collect();
     let Some(dimension) = some.first().map(|v| v.len()) else { return vec![[128; 3]; vectors.len()] };
     let mean: Vec<f32> = (0..dimension).map(|c| some.iter().map(|v| v[c]).sum::<f32>() / some.len() as f32).collect();

@@ -15,7 +15,7 @@ const BELOW: f32 = 92.0;
 
 impl Queries {
     /// The box, the answers, and the queries that are kept.
-    pub fn show(
+    pub(crate) fn show(
         &mut self,
         ui: &Ui,
         rect: Rect,

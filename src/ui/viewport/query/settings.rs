@@ -11,7 +11,7 @@ use crate::scene::LevelFilter;
 
 /// What tints the frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, VariantArray, IntoStaticStr)]
-pub enum ColorBy {
+pub(crate) enum ColorBy {
     /// Only the masks of the answers.
     #[default]
     Masks,
@@ -33,30 +33,30 @@ pub enum ColorBy {
 
 impl ColorBy {
     /// Its name.
-    pub fn text(self) -> &'static str {
+    pub(crate) fn text(self) -> &'static str {
         self.into()
     }
 }
 
 /// How answers are found and drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct OverlaySettings {
+pub(crate) struct OverlaySettings {
     /// What tints the frame.
-    pub color_by: ColorBy,
+    pub(crate) color_by: ColorBy,
     /// Colors of relevancy.
-    pub colormap: Colormap,
+    pub(crate) colormap: Colormap,
     /// Opacity of the tint.
-    pub opacity: f32,
+    pub(crate) opacity: f32,
     /// Which level queries are about.
-    pub kind: LevelFilter,
+    pub(crate) kind: LevelFilter,
     /// Answers whose pixels are shown at most.
-    pub top: usize,
+    pub(crate) top: usize,
     /// Where the codes that are matched come from.
-    pub mode: MatchMode,
+    pub(crate) mode: MatchMode,
     /// Largest difference per channel of a match.
-    pub tolerance: f32,
+    pub(crate) tolerance: f32,
     /// Relevancy that is outlined too; 0 = none.
-    pub threshold: f32,
+    pub(crate) threshold: f32,
 }
 
 impl Default for OverlaySettings {
@@ -76,7 +76,7 @@ impl Default for OverlaySettings {
 
 /// The settings. `heat` is the relevancy of the view's pixels, for the histogram. Whether the
 /// query has to be answered anew.
-pub fn show(ui: &mut Ui, settings: &mut OverlaySettings, heat: Option<&[f32]>) -> bool {
+pub(crate) fn show(ui: &mut Ui, settings: &mut OverlaySettings, heat: Option<&[f32]>) -> bool {
     let kind = settings.kind;
     egui::Grid::new("overlay settings").num_columns(2).spacing(vec2(10.0, 5.0)).show(ui, |ui| {
         ui.weak("Level");

@@ -23,7 +23,7 @@ const MEANING: &str = "encode: the words become vectors; nothing to do where the
     draw: the pixels become an overlay";
 
 /// Draws the bar with its numbers.
-pub fn show(ui: &mut Ui, basis: &str, stages: &StagesMs) {
+pub(crate) fn show(ui: &mut Ui, basis: &str, stages: &StagesMs) {
     let (rect, bar) = ui.allocate_exact_size(vec2(ui.available_width(), 5.0), Sense::hover());
     for (color, [from, to]) in COLORS.into_iter().zip(shares(stages)) {
         let at = |share: f64| rect.left() + rect.width() * share as f32;
