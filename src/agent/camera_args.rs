@@ -24,7 +24,6 @@ impl Side {
     pub const ALL: [Self; 7] =
         [Self::Same, Self::Other, Self::Front, Self::Left, Self::Right, Self::Above, Self::Below];
 
-    /// As in "from ...".
     pub(crate) fn text(self) -> &'static str {
         match self {
             Self::Same => "this side",

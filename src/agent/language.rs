@@ -19,9 +19,7 @@ pub(crate) enum Key {
     Length,
     /// Place to the right as seen now.
     Right,
-    /// Place upwards.
     Up,
-    /// From the eye.
     Distance,
 }
 

@@ -41,7 +41,6 @@ pub enum Effect {
     Explored(Arc<Explored>),
 }
 
-/// Receives the effects.
 pub(crate) type Emit = Box<dyn FnMut(Effect) + Send>;
 
 /// A scene that the agent acts in.

@@ -79,20 +79,8 @@ impl Session {
         &self.transcript
     }
 
-    /// The planner's name.
     pub(crate) fn planner(&self) -> &'static str {
         self.planner.name()
-    }
-
-    /// What was spoken of last.
-    pub(crate) fn dialog(&self) -> &DialogState {
-        &self.dialog
-    }
-
-    /// Tells the session that the user has chosen this by other means, so that "it" means it.
-    pub(crate) fn point_at(&mut self, id: IdentityId) {
-        self.dialog.last = Some(id);
-        self.dialog.group.clear();
     }
 
     /// What the session waits for.

@@ -70,21 +70,12 @@ impl Default for Transcript {
 }
 
 impl Transcript {
-    /// Adds an entry.
     pub(crate) fn add(&mut self, what: What) {
         if self.entries.len() >= MOST {
             self.entries.drain(..MOST / 4);
         }
         let elapsed_ms = u64::try_from(self.start.elapsed().as_millis()).unwrap_or(u64::MAX);
         self.entries.push(Entry { elapsed_ms, what });
-    }
-
-    /// The calls that were done.
-    pub(crate) fn done(&self) -> impl Iterator<Item = &ToolCall> {
-        self.entries.iter().filter_map(|e| match &e.what {
-            What::Result { call, done: true, .. } => Some(call),
-            _ => None,
-        })
     }
 
     /// As JSON.
@@ -187,7 +178,6 @@ fn flat(text: &str) -> String {
     flat
 }
 
-/// For between backticks.
 fn code(text: &str) -> String {
     text::line(text).replace('`', "'")
 }
@@ -205,7 +195,7 @@ mod tests {
         assert_eq!(json["entries"][1]["call"]["name"], "undo");
         let text = t.to_markdown();
         assert!(text.contains("hide \\# the \\`mug\\`") && text.contains("done: `undo()`"), "{text}");
-        assert_eq!(t.done().count(), 1);
+        assert_eq!(t.entries.iter().filter(|e| matches!(e.what, What::Result { done: true, .. })).count(), 1);
         for _ in 0..2 * MOST {
             t.add(What::Planner { text: String::new() });
         }

@@ -25,7 +25,6 @@ const MAX_BYTES: u64 = 1 << 16;
 struct Journal {
     /// Temporary names, and what they become.
     put: Vec<(String, String)>,
-    /// Files that go.
     remove: Vec<String>,
 }
 

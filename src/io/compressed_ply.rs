@@ -9,7 +9,6 @@ use super::quantized::{logit, unit_quaternion, unorm};
 use crate::math::sh::{SH_C0, coefficients};
 use crate::scene::GaussianCloud;
 
-/// Gaussians per chunk.
 const CHUNK: usize = 256;
 
 /// The Gaussians of a compressed `.ply`.
@@ -109,7 +108,6 @@ impl Chunk {
         within(&self.scale, three(packed))
     }
 
-    /// Color and opacity.
     fn color(&self, packed: u32) -> [f32; 4] {
         let [r, g, b, a] = [24, 16, 8, 0].map(|shift| unorm(packed >> shift, 8));
         let [r, g, b] = within(&self.color, [r, g, b]);

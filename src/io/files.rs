@@ -67,17 +67,6 @@ pub(crate) fn read(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
     Ok(bytes)
 }
 
-/// The whole file as [`read`] gives it, or `None` if there is none.
-///
-/// # Errors
-/// As [`read`].
-pub(crate) fn read_if_there(path: &Path, limit: u64) -> Result<Option<Vec<u8>>, IoError> {
-    match read(path, limit) {
-        Err(IoError::Read { cause, .. }) if cause.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        other => other.map(Some),
-    }
-}
-
 /// The first `limit` bytes of a file, or all of it if it is shorter.
 ///
 /// # Errors
@@ -217,8 +206,6 @@ mod tests {
         assert!(matches!(read(&file, 99), Err(IoError::OverBudget { bytes: 100, limit: 99, .. })));
         assert_eq!(read(&file, 100).expect("fits").len(), 100);
         assert!(matches!(read(folder.path(), 100), Err(IoError::NotAFile { .. })));
-        assert!(matches!(read_if_there(&folder.path().join("b"), 100), Ok(None)));
-        assert!(read_if_there(&file, 100).expect("fits").is_some());
         #[cfg(unix)]
         {
             let pipe = folder.path().join("pipe");
@@ -227,7 +214,6 @@ mod tests {
             for special in [Path::new("/dev/zero"), &pipe] {
                 assert!(matches!(read(special, 100), Err(IoError::NotAFile { .. })), "{}", special.display());
                 assert!(matches!(read_start(special, 100), Err(IoError::NotAFile { .. })));
-                assert!(matches!(read_if_there(special, 100), Err(IoError::NotAFile { .. })));
             }
         }
     }

@@ -55,7 +55,6 @@ impl FolderLock {
         }
     }
 
-    /// The folder.
     pub(crate) fn folder(&self) -> &Path {
         &self.folder
     }

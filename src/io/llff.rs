@@ -17,7 +17,6 @@ use crate::scene::{Camera, Dataset, Distortion};
 pub(crate) const POSES_FILE: &str = "poses_bounds.npy";
 /// Numbers per photo.
 const ROW: usize = 17;
-/// Endings of photos.
 const ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
 
 /// Reads the dataset in `root`.

@@ -34,7 +34,6 @@ pub(super) enum Focal {
 pub(super) struct Lens {
     /// The picture size that the other values refer to; `None` = the file's own.
     pub(crate) size_px: Option<(u32, u32)>,
-    /// Focal lengths.
     pub(crate) focal: Focal,
     /// Principal point in px; `None` = the middle.
     pub(crate) principal_px: Option<DVec2>,
@@ -49,7 +48,6 @@ pub(super) struct Listed {
     pub(crate) name: String,
     /// Its file, relative to the dataset's folder, from [`files::relative`].
     pub(crate) entry: String,
-    /// Its lens.
     pub(crate) lens: Lens,
     /// Axes of the camera (x right, y down, z forward) in the world, as columns.
     pub(crate) world_from_camera: DMat3,

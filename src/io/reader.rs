@@ -50,7 +50,6 @@ impl<'a> Reader<'a> {
         self.array(place).map(u64::from_le_bytes)
     }
 
-    /// The next double.
     pub(crate) fn f64(&mut self, place: &str) -> Result<f64, IoError> {
         self.array(place).map(f64::from_le_bytes)
     }

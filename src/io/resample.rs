@@ -10,7 +10,6 @@ use rayon::prelude::*;
 use crate::math::resize::{Filter, Tap, taps};
 use crate::scene::{Camera, Distortion, PhotoPixels};
 
-/// A decoded picture.
 pub(super) struct Pixels {
     /// Width in px.
     pub(crate) width: usize,

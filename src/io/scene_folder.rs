@@ -44,7 +44,6 @@ impl SceneFolder {
         Ok(Self { lock })
     }
 
-    /// The folder.
     pub(crate) fn path(&self) -> &Path {
         self.lock.folder()
     }

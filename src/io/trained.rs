@@ -15,7 +15,9 @@ use std::time::Duration;
 
 use super::scene_files::is_pending;
 use super::{IoError, SceneFolder, splat_ply};
-use crate::scene::{GaussianCloud, SemanticMap};
+use crate::scene::GaussianCloud;
+#[cfg(test)]
+use crate::scene::SemanticMap;
 
 pub use super::scene_files::{CLOUD_FILE, SCENE_FILE, is_scene};
 pub use super::scene_info::{DatasetReference, History, SceneCamera, SceneInfo, VERSION, load_info};
@@ -45,6 +47,7 @@ impl TrainedScene {
 ///
 /// # Errors
 /// As [`SceneFolder::hold`] and [`SceneFolder::save`].
+#[cfg(test)]
 pub(crate) fn save(
     folder: &Path,
     info: &SceneInfo,

@@ -51,11 +51,9 @@ pub(crate) struct Options {
 
 /// A scene beside the photos that it is compared with.
 pub(crate) struct Comparison {
-    /// The Gaussians.
     pub(crate) cloud: Arc<GaussianCloud>,
     /// How they are drawn.
     pub(crate) settings: RenderSettings,
-    /// The photos.
     pub(crate) dataset: Arc<Dataset>,
     /// Indices of the photos to compare with.
     pub(crate) views: Vec<usize>,
@@ -63,7 +61,6 @@ pub(crate) struct Comparison {
     pub(crate) max_side_px: u32,
     /// Borders of the photos, which are left out.
     pub(crate) borders: Option<Borders>,
-    /// Folder for pictures.
     pub(crate) pictures: Option<PathBuf>,
     /// Id of the save that the scene's files are of.
     pub(crate) state: Option<String>,

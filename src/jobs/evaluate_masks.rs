@@ -76,17 +76,11 @@ pub(crate) enum Summary {
     Ovs3d {
         /// Mean IoU where every pixel is of the class that fits best.
         argmax_miou: f64,
-        /// How many classes.
         #[serde(skip)]
         classes: usize,
     },
     /// Of the protocol [`Protocol::PartRecall`].
-    PartRecall {
-        /// The encoder.
-        encoder: String,
-        /// The paper's ablation.
-        rows: Vec<part_recall::Row>,
-    },
+    PartRecall { encoder: String, rows: Vec<part_recall::Row> },
 }
 
 /// What a comparison comes to.
@@ -206,7 +200,6 @@ fn compare(
     Ok((units, summary))
 }
 
-/// The paper's ablation.
 fn recall(map: &SemanticMap, views: &[LabeledView<'_>]) -> Result<(Vec<Unit>, Summary), JobError> {
     let language = map.language.as_ref().ok_or_else(|| {
         let text = "no encoder has looked at this scene; run 'fmlgs preprocess' on it with --encoder demo";

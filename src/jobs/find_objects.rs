@@ -92,8 +92,6 @@ pub(crate) struct FoundObjects {
     pub(crate) found: Found,
     /// The photos that were looked at; what was found counts them.
     pub(crate) photos: Vec<Photo>,
-    /// Where the objects and parts before are kept, if there were any.
-    pub(crate) kept: Option<PathBuf>,
     /// The state of the scene now.
     pub(crate) state: String,
     /// Seconds that it took.
@@ -160,8 +158,8 @@ pub(crate) fn run(
     let tools = Tools { segmenter: &mut *segmenter, follower: follower.as_mut(), encoder: encoder.as_deref_mut() };
     let found = find_objects(cloud, &photos, settings, tools, &options, observer)?;
     let (kept, state) = scene.replace_map(known, &found.map, cloud)?;
-    if let Some(kept) = &kept {
+    if let Some(kept) = kept {
         observer.note(Severity::Info, format!("The objects and parts before are kept in {}", kept.display()));
     }
-    Ok(FoundObjects { found, photos, kept, state, secs: start.elapsed().as_secs_f64() })
+    Ok(FoundObjects { found, photos, state, secs: start.elapsed().as_secs_f64() })
 }

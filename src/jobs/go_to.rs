@@ -14,7 +14,6 @@ use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 
 /// A scene in which one can move about.
 pub struct Explored {
-    /// Finds ways.
     pub(crate) navigator: Navigator,
     /// The Gaussians that it knows.
     pub(crate) cloud: Arc<GaussianCloud>,
@@ -71,7 +70,6 @@ impl Explored {
 pub struct ApproachRequest {
     /// The scene, if it was looked at before.
     pub(crate) explored: Option<Arc<Explored>>,
-    /// The Gaussians.
     pub(crate) cloud: Arc<GaussianCloud>,
     /// The photos' cameras.
     pub(crate) cameras: Vec<Camera>,
@@ -79,9 +77,7 @@ pub struct ApproachRequest {
     pub(crate) up: DVec3,
     /// How the Gaussians are drawn.
     pub(crate) settings: RenderSettings,
-    /// Objects and parts.
     pub(crate) map: Arc<SemanticMap>,
-    /// Which of them.
     pub(crate) id: IdentityId,
     /// How it is to be seen.
     pub(crate) wish: Wish,

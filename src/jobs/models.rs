@@ -42,7 +42,6 @@ pub(crate) fn list() -> ModelList {
 pub(crate) enum Source<'a> {
     /// An address; `None` = the one in the list.
     Fetch(Option<&'a str>),
-    /// A folder.
     Folder(&'a Path),
 }
 
@@ -77,13 +76,10 @@ pub fn check() -> Result<Vec<(String, Option<String>)>, JobError> {
 /// How long an encoder takes.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub(crate) struct EncoderTimes {
-    /// Its name.
     pub(crate) id: String,
     /// Loading it and its first use, ms.
     pub(crate) load_ms: f64,
-    /// A picture, ms.
     pub(crate) picture_ms: f64,
-    /// A phrase, ms.
     pub(crate) phrase_ms: f64,
     /// What it made of the picture.
     pub(crate) picture: Vec<f32>,

@@ -119,7 +119,6 @@ impl Scene {
 #[allow(clippy::large_enum_variant)]
 #[derive(Debug)]
 pub(crate) enum Contents {
-    /// Posed photos.
     Photos(Dataset),
     /// A splat or a trained scene.
     Scene(Scene),

@@ -62,7 +62,6 @@ pub(crate) struct Request<'a> {
     pub(crate) text: &'a str,
     /// Which level is asked for.
     pub(crate) level: LevelFilter,
-    /// The view.
     pub(crate) camera: &'a Camera,
     /// How pixels are matched.
     pub(crate) mode: MatchMode,

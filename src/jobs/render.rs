@@ -36,9 +36,7 @@ impl Quantity {
     }
 }
 
-/// A drawn view.
 pub(crate) struct Rendered {
-    /// It.
     pub(crate) frame: Frame<f32>,
     /// What drew it: "CPU", or the name of the GPU.
     pub(crate) backend: String,

@@ -17,19 +17,15 @@ const MARK: [u8; 3] = [255, 64, 160];
 /// A video to be made.
 #[derive(Clone, Debug)]
 pub struct VideoRequest {
-    /// The Gaussians.
     pub(crate) cloud: Arc<GaussianCloud>,
     /// How they are drawn.
     pub(crate) draw: RenderSettings,
-    /// One per frame.
     pub(crate) cameras: Vec<Camera>,
     /// What is marked in every frame.
     pub(crate) marked: Option<(Arc<SemanticMap>, Vec<IdentityId>)>,
-    /// Where it goes.
     pub(crate) out: PathBuf,
     /// How it is written.
     pub(crate) settings: Settings,
-    /// Which renderer draws.
     pub(crate) backend: BackendChoice,
 }
 

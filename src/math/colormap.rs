@@ -2,7 +2,6 @@
 
 use strum::{IntoStaticStr, VariantArray};
 
-/// A color map.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, IntoStaticStr, VariantArray)]
 #[strum(serialize_all = "lowercase")]
 pub(crate) enum Colormap {
@@ -11,12 +10,10 @@ pub(crate) enum Colormap {
     Turbo,
     /// Dark violet to yellow, evenly brighter; safe for the color-blind.
     Viridis,
-    /// Black to white.
     Gray,
 }
 
 impl Colormap {
-    /// Its name.
     pub(crate) fn text(self) -> &'static str {
         self.into()
     }

@@ -12,7 +12,6 @@ pub(crate) const CHECKED: bool = cfg!(feature = "debug-validation");
 pub struct NotFinite {
     /// The stage that left it.
     pub(crate) stage: &'static str,
-    /// What it is.
     pub(crate) field: &'static str,
     /// Which of these, from 0.
     pub(crate) index: usize,

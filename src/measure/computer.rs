@@ -23,7 +23,6 @@ pub(crate) fn look() -> Computer {
 }
 
 impl Computer {
-    /// In a line.
     pub(crate) fn words(&self) -> String {
         let gpu = self.gpu.as_deref().unwrap_or("no GPU");
         let memory = self.memory_bytes as f64 / 1e9;

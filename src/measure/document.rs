@@ -73,7 +73,6 @@ pub enum ErrorKind {
 /// Something that was measured of every setting.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Measure {
-    /// Its name: "PSNR".
     pub(crate) name: String,
     /// Its unit; empty for plain numbers.
     pub(crate) unit: String,
@@ -113,11 +112,8 @@ impl Measure {
 /// A number that was measured several times.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sample {
-    /// The middle one.
     pub(crate) median: f64,
-    /// The least.
     pub(crate) least: f64,
-    /// The most.
     pub(crate) most: f64,
     /// All, in the order of the repeats.
     pub(crate) each: Vec<f64>,
@@ -183,7 +179,6 @@ pub struct Order {
     pub(crate) expected: f64,
     /// The order that was seen (see [`super::order`]).
     pub(crate) observed: f64,
-    /// Whether they agree.
     pub(crate) agrees: bool,
     /// What that means, in a sentence.
     pub(crate) meaning: String,
@@ -209,7 +204,6 @@ impl Rule {
         Self { measure: measure.into(), times, floor, spare_secs }
     }
 
-    /// In words.
     pub(crate) fn words(&self) -> String {
         let times = 100.0 * (self.times - 1.0);
         let same = match self.spare_secs > 0.0 {

@@ -26,7 +26,6 @@ impl Case {
         Self { method: method.into(), setting: setting.into(), knobs, default: false }
     }
 
-    /// The program's defaults.
     pub(crate) fn default(setting: impl Into<String>) -> Self {
         Self { method: "default".into(), setting: setting.into(), knobs: Knobs::new(), default: true }
     }
@@ -189,7 +188,6 @@ impl Case {
 }
 
 impl Stage {
-    /// Adds a measurement.
     pub(crate) fn add(&mut self, case: &Case, trial: &Trial) {
         let at = self.points.iter().position(|p| case.is(p)).unwrap_or_else(|| {
             self.points.push(Point {

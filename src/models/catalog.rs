@@ -25,7 +25,6 @@ pub(crate) const SAM2: &str = "sam2.1-tiny";
 pub(crate) enum Role {
     /// Compares pictures with phrases.
     Encoder,
-    /// Finds masks.
     Segmenter,
 }
 
@@ -67,7 +66,6 @@ pub struct Entry {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ListedFile {
-    /// Its name.
     pub(crate) name: String,
     /// About how large it is.
     pub(crate) megabytes: u64,

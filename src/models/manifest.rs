@@ -20,7 +20,6 @@ pub(crate) const MAX_BYTES: u64 = super::fetch::MOST_UNPROMISED;
 pub struct Graph {
     /// Its file, in the same folder.
     pub(crate) file: String,
-    /// Its size.
     pub(crate) bytes: u64,
     /// Its SHA-256, in hexadecimal digits.
     pub(crate) sha256: String,

@@ -125,11 +125,6 @@ impl Network {
         Self { reopen: Some(Box::new(reopen)), ..self }
     }
 
-    /// Its file's name.
-    pub(crate) fn name(&self) -> &str {
-        &self.name
-    }
-
     /// Runs it. Every number that comes out is finite.
     ///
     /// # Errors

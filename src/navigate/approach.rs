@@ -15,11 +15,9 @@ const LEAST_VISIBLE: f64 = 0.05;
 /// A scene with what is known of it.
 #[derive(Clone, Copy)]
 pub(crate) struct Place<'a> {
-    /// The Gaussians.
     pub(crate) cloud: &'a GaussianCloud,
     /// How they are drawn.
     pub(crate) settings: &'a RenderSettings,
-    /// Objects and parts.
     pub(crate) map: &'a SemanticMap,
 }
 
@@ -30,7 +28,6 @@ pub(crate) struct Approach {
     pub(crate) view: View,
     /// The middle of the target.
     pub(crate) target: DVec3,
-    /// The way there.
     pub(crate) flight: Flight,
 }
 
@@ -46,7 +43,6 @@ pub(crate) enum ApproachError {
     /// There is no way; the nearest view that can be reached is offered, if it is seen from there.
     #[error("{why}")]
     NoRoute {
-        /// Why.
         why: NoRoute,
         /// A flight to the nearest place.
         nearest: Option<Box<Approach>>,

@@ -44,7 +44,6 @@ pub(crate) fn squared_distances(marked: &[bool], size: [usize; 3]) -> Vec<f32> {
 
 /// Lower envelope of the parabolas over one line.
 struct Line {
-    /// Their places.
     at: Vec<usize>,
     /// Where each takes over from the one before.
     from: Vec<f32>,

@@ -24,7 +24,6 @@ pub(crate) mod testing;
 pub(crate) use camera_spline::CameraSpline;
 pub use flight::{FRAMES, Flight, Speed};
 pub use navigator::{Navigator, NoRoute};
-pub(crate) use occupancy::OccupancyGrid;
 pub use pose::Pose;
 
 use glam::DVec3;

@@ -160,11 +160,6 @@ impl OccupancyGrid {
         self.clearance(p) < 0.5 * self.voxel
     }
 
-    /// Share of the voxels that are occupied space.
-    pub(crate) fn solid_share(&self) -> f64 {
-        self.depth.iter().filter(|d| **d >= SOLID).count() as f64 / self.depth.len().max(1) as f64
-    }
-
     /// The box outside of which nothing is known.
     pub(crate) fn bounds(&self) -> Bounds {
         let [x, y, z] = self.size.map(|n| n as f64);
@@ -280,7 +275,6 @@ impl OccupancyGrid {
 /// A Gaussian, smoothed to the size of voxels.
 struct Blob {
     center: DVec3,
-    /// Inverse covariance.
     inverse: DMat3,
     /// Half sides of the box that it reaches.
     reach: DVec3,

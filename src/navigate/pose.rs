@@ -27,7 +27,6 @@ impl Pose {
         Self { center: key.center, world_from_camera: key.rotation(), fov_y_rad: key.fov_y_rad }
     }
 
-    /// A key here.
     pub(crate) fn key(&self) -> PathKey {
         PathKey::of_pose(self.center, self.world_from_camera, self.fov_y_rad)
     }

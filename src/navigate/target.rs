@@ -56,7 +56,6 @@ pub enum Side {
 }
 
 impl Side {
-    /// In words.
     pub(crate) fn text(self) -> &'static str {
         self.into()
     }
@@ -65,7 +64,6 @@ impl Side {
 /// What is wanted of a view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Wish {
-    /// From which side.
     pub(crate) side: Side,
     /// Distance as a multiple of the usual one; under 1 is nearer.
     pub(crate) distance: f64,
@@ -89,7 +87,6 @@ pub(crate) struct Target {
 /// A view of a target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct View {
-    /// From where.
     pub(crate) pose: Pose,
     /// Share of its picture alone that is still seen in the scene, 0 to 1.
     pub(crate) visible: f64,
@@ -103,7 +100,6 @@ pub(crate) struct View {
 
 /// What a search for views needs to know.
 pub(crate) struct Search<'a> {
-    /// The Gaussians.
     pub(crate) cloud: &'a GaussianCloud,
     /// How they are drawn.
     pub(crate) settings: &'a RenderSettings,

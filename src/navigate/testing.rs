@@ -28,7 +28,6 @@ pub(crate) fn wall_with_hole(z: f32, radius: f32) -> GaussianCloud {
     cloud
 }
 
-/// Both clouds.
 pub(crate) fn joined(a: &GaussianCloud, b: &GaussianCloud) -> GaussianCloud {
     let mut all = a.clone();
     all.positions.extend_from_slice(&b.positions);

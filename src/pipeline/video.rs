@@ -16,11 +16,8 @@ const MARK: u32 = 3;
 /// Identities that are marked in every picture.
 #[derive(Clone, Copy)]
 pub(crate) struct Marked<'a> {
-    /// Objects and parts.
     pub(crate) map: &'a SemanticMap,
-    /// Which of them.
     pub(crate) ids: &'a [IdentityId],
-    /// With which color.
     pub(crate) color: [u8; 3],
 }
 

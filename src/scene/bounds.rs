@@ -43,7 +43,6 @@ impl Bounds {
         (self.min + self.max) * 0.5
     }
 
-    /// Edge lengths.
     pub(crate) fn size(&self) -> DVec3 {
         self.max - self.min
     }

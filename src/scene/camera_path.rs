@@ -109,6 +109,7 @@ impl CameraPath {
 
 impl PathKey {
     /// A key at a camera: its pose and vertical field of view, no roll, no wait.
+    #[cfg(test)]
     pub(crate) fn of_camera(camera: &Camera) -> Self {
         Self::of_pose(camera.center, camera.world_from_camera, camera.fov_y_rad())
     }
@@ -124,6 +125,7 @@ impl PathKey {
     }
 
     /// The camera that takes a picture of this size here: square pixels, principal point in the middle.
+    #[cfg(test)]
     pub(crate) fn camera(&self, width_px: u32, height_px: u32) -> Camera {
         Camera::of_pose(self.center, self.rotation(), self.fov_y_rad, width_px, height_px)
     }

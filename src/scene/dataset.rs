@@ -11,7 +11,6 @@ use super::{Bounds, Camera, Photo};
 pub struct Dataset {
     /// Short name for titles: the folder's.
     pub name: String,
-    /// The folder.
     pub(crate) root: PathBuf,
     /// Which layout it was read from, for display: "COLMAP binary", "transforms.json", ...
     pub format: String,

@@ -22,12 +22,9 @@ pub struct StepMetrics {
 /// Quality on one held-out photo.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ViewScore {
-    /// The photo's name.
     pub(crate) name: String,
-    /// PSNR in dB.
     #[serde(with = "or_null")]
     pub(crate) psnr: f64,
-    /// SSIM.
     #[serde(with = "or_null")]
     pub(crate) ssim: f64,
 }

@@ -1,6 +1,6 @@
 //! Language features of a scene's identities: what an encoder makes of their pictures.
 
-use super::{Identities, IdentityId};
+use super::Identities;
 
 /// Views of an identity whose features are kept at most. Averaging views blurs what they mean, so a
 /// few are kept and the best one counts.
@@ -27,11 +27,6 @@ pub struct ViewFeatures {
 }
 
 impl LanguageFeatures {
-    /// Features of an identity; `None` if it has none.
-    pub(crate) fn get(&self, id: IdentityId) -> Option<&ViewFeatures> {
-        self.of.get((id as usize).checked_sub(1)?).filter(|f| !f.raw.is_empty())
-    }
-
     /// Whether the numbers fit together, and fit these identities.
     pub fn is_valid(&self, identities: &Identities) -> bool {
         let good = |v: &Vec<f32>| v.len() == self.dimension && v.iter().all(|x| x.is_finite());
@@ -60,10 +55,6 @@ mod tests {
         let of = |of: Vec<ViewFeatures>| LanguageFeatures { encoder: "t".into(), dimension: 3, of };
         let good = of(vec![seen(MAX_VIEWS, 3), seen(0, 3)]);
         assert!(good.is_valid(&all));
-        assert_eq!(
-            (good.get(1).map(|f| f.raw.len()), good.get(2), good.get(0), good.get(3)),
-            (Some(4), None, None, None)
-        );
         assert!(!of(vec![seen(1, 3)]).is_valid(&all), "one is missing");
         assert!(!of(vec![seen(1, 3), seen(1, 2)]).is_valid(&all), "too short");
         assert!(!of(vec![seen(1, 3), seen(MAX_VIEWS + 1, 3)]).is_valid(&all), "too many");

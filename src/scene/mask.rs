@@ -47,15 +47,8 @@ impl Mask {
         Self { width_px, height_px, words }
     }
 
-    /// The pixels whose centers are inside a polygon (even-odd rule), vertices in px. With vertices
+    /// Adds the pixels whose centers are inside a polygon (even-odd rule), vertices in px. With vertices
     /// on whole numbers, as in label files, a pixel center is at its whole coordinates.
-    pub(crate) fn from_polygon(width_px: usize, height_px: usize, vertices: &[[f64; 2]]) -> Self {
-        let mut mask = Self::empty(width_px, height_px);
-        mask.add_polygon(vertices);
-        mask
-    }
-
-    /// Adds the pixels whose centers are inside a polygon, as [`Self::from_polygon`] has them.
     pub(crate) fn add_polygon(&mut self, vertices: &[[f64; 2]]) {
         let rows = |end: fn(f64, f64) -> f64, none: f64| vertices.iter().map(|v| v[1]).fold(none, end);
         let (top, bottom) = (rows(f64::min, f64::INFINITY), rows(f64::max, f64::NEG_INFINITY));
@@ -191,15 +184,20 @@ mod tests {
 
     #[test]
     fn polygons_cover_their_inside() {
+        let of = |vertices: &[[f64; 2]]| {
+            let mut mask = Mask::empty(10, 8);
+            mask.add_polygon(vertices);
+            mask
+        };
         let square = [[2.0, 1.0], [6.0, 1.0], [6.0, 4.0], [2.0, 4.0]];
-        let mask = Mask::from_polygon(10, 8, &square);
+        let mask = of(&square);
         assert_eq!(mask.bounds(), Some(PixelBox { x: 2..7, y: 1..4 }));
         assert_eq!(mask.area(), 15);
         // A hole by the even-odd rule, and vertices outside the picture.
         let bow = [[-5.0, -5.0], [50.0, -5.0], [50.0, 50.0], [-5.0, 50.0]];
-        assert_eq!(Mask::from_polygon(10, 8, &bow).area(), 80);
-        assert!(Mask::from_polygon(10, 8, &[]).is_empty());
-        assert!(Mask::from_polygon(10, 8, &[[3.0, 3.0]]).is_empty());
+        assert_eq!(of(&bow).area(), 80);
+        assert!(of(&[]).is_empty());
+        assert!(of(&[[3.0, 3.0]]).is_empty());
     }
 
     #[test]
@@ -219,7 +217,8 @@ mod tests {
         assert_eq!((mask.width_px(), mask.height_px(), mask.area()), (70, 3, 3));
         assert!(PixelBox { x: 1..3, y: 4..5 }.contains(2, 4) && !PixelBox { x: 1..3, y: 4..5 }.contains(3, 4));
         // A triangle, by hand: rows 0 to 4, from column 0 to the row's number.
-        let triangle = Mask::from_polygon(9, 9, &[[0.0, 0.0], [4.0, 4.0], [0.0, 4.0]]);
+        let mut triangle = Mask::empty(9, 9);
+        triangle.add_polygon(&[[0.0, 0.0], [4.0, 4.0], [0.0, 4.0]]);
         let rows = |m: &Mask| (0..9).map(|y| (0..9).filter(|x| m.contains(y * 9 + x)).count()).collect::<Vec<_>>();
         assert!(
             rows(&triangle)[..4].iter().zip([1, 2, 3, 4]).all(|(a, b)| a.abs_diff(b) <= 1),

@@ -38,9 +38,7 @@ impl Photo {
 pub struct Distortion {
     /// Quadratic radial coefficient.
     pub k1: f64,
-    /// Quartic radial coefficient.
     pub(crate) k2: f64,
-    /// First tangential coefficient.
     pub(crate) p1: f64,
     /// Second tangential coefficient.
     pub(crate) p2: f64,

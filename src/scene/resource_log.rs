@@ -42,7 +42,6 @@ pub struct Load {
     pub(crate) at_secs: f64,
     /// Its sort.
     pub sort: Sort,
-    /// What exactly.
     pub(crate) what: String,
     /// What it was needed for.
     pub(crate) why: &'static str,

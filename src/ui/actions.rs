@@ -40,7 +40,6 @@ pub enum Pane {
 }
 
 impl Pane {
-    /// Its title.
     pub(crate) fn text(self) -> &'static str {
         self.into()
     }
@@ -70,7 +69,6 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// Its name.
     pub(crate) fn text(self) -> &'static str {
         self.into()
     }
@@ -87,7 +85,6 @@ impl Axis {
 pub(crate) struct Shortcut {
     /// Control (Command on a Mac).
     pub(crate) ctrl: bool,
-    /// The key's name.
     pub(crate) key: &'static str,
 }
 

@@ -59,7 +59,6 @@ pub struct App {
     traced: usize,
     /// Edits of objects and parts that wait for the one that is under way.
     pub(super) edits: VecDeque<EditStep>,
-    /// The newest edit.
     pub(super) editing: Option<JobId>,
 }
 

@@ -33,7 +33,6 @@ const THUMBNAIL_PX: f32 = 34.0;
 
 /// What the agent is to work on, as the window has it now.
 pub(crate) struct Snapshot {
-    /// The scene.
     pub(crate) parts: Parts,
     /// Generation of its Gaussians.
     pub(crate) cloud: u64,
@@ -149,7 +148,6 @@ impl Chat {
         self.focus = true;
     }
 
-    /// Draws the pane.
     pub(crate) fn show(
         &mut self,
         ui: &mut Ui,

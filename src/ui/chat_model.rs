@@ -18,7 +18,6 @@ use crate::agent::llm::settings::{LlmSettings, Patience};
 pub(crate) struct ChatSettings {
     /// Whether a chat model plans, instead of the built-in commands.
     pub(crate) use_model: bool,
-    /// Where it is.
     pub(crate) model: LlmSettings,
 }
 
@@ -62,7 +61,6 @@ pub(crate) struct ModelChooser {
 }
 
 impl ModelChooser {
-    /// Draws the choice.
     pub(crate) fn show(&mut self, ui: &mut Ui, settings: &mut ChatSettings) {
         let text = if settings.use_model { "Chat model" } else { "Built-in" };
         ComboBox::from_id_salt("planner").selected_text(text).width(90.0).show_ui(ui, |ui| {

@@ -13,7 +13,6 @@ use super::theme;
 use crate::ui::actions::Action;
 use crate::worker::Repaint;
 
-/// The system's answer.
 pub(crate) enum Chosen {
     /// This path, for the action that asked for one.
     Path(Action, PathBuf),
@@ -105,13 +104,11 @@ fn dialog(action: &Action, name: &str) -> Option<(String, Dialog)> {
 
 /// A question before something is given up.
 pub(crate) struct Question {
-    /// What is asked.
     pub(crate) text: String,
     /// The button that goes ahead.
     pub(crate) yes: &'static str,
     /// The button that does not.
     pub(crate) no: &'static str,
-    /// What then happens.
     pub(crate) action: Action,
 }
 

@@ -20,7 +20,6 @@ pub(crate) enum PlotAxis {
     /// Seconds of training.
     #[default]
     Seconds,
-    /// Optimizer steps.
     Steps,
 }
 
@@ -81,7 +80,6 @@ impl Layout {
         layout
     }
 
-    /// Stores the layout.
     pub(crate) fn save(&self, storage: &mut dyn eframe::Storage) {
         eframe::set_value(storage, KEY, self);
     }

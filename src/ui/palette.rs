@@ -6,7 +6,6 @@ use super::keys;
 use super::theme;
 use crate::ui::actions::Action;
 
-/// The command palette.
 #[derive(Default)]
 pub(crate) struct Palette {
     open: bool,
@@ -23,11 +22,6 @@ impl Palette {
     /// Whether it is on screen.
     pub(crate) fn is_open(&self) -> bool {
         self.open
-    }
-
-    /// Closes it.
-    pub(crate) fn close(&mut self) {
-        self.open = false;
     }
 
     /// Draws it, and returns the action that was chosen.

@@ -25,13 +25,10 @@ const MAX_RECENT: usize = 8;
 /// How a message is meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Tone {
-    /// For the record.
     Info,
-    /// Something was done.
     Good,
     /// Something was left out or changed.
     Warning,
-    /// Something failed.
     Error,
 }
 
@@ -51,16 +48,13 @@ pub(crate) struct Toast {
     pub(crate) id: u64,
     /// How it is meant.
     pub(crate) tone: Tone,
-    /// What it says.
     pub(crate) text: String,
 }
 
 /// The long job that runs now.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunningJob {
-    /// Which.
     pub(crate) id: JobId,
-    /// Its sort.
     pub(crate) kind: JobKind,
     /// What it does, for the user.
     pub(crate) title: String,
@@ -84,7 +78,6 @@ pub struct ErrorBox {
 pub struct ShownReport {
     /// Where it was read from.
     pub(crate) path: PathBuf,
-    /// What it holds.
     pub(crate) report: Arc<Report>,
 }
 

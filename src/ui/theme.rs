@@ -8,23 +8,17 @@ use super::state::Tone;
 pub(crate) const ACCENT: Color32 = Color32::from_rgb(0x6c, 0xb2, 0xf0);
 /// Text on the accent.
 pub(crate) const ON_ACCENT: Color32 = Color32::from_rgb(0x0c, 0x14, 0x1c);
-/// Behind the panes.
 pub(crate) const PANEL: Color32 = Color32::from_rgb(0x18, 0x1a, 0x1f);
-/// Behind the viewport.
 pub(crate) const CANVAS: Color32 = Color32::from_rgb(0x0e, 0x0f, 0x12);
 /// Cards and fields on a pane.
 pub(crate) const SURFACE: Color32 = Color32::from_rgb(0x22, 0x25, 0x2b);
-/// Lines between things.
 pub(crate) const LINE: Color32 = Color32::from_rgb(0x2e, 0x32, 0x3a);
-/// Text.
 pub(crate) const TEXT: Color32 = Color32::from_rgb(0xd9, 0xdc, 0xe2);
 /// Text of less weight; still 5.5 : 1 on a pane.
 pub(crate) const WEAK: Color32 = Color32::from_rgb(0x93, 0x99, 0xa5);
-/// Done.
 pub(crate) const GOOD: Color32 = Color32::from_rgb(0x7f, 0xc7, 0x9a);
 /// Left out or changed; also held-out photos.
 pub(crate) const WARNING: Color32 = Color32::from_rgb(0xe3, 0xb3, 0x5f);
-/// Failed.
 pub(crate) const ERROR: Color32 = Color32::from_rgb(0xee, 0x82, 0x79);
 
 /// The color of a message.

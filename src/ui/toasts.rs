@@ -13,7 +13,6 @@ const STAY_LONG_SECS: f64 = 9.0;
 /// How many are on screen at once.
 const MOST: usize = 4;
 
-/// Times the messages.
 #[derive(Default)]
 pub(crate) struct Toasts {
     since: HashMap<u64, f64>,

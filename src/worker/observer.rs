@@ -19,7 +19,6 @@ pub(crate) type Repaint = Arc<dyn Fn() + Send + Sync>;
 pub struct CloudSnapshot {
     /// Whose they are.
     pub job: JobId,
-    /// The Gaussians.
     pub(crate) cloud: Arc<GaussianCloud>,
     /// After how many steps.
     pub step: u64,
@@ -32,7 +31,6 @@ const CLOUD_EVERY: Duration = Duration::from_millis(320);
 /// events wait.
 const KEPT_FREE: usize = 64;
 
-/// Reports one job.
 pub(super) struct JobObserver {
     pub(super) job: JobId,
     pub(super) control: Arc<Control>,

@@ -383,7 +383,6 @@ impl Event {
 pub struct MeasureRequest {
     /// The scene, for display.
     pub(crate) scene: String,
-    /// Its Gaussians.
     pub(crate) cloud: Arc<GaussianCloud>,
     /// How they are drawn.
     pub(crate) settings: RenderSettings,

@@ -22,7 +22,6 @@ const QUEUED: usize = 16;
 pub(crate) struct Encoded {
     /// Embeddings of their phrases.
     pub(crate) phrases: TextEmbeddings,
-    /// Each text.
     pub(crate) texts: BTreeMap<String, EncodedText>,
     /// Why the encoder cannot be used, if it cannot.
     pub(crate) problem: Option<String>,

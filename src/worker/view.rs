@@ -22,7 +22,6 @@ const REST: Duration = Duration::from_secs(2);
 /// What the pixels of a view belong to.
 #[derive(Clone, Debug)]
 pub struct MappedView {
-    /// The request's.
     pub(crate) ticket: u64,
     /// The pixels, or why they could not be drawn.
     pub(crate) maps: Result<Arc<ViewMaps>, Failure>,

@@ -27,7 +27,6 @@ pub enum ViewMode {
 }
 
 impl ViewMode {
-    /// Its name.
     pub(crate) fn text(self) -> &'static str {
         self.into()
     }

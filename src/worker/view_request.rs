@@ -40,9 +40,7 @@ pub struct ViewRequest {
 pub struct SkipPasses {
     /// Depth of frames from which no one picks points.
     pub(crate) depth: bool,
-    /// Codes of parts.
     pub(crate) parts: bool,
-    /// The GPU.
     pub(crate) gpu: bool,
     /// Working memory, while the eye rests.
     pub(crate) buffers: bool,

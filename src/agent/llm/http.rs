@@ -106,7 +106,6 @@ pub(crate) fn exchange(
     }
 }
 
-/// Starts to ask.
 fn ask(url: &str, key: Option<&Secret>, body: Option<String>, patience: &Patience) -> std::io::Result<Receiver<Piece>> {
     let config = http::config(url, 2 * patience.stall)
         // Neither the key nor the user's words follow a server elsewhere.

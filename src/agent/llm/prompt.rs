@@ -22,7 +22,6 @@ pub const SENT: &str = "Sent to the chat model: what you write; of the scene's o
     tools that the policy permits; the model's name. Not sent: pictures, Gaussians, cameras, paths and names of files, \
     why something failed on this machine. The key goes into one header of the request and nowhere else.";
 
-/// The task.
 pub(crate) const TASK: &str = "You help a person look around in a 3D scene in a viewer, by calling the tools. Rules: \
     Call tools for everything you do; never claim to have done what no tool result confirms. \
     Use the numbers of identities from the scene data as targets where you are sure, else words. \

@@ -18,7 +18,6 @@ impl Secret {
         sound.then(|| Self(key.to_owned()))
     }
 
-    /// The header's value.
     pub(super) fn bearer(&self) -> String {
         format!("Bearer {}", self.0)
     }

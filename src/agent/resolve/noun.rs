@@ -72,7 +72,6 @@ impl Vocabulary {
         self.words.contains(&singular(word))
     }
 
-    /// All of them.
     pub(crate) fn words(&self) -> impl Iterator<Item = &str> {
         self.words.iter().map(String::as_str)
     }

@@ -116,7 +116,6 @@ fn listed(image: &Image, cameras: &Cameras, root: &Path, folder: &str, source: &
     })
 }
 
-/// A point, checked.
 fn point(position: DVec3, rgb: [u8; 3], index: usize, path: &Path) -> Result<SparsePoint, IoError> {
     photo_list::place(position, "point", index, path).map(|position| SparsePoint { position, rgb })
 }

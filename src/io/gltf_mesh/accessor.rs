@@ -8,7 +8,6 @@ use crate::io::IoError;
 
 /// Values of an accessor as `f32`, those of one element together.
 pub(crate) struct Values {
-    /// Components per element.
     pub(crate) width: usize,
     /// `[count * width]`, finite.
     pub(crate) data: Vec<f32>,

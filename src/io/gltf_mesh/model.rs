@@ -37,7 +37,6 @@ pub(crate) struct MeshNode {
 /// A mesh: one primitive per material.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Mesh {
-    /// Its name.
     pub(crate) name: Option<String>,
     /// Its primitives that are made of triangles.
     pub(crate) primitives: Vec<Primitive>,
@@ -75,7 +74,6 @@ pub(crate) struct Material {
     pub(crate) metallic: f32,
     /// 0 for a mirror, 1 for chalk.
     pub(crate) roughness: f32,
-    /// What alpha means.
     pub(crate) alpha: AlphaMode,
     /// Shown in its own color whatever the light.
     pub(crate) unlit: bool,
@@ -84,7 +82,6 @@ pub(crate) struct Material {
 /// What a material's alpha means.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum AlphaMode {
-    /// Nothing.
     Opaque,
     /// The surface is absent where alpha is below this.
     Mask(f32),
@@ -97,7 +94,6 @@ pub(crate) enum AlphaMode {
 pub(crate) struct TextureUse {
     /// Index into [`MeshScene::images`].
     pub(crate) image: usize,
-    /// Texture coordinate set.
     pub(crate) uv_set: usize,
     /// `KHR_texture_transform`: added last.
     pub(crate) offset: Vec2,
@@ -123,15 +119,11 @@ impl TextureUse {
 /// What lies outside a texture's 0..1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Wrap {
-    /// The texture again.
     Repeat,
-    /// The texture mirrored.
     Mirror,
-    /// Its edge.
     Clamp,
 }
 
-/// A decoded image.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TextureImage {
     /// Width in px, at least 1.

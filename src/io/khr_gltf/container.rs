@@ -36,7 +36,6 @@ pub(super) struct Values<const N: usize> {
     pub(crate) signed_integer: bool,
 }
 
-/// A glTF file.
 pub(super) struct Gltf<'a> {
     meshes: &'a Meshes,
     file: File<'a>,

@@ -21,10 +21,8 @@ struct File {
 pub(crate) struct Listed {
     /// Value in the id maps.
     pub(crate) id: u16,
-    /// The node's name.
     #[serde(deserialize_with = "text::read_name")]
     pub(crate) name: String,
-    /// Object or part.
     pub(crate) level: Level,
     /// For a part, its object's id.
     #[serde(default)]
@@ -42,11 +40,6 @@ impl SynthIds {
     pub fn open(root: &Path) -> Result<Self, IoError> {
         let file: File = files::read_json(&root.join(LIST_FILE))?;
         Ok(Self { root: root.into(), list: file.identities })
-    }
-
-    /// Objects and parts, in the file's order.
-    pub(crate) fn list(&self) -> &[Listed] {
-        &self.list
     }
 
     fn path(&self, level: Level, stem: &str) -> PathBuf {

@@ -106,7 +106,6 @@ impl Scalar {
 pub(crate) enum Kind {
     /// One number.
     Scalar(Scalar),
-    /// A list.
     List {
         /// Type of the length.
         count: Scalar,
@@ -118,9 +117,7 @@ pub(crate) enum Kind {
 /// A property of an element.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Property {
-    /// Its name.
     pub(crate) name: String,
-    /// Its type.
     pub(crate) kind: Kind,
 }
 
@@ -135,7 +132,6 @@ pub(crate) struct Element {
     pub(crate) properties: Vec<Property>,
 }
 
-/// Reads the header.
 pub(super) fn parse<'a>(bytes: &'a [u8], path: &'a Path) -> Result<Ply<'a>, IoError> {
     let mut rest = bytes;
     let mut number = 0_usize;

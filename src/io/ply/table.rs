@@ -7,9 +7,7 @@ use super::Scalar;
 /// A column of a [`Table`].
 #[derive(Clone, Debug)]
 pub(crate) struct Column {
-    /// The property's name.
     pub(crate) name: String,
-    /// The property's type.
     pub(crate) scalar: Scalar,
     /// Where it starts in a row, in bytes.
     pub(crate) offset: usize,

@@ -18,7 +18,6 @@ pub(super) struct Meta {
     pub(crate) scales: Levels<3>,
     pub(crate) scales_file: String,
     pub(crate) quats_file: String,
-    /// Constant harmonics.
     pub(crate) sh0: Levels<3>,
     pub(crate) opacity: Opacity,
     pub(crate) sh0_file: String,
@@ -35,7 +34,6 @@ pub(super) enum Opacity {
     Logit(f32, f32),
 }
 
-/// Higher harmonics.
 pub(super) struct Rest {
     /// Degree, where the file says; else it follows from the palette's width.
     pub(crate) degree: Option<u8>,

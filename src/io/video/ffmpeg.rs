@@ -18,7 +18,6 @@ const LAST_LINES: usize = 12;
 /// Longest line that is kept, in bytes.
 const LINE_BYTES: u64 = 2000;
 
-/// See the module.
 pub(super) struct Ffmpeg {
     path: PathBuf,
     program: PathBuf,

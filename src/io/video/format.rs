@@ -18,7 +18,6 @@ pub(crate) enum Format {
 }
 
 impl Format {
-    /// Every format.
     pub(crate) const ALL: [Self; 4] = [Self::Mp4, Self::Gif, Self::WebP, Self::Frames];
 
     /// How a path of this format ends.

@@ -15,7 +15,6 @@ use crate::io::error::write_error;
 use crate::io::files::{folder_of, sync_folder};
 use crate::io::temporary::{TemporaryFolder, temporary_folder};
 
-/// See the module.
 pub(super) struct Frames {
     folder: PathBuf,
     /// Whether `folder` was there before.

@@ -8,7 +8,6 @@ use super::{Result, Settings, Sink, VideoFileError};
 use crate::io::atomic::Draft;
 use crate::io::error::write_error;
 
-/// See the module.
 pub(super) struct Gif {
     path: PathBuf,
     settings: Settings,

@@ -110,16 +110,6 @@ impl VideoWriter {
         Ok(Self { path: path.into(), format, settings: settings.clone(), size_px, frames: 0, sink: Some(sink) })
     }
 
-    /// Width and height of the video in px; see [`Summary::size_px`].
-    pub(crate) fn size_px(&self) -> (u32, u32) {
-        self.size_px
-    }
-
-    /// Frames pushed so far.
-    pub(crate) fn frames(&self) -> u64 {
-        self.frames
-    }
-
     /// Adds the next frame: sRGB, `width * height * 3` bytes, row by row from the top. After an error of
     /// the encoder or the disk the video is lost: every further call fails, and nothing is left on disk.
     ///

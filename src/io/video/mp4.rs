@@ -25,7 +25,6 @@ use super::{Result, Settings, Sink, VideoFileError};
 use crate::io::atomic::Draft;
 use crate::io::error::write_error;
 
-/// See the module.
 pub(super) struct Mp4 {
     path: PathBuf,
     row_px: usize,

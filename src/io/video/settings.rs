@@ -18,7 +18,6 @@ pub(crate) struct Settings {
     pub(crate) quality: u8,
     /// Whether a video or frames of the same name may be replaced.
     pub(crate) overwrite: bool,
-    /// What encodes.
     pub(crate) encoder: Encoder,
 }
 

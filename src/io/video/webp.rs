@@ -15,7 +15,6 @@ use super::{Result, Settings, Sink, VideoFileError};
 use crate::io::atomic::Draft;
 use crate::io::error::write_error;
 
-/// See the module.
 pub(super) struct WebP {
     path: PathBuf,
     size_px: (u32, u32),

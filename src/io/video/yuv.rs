@@ -14,7 +14,6 @@ const RED: f32 = 0.2126;
 const BLUE: f32 = 0.0722;
 
 impl Planes {
-    /// Black planes.
     pub(super) fn new(width: usize, height: usize) -> Self {
         let color = vec![128; width / 2 * (height / 2)];
         Self { width, height, y: vec![16; width * height], u: color.clone(), v: color }

@@ -108,7 +108,6 @@ fn medians(runs: &[StageTimes]) -> StageTimes {
 pub(crate) struct Timing {
     /// The scene or dataset.
     pub(crate) name: String,
-    /// Gaussians in it.
     pub(crate) gaussians: usize,
     /// Width and height, px.
     pub(crate) size: [u32; 2],

@@ -276,7 +276,6 @@ fn views(all: &mut Scenes) {
     }
 }
 
-/// Coefficients of colors.
 fn colors(all: &mut Scenes) {
     all.drawn("color coefficients that overflow to white and black", || {
         let mut cloud = one([0.3; 3], TURNED, 4.0);

@@ -36,7 +36,6 @@ impl Verdict {
         if holds { Self::Holds } else { Self::Broken }
     }
 
-    /// For tables.
     pub(crate) fn text(self) -> &'static str {
         match self {
             Self::Holds => "yes",
@@ -80,7 +79,6 @@ impl Finding {
     }
 }
 
-/// A named case.
 pub(crate) struct Case {
     pub(crate) area: &'static str,
     pub(crate) name: String,

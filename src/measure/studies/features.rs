@@ -21,7 +21,6 @@ use crate::render::{RenderError, RenderSettings, Renderer};
 use crate::scene::semantic_map::CODE_CHANNELS;
 use crate::scene::{GaussianCloud, Identities, IdentityId, Level, Mask, NOBODY};
 
-/// One way.
 struct Variant {
     /// Views that vote; none vote for nothing.
     views: usize,

@@ -33,7 +33,6 @@ struct Variant {
     way: Way,
 }
 
-/// By which formula.
 #[derive(Clone, Copy)]
 enum Way {
     Ours,

@@ -44,7 +44,6 @@ enum Way {
 /// A way and its settings.
 type Variant = (Way, RenderSettings);
 
-/// What is drawn.
 struct Drawing {
     cloud: Arc<GaussianCloud>,
     double: GaussianCloud<f64>,

@@ -20,7 +20,6 @@ use crate::scene::PhotoPixels;
 /// What the metadata file says.
 #[derive(Clone, Debug, Deserialize)]
 pub(crate) struct Metadata {
-    /// The model's name.
     pub(crate) name: String,
     /// Side of its square, px.
     pub(crate) image_size: usize,
@@ -48,7 +47,6 @@ pub(crate) struct Metadata {
     pub(crate) stability_delta: f32,
     /// Stability under which the single mask gives way to the best of three.
     pub(crate) stability_threshold: f32,
-    /// Whether it does.
     pub(crate) single_mask_falls_back: bool,
     /// Whether masks of prompted frames are remembered as yes or no.
     pub(crate) binarise_prompted: bool,

@@ -243,7 +243,6 @@ impl<'a> Track<'a> {
         (0, 0)
     }
 
-    /// Fills small holes.
     fn fill(&self, logits: &mut Array) {
         let most = self.model.about.fill_hole_area;
         if most == 0 {
@@ -356,11 +355,6 @@ impl<'a> Track<'a> {
         self.fill(&mut out.logits);
         self.objects.entry(id).or_default().followed.insert(frame, out.clone());
         Ok(out)
-    }
-
-    /// An object's pixels in a picture of the sequence.
-    pub(crate) fn mask(&self, out: &Output) -> Mask {
-        mask_of(out, self.size)
     }
 }
 

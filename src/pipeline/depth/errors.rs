@@ -30,7 +30,6 @@ pub(crate) struct DepthErrors {
 /// Drawn and true depths side by side.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Samples {
-    /// Absolute errors.
     abs: Vec<f64>,
     /// Errors over true depth, in the same order.
     rel: Vec<f64>,

@@ -100,7 +100,6 @@ pub(crate) struct DepthScores {
 pub(crate) struct DepthCounter {
     /// Of expected depth: all pixels, edges.
     expected: [Samples; 2],
-    /// Of median depth.
     median: [Samples; 2],
 }
 

@@ -24,7 +24,6 @@ pub(crate) enum Basis {
 /// An answered query.
 #[derive(Clone, Debug, PartialEq)]
 pub struct QueryAnswer {
-    /// What is meant.
     pub(crate) answer: Answer,
     /// What that rests on.
     pub(crate) basis: Basis,
@@ -42,7 +41,6 @@ pub(crate) struct Language<'a> {
     pub(crate) features: &'a LanguageFeatures,
     /// With the query's phrases learnt; see [`phrases_of`].
     pub(crate) phrases: &'a TextEmbeddings,
-    /// How to score.
     pub(crate) options: EmbeddingOptions,
 }
 

@@ -13,9 +13,7 @@ const LEAST_PX: usize = 12;
 /// What a mask is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Link {
-    /// This identity.
     Known(IdentityId),
-    /// Nobody seen before.
     New,
     /// Another mask fits this identity, which this one would fit too, better.
     Split(IdentityId),

@@ -75,7 +75,6 @@ impl Default for FindOptions {
     }
 }
 
-/// What was found.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Found {
     /// Objects and parts of the scene.
@@ -122,7 +121,6 @@ pub(crate) fn segmenter<'a>(
 
 /// What finds masks, carries them on, and looks at what they are of.
 pub(crate) struct Tools<'a> {
-    /// Finds masks.
     pub(crate) segmenter: &'a mut dyn Segmenter,
     /// Follows them through the photos, besides what the Gaussians carry.
     pub(crate) follower: Option<&'a mut Sam2Tracker>,

@@ -15,7 +15,6 @@ pub(crate) enum PartFeatures {
     /// Moved towards their whole's: the paper's semantic deviation.
     #[default]
     Deviated,
-    /// Their own alone.
     Raw,
 }
 
@@ -49,11 +48,7 @@ impl TextEmbeddings {
     ///
     /// # Errors
     /// What `encode` fails with.
-    pub fn learn<E>(
-        &mut self,
-        phrases: &[&str],
-        mut encode: impl FnMut(&str) -> Result<Vec<f32>, E>,
-    ) -> Result<(), E> {
+    pub fn learn<E>(&mut self, phrases: &[&str], mut encode: impl FnMut(&str) -> Result<Vec<f32>, E>) -> Result<(), E> {
         if self.0.len() > Self::MOST {
             self.0.clear();
         }
@@ -88,7 +83,6 @@ pub struct EmbeddingScorer<'a> {
     pub(crate) features: &'a LanguageFeatures,
     /// Embeddings of the phrases that will be asked for; others score nothing.
     pub(crate) phrases: &'a TextEmbeddings,
-    /// How.
     pub(crate) options: EmbeddingOptions,
     /// Scores that were asked for already.
     known: Vec<(String, Option<String>, Vec<f32>)>,

@@ -15,7 +15,6 @@ pub const RADIUS: f32 = 0.5;
 /// tolerance.
 pub(crate) const TOLERANCE: f32 = 5.0 / 255.0;
 
-/// Rounds of repulsion.
 const RELAXATIONS: usize = 30;
 
 /// `n` directions spread evenly: a Fibonacci sphere relaxed by repulsion.

@@ -6,7 +6,6 @@
 
 use crate::scene::Mask;
 
-/// Settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct FilterOptions {
     /// Share of a mask whose place may be taken already; it loses those pixels. 0 is the paper's

@@ -41,7 +41,6 @@ const SIZE_PX: [u32; 2] = [400, 300];
 const TRAIN_PX: u32 = 160;
 /// Longer side of the masks that are compared, px.
 const COMPARE_PX: u32 = 200;
-/// Steps of training.
 const STEPS: u64 = 150;
 /// Steps of training codes.
 const CODE_STEPS: u64 = 100;

@@ -19,11 +19,6 @@ pub(crate) struct QueryEngine {
 }
 
 impl QueryEngine {
-    /// With this encoder.
-    pub(crate) fn with(encoder: Box<dyn Encoder>) -> Self {
-        Self { encoder: Some(encoder), ..Self::default() }
-    }
-
     /// With the encoder that looked at the scene's identities, if one has.
     ///
     /// # Errors
@@ -150,7 +145,7 @@ mod tests {
         map.identities.add(Level::Object, NOBODY, vec!["lamp".into()]);
         let red = ViewFeatures { raw: vec![vec![1.0, 0.0]], deviated: vec![vec![1.0, 0.0]] };
         map.language = Some(LanguageFeatures { encoder: "small".into(), dimension: 2, of: vec![red] });
-        let mut engine = QueryEngine::with(Box::new(Small));
+        let mut engine = QueryEngine { encoder: Some(Box::new(Small)), ..QueryEngine::default() };
         let mut ask = |text: &str| engine.ask(&map, text, LevelFilter::Auto);
         let answered = ask("red").expect("encodes").expect("words");
         assert_eq!((answered.basis, answered.chosen(1)), (Basis::Embedding, vec![1]));

@@ -9,8 +9,6 @@ use crate::math::vector::{dot, unit};
 
 /// Phrases that mean anything.
 pub const CANONICAL: [&str; 3] = ["object", "stuff", "texture"];
-/// Temperature of the paper.
-pub(crate) const PAPER_TEMPERATURE: f32 = 1.0;
 /// Temperature that spreads scores over the unit interval, for display.
 pub(crate) const TEMPERATURE: f32 = 10.0;
 /// Share of its own feature that a part keeps.
@@ -57,7 +55,7 @@ mod tests {
             let q = f64::from(dot(&feature, &query)).exp();
             let paper = canonical.iter().map(|c| q / (f64::from(dot(&feature, c)).exp() + q));
             let paper = paper.fold(f64::INFINITY, f64::min);
-            let ours = f64::from(score(advantage(&feature, &query, &canonical), PAPER_TEMPERATURE));
+            let ours = f64::from(score(advantage(&feature, &query, &canonical), 1.0));
             assert!((paper - ours).abs() < 1e-6, "{paper} {ours}");
         }
     }

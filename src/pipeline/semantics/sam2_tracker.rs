@@ -110,7 +110,6 @@ struct Cached<'a> {
     folder: Option<PathBuf>,
     /// The frame that was used last: it is asked for by every object.
     kept: Option<(usize, Frame)>,
-    /// Time spent.
     secs: &'a mut f64,
 }
 

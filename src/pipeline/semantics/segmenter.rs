@@ -9,7 +9,6 @@ use crate::scene::{Level, Mask, Photo};
 /// A mask that a segmenter found in one photo.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FoundMask {
-    /// Object or part.
     pub(crate) level: Level,
     /// Index of the mask that it is a piece of; before its own.
     pub(crate) parent: Option<usize>,

@@ -38,7 +38,6 @@ impl<T: Copy> Stages<T> {
 }
 
 impl StagesMs {
-    /// All of it.
     pub(crate) fn whole(&self) -> f64 {
         self.values().iter().sum()
     }

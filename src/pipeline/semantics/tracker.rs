@@ -48,7 +48,6 @@ impl Default for TrackOptions {
 pub(crate) struct Sighting {
     /// Whose pixels.
     pub(crate) identity: IdentityId,
-    /// How many.
     pub(crate) pixels: usize,
     /// Mean share of its object in them, 0 to 1.
     pub(crate) confidence: f64,
@@ -68,9 +67,7 @@ pub(crate) struct ViewReport {
 /// The result of a tracking.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Tracked {
-    /// Objects and parts.
     pub(crate) identities: Identities,
-    /// Per Gaussian.
     pub(crate) assignments: Vec<Assignment>,
     /// The photos that were segmented, in order.
     pub(crate) seeds: Vec<usize>,

@@ -22,7 +22,6 @@ const RATES: [f64; 2] = [0.02, 0.002];
 /// The masks of one view.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct CodeView {
-    /// From where.
     pub(crate) camera: Camera,
     /// Innermost identity of each pixel, row-major; `UNKNOWN` says nothing.
     pub(crate) labels: Vec<IdentityId>,
@@ -31,7 +30,6 @@ pub(crate) struct CodeView {
 /// Settings of a training of codes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CodeTraining {
-    /// Optimizer steps.
     pub(crate) steps: u64,
     /// Seed of the order of the views.
     pub(crate) seed: u64,

@@ -23,7 +23,6 @@ pub struct ViewMap {
     pub identity: Vec<IdentityId>,
     /// Share of the pixel's weight that belongs to the winner's object.
     pub(crate) share: Vec<f32>,
-    /// Accumulated alpha.
     pub(crate) alpha: Vec<f32>,
 }
 

@@ -37,18 +37,9 @@ impl Votes {
         Self { of: vec![Vec::new(); n] }
     }
 
-    /// Number of Gaussians.
-    pub(crate) fn len(&self) -> usize {
-        self.of.len()
-    }
-
-    /// Whether there are no Gaussians.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.of.is_empty()
-    }
-
     /// Weight of all votes for Gaussian `i`, px.
-    pub(crate) fn weight(&self, i: usize) -> f32 {
+    #[cfg(test)]
+    fn weight(&self, i: usize) -> f32 {
         self.of[i].iter().map(|v| v.1).sum()
     }
 
@@ -226,7 +217,7 @@ mod tests {
         add(&mut votes, 52, 1.5);
         assert!(votes.contains(&(52, 1.5)) && votes.iter().all(|v| v.0 != 1) && votes.len() == KEPT);
         let all = Votes { of: vec![votes, vec![]] };
-        assert_eq!((all.len(), all.is_empty(), Votes::new(0).is_empty(), all.weight(1)), (2, false, true, 0.0));
+        assert_eq!(all.weight(1), 0.0);
         assert_eq!(all.weight(0), 2.0 + 3.5 + 4.0 + 5.0 + 6.0 + 7.0 + 8.0 + 1.5);
     }
 

@@ -30,9 +30,7 @@ use crate::scene::Level;
 pub struct Identity {
     /// Value in the id maps, from 1.
     pub(crate) id: u16,
-    /// The node's name.
     pub(crate) name: String,
-    /// Object or part.
     pub(crate) level: Level,
     /// For a part, its object's id.
     pub(crate) parent: Option<u16>,
@@ -59,7 +57,6 @@ pub(crate) struct NodeIds {
 pub struct Identities {
     /// In order of their ids, from 1.
     pub(crate) list: Vec<Identity>,
-    /// By node index.
     pub(crate) of_node: Vec<NodeIds>,
 }
 

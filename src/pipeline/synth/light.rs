@@ -59,7 +59,6 @@ pub(crate) struct Light {
 }
 
 impl Light {
-    /// Nothing known yet.
     pub(crate) fn new(surface: &Surface, materials: &Materials) -> Self {
         let directions = SKY_RAYS / surface.vertices.len().max(1);
         let directions = directions.clamp(*SKY_DIRECTIONS.start(), *SKY_DIRECTIONS.end());
@@ -127,11 +126,8 @@ impl Light {
 /// What light falls on.
 #[derive(Clone, Copy)]
 pub(crate) struct Lit<'a> {
-    /// Triangles.
     pub(crate) surface: &'a Surface,
-    /// Their hierarchy.
     pub(crate) tracer: &'a Tracer,
-    /// Their look.
     pub(crate) materials: &'a Materials,
 }
 

@@ -9,9 +9,7 @@ use crate::io::gltf_mesh::{AlphaMode, Material, MeshScene, TextureUse};
 /// The look of a point, linear.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Look {
-    /// Diffuse color.
     pub(crate) albedo: Vec3A,
-    /// Emitted light.
     pub(crate) emission: Vec3A,
     /// How much of what is behind it the point covers.
     pub(crate) alpha: f32,
@@ -26,7 +24,6 @@ pub(crate) struct Materials {
 }
 
 impl Materials {
-    /// Of a scene.
     pub(crate) fn of(scene: &MeshScene) -> Self {
         Self {
             list: scene.materials.clone(),
@@ -35,7 +32,6 @@ impl Materials {
         }
     }
 
-    /// One of them.
     pub(crate) fn get(&self, index: u32) -> &Material {
         &self.list[index as usize]
     }

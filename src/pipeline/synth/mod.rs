@@ -103,15 +103,11 @@ pub enum SynthError {
 /// What was made.
 #[derive(Clone, Debug)]
 pub struct SynthReport {
-    /// The folder.
     pub(crate) out: PathBuf,
-    /// Photos for training.
     pub(crate) train_views: usize,
-    /// Photos held out.
     pub(crate) held_out_views: usize,
     /// Objects and parts, pixels counted.
     pub(crate) identities: Vec<Identity>,
-    /// Sparse points.
     pub(crate) points: usize,
     /// Triangles of the scene after splitting for light.
     pub(crate) triangles: usize,

@@ -90,7 +90,6 @@ impl Default for SynthOptions {
 }
 
 impl SynthOptions {
-    /// Checks every field.
     pub(crate) fn validate(&self) -> Result<(), SynthError> {
         let bad = |what: &str| Err(SynthError::Options(what.into()));
         let side = 1..=Camera::MAX_SIDE_PX;

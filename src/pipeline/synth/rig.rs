@@ -21,7 +21,6 @@ const ATTEMPTS: usize = 24;
 /// What the cameras look at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Subject {
-    /// The middle.
     pub(crate) focus: DVec3,
     /// Radius around it that should fill a picture.
     pub(crate) radius: f64,

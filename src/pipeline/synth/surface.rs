@@ -25,7 +25,6 @@ const LIGHT_CELLS: f64 = 24_000.0;
 /// A vertex in the scene's frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Vertex {
-    /// Position.
     pub(crate) position: Vec3A,
     /// Unit normal.
     pub(crate) normal: Vec3A,
@@ -42,15 +41,12 @@ pub(crate) struct Triangle {
     pub(crate) vertices: [u32; 3],
     /// Index into the scene's materials.
     pub(crate) material: u32,
-    /// Object and part.
     pub(crate) ids: NodeIds,
 }
 
 /// All triangles of a scene.
 pub(crate) struct Surface {
-    /// Vertices.
     pub(crate) vertices: Vec<Vertex>,
-    /// Triangles.
     pub(crate) triangles: Vec<Triangle>,
     /// The frame's origin in the world.
     pub(crate) origin: DVec3,
@@ -61,7 +57,6 @@ pub(crate) struct Surface {
 }
 
 impl Surface {
-    /// Flattens the scene.
     pub(crate) fn of(scene: &MeshScene, identities: &Identities) -> Result<Self, SynthError> {
         let instances: Vec<Instance<'_>> = scene
             .nodes

@@ -40,7 +40,6 @@ pub(crate) struct Tracer {
 }
 
 impl Tracer {
-    /// Builds it.
     pub(crate) fn new(surface: &Surface) -> Self {
         let boxes: Vec<Aabb> = surface
             .triangles

@@ -33,11 +33,8 @@ pub(crate) struct View {
 
 /// Everything that rendering needs.
 pub struct Stage {
-    /// Triangles.
     pub(crate) surface: Surface,
-    /// Their hierarchy.
     pub(crate) tracer: Tracer,
-    /// Their look.
     pub(crate) materials: Materials,
     /// The light on them.
     pub(crate) light: Light,

@@ -18,7 +18,6 @@ use crate::scene::{Camera, SparsePoint};
 
 /// The file whose presence makes the folder a data set; written last.
 pub(crate) const TRANSFORMS: &str = "transforms.json";
-/// Settings and fingerprint.
 pub(crate) const SETTINGS: &str = "synth.json";
 
 /// Writes into one folder.

@@ -138,11 +138,8 @@ fn write_cloud(w: &mut dyn Write, c: &GaussianCloud) -> io::Result<()> {
 pub struct Checkpoint {
     /// The run.
     pub header: Header,
-    /// The Gaussians.
     pub(crate) cloud: GaussianCloud,
-    /// Adam's moments.
     pub(crate) moments: [GaussianCloud; 2],
-    /// Density statistics.
     pub(crate) stats: DensityStats,
 }
 

@@ -25,11 +25,9 @@ const SPLIT_SHRINK: f32 = 1.6;
 /// What a round of density control did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DensityReport {
-    /// Small Gaussians copied.
     pub(crate) cloned: usize,
     /// Large Gaussians replaced by two.
     pub(crate) split: usize,
-    /// Gaussians removed.
     pub(crate) pruned: usize,
     /// Growth left out for lack of budget.
     pub(crate) refused: usize,

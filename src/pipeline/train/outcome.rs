@@ -21,13 +21,10 @@ pub(crate) enum TrainEnd {
 /// What a run leaves behind.
 #[derive(Clone, Debug)]
 pub(crate) struct TrainOutcome {
-    /// The Gaussians.
     pub(crate) cloud: Arc<GaussianCloud>,
     /// Held-out evaluations, the last one of the final state.
     pub(crate) evaluations: Vec<Evaluation>,
-    /// How it ended.
     pub(crate) end: TrainEnd,
-    /// Steps done.
     pub(crate) steps: u64,
     /// Seconds of training.
     pub(crate) secs: f64,

@@ -114,7 +114,6 @@ fn stopped_early() -> TrainOutcome {
     TrainOutcome { cloud: Arc::default(), evaluations: Vec::new(), end: TrainEnd::Cancelled, steps: 0, secs: 0.0 }
 }
 
-/// A running job.
 struct Job<'a> {
     config: &'a TrainConfig,
     scene: Option<SceneFolder>,

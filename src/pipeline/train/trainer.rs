@@ -59,7 +59,6 @@ pub struct Trainer {
     pub step: u64,
     /// Size of the scene that thresholds scale with.
     pub(crate) extent: f64,
-    /// Most Gaussians allowed.
     pub(crate) budget: usize,
     settings: RenderSettings,
     densify: bool,
@@ -72,13 +71,7 @@ pub struct Trainer {
 
 impl Trainer {
     /// A run's first state.
-    pub fn new(
-        cloud: GaussianCloud,
-        config: &TrainConfig,
-        background: [f32; 3],
-        extent: f64,
-        rng: Pcg64Mcg,
-    ) -> Self {
+    pub fn new(cloud: GaussianCloud, config: &TrainConfig, background: [f32; 3], extent: f64, rng: Pcg64Mcg) -> Self {
         let zero = zeros_like(&cloud);
         Self {
             stats: DensityStats::new(cloud.len()),

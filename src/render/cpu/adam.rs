@@ -57,14 +57,7 @@ impl AdamStep {
 
     /// Moves one parameter against its gradient, which must be finite. Whether that was an outlier.
     #[inline(always)]
-    pub fn update(
-        &self,
-        parameter: &mut f32,
-        gradient: f32,
-        first: &mut f32,
-        second: &mut f32,
-        rate: f32,
-    ) -> bool {
+    pub fn update(&self, parameter: &mut f32, gradient: f32, first: &mut f32, second: &mut f32, rate: f32) -> bool {
         let limit = if *second > 0.0 { (GROWTH * *second).sqrt().min(CLIP) } else { CLIP };
         let outlier = gradient.abs() > OUTLIER * limit;
         let gradient = gradient.clamp(-limit, limit);

@@ -10,7 +10,6 @@ pub(crate) struct RowOut<'a, R> {
     pub(crate) planes: Vec<&'a mut [R]>,
     /// The primitive's extra values; none = not wanted.
     pub(crate) extra: Vec<&'a mut [R]>,
-    /// Transmittance left.
     pub(crate) transmittance: &'a mut [R],
     /// Place in the tile's list, from 1, of the last splat that contributed; 0 = none.
     pub(crate) last: &'a mut [R],
@@ -18,9 +17,7 @@ pub(crate) struct RowOut<'a, R> {
 
 /// Compositing of a row of tiles; returns the number of splat-pixel products evaluated.
 pub(crate) struct BlendRow<'a, 'b, R, P> {
-    /// What is drawn.
     pub(crate) row: TileRow<'a, R, P>,
-    /// Where to write.
     pub(crate) out: &'a mut RowOut<'b, R>,
 }
 

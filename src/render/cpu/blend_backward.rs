@@ -27,11 +27,8 @@ pub(crate) struct RowIn<'a, R> {
 /// Backward pass of a row of tiles: fills `records` with the primitive's sums and those of `C` channels per
 /// entry of the tile row, in the order of the lists.
 pub(crate) struct BlendRowBackward<'a, 'b, R, P> {
-    /// What is drawn.
     pub(crate) row: TileRow<'a, R, P>,
-    /// What to read.
     pub(crate) input: &'a RowIn<'b, R>,
-    /// Where to write.
     pub(crate) records: &'a mut [R],
 }
 

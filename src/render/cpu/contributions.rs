@@ -16,9 +16,7 @@ pub(crate) trait ContributionSink<R>: Send {
 
 /// Hands the weights of a row of tiles on.
 pub(crate) struct ContributionRow<'a, R, P, S> {
-    /// What is drawn.
     pub(crate) row: TileRow<'a, R, P>,
-    /// Who takes them.
     pub(crate) sink: &'a mut S,
 }
 

@@ -38,8 +38,6 @@ pub struct RenderStats {
     pub visible: usize,
     /// Gaussians left out because their shape is degenerate.
     pub degenerate: usize,
-    /// Tile list entries.
-    pub(crate) entries: usize,
     /// Splat-pixel products evaluated by the forward pass.
     pub(crate) products: u64,
     /// Seconds per stage: project, sort, bin, blend.

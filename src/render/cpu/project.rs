@@ -20,7 +20,6 @@ pub struct View<R> {
     pub principal: [R; 2],
     /// Largest tangent of the viewing angle at which the projection is linearized, per axis.
     pub(crate) clamp: [R; 2],
-    /// Near plane.
     pub(crate) near: R,
     /// Picture size in px.
     pub(crate) size: [usize; 2],
@@ -94,7 +93,6 @@ pub struct Geometry<R> {
     pub(crate) jacobian: [[R; 3]; 2],
     /// Rotation world_from_local.
     pub(crate) rotation: [[R; 3]; 3],
-    /// Standard deviations.
     pub(crate) scale: [R; 3],
     /// Rows of `J W R S`.
     pub(crate) factor: [[R; 3]; 2],
@@ -104,7 +102,6 @@ pub struct Geometry<R> {
     pub determinants: [R; 2],
 }
 
-/// The inner product.
 #[inline(always)]
 pub(crate) fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
@@ -221,11 +218,8 @@ pub(crate) struct Chunk<R> {
 /// What is to be drawn, and how.
 #[derive(Clone, Copy)]
 pub(crate) struct Scene<'a, R> {
-    /// The Gaussians.
     pub(crate) cloud: &'a GaussianCloud<R>,
-    /// Their extra channels.
     pub(crate) features: Features<'a, R>,
-    /// How.
     pub(crate) settings: &'a RenderSettings,
 }
 
@@ -233,7 +227,6 @@ pub(crate) struct Scene<'a, R> {
 pub(crate) enum Projected<R, S, D> {
     /// It reaches a pixel center: its splat, its shape, and what depth composites.
     Splat(Splat<R>, S, D),
-    /// It reaches none.
     Outside,
     /// Its shape is not usable.
     Degenerate,

@@ -18,7 +18,6 @@ use crate::math::{Real, sh};
 use crate::render::{Features, Frame, FrameGradient, MAX_CHANNELS, RenderSettings, TILE_PX};
 use crate::scene::{Camera, Gaussian, GaussianCloud};
 
-/// No splat.
 const NONE: u32 = u32::MAX;
 /// Most values of a record: sums and channels.
 const MOST: usize = MAX_CHANNELS + 16;
@@ -65,7 +64,6 @@ impl<R: Real> Lists<R> {
 struct Pixels<R> {
     transmittance: Vec<R>,
     last: Vec<R>,
-    /// Extra planes.
     kept: [Vec<R>; 3],
 }
 
@@ -77,9 +75,7 @@ struct FrameInfo<R, P> {
     settings: RenderSettings,
     /// Size of the cloud.
     gaussians: usize,
-    /// Extra channels.
     extra: usize,
-    /// Channels as padded.
     channels: usize,
 }
 
@@ -171,7 +167,6 @@ impl<R: Real, P: Primitive<R>> Rasterizer<R, P> {
         self.stats = RenderStats {
             visible: self.lists.ordered.splats.len(),
             degenerate: self.lists.parts.iter().map(|p| p.degenerate).sum(),
-            entries: self.lists.tiles.entries.len(),
             products,
             stage_secs: [project, sort, bin, lap(&mut clock)],
             backward_secs: 0.0,

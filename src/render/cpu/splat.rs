@@ -8,7 +8,6 @@ use crate::math::lanes::Lanes;
 use crate::render::{ALPHA_MAX, Frame, FrameGradient, MAX_CHANNELS, RenderSettings, TILE_PX};
 use crate::scene::Gaussian;
 
-/// Gaussians as splats.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Splats<R> {
     /// Smallest alpha that counts.
@@ -38,7 +37,6 @@ impl<R: Real> Primitive<R> for Splats<R> {
     const SHAPE: usize = 0;
     type Shape = [R; 0];
     type Depth = [R; 1];
-    /// Median depth.
     type Extra<V: Copy> = [V; 1];
     type State<V: Copy> = [V; 0];
     type Sums<V: Copy> = [V; MOMENTS];

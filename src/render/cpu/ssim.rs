@@ -29,9 +29,7 @@ pub struct PhotoLoss<R> {
 /// Parts of the loss, means over pixels and channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LossParts {
-    /// Mean absolute difference.
     pub(crate) l1: f64,
-    /// SSIM.
     pub(crate) ssim: f64,
     /// Mean squared difference.
     pub(crate) mse: f64,

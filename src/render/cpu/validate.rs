@@ -47,7 +47,6 @@ pub(crate) fn binned(tiles: &Tiles, splats: usize) -> Result<(), NotFinite> {
     fall.map_or(Ok(()), |i| broken("the end of tile", i))
 }
 
-/// After blending.
 pub(crate) fn drawn<R: Real>(frame: &Frame<R>) -> Result<(), NotFinite> {
     let plane = |field, plane: &[R]| all_finite("blending", field, plane);
     frame.color.iter().try_for_each(|p| plane("the color of pixel", p))?;

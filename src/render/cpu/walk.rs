@@ -131,9 +131,7 @@ pub(crate) trait Primitive<R: Real>: Copy + Send + Sync {
 
 /// A pass over a row of tiles, compiled for any number of channels and any vectors.
 pub(crate) trait RowPass<R: Real>: Sized {
-    /// What it returns.
     type Output;
-    /// Does it.
     fn tiles<L: Lanes<R>, const C: usize>(self, l: L) -> Self::Output;
 }
 
@@ -238,13 +236,10 @@ pub(crate) fn ramp<R: Real, L: Lanes<R>>(l: L) -> L::V {
 
 /// A row of tiles of a frame.
 pub(crate) struct TileRow<'a, R, P> {
-    /// What is drawn.
     pub(crate) primitive: P,
-    /// The frame's splats.
     pub(crate) splats: &'a [Splat<R>],
     /// Shape and channels of each.
     pub(crate) values: &'a [R],
-    /// Their tile lists.
     pub(crate) tiles: &'a Tiles,
     /// Picture size in px.
     pub(crate) size: [usize; 2],
@@ -260,7 +255,6 @@ pub(crate) struct Tile {
     pub(crate) corner: [usize; 2],
     /// Width and height; less than [`TILE_PX`] at the picture's edges.
     pub(crate) size: [usize; 2],
-    /// Its entries.
     pub(crate) entries: std::ops::Range<usize>,
 }
 

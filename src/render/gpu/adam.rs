@@ -40,12 +40,10 @@ pub(crate) struct AdamBuffers<'a> {
     pub(crate) parameters: &'a Parameters,
     /// Their gradient, with the marks of `project_backward`.
     pub(crate) gradient: &'a Parameters,
-    /// Both moments.
     pub(crate) moments: &'a [Parameters; 2],
 }
 
 impl Adam {
-    /// Compiles the kernel.
     pub(crate) fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
         let module = Module::new(device, "adam", Variant::default())?;
@@ -81,7 +79,6 @@ impl Adam {
         }
     }
 
-    /// Records the step.
     pub(crate) fn encode(
         &self,
         stage: &mut Stage<'_>,

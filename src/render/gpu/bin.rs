@@ -8,7 +8,6 @@ use super::{Device, GpuError};
 /// Workgroups of the kernel that looks for the ends of tiles; they stride over the pairs.
 const RANGE_GROUPS: u32 = 256;
 
-/// The binning kernels.
 #[derive(Debug)]
 pub(crate) struct Bin {
     sum_counts: Kernel,
@@ -18,7 +17,6 @@ pub(crate) struct Bin {
 }
 
 impl Bin {
-    /// Compiles the kernels.
     pub(crate) fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
         let module = Module::new(device, "bin", Variant::default())?;

@@ -41,7 +41,6 @@ impl TileKernel {
         Ok(())
     }
 
-    /// Records the passes.
     pub(crate) fn encode(
         &self,
         stage: &mut Stage<'_>,

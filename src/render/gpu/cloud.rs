@@ -96,16 +96,6 @@ impl Packed {
         Self { floats, degree }
     }
 
-    /// Number of Gaussians.
-    pub(crate) fn len(&self) -> usize {
-        self.floats[0].len() / GEOMETRY_STRIDE
-    }
-
-    /// Whether there are none.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
     /// The pad of each Gaussian's geometry; a gradient keeps the screen gradient's length there.
     pub(crate) fn pads(&self) -> impl Iterator<Item = f32> + '_ {
         self.floats[0].chunks_exact(GEOMETRY_STRIDE).map(|g| g[GEOMETRY_STRIDE - 1])
@@ -149,7 +139,6 @@ mod tests {
                 ..GaussianCloud::default()
             };
             let packed = Packed::of(&cloud);
-            assert_eq!(packed.len(), 3);
             assert_eq!(packed.to_cloud(), cloud);
             assert_eq!(packed.floats.each_ref().map(Vec::len), strides(degree).map(|s| 3 * s));
             assert_eq!(Packed::up_to(&cloud, 1).to_cloud(), cloud.up_to_degree(1));

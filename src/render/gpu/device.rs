@@ -140,7 +140,6 @@ impl Device {
         &self.device
     }
 
-    /// Its queue.
     pub(crate) fn queue(&self) -> &wgpu::Queue {
         &self.queue
     }

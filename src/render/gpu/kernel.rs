@@ -7,7 +7,6 @@ use super::{Device, GpuError};
 /// How a kernel uses a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Access {
-    /// A uniform.
     Uniform,
     /// A storage buffer that is only read.
     Read,
@@ -150,13 +149,11 @@ pub(crate) struct Recorder<'a> {
 }
 
 impl<'a> Recorder<'a> {
-    /// Starts recording.
     pub(crate) fn new(device: &'a Device, timer: Option<&'a mut Timer>) -> Self {
         let encoder = device.wgpu().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("fmlgs") });
         Self { device, encoder, timer }
     }
 
-    /// Records one stage.
     pub(crate) fn stage(&mut self, name: &'static str, record: impl FnOnce(&mut Stage<'_>)) {
         let timestamp_writes = self.timer.as_mut().and_then(|t| t.stage(name));
         let pass =

@@ -8,14 +8,12 @@ use super::{Device, GpuError, Parameters};
 use crate::render::{RenderSettings, TANGENT_CLAMP, TILE_PX};
 use crate::scene::Camera;
 
-/// The projection kernel.
 #[derive(Debug)]
 pub(crate) struct Project {
     kernel: Kernel,
 }
 
 impl Project {
-    /// Compiles the kernel.
     pub(crate) fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
         let module = Module::new(device, "project", Variant::default())?;
@@ -24,7 +22,6 @@ impl Project {
         Ok(Self { kernel: Kernel::new(device, &module, "main", &slots)? })
     }
 
-    /// Records the projection.
     pub(crate) fn encode(
         &self,
         stage: &mut Stage<'_>,

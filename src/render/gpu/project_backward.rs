@@ -4,7 +4,6 @@ use super::kernel::{Access, FrameBindings, Kernel, Module, Stage};
 use super::shader::Variant;
 use super::{Device, GpuError, Parameters};
 
-/// The kernels.
 #[derive(Debug)]
 pub(crate) struct ProjectBackward {
     main: Kernel,
@@ -12,7 +11,6 @@ pub(crate) struct ProjectBackward {
 }
 
 impl ProjectBackward {
-    /// Compiles the kernels.
     pub(crate) fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
         let module = Module::new(device, "project_backward", Variant::default())?;

@@ -31,7 +31,6 @@ pub(crate) struct Rasterizer {
     pub(crate) gaussians: PerGaussian,
     /// Buffers by number of pairs.
     pub(crate) pairs: PerPair,
-    /// Buffers by picture.
     pub(crate) picture: PerPicture,
     extent: (u32, [u32; 2]),
 }

@@ -79,7 +79,6 @@ impl Renderer {
         Ok(())
     }
 
-    /// Stops timing.
     pub(crate) fn stop_measuring(&mut self) {
         (self.timer, self.times) = (None, StageTimes::new());
     }

@@ -20,7 +20,6 @@ pub(crate) const CHUNK_CHANNELS: usize = 16;
 /// Buffers by number of Gaussians.
 #[derive(Debug)]
 pub(crate) struct PerGaussian {
-    /// Gaussians that fit.
     pub(crate) capacity: usize,
     /// Splats in the picture.
     pub(crate) splats: wgpu::Buffer,
@@ -49,7 +48,6 @@ impl PerGaussian {
 /// Buffers by number of (splat, tile) pairs.
 #[derive(Debug)]
 pub(crate) struct PerPair {
-    /// Pairs that fit.
     pub(crate) capacity: u32,
     /// Tiles that the sort's passes can tell apart.
     pub(crate) tiles: u32,
@@ -72,19 +70,15 @@ impl PerPair {
 pub(crate) struct PerPicture {
     /// Pixels that fit.
     pub(crate) pixels: usize,
-    /// Tiles that fit.
     pub(crate) tiles: usize,
-    /// Extra channels.
     pub(crate) channels: usize,
     /// Each tile's part of the pairs.
     pub(crate) ranges: wgpu::Buffer,
-    /// Color and transmittance.
     pub(crate) colors: wgpu::Buffer,
     /// Transmittance and end of each pixel's list.
     pub(crate) ends: wgpu::Buffer,
     /// Expected and median depth.
     pub(crate) depths: wgpu::Buffer,
-    /// Extra channels.
     pub(crate) features: wgpu::Buffer,
     /// Constants of the blending passes, with the number of channels each carries.
     pub(crate) chunks: Vec<(usize, wgpu::Buffer)>,

@@ -23,7 +23,6 @@ pub(crate) struct Sort {
 pub(crate) struct SortBuffers {
     /// Keys: the input, and the place of every other pass.
     pub(crate) keys: [wgpu::Buffer; 2],
-    /// Their values.
     pub(crate) values: [wgpu::Buffer; 2],
     histogram: wgpu::Buffer,
     totals: wgpu::Buffer,
@@ -67,7 +66,6 @@ impl SortBuffers {
 }
 
 impl Sort {
-    /// Compiles the kernels.
     pub(crate) fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
         let module = Module::new(device, "sort", Variant::default())?;
@@ -82,7 +80,6 @@ impl Sort {
         })
     }
 
-    /// Records the sort.
     pub(crate) fn encode(&self, stage: &mut Stage<'_>, on: &SortBuffers, counters: &wgpu::Buffer) {
         let blocks = [on.blocks, 1, 1];
         for (p, digit) in on.passes.iter().enumerate() {
@@ -109,12 +106,7 @@ impl Sort {
 
 /// Sorts `(key, value)` pairs by the low `bits` bits of the keys and returns them: the sort alone,
 /// for tests and measurements.
-pub fn sort_pairs(
-    device: &Device,
-    keys: &[u32],
-    values: &[u32],
-    bits: u32,
-) -> Result<(Vec<u32>, Vec<u32>), GpuError> {
+pub fn sort_pairs(device: &Device, keys: &[u32], values: &[u32], bits: u32) -> Result<(Vec<u32>, Vec<u32>), GpuError> {
     if keys.len() != values.len() {
         return Err(GpuError::Size { what: "values to sort", have: values.len(), want: keys.len() });
     }

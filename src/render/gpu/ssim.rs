@@ -40,9 +40,7 @@ impl DevicePhoto {
 /// Means over pixels and channels of one comparison, and what the frame's counters said.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LossSums {
-    /// Mean absolute difference.
     pub(crate) l1: f64,
-    /// SSIM.
     pub(crate) ssim: f64,
     /// Mean squared difference.
     pub(crate) mse: f64,
@@ -50,7 +48,6 @@ pub struct LossSums {
     pub overflow: bool,
     /// Pairs that it needed.
     pub wanted: u32,
-    /// Gaussians drawn.
     pub(crate) visible: u32,
     /// Gaussians left alone because their gradient was not finite.
     pub(crate) bad_gradients: u32,

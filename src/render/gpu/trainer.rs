@@ -125,11 +125,6 @@ impl Trainer {
         self.shape.gaussians as usize
     }
 
-    /// Whether there are none.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
     /// Steps done.
     pub fn steps(&self) -> u64 {
         self.step

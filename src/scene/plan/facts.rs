@@ -14,7 +14,6 @@ pub struct Machine {
     pub(crate) free_memory_bytes: u64,
     /// Most Gaussians that training may use of it.
     pub(crate) max_gaussians: usize,
-    /// Processor cores.
     pub(crate) cores: usize,
     /// Name of the graphics adapter if it is a real one; `None` where there is none or it is
     /// emulated in software.
@@ -37,7 +36,6 @@ pub struct Limits {
 /// The Gaussians of a scene.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CloudFacts {
-    /// How many.
     pub(crate) gaussians: usize,
     /// Degree of the spherical harmonics in the file.
     pub(crate) sh_stored: u8,
@@ -53,7 +51,6 @@ pub struct CloudFacts {
 /// The photos of a scene.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PhotoFacts {
-    /// How many.
     pub(crate) photos: usize,
     /// Width and height of the first, px.
     pub(crate) size_px: [u32; 2],
@@ -68,9 +65,7 @@ pub struct PhotoFacts {
 /// Objects and parts of a scene.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SemanticFacts {
-    /// Objects.
     pub(crate) objects: usize,
-    /// Parts.
     pub(crate) parts: usize,
     /// The encoder that looked at them, if one has.
     pub(crate) encoder: Option<String>,
@@ -87,7 +82,6 @@ pub struct Facts {
     pub(crate) photos: Option<PhotoFacts>,
     /// Objects and parts, if they were found.
     pub(crate) semantics: Option<SemanticFacts>,
-    /// The machine.
     pub(crate) machine: Machine,
     /// What the user has set.
     pub(crate) limits: Limits,

@@ -116,7 +116,6 @@ impl fmt::Display for Item {
 /// What the user wants of one item: "color=full".
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlanOverride {
-    /// Of which.
     pub(crate) item: Item,
     /// The alternative instead of what the data suggest.
     pub(crate) instead: bool,

@@ -44,13 +44,10 @@ impl When {
 /// One decision about a scene, for the user.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PlanLine {
-    /// What is decided.
     pub(crate) item: Item,
     /// Its name: "Color", "Feature maps", ...
     pub(crate) subject: String,
-    /// The decision.
     pub(crate) choice: String,
-    /// Why.
     pub(crate) reason: String,
     /// What it saves, or what it costs where the user wants it otherwise; empty for nothing.
     pub(crate) saving: String,

@@ -21,11 +21,9 @@ use crate::ui::actions::Action;
 
 /// The path that is being edited, and how it is played.
 pub(crate) struct CameraPane {
-    /// The path.
     pub(crate) path: CameraPath,
     /// How speed runs over it.
     pub(crate) speed: Speed,
-    /// What is played.
     pub(crate) player: Player,
     /// The key that was chosen.
     selected: Option<usize>,
@@ -338,7 +336,6 @@ pub(crate) fn write(file: &Path, path: &CameraPath, aspect: f64) -> Result<(), S
     crate::jobs::export::camera_path(file, path, aspect).map_err(|e| e.to_string())
 }
 
-/// A small caption.
 fn caption(text: &str) -> RichText {
     RichText::new(text).small().color(theme::WEAK)
 }

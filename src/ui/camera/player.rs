@@ -5,7 +5,6 @@ use crate::navigate::{CameraSpline, Flight, Pose};
 /// Seconds over which frames are counted.
 const COUNTED_SECS: f64 = 1.0;
 
-/// What is played.
 #[derive(Clone, Debug)]
 pub(crate) enum Clip {
     /// A flight to a target.
@@ -42,7 +41,6 @@ pub(crate) struct Player {
     clip: Option<Clip>,
     /// Seconds into it.
     pub(crate) time: f64,
-    /// Whether it runs.
     pub(crate) playing: bool,
     /// Whether it begins again at its end.
     pub(crate) looped: bool,
@@ -74,7 +72,6 @@ impl Player {
         self.clip = clip;
     }
 
-    /// What is in.
     pub(crate) fn clip(&self) -> Option<&Clip> {
         self.clip.as_ref()
     }

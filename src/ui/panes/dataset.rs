@@ -79,7 +79,6 @@ impl PhotoThumbnails {
         }
     }
 
-    /// Draws the pane.
     pub(crate) fn show(
         &mut self,
         ui: &mut Ui,

@@ -18,7 +18,6 @@ pub(crate) struct Models {
 }
 
 impl Models {
-    /// Draws the pane.
     pub(crate) fn show(
         &mut self,
         ui: &mut Ui,

@@ -15,7 +15,6 @@ use crate::ui::actions::Action;
 /// Side of a thumbnail, points.
 const THUMBNAIL_PX: f32 = 30.0;
 
-/// Draws the pane.
 pub(crate) fn show(
     ui: &mut Ui,
     state: &AppState,

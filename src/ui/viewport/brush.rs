@@ -118,7 +118,6 @@ impl Brush {
         }
     }
 
-    /// The controls.
     pub(crate) fn show(&mut self, ui: &Ui, rect: Rect, identities: &Identities, actions: &mut Vec<Action>) {
         let at = Align2::CENTER_BOTTOM.pos_in_rect(&rect.shrink(44.0));
         let area = Area::new(Id::unique("brush")).order(Order::Foreground).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);

@@ -35,7 +35,6 @@ pub(super) struct Display {
 }
 
 impl Display {
-    /// The newest frame.
     pub(super) fn picture(&self) -> Option<&ViewPicture> {
         self.picture.as_deref()
     }

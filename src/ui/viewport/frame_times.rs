@@ -57,7 +57,6 @@ impl FrameTimes {
         rows
     }
 
-    /// Draws the table.
     pub(crate) fn show(&self, ui: &mut Ui) {
         let small = |text: &str| RichText::new(text).small();
         let rows = self.rows();

@@ -54,7 +54,6 @@ pub struct Viewport {
     up: Option<DVec3>,
     /// Number of the scene that eye and cloud belong to.
     scene: u64,
-    /// What is drawn.
     cloud: Option<Versioned<GaussianCloud>>,
     /// Generation of the newest snapshot taken from training.
     snapshot: u64,

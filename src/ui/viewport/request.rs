@@ -26,7 +26,6 @@ pub(super) struct Wanted {
 #[derive(Clone, PartialEq)]
 struct Key {
     camera: Camera,
-    /// Generations.
     cloud: u64,
     semantics: Option<u64>,
     mode: ViewMode,

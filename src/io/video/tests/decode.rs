@@ -15,7 +15,6 @@ use super::super::Format;
 pub(crate) struct Decoded {
     /// Width and height in px.
     pub(crate) size_px: (u32, u32),
-    /// Frames as RGB.
     pub(crate) frames: Vec<Vec<u8>>,
     /// Playing time, where the format has times.
     pub(crate) secs: Option<f64>,

@@ -33,7 +33,7 @@ fn film(path: &Path, settings: &Settings) -> Summary {
     for t in 0..FRAMES {
         writer.push(&picture(t, (settings.width_px, settings.height_px))).expect("push");
     }
-    assert_eq!(writer.frames(), FRAMES);
+    assert_eq!(writer.frames, FRAMES);
     writer.finish().expect("finish")
 }
 
@@ -119,7 +119,7 @@ fn an_odd_last_column_and_row_are_left_out_of_mp4_only() {
     ] {
         let path = folder.path().join(name);
         let writer = VideoWriter::create(&path, &odd).expect("create");
-        assert_eq!(writer.size_px(), size, "{name}");
+        assert_eq!(writer.size_px, size, "{name}");
         drop(writer);
         assert_eq!(film(&path, &odd).size_px, size, "{name}");
         let film = decode(&path, format);

@@ -31,13 +31,10 @@ pub(crate) struct AskedScene<'a> {
 
 /// A labeled view of it.
 pub(crate) struct LabeledView<'a> {
-    /// The photo's name.
     pub(crate) name: &'a str,
-    /// From where.
     pub(crate) camera: &'a Camera,
     /// What its pixels belong to.
     pub(crate) exact: &'a ViewMap,
-    /// Its blended codes.
     pub(crate) blended: &'a CodeMap,
     /// Labels, of the view's size.
     pub(crate) categories: Vec<Category>,
@@ -66,13 +63,10 @@ impl Category {
 /// One compared category of a view.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub(crate) struct Unit {
-    /// The photo.
     pub(crate) view: String,
-    /// The category.
     pub(crate) query: String,
     /// Whether that is an object or a part.
     pub(crate) level: Level,
-    /// Intersection over union.
     pub(crate) iou: f64,
     /// Whether the point of largest relevancy is on it, where the protocol asks that.
     pub(crate) hit: Option<bool>,

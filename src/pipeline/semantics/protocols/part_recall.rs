@@ -63,7 +63,6 @@ pub(crate) struct Row {
     pub(crate) mean_iou: f64,
     /// Mean time of a query, its text's encoding included, seconds.
     pub(crate) mean_secs: f64,
-    /// All queries.
     pub(crate) units: Vec<Unit>,
 }
 

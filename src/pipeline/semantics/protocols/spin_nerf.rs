@@ -7,10 +7,8 @@ use crate::scene::Mask;
 /// Size at which masks are compared, px.
 pub(crate) const SIZE: [usize; 2] = [1_008, 567];
 
-/// A compared view.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub(crate) struct Foreground {
-    /// With its IoU.
     pub(crate) unit: Unit,
     /// Share of all pixels that are right.
     pub(crate) accuracy: f64,

@@ -4,7 +4,6 @@ use crate::math::grid::neighbors;
 
 /// The piece of pixels outside the domain.
 pub(crate) const OUTSIDE: u32 = u32::MAX;
-/// Not filled yet.
 const DRY: u32 = u32::MAX - 1;
 
 /// Splits the domain into connected basins of `strength`, numbered from 0 in the order of their

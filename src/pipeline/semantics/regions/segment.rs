@@ -23,7 +23,6 @@ pub struct Picture<'a> {
     pub ends: Option<&'a [f32]>,
 }
 
-/// Settings.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RegionOptions {
     /// Unlikeness, in steps of Lab color between pieces of a thousandth of the whole, from which

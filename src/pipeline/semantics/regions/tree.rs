@@ -53,10 +53,7 @@ pub(crate) struct Node {
 
 /// Leaves first, children before parents.
 pub(crate) struct Tree {
-    /// The nodes.
     pub(crate) nodes: Vec<Node>,
-    /// Number of leaves.
-    pub(crate) leaves: usize,
 }
 
 /// Merges pieces in the order of their unlikeness.
@@ -78,13 +75,12 @@ pub(crate) fn grow(pieces: Vec<Piece>, borders: BTreeMap<(u32, u32), Border>, un
     }
     // What was never merged lives on to the end.
     g.nodes.iter_mut().filter(|n| n.parent.is_none()).for_each(|n| n.death = g.last);
-    Tree { nodes: g.nodes, leaves: g.leaves }
+    Tree { nodes: g.nodes }
 }
 
 /// Pieces that are merged in place: the one with more neighbors takes up the other.
 struct Growing<'a> {
     unlike: &'a Unlike,
-    leaves: usize,
     nodes: Vec<Node>,
     pieces: Vec<Piece>,
     /// The node that a piece is by now.
@@ -100,7 +96,7 @@ impl<'a> Growing<'a> {
         let leaves = pieces.len();
         Self {
             unlike,
-            leaves,
+
             nodes: pieces.iter().map(leaf).collect(),
             node: (0..leaves as u32).collect(),
             near: vec![BTreeMap::new(); leaves],
@@ -190,7 +186,7 @@ mod tests {
     #[test]
     fn the_most_alike_merge_first() {
         let tree = row(&[(0.0, 1.0), (1.0, 1.0), (9.0, 2.0), (9.5, 2.0), (30.0, 1.0)]);
-        assert_eq!((tree.leaves, tree.nodes.len()), (5, 9));
+        assert_eq!(tree.nodes.len(), 9);
         let whole = |unlike| {
             let sorted = |node| {
                 let mut leaves = tree.leaves_of(node);

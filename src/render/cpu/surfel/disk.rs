@@ -28,7 +28,6 @@ pub(crate) struct Disk<R: Real, L: Lanes<R>> {
     pub(crate) z: L::V,
     /// `D`, not negative.
     pub(crate) determinant: L::V,
-    /// Determinant times depth.
     depth_factor: L::V,
     near: L::V,
     opacity: L::V,

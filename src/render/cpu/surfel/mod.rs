@@ -33,7 +33,6 @@ const MOST: usize = MAX_CHANNELS + 3;
 /// the six derivatives of a splat's shape, of its depth, and of its projected center.
 pub(crate) const RECORD: usize = 10;
 
-/// Gaussians as surfels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Surfels<R> {
     near: R,

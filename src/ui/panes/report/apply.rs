@@ -26,18 +26,14 @@ pub(crate) struct Now<'a> {
 /// A field that would change.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Change {
-    /// Its name.
     pub(crate) name: String,
-    /// Its value now.
     pub(crate) from: String,
-    /// Its value then.
     pub(crate) to: String,
 }
 
 /// What can be done with a measured setting.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Offer {
-    /// It changes this.
     Changes(Vec<Change>, Action),
     /// It is active already.
     Active,

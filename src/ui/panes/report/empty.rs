@@ -8,7 +8,6 @@ use crate::scene::text;
 use crate::ui::actions::Action;
 use crate::worker::JobKind;
 
-/// Draws it.
 pub(crate) fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     ui.label(RichText::new("Error against run time").strong());
     ui.label(

@@ -23,7 +23,6 @@ use crate::ui::actions::Action;
 #[derive(Default)]
 pub(crate) struct ReportPane {
     stage: Option<StageName>,
-    /// By name.
     measure: Option<String>,
     /// Knob and setting of the chosen point.
     selected: Option<[String; 2]>,
@@ -32,7 +31,6 @@ pub(crate) struct ReportPane {
 }
 
 impl ReportPane {
-    /// Draws the pane.
     pub(crate) fn show(
         &mut self,
         ui: &mut Ui,
@@ -179,7 +177,6 @@ impl ReportPane {
     }
 }
 
-/// Its folder's name.
 fn name(shown: &ShownReport) -> String {
     let folder = if shown.path.is_dir() { Some(shown.path.as_path()) } else { shown.path.parent() };
     let name = folder.and_then(|f| f.file_name()).map(|n| n.to_string_lossy().into_owned());

@@ -14,9 +14,7 @@ const NEAR: f32 = 14.0;
 /// Shapes of knobs, in turn with each round of colors.
 const SHAPES: [MarkerShape; 3] = [MarkerShape::Circle, MarkerShape::Diamond, MarkerShape::Square];
 
-/// What is drawn.
 pub(crate) struct Scatter<'a> {
-    /// The stage.
     pub(crate) stage: &'a Stage,
     /// The same stage of another report, drawn hollow.
     pub(crate) second: Option<&'a Stage>,

@@ -40,7 +40,6 @@ pub(crate) fn points<'a>(
     clicked
 }
 
-/// Knob and setting.
 pub(crate) fn title(p: &Point) -> String {
     format!("{}: {}", p.method, p.setting)
 }

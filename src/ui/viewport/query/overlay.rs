@@ -25,7 +25,6 @@ pub(crate) struct Layers<'a> {
     pub(crate) map: &'a ViewMap,
     /// Their blended codes, where they are drawn.
     pub(crate) codes: Option<&'a CodeMap>,
-    /// Objects and parts.
     pub(crate) identities: &'a Identities,
     /// Masks of the answers, with their colors; later ones on top.
     pub(crate) masks: &'a [([u8; 3], Mask)],
@@ -33,7 +32,6 @@ pub(crate) struct Layers<'a> {
     pub(crate) relevancy: &'a [f32],
     /// Colors of the language features of each identity by number.
     pub(crate) features: &'a [[u8; 3]],
-    /// Settings.
     pub(crate) settings: OverlaySettings,
 }
 

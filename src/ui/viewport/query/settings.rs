@@ -32,7 +32,6 @@ pub(crate) enum ColorBy {
 }
 
 impl ColorBy {
-    /// Its name.
     pub(crate) fn text(self) -> &'static str {
         self.into()
     }
@@ -43,7 +42,6 @@ impl ColorBy {
 pub(crate) struct OverlaySettings {
     /// What tints the frame.
     pub(crate) color_by: ColorBy,
-    /// Colors of relevancy.
     pub(crate) colormap: Colormap,
     /// Opacity of the tint.
     pub(crate) opacity: f32,
