@@ -11,7 +11,7 @@ use agent_common::room::Room;
 use agent_common::table::{Table, Tally, Wordings, outcome, tally};
 use fmlgs::agent::camera_args::Side;
 use fmlgs::agent::commands::{Commands, commands, complete};
-use fmlgs::agent::execute::Outcome;
+use fmlgs::agent::execute::CallOutcome;
 use fmlgs::agent::planner::{PlannerContext, Step};
 use fmlgs::agent::tool::{Target, ToolCall};
 use fmlgs::agent::transcript::What;
@@ -109,7 +109,7 @@ impl Planner for Deaf {
         self.0 = false;
     }
 
-    fn next(&mut self, _last: Option<&Outcome>, _context: &mut PlannerContext<'_>) -> Result<Step, Refusal> {
+    fn next(&mut self, _last: Option<&CallOutcome>, _context: &mut PlannerContext<'_>) -> Result<Step, Refusal> {
         if std::mem::replace(&mut self.0, true) {
             return Ok(Step::finish());
         }

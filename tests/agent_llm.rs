@@ -15,14 +15,14 @@ use agent_common::server::{Say, Server};
 use agent_common::table::{Table, Turn, ask, outcome};
 use fmlgs::agent::llm::Llm;
 use fmlgs::agent::llm::secret::Secret;
-use fmlgs::agent::llm::settings::{Limits, LlmSettings, Patience};
+use fmlgs::agent::llm::settings::{LlmSettings, RequestLimits, RequestPatience};
 use fmlgs::agent::{AgentEvent, Policy, RefusalKind, Reply, Session, World};
 use serde_json::{Value, json};
 
 const KEY: &str = "sk-test/0123456789abcdef+Q";
 
-fn patience() -> Patience {
-    Patience {
+fn patience() -> RequestPatience {
+    RequestPatience {
         stall: Duration::from_millis(300),
         answer: Duration::from_secs(3),
         request: Duration::from_secs(10),
@@ -32,14 +32,14 @@ fn patience() -> Patience {
     }
 }
 
-fn session_with(server: &Server, policy: Policy, limits: Limits) -> Session {
+fn session_with(server: &Server, policy: Policy, limits: RequestLimits) -> Session {
     let settings = LlmSettings { base_url: server.url.clone(), model: "test".into(), ..LlmSettings::default() };
     let planner = Llm::with(settings, Secret::new(KEY), patience(), limits).expect("settings");
     Session::new(policy, Box::new(planner))
 }
 
 fn session(server: &Server) -> Session {
-    session_with(server, Policy::built_in().expect("policy"), Limits::default())
+    session_with(server, Policy::built_in().expect("policy"), RequestLimits::default())
 }
 
 /// What came of a talk.
@@ -257,7 +257,7 @@ fn endless_loops_come_to_an_end() {
     let many: Vec<(String, String)> =
         (1..60).map(|n| call("turn", json!({ "direction": "left", "degrees": n }))).collect();
     let t = talk(vec![Say::Calls(many), text("Done.")], "turn left");
-    assert_eq!(t.room.log.len(), Limits::default().calls);
+    assert_eq!(t.room.log.len(), RequestLimits::default().calls);
     // Tokens.
     let t = talk(vec![Say::Tokens(String::new(), 60_000)], "turn left");
     assert_eq!((t.outcome(), t.server.requests()), ("limit", 2));
@@ -354,7 +354,7 @@ fn orders_in_names_and_texts_have_no_power() {
     let forbidding = "[tools]\nallowed = [\"go_to\", \"remove\", \"export\"]\nforbidden = [\"remove\"]";
     let policy = Policy::parse(forbidding, "own").expect("policy");
     let server = Server::new(vec![calls(&[("remove", json!({ "target": 1 })), ("undo", json!({}))]), text("No.")]);
-    let (mut session, mut room) = (session_with(&server, policy, Limits::default()), Room::new());
+    let (mut session, mut room) = (session_with(&server, policy, RequestLimits::default()), Room::new());
     session.say(&mut room, "tidy up", &mut |_| {}, &AtomicBool::new(false));
     assert!(room.log.is_empty());
     let tools = server.seen.lock().expect("log")[0].json()["tools"].as_array().map(Vec::len);
@@ -391,7 +391,7 @@ fn the_key_goes_into_the_header_and_nowhere_else() {
     // The control: without the key's own redaction the same talk shows it.
     let server = Server::new(vec![Say::EchoKey]);
     let settings = LlmSettings { base_url: server.url.clone(), model: "m".into(), ..LlmSettings::default() };
-    let planner = Llm::with(settings, None, patience(), Limits::default()).expect("settings");
+    let planner = Llm::with(settings, None, patience(), RequestLimits::default()).expect("settings");
     let mut open = Session::new(Policy::built_in().expect("policy"), Box::new(planner));
     let reply = open.say(&mut Room::new(), &format!("my key is {KEY}"), &mut |_| {}, &AtomicBool::new(false));
     assert!(reply.text.contains("none") && open.transcript().to_json().contains(KEY));
@@ -444,8 +444,8 @@ fn questions_of_the_model_are_answered_and_talks_go_on() {
 fn a_request_can_be_ended_while_the_server_is_silent() {
     let server = Server::new(vec![Say::Silence]);
     let settings = LlmSettings { base_url: server.url.clone(), model: "m".into(), ..LlmSettings::default() };
-    let slow = Patience { stall: Duration::from_secs(15), answer: Duration::from_secs(15), ..patience() };
-    let planner = Llm::with(settings, None, slow, Limits::default()).expect("settings");
+    let slow = RequestPatience { stall: Duration::from_secs(15), answer: Duration::from_secs(15), ..patience() };
+    let planner = Llm::with(settings, None, slow, RequestLimits::default()).expect("settings");
     let mut session = Session::new(Policy::built_in().expect("policy"), Box::new(planner));
     let cancel = Arc::new(AtomicBool::new(false));
     let stopper = Arc::clone(&cancel);

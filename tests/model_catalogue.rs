@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use fmlgs::math::stats;
-use fmlgs::models::catalog::{self, Entry, InstallError, State};
+use fmlgs::models::catalog::{self, CatalogEntry, InstallError, State};
 use fmlgs::models::fetch::{FetchError, Patience};
 
 mod cli_support;
@@ -20,7 +20,7 @@ fn fixtures() -> PathBuf {
 }
 
 /// The reduced CLIP as if it were listed.
-fn reduced() -> Entry {
+fn reduced() -> CatalogEntry {
     let file = |name: &str| serde_json::json!({ "name": name, "megabytes": 1 });
     serde_json::from_value(serde_json::json!({
         "id": "reduced", "role": "encoder", "title": "Reduced", "adds": "Nothing.", "licence": "MIT", "source": "here",

@@ -17,9 +17,9 @@ use fmlgs::pipeline::semantics::view_map::ViewMap;
 use fmlgs::render::gpu::cloud::Packed;
 use fmlgs::render::{BackendChoice, Features, Frame, RenderSettings, Renderer};
 use fmlgs::scene::plan::{Item, NOISE_FLOOR, PlanOverride, When};
-use fmlgs::scene::resource_log::{self, Sort};
+use fmlgs::scene::resource_log::{self, ResourceKind};
 use fmlgs::scene::{
-    Camera, Facts, GaussianCloud, Identities, Level, Limits, Machine, NOBODY, Overrides, ScenePlan, SemanticMap,
+    Camera, GaussianCloud, Identities, Level, Limits, Machine, NOBODY, Overrides, SceneFacts, ScenePlan, SemanticMap,
 };
 use fmlgs::worker::ViewMode;
 use fmlgs::worker::view::{QualityBudget, SkipPasses, ViewLane, ViewRequest};
@@ -71,7 +71,8 @@ fn objects(cloud: &GaussianCloud, with_part: bool) -> SemanticMap {
 }
 
 fn plan(cloud: &GaussianCloud, map: Option<&SemanticMap>, cameras: &[Camera], overrides: &Overrides) -> ScenePlan {
-    let facts = Facts::of(Machine::default(), LIMITS).with_photos(cameras).with_cloud(cloud, cloud.sh_degree, cameras);
+    let facts =
+        SceneFacts::of(Machine::default(), LIMITS).with_photos(cameras).with_cloud(cloud, cloud.sh_degree, cameras);
     ScenePlan::new(facts.with_semantics(map), overrides)
 }
 
@@ -224,7 +225,7 @@ fn working_memory_is_given_back_and_the_next_picture_is_the_same() {
 
 #[test]
 fn without_a_gpu_no_device_is_opened() {
-    let devices = || resource_log::since(0).iter().filter(|l| l.sort == Sort::Device).count();
+    let devices = || resource_log::since(0).iter().filter(|l| l.sort == ResourceKind::Device).count();
     let before = devices();
     let mut chosen = Renderer::choose(BackendChoice::Auto, |why| panic!("{why}")).expect("one that works");
     let real = fmlgs::render::real_gpu().is_some();

@@ -2,7 +2,7 @@
 
 use super::commands::is_command;
 use super::dialog::DialogState;
-use super::language::Language;
+use super::language::CommandLanguage;
 use super::resolve::{Resolved, name_words, resolve, words_of};
 use super::words::{number, ordinal};
 use super::world::World;
@@ -24,7 +24,7 @@ pub(crate) fn confirmation(text: &str) -> Confirmation {
     let words: Vec<String> = words_of(text).into_iter().filter(|w| w != ",").collect();
     let said = words.join(" ");
     let said = POLITE.iter().find_map(|p| said.strip_suffix(p)).unwrap_or(&said);
-    let language = Language::get();
+    let language = CommandLanguage::get();
     match said {
         said if language.yes.iter().any(|w| w == said) => Confirmation::Yes,
         said if language.no.iter().any(|w| w == said) => Confirmation::No,

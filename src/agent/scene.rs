@@ -6,15 +6,15 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 
 use super::camera_args::{Direction, Distance, NORMAL, Side};
-use super::relation::{Extent, View};
+use super::relation::{Extent, Viewpoint};
 pub use super::view_shares::Parts;
 use super::view_shares::{ViewShares, is_drawn};
-use super::world::{Arrival, Facts, Moved, Unreachable, World, WorldError};
+use super::world::{Arrival, IdentityFacts, Moved, Unreachable, World, WorldError};
 use crate::io;
 use crate::jobs::go_to::Explored;
-use crate::navigate::approach::{Approach, ApproachError, Place};
-use crate::navigate::target::{self, Wish};
-use crate::navigate::{FRAMES, Flight, Pose, Speed};
+use crate::navigate::approach::{Approach, ApproachError, SceneRef};
+use crate::navigate::target::{self, ViewPreference};
+use crate::navigate::{CameraTrajectory, FRAMES, Pose, Speed};
 use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::query_engine::QueryEngine;
 use crate::scene::undo::UndoHistory;
@@ -29,7 +29,7 @@ const STEP: f64 = 6.0;
 #[derive(Clone, Debug)]
 pub enum Effect {
     /// The camera flies; the point is what it turns about from then on.
-    Fly(Box<Flight>, Option<DVec3>),
+    Fly(Box<CameraTrajectory>, Option<DVec3>),
     /// These are marked, and nothing else.
     Mark(Vec<IdentityId>),
     /// Which identities are left out of the picture.
@@ -125,7 +125,7 @@ impl SceneWorld {
         self.shares.of(&self.parts, self.eye, self.aspect, &self.hidden, id)
     }
 
-    fn fly(&mut self, flight: Flight, about: Option<DVec3>, what: String) {
+    fn fly(&mut self, flight: CameraTrajectory, about: Option<DVec3>, what: String) {
         self.done.record(Before::Eye(self.eye, what));
         if let Some(last) = flight.poses.last() {
             self.eye = *last;
@@ -158,7 +158,7 @@ impl SceneWorld {
     /// A turn or a straight way, without looking for one.
     fn straight(&mut self, to: Pose, what: String) -> Result<f64, Unreachable> {
         let eye = self.eye;
-        let flight = Flight::new(&[eye.center, to.center], [&eye, &to], None, None, FRAMES / 2, Speed::Eased);
+        let flight = CameraTrajectory::new(&[eye.center, to.center], [&eye, &to], None, None, FRAMES / 2, Speed::Eased);
         let mut flight = flight.ok_or_else(|| Unreachable { reason: "the view has no place".into(), nearest: None })?;
         flight.seconds = 1.2;
         let length = flight.length;
@@ -202,9 +202,9 @@ impl World for SceneWorld {
         Ok(answered.unwrap_or_else(|| super::world::locate_by_names(&self.parts.map.identities, query, kind)))
     }
 
-    fn facts(&self, id: IdentityId) -> Option<Facts> {
+    fn facts(&self, id: IdentityId) -> Option<IdentityFacts> {
         let identity = self.parts.map.identities.get(id)?;
-        Some(Facts {
+        Some(IdentityFacts {
             names: identity.names.clone(),
             level: identity.level,
             parent: identity.parent,
@@ -223,8 +223,8 @@ impl World for SceneWorld {
         Extent::new(&points, self.parts.up)
     }
 
-    fn view(&self) -> View {
-        View { eye: self.eye.center, forward: self.eye.forward(), up: self.parts.up }
+    fn view(&self) -> Viewpoint {
+        Viewpoint { eye: self.eye.center, forward: self.eye.forward(), up: self.parts.up }
     }
 
     fn metres_per_unit(&self) -> Option<f64> {
@@ -235,10 +235,10 @@ impl World for SceneWorld {
         let explored = self.explored();
         let in_view = self.share_of(id) > 0.0;
         let eye = self.eye;
-        let place = Place { cloud: &self.parts.cloud, settings: &self.parts.settings, map: &self.parts.map };
+        let place = SceneRef { cloud: &self.parts.cloud, settings: &self.parts.settings, map: &self.parts.map };
         let distance = NORMAL / closeness.max(0.01);
         let go = |side: target::Side| {
-            explored.navigator.visit(place, id, Wish { side, distance }, &eye, self.aspect, FRAMES)
+            explored.navigator.visit(place, id, ViewPreference { side, distance }, &eye, self.aspect, FRAMES)
         };
         let wanted = side(from, in_view);
         let mut visit = go(wanted);

@@ -47,7 +47,7 @@ pub enum What {
 
 /// One line of the transcript.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Entry {
+pub struct TranscriptEntry {
     /// Milliseconds since the session began.
     pub(crate) elapsed_ms: u64,
     /// What happened.
@@ -58,7 +58,7 @@ pub struct Entry {
 /// Everything that happened in a session.
 #[derive(Clone, Debug, Serialize)]
 pub struct Transcript {
-    pub entries: Vec<Entry>,
+    pub entries: Vec<TranscriptEntry>,
     #[serde(skip)]
     start: Instant,
 }
@@ -75,7 +75,7 @@ impl Transcript {
             self.entries.drain(..MOST / 4);
         }
         let elapsed_ms = u64::try_from(self.start.elapsed().as_millis()).unwrap_or(u64::MAX);
-        self.entries.push(Entry { elapsed_ms, what });
+        self.entries.push(TranscriptEntry { elapsed_ms, what });
     }
 
     /// As JSON.

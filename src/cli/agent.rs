@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::{CliError, interrupt, number, output, view};
 use crate::agent::commands::Commands;
-use crate::agent::llm::settings::{LlmSettings, Patience};
+use crate::agent::llm::settings::{LlmSettings, RequestPatience};
 use crate::agent::llm::{Llm, SENT, discover};
 use crate::agent::scene::{Effect, Parts, SceneWorld};
 use crate::agent::{AgentEvent, Planner, Policy, Session};
@@ -29,7 +29,7 @@ const EXAMPLES: &str = "Examples:\n  \
 /// address. Exit code 1 if the last request was refused.
 #[derive(Debug, clap::Args)]
 #[command(after_help = format!("{EXAMPLES}\n\n{SENT}"))]
-pub(crate) struct Args {
+pub(crate) struct AgentArgs {
     /// Trained scene with objects and parts ('fmlgs preprocess')
     #[arg(required_unless_present_any = ["find_model", "test_model"])]
     scene: Option<PathBuf>,
@@ -82,7 +82,7 @@ enum PlannerArg {
     Llm,
 }
 
-impl Args {
+impl AgentArgs {
     fn settings(&self) -> LlmSettings {
         LlmSettings {
             base_url: self.url.clone().unwrap_or_default(),
@@ -126,12 +126,12 @@ fn find_model(json: bool) -> Result<(), CliError> {
     output::print(&format!("{}\nChoose one with --planner llm --url ADDRESS --model NAME.\n{SENT}", lines.join("\n")))
 }
 
-pub(crate) fn run(args: Args) -> Result<(), CliError> {
+pub(crate) fn run(args: AgentArgs) -> Result<(), CliError> {
     if args.find_model {
         return find_model(args.json);
     }
     if args.test_model {
-        let text = discover::test(&args.settings(), &Patience::default(), interrupt::flag());
+        let text = discover::test(&args.settings(), &RequestPatience::default(), interrupt::flag());
         return output::print(&text.map_err(CliError::failed)?);
     }
     let (planner, policy) = (args.planner()?, args.policy()?);

@@ -12,7 +12,7 @@ use crate::io::{self, Opened};
 use crate::jobs::{self, Folders};
 use crate::measure::StudyError;
 use crate::measure::bench::{self, Timings, cpu, gpu, query};
-use crate::measure::plan::{self, Cost, OpenScene, SIZE, Saving, Variant};
+use crate::measure::plan::{self, OpenScene, PlanCost, PlanVariant, SIZE, Saving};
 use crate::models;
 use crate::pipeline::observer::{Observer, Severity, Signal, Silent};
 use crate::pipeline::train::{TrainConfig, TrainView, load_views};
@@ -30,7 +30,7 @@ use crate::scene::Dataset;
     fmlgs bench --queries 100\n  \
     fmlgs bench --plan scene/ splat.ply\n  \
     fmlgs bench splats/*.ply photos/ --size 640x480 --size 1280x720 --max-side 504 --gpu --json")]
-pub(crate) struct Args {
+pub(crate) struct BenchArgs {
     /// Splats or trained scenes to draw, posed photos to train on
     #[arg(required_unless_present = "queries")]
     paths: Vec<PathBuf>,
@@ -57,7 +57,7 @@ pub(crate) struct Args {
     runs: u32,
     /// Measure one of the two in this process
     #[arg(long, value_enum, hide = true, conflicts_with = "plan")]
-    variant: Option<Variant>,
+    variant: Option<PlanVariant>,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
@@ -68,7 +68,7 @@ const QUERY_IDENTITIES: usize = 300;
 /// Its size in px.
 const QUERY_SIZE: [usize; 2] = [1_008, 567];
 
-pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+pub(crate) fn run(args: BenchArgs, quiet: bool) -> Result<(), CliError> {
     if let (Some(variant), Some(scene)) = (args.variant, args.paths.first()) {
         // As the window has it.
         process::settle();
@@ -143,7 +143,7 @@ fn photos(
 }
 
 /// Measures each scene with its plan and with everything on, each in processes of its own.
-fn savings(args: &Args) -> Result<(), CliError> {
+fn savings(args: &BenchArgs) -> Result<(), CliError> {
     let mut scenes = Vec::new();
     for scene in &args.paths {
         // In turns, so that what else the machine does meets both alike.
@@ -153,7 +153,7 @@ fn savings(args: &Args) -> Result<(), CliError> {
                 costs.push(child(scene, variant, args.repeats)?);
             }
         }
-        if let [Some(plan), Some(everything)] = costs.map(|c| Cost::median(&c)) {
+        if let [Some(plan), Some(everything)] = costs.map(|c| PlanCost::median(&c)) {
             scenes.push(Saving::new(scene, plan, everything));
         }
     }
@@ -174,7 +174,7 @@ fn savings(args: &Args) -> Result<(), CliError> {
 }
 
 /// What a process of its own has measured.
-fn child(scene: &Path, variant: &str, repeats: u32) -> Result<Cost, CliError> {
+fn child(scene: &Path, variant: &str, repeats: u32) -> Result<PlanCost, CliError> {
     let program = std::env::current_exe().map_err(|e| CliError::failed(format!("the program's own path: {e}")))?;
     let mut process = Process::new(program);
     process.args(["bench", "--variant", variant, "--repeats", &repeats.to_string()]).arg(scene);

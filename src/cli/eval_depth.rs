@@ -5,11 +5,16 @@ use std::path::Path;
 use serde_json::json;
 
 use super::{CliError, output};
-use crate::jobs::evaluate::{self, Comparison};
+use crate::jobs::evaluate::{self, PhotoComparison};
 use crate::pipeline::depth::{self, DepthErrors};
 use crate::pipeline::observer::Observer;
 
-pub(crate) fn run(scene: &Path, job: &Comparison, as_json: bool, observer: &mut dyn Observer) -> Result<(), CliError> {
+pub(crate) fn run(
+    scene: &Path,
+    job: &PhotoComparison,
+    as_json: bool,
+    observer: &mut dyn Observer,
+) -> Result<(), CliError> {
     let (scores, median_render_ms) = evaluate::depth(job, observer).map_err(CliError::of_views)?;
     if as_json {
         return output::print_json(&json!({

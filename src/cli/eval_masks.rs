@@ -7,8 +7,8 @@ use serde_json::json;
 use super::{CliError, output};
 use crate::io;
 use crate::jobs::JobError;
-use crate::jobs::evaluate::Comparison;
-use crate::jobs::evaluate_masks::{self, Protocol, Summary};
+use crate::jobs::evaluate::PhotoComparison;
+use crate::jobs::evaluate_masks::{self, Protocol, ProtocolSummary};
 use crate::pipeline::semantics::protocols::{Unit, part_recall};
 
 /// Rows of the table at most; the worst come first.
@@ -19,7 +19,7 @@ pub(crate) fn run(
     labels: &Path,
     protocol: Protocol,
     query: Option<&str>,
-    comparison: &Comparison,
+    comparison: &PhotoComparison,
     as_json: bool,
 ) -> Result<(), CliError> {
     let map = io::semantic_map::load(scene, comparison.state.as_deref(), &comparison.cloud)?;
@@ -56,23 +56,23 @@ pub(crate) fn run(
 }
 
 /// What the protocol counts, in words.
-fn summary(summary: &Summary) -> String {
+fn summary(summary: &ProtocolSummary) -> String {
     match summary {
-        Summary::Masks { object_miou, part_miou } => {
+        ProtocolSummary::Masks { object_miou, part_miou } => {
             format!("mean IoU: objects {object_miou:.4}, parts {part_miou:.4}")
         }
-        Summary::Langsplat { localization } => format!("localization accuracy {localization:.4}"),
-        Summary::FastlgsEx {} => {
+        ProtocolSummary::Langsplat { localization } => format!("localization accuracy {localization:.4}"),
+        ProtocolSummary::FastlgsEx {} => {
             "values are running pooled IoUs; not comparable with those of other protocols".to_owned()
         }
-        Summary::Selection3d { accuracy_25, accuracy_50 } => {
+        ProtocolSummary::Selection3d { accuracy_25, accuracy_50 } => {
             format!("accuracy at 0.25 {accuracy_25:.4}, at 0.5 {accuracy_50:.4}")
         }
-        Summary::SpinNerf { accuracy } => format!("pixel accuracy {accuracy:.4}"),
-        Summary::Ovs3d { argmax_miou, classes } => {
+        ProtocolSummary::SpinNerf { accuracy } => format!("pixel accuracy {accuracy:.4}"),
+        ProtocolSummary::Ovs3d { argmax_miou, classes } => {
             format!("arg-max over {classes} classes: mean IoU {argmax_miou:.4}")
         }
-        Summary::PartRecall { encoder, rows } => {
+        ProtocolSummary::PartRecall { encoder, rows } => {
             let table = output::table(&ablation(rows));
             format!("recall at IoU {}, encoder '{encoder}'\n{table}", part_recall::HIT_IOU)
         }

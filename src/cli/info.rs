@@ -21,7 +21,7 @@ use crate::scene::{Bounds, Dataset, ScenePlan, SemanticMap};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  fmlgs info photos/\n  fmlgs info scene.ply --json | jq .gaussians\n  \
     fmlgs info scene/ --plan color=full --plan feature-maps=always")]
-pub(crate) struct Args {
+pub(crate) struct InfoArgs {
     /// Dataset folder, transforms.json, splat file or trained scene
     path: PathBuf,
     /// Training pictures are limited to this many px along the longer side; the plan depends on it
@@ -41,7 +41,7 @@ struct Facts {
     warnings: Vec<String>,
 }
 
-pub(crate) fn run(args: Args) -> Result<(), CliError> {
+pub(crate) fn run(args: InfoArgs) -> Result<(), CliError> {
     let defaults = TrainConfig::default();
     let config = TrainConfig { max_side_px: args.max_side, ..defaults.clone() };
     let machine = plan::machine();

@@ -94,22 +94,22 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    Info(info::Args),
-    Train(train::Args),
-    Render(render::Args),
-    Eval(eval::Args),
-    Preprocess(preprocess::Args),
-    Query(query::Args),
-    Models(models::Args),
-    Segment(segment::Args),
-    Path(path::Args),
-    Agent(agent::Args),
-    Synth(synth::Args),
-    Demo(demo::Args),
-    Export(export::Args),
-    Bench(bench::Args),
-    Report(report::Args),
-    CheckStability(check_stability::Args),
+    Info(info::InfoArgs),
+    Train(train::TrainArgs),
+    Render(render::RenderArgs),
+    Eval(eval::EvalArgs),
+    Preprocess(preprocess::PreprocessArgs),
+    Query(query::QueryArgs),
+    Models(models::ModelsArgs),
+    Segment(segment::SegmentArgs),
+    Path(path::PathArgs),
+    Agent(agent::AgentArgs),
+    Synth(synth::SynthArgs),
+    Demo(demo::DemoArgs),
+    Export(export::ExportArgs),
+    Bench(bench::BenchArgs),
+    Report(report::ReportArgs),
+    CheckStability(check_stability::CheckStabilityArgs),
 }
 
 /// Opens the window with what is wanted of plans, does these things first, and returns when the window is closed.

@@ -8,7 +8,7 @@ use super::progress::Console;
 use super::{CliError, output};
 use crate::jobs::models::{self, Source};
 use crate::models::Role;
-use crate::models::catalog::{self, Entry, State};
+use crate::models::catalog::{self, CatalogEntry, State};
 use crate::models::engine::engine;
 use crate::pipeline::observer::Silent;
 
@@ -23,7 +23,7 @@ use crate::pipeline::observer::Silent;
     fmlgs models fetch sam2.1-tiny --from https://files.example.org/models\n  \
     fmlgs models add clip-vit-b16 exported/        take over files that you bring\n  \
     fmlgs models check                             compare all files with their checksums")]
-pub(crate) struct Args {
+pub(crate) struct ModelsArgs {
     #[command(subcommand)]
     command: Option<Command>,
     /// Print one JSON document
@@ -54,7 +54,7 @@ enum Command {
     Bench,
 }
 
-pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+pub(crate) fn run(args: ModelsArgs, quiet: bool) -> Result<(), CliError> {
     match args.command {
         None => list(args.json),
         Some(Command::Fetch { id, from }) => fetch(&id, from.as_deref(), quiet),
@@ -71,7 +71,7 @@ fn list(as_json: bool) -> Result<(), CliError> {
     let (engine, folder) = (engine()?, catalog::folder());
     let all = catalog::entries()?;
     if as_json {
-        let one = |e: &Entry| {
+        let one = |e: &CatalogEntry| {
             json!({ "id": e.id, "role": e.role, "title": e.title, "adds": e.adds, "license": e.license, "source": e.source,
                 "megabytes": e.megabytes(), "state": e.state(&folder) })
         };
@@ -103,7 +103,7 @@ fn list(as_json: bool) -> Result<(), CliError> {
 }
 
 /// The state of a model in a word, and what can be done about it.
-fn state_text(entry: &Entry, state: &State) -> (String, String) {
+fn state_text(entry: &CatalogEntry, state: &State) -> (String, String) {
     match state {
         State::BuiltIn => ("built in".into(), String::new()),
         State::Here => ("here".into(), String::new()),

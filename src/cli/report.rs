@@ -7,7 +7,7 @@ use super::progress::Console;
 use super::{CliError, number, output};
 use crate::io;
 use crate::jobs::open;
-use crate::measure::subject::{Options, Subject};
+use crate::measure::subject::{StudyOptions, Subject};
 use crate::measure::{BeginError, End, FILE, Report, Stage, StageName, computer, defaults, page, plot};
 use crate::pipeline::observer::{Observer, Severity};
 
@@ -25,7 +25,7 @@ use crate::pipeline::observer::{Observer, Severity};
     fmlgs report scene/ --masks photos/ --budget 600\n  \
     fmlgs report scene/ --stages render,path --repeats 5\n  \
     fmlgs report --defaults DEFAULTS.md --from report/ --from other/")]
-pub(crate) struct Args {
+pub(crate) struct ReportArgs {
     /// Trained scene
     #[arg(required_unless_present = "defaults")]
     scene: Option<PathBuf>,
@@ -67,7 +67,7 @@ pub(crate) struct Args {
     from: Vec<PathBuf>,
 }
 
-pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+pub(crate) fn run(args: ReportArgs, quiet: bool) -> Result<(), CliError> {
     if let Some(path) = &args.defaults {
         let reports = args.from.iter().map(|p| Report::read(p)).collect::<Result<Vec<_>, _>>();
         let text = defaults::markdown(&reports?);
@@ -83,7 +83,7 @@ pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
             other => other.into(),
         })?,
     };
-    let options = Options {
+    let options = StudyOptions {
         masks: args.masks.clone(),
         steps: args.steps.clone(),
         train_steps: args.train_steps,
@@ -132,7 +132,7 @@ pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
 }
 
 /// A trained scene with its photos, if they are there.
-fn subject(path: &Path, options: Options) -> Result<Subject, CliError> {
+fn subject(path: &Path, options: StudyOptions) -> Result<Subject, CliError> {
     let scene = open::scene(path)?;
     let dataset = scene.dataset_path.as_ref().filter(|p| p.exists()).map(|p| open::dataset(p)).transpose()?;
     let map = if path.is_dir() { io::semantic_map::load(path, scene.state.as_deref(), &scene.cloud)? } else { None };

@@ -18,7 +18,7 @@ use crate::pipeline::synth::{self, Levels, Rig, SynthError, SynthOptions, SynthR
 #[command(after_help = "Examples:\n  \
     fmlgs synth table.glb --out photos/\n  \
     fmlgs synth table.glb --views 200 --held-out 25 --size 1280x960 --rig survey --out photos/")]
-pub(crate) struct Args {
+pub(crate) struct SynthArgs {
     /// The scene: .glb or .gltf with named nodes
     scene: PathBuf,
     /// Folder for the dataset
@@ -56,7 +56,7 @@ pub(crate) struct Args {
     json: bool,
 }
 
-impl Args {
+impl SynthArgs {
     fn check(&self) -> Result<SynthOptions, CliError> {
         let base = SynthOptions::default();
         let [width_px, height_px] = self.size.unwrap_or([base.width_px, base.height_px]);
@@ -78,7 +78,7 @@ impl Args {
     }
 }
 
-pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+pub(crate) fn run(args: SynthArgs, quiet: bool) -> Result<(), CliError> {
     let options = args.check()?;
     let mut console = Console::new(quiet);
     let report = synth::run(&args.scene, &options, &args.out, &mut console).map_err(failure)?;

@@ -66,7 +66,7 @@ impl Default for FindSettings {
 
 /// A scene whose objects are to be found.
 #[derive(Clone, Debug)]
-pub struct Request {
+pub struct FindRequest {
     /// Folder of the trained scene.
     pub folder: PathBuf,
     /// Its Gaussians.
@@ -104,11 +104,11 @@ pub(crate) struct FoundObjects {
 /// If the folder cannot be written or has changed, a model or photo cannot be read, no mask is found, or the
 /// observer asks to stop.
 pub(crate) fn run(
-    request: &Request,
+    request: &FindRequest,
     known: Option<&str>,
     observer: &mut dyn Observer,
 ) -> Result<FoundObjects, JobError> {
-    let Request { folder, cloud, settings, dataset, with, .. } = request;
+    let FindRequest { folder, cloud, settings, dataset, with, .. } = request;
     let masks = request.masks.as_deref();
     if !trained::is_scene(folder) {
         return Err(JobError::NoScene(folder.into()));

@@ -6,10 +6,10 @@ use std::time::Instant;
 use super::JobError;
 use crate::math::stats::median;
 use crate::models::catalog;
-pub(crate) use crate::models::catalog::{Entry as ModelEntry, Role as ModelRole, SAM2, State as ModelState};
+pub(crate) use crate::models::catalog::{CatalogEntry as ModelEntry, Role as ModelRole, SAM2, State as ModelState};
 use crate::models::engine::engine;
 use crate::models::fetch::Patience;
-use crate::models::{self, ModelError, Tile};
+use crate::models::{self, IdentityCrop, ModelError};
 use crate::pipeline::observer::{Observer, Ticker};
 
 /// Engine and models of this machine.
@@ -112,7 +112,7 @@ pub(crate) fn time_encoders(runs: usize, told: &mut dyn FnMut(String)) -> Result
             let (x, y) = (i % side_px, i / side_px);
             [x as f32 / side_px as f32, y as f32 / side_px as f32, ((x / 8 + y / 8) % 2) as f32]
         };
-        let tile = Tile { side_px, rgb: (0..side_px * side_px).map(color).collect() };
+        let tile = IdentityCrop { side_px, rgb: (0..side_px * side_px).map(color).collect() };
         // The first run prepares the networks.
         let (picture, phrase) = (encoder.image(&tile)?, encoder.text(PHRASE)?);
         let load_ms = start.elapsed().as_secs_f64() * 1e3;

@@ -57,7 +57,7 @@ impl ViewMaps {
 
 /// A question about a scene in a view.
 #[derive(Clone, Debug)]
-pub(crate) struct Request<'a> {
+pub(crate) struct QueryRequest<'a> {
     /// As it was typed.
     pub(crate) text: &'a str,
     /// Which level is asked for.
@@ -90,7 +90,7 @@ pub(crate) struct QueryResult {
 ///
 /// # Errors
 /// If there is nothing in it, the encoder fails, or the view cannot be drawn.
-pub(crate) fn run(scene: &Scene, map: &SemanticMap, request: &Request<'_>) -> Result<QueryResult, JobError> {
+pub(crate) fn run(scene: &Scene, map: &SemanticMap, request: &QueryRequest<'_>) -> Result<QueryResult, JobError> {
     let drawn = (&*scene.cloud, &scene.settings);
     let blend = request.mode == MatchMode::Blend;
     let maps = ViewMaps::draw(&mut Renderer::new(), drawn, map, request.camera, blend, map.has_parts())?;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::{JobError, export};
-use crate::io::video::{Settings, Summary};
+use crate::io::video::{VideoSettings, VideoSummary};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::video::{self, Marked};
 use crate::render::{BackendChoice, RenderSettings, Renderer};
@@ -25,7 +25,7 @@ pub struct VideoRequest {
     pub(crate) marked: Option<(Arc<SemanticMap>, Vec<IdentityId>)>,
     pub(crate) out: PathBuf,
     /// How it is written.
-    pub(crate) settings: Settings,
+    pub(crate) settings: VideoSettings,
     pub(crate) backend: BackendChoice,
 }
 
@@ -33,7 +33,7 @@ pub struct VideoRequest {
 #[derive(Clone, Debug)]
 pub(crate) struct Video {
     /// The file or folder.
-    pub(crate) summary: Summary,
+    pub(crate) summary: VideoSummary,
     /// What drew it: "CPU", or the name of the GPU.
     pub(crate) backend: String,
     /// Seconds that it took.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::studies::views::{held_out, spread};
-use super::studies::{Input, depth, features, path, query, render, train};
+use super::studies::{StudyInput, depth, features, path, query, render, train};
 use super::sweep::failed;
 use super::{StageName, Study, StudyError};
 use crate::io::labels::Labels;
@@ -19,7 +19,7 @@ use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::{Camera, Dataset, GaussianCloud, Identities, IdentityId, NOBODY, Photo, SemanticMap};
 
-pub(crate) struct Options {
+pub(crate) struct StudyOptions {
     pub(crate) masks: Option<PathBuf>,
     pub(crate) steps: Vec<u64>,
     pub(crate) train_steps: u64,
@@ -43,7 +43,7 @@ pub(crate) struct Subject {
     /// Its photos, if they are there.
     pub(crate) dataset: Option<Dataset>,
     pub(crate) map: Option<SemanticMap>,
-    pub(crate) options: Options,
+    pub(crate) options: StudyOptions,
 }
 
 impl Subject {
@@ -114,8 +114,8 @@ impl Subject {
     }
 
     /// What is swept on, in words.
-    fn input(&self, more: &[(&str, String)]) -> Input {
-        let mut input = Input::from([
+    fn input(&self, more: &[(&str, String)]) -> StudyInput {
+        let mut input = StudyInput::from([
             ("scene".to_owned(), self.name.clone()),
             ("Gaussians".to_owned(), self.cloud.len().to_string()),
             ("longer side".to_owned(), format!("{} px", self.options.max_side_px)),
@@ -184,7 +184,7 @@ impl Subject {
             let photo = &dataset.photos[i];
             let categories = categories(&labels.segment(photo, side, &mut Silent).map_err(failed)?);
             let camera = photo.camera.limited_to(side);
-            views.push(query::Asked { name: photo.name.clone(), camera, categories });
+            views.push(query::LabeledScene { name: photo.name.clone(), camera, categories });
         }
         if views.is_empty() {
             return Err(self.few_labels("there are no labels of this scene's photos"));

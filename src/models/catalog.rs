@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::fetch::{self, FetchError, Patience, Wanted};
+use super::fetch::{self, FetchError, FileToFetch, Patience};
 use super::{ModelError, manifest};
 use crate::io::data_folder::data_folder;
 
@@ -31,7 +31,7 @@ pub(crate) enum Role {
 /// A model of the list.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Entry {
+pub struct CatalogEntry {
     /// Its name in commands.
     pub id: String,
     /// What it is for.
@@ -76,7 +76,7 @@ pub struct ListedFile {
 
 #[derive(Deserialize)]
 struct List {
-    model: Vec<Entry>,
+    model: Vec<CatalogEntry>,
 }
 
 /// Whether a model can be used.
@@ -127,7 +127,7 @@ pub enum InstallError {
 ///
 /// # Errors
 /// If the list that came with the program is damaged.
-pub fn entries() -> Result<Vec<Entry>, ModelError> {
+pub fn entries() -> Result<Vec<CatalogEntry>, ModelError> {
     let damaged =
         |e: toml::de::Error| ModelError::Metadata { path: "assets/models.toml".into(), problem: e.to_string() };
     toml::from_str::<List>(LIST).map(|list| list.model).map_err(damaged)
@@ -137,7 +137,7 @@ pub fn entries() -> Result<Vec<Entry>, ModelError> {
 ///
 /// # Errors
 /// If there is none.
-pub fn entry(id: &str) -> Result<Entry, InstallError> {
+pub fn entry(id: &str) -> Result<CatalogEntry, InstallError> {
     entries()?.into_iter().find(|e| e.id == id).ok_or_else(|| InstallError::Unknown(id.to_owned()))
 }
 
@@ -147,7 +147,7 @@ pub(crate) fn folder() -> PathBuf {
     set.map_or_else(|| data_folder().join("models"), PathBuf::from)
 }
 
-impl Entry {
+impl CatalogEntry {
     /// The file that describes it, if it were in `folder`.
     pub(crate) fn description_in(&self, folder: &Path) -> PathBuf {
         folder.join(&self.description)
@@ -226,7 +226,7 @@ impl Entry {
         let address = |name: &str| format!("{}/{name}", base.trim_end_matches('/'));
         let mut get = |name: &str, bytes: Option<u64>, sha256: Option<&str>| {
             let to = folder.join(name);
-            let wanted = Wanted { url: &address(name), to: &to, bytes, sha256 };
+            let wanted = FileToFetch { url: &address(name), to: &to, bytes, sha256 };
             fetch::fetch(&wanted, patience, &mut |there, all| progress(name, there, all))
         };
         // The description says what the graphs must be; fetched anew, it is that of these graphs.
@@ -299,7 +299,7 @@ pub(crate) fn usable(role: Role, told: &mut dyn FnMut(String)) -> Result<Vec<Str
     Ok(usable_of(&entries()?, role, &folder(), told))
 }
 
-fn usable_of(all: &[Entry], role: Role, folder: &Path, told: &mut dyn FnMut(String)) -> Vec<String> {
+fn usable_of(all: &[CatalogEntry], role: Role, folder: &Path, told: &mut dyn FnMut(String)) -> Vec<String> {
     let (mut here, mut built_in) = (Vec::new(), Vec::new());
     for entry in all.iter().filter(|e| e.role == role) {
         match entry.state(folder) {

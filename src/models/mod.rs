@@ -27,7 +27,7 @@ pub use error::ModelError;
 
 /// A picture of one identity: mask on black, padded to a square, side x side, sRGB 0..1, row-major.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tile {
+pub struct IdentityCrop {
     /// Side in px.
     pub side_px: usize,
     /// Colors.
@@ -46,10 +46,10 @@ pub trait Encoder: Send {
     fn tile_side_px(&self) -> Option<usize>;
 
     /// The vectors of pictures; of unit length.
-    fn images(&mut self, tiles: &[Tile]) -> Result<Vec<Vec<f32>>, ModelError>;
+    fn images(&mut self, tiles: &[IdentityCrop]) -> Result<Vec<Vec<f32>>, ModelError>;
 
     /// The vector of one picture.
-    fn image(&mut self, tile: &Tile) -> Result<Vec<f32>, ModelError> {
+    fn image(&mut self, tile: &IdentityCrop) -> Result<Vec<f32>, ModelError> {
         let mut one = self.images(std::slice::from_ref(tile))?;
         one.pop().ok_or_else(|| ModelError::NoOutput { model: self.name().to_owned(), output: "embedding".into() })
     }

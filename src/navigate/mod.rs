@@ -22,7 +22,7 @@ pub mod target;
 pub(crate) mod testing;
 
 pub(crate) use camera_spline::CameraSpline;
-pub use flight::{FRAMES, Flight, Speed};
+pub use flight::{CameraTrajectory, FRAMES, Speed};
 pub use navigator::{Navigator, NoRoute};
 pub use pose::Pose;
 

@@ -63,13 +63,13 @@ impl Side {
 
 /// What is wanted of a view.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Wish {
+pub(crate) struct ViewPreference {
     pub(crate) side: Side,
     /// Distance as a multiple of the usual one; under 1 is nearer.
     pub(crate) distance: f64,
 }
 
-impl Default for Wish {
+impl Default for ViewPreference {
     fn default() -> Self {
         Self { side: Side::Best, distance: 1.0 }
     }
@@ -77,7 +77,7 @@ impl Default for Wish {
 
 /// What is to be seen.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Target {
+pub(crate) struct TargetGaussians {
     /// Gaussians of it by number, rising.
     pub(crate) members: Vec<usize>,
     /// The middle of what it is a part of, if it is one.
@@ -86,7 +86,7 @@ pub(crate) struct Target {
 
 /// A view of a target.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct View {
+pub(crate) struct TargetView {
     pub(crate) pose: Pose,
     /// Share of its picture alone that is still seen in the scene, 0 to 1.
     pub(crate) visible: f64,
@@ -119,7 +119,13 @@ impl Search<'_> {
     ///
     /// # Errors
     /// If a view cannot be drawn.
-    pub(crate) fn views(&self, target: &Target, wish: Wish, eye: &Pose, aspect: f64) -> Result<Vec<View>, RenderError> {
+    pub(crate) fn views(
+        &self,
+        target: &TargetGaussians,
+        wish: ViewPreference,
+        eye: &Pose,
+        aspect: f64,
+    ) -> Result<Vec<TargetView>, RenderError> {
         let place = |i: &usize| self.cloud.world_position(*i);
         let inside = target.members.iter().filter(|i| **i < self.cloud.len());
         let Some(bounds) = Bounds::robust(inside.clone().map(place)) else { return Ok(Vec::new()) };
@@ -179,14 +185,14 @@ impl Search<'_> {
             let (visible, covers) = drawing.look(&pose.camera(width, height))?;
             // What the grid is too coarse for, the picture knows.
             let score = score * (0.05 + visible);
-            views.push(View { pose, visible, covers, clearance: self.occupancy.clearance(at), score });
+            views.push(TargetView { pose, visible, covers, clearance: self.occupancy.clearance(at), score });
         }
         views.sort_by(|a, b| b.score.total_cmp(&a.score));
         Ok(views)
     }
 
     /// The direction in which a target faces.
-    fn front(&self, target: &Target, center: DVec3) -> Option<DVec3> {
+    fn front(&self, target: &TargetGaussians, center: DVec3) -> Option<DVec3> {
         if let Some(outwards) = target.whole.and_then(|whole| (center - whole).try_normalize()) {
             return Some(outwards);
         }
@@ -281,7 +287,7 @@ struct Drawing<'a> {
 }
 
 impl<'a> Drawing<'a> {
-    fn new(search: &Search<'a>, target: &Target) -> Self {
+    fn new(search: &Search<'a>, target: &TargetGaussians) -> Self {
         let mut inside = vec![0.0; search.cloud.len()];
         let members: Vec<usize> = target.members.iter().copied().filter(|i| *i < inside.len()).collect();
         members.iter().for_each(|i| inside[*i] = 1.0);
@@ -309,7 +315,7 @@ mod tests {
     use glam::DMat3;
 
     /// A ball of Gaussians behind a wall, seen from its side of the wall only.
-    fn scene() -> (GaussianCloud, Target, Vec<Camera>) {
+    fn scene() -> (GaussianCloud, TargetGaussians, Vec<Camera>) {
         let mut ball = GaussianCloud::default();
         for d in directions(120) {
             ball.positions.push((d * 0.2 + DVec3::Z * 1.0).to_array().map(|v| v as f32));
@@ -323,12 +329,12 @@ mod tests {
         let cameras = [[0.0, 0.0, 3.0], [1.5, 0.0, 2.0], [-1.5, 0.3, 2.0], [0.0, 0.0, -2.0]];
         (
             joined(&wall, &ball),
-            Target { members, whole: None },
+            TargetGaussians { members, whole: None },
             cameras.map(|c| camera_at(DVec3::from_array(c))).to_vec(),
         )
     }
 
-    fn best(wish: Wish, from: DVec3) -> View {
+    fn best(wish: ViewPreference, from: DVec3) -> TargetView {
         let (cloud, target, cameras) = scene();
         let eyes: Vec<DVec3> = cameras.iter().map(|c| c.center).collect();
         let occupancy = OccupancyGrid::of(&cloud, &eyes, 0.05);
@@ -347,7 +353,7 @@ mod tests {
 
     #[test]
     fn the_target_is_seen_from_its_side_of_the_wall() {
-        let view = best(Wish::default(), DVec3::new(0.0, 0.0, -2.0));
+        let view = best(ViewPreference::default(), DVec3::new(0.0, 0.0, -2.0));
         assert!(view.visible > 0.8, "{view:?}");
         assert!(view.pose.center.z > 0.1, "beyond the wall: {view:?}");
         assert!(view.pose.forward().angle_between(DVec3::Z - view.pose.center) < 0.1);
@@ -357,7 +363,8 @@ mod tests {
     #[test]
     fn sides_and_distances_are_as_wished() {
         let eye = DVec3::new(0.0, 0.0, 3.0);
-        let side = |side: Side| (best(Wish { side, distance: 1.0 }, eye).pose.center - DVec3::Z).normalize_or_zero();
+        let side =
+            |side: Side| (best(ViewPreference { side, distance: 1.0 }, eye).pose.center - DVec3::Z).normalize_or_zero();
         assert!(side(Side::Same).z > 0.8);
         assert!(side(Side::Above).y < -0.5, "{}", side(Side::Above));
         // The eye looks along -z with -y upwards: its left is +x... seen from behind the camera.
@@ -365,8 +372,8 @@ mod tests {
         assert!(left.x * right.x < 0.0 && left.x.abs() > 0.5, "{left} {right}");
         let pose = Pose::looking_at(eye, DVec3::Z, DVec3::NEG_Y, 0.8, &DMat3::IDENTITY);
         assert!(left.dot(pose.world_from_camera.x_axis) < -0.5, "left is left in the picture");
-        let far = best(Wish { side: Side::Same, distance: 1.2 }, eye).pose.center.distance(DVec3::Z);
-        let near = best(Wish { side: Side::Same, distance: 0.6 }, eye).pose.center.distance(DVec3::Z);
+        let far = best(ViewPreference { side: Side::Same, distance: 1.2 }, eye).pose.center.distance(DVec3::Z);
+        let near = best(ViewPreference { side: Side::Same, distance: 0.6 }, eye).pose.center.distance(DVec3::Z);
         assert!(far > 1.4 * near, "{far} {near}");
     }
 
@@ -385,7 +392,9 @@ mod tests {
         };
         let eye = Pose::of(&cameras[0]);
         for members in [vec![], vec![usize::MAX]] {
-            let none = search.views(&Target { members, whole: None }, Wish::default(), &eye, 1.0).expect("drawn");
+            let none = search
+                .views(&TargetGaussians { members, whole: None }, ViewPreference::default(), &eye, 1.0)
+                .expect("drawn");
             assert!(none.is_empty());
         }
     }

@@ -9,7 +9,7 @@ use super::measure as measuring;
 use super::protocol::{Command, Outcome};
 use super::thread::Jobs;
 use crate::io::{self, trained};
-use crate::jobs::evaluate::{self, Comparison, Options};
+use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::models::Source;
 use crate::jobs::train::Trained;
 use crate::jobs::{
@@ -149,5 +149,5 @@ fn measured(
     let cameras = if trained::is_scene(out) { trained::load_info(out)?.cameras } else { Vec::new() };
     let settings = config.render_settings(dataset.background);
     let scene = Scene { cloud, cameras, settings, config, ..Scene::default() };
-    evaluate::photometric(&Comparison::of(&scene, dataset, Options::default())?, observer)
+    evaluate::photometric(&PhotoComparison::of(&scene, dataset, EvaluateOptions::default())?, observer)
 }

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use super::failure::{Failure, Stop};
 use super::protocol::{MeasureRequest, Outcome};
-use crate::measure::studies::Input;
+use crate::measure::studies::StudyInput;
 use crate::measure::studies::render;
-use crate::measure::studies::views::{View, held_out};
+use crate::measure::studies::views::{StudyView, held_out};
 use crate::measure::{End, FILE, Report, computer, is_report};
 use crate::pipeline::observer::{Observer, Severity};
 
@@ -45,7 +45,7 @@ pub(crate) fn run(request: MeasureRequest, observer: &mut dyn Observer) -> Resul
     let unwritable = |e| Failure { message: format!("{folder}: {e}"), remedy: "Is the disk writable?".into() };
     std::fs::create_dir_all(&request.out).map_err(|e| Stop::Failed(unwritable(e)))?;
     let views = views(&request, observer)?;
-    let input = Input::from([
+    let input = StudyInput::from([
         ("scene".to_owned(), request.scene.clone()),
         ("Gaussians".to_owned(), request.cloud.len().to_string()),
         ("longer side".to_owned(), format!("{MAX_SIDE_PX} px")),
@@ -62,7 +62,7 @@ pub(crate) fn run(request: MeasureRequest, observer: &mut dyn Observer) -> Resul
 }
 
 /// A few held-out photos with their cameras, or the one view without a photo.
-fn views(request: &MeasureRequest, observer: &mut dyn Observer) -> Result<Vec<View>, Stop> {
+fn views(request: &MeasureRequest, observer: &mut dyn Observer) -> Result<Vec<StudyView>, Stop> {
     let views = match &request.dataset {
         Some(dataset) => held_out(dataset, request.holdout_every, MAX_SIDE_PX, VIEWS, observer),
         None => Ok(Some(Vec::new())),

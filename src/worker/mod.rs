@@ -21,7 +21,7 @@ mod view_request;
 pub(crate) use control::Control;
 pub use failure::{Failure, Stop};
 pub(crate) use observer::{CloudSnapshot, Repaint};
-pub use protocol::{Command, Event, JobId, JobKind, Lane, MeasureRequest, Outcome, Start};
+pub use protocol::{Command, Event, JobId, JobKind, MeasureRequest, Outcome, Start, WorkerThread};
 pub(crate) use slot::{Slot, Versioned};
 pub use thread::{Jobs, QueueFull, Worker};
 pub use view_modes::ViewMode;

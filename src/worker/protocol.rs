@@ -16,7 +16,7 @@ use crate::pipeline::observer::{Evaluation, Progress, Severity, StepMetrics};
 use crate::pipeline::semantics::thumbnails::Thumbnails;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
-use crate::scene::{Camera, Dataset, Facts, GaussianCloud, HomeView, Photo, PhotoPixels, SemanticMap};
+use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, Photo, PhotoPixels, SceneFacts, SemanticMap};
 
 /// Names one job of one worker.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -76,7 +76,7 @@ pub enum JobKind {
 
 impl JobKind {
     /// Which thread runs it.
-    pub(crate) fn lane(self) -> Lane {
+    pub(crate) fn lane(self) -> WorkerThread {
         match self {
             Self::Open
             | Self::Demo
@@ -85,7 +85,7 @@ impl JobKind {
             | Self::Objects
             | Self::Model
             | Self::CameraSpline
-            | Self::Measure => Lane::Long,
+            | Self::Measure => WorkerThread::Long,
             Self::Edit
             | Self::Export
             | Self::Photo
@@ -94,14 +94,14 @@ impl JobKind {
             | Self::Models
             | Self::Explore
             | Self::Approach
-            | Self::Report => Lane::Short,
+            | Self::Report => WorkerThread::Short,
         }
     }
 }
 
 /// Which thread a job runs on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Lane {
+pub enum WorkerThread {
     /// One after another, minutes each.
     Long,
     /// Answered while a long job runs.
@@ -139,7 +139,7 @@ pub enum Command {
         out: PathBuf,
     },
     /// Find the objects and parts of a trained scene, and store them with it.
-    FindObjects(Box<find_objects::Request>),
+    FindObjects(Box<find_objects::FindRequest>),
     /// Change the objects and parts of a scene, and store them with it.
     EditObjects {
         /// The Gaussians.
@@ -285,7 +285,7 @@ pub enum Outcome {
         /// Objects and parts that were carried over from the scene before.
         semantics: Option<Arc<SemanticMap>>,
         /// What the plan of the result is computed from.
-        facts: Box<Facts>,
+        facts: Box<SceneFacts>,
     },
     /// Held-out quality was measured.
     Evaluated(Evaluation),

@@ -14,7 +14,7 @@ use super::view_renderer::ViewRenderer;
 pub use super::view_request::{QualityBudget, SkipPasses, ViewPicture, ViewRequest, ViewResult};
 use crate::jobs::query::ViewMaps;
 use crate::render::{RenderError, Renderer};
-use crate::scene::resource_log::{self, Sort};
+use crate::scene::resource_log::{self, ResourceKind};
 
 /// How long the eye rests before working memory is given back.
 const REST: Duration = Duration::from_secs(2);
@@ -80,7 +80,12 @@ impl ViewLane {
                         && !std::mem::replace(&mut mapped_before, true)
                     {
                         let pixels = maps.identities.identity.len() as u64;
-                        resource_log::record(Sort::Maps, "maps of the view", "something is asked of it", pixels * 12);
+                        resource_log::record(
+                            ResourceKind::Maps,
+                            "maps of the view",
+                            "something is asked of it",
+                            pixels * 12,
+                        );
                     }
                     if maps.is_err() {
                         // Buffers may be in any state.

@@ -1,8 +1,8 @@
 //! A room with some forty things and parts, on boxes only, that remembers what was done to it.
 
 use fmlgs::agent::camera_args::{Direction, Distance, Side};
-use fmlgs::agent::relation::View;
-use fmlgs::agent::world::{Arrival, Facts, Moved, Unreachable, World, WorldError, locate_by_names};
+use fmlgs::agent::relation::Viewpoint;
+use fmlgs::agent::world::{Arrival, IdentityFacts, Moved, Unreachable, World, WorldError, locate_by_names};
 use fmlgs::pipeline::semantics::answer::QueryAnswer;
 use fmlgs::scene::LevelFilter;
 use fmlgs::scene::{Bounds, Identities, IdentityId, Level, NOBODY};
@@ -130,11 +130,11 @@ impl World for Room {
         Ok(locate_by_names(&self.identities, query, kind))
     }
 
-    fn facts(&self, id: IdentityId) -> Option<Facts> {
+    fn facts(&self, id: IdentityId) -> Option<IdentityFacts> {
         let identity = self.identities.get(id)?;
         let gone = self.identities.line(id).any(|i| self.removed[i as usize]);
         let hidden = self.identities.line(id).any(|i| self.hidden[i as usize]);
-        (!gone).then(|| Facts {
+        (!gone).then(|| IdentityFacts {
             names: identity.names.clone(),
             level: identity.level,
             parent: identity.parent,
@@ -144,8 +144,8 @@ impl World for Room {
         })
     }
 
-    fn view(&self) -> View {
-        View { eye: self.eye, forward: self.forward, up: DVec3::Z }
+    fn view(&self) -> Viewpoint {
+        Viewpoint { eye: self.eye, forward: self.forward, up: DVec3::Z }
     }
 
     fn metres_per_unit(&self) -> Option<f64> {

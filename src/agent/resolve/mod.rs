@@ -4,7 +4,7 @@
 
 mod noun;
 
-pub(crate) use noun::{Vocabulary, is_thing, name_words, words_of};
+pub(crate) use noun::{NameWords, is_thing, name_words, words_of};
 
 use self::noun::{ANYTHING, Noun, PARTS, Pick, readings};
 use super::describe::{join, the};
@@ -105,7 +105,7 @@ impl Resolver<'_> {
     fn phrase(&mut self, phrase: &str) -> Result<Set, Lost> {
         let words = words_of(phrase);
         let words: Vec<&str> = words.iter().map(String::as_str).collect();
-        let known = Vocabulary::new(self.world.identities());
+        let known = NameWords::new(self.world.identities());
         let mut nouns = readings(&words, &known, false);
         // What is called "left stick" is not the left one of the sticks.
         nouns.sort_by_key(|n| matches!(n, Noun::Picked(..)));

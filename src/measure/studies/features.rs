@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use serde_json::json;
 
-use super::{Input, Variants, overlap};
+use super::{StudyInput, Variants, overlap};
 use crate::math::stats::mean;
 use crate::measure::sweep::failed;
 use crate::measure::{Rule, Stage, StageName, Study, Trial};
@@ -38,7 +38,7 @@ pub(crate) fn study<'a>(
     [training, held_out]: [Vec<CodeView>; 2],
     steps: &[u64],
     repeats: u32,
-    input: Input,
+    input: StudyInput,
 ) -> Result<Study<'a>, RenderError> {
     let voted = vote(drawn, &identities, &training)?;
     // Codes are chosen once it is known who is next to whom.

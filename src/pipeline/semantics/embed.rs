@@ -5,7 +5,7 @@ use std::collections::{BTreeSet, HashMap};
 use super::relevancy::{PART_WEIGHT, deviate};
 use super::view_map::ViewMap;
 use crate::io::{self, IoError};
-use crate::models::{Encoder, ModelError, Tile};
+use crate::models::{Encoder, IdentityCrop, ModelError};
 use crate::pipeline::observer::{Interrupted, Observer, Ticker};
 use crate::render::{RenderError, RenderSettings, Renderer};
 use crate::scene::language::MAX_VIEWS;
@@ -122,9 +122,9 @@ impl Eye<'_> {
         let tile = |id: &IdentityId| {
             let mask: Mask = self.view.mask(self.identities, *id);
             let own_side = mask.bounds().map_or(0, |b| b.x.len().max(b.y.len()));
-            Some((*id, Tile::cut(&self.rgb, &mask, encoder.tile_side_px().unwrap_or(own_side))?))
+            Some((*id, IdentityCrop::cut(&self.rgb, &mask, encoder.tile_side_px().unwrap_or(own_side))?))
         };
-        let (ids, tiles): (Vec<IdentityId>, Vec<Tile>) = ids.iter().filter_map(tile).unzip();
+        let (ids, tiles): (Vec<IdentityId>, Vec<IdentityCrop>) = ids.iter().filter_map(tile).unzip();
         self.looked = ids.into_iter().zip(encoder.images(&tiles)?).collect();
         Ok(())
     }
@@ -187,9 +187,9 @@ mod tests {
             self.side_px
         }
 
-        fn images(&mut self, tiles: &[Tile]) -> Result<Vec<Vec<f32>>, ModelError> {
+        fn images(&mut self, tiles: &[IdentityCrop]) -> Result<Vec<Vec<f32>>, ModelError> {
             self.tiles.extend(tiles.iter().map(|t| t.side_px));
-            let red = |t: &Tile| t.rgb.iter().any(|c| c[0] > 0.5);
+            let red = |t: &IdentityCrop| t.rgb.iter().any(|c| c[0] > 0.5);
             Ok(tiles.iter().map(|t| if red(t) { vec![1.0, 0.0] } else { vec![0.0, 1.0] }).collect())
         }
 

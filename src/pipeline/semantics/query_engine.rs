@@ -101,7 +101,7 @@ pub(crate) fn ask_by_embedding<E>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::models::Tile;
+    use crate::models::IdentityCrop;
     use crate::pipeline::semantics::answer::Basis;
     use crate::scene::{Level, NOBODY, ViewFeatures};
 
@@ -121,7 +121,7 @@ mod tests {
             None
         }
 
-        fn images(&mut self, _: &[Tile]) -> Result<Vec<Vec<f32>>, ModelError> {
+        fn images(&mut self, _: &[IdentityCrop]) -> Result<Vec<Vec<f32>>, ModelError> {
             Ok(Vec::new())
         }
 

@@ -24,7 +24,7 @@ fn two_cubes() -> MeshScene {
 
 const BOXES: [(DVec3, f64); 2] = [(DVec3::new(0.3, 0.2, -0.4), 0.5), (DVec3::new(-0.2, 0.1, 0.9), 0.2)];
 
-fn stage_of(scene: &MeshScene) -> view::Stage {
+fn stage_of(scene: &MeshScene) -> view::SynthScene {
     stage(scene, &levels::identities(scene, Levels::Nodes, "test").unwrap()).unwrap()
 }
 
@@ -110,7 +110,7 @@ fn anti_aliasing_covers_edges_by_area() {
     let stage = stage_of(&scene);
     let camera = Camera::look_at(DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, DVec3::Y, 0.5, 41, 41).unwrap();
     let options = SynthOptions { samples: 8, background: [255; 3], ..small() };
-    let covered = |stage: &view::Stage| -> f64 {
+    let covered = |stage: &view::SynthScene| -> f64 {
         let view = stage.render(&camera, 0, &options);
         view.rgb.iter().map(|p| 1.0 - f64::from(crate::math::srgb::linear(f32::from(p[0]) / 255.0))).sum()
     };

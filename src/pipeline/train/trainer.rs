@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::density::{self, DensityReport, DensityStats};
 use super::device::{DeviceRun, LAMBDA, StepResult};
-use super::geometry::Geometry;
+use super::geometry::GeometryLoss;
 use super::schedule::Schedule;
 use super::{TrainConfig, TrainView};
 use crate::math::finite::{CHECKED, NotFinite, all_finite};
@@ -65,7 +65,7 @@ pub struct Trainer {
     renderer: DifferentiableRenderer,
     losses: [PhotoLoss<f32>; 3],
     gradient: FrameGradient<f32>,
-    geometry: Geometry,
+    geometry: GeometryLoss,
     device: Option<DeviceRun>,
 }
 
@@ -87,7 +87,7 @@ impl Trainer {
             renderer: DifferentiableRenderer::new(),
             losses: Default::default(),
             gradient: FrameGradient::default(),
-            geometry: Geometry::new(config, extent),
+            geometry: GeometryLoss::new(config, extent),
             device: None,
             cloud,
         }

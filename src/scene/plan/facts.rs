@@ -75,7 +75,7 @@ pub struct SemanticFacts {
 
 /// All that a plan depends on.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Facts {
+pub struct SceneFacts {
     /// The Gaussians, if they are a result.
     pub(crate) cloud: Option<CloudFacts>,
     /// The photos, if there are any.
@@ -87,7 +87,7 @@ pub struct Facts {
     pub(crate) limits: Limits,
 }
 
-impl Facts {
+impl SceneFacts {
     /// Facts of a machine with nothing open.
     pub fn of(machine: Machine, limits: Limits) -> Self {
         Self { machine, limits, ..Self::default() }
