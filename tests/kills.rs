@@ -172,7 +172,7 @@ fn edit_for_ever(scene: PathBuf) {
     other.of.reverse();
     // What a kill left may be the one or the other.
     let seeds = if map.seeds == ["reversed"] { "straight" } else { "reversed" };
-    other = SemanticMap::of_identities(other.identities, other.of, other.margin, vec![seeds.into()]);
+    other = SemanticMap::from_identities(other.identities, other.of, other.margin, vec![seeds.into()]);
     let other = Arc::new(other);
     for round in 0.. {
         let to = if round % 2 == 0 { &other } else { &map };

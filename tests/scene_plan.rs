@@ -67,7 +67,7 @@ fn objects(cloud: &GaussianCloud, with_part: bool) -> SemanticMap {
         _ => right,
     });
     let of = of.collect();
-    SemanticMap::of_identities(all, of, vec![1.0; cloud.len()], vec![])
+    SemanticMap::from_identities(all, of, vec![1.0; cloud.len()], vec![])
 }
 
 fn plan(cloud: &GaussianCloud, map: Option<&SemanticMap>, cameras: &[Camera], overrides: &Overrides) -> ScenePlan {

@@ -62,7 +62,7 @@ pub(crate) fn choice(world: &mut dyn World, text: &str, candidates: &[IdentityId
     let all = world.identities();
     let fits = |id: &IdentityId| {
         let known: Vec<String> =
-            all.line(*id).filter_map(|i| all.get(i)).flat_map(|i| &i.names).flat_map(|n| name_words(n)).collect();
+            all.ancestors(*id).filter_map(|i| all.get(i)).flat_map(|i| &i.names).flat_map(|n| name_words(n)).collect();
         !content.is_empty() && content.iter().all(|w| name_words(w).iter().all(|w| known.contains(w)))
     };
     let fit: Vec<IdentityId> = candidates.iter().copied().filter(fits).collect();

@@ -1,7 +1,7 @@
 //! From a planned call to what happens: permission, target, the scene's facts, confirmation; then the
 //! world acts. Every planner's calls pass here, and only here.
 
-use super::camera_args::{Distance, NORMAL, Side};
+use super::camera_args::{Distance, NORMAL};
 use super::describe::{self, SEEN, capital, length, the};
 use super::dialog::DialogState;
 use super::listing::{list_ids, measure, say_list};
@@ -10,6 +10,7 @@ use super::refusal::{Refusal, RefusalKind};
 use super::resolve::{Resolved, resolve};
 use super::tool::{Reference, Target, ToolCall};
 use super::world::{Unreachable, World, WorldError};
+use crate::navigate::target::Side;
 use crate::scene::{IdentityId, LevelFilter, NOBODY};
 
 /// What became of a call.
@@ -258,7 +259,7 @@ fn act(
         ToolCall::GoTo { side, closeness, .. } => {
             let arrival = world.go_to(id, *side, *closeness).map_err(|e| unreachable(world, &it, &e))?;
             dialog.closeness = *closeness;
-            let from = if *side == Side::Same { String::new() } else { format!(" from {}", side.text()) };
+            let from = if *side == Side::Same { String::new() } else { format!(" {}", side.text()) };
             let close = match *closeness {
                 c if c > NORMAL => ", closer",
                 c if c < NORMAL => ", from farther away",

@@ -4,8 +4,9 @@ use std::sync::OnceLock;
 
 use serde::Deserialize;
 
-use super::camera_args::{Direction, Side};
+use super::camera_args::Direction;
 use super::relation::Relation;
+use crate::navigate::target::Side;
 
 /// What things are compared by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]

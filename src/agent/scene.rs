@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
-use super::camera_args::{Direction, Distance, NORMAL, Side};
+use super::camera_args::{Direction, Distance, NORMAL};
 use super::relation::{Extent, Viewpoint};
 pub use super::view_shares::Parts;
 use super::view_shares::{ViewShares, is_drawn};
@@ -13,7 +13,7 @@ use super::world::{Arrival, IdentityFacts, Moved, Unreachable, World, WorldError
 use crate::io;
 use crate::jobs::go_to::Explored;
 use crate::navigate::approach::{Approach, ApproachError, SceneRef};
-use crate::navigate::target::{self, ViewPreference};
+use crate::navigate::target::{Side, ViewPreference};
 use crate::navigate::{CameraTrajectory, FRAMES, Pose, Speed};
 use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::query_engine::QueryEngine;
@@ -171,25 +171,10 @@ impl SceneWorld {
 fn bounds(parts: &Parts) -> Vec<Option<Bounds>> {
     let Parts { cloud, map, .. } = parts;
     let mut places: Vec<Vec<DVec3>> = vec![Vec::new(); map.identities.len() + 1];
-    for (i, &id) in map.of.iter().enumerate().take(cloud.len()) {
-        map.identities.line(id).for_each(|id| places[id as usize].push(cloud.world_position(i)));
+    for (i, &id) in map.identity_of.iter().enumerate().take(cloud.len()) {
+        map.identities.ancestors(id).for_each(|id| places[id as usize].push(cloud.world_position(i)));
     }
     places.into_iter().map(Bounds::robust).collect()
-}
-
-/// The side in navigation's terms. What is in view is seen from where it is seen now, unless another
-/// side is asked for; what is not, from wherever it is seen best.
-fn side(side: Side, in_view: bool) -> target::Side {
-    match side {
-        Side::Same if in_view => target::Side::Same,
-        Side::Same => target::Side::Best,
-        Side::Other => target::Side::Other,
-        Side::Front => target::Side::Front,
-        Side::Left => target::Side::Left,
-        Side::Right => target::Side::Right,
-        Side::Above => target::Side::Above,
-        Side::Below => target::Side::Below,
-    }
 }
 
 impl World for SceneWorld {
@@ -237,13 +222,13 @@ impl World for SceneWorld {
         let eye = self.eye;
         let place = SceneRef { cloud: &self.parts.cloud, settings: &self.parts.settings, map: &self.parts.map };
         let distance = NORMAL / closeness.max(0.01);
-        let go = |side: target::Side| {
+        let go = |side: Side| {
             explored.navigator.visit(place, id, ViewPreference { side, distance }, &eye, self.aspect, FRAMES)
         };
-        let wanted = side(from, in_view);
-        let mut visit = go(wanted);
-        if visit.is_err() && from == Side::Same && wanted != target::Side::Best {
-            visit = go(target::Side::Best);
+        // What is in view is seen from where it is seen now; what is not, from wherever it is seen best.
+        let mut visit = go(if from == Side::Same && !in_view { Side::Best } else { from });
+        if visit.is_err() && from == Side::Same && in_view {
+            visit = go(Side::Best);
         }
         match visit {
             Ok(Approach { view, target, flight }) => {
@@ -318,8 +303,8 @@ impl World for SceneWorld {
 
     fn isolate(&mut self, id: IdentityId) -> Result<(), WorldError> {
         let all = &self.parts.map.identities;
-        let inside = all.within(id);
-        let line: Vec<IdentityId> = all.line(id).collect();
+        let inside = all.descendants(id);
+        let line: Vec<IdentityId> = all.ancestors(id).collect();
         let hidden = (0..=all.len() as IdentityId).map(|i| !inside[i as usize] && !line.contains(&i)).collect();
         let what = format!("showing only {}", self.name(id));
         self.set_hidden_list(hidden, what);

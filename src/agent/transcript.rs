@@ -4,10 +4,11 @@ use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-use super::camera_args::{self, Distance, Side};
+use super::camera_args::{self, Distance};
 use super::relation::Relation;
 use super::tool::{Reference, Target, ToolCall};
 use crate::math::format::short;
+use crate::navigate::target::Side;
 use crate::scene::{Identities, LevelFilter, text};
 
 /// Entries that are kept; the oldest go first.
@@ -126,7 +127,7 @@ impl ToolCall {
             }
             Self::GoTo { side, closeness, .. } => {
                 if *side != Side::Same {
-                    parts.push(format!("from {}", side.text()));
+                    parts.push(side.text().into());
                 }
                 if *closeness > camera_args::NORMAL {
                     parts.push("closer".into());

@@ -1,8 +1,9 @@
 //! What the agent needs of the scene. The window, the command line and tests supply it; everything
 //! that does not need a camera or a file is in [`super::resolve`] and [`super::describe`].
 
-use super::camera_args::{Direction, Distance, Side};
+use super::camera_args::{Direction, Distance};
 use super::relation::{Extent, Viewpoint};
+use crate::navigate::target::Side;
 use crate::pipeline::semantics::answer::{QueryAnswer, by_name};
 use crate::pipeline::semantics::localize::Answer;
 use crate::pipeline::semantics::parse::ParsedQuery;

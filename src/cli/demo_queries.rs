@@ -105,7 +105,8 @@ pub(crate) fn run(
     for (k, &i) in job.views.iter().enumerate() {
         let photo = &job.dataset.photos[i];
         let camera = photo.camera.limited_to(job.max_side_px);
-        let view = ViewMap::render(&mut renderer, &job.cloud, &map.of, &map.identities, &camera, &job.settings)?;
+        let view =
+            ViewMap::render(&mut renderer, &job.cloud, &map.identity_of, &map.identities, &camera, &job.settings)?;
         let labeled = LabeledView {
             name: &photo.name,
             camera: &camera,

@@ -252,7 +252,7 @@ fn labeled(comparison: &PhotoComparison, map: &SemanticMap, labels: &mut FileMas
     for index in views {
         let photo = &photos[index];
         let camera = photo.camera.limited_to(*max_side_px);
-        let exact = ViewMap::render(&mut renderer, cloud, &map.of, &map.identities, &camera, settings)?;
+        let exact = ViewMap::render(&mut renderer, cloud, &map.identity_of, &map.identities, &camera, settings)?;
         let blended = CodeMap::render(&mut renderer, cloud, &map.codes, map.has_parts(), &camera, settings)?;
         let categories = categories(&labels.segment(photo, *max_side_px, &mut Silent)?);
         drawn.push(Drawn { index, name: photo.name.clone(), camera, trained_on, exact, blended, categories });

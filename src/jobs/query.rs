@@ -38,7 +38,7 @@ impl ViewMaps {
         wanted: bool,
         parts: bool,
     ) -> Result<Self, crate::render::RenderError> {
-        let identities = ViewMap::render(renderer, cloud, &map.of, &map.identities, camera, settings)?;
+        let identities = ViewMap::render(renderer, cloud, &map.identity_of, &map.identities, camera, settings)?;
         let codes = match wanted {
             true => Some(CodeMap::render(renderer, cloud, &map.codes, parts, camera, settings)?),
             false => None,

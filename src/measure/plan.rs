@@ -159,7 +159,8 @@ fn maps(
     settings: &RenderSettings,
 ) -> Result<(ViewMap, CodeMap), StudyError> {
     let (cloud, camera) = (&scene.cloud, &scene.first);
-    let exact = ViewMap::render(renderer, cloud, &map.of, &map.identities, camera, settings).map_err(failed)?;
+    let exact =
+        ViewMap::render(renderer, cloud, &map.identity_of, &map.identities, camera, settings).map_err(failed)?;
     let codes = CodeMap::render(renderer, cloud, &map.codes, plan.parts, camera, settings).map_err(failed)?;
     Ok((exact, codes))
 }

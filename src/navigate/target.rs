@@ -3,6 +3,7 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use strum::{IntoStaticStr, VariantArray};
 
 use super::occupancy::OccupancyGrid;
@@ -26,7 +27,21 @@ const DRAWN_PX: u32 = 128;
 const PHOTO_ANGLE: f64 = 0.6;
 
 /// From which side.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, clap::ValueEnum, IntoStaticStr, VariantArray)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Hash,
+    Serialize,
+    Deserialize,
+    clap::ValueEnum,
+    IntoStaticStr,
+    VariantArray,
+)]
+#[serde(rename_all = "snake_case")]
 pub enum Side {
     /// Whichever shows it best
     #[default]

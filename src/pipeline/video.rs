@@ -58,7 +58,7 @@ pub(crate) fn write(
         let mut pixels = renderer.draw(cloud, camera, draw)?.to_rgb8();
         if let Some(marked) = marked.filter(|m| !m.ids.is_empty()) {
             let Marked { map, ids, .. } = marked;
-            let view = ViewMap::render(renderer, cloud, &map.of, &map.identities, camera, draw)?;
+            let view = ViewMap::render(renderer, cloud, &map.identity_of, &map.identities, camera, draw)?;
             for id in ids {
                 let mask = view.mask(&map.identities, *id);
                 mark(&mut pixels, camera.width_px as usize, |i| mask.contains(i), marked.color);

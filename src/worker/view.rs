@@ -163,7 +163,7 @@ fn next(mailbox: &(Mutex<Mailbox>, Condvar), patience: Option<Duration>) -> Wait
 
 /// What the pixels of a resting view belong to; `None` if no one wants to know.
 fn maps_of(renderer: &mut Renderer, request: &ViewRequest) -> Option<Result<ViewMaps, Failure>> {
-    let semantics = request.semantics.as_ref().filter(|s| s.of.len() == request.cloud.len())?;
+    let semantics = request.semantics.as_ref().filter(|s| s.identity_of.len() == request.cloud.len())?;
     if request.budget != QualityBudget::Full {
         return None;
     }
@@ -202,7 +202,7 @@ mod tests {
         };
         let mut all = Identities::default();
         all.add(Level::Object, NOBODY, Vec::new());
-        let mut map = SemanticMap::of_identities(all, vec![1], vec![1.0], vec![]);
+        let mut map = SemanticMap::from_identities(all, vec![1], vec![1.0], vec![]);
         let lane = ViewLane::start(Arc::new(|| {})).expect("a thread");
         let mapped = |ticket: u64, map: &SemanticMap| {
             lane.request(ViewRequest {

@@ -1,8 +1,9 @@
 //! A room with some forty things and parts, on boxes only, that remembers what was done to it.
 
-use fmlgs::agent::camera_args::{Direction, Distance, Side};
+use fmlgs::agent::camera_args::{Direction, Distance};
 use fmlgs::agent::relation::Viewpoint;
 use fmlgs::agent::world::{Arrival, IdentityFacts, Moved, Unreachable, World, WorldError, locate_by_names};
+use fmlgs::navigate::target::Side;
 use fmlgs::pipeline::semantics::answer::QueryAnswer;
 use fmlgs::scene::LevelFilter;
 use fmlgs::scene::{Bounds, Identities, IdentityId, Level, NOBODY};
@@ -132,8 +133,8 @@ impl World for Room {
 
     fn facts(&self, id: IdentityId) -> Option<IdentityFacts> {
         let identity = self.identities.get(id)?;
-        let gone = self.identities.line(id).any(|i| self.removed[i as usize]);
-        let hidden = self.identities.line(id).any(|i| self.hidden[i as usize]);
+        let gone = self.identities.ancestors(id).any(|i| self.removed[i as usize]);
+        let hidden = self.identities.ancestors(id).any(|i| self.hidden[i as usize]);
         (!gone).then(|| IdentityFacts {
             names: identity.names.clone(),
             level: identity.level,
@@ -161,7 +162,7 @@ impl World for Room {
         let b = self.boxes[id as usize].expect("a box");
         let level = DVec3::new(self.forward.x, self.forward.y, 0.0).normalize_or(DVec3::Y);
         let ahead = match side {
-            Side::Same => level,
+            Side::Same | Side::Best => level,
             Side::Other | Side::Front => -level,
             Side::Left => level.cross(DVec3::Z),
             Side::Right => DVec3::Z.cross(level),

@@ -4,11 +4,12 @@
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
-use crate::agent::camera_args::{Direction, Distance, Side};
+use crate::agent::camera_args::{Direction, Distance};
 use crate::agent::language::{CommandHelp, CommandLanguage, commands, find};
 use crate::agent::relation::Relation;
 use crate::agent::resolve::{NameWords, is_thing};
 use crate::agent::words::{Token, number};
+use crate::navigate::target::Side;
 
 /// What stands in a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

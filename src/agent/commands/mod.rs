@@ -12,7 +12,8 @@ use std::collections::VecDeque;
 
 use self::form::{FormItem, FormRequest, beginning_with, many, sequences};
 use self::task::{Task, task};
-use super::camera_args::{CLOSENESS, CLOSER, Direction, Distance, FARTHER, NORMAL, Side};
+use super::camera_args::{CLOSENESS, CLOSER, Direction, Distance, FARTHER, NORMAL};
+use super::describe::capital;
 use super::dialog::DialogState;
 use super::execute::CallOutcome;
 use super::language::CommandLanguage;
@@ -22,6 +23,7 @@ use super::resolve::{NameWords, Resolved, is_thing, name_words, resolve, resolve
 use super::tool::{Reference, Target, ToolCall};
 use super::words::{Token, alike, is_mark, tokens};
 use super::world::World;
+use crate::navigate::target::Side;
 use crate::scene::{Identities, LevelFilter};
 
 /// Most tasks of one request.
@@ -92,7 +94,7 @@ impl Commands {
             }
             (Task::From(side), Some(id)) => go(Target::Identity(id), side, dialog.closeness),
             (Task::From(side), None) => {
-                let text = format!("From {}: of what? Name a thing, such as 'the lamp from above'.", side.text());
+                let text = format!("{}: of what? Name a thing, such as 'the lamp from above'.", capital(side.text()));
                 self.refuse(Refusal::new(RefusalKind::Unclear, text))
             }
             (Task::Again, _) => match dialog.moved.clone() {

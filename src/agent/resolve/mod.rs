@@ -192,7 +192,7 @@ impl Resolver<'_> {
         let Some((head, rest)) = words.split_last() else { return Err(self.not_found("that", &[])) };
         let own = |id: IdentityId| all.get(id).map(|i| i.names.as_slice()).unwrap_or_default();
         let line_has = |id: IdentityId, word: &String| {
-            all.line(id).any(|i| own(i).iter().any(|name| name_words(name).contains(word)))
+            all.ancestors(id).any(|i| own(i).iter().any(|name| name_words(name).contains(word)))
         };
         let is_object = |id: &IdentityId| all.object_of(*id) == *id;
         let generic = match head.as_str() {
@@ -273,7 +273,7 @@ impl Resolver<'_> {
         let all = self.world.identities();
         let mut inside = vec![false; all.len() + 1];
         for whole in &wholes {
-            all.within(*whole).iter().enumerate().for_each(|(i, is_in)| inside[i] |= *is_in);
+            all.descendants(*whole).iter().enumerate().for_each(|(i, is_in)| inside[i] |= *is_in);
         }
         wholes.iter().for_each(|id| inside[*id as usize] = false);
         let is_in = |id: &IdentityId| inside.get(*id as usize) == Some(&true);
@@ -319,7 +319,8 @@ impl Resolver<'_> {
         let set = self.set(thing)?;
         let all = self.world.identities();
         let place = self.bounds(anchor);
-        let apart = |id: &IdentityId| !all.line(*id).any(|l| l == anchor) && !all.line(anchor).any(|l| l == *id);
+        let apart =
+            |id: &IdentityId| !all.ancestors(*id).any(|l| l == anchor) && !all.ancestors(anchor).any(|l| l == *id);
         let holds = |id: &IdentityId| score(&self.bounds(*id)?, place.as_ref()?).map(|s| (s, *id));
         let mut found: Vec<(f64, IdentityId)> = set.ids.iter().filter(|id| apart(id)).filter_map(holds).collect();
         found.sort_by(|a, b| a.0.total_cmp(&b.0));

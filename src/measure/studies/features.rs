@@ -100,7 +100,7 @@ fn score(
             }
         };
         for (id, identity) in all.iter() {
-            let inside = all.within(id);
+            let inside = all.descendants(id);
             let truth = Mask::from_fn(w, h, |i| inside.get(labels[i] as usize).copied().unwrap_or(false));
             if !truth.is_empty() {
                 ious.entry(identity.level).or_default().push(find(id).iou(&truth));

@@ -92,7 +92,7 @@ pub(crate) fn study<'a>(
             }
             let (w, h) = (view.camera.width_px, view.camera.height_px);
             let small = view.camera.resized((w / variant.smaller).max(1), (h / variant.smaller).max(1));
-            let (of, all) = (&map.of, &map.identities);
+            let (of, all) = (&map.identity_of, &map.identities);
             let exact = ViewMap::render(&mut renderer, cloud, of, all, &small, settings).map_err(failed)?;
             let blended = match variant.blend {
                 true => CodeMap::render(&mut renderer, cloud, &map.codes, true, &small, settings).map_err(failed)?,
@@ -150,7 +150,7 @@ fn reduced(language: &LanguageFeatures, map: &SemanticMap, variant: &Variant) ->
         map.identities.iter().filter(|(_, i)| i.level == Level::Object).map(|(id, _)| id).collect();
     let known = (variant.share * objects.len() as f64).ceil() as usize;
     let dropped = &objects[known.min(objects.len())..];
-    for ((id, _), of) in map.identities.iter().zip(&mut features.of) {
+    for ((id, _), of) in map.identities.iter().zip(&mut features.by_identity) {
         if dropped.contains(&map.identities.object_of(id)) {
             *of = Default::default();
         }

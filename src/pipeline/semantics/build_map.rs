@@ -153,7 +153,7 @@ pub(crate) fn find_objects(
     codes::assign(&mut identities, &centers);
     let margin = tracked.assignments.iter().map(|b| b.margin).collect();
     let seeds = tracked.seeds.iter().map(|&i| photos[i].name.clone()).collect();
-    let mut map = SemanticMap::of_identities(identities, of, margin, seeds);
+    let mut map = SemanticMap::from_identities(identities, of, margin, seeds);
     let Tracked { views, disagreements, mut secs, .. } = tracked;
     let mut timed = |stage: &'static str, start: Instant| secs.push((stage, start.elapsed().as_secs_f64()));
     let start = Instant::now();
@@ -183,7 +183,7 @@ fn lift(
     let mut views = Vec::with_capacity(photos.len());
     for photo in photos {
         let camera = photo.camera.limited_to(CODE_SIDE_PX);
-        let seen = ViewMap::render(&mut renderer, cloud, &map.of, &map.identities, &camera, settings)?;
+        let seen = ViewMap::render(&mut renderer, cloud, &map.identity_of, &map.identities, &camera, settings)?;
         views.push(CodeView { camera, labels: seen.identity });
     }
     if options.lifting == Lifting::Paper {
@@ -194,7 +194,7 @@ fn lift(
     train_codes(cloud, &mut map.codes, &views, &map.identities, settings, training, observer)?;
     observer.proceed().map_err(TrackError::from)?;
     if options.lifting == Lifting::Paper {
-        map.of = decode(&map.codes, &map.identities);
+        map.identity_of = decode(&map.codes, &map.identities);
     }
     Ok(())
 }
@@ -218,7 +218,7 @@ fn unknown(views: &[ViewReport], photos: &[Photo], share: f64) -> Option<String>
 pub(crate) fn centers(cloud: &GaussianCloud, of: &[IdentityId], identities: &Identities) -> Vec<DVec3> {
     let mut sums = vec![(DVec3::ZERO, 0.0); identities.len()];
     for (i, &id) in of.iter().enumerate() {
-        for id in identities.line(id) {
+        for id in identities.ancestors(id) {
             let sum = &mut sums[id as usize - 1];
             *sum = (sum.0 + cloud.world_position(i), sum.1 + 1.0);
         }

@@ -88,7 +88,7 @@ pub(crate) fn embed(
         }
         ticker.tick(done + 1, observer)?;
     }
-    Ok(LanguageFeatures { encoder: encoder.name().into(), dimension: encoder.dimension(), of })
+    Ok(LanguageFeatures { encoder: encoder.name().into(), dimension: encoder.dimension(), by_identity: of })
 }
 
 struct Looker<'a> {
@@ -102,7 +102,7 @@ impl Looker<'_> {
     fn draw(&mut self, photo: &Photo, max_side_px: u32) -> Result<ViewMap, EmbedError> {
         let camera = photo.camera.limited_to(max_side_px);
         let Self { cloud, map, settings, renderer } = self;
-        ViewMap::render(renderer, cloud, &map.of, &map.identities, &camera, settings)
+        ViewMap::render(renderer, cloud, &map.identity_of, &map.identities, &camera, settings)
             .map_err(|e| EmbedError::Render(photo.name.clone(), e))
     }
 }
@@ -147,7 +147,7 @@ fn counts(view: &ViewMap, identities: &Identities) -> Vec<f64> {
         }
         let (x, y) = (i % w, i / w);
         let edge = x == 0 || y == 0 || x + 1 == w || y + 1 == h;
-        for id in identities.line(id) {
+        for id in identities.ancestors(id) {
             inside[id as usize] += 1;
             at_edge[id as usize] += usize::from(edge);
         }
@@ -229,7 +229,7 @@ mod tests {
             Photo { name: k.to_string(), path, camera, distortion: None, test_split: false, background: None }
         };
         let photos = (0..MAX_VIEWS + 2).map(|k| photo(k, DVec3::new(0.0, 0.0, -3.0 - 0.2 * k as f64))).collect();
-        let map = SemanticMap::of_identities(all, vec![doll, eye], vec![1.0; 2], vec![]);
+        let map = SemanticMap::from_identities(all, vec![doll, eye], vec![1.0; 2], vec![]);
         (cloud, map, photos)
     }
 

@@ -18,7 +18,7 @@ const KEPT: usize = 8;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Votes {
     /// Per Gaussian: identity and weight in px, any order, each identity once.
-    of: Vec<Vec<(IdentityId, f32)>>,
+    by_gaussian: Vec<Vec<(IdentityId, f32)>>,
 }
 
 /// What a Gaussian belongs to.
@@ -34,7 +34,7 @@ pub(crate) struct Assignment {
 impl Votes {
     /// No votes for `n` Gaussians.
     pub(crate) fn new(n: usize) -> Self {
-        Self { of: vec![Vec::new(); n] }
+        Self { by_gaussian: vec![Vec::new(); n] }
     }
 
     /// Weight of all votes for Gaussian `i`, px.
@@ -63,11 +63,11 @@ impl Votes {
         for mut row in rows {
             row.finish();
             for (gaussian, identity, weight) in row.found {
-                add(&mut self.of[gaussian as usize], identity, weight);
+                add(&mut self.by_gaussian[gaussian as usize], identity, weight);
             }
         }
         if CHECKED {
-            let weights = self.of.iter().flatten().map(|v| &v.1);
+            let weights = self.by_gaussian.iter().flatten().map(|v| &v.1);
             all_finite("voting", "vote", weights)?;
         }
         Ok(())
@@ -77,7 +77,7 @@ impl Votes {
     /// identity with most. Gaussians with less than `least` px of votes count as unseen.
     pub(crate) fn decide(&self, identities: &Identities, least: f32) -> Vec<Assignment> {
         let objects: Vec<IdentityId> = (0..=identities.len() as IdentityId).map(|i| identities.object_of(i)).collect();
-        self.of.par_iter().map(|votes| decide(votes, &objects, least)).collect()
+        self.by_gaussian.par_iter().map(|votes| decide(votes, &objects, least)).collect()
     }
 }
 

@@ -144,7 +144,8 @@ impl PhotoFacts {
 impl SemanticFacts {
     fn of(map: &SemanticMap) -> Self {
         let of = |level: Level| map.identities.iter().filter(|(_, i)| i.level == level).count();
-        let vectors = |l: &LanguageFeatures| -> usize { l.of.iter().map(|f| f.raw.len() + f.deviated.len()).sum() };
+        let vectors =
+            |l: &LanguageFeatures| -> usize { l.by_identity.iter().map(|f| f.raw.len() + f.deviated.len()).sum() };
         let numbers = map.language.as_ref().map_or(0, |l| l.dimension * vectors(l));
         let encoder = map.language.as_ref().map(|l| l.encoder.clone());
         Self { objects: of(Level::Object), parts: of(Level::Part), encoder, numbers }

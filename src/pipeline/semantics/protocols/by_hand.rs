@@ -28,7 +28,7 @@ fn scene(of: Vec<IdentityId>) -> SemanticMap {
         all.get_mut(id).expect("there").code = code;
     }
     let n = of.len();
-    SemanticMap::of_identities(all, of, vec![1.0; n], vec![])
+    SemanticMap::from_identities(all, of, vec![1.0; n], vec![])
 }
 
 fn exact(width_px: usize, identity: Vec<IdentityId>) -> ViewMap {

@@ -286,7 +286,8 @@ impl Queries {
         let features = match (&semantics.language, self.settings.color_by) {
             (Some(language), ColorBy::Features) => {
                 let of = |f: &crate::scene::ViewFeatures| f.deviated.first().cloned();
-                let vectors: Vec<Option<Vec<f32>>> = std::iter::once(None).chain(language.of.iter().map(of)).collect();
+                let vectors: Vec<Option<Vec<f32>>> =
+                    std::iter::once(None).chain(language.by_identity.iter().map(of)).collect();
                 overlay::main_directions(&vectors.iter().map(Option::as_deref).collect::<Vec<_>>())
             }
             _ => Vec::new(),
