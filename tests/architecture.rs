@@ -8,6 +8,8 @@
 // The generator of a committed asset: its own test compares the two.
 #[path = "../tools/demo_scene/mod.rs"]
 mod demo_scene;
+#[path = "architecture/front_ends.rs"]
+mod front_ends;
 #[path = "architecture/rules.rs"]
 mod rules;
 #[path = "architecture/source.rs"]
@@ -68,6 +70,11 @@ fn no_file_uses_one_that_uses_it() {
 #[test]
 fn channels_are_bounded_addresses_are_no_keys_and_progress_is_a_tickers() {
     check(habits(&tree()));
+}
+
+#[test]
+fn front_ends_leave_the_work_to_jobs() {
+    check(front_ends::front_ends(&tree()));
 }
 
 #[test]

@@ -166,5 +166,5 @@ fn the_window_and_the_command_line_do_the_same() {
     let Outcome::Objects(found) = window(command) else { panic!("no objects") };
     let told = fmlgs(&["preprocess", &trained, "--masks", photos, "--encoder", "none"]).ok();
     let stored = jobs::open::scene(&out).unwrap().semantics().unwrap();
-    assert_eq!((&stored.of, &stored.seeds), (&found.of, &found.seeds), "{}", told.stderr);
+    assert_eq!((&stored.identity_of, &stored.seeds), (&found.identity_of, &found.seeds), "{}", told.stderr);
 }

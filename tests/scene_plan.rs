@@ -148,7 +148,7 @@ fn a_far_larger_photo_than_the_gaussians_resolve_is_looked_at_smaller() {
         let (map, view) = (objects(cloud, false), photo.limited_to(side_px));
         let mut renderer = Renderer::new();
         let settings = RenderSettings::default();
-        let drawn = ViewMap::render(&mut renderer, cloud, &map.of, &map.identities, &view, &settings);
+        let drawn = ViewMap::render(&mut renderer, cloud, &map.identity_of, &map.identities, &view, &settings);
         drawn.expect("drawn")
     };
     let small = side(&coarse);

@@ -10,13 +10,13 @@ use super::relation::{Extent, Viewpoint};
 pub use super::view_shares::Parts;
 use super::view_shares::{ViewShares, is_drawn};
 use super::world::{Arrival, IdentityFacts, Moved, Unreachable, World, WorldError};
-use crate::io;
-use crate::jobs::go_to::Explored;
-use crate::navigate::approach::{Approach, ApproachError, SceneRef};
+use crate::jobs::export;
+use crate::jobs::go_to::{self, ApproachRequest, Approached, Explored};
+use crate::jobs::query::QueryEngine;
+use crate::navigate::approach::Approach;
 use crate::navigate::target::{Side, ViewPreference};
 use crate::navigate::{CameraTrajectory, FRAMES, Pose, Speed};
 use crate::pipeline::semantics::answer::QueryAnswer;
-use crate::pipeline::semantics::query_engine::QueryEngine;
 use crate::scene::undo::UndoHistory;
 use crate::scene::{Bounds, Identities, IdentityId, LevelFilter, SemanticMap, text};
 
@@ -220,30 +220,41 @@ impl World for SceneWorld {
         let explored = self.explored();
         let in_view = self.share_of(id) > 0.0;
         let eye = self.eye;
-        let place = SceneRef { cloud: &self.parts.cloud, settings: &self.parts.settings, map: &self.parts.map };
-        let distance = NORMAL / closeness.max(0.01);
-        let go = |side: Side| {
-            explored.navigator.visit(place, id, ViewPreference { side, distance }, &eye, self.aspect, FRAMES)
+        let wish = |side: Side| ViewPreference { side, distance: NORMAL / closeness.max(0.01) };
+        let visit = |side: Side| {
+            let request = ApproachRequest {
+                explored: Some(Arc::clone(&explored)),
+                cloud: Arc::clone(&self.parts.cloud),
+                cameras: Vec::new(),
+                up: self.parts.up,
+                settings: self.parts.settings.clone(),
+                map: Arc::clone(&self.parts.map),
+                id,
+                wish: wish(side),
+                from: eye,
+                aspect: self.aspect,
+                frames: FRAMES,
+            };
+            go_to::visit(request).1
         };
         // What is in view is seen from where it is seen now; what is not, from wherever it is seen best.
-        let mut visit = go(if from == Side::Same && !in_view { Side::Best } else { from });
-        if visit.is_err() && from == Side::Same && in_view {
-            visit = go(Side::Best);
+        let mut visited = visit(if from == Side::Same && !in_view { Side::Best } else { from });
+        if visited.problem.is_some() && from == Side::Same && in_view {
+            visited = visit(Side::Best);
         }
-        match visit {
-            Ok(Approach { view, target, flight }) => {
+        let Approached { name, flight, problem } = visited;
+        match (problem, flight.map(|f| *f)) {
+            (None, Some(Approach { view, target, flight })) => {
                 let arrival = Arrival { distance: flight.length, in_view: view.covers };
-                let what = format!("going to {}", self.name(id));
                 (self.emit)(Effect::Mark(vec![id]));
-                self.fly(flight, Some(target), what);
+                self.fly(flight, Some(target), format!("going to {name}"));
                 Ok(arrival)
             }
-            Err(ApproachError::NoRoute { why, nearest }) => {
+            (problem, nearest) => {
                 let center = self.bounds.get(id as usize).copied().flatten().map(|b| b.center());
                 let nearest = nearest.and_then(|n| Some(n.view.pose.center.distance(center?)));
-                Err(Unreachable { reason: why.to_string(), nearest })
+                Err(Unreachable { reason: problem.unwrap_or_default(), nearest })
             }
-            Err(e) => Err(Unreachable { reason: e.to_string(), nearest: None }),
         }
     }
 
@@ -366,12 +377,11 @@ impl World for SceneWorld {
     fn export(&mut self, id: IdentityId) -> Result<String, WorldError> {
         let file = self.export_file(id);
         let failed = |e: &dyn std::fmt::Display| WorldError(format!("{}: {e}", file.display()));
-        std::fs::create_dir_all(&self.parts.exports).map_err(|e| failed(&e))?;
         let members = self.parts.map.members(id);
         if members.is_empty() {
             return Err(WorldError(format!("nothing in the scene belongs to {}", self.name(id))));
         }
-        io::splat_ply::write(&file, &self.parts.cloud.select(&members)).map_err(|e| failed(&e))?;
+        export::ply(&file, &self.parts.cloud.select(&members)).map_err(|e| failed(&e))?;
         Ok(file.display().to_string())
     }
 

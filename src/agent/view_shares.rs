@@ -7,9 +7,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use glam::DVec3;
 
 use crate::jobs::go_to::Explored;
+use crate::jobs::query;
 use crate::navigate::Pose;
-use crate::pipeline::semantics::view_map::ViewMap;
-use crate::render::{RenderSettings, Renderer};
+use crate::render::RenderSettings;
 use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, SemanticMap};
 
 /// What a scene is made of.
@@ -65,10 +65,9 @@ fn count(parts: &Parts, eye: Pose, aspect: f64, hidden: &[bool]) -> Vec<f64> {
     let view = if hidden.contains(&true) {
         let is_kept = |i: &usize| map.identity_of.get(*i).is_none_or(|id| is_drawn(identities, hidden, *id));
         let kept: Vec<usize> = (0..cloud.len()).filter(is_kept).collect();
-        let of: Vec<IdentityId> = kept.iter().map(|i| map.identity_of[*i]).collect();
-        ViewMap::render(&mut Renderer::new(), &cloud.select(&kept), &of, identities, &camera, settings)
+        query::identities_in_view((&cloud.select(&kept), settings), &map.select(&kept), &camera)
     } else {
-        ViewMap::render(&mut Renderer::new(), cloud, &map.identity_of, identities, &camera, settings)
+        query::identities_in_view((cloud, settings), map, &camera)
     };
     // A view that cannot be drawn shows nothing.
     for id in view.map(|v| v.identity).unwrap_or_default() {

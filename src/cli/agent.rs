@@ -12,8 +12,7 @@ use crate::agent::llm::settings::{LlmSettings, RequestPatience};
 use crate::agent::llm::{Llm, SENT, discover};
 use crate::agent::scene::{Effect, Parts, SceneWorld};
 use crate::agent::{AgentEvent, Planner, Policy, Session};
-use crate::io;
-use crate::jobs::open;
+use crate::jobs::{export, open, render};
 use crate::navigate::Pose;
 
 const EXAMPLES: &str = "Examples:\n  \
@@ -138,10 +137,10 @@ pub(crate) fn run(args: AgentArgs) -> Result<(), CliError> {
     let folder = args.scene.as_deref().unwrap_or(Path::new(""));
     let scene = open::scene(folder)?;
     if let Some(view) = &args.view {
-        output::check(view, &[".png"], &scene.reads())?;
+        export::check(view, &[".png"], &scene.reads())?;
     }
     if let Some(transcript) = &args.transcript {
-        output::check(transcript, &[".json", ".md"], &scene.reads())?;
+        export::check(transcript, &[".json", ".md"], &scene.reads())?;
     }
     let map = scene.semantics()?;
     let camera = view::choose(args.from.as_deref(), &scene)?;
@@ -183,15 +182,11 @@ pub(crate) fn run(args: AgentArgs) -> Result<(), CliError> {
     if let Some(path) = &args.transcript {
         let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
         let text = if json { session.transcript().to_json() } else { session.transcript().to_markdown() };
-        output::make_parent(path)?;
-        io::atomic::write(path, |w| std::io::Write::write_all(w, text.as_bytes()))?;
+        export::text(path, &text)?;
     }
     if let Some(path) = &args.view {
         let camera = world.eye().camera(camera.width_px, camera.height_px).limited_to(1280);
-        let frame = crate::render::Renderer::new().draw(&cloud, &camera, &settings)?;
-        output::make_parent(path)?;
-        let size = [camera.width_px, camera.height_px];
-        output::write_png(path, frame.to_rgb8().as_flattened(), size, image::ColorType::Rgb8)?;
+        render::picture(path, &cloud, &camera, &settings)?;
     }
     if args.json {
         output::print_json(&json!({ "planner": session.planner(), "requests": talk.told }))?;

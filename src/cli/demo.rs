@@ -159,7 +159,7 @@ fn make_photos(folder: &Path, console: &mut Console) -> Result<Option<f64>, CliE
         console.note(Severity::Info, format!("Using the photos in {}", folder.display()));
         return Ok(None);
     }
-    let report = demo::write_demo(folder, console).map_err(synth::failure)?;
+    let report = demo::write_demo(folder, console).map_err(|e| synth::failure(e.into()))?;
     console.note(Severity::Info, synth::summary(&report));
     Ok(Some(report.secs))
 }

@@ -8,7 +8,7 @@ use super::progress::Console;
 use super::{CliError, eval_depth, eval_masks, number, output};
 use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::evaluate_masks::Protocol;
-use crate::jobs::open;
+use crate::jobs::{export, open};
 
 /// Measure PSNR and SSIM of a scene on held-out photos
 ///
@@ -64,7 +64,7 @@ impl EvalArgs {
         let scene = open::scene(&self.scene)?;
         let photos = scene.photos(self.photos.as_deref())?;
         if let Some(folder) = &self.pictures {
-            output::check_folder(folder, &[&photos])?;
+            export::check_folder(folder, &[&photos])?;
         }
         let options = EvaluateOptions {
             max_side_px: self.max_side,

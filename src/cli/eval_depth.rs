@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::{CliError, output};
 use crate::jobs::evaluate::{self, PhotoComparison};
-use crate::pipeline::depth::{self, DepthErrors};
+use crate::pipeline::depth::{DepthErrors, EDGE_JUMP, EDGE_PX};
 use crate::pipeline::observer::Observer;
 
 pub(crate) fn run(
@@ -23,8 +23,8 @@ pub(crate) fn run(
             "surfels": job.settings.surfels,
             "max_side_px": job.max_side_px,
             "views": job.views.len(),
-            "edge_px": depth::EDGE_PX,
-            "edge_jump": depth::EDGE_JUMP,
+            "edge_px": EDGE_PX,
+            "edge_jump": EDGE_JUMP,
             "median_render_ms": median_render_ms,
             "scores": scores,
         }));

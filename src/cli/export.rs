@@ -28,7 +28,7 @@ pub(crate) struct ExportArgs {
 
 pub(crate) fn run(args: ExportArgs) -> Result<(), CliError> {
     let scene = open::scene(&args.scene)?;
-    output::check(&args.out, &[".ply"], &scene.reads())?;
+    export::check(&args.out, &[".ply"], &scene.reads())?;
     let cloud = match args.sh_degree {
         Some(degree) => Arc::unwrap_or_clone(scene.cloud).up_to_degree(degree).into(),
         None => scene.cloud,

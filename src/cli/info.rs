@@ -7,7 +7,8 @@ use serde_json::{Value, json};
 
 use super::plan::PlanArgs;
 use super::{CliError, output};
-use crate::io::{semantic_map, trained};
+use crate::io::semantic_map::FILE as MAP_FILE;
+use crate::io::trained::CLOUD_FILE;
 use crate::jobs::open::{self, Contents};
 use crate::jobs::{JobError, Scene, plan};
 use crate::pipeline::train::TrainConfig;
@@ -152,13 +153,12 @@ fn of_trained(s: &Scene, folder: &Path) -> (Facts, Option<SemanticMap>) {
         Err(JobError::NoObjects(_)) => Ok(None),
         map => map.map(Some),
     };
-    let of_others = matches!(map, Ok(None)) && folder.join(semantic_map::FILE).exists();
+    let of_others = matches!(map, Ok(None)) && folder.join(MAP_FILE).exists();
     let warning = match &map {
         Err(e) => Some(format!("its objects cannot be read ('fmlgs preprocess' finds them anew): {e}")),
         Ok(None) if of_others => Some(format!(
             "{} is of other Gaussians than {}, so no objects are known; 'fmlgs preprocess' finds them anew",
-            semantic_map::FILE,
-            trained::CLOUD_FILE
+            MAP_FILE, CLOUD_FILE
         )),
         Ok(_) => None,
     };

@@ -77,7 +77,7 @@ fn explored(scene: &Scene) -> Arc<Explored> {
 pub(crate) fn run(args: PathArgs) -> Result<(), CliError> {
     let scene = open::scene(&args.scene)?;
     if let Some(out) = &args.out {
-        output::check(out, &[".json"], &scene.reads())?;
+        export::check(out, &[".json"], &scene.reads())?;
     }
     if let Some(flights) = args.survey {
         let own = scene.views();

@@ -9,8 +9,8 @@ use super::plan::PlanArgs;
 use super::progress::Console;
 use super::{CliError, number, output};
 use crate::jobs::find_objects::{self, FindRequest, FindSettings, FoundObjects};
+use crate::jobs::models::SAM2;
 use crate::jobs::{JobError, open, plan};
-use crate::models::catalog;
 use crate::pipeline::semantics::build_map::{CODE_STEPS, Carry, Found, Lifting};
 use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::scene::Level;
@@ -42,7 +42,7 @@ pub(crate) struct PreprocessArgs {
     #[arg(long, value_enum, default_value_t = Carry::Gaussians)]
     tracker: Carry,
     /// The SAM 2 that follows masks: a model of 'fmlgs models', or the path of a model's .json
-    #[arg(long, default_value = catalog::SAM2)]
+    #[arg(long, default_value = SAM2)]
     tracker_model: String,
     /// Dataset with the photos [default: where the scene's photos are]
     #[arg(long)]

@@ -6,8 +6,8 @@ use std::time::Instant;
 use serde_json::{Value, json};
 
 use super::{CliError, number, output, view};
-use crate::jobs::open;
 use crate::jobs::query::{self, QueryRequest, QueryResult};
+use crate::jobs::{export, open, render};
 use crate::pipeline::semantics::answer::Basis;
 use crate::pipeline::semantics::codes::TOLERANCE;
 use crate::pipeline::semantics::localize::{Answer, Hit};
@@ -61,11 +61,11 @@ pub(crate) struct QueryArgs {
 pub(crate) fn run(args: QueryArgs) -> Result<(), CliError> {
     let scene = open::scene(&args.scene)?;
     for out in args.mask.iter().chain(&args.heat) {
-        output::check(out, &[".png"], &scene.reads())?;
+        export::check(out, &[".png"], &scene.reads())?;
     }
     let map = scene.semantics()?;
     let camera = view::choose(args.camera.as_deref(), &scene)?.limited_to(args.max_side);
-    view::check_room(camera.width_px, camera.height_px)?;
+    render::check_room(camera.width_px, camera.height_px)?;
     let request = QueryRequest {
         text: &args.text,
         level: args.kind,

@@ -8,11 +8,10 @@ use serde_json::json;
 use super::plan::PlanArgs;
 use super::progress::Console;
 use super::{CliError, number, output, view};
-use crate::io;
 use crate::io::video::{VideoEncoder, VideoSettings};
 use crate::jobs::render::{self, Quantity};
 use crate::jobs::video::{self, Video, VideoRequest};
-use crate::jobs::{Scene, open, plan, query};
+use crate::jobs::{Scene, export, open, plan, query};
 use crate::navigate::camera_spline::MOST_PICTURES;
 use crate::navigate::{CameraSpline, Speed};
 use crate::render::{BackendChoice, RenderSettings};
@@ -89,7 +88,7 @@ impl RenderArgs {
         if let Some(photos) = &self.photos {
             scene.cameras = open::cameras(&open::dataset(photos)?, scene.config.holdout_every);
         }
-        output::check(&self.out, &[], &scene.reads())?;
+        export::check(&self.out, &[], &scene.reads())?;
         let mut camera = view::choose(self.camera.as_deref(), &scene)?;
         if let Some([width, height]) = self.size {
             camera = camera.with_size(width, height);
@@ -97,7 +96,7 @@ impl RenderArgs {
         if let Some(side) = self.max_side {
             camera = camera.limited_to(side);
         }
-        view::check_room(camera.width_px, camera.height_px)?;
+        render::check_room(camera.width_px, camera.height_px)?;
         Ok((scene, camera))
     }
 }
@@ -136,15 +135,15 @@ pub(crate) fn run(args: RenderArgs, quiet: bool) -> Result<(), CliError> {
 
 /// Draws a video along the camera path in `path`.
 fn video(args: &RenderArgs, path: &Path, quiet: bool) -> Result<(), CliError> {
-    let keys = io::camera_path::open(path)?;
+    let keys = video::camera_path(path)?;
     let spline = CameraSpline::new(&keys, Speed::Constant);
     let spline = spline.ok_or_else(|| CliError::failed(format!("{}: there are no keys in it", path.display())))?;
     let scene = open::scene(&args.scene)?;
     let reads: Vec<&Path> = scene.reads().into_iter().chain([path]).collect();
     if args.out.is_dir() {
-        output::check_folder(&args.out, &reads)?
+        export::check_folder(&args.out, &reads)?
     } else {
-        output::check(&args.out, &[], &reads)?
+        export::check(&args.out, &[], &reads)?
     }
     let plan = plan::of_scene(&scene, &args.plan.overrides());
     let draw = RenderSettings { sh_degree: plan.sh_degree, ..scene.settings.clone() };
@@ -153,7 +152,7 @@ fn video(args: &RenderArgs, path: &Path, quiet: bool) -> Result<(), CliError> {
         let limit = args.max_side.unwrap_or(1280);
         [limit, (f64::from(limit) * 9.0 / 16.0).round().max(1.0) as u32]
     });
-    view::check_room(width, height)?;
+    render::check_room(width, height)?;
     let mut settings = VideoSettings::new(width, height, fps);
     (settings.quality, settings.overwrite) = (args.quality, true);
     if let Some(program) = &args.ffmpeg {

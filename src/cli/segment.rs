@@ -44,7 +44,7 @@ pub(crate) struct SegmentArgs {
 
 pub(crate) fn run(args: SegmentArgs) -> Result<(), CliError> {
     let scene = open::scene(&args.scene)?;
-    output::check(&args.out, &[".ply"], &scene.reads())?;
+    export::check(&args.out, &[".ply"], &scene.reads())?;
     let map = scene.semantics()?;
     let targets = query::identities(&map, &args.text, args.kind, args.top)?;
     let mode = if args.blend { MatchMode::Blend } else { MatchMode::Exact };

@@ -196,7 +196,7 @@ mod tests {
             deviated: vec![deviated.to_vec(); 2],
         };
         let of = vec![views([1.0, 0.0], [1.0, 0.0]), views([0.0, 1.0], [0.25, 0.75])];
-        map.language = Some(LanguageFeatures { encoder: "test".into(), dimension: 2, of });
+        map.language = Some(LanguageFeatures { encoder: "test".into(), dimension: 2, by_identity: of });
         (map, cloud)
     }
 

@@ -103,18 +103,20 @@ impl MaskScores {
     }
 }
 
-/// Compares the objects and parts `map` with `labels`; `query` is what to ask for where those do not name it.
+/// Compares the objects and parts of a scene with `labels`; `query` is what to ask for where those do not name it.
 /// Pictures show the identities over the photos.
 ///
 /// # Errors
 /// If labels or photos cannot be read, no view has labels, or a protocol lacks what it needs.
 pub(crate) fn run(
     comparison: &PhotoComparison,
-    map: &SemanticMap,
+    scene: &Path,
     labels: &Path,
     protocol: Protocol,
     query: Option<&str>,
 ) -> Result<MaskScores, JobError> {
+    let map = io::semantic_map::load(scene, comparison.state.as_deref(), &comparison.cloud)?;
+    let map = &map.ok_or_else(|| JobError::NoObjects(scene.into()))?;
     let mut known = FileMasks(Labels::open(labels)?);
     let views = labeled(comparison, map, &mut known)?;
     if views.is_empty() {

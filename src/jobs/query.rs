@@ -10,7 +10,7 @@ use crate::math::colormap::Colormap;
 use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::matching::{self, MatchMode};
-use crate::pipeline::semantics::query_engine::QueryEngine;
+pub(crate) use crate::pipeline::semantics::query_engine::{QueryEngine, answer_encoded};
 use crate::pipeline::semantics::timing::ms_since;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{Features, RenderSettings, Renderer};
@@ -53,6 +53,18 @@ impl ViewMaps {
             _ => matching::exact(&self.identities, &map.identities, id, tolerance),
         }
     }
+}
+
+/// What the pixels of a view belong to.
+///
+/// # Errors
+/// If the view cannot be drawn.
+pub(crate) fn identities_in_view(
+    drawn: (&GaussianCloud, &RenderSettings),
+    map: &SemanticMap,
+    camera: &Camera,
+) -> Result<ViewMap, JobError> {
+    Ok(ViewMaps::draw(&mut Renderer::new(), drawn, map, camera, false, false)?.identities)
 }
 
 /// A question about a scene in a view.

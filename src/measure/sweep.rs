@@ -44,7 +44,7 @@ pub(crate) struct Trial {
 /// Why a measurement failed, in words.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{0}")]
-pub(crate) struct StudyError(pub(crate) String);
+pub struct StudyError(pub(crate) String);
 
 /// Makes a study's error of another.
 pub(crate) fn failed(error: impl std::fmt::Display) -> StudyError {

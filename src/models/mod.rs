@@ -20,7 +20,7 @@ pub mod session_cache;
 mod tile;
 mod vocabulary;
 
-pub(crate) use catalog::Role;
+pub(crate) use catalog::ModelRole;
 pub use clip::ClipEncoder;
 pub(crate) use demo::DemoEncoder;
 pub use error::ModelError;
@@ -70,7 +70,7 @@ pub(crate) const DEMO: &str = "demo";
 /// # Errors
 /// If it cannot be loaded.
 pub(crate) fn best_encoder(told: &mut dyn FnMut(String)) -> Result<Box<dyn Encoder>, ModelError> {
-    let best = catalog::usable(Role::Encoder, told)?.into_iter().next();
+    let best = catalog::usable(ModelRole::Encoder, told)?.into_iter().next();
     encoder(best.as_deref().unwrap_or(DEMO))
 }
 
@@ -81,6 +81,6 @@ pub(crate) fn best_encoder(told: &mut dyn FnMut(String)) -> Result<Box<dyn Encod
 pub fn encoder(name: &str) -> Result<Box<dyn Encoder>, ModelError> {
     match name {
         DEMO => Ok(Box::new(DemoEncoder::new()?)),
-        name => Ok(Box::new(ClipEncoder::open(&catalog::find(name, Role::Encoder)?)?.called(name))),
+        name => Ok(Box::new(ClipEncoder::open(&catalog::find(name, ModelRole::Encoder)?)?.called(name))),
     }
 }

@@ -147,7 +147,7 @@ mod tests {
         assert_eq!(map.sizes(), [1, 2, 1]);
         assert_eq!((map.members(doll), map.members(eye), map.members(77)), (vec![0, 2], vec![0], vec![]));
         let left = map.select(&[2]);
-        assert_eq!((left.of, left.margin, left.codes[0][4]), (vec![doll], vec![1.0], 0.25));
+        assert_eq!((left.identity_of, left.margin, left.codes[0][4]), (vec![doll], vec![1.0], 0.25));
         assert_eq!(SemanticMap::restore(Identities::default(), vec![], &cloud), None, "identities are missing");
         for bad in [-1.0, 0.5, 3.0, f32::NAN] {
             cloud.extras[1].values[0] = bad;
@@ -171,7 +171,7 @@ mod tests {
         // Eight numbers of 4 bytes a Gaussian; two views of three numbers, raw and deviated.
         assert_eq!(map.bytes(), 4 * 32);
         let seen = crate::scene::ViewFeatures { raw: vec![vec![0.0; 3]; 2], deviated: vec![vec![0.0; 3]; 2] };
-        map.language = Some(LanguageFeatures { encoder: "t".into(), dimension: 3, of: vec![seen] });
+        map.language = Some(LanguageFeatures { encoder: "t".into(), dimension: 3, by_identity: vec![seen] });
         assert_eq!(map.bytes(), 4 * 32 + 4 * 3 * 4);
         assert_eq!(map.sizes(), [1, 2, 1]);
     }

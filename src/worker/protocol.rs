@@ -9,6 +9,7 @@ use super::failure::Failure;
 use crate::jobs::edit::EditRequest;
 use crate::jobs::go_to::{ApproachRequest, Approached, Explored};
 use crate::jobs::models::ModelList;
+use crate::jobs::report::ReportRequest;
 use crate::jobs::video::VideoRequest;
 use crate::jobs::{OpenedScene, find_objects};
 use crate::measure::Report;
@@ -199,7 +200,7 @@ pub enum Command {
     /// Draw a video.
     CameraSpline(Box<VideoRequest>),
     /// Measure error against run time of drawing, and write it as a report.
-    Measure(Box<MeasureRequest>),
+    Measure(Box<ReportRequest>),
     /// Read a report.
     ReadReport {
         /// Its folder or file.
@@ -376,22 +377,4 @@ impl Event {
     pub fn is_end(&self) -> bool {
         matches!(self, Self::Finished(..) | Self::Cancelled(_) | Self::Failed(..))
     }
-}
-
-/// What is to be drawn in many ways.
-#[derive(Clone, Debug)]
-pub struct MeasureRequest {
-    /// The scene, for display.
-    pub(crate) scene: String,
-    pub(crate) cloud: Arc<GaussianCloud>,
-    /// How they are drawn.
-    pub(crate) settings: RenderSettings,
-    /// Its photos; those that are held out are compared with, too.
-    pub(crate) dataset: Option<Arc<Dataset>>,
-    /// Every how-manieth photo is held out.
-    pub(crate) holdout_every: usize,
-    /// From where it is drawn without held-out photos.
-    pub(crate) camera: Camera,
-    /// Folder of the report. What is measured there already is resumed.
-    pub(crate) out: PathBuf,
 }

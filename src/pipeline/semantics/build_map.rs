@@ -333,14 +333,17 @@ mod tests {
         for named in [true, false] {
             let found = find(Told { named, covers: true }, (Lifting::Votes, 0), 12, &mut Silent).expect("found");
             let map = &found.map;
-            assert_eq!((map.of.as_slice(), map.seeds.as_slice()), (&TRUTH[..], &["near".into(), "far".to_owned()][..]));
+            assert_eq!(
+                (map.identity_of.as_slice(), map.seeds.as_slice()),
+                (&TRUTH[..], &["near".into(), "far".to_owned()][..])
+            );
             let list: Vec<_> = map.identities.iter().map(|(_, i)| (i.level, i.parent, i.names.clone())).collect();
             let names = |name: &str| if named { vec![name.to_owned()] } else { vec![] };
             let expected = [(Of::Object, 0, names("doll")), (Of::Part, 1, names("eye")), (Of::Object, 0, names("cat"))];
             assert_eq!(list, expected);
             assert!(found.disagreements.is_empty(), "{:?}", found.disagreements);
             assert!(map.margin.iter().all(|m| *m > 0.0), "{:?}", map.margin);
-            let codes: Vec<_> = map.of.iter().map(|id| map.identities.codes(*id)).collect();
+            let codes: Vec<_> = map.identity_of.iter().map(|id| map.identities.codes(*id)).collect();
             assert_eq!(map.codes, codes);
             let seen = |k: usize| found.views[k].seen.iter().map(|s| s.identity).collect::<Vec<_>>();
             assert_eq!((seen(0), seen(1)), (vec![1, 2], vec![1, 2, 3]));
@@ -361,7 +364,7 @@ mod tests {
         let mut notes = Notes(vec![]);
         let found = find(Told { named: true, covers: true }, (Lifting::Votes, 0), 1, &mut notes).expect("found");
         assert_eq!(found.map.identities.len(), 2);
-        assert_eq!((&found.map.of[..9], &found.map.of[9..]), (&TRUTH[..9], &[NOBODY; 6][..]));
+        assert_eq!((&found.map.identity_of[..9], &found.map.identity_of[9..]), (&TRUTH[..9], &[NOBODY; 6][..]));
         // The far photo shows the cat, too different in color to be taken for a piece of what is near.
         assert!((0.01..0.3).contains(&found.views[1].unknown) && found.views[0].unknown == 0.0);
         assert!(
@@ -381,7 +384,7 @@ mod tests {
         let votes = find(told(), (Lifting::Votes, 0), 12, &mut Silent).expect("found").map;
         for lifting in [(Lifting::Refined, 20), (Lifting::Paper, 120)] {
             let map = find(told(), lifting, 12, &mut Silent).expect("found").map;
-            assert_eq!(map.of, TRUTH, "{lifting:?}");
+            assert_eq!(map.identity_of, TRUTH, "{lifting:?}");
             assert_ne!(map.codes, votes.codes, "{lifting:?} trains");
             let far = |a: &[f32; 6], b: &[f32; 6]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
             let worst = map.codes.iter().zip(&votes.codes).map(|(a, b)| far(a, b)).fold(0.0, f32::max);

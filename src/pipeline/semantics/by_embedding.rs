@@ -146,7 +146,7 @@ mod tests {
         LanguageFeatures {
             encoder: "test".into(),
             dimension: 2,
-            of: vec![f([1.0, 0.0], [1.0, 0.0]), f([0.0, 1.0], [0.6, 0.8]), ViewFeatures::default()],
+            by_identity: vec![f([1.0, 0.0], [1.0, 0.0]), f([0.0, 1.0], [0.6, 0.8]), ViewFeatures::default()],
         }
     }
 

@@ -64,7 +64,7 @@ mod tests {
         // Moved, cloned, exchanged, in another frame, and one that is nobody's: 0.3 off, three deviations.
         let to = cloud(&[-8.95, -9.99, -10.19, -8.7], DVec3::X * 10.0);
         let (carried, share) = carry(&map, &from, &to);
-        assert_eq!(carried.of, [b, a, a, NOBODY]);
+        assert_eq!(carried.identity_of, [b, a, a, NOBODY]);
         assert_eq!(carried.margin, [1.0, 0.5, 0.5, 0.0]);
         assert_eq!((carried.codes[0], carried.codes[1]), (map.codes[1], map.codes[0]));
         assert_eq!(
@@ -73,6 +73,6 @@ mod tests {
         );
         assert_eq!((share, carried.seeds), (0.75, map.seeds.clone()));
         assert_eq!(carry(&map, &from, &from).0, map, "the same Gaussians keep everything");
-        assert!(carry(&map, &from, &GaussianCloud::default()).0.of.is_empty());
+        assert!(carry(&map, &from, &GaussianCloud::default()).0.identity_of.is_empty());
     }
 }

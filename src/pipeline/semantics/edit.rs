@@ -245,7 +245,7 @@ mod tests {
         };
         let mut map = SemanticMap::from_identities(all, of, vec![1.0; n], vec![]);
         map.language =
-            Some(LanguageFeatures { encoder: "t".into(), dimension: 1, of: vec![ViewFeatures::default(); 4] });
+            Some(LanguageFeatures { encoder: "t".into(), dimension: 1, by_identity: vec![ViewFeatures::default(); 4] });
         (map, cloud)
     }
 
@@ -253,7 +253,7 @@ mod tests {
         for (id, identity) in map.identities.iter() {
             assert!(identity.parent < id, "wholes come before their pieces");
         }
-        let codes: Vec<_> = map.of.iter().map(|id| map.identities.codes(*id)).collect();
+        let codes: Vec<_> = map.identity_of.iter().map(|id| map.identities.codes(*id)).collect();
         assert_eq!(map.codes, codes);
         assert!(map.language.as_ref().is_some_and(|l| l.is_valid(&map.identities)));
     }
@@ -292,7 +292,10 @@ mod tests {
         let new = apply(&map, &cloud, &Edit::Split(1)).expect("split");
         check(&new);
         assert_eq!((new.identities.len(), new.sizes()[5]), (5, 10));
-        assert!(new.of[..10].iter().all(|id| *id == new.of[0]) && new.of[0] != new.of[10]);
+        assert!(
+            new.identity_of[..10].iter().all(|id| *id == new.identity_of[0])
+                && new.identity_of[0] != new.identity_of[10]
+        );
         // In one place: two halves.
         let new = apply(&map, &cloud, &Edit::Split(3)).expect("split");
         assert_eq!((new.sizes()[3], new.sizes()[5]), (20, 10), "its eye stays with it");

@@ -242,7 +242,7 @@ mod tests {
         let language = embed(&cloud, &map, &photos, &settings, &mut encoder, &mut Silent).expect("looks");
         assert_eq!((language.encoder.as_str(), language.dimension), ("reddish", 2));
         assert!(language.is_valid(&map.identities));
-        let [doll, eye, nowhere] = &language.of[..] else { panic!("{language:?}") };
+        let [doll, eye, nowhere] = &language.by_identity[..] else { panic!("{language:?}") };
         // The doll is partly red, its eye is not: 0.3 of the doll and 0.7 of the eye, of unit length.
         let length = 0.3_f32.hypot(0.7);
         assert_eq!((doll.raw.len(), eye.raw.len(), nowhere.raw.len()), (MAX_VIEWS, MAX_VIEWS, 0));

@@ -184,7 +184,7 @@ impl Scene {
         let mut renderer = Renderer::new();
         let mut draw = |camera: &Camera| {
             let (cloud, settings) = (&self.cloud, &self.settings);
-            ViewMap::render(&mut renderer, cloud, &map.of, &map.identities, camera, settings).expect("drawn")
+            ViewMap::render(&mut renderer, cloud, &map.identity_of, &map.identities, camera, settings).expect("drawn")
         };
         self.held.iter().map(|h| draw(&h.1)).collect()
     }
@@ -222,12 +222,14 @@ fn harmed(map: &SemanticMap, harm: Harm) -> SemanticMap {
                 }
             }
         }
-        (Harm::Looks, Some(language)) => language.of = next.iter().map(|k| language.of[*k].clone()).collect(),
+        (Harm::Looks, Some(language)) => {
+            language.by_identity = next.iter().map(|k| language.by_identity[*k].clone()).collect()
+        }
         (Harm::Deviation, Some(language)) => {
-            let wholes = language.of.clone();
+            let wholes = language.by_identity.clone();
             for (id, identity) in map.identities.iter().filter(|(_, i)| i.level == Level::Part) {
                 let whole = &wholes[map.identities.object_of(id) as usize - 1].raw;
-                let of = &mut language.of[id as usize - 1];
+                let of = &mut language.by_identity[id as usize - 1];
                 let Some(whole) = whole.first() else { continue };
                 let exchanged = |raw: &Vec<f32>| deviate(whole, raw, PART_WEIGHT).expect("a direction");
                 of.deviated = of.raw.iter().map(exchanged).collect();

@@ -144,7 +144,7 @@ mod tests {
         let mut map = SemanticMap::default();
         map.identities.add(Level::Object, NOBODY, vec!["lamp".into()]);
         let red = ViewFeatures { raw: vec![vec![1.0, 0.0]], deviated: vec![vec![1.0, 0.0]] };
-        map.language = Some(LanguageFeatures { encoder: "small".into(), dimension: 2, of: vec![red] });
+        map.language = Some(LanguageFeatures { encoder: "small".into(), dimension: 2, by_identity: vec![red] });
         let mut engine = QueryEngine { encoder: Some(Box::new(Small)), ..QueryEngine::default() };
         let mut ask = |text: &str| engine.ask(&map, text, LevelFilter::Auto);
         let answered = ask("red").expect("encodes").expect("words");

@@ -11,7 +11,7 @@ use super::segmenter::FoundMask;
 use super::votes::UNKNOWN;
 use crate::io::{self, atomic, files};
 use crate::models::ModelError;
-use crate::models::catalog::{self, Role};
+use crate::models::catalog::{self, ModelRole};
 use crate::models::network::Tensor;
 use crate::models::sam2::track::{FrameSource, ObjectId, Prompt, Track, mask_of};
 use crate::models::sam2::{EncodedFrame, Sam2};
@@ -50,7 +50,7 @@ impl Sam2Tracker {
     /// # Errors
     /// If it is not on this machine.
     pub(crate) fn open(name: &str, cache: Option<PathBuf>) -> Result<Self, ModelError> {
-        Ok(Self { model: Sam2::open(&catalog::find(name, Role::Segmenter)?)?, cache, encode_secs: 0.0 })
+        Ok(Self { model: Sam2::open(&catalog::find(name, ModelRole::Segmenter)?)?, cache, encode_secs: 0.0 })
     }
 
     /// The label of every pixel of every photo, scaled to at most [`LABEL_SIDE_PX`], row-major: the

@@ -43,7 +43,7 @@ fn objects(with_part: bool, with_looks: bool) -> SemanticMap {
     }
     let looks = ViewFeatures { raw: vec![vec![0.5; 4]], deviated: vec![vec![0.5; 4]] };
     let of = vec![looks; identities.len()];
-    let language = with_looks.then(|| LanguageFeatures { encoder: "demo".into(), dimension: 4, of });
+    let language = with_looks.then(|| LanguageFeatures { encoder: "demo".into(), dimension: 4, by_identity: of });
     SemanticMap { identities, language, ..SemanticMap::default() }
 }
 

@@ -328,7 +328,7 @@ impl CameraPane {
 
 /// Reads a path's file; the error for the user.
 pub(crate) fn read(path: &Path) -> Result<CameraPath, String> {
-    crate::io::camera_path::open(path).map_err(|e| e.to_string())
+    crate::jobs::video::camera_path(path).map_err(|e| e.to_string())
 }
 
 /// Writes a path's file, in nerfstudio's format if its name says so.

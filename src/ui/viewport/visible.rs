@@ -121,7 +121,7 @@ mod tests {
         let mut v = Visibility::default();
         let xs = |v: &mut Visibility| {
             let (cloud, map) = v.apply(&cloud, &map);
-            assert_eq!(cloud.len(), map.of.len());
+            assert_eq!(cloud.len(), map.identity_of.len());
             cloud.positions.iter().map(|p| p[0] as i32).collect::<Vec<_>>()
         };
         assert_eq!(xs(&mut v), [0, 1, 2, 3]);

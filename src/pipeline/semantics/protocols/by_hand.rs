@@ -289,7 +289,7 @@ fn kitchen() -> (SemanticMap, LanguageFeatures) {
     };
     let of = [&of_mug, &of_pan].into_iter().map(whole).chain(parts.iter().map(part)).collect();
     let map = SemanticMap { identities: all, ..SemanticMap::default() };
-    (map, LanguageFeatures { encoder: "test".into(), dimension: 7, of })
+    (map, LanguageFeatures { encoder: "test".into(), dimension: 7, by_identity: of })
 }
 
 #[test]

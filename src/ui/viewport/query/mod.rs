@@ -19,11 +19,10 @@ use egui::{Color32, Rect, TextureHandle, TextureOptions, Ui};
 
 use self::embeddings::Embeddings;
 pub(crate) use self::settings::{ColorBy, OverlaySettings};
-use crate::jobs::query::ViewMaps;
+use crate::jobs::query::{ViewMaps, answer_encoded};
 use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::matching::MatchMode;
 use crate::pipeline::semantics::names;
-use crate::pipeline::semantics::query_engine::answer_encoded;
 use crate::pipeline::semantics::timing::{StagesMs, ms_since};
 use crate::scene::{IdentityId, Mask, ScenePlan, SemanticMap};
 use crate::worker::Versioned;
