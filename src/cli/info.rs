@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::plan::PlanArgs;
 use super::{CliError, output};
-use crate::io::semantic_map::FILE as MAP_FILE;
+use crate::io::scene_files::MAP_FILE;
 use crate::io::trained::CLOUD_FILE;
 use crate::jobs::open::{self, Contents};
 use crate::jobs::{JobError, Scene, plan};

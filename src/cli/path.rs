@@ -83,8 +83,7 @@ pub(crate) fn run(args: PathArgs) -> Result<(), CliError> {
         let own = scene.views();
         let counts = if args.cameras.is_empty() { vec![own.len() as u32] } else { args.cameras };
         let frames = args.frames as usize;
-        let survey = |count: &u32| survey::surveyed(&scene.cloud, &own, *count as usize, flights, frames);
-        let found: Vec<_> = counts.iter().map(survey).collect();
+        let found = go_to::survey(&scene, &counts, flights, frames);
         return match args.json {
             true => output::print_json(&survey::documents(&found)),
             false => output::print(&output::table(&survey::table(&found))),

@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::Scene;
+use crate::measure::survey::{Surveyed, surveyed};
 use crate::navigate::approach::{Approach, ApproachError, SceneRef};
 use crate::navigate::flight::Smoothness;
 use crate::navigate::target::ViewPreference;
@@ -63,6 +65,12 @@ impl Explored {
         let count = self.parts.iter().max().map_or(0, |m| m + 1);
         format!("{why} ({} keypoints in {count} parts that are not connected)", self.parts.len())
     }
+}
+
+/// How flights through a scene fare, with each of these counts of cameras.
+pub(crate) fn survey(scene: &Scene, counts: &[u32], flights: usize, frames: usize) -> Vec<Surveyed> {
+    let own = scene.views();
+    counts.iter().map(|count| surveyed(&scene.cloud, &own, *count as usize, flights, frames)).collect()
 }
 
 /// What is to be visited.

@@ -17,7 +17,7 @@ pub(crate) use cpu::contributions::ContributionSink;
 pub(crate) use cpu::ssim::{LossParts, PhotoLoss, ssim};
 pub(crate) use cpu::{RenderStats, normals, validate};
 pub(crate) use gpu::timing::StageTimes;
-pub use gpu::trainer::{GpuTrainer as DeviceTrainer, StepLoss, TrainerSettings};
+pub use gpu::trainer::{GpuTrainer, StepLoss, TrainerSettings};
 pub use gpu::{Device, DevicePhoto, GpuError, real_gpu};
 pub use renderer::{BackendChoice, DifferentiableRenderer, DrawError, FrameCost, Renderer, instead_of_gpu};
 

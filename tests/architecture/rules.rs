@@ -23,7 +23,7 @@ const MODULES: [(&str, &[&str]); 13] = [
 ];
 
 /// Longest Rust file in lines.
-const RUST_LINES: usize = 600;
+const RUST_LINES: usize = 400;
 /// Longest WGSL file in lines.
 const WGSL_LINES: usize = 250;
 

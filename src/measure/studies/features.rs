@@ -10,7 +10,6 @@ use super::{StudyInput, Variants, overlap};
 use crate::math::stats::mean;
 use crate::measure::sweep::failed;
 use crate::measure::{Rule, Stage, StageName, Study, Trial};
-use crate::pipeline::semantics::build_map::centers;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::codes::{self, TOLERANCE};
 use crate::pipeline::semantics::matching;
@@ -42,7 +41,7 @@ pub(crate) fn study<'a>(
 ) -> Result<Study<'a>, RenderError> {
     let voted = vote(drawn, &identities, &training)?;
     // Codes are chosen once it is known who is next to whom.
-    let centers = centers(drawn.0, &voted, &identities);
+    let centers = codes::centers(drawn.0, &voted, &identities);
     codes::assign(&mut identities, &centers);
     let measures = vec![
         overlap("mIoU", "mean overlap of every identity's mask in the held-out photos with its label"),

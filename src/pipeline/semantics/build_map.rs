@@ -3,7 +3,6 @@
 use std::path::Path;
 use std::time::Instant;
 
-use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::associate::Disagreement;
@@ -21,7 +20,7 @@ use crate::models::Encoder;
 use crate::pipeline::observer::{Observer, Severity};
 use crate::render::{RenderError, RenderSettings, Renderer};
 use crate::scene::semantic_map::{BACKGROUND_CODE, CODE_CHANNELS};
-use crate::scene::{GaussianCloud, Identities, IdentityId, Photo, SemanticMap};
+use crate::scene::{GaussianCloud, IdentityId, Photo, SemanticMap};
 
 /// Longer side of the masks that codes are trained on, px.
 const CODE_SIDE_PX: u32 = 256;
@@ -149,7 +148,7 @@ pub(crate) fn find_objects(
     }
     let mut identities = tracked.identities.clone();
     let of: Vec<IdentityId> = tracked.assignments.iter().map(|b| b.identity).collect();
-    let centers = centers(cloud, &of, &identities);
+    let centers = codes::centers(cloud, &of, &identities);
     codes::assign(&mut identities, &centers);
     let margin = tracked.assignments.iter().map(|b| b.margin).collect();
     let seeds = tracked.seeds.iter().map(|&i| photos[i].name.clone()).collect();
@@ -214,26 +213,16 @@ fn unknown(views: &[ViewReport], photos: &[Photo], share: f64) -> Option<String>
     ))
 }
 
-/// Mean position of each identity's Gaussians, pieces included, by number less one.
-pub(crate) fn centers(cloud: &GaussianCloud, of: &[IdentityId], identities: &Identities) -> Vec<DVec3> {
-    let mut sums = vec![(DVec3::ZERO, 0.0); identities.len()];
-    for (i, &id) in of.iter().enumerate() {
-        for id in identities.ancestors(id) {
-            let sum = &mut sums[id as usize - 1];
-            *sum = (sum.0 + cloud.world_position(i), sum.1 + 1.0);
-        }
-    }
-    sums.iter().map(|(sum, n)| if *n > 0.0 { *sum / *n } else { DVec3::ZERO }).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use std::path::PathBuf;
 
+    use glam::DVec3;
+
     use super::*;
     use crate::pipeline::observer::{Interrupted, Signal, Silent};
     use crate::pipeline::semantics::segmenter::FoundMask;
-    use crate::scene::{Camera, Level as Of, Mask, NOBODY};
+    use crate::scene::{Camera, Identities, Level as Of, Mask, NOBODY};
 
     /// A doll with an eye on the left, a cat on the right: whose the Gaussians are.
     const TRUTH: [IdentityId; 15] = [1, 1, 1, 1, 1, 1, 2, 2, 2, 3, 3, 3, 3, 3, 3];
@@ -406,20 +395,5 @@ mod tests {
         let stopped =
             find(Told { named: true, covers: true }, (Lifting::Votes, 0), 12, &mut Stop).expect_err("stopped");
         assert!(Interrupted::is_cause_of(&stopped), "{stopped}");
-    }
-
-    #[test]
-    fn centers_are_means_and_wholes_count_their_pieces() {
-        let mut all = Identities::default();
-        let doll = all.add(Of::Object, NOBODY, vec![]);
-        let eye = all.add(Of::Part, doll, vec![]);
-        all.add(Of::Object, NOBODY, vec![]);
-        let cloud = GaussianCloud {
-            origin: DVec3::new(10.0, 0.0, 0.0),
-            positions: vec![[1.0, 0.0, 0.0], [3.0, 6.0, 0.0], [5.0, 0.0, 3.0], [9.0; 3]],
-            ..GaussianCloud::default()
-        };
-        let found = centers(&cloud, &[doll, eye, eye, NOBODY], &all);
-        assert_eq!(found, [DVec3::new(13.0, 2.0, 1.0), DVec3::new(14.0, 3.0, 1.5), DVec3::ZERO]);
     }
 }
