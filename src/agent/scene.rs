@@ -220,7 +220,7 @@ impl World for SceneWorld {
         let explored = self.explored();
         let in_view = self.share_of(id) > 0.0;
         let eye = self.eye;
-        let wish = |side: Side| ViewPreference { side, distance: NORMAL / closeness.max(0.01) };
+        let preference = |side: Side| ViewPreference { side, distance: NORMAL / closeness.max(0.01) };
         let visit = |side: Side| {
             let request = ApproachRequest {
                 explored: Some(Arc::clone(&explored)),
@@ -230,7 +230,7 @@ impl World for SceneWorld {
                 settings: self.parts.settings.clone(),
                 map: Arc::clone(&self.parts.map),
                 id,
-                wish: wish(side),
+                preference: preference(side),
                 from: eye,
                 aspect: self.aspect,
                 frames: FRAMES,

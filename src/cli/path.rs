@@ -157,7 +157,7 @@ fn to_target(
         settings: scene.settings.clone(),
         map: Arc::new(map),
         id,
-        wish: ViewPreference { side: args.side, distance: args.distance },
+        preference: ViewPreference { side: args.side, distance: args.distance },
         from,
         aspect: args.aspect,
         frames: args.frames as usize,

@@ -88,7 +88,7 @@ pub struct ApproachRequest {
     pub(crate) map: Arc<SemanticMap>,
     pub(crate) id: IdentityId,
     /// How it is to be seen.
-    pub(crate) wish: ViewPreference,
+    pub(crate) preference: ViewPreference,
     /// Where the eye is.
     pub(crate) from: Pose,
     /// Width by height of the picture.
@@ -99,12 +99,12 @@ pub struct ApproachRequest {
 
 /// Finds the flight to an identity. What was learned about the scene comes back with it.
 pub(crate) fn visit(request: ApproachRequest) -> (Arc<Explored>, Approached) {
-    let ApproachRequest { explored, cloud, cameras, up, settings, map, id, wish, from, aspect, frames } = request;
+    let ApproachRequest { explored, cloud, cameras, up, settings, map, id, preference, from, aspect, frames } = request;
     let known = explored.filter(|e| Arc::ptr_eq(&e.cloud, &cloud));
     let explored = known.unwrap_or_else(|| Arc::new(Explored::new(Arc::clone(&cloud), &cameras, up)));
     let place = SceneRef { cloud: &cloud, settings: &settings, map: &map };
     let name = map.identities.full_name(id);
-    let visit = match explored.navigator.visit(place, id, wish, &from, aspect, frames) {
+    let visit = match explored.navigator.visit(place, id, preference, &from, aspect, frames) {
         Ok(visit) => Approached { name, flight: Some(Box::new(visit)), problem: None },
         Err(ApproachError::NoRoute { why, nearest }) => {
             Approached { name, flight: nearest, problem: Some(explored.no_route(&why)) }

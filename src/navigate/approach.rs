@@ -75,7 +75,7 @@ impl Navigator {
         &self,
         place: SceneRef<'_>,
         id: IdentityId,
-        wish: ViewPreference,
+        preference: ViewPreference,
         eye: &Pose,
         aspect: f64,
         frames: usize,
@@ -90,7 +90,7 @@ impl Navigator {
             clearance: self.clearance,
         };
         let center = bounds.center();
-        let views = search.views(&target, wish, eye, aspect)?;
+        let views = search.views(&target, preference, eye, aspect)?;
         let seen: Vec<TargetView> = views.into_iter().filter(|v| v.visible >= LEAST_VISIBLE).collect();
         let mut first = None;
         for view in seen {

@@ -17,6 +17,7 @@ pub mod keypoints;
 pub(crate) mod navigator;
 pub(crate) mod occupancy;
 pub(crate) mod pose;
+mod preference;
 pub mod target;
 #[cfg(test)]
 pub(crate) mod testing;

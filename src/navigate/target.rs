@@ -3,11 +3,12 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
-use strum::{IntoStaticStr, VariantArray};
 
 use super::occupancy::OccupancyGrid;
 use super::pose::Pose;
+pub use super::preference::Side;
+pub(crate) use super::preference::ViewPreference;
+use super::preference::{fit, wanted};
 use crate::render::{Features, RenderError, RenderSettings, Renderer};
 use crate::scene::{Bounds, Camera, GaussianCloud};
 
@@ -25,70 +26,6 @@ const DRAWN: usize = 8;
 const DRAWN_PX: u32 = 128;
 /// Angle to the nearest photo at which a view is trusted half as much, radians.
 const PHOTO_ANGLE: f64 = 0.6;
-
-/// From which side.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Default,
-    PartialEq,
-    Eq,
-    Hash,
-    Serialize,
-    Deserialize,
-    clap::ValueEnum,
-    IntoStaticStr,
-    VariantArray,
-)]
-#[serde(rename_all = "snake_case")]
-pub enum Side {
-    /// Whichever shows it best
-    #[default]
-    #[strum(serialize = "where it is seen best")]
-    Best,
-    /// As it is seen now
-    #[strum(serialize = "from this side")]
-    Same,
-    /// The opposite
-    #[strum(serialize = "from the other side")]
-    Other,
-    /// Its front: away from what it is a part of, or where most photos were taken
-    #[strum(serialize = "from its front")]
-    Front,
-    /// Its left, seen from the start
-    #[strum(serialize = "from its left")]
-    Left,
-    /// Its right, seen from the start
-    #[strum(serialize = "from its right")]
-    Right,
-    /// From above
-    #[strum(serialize = "from above")]
-    Above,
-    /// From below
-    #[strum(serialize = "from below")]
-    Below,
-}
-
-impl Side {
-    pub(crate) fn text(self) -> &'static str {
-        self.into()
-    }
-}
-
-/// What is wanted of a view.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct ViewPreference {
-    pub(crate) side: Side,
-    /// Distance as a multiple of the usual one; under 1 is nearer.
-    pub(crate) distance: f64,
-}
-
-impl Default for ViewPreference {
-    fn default() -> Self {
-        Self { side: Side::Best, distance: 1.0 }
-    }
-}
 
 /// What is to be seen.
 #[derive(Clone, Debug, PartialEq)]
@@ -137,7 +74,7 @@ impl Search<'_> {
     pub(crate) fn views(
         &self,
         target: &TargetGaussians,
-        wish: ViewPreference,
+        preference: ViewPreference,
         eye: &Pose,
         aspect: f64,
     ) -> Result<Vec<TargetView>, RenderError> {
@@ -156,8 +93,8 @@ impl Search<'_> {
         let least = self.clearance + 0.5 * self.occupancy.voxel();
         let now = (eye.center - center).try_normalize().unwrap_or(-eye.forward());
         let front = self.front(target, center);
-        let wanted = wanted(wish.side, now, front, self.up);
-        let distance = usual * wish.distance.clamp(0.05, 50.0);
+        let wanted = wanted(preference.side, now, front, self.up);
+        let distance = usual * preference.distance.clamp(0.05, 50.0);
         let directions = directions(DIRECTIONS).chain(wanted).chain([now]);
         let mut rough: Vec<(f64, DVec3)> = directions
             .collect::<Vec<_>>()
@@ -165,7 +102,7 @@ impl Search<'_> {
             .flat_map_iter(|d| DISTANCES.iter().map(move |k| (d, (k * distance).max(least))))
             .filter_map(|(direction, distance)| {
                 let at = center + direction * distance;
-                let fits = fit(wish.side, wanted, now, direction)?;
+                let fits = fit(preference.side, wanted, now, direction)?;
                 let clearance = self.occupancy.clearance(at);
                 if clearance < self.clearance {
                     return None;
@@ -173,7 +110,7 @@ impl Search<'_> {
                 let skip = 1.5 * self.occupancy.voxel();
                 let light = |p: &DVec3| self.occupancy.transmittance(at, *p, skip);
                 let visible = points.iter().map(light).sum::<f64>() / points.len() as f64;
-                let size = usual * wish.distance / distance;
+                let size = usual * preference.distance / distance;
                 let size = size.min(1.0 / size);
                 let facing = front.map_or(0.5, |f| 0.5 + 0.5 * f.dot(direction));
                 let room = (clearance / (4.0 * self.clearance.max(1e-9))).min(1.0);
@@ -245,41 +182,6 @@ fn spread_out(rough: &[(f64, DVec3)], center: DVec3) -> Vec<(f64, DVec3)> {
     chosen
 }
 
-/// The direction from the target in which the eye is wanted.
-fn wanted(side: Side, now: DVec3, front: Option<DVec3>, up: DVec3) -> Option<DVec3> {
-    let flat = (now - up * now.dot(up)).try_normalize();
-    let flat = flat.unwrap_or_else(|| up.any_orthonormal_vector());
-    let height = now.dot(up);
-    let level = |d: DVec3| (d * (1.0 - height * height).max(0.0).sqrt() + up * height).try_normalize();
-    match side {
-        Side::Best => None,
-        Side::Same => Some(now),
-        Side::Other => level(-flat),
-        Side::Front => front.or(Some(now)),
-        // Seen from the eye, the target's left side is where the eye's left hand points.
-        Side::Left => level(flat.cross(up)),
-        Side::Right => level(up.cross(flat)),
-        Side::Above => (up * 2.0 + flat).try_normalize(),
-        Side::Below => (-up * 2.0 + flat).try_normalize(),
-    }
-}
-
-/// How well a direction fits the wish, 0 to 1; `None` if it is not that side at all.
-fn fit(side: Side, wanted: Option<DVec3>, now: DVec3, direction: DVec3) -> Option<f64> {
-    match wanted {
-        // A little for staying near: a view that is as good from here is better from here.
-        None => Some(0.9 + 0.1 * now.dot(direction)),
-        Some(wanted) => {
-            let cosine = wanted.dot(direction);
-            let least = match side {
-                Side::Same => 0.85,
-                _ => 0.5,
-            };
-            (cosine >= least).then(|| cosine.powi(4))
-        }
-    }
-}
-
 /// Directions evenly spread over the sphere (Fibonacci's).
 fn directions(n: usize) -> impl Iterator<Item = DVec3> {
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
@@ -349,7 +251,7 @@ mod tests {
         )
     }
 
-    fn best(wish: ViewPreference, from: DVec3) -> TargetView {
+    fn best(preference: ViewPreference, from: DVec3) -> TargetView {
         let (cloud, target, cameras) = scene();
         let eyes: Vec<DVec3> = cameras.iter().map(|c| c.center).collect();
         let occupancy = OccupancyGrid::of(&cloud, &eyes, 0.05);
@@ -363,7 +265,7 @@ mod tests {
             clearance: 0.05,
         };
         let eye = Pose::looking_at(from, DVec3::Z, DVec3::NEG_Y, 0.8, &DMat3::IDENTITY);
-        *search.views(&target, wish, &eye, 4.0 / 3.0).expect("drawn").first().expect("a view")
+        *search.views(&target, preference, &eye, 4.0 / 3.0).expect("drawn").first().expect("a view")
     }
 
     #[test]

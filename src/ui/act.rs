@@ -240,7 +240,7 @@ impl App {
     }
 
     /// Looks for the way to an identity; the flight begins when it is found.
-    fn visit(&mut self, id: IdentityId, wish: ViewPreference) {
+    fn visit(&mut self, id: IdentityId, preference: ViewPreference) {
         let Some(SceneContext { cloud, map: Some(map), settings, cameras, up, eye, aspect, explored, .. }) =
             self.context()
         else {
@@ -248,7 +248,8 @@ impl App {
         };
         let (cloud, map, from) = (Arc::clone(&cloud), Arc::clone(&map), eye);
         let frames = FRAMES;
-        let request = ApproachRequest { explored, cloud, cameras, up, settings, map, id, wish, from, aspect, frames };
+        let request =
+            ApproachRequest { explored, cloud, cameras, up, settings, map, id, preference, from, aspect, frames };
         self.submit(Command::Approach(Box::new(request)));
     }
 
