@@ -124,10 +124,9 @@ impl Queries {
     /// The same with the colors of their queries.
     pub(super) fn found_colors(&self) -> Vec<(IdentityId, Color32)> {
         let colors = COLORS.map(|[r, g, b]| Color32::from_rgb(r, g, b));
-        let of = |(k, asked): (usize, &Asked)| {
-            asked.shown(&self.settings).into_iter().map(move |id| (id, colors[k % colors.len()]))
-        };
-        self.all().enumerate().flat_map(of).collect()
+        let colored =
+            |(k, q): (usize, &Asked)| q.shown(&self.settings).into_iter().map(move |id| (id, colors[k % COLORS.len()]));
+        self.all().enumerate().flat_map(colored).collect()
     }
 
     /// What the present view's pixels belong to, once that is drawn.
