@@ -207,6 +207,11 @@ pub struct OpenedScene {
 }
 
 impl OpenedScene {
+    /// Length of a unit in meters, if it is known of the scene or of its photos.
+    pub(crate) fn meters_per_unit(&self) -> Option<f64> {
+        self.metres_per_unit.or_else(|| self.dataset.as_ref().and_then(|d| d.metres_per_unit))
+    }
+
     fn of(scene: Scene, dataset: Option<Arc<Dataset>>, observer: &mut dyn Observer) -> Self {
         let home = match &dataset {
             Some(dataset) if scene.cameras.is_empty() => HomeView::new(&dataset.cameras(), Some(&scene.cloud)),

@@ -9,6 +9,7 @@ pub(crate) use super::train_history::TrainHistory;
 use crate::jobs::OpenedScene;
 use crate::jobs::go_to::{Approached, Explored};
 use crate::jobs::models::ModelList;
+use crate::math::format;
 use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Progress, Severity};
 use crate::pipeline::semantics::thumbnails::Thumbnails;
@@ -319,6 +320,12 @@ impl AppState {
                 self.edits = UndoHistory::default();
             }
             Outcome::Edited(map) => self.edited(map),
+            Outcome::Scale(meters, stored) => {
+                let scaled = |s: &Arc<OpenedScene>| OpenedScene { metres_per_unit: Some(meters), ..(**s).clone() };
+                self.scene = self.scene.as_ref().map(scaled).map(Arc::new);
+                let kept = if stored { "kept with the scene" } else { "not kept: the scene is not saved yet" };
+                self.toast(Tone::Good, format!("1 unit is {}, {kept}", format::length(1.0, Some(meters))));
+            }
             Outcome::Models(models) => self.models = Some(models),
             Outcome::ModelInstalled(id) => {
                 self.models_installed += 1;
