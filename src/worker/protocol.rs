@@ -76,26 +76,18 @@ pub enum JobKind {
 }
 
 impl JobKind {
+    /// Whether its outcome is what is on screen then: what it warns of is wrong with that.
+    pub(crate) fn makes_scene(self) -> bool {
+        matches!(self, Self::Open | Self::Demo | Self::Train | Self::Objects)
+    }
+
     /// Which thread runs it.
     pub(crate) fn lane(self) -> WorkerThread {
         match self {
-            Self::Open
-            | Self::Demo
-            | Self::Train
-            | Self::Evaluate
-            | Self::Objects
-            | Self::Model
-            | Self::CameraSpline
-            | Self::Measure => WorkerThread::Long,
-            Self::Edit
-            | Self::Export
-            | Self::Photo
-            | Self::Picture
-            | Self::Thumbnails
-            | Self::Models
-            | Self::Explore
-            | Self::Approach
-            | Self::Report => WorkerThread::Short,
+            Self::Open | Self::Demo | Self::Train | Self::Evaluate | Self::Objects => WorkerThread::Long,
+            Self::Model | Self::CameraSpline | Self::Measure => WorkerThread::Long,
+            Self::Edit | Self::Export | Self::Photo | Self::Picture | Self::Thumbnails => WorkerThread::Short,
+            Self::Models | Self::Explore | Self::Approach | Self::Report => WorkerThread::Short,
         }
     }
 }
@@ -294,6 +286,8 @@ pub enum Outcome {
     Objects(Arc<SemanticMap>),
     /// Objects and parts were changed.
     Edited(Arc<SemanticMap>),
+    /// Such a change makes no sense, and why.
+    Refused(String),
     /// A file was written.
     Written(PathBuf),
     /// A report was read or measured.

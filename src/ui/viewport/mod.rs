@@ -1,5 +1,6 @@
 //! The viewport: shows what the drawing lane rendered, and moves the eye.
 
+mod act;
 pub(crate) mod brush;
 mod display;
 pub mod eye;
@@ -154,56 +155,17 @@ impl Viewport {
         if let Some(why) = self.display.newly_instead_of_gpu() {
             state.toast(Tone::Warning, why);
         }
+        if let Some(why) = self.queries.newly_failed() {
+            let remedy = "Install the encoder (Models pane), or find the objects again with another";
+            state.problem(None, &format!("Queries find names only, the text encoder failed: {why}. {remedy}."));
+        }
         if let Some(photo) = &mut self.photo {
             photo.take_loaded(state);
         }
     }
 
-    /// Does what a user asked of the view.
-    pub(crate) fn act(&mut self, action: &Action, state: &AppState, worker: &Worker, now: f64) {
-        let Some(scene) = state.scene.clone() else { return };
-        let photos = scene.dataset.as_ref().map_or(0, |d| d.photos.len());
-        let here = self.photo_index();
-        match action {
-            Action::FrameScene => {
-                self.leave_photo();
-                let selected = self.selected_bounds(state.semantics.as_ref());
-                self.eye.frame(selected.as_ref().unwrap_or(&scene.home.bounds));
-            }
-            Action::Paint(of) => self.brush = of.filter(|_| state.semantics.is_some()).map(Brush::new),
-            Action::Select(id) => return self.picking.select(*id),
-            Action::Isolate(only) => self.visibility.isolate(*only),
-            Action::Hide(id) => self.visibility.toggle(*id),
-            Action::ResetView => {
-                self.photo = None;
-                self.eye = Eye::home(&scene.home, self.up);
-            }
-            Action::TurnUp(axis) => {
-                self.leave_photo();
-                self.up = Some(axis.vector());
-                self.eye.set_up(axis.vector());
-            }
-            Action::NextPhoto if photos > 0 => self.look_through(here.map_or(0, |i| (i + 1) % photos), &scene, worker),
-            Action::PreviousPhoto if photos > 0 => {
-                self.look_through(here.map_or(photos - 1, |i| (i + photos - 1) % photos), &scene, worker);
-            }
-            Action::GoToPhoto(i) if *i < photos => self.look_through(*i, &scene, worker),
-            _ => return,
-        }
-        self.moved_at = now;
-    }
-
     fn set_cloud(&mut self, cloud: Option<Arc<GaussianCloud>>) {
         self.cloud = cloud.map(Versioned::new);
-    }
-
-    fn look_through(&mut self, index: usize, scene: &OpenedScene, worker: &Worker) {
-        let Some(photo) = scene.dataset.as_ref().and_then(|d| d.photos.get(index)) else { return };
-        let c = &photo.camera;
-        let ahead = (scene.home.bounds.center() - c.center).dot(c.forward());
-        let pivot = c.center + c.forward() * ahead.max(0.1 * scene.home.bounds.radius());
-        self.eye = Eye::of_camera(c, pivot, self.up.unwrap_or(scene.home.up));
-        self.photo = Some(PhotoView::new(index, photo, worker));
     }
 
     /// The camera for what is drawn over the frame: the frame's own, so that both move together.
