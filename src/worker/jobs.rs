@@ -95,7 +95,10 @@ impl Jobs for PipelineJobs {
             }
             Command::EditObjects { cloud, map, settings, request, out } => {
                 let failed = |remedy| move |e: JobError| Stop::Failed(Failure::of(&e, remedy));
-                let new = edit::apply(&cloud, &map, &settings, &request).map_err(failed("Nothing has changed."))?;
+                let new = match edit::apply(&cloud, &map, &settings, &request) {
+                    Err(JobError::Edit(why)) => return Ok(Outcome::Refused(why.to_string())),
+                    done => done.map_err(failed("Nothing has changed."))?,
+                };
                 let stored = edit::store(&out, self.known(&out).as_deref(), &new, &cloud);
                 if let Some(state) = stored.map_err(failed("The change is not stored."))? {
                     self.knows(&out, Some(state));

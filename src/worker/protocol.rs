@@ -78,27 +78,18 @@ pub enum JobKind {
 }
 
 impl JobKind {
+    /// Whether its outcome is what is on screen then: what it warns of is wrong with that.
+    pub(crate) fn makes_scene(self) -> bool {
+        matches!(self, Self::Open | Self::Demo | Self::Train | Self::Objects)
+    }
+
     /// Which thread runs it.
     pub(crate) fn lane(self) -> WorkerThread {
         match self {
-            Self::Open
-            | Self::Demo
-            | Self::Train
-            | Self::Evaluate
-            | Self::Objects
-            | Self::Model
-            | Self::Video
-            | Self::Measure => WorkerThread::Long,
-            Self::Edit
-            | Self::Export
-            | Self::Photo
-            | Self::Picture
-            | Self::Thumbnails
-            | Self::Models
-            | Self::Explore
-            | Self::Approach
-            | Self::Scale
-            | Self::Report => WorkerThread::Short,
+            Self::Open | Self::Demo | Self::Train | Self::Evaluate | Self::Objects => WorkerThread::Long,
+            Self::Model | Self::Video | Self::Measure => WorkerThread::Long,
+            Self::Edit | Self::Export | Self::Photo | Self::Picture | Self::Thumbnails => WorkerThread::Short,
+            Self::Models | Self::Explore | Self::Approach | Self::Scale | Self::Report => WorkerThread::Short,
         }
     }
 }
@@ -308,6 +299,8 @@ pub enum Outcome {
     Edited(Arc<SemanticMap>),
     /// The length of a unit in meters, and whether it was stored.
     Scale(f64, bool),
+    /// Such a change makes no sense, and why.
+    Refused(String),
     /// A file was written.
     Written(PathBuf),
     /// A report was read or measured.

@@ -1,5 +1,6 @@
 //! The viewport: shows what the drawing lane rendered, and moves the eye.
 
+mod act;
 pub(crate) mod brush;
 mod display;
 pub mod eye;
@@ -8,7 +9,6 @@ mod frusta;
 mod input;
 mod legend;
 mod marks;
-mod moves;
 mod outline;
 mod overlay;
 pub(crate) mod overrides;
@@ -160,6 +160,10 @@ impl Viewport {
         }
         if let Some(why) = self.display.newly_instead_of_gpu() {
             state.toast(Tone::Warning, why);
+        }
+        if let Some(why) = self.queries.newly_failed() {
+            let remedy = "Install the encoder (Models pane), or find the objects again with another";
+            state.problem(None, &format!("Queries find names only, the text encoder failed: {why}. {remedy}."));
         }
         if let Some(photo) = &mut self.photo {
             photo.take_loaded(state);

@@ -1,14 +1,12 @@
-//! What a user asks of the view: where the eye goes, and what is shown there.
+//! What the actions about the view do, and where they put the eye.
 
 use glam::DVec3;
 
-use super::super::state::AppState;
-use super::Viewport;
 use super::brush::Brush;
 use super::eye::Eye;
 use super::photo::PhotoView;
 use super::ruler::Ruler;
-use crate::jobs::OpenedScene;
+use super::{AppState, OpenedScene, Viewport};
 use crate::navigate::Pose;
 use crate::ui::actions::Action;
 use crate::worker::Worker;
@@ -18,7 +16,7 @@ impl Viewport {
     pub(crate) fn act(&mut self, action: &Action, state: &AppState, worker: &Worker, now: f64) {
         let Some(scene) = state.scene.clone() else { return };
         let photos = scene.dataset.as_ref().map_or(0, |d| d.photos.len());
-        let here = self.photo_index();
+        let (here, all) = (self.photo_index(), state.semantics.as_ref().map(|map| &map.identities));
         match action {
             Action::FrameScene => {
                 self.leave_photo();
@@ -27,8 +25,8 @@ impl Viewport {
             }
             Action::Paint(of) => self.brush = of.filter(|_| state.semantics.is_some()).map(Brush::new),
             Action::Select(id) => return self.picking.select(*id),
-            Action::Isolate(only) => self.visibility.isolate(*only),
-            Action::Hide(id) => self.visibility.toggle(*id),
+            Action::Isolate(only) => return all.map_or((), |all| self.visibility.isolate(all, *only)),
+            Action::Hide(id) => return all.map_or((), |all| self.visibility.toggle(all, *id)),
             Action::ResetView => {
                 self.photo = None;
                 self.eye = Eye::home(&scene.home, self.up);
@@ -49,12 +47,6 @@ impl Viewport {
         self.moved_at = now;
     }
 
-    fn turn_up(&mut self, up: DVec3) {
-        self.leave_photo();
-        self.up = Some(up);
-        self.eye.set_up(up);
-    }
-
     fn look_through(&mut self, index: usize, scene: &OpenedScene, worker: &Worker) {
         let Some(photo) = scene.dataset.as_ref().and_then(|d| d.photos.get(index)) else { return };
         let c = &photo.camera;
@@ -62,6 +54,12 @@ impl Viewport {
         let pivot = c.center + c.forward() * ahead.max(0.1 * scene.home.bounds.radius());
         self.eye = Eye::of_camera(c, pivot, self.up.unwrap_or(scene.home.up));
         self.photo = Some(PhotoView::new(index, photo, worker));
+    }
+
+    fn turn_up(&mut self, up: DVec3) {
+        self.leave_photo();
+        self.up = Some(up);
+        self.eye.set_up(up);
     }
 
     /// Puts the eye into a pose.
