@@ -226,7 +226,7 @@ fn working_memory_is_given_back_and_the_next_picture_is_the_same() {
 
 #[test]
 fn without_a_gpu_no_device_is_opened() {
-    let devices = || resource_log::since(0).iter().filter(|l| l.sort == ResourceKind::Device).count();
+    let devices = || resource_log::since(0).iter().filter(|l| l.kind == ResourceKind::Device).count();
     let before = devices();
     let mut chosen = Renderer::choose(BackendChoice::Auto, |why| panic!("{why}")).expect("one that works");
     let real = fmlgs::render::real_gpu().is_some();

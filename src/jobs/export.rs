@@ -6,6 +6,7 @@ use std::path::Path;
 use image::codecs::png::PngEncoder;
 use image::{ColorType, ImageEncoder};
 use npyz::WriterBuilder;
+use serde::Serialize;
 
 use super::JobError;
 use crate::io::{self, IoError, atomic, scene_files, splat_ply, trained};
@@ -28,6 +29,15 @@ pub(crate) fn ply(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
 pub(crate) fn text(path: &Path, text: &str) -> Result<(), IoError> {
     make_parent(path)?;
     atomic::write(path, |w| w.write_all(text.as_bytes()))
+}
+
+/// Writes a value as indented JSON.
+///
+/// # Errors
+/// If the file cannot be written.
+pub(crate) fn json(path: &Path, value: &impl Serialize) -> Result<(), IoError> {
+    make_parent(path)?;
+    atomic::write(path, |w| Ok(serde_json::to_writer_pretty(w, value)?))
 }
 
 /// Writes pixels as a `.png`.

@@ -117,6 +117,21 @@ pub struct SynthReport {
     pub(crate) warnings: Vec<String>,
 }
 
+impl SynthReport {
+    /// What was made, as one line.
+    pub(crate) fn summary(&self) -> String {
+        format!(
+            "{}: {} photos to train on, {} held out, {} objects and parts, {} sparse points, in {:.1} s",
+            self.out.display(),
+            self.train_views,
+            self.held_out_views,
+            self.identities.len(),
+            self.points,
+            self.secs
+        )
+    }
+}
+
 /// Renders the scene in `glb` (any glTF file) into a data set in the folder `out`, which is made.
 /// Files of an earlier run are overwritten, others left alone.
 pub fn run(
