@@ -18,9 +18,6 @@ enum CameraFile {
 }
 
 /// Reads a camera.
-///
-/// # Errors
-/// If the file cannot be read, or is no camera or one that nothing can be seen with.
 pub fn read(path: &Path) -> Result<Camera, IoError> {
     let bytes = files::read(path, MAX_BYTES)?;
     let camera = match serde_json::from_slice(&bytes) {

@@ -12,7 +12,6 @@ pub(crate) const MAX_TEXT_BYTES: u64 = 512 << 20;
 /// Largest picture file in bytes.
 pub(crate) const MAX_PICTURE_BYTES: u64 = 256 << 20;
 
-/// The folder that a file is in.
 pub(crate) fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(p) if !p.as_os_str().is_empty() => p,
@@ -28,9 +27,6 @@ pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
 /// Opens a file to be read, if it is a regular one. A pipe would keep the program waiting and a
 /// device has no end, so both are refused before they are opened; every read of a file that a
 /// person or another file names goes through here.
-///
-/// # Errors
-/// [`IoError::NotAFile`] for folders, pipes and devices; [`IoError::Read`] with the system's reason.
 pub fn open(path: &Path) -> Result<File, IoError> {
     let failed = |cause| IoError::Read { path: path.into(), cause };
     if !fs::metadata(path).map_err(failed)?.is_file() {
@@ -40,9 +36,6 @@ pub fn open(path: &Path) -> Result<File, IoError> {
 }
 
 /// The whole file, if it is a regular one of at most `limit` bytes that [`memory::budget`] allows.
-///
-/// # Errors
-/// As [`open`]; and [`IoError::OverBudget`] for one that is larger.
 pub(crate) fn read(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
     let failed = |cause| IoError::Read { path: path.into(), cause };
     let file = open(path)?;
@@ -68,9 +61,6 @@ pub(crate) fn read(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
 }
 
 /// The first `limit` bytes of a file, or all of it if it is shorter.
-///
-/// # Errors
-/// As [`open`].
 pub(crate) fn read_start(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
     let mut bytes = Vec::new();
     let read = open(path)?.take(limit).read_to_end(&mut bytes);

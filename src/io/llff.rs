@@ -13,7 +13,6 @@ use super::photo_list::{self, Focal, Lens, Listed, photos};
 use super::{IoError, files, npy};
 use crate::scene::{Camera, Dataset, Distortion};
 
-/// The file with the poses.
 pub(crate) const POSES_FILE: &str = "poses_bounds.npy";
 /// Numbers per photo.
 const ROW: usize = 17;

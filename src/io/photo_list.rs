@@ -29,7 +29,6 @@ pub(super) enum Focal {
     Angle(f64, Option<f64>),
 }
 
-/// A lens as files give it.
 #[derive(Clone, Debug)]
 pub(super) struct Lens {
     /// The picture size that the other values refer to; `None` = the file's own.
@@ -44,7 +43,6 @@ pub(super) struct Lens {
 /// A photo as a file lists it.
 #[derive(Clone, Debug)]
 pub(super) struct Listed {
-    /// Its name in the dataset.
     pub(crate) name: String,
     /// Its file, relative to the dataset's folder, from [`files::relative`].
     pub(crate) entry: String,

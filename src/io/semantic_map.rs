@@ -45,9 +45,6 @@ struct Header {
 }
 
 /// The bytes of a map that belongs to a scene's state; `path` is for errors.
-///
-/// # Errors
-/// If it is too large for the format.
 pub fn encode(map: &SemanticMap, state: Option<&str>, path: &Path) -> Result<Vec<u8>, IoError> {
     let language = map.language.as_ref();
     let header = Header {
@@ -85,9 +82,6 @@ pub fn encode(map: &SemanticMap, state: Option<&str>, path: &Path) -> Result<Vec
 }
 
 /// The map of the scene in `folder`, whose Gaussians `cloud` are of the save `state`; `None` if it has none.
-///
-/// # Errors
-/// If its file is broken, or [`IoError::Torn`] if it is of other Gaussians.
 pub fn load(folder: &Path, state: Option<&str>, cloud: &GaussianCloud) -> Result<Option<SemanticMap>, IoError> {
     let path = folder.join(FILE);
     if !path.exists() {

@@ -165,7 +165,6 @@ fn pose(m: &[Vec<f64>]) -> Result<(DMat3, DVec3), &'static str> {
     Ok((DMat3::from_cols(column(0), -column(1), -column(2)), column(3)))
 }
 
-/// Why a lens is refused.
 enum Flaw {
     Reason(String),
     Error(IoError),

@@ -54,9 +54,6 @@ pub(crate) fn apply(
 
 /// Stores the map of the scene in `folder`, which is known in the state `known`. Returns its state then; `None`
 /// if nothing is stored because there is no scene yet.
-///
-/// # Errors
-/// If it cannot be written, or somebody else has changed the scene.
 pub(crate) fn store(
     folder: &Path,
     known: Option<&str>,

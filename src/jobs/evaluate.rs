@@ -52,7 +52,6 @@ pub(crate) struct Options {
 /// A scene beside the photos that it is compared with.
 pub(crate) struct Comparison {
     pub(crate) cloud: Arc<GaussianCloud>,
-    /// How they are drawn.
     pub(crate) settings: RenderSettings,
     pub(crate) dataset: Arc<Dataset>,
     /// Indices of the photos to compare with.
@@ -68,9 +67,6 @@ pub(crate) struct Comparison {
 
 impl Comparison {
     /// Of `scene` with `photos`.
-    ///
-    /// # Errors
-    /// If they cannot be read, or none is held out.
     pub(crate) fn new(scene: Scene, photos: &Path, options: Options) -> Result<Self, JobError> {
         let dataset = Arc::new(open::dataset(photos)?);
         let mut comparison = Self::of(&scene, dataset, options)?;
@@ -79,9 +75,6 @@ impl Comparison {
     }
 
     /// Of `scene` with the photos of `dataset`.
-    ///
-    /// # Errors
-    /// If they cannot be read, or none is held out.
     pub(crate) fn of(scene: &Scene, dataset: Arc<Dataset>, options: Options) -> Result<Self, JobError> {
         let Options { max_side_px, holdout_every, keep_borders, pictures } = options;
         let default_every = scene.config.holdout_every;
@@ -127,9 +120,6 @@ impl Comparison {
 }
 
 /// PSNR and SSIM of every view, one at a time so that memory holds one photo. Writes the pictures.
-///
-/// # Errors
-/// If a photo cannot be read or drawn, a picture cannot be written, or the observer asks to stop.
 pub(crate) fn photometric(comparison: &Comparison, observer: &mut dyn Observer) -> Result<Evaluation, JobError> {
     for warning in &comparison.dataset.warnings {
         observer.note(Severity::Warning, warning.clone());
@@ -150,9 +140,6 @@ pub(crate) fn photometric(comparison: &Comparison, observer: &mut dyn Observer) 
 }
 
 /// Drawn depth against the true depth of synthetic photos, and the median milliseconds of drawing it.
-///
-/// # Errors
-/// If a true depth is missing, a view cannot be drawn, or the observer asks to stop.
 pub(crate) fn depth(comparison: &Comparison, observer: &mut dyn Observer) -> Result<(DepthScores, f64), JobError> {
     let mut renderer = Renderer::new();
     let mut counter = DepthCounter::default();

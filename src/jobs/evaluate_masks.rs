@@ -83,16 +83,13 @@ pub(crate) enum Summary {
     PartRecall { encoder: String, rows: Vec<part_recall::Row> },
 }
 
-/// What a comparison comes to.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct MaskScores {
-    /// The views that were compared.
     pub(crate) views: usize,
     /// How many of them were trained on.
     pub(crate) trained_on: usize,
     /// Every query of every view.
     pub(crate) units: Vec<Unit>,
-    /// What the protocol counts.
     pub(crate) summary: Summary,
 }
 
@@ -105,9 +102,6 @@ impl MaskScores {
 
 /// Compares the objects and parts `map` with `labels`; `query` is what to ask for where those do not name it.
 /// Pictures show the identities over the photos.
-///
-/// # Errors
-/// If labels or photos cannot be read, no view has labels, or a protocol lacks what it needs.
 pub(crate) fn run(
     comparison: &Comparison,
     map: &SemanticMap,

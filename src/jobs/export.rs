@@ -12,26 +12,17 @@ use crate::navigate::{CameraSpline, Pose, Speed};
 use crate::scene::{CameraPath, GaussianCloud, PathKey, PhotoPixels};
 
 /// Writes Gaussians as a `.ply`.
-///
-/// # Errors
-/// If the file cannot be written.
 pub(crate) fn ply(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
     make_parent(path)?;
     splat_ply::write(path, cloud)
 }
 
 /// Writes pixels as a `.png`.
-///
-/// # Errors
-/// If the file cannot be written.
 pub(crate) fn picture(path: &Path, pixels: &PhotoPixels) -> Result<(), IoError> {
     png(path, pixels.rgb.as_flattened(), [pixels.width_px, pixels.height_px], ColorType::Rgb8)
 }
 
 /// Writes a `.png` of `size_px` from raw samples, those of 16 bits in the machine's byte order.
-///
-/// # Errors
-/// If the file cannot be written.
 pub(crate) fn png(path: &Path, samples: &[u8], size_px: [u32; 2], color: ColorType) -> Result<(), IoError> {
     atomic::write(path, |w| {
         PngEncoder::new(w).write_image(samples, size_px[0], size_px[1], color.into()).map_err(std::io::Error::other)
@@ -39,9 +30,6 @@ pub(crate) fn png(path: &Path, samples: &[u8], size_px: [u32; 2], color: ColorTy
 }
 
 /// Writes rows of `f32` values as a NumPy array of shape `[height, width]`.
-///
-/// # Errors
-/// If the file cannot be written.
 pub(crate) fn npy(path: &Path, values: &[f32], size_px: [u32; 2]) -> Result<(), IoError> {
     atomic::write(path, |w: &mut dyn Write| {
         let shape = [u64::from(size_px[1]), u64::from(size_px[0])];
@@ -53,9 +41,6 @@ pub(crate) fn npy(path: &Path, values: &[f32], size_px: [u32; 2]) -> Result<(), 
 
 /// Writes a camera path: this program's `.json`, or frames of this `aspect` for nerfstudio where the name ends in
 /// `.nerfstudio.json`.
-///
-/// # Errors
-/// If the file cannot be written.
 pub(crate) fn camera_path(file: &Path, path: &CameraPath, aspect: f64) -> Result<(), IoError> {
     make_parent(file)?;
     if !file.to_string_lossy().ends_with(".nerfstudio.json") {
@@ -68,9 +53,6 @@ pub(crate) fn camera_path(file: &Path, path: &CameraPath, aspect: f64) -> Result
 }
 
 /// Makes the folder that `path` lies in.
-///
-/// # Errors
-/// If that is not possible.
 pub(crate) fn make_parent(path: &Path) -> Result<(), IoError> {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => make_folder(folder),
@@ -79,9 +61,6 @@ pub(crate) fn make_parent(path: &Path) -> Result<(), IoError> {
 }
 
 /// Makes `folder` and those above it.
-///
-/// # Errors
-/// If that is not possible.
 pub(crate) fn make_folder(folder: &Path) -> Result<(), IoError> {
     let remedy = "the folder cannot be created: choose another place";
     std::fs::create_dir_all(folder).map_err(|cause| IoError::Write { path: folder.into(), remedy, cause })

@@ -21,7 +21,6 @@ use crate::scene::{Bounds, Camera, Dataset, Facts, GaussianCloud, HomeView, Mach
 /// Gaussians that can be drawn, and what came with them.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
-    /// Where it was read from.
     pub(crate) path: PathBuf,
     /// Folder of the trained scene, if it is one.
     pub(crate) folder: Option<PathBuf>,
@@ -39,7 +38,6 @@ pub struct Scene {
     pub(crate) config: TrainConfig,
     /// Measurements of its training.
     pub(crate) history: History,
-    /// Where its photos were, for display.
     pub(crate) photos: Option<PathBuf>,
     /// Where its photos are, if they are still there.
     pub(crate) dataset_path: Option<PathBuf>,
@@ -55,7 +53,6 @@ impl Scene {
         std::iter::once(self.path.as_path()).chain(self.dataset_path.as_deref()).collect()
     }
 
-    /// The cameras alone.
     pub(crate) fn views(&self) -> Vec<Camera> {
         self.cameras.iter().map(|c| c.camera.clone()).collect()
     }
@@ -66,9 +63,6 @@ impl Scene {
     }
 
     /// Its objects and parts.
-    ///
-    /// # Errors
-    /// If it has none, or they cannot be read.
     pub fn semantics(&self) -> Result<SemanticMap, JobError> {
         let map = match &self.folder {
             Some(folder) => io::semantic_map::load(folder, self.state.as_deref(), &self.cloud)?,
@@ -78,9 +72,6 @@ impl Scene {
     }
 
     /// Where its photos are, unless they are somewhere else.
-    ///
-    /// # Errors
-    /// If nobody knows.
     pub(crate) fn photos(&self, elsewhere: Option<&Path>) -> Result<PathBuf, JobError> {
         let known = elsewhere.map(Path::to_path_buf).or_else(|| self.dataset_path.clone());
         known.ok_or_else(|| JobError::PhotosGone(self.path.clone()))
@@ -120,14 +111,10 @@ impl Scene {
 #[derive(Debug)]
 pub(crate) enum Contents {
     Photos(Dataset),
-    /// A splat or a trained scene.
     Scene(Scene),
 }
 
 /// Reads what lies at `path`.
-///
-/// # Errors
-/// If it cannot be read, the settings of a trained scene included.
 pub(crate) fn contents(path: &Path) -> Result<Contents, JobError> {
     Ok(match io::open(path)? {
         Opened::Dataset(dataset) => Contents::Photos(dataset),
@@ -140,9 +127,6 @@ pub(crate) fn contents(path: &Path) -> Result<Contents, JobError> {
 }
 
 /// Reads a trained scene or a splat.
-///
-/// # Errors
-/// If it cannot be read, or is something else.
 pub fn scene(path: &Path) -> Result<Scene, JobError> {
     match contents(path)? {
         Contents::Scene(scene) => Ok(scene),
@@ -150,10 +134,6 @@ pub fn scene(path: &Path) -> Result<Scene, JobError> {
     }
 }
 
-/// Reads posed photos.
-///
-/// # Errors
-/// If they cannot be read, or it is something else.
 pub(crate) fn dataset(path: &Path) -> Result<Dataset, JobError> {
     match io::open(path)? {
         Opened::Dataset(dataset) => Ok(dataset),
@@ -170,7 +150,6 @@ pub(crate) fn cameras(dataset: &Dataset, every: usize) -> Vec<SceneCamera> {
 /// A scene with all that is known of it, as it is looked at and worked on.
 #[derive(Clone, Debug, Default)]
 pub struct OpenedScene {
-    /// Where it was read from.
     pub(crate) path: PathBuf,
     /// Short name for titles.
     pub name: String,
@@ -196,11 +175,9 @@ pub struct OpenedScene {
     pub render: RenderSettings,
     /// Degree of the harmonics in its file.
     pub(crate) sh_stored: u8,
-    /// What its plan is computed from.
     pub(crate) facts: Facts,
     /// Id of the save that its files are of, if it has one.
     pub(crate) state: Option<String>,
-    /// Reports that may be of it.
     pub(crate) reports: Vec<PathBuf>,
     /// Folder for a report of it.
     pub(crate) report_out: PathBuf,
@@ -234,9 +211,6 @@ impl OpenedScene {
 
 /// Opens a path with all that is known of it: photos with the Gaussians that were trained on them before, a
 /// trained scene with its photos. What is missing or broken beside the scene itself is told and left out.
-///
-/// # Errors
-/// If nothing that is known lies there, or it cannot be read.
 pub(crate) fn open(
     path: &Path,
     folders: &Folders,
@@ -267,9 +241,6 @@ pub(crate) fn open(
 }
 
 /// Opens the demo scene, whose photos are made unless that was done before.
-///
-/// # Errors
-/// If they cannot be made or read, or the observer asks to stop.
 pub(crate) fn demo(folders: &Folders, machine: &Machine, observer: &mut dyn Observer) -> Result<OpenedScene, JobError> {
     let out = folders.demo();
     if !demo::demo_is_written(&out) {

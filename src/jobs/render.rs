@@ -11,7 +11,6 @@ use crate::pipeline::observer::{Observer, Severity};
 use crate::render::{BackendChoice, Frame, RenderSettings, Renderer, normals};
 use crate::scene::{Camera, Overrides};
 
-/// What of a scene is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum Quantity {
     /// Colors
@@ -49,9 +48,6 @@ pub(crate) struct Rendered {
 }
 
 /// Draws `what` of a scene.
-///
-/// # Errors
-/// If the renderer that is demanded is not there, or fails.
 pub(crate) fn run(
     scene: &Scene,
     camera: &Camera,
@@ -74,9 +70,6 @@ pub(crate) fn run(
 
 /// Writes a frame as a `.png`, or as an array where the name ends in `.npy`. Returns the depth that 65535 stands
 /// for, where that is how it is stored.
-///
-/// # Errors
-/// If the file cannot be written.
 pub fn write(path: &Path, frame: &Frame<f32>, camera: &Camera, what: Quantity) -> Result<Option<f32>, IoError> {
     export::make_parent(path)?;
     let size = [frame.width_px as u32, frame.height_px as u32];

@@ -11,28 +11,22 @@ use crate::pipeline::video::{self, Marked};
 use crate::render::{BackendChoice, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 
-/// The color of what is marked.
 const MARK: [u8; 3] = [255, 64, 160];
 
 /// A video to be made.
 #[derive(Clone, Debug)]
 pub struct VideoRequest {
     pub(crate) cloud: Arc<GaussianCloud>,
-    /// How they are drawn.
     pub(crate) draw: RenderSettings,
     pub(crate) cameras: Vec<Camera>,
-    /// What is marked in every frame.
     pub(crate) marked: Option<(Arc<SemanticMap>, Vec<IdentityId>)>,
     pub(crate) out: PathBuf,
-    /// How it is written.
     pub(crate) settings: Settings,
     pub(crate) backend: BackendChoice,
 }
 
-/// A video that was made.
 #[derive(Clone, Debug)]
 pub(crate) struct Video {
-    /// The file or folder.
     pub(crate) summary: Summary,
     /// What drew it: "CPU", or the name of the GPU.
     pub(crate) backend: String,

@@ -76,10 +76,8 @@ pub struct Measure {
     pub(crate) name: String,
     /// Its unit; empty for plain numbers.
     pub(crate) unit: String,
-    /// How it becomes an error.
     #[serde(rename = "form")]
     pub(crate) kind: ErrorKind,
-    /// What it is, in a sentence.
     pub(crate) meaning: String,
 }
 
@@ -180,7 +178,6 @@ pub struct Order {
     /// The order that was seen (see [`super::order`]).
     pub(crate) observed: f64,
     pub(crate) agrees: bool,
-    /// What that means, in a sentence.
     pub(crate) meaning: String,
 }
 
@@ -291,7 +288,6 @@ impl Stage {
         names
     }
 
-    /// The measure of this name.
     pub(crate) fn measure(&self, name: &str) -> Option<&Measure> {
         self.measures.iter().find(|m| m.name == name)
     }
@@ -335,7 +331,6 @@ pub struct Report {
 }
 
 impl Report {
-    /// The stage of this name.
     pub(crate) fn stage(&self, name: StageName) -> Option<&Stage> {
         self.stages.iter().find(|s| s.name == name)
     }

@@ -51,7 +51,6 @@ pub(crate) fn errors(a: &Planes, b: &Planes) -> Errors {
     [rms, worst(off.iter().copied()), quantile(&off, 0.999), flip, flip_tail]
 }
 
-/// By the names of measures.
 pub(crate) fn named([rms, largest, tail, flip, flip_tail]: Errors) -> Vec<(&'static str, f64)> {
     vec![
         ("RMS error", rms),

@@ -24,7 +24,6 @@ use crate::scene::{Camera, Facts, GaussianCloud, SemanticMap, resource_log};
 /// Size of the images, px.
 pub(crate) const SIZE: [u32; 2] = [1_008, 567];
 
-/// Which plan a process follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Variant {
@@ -32,7 +31,6 @@ pub(crate) enum Variant {
     Everything,
 }
 
-/// A scene that was opened.
 pub(crate) struct OpenScene {
     pub(crate) cloud: Arc<GaussianCloud>,
     pub(crate) settings: RenderSettings,
@@ -41,7 +39,6 @@ pub(crate) struct OpenScene {
     pub(crate) up: glam::DVec3,
     /// The first view, of [`SIZE`].
     pub(crate) first: Camera,
-    /// What its plan is made of.
     pub(crate) facts: Facts,
 }
 
@@ -64,7 +61,6 @@ pub struct Cost {
     frame_ms: f64,
     /// Drawing all that belongs to a view at rest.
     view_ms: f64,
-    /// What was loaded and built.
     loaded: Vec<String>,
 }
 
@@ -164,7 +160,6 @@ fn maps(
     Ok((exact, codes))
 }
 
-/// What a plan wants at opening.
 struct AtOpening {
     navigator: Option<Navigator>,
     thumbnails: Option<crate::pipeline::semantics::thumbnails::Thumbnails>,

@@ -25,9 +25,6 @@ pub(crate) fn place(point: &Point, measure: &Measure) -> Option<(f64, f64)> {
 }
 
 /// The stage as SVG, for one of its measures.
-///
-/// # Errors
-/// If there is nothing to draw, in words.
 pub(crate) fn svg(stage: &Stage, measure: &Measure) -> Result<String, String> {
     let mut image = String::new();
     draw(stage, measure, &mut image).map_err(|e| e.to_string())?;
@@ -127,9 +124,6 @@ fn series(stage: &Stage, measure: &Measure, method: &str, k: usize, chart: &mut 
 }
 
 /// An order of convergence as SVG: error over work, with the slope that theory gives.
-///
-/// # Errors
-/// If there is nothing to draw, in words.
 pub(crate) fn order_svg(order: &super::document::Order) -> Result<String, String> {
     let mut image = String::new();
     draw_order(order, &mut image).map_err(|e| e.to_string())?;

@@ -32,7 +32,6 @@ pub(crate) struct Options {
 
 /// A scene and what came with it.
 pub(crate) struct Subject {
-    /// Its name in the report.
     pub(crate) name: String,
     pub(crate) cloud: Arc<GaussianCloud>,
     pub(crate) settings: RenderSettings,
@@ -40,7 +39,6 @@ pub(crate) struct Subject {
     pub(crate) cameras: Vec<(Camera, bool)>,
     /// Every how-manieth photo is held out.
     pub(crate) holdout_every: usize,
-    /// Its photos, if they are there.
     pub(crate) dataset: Option<Dataset>,
     pub(crate) map: Option<SemanticMap>,
     pub(crate) options: Options,
@@ -48,9 +46,6 @@ pub(crate) struct Subject {
 
 impl Subject {
     /// The stages that are wanted, and for each that is not possible why.
-    ///
-    /// # Errors
-    /// If one was asked for that is not possible.
     pub(crate) fn stages(&self, wanted: &[StageName]) -> Result<(Vec<StageName>, Vec<String>), StudyError> {
         let (mut stages, mut missing) = (Vec::new(), Vec::new());
         for name in StageName::ALL {
@@ -92,7 +87,6 @@ impl Subject {
         }
     }
 
-    /// The study of a stage.
     pub(crate) fn study(&self, name: StageName) -> Result<Study<'_>, StudyError> {
         match name {
             StageName::Render => self.drawing(),
@@ -113,7 +107,6 @@ impl Subject {
         self.map.as_ref().and_then(|m| Some((m, m.language.as_ref()?.encoder.as_str())))
     }
 
-    /// What is swept on, in words.
     fn input(&self, more: &[(&str, String)]) -> Input {
         let mut input = Input::from([
             ("scene".to_owned(), self.name.clone()),

@@ -30,7 +30,6 @@ pub(crate) struct Sum {
     pub(crate) worst: Smoothness,
 }
 
-/// What a survey found.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Survey {
     pub(crate) ours: Sum,

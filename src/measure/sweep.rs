@@ -9,14 +9,11 @@ use super::file::FILE;
 use super::knobs::Knobs;
 use crate::pipeline::observer::{Observer, Severity, Ticker};
 
-/// A setting to be measured.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Case {
     pub(crate) method: String,
     pub(crate) setting: String,
-    /// Its setting, for the program.
     pub(crate) knobs: Knobs,
-    /// Whether these are the defaults.
     pub(crate) default: bool,
 }
 
@@ -31,7 +28,6 @@ impl Case {
     }
 }
 
-/// What one measurement gave.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Trial {
     pub(crate) secs: f64,
@@ -41,7 +37,6 @@ pub(crate) struct Trial {
     pub(crate) curve: Vec<[f64; 2]>,
 }
 
-/// Why a measurement failed, in words.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{0}")]
 pub(crate) struct StudyError(pub(crate) String);
@@ -76,7 +71,6 @@ impl<'a> Study<'a> {
         Self { stage: Stage { planned: cases.len(), ..stage }, cases, run, orders: Box::new(|| Ok(Vec::new())) }
     }
 
-    /// The same with checks of convergence.
     #[must_use]
     pub(crate) fn with_orders(self, orders: impl Fn() -> Result<Vec<Order>, StudyError> + 'a) -> Self {
         Self { orders: Box::new(orders), ..self }
@@ -91,12 +85,10 @@ impl<'a> Study<'a> {
     }
 }
 
-/// How a sweep ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum End {
     Finished,
     OutOfTime,
-    /// The observer asked to stop.
     Cancelled,
 }
 

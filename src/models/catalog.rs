@@ -19,7 +19,6 @@ const LIST: &str = include_str!("../../assets/models.toml");
 /// Name of the model that follows masks.
 pub(crate) const SAM2: &str = "sam2.1-tiny";
 
-/// What a model is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Role {
@@ -34,7 +33,6 @@ pub(crate) enum Role {
 pub struct Entry {
     /// Its name in commands.
     pub id: String,
-    /// What it is for.
     pub(crate) role: Role,
     /// Its name for display.
     pub title: String,
@@ -43,7 +41,6 @@ pub struct Entry {
     /// License of its weights.
     #[serde(alias = "licence")]
     pub license: String,
-    /// Where its weights come from.
     pub(crate) source: String,
     /// The command that makes its files, of those in `tools/export`.
     #[serde(default)]
@@ -95,38 +92,24 @@ pub enum State {
 
 /// Why a model could not be put in place.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum InstallError {
-    /// Not in the list.
     #[error("there is no model called '{0}'; 'fmlgs models' lists them")]
     Unknown(String),
-    /// Nothing to fetch.
     #[error("'{0}' is part of the program")]
     BuiltIn(String),
-    /// Nobody hosts its files.
     #[error(
         "no address is known for '{id}'. Make its files of the official checkpoint ({source_page}): python tools/export/{export} \
          --out FOLDER, then 'fmlgs models add {id} FOLDER'; or give the address of a folder that has them with --from"
     )]
-    NoAddress {
-        /// Which model.
-        id: String,
-        /// Where its weights are.
-        source_page: String,
-        /// The command that makes its files.
-        export: String,
-    },
-    /// A file could not be fetched or written.
+    NoAddress { id: String, source_page: String, export: String },
     #[error(transparent)]
     Fetch(#[from] FetchError),
-    /// A file does not fit.
     #[error(transparent)]
     Model(#[from] ModelError),
 }
 
 /// All models of the list, in its order.
-///
-/// # Errors
-/// If the list that came with the program is damaged.
 pub fn entries() -> Result<Vec<Entry>, ModelError> {
     let damaged =
         |e: toml::de::Error| ModelError::Metadata { path: "assets/models.toml".into(), problem: e.to_string() };
@@ -134,14 +117,10 @@ pub fn entries() -> Result<Vec<Entry>, ModelError> {
 }
 
 /// The model with this name.
-///
-/// # Errors
-/// If there is none.
 pub fn entry(id: &str) -> Result<Entry, InstallError> {
     entries()?.into_iter().find(|e| e.id == id).ok_or_else(|| InstallError::Unknown(id.to_owned()))
 }
 
-/// Where models lie on this machine.
 pub(crate) fn folder() -> PathBuf {
     let set = std::env::var_os("FMLGS_MODELS").filter(|p| !p.is_empty());
     set.map_or_else(|| data_folder().join("models"), PathBuf::from)
@@ -183,9 +162,6 @@ impl Entry {
     }
 
     /// Compares all its graphs in `folder` with their SHA-256.
-    ///
-    /// # Errors
-    /// If one differs, or cannot be read.
     pub fn verify(&self, folder: &Path) -> Result<(), InstallError> {
         if self.built_in {
             return Ok(());
@@ -205,9 +181,6 @@ impl Entry {
     /// Fetches what is not here yet from its address, or from that of another `from` folder, into
     /// `folder`, and checks it. `progress` is told the file, its bytes that are there and those that
     /// there will be, and says whether to go on.
-    ///
-    /// # Errors
-    /// If there is no address, a download fails, or a file is not what its description says.
     pub fn fetch(
         &self,
         folder: &Path,
@@ -244,9 +217,6 @@ impl Entry {
 
     /// Takes over its files from a folder that somebody brings. They are checked there before
     /// anything here changes.
-    ///
-    /// # Errors
-    /// If files are missing there or are not what the description says, or cannot be copied.
     pub fn add(&self, folder: &Path, brought: &Path) -> Result<(), InstallError> {
         if self.built_in {
             return Err(InstallError::BuiltIn(self.id.clone()));
@@ -269,9 +239,6 @@ impl Entry {
 
 /// The description of a model that is here, by its name in the list; of any other, by the path of
 /// its description.
-///
-/// # Errors
-/// If it is neither.
 pub(crate) fn find(name: &str, role: Role) -> Result<PathBuf, ModelError> {
     let listed = entries()?.into_iter().find(|e| e.id == name && e.role == role && !e.built_in);
     if let Some(entry) = listed {
@@ -292,9 +259,6 @@ pub(crate) fn find(name: &str, role: Role) -> Result<PathBuf, ModelError> {
 
 /// Names of the models of a role that can be used now, best first; the built-in ones last. `told` hears of
 /// each that is here and cannot be used.
-///
-/// # Errors
-/// If the list that came with the program is damaged.
 pub(crate) fn usable(role: Role, told: &mut dyn FnMut(String)) -> Result<Vec<String>, ModelError> {
     Ok(usable_of(&entries()?, role, &folder(), told))
 }

@@ -88,7 +88,6 @@ impl DemoEncoder {
     }
 }
 
-/// The one row of a result.
 fn only(mut rows: Vec<Vec<f32>>) -> Result<Vec<f32>, ModelError> {
     rows.pop().ok_or_else(|| ModelError::NoOutput { model: super::DEMO.into(), output: "embedding".into() })
 }

@@ -23,7 +23,6 @@ use crate::scene::resource_log::{self, Sort};
 /// Why networks are loaded, for the trace.
 const MODEL_USE: &str = "it is about to run for the first time";
 
-/// What runs networks in this process.
 pub(crate) struct Engine {
     environment: Environment,
     name: String,
@@ -162,12 +161,10 @@ impl Engine {
         Ok(Self { environment, name, device, note })
     }
 
-    /// Which engine it is, for display.
     pub(crate) fn name(&self) -> &str {
         &self.name
     }
 
-    /// What it computes on, for display.
     pub(crate) fn device(&self) -> &'static str {
         self.device.map_or("processor", Device::text)
     }
@@ -178,18 +175,12 @@ impl Engine {
     }
 
     /// Prepares a network that is in memory.
-    ///
-    /// # Errors
-    /// If it is no network, or one that this engine cannot run.
     pub(crate) fn load(&self, bytes: &[u8], name: &str) -> Result<Network, ModelError> {
         resource_log::record(Sort::Model, format!("network {name}"), MODEL_USE, bytes.len() as u64);
         Ok(Network::new(self.prepare(name, |builder| builder.commit_from_memory(bytes))?, name))
     }
 
     /// Prepares a network in a file.
-    ///
-    /// # Errors
-    /// If it is no network, or one that this engine cannot run.
     pub(crate) fn load_file(&self, path: &Path) -> Result<Network, ModelError> {
         let file = path.to_path_buf();
         let network = Network::new(self.session(path)?, &path.display().to_string());

@@ -53,95 +53,31 @@ impl Default for Patience {
 /// Why a file could not be fetched. What arrived before stays, and is resumed the next time,
 /// unless it was wrong.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum FetchError {
-    /// No connection.
     #[error("{url} cannot be reached: {problem}; check the network (and HTTPS_PROXY), or bring the file yourself")]
-    Unreachable {
-        /// From where.
-        url: String,
-        /// What happened.
-        problem: String,
-    },
-    /// The server answered, but not with the file.
+    Unreachable { url: String, problem: String },
     #[error("{url} answered {status}; the address may have changed")]
-    Refused {
-        /// From where.
-        url: String,
-        /// HTTP status.
-        status: u16,
-    },
-    /// The server went silent.
+    Refused { url: String, status: u16 },
     #[error("{url} sent nothing for {secs} s, after {got} bytes; try again, what arrived is kept")]
-    Stalled {
-        /// From where.
-        url: String,
-        /// How long it was waited.
-        secs: u64,
-        /// Bytes that are there.
-        got: u64,
-    },
-    /// The connection ended early.
+    Stalled { url: String, secs: u64, got: u64 },
     #[error("{url} ended after {got} of {expected} bytes; try again, what arrived is kept")]
-    Truncated {
-        /// From where.
-        url: String,
-        /// Bytes that are there.
-        got: u64,
-        /// Bytes that were promised.
-        expected: u64,
-    },
-    /// Another size than the catalog's.
+    Truncated { url: String, got: u64, expected: u64 },
     #[error("{url} offers {offered} bytes, but the file has {expected}; it is another file, and was not taken")]
-    OtherSize {
-        /// From where.
-        url: String,
-        /// Bytes that the server has.
-        offered: u64,
-        /// Bytes that it should have.
-        expected: u64,
-    },
-    /// More than a file without a promised size may have.
+    OtherSize { url: String, offered: u64, expected: u64 },
     #[error("{url} is larger than the {most} bytes that a description may have; it is another file, and was not taken")]
-    TooLarge {
-        /// From where.
-        url: String,
-        /// Most bytes.
-        most: u64,
-    },
-    /// A page for people in place of the file.
+    TooLarge { url: String, most: u64 },
     #[error("{url} is a web page, not a file (a sign-in, or an error page?)")]
-    WebPage {
-        /// From where.
-        url: String,
-    },
-    /// The content is not what it should be.
+    WebPage { url: String },
     #[error("{path} has SHA-256 {got}, expected {expected}; it is broken or another file, and was refused")]
-    Checksum {
-        /// The file.
-        path: PathBuf,
-        /// What it has.
-        got: String,
-        /// What it should have.
-        expected: String,
-    },
-    /// The file cannot be written.
+    Checksum { path: PathBuf, got: String, expected: String },
     #[error("{path}: {source}")]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// Somebody asked to stop.
+    File { path: PathBuf, source: io::Error },
     #[error("cancelled after {got} bytes; what arrived is kept")]
-    Cancelled {
-        /// Bytes that are there.
-        got: u64,
-    },
+    Cancelled { got: u64 },
 }
 
 impl FetchError {
-    /// Whether trying again may help.
     fn is_passing(&self) -> bool {
         match self {
             Self::Unreachable { .. } | Self::Stalled { .. } | Self::Truncated { .. } => true,
@@ -153,9 +89,6 @@ impl FetchError {
 
 /// Fetches a file. `progress` is told the bytes that are there and those that there will be, and
 /// whether to go on.
-///
-/// # Errors
-/// See [`FetchError`].
 pub fn fetch(
     wanted: &Wanted<'_>,
     patience: Patience,
@@ -197,9 +130,6 @@ pub fn fetch(
 }
 
 /// Compares a file with its SHA-256.
-///
-/// # Errors
-/// If they differ, or the file cannot be read.
 pub(crate) fn check(path: &Path, expected: &str) -> Result<(), FetchError> {
     let got = sha256(path).map_err(|source| FetchError::File { path: path.into(), source })?;
     if got.eq_ignore_ascii_case(expected) {
@@ -209,9 +139,6 @@ pub(crate) fn check(path: &Path, expected: &str) -> Result<(), FetchError> {
 }
 
 /// SHA-256 of a file, in hexadecimal digits.
-///
-/// # Errors
-/// If it cannot be read.
 pub fn sha256(path: &Path) -> io::Result<String> {
     let mut file = File::open(path)?;
     let mut hasher = Sha256::new();

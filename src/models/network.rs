@@ -59,7 +59,6 @@ impl<T: Clone> Array<T> {
     }
 }
 
-/// What goes into a network.
 pub(crate) enum Input {
     /// Floating-point numbers.
     Floats(Array<f32>),
@@ -93,10 +92,6 @@ pub(crate) struct Outputs {
 }
 
 impl Outputs {
-    /// Takes an output.
-    ///
-    /// # Errors
-    /// If there is none of that name.
     pub(crate) fn take(&mut self, name: &str) -> Result<Array<f32>, ModelError> {
         self.arrays.remove(name).ok_or_else(|| ModelError::NoOutput { model: self.model.clone(), output: name.into() })
     }
@@ -126,9 +121,6 @@ impl Network {
     }
 
     /// Runs it. Every number that comes out is finite.
-    ///
-    /// # Errors
-    /// If the engine fails, an input is missing or of another shape, or an output is not finite.
     pub(crate) fn run(&mut self, inputs: Vec<(&'static str, Input)>) -> Result<Outputs, ModelError> {
         let name = self.name.clone();
         // A panic while it ran leaves a session that runs again.
@@ -176,9 +168,6 @@ impl Network {
     }
 
     /// The rows of an output, each scaled to unit length; `length` numbers in each are expected.
-    ///
-    /// # Errors
-    /// As [`Self::run`]; and if rows are of another length, or have no direction.
     pub(crate) fn unit_rows(
         &mut self,
         inputs: Vec<(&'static str, Input)>,

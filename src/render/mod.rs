@@ -49,24 +49,16 @@ pub(crate) const MAX_CHANNELS: usize = 32;
 
 /// Why a picture could not be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum RenderError {
-    /// The camera is not usable.
     #[error("camera: {0}")]
     Camera(#[from] CameraError),
-    /// More extra channels than one pass composites.
     #[error("{0} extra channels are too many for one pass (at most {max}); render them in groups", max = MAX_CHANNELS - 4)]
     Channels(usize),
-    /// Cut-offs other than the defaults, on a GPU.
     #[error("the GPU draws with the default cut-offs only; choose the CPU for others")]
     Cutoffs,
-    /// A feature array of the wrong length.
     #[error("the feature array holds {have} values, expected {want}")]
-    FeatureLength {
-        /// Values given.
-        have: usize,
-        /// Gaussians times channels.
-        want: usize,
-    },
+    FeatureLength { have: usize, want: usize },
     /// A stage left a number that is none; looked for under `debug-validation` only.
     #[error(transparent)]
     NotFinite(#[from] NotFinite),

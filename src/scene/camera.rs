@@ -29,38 +29,26 @@ pub struct Camera {
 
 /// What is wrong with a camera.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum CameraError {
-    /// Zero pixels, or more than [`Camera::MAX_SIDE_PX`] along a side.
     #[error("picture size {0} x {1} px is not between 1 and {max} px a side", max = Camera::MAX_SIDE_PX)]
     Size(u32, u32),
-    /// A focal length that is not positive and finite.
     #[error("focal length ({0}, {1}) px is not positive and finite")]
     Focal(f64, f64),
-    /// A focal length that no lens has.
     #[error(
         "focal length {focal_px:e} px along a side of {side_px} px is no lens's; between {} and {:e} sides are believed",
         Camera::FOCAL_SIDES.start(),
         Camera::FOCAL_SIDES.end()
     )]
-    Lens {
-        /// The focal length, px.
-        focal_px: f64,
-        /// The picture's side along the same axis, px.
-        side_px: u32,
-    },
-    /// A principal point far outside of the picture.
+    Lens { focal_px: f64, side_px: u32 },
     #[error("principal point ({0:e}, {1:e}) px is over {max:e} picture sides away from the picture", max = Camera::PRINCIPAL_SIDES)]
     Off(f64, f64),
-    /// A camera center so far out that distances lose their meaning.
     #[error("the camera center ({0:e}, {1:e}, {2:e}) is farther than {max:e} units from the origin", max = Camera::FARTHEST)]
     Far(f64, f64, f64),
-    /// A principal point that is not finite.
     #[error("principal point ({0}, {1}) px is not finite")]
     Principal(f64, f64),
-    /// A pose whose 3x3 part is no rotation.
     #[error("the pose's 3x3 part is not a rotation (deviation {0:.2e}; scale, shear, reflection or NaN)")]
     Rotation(f64),
-    /// A camera center that is not finite.
     #[error("the camera center ({0}, {1}, {2}) is not finite")]
     Center(f64, f64, f64),
 }

@@ -53,19 +53,12 @@ pub struct Gaussian<'a, R = f32> {
 
 /// What is wrong with a cloud.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum CloudError {
-    /// Arrays of different lengths.
     #[error("array '{0}' holds {1} entries, expected {2}")]
     Length(&'static str, usize, usize),
-    /// A value that is NaN or infinite.
     #[error("Gaussian {index}: {field} is not finite")]
-    NotFinite {
-        /// Which Gaussian.
-        index: usize,
-        /// Which of its parameters.
-        field: &'static str,
-    },
-    /// A spherical-harmonics degree over 3.
+    NotFinite { index: usize, field: &'static str },
     #[error("spherical-harmonics degree {0} is over 3")]
     Degree(u8),
 }

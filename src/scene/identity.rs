@@ -151,7 +151,6 @@ impl Identities {
         std::array::from_fn(|c| if c < 3 { object[c] } else { part[c - 3] })
     }
 
-    /// The direct pieces of an identity.
     pub(crate) fn pieces(&self, id: IdentityId) -> impl Iterator<Item = IdentityId> + '_ {
         self.iter().filter(move |(_, i)| i.parent == id && id != NOBODY).map(|(i, _)| i)
     }

@@ -27,7 +27,6 @@ pub struct PixelBox {
 }
 
 impl PixelBox {
-    /// Whether a pixel is inside.
     pub(crate) fn contains(&self, x: usize, y: usize) -> bool {
         self.x.contains(&x) && self.y.contains(&y)
     }

@@ -43,7 +43,6 @@ pub struct Load {
     /// Its sort.
     pub sort: Sort,
     pub(crate) what: String,
-    /// What it was needed for.
     pub(crate) why: &'static str,
     /// Bytes that it takes in memory; 0 where that is not known.
     pub(crate) bytes: u64,

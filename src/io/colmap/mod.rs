@@ -23,7 +23,6 @@ pub use text::{check_text_cameras, check_text_images, check_text_points};
 /// Where a reconstruction may lie, relative to the dataset's folder.
 const FOLDERS: [&str; 3] = ["sparse/0", "sparse", "."];
 
-/// The photos of a reconstruction.
 struct Image {
     name: String,
     camera: u32,

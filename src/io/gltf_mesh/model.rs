@@ -15,11 +15,9 @@ pub struct MeshScene {
     pub(crate) materials: Vec<Material>,
     /// Decoded images, indexed by [`TextureUse::image`].
     pub(crate) images: Vec<TextureImage>,
-    /// What was left out, for display.
     pub(crate) warnings: Vec<String>,
 }
 
-/// A node of the tree.
 #[derive(Clone, Debug)]
 pub(crate) struct MeshNode {
     /// Its name, never blank.
@@ -79,7 +77,6 @@ pub(crate) struct Material {
     pub(crate) unlit: bool,
 }
 
-/// What a material's alpha means.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum AlphaMode {
     Opaque,

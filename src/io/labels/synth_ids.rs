@@ -8,7 +8,6 @@ use super::{Region, Sheet, read_ids};
 use crate::io::{IoError, files};
 use crate::scene::{Level, Mask, text};
 
-/// The list of identities.
 pub(crate) const LIST_FILE: &str = "identities.json";
 
 #[derive(Deserialize)]
@@ -16,7 +15,6 @@ struct File {
     identities: Vec<Listed>,
 }
 
-/// An object or part as listed.
 #[derive(Clone, Debug, Deserialize)]
 pub(crate) struct Listed {
     /// Value in the id maps.

@@ -8,7 +8,6 @@ use crate::io::IoError;
 /// Longest header in bytes.
 const MAX_HEADER_BYTES: usize = 1 << 20;
 
-/// How rows are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Encoding {
     /// Numbers as text.
@@ -104,7 +103,6 @@ impl Scalar {
 /// A number, or a list of them with its length in front.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// One number.
     Scalar(Scalar),
     List {
         /// Type of the length.
@@ -114,21 +112,18 @@ pub(crate) enum Kind {
     },
 }
 
-/// A property of an element.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Property {
     pub(crate) name: String,
     pub(crate) kind: Kind,
 }
 
-/// A kind of row.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Element {
     /// Its name: `vertex`, `face`, `chunk`.
     pub(crate) name: String,
     /// Rows, as the file claims.
     pub(crate) count: u64,
-    /// What each row holds.
     pub(crate) properties: Vec<Property>,
 }
 

@@ -39,7 +39,6 @@ pub(crate) struct Table<'a> {
     pub(crate) rows: usize,
     /// Bytes per row.
     pub(crate) stride: usize,
-    /// The columns in file order.
     pub(crate) columns: Vec<Column>,
     /// `rows * stride` bytes.
     pub(crate) data: Cow<'a, [u8]>,
@@ -52,7 +51,6 @@ impl Table<'_> {
         &self.data[i * self.stride..(i + 1) * self.stride]
     }
 
-    /// The column of that name.
     pub(crate) fn column(&self, name: &str) -> Option<&Column> {
         self.columns.iter().find(|c| c.name == name)
     }

@@ -22,7 +22,6 @@ pub(super) struct Ffmpeg {
     path: PathBuf,
     program: PathBuf,
     size_px: (u32, u32),
-    /// What the program writes to.
     draft: Option<NamedTempFile>,
     child: Child,
     frames_in: Option<ChildStdin>,

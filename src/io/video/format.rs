@@ -32,9 +32,6 @@ impl Format {
 
     /// The format that a path names: by its ending, or [`Format::Frames`] for a folder that exists, a
     /// path with `/` at its end, or one without an ending.
-    ///
-    /// # Errors
-    /// [`VideoFileError::UnknownFormat`] lists the endings there are.
     pub(crate) fn of(path: &Path) -> Result<Self> {
         let folder = path.is_dir() || path.as_os_str().to_string_lossy().ends_with(std::path::is_separator);
         if folder && path.file_name().is_some() {

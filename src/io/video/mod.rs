@@ -34,10 +34,8 @@ pub(crate) use error::VideoFileError;
 pub(crate) use format::Format;
 pub(crate) use settings::{Encoder, Settings};
 
-/// Result of this module's functions.
 pub(crate) type Result<T> = std::result::Result<T, VideoFileError>;
 
-/// What was written.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Summary {
     /// The file, or the folder of PNG frames.
@@ -55,7 +53,6 @@ pub(crate) struct Summary {
     pub(crate) size_px: (u32, u32),
 }
 
-/// Writes a video frame by frame.
 pub(crate) struct VideoWriter {
     path: PathBuf,
     format: Option<Format>,
@@ -79,11 +76,6 @@ trait Sink: Send {
 impl VideoWriter {
     /// Starts a video at `path`, in the format that the path's ending names (see [`Format::of`]);
     /// with [`Encoder::Ffmpeg`] any ending that the program knows.
-    ///
-    /// # Errors
-    /// [`VideoFileError`]: an ending that no format has, a size or rate that the format cannot hold,
-    /// a file that exists (unless [`Settings::overwrite`]), a folder that cannot be written to, a
-    /// program that is missing.
     pub(crate) fn create(path: &Path, settings: &Settings) -> Result<Self> {
         settings.check(path)?;
         let (format, sink): (_, Box<dyn Sink>) = match &settings.encoder {
@@ -112,9 +104,6 @@ impl VideoWriter {
 
     /// Adds the next frame: sRGB, `width * height * 3` bytes, row by row from the top. After an error of
     /// the encoder or the disk the video is lost: every further call fails, and nothing is left on disk.
-    ///
-    /// # Errors
-    /// [`VideoFileError`]: wrong length, an encoder that gives up, a full disk.
     pub(crate) fn push(&mut self, rgb: &[u8]) -> Result<()> {
         let expected = self.settings.frame_bytes();
         if rgb.len() as u64 != expected {

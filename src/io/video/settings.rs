@@ -21,10 +21,8 @@ pub(crate) struct Settings {
     pub(crate) encoder: Encoder,
 }
 
-/// What encodes a video.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) enum Encoder {
-    /// What is built into the program.
     #[default]
     BuiltIn,
     /// A program with ffmpeg's command line, fed through a pipe.
@@ -70,7 +68,6 @@ impl Settings {
         Ok(())
     }
 
-    /// Bytes of a frame.
     pub(super) fn frame_bytes(&self) -> u64 {
         u64::from(self.width_px) * u64::from(self.height_px) * 3
     }

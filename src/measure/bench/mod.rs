@@ -41,7 +41,6 @@ pub(crate) struct Timings {
     pub(crate) gpu: Option<String>,
     /// Drawing on the GPU.
     pub(crate) gpu_render: Vec<Timing>,
-    /// Training on the GPU.
     pub(crate) gpu_train: Vec<Timing>,
     /// What one core could do at most (see [`one_core_limit`]).
     pub(crate) one_core_products_per_sec: f64,

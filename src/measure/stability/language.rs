@@ -23,7 +23,6 @@ fn identities(n: usize) -> Identities {
     all
 }
 
-/// The same scores for everything.
 struct Fixed([f32; 4]);
 
 impl Scorer for Fixed {

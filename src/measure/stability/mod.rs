@@ -21,7 +21,6 @@ use serde::Serialize;
 
 use super::table::{Rows, rows};
 
-/// Whether a promise holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Verdict {
@@ -45,7 +44,6 @@ impl Verdict {
     }
 }
 
-/// What happened in a case.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Finding {
     pub(crate) outcome: String,
@@ -86,7 +84,6 @@ pub(crate) struct Case {
     run: Box<dyn Fn(bool) -> Finding + Send + Sync>,
 }
 
-/// A case and what was found.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Checked {
     pub(crate) area: &'static str,

@@ -17,7 +17,6 @@ use crate::scene::PhotoPixels;
 /// Tiles that go through the network together.
 const BATCH: usize = 8;
 
-/// What the metadata file says.
 #[derive(Clone, Debug, Deserialize)]
 struct Metadata {
     name: String,
@@ -59,9 +58,6 @@ pub struct ClipEncoder {
 
 impl ClipEncoder {
     /// The model that a metadata file describes; its graphs lie beside it.
-    ///
-    /// # Errors
-    /// If the file cannot be read, or describes what this program cannot do.
     pub fn open(path: &Path) -> Result<Self, ModelError> {
         let about: Metadata = manifest::read(path, "clip")?;
         let refused = |problem: String| ModelError::Metadata { path: path.into(), problem };
@@ -103,18 +99,12 @@ impl ClipEncoder {
     }
 
     /// Embeddings of prepared pictures `[n, 3, S, S]`, of unit length.
-    ///
-    /// # Errors
-    /// If the network cannot be loaded, or fails.
     pub fn embed_pixels(&mut self, pixels: Array) -> Result<Vec<Vec<f32>>, ModelError> {
         let network = self.about.graphs.image.ready(&mut self.image, &self.folder)?;
         network.unit_rows(vec![("pixels", pixels.into())], "embedding", self.about.embed_dim)
     }
 
     /// Embeddings of rows of tokens, of unit length.
-    ///
-    /// # Errors
-    /// If the network cannot be loaded, or fails.
     pub fn embed_tokens(&mut self, tokens: Array<i64>) -> Result<Vec<Vec<f32>>, ModelError> {
         let network = self.about.graphs.text.ready(&mut self.text, &self.folder)?;
         network.unit_rows(vec![("tokens", tokens.into())], "embedding", self.about.embed_dim)

@@ -17,7 +17,6 @@ use super::{ModelError, manifest};
 use crate::math::resize::{Filter, resize};
 use crate::scene::PhotoPixels;
 
-/// What the metadata file says.
 #[derive(Clone, Debug, Deserialize)]
 pub(crate) struct Metadata {
     pub(crate) name: String,
@@ -95,7 +94,6 @@ pub(crate) struct Decoded {
 /// SAM 2's networks, each loaded when it is first needed.
 pub struct Sam2 {
     folder: PathBuf,
-    /// What the model's metadata says.
     pub(crate) about: Metadata,
     prepare: Prepare,
     encoder: Option<Network>,
@@ -109,9 +107,6 @@ pub struct Sam2 {
 
 impl Sam2 {
     /// The model that a metadata file describes; its graphs lie beside it.
-    ///
-    /// # Errors
-    /// If the file cannot be read, or describes another kind of model.
     pub fn open(path: &Path) -> Result<Self, ModelError> {
         let about: Metadata = manifest::read(path, "sam2")?;
         let Metadata { image_size, mean, std, .. } = about;
@@ -143,9 +138,6 @@ impl Sam2 {
     }
 
     /// Looks at a frame of a sequence.
-    ///
-    /// # Errors
-    /// If it has no pixels, or the network fails.
     pub(crate) fn encode(&mut self, picture: &PhotoPixels) -> Result<Frame, ModelError> {
         let image = self.prepare.picture(picture).ok_or(ModelError::NoPicture)?;
         self.encode_pixels(image)
@@ -169,9 +161,6 @@ impl Sam2 {
     }
 
     /// Looks at a prepared picture, `[1, 3, S, S]`.
-    ///
-    /// # Errors
-    /// If the network fails.
     pub fn encode_pixels(&mut self, image: Array) -> Result<Frame, ModelError> {
         let encoder = self.about.graphs.encoder.ready(&mut self.encoder, &self.folder)?;
         let mut out = encoder.run(vec![("image", image.into())])?;
@@ -198,9 +187,6 @@ impl Sam2 {
     }
 
     /// Masks for prompts on a frame whose embeddings may be conditioned on memories.
-    ///
-    /// # Errors
-    /// If the network fails.
     pub(crate) fn decode(
         &mut self,
         frame: &Frame,

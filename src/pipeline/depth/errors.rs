@@ -4,7 +4,6 @@ use serde::Serialize;
 
 use crate::math::stats::{mean, median};
 
-/// The errors of some pixels.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct DepthErrors {
     /// Pixels that truly show something.

@@ -24,9 +24,6 @@ pub(crate) struct TrueDepth {
 
 impl TrueDepth {
     /// Reads an `.npy` file.
-    ///
-    /// # Errors
-    /// If it is no map of depths.
     pub(crate) fn read(path: &Path) -> Result<Self, IoError> {
         let (width, height, values) = npy::read_map(path)?;
         Ok(Self { width, height, values })

@@ -12,7 +12,6 @@ use super::timing::{StagesMs, ms_since};
 use super::view_map::ViewMap;
 use crate::scene::{Identities, IdentityId, LanguageFeatures, LevelFilter, Mask};
 
-/// What an answer rests on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Basis {
     /// Names that people or label files gave.
@@ -25,7 +24,6 @@ pub(crate) enum Basis {
 #[derive(Clone, Debug, PartialEq)]
 pub struct QueryAnswer {
     pub(crate) answer: Answer,
-    /// What that rests on.
     pub(crate) basis: Basis,
     /// Relevancy of every identity by number, 0 to 1; a piece is at least as relevant as its whole
     /// where names decide.
@@ -37,7 +35,6 @@ pub struct QueryAnswer {
 /// Features and encoded phrases for answers by meaning.
 #[derive(Clone, Copy)]
 pub(crate) struct Language<'a> {
-    /// Of the scene's identities.
     pub(crate) features: &'a LanguageFeatures,
     /// With the query's phrases learnt; see [`phrases_of`].
     pub(crate) phrases: &'a TextEmbeddings,

@@ -10,7 +10,6 @@ const SAME: f64 = 0.5;
 /// Pixels that must be the same at least.
 const LEAST_PX: usize = 12;
 
-/// What a mask is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Link {
     Known(IdentityId),

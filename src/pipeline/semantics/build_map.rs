@@ -58,12 +58,9 @@ pub enum Carry {
 /// Name of the masks that need no model.
 pub(crate) const REGIONS: &str = "regions";
 
-/// Settings of the whole way.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct FindOptions {
-    /// How masks become identities.
     pub(crate) track: TrackOptions,
-    /// How identities become codes of Gaussians.
     pub(crate) lifting: Lifting,
     /// Steps of training codes, where they are trained.
     pub(crate) code_steps: u64,
@@ -89,23 +86,18 @@ pub(crate) struct Found {
 
 /// Why objects could not be found.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum FindError {
-    /// In making identities of masks.
     #[error(transparent)]
     Track(#[from] TrackError),
-    /// In training codes.
     #[error("training codes: {0}")]
     Lift(#[from] RenderError),
-    /// In looking at the identities.
     #[error(transparent)]
     Embed(#[from] EmbedError),
 }
 
 /// What finds the masks of photos that `cloud` was trained on: files, where there are any, else the
 /// network of this name, else regions of the photos.
-///
-/// # Errors
-/// If there are no masks at `files`, or the network cannot be used.
 pub(crate) fn segmenter<'a>(
     files: Option<&Path>,
     cloud: &'a GaussianCloud,
@@ -130,10 +122,6 @@ pub(crate) struct Tools<'a> {
 
 /// Finds the objects and parts of `cloud`, which was trained on `photos`, gives them codes, and lets
 /// an encoder look at them, if there is one.
-///
-/// # Errors
-/// If masks or photos cannot be read, a view cannot be drawn, the encoder fails, or the observer asks
-/// to stop.
 pub(crate) fn find_objects(
     cloud: &GaussianCloud,
     photos: &[Photo],

@@ -9,7 +9,6 @@ use super::relevancy::{CANONICAL, TEMPERATURE, advantage, score};
 use crate::math::finite::{all_finite, insist};
 use crate::scene::{LanguageFeatures, ViewFeatures};
 
-/// Which features of parts are compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum PartFeatures {
     /// Moved towards their whole's: the paper's semantic deviation.
@@ -21,7 +20,6 @@ pub(crate) enum PartFeatures {
 /// How scores are made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmbeddingOptions {
-    /// Which features of parts are compared.
     pub(crate) parts: PartFeatures,
     /// How pieces of wholes are looked for.
     pub(crate) strategy: Strategy,
@@ -45,9 +43,6 @@ impl TextEmbeddings {
 
     /// Adds the embedding that `encode` makes of each phrase, and of the canonical ones, unless it is
     /// there already.
-    ///
-    /// # Errors
-    /// What `encode` fails with.
     pub fn learn<E>(&mut self, phrases: &[&str], mut encode: impl FnMut(&str) -> Result<Vec<f32>, E>) -> Result<(), E> {
         if self.0.len() > Self::MOST {
             self.0.clear();

@@ -21,9 +21,6 @@ pub struct CodeMap {
 
 impl CodeMap {
     /// Blends the `codes` of the Gaussians of `cloud`, those of parts only if there are `parts`.
-    ///
-    /// # Errors
-    /// If the camera is not usable or there is not one set of codes per Gaussian.
     pub fn render(
         renderer: &mut Renderer,
         cloud: &GaussianCloud,
@@ -50,7 +47,6 @@ impl CodeMap {
         Ok(Self { width_px: frame.width_px, height_px: frame.height_px, planes })
     }
 
-    /// The three planes of a level.
     pub(crate) fn level(&self, level: Level) -> &[Vec<f32>] {
         let (object, part) = self.planes.split_at(OBJECT_CHANNELS);
         if level == Level::Object { object } else { part }

@@ -32,20 +32,16 @@ pub enum Edit {
 
 /// Why an edit cannot be made.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum EditError {
-    /// The identity is not there.
     #[error("there is no object or part number {0}")]
     Unknown(IdentityId),
-    /// A name without a letter.
     #[error("a name needs at least one letter or digit")]
     NoName,
-    /// An identity with itself or with a piece of itself.
     #[error("'{0}' and '{1}' cannot become one: one is the other, or a piece of it")]
     Related(String, String),
-    /// Nothing to split.
     #[error("'{0}' has too few Gaussians to be split")]
     TooSmall(String),
-    /// None of the Gaussians belongs to the whole.
     #[error("nothing of '{0}' was marked")]
     Nothing(String),
 }

@@ -22,25 +22,19 @@ const LEAST_PX: usize = 12;
 
 /// Why identities could not be looked at.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum EmbedError {
-    /// A photo could not be read.
     #[error(transparent)]
     Photo(#[from] IoError),
-    /// A view could not be drawn.
     #[error("photo {0}: {1}")]
     Render(String, RenderError),
-    /// The encoder failed.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The observer asked to stop.
     #[error("cancelled")]
     Interrupted(#[from] Interrupted),
 }
 
 /// Lets `encoder` look at every identity of `map`, in up to [`MAX_VIEWS`] of the `photos`.
-///
-/// # Errors
-/// If a photo cannot be read, the encoder fails, or the observer asks to stop.
 pub(crate) fn embed(
     cloud: &GaussianCloud,
     map: &SemanticMap,

@@ -12,10 +12,8 @@ use crate::models::{ModelError, manifest};
 use crate::pipeline::observer::{Interrupted, Observer, Ticker};
 use crate::scene::{Level, Mask, Photo, PhotoPixels};
 
-/// Masks by a network.
 pub(crate) struct NetworkMasks {
     network: Box<dyn PromptedMasks>,
-    /// Which of its answers are taken.
     pub(crate) options: AutomaticOptions,
     /// Which of those are objects, and parts.
     pub(crate) filters: FilterOptions,
@@ -33,9 +31,6 @@ const LEAST_TILE_PX: usize = 32;
 
 impl NetworkMasks {
     /// The network of this name: a model of the catalog, or the path of a model's description.
-    ///
-    /// # Errors
-    /// If it is not on this machine, or finds no masks.
     pub(crate) fn open(name: &str) -> Result<Self, ModelError> {
         let path = catalog::find(name, Role::Segmenter)?;
         let mut options = AutomaticOptions::default();

@@ -25,11 +25,10 @@ pub(crate) const LABEL_SIDE_PX: u32 = 512;
 
 /// Why masks could not be followed.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum Sam2TrackError {
-    /// A network fails.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The observer asked to stop.
     #[error("cancelled")]
     Interrupted(#[from] Interrupted),
 }
@@ -37,7 +36,6 @@ pub enum Sam2TrackError {
 /// Follows masks through a sequence of photos.
 pub(crate) struct Sam2Tracker {
     model: Sam2,
-    /// Where frames are kept, if anywhere.
     cache: Option<PathBuf>,
     /// Seconds that looking at frames has taken, reading kept ones included.
     pub(crate) encode_secs: f64,
@@ -46,9 +44,6 @@ pub(crate) struct Sam2Tracker {
 impl Sam2Tracker {
     /// With the SAM 2 of this name: a model of the catalog, or the path of a description. Frames
     /// are kept in `cache`.
-    ///
-    /// # Errors
-    /// If it is not on this machine.
     pub(crate) fn open(name: &str, cache: Option<PathBuf>) -> Result<Self, ModelError> {
         Ok(Self { model: Sam2::open(&catalog::find(name, Role::Segmenter)?)?, cache, encode_secs: 0.0 })
     }
@@ -56,9 +51,6 @@ impl Sam2Tracker {
     /// The label of every pixel of every photo, scaled to at most [`LABEL_SIDE_PX`], row-major: the
     /// number in `ids` of the innermost mask that was followed there; `UNKNOWN` elsewhere, because
     /// what was not marked may be anything.
-    ///
-    /// # Errors
-    /// If a photo cannot be read, a network fails, or the observer asks to stop.
     pub(crate) fn follow(
         &mut self,
         photos: &[Photo],

@@ -28,9 +28,6 @@ pub trait Segmenter {
 
     /// Masks of a photo, undistorted and scaled to at most `max_side_px`, wholes before pieces.
     /// Empty where it finds nothing.
-    ///
-    /// # Errors
-    /// If the photo or what is known about it cannot be read, or the observer asks to stop.
     fn segment(
         &mut self,
         photo: &Photo,
@@ -41,14 +38,12 @@ pub trait Segmenter {
 
 /// Why a photo could not be segmented.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum SegmentError {
-    /// The photo or what is known about it cannot be read.
     #[error(transparent)]
     Io(#[from] IoError),
-    /// A network fails.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The observer asked to stop.
     #[error("cancelled")]
     Interrupted(#[from] Interrupted),
 }

@@ -15,9 +15,6 @@ const FOV_RAD: f64 = 0.5;
 pub(crate) type Thumbnails = Vec<Option<Vec<[u8; 3]>>>;
 
 /// A picture of every identity as somebody at `from` sees it.
-///
-/// # Errors
-/// If one cannot be drawn.
 pub(crate) fn portraits(
     cloud: &GaussianCloud,
     map: &SemanticMap,

@@ -22,7 +22,6 @@ const DRIFT: f64 = 0.2;
 /// Pixels from which each of them says something.
 const DRIFT_PX: usize = 30;
 
-/// Settings of a tracking.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TrackOptions {
     /// Photo to begin with; `None` = the first that the segmenter can say something about.
@@ -43,7 +42,6 @@ impl Default for TrackOptions {
     }
 }
 
-/// An identity in a view.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub(crate) struct Sighting {
     /// Whose pixels.
@@ -53,7 +51,6 @@ pub(crate) struct Sighting {
     pub(crate) confidence: f64,
 }
 
-/// What became of one view.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub(crate) struct ViewReport {
     /// Index of the photo.
@@ -64,7 +61,6 @@ pub(crate) struct ViewReport {
     pub(crate) seen: Vec<Sighting>,
 }
 
-/// The result of a tracking.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Tracked {
     pub(crate) identities: Identities,
@@ -81,20 +77,16 @@ pub(crate) struct Tracked {
 
 /// Why tracking failed.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum TrackError {
-    /// There is nothing to begin with.
     #[error("the '{0}' masks say nothing about any photo; give masks of at least one")]
     NoSeed(String),
-    /// Masks could not be read.
     #[error(transparent)]
     Masks(#[from] SegmentError),
-    /// Masks could not be followed.
     #[error(transparent)]
     Follow(#[from] Sam2TrackError),
-    /// A view could not be drawn.
     #[error("photo {0}: {1}")]
     Render(String, RenderError),
-    /// The observer asked to stop.
     #[error("cancelled")]
     Interrupted(#[from] Interrupted),
 }
@@ -248,7 +240,6 @@ impl Tracker<'_> {
         Ok(())
     }
 
-    /// A disagreement, for display.
     fn told(&self, what: &Disagreement) -> String {
         let name = |id: &IdentityId| self.identities.full_name(*id);
         match what {

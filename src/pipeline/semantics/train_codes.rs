@@ -19,7 +19,6 @@ use crate::scene::{Camera, GaussianCloud, Identities, IdentityId};
 /// Learning rate at the first and at the last step, in units of code space.
 const RATES: [f64; 2] = [0.02, 0.002];
 
-/// The masks of one view.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct CodeView {
     pub(crate) camera: Camera,
@@ -27,7 +26,6 @@ pub(crate) struct CodeView {
     pub(crate) labels: Vec<IdentityId>,
 }
 
-/// Settings of a training of codes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CodeTraining {
     pub(crate) steps: u64,
@@ -37,9 +35,6 @@ pub(crate) struct CodeTraining {
 
 /// Trains `codes`, one set per Gaussian of `cloud`, from where they stand. Returns the loss of the
 /// last tenth of the steps. The observer may stop it; codes are then those of the last step.
-///
-/// # Errors
-/// If a camera is not usable.
 pub(crate) fn train_codes(
     cloud: &GaussianCloud,
     codes: &mut [[f32; CODE_CHANNELS]],

@@ -28,9 +28,6 @@ pub struct ViewMap {
 
 impl ViewMap {
     /// Draws the identities `of` the Gaussians of `cloud`.
-    ///
-    /// # Errors
-    /// If the camera is not usable.
     pub fn render(
         renderer: &mut Renderer,
         cloud: &GaussianCloud,

@@ -21,7 +21,6 @@ pub(crate) struct Votes {
     of: Vec<Vec<(IdentityId, f32)>>,
 }
 
-/// What a Gaussian belongs to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Assignment {
     /// The innermost identity; `NOBODY` if none claims it, `UNKNOWN` without a vote.
@@ -44,9 +43,6 @@ impl Votes {
     }
 
     /// Adds the votes of one view. `labels` holds the innermost identity of each pixel, row-major.
-    ///
-    /// # Errors
-    /// If the camera is not usable or has another number of pixels.
     pub(crate) fn add_view(
         &mut self,
         renderer: &mut Renderer,

@@ -123,7 +123,6 @@ impl Light {
     }
 }
 
-/// What light falls on.
 #[derive(Clone, Copy)]
 pub(crate) struct Lit<'a> {
     pub(crate) surface: &'a Surface,

@@ -58,32 +58,16 @@ pub struct Header {
 
 /// Why a checkpoint cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum CheckpointError {
-    /// It cannot be read or written.
     #[error(transparent)]
     Io(#[from] IoError),
-    /// It is not a checkpoint, or a damaged one.
     #[error("{path} is damaged or no checkpoint ({reason}); choose another folder to train anew")]
-    Damaged {
-        /// The file.
-        path: std::path::PathBuf,
-        /// What is wrong.
-        reason: String,
-    },
-    /// There is a scene, but nothing to go on from.
+    Damaged { path: std::path::PathBuf, reason: String },
     #[error("{folder} holds a trained scene, but no checkpoint to go on from; choose another folder for the result")]
-    Missing {
-        /// The scene's folder.
-        folder: std::path::PathBuf,
-    },
-    /// It belongs to another run.
+    Missing { folder: std::path::PathBuf },
     #[error("{path} belongs to a run with other {what}; choose another folder for the result")]
-    OtherRun {
-        /// The file.
-        path: std::path::PathBuf,
-        /// What differs.
-        what: &'static str,
-    },
+    OtherRun { path: std::path::PathBuf, what: &'static str },
 }
 
 /// Writes the state atomically.

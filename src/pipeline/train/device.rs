@@ -23,7 +23,6 @@ pub struct StepResult {
     pub(crate) outliers: usize,
 }
 
-/// A run on a GPU.
 pub(crate) struct DeviceRun {
     trainer: DeviceTrainer,
     photos: Vec<DevicePhoto>,

@@ -27,11 +27,10 @@ const BLOCK: usize = 512;
 
 /// Why a step failed.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum StepError {
-    /// The view cannot be drawn.
     #[error(transparent)]
     Render(#[from] RenderError),
-    /// The GPU failed.
     #[error(transparent)]
     Gpu(#[from] GpuError),
     /// A stage left a number that is none; looked for under `debug-validation` only.
@@ -281,12 +280,10 @@ impl Trainer {
     }
 }
 
-/// What a step left out.
 #[derive(Clone, Copy, Default)]
 struct StepStats {
     /// Gaussians whose gradient was not finite.
     skipped: usize,
-    /// The first of them.
     first: Option<usize>,
     /// Gradients that were cut as outliers.
     outliers: usize,
@@ -314,7 +311,6 @@ struct Update {
     eye: Option<[f32; 3]>,
 }
 
-/// The arrays of some consecutive Gaussians.
 struct Slices<'a> {
     positions: &'a mut [[f32; 3]],
     log_scales: &'a mut [[f32; 3]],

@@ -87,7 +87,6 @@ pub struct Geometry<R> {
     pub local: [R; 3],
     /// Tangents `x/z`, `y/z` after clamping, and whether they were clamped.
     pub(crate) tangent: [R; 2],
-    /// Whether each tangent was clamped.
     pub(crate) clamped: [bool; 2],
     /// Rows of the linearized projection in world axes, `J W`.
     pub(crate) jacobian: [[R; 3]; 2],

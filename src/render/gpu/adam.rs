@@ -33,7 +33,6 @@ pub(crate) struct Adam {
     pub(crate) outliers: wgpu::Buffer,
 }
 
-/// What one step works on.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AdamBuffers<'a> {
     /// Parameters to move.

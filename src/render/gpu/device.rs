@@ -55,9 +55,6 @@ impl Device {
     }
 
     /// The process's device where it is a real GPU's. No device of an emulated adapter is opened to find that out.
-    ///
-    /// # Errors
-    /// If there is one that does not open.
     pub(crate) fn shared_real() -> Result<Option<Self>, GpuError> {
         Ok(held_or(&SHARED, Self::real)?.filter(|device| !device.is_software()))
     }
@@ -87,9 +84,6 @@ impl Device {
 
     /// Opens the best real GPU; `None` where there is none. No device of an emulated adapter is opened
     /// to find that out.
-    ///
-    /// # Errors
-    /// If there is one that does not open.
     pub(crate) fn real() -> Result<Option<Self>, GpuError> {
         let adapter = adapter(false).ok().filter(|a| a.get_info().device_type != wgpu::DeviceType::Cpu);
         adapter.map(|a| Self::open(&a)).transpose()
@@ -231,14 +225,12 @@ impl Device {
         self.buffer(what, bytes, usage)
     }
 
-    /// A storage buffer with contents.
     pub(super) fn storage_with(&self, what: &str, contents: &[u8]) -> Result<wgpu::Buffer, GpuError> {
         let buffer = self.storage(what, contents.len() as u64)?;
         self.queue.write_buffer(&buffer, 0, contents);
         Ok(buffer)
     }
 
-    /// A uniform buffer with contents.
     pub(super) fn uniform(&self, what: &str, contents: &[u8]) -> Result<wgpu::Buffer, GpuError> {
         let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
         let buffer = self.buffer(what, contents.len() as u64, usage)?;

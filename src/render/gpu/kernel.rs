@@ -35,7 +35,6 @@ impl Module {
     }
 }
 
-/// One entry point, ready to run.
 #[derive(Debug)]
 pub(crate) struct Kernel {
     pipeline: wgpu::ComputePipeline,
@@ -126,7 +125,6 @@ pub(crate) struct FrameBindings<'a> {
     pub(crate) tiles: [u32; 2],
 }
 
-/// One stage that is being recorded.
 #[derive(Debug)]
 pub(crate) struct Stage<'a> {
     device: &'a Device,

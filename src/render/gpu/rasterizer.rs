@@ -139,14 +139,12 @@ impl Rasterizer {
         all.map(wgpu::Buffer::size).sum::<u64>() + sorts
     }
 
-    /// Reads the frame's counters.
     pub(crate) fn read_counters(&self, device: &Device) -> Result<Counters, GpuError> {
         let bytes = device.read(&[(&self.counters, size_of::<Counters>() as u64)])?;
         Ok(counters_of(&bytes[0]))
     }
 }
 
-/// Counters from their bytes.
 pub(crate) fn counters_of(bytes: &[u8]) -> Counters {
     bytemuck::pod_read_unaligned(&bytes[..size_of::<Counters>()])
 }

@@ -67,7 +67,6 @@ impl LossSums {
     }
 }
 
-/// The kernels with their buffers.
 #[derive(Debug)]
 pub(crate) struct Ssim {
     moments: Kernel,

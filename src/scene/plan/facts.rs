@@ -56,7 +56,6 @@ pub struct PhotoFacts {
     pub(crate) size_px: [u32; 2],
     /// Longest side of all of them, px.
     pub(crate) longest_px: u32,
-    /// Pixels of all of them.
     pub(crate) pixels: u64,
     /// Pixels of all of them once they are limited to the training's size.
     pub(crate) limited_pixels: u64,
@@ -78,12 +77,10 @@ pub struct SemanticFacts {
 pub struct Facts {
     /// The Gaussians, if they are a result.
     pub(crate) cloud: Option<CloudFacts>,
-    /// The photos, if there are any.
     pub(crate) photos: Option<PhotoFacts>,
     /// Objects and parts, if they were found.
     pub(crate) semantics: Option<SemanticFacts>,
     pub(crate) machine: Machine,
-    /// What the user has set.
     pub(crate) limits: Limits,
 }
 

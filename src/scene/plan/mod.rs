@@ -60,9 +60,7 @@ pub struct PlanLine {
 /// The decisions for a scene.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ScenePlan {
-    /// What they were computed from.
     pub(crate) facts: Facts,
-    /// What the user wants otherwise.
     pub(crate) overrides: Overrides,
     /// Highest spherical-harmonics degree that is drawn.
     pub sh_degree: u8,
@@ -92,7 +90,6 @@ pub struct ScenePlan {
     pub(crate) redraw: When,
     /// When the renderer holds its working memory.
     pub(crate) buffers: When,
-    /// The decisions, for the user.
     pub(crate) lines: Vec<PlanLine>,
 }
 

@@ -141,7 +141,6 @@ fn parameters(avcc: &[u8]) -> (Vec<u8>, String) {
     (stream, vui)
 }
 
-/// The bits of a parameter set.
 struct Bits<'a>(&'a [u8], usize);
 
 impl Bits<'_> {

@@ -40,7 +40,6 @@ fn camera(width_px: u32, height_px: u32) -> Camera {
     Camera::look_at(DVec3::new(0.0, 0.0, -4.0), DVec3::ZERO, DVec3::NEG_Y, 0.8, width_px, height_px).expect("valid")
 }
 
-/// A label of some pixels.
 fn label(name: &str, level: Level, size: [usize; 2], inside: impl Fn(usize) -> bool + Sync) -> Category {
     let mask = Mask::from_fn(size[0], size[1], inside);
     Category { name: name.into(), level, boxes: mask.bounds().into_iter().collect(), mask }

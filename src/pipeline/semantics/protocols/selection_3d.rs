@@ -10,9 +10,6 @@ use crate::scene::{GaussianCloud, Mask};
 const CUT: f32 = 0.7;
 
 /// Compares all categories of a view.
-///
-/// # Errors
-/// If the view cannot be drawn.
 pub(crate) fn compare(
     scene: &mut AskedScene<'_>,
     view: &LabeledView<'_>,

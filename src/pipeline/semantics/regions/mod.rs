@@ -27,9 +27,7 @@ use crate::scene::{GaussianCloud, Level, Mask, Photo};
 pub struct Regions<'a> {
     /// Gaussians that were trained on the photos, and how they are drawn, for the scene's shape.
     pub(crate) trained: Option<(&'a GaussianCloud, &'a RenderSettings)>,
-    /// How regions are found.
     pub(crate) options: RegionOptions,
-    /// Which of them are kept.
     pub(crate) filters: FilterOptions,
 }
 
