@@ -26,7 +26,6 @@ use crate::scene::{GaussianCloud, Identities, LanguageFeatures, SemanticMap, Vie
 pub use super::scene_files::MAP_FILE as FILE;
 /// Version that this program writes, and the highest it reads.
 const VERSION: u64 = 1;
-/// Key of the metadata.
 const KEY: &str = "fmlgs";
 /// Largest file that is read.
 const MAX_BYTES: u64 = 256 << 20;

@@ -54,7 +54,6 @@ pub(crate) struct Comparison {
     pub(crate) cloud: Arc<GaussianCloud>,
     pub(crate) settings: RenderSettings,
     pub(crate) dataset: Arc<Dataset>,
-    /// Indices of the photos to compare with.
     pub(crate) views: Vec<usize>,
     /// Longer side of the compared pictures in px.
     pub(crate) max_side_px: u32,

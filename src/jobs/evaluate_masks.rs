@@ -86,9 +86,7 @@ pub(crate) enum Summary {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct MaskScores {
     pub(crate) views: usize,
-    /// How many of them were trained on.
     pub(crate) trained_on: usize,
-    /// Every query of every view.
     pub(crate) units: Vec<Unit>,
     pub(crate) summary: Summary,
 }

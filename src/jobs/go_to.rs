@@ -27,7 +27,6 @@ impl std::fmt::Debug for Explored {
 }
 
 impl Explored {
-    /// Looks at a scene.
     pub(crate) fn new(cloud: Arc<GaussianCloud>, cameras: &[Camera], up: DVec3) -> Self {
         let navigator = Navigator::new(&cloud, cameras, up);
         resource_log::record(
@@ -74,9 +73,7 @@ pub struct ApproachRequest {
     pub(crate) id: IdentityId,
     pub(crate) wish: Wish,
     pub(crate) from: Pose,
-    /// Width by height of the picture.
     pub(crate) aspect: f64,
-    /// Poses of the flight.
     pub(crate) frames: usize,
 }
 

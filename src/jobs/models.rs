@@ -18,7 +18,6 @@ pub struct ModelList {
     pub(crate) engine: String,
     /// What is wrong with it, or could be better.
     pub(crate) note: Option<String>,
-    /// All models of the catalog.
     pub(crate) models: Vec<(ModelEntry, ModelState)>,
 }
 

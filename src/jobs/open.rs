@@ -24,7 +24,6 @@ pub struct Scene {
     pub(crate) path: PathBuf,
     /// Folder of the trained scene, if it is one.
     pub(crate) folder: Option<PathBuf>,
-    /// Short name for titles.
     pub(crate) name: String,
     /// The Gaussians, without bands of harmonics that are zero.
     pub(crate) cloud: Arc<GaussianCloud>,
@@ -36,7 +35,6 @@ pub struct Scene {
     pub(crate) settings: RenderSettings,
     /// How it was trained; defaults where that is not known.
     pub(crate) config: TrainConfig,
-    /// Measurements of its training.
     pub(crate) history: History,
     pub(crate) photos: Option<PathBuf>,
     /// Where its photos are, if they are still there.
@@ -165,7 +163,6 @@ pub struct OpenedScene {
     pub(crate) masks: Option<PathBuf>,
     /// Folder in which training keeps its results and checkpoints.
     pub out: PathBuf,
-    /// Measurements of earlier training.
     pub(crate) history: History,
     /// Length of a scene unit in meters, if that is known.
     pub(crate) metres_per_unit: Option<f64>,
@@ -179,7 +176,6 @@ pub struct OpenedScene {
     /// Id of the save that its files are of, if it has one.
     pub(crate) state: Option<String>,
     pub(crate) reports: Vec<PathBuf>,
-    /// Folder for a report of it.
     pub(crate) report_out: PathBuf,
 }
 

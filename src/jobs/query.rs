@@ -55,7 +55,6 @@ impl ViewMaps {
 /// A question about a scene in a view.
 #[derive(Clone, Debug)]
 pub(crate) struct Request<'a> {
-    /// As it was typed.
     pub(crate) text: &'a str,
     pub(crate) level: LevelFilter,
     pub(crate) camera: &'a Camera,
@@ -71,14 +70,12 @@ pub(crate) struct QueryResult {
     /// What is meant, and how long that took.
     pub(crate) answered: QueryAnswer,
     pub(crate) mask: Mask,
-    /// Words that nothing here knows.
     pub(crate) unknown_words: Vec<String>,
     /// Milliseconds from the text to the mask, the view there.
     pub(crate) query_ms: f64,
     pub(crate) maps: ViewMaps,
 }
 
-/// Answers a question.
 pub(crate) fn run(scene: &Scene, map: &SemanticMap, request: &Request<'_>) -> Result<QueryResult, JobError> {
     let drawn = (&*scene.cloud, &scene.settings);
     let blend = request.mode == MatchMode::Blend;

@@ -13,7 +13,6 @@ use crate::scene::{Dataset, SemanticMap};
 #[derive(Clone, Debug)]
 pub(crate) struct Trained {
     pub(crate) outcome: TrainOutcome,
-    /// Folder of the trained scene.
     pub(crate) out: PathBuf,
     /// Id of its save.
     pub(crate) state: Option<String>,

@@ -3,7 +3,6 @@
 use super::document::{Measure, Point, Report, Stage};
 use super::front::NOISE;
 
-/// A setting that both reports have measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Pair<'a> {
     /// As the first has it.

@@ -45,7 +45,6 @@ impl StageName {
         }
     }
 
-    /// As it is shown.
     pub(crate) fn title(self) -> &'static str {
         match self {
             Self::Render => "Drawing",

@@ -30,14 +30,12 @@ pub(crate) struct Options {
     pub(crate) repeats: u32,
 }
 
-/// A scene and what came with it.
 pub(crate) struct Subject {
     pub(crate) name: String,
     pub(crate) cloud: Arc<GaussianCloud>,
     pub(crate) settings: RenderSettings,
     /// Cameras of its photos, and whether training did not see them.
     pub(crate) cameras: Vec<(Camera, bool)>,
-    /// Every how-manieth photo is held out.
     pub(crate) holdout_every: usize,
     pub(crate) dataset: Option<Dataset>,
     pub(crate) map: Option<SemanticMap>,

@@ -41,7 +41,6 @@ pub(crate) struct Trial {
 #[error("{0}")]
 pub(crate) struct StudyError(pub(crate) String);
 
-/// Makes a study's error of another.
 pub(crate) fn failed(error: impl std::fmt::Display) -> StudyError {
     StudyError(error.to_string())
 }

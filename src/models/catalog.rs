@@ -13,7 +13,6 @@ use super::fetch::{self, FetchError, Patience, Wanted};
 use super::{ModelError, manifest};
 use crate::io::data_folder::data_folder;
 
-/// The list that comes with the program.
 const LIST: &str = include_str!("../../assets/models.toml");
 
 /// Name of the model that follows masks.

@@ -18,7 +18,6 @@ pub(crate) struct DemoEncoder {
 }
 
 impl DemoEncoder {
-    /// Ready to be asked.
     pub(crate) fn new() -> Result<Self, ModelError> {
         Ok(Self { words: Vocabulary::parse(WORDS.1, WORDS.0)?, image: None, text: None })
     }

@@ -20,7 +20,6 @@ use super::network::{Network, guarded};
 use super::session_cache;
 use crate::scene::resource_log::{self, Sort};
 
-/// Why networks are loaded, for the trace.
 const MODEL_USE: &str = "it is about to run for the first time";
 
 pub(crate) struct Engine {
@@ -174,13 +173,11 @@ impl Engine {
         self.note.as_deref()
     }
 
-    /// Prepares a network that is in memory.
     pub(crate) fn load(&self, bytes: &[u8], name: &str) -> Result<Network, ModelError> {
         resource_log::record(Sort::Model, format!("network {name}"), MODEL_USE, bytes.len() as u64);
         Ok(Network::new(self.prepare(name, |builder| builder.commit_from_memory(bytes))?, name))
     }
 
-    /// Prepares a network in a file.
     pub(crate) fn load_file(&self, path: &Path) -> Result<Network, ModelError> {
         let file = path.to_path_buf();
         let network = Network::new(self.session(path)?, &path.display().to_string());
@@ -224,7 +221,6 @@ impl Engine {
     }
 }
 
-/// Loads an ONNX Runtime library.
 fn loaded(path: &Path) -> Result<ort::environment::EnvironmentBuilder, String> {
     // A missing file would make the loader's own message a riddle.
     if path.is_absolute() && !path.is_file() {

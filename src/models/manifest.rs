@@ -82,7 +82,6 @@ pub(crate) fn check_pictures(path: &Path, side_px: usize, mean: [f32; 3], std: [
     Ok(())
 }
 
-/// Checks a length that a description gives.
 pub(crate) fn check_length(path: &Path, name: &str, length: usize, most: usize) -> Result<(), ModelError> {
     match (1..=most).contains(&length) {
         true => Ok(()),

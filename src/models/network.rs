@@ -60,9 +60,7 @@ impl<T: Clone> Array<T> {
 }
 
 pub(crate) enum Input {
-    /// Floating-point numbers.
     Floats(Array<f32>),
-    /// Whole numbers.
     Ints(Array<i64>),
 }
 
@@ -97,10 +95,8 @@ impl Outputs {
     }
 }
 
-/// Opens a network's file.
 type Reopen = Box<dyn Fn() -> Result<Session, ModelError> + Send + Sync>;
 
-/// A network that is ready to run.
 pub(crate) struct Network {
     place: Arc<Mutex<Place>>,
     name: String,

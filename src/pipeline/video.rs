@@ -13,7 +13,6 @@ use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 /// How much of a marked pixel is the mark, of 8.
 const MARK: u32 = 3;
 
-/// Identities that are marked in every picture.
 #[derive(Clone, Copy)]
 pub(crate) struct Marked<'a> {
     pub(crate) map: &'a SemanticMap,

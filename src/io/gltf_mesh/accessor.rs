@@ -81,7 +81,6 @@ impl File<'_> {
         Ok(Values { width, data, signed_integer: matches!(component, ComponentType::I8 | ComponentType::I16) })
     }
 
-    /// Reads an index accessor.
     pub(super) fn indices(&self, index: usize, place: &str) -> Result<Vec<u32>, IoError> {
         let root = self.root;
         let accessor = self.item(&root.accessors, index, "accessors", place)?;
@@ -132,7 +131,6 @@ impl File<'_> {
         Ok((0..count).map(move |i| &bytes[offset + i * stride..][..size]))
     }
 
-    /// The bytes of a buffer view.
     pub(super) fn view_bytes(&self, index: usize, place: &str) -> Result<&[u8], IoError> {
         let view = self.item(&self.root.buffer_views, index, "bufferViews", place)?;
         let buffer = self.item(&self.buffers, view.buffer.value(), "buffers", &format!("bufferViews[{index}]"))?;

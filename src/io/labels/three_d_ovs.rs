@@ -10,7 +10,6 @@ use super::{entries, stem};
 use crate::io::{IoError, files, llff, photo_list};
 use crate::scene::Level;
 
-/// Folder of the masks.
 const FOLDER: &str = "segmentations";
 const LIST_FILE: &str = "classes.txt";
 

@@ -40,7 +40,6 @@ impl<'a> Ply<'a> {
         self.columns(element).ok()
     }
 
-    /// Bytes after the header.
     pub(crate) fn body_len(&self) -> usize {
         self.body.len()
     }

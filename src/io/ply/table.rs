@@ -35,7 +35,6 @@ impl Column {
 
 /// Rows of fixed size, little-endian.
 pub(crate) struct Table<'a> {
-    /// Number of rows.
     pub(crate) rows: usize,
     /// Bytes per row.
     pub(crate) stride: usize,

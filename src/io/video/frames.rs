@@ -98,7 +98,6 @@ impl Sink for Frames {
     }
 }
 
-/// File name of a frame.
 fn name(frame: u64) -> String {
     format!("frame_{frame:05}.png")
 }

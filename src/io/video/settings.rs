@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use super::{Result, VideoFileError};
 use crate::scene::Camera;
 
-/// Size, rate and quality of a video.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Settings {
     /// Width of the frames in px.

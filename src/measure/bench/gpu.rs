@@ -97,7 +97,6 @@ fn medians(runs: &[StageTimes]) -> StageTimes {
     runs.first().into_iter().flatten().enumerate().map(|(k, (name, _))| (*name, stage(k))).collect()
 }
 
-/// Timing of frames or training steps.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Timing {
     pub(crate) name: String,

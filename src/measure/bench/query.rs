@@ -41,7 +41,6 @@ pub(crate) struct QueryTiming {
     #[serde(flatten)]
     pub(crate) stages: Stages<Percentiles>,
     pub(crate) without_encoding: Percentiles,
-    /// From the text to the mask.
     pub(crate) whole: Percentiles,
 }
 
@@ -68,7 +67,6 @@ impl QueryTiming {
     }
 }
 
-/// Words that queries are made of.
 const COLORS: [&str; 6] = ["red", "blue", "green", "yellow", "white", "black"];
 const THINGS: [&str; 8] = ["controller", "mug", "kettle", "lamp", "camera", "book", "car", "jar"];
 const PARTS: [&str; 6] = ["button", "handle", "lid", "shade", "lens", "wheel"];
@@ -124,7 +122,6 @@ pub(crate) fn time(
     })
 }
 
-/// Objects with four parts each.
 fn scene(identities: usize) -> Identities {
     let mut all = Identities::default();
     let mut object = NOBODY;

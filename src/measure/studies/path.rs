@@ -17,7 +17,6 @@ use crate::navigate::pose::{RotationSpline, angle};
 use crate::navigate::{FRAMES, Flight, Navigator, Pose, Speed};
 use crate::scene::{Camera, GaussianCloud};
 
-/// Flights of one measurement.
 const FLIGHTS: usize = 24;
 /// A turn from one pose to the next that is seen as a jerk, radians.
 const JERK: f64 = 3.0 * std::f64::consts::PI / 180.0;

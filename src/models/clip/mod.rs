@@ -14,7 +14,6 @@ use super::{Encoder, ModelError, Tile, manifest};
 use crate::math::resize::Filter;
 use crate::scene::PhotoPixels;
 
-/// Tiles that go through the network together.
 const BATCH: usize = 8;
 
 #[derive(Clone, Debug, Deserialize)]
@@ -43,7 +42,6 @@ struct Graphs {
     text: manifest::Graph,
 }
 
-/// Tokens that CLIP's own vocabulary has.
 const VOCABULARY: usize = 49_408;
 
 /// A CLIP with its networks, each prepared when it is first needed.
@@ -158,7 +156,6 @@ fn tile_error(tile: &Tile) -> ModelError {
     ModelError::TileSize { side_px: tile.side_px, pixels: tile.rgb.len(), expected_px: tile.side_px }
 }
 
-/// A tile as bytes.
 fn picture(tile: &Tile) -> Result<PhotoPixels, ModelError> {
     if tile.rgb.len() != tile.side_px * tile.side_px {
         return Err(tile_error(tile));

@@ -26,7 +26,6 @@ pub(crate) struct DepthErrors {
     pub(crate) within_5: f64,
 }
 
-/// Drawn and true depths side by side.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Samples {
     abs: Vec<f64>,

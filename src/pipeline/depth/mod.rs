@@ -68,7 +68,6 @@ pub enum DepthError {
     Render(#[from] RenderError),
 }
 
-/// The errors of one kind of depth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Split {
     pub(crate) all: DepthErrors,
@@ -76,7 +75,6 @@ pub(crate) struct Split {
     pub(crate) edges: DepthErrors,
 }
 
-/// The errors of both kinds of depth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct DepthScores {
     /// Of `sum(w z) / sum(w)`.
@@ -85,7 +83,6 @@ pub(crate) struct DepthScores {
     pub(crate) median: Split,
 }
 
-/// Counts errors view after view.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DepthCounter {
     /// Of expected depth: all pixels, edges.

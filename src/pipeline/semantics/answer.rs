@@ -67,7 +67,6 @@ pub(crate) fn answer(
     QueryAnswer { stages, ..taken }
 }
 
-/// Counts the time that scores take.
 struct Timed<'a, S> {
     scorer: &'a mut S,
     ms: f64,
@@ -114,7 +113,6 @@ fn judged<S: Scorer>(
     QueryAnswer { answer, basis, relevancy, stages }
 }
 
-/// Answers by names alone.
 pub(crate) fn by_name(identities: &Identities, phrase: &ParsedQuery, level: LevelFilter) -> QueryAnswer {
     judged((identities, phrase, level), Basis::Names, &mut ByName(identities), |answer, _| {
         let alone = names::scores(identities, &phrase.target);

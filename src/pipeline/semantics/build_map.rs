@@ -74,7 +74,6 @@ impl Default for FindOptions {
 
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Found {
-    /// Objects and parts of the scene.
     pub(crate) map: SemanticMap,
     /// What masks of the first photos explain of each photo.
     pub(crate) views: Vec<ViewReport>,

@@ -21,7 +21,6 @@ pub(crate) enum PartFeatures {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmbeddingOptions {
     pub(crate) parts: PartFeatures,
-    /// How pieces of wholes are looked for.
     pub(crate) strategy: Strategy,
     /// Spread of the scores; the order does not depend on it.
     pub(crate) temperature: f32,
@@ -74,12 +73,10 @@ const IDENTITIES_PER_TASK: usize = 32;
 
 /// Scores by language features.
 pub struct EmbeddingScorer<'a> {
-    /// Features of the identities.
     pub(crate) features: &'a LanguageFeatures,
     /// Embeddings of the phrases that will be asked for; others score nothing.
     pub(crate) phrases: &'a TextEmbeddings,
     pub(crate) options: EmbeddingOptions,
-    /// Scores that were asked for already.
     known: Vec<(String, Option<String>, Vec<f32>)>,
 }
 

@@ -110,7 +110,6 @@ struct Eye<'a> {
 }
 
 impl Eye<'_> {
-    /// Looks at these identities, all together.
     fn look(&mut self, ids: impl Iterator<Item = IdentityId>, encoder: &mut dyn Encoder) -> Result<(), ModelError> {
         let ids: BTreeSet<IdentityId> = ids.collect();
         let tile = |id: &IdentityId| {

@@ -33,7 +33,6 @@ pub enum Sam2TrackError {
     Interrupted(#[from] Interrupted),
 }
 
-/// Follows masks through a sequence of photos.
 pub(crate) struct Sam2Tracker {
     model: Sam2,
     cache: Option<PathBuf>,

@@ -53,7 +53,6 @@ pub(crate) struct Sighting {
 
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub(crate) struct ViewReport {
-    /// Index of the photo.
     pub(crate) photo: usize,
     /// Share of its pixels that only Gaussians without a vote cover.
     pub(crate) unknown: f64,
@@ -267,7 +266,6 @@ impl Tracker<'_> {
             .map_err(|e| TrackError::Render(photo.name.clone(), e))
     }
 
-    /// Draws what is known into every view.
     fn look(&mut self, round: usize, observer: &mut dyn Observer) -> Result<Vec<ViewReport>, TrackError> {
         let mut ticker = Ticker::new(format!("Carrying identities to all views, round {round}"), self.photos.len());
         observer.proceed()?;

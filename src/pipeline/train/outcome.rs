@@ -11,7 +11,6 @@ use crate::scene::GaussianCloud;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum TrainEnd {
-    /// All steps were done.
     Finished,
     /// The observer asked to stop; the state is saved.
     Cancelled,

@@ -92,7 +92,6 @@ impl Trainer {
         }
     }
 
-    /// Goes on on a GPU.
     pub(crate) fn move_to(&mut self, device: &Device, views: &[TrainView]) -> Result<(), GpuError> {
         let device = DeviceRun::new(device, &self.cloud, &self.moments, self.step, self.settings.clone(), views)?;
         self.device = Some(device);

@@ -73,7 +73,6 @@ struct FrameInfo<R, P> {
     primitive: P,
     view: View<R>,
     settings: RenderSettings,
-    /// Size of the cloud.
     gaussians: usize,
     extra: usize,
     channels: usize,
@@ -293,7 +292,6 @@ impl<R: Real, P: Primitive<R>> Rasterizer<R, P> {
 }
 
 impl<R: Real, P: Primitive<R>> FrameInfo<R, P> {
-    /// Values of a record.
     #[inline(always)]
     fn stride(&self) -> usize {
         P::Sums::all(R::ZERO).as_ref().len() + self.channels

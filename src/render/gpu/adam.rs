@@ -35,7 +35,6 @@ pub(crate) struct Adam {
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AdamBuffers<'a> {
-    /// Parameters to move.
     pub(crate) parameters: &'a Parameters,
     /// Their gradient, with the marks of `project_backward`.
     pub(crate) gradient: &'a Parameters,

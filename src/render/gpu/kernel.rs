@@ -119,9 +119,7 @@ pub(crate) struct FrameBindings<'a> {
     pub(crate) view: &'a wgpu::Buffer,
     /// See [`super::layout::Counters`].
     pub(crate) counters: &'a wgpu::Buffer,
-    /// Gaussians in the cloud.
     pub(crate) gaussians: u32,
-    /// Picture size in tiles.
     pub(crate) tiles: [u32; 2],
 }
 
@@ -164,7 +162,6 @@ impl<'a> Recorder<'a> {
         self.encoder.clear_buffer(buffer, 0, None);
     }
 
-    /// Hands the commands to the device.
     pub(crate) fn submit(mut self) -> wgpu::SubmissionIndex {
         if let Some(timer) = self.timer {
             timer.resolve(&mut self.encoder);

@@ -23,13 +23,9 @@ pub(crate) struct Rasterizer {
     sort: Sort,
     bin: Bin,
     blend: TileKernel,
-    /// Camera and picture.
     pub(crate) view: wgpu::Buffer,
-    /// Counters of the frame.
     pub(crate) counters: wgpu::Buffer,
-    /// Buffers by number of Gaussians.
     pub(crate) gaussians: PerGaussian,
-    /// Buffers by number of pairs.
     pub(crate) pairs: PerPair,
     pub(crate) picture: PerPicture,
     extent: (u32, [u32; 2]),
@@ -129,7 +125,6 @@ impl Rasterizer {
         Ok(())
     }
 
-    /// Bytes of its buffers on the device.
     pub(crate) fn device_bytes(&self) -> u64 {
         let (g, p) = (&self.gaussians, &self.picture);
         let own = [&self.view, &self.counters, &g.splats, &g.tile_counts, &g.sums];

@@ -23,7 +23,6 @@ pub struct DevicePhoto {
 }
 
 impl DevicePhoto {
-    /// Sends a photo to the device.
     pub(crate) fn new(device: &Device, photo: &PhotoPixels) -> Result<Self, GpuError> {
         let size_px = [photo.width_px, photo.height_px];
         let [want, _] = extent(size_px);

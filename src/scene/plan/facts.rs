@@ -68,7 +68,6 @@ pub struct SemanticFacts {
     pub(crate) parts: usize,
     /// The encoder that looked at them, if one has.
     pub(crate) encoder: Option<String>,
-    /// Numbers in their stored features.
     pub(crate) numbers: usize,
 }
 

@@ -68,11 +68,9 @@ pub struct ScenePlan {
     pub maps: When,
     /// Whether these maps have a level for parts.
     pub parts: bool,
-    /// When objects and parts are drawn alone.
     pub(crate) thumbnails: When,
     /// When the encoder of typed phrases is loaded.
     pub(crate) encoder: When,
-    /// When the graph for navigation is built.
     pub(crate) navigation: When,
     /// When depth is drawn: as it is used, or with every picture.
     pub(crate) depth: When,
@@ -88,7 +86,6 @@ pub struct ScenePlan {
     pub(crate) on_cpu: bool,
     /// When the window is drawn: as something changes, or all the time.
     pub(crate) redraw: When,
-    /// When the renderer holds its working memory.
     pub(crate) buffers: When,
     pub(crate) lines: Vec<PlanLine>,
 }

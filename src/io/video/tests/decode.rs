@@ -11,7 +11,6 @@ use openh264::formats::YUVSource;
 
 use super::super::Format;
 
-/// A video as a decoder sees it.
 pub(crate) struct Decoded {
     /// Width and height in px.
     pub(crate) size_px: (u32, u32),

@@ -16,7 +16,6 @@ const MAJORITY: usize = 3;
 /// What is kept after normalization.
 const CUT: f32 = 0.4;
 
-/// Compares all categories of a view.
 pub(crate) fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>) -> Vec<Unit> {
     let (w, h) = (view.exact.width_px, view.exact.height_px);
     let identities = &scene.map.identities;

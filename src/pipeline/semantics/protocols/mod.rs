@@ -32,7 +32,6 @@ pub(crate) struct LabeledView<'a> {
     pub(crate) camera: &'a Camera,
     pub(crate) exact: &'a ViewMap,
     pub(crate) blended: &'a CodeMap,
-    /// Labels, of the view's size.
     pub(crate) categories: Vec<Category>,
 }
 
@@ -44,7 +43,6 @@ pub(crate) struct Category {
     /// A part, if it is a piece of something that has a name.
     pub(crate) level: Level,
     pub(crate) mask: Mask,
-    /// Box of each region.
     pub(crate) boxes: Vec<PixelBox>,
 }
 
