@@ -178,14 +178,7 @@ mod tests {
     use crate::scene::{Identities, Level, NOBODY};
 
     fn cloud(x: f32) -> GaussianCloud {
-        GaussianCloud {
-            positions: vec![[x; 3]],
-            log_scales: vec![[0.0; 3]],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]],
-            opacity_logits: vec![0.0],
-            sh: vec![[0.0; 3]],
-            ..GaussianCloud::default()
-        }
+        GaussianCloud::isotropic(vec![[x; 3]], 0.0, 0.0)
     }
 
     fn named(name: &str) -> SemanticMap {

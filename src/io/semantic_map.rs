@@ -174,14 +174,7 @@ mod tests {
         let mut identities = Identities::default();
         let doll = identities.add(Level::Object, NOBODY, vec!["doll".into(), "人形".into()]);
         let eye = identities.add(Level::Part, doll, vec![]);
-        let cloud = GaussianCloud {
-            positions: vec![[0.0; 3]; 2],
-            log_scales: vec![[0.0; 3]; 2],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 2],
-            opacity_logits: vec![0.0; 2],
-            sh: vec![[0.0; 3]; 2],
-            ..GaussianCloud::default()
-        };
+        let cloud = GaussianCloud::isotropic(vec![[0.0; 3]; 2], 0.0, 0.0);
         let mut map = SemanticMap::of_identities(identities, vec![eye, NOBODY], vec![0.25, 0.0], vec!["a".into()]);
         let views = |raw: [f32; 2], deviated: [f32; 2]| ViewFeatures {
             raw: vec![raw.to_vec(); 2],

@@ -322,17 +322,15 @@ pub(crate) fn sparse_cloud(dataset: &Dataset) -> Option<GaussianCloud> {
     let points: Vec<_> = dataset.points.iter().filter(|p| p.position.is_finite()).collect();
     let spacing = bounds.radius() / (points.len() as f64).sqrt();
     let sigma = (0.35 * spacing).max(1e-9).ln() as f32;
-    let n = points.len();
     let sh = |rgb: [u8; 3]| rgb.map(|c| ((f64::from(c) / 255.0 - 0.5) / SH_C0) as f32);
     Some(GaussianCloud {
         origin,
-        positions: points.iter().map(|p| DVec3::to_array(&(p.position - origin)).map(|v| v as f32)).collect(),
-        log_scales: vec![[sigma; 3]; n],
-        quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
-        opacity_logits: vec![3.0; n],
-        sh_degree: 0,
         sh: points.iter().map(|p| sh(p.rgb)).collect(),
-        extras: Vec::new(),
+        ..GaussianCloud::isotropic(
+            points.iter().map(|p| DVec3::to_array(&(p.position - origin)).map(|v| v as f32)).collect(),
+            sigma,
+            3.0,
+        )
     })
 }
 

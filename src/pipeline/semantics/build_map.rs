@@ -238,12 +238,8 @@ mod tests {
         };
         let color = |i: usize| if i < 9 { [10.0, 0.0, 0.0] } else { [0.0, 0.0, 10.0] };
         GaussianCloud {
-            positions: (0..15).map(place).collect(),
-            log_scales: vec![[-2.4; 3]; 15],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 15],
-            opacity_logits: vec![5.0; 15],
             sh: (0..15).map(color).collect(),
-            ..GaussianCloud::default()
+            ..GaussianCloud::isotropic((0..15).map(place).collect(), -2.4, 5.0)
         }
     }
 

@@ -63,12 +63,8 @@ mod tests {
     fn codes_are_means_weighed_by_what_is_seen() {
         // Two Gaussians in one place: both blend, and half of their light is not blocked further out.
         let cloud = GaussianCloud {
-            positions: vec![[0.0; 3], [0.0, 0.0, 0.1]],
-            log_scales: vec![[-1.2; 3]; 2],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 2],
             opacity_logits: vec![0.0, 4.0],
-            sh: vec![[0.0; 3]; 2],
-            ..GaussianCloud::default()
+            ..GaussianCloud::isotropic(vec![[0.0; 3], [0.0, 0.0, 0.1]], -1.2, 0.0)
         };
         let camera =
             Camera::look_at(DVec3::new(0.0, 0.0, -4.0), DVec3::ZERO, DVec3::NEG_Y, 0.8, 61, 41).expect("valid");

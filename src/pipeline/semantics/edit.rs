@@ -231,14 +231,7 @@ mod tests {
         let of = [vec![red; 20], vec![red_eye; 10], vec![blue; 20], vec![blue_eye; 10]].concat();
         let n = of.len();
         let place = |i: usize| if i < 10 { [i as f32 * 0.01, 0.0, 0.0] } else { [5.0 + i as f32 * 0.01, 0.0, 0.0] };
-        let cloud = GaussianCloud {
-            positions: (0..n).map(place).collect(),
-            log_scales: vec![[-4.0; 3]; n],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
-            opacity_logits: vec![0.0; n],
-            sh: vec![[0.0; 3]; n],
-            ..GaussianCloud::default()
-        };
+        let cloud = GaussianCloud::isotropic((0..n).map(place).collect(), -4.0, 0.0);
         let mut map = SemanticMap::of_identities(all, of, vec![1.0; n], vec![]);
         map.language =
             Some(LanguageFeatures { encoder: "t".into(), dimension: 1, of: vec![ViewFeatures::default(); 4] });

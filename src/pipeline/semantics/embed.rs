@@ -203,14 +203,7 @@ mod tests {
         let eye = all.add(Level::Part, doll, vec![]);
         let nowhere = all.add(Level::Object, NOBODY, vec![]);
         assert_eq!((doll, eye, nowhere), (1, 2, 3));
-        let cloud = GaussianCloud {
-            positions: vec![[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]],
-            log_scales: vec![[-1.4; 3]; 2],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 2],
-            opacity_logits: vec![4.0; 2],
-            sh: vec![[0.0; 3]; 2],
-            ..GaussianCloud::default()
-        };
+        let cloud = GaussianCloud::isotropic(vec![[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]], -1.4, 4.0);
         let photo = |k: usize, eye: DVec3| {
             let camera = Camera::look_at(eye, DVec3::ZERO, DVec3::NEG_Y, 0.8, 96, 64).expect("valid");
             let left = camera.project(DVec3::new(-0.5, 0.0, 0.0)).expect("in front").x;

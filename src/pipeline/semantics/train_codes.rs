@@ -164,14 +164,7 @@ mod tests {
         for (id, code) in [(doll, [0.9, 0.2, 0.5]), (eye, [0.1, 0.3, 0.8])] {
             all.get_mut(id).expect("there").code = code;
         }
-        let cloud = GaussianCloud {
-            positions: vec![[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]],
-            log_scales: vec![[-1.6; 3]; 2],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 2],
-            opacity_logits: vec![4.0; 2],
-            sh: vec![[0.0; 3]; 2],
-            ..GaussianCloud::default()
-        };
+        let cloud = GaussianCloud::isotropic(vec![[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]], -1.6, 4.0);
         let camera =
             Camera::look_at(DVec3::new(0.0, 0.0, -3.0), DVec3::ZERO, DVec3::NEG_Y, 0.6, 48, 32).expect("valid");
         let label = |i: usize| {

@@ -143,12 +143,8 @@ mod tests {
         let mut all = Identities::default();
         let (front, behind) = (all.add(Level::Object, NOBODY, vec![]), all.add(Level::Object, NOBODY, vec![]));
         let cloud = GaussianCloud {
-            positions: vec![[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]],
             log_scales: vec![[-1.8; 3], [-0.9; 3]],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 2],
-            opacity_logits: vec![4.0; 2],
-            sh: vec![[0.0; 3]; 2],
-            ..GaussianCloud::default()
+            ..GaussianCloud::isotropic(vec![[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]], 0.0, 4.0)
         };
         let camera =
             Camera::look_at(DVec3::new(0.0, 0.0, -3.0), DVec3::ZERO, DVec3::NEG_Y, 0.6, 50, 37).expect("valid");

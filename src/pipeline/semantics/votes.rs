@@ -169,14 +169,7 @@ mod tests {
     #[test]
     fn pixels_vote_for_what_they_show() {
         // Two Gaussians side by side, labeled left and right; the middle columns say nothing.
-        let cloud = GaussianCloud {
-            positions: vec![[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]],
-            log_scales: vec![[-2.0; 3]; 2],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 2],
-            opacity_logits: vec![2.0; 2],
-            sh: vec![[0.0; 3]; 2],
-            ..GaussianCloud::default()
-        };
+        let cloud = GaussianCloud::isotropic(vec![[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]], -2.0, 2.0);
         let camera =
             Camera::look_at(DVec3::new(0.0, 0.0, -3.0), DVec3::ZERO, DVec3::NEG_Y, 0.6, 45, 33).expect("valid");
         let labels: Vec<IdentityId> = (0..45 * 33).map(|i| [1, UNKNOWN, 2][(i % 45) / 15]).collect();

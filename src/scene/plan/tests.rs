@@ -17,14 +17,7 @@ fn colored(band_one: f32, band_two: f32) -> GaussianCloud {
 
 /// `n` round Gaussians along a line, of this log-scale.
 fn blobs(n: usize, log_scale: f32) -> GaussianCloud {
-    GaussianCloud {
-        positions: (0..n).map(|i| [0.2 * i as f32 - 0.1 * n as f32, 0.0, 0.0]).collect(),
-        log_scales: vec![[log_scale; 3]; n],
-        quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
-        opacity_logits: vec![3.0; n],
-        sh: vec![[0.0; 3]; n],
-        ..GaussianCloud::default()
-    }
+    GaussianCloud::isotropic((0..n).map(|i| [0.2 * i as f32 - 0.1 * n as f32, 0.0, 0.0]).collect(), log_scale, 3.0)
 }
 
 fn camera(side_px: u32) -> Camera {

@@ -161,12 +161,8 @@ fn fastlgs_ex_pools_over_categories_and_views() {
 fn a_selection_is_drawn_alone_and_cut_at_seven_tenths() {
     // A doll, and a cat that stands in front of it.
     let cloud = GaussianCloud {
-        positions: vec![[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]],
         log_scales: vec![[-0.6; 3], [-0.2; 3]],
-        quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 2],
-        opacity_logits: vec![4.0; 2],
-        sh: vec![[0.0; 3]; 2],
-        ..GaussianCloud::default()
+        ..GaussianCloud::isotropic(vec![[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]], 0.0, 4.0)
     };
     let map = scene(vec![DOLL, CAT]);
     let camera = camera(120, 90);
