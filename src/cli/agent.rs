@@ -13,7 +13,7 @@ use crate::agent::llm::{Llm, SENT, discover};
 use crate::agent::scene::{Effect, Parts, SceneWorld};
 use crate::agent::{AgentEvent, Planner, Policy, Session};
 use crate::io;
-use crate::jobs::open;
+use crate::jobs::{export, open};
 use crate::navigate::Pose;
 
 const EXAMPLES: &str = "Examples:\n  \
@@ -183,15 +183,15 @@ pub(crate) fn run(args: Args) -> Result<(), CliError> {
     if let Some(path) = &args.transcript {
         let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
         let text = if json { session.transcript().to_json() } else { session.transcript().to_markdown() };
-        output::make_parent(path)?;
+        export::make_parent(path)?;
         io::atomic::write(path, |w| std::io::Write::write_all(w, text.as_bytes()))?;
     }
     if let Some(path) = &args.view {
         let camera = world.eye().camera(camera.width_px, camera.height_px).limited_to(1280);
         let frame = crate::render::Renderer::new().draw(&cloud, &camera, &settings)?;
-        output::make_parent(path)?;
+        export::make_parent(path)?;
         let size = [camera.width_px, camera.height_px];
-        output::write_png(path, frame.to_rgb8().as_flattened(), size, image::ColorType::Rgb8)?;
+        export::png(path, frame.to_rgb8().as_flattened(), size, image::ColorType::Rgb8)?;
     }
     if args.json {
         output::print_json(&json!({ "planner": session.planner(), "requests": talk.told }))?;

@@ -13,8 +13,7 @@ use super::train::Settings;
 use super::{CliError, interrupt, output, synth};
 use crate::io;
 use crate::jobs::evaluate::{self, Comparison, Options};
-use crate::jobs::open;
-use crate::jobs::plan;
+use crate::jobs::{export, open, plan};
 use crate::math::stats::median;
 use crate::measure::studies::Input;
 use crate::measure::table::{markdown, rows};
@@ -166,7 +165,7 @@ fn make_photos(folder: &Path, console: &mut Console) -> Result<Option<f64>, CliE
 
 /// Draws a circle around what the photos look at; returns the median milliseconds per image.
 fn fly(cloud: &GaussianCloud, settings: &RenderSettings, dataset: &Dataset, folder: &Path) -> Result<f64, CliError> {
-    output::make_folder(folder)?;
+    export::make_folder(folder)?;
     let mut renderer = Renderer::new();
     let mut millis = Vec::with_capacity(FLIGHT_PICTURES);
     for (i, camera) in circle(dataset).iter().enumerate() {
@@ -178,7 +177,7 @@ fn fly(cloud: &GaussianCloud, settings: &RenderSettings, dataset: &Dataset, fold
         millis.push(start.elapsed().as_secs_f64() * 1e3);
         let path = folder.join(format!("{i:03}.png"));
         let size = [camera.width_px, camera.height_px];
-        output::write_png(&path, frame.to_rgb8().as_flattened(), size, ColorType::Rgb8)?;
+        export::png(&path, frame.to_rgb8().as_flattened(), size, ColorType::Rgb8)?;
     }
     Ok(median(&millis))
 }
@@ -264,15 +263,12 @@ mod tests {
     fn the_flight_stays_with_the_photos() {
         let photo = |i: usize| {
             let (sin, cos) = (i as f64 * 0.7).sin_cos();
-            Photo {
-                name: i.to_string(),
-                path: PathBuf::new(),
-                camera: Camera::look_at(DVec3::new(3.0 * cos, 3.0 * sin, 1.0), DVec3::ZERO, DVec3::Z, 0.8, 64, 48)
+            Photo::new(
+                i.to_string(),
+                PathBuf::new(),
+                Camera::look_at(DVec3::new(3.0 * cos, 3.0 * sin, 1.0), DVec3::ZERO, DVec3::Z, 0.8, 64, 48)
                     .expect("valid"),
-                distortion: None,
-                background: None,
-                test_split: false,
-            }
+            )
         };
         let dataset = Dataset { photos: (0..9).map(photo).collect(), ..Dataset::default() };
         let cameras = circle(&dataset);

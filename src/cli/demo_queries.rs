@@ -5,12 +5,12 @@ use std::time::Instant;
 
 use serde::Serialize;
 
+use super::CliError;
 use super::progress::Console;
-use super::{CliError, output};
 use crate::io::SceneFolder;
 use crate::io::labels::Labels;
 use crate::jobs::evaluate::Comparison;
-use crate::jobs::query;
+use crate::jobs::{export, query};
 use crate::models;
 use crate::pipeline::observer::{Observer, Severity, Silent};
 use crate::pipeline::semantics::build_map::{FindOptions, Found, Tools, find_objects};
@@ -98,7 +98,7 @@ pub(crate) fn run(
     }
     console.note(Severity::Info, format!("{} objects and parts found", map.identities.len()));
 
-    output::make_folder(pictures)?;
+    export::make_folder(pictures)?;
     let mut asker = QueryEngine::new(map.language.as_ref())?;
     let (mut units, mut asked) = (Vec::new(), Vec::new());
     let mut renderer = Renderer::new();

@@ -4,12 +4,10 @@
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 
-use image::ColorType;
 use serde::Serialize;
 
 use super::CliError;
 use crate::io::{atomic, scene_files, trained};
-use crate::jobs::export;
 use crate::scene::text;
 
 /// Prints `text` and a line break to standard output. A reader that has closed its end (`| head`)
@@ -83,21 +81,6 @@ pub(crate) fn check(path: &Path, endings: &[&str], reads: &[&Path]) -> Result<()
 pub(crate) fn check_folder(folder: &Path, reads: &[&Path]) -> Result<(), CliError> {
     // Where it does not exist yet, nothing in it is read.
     if folder.exists() { check(folder, &[], reads) } else { Ok(()) }
-}
-
-/// Makes the folder that `path` lies in.
-pub(crate) fn make_parent(path: &Path) -> Result<(), CliError> {
-    Ok(export::make_parent(path)?)
-}
-
-/// Makes `folder` and those above it.
-pub(crate) fn make_folder(folder: &Path) -> Result<(), CliError> {
-    Ok(export::make_folder(folder)?)
-}
-
-/// Writes a PNG of `size_px` from raw samples, those of 16 bits in the machine's byte order.
-pub(crate) fn write_png(path: &Path, samples: &[u8], size_px: [u32; 2], color: ColorType) -> Result<(), CliError> {
-    Ok(export::png(path, samples, size_px, color)?)
 }
 
 #[cfg(test)]

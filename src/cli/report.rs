@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::progress::Console;
 use super::{CliError, number, output};
 use crate::io;
-use crate::jobs::open;
+use crate::jobs::{export, open};
 use crate::measure::subject::{Options, Subject};
 use crate::measure::{BeginError, End, FILE, Report, Stage, StageName, computer, defaults, page, plot};
 use crate::pipeline::observer::{Observer, Severity};
@@ -94,7 +94,7 @@ pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let subject = subject(&scene, options)?;
     let (stages, missing) = subject.stages(&args.stages)?;
     missing.iter().for_each(|m| console.note(Severity::Info, m.clone()));
-    output::make_folder(&args.out)?;
+    export::make_folder(&args.out)?;
     let start = Instant::now();
     let mut stopped = None;
     for (k, name) in stages.iter().enumerate() {

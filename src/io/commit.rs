@@ -109,11 +109,7 @@ pub(super) fn carry_out(folder: &Path) -> Result<(), IoError> {
     let plain = |name: &str| !name.is_empty() && !name.contains(['/', '\\']) && name != ".." && name != ".";
     let names = journal.put.iter().map(|(_, to)| to).chain(&journal.remove);
     if !journal.put.iter().all(|(from, _)| is_temporary(from) && plain(from)) || !names.clone().all(|n| plain(n)) {
-        return Err(IoError::Syntax {
-            path,
-            place: "names".into(),
-            reason: "they are not those of an interrupted save; remove the file".into(),
-        });
+        return Err(IoError::syntax(&path, "names", "they are not those of an interrupted save; remove the file"));
     }
     let rename = || {
         for (from, to) in &journal.put {

@@ -68,6 +68,13 @@ pub enum IoError {
     Version { path: PathBuf, found: u64, supported: u64 },
 }
 
+impl IoError {
+    /// Something at `place` of a file that does not follow its format.
+    pub(crate) fn syntax(path: &Path, place: impl Into<String>, reason: impl Into<String>) -> Self {
+        Self::Syntax { path: path.into(), place: place.into(), reason: reason.into() }
+    }
+}
+
 /// Why a path could not be opened.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]

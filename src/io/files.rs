@@ -70,11 +70,8 @@ pub(crate) fn read_start(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
 
 /// The text of a UTF-8 file of at most [`MAX_TEXT_BYTES`].
 pub(crate) fn read_text(path: &Path) -> Result<String, IoError> {
-    String::from_utf8(read(path, MAX_TEXT_BYTES)?).map_err(|e| IoError::Syntax {
-        path: path.into(),
-        place: format!("byte {}", e.utf8_error().valid_up_to()),
-        reason: "not UTF-8 text".into(),
-    })
+    String::from_utf8(read(path, MAX_TEXT_BYTES)?)
+        .map_err(|e| IoError::syntax(path, format!("byte {}", e.utf8_error().valid_up_to()), "not UTF-8 text"))
 }
 
 /// A JSON file as `T`.
@@ -87,11 +84,7 @@ pub(crate) fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T
 pub(crate) fn json_error(path: &Path, e: &serde_json::Error) -> IoError {
     let text = e.to_string();
     let reason = text.rsplit_once(" at line ").map_or(text.as_str(), |(reason, _)| reason);
-    IoError::Syntax {
-        path: path.into(),
-        place: format!("line {} column {}", e.line(), e.column()),
-        reason: reason.into(),
-    }
+    IoError::syntax(path, format!("line {} column {}", e.line(), e.column()), reason)
 }
 
 /// A path that a dataset's file `source` refers to, relative to the dataset's folder `root`:
@@ -133,11 +126,11 @@ pub(crate) fn inside(root: &Path, entry: &str, source: &Path) -> Result<Option<P
 pub(crate) fn photo_name(name: &str, source: &Path) -> Result<(), IoError> {
     let most = text::LONGEST_PHOTO_NAME;
     match name.chars().count() {
-        length if length > most => Err(IoError::Syntax {
-            path: source.into(),
-            place: format!("photo '{}'", text::shortened(name, 40)),
-            reason: format!("its name has {length} letters, at most {most} are read; rename the photo"),
-        }),
+        length if length > most => Err(IoError::syntax(
+            source,
+            format!("photo '{}'", text::shortened(name, 40)),
+            format!("its name has {length} letters, at most {most} are read; rename the photo"),
+        )),
         _ => Ok(()),
     }
 }

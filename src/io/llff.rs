@@ -97,11 +97,11 @@ fn listed(row: &[f64; ROW], name: &str, folder: &str, source: &Path) -> Result<L
     let DVec3 { x: height, y: width, z: focal } = column(4);
     let side = |v: f64| (v >= 1.0 && v <= f64::from(Camera::MAX_SIDE_PX)).then_some(v.round() as u32);
     let (Some(w), Some(h)) = (side(width), side(height)) else {
-        return Err(IoError::Syntax {
-            path: source.into(),
-            place: format!("photo '{name}'"),
-            reason: format!("size {width} x {height} px is not between 1 and {} px a side", Camera::MAX_SIDE_PX),
-        });
+        return Err(IoError::syntax(
+            source,
+            format!("photo '{name}'"),
+            format!("size {width} x {height} px is not between 1 and {} px a side", Camera::MAX_SIDE_PX),
+        ));
     };
     Ok(Listed {
         name: name.into(),

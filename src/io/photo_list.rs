@@ -102,11 +102,11 @@ fn resolve(l: &Listed, root: &Path, source: &Path) -> Result<Option<Photo>, IoEr
     for (property, value) in [("k1", d.k1), ("k2", d.k2), ("p1", d.p1), ("p2", d.p2)] {
         if !value.is_finite() {
             let property = format!("distortion {property}");
-            return Err(IoError::Syntax {
-                path: source.into(),
-                place: format!("photo '{}'", l.name),
-                reason: format!("{property} = {value} is not finite"),
-            });
+            return Err(IoError::syntax(
+                source,
+                format!("photo '{}'", l.name),
+                format!("{property} = {value} is not finite"),
+            ));
         }
     }
     let Some(path) = find(root, &l.entry, source)? else { return Ok(None) };
@@ -114,15 +114,15 @@ fn resolve(l: &Listed, root: &Path, source: &Path) -> Result<Option<Photo>, IoEr
     let declared = l.lens.camera(found, rotation, l.center);
     declared.believe().map_err(bad)?;
     if d != Distortion::default() && !covers(&declared, &d) {
-        return Err(IoError::Syntax {
-            path: source.into(),
-            place: format!("photo '{}'", l.name),
-            reason: format!(
+        return Err(IoError::syntax(
+            source,
+            format!("photo '{}'", l.name),
+            format!(
                 "its lens distortion (k1 {:e}, k2 {:e}, p1 {:e}, p2 {:e}) leaves nothing of the picture; calibrate the camera \
                  anew or undistort the photo",
                 d.k1, d.k2, d.p1, d.p2
             ),
-        });
+        ));
     }
     let expected = (declared.width_px, declared.height_px);
     if !is_scaled(expected, found) {
@@ -147,11 +147,11 @@ pub(super) fn place(p: DVec3, element: &'static str, index: usize, path: &Path) 
     if !value.is_finite() {
         return Err(IoError::NotFinite { path: path.into(), element, index, property: property.into() });
     }
-    Err(IoError::Syntax {
-        path: path.into(),
-        place: format!("{element} {index}"),
-        reason: format!("{property} = {value:e} is farther than {:e} units from the origin", Camera::FARTHEST),
-    })
+    Err(IoError::syntax(
+        path,
+        format!("{element} {index}"),
+        format!("{property} = {value:e} is farther than {:e} units from the origin", Camera::FARTHEST),
+    ))
 }
 
 /// The listed file, with one of the usual endings if it has none.
@@ -187,11 +187,11 @@ pub(super) fn photo_folder(root: &Path, source: &Path) -> Result<String, IoError
     }
     match best {
         Some((_, name)) => Ok(name),
-        None => Err(IoError::Syntax {
-            path: source.into(),
-            place: "photos".into(),
-            reason: format!("there is neither a folder 'images' nor 'images_<factor>' in {}", root.display()),
-        }),
+        None => Err(IoError::syntax(
+            source,
+            "photos",
+            format!("there is neither a folder 'images' nor 'images_<factor>' in {}", root.display()),
+        )),
     }
 }
 

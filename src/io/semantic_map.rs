@@ -53,11 +53,7 @@ pub fn encode(map: &SemanticMap, state: Option<&str>, path: &Path) -> Result<Vec
         encoder: language.map(|l| l.encoder.clone()),
         identities: map.identities.clone(),
     };
-    let broken = |e: &dyn std::fmt::Display| IoError::Syntax {
-        path: path.into(),
-        place: "semantic map".into(),
-        reason: e.to_string(),
-    };
+    let broken = |e: &dyn std::fmt::Display| IoError::syntax(path, "semantic map", e.to_string());
     let text = serde_json::to_string(&header).map_err(|e| broken(&e))?;
     let codes: Vec<[f32; 3]> = map.identities.iter().map(|(_, i)| i.code).collect();
     let parents: Vec<u32> = map.identities.iter().map(|(_, i)| i.parent).collect();
@@ -113,11 +109,7 @@ fn packed(language: &LanguageFeatures, of: impl Fn(&ViewFeatures) -> &Vec<Vec<f3
 }
 
 fn features(path: &Path, bytes: &[u8], encoder: String, identities: &Identities) -> Result<LanguageFeatures, IoError> {
-    let broken = |place: &str, reason: &str| IoError::Syntax {
-        path: path.into(),
-        place: format!("tensor '{place}'"),
-        reason: reason.into(),
-    };
+    let broken = |place: &str, reason: &str| IoError::syntax(path, format!("tensor '{place}'"), reason);
     let file = SafeTensors::deserialize(bytes).map_err(|e| broken("", &e.to_string()))?;
     let tensor = |name: &str, dtype: Dtype| {
         let found = file.tensor(name).map_err(|e| broken(name, &e.to_string()))?;

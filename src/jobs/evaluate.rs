@@ -201,13 +201,12 @@ mod tests {
 
     #[test]
     fn a_scene_says_by_name_which_photos_it_has_not_seen() {
-        let photo = |name: &str| Photo {
-            name: name.into(),
-            path: PathBuf::new(),
-            camera: Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid"),
-            distortion: None,
-            test_split: false,
-            background: None,
+        let photo = |name: &str| {
+            Photo::new(
+                name,
+                PathBuf::new(),
+                Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid"),
+            )
         };
         let trained_on = Dataset { photos: ["a", "b", "c", "d"].map(photo).to_vec(), ..Dataset::default() };
         let cameras = open::cameras(&trained_on, 2);

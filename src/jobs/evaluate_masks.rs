@@ -42,45 +42,38 @@ pub(crate) enum Protocol {
     PartRecall,
 }
 
-/// What a protocol counts besides the IoU of each query.
+/// What the [`Protocol`] of the same name counts besides the IoU of each query.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub(crate) enum Summary {
-    /// Of the protocol [`Protocol::Masks`].
     Masks {
-        /// Mean IoU of objects.
         object_miou: f64,
-        /// Mean IoU of parts.
         part_miou: f64,
     },
-    /// Of the protocol [`Protocol::Langsplat`].
     Langsplat {
         /// Share of queries whose most relevant pixel lies in their box.
         localization: f64,
     },
-    /// Of the protocol [`Protocol::FastlgsEx`]: nothing.
     FastlgsEx {},
-    /// Of the protocol [`Protocol::Selection3d`].
     Selection3d {
         /// Share of queries with an IoU of 0.25 or more.
         accuracy_25: f64,
         /// Share of queries with an IoU of 0.5 or more.
         accuracy_50: f64,
     },
-    /// Of the protocol [`Protocol::SpinNerf`].
     SpinNerf {
-        /// Share of pixels that are right.
         accuracy: f64,
     },
-    /// Of the protocol [`Protocol::Ovs3d`].
     Ovs3d {
         /// Mean IoU where every pixel is of the class that fits best.
         argmax_miou: f64,
         #[serde(skip)]
         classes: usize,
     },
-    /// Of the protocol [`Protocol::PartRecall`].
-    PartRecall { encoder: String, rows: Vec<part_recall::Row> },
+    PartRecall {
+        encoder: String,
+        rows: Vec<part_recall::Row>,
+    },
 }
 
 #[derive(Clone, Debug, PartialEq)]

@@ -90,6 +90,15 @@ fn each<R: Real>(f: impl Fn(usize) -> R) -> Lane<R> {
     std::array::from_fn(f)
 }
 
+macro_rules! by_lane {
+    ($($name:ident $op:tt),*) => {$(
+        #[inline(always)]
+        fn $name(self, a: Lane<R>, b: Lane<R>) -> Lane<R> {
+            each(|l| a[l] $op b[l])
+        }
+    )*};
+}
+
 impl<R: Real> Lanes<R> for Plain {
     type V = Lane<R>;
     type M = [bool; LANES];
@@ -105,22 +114,7 @@ impl<R: Real> Lanes<R> for Plain {
     fn store(self, v: Lane<R>) -> Lane<R> {
         v
     }
-    #[inline(always)]
-    fn add(self, a: Lane<R>, b: Lane<R>) -> Lane<R> {
-        each(|l| a[l] + b[l])
-    }
-    #[inline(always)]
-    fn sub(self, a: Lane<R>, b: Lane<R>) -> Lane<R> {
-        each(|l| a[l] - b[l])
-    }
-    #[inline(always)]
-    fn mul(self, a: Lane<R>, b: Lane<R>) -> Lane<R> {
-        each(|l| a[l] * b[l])
-    }
-    #[inline(always)]
-    fn div(self, a: Lane<R>, b: Lane<R>) -> Lane<R> {
-        each(|l| a[l] / b[l])
-    }
+    by_lane! { add +, sub -, mul *, div / }
     #[inline(always)]
     fn mul_add(self, a: Lane<R>, b: Lane<R>, c: Lane<R>) -> Lane<R> {
         each(|l| a[l] * b[l] + c[l])
@@ -171,6 +165,15 @@ mod avx2 {
 
     use super::{LANES, Lane, LaneOp, Lanes};
 
+    macro_rules! instructions {
+        ($($name:ident $instruction:ident),*) => {$(
+            #[inline(always)]
+            fn $name(self, a: f32x8, b: f32x8) -> f32x8 {
+                self.$instruction(a, b)
+            }
+        )*};
+    }
+
     impl Lanes<f32> for V3 {
         type V = f32x8;
         type M = m32x8;
@@ -186,33 +189,10 @@ mod avx2 {
         fn store(self, v: f32x8) -> Lane<f32> {
             bytemuck::cast(v)
         }
-        #[inline(always)]
-        fn add(self, a: f32x8, b: f32x8) -> f32x8 {
-            self.add_f32x8(a, b)
-        }
-        #[inline(always)]
-        fn sub(self, a: f32x8, b: f32x8) -> f32x8 {
-            self.sub_f32x8(a, b)
-        }
-        #[inline(always)]
-        fn mul(self, a: f32x8, b: f32x8) -> f32x8 {
-            self.mul_f32x8(a, b)
-        }
-        #[inline(always)]
-        fn div(self, a: f32x8, b: f32x8) -> f32x8 {
-            self.div_f32x8(a, b)
-        }
+        instructions! { add add_f32x8, sub sub_f32x8, mul mul_f32x8, div div_f32x8, min min_f32x8, max max_f32x8 }
         #[inline(always)]
         fn mul_add(self, a: f32x8, b: f32x8, c: f32x8) -> f32x8 {
             self.mul_add_f32x8(a, b, c)
-        }
-        #[inline(always)]
-        fn min(self, a: f32x8, b: f32x8) -> f32x8 {
-            self.min_f32x8(a, b)
-        }
-        #[inline(always)]
-        fn max(self, a: f32x8, b: f32x8) -> f32x8 {
-            self.max_f32x8(a, b)
         }
         #[inline(always)]
         fn ge(self, a: f32x8, b: f32x8) -> m32x8 {

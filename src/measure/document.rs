@@ -11,49 +11,54 @@ use crate::math::stats::median;
 /// Version of the JSON document.
 pub const VERSION: u32 = 2;
 
-/// A part of the program whose knobs are measured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, clap::ValueEnum)]
+/// A part of the program whose knobs are measured, in the order of the program; its message is its title.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Serialize,
+    Deserialize,
+    clap::ValueEnum,
+    strum::EnumMessage,
+    strum::IntoStaticStr,
+    strum::VariantArray,
+)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum StageName {
     /// Images against the exact image.
+    #[strum(message = "Drawing")]
     Render,
     /// Training against held-out photos.
+    #[strum(message = "Training")]
     Train,
     /// Identities of Gaussians against labels.
+    #[strum(message = "Finding objects")]
     Features,
     /// Answers to typed queries against labels.
+    #[strum(message = "Queries")]
     Query,
     /// Flights against occupied space and their own length.
+    #[strum(message = "Camera paths")]
     Path,
     /// Drawn depth against true depth.
+    #[strum(message = "Depth")]
     Depth,
 }
 
 impl StageName {
-    /// All, in the order of the program.
-    pub(crate) const ALL: [Self; 6] = [Self::Render, Self::Train, Self::Features, Self::Query, Self::Path, Self::Depth];
-
     /// As in JSON and on the command line.
     pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Render => "render",
-            Self::Train => "train",
-            Self::Features => "features",
-            Self::Query => "query",
-            Self::Path => "path",
-            Self::Depth => "depth",
-        }
+        self.into()
     }
 
     pub(crate) fn title(self) -> &'static str {
-        match self {
-            Self::Render => "Drawing",
-            Self::Train => "Training",
-            Self::Features => "Finding objects",
-            Self::Query => "Queries",
-            Self::Path => "Camera paths",
-            Self::Depth => "Depth",
-        }
+        strum::EnumMessage::get_message(&self).unwrap_or_default()
     }
 }
 

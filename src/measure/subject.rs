@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use strum::VariantArray;
+
 use super::studies::views::{held_out, spread};
 use super::studies::{Input, depth, features, path, query, render, train};
 use super::sweep::failed;
@@ -46,7 +48,7 @@ impl Subject {
     /// The stages that are wanted, and for each that is not possible why.
     pub(crate) fn stages(&self, wanted: &[StageName]) -> Result<(Vec<StageName>, Vec<String>), StudyError> {
         let (mut stages, mut missing) = (Vec::new(), Vec::new());
-        for name in StageName::ALL {
+        for &name in StageName::VARIANTS {
             let asked = wanted.contains(&name);
             match self.lacks(name) {
                 None if asked || wanted.is_empty() => stages.push(name),

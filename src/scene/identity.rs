@@ -67,6 +67,15 @@ pub struct Identities {
 }
 
 impl Identities {
+    /// So many nameless objects.
+    pub(crate) fn objects(count: usize) -> Self {
+        let mut all = Self::default();
+        for _ in 0..count {
+            all.add(Level::Object, NOBODY, Vec::new());
+        }
+        all
+    }
+
     /// Adds an identity. A parent that does not exist yet is nobody.
     pub fn add(&mut self, level: Level, parent: IdentityId, names: Vec<String>) -> IdentityId {
         let parent = if self.get(parent).is_some() { parent } else { NOBODY };

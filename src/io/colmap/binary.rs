@@ -61,11 +61,8 @@ pub(super) fn images(bytes: &[u8], path: &Path) -> Result<Vec<Image>, IoError> {
         }
         let translation = DVec3::new(r.f64(&place)?, r.f64(&place)?, r.f64(&place)?);
         let camera = r.u32(&place)?;
-        let name = std::str::from_utf8(r.c_string(&place)?).map_err(|_| IoError::Syntax {
-            path: path.into(),
-            place: place.clone(),
-            reason: "its name is not UTF-8 text".into(),
-        })?;
+        let name = std::str::from_utf8(r.c_string(&place)?)
+            .map_err(|_| IoError::syntax(path, place.clone(), "its name is not UTF-8 text"))?;
         let observations = r.count(&format!("2-D points of {place}"), OBSERVATION_BYTES)?;
         r.take(observations * OBSERVATION_BYTES, &place)?;
         images.push(Image { name: name.into(), camera, quaternion: q, translation });

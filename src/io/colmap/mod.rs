@@ -93,11 +93,11 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
 
 fn listed(image: &Image, cameras: &Cameras, root: &Path, folder: &str, source: &Path) -> Result<Listed, IoError> {
     let Some(lens) = cameras.get(&image.camera) else {
-        return Err(IoError::Syntax {
-            path: source.into(),
-            place: format!("photo '{}'", image.name),
-            reason: format!("there is no camera {}", image.camera),
-        });
+        return Err(IoError::syntax(
+            source,
+            format!("photo '{}'", image.name),
+            format!("there is no camera {}", image.camera),
+        ));
     };
     let bad = |cause| IoError::Camera { path: source.into(), photo: image.name.clone(), cause };
     let [x, y, z] = matrix_from_quaternion(image.quaternion).ok_or_else(|| bad(CameraError::Rotation(f64::NAN)))?;
@@ -124,11 +124,11 @@ fn distinct(mut ids: Vec<u64>, what: &str, path: &Path) -> Result<(), IoError> {
     ids.sort_unstable();
     match ids.windows(2).find(|w| w[0] == w[1]) {
         None => Ok(()),
-        Some(w) => Err(IoError::Syntax {
-            path: path.into(),
-            place: format!("{what} {}", w[0]),
-            reason: "its number is given twice; which of the two is meant cannot be told".into(),
-        }),
+        Some(w) => Err(IoError::syntax(
+            path,
+            format!("{what} {}", w[0]),
+            "its number is given twice; which of the two is meant cannot be told",
+        )),
     }
 }
 

@@ -130,11 +130,7 @@ pub(crate) struct Element {
 pub(super) fn parse<'a>(bytes: &'a [u8], path: &'a Path) -> Result<Ply<'a>, IoError> {
     let mut rest = bytes;
     let mut number = 0_usize;
-    let bad = |line: usize, reason: &str| IoError::Syntax {
-        path: path.into(),
-        place: format!("header line {line}"),
-        reason: reason.into(),
-    };
+    let bad = |line: usize, reason: &str| IoError::syntax(path, format!("header line {line}"), reason);
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
     let mut comments = Vec::new();

@@ -81,14 +81,7 @@ fn datasets_are_referred_to_relatively() {
     let folder = tempfile::tempdir().expect("folder");
     let root = folder.path().join("data/plush");
     fs::create_dir_all(&root).expect("create");
-    let photo = |name: &str| Photo {
-        name: name.into(),
-        path: root.join(name),
-        camera: camera(),
-        distortion: None,
-        test_split: false,
-        background: None,
-    };
+    let photo = |name: &str| Photo::new(name, root.join(name), camera());
     let dataset = Dataset { root: root.clone(), photos: vec![photo("a"), photo("b")], ..Dataset::default() };
     let scene = folder.path().join("out/scene");
     fs::create_dir_all(&scene).expect("create");

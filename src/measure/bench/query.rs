@@ -156,11 +156,5 @@ fn view(rng: &mut Pcg64Mcg, identities: usize, [w, h]: [usize; 2]) -> ViewMap {
         let far = |k: &usize| (points[*k][0] - x).pow(2) + (points[*k][1] - y).pow(2);
         (0..points.len()).min_by_key(far).map_or(NOBODY, |k| k as IdentityId + 1)
     };
-    ViewMap {
-        width_px: w,
-        height_px: h,
-        identity: (0..w * h).map(nearest).collect(),
-        share: vec![1.0; w * h],
-        alpha: vec![1.0; w * h],
-    }
+    ViewMap::certain(w, (0..w * h).map(nearest).collect())
 }

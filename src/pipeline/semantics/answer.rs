@@ -239,8 +239,7 @@ mod tests {
         assert_eq!(stages.whole(), stages.relevancy + stages.localize, "nothing else happens here");
         let a = ask("lamp", true);
         assert_eq!(a.chosen(2), [1], "only what fits");
-        let map =
-            ViewMap { width_px: 3, height_px: 1, identity: vec![1, 2, 3], share: vec![1.0; 3], alpha: vec![1.0; 3] };
+        let map = ViewMap::certain(3, vec![1, 2, 3]);
         let (all, _) = scene();
         assert_eq!(a.mask(&map, &all, 1).area(), 2, "a piece belongs to its whole");
         assert_eq!(a.heat(&map)[2], 0.0);

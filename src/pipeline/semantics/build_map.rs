@@ -245,14 +245,13 @@ mod tests {
 
     /// The first photo shows the doll alone, the second everything.
     fn photos() -> Vec<Photo> {
-        let photo = |name: &str, x: f64, away: f64| Photo {
-            name: name.into(),
-            path: PathBuf::new(),
-            camera: Camera::look_at(DVec3::new(x, 0.0, -away), DVec3::new(x, 0.0, 0.0), DVec3::NEG_Y, 0.7, 96, 64)
-                .expect("valid"),
-            distortion: None,
-            test_split: false,
-            background: None,
+        let photo = |name: &str, x: f64, away: f64| {
+            Photo::new(
+                name,
+                PathBuf::new(),
+                Camera::look_at(DVec3::new(x, 0.0, -away), DVec3::new(x, 0.0, 0.0), DVec3::NEG_Y, 0.7, 96, 64)
+                    .expect("valid"),
+            )
         };
         vec![photo("near", -0.75, 1.6), photo("far", 0.0, 3.2)]
     }

@@ -82,7 +82,6 @@ pub fn matches(blended: [f32; 3], code: [f32; 3], tolerance: f32) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Level, NOBODY};
 
     #[test]
     fn points_are_on_the_sphere_and_apart() {
@@ -100,10 +99,7 @@ mod tests {
 
     #[test]
     fn no_blend_of_two_codes_is_a_third() {
-        let mut all = Identities::default();
-        (0..100).for_each(|_| {
-            all.add(Level::Object, NOBODY, vec![]);
-        });
+        let mut all = Identities::objects(100);
         let centers: Vec<DVec3> = (0..100).map(|i| DVec3::new(f64::from(i % 10), f64::from(i / 10), 0.0)).collect();
         assign(&mut all, &centers);
         let codes: Vec<[f32; 3]> =
@@ -140,10 +136,7 @@ mod tests {
 
     #[test]
     fn neighbors_get_distant_codes() {
-        let mut all = Identities::default();
-        (0..60).for_each(|_| {
-            all.add(Level::Object, NOBODY, vec![]);
-        });
+        let mut all = Identities::objects(60);
         let centers: Vec<DVec3> = (0..60).map(|i| DVec3::new(f64::from(i), 0.0, 0.0)).collect();
         assign(&mut all, &centers);
         let code = |i: u32| Vec3::from(all.get(i).expect("there").code);
@@ -172,10 +165,7 @@ mod tests {
     #[test]
     fn of_three_the_near_pair_is_farther_apart_in_code_space() {
         for (place, near, far) in [(1.0, [1, 2], [1, 3]), (9.0, [2, 3], [1, 2])] {
-            let mut all = Identities::default();
-            (0..8).for_each(|_| {
-                all.add(Level::Object, NOBODY, vec![]);
-            });
+            let mut all = Identities::objects(8);
             let mut centers: Vec<DVec3> = (0..8).map(|i| DVec3::new(0.0, 100.0 * f64::from(i), 0.0)).collect();
             (centers[0], centers[1], centers[2]) =
                 (DVec3::ZERO, DVec3::new(place, 0.0, 0.0), DVec3::new(10.0, 0.0, 0.0));

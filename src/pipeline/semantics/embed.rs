@@ -212,7 +212,7 @@ mod tests {
             let pixel = |x: u32, _: u32| image::Rgb(if red(x) { [255, 0, 0] } else { [0, 0, 255] });
             let path = folder.join(format!("{k}.png"));
             image::RgbImage::from_fn(96, 64, pixel).save(&path).expect("written");
-            Photo { name: k.to_string(), path, camera, distortion: None, test_split: false, background: None }
+            Photo::new(k.to_string(), path, camera)
         };
         let photos = (0..MAX_VIEWS + 2).map(|k| photo(k, DVec3::new(0.0, 0.0, -3.0 - 0.2 * k as f64))).collect();
         let map = SemanticMap::of_identities(all, vec![doll, eye], vec![1.0; 2], vec![]);
@@ -269,7 +269,7 @@ mod tests {
         identity[45] = doll;
         identity[0] = cat;
         identity[11] = cat;
-        let view = ViewMap { width_px: 10, height_px: 10, identity, share: vec![1.0; 100], alpha: vec![1.0; 100] };
+        let view = ViewMap::certain(10, identity);
         let c = counts(&view, &all);
         assert_eq!(c[..2], [2.0, 1.0]);
         assert!(c[2] < 1.0, "{c:?}");
@@ -277,15 +277,12 @@ mod tests {
 
     #[test]
     fn every_edge_of_the_picture_cuts() {
-        let mut all = Identities::default();
-        (0..5).for_each(|_| {
-            all.add(Level::Object, NOBODY, vec![]);
-        });
+        let all = Identities::objects(5);
         // Left, right, upper and lower edge: four pixels each, two of them at the edge; one in the middle.
         let places = [[20, 21, 30, 31], [28, 29, 38, 39], [4, 5, 14, 15], [84, 85, 94, 95], [44, 45, 54, 55]];
         let mut identity = vec![NOBODY; 100];
         places.iter().enumerate().for_each(|(k, p)| p.iter().for_each(|i| identity[*i] = k as IdentityId + 1));
-        let view = ViewMap { width_px: 10, height_px: 10, identity, share: vec![1.0; 100], alpha: vec![1.0; 100] };
+        let view = ViewMap::certain(10, identity);
         // 4 / (1 + 4 x 2 / sqrt(4)) = 0.8.
         let c = counts(&view, &all);
         assert!(c[..4].iter().all(|c| (c - 0.8).abs() < 1e-12) && c[4] == 4.0, "{c:?}");

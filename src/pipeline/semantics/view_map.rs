@@ -27,6 +27,12 @@ pub struct ViewMap {
 }
 
 impl ViewMap {
+    /// Opaque pixels without a doubt, in rows of `width_px`.
+    pub(crate) fn certain(width_px: usize, identity: Vec<IdentityId>) -> Self {
+        let n = identity.len();
+        Self { width_px, height_px: n / width_px.max(1), identity, share: vec![1.0; n], alpha: vec![1.0; n] }
+    }
+
     /// Draws the identities `of` the Gaussians of `cloud`.
     pub fn render(
         renderer: &mut Renderer,

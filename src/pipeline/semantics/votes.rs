@@ -176,10 +176,7 @@ mod tests {
         let mut votes = Votes::new(2);
         let mut renderer = Renderer::new();
         votes.add_view(&mut renderer, &cloud, &camera, &RenderSettings::default(), &labels).expect("drawn");
-        let mut all = Identities::default();
-        (0..2).for_each(|_| {
-            all.add(Level::Object, NOBODY, vec![]);
-        });
+        let all = Identities::objects(2);
         let left = camera.project(DVec3::new(-0.5, 0.0, 0.0)).map(|p| p.x).expect("in front");
         let expected = if left < 22.0 { [1, 2] } else { [2, 1] };
         let b = votes.decide(&all, 0.0);
@@ -212,10 +209,7 @@ mod tests {
 
     #[test]
     fn votes_are_decided_by_weight_and_ties_by_number() {
-        let mut all = Identities::default();
-        (0..3).for_each(|_| {
-            all.add(Level::Object, NOBODY, vec![]);
-        });
+        let all = Identities::objects(3);
         let votes = Votes { of: vec![vec![(3, 1.0), (2, 1.0), (1, 0.5)], vec![(2, 0.05)], vec![(1, 0.0)]] };
         let b = votes.decide(&all, 0.05);
         assert_eq!(

@@ -135,14 +135,7 @@ fn a_single_photo_is_trained_on() {
     let p = plan(|facts| facts.with_photos(&[camera(1_000)]));
     assert_eq!(p.holdout_every, 0);
     let dataset = |n: usize| {
-        let photo = |i: usize| crate::scene::Photo {
-            name: i.to_string(),
-            path: "a".into(),
-            camera: camera(64),
-            distortion: None,
-            test_split: false,
-            background: None,
-        };
+        let photo = |i: usize| crate::scene::Photo::new(i.to_string(), "a", camera(64));
         crate::scene::Dataset { photos: (0..n).map(photo).collect(), ..crate::scene::Dataset::default() }
     };
     assert_eq!(dataset(1).split(8), (vec![0], vec![]));

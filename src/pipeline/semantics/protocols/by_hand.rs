@@ -97,10 +97,7 @@ fn masks_are_intersection_over_union_by_level() {
 fn langsplat_smooths_scales_and_cuts() {
     // Columns of four objects, 60 px each; rows are all the same, so only columns count.
     let (w, h) = (240, 8);
-    let mut all = Identities::default();
-    (0..4).for_each(|_| {
-        all.add(Level::Object, NOBODY, vec![]);
-    });
+    let all = Identities::objects(4);
     let map = SemanticMap { identities: all, ..SemanticMap::default() };
     let view = exact(w, (0..w * h).map(|i| (i % w / 60) as IdentityId + 1).collect());
     // Relevancies 1, 0.65, 0.76, 0. `v` is half the relevancy, half its mean over columns x-15..x+14;

@@ -160,7 +160,7 @@ mod tests {
             })
             .collect();
         let map = SemanticMap { identities: all, ..SemanticMap::default() };
-        let exact = ViewMap { width_px: w, height_px: h, identity, share: vec![1.0; w * h], alpha: vec![1.0; w * h] };
+        let exact = ViewMap::certain(w, identity);
         let truth = exact.mask(&map.identities, eye);
         let camera = Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, w as u32, h as u32).expect("valid");
         let blended = CodeMap::default();

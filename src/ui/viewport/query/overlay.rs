@@ -173,7 +173,7 @@ mod tests {
         let lamp = all.add(Level::Object, NOBODY, vec!["lamp".into()]);
         all.add(Level::Part, lamp, vec!["shade".into()]);
         let identity = [[0, 0, 2, 2, 2, 1]; 3].concat();
-        (all, ViewMap { width_px: 6, height_px: 3, identity, share: vec![1.0; 18], alpha: vec![1.0; 18] })
+        (all, ViewMap::certain(6, identity))
     }
 
     fn paint(settings: OverlaySettings) -> ColorImage {
