@@ -9,7 +9,6 @@ use crate::scene::text;
 
 /// Largest text file (JSON, COLMAP text) in bytes.
 pub(crate) const MAX_TEXT_BYTES: u64 = 512 << 20;
-/// Largest picture file in bytes.
 pub(crate) const MAX_PICTURE_BYTES: u64 = 256 << 20;
 
 pub(crate) fn folder_of(path: &Path) -> &Path {

@@ -40,7 +40,6 @@ pub(super) struct Lens {
     pub(crate) distortion: Distortion,
 }
 
-/// A photo as a file lists it.
 #[derive(Clone, Debug)]
 pub(super) struct Listed {
     pub(crate) name: String,

@@ -9,9 +9,8 @@ use crate::models::catalog::InstallError;
 use crate::models::fetch::FetchError;
 use crate::pipeline::depth::DepthError;
 use crate::pipeline::observer::Interrupted;
-use crate::pipeline::semantics::build_map::FindError;
 use crate::pipeline::semantics::edit::EditError;
-use crate::pipeline::semantics::segmenter::SegmentError;
+use crate::pipeline::semantics::error::FindError;
 use crate::pipeline::synth::SynthError;
 use crate::pipeline::train::TrainError;
 use crate::pipeline::train::config::UnreadableConfig;
@@ -56,8 +55,6 @@ pub enum JobError {
     Train(#[from] TrainError),
     #[error(transparent)]
     Find(#[from] FindError),
-    #[error(transparent)]
-    Segment(#[from] SegmentError),
     #[error(transparent)]
     Edit(#[from] EditError),
     #[error(transparent)]

@@ -233,7 +233,6 @@ impl Saving {
     }
 }
 
-/// A row for each plan of each scene.
 pub(crate) fn table(all: &[Saving]) -> Rows {
     let head =
         ["scene", "", "open s", "picture s", "ready s", "at rest", "peak", "GPU", "frame ms", "view ms", "loaded"];

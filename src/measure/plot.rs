@@ -24,7 +24,6 @@ pub(crate) fn place(point: &Point, measure: &Measure) -> Option<(f64, f64)> {
     (secs.is_finite() && error.is_finite()).then(|| (secs.max(1e-9), error.max(LEAST)))
 }
 
-/// The stage as SVG, for one of its measures.
 pub(crate) fn svg(stage: &Stage, measure: &Measure) -> Result<String, String> {
     let mut image = String::new();
     draw(stage, measure, &mut image).map_err(|e| e.to_string())?;

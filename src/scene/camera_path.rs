@@ -55,7 +55,6 @@ fn key_name(key: usize, name: Option<&str>) -> String {
 }
 
 impl CameraPath {
-    /// Most keys of a path.
     pub(crate) const MAX_KEYS: usize = 100_000;
     /// Most frames per second.
     pub(crate) const MAX_FPS: f64 = 1000.0;

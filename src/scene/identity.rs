@@ -136,7 +136,6 @@ impl Identities {
         std::iter::successors(known(id), move |&at| self.get(at).and_then(|i| known(i.parent)).filter(|p| *p < at))
     }
 
-    /// The object that an identity is, or is a piece of.
     pub(crate) fn object_of(&self, id: IdentityId) -> IdentityId {
         self.line(id).last().unwrap_or(NOBODY)
     }

@@ -66,7 +66,6 @@ pub(crate) struct Material {
     pub(crate) base_texture: Option<TextureUse>,
     /// Linear emitted color.
     pub(crate) emission: Vec3,
-    /// Texture multiplied with the emission.
     pub(crate) emission_texture: Option<TextureUse>,
     /// 0 for plastic, 1 for metal.
     pub(crate) metallic: f32,
@@ -86,7 +85,6 @@ pub(crate) enum AlphaMode {
     Blend,
 }
 
-/// A texture as a material uses it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TextureUse {
     /// Index into [`MeshScene::images`].

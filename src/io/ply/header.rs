@@ -5,7 +5,6 @@ use std::path::Path;
 use super::Ply;
 use crate::io::IoError;
 
-/// Longest header in bytes.
 const MAX_HEADER_BYTES: usize = 1 << 20;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

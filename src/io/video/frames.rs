@@ -108,7 +108,6 @@ fn number(path: &Path) -> Option<u64> {
     digits.parse().ok().filter(|n| path.file_name().is_some_and(|f| f.to_str() == Some(&name(*n))))
 }
 
-/// The frames in a folder, in order.
 fn numbered(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder)? {

@@ -7,9 +7,7 @@ use crate::scene::Camera;
 
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Settings {
-    /// Width of the frames in px.
     pub(crate) width_px: u32,
-    /// Height of the frames in px.
     pub(crate) height_px: u32,
     /// Frames per second, the same throughout.
     pub(crate) fps: f64,

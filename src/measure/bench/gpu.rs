@@ -91,7 +91,6 @@ pub fn training_step(
     Ok(Measurement { stages: medians(&runs), whole_secs })
 }
 
-/// Medians over runs that had the same stages.
 fn medians(runs: &[StageTimes]) -> StageTimes {
     let stage = |k: usize| median(&runs.iter().filter_map(|r| r.get(k)).map(|s| s.1).collect::<Vec<_>>());
     runs.first().into_iter().flatten().enumerate().map(|(k, (name, _))| (*name, stage(k))).collect()

@@ -29,7 +29,6 @@ pub(crate) struct Percentiles {
     pub(crate) p95_ms: f64,
 }
 
-/// Times of the stages of a query.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct QueryTiming {
     pub(crate) encoder: String,

@@ -118,7 +118,6 @@ impl Case {
     }
 }
 
-/// What was found, a row for each case.
 pub(crate) fn table(checked: &[Checked]) -> Rows {
     let number = |v: f64| if v.is_nan() { String::new() } else { format!("{v:.1e}") };
     rows(

@@ -16,7 +16,6 @@ use crate::render::cpu::ssim::ssim;
 use crate::render::{Features, RenderSettings};
 use crate::scene::{GaussianCloud, PhotoPixels};
 
-/// Steps of a short training.
 const STEPS: u64 = 60;
 
 /// A photo of one gray level.

@@ -40,7 +40,6 @@ pub(crate) struct Metadata {
     pub(crate) multimask_points: [usize; 2],
     /// Whether three masks are tried while following.
     pub(crate) multimask_when_tracking: bool,
-    /// Whether the pointer is that of the best mask of three.
     pub(crate) pointer_of_best_mask: bool,
     /// Shift of the threshold that stability is measured with, logits.
     pub(crate) stability_delta: f32,

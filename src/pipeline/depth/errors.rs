@@ -16,7 +16,6 @@ pub(crate) struct DepthErrors {
     pub(crate) median_abs: f64,
     /// Root of the mean squared error, scene units.
     pub(crate) rmse: f64,
-    /// Mean of error over true depth.
     pub(crate) mean_rel: f64,
     /// Share of all pixels whose depth is within 1 % of the truth.
     pub(crate) within_1: f64,

@@ -8,24 +8,24 @@ use serde::{Deserialize, Serialize};
 
 use super::associate::Disagreement;
 use super::codes;
-use super::embed::{EmbedError, embed};
+use super::embed::embed;
+use super::error::FindError;
 use super::network_segmenter::NetworkMasks;
 use super::regions::Regions;
 use super::sam2_tracker::Sam2Tracker;
-use super::segmenter::{FileMasks, SegmentError, Segmenter};
-use super::tracker::{TrackError, TrackOptions, Tracked, ViewReport, track};
+use super::segmenter::{FileMasks, Segmenter};
+use super::tracker::{TrackOptions, Tracked, ViewReport, track};
 use super::train_codes::{CodeTraining, CodeView, decode, train_codes};
 use super::view_map::ViewMap;
 use crate::io::labels::Labels;
 use crate::models::Encoder;
 use crate::pipeline::observer::{Observer, Severity};
-use crate::render::{RenderError, RenderSettings, Renderer};
+use crate::render::{RenderSettings, Renderer};
 use crate::scene::semantic_map::{BACKGROUND_CODE, CODE_CHANNELS};
 use crate::scene::{GaussianCloud, Identities, IdentityId, Photo, SemanticMap};
 
 /// Longer side of the masks that codes are trained on, px.
 const CODE_SIDE_PX: u32 = 256;
-/// Steps of training codes.
 pub(crate) const CODE_STEPS: u64 = 1_000;
 /// Seed of the order in which views are trained on.
 const SEED: u64 = 0;
@@ -83,18 +83,6 @@ pub(crate) struct Found {
     pub(crate) secs: Vec<(&'static str, f64)>,
 }
 
-/// Why objects could not be found.
-#[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "each text says what its variant is")]
-pub enum FindError {
-    #[error(transparent)]
-    Track(#[from] TrackError),
-    #[error("training codes: {0}")]
-    Lift(#[from] RenderError),
-    #[error(transparent)]
-    Embed(#[from] EmbedError),
-}
-
 /// What finds the masks of photos that `cloud` was trained on: files, where there are any, else the
 /// network of this name, else regions of the photos.
 pub(crate) fn segmenter<'a>(
@@ -102,7 +90,7 @@ pub(crate) fn segmenter<'a>(
     cloud: &'a GaussianCloud,
     settings: &'a RenderSettings,
     network: Option<&str>,
-) -> Result<Box<dyn Segmenter + 'a>, SegmentError> {
+) -> Result<Box<dyn Segmenter + 'a>, FindError> {
     Ok(match (files, network) {
         (Some(files), _) => Box::new(FileMasks(Labels::open(files)?)),
         (None, Some(network)) => Box::new(NetworkMasks::open(network)?),
@@ -179,7 +167,7 @@ fn lift(
     }
     let training = CodeTraining { steps: options.code_steps, seed: SEED };
     train_codes(cloud, &mut map.codes, &views, &map.identities, settings, training, observer)?;
-    observer.proceed().map_err(TrackError::from)?;
+    observer.proceed()?;
     if options.lifting == Lifting::Paper {
         map.of = decode(&map.codes, &map.identities);
     }
@@ -276,7 +264,7 @@ mod tests {
             photo: &Photo,
             max_side_px: u32,
             _: &mut dyn Observer,
-        ) -> Result<Vec<FoundMask>, SegmentError> {
+        ) -> Result<Vec<FoundMask>, FindError> {
             let mut all = Identities::default();
             let doll = all.add(Of::Object, NOBODY, vec![]);
             all.add(Of::Part, doll, vec![]);

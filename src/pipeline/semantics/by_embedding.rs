@@ -54,7 +54,6 @@ impl TextEmbeddings {
         Ok(())
     }
 
-    /// The embedding of a phrase that was learnt.
     pub(crate) fn get(&self, phrase: &str) -> Option<&[f32]> {
         self.0.get(phrase).map(Vec::as_slice)
     }

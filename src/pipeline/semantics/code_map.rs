@@ -10,9 +10,7 @@ const OBJECT_CHANNELS: usize = CODE_CHANNELS / 2;
 /// Blended codes of a view.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CodeMap {
-    /// Width in px.
     pub(crate) width_px: usize,
-    /// Height in px.
     pub(crate) height_px: usize,
     /// Planes of the object's code, then of the part's, row-major. NaN, which nothing matches, where
     /// less than half of the light is blocked. The part's are empty where they were left out.

@@ -91,7 +91,6 @@ pub(crate) fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Re
     Ok(new)
 }
 
-/// Adds an identity that takes over these Gaussians.
 fn add(map: &mut SemanticMap, level: Level, parent: IdentityId, name: String, gaussians: &[usize]) {
     let code = free_code(&map.identities);
     let id = map.identities.add(level, parent, Some(name).filter(|n| !n.is_empty()).into_iter().collect());

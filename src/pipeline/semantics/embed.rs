@@ -2,12 +2,13 @@
 
 use std::collections::{BTreeSet, HashMap};
 
+use super::error::FindError;
 use super::relevancy::{PART_WEIGHT, deviate};
 use super::view_map::ViewMap;
-use crate::io::{self, IoError};
+use crate::io;
 use crate::models::{Encoder, ModelError, Tile};
-use crate::pipeline::observer::{Interrupted, Observer, Ticker};
-use crate::render::{RenderError, RenderSettings, Renderer};
+use crate::pipeline::observer::{Observer, Ticker};
+use crate::render::{RenderSettings, Renderer};
 use crate::scene::language::MAX_VIEWS;
 use crate::scene::{
     GaussianCloud, Identities, IdentityId, LanguageFeatures, Level, Mask, Photo, PhotoPixels, SemanticMap, ViewFeatures,
@@ -20,20 +21,6 @@ const COUNT_SIDE_PX: u32 = 256;
 /// Pixels of such a view that must show an identity for it to be looked at.
 const LEAST_PX: usize = 12;
 
-/// Why identities could not be looked at.
-#[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "each text says what its variant is")]
-pub enum EmbedError {
-    #[error(transparent)]
-    Photo(#[from] IoError),
-    #[error("photo {0}: {1}")]
-    Render(String, RenderError),
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    #[error("cancelled")]
-    Interrupted(#[from] Interrupted),
-}
-
 /// Lets `encoder` look at every identity of `map`, in up to [`MAX_VIEWS`] of the `photos`.
 pub(crate) fn embed(
     cloud: &GaussianCloud,
@@ -42,7 +29,7 @@ pub(crate) fn embed(
     settings: &RenderSettings,
     encoder: &mut dyn Encoder,
     observer: &mut dyn Observer,
-) -> Result<LanguageFeatures, EmbedError> {
+) -> Result<LanguageFeatures, FindError> {
     let mut looker = Looker { cloud, map, settings, renderer: Renderer::new() };
     let mut ticker = Ticker::new("Choosing views of the objects", photos.len());
     let n = map.identities.len();
@@ -93,11 +80,11 @@ struct Looker<'a> {
 }
 
 impl Looker<'_> {
-    fn draw(&mut self, photo: &Photo, max_side_px: u32) -> Result<ViewMap, EmbedError> {
+    fn draw(&mut self, photo: &Photo, max_side_px: u32) -> Result<ViewMap, FindError> {
         let camera = photo.camera.limited_to(max_side_px);
         let Self { cloud, map, settings, renderer } = self;
         ViewMap::render(renderer, cloud, &map.of, &map.identities, &camera, settings)
-            .map_err(|e| EmbedError::Render(photo.name.clone(), e))
+            .map_err(|e| FindError::Render(photo.name.clone(), e))
     }
 }
 
@@ -255,7 +242,7 @@ mod tests {
         let (cloud, map, photos) = doll(folder.path());
         let mut encoder = Reddish { side_px: None, tiles: vec![] };
         let stopped = embed(&cloud, &map, &photos, &RenderSettings::default(), &mut encoder, &mut Stop);
-        assert!(matches!(stopped, Err(EmbedError::Interrupted(_))), "{stopped:?}");
+        assert!(matches!(stopped, Err(FindError::Interrupted(_))), "{stopped:?}");
     }
 
     #[test]

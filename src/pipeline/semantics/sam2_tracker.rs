@@ -7,6 +7,7 @@ use std::time::SystemTime;
 
 use sha2::{Digest, Sha256};
 
+use super::error::FindError;
 use super::segmenter::FoundMask;
 use super::votes::UNKNOWN;
 use crate::io::{self, atomic, files};
@@ -15,23 +16,12 @@ use crate::models::catalog::{self, Role};
 use crate::models::network::Array;
 use crate::models::sam2::track::{Frames, ObjectId, Prompt, Track, mask_of};
 use crate::models::sam2::{Frame, Sam2};
-use crate::pipeline::observer::{Interrupted, Observer, Ticker};
+use crate::pipeline::observer::{Observer, Ticker};
 use crate::scene::{IdentityId, Photo};
 
 /// Objects that are followed together; memory grows with it.
 const BATCH: usize = 16;
-/// Longer side of the labels, px.
 pub(crate) const LABEL_SIDE_PX: u32 = 512;
-
-/// Why masks could not be followed.
-#[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "each text says what its variant is")]
-pub enum Sam2TrackError {
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    #[error("cancelled")]
-    Interrupted(#[from] Interrupted),
-}
 
 pub(crate) struct Sam2Tracker {
     model: Sam2,
@@ -57,7 +47,7 @@ impl Sam2Tracker {
         found: &[FoundMask],
         ids: &[IdentityId],
         observer: &mut dyn Observer,
-    ) -> Result<Vec<Vec<IdentityId>>, Sam2TrackError> {
+    ) -> Result<Vec<Vec<IdentityId>>, FindError> {
         let size = |photo: &Photo| {
             let camera = photo.camera.limited_to(LABEL_SIDE_PX);
             (camera.width_px as usize, camera.height_px as usize)

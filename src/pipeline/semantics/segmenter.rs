@@ -1,9 +1,8 @@
 //! Masks of one photo, and where they come from.
 
-use crate::io::IoError;
+use super::error::FindError;
 use crate::io::labels::{Labels, Region};
-use crate::models::ModelError;
-use crate::pipeline::observer::{Interrupted, Observer};
+use crate::pipeline::observer::Observer;
 use crate::scene::{Level, Mask, Photo};
 
 /// A mask that a segmenter found in one photo.
@@ -33,19 +32,7 @@ pub trait Segmenter {
         photo: &Photo,
         max_side_px: u32,
         observer: &mut dyn Observer,
-    ) -> Result<Vec<FoundMask>, SegmentError>;
-}
-
-/// Why a photo could not be segmented.
-#[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "each text says what its variant is")]
-pub enum SegmentError {
-    #[error(transparent)]
-    Io(#[from] IoError),
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    #[error("cancelled")]
-    Interrupted(#[from] Interrupted),
+    ) -> Result<Vec<FoundMask>, FindError>;
 }
 
 /// Masks that come with the dataset. Regions that do not say what they are count as objects where
@@ -64,12 +51,7 @@ impl Segmenter for FileMasks {
         self.0.has(photo)
     }
 
-    fn segment(
-        &mut self,
-        photo: &Photo,
-        max_side_px: u32,
-        _: &mut dyn Observer,
-    ) -> Result<Vec<FoundMask>, SegmentError> {
+    fn segment(&mut self, photo: &Photo, max_side_px: u32, _: &mut dyn Observer) -> Result<Vec<FoundMask>, FindError> {
         Ok(found(self.0.of(photo, max_side_px)?))
     }
 }

@@ -33,7 +33,6 @@ const BOUNCE: f32 = 0.42;
 /// Rays start this far above the surface, in the frame's units.
 const LIFT: f32 = 2e-4;
 
-/// Light on one face of a vertex.
 #[derive(Clone, Copy, Debug, Default)]
 struct Face {
     /// Irradiance over pi: what a white surface shows.

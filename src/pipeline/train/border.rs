@@ -105,7 +105,6 @@ fn find(photos: &[&PhotoPixels]) -> Option<Vec<bool>> {
     (any_black && sharp && small).then_some(border)
 }
 
-/// Takes the border's pixels out of a photo.
 fn leave_out(border: &[bool], photo: &mut PhotoPixels) {
     let n = photo.len();
     let coverage = photo.coverage.get_or_insert_with(|| vec![u8::MAX; n]);

@@ -45,7 +45,6 @@ impl DeviceRun {
         Ok(Self { trainer, photos })
     }
 
-    /// Replaces cloud and moments.
     pub(crate) fn upload(
         &mut self,
         cloud: &GaussianCloud,

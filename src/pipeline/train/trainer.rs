@@ -361,7 +361,6 @@ fn zeros_like(cloud: &GaussianCloud) -> GaussianCloud {
     }
 }
 
-/// Updates a block and returns what it left out.
 #[multiversion::multiversion(targets("x86_64+avx2+fma"))]
 fn step_block(renderer: &DifferentiableRenderer, block: &mut Block<'_>, update: &Update) -> StepStats {
     let Update { rates, adam, stride, active, radius_scale, eye } = update;

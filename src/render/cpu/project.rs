@@ -231,7 +231,6 @@ pub(crate) enum Projected<R, S, D> {
     Degenerate,
 }
 
-/// A Gaussian as a splat of at least this alpha.
 #[inline(always)]
 pub(crate) fn splat<R: Real>(
     gaussian: &Gaussian<'_, R>,

@@ -19,7 +19,6 @@ pub struct Device {
     fault: Arc<Mutex<Option<GpuError>>>,
 }
 
-/// The fastest adapter, or a software one.
 fn adapter(software: bool) -> Result<wgpu::Adapter, wgpu::RequestAdapterError> {
     let mut description = wgpu::InstanceDescriptor::new_without_display_handle();
     description.backends = wgpu::Backends::PRIMARY;

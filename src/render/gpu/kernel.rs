@@ -112,7 +112,6 @@ impl Kernel {
     }
 }
 
-/// What every kernel of one frame is told.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FrameBindings<'a> {
     /// The camera and the picture, see [`super::layout::View`].
