@@ -7,7 +7,6 @@ use serde::Deserialize;
 use super::{IoError, files};
 use crate::scene::Camera;
 
-/// Largest file that is read, bytes.
 const MAX_BYTES: u64 = 16 << 20;
 
 #[derive(Deserialize)]

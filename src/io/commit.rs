@@ -18,7 +18,6 @@ use super::temporary::{is_temporary, temporary_file};
 use super::{IoError, files};
 use tempfile::NamedTempFile;
 
-/// Largest journal that is read.
 const MAX_BYTES: u64 = 1 << 16;
 
 #[derive(Default, Serialize, Deserialize)]

@@ -87,7 +87,6 @@ pub enum OpenError {
     Io(#[from] IoError),
 }
 
-/// The error of a failed write, with its remedy.
 pub(crate) fn write_error(path: &Path, cause: io::Error) -> IoError {
     IoError::Write { path: path.into(), remedy: remedy(cause.kind()), cause }
 }

@@ -73,7 +73,6 @@ pub(crate) fn read_text(path: &Path) -> Result<String, IoError> {
         .map_err(|e| IoError::syntax(path, format!("byte {}", e.utf8_error().valid_up_to()), "not UTF-8 text"))
 }
 
-/// A JSON file as `T`.
 pub(crate) fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, IoError> {
     let bytes = read(path, MAX_TEXT_BYTES)?;
     serde_json::from_slice(&bytes).map_err(|e| json_error(path, &e))

@@ -42,7 +42,6 @@ pub fn open<'a>(bytes: &'a [u8], path: &'a Path) -> Result<Array<'a>, IoError> {
 }
 
 impl Array<'_> {
-    /// Entries along each axis.
     pub(crate) fn shape(&self) -> &[u64] {
         self.npy.shape()
     }

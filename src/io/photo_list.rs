@@ -36,7 +36,6 @@ pub(super) struct Lens {
     pub(crate) focal: Focal,
     /// Principal point in px; `None` = the middle.
     pub(crate) principal_px: Option<DVec2>,
-    /// Radial and tangential coefficients.
     pub(crate) distortion: Distortion,
 }
 
@@ -50,7 +49,6 @@ pub(super) struct Listed {
     pub(crate) world_from_camera: DMat3,
     /// Camera center in the world.
     pub(crate) center: DVec3,
-    /// Whether the dataset marks it as a test photo.
     pub(crate) test_split: bool,
     /// What transparent pixels are composited over.
     pub(crate) background: Option<[f32; 3]>,

@@ -27,7 +27,6 @@ pub use super::scene_files::MAP_FILE as FILE;
 /// Version that this program writes, and the highest it reads.
 const VERSION: u64 = 1;
 const KEY: &str = "fmlgs";
-/// Largest file that is read.
 const MAX_BYTES: u64 = 256 << 20;
 
 #[derive(Serialize, Deserialize)]

@@ -16,7 +16,6 @@ use crate::scene::{Camera, Dataset, Distortion};
 /// Blender's synthetic scenes have no backdrop; the literature shows them on white.
 const WHITE: [f32; 3] = [1.0; 3];
 
-/// A `transforms*.json`.
 #[derive(Deserialize)]
 struct File {
     #[serde(flatten)]
@@ -30,12 +29,10 @@ struct File {
     fmlgs: Own,
 }
 
-/// See [`File::fmlgs`].
 #[derive(Default, Deserialize)]
 struct Own {
     /// sRGB color behind everything, 0 to 1.
     background: Option<[f32; 3]>,
-    /// Length of a unit in meters.
     metres_per_unit: Option<f64>,
 }
 

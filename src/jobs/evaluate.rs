@@ -55,7 +55,6 @@ pub(crate) struct Comparison {
     pub(crate) settings: RenderSettings,
     pub(crate) dataset: Arc<Dataset>,
     pub(crate) views: Vec<usize>,
-    /// Longer side of the compared pictures in px.
     pub(crate) max_side_px: u32,
     /// Borders of the photos, which are left out.
     pub(crate) borders: Option<Borders>,

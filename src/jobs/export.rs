@@ -11,13 +11,11 @@ use crate::io::{self, IoError, atomic, splat_ply};
 use crate::navigate::{CameraSpline, Pose, Speed};
 use crate::scene::{CameraPath, GaussianCloud, PathKey, PhotoPixels};
 
-/// Writes Gaussians as a `.ply`.
 pub(crate) fn ply(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
     make_parent(path)?;
     splat_ply::write(path, cloud)
 }
 
-/// Writes pixels as a `.png`.
 pub(crate) fn picture(path: &Path, pixels: &PhotoPixels) -> Result<(), IoError> {
     png(path, pixels.rgb.as_flattened(), [pixels.width_px, pixels.height_px], ColorType::Rgb8)
 }
@@ -52,7 +50,6 @@ pub(crate) fn camera_path(file: &Path, path: &CameraPath, aspect: f64) -> Result
     io::camera_path::nerfstudio::write(file, path, &frames, (1280, (1280.0 / aspect.max(0.01)) as u32))
 }
 
-/// Makes the folder that `path` lies in.
 pub(crate) fn make_parent(path: &Path) -> Result<(), IoError> {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => make_folder(folder),

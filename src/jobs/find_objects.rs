@@ -92,7 +92,6 @@ pub(crate) struct FoundObjects {
     /// The photos that were looked at; what was found counts them.
     pub(crate) photos: Vec<Photo>,
     pub(crate) state: String,
-    /// Seconds that it took.
     pub(crate) secs: f64,
 }
 

@@ -39,7 +39,6 @@ pub struct Scene {
     pub(crate) photos: Option<PathBuf>,
     /// Where its photos are, if they are still there.
     pub(crate) dataset_path: Option<PathBuf>,
-    /// Length of a scene unit in meters, if that is known.
     pub(crate) metres_per_unit: Option<f64>,
     /// Id of the save that its files are of, if it has one.
     pub(crate) state: Option<String>,
@@ -164,13 +163,11 @@ pub struct OpenedScene {
     /// Folder in which training keeps its results and checkpoints.
     pub out: PathBuf,
     pub(crate) history: History,
-    /// Length of a scene unit in meters, if that is known.
     pub(crate) metres_per_unit: Option<f64>,
     /// How to look at it at first.
     pub home: HomeView,
     /// How to draw it: background and filter.
     pub render: RenderSettings,
-    /// Degree of the harmonics in its file.
     pub(crate) sh_stored: u8,
     pub(crate) facts: Facts,
     /// Id of the save that its files are of, if it has one.

@@ -39,7 +39,6 @@ pub(crate) struct Rendered {
     pub(crate) frame: Frame<f32>,
     /// What drew it: "CPU", or the name of the GPU.
     pub(crate) backend: String,
-    /// Milliseconds that drawing took.
     pub(crate) millis: f64,
     /// Degree of the spherical harmonics that were drawn.
     pub(crate) sh_degree: u8,

@@ -30,7 +30,6 @@ pub(crate) struct Video {
     pub(crate) summary: Summary,
     /// What drew it: "CPU", or the name of the GPU.
     pub(crate) backend: String,
-    /// Seconds that it took.
     pub(crate) secs: f64,
 }
 

@@ -14,9 +14,7 @@ pub type Lane<R> = [R; LANES];
 /// A computation that can run on any vectors. Implementations must be `#[inline(always)]` down to
 /// the arithmetic, so that all of it is compiled for the instructions of `L`.
 pub trait LaneOp<R: Real> {
-    /// What it returns.
     type Output;
-    /// Does it.
     fn run<L: Lanes<R>>(self, lanes: L) -> Self::Output;
 }
 
@@ -28,23 +26,14 @@ pub trait Lanes<R: Real>: Copy + Send + Sync {
     type M: Copy;
     /// The same number in every lane.
     fn splat(self, x: R) -> Self::V;
-    /// From memory.
     fn load(self, x: &Lane<R>) -> Self::V;
-    /// To memory.
     fn store(self, v: Self::V) -> Lane<R>;
-    /// `a + b`.
     fn add(self, a: Self::V, b: Self::V) -> Self::V;
-    /// `a - b`.
     fn sub(self, a: Self::V, b: Self::V) -> Self::V;
-    /// `a b`.
     fn mul(self, a: Self::V, b: Self::V) -> Self::V;
-    /// `a / b`.
     fn div(self, a: Self::V, b: Self::V) -> Self::V;
-    /// `a b + c`.
     fn mul_add(self, a: Self::V, b: Self::V, c: Self::V) -> Self::V;
-    /// The smaller.
     fn min(self, a: Self::V, b: Self::V) -> Self::V;
-    /// The larger.
     fn max(self, a: Self::V, b: Self::V) -> Self::V;
     /// Square root; NaN below 0.
     fn sqrt(self, v: Self::V) -> Self::V;
@@ -52,7 +41,6 @@ pub trait Lanes<R: Real>: Copy + Send + Sync {
     fn ge(self, a: Self::V, b: Self::V) -> Self::M;
     /// `a > b`, false for NaN.
     fn gt(self, a: Self::V, b: Self::V) -> Self::M;
-    /// Both.
     fn both(self, a: Self::M, b: Self::M) -> Self::M;
     /// `a` where the mask holds, else `b`.
     fn select(self, mask: Self::M, a: Self::V, b: Self::V) -> Self::V;

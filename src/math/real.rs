@@ -6,6 +6,7 @@ use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssi
 
 /// A real number: the few operations that splatting needs, with stable forms of the
 /// transcendental ones.
+#[allow(missing_docs, reason = "each name says what it is")]
 pub trait Real:
     Copy
     + Default
@@ -25,34 +26,24 @@ pub trait Real:
     + Sum
     + 'static
 {
-    /// 0.
     const ZERO: Self;
-    /// 1.
     const ONE: Self;
-    /// One half.
     const HALF: Self;
-    /// The nearest value to `x`.
     fn of(x: f64) -> Self;
-    /// This value in double precision.
     fn f64(self) -> f64;
-    /// This value in single precision.
     fn f32(self) -> f32;
-    /// Square root.
     fn sqrt(self) -> Self;
     /// Natural exponential, correctly rounded to a few ulp.
     fn exp(self) -> Self;
     /// Natural exponential of `x <= 0`, free of branches so that loops over it vectorize.
     /// Below -87 it returns a value under 2e-38. Relative error under 3e-7 in `f32`.
     fn exp_neg(self) -> Self;
-    /// Natural logarithm.
     fn ln(self) -> Self;
-    /// Absolute value.
     fn abs(self) -> Self;
     /// The smaller; the other operand if one is NaN.
     fn min(self, other: Self) -> Self;
     /// The larger; the other operand if one is NaN.
     fn max(self, other: Self) -> Self;
-    /// Neither infinite nor NaN.
     fn is_finite(self) -> bool;
 
     /// Runs a vector computation with the best vectors that this machine has for this type.

@@ -8,7 +8,6 @@ use crate::io::{self, IoError};
 /// Name of the document in a report's folder.
 pub const FILE: &str = "report.json";
 const PROGRAM: &str = env!("CARGO_PKG_VERSION");
-/// Largest document that is read.
 const MOST_BYTES: u64 = 256 << 20;
 
 /// Why a report cannot be used.

@@ -18,9 +18,7 @@ const MOST_PSNR: f64 = 150.0;
 /// Red, green and blue as they are shown, 0 to 1.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Planes {
-    /// Width in px.
     pub(crate) width: usize,
-    /// Height in px.
     pub(crate) height: usize,
     pub(crate) color: [Vec<f64>; 3],
 }

@@ -21,7 +21,6 @@ use crate::render::{BackendChoice, Device, RenderSettings, Renderer, real_gpu};
 use crate::scene::plan::{Overrides, ScenePlan, When};
 use crate::scene::{Camera, Facts, GaussianCloud, SemanticMap, resource_log};
 
-/// Size of the images, px.
 pub(crate) const SIZE: [u32; 2] = [1_008, 567];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]

@@ -6,7 +6,6 @@ use plotters::prelude::*;
 
 use super::document::{Measure, Point, Stage};
 
-/// Size of the image in px.
 const SIZE: (u32, u32) = (860, 520);
 /// How much further than its points a plot reaches to the right, where the legend is, as a share.
 const LEGEND: f64 = 0.4;

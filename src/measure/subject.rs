@@ -25,7 +25,6 @@ pub(crate) struct Options {
     pub(crate) masks: Option<PathBuf>,
     pub(crate) steps: Vec<u64>,
     pub(crate) train_steps: u64,
-    /// Longer side of compared images, px.
     pub(crate) max_side_px: u32,
     /// Most views that are compared.
     pub(crate) views: usize,

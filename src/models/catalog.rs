@@ -63,9 +63,7 @@ pub struct Entry {
 #[serde(deny_unknown_fields)]
 pub struct ListedFile {
     pub(crate) name: String,
-    /// About how large it is.
     pub(crate) megabytes: u64,
-    /// Its SHA-256, if that is fixed.
     #[serde(default)]
     pub(crate) sha256: Option<String>,
 }

@@ -12,7 +12,6 @@ use super::network::Network;
 
 /// Version of the file that this program reads.
 const VERSION: u64 = 1;
-/// Largest file that is read, bytes.
 pub(crate) const MAX_BYTES: u64 = super::fetch::MOST_UNPROMISED;
 
 /// A graph of a model.
@@ -20,7 +19,6 @@ pub(crate) const MAX_BYTES: u64 = super::fetch::MOST_UNPROMISED;
 pub struct Graph {
     pub(crate) file: String,
     pub(crate) bytes: u64,
-    /// Its SHA-256, in hexadecimal digits.
     pub(crate) sha256: String,
 }
 

@@ -178,37 +178,26 @@ impl<R: Real> Frame<R> {
 
 /// Gradient of a loss with respect to a [`Frame`]; empty vectors mean zero.
 #[derive(Clone, Debug, Default)]
+#[allow(missing_docs, reason = "each name says what it is")]
 pub struct FrameGradient<R> {
-    /// With respect to `Frame::color`.
     pub color: [Vec<R>; 3],
-    /// With respect to `Frame::features`.
     pub features: Vec<Vec<R>>,
-    /// With respect to `Frame::alpha`.
     pub alpha: Vec<R>,
-    /// With respect to `Frame::depth`.
     pub depth: Vec<R>,
-    /// With respect to `Frame::median_depth`, of surfels.
     pub median_depth: Vec<R>,
-    /// With respect to `Frame::normals`.
     pub normals: [Vec<R>; 3],
-    /// With respect to `Frame::distortion`.
     pub distortion: Vec<R>,
 }
 
 /// Gradient with respect to every parameter of a cloud, laid out like the cloud.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[allow(missing_docs, reason = "each name says what it is")]
 pub struct CloudGradient<R> {
-    /// With respect to `positions`.
     pub positions: Vec<[R; 3]>,
-    /// With respect to `log_scales`.
     pub log_scales: Vec<[R; 3]>,
-    /// With respect to the raw `quaternions`.
     pub quaternions: Vec<[R; 4]>,
-    /// With respect to `opacity_logits`.
     pub opacity_logits: Vec<R>,
-    /// With respect to `sh`.
     pub sh: Vec<[R; 3]>,
-    /// With respect to the features' values.
     pub features: Vec<R>,
     /// Length of the gradient with respect to the center's position in the picture, in loss per
     /// half picture side (normalized device coordinates, as 3DGS thresholds it); 0 where unseen.

@@ -14,7 +14,6 @@ pub struct CameraPath {
     pub(crate) keys: Vec<PathKey>,
     /// Whether the flight goes on from the last key to the first.
     pub(crate) closed: bool,
-    /// Frames per second of a video of the flight.
     pub(crate) fps: f64,
     /// Seconds that the whole flight takes, waits included.
     pub(crate) seconds: f64,

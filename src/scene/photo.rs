@@ -64,12 +64,10 @@ pub struct PhotoPixels {
 }
 
 impl PhotoPixels {
-    /// Number of pixels.
     pub(crate) fn len(&self) -> usize {
         self.rgb.len()
     }
 
-    /// Whether there are none.
     pub(crate) fn is_empty(&self) -> bool {
         self.rgb.is_empty()
     }

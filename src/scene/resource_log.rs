@@ -12,26 +12,17 @@ use crate::math::format::bytes;
 /// What sort of thing was loaded or built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
+#[allow(missing_docs, reason = "each name says what it is")]
 pub enum Sort {
-    /// Gaussians of a scene.
     Gaussians,
-    /// Objects and parts of a scene.
     Objects,
-    /// Maps of a view's identities.
     Maps,
-    /// Pictures of objects and parts alone.
     Thumbnails,
-    /// A neural network.
     Model,
-    /// The graph for moving about.
     Paths,
-    /// The assistant.
     Agent,
-    /// A graphics device.
     Device,
-    /// The window.
     Window,
-    /// The first picture of a scene.
     Picture,
 }
 
@@ -73,7 +64,6 @@ fn lock() -> MutexGuard<'static, Trace> {
     TRACE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Adds to the trace.
 pub(crate) fn record(sort: Sort, what: impl Into<String>, why: &'static str, bytes: u64) {
     let at_secs = START.get_or_init(Instant::now).elapsed().as_secs_f64();
     let load = Load { at_secs, sort, what: what.into(), why, bytes };

@@ -13,11 +13,9 @@ use crate::scene::SparsePoint;
 const CAMERA_BYTES: usize = 4 + 4 + 16 + 24;
 /// Least bytes of an image: id, pose, camera, empty name, number of 2-D points.
 const IMAGE_BYTES: usize = 4 + 56 + 4 + 1 + 8;
-/// Bytes of an image's 2-D point.
 const OBSERVATION_BYTES: usize = 24;
 /// Least bytes of a point: id, position, color, error, length of its track.
 const POINT_BYTES: usize = 8 + 24 + 3 + 8 + 8;
-/// Bytes of an entry of a point's track.
 const TRACK_BYTES: usize = 8;
 
 /// `cameras.bin`.

@@ -45,7 +45,6 @@ fn find(root: &Path) -> Option<(PathBuf, bool)> {
     })
 }
 
-/// Whether `root` holds a reconstruction.
 pub(crate) fn is_colmap(root: &Path) -> bool {
     find(root).is_some()
 }

@@ -11,7 +11,6 @@ pub(crate) struct Values {
     pub(crate) width: usize,
     /// `[count * width]`, finite.
     pub(crate) data: Vec<f32>,
-    /// Whether the type is a signed integer.
     pub(crate) signed_integer: bool,
 }
 

@@ -22,11 +22,8 @@ pub struct MeshScene {
 pub(crate) struct MeshNode {
     /// Its name, never blank.
     pub(crate) name: Option<String>,
-    /// Index of its parent.
     pub(crate) parent: Option<usize>,
-    /// Indices of its children.
     pub(crate) children: Vec<usize>,
-    /// Index of its own mesh.
     pub(crate) mesh: Option<usize>,
     /// Points of the node to world points (glTF axes: y up, meters).
     pub(crate) world_from_node: DMat4,

@@ -31,7 +31,6 @@ pub(super) struct Primitive {
 
 pub(super) struct Values<const N: usize> {
     pub(crate) rows: Vec<[f32; N]>,
-    /// Whether the type is a signed integer.
     pub(crate) signed_integer: bool,
 }
 

@@ -45,7 +45,6 @@ impl SynthIds {
         self.root.join(folder).join(format!("{stem}.png"))
     }
 
-    /// Whether the photo `stem` has maps.
     pub(crate) fn has(&self, stem: &str) -> bool {
         self.path(Level::Object, stem).is_file()
     }

@@ -9,32 +9,21 @@ const MAX_HEADER_BYTES: usize = 1 << 20;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Encoding {
-    /// Numbers as text.
     Ascii,
-    /// Binary, least significant byte first.
     LittleEndian,
-    /// Binary, most significant byte first.
     BigEndian,
 }
 
 /// Type of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Scalar {
-    /// `char`.
     I8,
-    /// `uchar`.
     U8,
-    /// `short`.
     I16,
-    /// `ushort`.
     U16,
-    /// `int`.
     I32,
-    /// `uint`.
     U32,
-    /// `float`.
     F32,
-    /// `double`.
     F64,
 }
 
@@ -53,7 +42,6 @@ impl Scalar {
         })
     }
 
-    /// Bytes in a binary file.
     pub(crate) const fn bytes(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,

@@ -14,13 +14,11 @@ pub(crate) struct Column {
 }
 
 impl Column {
-    /// The value in `row`.
     #[inline]
     pub(crate) fn f64(&self, row: &[u8]) -> f64 {
         self.scalar.read(&row[self.offset..])
     }
 
-    /// The value in `row`, in single precision.
     #[inline]
     pub(crate) fn f32(&self, row: &[u8]) -> f32 {
         self.f64(row) as f32
@@ -36,7 +34,6 @@ impl Column {
 /// Rows of fixed size, little-endian.
 pub(crate) struct Table<'a> {
     pub(crate) rows: usize,
-    /// Bytes per row.
     pub(crate) stride: usize,
     pub(crate) columns: Vec<Column>,
     /// `rows * stride` bytes.
@@ -44,7 +41,6 @@ pub(crate) struct Table<'a> {
 }
 
 impl Table<'_> {
-    /// The bytes of row `i`.
     #[inline]
     pub(crate) fn row(&self, i: usize) -> &[u8] {
         &self.data[i * self.stride..(i + 1) * self.stride]

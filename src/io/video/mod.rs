@@ -42,9 +42,7 @@ pub(crate) struct Summary {
     pub(crate) path: PathBuf,
     /// Its format; `None` where ffmpeg chose it by the file's name.
     pub(crate) format: Option<Format>,
-    /// Frames pushed.
     pub(crate) frames: u64,
-    /// Bytes on disk.
     pub(crate) bytes: u64,
     /// Playing time in seconds.
     pub(crate) secs: f64,

@@ -9,7 +9,6 @@ use crate::scene::Camera;
 pub(crate) struct Settings {
     pub(crate) width_px: u32,
     pub(crate) height_px: u32,
-    /// Frames per second, the same throughout.
     pub(crate) fps: f64,
     /// From 0 (smallest file) to 100 (best picture).
     pub(crate) quality: u8,

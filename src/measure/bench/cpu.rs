@@ -43,7 +43,6 @@ pub(crate) struct StepTiming {
     pub(crate) size: [u32; 2],
     /// Milliseconds of a step, median.
     pub(crate) step_ms: f64,
-    /// Steps per second, from the median.
     pub(crate) steps_per_sec: f64,
 }
 

@@ -23,9 +23,7 @@ use crate::scene::{Identities, IdentityId, LanguageFeatures, Level, NOBODY, View
 /// Median and 95th percentile, ms.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub(crate) struct Percentiles {
-    /// Half of the queries take no longer.
     pub(crate) p50_ms: f64,
-    /// 95 of 100 take no longer.
     pub(crate) p95_ms: f64,
 }
 

@@ -88,7 +88,6 @@ pub(crate) struct Case {
 pub(crate) struct Checked {
     pub(crate) area: &'static str,
     pub(crate) name: String,
-    /// How long it took, seconds.
     pub(crate) secs: f64,
     pub(crate) finding: Finding,
 }

@@ -20,7 +20,6 @@ use crate::scene::PhotoPixels;
 #[derive(Clone, Debug, Deserialize)]
 pub(crate) struct Metadata {
     pub(crate) name: String,
-    /// Side of its square, px.
     pub(crate) image_size: usize,
     mean: [f32; 3],
     std: [f32; 3],

@@ -19,9 +19,7 @@ pub(crate) struct DepthErrors {
     pub(crate) mean_rel: f64,
     /// Share of all pixels whose depth is within 1 % of the truth.
     pub(crate) within_1: f64,
-    /// The same for 2 %.
     pub(crate) within_2: f64,
-    /// The same for 5 %.
     pub(crate) within_5: f64,
 }
 

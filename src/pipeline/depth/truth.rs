@@ -14,9 +14,7 @@ pub(crate) const EDGE_PX: usize = 2;
 /// Depths along the camera's axis at pixel centers, row by row; 0 where nothing is.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TrueDepth {
-    /// Pixels per row.
     pub(crate) width: usize,
-    /// Rows.
     pub(crate) height: usize,
     /// Scene units.
     pub(crate) values: Vec<f32>,

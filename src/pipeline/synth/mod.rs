@@ -90,7 +90,6 @@ pub struct SynthReport {
     pub(crate) points: usize,
     /// Triangles of the scene after splitting for light.
     pub(crate) triangles: usize,
-    /// Seconds in all.
     pub(crate) secs: f64,
     /// What was left out of the scene.
     pub(crate) warnings: Vec<String>,

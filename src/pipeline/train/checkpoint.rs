@@ -29,22 +29,17 @@ const MAGIC_1: &[u8; 8] = b"FMLGSCP1";
 
 /// Everything about a run but its arrays.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs, reason = "each name says what it is")]
 pub struct Header {
-    /// Settings of the run.
     pub config: TrainConfig,
     /// Names of the photos trained on.
     pub photos: Vec<String>,
-    /// Steps done.
     pub step: u64,
-    /// Seconds of training so far.
     pub secs: f64,
     /// Gaussians.
     pub count: usize,
-    /// Their SH degree.
     pub sh_degree: u8,
-    /// Their origin.
     pub origin: DVec3,
-    /// State of the random generator.
     pub rng: Pcg64Mcg,
     /// Photos left in the round.
     pub round: Vec<u32>,
@@ -52,7 +47,6 @@ pub struct Header {
     pub budget: usize,
     /// Factor on the learning rates.
     pub damping: f64,
-    /// What was measured so far.
     pub history: History,
 }
 

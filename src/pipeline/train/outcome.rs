@@ -23,7 +23,6 @@ pub(crate) struct TrainOutcome {
     pub(crate) evaluations: Vec<Evaluation>,
     pub(crate) end: TrainEnd,
     pub(crate) steps: u64,
-    /// Seconds of training.
     pub(crate) secs: f64,
 }
 

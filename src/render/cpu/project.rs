@@ -73,7 +73,6 @@ pub(crate) struct Splat<R> {
     pub(crate) reach: R,
     /// Half width and half height of the ellipse at `reach`, px.
     pub(crate) half: [R; 2],
-    /// Camera-space depth.
     pub(crate) depth: R,
     /// Index in the cloud.
     pub(crate) gaussian: u32,

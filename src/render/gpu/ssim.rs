@@ -18,7 +18,6 @@ const SLOT_BYTES: u64 = 32;
 #[derive(Clone, Debug)]
 pub struct DevicePhoto {
     pixels: wgpu::Buffer,
-    /// Width and height in px.
     pub(crate) size_px: [u32; 2],
 }
 
@@ -41,7 +40,6 @@ impl DevicePhoto {
 pub struct LossSums {
     pub(crate) l1: f64,
     pub(crate) ssim: f64,
-    /// Mean squared difference.
     pub(crate) mse: f64,
     /// The frame's (splat, tile) pairs did not fit, so it was not drawn and nothing moved.
     pub overflow: bool,

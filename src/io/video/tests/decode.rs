@@ -12,12 +12,10 @@ use openh264::formats::YUVSource;
 use super::super::Format;
 
 pub(crate) struct Decoded {
-    /// Width and height in px.
     pub(crate) size_px: (u32, u32),
     pub(crate) frames: Vec<Vec<u8>>,
     /// Playing time, where the format has times.
     pub(crate) secs: Option<f64>,
-    /// Bytes on disk.
     pub(crate) bytes: u64,
 }
 
