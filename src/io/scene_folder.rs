@@ -47,12 +47,7 @@ impl SceneFolder {
 
     /// Saves the scene: all of its files change, or none. Without a map, the folder has none afterwards.
     /// Returns the id of this state.
-    pub(crate) fn save(
-        &self,
-        info: &SceneInfo,
-        cloud: &GaussianCloud,
-        map: Option<&SemanticMap>,
-    ) -> Result<String, IoError> {
+    pub fn save(&self, info: &SceneInfo, cloud: &GaussianCloud, map: Option<&SemanticMap>) -> Result<String, IoError> {
         let state = format!("{:032x}", rand::random::<u128>());
         let info = SceneInfo { version: VERSION, state: Some(state.clone()), ..info.clone() };
         let stored = map.map(|map| {

@@ -69,10 +69,6 @@ impl Frames {
 }
 
 impl Sink for Frames {
-    fn size_px(&self) -> (u32, u32) {
-        self.size_px
-    }
-
     fn push(&mut self, rgb: &[u8]) -> Result<()> {
         let path = self.draft.folder.path().join(name(self.frames));
         let mut file = Vec::new();

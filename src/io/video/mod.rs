@@ -1,18 +1,5 @@
 //! Videos of pictures: MP4, GIF, WebP, or PNG frames in a folder; or whatever an ffmpeg program writes.
 //!
-//! ```no_run
-//! use fmlgs::io::video::{Settings, VideoWriter};
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let mut video = VideoWriter::create("flight.mp4".as_ref(), &Settings::new(640, 480, 30.0))?;
-//! for _ in 0..90 {
-//!     video.push(&[0; 640 * 480 * 3])?; // sRGB, row by row from the top
-//! }
-//! let summary = video.finish()?;
-//! assert_eq!((summary.frames, summary.secs), (90, 3.0));
-//! # Ok(())
-//! # }
-//! ```
-//!
 //! Frames go through one at a time and are not kept. What is written lies in a temporary place and
 //! appears under its name when [`VideoWriter::finish`] succeeds; a writer that is dropped before
 //! leaves nothing behind. Two formats keep more than a frame in memory: WebP all *compressed* frames
@@ -63,8 +50,6 @@ pub(crate) struct VideoWriter {
 
 /// Where the frames of one format go. Dropped without `finish`, it removes what it wrote.
 trait Sink: Send {
-    /// Width and height of the video in px.
-    fn size_px(&self) -> (u32, u32);
     /// Takes the next frame: sRGB, `width * height * 3` bytes.
     fn push(&mut self, rgb: &[u8]) -> Result<()>;
     /// Completes the video, puts it in its place and returns its bytes.
@@ -96,7 +81,8 @@ impl VideoWriter {
                 (Some(format), sink)
             }
         };
-        let size_px = sink.size_px();
+        let even = if format == Some(Format::Mp4) { !1 } else { !0 };
+        let size_px = (settings.width_px & even, settings.height_px & even);
         Ok(Self { path: path.into(), format, settings: settings.clone(), size_px, frames: 0, sink: Some(sink) })
     }
 
