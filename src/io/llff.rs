@@ -40,10 +40,8 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
         root: root.into(),
         format: "LLFF".into(),
         photos: photos(listed, root, &file, &mut warnings)?,
-        points: Vec::new(),
-        background: None,
-        metres_per_unit: None,
         warnings,
+        ..Dataset::default()
     })
 }
 

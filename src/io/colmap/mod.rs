@@ -84,9 +84,8 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
         format: if is_binary { "COLMAP binary" } else { "COLMAP text" }.into(),
         photos: photos(listed, root, &images_file, &mut warnings)?,
         points,
-        background: None,
-        metres_per_unit: None,
         warnings,
+        ..Dataset::default()
     })
 }
 

@@ -226,15 +226,8 @@ mod tests {
     fn frames_of_the_first_version_are_used_on() {
         let folder = tempfile::tempdir().expect("folder");
         let camera = crate::scene::Camera::look_at(glam::DVec3::ONE, glam::DVec3::ZERO, glam::DVec3::Z, 0.8, 64, 48);
-        let photo = Photo {
-            name: "a.jpg".into(),
-            // It is not there, so nobody knows when it was written.
-            path: "/one/fox/a.jpg".into(),
-            camera: camera.expect("valid"),
-            distortion: None,
-            test_split: false,
-            background: None,
-        };
+        // It is not there, so nobody knows when it was written.
+        let photo = Photo::new("a.jpg", "/one/fox/a.jpg", camera.expect("valid"));
         let model = ("sam2.1-tiny", "00ff");
         let old = folder.path().join("sam2.1-tiny-7228bc543858c811.frame");
         assert_eq!(folder.path().join(first_name(model, &photo, None)), old, "as the first version called it");
