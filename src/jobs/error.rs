@@ -3,7 +3,9 @@
 use std::error::Error;
 use std::path::PathBuf;
 
+use crate::io::memory::NoRoom;
 use crate::io::{IoError, OpenError};
+use crate::measure::{BeginError, ReportError, StudyError};
 use crate::models::ModelError;
 use crate::models::catalog::InstallError;
 use crate::models::fetch::FetchError;
@@ -14,6 +16,7 @@ use crate::pipeline::semantics::error::FindError;
 use crate::pipeline::synth::SynthError;
 use crate::pipeline::train::TrainError;
 use crate::pipeline::train::config::UnreadableConfig;
+use crate::pipeline::train::trainer::StepError;
 use crate::pipeline::video::VideoError;
 use crate::render::{DrawError, GpuError, RenderError};
 
@@ -47,12 +50,18 @@ pub enum JobError {
     NoGaussians,
     #[error("{0}")]
     Protocol(String),
+    /// The memory that is free is not enough.
+    #[error(transparent)]
+    Room(#[from] NoRoom),
     #[error(transparent)]
     Io(#[from] IoError),
     #[error(transparent)]
     Config(#[from] UnreadableConfig),
     #[error(transparent)]
     Train(#[from] TrainError),
+    /// A step of training failed.
+    #[error(transparent)]
+    Step(#[from] StepError),
     #[error(transparent)]
     Find(#[from] FindError),
     #[error(transparent)]
@@ -71,6 +80,18 @@ pub enum JobError {
     Draw(#[from] DrawError),
     #[error(transparent)]
     Video(#[from] VideoError),
+    /// A report cannot be resumed.
+    #[error(transparent)]
+    Report(#[from] BeginError),
+    /// A report cannot be read.
+    #[error(transparent)]
+    ReadReport(#[from] ReportError),
+    /// A measurement failed.
+    #[error(transparent)]
+    Study(#[from] StudyError),
+    /// A file for a result that is not as it must be.
+    #[error("{0}")]
+    Output(String),
     #[error(transparent)]
     Synth(#[from] SynthError),
 }

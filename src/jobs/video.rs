@@ -1,15 +1,17 @@
 //! Drawing a video of a scene along a path.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
 use super::{JobError, export};
-use crate::io::video::{Settings, Summary};
+use crate::io::IoError;
+use crate::io::camera_path::open;
+use crate::io::video::{VideoSettings, VideoSummary};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::video::{self, Marked};
 use crate::render::{BackendChoice, RenderSettings, Renderer};
-use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
+use crate::scene::{Camera, CameraPath, GaussianCloud, IdentityId, SemanticMap};
 
 const MARK: [u8; 3] = [255, 64, 160];
 
@@ -21,13 +23,13 @@ pub struct VideoRequest {
     pub(crate) cameras: Vec<Camera>,
     pub(crate) marked: Option<(Arc<SemanticMap>, Vec<IdentityId>)>,
     pub(crate) out: PathBuf,
-    pub(crate) settings: Settings,
+    pub(crate) settings: VideoSettings,
     pub(crate) backend: BackendChoice,
 }
 
 #[derive(Clone, Debug)]
 pub(crate) struct Video {
-    pub(crate) summary: Summary,
+    pub(crate) summary: VideoSummary,
     /// What drew it: "CPU", or the name of the GPU.
     pub(crate) backend: String,
     pub(crate) secs: f64,
@@ -54,4 +56,9 @@ pub(crate) fn run(request: VideoRequest, observer: &mut dyn Observer) -> Result<
     export::make_parent(&out)?;
     let summary = video::write(&cloud, &draw, &cameras, marked, &mut renderer, (&out, &settings), observer)?;
     Ok(Video { summary, backend: renderer.name().to_owned(), secs: start.elapsed().as_secs_f64() })
+}
+
+/// A camera path from a file: this program's or nerfstudio's.
+pub(crate) fn camera_path(path: &Path) -> Result<CameraPath, IoError> {
+    open(path)
 }

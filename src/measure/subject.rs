@@ -6,7 +6,7 @@ use std::sync::Arc;
 use strum::VariantArray;
 
 use super::studies::views::{held_out, spread};
-use super::studies::{Input, depth, features, path, query, render, train};
+use super::studies::{StudyInput, depth, features, path, query, render, train};
 use super::sweep::failed;
 use super::{StageName, Study, StudyError};
 use crate::io::labels::Labels;
@@ -21,7 +21,8 @@ use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::{Camera, Dataset, GaussianCloud, Identities, IdentityId, NOBODY, Photo, SemanticMap};
 
-pub(crate) struct Options {
+#[derive(Clone, Debug)]
+pub struct StudyOptions {
     pub(crate) masks: Option<PathBuf>,
     pub(crate) steps: Vec<u64>,
     pub(crate) train_steps: u64,
@@ -31,16 +32,23 @@ pub(crate) struct Options {
     pub(crate) repeats: u32,
 }
 
-pub(crate) struct Subject {
+#[derive(Clone, Debug)]
+pub struct Subject {
     pub(crate) name: String,
     pub(crate) cloud: Arc<GaussianCloud>,
     pub(crate) settings: RenderSettings,
     /// Cameras of its photos, and whether training did not see them.
     pub(crate) cameras: Vec<(Camera, bool)>,
     pub(crate) holdout_every: usize,
-    pub(crate) dataset: Option<Dataset>,
-    pub(crate) map: Option<SemanticMap>,
-    pub(crate) options: Options,
+    pub(crate) dataset: Option<Arc<Dataset>>,
+    pub(crate) map: Option<Arc<SemanticMap>>,
+    pub(crate) options: StudyOptions,
+}
+
+impl Default for StudyOptions {
+    fn default() -> Self {
+        Self { masks: None, steps: vec![300, 1_000], train_steps: 1_000, max_side_px: 256, views: 4, repeats: 3 }
+    }
 }
 
 impl Subject {
@@ -103,11 +111,11 @@ impl Subject {
 
     /// Objects and parts, if an encoder has embedded them.
     fn language(&self) -> Option<(&SemanticMap, &str)> {
-        self.map.as_ref().and_then(|m| Some((m, m.language.as_ref()?.encoder.as_str())))
+        self.map.as_deref().and_then(|m| Some((m, m.language.as_ref()?.encoder.as_str())))
     }
 
-    fn input(&self, more: &[(&str, String)]) -> Input {
-        let mut input = Input::from([
+    fn input(&self, more: &[(&str, String)]) -> StudyInput {
+        let mut input = StudyInput::from([
             ("scene".to_owned(), self.name.clone()),
             ("Gaussians".to_owned(), self.cloud.len().to_string()),
             ("longer side".to_owned(), format!("{} px", self.options.max_side_px)),
@@ -117,7 +125,7 @@ impl Subject {
     }
 
     fn dataset(&self) -> Result<&Dataset, StudyError> {
-        self.dataset.as_ref().ok_or_else(|| failed("photos are needed"))
+        self.dataset.as_deref().ok_or_else(|| failed("photos are needed"))
     }
 
     fn labels(&self) -> Result<FileMasks, StudyError> {
@@ -176,7 +184,7 @@ impl Subject {
             let photo = &dataset.photos[i];
             let categories = categories(&labels.segment(photo, side, &mut Silent).map_err(failed)?);
             let camera = photo.camera.limited_to(side);
-            views.push(query::Asked { name: photo.name.clone(), camera, categories });
+            views.push(query::LabeledScene { name: photo.name.clone(), camera, categories });
         }
         if views.is_empty() {
             return Err(self.few_labels("there are no labels of this scene's photos"));

@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 use ureq::Agent;
 use ureq::http::StatusCode;
 
-use crate::io::http::{self, Piece, TICK};
+use crate::io::http::{self, ResponsePart, TICK};
 
 /// Least that has to arrive within the patience for a stall: a server that sends a byte now and then is
 /// as good as silent.
@@ -22,7 +22,7 @@ pub const MOST_UNPROMISED: u64 = 16 << 20;
 
 /// A file to fetch.
 #[derive(Clone, Copy, Debug)]
-pub struct Wanted<'a> {
+pub struct FileToFetch<'a> {
     /// From where.
     pub url: &'a str,
     /// The file that it becomes, once it is complete and right.
@@ -90,7 +90,7 @@ impl FetchError {
 /// Fetches a file. `progress` is told the bytes that are there and those that there will be, and
 /// whether to go on.
 pub fn fetch(
-    wanted: &Wanted<'_>,
+    wanted: &FileToFetch<'_>,
     patience: Patience,
     progress: &mut dyn FnMut(u64, Option<u64>) -> bool,
 ) -> Result<(), FetchError> {
@@ -162,7 +162,7 @@ struct Part {
 }
 
 impl Part {
-    fn of(wanted: &Wanted<'_>) -> Self {
+    fn of(wanted: &FileToFetch<'_>) -> Self {
         let beside = |ending: &str| {
             let mut name = wanted.to.as_os_str().to_owned();
             name.push(ending);
@@ -209,7 +209,7 @@ impl Part {
 /// One connection: goes on from what is there.
 fn receive(
     agent: &Agent,
-    wanted: &Wanted<'_>,
+    wanted: &FileToFetch<'_>,
     part: &Part,
     stall: Duration,
     progress: &mut dyn FnMut(u64, Option<u64>) -> bool,
@@ -235,8 +235,8 @@ fn receive(
     let pieces = http::ask(move || request.call()).map_err(|e| part.failed(e))?;
     let mut wait = Wait { pieces, stall, since: Instant::now(), got: 0 };
     let (status, headers) = match wait.next(there, wanted.bytes, progress) {
-        Ok(Some(Piece::Head(status, headers))) => (status, headers),
-        Ok(Some(Piece::Failed(problem))) => return Err(FetchError::Unreachable { url, problem }),
+        Ok(Some(ResponsePart::Head(status, headers))) => (status, headers),
+        Ok(Some(ResponsePart::Failed(problem))) => return Err(FetchError::Unreachable { url, problem }),
         Ok(_) => return Err(FetchError::Unreachable { url, problem: "the connection ended".into() }),
         Err(ended) => return Err(ended.error(url, stall, there)),
     };
@@ -277,7 +277,7 @@ fn receive(
     let expected = wanted.bytes.or(total);
     loop {
         match wait.next(there, expected, progress) {
-            Ok(Some(Piece::Bytes(piece))) => {
+            Ok(Some(ResponsePart::Bytes(piece))) => {
                 if there + piece.len() as u64 > most {
                     // What is longer than it should be is another file from its start.
                     part.forget();
@@ -287,7 +287,7 @@ fn receive(
                 file.write_all(&piece).map_err(|e| part.failed(e))?;
             }
             // Where no size is known, only a whole answer is a whole file.
-            Ok(Some(Piece::Failed(problem))) if expected.is_none() => {
+            Ok(Some(ResponsePart::Failed(problem))) if expected.is_none() => {
                 return Err(FetchError::Unreachable { url, problem });
             }
             Ok(_) => break,
@@ -318,7 +318,7 @@ impl Ended {
 
 /// Waits for pieces, for as long as enough of them come and nobody wants it to end.
 struct Wait {
-    pieces: Receiver<Piece>,
+    pieces: Receiver<ResponsePart>,
     stall: Duration,
     /// When enough came last.
     since: Instant,
@@ -333,7 +333,7 @@ impl Wait {
         there: u64,
         expected: Option<u64>,
         progress: &mut dyn FnMut(u64, Option<u64>) -> bool,
-    ) -> Result<Option<Piece>, Ended> {
+    ) -> Result<Option<ResponsePart>, Ended> {
         loop {
             if !progress(there, expected) {
                 return Err(Ended::Cancelled);
@@ -345,7 +345,7 @@ impl Wait {
                 Err(RecvTimeoutError::Timeout) => continue,
             };
             self.got += match &piece {
-                Piece::Bytes(bytes) => bytes.len() as u64,
+                ResponsePart::Bytes(bytes) => bytes.len() as u64,
                 _ => LEAST_BYTES,
             };
             if self.got >= LEAST_BYTES {

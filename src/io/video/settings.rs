@@ -6,7 +6,7 @@ use super::{Result, VideoFileError};
 use crate::scene::Camera;
 
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Settings {
+pub(crate) struct VideoSettings {
     pub(crate) width_px: u32,
     pub(crate) height_px: u32,
     pub(crate) fps: f64,
@@ -14,11 +14,11 @@ pub(crate) struct Settings {
     pub(crate) quality: u8,
     /// Whether a video or frames of the same name may be replaced.
     pub(crate) overwrite: bool,
-    pub(crate) encoder: Encoder,
+    pub(crate) encoder: VideoEncoder,
 }
 
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) enum Encoder {
+pub(crate) enum VideoEncoder {
     #[default]
     BuiltIn,
     /// A program with ffmpeg's command line, fed through a pipe.
@@ -30,10 +30,10 @@ pub(crate) enum Encoder {
     },
 }
 
-impl Settings {
+impl VideoSettings {
     /// A video of this size and rate: quality 80, built-in encoder, nothing is overwritten.
     pub(crate) fn new(width_px: u32, height_px: u32, fps: f64) -> Self {
-        Self { width_px, height_px, fps, quality: 80, overwrite: false, encoder: Encoder::BuiltIn }
+        Self { width_px, height_px, fps, quality: 80, overwrite: false, encoder: VideoEncoder::BuiltIn }
     }
 
     /// Refuses what no format can hold.

@@ -5,7 +5,7 @@ use super::error::FindError;
 use super::filters::{self, FilterOptions};
 use super::segmenter::{FoundMask, Segmenter};
 use crate::io;
-use crate::models::catalog::{self, Role};
+use crate::models::catalog::{self, ModelRole};
 use crate::models::sam::automatic::{AutomaticMask, AutomaticOptions, everything};
 use crate::models::sam::{PromptedMasks, Sam};
 use crate::models::sam2::Sam2;
@@ -33,7 +33,7 @@ const LEAST_TILE_PX: usize = 32;
 impl NetworkMasks {
     /// The network of this name: a model of the catalog, or the path of a model's description.
     pub(crate) fn open(name: &str) -> Result<Self, ModelError> {
-        let path = catalog::find(name, Role::Segmenter)?;
+        let path = catalog::find(name, ModelRole::Segmenter)?;
         let mut options = AutomaticOptions::default();
         let network: Box<dyn PromptedMasks> = match manifest::kind(&path)?.as_str() {
             "sam" => Box::new(Sam::open(&path)?),

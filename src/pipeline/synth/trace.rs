@@ -19,7 +19,7 @@ const REACH: f32 = 1e-6;
 const MAX_SHARE: f32 = 0.02;
 
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Hit {
+pub(crate) struct SurfaceHit {
     /// Distance in lengths of the ray's direction.
     pub(crate) t: f32,
     /// Index of the triangle.
@@ -60,7 +60,7 @@ impl Tracer {
     }
 
     /// The nearest surface from `origin` along `direction`, from `t_min` on.
-    pub(crate) fn nearest(&self, origin: Vec3A, direction: Vec3A, t_min: f32) -> Option<Hit> {
+    pub(crate) fn nearest(&self, origin: Vec3A, direction: Vec3A, t_min: f32) -> Option<SurfaceHit> {
         let ray = Ray::new(origin, direction, t_min, f32::INFINITY);
         let mut hit = RayHit::none();
         if !self.bvh.ray_traverse(ray, &mut hit, |ray, i| distance(&self.triangles[i], ray)) {
@@ -69,7 +69,7 @@ impl Tracer {
         let i = hit.primitive_id as usize;
         let w = self.triangles[i].0.compute_barycentric(&ray);
         let weights = Vec3::new(1.0 - w.x - w.y, w.x, w.y);
-        Some(Hit { t: hit.t, triangle: self.original[i] as usize, weights })
+        Some(SurfaceHit { t: hit.t, triangle: self.original[i] as usize, weights })
     }
 
     /// Whether the way from `origin` to `origin + direction` is free of surfaces, those left out

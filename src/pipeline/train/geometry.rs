@@ -15,7 +15,7 @@ const NORMALS_FROM: f64 = 7.0 / 30.0;
 const THICKNESS: f64 = 1e-7;
 
 #[derive(Debug, Default)]
-pub(crate) struct Geometry {
+pub(crate) struct GeometryLoss {
     surfels: bool,
     normal_weight: f64,
     /// Of distortion in inverse depth times the scene's extent, so that units cancel.
@@ -25,7 +25,7 @@ pub(crate) struct Geometry {
     d_normals: [Vec<f32>; 3],
 }
 
-impl Geometry {
+impl GeometryLoss {
     /// The terms of a run in a scene of this extent.
     pub(crate) fn new(config: &TrainConfig, extent: f64) -> Self {
         let (normal_weight, distortion) = config.geometry_weights();
