@@ -7,28 +7,19 @@ use std::time::Instant;
 
 use crate::math::format::bytes;
 
-/// What was loaded or built.
+/// What sort of thing was loaded or built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "each name says what it is")]
 pub enum ResourceKind {
-    /// Gaussians of a scene.
     Gaussians,
-    /// Objects and parts of a scene.
     Objects,
-    /// Maps of a view's identities.
     Maps,
-    /// Pictures of objects and parts alone.
     Thumbnails,
-    /// A neural network.
     Model,
-    /// The graph for moving about.
     Paths,
-    /// The assistant.
     Agent,
-    /// A graphics device.
     Device,
-    /// The window.
     Window,
-    /// The first picture of a scene.
     Picture,
 }
 
@@ -41,7 +32,6 @@ pub struct ResourceEntry {
     pub kind: ResourceKind,
     /// Its name, with how it was made.
     pub(crate) what: String,
-    /// What it was needed for.
     pub(crate) why: &'static str,
     /// Bytes that it takes in memory; 0 where that is not known.
     pub(crate) bytes: u64,
