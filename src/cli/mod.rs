@@ -8,7 +8,6 @@ mod agent;
 mod bench;
 mod check_stability;
 mod demo;
-mod demo_queries;
 mod error;
 mod eval;
 mod eval_depth;

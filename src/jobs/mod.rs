@@ -4,6 +4,8 @@
 //! and return a typed result or a [`JobError`]. Whoever calls them says the result in its own way.
 
 pub(crate) mod bench;
+pub(crate) mod demo_questions;
+pub(crate) mod demo_tour;
 pub mod edit;
 pub(crate) mod error;
 pub(crate) mod evaluate;
@@ -18,6 +20,7 @@ pub(crate) mod plan;
 pub(crate) mod query;
 pub(crate) mod render;
 pub(crate) mod report;
+pub(crate) mod scale;
 pub(crate) mod segment;
 pub(crate) mod synth;
 pub(crate) mod thumbnails;

@@ -44,6 +44,7 @@ impl App {
                     self.worker.cancel(job.id);
                 }
             }
+            Action::Dismiss if self.viewport.is_measuring() => self.view(&Action::Measure, ctx),
             Action::Dismiss if self.viewport.picking.selected().is_some() => self.view(&Action::Select(None), ctx),
             Action::Dismiss => self.act(Action::Cancel, ctx),
             Action::Evaluate => self.evaluate(),
@@ -53,6 +54,12 @@ impl App {
             Action::Ask(text) => {
                 if let Some(semantics) = self.state.semantics.clone() {
                     self.viewport.queries.ask(&text, &semantics);
+                }
+            }
+            Action::SetScale(meters_per_unit) => {
+                if let Some(scene) = &self.state.scene {
+                    let out = scene.out.clone();
+                    self.submit(Command::SetScale { out, meters_per_unit });
                 }
             }
             Action::Show(mode) => {
@@ -124,6 +131,8 @@ impl App {
             | Action::Hide(_)
             | Action::ResetView
             | Action::TurnUp(_)
+            | Action::SetUp(_)
+            | Action::Measure
             | Action::PreviousPhoto
             | Action::NextPhoto
             | Action::GoToPhoto(_) => {
@@ -313,7 +322,7 @@ impl App {
                 map: Arc::clone(&map),
                 cameras,
                 up,
-                meters: scene.metres_per_unit.or_else(|| scene.dataset.as_ref().and_then(|d| d.metres_per_unit)),
+                meters: scene.meters_per_unit(),
                 exports: scene.out.join("exports"),
                 explored,
             },

@@ -87,15 +87,7 @@ impl App {
         let found = self.viewport.queries.found();
         let marked = map.filter(|_| self.camera.mark).map(|map| (Arc::clone(&map), found));
         let (cloud, backend) = (Arc::clone(&cloud), BackendChoice::Auto);
-        self.submit(Command::CameraSpline(Box::new(VideoRequest {
-            cloud,
-            draw,
-            cameras,
-            marked,
-            out,
-            settings,
-            backend,
-        })));
+        self.submit(Command::Video(Box::new(VideoRequest { cloud, draw, cameras, marked, out, settings, backend })));
     }
 
     fn save_chat(&mut self, path: &Path) {

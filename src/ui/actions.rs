@@ -98,7 +98,7 @@ macro_rules! actions {
     };
     ($($name:ident $(($($arg:ident: $ty:ty),+))?: $text:expr, $tip:literal $(, $key:literal)?;)*) => {
         /// What a user wants.
-        #[derive(Clone, Debug, PartialEq, Eq)]
+        #[derive(Clone, Debug, PartialEq)]
         pub enum Action {
             $(#[doc = $tip] $name $(($($ty),+))?,)*
         }
@@ -192,6 +192,11 @@ actions! {
     FrameScene: "Frame the selection or the scene", "Move until all of what is selected is in view, or else the whole scene.", "F";
     ResetView: "Reset the view", "Return to the view with which the scene opened.", "Home";
     TurnUp(axis: Axis): format!("Make {} the up direction", axis.text()), "For scenes that lie on their side.";
+    SetUp(up: DVec3): format!("Make ({:.2}, {:.2}, {:.2}) the up direction", up.x, up.y, up.z),
+        "The plane that was picked becomes the floor.";
+    Measure: "Measure a distance", "Click two points on surfaces; set the scale from a length that you know.", "M";
+    SetScale(meters: f64): format!("Set the scale to {meters} m per unit"),
+        "Lengths are shown in meters from now on; kept with the scene.";
     PreviousPhoto: "Previous photo", "Look through the camera of the previous photo.", "[";
     NextPhoto: "Next photo", "Look through the camera of the next photo.", "]";
     GoToPhoto(index: usize): format!("Go to photo {}", index + 1), "Look through the camera of this photo.";

@@ -196,6 +196,8 @@ fn shown_text(before: &BTreeSet<IdentityId>, now: &BTreeSet<IdentityId>, all: &I
 
 #[cfg(test)]
 mod tests {
+    use glam::{DMat3, DVec3};
+
     use super::*;
     use crate::scene::{Level, PathKey};
 
@@ -224,7 +226,7 @@ mod tests {
         assert_eq!(done(&mut history, &now, None), "showed only lamp");
         now.map = Some(lamp());
         assert_eq!(done(&mut history, &now, Some("split lamp")), "split lamp");
-        now.view.path.keys.push(PathKey::default());
+        now.view.path.keys.push(PathKey::of_pose(DVec3::ZERO, DMat3::IDENTITY, 1.0));
         assert_eq!(done(&mut history, &now, None), "added a keyframe");
         now.view.mode = ViewMode::Depth;
         assert_eq!(done(&mut history, &now, None), "showed depth");

@@ -12,6 +12,7 @@ pub(crate) use super::train_history::TrainHistory;
 use crate::jobs::OpenedScene;
 use crate::jobs::go_to::{Approached, Explored};
 use crate::jobs::models::ModelList;
+use crate::math::format;
 use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Progress, Severity};
 use crate::pipeline::semantics::thumbnails::Thumbnails;
@@ -267,6 +268,12 @@ impl AppState {
             }
             Outcome::Edited(map) => self.set_semantics(Some(map)),
             Outcome::Refused(why) => self.toast(Tone::Warning, why),
+            Outcome::Scale(meters, stored) => {
+                let scaled = |s: &Arc<OpenedScene>| OpenedScene { metres_per_unit: Some(meters), ..(**s).clone() };
+                self.scene = self.scene.as_ref().map(scaled).map(Arc::new);
+                let kept = if stored { "kept with the scene" } else { "not kept: the scene is not saved yet" };
+                self.toast(Tone::Good, format!("1 unit is {}, {kept}", format::length(1.0, Some(meters))));
+            }
             Outcome::Models(models) => self.models = Some(models),
             Outcome::ModelInstalled(id) => {
                 self.models_installed += 1;

@@ -12,8 +12,8 @@ use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::models::Source;
 use crate::jobs::train::Trained;
 use crate::jobs::{
-    Folders, JobError, OpenedScene, Scene, edit, export, find_objects, go_to, models, open, plan, report, thumbnails,
-    train, video,
+    Folders, JobError, OpenedScene, Scene, edit, export, find_objects, go_to, models, open, plan, report, scale,
+    thumbnails, train, video,
 };
 use crate::measure::{End, FILE, Report};
 use crate::pipeline::observer::{Observer, Severity};
@@ -105,6 +105,10 @@ impl Jobs for PipelineJobs {
                 }
                 Outcome::Edited(new)
             }
+            Command::SetScale { out, meters_per_unit } => {
+                let stored = scale::store(&out, self.known(&out).as_deref(), meters_per_unit)?;
+                Outcome::Scale(meters_per_unit, stored)
+            }
             Command::Export { cloud, path } => {
                 export::ply(&path, &cloud)?;
                 Outcome::Written(path)
@@ -130,7 +134,7 @@ impl Jobs for PipelineJobs {
             Command::Explore { cloud, cameras, up } => {
                 Outcome::Explored(Arc::new(go_to::Explored::new(cloud, &cameras, up)))
             }
-            Command::CameraSpline(request) => Outcome::Written(video::run(*request, observer)?.summary.path),
+            Command::Video(request) => Outcome::Written(video::run(*request, observer)?.summary.path),
             Command::Measure(request) => {
                 let done = report::run(&request, observer)?;
                 if done.end == End::Cancelled {

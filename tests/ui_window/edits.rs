@@ -24,7 +24,13 @@ fn copy(from: &Path, to: &Path) {
     for entry in std::fs::read_dir(from).expect("folder") {
         let path = entry.expect("entry").path();
         let to = to.join(path.file_name().expect("a name"));
-        if path.is_dir() { copy(&path, &to) } else { drop(std::fs::copy(&path, &to).expect("copied")) }
+        if path.is_dir() {
+            copy(&path, &to)
+        } else {
+            {
+                std::fs::copy(&path, &to).expect("copied");
+            }
+        }
     }
 }
 

@@ -1,9 +1,13 @@
-//! What the actions about the view do.
+//! What the actions about the view do, and where they put the eye.
+
+use glam::DVec3;
 
 use super::brush::Brush;
 use super::eye::Eye;
 use super::photo::PhotoView;
+use super::ruler::Ruler;
 use super::{AppState, OpenedScene, Viewport};
+use crate::navigate::Pose;
 use crate::ui::actions::Action;
 use crate::worker::Worker;
 
@@ -27,11 +31,12 @@ impl Viewport {
                 self.photo = None;
                 self.eye = Eye::home(&scene.home, self.up);
             }
-            Action::TurnUp(axis) => {
-                self.leave_photo();
-                self.up = Some(axis.vector());
-                self.eye.set_up(axis.vector());
+            Action::Measure => {
+                self.ruler = if self.ruler.is_some() { None } else { Some(Ruler::default()) };
+                return;
             }
+            Action::TurnUp(axis) => self.turn_up(axis.vector()),
+            Action::SetUp(up) => self.turn_up(*up),
             Action::NextPhoto if photos > 0 => self.look_through(here.map_or(0, |i| (i + 1) % photos), &scene, worker),
             Action::PreviousPhoto if photos > 0 => {
                 self.look_through(here.map_or(photos - 1, |i| (i + photos - 1) % photos), &scene, worker);
@@ -49,5 +54,35 @@ impl Viewport {
         let pivot = c.center + c.forward() * ahead.max(0.1 * scene.home.bounds.radius());
         self.eye = Eye::of_camera(c, pivot, self.up.unwrap_or(scene.home.up));
         self.photo = Some(PhotoView::new(index, photo, worker));
+    }
+
+    fn turn_up(&mut self, up: DVec3) {
+        self.leave_photo();
+        self.up = Some(up);
+        self.eye.set_up(up);
+    }
+
+    /// Puts the eye into a pose.
+    pub(crate) fn stand(&mut self, pose: &Pose, state: &AppState, now: f64) {
+        let Some(scene) = state.scene.clone() else { return };
+        self.photo = None;
+        // What it turns about stays ahead, at the distance that it has.
+        let ahead = (self.eye.pivot - pose.center).dot(pose.forward());
+        let distance = if ahead > 0.0 { ahead } else { 0.5 * scene.home.bounds.radius() };
+        self.eye = Eye {
+            center: pose.center,
+            world_from_eye: pose.world_from_camera,
+            pivot: pose.center + pose.forward() * distance,
+            up: self.up(&scene),
+            fov_y_rad: pose.fov_y_rad,
+        };
+        self.moved_at = now;
+    }
+
+    /// Goes on freely from the photo's place, at the scale that the frame had.
+    pub(super) fn leave_photo(&mut self) {
+        if let Some(photo) = self.photo.take() {
+            self.eye.fov_y_rad = photo.free_fov(self.eye.fov_y_rad);
+        }
     }
 }

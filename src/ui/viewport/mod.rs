@@ -17,6 +17,7 @@ pub mod picking;
 pub(crate) mod query;
 mod request;
 mod route;
+mod ruler;
 pub(crate) mod visible;
 
 use std::sync::Arc;
@@ -32,23 +33,18 @@ use self::overrides::RenderOverrides;
 use self::photo::PhotoView;
 use self::picking::Picking;
 use self::query::Queries;
-use self::request::{Moved, Requests, Wanted};
+use self::request::Requests;
+use self::ruler::Ruler;
 use self::visible::Visibility;
 use super::camera::CameraPane;
 use super::layout::Layout;
 use super::state::{AppState, Tone};
 use crate::jobs::OpenedScene;
 use crate::navigate::Pose;
-use crate::scene::plan::When;
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
 use crate::ui::actions::Action;
-use crate::worker::view::{QualityBudget, SkipPasses, ViewLane, ViewPicture};
+use crate::worker::view::{ViewLane, ViewPicture};
 use crate::worker::{CloudSnapshot, Repaint, Versioned, Worker};
-
-/// The eye counts as moving until it has rested this long.
-const REST_SECS: f64 = 0.15;
-/// Longest side of a frame in px: beyond this the eye gains nothing and waiting costs.
-const MAX_SIDE_PX: u32 = 1600;
 
 /// State of the viewport.
 pub struct Viewport {
@@ -74,6 +70,8 @@ pub struct Viewport {
     /// What is under the cursor and what is selected.
     pub picking: Picking,
     marks: Marks,
+    /// What is being measured.
+    ruler: Option<Ruler>,
     /// What is being marked by hand.
     pub(crate) brush: Option<Brush>,
     /// Render settings in place of the scene's own.
@@ -101,6 +99,7 @@ impl Viewport {
             visibility: Visibility::default(),
             picking: Picking::default(),
             marks: Marks::default(),
+            ruler: None,
             brush: None,
             overrides: RenderOverrides::default(),
             zoom_anchor: None,
@@ -141,6 +140,7 @@ impl Viewport {
             self.queries.clear();
             self.visibility = Visibility::default();
             self.picking = Picking::default();
+            self.ruler = None;
             self.brush = None;
             self.overrides = RenderOverrides::default();
             self.eye = Eye::home(&scene.home, None);
@@ -201,23 +201,6 @@ impl Viewport {
         self.up.unwrap_or(scene.home.up)
     }
 
-    /// Puts the eye into a pose.
-    pub(crate) fn stand(&mut self, pose: &Pose, state: &AppState, now: f64) {
-        let Some(scene) = state.scene.clone() else { return };
-        self.photo = None;
-        // What it turns about stays ahead, at the distance that it has.
-        let ahead = (self.eye.pivot - pose.center).dot(pose.forward());
-        let distance = if ahead > 0.0 { ahead } else { 0.5 * scene.home.bounds.radius() };
-        self.eye = Eye {
-            center: pose.center,
-            world_from_eye: pose.world_from_camera,
-            pivot: pose.center + pose.forward() * distance,
-            up: self.up(&scene),
-            fov_y_rad: pose.fov_y_rad,
-        };
-        self.moved_at = now;
-    }
-
     /// Turns about this point from now on.
     pub(crate) fn turn_about(&mut self, point: DVec3) {
         self.eye.pivot = point;
@@ -226,13 +209,6 @@ impl Viewport {
     /// Whether a frame has come since this was asked last.
     pub(crate) fn take_new_picture(&mut self) -> bool {
         self.display.take_new()
-    }
-
-    /// Goes on freely from the photo's place, at the scale that the frame had.
-    fn leave_photo(&mut self) {
-        if let Some(photo) = self.photo.take() {
-            self.eye.fov_y_rad = photo.free_fov(self.eye.fov_y_rad);
-        }
     }
 
     /// Draws the viewport into all that is left of `ui`.
@@ -268,7 +244,9 @@ impl Viewport {
         }
         let on_camera =
             layout.cameras && self.photo.is_none() && self.show_frusta(ui, rect, &scene, &response, layout, actions);
-        if let Some(semantics) = state.semantics.as_ref().filter(|_| self.brush.is_none()) {
+        let meters = scene.meters_per_unit();
+        self.show_ruler(ui, &response, shown, meters, actions);
+        if let Some(semantics) = state.semantics.as_ref().filter(|_| self.brush.is_none() && !self.is_measuring()) {
             self.show_picking(ui, &response, shown, semantics, on_camera, actions);
             if let Some(cloud) = self.cloud.clone() {
                 self.show_marks(ui, shown, &cloud, semantics, actions);
@@ -293,67 +271,6 @@ impl Viewport {
             self.queries.set_maps(maps, exact);
         }
         self.display.take(ctx, self.lane.pictures());
-    }
-
-    /// Asks for a new frame if anything changed.
-    fn request(&mut self, ui: &Ui, shown: Rect, state: &AppState, layout: &Layout, now: f64) {
-        let Some(cloud) = self.cloud.clone() else { return };
-        let plan = &state.plan;
-        let (cloud, semantics) = match &state.semantics {
-            Some(semantics) => {
-                let (cloud, semantics) = self.visibility.apply(&cloud, semantics);
-                (
-                    cloud,
-                    Some(semantics).filter(|_| {
-                        plan.maps.now(self.queries.wanted() || self.picking.wanted() || self.brush.is_some())
-                    }),
-                )
-            }
-            None => (cloud, None),
-        };
-        let rests = now - self.moved_at - REST_SECS;
-        if rests < 0.0 {
-            ui.ctx().request_repaint_after_secs((-rests + 0.01) as f32);
-        }
-        let busy = state.job.as_ref().is_some_and(|j| !j.paused);
-        let budget = match (rests < 0.0, busy) {
-            (true, _) => QualityBudget::Moving,
-            (false, true) => QualityBudget::Shared,
-            (false, false) => QualityBudget::Full,
-        };
-        let size = shown.size() * ui.pixels_per_point();
-        let (w, h) = ((size.x.round() as u32).max(1), (size.y.round() as u32).max(1));
-        let camera = match &self.photo {
-            Some(p) => p.camera().resized(w, h),
-            None => self.eye.camera(w, h),
-        };
-        let always = plan.redraw == When::Always;
-        if always {
-            ui.ctx().request_repaint();
-        }
-        // A newer request would keep what belongs to the last one from ever being drawn.
-        let drawn = self.display.picture().is_some_and(|p| p.ticket == self.requests.ticket())
-            && (semantics.is_none() || self.queries.maps().is_some());
-        let wanted = Wanted {
-            cloud,
-            camera: camera.limited_to(MAX_SIDE_PX),
-            mode: layout.mode,
-            settings: self.overrides.over(state.render_settings(), self.on_gpu()),
-            budget,
-            photo: self.photo.as_ref().and_then(PhotoView::pixels),
-            codes: semantics.is_some() && self.queries.wants_codes(),
-            follow: budget == QualityBudget::Moving && (self.queries.tints() || self.picking.selected().is_some()),
-            semantics,
-            skip: SkipPasses::of(plan),
-            timed: layout.times,
-        };
-        if let Some((request, moved)) = self.requests.next(wanted, always && drawn) {
-            self.lane.request(request);
-            if moved != Moved::Nothing {
-                self.queries.forget_maps(moved == Moved::Eye);
-                self.display.forget_maps();
-            }
-        }
     }
 
     /// Whether a GPU draws the view.
