@@ -116,10 +116,12 @@ impl Tree<'_> {
                 return self.name_field(ui, actions);
             }
             let name = ui.add(Button::new(self.identities.name(id)).frame_when_inactive(false));
+            let name = name.on_hover_text("Highlight it in the view; double-click to rename it");
+            if name.clicked() {
+                actions.extend([Action::Select(Some(id)), Action::Ask(self.identities.full_name(id))]);
+            }
             if name.double_clicked() {
                 self.start_renaming(id);
-            } else if name.on_hover_text("Highlight it in the view; double-click to rename it").clicked() {
-                actions.push(Action::Ask(self.identities.full_name(id)));
             }
             self.menu(ui, id, actions);
             let size = self.sizes.get(id as usize).unwrap_or(&0).to_string();
