@@ -12,6 +12,7 @@ use crate::pipeline::semantics::answer::Basis;
 use crate::pipeline::semantics::codes::TOLERANCE;
 use crate::pipeline::semantics::localize::{Answer, Hit};
 use crate::pipeline::semantics::matching::MatchMode;
+use crate::pipeline::semantics::reading::mended_text;
 use crate::pipeline::semantics::timing::ms_since;
 use crate::scene::{LevelFilter, SemanticMap};
 
@@ -90,7 +91,7 @@ pub(crate) fn run(args: Args) -> Result<(), CliError> {
 }
 
 fn tell(args: &Args, map: &SemanticMap, result: &QueryResult) -> Result<(), CliError> {
-    let QueryResult { answered, mask, unknown_words: unknown, query_ms, .. } = result;
+    let QueryResult { answered, reading, mask, unknown_words: unknown, ignored_words: ignored, query_ms, .. } = result;
     let full_name = |hit: &Hit| map.identities.full_name(hit.identity);
     let basis = if answered.basis == Basis::Names { "names" } else { "looks" };
     let answer = &answered.answer;
@@ -107,13 +108,16 @@ fn tell(args: &Args, map: &SemanticMap, result: &QueryResult) -> Result<(), CliE
             "pixels": mask.area(),
             "in_view": !mask.is_empty(),
             "unknown_words": unknown,
+            "ignored_words": ignored,
+            "mended": reading.mended.iter().map(|(typed, read)| json!({ "typed": typed, "read": read })).collect::<Vec<_>>(),
             "query_ms": query_ms,
             "stages_ms": answered.stages,
         }))?;
     }
     match answer {
         Answer::NotFound(_) => {
-            let near = hits.iter().filter(|h| h.score > 0.0).map(full_name).collect::<Vec<_>>().join(", ");
+            let alike = reading.near.iter().map(|(_, other)| other.clone());
+            let near = hits.iter().filter(|h| h.score > 0.0).map(full_name).chain(alike).collect::<Vec<_>>().join(", ");
             let near = if near.is_empty() { String::new() } else { format!("; nearest: {near}") };
             let known = match unknown.as_slice() {
                 [] => String::new(),
@@ -131,7 +135,10 @@ fn tell(args: &Args, map: &SemanticMap, result: &QueryResult) -> Result<(), CliE
                 0 => "not in this view (--camera looks from another photo)".to_owned(),
                 n => format!("{n} px in this view"),
             };
-            output::print(&format!("{}\n{seen}, answered by {basis} in {query_ms:.2} ms{note}", output::table(&rows)))
+            let mended = mended_text(&reading.mended).map(|t| format!("\n{t}")).unwrap_or_default();
+            let ignored = if ignored.is_empty() { String::new() } else { format!("\nignored: {}", ignored.join(", ")) };
+            let table = output::table(&rows);
+            output::print(&format!("{table}\n{seen}, answered by {basis} in {query_ms:.2} ms{note}{mended}{ignored}"))
         }
     }
 }

@@ -163,6 +163,23 @@ impl QueryAnswer {
         hits.iter().take(most).filter(|h| h.score >= threshold).map(|h| h.identity).collect()
     }
 
+    /// The words of a query that the answer does not rest on; `unknown` are those that nothing here knows.
+    pub(crate) fn ignored_words(
+        &self,
+        identities: &Identities,
+        phrase: &ParsedQuery,
+        unknown: &[String],
+    ) -> Vec<String> {
+        match (&self.answer, self.basis) {
+            (Answer::NotFound(_), _) => Vec::new(),
+            (found, Basis::Names) => {
+                let first = found.hits().first();
+                first.map_or_else(Vec::new, |h| names::words_beside(identities, h.identity, &phrase.text))
+            }
+            (_, Basis::Embedding) => unknown.to_vec(),
+        }
+    }
+
     /// Score from which an identity is what was asked for.
     pub(crate) fn threshold(&self) -> f32 {
         match self.basis {

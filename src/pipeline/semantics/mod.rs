@@ -27,6 +27,7 @@ pub mod parse;
 pub(crate) mod propagate;
 pub(crate) mod protocols;
 pub(crate) mod query_engine;
+pub(crate) mod reading;
 pub mod regions;
 pub mod relevancy;
 pub mod sam2_tracker;

@@ -9,6 +9,7 @@ use crate::pipeline::semantics::answer::Basis;
 use crate::pipeline::semantics::localize::Answer;
 use crate::pipeline::semantics::matching::{self, MatchMode};
 use crate::pipeline::semantics::names;
+use crate::pipeline::semantics::reading::mended_text;
 use crate::scene::{Bounds, GaussianCloud, IdentityId, SemanticMap, text};
 use crate::ui::actions::Action;
 use crate::ui::theme;
@@ -92,12 +93,15 @@ impl Queries {
     }
 
     fn show_verdict(&self, ui: &mut Ui, newest: &super::Asked) {
-        let unknown = newest.unknown.join("\", \"");
-        let unknown = text::shortened(&unknown, 80);
+        let quoted = |words: &[String]| text::shortened(&words.join("\", \""), 80).into_owned();
+        let unknown = quoted(&newest.unknown);
+        if let Some(mended) = mended_text(&newest.reading.mended) {
+            ui.weak(text::shortened(&mended, 120));
+        }
         match &newest.answered.answer {
-            Answer::Found(_) if unknown.is_empty() || newest.answered.basis == Basis::Names => {}
+            Answer::Found(_) if newest.ignored.is_empty() => {}
             Answer::Found(_) => {
-                ui.colored_label(theme::WARNING, format!("Ignored unknown words: \"{unknown}\"."));
+                ui.colored_label(theme::WARNING, format!("Ignored: \"{}\".", quoted(&newest.ignored)));
             }
             Answer::Ambiguous(_) => {
                 ui.colored_label(theme::WARNING, "Ambiguous:");
@@ -111,6 +115,9 @@ impl Queries {
                     _ => format!("No match for \"{unknown}\"."),
                 };
                 ui.colored_label(theme::WARNING, text);
+                if let Some((_, other)) = newest.reading.near.first() {
+                    ui.weak(format!("Did you mean \"{other}\"?"));
+                }
             }
         }
         if let Some(trouble) = self.embeddings.problem() {

@@ -24,6 +24,7 @@ use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::matching::MatchMode;
 use crate::pipeline::semantics::names;
 use crate::pipeline::semantics::query_engine::answer_encoded;
+use crate::pipeline::semantics::reading::Reading;
 use crate::pipeline::semantics::timing::{StagesMs, ms_since};
 use crate::scene::{IdentityId, Mask, ScenePlan, SemanticMap};
 use crate::worker::Versioned;
@@ -45,8 +46,12 @@ pub struct Asked {
     pub pending: bool,
     /// A hit that was chosen among the others; else the best are shown.
     chosen: Option<IdentityId>,
+    /// How it was read.
+    reading: Reading,
     /// Words that neither names nor the encoder know.
     unknown: Vec<String>,
+    /// Words that the answer does not rest on.
+    ignored: Vec<String>,
 }
 
 impl Asked {
@@ -144,7 +149,7 @@ impl Queries {
         let encoder = semantics.language.as_ref().map(|l| l.encoder.as_str());
         let now = semantics.generation();
         // One that is of no more use goes at once, one that is new waits for a query.
-        let texts: Vec<String> = self.all().map(|q| q.text.clone()).collect();
+        let texts = self.all().map(|q| q.reading.phrase.clone()).collect();
         let encoded =
             (encoder.is_none() || plan.encoder.now(self.wanted)) && self.embeddings.keep_up(ctx, encoder, texts);
         if encoded || self.answered_for != now {
@@ -193,13 +198,16 @@ impl Queries {
 
     fn asked(&self, text: &str, semantics: &SemanticMap) -> Option<Asked> {
         let text = text.trim();
-        let encoded = self.embeddings.of(text);
-        let mut answered = answer_encoded(semantics, text, self.settings.kind, self.embeddings.phrases(text))?;
+        let reading = Reading::new(&semantics.identities, text, self.settings.kind)?;
+        let phrase = &reading.phrase;
+        let encoded = self.embeddings.of(phrase);
+        let mut answered = answer_encoded(semantics, phrase, self.settings.kind, self.embeddings.phrases(phrase));
         answered.stages.encode = encoded.map_or(0.0, |t| t.encode_ms);
         let to_encoder = encoded.map(|t| t.unknown.as_slice());
-        let unknown = names::unknown_to_all(&semantics.identities, text, to_encoder);
-        let pending = semantics.language.is_some() && self.embeddings.is_pending(text);
-        Some(Asked { text: text.to_owned(), answered, pending, chosen: None, unknown })
+        let unknown = names::unknown_to_all(&semantics.identities, &phrase.text, to_encoder);
+        let ignored = answered.ignored_words(&semantics.identities, phrase, &unknown);
+        let pending = semantics.language.is_some() && self.embeddings.is_pending(phrase);
+        Some(Asked { text: text.to_owned(), answered, pending, chosen: None, reading, unknown, ignored })
     }
 
     /// Keeps the query being typed on screen, and makes room for the next.
