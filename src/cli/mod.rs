@@ -25,6 +25,7 @@ mod preprocess;
 mod process;
 mod progress;
 mod query;
+mod query_phrases;
 mod render;
 mod report;
 mod segment;

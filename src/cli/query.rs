@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 
-use super::{CliError, number, output, view};
+use super::{CliError, number, output, query_phrases, view};
 use crate::jobs::open;
 use crate::jobs::query::{self, QueryResult, Request};
 use crate::pipeline::semantics::answer::Basis;
@@ -24,30 +24,44 @@ use crate::scene::{LevelFilter, SemanticMap};
 #[command(after_help = "Examples:\n  \
     fmlgs query scene/ \"a button of the red controller\"\n  \
     fmlgs query scene/ \"the lamp's shade\" --camera 12 --mask mask.png --heat heat.png\n  \
-    fmlgs query scene/ lamp --kind object --json")]
+    fmlgs query scene/ lamp --kind object --json\n  \
+    fmlgs query scene/ --phrases words.txt --views all --export masks/ --truth true_masks/")]
 pub(crate) struct Args {
     /// Trained scene with objects and parts ('fmlgs preprocess')
     scene: PathBuf,
     /// What to look for
-    text: String,
+    #[arg(required_unless_present = "phrases", conflicts_with = "phrases")]
+    text: Option<String>,
+    /// Ask every phrase of a text file, one a line, instead of one
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["mask", "heat"])]
+    phrases: Option<PathBuf>,
+    /// Views for --phrases: 'all' photos, or some by index or name, with commas between [default: --camera]
+    #[arg(long, requires = "phrases", conflicts_with = "camera")]
+    pub(super) views: Option<String>,
+    /// True masks for --phrases, as it exports them: FOLDER/<view>/<phrase>.png, white on black
+    #[arg(long, value_name = "FOLDER", requires = "phrases")]
+    pub(super) truth: Option<PathBuf>,
+    /// Write the masks of --phrases as .png, COCO .json and a .csv table into this folder
+    #[arg(long, value_name = "FOLDER", requires = "phrases")]
+    pub(super) export: Option<PathBuf>,
     /// Photo by index from 0 or by name, or a JSON camera file [default: the first photo]
     #[arg(long)]
-    camera: Option<String>,
+    pub(super) camera: Option<String>,
     /// Shrink the view to at most this many px along its longer side
     #[arg(long, default_value_t = 1008, value_parser = clap::value_parser!(u32).range(16..=16384))]
-    max_side: u32,
+    pub(super) max_side: u32,
     /// Whether an object or a part is meant
     #[arg(long, value_enum, default_value_t = LevelFilter::Auto)]
-    kind: LevelFilter,
+    pub(super) kind: LevelFilter,
     /// Answers whose pixels go into the mask at most
     #[arg(long, default_value_t = 1, value_parser = number::within(1..=100_000_usize))]
-    top: usize,
+    pub(super) top: usize,
     /// Match alpha-blended codes, as the paper does, instead of identities
     #[arg(long)]
-    blend: bool,
+    pub(super) blend: bool,
     /// Largest difference per channel of a match, in 255ths
     #[arg(long, default_value_t = 255.0 * TOLERANCE, value_parser = number::within(0.0..=255.0_f32))]
-    tolerance: f32,
+    pub(super) tolerance: f32,
     /// Write the mask of the answer: white on black
     #[arg(long)]
     mask: Option<PathBuf>,
@@ -56,7 +70,7 @@ pub(crate) struct Args {
     heat: Option<PathBuf>,
     /// Print one JSON document
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 pub(crate) fn run(args: Args) -> Result<(), CliError> {
@@ -65,10 +79,14 @@ pub(crate) fn run(args: Args) -> Result<(), CliError> {
         output::check(out, &[".png"], &scene.reads())?;
     }
     let map = scene.semantics()?;
+    if let Some(list) = &args.phrases {
+        return query_phrases::run(&args, list, &scene, map);
+    }
+    let text = args.text.as_deref().unwrap_or_default();
     let camera = view::choose(args.camera.as_deref(), &scene)?.limited_to(args.max_side);
     view::check_room(camera.width_px, camera.height_px)?;
     let request = Request {
-        text: &args.text,
+        text,
         level: args.kind,
         camera: &camera,
         mode: if args.blend { MatchMode::Blend } else { MatchMode::Exact },
@@ -87,10 +105,10 @@ pub(crate) fn run(args: Args) -> Result<(), CliError> {
     if args.mask.is_some() || args.heat.is_some() {
         result.answered.stages.draw = ms_since(drawing_since);
     }
-    tell(&args, &map, &result)
+    tell(&args, text, &map, &result)
 }
 
-fn tell(args: &Args, map: &SemanticMap, result: &QueryResult) -> Result<(), CliError> {
+fn tell(args: &Args, text: &str, map: &SemanticMap, result: &QueryResult) -> Result<(), CliError> {
     let QueryResult { answered, reading, mask, unknown_words: unknown, ignored_words: ignored, query_ms, .. } = result;
     let full_name = |hit: &Hit| map.identities.full_name(hit.identity);
     let basis = if answered.basis == Basis::Names { "names" } else { "looks" };
@@ -101,7 +119,7 @@ fn tell(args: &Args, map: &SemanticMap, result: &QueryResult) -> Result<(), CliE
             json!({ "identity": h.identity, "name": full_name(h), "score": h.score, "margin": h.margin })
         };
         output::print_json(&json!({
-            "query": args.text,
+            "query": text,
             "answer": answer.verdict(),
             "basis": basis,
             "hits": hits.iter().map(hit).collect::<Vec<_>>(),
@@ -123,7 +141,7 @@ fn tell(args: &Args, map: &SemanticMap, result: &QueryResult) -> Result<(), CliE
                 [] => String::new(),
                 words => format!("; words that are not known: {}", words.join(", ")),
             };
-            Err(CliError::failed(format!("nothing here fits '{}'{near}{known}", args.text)))
+            Err(CliError::failed(format!("nothing here fits '{text}'{near}{known}")))
         }
         _ if args.json => Ok(()),
         _ => {

@@ -54,6 +54,9 @@ pub enum JobError {
     /// Nothing is what was asked for.
     #[error("nothing here fits '{0}'")]
     NoMatch(String),
+    /// A list of phrases, or a mask to compare with, makes no sense.
+    #[error("{0}")]
+    Phrases(String),
     /// Nothing is left to write.
     #[error("no Gaussian is left to write")]
     NoGaussians,

@@ -52,6 +52,8 @@ impl App {
                     self.viewport.queries.ask(&text, &semantics);
                 }
             }
+            Action::RunPhrases(to) => self.run_phrases(to),
+            Action::TrueMask(path) => self.compare_with_mask(path.as_deref()),
             Action::Show(mode) => self.layout.mode = mode,
             Action::OpenReport(path) => self.read_report(path, false),
             Action::CompareReport(path) => self.read_report(path, true),
@@ -98,6 +100,8 @@ impl App {
             | Action::Screenshot
             | Action::ChooseMasks
             | Action::AddModel(_)
+            | Action::ExportPhrases
+            | Action::ChooseTrueMask
             | Action::ChooseReport
             | Action::ChooseSecondReport
             | Action::OpenPath

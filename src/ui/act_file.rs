@@ -30,6 +30,8 @@ impl App {
     pub(super) fn chosen(&mut self, answer: Chosen) {
         match answer {
             Chosen::Path(Action::OpenFolder | Action::OpenFile, path) => self.ask(Action::Open(path)),
+            Chosen::Path(Action::ExportPhrases, path) => self.ask(Action::RunPhrases(Some(path))),
+            Chosen::Path(Action::ChooseTrueMask, path) => self.ask(Action::TrueMask(Some(path))),
             Chosen::Path(Action::ChooseReport, path) => self.read_report(path, false),
             Chosen::Path(Action::ChooseSecondReport, path) => self.read_report(path, true),
             Chosen::Path(Action::ChooseMasks, path) => self.find_objects(Some(path)),

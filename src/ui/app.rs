@@ -13,8 +13,8 @@ use super::edits::EditStep;
 use super::layout::Layout;
 use super::palette::{Palette, shortcut_sheet};
 use super::panes::{
-    bars, dataset::PhotoThumbnails, empty, log, models::Models, object_thumbnails::ObjectThumbnails, objects, plan,
-    report::ReportPane, training,
+    bars, dataset::PhotoThumbnails, empty, log, models::Models, object_thumbnails::ObjectThumbnails, objects,
+    phrases::PhrasesPane, plan, report::ReportPane, training,
 };
 use super::state::AppState;
 use super::toasts::Toasts;
@@ -42,6 +42,8 @@ pub struct App {
     pub(super) sheet: bool,
     photo_thumbnails: PhotoThumbnails,
     object_thumbnails: ObjectThumbnails,
+    /// The list of phrases.
+    pub phrases: PhrasesPane,
     models: Models,
     /// Error against run time.
     pub(crate) report: ReportPane,
@@ -90,6 +92,7 @@ impl App {
             sheet: false,
             photo_thumbnails: PhotoThumbnails::default(),
             object_thumbnails: ObjectThumbnails::default(),
+            phrases: PhrasesPane::default(),
             models: Models::default(),
             report: ReportPane::default(),
             camera: CameraPane::default(),
@@ -191,6 +194,11 @@ impl App {
                 viewport.stand(&pose, state, ui.input(|i| i.time));
             }
         }
+        if layout.shows(Pane::Phrases) && state.semantics.is_some() {
+            let comparing = viewport.queries.truth().is_some();
+            let shown = Panel::bottom("phrases").frame(pane).resizable(true).default_size(220.0).min_size(150.0);
+            shown.show(ui, |ui| self.phrases.show(ui, state, comparing, actions));
+        }
         if layout.shows(Pane::Report) {
             // The view stays larger than what is said about it.
             let most = (0.55 * ui.available_height()).max(200.0);
@@ -211,11 +219,20 @@ impl App {
                 },
             );
         }
-        if [Pane::Chat, Pane::Training, Pane::Objects, Pane::Plan, Pane::Models].iter().any(|p| layout.shows(*p)) {
+        if [Pane::Chat, Pane::Query, Pane::Training, Pane::Objects, Pane::Plan, Pane::Models]
+            .iter()
+            .any(|p| layout.shows(*p))
+        {
             Panel::right("work").frame(pane).resizable(true).default_size(350.0).size_range(290.0..=640.0).show(
                 ui,
                 |ui| {
                     ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+                        if layout.shows(Pane::Query) {
+                            egui::CollapsingHeader::new(Pane::Query.text())
+                                .default_open(true)
+                                .show(ui, |ui| viewport.show_query(ui, state, actions));
+                            ui.add_space(8.0);
+                        }
                         let objects = layout.shows(Pane::Objects) && scene.dataset.is_some();
                         let show_objects = |ui: &mut Ui, actions: &mut Vec<Action>| {
                             egui::CollapsingHeader::new(Pane::Objects.text()).default_open(true).show(ui, |ui| {

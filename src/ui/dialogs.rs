@@ -89,6 +89,8 @@ fn dialog(action: &Action, name: &str) -> Option<(String, Dialog)> {
         Action::OpenFolder => ("Open a folder of photos or a trained scene", Dialog::Folder),
         Action::OpenFile => ("Open a scene", Dialog::File("Scenes", &["ply", "json"])),
         Action::AddModel(id) => return Some((format!("Choose the folder with the files of {id}"), Dialog::Folder)),
+        Action::ExportPhrases => ("Choose a folder for the masks", Dialog::Folder),
+        Action::ChooseTrueMask => ("Choose the true mask of this view", Dialog::File("Masks", &["png"])),
         Action::ChooseMasks => ("Choose the folder with the masks", Dialog::Folder),
         Action::ExportPly | Action::ExportTarget(_) => ("Export Gaussians", save(".ply")),
         Action::OpenPath => ("Open a camera path", Dialog::File("Camera paths", &["json"])),

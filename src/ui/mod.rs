@@ -6,6 +6,7 @@
 
 mod act;
 mod act_file;
+mod act_phrases;
 mod act_report;
 pub mod actions;
 pub mod app;
@@ -16,6 +17,7 @@ mod context;
 pub(crate) mod dialogs;
 mod edits;
 pub(crate) mod keys;
+pub(crate) mod labels;
 pub(crate) mod layout;
 pub(crate) mod palette;
 pub(crate) mod panes;

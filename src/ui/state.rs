@@ -5,13 +5,14 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::actions::Action;
+use super::labels::{Labels, PhraseTable};
 pub(crate) use super::train_history::TrainHistory;
 use crate::jobs::OpenedScene;
 use crate::jobs::go_to::{Approached, Explored};
 use crate::jobs::models::ModelList;
+use crate::jobs::thumbnails::Drawn;
 use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Progress, Severity};
-use crate::pipeline::semantics::thumbnails::Thumbnails;
 use crate::render::RenderSettings;
 use crate::scene::undo::UndoHistory;
 use crate::scene::{Facts, Limits, Overrides, PhotoPixels, ScenePlan, SemanticMap, text};
@@ -56,9 +57,7 @@ pub(crate) struct Toast {
 pub struct RunningJob {
     pub(crate) id: JobId,
     pub(crate) kind: JobKind,
-    /// What it does, for the user.
     pub(crate) title: String,
-    /// Where it stands, once it says.
     pub(crate) progress: Option<Progress>,
     /// Whether it waits.
     pub paused: bool,
@@ -94,10 +93,12 @@ pub struct AppState {
     pub(crate) antialias: bool,
     /// Objects and parts of the Gaussians on screen.
     pub semantics: Option<Versioned<SemanticMap>>,
-    /// Gaussians of each of them by number, pieces included.
+    /// Gaussians of each of them by number, pieces included; and what they are called on screen.
     pub(crate) sizes: Vec<usize>,
+    pub(crate) labels: Labels,
+    pub phrases: PhraseTable,
     /// New thumbnails of objects and parts, until they are taken over.
-    pub(crate) thumbnails: Option<(Arc<SemanticMap>, Thumbnails)>,
+    pub(crate) thumbnails: Option<(Arc<SemanticMap>, Drawn)>,
     /// What is known of moving about in the scene.
     pub explored: Option<Arc<Explored>>,
     /// The way that was looked for last, until the window takes it.
@@ -132,7 +133,6 @@ pub struct AppState {
     pub report: Option<ShownReport>,
     /// The report that it is compared with.
     pub second_report: Option<ShownReport>,
-    /// Short jobs that run, with their titles.
     short_jobs: BTreeMap<JobId, (JobKind, String)>,
     next_toast: u64,
 }
@@ -336,7 +336,8 @@ impl AppState {
                     false => self.report = shown,
                 }
             }
-            Outcome::Thumbnails(map, pictures) => self.thumbnails = Some((map, pictures)),
+            Outcome::Thumbnails(map, drawn) => self.thumbnails = Some((map, drawn)),
+            Outcome::Phrases(rows, to) => self.phrases.finished(rows, to),
             Outcome::Written(path) => self.toast(Tone::Good, format!("Wrote {}", path.display())),
             Outcome::Photo { index, max_side_px, pixels } => {
                 self.photos.insert((index, max_side_px), pixels);
@@ -376,7 +377,7 @@ impl AppState {
         self.set_facts(scene.facts.clone());
         self.antialias = scene.render.antialias;
         self.set_semantics(scene.semantics.clone());
-        self.edits = UndoHistory::default();
+        (self.edits, self.labels, self.phrases) = Default::default();
         self.scene = Some(Arc::new(scene));
     }
 

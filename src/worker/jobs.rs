@@ -13,8 +13,8 @@ use crate::jobs::evaluate::{self, Comparison, Options};
 use crate::jobs::models::Source;
 use crate::jobs::train::Trained;
 use crate::jobs::{
-    Folders, JobError, OpenedScene, Scene, edit, export, find_objects, go_to, models, open, plan, thumbnails, train,
-    video,
+    Folders, JobError, OpenedScene, Scene, edit, export, find_objects, go_to, models, open, phrases, plan, thumbnails,
+    train, video,
 };
 use crate::pipeline::observer::Observer;
 use crate::pipeline::train::TrainConfig;
@@ -130,6 +130,7 @@ impl Jobs for PipelineJobs {
             Command::CameraSpline(request) => Outcome::Written(video::run(*request, observer)?.summary.path),
             Command::Measure(request) => return measuring::run(*request, observer),
             Command::ReadReport { path, second } => return measuring::read(path, second),
+            Command::Phrases(request) => Outcome::Phrases(phrases::run(&request, observer)?, request.export),
             Command::Thumbnails { cloud, map, settings, home } => {
                 let drawn = thumbnails::draw(&cloud, &map, &settings, &home)?;
                 Outcome::Thumbnails(map, drawn)

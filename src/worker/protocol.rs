@@ -9,11 +9,12 @@ use super::failure::Failure;
 use crate::jobs::edit::EditRequest;
 use crate::jobs::go_to::{ApproachRequest, Approached, Explored};
 use crate::jobs::models::ModelList;
+use crate::jobs::phrases::{PhraseRow, PhrasesRequest};
+use crate::jobs::thumbnails::Drawn;
 use crate::jobs::video::VideoRequest;
 use crate::jobs::{OpenedScene, find_objects};
 use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Progress, Severity, StepMetrics};
-use crate::pipeline::semantics::thumbnails::Thumbnails;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::{Camera, Dataset, Facts, GaussianCloud, HomeView, Photo, PhotoPixels, SemanticMap};
@@ -72,6 +73,8 @@ pub enum JobKind {
     Measure,
     /// Reads a report.
     Report,
+    /// Asks a list of phrases.
+    Phrases,
 }
 
 impl JobKind {
@@ -85,6 +88,7 @@ impl JobKind {
             | Self::Objects
             | Self::Model
             | Self::CameraSpline
+            | Self::Phrases
             | Self::Measure => Lane::Long,
             Self::Edit
             | Self::Export
@@ -207,6 +211,8 @@ pub enum Command {
         /// Whether it is to be compared with the one that is shown.
         second: bool,
     },
+    /// Ask a list of phrases of some views.
+    Phrases(Box<PhrasesRequest>),
     /// Draw every object and part alone, small.
     Thumbnails {
         /// The Gaussians.
@@ -240,6 +246,7 @@ impl Command {
             Self::Approach(_) => JobKind::Approach,
             Self::CameraSpline(_) => JobKind::CameraSpline,
             Self::Measure(_) => JobKind::Measure,
+            Self::Phrases(_) => JobKind::Phrases,
             Self::ReadReport { .. } => JobKind::Report,
         }
     }
@@ -266,6 +273,7 @@ impl Command {
             }
             Self::CameraSpline(request) => format!("Rendering {}", name(&request.out)),
             Self::Measure(_) => "Benchmarking rendering".into(),
+            Self::Phrases(_) => "Asking a list of phrases".into(),
             Self::ReadReport { path, .. } => format!("Opening the report {}", name(path)),
         }
     }
@@ -295,6 +303,8 @@ pub enum Outcome {
     Edited(Arc<SemanticMap>),
     /// A file was written.
     Written(PathBuf),
+    /// Phrases were asked; and where their masks are, if they were written.
+    Phrases(Vec<PhraseRow>, Option<PathBuf>),
     /// A report was read or measured.
     Report {
         /// Where it lies.
@@ -305,14 +315,14 @@ pub enum Outcome {
         second: bool,
     },
     /// Portraits of objects and parts by number less one, as `semantics::portraits` draws them.
-    Thumbnails(Arc<SemanticMap>, Thumbnails),
+    Thumbnails(Arc<SemanticMap>, Drawn),
     /// The models were listed.
     Models(Arc<ModelList>),
     /// A model can be used now.
     ModelInstalled(String),
     /// The scene was looked at.
     Explored(Arc<Explored>),
-    /// The way to an identity, or why there is none; and what was learnt about the scene.
+    /// The way to an identity, or why there is none; and what was learned of the scene.
     Approached(Arc<Explored>, Approached),
     /// A photo was loaded.
     Photo {
@@ -325,8 +335,7 @@ pub enum Outcome {
     },
 }
 
-/// What happened. For each job: first `Started`, then any of the middle ones, at last exactly one of
-/// `Finished`, `Cancelled`, `Failed`. Only `Progress` may be missing.
+/// What happened. For each job: first `Started`, at last one of `Finished`, `Cancelled`, `Failed`.
 #[derive(Clone, Debug)]
 pub enum Event {
     /// The job has left the queue.
@@ -381,17 +390,11 @@ impl Event {
 /// What is to be drawn in many ways.
 #[derive(Clone, Debug)]
 pub struct MeasureRequest {
-    /// The scene, for display.
     pub(crate) scene: String,
     pub(crate) cloud: Arc<GaussianCloud>,
-    /// How they are drawn.
     pub(crate) settings: RenderSettings,
-    /// Its photos; those that are held out are compared with, too.
     pub(crate) dataset: Option<Arc<Dataset>>,
-    /// Every how-manieth photo is held out.
     pub(crate) holdout_every: usize,
-    /// From where it is drawn without held-out photos.
     pub(crate) camera: Camera,
-    /// Folder of the report. What is measured there already is resumed.
     pub(crate) out: PathBuf,
 }

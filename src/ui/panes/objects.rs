@@ -1,12 +1,14 @@
 //! The objects and parts of the scene, as a tree; a click asks for one.
 
 use egui::collapsing_header::CollapsingState;
-use egui::{Button, Color32, Id, Key, RichText, ScrollArea, TextEdit, Ui, vec2};
+use egui::{Button, CollapsingHeader, Color32, Id, Key, RichText, ScrollArea, TextEdit, Ui, vec2};
 
+use super::super::labels::{self, Labels};
 use super::super::state::AppState;
 use super::super::theme;
 use super::super::viewport::visible::Visibility;
 use super::object_thumbnails::ObjectThumbnails;
+use crate::math::format::things;
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::edit::Edit;
 use crate::scene::{Identities, IdentityId, Level, NOBODY};
@@ -30,7 +32,7 @@ pub(crate) fn show(
     let from = if map.seeds.len() == 1 { "1 photo".to_owned() } else { format!("{} photos", map.seeds.len()) };
     ui.weak(format!("{} objects, {} parts, from the masks of {from}", count(Level::Object), count(Level::Part)));
     if identities.iter().all(|(_, i)| i.names.is_empty()) {
-        ui.weak("Regions of the photos: unnamed and rough. Query them by number, such as #1.");
+        ui.weak("Regions of the photos, without names yet. Click one to see it, name it in its menu.");
     }
     ui.add_space(4.0);
     ui.horizontal(|ui| {
@@ -48,14 +50,14 @@ pub(crate) fn show(
             }
         }
     });
-    let tree = Tree { identities, sizes: &state.sizes, object_thumbnails, visibility };
-    for (id, _) in identities.iter().filter(|(_, i)| i.parent == NOBODY) {
-        tree.branch(ui, id, actions);
-    }
+    let tree = Tree { identities, labels: &state.labels, sizes: &state.sizes, object_thumbnails, visibility };
+    let roots = identities.iter().filter(|(_, i)| i.parent == NOBODY).map(|(id, _)| id);
+    tree.branches(ui, Id::unique("objects"), roots.collect(), actions);
 }
 
 struct Tree<'a> {
     identities: &'a Identities,
+    labels: &'a Labels,
     /// Gaussians by number.
     sizes: &'a [usize],
     object_thumbnails: &'a ObjectThumbnails,
@@ -63,6 +65,16 @@ struct Tree<'a> {
 }
 
 impl Tree<'_> {
+    /// One branch each, the tiny ones without names folded away.
+    fn branches(&self, ui: &mut Ui, of: Id, ids: Vec<IdentityId>, actions: &mut Vec<Action>) {
+        let (shown, tiny) = labels::listed(self.identities, self.sizes, ids);
+        shown.into_iter().for_each(|id| self.branch(ui, id, actions));
+        if !tiny.is_empty() {
+            let header = CollapsingHeader::new(things(tiny.len(), "tiny region")).id_salt(of.with("tiny"));
+            header.show(ui, |ui| tiny.into_iter().for_each(|id| self.branch(ui, id, actions)));
+        }
+    }
+
     fn branch(&self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
         let pieces: Vec<IdentityId> = self.identities.pieces(id).collect();
         if pieces.is_empty() {
@@ -70,11 +82,11 @@ impl Tree<'_> {
         }
         let state = CollapsingState::load_with_default_open(ui.ctx(), Id::unique("branch").with(id), false);
         let header = state.show_header(ui, |ui| self.leaf(ui, id, actions));
-        header.body(|ui| pieces.into_iter().for_each(|piece| self.branch(ui, piece, actions)));
+        header.body(|ui| self.branches(ui, Id::unique("pieces").with(id), pieces, actions));
     }
 
     fn leaf(&self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
-        let Self { identities, sizes, object_thumbnails, visibility } = self;
+        let Self { identities, labels, sizes, object_thumbnails, visibility } = self;
         ui.horizontal(|ui| {
             let mut drawn = !visibility.is_hidden(id);
             if ui.checkbox(&mut drawn, "").on_hover_text("Visible").changed() {
@@ -84,8 +96,9 @@ impl Tree<'_> {
             let code = identities.get(id).map_or([0.5; 3], |i| i.code).map(|c| (c * 255.0) as u8);
             let (rect, _) = ui.allocate_exact_size(vec2(11.0, 11.0), egui::Sense::hover());
             ui.painter().rect_filled(rect, 3.0, Color32::from_rgb(code[0], code[1], code[2]));
-            let button = Button::new(identities.name(id)).frame_when_inactive(false);
-            if ui.add(button).on_hover_text("Highlight it in the view").clicked() {
+            let button = Button::new(labels.name(identities, id)).frame_when_inactive(false);
+            let hint = format!("Highlight {} in the view", identities.full_name(id));
+            if ui.add(button).on_hover_text(hint).clicked() {
                 actions.push(Action::Ask(identities.full_name(id)));
             }
             self.menu(ui, id, actions);

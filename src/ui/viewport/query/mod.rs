@@ -6,11 +6,13 @@
 
 mod bar;
 mod card;
+mod details;
 mod embeddings;
 mod overlay;
 mod panel;
 mod settings;
 mod times;
+mod truth;
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -20,6 +22,7 @@ use egui::{Color32, Rect, TextureHandle, TextureOptions, Ui};
 use self::embeddings::Embeddings;
 pub(crate) use self::settings::{ColorBy, OverlaySettings};
 use crate::jobs::query::ViewMaps;
+use crate::navigate::Pose;
 use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::matching::MatchMode;
 use crate::pipeline::semantics::names;
@@ -81,8 +84,6 @@ pub struct Queries {
     wanted: bool,
     /// Place in the history while going through it.
     recalled: Option<usize>,
-    /// Whether the settings are open.
-    open: bool,
     settings: OverlaySettings,
     live: Option<Asked>,
     kept: Vec<Asked>,
@@ -97,6 +98,10 @@ pub struct Queries {
     heat: Vec<f32>,
     texture: Option<TextureHandle>,
     painted: Option<Painted>,
+    /// What answers are compared with, where the eye is, and what that came to.
+    truth: Option<truth::TrueMask>,
+    eye: Option<Pose>,
+    comparison: Option<truth::Comparison>,
     /// Of the target that is shown.
     facts: Option<card::Facts>,
     /// Pixels of identities in the present view, counted as they are listed.
@@ -117,6 +122,18 @@ impl Queries {
     /// All queries, the one being typed last.
     pub fn all(&self) -> impl Iterator<Item = &Asked> {
         self.kept.iter().chain(&self.live)
+    }
+
+    /// The query that is answered on screen.
+    fn newest(&self) -> Option<&Asked> {
+        self.live.as_ref().or(self.kept.last())
+    }
+
+    /// Shows this hit of the newest query alone, or the best again.
+    fn choose(&mut self, chosen: Option<IdentityId>) {
+        if let (Some(id), Some(newest)) = (chosen, self.live.as_mut().or(self.kept.last_mut())) {
+            newest.chosen = (newest.chosen != Some(id)).then_some(id);
+        }
     }
 
     /// The identities that are found on screen.
@@ -188,7 +205,7 @@ impl Queries {
     pub(crate) fn clear(&mut self) {
         let history = std::mem::take(&mut self.history);
         let embeddings = std::mem::take(&mut self.embeddings);
-        *self = Self { settings: self.settings, open: self.open, history, embeddings, ..Self::default() };
+        *self = Self { settings: self.settings, history, embeddings, ..Self::default() };
     }
 
     /// Takes over what the present view's pixels belong to; `None` while it is not known.
@@ -288,6 +305,7 @@ impl Queries {
         let start = Instant::now();
         let masks: Vec<([u8; 3], Mask)> =
             shown.iter().enumerate().map(|(k, ids)| (COLORS[k % COLORS.len()], union(ids))).collect();
+        let masks = self.compared(masks);
         self.paint_ms.mask = ms_since(start);
         let newest = self.all().last();
         let relevancy = newest.map_or_else(Vec::new, |q| q.answered.relevancy.clone());

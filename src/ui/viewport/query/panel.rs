@@ -3,9 +3,10 @@
 use egui::{Align2, Area, Id, Order, Rect, Ui};
 
 use super::super::super::theme;
-use super::{Queries, settings};
+use super::Queries;
 use crate::scene::{GaussianCloud, Identities, NOBODY, SemanticMap};
 use crate::ui::actions::Action;
+use crate::ui::state::AppState;
 use crate::worker::Versioned;
 
 /// Views narrower than this have no room for the query beside the view's own buttons, points.
@@ -19,6 +20,7 @@ impl Queries {
         &mut self,
         ui: &Ui,
         rect: Rect,
+        state: &AppState,
         semantics: &Versioned<SemanticMap>,
         cloud: &GaussianCloud,
         actions: &mut Vec<Action>,
@@ -33,21 +35,15 @@ impl Queries {
             theme::overlay().show(ui, |ui| {
                 // Beside the view's own buttons, as long as there is room.
                 ui.set_width((rect.width() - 410.0).clamp(300.0, 380.0).min(rect.width() - 40.0));
-                self.show_bar(ui, semantics);
-                if self.open {
-                    let heat = (!self.heat.is_empty()).then_some(self.heat.as_slice());
-                    if settings::show(ui, &mut self.settings, heat) {
-                        self.ask_again(semantics);
-                    }
-                }
-                self.show_answer(ui, semantics, cloud, actions);
+                self.show_bar(ui, semantics, actions);
+                self.show_answer(ui, state, semantics, cloud, actions);
                 self.show_kept(ui);
             });
         });
-        self.show_name_under_cursor(ui, rect, &semantics.identities);
+        self.show_name_under_cursor(ui, rect, state, &semantics.identities);
     }
 
-    fn show_name_under_cursor(&self, ui: &Ui, rect: Rect, identities: &Identities) {
+    fn show_name_under_cursor(&self, ui: &Ui, rect: Rect, state: &AppState, identities: &Identities) {
         let Some(maps) = &self.maps else { return };
         let map = &maps.identities;
         let Some(pos) = ui.input(|i| i.pointer.hover_pos()).filter(|p| rect.contains(*p)) else { return };
@@ -61,7 +57,7 @@ impl Queries {
         let area =
             Area::new(Id::unique("under cursor")).order(Order::Middle).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
         area.interactable(false).show(ui.ctx(), |ui| {
-            theme::overlay().show(ui, |ui| ui.label(identities.full_name(id)));
+            theme::overlay().show(ui, |ui| ui.label(state.labels.full_name(identities, id)));
         });
     }
 }
