@@ -9,7 +9,7 @@ use super::progress::Console;
 use super::{CliError, output};
 use crate::io::SceneFolder;
 use crate::io::labels::Labels;
-use crate::jobs::evaluate::Comparison;
+use crate::jobs::evaluate::PhotoComparison;
 use crate::jobs::query;
 use crate::models;
 use crate::pipeline::observer::{Observer, Severity, Silent};
@@ -36,7 +36,7 @@ const QUESTIONS: [&str; 7] = [
 
 /// What was asked and answered.
 #[derive(Debug, Serialize)]
-pub(crate) struct Asked {
+pub(crate) struct DemoQuestion {
     /// The question.
     pub(crate) question: String,
     /// "found", "ambiguous" or "not found".
@@ -51,7 +51,7 @@ pub(crate) struct Asked {
 
 /// How well every name was found in all held-out views, and the questions.
 #[derive(Debug, Serialize)]
-pub(crate) struct Queries {
+pub(crate) struct DemoQueries {
     /// Photos whose masks were used.
     pub(crate) seeds: Vec<String>,
     /// Seconds that finding objects took.
@@ -61,7 +61,7 @@ pub(crate) struct Queries {
     /// Mean IoU of parts.
     pub(crate) part_miou: f64,
     /// The questions.
-    pub(crate) asked: Vec<Asked>,
+    pub(crate) asked: Vec<DemoQuestion>,
 }
 
 /// Finds objects from the masks of one photo in `photos` (and of more where much is unknown), stores
@@ -69,10 +69,10 @@ pub(crate) struct Queries {
 pub(crate) fn run(
     scene: &Path,
     photos: &Path,
-    job: &Comparison,
+    job: &PhotoComparison,
     pictures: &Path,
     console: &mut Console,
-) -> Result<Queries, CliError> {
+) -> Result<DemoQueries, CliError> {
     let mut segmenter = FileMasks(Labels::open(photos)?);
     let training: Vec<Photo> = (0..job.dataset.photos.len())
         .filter(|i| !job.views.contains(i))
@@ -105,7 +105,8 @@ pub(crate) fn run(
     for (k, &i) in job.views.iter().enumerate() {
         let photo = &job.dataset.photos[i];
         let camera = photo.camera.limited_to(job.max_side_px);
-        let view = ViewMap::render(&mut renderer, &job.cloud, &map.of, &map.identities, &camera, &job.settings)?;
+        let view =
+            ViewMap::render(&mut renderer, &job.cloud, &map.identity_of, &map.identities, &camera, &job.settings)?;
         let labeled = LabeledView {
             name: &photo.name,
             camera: &camera,
@@ -131,7 +132,7 @@ pub(crate) fn run(
             let millis = start.elapsed().as_secs_f64() * 1e3;
             let path = pictures.join(format!("{n}_{}.png", question.replace([' ', '\''], "_")));
             query::write_heat(&path, (&job.cloud, &job.settings), &camera, &answered.heat(&view))?;
-            asked.push(Asked {
+            asked.push(DemoQuestion {
                 question: (*question).to_owned(),
                 verdict: answered.answer.verdict(),
                 answer: answered.chosen(1).iter().map(|id| map.identities.full_name(*id)).collect(),
@@ -141,5 +142,5 @@ pub(crate) fn run(
         }
     }
     let [object_miou, part_miou] = masks::by_level(&units);
-    Ok(Queries { seeds: map.seeds.clone(), find_secs, object_miou, part_miou, asked })
+    Ok(DemoQueries { seeds: map.seeds.clone(), find_secs, object_miou, part_miou, asked })
 }

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use super::output;
 use crate::jobs::JobError;
 use crate::jobs::error::chain;
+use crate::measure::BeginError;
 use crate::pipeline::observer::Interrupted;
 
 /// Why a subcommand did not do what was asked.
@@ -32,6 +33,8 @@ impl CliError {
             JobError::EmptyQuery => return Self::Usage(error.to_string()),
             JobError::NotTrained(path) => format!(", with 'fmlgs train {} --out SCENE'", path.display()),
             JobError::PhotosGone(_) => "; give them with --photos".into(),
+            JobError::Output(_) => return Self::Usage(error.to_string()),
+            JobError::Report(BeginError::Other(..)) => " (--out); --fresh forgets it".into(),
             JobError::NothingHeldOut(_) => "; --holdout-every 0 compares with all photos".into(),
             JobError::NoObjects(path) => format!("; find them with 'fmlgs preprocess {}'", path.display()),
             JobError::UnknownPhoto(_) => "; see 'fmlgs info'".into(),

@@ -6,20 +6,20 @@ use std::sync::Arc;
 use serde_json::json;
 
 use super::progress::Console;
-use super::query::Args;
+use super::query::QueryArgs;
 use super::{CliError, output, view};
-use crate::jobs::Scene;
-use crate::jobs::phrases::{self, PhraseRow, PhrasesRequest, Truth};
+use crate::jobs::phrases::{self, PhraseRow, PhrasesRequest, TrueMasks};
+use crate::jobs::{Scene, export, render};
 use crate::pipeline::semantics::matching::MatchMode;
 use crate::scene::{Camera, SemanticMap};
 
 /// Rows of the printed table at most; files have all.
 const ROWS: usize = 60;
 
-pub(super) fn run(args: &Args, list: &Path, scene: &Scene, map: SemanticMap) -> Result<(), CliError> {
+pub(super) fn run(args: &QueryArgs, list: &Path, scene: &Scene, map: SemanticMap) -> Result<(), CliError> {
     if let Some(folder) = &args.export {
-        output::check_folder(folder, &scene.reads())?;
-        output::make_folder(folder)?;
+        export::check_folder(folder, &scene.reads())?;
+        export::make_folder(folder)?;
     }
     let request = PhrasesRequest {
         cloud: Arc::clone(&scene.cloud),
@@ -30,7 +30,7 @@ pub(super) fn run(args: &Args, list: &Path, scene: &Scene, map: SemanticMap) -> 
         level: args.kind,
         matching: (if args.blend { MatchMode::Blend } else { MatchMode::Exact }, args.tolerance / 255.0),
         top: args.top,
-        truth: args.truth.clone().map_or(Truth::None, Truth::Folder),
+        truth: args.truth.clone().map_or(TrueMasks::None, TrueMasks::Folder),
         export: args.export.clone(),
     };
     let rows = phrases::run(&request, &mut Console::new(args.json))?;
@@ -51,7 +51,7 @@ pub(super) fn run(args: &Args, list: &Path, scene: &Scene, map: SemanticMap) -> 
 }
 
 /// The views that are asked for, by name.
-fn views(args: &Args, scene: &Scene) -> Result<Vec<(String, Camera)>, CliError> {
+fn views(args: &QueryArgs, scene: &Scene) -> Result<Vec<(String, Camera)>, CliError> {
     let limited = |camera: &Camera| camera.limited_to(args.max_side);
     let views: Vec<(String, Camera)> = match args.views.as_deref() {
         Some("all") => scene.cameras.iter().map(|c| (c.name.clone(), limited(&c.camera))).collect(),
@@ -68,7 +68,7 @@ fn views(args: &Args, scene: &Scene) -> Result<Vec<(String, Camera)>, CliError> 
     if views.is_empty() {
         return Err(CliError::failed("--views names no view; this scene's photos are listed by 'fmlgs info'"));
     }
-    views.iter().try_for_each(|(_, c)| view::check_room(c.width_px, c.height_px))?;
+    views.iter().try_for_each(|(_, c)| render::check_room(c.width_px, c.height_px))?;
     Ok(views)
 }
 

@@ -3,6 +3,7 @@
 //! Jobs take plain inputs and an [`Observer`](crate::pipeline::observer::Observer) where they take long,
 //! and return a typed result or a [`JobError`]. Whoever calls them says the result in its own way.
 
+pub(crate) mod bench;
 pub mod edit;
 pub(crate) mod error;
 pub(crate) mod evaluate;
@@ -17,7 +18,9 @@ pub mod phrases;
 pub(crate) mod plan;
 pub(crate) mod query;
 pub(crate) mod render;
+pub(crate) mod report;
 pub(crate) mod segment;
+pub(crate) mod synth;
 pub(crate) mod thumbnails;
 pub(crate) mod train;
 pub(crate) mod video;

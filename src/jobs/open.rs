@@ -15,8 +15,8 @@ use crate::pipeline::synth::demo;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::plan::used_degree;
-use crate::scene::resource_log::{self, Sort};
-use crate::scene::{Bounds, Camera, Dataset, Facts, GaussianCloud, HomeView, Machine, SemanticMap};
+use crate::scene::resource_log::{self, ResourceKind};
+use crate::scene::{Bounds, Camera, Dataset, GaussianCloud, HomeView, Machine, SceneFacts, SemanticMap};
 
 /// Gaussians that can be drawn, and what came with them.
 #[derive(Clone, Debug, Default)]
@@ -197,7 +197,7 @@ pub struct OpenedScene {
     /// Degree of the harmonics in its file.
     pub(crate) sh_stored: u8,
     /// What its plan is computed from.
-    pub(crate) facts: Facts,
+    pub(crate) facts: SceneFacts,
     /// Id of the save that its files are of, if it has one.
     pub(crate) state: Option<String>,
     /// Reports that may be of it.
@@ -207,6 +207,11 @@ pub struct OpenedScene {
 }
 
 impl OpenedScene {
+    /// Length of a unit in meters, if the scene or its photos tell.
+    pub(crate) fn unit(&self) -> Option<f64> {
+        self.metres_per_unit.or_else(|| self.dataset.as_ref()?.metres_per_unit)
+    }
+
     fn of(scene: Scene, dataset: Option<Arc<Dataset>>, observer: &mut dyn Observer) -> Self {
         let home = match &dataset {
             Some(dataset) if scene.cameras.is_empty() => HomeView::new(&dataset.cameras(), Some(&scene.cloud)),
@@ -283,7 +288,7 @@ pub(crate) fn known_objects(scene: &Scene, observer: &mut dyn Observer) -> Optio
     match scene.semantics() {
         Ok(map) => {
             let what = format!("{} objects and parts", map.identities.len());
-            resource_log::record(Sort::Objects, what, "the scene was opened", map.bytes());
+            resource_log::record(ResourceKind::Objects, what, "the scene was opened", map.bytes());
             Some(Arc::new(map))
         }
         Err(JobError::NoObjects(_)) => None,
@@ -343,7 +348,12 @@ fn compact(cloud: GaussianCloud) -> (Arc<GaussianCloud>, u8) {
     let stored = cloud.sh_degree;
     let used = used_degree(&cloud);
     let cloud = cloud.up_to_degree(used);
-    resource_log::record(Sort::Gaussians, format!("{} Gaussians", cloud.len()), "the scene was opened", cloud.bytes());
+    resource_log::record(
+        ResourceKind::Gaussians,
+        format!("{} Gaussians", cloud.len()),
+        "the scene was opened",
+        cloud.bytes(),
+    );
     (Arc::new(cloud), stored)
 }
 

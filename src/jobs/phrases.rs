@@ -25,7 +25,7 @@ pub(crate) const MOST: usize = 1_000;
 
 /// What phrases are compared with.
 #[derive(Clone, Debug, Default)]
-pub(crate) enum Truth {
+pub(crate) enum TrueMasks {
     #[default]
     None,
     /// `FOLDER/<view>/<phrase>.png`, named as masks are exported; what has no file is not compared.
@@ -48,7 +48,7 @@ pub struct PhrasesRequest {
     pub(crate) matching: (MatchMode, f32),
     /// Answers whose pixels go into a mask at most.
     pub(crate) top: usize,
-    pub(crate) truth: Truth,
+    pub(crate) truth: TrueMasks,
     /// Folder for masks and tables, if they are wanted.
     pub(crate) export: Option<PathBuf>,
 }
@@ -148,11 +148,11 @@ fn mask(request: &PhrasesRequest, maps: &ViewMaps, answered: &QueryAnswer) -> Ma
 }
 
 /// The true mask, in the size of `like`.
-fn truth(truth: &Truth, place: &Path, like: &Mask) -> Result<Option<Mask>, JobError> {
+fn truth(truth: &TrueMasks, place: &Path, like: &Mask) -> Result<Option<Mask>, JobError> {
     let read = match truth {
-        Truth::None => None,
-        Truth::Mask(mask) => Some((**mask).clone()),
-        Truth::Folder(folder) => {
+        TrueMasks::None => None,
+        TrueMasks::Mask(mask) => Some((**mask).clone()),
+        TrueMasks::Folder(folder) => {
             let path = folder.join(place);
             if path.is_file() { Some(true_mask(&path)?) } else { None }
         }
@@ -267,7 +267,8 @@ impl Coco {
 
 /// A name as a file may have it: letters and digits in lower case, `_` between them; without the ending of a picture.
 fn stem(name: &str) -> String {
-    let name = name.rsplit_once('.').map_or(name, |(stem, ending)| if ending.len() <= 4 { stem } else { name });
+    let is_ending = |e: &str| (1..=4).contains(&e.len()) && e.chars().all(char::is_alphanumeric);
+    let name = name.rsplit_once('.').filter(|(_, ending)| is_ending(ending)).map_or(name, |(stem, _)| stem);
     let words: Vec<String> =
         name.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty()).map(|w| w.to_lowercase()).collect();
     let stem: String = words.join("_").chars().take(60).collect();

@@ -4,12 +4,12 @@ use super::JobError;
 use crate::pipeline::semantics::thumbnails::{Thumbnails, portraits};
 use crate::render::RenderSettings;
 use crate::scene::appearance::{self, Appearance};
-use crate::scene::resource_log::{self, Sort};
+use crate::scene::resource_log::{self, ResourceKind};
 use crate::scene::{GaussianCloud, HomeView, SemanticMap};
 
 /// What is known of objects and parts, by number less one.
 #[derive(Clone, Debug)]
-pub struct Drawn {
+pub struct ThumbnailSet {
     pub(crate) pictures: Thumbnails,
     /// Of those without a name.
     pub(crate) appearances: Vec<Option<Appearance>>,
@@ -24,9 +24,9 @@ pub(crate) fn draw(
     map: &SemanticMap,
     settings: &RenderSettings,
     home: &HomeView,
-) -> Result<Drawn, JobError> {
+) -> Result<ThumbnailSet, JobError> {
     let from = home.camera.as_ref().map_or(home.bounds.center() + home.up, |c| c.center);
-    resource_log::record(Sort::Thumbnails, "portraits of objects and parts", "a list of them is shown", 0);
+    resource_log::record(ResourceKind::Thumbnails, "portraits of objects and parts", "a list of them is shown", 0);
     let appearances = appearance::of_unnamed(cloud, map);
-    Ok(Drawn { pictures: portraits(cloud, map, settings, from, home.up)?, appearances })
+    Ok(ThumbnailSet { pictures: portraits(cloud, map, settings, from, home.up)?, appearances })
 }

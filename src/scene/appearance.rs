@@ -126,7 +126,7 @@ mod tests {
             ..GaussianCloud::default()
         };
         let of = (0..n).map(|i| if i < 20 { region } else { lamp }).collect();
-        let map = SemanticMap::of_identities(all, of, vec![1.0; n], vec![]);
+        let map = SemanticMap::from_identities(all, of, vec![1.0; n], vec![]);
         let found = of_unnamed(&cloud, &map);
         assert!(found[1].is_none() && found[2].is_none(), "one has a name, one has no Gaussians");
         let region = found[0].expect("Gaussians");

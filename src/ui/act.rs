@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::app::App;
 use super::chat::Snapshot;
+use super::color_by::ColorBy;
 use super::context::SceneContext;
 use super::dialogs::Question;
 use super::edits::EditStep;
@@ -13,17 +14,17 @@ use super::viewport::brush::Brush;
 use super::viewport::overrides::RenderOverrides;
 use crate::agent::scene::{Effect, Parts};
 use crate::jobs::edit::EditRequest;
-use crate::jobs::find_objects::Request;
+use crate::jobs::find_objects::FindRequest;
 use crate::jobs::go_to::{ApproachRequest, Approached};
 use crate::measure::is_report;
 use crate::navigate::FRAMES;
-use crate::navigate::target::Wish;
+use crate::navigate::target::{Side, ViewPreference};
 use crate::pipeline::semantics::edit::Edit;
 use crate::pipeline::train::TrainConfig;
 use crate::scene::IdentityId;
 use crate::scene::plan::When;
 use crate::ui::actions::{Action, Pane};
-use crate::worker::{Command, JobId, JobKind};
+use crate::worker::{Command, JobId, JobKind, ViewMode};
 
 impl App {
     /// Does what a user asked for.
@@ -43,6 +44,8 @@ impl App {
                     self.worker.cancel(job.id);
                 }
             }
+            Action::Dismiss if self.viewport.picking.selected().is_some() => self.view(&Action::Select(None), ctx),
+            Action::Dismiss => self.act(Action::Cancel, ctx),
             Action::Evaluate => self.evaluate(),
             Action::FindObjects => self.find_objects(None),
             Action::FetchModel(id) => self.install_model(id, None),
@@ -54,7 +57,14 @@ impl App {
             }
             Action::RunPhrases(to) => self.run_phrases(to),
             Action::TrueMask(path) => self.compare_with_mask(path.as_deref()),
-            Action::Show(mode) => self.layout.mode = mode,
+            Action::Show(mode) => {
+                self.layout.mode = mode;
+                // The picture is the picture.
+                if mode == ViewMode::Rgb {
+                    self.viewport.queries.tint(ColorBy::Masks);
+                }
+            }
+            Action::Tint(by) => self.viewport.queries.tint(by),
             Action::OpenReport(path) => self.read_report(path, false),
             Action::CompareReport(path) => self.read_report(path, true),
             Action::EndComparison => self.state.second_report = None,
@@ -81,7 +91,7 @@ impl App {
             }
             Action::Undo => self.edit(EditStep::Undo),
             Action::Redo => self.edit(EditStep::Redo),
-            Action::GoToTarget(id, side) => self.visit(id, Wish { side, ..Wish::default() }),
+            Action::GoToTarget(id, side) => self.visit(id, ViewPreference { side, ..ViewPreference::default() }),
             Action::PlayPath => self.camera.toggle(),
             Action::StepBack => self.step_in_time(-1.0, ctx),
             Action::StepForward => self.step_in_time(1.0, ctx),
@@ -108,7 +118,9 @@ impl App {
             | Action::SavePath
             | Action::ExportVideo
             | Action::SaveChat => self.choose(action),
+            Action::IsolateSelected | Action::HideSelected | Action::GoToSelected => self.act_on_selected(&action, ctx),
             Action::FrameScene
+            | Action::Select(_)
             | Action::Paint(_)
             | Action::Isolate(_)
             | Action::Hide(_)
@@ -125,6 +137,19 @@ impl App {
     fn view(&mut self, action: &Action, ctx: &egui::Context) {
         let now = ctx.input(|i| i.time);
         self.viewport.act(action, &self.state, &self.worker, now);
+    }
+
+    /// Does what a key means for what is selected.
+    fn act_on_selected(&mut self, action: &Action, ctx: &egui::Context) {
+        let Some(id) = self.viewport.picking.selected() else {
+            return self.state.toast(Tone::Info, "Nothing is selected: click an object in the view.");
+        };
+        let action = match action {
+            Action::HideSelected => Action::Hide(id),
+            Action::GoToSelected => Action::GoToTarget(id, Side::Best),
+            _ => Action::Isolate(Some(id).filter(|_| !self.viewport.visibility.is_isolated())),
+        };
+        self.act(action, ctx);
     }
 
     /// Opens something else; asks first if that ends a running job.
@@ -210,7 +235,7 @@ impl App {
         let masks = masks.or_else(|| scene.masks.clone());
         match self.viewport.cloud().cloned().filter(|_| self.state.is_trained()) {
             Some(cloud) => {
-                self.submit(Command::FindObjects(Box::new(Request {
+                self.submit(Command::FindObjects(Box::new(FindRequest {
                     folder: scene.out.clone(),
                     cloud: Arc::clone(&cloud),
                     settings: self.state.render_settings(),
@@ -244,7 +269,7 @@ impl App {
     }
 
     /// Looks for the way to an identity; the flight begins when it is found.
-    fn visit(&mut self, id: IdentityId, wish: Wish) {
+    fn visit(&mut self, id: IdentityId, preference: ViewPreference) {
         let Some(SceneContext { cloud, map: Some(map), settings, cameras, up, eye, aspect, explored, .. }) =
             self.context()
         else {
@@ -252,7 +277,8 @@ impl App {
         };
         let (cloud, map, from) = (Arc::clone(&cloud), Arc::clone(&map), eye);
         let frames = FRAMES;
-        let request = ApproachRequest { explored, cloud, cameras, up, settings, map, id, wish, from, aspect, frames };
+        let request =
+            ApproachRequest { explored, cloud, cameras, up, settings, map, id, preference, from, aspect, frames };
         self.submit(Command::Approach(Box::new(request)));
     }
 
@@ -289,7 +315,7 @@ impl App {
                 map: Arc::clone(&map),
                 cameras,
                 up,
-                meters: scene.metres_per_unit.or_else(|| scene.dataset.as_ref().and_then(|d| d.metres_per_unit)),
+                meters: scene.unit(),
                 exports: scene.out.join("exports"),
                 explored,
             },

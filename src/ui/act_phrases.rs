@@ -7,7 +7,7 @@ use super::actions::Pane;
 use super::app::App;
 use super::context::SceneContext;
 use super::state::Tone;
-use crate::jobs::phrases::{self, PhrasesRequest, Truth};
+use crate::jobs::phrases::{self, PhrasesRequest, TrueMasks};
 use crate::scene::{Camera, LevelFilter};
 use crate::worker::{Command, Failure};
 
@@ -32,7 +32,7 @@ impl App {
             (None, None) => return,
         };
         // A mask is of one view alone.
-        let truth = self.viewport.queries.truth().filter(|_| photos.is_none()).map_or(Truth::None, Truth::Mask);
+        let truth = self.viewport.queries.truth().filter(|_| photos.is_none()).map_or(TrueMasks::None, TrueMasks::Mask);
         self.submit(Command::Phrases(Box::new(PhrasesRequest {
             cloud: Arc::clone(&cloud),
             map: Arc::clone(&map),

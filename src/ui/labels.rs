@@ -9,9 +9,9 @@ use crate::scene::{Identities, IdentityId};
 
 /// Names for what has none, by number less one.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Labels(Vec<Option<String>>);
+pub(crate) struct ScreenNames(Vec<Option<String>>);
 
-impl Labels {
+impl ScreenNames {
     pub(crate) fn new(appearances: &[Option<Appearance>], meters_per_unit: Option<f64>) -> Self {
         Self(appearances.iter().map(|a| a.map(|a| a.text(meters_per_unit))).collect())
     }
@@ -86,7 +86,7 @@ mod tests {
         let mut all = Identities::default();
         let region = all.add(Level::Object, NOBODY, vec![]);
         let part = all.add(Level::Part, region, vec![]);
-        let labels = Labels(vec![Some("red region, 2 cm".into()), None]);
+        let labels = ScreenNames(vec![Some("red region, 2 cm".into()), None]);
         assert_eq!(labels.name(&all, region), "red region, 2 cm");
         assert_eq!((labels.name(&all, part), labels.full_name(&all, part)), ("#2".into(), "#2 of the #1".into()));
         all.rename(region, "apple");

@@ -5,18 +5,18 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::actions::Action;
-use super::labels::{Labels, PhraseTable};
+use super::labels::{PhraseTable, ScreenNames};
 pub(crate) use super::train_history::TrainHistory;
 use crate::jobs::OpenedScene;
 use crate::jobs::go_to::{Approached, Explored};
 use crate::jobs::models::ModelList;
-use crate::jobs::thumbnails::Drawn;
+use crate::jobs::thumbnails::ThumbnailSet;
 use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Progress, Severity};
 use crate::render::RenderSettings;
 use crate::scene::undo::UndoHistory;
-use crate::scene::{Facts, Limits, Overrides, PhotoPixels, ScenePlan, SemanticMap, text};
-use crate::worker::{Event, Failure, JobId, JobKind, Lane, Outcome, Versioned};
+use crate::scene::{Limits, Overrides, PhotoPixels, SceneFacts, ScenePlan, SemanticMap, text};
+use crate::worker::{Event, Failure, JobId, JobKind, Outcome, Versioned, WorkerThread};
 
 /// Lines kept in the log.
 const MAX_LOG: usize = 1_000;
@@ -95,10 +95,10 @@ pub struct AppState {
     pub semantics: Option<Versioned<SemanticMap>>,
     /// Gaussians of each of them by number, pieces included; and what they are called on screen.
     pub(crate) sizes: Vec<usize>,
-    pub(crate) labels: Labels,
+    pub(crate) labels: ScreenNames,
     pub phrases: PhraseTable,
     /// New thumbnails of objects and parts, until they are taken over.
-    pub(crate) thumbnails: Option<(Arc<SemanticMap>, Drawn)>,
+    pub(crate) thumbnails: Option<(Arc<SemanticMap>, ThumbnailSet)>,
     /// What is known of moving about in the scene.
     pub explored: Option<Arc<Explored>>,
     /// The way that was looked for last, until the window takes it.
@@ -146,7 +146,7 @@ impl AppState {
     /// Takes in one event; what the window is to do next because of it.
     pub(crate) fn apply(&mut self, event: Event) -> Vec<Action> {
         match event {
-            Event::Started { job, kind, title } if kind.lane() == Lane::Short => {
+            Event::Started { job, kind, title } if kind.lane() == WorkerThread::Short => {
                 self.short_jobs.insert(job, (kind, text::line(&title).into_owned()));
             }
             Event::Started { job, kind, title } => {
@@ -245,7 +245,7 @@ impl AppState {
         RenderSettings { sh_degree, antialias: self.antialias, ..scene }
     }
 
-    fn set_facts(&mut self, facts: Facts) {
+    fn set_facts(&mut self, facts: SceneFacts) {
         self.plan = ScenePlan::new(facts, &self.plan.overrides);
     }
 

@@ -10,14 +10,15 @@ use crate::jobs::edit::EditRequest;
 use crate::jobs::go_to::{ApproachRequest, Approached, Explored};
 use crate::jobs::models::ModelList;
 use crate::jobs::phrases::{PhraseRow, PhrasesRequest};
-use crate::jobs::thumbnails::Drawn;
+use crate::jobs::report::ReportRequest;
+use crate::jobs::thumbnails::ThumbnailSet;
 use crate::jobs::video::VideoRequest;
 use crate::jobs::{OpenedScene, find_objects};
 use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Progress, Severity, StepMetrics};
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
-use crate::scene::{Camera, Dataset, Facts, GaussianCloud, HomeView, Photo, PhotoPixels, SemanticMap};
+use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, Photo, PhotoPixels, SceneFacts, SemanticMap};
 
 /// Names one job of one worker.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -79,7 +80,7 @@ pub enum JobKind {
 
 impl JobKind {
     /// Which thread runs it.
-    pub(crate) fn lane(self) -> Lane {
+    pub(crate) fn lane(self) -> WorkerThread {
         match self {
             Self::Open
             | Self::Demo
@@ -89,7 +90,7 @@ impl JobKind {
             | Self::Model
             | Self::CameraSpline
             | Self::Phrases
-            | Self::Measure => Lane::Long,
+            | Self::Measure => WorkerThread::Long,
             Self::Edit
             | Self::Export
             | Self::Photo
@@ -98,14 +99,14 @@ impl JobKind {
             | Self::Models
             | Self::Explore
             | Self::Approach
-            | Self::Report => Lane::Short,
+            | Self::Report => WorkerThread::Short,
         }
     }
 }
 
 /// Which thread a job runs on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Lane {
+pub enum WorkerThread {
     /// One after another, minutes each.
     Long,
     /// Answered while a long job runs.
@@ -143,7 +144,7 @@ pub enum Command {
         out: PathBuf,
     },
     /// Find the objects and parts of a trained scene, and store them with it.
-    FindObjects(Box<find_objects::Request>),
+    FindObjects(Box<find_objects::FindRequest>),
     /// Change the objects and parts of a scene, and store them with it.
     EditObjects {
         /// The Gaussians.
@@ -203,7 +204,7 @@ pub enum Command {
     /// Draw a video.
     CameraSpline(Box<VideoRequest>),
     /// Measure error against run time of drawing, and write it as a report.
-    Measure(Box<MeasureRequest>),
+    Measure(Box<ReportRequest>),
     /// Read a report.
     ReadReport {
         /// Its folder or file.
@@ -293,7 +294,7 @@ pub enum Outcome {
         /// Objects and parts that were carried over from the scene before.
         semantics: Option<Arc<SemanticMap>>,
         /// What the plan of the result is computed from.
-        facts: Box<Facts>,
+        facts: Box<SceneFacts>,
     },
     /// Held-out quality was measured.
     Evaluated(Evaluation),
@@ -315,7 +316,7 @@ pub enum Outcome {
         second: bool,
     },
     /// Portraits of objects and parts by number less one, as `semantics::portraits` draws them.
-    Thumbnails(Arc<SemanticMap>, Drawn),
+    Thumbnails(Arc<SemanticMap>, ThumbnailSet),
     /// The models were listed.
     Models(Arc<ModelList>),
     /// A model can be used now.
@@ -385,16 +386,4 @@ impl Event {
     pub fn is_end(&self) -> bool {
         matches!(self, Self::Finished(..) | Self::Cancelled(_) | Self::Failed(..))
     }
-}
-
-/// What is to be drawn in many ways.
-#[derive(Clone, Debug)]
-pub struct MeasureRequest {
-    pub(crate) scene: String,
-    pub(crate) cloud: Arc<GaussianCloud>,
-    pub(crate) settings: RenderSettings,
-    pub(crate) dataset: Option<Arc<Dataset>>,
-    pub(crate) holdout_every: usize,
-    pub(crate) camera: Camera,
-    pub(crate) out: PathBuf,
 }

@@ -13,6 +13,9 @@ fn request(phrases: &[&str]) -> PhrasesRequest {
     let lamp = all.add(Level::Object, NOBODY, vec!["lamp".into()]);
     let mug = all.add(Level::Object, NOBODY, vec!["mug".into()]);
     let shade = all.add(Level::Part, lamp, vec!["shade".into()]);
+    for (id, code) in [(lamp, [0.1, 0.5, 0.5]), (mug, [0.9, 0.5, 0.5]), (shade, [0.5, 0.9, 0.1])] {
+        all.get_mut(id).expect("there").code = code;
+    }
     let cloud = GaussianCloud {
         positions: vec![[-0.5, 0.3, 0.0], [0.5, 0.0, 0.0], [-0.5, -0.3, 0.0]],
         log_scales: vec![[-2.0; 3]; 3],
@@ -21,7 +24,7 @@ fn request(phrases: &[&str]) -> PhrasesRequest {
         sh: vec![[1.0; 3]; 3],
         ..GaussianCloud::default()
     };
-    let map = SemanticMap::of_identities(all, vec![lamp, mug, shade], vec![1.0; 3], vec![]);
+    let map = SemanticMap::from_identities(all, vec![lamp, mug, shade], vec![1.0; 3], vec![]);
     let eye = |x: f64| {
         Camera::look_at(DVec3::new(x, 0.0, -3.0), DVec3::new(x, 0.0, 0.0), DVec3::NEG_Y, 0.8, 64, 48).expect("valid")
     };
@@ -34,7 +37,7 @@ fn request(phrases: &[&str]) -> PhrasesRequest {
         level: LevelFilter::Auto,
         matching: (MatchMode::Exact, 0.02),
         top: 1,
-        truth: Truth::None,
+        truth: TrueMasks::None,
         export: None,
     }
 }
@@ -65,7 +68,7 @@ fn masks_are_written_in_three_forms_and_compared_with_what_was_written() {
     asked.export = Some(folder.path().into());
     let rows = run(&asked, &mut Silent).expect("runs");
     // What was written is the truth: all of it is met, and what is nowhere is nowhere.
-    asked.truth = Truth::Folder(folder.path().join("masks"));
+    asked.truth = TrueMasks::Folder(folder.path().join("masks"));
     asked.export = None;
     let again = run(&asked, &mut Silent).expect("runs");
     assert!(again[..3].iter().all(|r| r.iou == Some(1.0)), "{again:?}");
@@ -111,8 +114,8 @@ fn lists_and_masks_that_make_no_sense_are_refused() {
 #[test]
 fn names_are_safe_for_files_and_tables() {
     assert_eq!(
-        [stem("images/00 1.PNG"), stem("../../x"), stem("?!"), stem("手柄")],
-        ["images_00_1", "x", "unnamed", "手柄"]
+        [stem("images/00 1.PNG"), stem("../../x.y/z"), stem("?!"), stem("手柄")],
+        ["images_00_1", "x_y_z", "unnamed", "手柄"]
     );
     assert_eq!(stems(&["a b".into(), "a-b".into(), "A B".into()]), ["a_b", "a_b_2", "a_b_3"]);
     let row = PhraseRow {

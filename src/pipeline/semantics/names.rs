@@ -61,7 +61,7 @@ pub(crate) fn words_beside(identities: &Identities, id: IdentityId, phrase: &str
         Some([]) | None => vec![identities.name(i)],
         Some(names) => names.to_vec(),
     };
-    not_in(phrase, &identities.line(id).flat_map(names).flat_map(|n| words(&n)).collect())
+    not_in(phrase, &identities.ancestors(id).flat_map(names).flat_map(|n| words(&n)).collect())
 }
 
 fn not_in(phrase: &str, known: &HashSet<String>) -> Vec<String> {

@@ -70,9 +70,9 @@ pub(crate) fn mended_text(mended: &[(String, String)]) -> Option<String> {
 }
 
 /// The words of all names, as they are written, by their singular.
-type Vocabulary = BTreeMap<String, String>;
+type SceneWords = BTreeMap<String, String>;
 
-fn vocabulary(identities: &Identities) -> Vocabulary {
+fn vocabulary(identities: &Identities) -> SceneWords {
     identities.iter().flat_map(|(_, i)| &i.names).flat_map(|n| written(n)).map(|w| (singular(&w), w)).collect()
 }
 
@@ -97,7 +97,7 @@ enum Slip {
     None,
 }
 
-fn slip(word: &str, known: &Vocabulary) -> Slip {
+fn slip(word: &str, known: &SceneWords) -> Slip {
     let is_known = |w: &str| known.contains_key(w) || known.contains_key(&singular(w)) || is_glue(w);
     if matches!(word, "teh" | "hte") && !is_known(word) {
         return Slip::Of("the".into());
@@ -151,7 +151,9 @@ fn compound(identities: &Identities, phrase: &ParsedQuery) -> Option<ParsedQuery
     let (mut best, mut split) = ((alone, 0.0), None);
     for (id, _) in identities.iter() {
         let pieces = names_of(id).iter().filter(|n| has_last(&asked, n));
-        for (piece, whole) in pieces.flat_map(|p| identities.line(id).skip(1).flat_map(names_of).map(move |w| (p, w))) {
+        for (piece, whole) in
+            pieces.flat_map(|p| identities.ancestors(id).skip(1).flat_map(names_of).map(move |w| (p, w)))
+        {
             for i in 1..asked.len() {
                 let (left, right) = asked.split_at(i);
                 if !has_last(left, whole) {

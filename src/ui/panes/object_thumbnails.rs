@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use egui::{ColorImage, Rect, TextureHandle, TextureOptions, Ui, pos2, vec2};
 
-use super::super::labels::Labels;
+use super::super::labels::ScreenNames;
 use super::super::state::AppState;
 use crate::pipeline::semantics::thumbnails::SIDE_PX;
 use crate::scene::{GaussianCloud, IdentityId, SemanticMap};
@@ -39,7 +39,7 @@ impl ObjectThumbnails {
             return;
         };
         let wanted = state.plan.thumbnails.now(self.used.take());
-        if wanted && self.asked.as_ref().is_none_or(|a| !Arc::ptr_eq(a, map)) && map.of.len() == cloud.len() {
+        if wanted && self.asked.as_ref().is_none_or(|a| !Arc::ptr_eq(a, map)) && map.identity_of.len() == cloud.len() {
             let command = Command::Thumbnails {
                 cloud: Arc::clone(cloud),
                 map: Arc::clone(map),
@@ -52,8 +52,8 @@ impl ObjectThumbnails {
             }
         }
         if let Some((of, drawn)) = state.thumbnails.take() {
-            let unit = state.scene.as_ref().and_then(|s| s.metres_per_unit);
-            state.labels = Labels::new(&drawn.appearances, unit);
+            let unit = state.scene.as_ref().and_then(|s| s.unit());
+            state.labels = ScreenNames::new(&drawn.appearances, unit);
             let pictures = drawn.pictures;
             let rows = pictures.len().div_ceil(COLUMNS).max(1);
             let texture = ctx.load_texture("object_thumbnails", atlas(&pictures, rows), TextureOptions::LINEAR);

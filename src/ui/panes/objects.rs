@@ -3,7 +3,7 @@
 use egui::collapsing_header::CollapsingState;
 use egui::{Button, CollapsingHeader, Color32, Id, Key, RichText, ScrollArea, TextEdit, Ui, vec2};
 
-use super::super::labels::{self, Labels};
+use super::super::labels::{self, ScreenNames};
 use super::super::state::AppState;
 use super::super::theme;
 use super::super::viewport::visible::Visibility;
@@ -57,7 +57,7 @@ pub(crate) fn show(
 
 struct Tree<'a> {
     identities: &'a Identities,
-    labels: &'a Labels,
+    labels: &'a ScreenNames,
     /// Gaussians by number.
     sizes: &'a [usize],
     object_thumbnails: &'a ObjectThumbnails,
@@ -76,7 +76,7 @@ impl Tree<'_> {
     }
 
     fn branch(&self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
-        let pieces: Vec<IdentityId> = self.identities.pieces(id).collect();
+        let pieces: Vec<IdentityId> = self.identities.children(id).collect();
         if pieces.is_empty() {
             return self.leaf(ui, id, actions);
         }

@@ -9,11 +9,11 @@ use super::super::theme;
 use crate::pipeline::observer::{Evaluation, StepMetrics};
 
 /// PSNR over seconds of another training, with its name.
-pub(crate) type Curve = (String, Vec<[f64; 2]>);
+pub(crate) type PsnrCurve = (String, Vec<[f64; 2]>);
 
 /// Draws both plots with a common horizontal axis. The `curves` are of other trainings, and drawn over
 /// seconds only: how many steps they had does not matter to them.
-pub(crate) fn show(ui: &mut Ui, history: &TrainHistory, curves: &[Curve], axis: &mut PlotAxis) {
+pub(crate) fn show(ui: &mut Ui, history: &TrainHistory, curves: &[PsnrCurve], axis: &mut PlotAxis) {
     ui.horizontal(|ui| {
         theme::section(ui, "Quality");
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {

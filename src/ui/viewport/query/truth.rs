@@ -12,14 +12,14 @@ const COLORS: [[u8; 3]; 3] = [[40, 200, 120], [230, 60, 60], [250, 180, 30]];
 
 /// A true mask of the view from one place.
 #[derive(Clone, Debug)]
-pub(super) struct TrueMask {
+pub(super) struct ViewTruth {
     mask: Arc<Mask>,
     at: Pose,
 }
 
 /// Pixels by how the answer has them.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Comparison {
+pub(super) struct TruthComparison {
     pub(super) hits: usize,
     pub(super) misses: usize,
     pub(super) false_alarms: usize,
@@ -29,7 +29,7 @@ pub(super) struct Comparison {
 impl Queries {
     /// Compares answers with a mask of the view from this pose; with none, shows them plainly again.
     pub(crate) fn compare_with(&mut self, truth: Option<(Arc<Mask>, Pose)>) {
-        self.truth = truth.map(|(mask, at)| TrueMask { mask, at });
+        self.truth = truth.map(|(mask, at)| ViewTruth { mask, at });
         (self.painted, self.comparison) = (None, None);
     }
 
@@ -45,7 +45,7 @@ impl Queries {
 
     /// The mask that is true of the present view.
     pub(crate) fn truth(&self) -> Option<Arc<Mask>> {
-        let here = |t: &&TrueMask| self.eye.is_some_and(|eye| is_same(&eye, &t.at));
+        let here = |t: &&ViewTruth| self.eye.is_some_and(|eye| is_same(&eye, &t.at));
         self.truth.as_ref().filter(here).map(|t| Arc::clone(&t.mask))
     }
 
@@ -71,17 +71,21 @@ fn is_same(a: &Pose, b: &Pose) -> bool {
 }
 
 /// Hits, misses and false alarms of an answer.
-fn compare(answer: &Mask, truth: &Mask) -> (Comparison, [Mask; 3]) {
+fn compare(answer: &Mask, truth: &Mask) -> (TruthComparison, [Mask; 3]) {
     let (mut hits, mut misses, mut alarms) = (answer.clone(), truth.clone(), answer.clone());
     hits.intersect(truth);
     misses.subtract(answer);
     alarms.subtract(truth);
-    let comparison =
-        Comparison { hits: hits.area(), misses: misses.area(), false_alarms: alarms.area(), iou: answer.iou(truth) };
+    let comparison = TruthComparison {
+        hits: hits.area(),
+        misses: misses.area(),
+        false_alarms: alarms.area(),
+        iou: answer.iou(truth),
+    };
     (comparison, [hits, misses, alarms])
 }
 
-impl Comparison {
+impl TruthComparison {
     /// The figure, and what the colors mean.
     pub(super) fn show(&self, ui: &mut egui::Ui) {
         let Self { hits, misses, false_alarms, iou } = self;
@@ -105,10 +109,10 @@ mod tests {
         let answer = Mask::from_fn(10, 1, |i| i < 6);
         let truth = Mask::from_fn(10, 1, |i| (4..8).contains(&i));
         let (told, masks) = compare(&answer, &truth);
-        assert_eq!(told, Comparison { hits: 2, misses: 2, false_alarms: 4, iou: 0.25 });
+        assert_eq!(told, TruthComparison { hits: 2, misses: 2, false_alarms: 4, iou: 0.25 });
         assert_eq!(masks.map(|m| m.pixels().collect::<Vec<_>>()), [vec![4, 5], vec![6, 7], vec![0, 1, 2, 3]]);
         // The control: the truth itself is met in full.
-        assert_eq!(compare(&truth, &truth).0, Comparison { hits: 4, misses: 0, false_alarms: 0, iou: 1.0 });
+        assert_eq!(compare(&truth, &truth).0, TruthComparison { hits: 4, misses: 0, false_alarms: 0, iou: 1.0 });
     }
 
     #[test]
