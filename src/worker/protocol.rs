@@ -69,37 +69,30 @@ pub enum JobKind {
     /// Finds the way to an identity.
     Approach,
     /// Draws a video.
-    CameraSpline,
+    Video,
     /// Measures drawing, knob by knob.
     Measure,
     /// Reads a report.
     Report,
     /// Asks a list of phrases.
     Phrases,
+    /// Stores the scene's scale.
+    Scale,
 }
 
 impl JobKind {
+    /// Whether its outcome is what is on screen then: what it warns of is wrong with that.
+    pub(crate) fn makes_scene(self) -> bool {
+        matches!(self, Self::Open | Self::Demo | Self::Train | Self::Objects)
+    }
+
     /// Which thread runs it.
     pub(crate) fn lane(self) -> WorkerThread {
         match self {
-            Self::Open
-            | Self::Demo
-            | Self::Train
-            | Self::Evaluate
-            | Self::Objects
-            | Self::Model
-            | Self::CameraSpline
-            | Self::Phrases
-            | Self::Measure => WorkerThread::Long,
-            Self::Edit
-            | Self::Export
-            | Self::Photo
-            | Self::Picture
-            | Self::Thumbnails
-            | Self::Models
-            | Self::Explore
-            | Self::Approach
-            | Self::Report => WorkerThread::Short,
+            Self::Open | Self::Demo | Self::Train | Self::Evaluate | Self::Objects => WorkerThread::Long,
+            Self::Model | Self::Video | Self::Measure | Self::Phrases => WorkerThread::Long,
+            Self::Edit | Self::Export | Self::Photo | Self::Picture | Self::Thumbnails => WorkerThread::Short,
+            Self::Models | Self::Explore | Self::Approach | Self::Scale | Self::Report => WorkerThread::Short,
         }
     }
 }
@@ -202,9 +195,16 @@ pub enum Command {
     /// Find the way to where an identity is seen best.
     Approach(Box<ApproachRequest>),
     /// Draw a video.
-    CameraSpline(Box<VideoRequest>),
+    Video(Box<VideoRequest>),
     /// Measure error against run time of drawing, and write it as a report.
     Measure(Box<ReportRequest>),
+    /// Store how long a unit of the scene is.
+    SetScale {
+        /// Folder of the trained scene.
+        out: PathBuf,
+        /// Meters.
+        meters_per_unit: f64,
+    },
     /// Read a report.
     ReadReport {
         /// Its folder or file.
@@ -245,9 +245,10 @@ impl Command {
             Self::Explore { .. } => JobKind::Explore,
             Self::InstallModel { .. } => JobKind::Model,
             Self::Approach(_) => JobKind::Approach,
-            Self::CameraSpline(_) => JobKind::CameraSpline,
+            Self::Video(_) => JobKind::Video,
             Self::Measure(_) => JobKind::Measure,
             Self::Phrases(_) => JobKind::Phrases,
+            Self::SetScale { .. } => JobKind::Scale,
             Self::ReadReport { .. } => JobKind::Report,
         }
     }
@@ -263,6 +264,7 @@ impl Command {
             Self::Evaluate { dataset, .. } => format!("Evaluating {}", dataset.name),
             Self::FindObjects(request) => format!("Finding objects in {}", request.dataset.name),
             Self::EditObjects { .. } => "Editing objects".into(),
+            Self::SetScale { .. } => "Storing the scale".into(),
             Self::Export { path, .. } | Self::Picture { path, .. } => format!("Writing {}", name(path)),
             Self::Photo { photo, .. } => format!("Loading {}", photo.name),
             Self::Thumbnails { .. } => "Rendering thumbnails".into(),
@@ -272,7 +274,7 @@ impl Command {
             Self::Approach(request) => {
                 format!("Planning the flight to {}", request.map.identities.full_name(request.id))
             }
-            Self::CameraSpline(request) => format!("Rendering {}", name(&request.out)),
+            Self::Video(request) => format!("Rendering {}", name(&request.out)),
             Self::Measure(_) => "Benchmarking rendering".into(),
             Self::Phrases(_) => "Asking a list of phrases".into(),
             Self::ReadReport { path, .. } => format!("Opening the report {}", name(path)),
@@ -302,6 +304,10 @@ pub enum Outcome {
     Objects(Arc<SemanticMap>),
     /// Objects and parts were changed.
     Edited(Arc<SemanticMap>),
+    /// The length of a unit in meters, and whether it was stored.
+    Scale(f64, bool),
+    /// Such a change makes no sense, and why.
+    Refused(String),
     /// A file was written.
     Written(PathBuf),
     /// Phrases were asked; and where their masks are, if they were written.

@@ -10,5 +10,6 @@ pub(crate) mod objects;
 pub mod phrases;
 pub(crate) mod plan;
 pub(crate) mod plots;
+pub(crate) mod problems;
 pub(crate) mod report;
 pub(crate) mod training;

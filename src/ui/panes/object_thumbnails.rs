@@ -52,7 +52,7 @@ impl ObjectThumbnails {
             }
         }
         if let Some((of, drawn)) = state.thumbnails.take() {
-            let unit = state.scene.as_ref().and_then(|s| s.unit());
+            let unit = state.scene.as_ref().and_then(|s| s.meters_per_unit());
             state.labels = ScreenNames::new(&drawn.appearances, unit);
             let pictures = drawn.pictures;
             let rows = pictures.len().div_ceil(COLUMNS).max(1);

@@ -122,7 +122,7 @@ fn certainty(ui: &mut Ui, newest: &super::Asked) {
 
 /// The longest edge, in the scene's unit.
 fn size_text(bounds: Bounds, state: &AppState) -> String {
-    format::length(bounds.size().max_element(), state.scene.as_ref().and_then(|s| s.unit()))
+    format::length(bounds.size().max_element(), state.scene.as_ref().and_then(|s| s.meters_per_unit()))
 }
 
 /// The target in space.

@@ -92,7 +92,7 @@ impl Queries {
 
 /// The target in space, and what can be done with it.
 fn show_target(ui: &mut Ui, target: IdentityId, facts: &Facts, state: &AppState, actions: &mut Vec<Action>) {
-    let unit = state.scene.as_ref().and_then(|s| s.unit());
+    let unit = state.scene.as_ref().and_then(|s| s.meters_per_unit());
     let edges = facts.bounds.map(|b| b.size().to_array().map(|edge| format::length(edge, unit)).join(" \u{00d7} "));
     let size = edges.map(|e| format!("  \u{00b7}  box {e}")).unwrap_or_default();
     let gaussians = format::things(facts.gaussians, "Gaussian");

@@ -96,6 +96,8 @@ pub struct Queries {
     answered_for: u64,
     /// Embeddings of the texts on screen.
     embeddings: Embeddings,
+    /// Why there are none, once that was reported.
+    reported: Option<String>,
     /// Relevancy of the pixels, for the histogram.
     heat: Vec<f32>,
     texture: Option<TextureHandle>,
@@ -219,6 +221,12 @@ impl Queries {
         *self = Self { settings: self.settings, history, embeddings, ..Self::default() };
     }
 
+    /// Why only names are understood, once for each reason.
+    pub(crate) fn newly_failed(&mut self) -> Option<String> {
+        let why = self.embeddings.problem()?.to_owned();
+        (self.reported.replace(why.clone()).as_ref() != Some(&why)).then_some(why)
+    }
+
     /// Takes over what the present view's pixels belong to, exactly or as the eye moves.
     pub(crate) fn set_maps(&mut self, maps: Versioned<ViewMaps>, exact: bool) {
         (self.maps, self.moving) = if exact { (Some(maps), None) } else { (None, Some(maps)) };
@@ -264,20 +272,6 @@ impl Queries {
         let ignored = answered.ignored_words(&semantics.identities, phrase, &unknown);
         let pending = semantics.language.is_some() && self.embeddings.is_pending(phrase);
         Some(Asked { text: text.to_owned(), answered, pending, chosen: None, reading, unknown, ignored })
-    }
-
-    /// Keeps the query being typed on screen, and makes room for the next.
-    fn keep(&mut self) {
-        let Some(live) = self.live.take() else { return };
-        self.kept.retain(|q| q.text != live.text);
-        if self.kept.len() == MOST {
-            self.kept.remove(0);
-        }
-        self.history.retain(|t| *t != live.text);
-        self.history.push(live.text.clone());
-        self.recalled = None;
-        self.kept.push(live);
-        self.typed.clear();
     }
 
     /// The target's pixels in the present view.
@@ -385,43 +379,4 @@ impl Queries {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::{Identities, Level, NOBODY};
-
-    fn semantics() -> SemanticMap {
-        let mut identities = Identities::default();
-        let lamp = identities.add(Level::Object, NOBODY, vec!["lamp".into()]);
-        identities.add(Level::Part, lamp, vec!["shade".into()]);
-        SemanticMap { identities, ..SemanticMap::default() }
-    }
-
-    #[test]
-    fn a_question_is_kept_and_answers_follow_the_names() {
-        let (mut semantics, mut queries) = (semantics(), Queries::default());
-        queries.ask("the lamp's shade", &semantics);
-        queries.keep();
-        queries.ask("lamp", &semantics);
-        let shown = |q: &Queries| q.all().map(|a| a.shown(&q.settings)).collect::<Vec<_>>();
-        assert_eq!(shown(&queries), [vec![2], vec![1]]);
-        queries.ask("giraffe", &semantics);
-        assert!(shown(&queries)[1].is_empty());
-        semantics.identities.get_mut(2).expect("there").names = vec!["giraffe".into()];
-        queries.ask_again(&semantics);
-        assert_eq!(shown(&queries), [Vec::new(), vec![2]]);
-        queries.ask("  ", &semantics);
-        assert!(queries.live.is_none());
-    }
-
-    #[test]
-    fn history_is_kept_once_each() {
-        let (semantics, mut queries) = (semantics(), Queries::default());
-        for text in ["lamp", "shade", "lamp"] {
-            queries.ask(text, &semantics);
-            queries.keep();
-        }
-        assert_eq!(queries.history, ["shade", "lamp"]);
-        queries.clear();
-        assert_eq!((queries.history.len(), queries.kept.len()), (2, 0));
-    }
-}
+mod tests;
