@@ -5,6 +5,8 @@
 mod edits;
 #[path = "ui_window/hands.rs"]
 mod hands;
+#[path = "ui_window/phrases.rs"]
+mod phrases;
 #[path = "ui_window/problems.rs"]
 mod problems;
 #[path = "ui_window/report.rs"]
@@ -105,12 +107,12 @@ impl Window {
 fn write_splat(folder: &Path) -> PathBuf {
     let n = 40;
     let cloud = fmlgs::scene::GaussianCloud {
-        positions: (0..n).map(|i| [(i % 7) as f32 * 0.1, (i / 7) as f32 * 0.1, 0.0]).collect(),
-        log_scales: vec![[-3.0; 3]; n],
-        quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
-        opacity_logits: vec![2.0; n],
         sh: vec![[0.5, 0.1, -0.3]; n],
-        ..Default::default()
+        ..fmlgs::scene::GaussianCloud::isotropic(
+            (0..n).map(|i| [(i % 7) as f32 * 0.1, (i / 7) as f32 * 0.1, 0.0]).collect(),
+            -3.0,
+            2.0,
+        )
     };
     let path = folder.join("dots.ply");
     fmlgs::io::splat_ply::write(&path, &cloud).expect("write");
@@ -370,27 +372,7 @@ fn objects_are_found_asked_for_renamed_hidden_and_undone() {
     w.ask(Action::Ask(String::new()));
     assert!(w.app().state.error.is_none());
 
-    // A list of phrases in this view, then against a true mask: here the answer's own.
-    w.until("what the pixels belong to", |a| a.viewport.queries.maps().is_some());
-    w.harness.state_mut().phrases.text = "the table\ngiraffe\n".into();
-    w.ask(Action::RunPhrases(Some(folder.path().join("masks"))));
-    w.until("the answers", |a| a.state.phrases.rows.len() == 2);
-    assert!(w.shows("1 of 2 questions answered") && w.app().state.phrases.rows.iter().all(|r| r.iou.is_none()));
-    let table_mask = folder.path().join("masks/masks/this_view/the_table.png");
-    w.ask(Action::Ask("table".into()));
-    w.ask(Action::TrueMask(Some(table_mask)));
-    w.harness.run_steps(4);
-    assert!(w.shows("IoU 0.9") || w.shows("IoU 1.0"), "drawn twice, it is the same but for its edge");
-    // The control: a part of the scene is not the table.
-    w.ask(Action::Ask("red controller".into()));
-    w.harness.run_steps(4);
-    assert!(w.shows("IoU 0.0"), "nothing of it is met");
-    w.ask(Action::RunPhrases(None));
-    w.until("IoU in the table", |a| a.state.phrases.rows.iter().any(|r| r.iou.is_some_and(|v| v > 0.9)));
-    w.ask(Action::TrueMask(None));
-    w.harness.run_steps(4);
-    assert!(!w.shows("IoU 0"));
-    w.ask(Action::TogglePane(Pane::Phrases));
+    phrases::are_listed_exported_and_compared(&mut w, folder.path());
 
     // The table is seen from everywhere.
     let table = map.identities.iter().find(|(_, i)| i.names == ["table"]).map(|(id, _)| id).expect("a table");

@@ -4,6 +4,8 @@
 //! and return a typed result or a [`JobError`]. Whoever calls them says the result in its own way.
 
 pub(crate) mod bench;
+pub(crate) mod demo_questions;
+pub(crate) mod demo_tour;
 pub mod edit;
 pub(crate) mod error;
 pub(crate) mod evaluate;

@@ -16,9 +16,6 @@ pub struct ThumbnailSet {
 }
 
 /// Draws every object and part alone.
-///
-/// # Errors
-/// If one cannot be drawn.
 pub(crate) fn draw(
     cloud: &GaussianCloud,
     map: &SemanticMap,

@@ -42,9 +42,8 @@ pub(crate) fn resolve(world: &mut dyn World, phrase: &str, level: LevelFilter, d
     match resolver.phrase(&phrase) {
         Ok(set) => match set.settled() {
             [id] => {
-                let notes =
-                    mended_text(&mended).into_iter().chain((!resolver.note.is_empty()).then_some(resolver.note));
-                Resolved::One { id: *id, note: notes.collect::<Vec<_>>().join(" ") }
+                let notes = [mended_text(&mended).unwrap_or_default(), resolver.note];
+                Resolved::One { id: *id, note: notes.join(" ").trim().into() }
             }
             several => Resolved::Several(several.to_vec()),
         },
@@ -53,9 +52,6 @@ pub(crate) fn resolve(world: &mut dyn World, phrase: &str, level: LevelFilter, d
 }
 
 /// All identities that a phrase such as "buttons" or "bottles on the table" means; none if nothing fits.
-///
-/// # Errors
-/// If the scene cannot be asked, or the phrase needs something that is not clear.
 pub(crate) fn resolve_all(
     world: &mut dyn World,
     phrase: &str,

@@ -11,7 +11,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::scene::Mask;
 
-/// A mask as written.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 pub(crate) struct Rle {
     /// Height and width in px.

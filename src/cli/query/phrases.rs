@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use serde_json::json;
 
-use super::progress::Console;
-use super::query::QueryArgs;
-use super::{CliError, output, view};
+use super::QueryArgs;
+use crate::cli::progress::Console;
+use crate::cli::{CliError, output, view};
 use crate::jobs::phrases::{self, PhraseRow, PhrasesRequest, TrueMasks};
 use crate::jobs::{Scene, export, render};
 use crate::pipeline::semantics::matching::MatchMode;

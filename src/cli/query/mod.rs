@@ -1,11 +1,13 @@
 //! `fmlgs query`: where in a view is what is asked for.
 
+mod phrases;
+
 use std::path::PathBuf;
 use std::time::Instant;
 
 use serde_json::{Value, json};
 
-use super::{CliError, number, output, query_phrases, view};
+use super::{CliError, number, output, view};
 use crate::jobs::query::{self, QueryRequest, QueryResult};
 use crate::jobs::{export, open, render};
 use crate::pipeline::semantics::answer::Basis;
@@ -37,31 +39,31 @@ pub(crate) struct QueryArgs {
     phrases: Option<PathBuf>,
     /// Views for --phrases: 'all' photos, or some by index or name, with commas between [default: --camera]
     #[arg(long, requires = "phrases", conflicts_with = "camera")]
-    pub(super) views: Option<String>,
+    views: Option<String>,
     /// True masks for --phrases, as it exports them: FOLDER/<view>/<phrase>.png, white on black
     #[arg(long, value_name = "FOLDER", requires = "phrases")]
-    pub(super) truth: Option<PathBuf>,
+    truth: Option<PathBuf>,
     /// Write the masks of --phrases as .png, COCO .json and a .csv table into this folder
     #[arg(long, value_name = "FOLDER", requires = "phrases")]
-    pub(super) export: Option<PathBuf>,
+    export: Option<PathBuf>,
     /// Photo by index from 0 or by name, or a JSON camera file [default: the first photo]
     #[arg(long)]
-    pub(super) camera: Option<String>,
+    camera: Option<String>,
     /// Shrink the view to at most this many px along its longer side
     #[arg(long, default_value_t = 1008, value_parser = clap::value_parser!(u32).range(16..=16384))]
-    pub(super) max_side: u32,
+    max_side: u32,
     /// Whether an object or a part is meant
     #[arg(long, value_enum, default_value_t = LevelFilter::Auto)]
-    pub(super) kind: LevelFilter,
+    kind: LevelFilter,
     /// Answers whose pixels go into the mask at most
     #[arg(long, default_value_t = 1, value_parser = number::within(1..=100_000_usize))]
-    pub(super) top: usize,
+    top: usize,
     /// Match alpha-blended codes, as the paper does, instead of identities
     #[arg(long)]
-    pub(super) blend: bool,
+    blend: bool,
     /// Largest difference per channel of a match, in 255ths
     #[arg(long, default_value_t = 255.0 * TOLERANCE, value_parser = number::within(0.0..=255.0_f32))]
-    pub(super) tolerance: f32,
+    tolerance: f32,
     /// Write the mask of the answer: white on black
     #[arg(long)]
     mask: Option<PathBuf>,
@@ -70,7 +72,7 @@ pub(crate) struct QueryArgs {
     heat: Option<PathBuf>,
     /// Print one JSON document
     #[arg(long)]
-    pub(super) json: bool,
+    json: bool,
 }
 
 pub(crate) fn run(args: QueryArgs) -> Result<(), CliError> {
@@ -80,7 +82,7 @@ pub(crate) fn run(args: QueryArgs) -> Result<(), CliError> {
     }
     let map = scene.semantics()?;
     if let Some(list) = &args.phrases {
-        return query_phrases::run(&args, list, &scene, map);
+        return phrases::run(&args, list, &scene, map);
     }
     let text = args.text.as_deref().unwrap_or_default();
     let camera = view::choose(args.camera.as_deref(), &scene)?.limited_to(args.max_side);
