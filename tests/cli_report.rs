@@ -65,6 +65,22 @@ fn every_stage_is_measured_and_resumed() {
     let told = run(&["query", &scene, "box 1", "--camera", &away]).ok().stdout;
     assert!(told.contains("not in this view") && told.contains("--camera"), "{told}");
 
+    // A list of phrases over all photos: its masks are met by themselves, and by no others.
+    std::fs::write(at("words.txt"), "box 1\n\ngiraffe\nbox 2\n").unwrap();
+    let (words, masks) = (at("words.txt"), at("masks"));
+    let list = ["query", &scene, "--phrases", &words, "--views", "all"];
+    let told = run(&[&list[..], &["--export", &masks]].concat()).ok().stdout;
+    assert!(told.contains("giraffe") && told.contains("coco.json"), "{told}");
+    assert!(std::fs::read_to_string(at("masks/phrases.csv")).unwrap().lines().count() > 3);
+    let truth = at("masks/masks");
+    let compared = || run(&[&list[..], &["--truth", &truth, "--json"]].concat()).ok().json();
+    assert_eq!(compared()["mean_iou"], 1.0);
+    let view = std::fs::read_dir(&truth).unwrap().next().unwrap().unwrap().path();
+    std::fs::copy(view.join("giraffe.png"), view.join("box_1.png")).unwrap();
+    assert!(compared()["mean_iou"].as_f64().unwrap() < 1.0, "nothing is not the box");
+    run(&["query", &scene, "box 1", "--phrases", &words]).fails_with(2);
+    run(&["query", &scene, "--phrases", &at("none.txt")]).fails_with(1);
+
     let wanted = ["report", &scene, "--masks", photos, "--max-side", "64", "--steps", "20", "--train-steps", "20"];
     let rest = ["--views", "1", "--stages", "render,train,features,query,path", "--out", &out, "-q"];
     let read = || -> Value { serde_json::from_slice(&std::fs::read(format!("{out}/report.json")).unwrap()).unwrap() };

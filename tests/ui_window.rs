@@ -5,6 +5,8 @@
 mod edits;
 #[path = "ui_window/hands.rs"]
 mod hands;
+#[path = "ui_window/phrases.rs"]
+mod phrases;
 #[path = "ui_window/problems.rs"]
 mod problems;
 #[path = "ui_window/report.rs"]
@@ -352,7 +354,16 @@ fn objects_are_found_asked_for_renamed_hidden_and_undone() {
     w.ask(Action::Ask("the red controller".into()));
     let red = w.app().viewport.queries.all().last().expect("asked").answered.chosen(1);
     assert_eq!(red.iter().map(|id| map.identities.name(*id)).collect::<Vec<_>>(), ["red controller"]);
-    assert!(w.shows("Go there") && w.shows("Isolate"), "what can be done with it");
+    assert!(w.shows("Go there") && w.shows("certain") && !w.shows("Isolate"), "one line over the view");
+    w.click("Details");
+    assert!(w.shows("Isolate") && w.shows("Tolerance"), "all of it in a pane");
+    w.ask(Action::TogglePane(Pane::Query));
+    assert!(!w.shows("Isolate"));
+    w.ask(Action::Ask("buton of teh red contoller".into()));
+    assert!(w.shows("Read \"buton\" as \"button\""), "what was mended is said");
+    w.ask(Action::Ask("red controller wheel".into()));
+    w.until("an answer", |a| a.viewport.queries.all().last().is_some_and(|q| !q.pending));
+    assert!(w.shows("Ignored: \"wheel\"") && !w.shows("certain"), "the object is no sure answer");
     w.until("what the pixels belong to", |a| a.viewport.queries.maps().is_some());
     w.ask(Action::Ask("giraffe".into()));
     w.until("an answer", |a| a.viewport.queries.all().last().is_some_and(|q| !q.pending));
@@ -360,6 +371,8 @@ fn objects_are_found_asked_for_renamed_hidden_and_undone() {
     w.ask(Action::Ask("x".repeat(10_000)));
     w.ask(Action::Ask(String::new()));
     assert!(w.app().state.error.is_none());
+
+    phrases::are_listed_exported_and_compared(&mut w, folder.path());
 
     // The table is seen from everywhere.
     let table = map.identities.iter().find(|(_, i)| i.names == ["table"]).map(|(id, _)| id).expect("a table");

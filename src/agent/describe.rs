@@ -2,7 +2,7 @@
 
 use super::relation::{Relation, fit};
 use super::world::World;
-use crate::math::format::short;
+use crate::math::format::{self, short};
 use crate::scene::{Bounds, IdentityId, Level, NOBODY};
 
 /// Share of the view under which something is not really seen.
@@ -35,12 +35,8 @@ pub(crate) fn names(world: &dyn World, ids: &[IdentityId], most: usize) -> Strin
 /// A length in scene units as people say it.
 pub(crate) fn length(world: &dyn World, units: f64) -> String {
     match world.metres_per_unit() {
-        Some(scale) => match units * scale {
-            m if m >= 1.0 => format!("{} m", short((m * 100.0).round() / 100.0)),
-            m if m >= 0.01 => format!("{} cm", short((m * 1000.0).round() / 10.0)),
-            m => format!("{} mm", short((m * 10_000.0).round() / 10.0)),
-        },
         None => format!("{} scene units", short(units)),
+        known => format::length(units, known),
     }
 }
 

@@ -1,4 +1,6 @@
-//! A request as words: tokens, numbers, singular forms.
+//! A request as words: tokens, numbers.
+
+pub(crate) use crate::pipeline::semantics::names::singular;
 
 /// Longest request that is looked at, in characters.
 pub(crate) const MAX_CHARS: usize = 600;
@@ -105,24 +107,6 @@ pub(crate) fn ordinal(word: &str) -> Option<usize> {
     WORDS.iter().position(|w| *w == word)
 }
 
-/// A word without an English plural's ending.
-pub(crate) fn singular(word: &str) -> String {
-    for (end, instead) in [("knives", "knife"), ("shelves", "shelf"), ("ies", "y")] {
-        if let Some(stem) = word.strip_suffix(end).filter(|s| s.len() > 1 || end.len() > 3) {
-            return format!("{stem}{instead}");
-        }
-    }
-    for end in ["sses", "xes", "ches", "shes"] {
-        if word.ends_with(end) {
-            return word[..word.len() - 2].into();
-        }
-    }
-    match word.strip_suffix('s') {
-        Some(stem) if stem.chars().count() > 2 && !stem.ends_with(['s', 'u', 'i']) => stem.into(),
-        _ => word.into(),
-    }
-}
-
 /// Whether two words are the same but for a plural or a slip.
 pub(crate) fn alike(a: &str, b: &str) -> bool {
     let (a, b) = (singular(a), singular(b));
@@ -158,7 +142,5 @@ mod tests {
         assert_eq!((number("half"), number("twenty-five"), number("1/2")), (None, Some(25.0), Some(0.5)));
         assert_eq!((number("0,5"), number("1e999"), number("nan"), number("1/0")), (Some(0.5), None, None, None));
         assert!(alike("controllers", "controller") && alike("contoller", "controller") && !alike("mug", "mag"));
-        let plurals = ["knives", "glasses", "dishes", "keys"].map(singular);
-        assert_eq!(plurals, ["knife", "glass", "dish", "key"]);
     }
 }

@@ -46,6 +46,8 @@ pub enum JobError {
     EmptyQuery,
     #[error("nothing here fits '{0}'")]
     NoMatch(String),
+    #[error("{0}")]
+    Phrases(String),
     #[error("no Gaussian is left to write")]
     NoGaussians,
     #[error("{0}")]

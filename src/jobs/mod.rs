@@ -16,6 +16,7 @@ pub(crate) mod folders;
 pub(crate) mod go_to;
 pub(crate) mod models;
 pub mod open;
+pub mod phrases;
 pub(crate) mod plan;
 pub(crate) mod query;
 pub(crate) mod render;

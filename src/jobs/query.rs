@@ -11,6 +11,7 @@ use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::matching::{self, MatchMode};
 pub(crate) use crate::pipeline::semantics::query_engine::{QueryEngine, answer_encoded};
+use crate::pipeline::semantics::reading::Reading;
 use crate::pipeline::semantics::timing::ms_since;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{Features, RenderSettings, Renderer};
@@ -78,8 +79,12 @@ pub(crate) struct QueryRequest<'a> {
 pub(crate) struct QueryResult {
     /// What is meant, and how long that took.
     pub(crate) answered: QueryAnswer,
+    /// How the question was read.
+    pub(crate) reading: Reading,
     pub(crate) mask: Mask,
     pub(crate) unknown_words: Vec<String>,
+    /// Words that the answer does not rest on.
+    pub(crate) ignored_words: Vec<String>,
     /// Milliseconds from the text to the mask, the view there.
     pub(crate) query_ms: f64,
     pub(crate) maps: ViewMaps,
@@ -91,7 +96,8 @@ pub(crate) fn run(scene: &Scene, map: &SemanticMap, request: &QueryRequest<'_>) 
     let maps = ViewMaps::draw(&mut Renderer::new(), drawn, map, request.camera, blend, map.has_parts())?;
     let mut engine = QueryEngine::new(map.language.as_ref())?;
     let start = Instant::now();
-    let mut answered = engine.ask(map, request.text, request.level)?.ok_or(JobError::EmptyQuery)?;
+    let reading = Reading::new(&map.identities, request.text, request.level).ok_or(JobError::EmptyQuery)?;
+    let mut answered = engine.answer(map, &reading.phrase, request.level)?;
     let matching_since = Instant::now();
     let mut mask = Mask::empty(maps.identities.width_px, maps.identities.height_px);
     for id in answered.chosen(request.top) {
@@ -99,8 +105,9 @@ pub(crate) fn run(scene: &Scene, map: &SemanticMap, request: &QueryRequest<'_>) 
     }
     answered.stages.mask = ms_since(matching_since);
     let query_ms = ms_since(start);
-    let unknown_words = engine.unknown_words(&map.identities, request.text);
-    Ok(QueryResult { answered, mask, unknown_words, query_ms, maps })
+    let unknown_words = engine.unknown_words(&map.identities, &reading.phrase);
+    let ignored_words = answered.ignored_words(&map.identities, &reading.phrase, &unknown_words);
+    Ok(QueryResult { answered, reading, mask, unknown_words, ignored_words, query_ms, maps })
 }
 
 /// The identities that are meant, at most `top` of them.

@@ -1,19 +1,29 @@
-//! Small pictures of a scene's objects and parts, as its first view sees them.
+//! Small pictures of a scene's objects and parts, as its first view sees them, and what those without a name look like.
 
 use super::JobError;
 use crate::pipeline::semantics::thumbnails::{Thumbnails, portraits};
 use crate::render::RenderSettings;
+use crate::scene::appearance::{self, Appearance};
 use crate::scene::resource_log::{self, ResourceKind};
 use crate::scene::{GaussianCloud, HomeView, SemanticMap};
 
-/// Draws every object and part alone, by number less one.
+/// What is known of objects and parts, by number less one.
+#[derive(Clone, Debug)]
+pub struct ThumbnailSet {
+    pub(crate) pictures: Thumbnails,
+    /// Of those without a name.
+    pub(crate) appearances: Vec<Option<Appearance>>,
+}
+
+/// Draws every object and part alone.
 pub(crate) fn draw(
     cloud: &GaussianCloud,
     map: &SemanticMap,
     settings: &RenderSettings,
     home: &HomeView,
-) -> Result<Thumbnails, JobError> {
+) -> Result<ThumbnailSet, JobError> {
     let from = home.camera.as_ref().map_or(home.bounds.center() + home.up, |c| c.center);
     resource_log::record(ResourceKind::Thumbnails, "portraits of objects and parts", "a list of them is shown", 0);
-    Ok(portraits(cloud, map, settings, from, home.up)?)
+    let appearances = appearance::of_unnamed(cloud, map);
+    Ok(ThumbnailSet { pictures: portraits(cloud, map, settings, from, home.up)?, appearances })
 }

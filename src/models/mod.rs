@@ -19,11 +19,13 @@ pub mod sam2;
 pub mod session_cache;
 mod tile;
 mod vocabulary;
+mod words;
 
 pub(crate) use catalog::ModelRole;
 pub use clip::ClipEncoder;
 pub(crate) use demo::DemoEncoder;
 pub use error::ModelError;
+pub(crate) use words::is_word;
 
 /// A picture of one identity: mask on black, padded to a square, side x side, sRGB 0..1, row-major.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,5 +1,6 @@
 //! What a scene is made of. Pure data: nothing here reads or writes files.
 
+pub(crate) mod appearance;
 pub(crate) mod bounds;
 pub(crate) mod camera;
 pub(crate) mod camera_path;

@@ -56,6 +56,8 @@ impl App {
                     self.viewport.queries.ask(&text, &semantics);
                 }
             }
+            Action::RunPhrases(to) => self.run_phrases(to),
+            Action::TrueMask(path) => self.compare_with_mask(path.as_deref()),
             Action::SetScale(meters_per_unit) => {
                 if let Some(scene) = &self.state.scene {
                     let out = scene.out.clone();
@@ -117,6 +119,8 @@ impl App {
             | Action::Screenshot
             | Action::ChooseMasks
             | Action::AddModel(_)
+            | Action::ExportPhrases
+            | Action::ChooseTrueMask
             | Action::ChooseReport
             | Action::ChooseSecondReport
             | Action::OpenPath

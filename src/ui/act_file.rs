@@ -36,6 +36,8 @@ impl App {
         self.layout.folder = folder.map(Path::to_path_buf);
         match action {
             Action::OpenFolder | Action::OpenFile => self.ask(Action::Open(path)),
+            Action::ExportPhrases => self.ask(Action::RunPhrases(Some(path))),
+            Action::ChooseTrueMask => self.ask(Action::TrueMask(Some(path))),
             Action::ChooseReport => self.read_report(path, false),
             Action::ChooseSecondReport => self.read_report(path, true),
             Action::ChooseMasks => self.find_objects(Some(path)),

@@ -26,11 +26,16 @@ pub enum Pane {
     Training,
     /// Objects and parts.
     Objects,
+    /// The answer to the query in full, and how answers are found and drawn.
+    #[strum(serialize = "Query")]
+    Query,
     /// What is left out for this scene, and why.
     #[strum(serialize = "Scene plan")]
     Plan,
     /// Neural networks: which are installed, which are missing.
     Models,
+    /// A list of phrases with their answers.
+    Phrases,
     /// The camera's path.
     #[strum(serialize = "Camera path")]
     Camera,
@@ -152,6 +157,15 @@ actions! {
         "Choose a folder with its files; they are verified and copied.";
     TypeQuery: "Query an object or a part", "A name, or \"the button of the red controller\".", "/";
     Ask(text: String): format!("Query {text}"), "A name, or \"the button of the red controller\".";
+    RunPhrases(to: Option<PathBuf>): to.as_ref().map_or_else(|| "Ask the list of phrases".into(),
+            |to| format!("Write the masks of the phrases to {}", to.display())),
+        "Ask every phrase of the list, in this view or in all photos.";
+    ExportPhrases: "Export the masks of the phrases\u{2026}", "As .png, COCO .json and a .csv table, into a folder.";
+    ChooseTrueMask: "Compare with a true mask\u{2026}",
+        "A picture of this view, white where the object is: hits, misses, false alarms and IoU are shown.";
+    TrueMask(path: Option<PathBuf>): path.as_ref().map_or_else(|| "End the comparison with a true mask".into(),
+            |p| format!("Compare with the true mask {}", p.display())),
+        "Hits, misses and false alarms of the newest answer, and its IoU.";
     GoToTarget(id: IdentityId, side: Side): format!("Go to #{id}, {}", side.text()),
         "Fly to where it is seen best, around everything in between.";
     PlayPath: "Play or pause the camera path", "Fly along the path, or pause where you are.", "Space";

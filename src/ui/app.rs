@@ -15,7 +15,7 @@ use super::layout::Layout;
 use super::palette::{Palette, shortcut_sheet};
 use super::panes::{
     bars, dataset::PhotoThumbnails, empty, log, models::Models, object_thumbnails::ObjectThumbnails,
-    objects::ObjectsPane, plan, problems, report::ReportPane, training,
+    objects::ObjectsPane, phrases::PhrasesPane, plan, problems, report::ReportPane, training,
 };
 use super::state::AppState;
 use super::toasts::Toasts;
@@ -43,6 +43,8 @@ pub struct App {
     pub(super) sheet: bool,
     photo_thumbnails: PhotoThumbnails,
     object_thumbnails: ObjectThumbnails,
+    /// The list of phrases.
+    pub phrases: PhrasesPane,
     pub(super) objects: ObjectsPane,
     models: Models,
     /// Error against run time.
@@ -94,6 +96,7 @@ impl App {
             sheet: false,
             photo_thumbnails: PhotoThumbnails::default(),
             object_thumbnails: ObjectThumbnails::default(),
+            phrases: PhrasesPane::default(),
             objects: ObjectsPane::default(),
             models: Models::default(),
             report: ReportPane::default(),
@@ -210,6 +213,11 @@ impl App {
                 viewport.stand(&pose, state, ui.input(|i| i.time));
             }
         }
+        if layout.shows(Pane::Phrases) && state.semantics.is_some() {
+            let comparing = viewport.queries.truth().is_some();
+            let shown = Panel::bottom("phrases").frame(pane).resizable(true).default_size(220.0).min_size(150.0);
+            shown.show(ui, |ui| self.phrases.show(ui, state, comparing, actions));
+        }
         if layout.shows(Pane::Report) {
             // The view stays larger than what is said about it.
             let most = (0.55 * ui.available_height()).max(200.0);
@@ -230,17 +238,27 @@ impl App {
                 },
             );
         }
-        if [Pane::Chat, Pane::Training, Pane::Objects, Pane::Plan, Pane::Models].iter().any(|p| layout.shows(*p)) {
+        if [Pane::Chat, Pane::Query, Pane::Training, Pane::Objects, Pane::Plan, Pane::Models]
+            .iter()
+            .any(|p| layout.shows(*p))
+        {
             Panel::right("work").frame(pane).resizable(true).default_size(350.0).size_range(290.0..=640.0).show(
                 ui,
                 |ui| {
                     ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+                        if layout.shows(Pane::Query) {
+                            header(Pane::Query)
+                                .default_open(true)
+                                .show(ui, |ui| viewport.show_query(ui, state, actions));
+                            ui.add_space(8.0);
+                        }
                         let can_have = scene.dataset.is_some() || state.semantics.is_some();
                         let objects = layout.shows(Pane::Objects) && can_have;
                         let mut show_objects = |ui: &mut Ui, actions: &mut Vec<Action>| {
                             header(Pane::Objects).default_open(true).show(ui, |ui| {
                                 let (thumbnails, visibility) = (&self.object_thumbnails, &viewport.visibility);
-                                self.objects.show(ui, state, thumbnails, visibility, actions);
+                                let selected = viewport.picking.selected();
+                                self.objects.show(ui, state, thumbnails, visibility, selected, actions);
                             });
                             ui.add_space(10.0);
                         };

@@ -204,6 +204,8 @@ fn dialog(action: &Action, name: &str) -> Option<(String, Kind)> {
         Action::OpenFolder => ("Open a folder of photos or a trained scene", Kind::Folder),
         Action::OpenFile => ("Open a scene", Kind::File("Scenes", &["ply", "json"])),
         Action::AddModel(id) => return Some((format!("Choose the folder with the files of {id}"), Kind::Folder)),
+        Action::ExportPhrases => ("Choose a folder for the masks", Kind::Folder),
+        Action::ChooseTrueMask => ("Choose the true mask of this view", Kind::File("Masks", &["png"])),
         Action::ChooseMasks => ("Choose the folder with the masks", Kind::Folder),
         Action::ExportPly | Action::ExportTarget(_) => ("Export Gaussians", save(".ply")),
         Action::OpenPath => ("Open a camera path", Kind::File("Camera paths", &["json"])),

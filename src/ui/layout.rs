@@ -58,7 +58,7 @@ pub struct Layout {
 impl Default for Layout {
     fn default() -> Self {
         Self {
-            hidden: vec![Pane::Log, Pane::Camera, Pane::Report],
+            hidden: vec![Pane::Log, Pane::Camera, Pane::Report, Pane::Query, Pane::Phrases],
             cameras: true,
             compare: false,
             split: 0.5,

@@ -6,6 +6,7 @@
 
 mod act;
 mod act_file;
+mod act_phrases;
 mod act_report;
 pub mod actions;
 pub mod app;
@@ -20,6 +21,7 @@ mod file_dialogs;
 mod fonts;
 mod history;
 pub(crate) mod keys;
+pub(crate) mod labels;
 pub(crate) mod layout;
 pub(crate) mod palette;
 pub(crate) mod panes;

@@ -8,14 +8,15 @@ pub use self::messages::{ErrorBox, LogLine};
 pub(crate) use self::messages::{Toast, Tone};
 use super::actions::Action;
 use super::history::History;
+use super::labels::{PhraseTable, ScreenNames};
 pub(crate) use super::train_history::TrainHistory;
 use crate::jobs::OpenedScene;
 use crate::jobs::go_to::{Approached, Explored};
 use crate::jobs::models::ModelList;
+use crate::jobs::thumbnails::ThumbnailSet;
 use crate::math::format;
 use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Progress, Severity};
-use crate::pipeline::semantics::thumbnails::Thumbnails;
 use crate::render::RenderSettings;
 use crate::scene::{Limits, Overrides, PhotoPixels, SceneFacts, ScenePlan, SemanticMap, text};
 use crate::worker::{Event, Failure, JobId, JobKind, Outcome, Versioned, WorkerThread};
@@ -30,9 +31,7 @@ const MAX_RECENT: usize = 8;
 pub struct RunningJob {
     pub(crate) id: JobId,
     pub(crate) kind: JobKind,
-    /// What it does, for the user.
     pub(crate) title: String,
-    /// Where it stands, once it says.
     pub(crate) progress: Option<Progress>,
     /// Whether it waits.
     pub paused: bool,
@@ -59,10 +58,12 @@ pub struct AppState {
     pub(crate) antialias: bool,
     /// Objects and parts of the Gaussians on screen.
     pub semantics: Option<Versioned<SemanticMap>>,
-    /// Gaussians of each of them by number, pieces included.
+    /// Gaussians of each of them by number, pieces included; and what they are called on screen.
     pub(crate) sizes: Vec<usize>,
+    pub(crate) labels: ScreenNames,
+    pub phrases: PhraseTable,
     /// New thumbnails of objects and parts, until they are taken over.
-    pub(crate) thumbnails: Option<(Arc<SemanticMap>, Thumbnails)>,
+    pub(crate) thumbnails: Option<(Arc<SemanticMap>, ThumbnailSet)>,
     /// What is known of moving about in the scene.
     pub explored: Option<Arc<Explored>>,
     /// The way that was looked for last, until the window takes it.
@@ -99,7 +100,6 @@ pub struct AppState {
     pub report: Option<ShownReport>,
     /// The report that it is compared with.
     pub second_report: Option<ShownReport>,
-    /// Short jobs that run, with their titles.
     short_jobs: BTreeMap<JobId, (JobKind, String)>,
     next_toast: u64,
 }
@@ -291,7 +291,8 @@ impl AppState {
                     false => self.report = shown,
                 }
             }
-            Outcome::Thumbnails(map, pictures) => self.thumbnails = Some((map, pictures)),
+            Outcome::Thumbnails(map, drawn) => self.thumbnails = Some((map, drawn)),
+            Outcome::Phrases(rows, to) => self.phrases.finished(rows, to),
             Outcome::Written(path) => self.toast(Tone::Good, format!("Wrote {}", path.display())),
             Outcome::Photo { index, max_side_px, pixels } => {
                 self.photos.insert((index, max_side_px), pixels);
@@ -323,6 +324,7 @@ impl AppState {
         self.set_facts(scene.facts.clone());
         self.antialias = scene.render.antialias;
         self.set_semantics(scene.semantics.clone());
+        (self.labels, self.phrases) = Default::default();
         self.scene = Some(Arc::new(scene));
     }
 

@@ -12,8 +12,8 @@ use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::models::Source;
 use crate::jobs::train::Trained;
 use crate::jobs::{
-    Folders, JobError, OpenedScene, Scene, edit, export, find_objects, go_to, models, open, plan, report, scale,
-    thumbnails, train, video,
+    Folders, JobError, OpenedScene, Scene, edit, export, find_objects, go_to, models, open, phrases, plan, report,
+    scale, thumbnails, train, video,
 };
 use crate::measure::{End, FILE, Report};
 use crate::pipeline::observer::{Observer, Severity};
@@ -135,6 +135,7 @@ impl Jobs for PipelineJobs {
                 Outcome::Explored(Arc::new(go_to::Explored::new(cloud, &cameras, up)))
             }
             Command::Video(request) => Outcome::Written(video::run(*request, observer)?.summary.path),
+            Command::Phrases(request) => Outcome::Phrases(phrases::run(&request, observer)?, request.export),
             Command::Measure(request) => {
                 let done = report::run(&request, observer)?;
                 if done.end == End::Cancelled {

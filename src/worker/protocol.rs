@@ -9,12 +9,13 @@ use super::failure::Failure;
 use crate::jobs::edit::EditRequest;
 use crate::jobs::go_to::{ApproachRequest, Approached, Explored};
 use crate::jobs::models::ModelList;
+use crate::jobs::phrases::{PhraseRow, PhrasesRequest};
 use crate::jobs::report::ReportRequest;
+use crate::jobs::thumbnails::ThumbnailSet;
 use crate::jobs::video::VideoRequest;
 use crate::jobs::{OpenedScene, find_objects};
 use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Progress, Severity, StepMetrics};
-use crate::pipeline::semantics::thumbnails::Thumbnails;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, Photo, PhotoPixels, SceneFacts, SemanticMap};
@@ -73,6 +74,8 @@ pub enum JobKind {
     Measure,
     /// Reads a report.
     Report,
+    /// Asks a list of phrases.
+    Phrases,
     /// Stores the scene's scale.
     Scale,
 }
@@ -87,7 +90,7 @@ impl JobKind {
     pub(crate) fn lane(self) -> WorkerThread {
         match self {
             Self::Open | Self::Demo | Self::Train | Self::Evaluate | Self::Objects => WorkerThread::Long,
-            Self::Model | Self::Video | Self::Measure => WorkerThread::Long,
+            Self::Model | Self::Video | Self::Measure | Self::Phrases => WorkerThread::Long,
             Self::Edit | Self::Export | Self::Photo | Self::Picture | Self::Thumbnails => WorkerThread::Short,
             Self::Models | Self::Explore | Self::Approach | Self::Scale | Self::Report => WorkerThread::Short,
         }
@@ -209,6 +212,8 @@ pub enum Command {
         /// Whether it is to be compared with the one that is shown.
         second: bool,
     },
+    /// Ask a list of phrases of some views.
+    Phrases(Box<PhrasesRequest>),
     /// Draw every object and part alone, small.
     Thumbnails {
         /// The Gaussians.
@@ -242,6 +247,7 @@ impl Command {
             Self::Approach(_) => JobKind::Approach,
             Self::Video(_) => JobKind::Video,
             Self::Measure(_) => JobKind::Measure,
+            Self::Phrases(_) => JobKind::Phrases,
             Self::SetScale { .. } => JobKind::Scale,
             Self::ReadReport { .. } => JobKind::Report,
         }
@@ -270,6 +276,7 @@ impl Command {
             }
             Self::Video(request) => format!("Rendering {}", name(&request.out)),
             Self::Measure(_) => "Benchmarking rendering".into(),
+            Self::Phrases(_) => "Asking a list of phrases".into(),
             Self::ReadReport { path, .. } => format!("Opening the report {}", name(path)),
         }
     }
@@ -303,6 +310,8 @@ pub enum Outcome {
     Refused(String),
     /// A file was written.
     Written(PathBuf),
+    /// Phrases were asked; and where their masks are, if they were written.
+    Phrases(Vec<PhraseRow>, Option<PathBuf>),
     /// A report was read or measured.
     Report {
         /// Where it lies.
@@ -313,14 +322,14 @@ pub enum Outcome {
         second: bool,
     },
     /// Portraits of objects and parts by number less one, as `semantics::portraits` draws them.
-    Thumbnails(Arc<SemanticMap>, Thumbnails),
+    Thumbnails(Arc<SemanticMap>, ThumbnailSet),
     /// The models were listed.
     Models(Arc<ModelList>),
     /// A model can be used now.
     ModelInstalled(String),
     /// The scene was looked at.
     Explored(Arc<Explored>),
-    /// The way to an identity, or why there is none; and what was learnt about the scene.
+    /// The way to an identity, or why there is none; and what was learned of the scene.
     Approached(Arc<Explored>, Approached),
     /// A photo was loaded.
     Photo {
@@ -333,8 +342,7 @@ pub enum Outcome {
     },
 }
 
-/// What happened. For each job: first `Started`, then any of the middle ones, at last exactly one of
-/// `Finished`, `Cancelled`, `Failed`. Only `Progress` may be missing.
+/// What happened. For each job: first `Started`, at last one of `Finished`, `Cancelled`, `Failed`.
 #[derive(Clone, Debug)]
 pub enum Event {
     /// The job has left the queue.

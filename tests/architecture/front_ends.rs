@@ -23,7 +23,7 @@ const AT_WORK: [&str; 10] = [
 ];
 
 /// What of them front ends may name nevertheless: paths or beginnings of paths.
-const ALLOWED: [(&str, &str); 16] = [
+const ALLOWED: [(&str, &str); 17] = [
     ("io::files::read", "a file of settings: the agent's policy"),
     ("io::http", "the way to a chat model is the agent's own"),
     ("measure::defaults", "the text of reports"),
@@ -38,6 +38,7 @@ const ALLOWED: [(&str, &str); 16] = [
     ("pipeline::semantics::answer::by_name", "names are compared in a scene that was opened"),
     ("pipeline::semantics::matching", "the Gaussians of an answer"),
     ("pipeline::semantics::names", "names are compared in a scene that was opened"),
+    ("pipeline::semantics::reading", "words are compared with the names in a scene that was opened"),
     ("pipeline::semantics::timing::ms_since", "a clock"),
     ("render::real_gpu", "what the window itself is drawn by"),
 ];

@@ -16,6 +16,7 @@ use super::words::{alike, singular};
 use super::world::World;
 use crate::pipeline::semantics::answer::Basis;
 use crate::pipeline::semantics::localize::Answer;
+use crate::pipeline::semantics::reading::{mend, mended_text};
 use crate::scene::{Bounds, IdentityId, Level, LevelFilter};
 
 /// What words come to.
@@ -35,10 +36,15 @@ pub(crate) enum Resolved {
 
 /// Finds what `phrase` means.
 pub(crate) fn resolve(world: &mut dyn World, phrase: &str, level: LevelFilter, dialog: &DialogState) -> Resolved {
+    // What is done to one thing is said of it by name, so a slip that was mended wrongly is seen.
+    let (phrase, mended) = mend(world.identities(), phrase);
     let mut resolver = Resolver { world, dialog, level, note: String::new() };
-    match resolver.phrase(phrase) {
+    match resolver.phrase(&phrase) {
         Ok(set) => match set.settled() {
-            [id] => Resolved::One { id: *id, note: resolver.note },
+            [id] => {
+                let notes = [mended_text(&mended).unwrap_or_default(), resolver.note];
+                Resolved::One { id: *id, note: notes.join(" ").trim().into() }
+            }
             several => Resolved::Several(several.to_vec()),
         },
         Err(Lost { refusal, near }) => Resolved::Missing { refusal, near },
@@ -46,9 +52,6 @@ pub(crate) fn resolve(world: &mut dyn World, phrase: &str, level: LevelFilter, d
 }
 
 /// All identities that a phrase such as "buttons" or "bottles on the table" means; none if nothing fits.
-///
-/// # Errors
-/// If the scene cannot be asked, or the phrase needs something that is not clear.
 pub(crate) fn resolve_all(
     world: &mut dyn World,
     phrase: &str,

@@ -42,6 +42,12 @@ fn read(path: &Path, least: u8, sheet: Sheet<'_>, masks: usize) -> Result<Mask, 
     Ok(Mask::from_fn(width, height, |i| values[i] >= least))
 }
 
+/// The white pixels of a picture on its own.
+pub(crate) fn mask(path: &Path) -> Result<Mask, IoError> {
+    let (width, height, values) = photo::decode_brightest(&files::read(path, files::MAX_PICTURE_BYTES)?, path)?;
+    Ok(Mask::from_fn(width, height, |i| values[i] >= 128))
+}
+
 /// Whether a name is a `.png`'s; its stem then.
 pub(crate) fn png_stem(name: &str) -> Option<&str> {
     name.rsplit_once('.').filter(|(stem, ending)| ending.eq_ignore_ascii_case("png") && !stem.is_empty()).map(|p| p.0)

@@ -7,18 +7,18 @@
 
 use std::collections::VecDeque;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::scene::Mask;
 
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 pub(crate) struct Rle {
     /// Height and width in px.
     pub(crate) size: [u32; 2],
     counts: Counts,
 }
 
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(untagged)]
 enum Counts {
     Packed(String),
@@ -26,6 +26,21 @@ enum Counts {
 }
 
 impl Rle {
+    /// The plain run lengths of a mask.
+    pub(crate) fn of(mask: &Mask) -> Self {
+        let (w, h) = (mask.width_px(), mask.height_px());
+        let (mut counts, mut on, mut length) = (Vec::new(), false, 0);
+        for i in 0..w * h {
+            if mask.contains(i % h * w + i / h) != on {
+                counts.push(length);
+                (on, length) = (!on, 0);
+            }
+            length += 1;
+        }
+        counts.push(length);
+        Self { size: [h as u32, w as u32], counts: Counts::Plain(counts) }
+    }
+
     /// Width and height in px.
     pub(crate) fn size_px(&self) -> (u32, u32) {
         (self.size[1], self.size[0])

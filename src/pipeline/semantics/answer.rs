@@ -20,6 +20,20 @@ pub(crate) enum Basis {
     Embedding,
 }
 
+/// How sure an answer is, in a word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
+pub(crate) enum Certainty {
+    /// Every word is in its name or in those of its wholes, and every word of its name was said.
+    Certain,
+    /// A part of its name was said, or it looks like it far more than anything else.
+    Likely,
+    Guess,
+}
+
+/// Score from which, and margin by which, what looks like the query is likely meant.
+const LIKELY: (f32, f32) = (0.6, 0.05);
+
 /// An answered query.
 #[derive(Clone, Debug, PartialEq)]
 pub struct QueryAnswer {
@@ -158,6 +172,40 @@ impl QueryAnswer {
         hits.iter().take(most).filter(|h| h.score >= threshold).map(|h| h.identity).collect()
     }
 
+    /// The words of a query that the answer does not rest on; `unknown` are those that nothing here knows.
+    pub(crate) fn ignored_words(
+        &self,
+        identities: &Identities,
+        phrase: &ParsedQuery,
+        unknown: &[String],
+    ) -> Vec<String> {
+        match (&self.answer, self.basis) {
+            (Answer::NotFound(_), _) => Vec::new(),
+            (found, Basis::Names) => {
+                let first = found.hits().first();
+                first.map_or_else(Vec::new, |h| names::words_beside(identities, h.identity, &phrase.text))
+            }
+            (_, Basis::Embedding) => unknown.to_vec(),
+        }
+    }
+
+    /// How sure the first hit is, some words being `ignored`.
+    pub(crate) fn certainty(&self, ignored: &[String]) -> Certainty {
+        let hits = self.answer.hits();
+        match (&self.answer, hits.first(), self.basis) {
+            (Answer::Found(_), Some(first), Basis::Names) if first.score > 0.999 && ignored.is_empty() => {
+                Certainty::Certain
+            }
+            (Answer::Found(_), Some(_), Basis::Names) if ignored.is_empty() => Certainty::Likely,
+            (Answer::Found(_), Some(first), Basis::Embedding)
+                if ignored.is_empty() && first.score >= LIKELY.0 && first.margin >= LIKELY.1 =>
+            {
+                Certainty::Likely
+            }
+            _ => Certainty::Guess,
+        }
+    }
+
     /// Score from which an identity is what was asked for.
     pub(crate) fn threshold(&self) -> f32 {
         match self.basis {
@@ -263,6 +311,25 @@ mod tests {
         let a = ask("mug", [0.0, 1.0, 0.0]);
         assert_eq!((a.basis, a.chosen(1)), (Basis::Names, vec![3]), "a known name is not asked of the encoder");
         assert_eq!((a.threshold(), ask("cup", [1.0, 0.0, 0.0]).threshold()), (names::THRESHOLD, 0.5));
+    }
+
+    #[test]
+    fn an_answer_is_as_sure_as_it_rests_on_names() {
+        let sure = |text: &str| {
+            let (all, _) = scene();
+            let phrase = ParsedQuery::parse(text).expect("a phrase");
+            let answered = ask(text, true);
+            let ignored = answered.ignored_words(&all, &phrase, &["beige".to_owned()]);
+            (answered.certainty(&ignored), ignored)
+        };
+        assert_eq!(sure("the lamp's shade"), (Certainty::Certain, vec![]));
+        assert_eq!(sure("lamp mug shade").0, Certainty::Guess, "not all of it is explained");
+        assert_eq!(sure("cup"), (Certainty::Guess, vec!["beige".into()]), "by looks, with a word left out");
+        let mut looks = ask("cup", true);
+        assert_eq!(looks.certainty(&[]), Certainty::Likely);
+        looks.answer = Answer::Found(vec![Hit { identity: 3, score: 0.9, margin: 0.01 }]);
+        assert_eq!(looks.certainty(&[]), Certainty::Guess, "another fits nearly as well");
+        assert_eq!(ask("giraffe", true).certainty(&[]), Certainty::Guess);
     }
 
     #[test]

@@ -3,7 +3,8 @@
 //!
 //! In the order of the data: [`segmenter`] finds masks ([`regions`] without any model; [`filters`]
 //! tell objects from parts), [`tracker`] makes them identities over all views, [`votes`] gives every Gaussian its
-//! identity, [`codes`] every identity its point in code space, [`view_map`] draws identities into a view; [`parse`] takes a query apart, [`names`] and
+//! identity, [`codes`] every identity its point in code space, [`view_map`] draws identities into a view;
+//! [`parse`] takes a query apart, [`reading`] mends its slips and reads noun compounds, [`names`] and
 //! [`by_embedding`] score identities for it by name and by embedding, [`localize`] picks those that are
 //! meant, and [`answer`] puts it together, with the time of each of the [`timing`] stages.
 
@@ -28,6 +29,7 @@ pub mod parse;
 pub(crate) mod propagate;
 pub(crate) mod protocols;
 pub(crate) mod query_engine;
+pub(crate) mod reading;
 pub mod regions;
 pub mod relevancy;
 pub mod sam2_tracker;

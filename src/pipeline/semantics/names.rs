@@ -1,14 +1,11 @@
-//! Identities found by their names: exactly, by their words, or nearly. Needs no network and knows
-//! no language.
+//! Identities found by their names: exactly, or by the words they share. Needs no network and knows
+//! no language; slips are mended before ([`super::reading`]).
 
 use std::collections::HashSet;
 
 use super::localize::Scorer;
 use super::parse::{MAX_CHARS, is_glue};
 use crate::scene::{Identities, IdentityId};
-
-/// Similarity under which two words have nothing to do with each other.
-const ALIKE: f64 = 0.82;
 
 /// Score under which a name is not what was asked for.
 pub(crate) const THRESHOLD: f32 = 0.45;
@@ -51,13 +48,24 @@ pub(crate) fn unknown_to_all(identities: &Identities, phrase: &str, to_encoder: 
     unknown
 }
 
-/// The words of a phrase that no name in the scene resembles; articles and the like left out.
+/// The words of a phrase that no name in the scene has; articles and the like left out.
 pub(crate) fn unknown_words(identities: &Identities, phrase: &str) -> Vec<String> {
     let known: HashSet<String> = identities.iter().flat_map(|(_, i)| &i.names).flat_map(|n| words(n)).collect();
     let numbers = identities.iter().filter(|(_, i)| i.names.is_empty()).map(|(id, _)| id.to_string());
-    let known: HashSet<String> = known.into_iter().chain(numbers).collect();
-    let carries = |w: &String| !is_glue(w) && !known.iter().any(|k| alike(w, k) > 0.0);
-    words(phrase).into_iter().filter(carries).collect()
+    not_in(phrase, &known.into_iter().chain(numbers).collect())
+}
+
+/// The words of a phrase that say nothing about `id`: neither its names nor those of its wholes have them.
+pub(crate) fn words_beside(identities: &Identities, id: IdentityId, phrase: &str) -> Vec<String> {
+    let names = |i: IdentityId| match identities.get(i).map(|i| i.names.as_slice()) {
+        Some([]) | None => vec![identities.name(i)],
+        Some(names) => names.to_vec(),
+    };
+    not_in(phrase, &identities.ancestors(id).flat_map(names).flat_map(|n| words(&n)).collect())
+}
+
+fn not_in(phrase: &str, known: &HashSet<String>) -> Vec<String> {
+    words(phrase).into_iter().filter(|w| !is_glue(w) && !known.contains(w)).collect()
 }
 
 /// Names for a phrase that is being typed, best first.
@@ -77,36 +85,40 @@ pub(crate) fn completions(identities: &Identities, typed: &str, most: usize) -> 
 }
 
 /// Lower-case words of a name; an English plural counts like its singular.
-fn words(text: &str) -> Vec<String> {
+pub(crate) fn words(text: &str) -> Vec<String> {
+    written(text).map(|w| singular(&w)).collect()
+}
+
+/// Lower-case words of a name as they are written.
+pub(super) fn written(text: &str) -> impl Iterator<Item = String> {
     // Nobody's name is longer, and comparing every letter of a pasted book would take long.
     let lower = text.chars().take(MAX_CHARS).collect::<String>().to_lowercase();
     let apart = lower.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty() && *w != "s");
-    apart.map(singular).collect()
+    apart.map(str::to_owned).collect::<Vec<_>>().into_iter()
 }
 
-fn singular(word: &str) -> String {
+/// A word without an English plural's ending.
+pub(crate) fn singular(word: &str) -> String {
+    for (end, instead) in [("knives", "knife"), ("shelves", "shelf"), ("ies", "y")] {
+        if let Some(stem) = word.strip_suffix(end).filter(|s| s.len() > 1 || end.len() > 3) {
+            return format!("{stem}{instead}");
+        }
+    }
+    for end in ["sses", "xes", "ches", "shes"] {
+        if word.ends_with(end) {
+            return word[..word.len() - 2].into();
+        }
+    }
     match word.strip_suffix('s') {
         Some(stem) if stem.chars().count() > 2 && !stem.ends_with(['s', 'u', 'i']) => stem.into(),
         _ => word.into(),
     }
 }
 
-/// How much alike two words are; 0 below [`ALIKE`].
-fn alike(a: &str, b: &str) -> f64 {
-    if a == b {
-        return 1.0;
-    }
-    let s = strsim::jaro_winkler(a, b);
-    // Short words differ by a letter and mean something else.
-    if a.chars().count().min(b.chars().count()) < 4 || s < ALIKE { 0.0 } else { s * s }
-}
-
 /// Harmonic mean of how much of the phrase is in the name and how much of the name in the phrase.
 fn similarity(phrase: &[String], name: &[String]) -> f64 {
-    let covered = |of: &[String], by: &[String]| {
-        let best = |w: &String| by.iter().map(|v| alike(w, v)).fold(0.0, f64::max);
-        of.iter().map(best).sum::<f64>() / of.len().max(1) as f64
-    };
+    let covered =
+        |of: &[String], by: &[String]| of.iter().filter(|w| by.contains(w)).count() as f64 / of.len().max(1) as f64;
     let (asked, named) = (covered(phrase, name), covered(name, phrase));
     if asked + named > 0.0 { 2.0 * asked * named / (asked + named) } else { 0.0 }
 }
@@ -136,7 +148,7 @@ mod tests {
         assert_eq!(best("red controller"), (1, 1.0));
         assert_eq!(best("Blue controllers"), (2, 1.0));
         assert_eq!(best("手柄"), (2, 1.0));
-        assert_eq!(best("blue contoller").0, 2, "a slip of the keys");
+        assert!(best("blue contoller").1 < 0.6, "slips are mended elsewhere");
         assert_eq!(best("button").0, 3);
         assert_eq!(best("#4"), (4, 1.0));
         assert!(scores(&all, "#3").iter().all(|s| *s < 0.5) && scores(&all, "#44").iter().all(|s| *s == 0.0));
@@ -160,22 +172,23 @@ mod tests {
     }
 
     #[test]
-    fn words_are_alike_by_their_letters() {
-        let plural = ["lamps", "glass", "virus", "taxis", "bus", "gas", "s", "keys"];
-        assert_eq!(plural.map(singular), ["lamp", "glass", "virus", "taxis", "bus", "gas", "s", "key"]);
-        assert_eq!((alike("cup", "cup"), alike("cup", "cap"), alike("lamp", "mug")), (1.0, 0.0, 0.0));
-        assert_eq!((alike("bolt", "bow"), alike("car", "cart")), (0.0, 0.0), "the shorter has three letters");
-        // Three of four letters, three at the beginning: (3/4 + 3/4 + 1) / 3, and 0.3 of the rest, squared.
-        // Five of six and of five, three at the beginning: (5/6 + 1 + 1) / 3, and 0.3 of the rest.
-        for (a, b, jaro) in [("lamp", "lamb", 2.5 / 3.0), ("kettle", "ketle", 17.0 / 18.0)] {
-            let expected = f64::powi(jaro + 0.3 * (1.0 - jaro), 2);
-            assert!((alike(a, b) - expected).abs() < 1e-9, "{a} {b}: {} {expected}", alike(a, b));
-        }
+    fn words_are_compared_whole_and_in_the_singular() {
+        let plural = ["lamps", "glass", "virus", "taxis", "bus", "gas", "s", "keys", "knives", "dishes", "berries"];
+        let single = ["lamp", "glass", "virus", "taxis", "bus", "gas", "s", "key", "knife", "dish", "berry"];
+        assert_eq!(plural.map(singular), single);
         // One of two words of the phrase, all of the name: 2 x 1/2 x 1 / (1/2 + 1).
         let words = |text: &str| words(text);
         assert!((similarity(&words("red lamp"), &words("lamp")) - 2.0 / 3.0).abs() < 1e-12);
-        assert_eq!(similarity(&words("red"), &words("lamp")), 0.0);
+        assert_eq!((similarity(&words("lamb"), &words("lamp")), similarity(&words("red"), &words("lamp"))), (0.0, 0.0));
         assert_eq!((similarity(&[], &[]), similarity(&words("lamp"), &[])), (0.0, 0.0));
+    }
+
+    #[test]
+    fn words_beside_an_identity_are_those_that_neither_it_nor_its_wholes_have() {
+        let all = scene();
+        assert_eq!(words_beside(&all, 3, "the green button of the red controllers"), ["green"]);
+        assert_eq!(words_beside(&all, 2, "red controller"), ["red"]);
+        assert!(words_beside(&all, 4, "#4").is_empty());
     }
 
     #[test]

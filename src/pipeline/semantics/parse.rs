@@ -4,7 +4,7 @@
 pub(crate) const MAX_CHARS: usize = 300;
 
 /// A query taken apart.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct ParsedQuery {
     /// All of it, lower case, without what carries nothing.
     pub text: String,

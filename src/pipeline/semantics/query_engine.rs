@@ -7,6 +7,7 @@ use super::answer::{Language, QueryAnswer, answer, by_embedding, phrases_of};
 use super::by_embedding::{EmbeddingOptions, TextEmbeddings};
 use super::names;
 use super::parse::ParsedQuery;
+use super::reading::Reading;
 use super::timing::{StagesMs, ms_since};
 use crate::models::{self, Encoder, ModelError};
 use crate::scene::{Identities, LanguageFeatures, LevelFilter, SemanticMap};
@@ -32,10 +33,23 @@ impl QueryEngine {
         text: &str,
         level: LevelFilter,
     ) -> Result<Option<QueryAnswer>, ModelError> {
+        let reading = Reading::new(&map.identities, text, level);
+        reading.map(|reading| self.answer(map, &reading.phrase, level)).transpose()
+    }
+
+    /// Answers a question that was read.
+    ///
+    /// # Errors
+    /// If the encoder fails.
+    pub(crate) fn answer(
+        &mut self,
+        map: &SemanticMap,
+        phrase: &ParsedQuery,
+        level: LevelFilter,
+    ) -> Result<QueryAnswer, ModelError> {
         let start = Instant::now();
-        let Some(phrase) = ParsedQuery::parse(text) else { return Ok(None) };
         let known = match &mut self.encoder {
-            Some(encoder) => match self.phrases.learn(&phrases_of(&phrase), |p| encoder.text(p)) {
+            Some(encoder) => match self.phrases.learn(&phrases_of(phrase), |p| encoder.text(p)) {
                 Ok(()) => true,
                 // Words that nobody knows are no failure: names may know them.
                 Err(ModelError::NoKnownWord { .. }) => false,
@@ -44,30 +58,28 @@ impl QueryEngine {
             None => false,
         };
         let encode = ms_since(start);
-        let answered = answer_encoded(map, text, level, known.then_some(&self.phrases));
-        Ok(answered.map(|a| QueryAnswer { stages: StagesMs { encode, ..a.stages }, ..a }))
+        let answered = answer_encoded(map, phrase, level, known.then_some(&self.phrases));
+        Ok(QueryAnswer { stages: StagesMs { encode, ..answered.stages }, ..answered })
     }
 
     /// The words of a question that nothing here knows.
-    pub(crate) fn unknown_words(&self, identities: &Identities, text: &str) -> Vec<String> {
-        let to_encoder = self.encoder.as_ref().map(|e| e.unknown_words(text));
-        names::unknown_to_all(identities, text, to_encoder.as_deref())
+    pub(crate) fn unknown_words(&self, identities: &Identities, phrase: &ParsedQuery) -> Vec<String> {
+        let to_encoder = self.encoder.as_ref().map(|e| e.unknown_words(&phrase.text));
+        names::unknown_to_all(identities, &phrase.text, to_encoder.as_deref())
     }
 }
 
-/// Answers a question whose phrases are among those that were encoded, or by names alone without them; `None` if
-/// there is nothing in it.
+/// Answers a question whose phrases are among those that were encoded, or by names alone without them.
 pub(crate) fn answer_encoded(
     map: &SemanticMap,
-    text: &str,
+    phrase: &ParsedQuery,
     level: LevelFilter,
     phrases: Option<&TextEmbeddings>,
-) -> Option<QueryAnswer> {
-    let phrase = ParsedQuery::parse(text)?;
+) -> QueryAnswer {
     let language = map.language.as_ref().zip(phrases);
     let language =
         language.map(|(features, phrases)| Language { features, phrases, options: EmbeddingOptions::default() });
-    Some(answer(&map.identities, &phrase, level, language))
+    answer(&map.identities, phrase, level, language)
 }
 
 /// Answers a question by these `features` alone, whatever identities are called; `None` if there is nothing in
@@ -143,7 +155,8 @@ mod tests {
         assert!(ask("giraffe").expect("no failure").expect("words").chosen(1).is_empty());
         assert!(matches!(ask("broken"), Err(ModelError::Run { .. })));
         assert!(ask("  ").expect("no failure").is_none());
-        assert_eq!(engine.unknown_words(&map.identities, "lamp giraffe"), ["giraffe"]);
+        let phrase = ParsedQuery::parse("lamp giraffe").expect("words");
+        assert_eq!(engine.unknown_words(&map.identities, &phrase), ["giraffe"]);
         // Without an encoder, by names alone.
         let mut names = QueryEngine::default();
         assert!(names.ask(&map, "red", LevelFilter::Auto).expect("no encoder").expect("words").chosen(1).is_empty());

@@ -7,6 +7,7 @@ pub(crate) mod log;
 pub(crate) mod models;
 pub(crate) mod object_thumbnails;
 pub(crate) mod objects;
+pub mod phrases;
 pub(crate) mod plan;
 pub(crate) mod plots;
 pub(crate) mod problems;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use egui::{ColorImage, Rect, TextureHandle, TextureOptions, Ui, pos2, vec2};
 
+use super::super::labels::ScreenNames;
 use super::super::state::AppState;
 use crate::pipeline::semantics::thumbnails::SIDE_PX;
 use crate::scene::{GaussianCloud, IdentityId, SemanticMap};
@@ -50,7 +51,10 @@ impl ObjectThumbnails {
                 self.asked = Some(Arc::clone(map));
             }
         }
-        if let Some((of, pictures)) = state.thumbnails.take() {
+        if let Some((of, drawn)) = state.thumbnails.take() {
+            let unit = state.scene.as_ref().and_then(|s| s.meters_per_unit());
+            state.labels = ScreenNames::new(&drawn.appearances, unit);
+            let pictures = drawn.pictures;
             let rows = pictures.len().div_ceil(COLUMNS).max(1);
             let texture = ctx.load_texture("object_thumbnails", atlas(&pictures, rows), TextureOptions::LINEAR);
             self.shown = Some((of, texture, rows));

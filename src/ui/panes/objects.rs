@@ -1,14 +1,16 @@
 //! The objects and parts of the scene, as a tree; a click asks for one.
 
 use egui::collapsing_header::CollapsingState;
-use egui::{Button, Checkbox, Color32, Id, Key, RichText, ScrollArea, TextEdit, Ui, vec2};
+use egui::{Align, Button, Checkbox, CollapsingHeader, Color32, Id, Key, RichText, ScrollArea, TextEdit, Ui, vec2};
 
+use super::super::labels::{self, ScreenNames};
 use super::super::state::AppState;
 use super::super::text_field::select_all;
 use super::super::theme;
 use super::super::viewport::visible::Visibility;
 use super::bars;
 use super::object_thumbnails::ObjectThumbnails;
+use crate::math::format::things;
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::edit::Edit;
 use crate::scene::{Identities, IdentityId, Level, NOBODY};
@@ -21,6 +23,8 @@ const THUMBNAIL_PX: f32 = 30.0;
 #[derive(Default)]
 pub(crate) struct ObjectsPane {
     renaming: Option<Renaming>,
+    /// What was selected when it was drawn last.
+    selected: Option<IdentityId>,
 }
 
 /// A name that is being typed in its row.
@@ -43,6 +47,7 @@ impl ObjectsPane {
         state: &AppState,
         object_thumbnails: &ObjectThumbnails,
         visibility: &Visibility,
+        selected: Option<IdentityId>,
         actions: &mut Vec<Action>,
     ) {
         let Some(map) = &state.semantics else {
@@ -53,7 +58,7 @@ impl ObjectsPane {
         let from = if map.seeds.len() == 1 { "1 photo".to_owned() } else { format!("{} photos", map.seeds.len()) };
         ui.weak(format!("{} objects, {} parts, from the masks of {from}", count(Level::Object), count(Level::Part)));
         if identities.iter().all(|(_, i)| i.names.is_empty()) {
-            ui.weak("Regions of the photos: unnamed and rough. Query them by number, such as #1.");
+            ui.weak("Regions of the photos, without names yet. Click one to see it, double-click to name it.");
         }
         ui.add_space(4.0);
         ui.horizontal(|ui| {
@@ -66,37 +71,54 @@ impl ObjectsPane {
             }
             bars::history_buttons(ui, &state.changes, actions);
         });
+        // The list follows what is selected in the view.
+        let scroll_to = selected.filter(|_| self.selected != selected);
+        self.selected = selected;
         let renaming = &mut self.renaming;
-        let mut tree = Tree { identities, sizes: &state.sizes, object_thumbnails, visibility, renaming };
-        for (id, _) in identities.iter().filter(|(_, i)| i.parent == NOBODY) {
-            tree.branch(ui, id, actions);
-        }
+        let (labels, sizes) = (&state.labels, &state.sizes);
+        let mut tree = Tree { identities, labels, sizes, object_thumbnails, visibility, renaming, selected, scroll_to };
+        let roots = identities.iter().filter(|(_, i)| i.parent == NOBODY).map(|(id, _)| id);
+        tree.branches(ui, Id::unique("objects"), roots.collect(), actions);
     }
 }
 
 struct Tree<'a> {
     identities: &'a Identities,
+    labels: &'a ScreenNames,
     /// Gaussians by number.
     sizes: &'a [usize],
     object_thumbnails: &'a ObjectThumbnails,
     visibility: &'a Visibility,
     renaming: &'a mut Option<Renaming>,
+    selected: Option<IdentityId>,
+    /// What is to be brought into view.
+    scroll_to: Option<IdentityId>,
 }
 
 impl Tree<'_> {
+    /// One branch each, the tiny ones without names folded away.
+    fn branches(&mut self, ui: &mut Ui, of: Id, ids: Vec<IdentityId>, actions: &mut Vec<Action>) {
+        let (shown, tiny) = labels::listed(self.identities, self.sizes, ids);
+        shown.into_iter().for_each(|id| self.branch(ui, id, actions));
+        if !tiny.is_empty() {
+            let header = CollapsingHeader::new(things(tiny.len(), "tiny region")).id_salt(of.with("tiny"));
+            header.show(ui, |ui| tiny.into_iter().for_each(|id| self.branch(ui, id, actions)));
+        }
+    }
+
     fn branch(&mut self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
         let pieces: Vec<IdentityId> = self.identities.children(id).collect();
         if pieces.is_empty() {
             return self.leaf(ui, id, actions);
         }
         let mut state = CollapsingState::load_with_default_open(ui.ctx(), Id::unique("branch").with(id), false);
-        let is_within =
-            |r: &Renaming| r.frames == 0 && self.identities.ancestors(r.id).skip(1).any(|whole| whole == id);
-        if self.renaming.as_ref().is_some_and(is_within) {
+        let is_within = |piece: IdentityId| self.identities.ancestors(piece).skip(1).any(|whole| whole == id);
+        let renamed = self.renaming.as_ref().filter(|r| r.frames == 0).map(|r| r.id);
+        if renamed.into_iter().chain(self.scroll_to).any(is_within) {
             state.set_open(true);
         }
         let header = state.show_header(ui, |ui| self.leaf(ui, id, actions));
-        header.body(|ui| pieces.into_iter().for_each(|piece| self.branch(ui, piece, actions)));
+        header.body(|ui| self.branches(ui, Id::unique("pieces").with(id), pieces, actions));
     }
 
     fn leaf(&mut self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
@@ -115,8 +137,13 @@ impl Tree<'_> {
             if self.renaming.as_ref().is_some_and(|r| r.id == id) {
                 return self.name_field(ui, actions);
             }
-            let name = ui.add(Button::new(self.identities.name(id)).frame_when_inactive(false));
-            let name = name.on_hover_text("Highlight it in the view; double-click to rename it");
+            let is_selected = self.selected == Some(id);
+            let name = Button::new(self.labels.name(self.identities, id)).selected(is_selected);
+            let name = ui.add(name.frame_when_inactive(is_selected));
+            if self.scroll_to == Some(id) {
+                name.scroll_to_me(Some(Align::Center));
+            }
+            let name = name.on_hover_text("Select it and highlight it in the view; double-click to rename it");
             if name.clicked() {
                 actions.extend([Action::Select(Some(id)), Action::Ask(self.identities.full_name(id))]);
             }

@@ -237,6 +237,7 @@ impl Viewport {
         self.display.paint(ui, rect, shown);
         if let Some(semantics) = &state.semantics {
             self.queries.keep_up(ui.ctx(), semantics, &state.plan);
+            self.queries.stand(self.pose());
             self.queries.paint(ui, shown, semantics);
         }
         if let Some(photo) = self.photo.as_mut().filter(|_| layout.compare) {
@@ -261,7 +262,7 @@ impl Viewport {
             brush.show(ui, shown, &semantics.identities, actions);
         }
         if let (Some(semantics), Some(cloud)) = (&state.semantics, &self.cloud) {
-            self.queries.show(ui, shown, semantics, cloud, actions);
+            self.queries.show(ui, shown, state, semantics, cloud, actions);
         }
     }
 

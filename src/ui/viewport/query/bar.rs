@@ -5,6 +5,7 @@ use egui::{Id, Key, Modifiers, RichText, TextEdit, Ui};
 use super::{COLORS, MOST, Queries};
 use crate::pipeline::semantics::names;
 use crate::scene::SemanticMap;
+use crate::ui::actions::{Action, Pane};
 use crate::ui::text_field::cursor_to_end;
 use crate::ui::theme;
 
@@ -12,12 +13,11 @@ use crate::ui::theme;
 const OFFERED: usize = 5;
 
 impl Queries {
-    pub(super) fn show_bar(&mut self, ui: &mut Ui, semantics: &SemanticMap) {
+    pub(super) fn show_bar(&mut self, ui: &mut Ui, semantics: &SemanticMap, actions: &mut Vec<Action>) {
         let id = ui.scope_id().with("typed");
         // Taken before the field sees them: it would move its cursor.
         let focused = ui.memory(|m| m.has_focus(id));
-        // Settings are for looking at maps.
-        self.wanted |= focused || self.open;
+        self.wanted |= focused;
         if focused {
             self.recall(ui, id, semantics);
         }
@@ -49,7 +49,10 @@ impl Queries {
                 self.keep();
                 response.request_focus();
             }
-            ui.toggle_value(&mut self.open, "Options").on_hover_text("How answers are found and displayed");
+            let details = ui.button("Details");
+            if details.on_hover_text("All of the answer, and how answers are found and drawn").clicked() {
+                actions.push(Action::TogglePane(Pane::Query));
+            }
         });
         if focused && !self.typed.is_empty() && offered.first().is_some_and(|o| *o != self.typed) {
             self.show_offered(ui, &offered, semantics);

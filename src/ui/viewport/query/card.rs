@@ -1,68 +1,128 @@
-//! The answer to the newest query: verdict, hits, and what can be done with the one that is shown.
+//! The answer to the newest query in one line: what is meant, how surely, how large it is, and the way there.
 
-use egui::{RichText, Ui};
-use strum::VariantArray;
+use egui::{Align, Layout, RichText, Ui};
 
-use super::{OverlaySettings, Queries, times};
+use super::{OverlaySettings, Queries};
+use crate::math::format;
 use crate::navigate::target::Side;
-use crate::pipeline::semantics::answer::Basis;
+use crate::pipeline::semantics::answer::{Basis, Certainty};
 use crate::pipeline::semantics::localize::Answer;
 use crate::pipeline::semantics::matching::{self, MatchMode};
 use crate::pipeline::semantics::names;
+use crate::pipeline::semantics::reading::mended_text;
 use crate::scene::{Bounds, GaussianCloud, IdentityId, SemanticMap, text};
 use crate::ui::actions::Action;
+use crate::ui::state::AppState;
 use crate::ui::theme;
 use crate::worker::Versioned;
 
-/// Hits that are listed.
-const LISTED: usize = 5;
+/// Things that fit equally and are named.
+const NAMED: usize = 3;
 
 impl Queries {
     pub(super) fn show_answer(
         &mut self,
         ui: &mut Ui,
+        state: &AppState,
         semantics: &Versioned<SemanticMap>,
         cloud: &GaussianCloud,
         actions: &mut Vec<Action>,
     ) {
-        let Some(newest) = self.live.as_ref().or(self.kept.last()).cloned() else { return };
-        let identities = &semantics.identities;
-        self.show_verdict(ui, &newest);
+        let Some(newest) = self.newest().cloned() else { return };
+        if let Some(mended) = mended_text(&newest.reading.mended) {
+            ui.weak(text::shortened(&mended, 120));
+        }
+        let ignored = newest.ignored.join("\", \"");
+        if !ignored.is_empty() {
+            ui.colored_label(theme::WARNING, format!("Ignored: \"{}\".", text::shortened(&ignored, 80)));
+        }
         let shown = newest.shown(&self.settings);
-        let mut chosen = None;
-        let hits = newest.answered.answer.hits().iter();
-        for hit in hits.filter(|h| h.score > 0.0).take(LISTED) {
-            ui.horizontal(|ui| {
-                let name = RichText::new(identities.full_name(hit.identity)).strong();
-                if ui.selectable_label(shown.contains(&hit.identity), name).clicked() {
-                    chosen = Some(hit.identity);
-                }
-                let pixels = match self.area_of(semantics, hit.identity) {
-                    Some(0) => "  not in this view".to_owned(),
-                    Some(n) => format!("  {n} px"),
-                    None => String::new(),
-                };
-                ui.weak(format!("{:.2}  +{:.2}{pixels}", hit.score, hit.margin.max(0.0)))
-                    .on_hover_text("Score from 0 to 1, margin over the next, and pixels in this view");
-            });
+        match (&newest.answered.answer, shown.first()) {
+            (Answer::NotFound(_), None) => self.show_nothing(ui, &newest, semantics),
+            (Answer::Ambiguous(_), Some(_)) if newest.chosen.is_none() => {
+                let mut chosen = None;
+                ui.horizontal_wrapped(|ui| {
+                    ui.colored_label(theme::WARNING, format!("Ambiguous: {} fit equally.", shown.len()));
+                    for id in shown.iter().take(NAMED) {
+                        if ui.small_button(state.labels.full_name(&semantics.identities, *id)).clicked() {
+                            chosen = Some(*id);
+                        }
+                    }
+                });
+                self.choose(chosen);
+            }
+            (_, Some(&target)) => {
+                let facts = self.facts_of(target, semantics, cloud);
+                let pixels = self.area_of(semantics, target);
+                ui.horizontal(|ui| {
+                    let name = state.labels.full_name(&semantics.identities, target);
+                    ui.add(egui::Label::new(RichText::new(name).strong()).truncate());
+                    certainty(ui, &newest);
+                    if let Some(bounds) = facts.bounds {
+                        ui.weak(size_text(bounds, state)).on_hover_text("Longest edge of its box");
+                    }
+                    if pixels == Some(0) {
+                        ui.colored_label(theme::WARNING, "not in this view");
+                    }
+                    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                        let go = Action::GoToTarget(target, Side::Best);
+                        if ui.small_button("Go there").on_hover_text(go.tooltip()).clicked() {
+                            actions.push(go);
+                        }
+                    });
+                });
+            }
+            _ => {}
         }
-        if let Some(&target) = shown.first() {
-            let facts = self.facts_of(target, semantics, cloud);
-            show_target(ui, target, &facts, actions);
+        if let Some(comparison) = &self.comparison {
+            comparison.show(ui);
         }
-        let basis = match newest.answered.basis {
-            Basis::Names => "by name",
-            Basis::Embedding => "by embedding",
-        };
-        times::show(ui, basis, &newest.answered.stages.and(self.paint_ms));
-        if newest.answered.answer.hits().iter().all(|h| h.score <= 0.0) {
-            let known = names::completions(identities, "", 6).join(", ");
-            ui.weak(format!("Names in this scene: {known}"));
-        }
-        if let (Some(id), Some(newest)) = (chosen, self.live.as_mut().or(self.kept.last_mut())) {
-            newest.chosen = (newest.chosen != Some(id)).then_some(id);
+        if let Some(trouble) = self.embeddings.problem() {
+            let text = format!("Names only, no open-vocabulary queries: {}", text::line(trouble));
+            ui.label(RichText::new(text).small().color(theme::WARNING));
         }
     }
+
+    fn show_nothing(&self, ui: &mut Ui, newest: &super::Asked, semantics: &SemanticMap) {
+        if newest.pending {
+            ui.weak("Encoding the query\u{2026}");
+            return;
+        }
+        let unknown = newest.unknown.join("\", \"");
+        let text = match &*text::shortened(&unknown, 80) {
+            "" => "No match.".to_owned(),
+            unknown => format!("No match for \"{unknown}\"."),
+        };
+        ui.colored_label(theme::WARNING, text);
+        let known = names::completions(&semantics.identities, "", 6).join(", ");
+        match newest.reading.near.first() {
+            Some((_, other)) => ui.weak(format!("Did you mean \"{other}\"?")),
+            None => ui.weak(format!("Names in this scene: {known}")),
+        };
+    }
+}
+
+/// How sure the answer is, with the numbers that say so.
+fn certainty(ui: &mut Ui, newest: &super::Asked) {
+    let certainty = newest.answered.certainty(&newest.ignored);
+    let color = match certainty {
+        Certainty::Certain => theme::GOOD,
+        Certainty::Likely => theme::TEXT,
+        Certainty::Guess => theme::WARNING,
+    };
+    let by = match newest.answered.basis {
+        Basis::Names => "by name",
+        Basis::Embedding => "by embedding",
+    };
+    let numbers = newest.answered.answer.hits().first().map_or_else(String::new, |hit| {
+        format!("Score {:.2} of 1, {:.2} over the next, found {by}", hit.score, hit.margin.max(0.0))
+    });
+    ui.colored_label(color, <&str>::from(certainty)).on_hover_text(numbers);
+}
+
+/// The longest edge, in the scene's unit.
+fn size_text(bounds: Bounds, state: &AppState) -> String {
+    format::length(bounds.size().max_element(), state.scene.as_ref().and_then(|s| s.meters_per_unit()))
 }
 
 /// The target in space.
@@ -70,14 +130,19 @@ impl Queries {
 pub(super) struct Facts {
     /// What they were counted for.
     of: (u64, IdentityId, MatchMode, u32),
-    gaussians: usize,
+    pub(super) gaussians: usize,
     /// In scene units, without stray Gaussians.
-    bounds: Option<Bounds>,
+    pub(super) bounds: Option<Bounds>,
 }
 
 impl Queries {
     /// Facts of the target; counted anew only when it or the match has changed.
-    fn facts_of(&mut self, target: IdentityId, semantics: &Versioned<SemanticMap>, cloud: &GaussianCloud) -> Facts {
+    pub(super) fn facts_of(
+        &mut self,
+        target: IdentityId,
+        semantics: &Versioned<SemanticMap>,
+        cloud: &GaussianCloud,
+    ) -> Facts {
         let OverlaySettings { mode, tolerance, .. } = self.settings;
         let of = (semantics.generation(), target, mode, tolerance.to_bits());
         if let Some(facts) = self.facts.as_ref().filter(|f| f.of == of) {
@@ -90,67 +155,4 @@ impl Queries {
         self.facts = Some(facts.clone());
         facts
     }
-
-    fn show_verdict(&self, ui: &mut Ui, newest: &super::Asked) {
-        let unknown = newest.unknown.join("\", \"");
-        let unknown = text::shortened(&unknown, 80);
-        match &newest.answered.answer {
-            Answer::Found(_) if unknown.is_empty() || newest.answered.basis == Basis::Names => {}
-            Answer::Found(_) => {
-                ui.colored_label(theme::WARNING, format!("Ignored unknown words: \"{unknown}\"."));
-            }
-            Answer::Ambiguous(_) => {
-                ui.colored_label(theme::WARNING, "Ambiguous:");
-            }
-            Answer::NotFound(_) if newest.pending => {
-                ui.weak("Encoding the query\u{2026}");
-            }
-            Answer::NotFound(_) => {
-                let text = match &*unknown {
-                    "" => "No match.".to_owned(),
-                    _ => format!("No match for \"{unknown}\"."),
-                };
-                ui.colored_label(theme::WARNING, text);
-            }
-        }
-        if let Some(trouble) = self.embeddings.problem() {
-            let text = format!("Names only, no open-vocabulary queries: {}", text::line(trouble));
-            ui.label(RichText::new(text).small().color(theme::WARNING));
-        }
-    }
-}
-
-/// Facts of the target in space, and what can be done with it.
-fn show_target(ui: &mut Ui, target: IdentityId, facts: &Facts, actions: &mut Vec<Action>) {
-    let size = facts.bounds.map(size_text).unwrap_or_default();
-    ui.label(RichText::new(format!("{} Gaussians{size}", facts.gaussians)).small().color(theme::WEAK));
-    ui.horizontal(|ui| {
-        let go = Action::GoToTarget(target, Side::Best);
-        if ui.small_button("Go there").on_hover_text(go.tooltip()).clicked() {
-            actions.push(go);
-        }
-        ui.menu_button(RichText::new("from\u{2026}").small(), |ui| {
-            for &side in Side::VARIANTS {
-                if ui.button(side.text()).clicked() {
-                    actions.push(Action::GoToTarget(target, side));
-                    ui.close();
-                }
-            }
-        });
-        for (action, text) in [
-            (Action::Isolate(Some(target)), "Isolate"),
-            (Action::Hide(target), "Hide"),
-            (Action::ExportTarget(target), "Export\u{2026}"),
-        ] {
-            if ui.small_button(text).on_hover_text(action.tooltip()).clicked() {
-                actions.push(action);
-            }
-        }
-    });
-}
-
-/// " · box 0.21 x 0.10 x 0.08", in scene units.
-fn size_text(bounds: Bounds) -> String {
-    let s = bounds.size();
-    format!("  \u{00b7}  box {:.3} \u{00d7} {:.3} \u{00d7} {:.3}", s.x, s.y, s.z)
 }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::pipeline::semantics::by_embedding::TextEmbeddings;
+use crate::pipeline::semantics::parse::ParsedQuery;
 use crate::worker::text_encoder::{Encoded, EncodedText, TextEncoder};
 
 /// What is known of the texts on screen.
@@ -15,13 +16,13 @@ pub(super) struct Embeddings {
     seen: u64,
     known: Arc<Encoded>,
     /// The texts that were asked for last.
-    requested: Vec<String>,
+    requested: Vec<ParsedQuery>,
 }
 
 impl Embeddings {
     /// Loads the encoder of this name if it is another one than before, asks it for `texts`, and takes over what it
     /// has encoded. Whether anything is new.
-    pub(super) fn keep_up(&mut self, ctx: &egui::Context, name: Option<&str>, texts: Vec<String>) -> bool {
+    pub(super) fn keep_up(&mut self, ctx: &egui::Context, name: Option<&str>, texts: Vec<ParsedQuery>) -> bool {
         if self.name.as_deref() != name {
             *self = Self { name: name.map(str::to_owned), ..Self::default() };
             if let Some(name) = self.name.clone() {
@@ -42,17 +43,17 @@ impl Embeddings {
     }
 
     /// What is known of a text; `None` until the encoder has read it.
-    pub(super) fn of(&self, text: &str) -> Option<&EncodedText> {
+    pub(super) fn of(&self, text: &ParsedQuery) -> Option<&EncodedText> {
         self.known.texts.get(text)
     }
 
     /// Embeddings of the phrases of a text, if the encoder knows its words.
-    pub(super) fn phrases(&self, text: &str) -> Option<&TextEmbeddings> {
+    pub(super) fn phrases(&self, text: &ParsedQuery) -> Option<&TextEmbeddings> {
         self.of(text).filter(|t| t.known).map(|_| &self.known.phrases)
     }
 
     /// Whether a text may yet be encoded.
-    pub(super) fn is_pending(&self, text: &str) -> bool {
+    pub(super) fn is_pending(&self, text: &ParsedQuery) -> bool {
         self.known.problem.is_none() && self.of(text).is_none()
     }
 

@@ -6,11 +6,13 @@
 
 mod bar;
 mod card;
+mod details;
 mod embeddings;
 mod overlay;
 mod panel;
 mod settings;
 mod times;
+mod truth;
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -20,9 +22,11 @@ use egui::{Color32, Rect, TextureHandle, TextureOptions, Ui, Vec2, vec2};
 use self::embeddings::Embeddings;
 pub(crate) use self::settings::OverlaySettings;
 use crate::jobs::query::{ViewMaps, answer_encoded};
+use crate::navigate::Pose;
 use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::matching::MatchMode;
 use crate::pipeline::semantics::names;
+use crate::pipeline::semantics::reading::Reading;
 use crate::pipeline::semantics::timing::{StagesMs, ms_since};
 use crate::scene::{IdentityId, Mask, ScenePlan, SemanticMap};
 use crate::ui::color_by::ColorBy;
@@ -45,8 +49,12 @@ pub struct Asked {
     pub pending: bool,
     /// A hit that was chosen among the others; else the best are shown.
     chosen: Option<IdentityId>,
+    /// How it was read.
+    reading: Reading,
     /// Words that neither names nor the encoder know.
     unknown: Vec<String>,
+    /// Words that the answer does not rest on.
+    ignored: Vec<String>,
 }
 
 impl Asked {
@@ -76,8 +84,6 @@ pub struct Queries {
     wanted: bool,
     /// Place in the history while going through it.
     recalled: Option<usize>,
-    /// Whether the settings are open.
-    open: bool,
     settings: OverlaySettings,
     live: Option<Asked>,
     kept: Vec<Asked>,
@@ -96,6 +102,10 @@ pub struct Queries {
     heat: Vec<f32>,
     texture: Option<TextureHandle>,
     painted: Option<Painted>,
+    /// What answers are compared with, where the eye is, and what that came to.
+    truth: Option<truth::ViewTruth>,
+    eye: Option<Pose>,
+    comparison: Option<truth::TruthComparison>,
     /// Of the target that is shown.
     facts: Option<card::Facts>,
     /// Pixels of identities in the present view, counted as they are listed.
@@ -116,6 +126,18 @@ impl Queries {
     /// All queries, the one being typed last.
     pub fn all(&self) -> impl Iterator<Item = &Asked> {
         self.kept.iter().chain(&self.live)
+    }
+
+    /// The query that is answered on screen.
+    fn newest(&self) -> Option<&Asked> {
+        self.live.as_ref().or(self.kept.last())
+    }
+
+    /// Shows this hit of the newest query alone, or the best again.
+    fn choose(&mut self, chosen: Option<IdentityId>) {
+        if let (Some(id), Some(newest)) = (chosen, self.live.as_mut().or(self.kept.last_mut())) {
+            newest.chosen = (newest.chosen != Some(id)).then_some(id);
+        }
     }
 
     /// The identities that are found on screen.
@@ -156,7 +178,7 @@ impl Queries {
         let encoder = semantics.language.as_ref().map(|l| l.encoder.as_str());
         let now = semantics.generation();
         // One that is of no more use goes at once, one that is new waits for a query.
-        let texts: Vec<String> = self.all().map(|q| q.text.clone()).collect();
+        let texts = self.all().map(|q| q.reading.phrase.clone()).collect();
         let encoded =
             (encoder.is_none() || plan.encoder.now(self.wanted)) && self.embeddings.keep_up(ctx, encoder, texts);
         if encoded || self.answered_for != now {
@@ -195,7 +217,7 @@ impl Queries {
     pub(crate) fn clear(&mut self) {
         let history = std::mem::take(&mut self.history);
         let embeddings = std::mem::take(&mut self.embeddings);
-        *self = Self { settings: self.settings, open: self.open, history, embeddings, ..Self::default() };
+        *self = Self { settings: self.settings, history, embeddings, ..Self::default() };
     }
 
     /// Why only names are understood, once for each reason.
@@ -239,13 +261,16 @@ impl Queries {
 
     fn asked(&self, text: &str, semantics: &SemanticMap) -> Option<Asked> {
         let text = text.trim();
-        let encoded = self.embeddings.of(text);
-        let mut answered = answer_encoded(semantics, text, self.settings.kind, self.embeddings.phrases(text))?;
+        let reading = Reading::new(&semantics.identities, text, self.settings.kind)?;
+        let phrase = &reading.phrase;
+        let encoded = self.embeddings.of(phrase);
+        let mut answered = answer_encoded(semantics, phrase, self.settings.kind, self.embeddings.phrases(phrase));
         answered.stages.encode = encoded.map_or(0.0, |t| t.encode_ms);
         let to_encoder = encoded.map(|t| t.unknown.as_slice());
-        let unknown = names::unknown_to_all(&semantics.identities, text, to_encoder);
-        let pending = semantics.language.is_some() && self.embeddings.is_pending(text);
-        Some(Asked { text: text.to_owned(), answered, pending, chosen: None, unknown })
+        let unknown = names::unknown_to_all(&semantics.identities, &phrase.text, to_encoder);
+        let ignored = answered.ignored_words(&semantics.identities, phrase, &unknown);
+        let pending = semantics.language.is_some() && self.embeddings.is_pending(phrase);
+        Some(Asked { text: text.to_owned(), answered, pending, chosen: None, reading, unknown, ignored })
     }
 
     /// The target's pixels in the present view.
@@ -325,6 +350,7 @@ impl Queries {
         let start = Instant::now();
         let masks: Vec<([u8; 3], Mask)> =
             shown.iter().enumerate().map(|(k, ids)| (COLORS[k % COLORS.len()], union(ids))).collect();
+        let masks = self.compared(masks);
         self.paint_ms.mask = ms_since(start);
         let newest = self.all().last();
         let relevancy = newest.map_or_else(Vec::new, |q| q.answered.relevancy.clone());
@@ -352,43 +378,4 @@ impl Queries {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::{Identities, Level, NOBODY};
-
-    fn semantics() -> SemanticMap {
-        let mut identities = Identities::default();
-        let lamp = identities.add(Level::Object, NOBODY, vec!["lamp".into()]);
-        identities.add(Level::Part, lamp, vec!["shade".into()]);
-        SemanticMap { identities, ..SemanticMap::default() }
-    }
-
-    #[test]
-    fn a_question_is_kept_and_answers_follow_the_names() {
-        let (mut semantics, mut queries) = (semantics(), Queries::default());
-        queries.ask("the lamp's shade", &semantics);
-        queries.keep();
-        queries.ask("lamp", &semantics);
-        let shown = |q: &Queries| q.all().map(|a| a.shown(&q.settings)).collect::<Vec<_>>();
-        assert_eq!(shown(&queries), [vec![2], vec![1]]);
-        queries.ask("giraffe", &semantics);
-        assert!(shown(&queries)[1].is_empty());
-        semantics.identities.get_mut(2).expect("there").names = vec!["giraffe".into()];
-        queries.ask_again(&semantics);
-        assert_eq!(shown(&queries), [Vec::new(), vec![2]]);
-        queries.ask("  ", &semantics);
-        assert!(queries.live.is_none());
-    }
-
-    #[test]
-    fn history_is_kept_once_each() {
-        let (semantics, mut queries) = (semantics(), Queries::default());
-        for text in ["lamp", "shade", "lamp"] {
-            queries.ask(text, &semantics);
-            queries.keep();
-        }
-        assert_eq!(queries.history, ["shade", "lamp"]);
-        queries.clear();
-        assert_eq!((queries.history.len(), queries.kept.len()), (2, 0));
-    }
-}
+mod tests;

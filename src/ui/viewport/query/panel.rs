@@ -3,9 +3,10 @@
 use egui::{Align2, Area, Context, Id, LayerId, Order, Rect, ScrollArea, Ui};
 
 use super::super::super::theme;
-use super::{Queries, settings};
+use super::Queries;
 use crate::scene::{GaussianCloud, SemanticMap};
 use crate::ui::actions::Action;
+use crate::ui::state::AppState;
 use crate::worker::Versioned;
 
 /// Around cards, points.
@@ -24,6 +25,7 @@ impl Queries {
         &mut self,
         ui: &Ui,
         rect: Rect,
+        state: &AppState,
         semantics: &Versioned<SemanticMap>,
         cloud: &GaussianCloud,
         actions: &mut Vec<Action>,
@@ -43,14 +45,8 @@ impl Queries {
                 ui.set_width(width);
                 let height = (rect.bottom() - at.y - 2.5 * MARGIN).max(60.0);
                 ScrollArea::vertical().max_height(height).show(ui, |ui| {
-                    self.show_bar(ui, semantics);
-                    if self.open {
-                        let heat = (!self.heat.is_empty()).then_some(self.heat.as_slice());
-                        if settings::show(ui, &mut self.settings, heat) {
-                            self.ask_again(semantics);
-                        }
-                    }
-                    self.show_answer(ui, semantics, cloud, actions);
+                    self.show_bar(ui, semantics, actions);
+                    self.show_answer(ui, state, semantics, cloud, actions);
                     self.show_kept(ui);
                 });
             });

@@ -1,5 +1,7 @@
 //! `fmlgs query`: where in a view is what is asked for.
 
+mod phrases;
+
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -12,6 +14,7 @@ use crate::pipeline::semantics::answer::Basis;
 use crate::pipeline::semantics::codes::TOLERANCE;
 use crate::pipeline::semantics::localize::{Answer, Hit};
 use crate::pipeline::semantics::matching::MatchMode;
+use crate::pipeline::semantics::reading::mended_text;
 use crate::pipeline::semantics::timing::ms_since;
 use crate::scene::{LevelFilter, SemanticMap};
 
@@ -23,12 +26,26 @@ use crate::scene::{LevelFilter, SemanticMap};
 #[command(after_help = "Examples:\n  \
     fmlgs query scene/ \"a button of the red controller\"\n  \
     fmlgs query scene/ \"the lamp's shade\" --camera 12 --mask mask.png --heat heat.png\n  \
-    fmlgs query scene/ lamp --kind object --json")]
+    fmlgs query scene/ lamp --kind object --json\n  \
+    fmlgs query scene/ --phrases words.txt --views all --export masks/ --truth true_masks/")]
 pub(crate) struct QueryArgs {
     /// Trained scene with objects and parts ('fmlgs preprocess')
     scene: PathBuf,
     /// What to look for
-    text: String,
+    #[arg(required_unless_present = "phrases", conflicts_with = "phrases")]
+    text: Option<String>,
+    /// Ask every phrase of a text file, one a line, instead of one
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["mask", "heat"])]
+    phrases: Option<PathBuf>,
+    /// Views for --phrases: 'all' photos, or some by index or name, with commas between [default: --camera]
+    #[arg(long, requires = "phrases", conflicts_with = "camera")]
+    views: Option<String>,
+    /// True masks for --phrases, as it exports them: FOLDER/<view>/<phrase>.png, white on black
+    #[arg(long, value_name = "FOLDER", requires = "phrases")]
+    truth: Option<PathBuf>,
+    /// Write the masks of --phrases as .png, COCO .json and a .csv table into this folder
+    #[arg(long, value_name = "FOLDER", requires = "phrases")]
+    export: Option<PathBuf>,
     /// Photo by index from 0 or by name, or a JSON camera file [default: the first photo]
     #[arg(long)]
     camera: Option<String>,
@@ -64,10 +81,14 @@ pub(crate) fn run(args: QueryArgs) -> Result<(), CliError> {
         export::check(out, &[".png"], &scene.reads())?;
     }
     let map = scene.semantics()?;
+    if let Some(list) = &args.phrases {
+        return phrases::run(&args, list, &scene, map);
+    }
+    let text = args.text.as_deref().unwrap_or_default();
     let camera = view::choose(args.camera.as_deref(), &scene)?.limited_to(args.max_side);
     render::check_room(camera.width_px, camera.height_px)?;
     let request = QueryRequest {
-        text: &args.text,
+        text,
         level: args.kind,
         camera: &camera,
         mode: if args.blend { MatchMode::Blend } else { MatchMode::Exact },
@@ -86,11 +107,11 @@ pub(crate) fn run(args: QueryArgs) -> Result<(), CliError> {
     if args.mask.is_some() || args.heat.is_some() {
         result.answered.stages.draw = ms_since(drawing_since);
     }
-    tell(&args, &map, &result)
+    tell(&args, text, &map, &result)
 }
 
-fn tell(args: &QueryArgs, map: &SemanticMap, result: &QueryResult) -> Result<(), CliError> {
-    let QueryResult { answered, mask, unknown_words: unknown, query_ms, .. } = result;
+fn tell(args: &QueryArgs, text: &str, map: &SemanticMap, result: &QueryResult) -> Result<(), CliError> {
+    let QueryResult { answered, reading, mask, unknown_words: unknown, ignored_words: ignored, query_ms, .. } = result;
     let full_name = |hit: &Hit| map.identities.full_name(hit.identity);
     let basis = if answered.basis == Basis::Names { "names" } else { "looks" };
     let answer = &answered.answer;
@@ -100,26 +121,29 @@ fn tell(args: &QueryArgs, map: &SemanticMap, result: &QueryResult) -> Result<(),
             json!({ "identity": h.identity, "name": full_name(h), "score": h.score, "margin": h.margin })
         };
         output::print_json(&json!({
-            "query": args.text,
+            "query": text,
             "answer": answer.verdict(),
             "basis": basis,
             "hits": hits.iter().map(hit).collect::<Vec<_>>(),
             "pixels": mask.area(),
             "in_view": !mask.is_empty(),
             "unknown_words": unknown,
+            "ignored_words": ignored,
+            "mended": reading.mended.iter().map(|(typed, read)| json!({ "typed": typed, "read": read })).collect::<Vec<_>>(),
             "query_ms": query_ms,
             "stages_ms": answered.stages,
         }))?;
     }
     match answer {
         Answer::NotFound(_) => {
-            let near = hits.iter().filter(|h| h.score > 0.0).map(full_name).collect::<Vec<_>>().join(", ");
+            let alike = reading.near.iter().map(|(_, other)| other.clone());
+            let near = hits.iter().filter(|h| h.score > 0.0).map(full_name).chain(alike).collect::<Vec<_>>().join(", ");
             let near = if near.is_empty() { String::new() } else { format!("; nearest: {near}") };
             let known = match unknown.as_slice() {
                 [] => String::new(),
                 words => format!("; words that are not known: {}", words.join(", ")),
             };
-            Err(CliError::failed(format!("nothing here fits '{}'{near}{known}", args.text)))
+            Err(CliError::failed(format!("nothing here fits '{text}'{near}{known}")))
         }
         _ if args.json => Ok(()),
         _ => {
@@ -131,7 +155,10 @@ fn tell(args: &QueryArgs, map: &SemanticMap, result: &QueryResult) -> Result<(),
                 0 => "not in this view (--camera looks from another photo)".to_owned(),
                 n => format!("{n} px in this view"),
             };
-            output::print(&format!("{}\n{seen}, answered by {basis} in {query_ms:.2} ms{note}", output::table(&rows)))
+            let mended = mended_text(&reading.mended).map(|t| format!("\n{t}")).unwrap_or_default();
+            let ignored = if ignored.is_empty() { String::new() } else { format!("\nignored: {}", ignored.join(", ")) };
+            let table = output::table(&rows);
+            output::print(&format!("{table}\n{seen}, answered by {basis} in {query_ms:.2} ms{note}{mended}{ignored}"))
         }
     }
 }

@@ -1,0 +1,292 @@
+//! A list of phrases asked of some views: scores, areas, IoU with true masks, and the masks as files.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use super::JobError;
+use super::query::{ViewMaps, write_mask};
+use crate::io::labels::{pictures, rle::Rle};
+use crate::io::{atomic, files};
+use crate::pipeline::observer::{Observer, Ticker};
+use crate::pipeline::semantics::answer::{Certainty, QueryAnswer};
+use crate::pipeline::semantics::matching::MatchMode;
+use crate::pipeline::semantics::query_engine::QueryEngine;
+use crate::pipeline::semantics::reading::Reading;
+use crate::render::{RenderSettings, Renderer};
+use crate::scene::{Camera, GaussianCloud, LevelFilter, Mask, SemanticMap};
+
+/// Phrases of a list at most.
+pub(crate) const MOST: usize = 1_000;
+
+/// What phrases are compared with.
+#[derive(Clone, Debug, Default)]
+pub(crate) enum TrueMasks {
+    #[default]
+    None,
+    /// `FOLDER/<view>/<phrase>.png`, named as masks are exported; what has no file is not compared.
+    Folder(PathBuf),
+    /// One mask for every phrase and view.
+    Mask(Arc<Mask>),
+}
+
+/// What is to be asked, and where.
+#[derive(Clone, Debug)]
+pub struct PhrasesRequest {
+    pub(crate) cloud: Arc<GaussianCloud>,
+    pub(crate) map: Arc<SemanticMap>,
+    pub(crate) settings: RenderSettings,
+    /// Views with their names.
+    pub(crate) views: Vec<(String, Camera)>,
+    pub(crate) phrases: Vec<String>,
+    pub(crate) level: LevelFilter,
+    /// How pixels are matched, and the largest difference per channel.
+    pub(crate) matching: (MatchMode, f32),
+    /// Answers whose pixels go into a mask at most.
+    pub(crate) top: usize,
+    pub(crate) truth: TrueMasks,
+    /// Folder for masks and tables, if they are wanted.
+    pub(crate) export: Option<PathBuf>,
+}
+
+/// A phrase in a view.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PhraseRow {
+    pub(crate) view: String,
+    pub(crate) phrase: String,
+    /// "found", "ambiguous" or "not found".
+    pub(crate) verdict: &'static str,
+    /// "certain", "likely" or "guess".
+    pub(crate) certainty: &'static str,
+    /// What is meant, in full.
+    pub(crate) answer: String,
+    pub(crate) score: f32,
+    pub(crate) margin: f32,
+    pub(crate) area_px: usize,
+    /// Share of the view.
+    pub(crate) share: f64,
+    /// With the true mask, where there is one.
+    pub iou: Option<f64>,
+}
+
+/// The phrases of a list, one a line, blank lines left out.
+///
+/// # Errors
+/// If there are none, or too many.
+pub(crate) fn listed(text: &str) -> Result<Vec<String>, JobError> {
+    let phrases: Vec<String> = text.lines().map(str::trim).filter(|l| !l.is_empty()).map(str::to_owned).collect();
+    match phrases.len() {
+        0 => Err(JobError::Phrases("the list has no phrase: write one a line".into())),
+        n if n > MOST => Err(JobError::Phrases(format!("{n} phrases are more than {MOST}: split the list"))),
+        _ => Ok(phrases),
+    }
+}
+
+/// Reads a list of phrases.
+///
+/// # Errors
+/// If the file cannot be read, or holds none or too many.
+pub(crate) fn read(path: &Path) -> Result<Vec<String>, JobError> {
+    let named = |e: JobError| JobError::Phrases(format!("{}: {e}", path.display()));
+    listed(&files::read_text(path)?).map_err(named)
+}
+
+/// Asks every phrase of every view.
+///
+/// # Errors
+/// If an encoder fails, a view cannot be drawn, or a file not be read or written.
+pub(crate) fn run(request: &PhrasesRequest, observer: &mut dyn Observer) -> Result<Vec<PhraseRow>, JobError> {
+    let PhrasesRequest { cloud, map, settings, views, phrases, level, .. } = request;
+    let mut engine = QueryEngine::new(map.language.as_ref())?;
+    let mut asked = Vec::new();
+    for phrase in phrases {
+        let reading = Reading::new(&map.identities, phrase, *level).ok_or(JobError::EmptyQuery)?;
+        let answered = engine.answer(map, &reading.phrase, *level)?;
+        let unknown = engine.unknown_words(&map.identities, &reading.phrase);
+        let ignored = answered.ignored_words(&map.identities, &reading.phrase, &unknown);
+        asked.push((answered.certainty(&ignored), answered));
+    }
+    let (stems, mut coco) = (stems(phrases), Coco::default());
+    let (mut rows, mut renderer) = (Vec::new(), Renderer::new());
+    let mut ticker = Ticker::new("Asking phrases", views.len());
+    for (k, (view, camera)) in views.iter().enumerate() {
+        ticker.tick(k, observer)?;
+        let blend = request.matching.0 == MatchMode::Blend;
+        let maps = ViewMaps::draw(&mut renderer, (cloud, settings), map, camera, blend, map.has_parts())?;
+        coco.view(view, camera);
+        for (i, (certainty, answered)) in asked.iter().enumerate() {
+            let mask = mask(request, &maps, answered);
+            let place = Path::new(&stem(view)).join(format!("{}.png", stems[i]));
+            let iou = truth(&request.truth, &place, &mask)?.map(|truth| mask.iou(&truth));
+            if let Some(folder) = &request.export {
+                write_mask(&folder.join("masks").join(&place), &mask)?;
+                coco.mask(i, &mask, answered);
+            }
+            rows.push(row(view, &phrases[i], (*certainty, answered), map, &mask, iou));
+        }
+    }
+    ticker.tick(views.len(), observer)?;
+    if let Some(folder) = &request.export {
+        let csv = csv(&rows);
+        atomic::write(&folder.join("phrases.csv"), |w| w.write_all(csv.as_bytes()))?;
+        let coco = coco.document(phrases);
+        atomic::write(&folder.join("coco.json"), |w| Ok(serde_json::to_writer(w, &coco)?))?;
+    }
+    Ok(rows)
+}
+
+fn mask(request: &PhrasesRequest, maps: &ViewMaps, answered: &QueryAnswer) -> Mask {
+    let mut mask = Mask::empty(maps.identities.width_px, maps.identities.height_px);
+    let (mode, tolerance) = request.matching;
+    let chosen = answered.chosen(request.top);
+    chosen.into_iter().for_each(|id| mask.add(&maps.mask(&request.map, id, mode, tolerance)));
+    mask
+}
+
+/// The true mask, in the size of `like`.
+fn truth(truth: &TrueMasks, place: &Path, like: &Mask) -> Result<Option<Mask>, JobError> {
+    let read = match truth {
+        TrueMasks::None => None,
+        TrueMasks::Mask(mask) => Some((**mask).clone()),
+        TrueMasks::Folder(folder) => {
+            let path = folder.join(place);
+            if path.is_file() { Some(true_mask(&path)?) } else { None }
+        }
+    };
+    read.map(|mask| fitted(mask, like.width_px(), like.height_px(), place)).transpose()
+}
+
+/// Reads a true mask: what is white in a picture.
+///
+/// # Errors
+/// If it cannot be read, or is too large.
+pub(crate) fn true_mask(path: &Path) -> Result<Mask, JobError> {
+    Ok(pictures::mask(path)?)
+}
+
+/// A mask in the size of a view of the same shape.
+///
+/// # Errors
+/// If its shape is another.
+pub(crate) fn fitted(mask: Mask, width_px: usize, height_px: usize, place: &Path) -> Result<Mask, JobError> {
+    let (w, h) = (mask.width_px(), mask.height_px());
+    // A pixel more or less is from rounding.
+    if (w * height_px).abs_diff(h * width_px) > w.max(h).max(width_px).max(height_px) {
+        let shapes = format!("the mask has {w} x {h} px, the view {width_px} x {height_px}");
+        let remedy = "use a mask that was drawn on this view";
+        return Err(JobError::Phrases(format!("{}: {shapes}: {remedy}", place.display())));
+    }
+    Ok(if (w, h) == (width_px, height_px) { mask } else { mask.resized(width_px, height_px) })
+}
+
+fn row(
+    view: &str,
+    phrase: &str,
+    (certainty, answered): (Certainty, &QueryAnswer),
+    map: &SemanticMap,
+    mask: &Mask,
+    iou: Option<f64>,
+) -> PhraseRow {
+    let chosen = answered.chosen(1);
+    let names: Vec<String> = chosen.iter().map(|id| map.identities.full_name(*id)).collect();
+    let best = answered.answer.hits().first();
+    PhraseRow {
+        view: view.into(),
+        phrase: phrase.into(),
+        verdict: answered.answer.verdict(),
+        certainty: certainty.into(),
+        answer: names.join("; "),
+        score: best.map_or(0.0, |h| h.score),
+        margin: best.map_or(0.0, |h| h.margin.max(0.0)),
+        area_px: mask.area(),
+        share: mask.area() as f64 / (mask.width_px() * mask.height_px()).max(1) as f64,
+        iou,
+    }
+}
+
+/// The rows as a table for spreadsheets.
+fn csv(rows: &[PhraseRow]) -> String {
+    // What begins with these is a formula to some spreadsheets.
+    let cell = |text: &str| {
+        let text = if text.starts_with(['=', '+', '-', '@']) { format!("'{text}") } else { text.to_owned() };
+        format!("\"{}\"", text.replace('"', "\"\""))
+    };
+    let mut all = String::from("view,phrase,verdict,certainty,answer,score,margin,area_px,share,iou\n");
+    for r in rows {
+        let iou = r.iou.map_or_else(String::new, |v| format!("{v:.6}"));
+        let texts = [&*r.view, &r.phrase, r.verdict, r.certainty, &r.answer].map(cell).join(",");
+        // Writing to a text cannot fail.
+        let _ = writeln!(all, "{texts},{:.6},{:.6},{},{:.8},{iou}", r.score, r.margin, r.area_px, r.share);
+    }
+    all
+}
+
+/// Masks as COCO has them: run lengths, column by column.
+#[derive(Default)]
+struct Coco {
+    images: Vec<Value>,
+    annotations: Vec<Value>,
+}
+
+impl Coco {
+    fn view(&mut self, name: &str, camera: &Camera) {
+        let id = self.images.len() + 1;
+        self.images.push(json!({
+            "id": id, "file_name": name, "width": camera.width_px, "height": camera.height_px
+        }));
+    }
+
+    /// The mask of phrase `i` in the newest view; nothing if it is empty.
+    fn mask(&mut self, i: usize, mask: &Mask, answered: &QueryAnswer) {
+        let Some(b) = mask.bounds() else { return };
+        self.annotations.push(json!({
+            "id": self.annotations.len() + 1,
+            "image_id": self.images.len(),
+            "category_id": i + 1,
+            "segmentation": Rle::of(mask),
+            "area": mask.area(),
+            "bbox": [b.x.start, b.y.start, b.x.len(), b.y.len()],
+            "iscrowd": 0,
+            "score": answered.answer.hits().first().map_or(0.0, |h| h.score),
+        }));
+    }
+
+    fn document(self, phrases: &[String]) -> Value {
+        let category = |(i, phrase): (usize, &String)| json!({ "id": i + 1, "name": phrase, "supercategory": "" });
+        json!({
+            "images": self.images,
+            "annotations": self.annotations,
+            "categories": phrases.iter().enumerate().map(category).collect::<Vec<_>>(),
+        })
+    }
+}
+
+/// A name as a file may have it: letters and digits in lower case, `_` between them; without the ending of a picture.
+fn stem(name: &str) -> String {
+    let is_ending = |e: &str| (1..=4).contains(&e.len()) && e.chars().all(char::is_alphanumeric);
+    let name = name.rsplit_once('.').filter(|(_, ending)| is_ending(ending)).map_or(name, |(stem, _)| stem);
+    let words: Vec<String> =
+        name.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty()).map(|w| w.to_lowercase()).collect();
+    let stem: String = words.join("_").chars().take(60).collect();
+    if stem.is_empty() { "unnamed".into() } else { stem }
+}
+
+/// A file stem for each phrase; what would be the same gets a number.
+fn stems(phrases: &[String]) -> Vec<String> {
+    let mut taken = BTreeSet::new();
+    let mut next = |phrase: &String| {
+        let plain = stem(phrase);
+        let numbered = (2..).map(|n| format!("{plain}_{n}"));
+        let free = std::iter::once(plain.clone()).chain(numbered).find(|s| !taken.contains(s)).unwrap_or_default();
+        taken.insert(free.clone());
+        free
+    };
+    phrases.iter().map(&mut next).collect()
+}
+
+#[cfg(test)]
+mod tests;

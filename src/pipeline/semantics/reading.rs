@@ -1,0 +1,289 @@
+//! What a typed query means in a scene: slips are mended by the words of the scene's own names, and noun
+//! compounds ("kettle spout") are read as pieces of wholes where names say so.
+
+use std::collections::BTreeMap;
+
+use super::names::{singular, words, written};
+use super::parse::{MAX_CHARS, ParsedQuery, is_glue};
+use crate::models;
+use crate::scene::{Identities, IdentityId, LevelFilter};
+
+/// Words as they were typed, each with another one.
+pub(crate) type Pairs = Vec<(String, String)>;
+
+/// A query as it is answered.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Reading {
+    pub(crate) phrase: ParsedQuery,
+    /// Words that were taken for slips, each with the word that it was taken for.
+    pub(crate) mended: Pairs,
+    /// Words of their own that are near a word of the scene: what may have been meant if nothing fits.
+    pub(crate) near: Pairs,
+}
+
+/// Letters of a word that is mended, and of what it becomes, at least: short words differ by a letter and mean
+/// something else.
+const SHORTEST: usize = 4;
+/// Letters from which two slips in one word are mended.
+const LONG: usize = 8;
+/// Words of a compound at most.
+const MOST_WORDS: usize = 10;
+
+impl Reading {
+    /// Reads a query about these identities; `None` if there is nothing in it.
+    pub(crate) fn new(identities: &Identities, query: &str, level: LevelFilter) -> Option<Self> {
+        let (text, mended, near) = mend_all(identities, query);
+        let parsed = ParsedQuery::parse(&text)?;
+        // A level that is asked for is not overruled.
+        let compound = if level == LevelFilter::Object { None } else { compound(identities, &parsed) };
+        Some(Self { phrase: compound.unwrap_or(parsed), mended, near })
+    }
+}
+
+/// The text, in lower case, with slips of the scene's own words mended, and which those were.
+pub(crate) fn mend(identities: &Identities, text: &str) -> (String, Pairs) {
+    let (text, mended, _) = mend_all(identities, text);
+    (text, mended)
+}
+
+fn mend_all(identities: &Identities, text: &str) -> (String, Pairs, Pairs) {
+    let known = vocabulary(identities);
+    let (mut mended, mut near) = (Vec::new(), Vec::new());
+    let text = by_words(text, |word| match slip(word, &known) {
+        Slip::Of(right) => {
+            mended.push((word.to_owned(), right.clone()));
+            Some(right)
+        }
+        Slip::Near(other) => {
+            near.push((word.to_owned(), other));
+            None
+        }
+        Slip::None => None,
+    });
+    (text, mended, near)
+}
+
+/// What was mended, in a sentence; nothing if nothing was.
+pub(crate) fn mended_text(mended: &[(String, String)]) -> Option<String> {
+    let each: Vec<String> = mended.iter().map(|(typed, read)| format!("\"{typed}\" as \"{read}\"")).collect();
+    (!each.is_empty()).then(|| format!("Read {}.", each.join(", ")))
+}
+
+/// The words of all names, as they are written, by their singular.
+type SceneWords = BTreeMap<String, String>;
+
+fn vocabulary(identities: &Identities) -> SceneWords {
+    identities.iter().flat_map(|(_, i)| &i.names).flat_map(|n| written(n)).map(|w| (singular(&w), w)).collect()
+}
+
+/// The text with every word for which `instead` gives another one exchanged.
+fn by_words(text: &str, mut instead: impl FnMut(&str) -> Option<String>) -> String {
+    let text: String = text.chars().take(MAX_CHARS).collect::<String>().to_lowercase();
+    let mut all = String::with_capacity(text.len());
+    for run in text.split_inclusive(|c: char| !c.is_alphanumeric()) {
+        let word = run.trim_end_matches(|c: char| !c.is_alphanumeric());
+        all.push_str(&instead(word).unwrap_or_else(|| word.to_owned()));
+        all.push_str(&run[word.len()..]);
+    }
+    all
+}
+
+/// What a word is to the words of the scene.
+enum Slip {
+    /// A slip of this one.
+    Of(String),
+    /// A word of its own that is near this one.
+    Near(String),
+    None,
+}
+
+fn slip(word: &str, known: &SceneWords) -> Slip {
+    let is_known = |w: &str| known.contains_key(w) || known.contains_key(&singular(w)) || is_glue(w);
+    if matches!(word, "teh" | "hte") && !is_known(word) {
+        return Slip::Of("the".into());
+    }
+    let letters = word.chars().count();
+    if letters < SHORTEST || !word.chars().all(char::is_alphabetic) || is_known(word) {
+        return Slip::None;
+    }
+    let most = if letters >= LONG { 2 } else { 1 };
+    let letters_of = |w: &str| {
+        w.chars().fold(BTreeMap::new(), |mut n, c| {
+            *n.entry(c).or_insert(0) += 1;
+            n
+        })
+    };
+    let mut near = Vec::new();
+    for (single, written) in known.iter().filter(|(_, w)| w.chars().count() >= SHORTEST) {
+        // Whoever slips at the first letter swaps it with the second, or leaves it out.
+        if !written.chars().take(2).any(|c| word.starts_with(c)) {
+            continue;
+        }
+        let far = |other: &str| strsim::damerau_levenshtein(word, other);
+        let far = far(written).min(far(single)).min(strsim::damerau_levenshtein(&singular(word), single));
+        if far <= most {
+            // Letters that only changed places are the likelier slip.
+            near.push(((far, letters_of(written) != letters_of(word)), written));
+        }
+    }
+    near.sort();
+    match near.as_slice() {
+        // Two that are as near are a guess.
+        [a, b, ..] if a.0 == b.0 => Slip::None,
+        [(_, other), ..] if models::is_word(word) => Slip::Near((*other).clone()),
+        [(_, other), ..] => Slip::Of((*other).clone()),
+        [] => Slip::None,
+    }
+}
+
+/// "A B" as "B of the A", where that explains more words by names than any single name does: A is in the name of
+/// something, B in that of one of its pieces, both with their last words, which say what is meant.
+fn compound(identities: &Identities, phrase: &ParsedQuery) -> Option<ParsedQuery> {
+    let raw: Vec<&str> = phrase.text.split_whitespace().collect();
+    if phrase.whole.is_some() || !(2..=MOST_WORDS).contains(&raw.len()) {
+        return None;
+    }
+    let asked: Vec<Vec<String>> = raw.iter().map(|w| words(w)).collect();
+    let names: Vec<Vec<Vec<String>>> =
+        identities.iter().map(|(_, i)| i.names.iter().map(|n| words(n)).collect()).collect();
+    let names_of = |id: IdentityId| names.get(id as usize - 1).map(Vec::as_slice).unwrap_or_default();
+    let alone = names.iter().flatten().map(|n| explained(&asked, n)).max().unwrap_or(0);
+    let (mut best, mut split) = ((alone, 0.0), None);
+    for (id, _) in identities.iter() {
+        let pieces = names_of(id).iter().filter(|n| has_last(&asked, n));
+        for (piece, whole) in
+            pieces.flat_map(|p| identities.ancestors(id).skip(1).flat_map(names_of).map(move |w| (p, w)))
+        {
+            for i in 1..asked.len() {
+                let (left, right) = asked.split_at(i);
+                if !has_last(left, whole) {
+                    continue;
+                }
+                let (by_whole, by_piece) = (explained(left, whole), explained(right, piece));
+                // The more of both names is said, the better; the first of equals has the longest piece.
+                let said = by_whole as f64 / whole.len() as f64 + by_piece as f64 / piece.len() as f64;
+                let new = (by_whole + by_piece, said);
+                if new.0 > alone && (new.0 > best.0 || (new.0 == best.0 && new.1 > best.1)) {
+                    (best, split) = (new, Some(i));
+                }
+            }
+        }
+    }
+    let (whole, piece) = raw.split_at(split?);
+    let (whole, target) = (whole.join(" "), piece.join(" "));
+    Some(ParsedQuery { text: format!("{target} of the {whole}"), target, whole: Some(whole) })
+}
+
+/// How many of these words are in a name, each word of the name for one of them.
+fn explained(asked: &[Vec<String>], name: &[String]) -> usize {
+    let mut left: Vec<&String> = name.iter().collect();
+    let mut take = |word: &String| left.iter().position(|n| *n == word).map(|at| left.swap_remove(at)).is_some();
+    asked.iter().filter(|ws| !ws.is_empty() && ws.iter().all(&mut take)).count()
+}
+
+fn has_last(asked: &[Vec<String>], name: &[String]) -> bool {
+    asked.last().is_some_and(|ws| !ws.is_empty() && ws.iter().all(|w| name.contains(w)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::answer::by_name;
+    use super::super::localize::Answer;
+    use super::*;
+    use crate::scene::{Level, NOBODY};
+
+    /// The demo's scene, and the questions by their list.
+    fn data() -> (Identities, toml::Table) {
+        let table: toml::Table =
+            include_str!("../../../tests/data/compounds_and_slips.toml").parse().expect("sound TOML");
+        let mut all = Identities::default();
+        for (object, parts) in table["scene"].as_table().expect("a table") {
+            let id = all.add(Level::Object, NOBODY, vec![object.clone()]);
+            for part in parts.as_array().expect("a list") {
+                all.add(Level::Part, id, vec![part.as_str().expect("a name").into()]);
+            }
+        }
+        (all, table)
+    }
+
+    fn rows<'a>(table: &'a toml::Table, list: &str) -> Vec<Vec<&'a str>> {
+        let texts = |row: &'a toml::Value| {
+            row.as_array().expect("a row").iter().map(|t| t.as_str().expect("a text")).collect::<Vec<_>>()
+        };
+        table[list].as_array().expect("a list").iter().map(texts).collect()
+    }
+
+    /// What a question comes to, in the words of the lists.
+    fn told(all: &Identities, phrase: &ParsedQuery) -> String {
+        let answered = by_name(all, phrase, LevelFilter::Auto);
+        let first = answered.answer.hits().first().map(|h| all.full_name(h.identity)).unwrap_or_default();
+        match answered.answer {
+            Answer::Found(_) => first,
+            Answer::Ambiguous(_) => format!("ambiguous {first}"),
+            Answer::NotFound(_) => "not found".into(),
+        }
+    }
+
+    fn read(all: &Identities, text: &str) -> Reading {
+        Reading::new(all, text, LevelFilter::Auto).expect("words")
+    }
+
+    #[test]
+    fn compounds_are_pieces_of_wholes_and_nothing_else_changes() {
+        let (all, table) = data();
+        let lists = [rows(&table, "compounds"), rows(&table, "kept")];
+        assert!(lists[0].len() >= 40);
+        let mut wrong = Vec::new();
+        for row in lists.iter().flatten() {
+            let found = told(&all, &read(&all, row[0]).phrase);
+            if found != row[1] {
+                wrong.push(format!("{}: {found}, not {}", row[0], row[1]));
+            }
+        }
+        assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+        for row in &lists[1] {
+            assert_eq!(read(&all, row[0]).phrase, ParsedQuery::parse(row[0]).expect("words"), "{}", row[0]);
+        }
+        // Without the reading most are wrong, and an object that is asked for is no piece.
+        let plain = |row: &&Vec<&str>| told(&all, &ParsedQuery::parse(row[0]).expect("words")) == row[1];
+        assert!(lists[0].iter().filter(plain).count() * 4 < lists[0].len());
+        let object = Reading::new(&all, "kettle spout", LevelFilter::Object).expect("words");
+        assert_eq!((object.phrase.target.as_str(), object.phrase.whole), ("kettle spout", None));
+    }
+
+    #[test]
+    fn slips_are_mended_word_by_word_and_words_of_their_own_are_not() {
+        let (all, table) = data();
+        let (slips, own) = (rows(&table, "slips"), rows(&table, "own_words"));
+        assert!(slips.len() >= 40);
+        for row in &slips {
+            let reading = read(&all, row[0]);
+            let said: Vec<String> = reading.mended.iter().map(|(a, b)| format!("{a}={b}")).collect();
+            let mut wanted: Vec<&str> = row[2].split(' ').collect();
+            wanted.sort_by_key(|w| row[0].find(w.split('=').next().unwrap_or_default()));
+            assert_eq!((said.join(" "), told(&all, &reading.phrase)), (wanted.join(" "), row[1].into()), "{}", row[0]);
+        }
+        for row in &own {
+            assert!(read(&all, row[0]).mended.is_empty(), "{}", row[0]);
+            assert_ne!(told(&all, &read(&all, row[0]).phrase), row[1], "{}", row[0]);
+        }
+        assert_eq!(read(&all, "lamb").near, [("lamb".into(), "lamp".into())]);
+        // The words of another scene are its own; names are never mended.
+        let mut other = Identities::default();
+        other.add(Level::Object, NOBODY, vec!["kettel".into(), "teh".into()]);
+        assert!(read(&other, "teh kettel").mended.is_empty());
+        assert!(rows(&table, "compounds").iter().all(|row| read(&all, row[0]).mended.is_empty()));
+        let mended = read(&all, "buton of teh lmap").mended;
+        assert_eq!(mended_text(&mended[1..]).as_deref(), Some("Read \"teh\" as \"the\", \"lmap\" as \"lamp\"."));
+        assert_eq!(mended_text(&[]), None);
+    }
+
+    #[test]
+    fn strange_texts_are_read_in_no_time() {
+        let (all, _) = data();
+        assert!(Reading::new(&all, " \t", LevelFilter::Auto).is_none());
+        for text in ["lamp ".repeat(5_000), "x".repeat(5_000), "的".repeat(900), "a\u{0}b \u{202e}lmap".into()] {
+            assert!(Reading::new(&all, &text, LevelFilter::Auto).is_some());
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! What the actions around phrases and true masks do.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::actions::Pane;
+use super::app::App;
+use super::context::SceneContext;
+use super::state::Tone;
+use crate::jobs::phrases::{self, PhrasesRequest, TrueMasks};
+use crate::scene::{Camera, LevelFilter};
+use crate::worker::{Command, Failure};
+
+/// Longer side of the views that are asked, px.
+const SIDE_PX: u32 = 1008;
+
+impl App {
+    /// Asks the list of phrases; its masks are written into `to`, if that is given.
+    pub(super) fn run_phrases(&mut self, to: Option<PathBuf>) {
+        self.layout.hidden.retain(|p| *p != Pane::Phrases);
+        let phrases = match phrases::listed(&self.phrases.text) {
+            Ok(phrases) => phrases,
+            Err(e) => return self.state.toast(Tone::Warning, e.to_string()),
+        };
+        let Some(SceneContext { cloud, map: Some(map), settings, scene, .. }) = self.context() else {
+            return self.state.toast(Tone::Warning, "Find objects first: they are what phrases are asked of.");
+        };
+        let photos = scene.dataset.as_ref().filter(|_| self.phrases.all_photos);
+        let views: Vec<(String, Camera)> = match (photos, self.viewport.picture()) {
+            (Some(d), _) => d.photos.iter().map(|p| (p.name.clone(), p.camera.limited_to(SIDE_PX))).collect(),
+            (None, Some(picture)) => vec![("this view".to_owned(), picture.camera.limited_to(SIDE_PX))],
+            (None, None) => return,
+        };
+        // A mask is of one view alone.
+        let truth = self.viewport.queries.truth().filter(|_| photos.is_none()).map_or(TrueMasks::None, TrueMasks::Mask);
+        self.submit(Command::Phrases(Box::new(PhrasesRequest {
+            cloud: Arc::clone(&cloud),
+            map: Arc::clone(&map),
+            settings,
+            views,
+            phrases,
+            level: LevelFilter::Auto,
+            matching: self.viewport.queries.matching(),
+            top: 1,
+            truth,
+            export: to,
+        })));
+    }
+
+    /// Compares the newest answer with a true mask of the present view, or with none.
+    pub(super) fn compare_with_mask(&mut self, path: Option<&Path>) {
+        let Some(path) = path else { return self.viewport.queries.compare_with(None) };
+        let read = phrases::true_mask(path).and_then(|mask| match self.viewport.queries.maps() {
+            Some(maps) => phrases::fitted(mask, maps.identities.width_px, maps.identities.height_px, path),
+            None => Ok(mask),
+        });
+        match read {
+            Ok(mask) => {
+                let pose = self.viewport.pose();
+                self.viewport.queries.compare_with(Some((Arc::new(mask), pose)));
+            }
+            Err(e) => self.state.fail("Opening the true mask", Failure::of(&e, "Choose a .png of this view.")),
+        }
+    }
+}

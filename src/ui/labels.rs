@@ -1,0 +1,99 @@
+//! What objects and parts are called on screen: by name, or, without one, by what they look like; and the answers
+//! to a list of phrases.
+
+use std::path::PathBuf;
+
+use crate::jobs::phrases::PhraseRow;
+use crate::scene::appearance::Appearance;
+use crate::scene::{Identities, IdentityId};
+
+/// Names for what has none, by number less one.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ScreenNames(Vec<Option<String>>);
+
+impl ScreenNames {
+    pub(crate) fn new(appearances: &[Option<Appearance>], meters_per_unit: Option<f64>) -> Self {
+        Self(appearances.iter().map(|a| a.map(|a| a.text(meters_per_unit))).collect())
+    }
+
+    /// What stands in for a name, where there is none.
+    fn instead(&self, all: &Identities, id: IdentityId) -> Option<&str> {
+        let unnamed = all.get(id).is_some_and(|i| i.names.is_empty());
+        self.0.get((id as usize).checked_sub(1)?)?.as_deref().filter(|_| unnamed)
+    }
+
+    /// "kettle", "pale blue region, 12 cm".
+    pub(crate) fn name(&self, all: &Identities, id: IdentityId) -> String {
+        self.instead(all, id).map_or_else(|| all.name(id), str::to_owned)
+    }
+
+    /// "lid of the kettle", "pale blue region, 12 cm".
+    pub(crate) fn full_name(&self, all: &Identities, id: IdentityId) -> String {
+        self.instead(all, id).map_or_else(|| all.full_name(id), str::to_owned)
+    }
+}
+
+/// What a list of phrases came to last.
+#[derive(Clone, Debug, Default)]
+pub struct PhraseTable {
+    /// A row for each phrase in each view.
+    pub rows: Vec<PhraseRow>,
+    /// Where the masks were written, if they were.
+    pub(crate) written: Option<PathBuf>,
+}
+
+impl PhraseTable {
+    pub(crate) fn finished(&mut self, rows: Vec<PhraseRow>, written: Option<PathBuf>) {
+        *self = Self { rows, written };
+    }
+}
+
+/// Share of the largest region's Gaussians under which a region without a name is tiny.
+const TINY: f64 = 0.01;
+
+/// In which order identities are listed: those with names as they come, then those without by falling size; and
+/// apart from them the tiny ones without a name.
+pub(crate) fn listed(all: &Identities, sizes: &[usize], ids: Vec<IdentityId>) -> (Vec<IdentityId>, Vec<IdentityId>) {
+    let size = |id: &IdentityId| sizes.get(*id as usize).copied().unwrap_or(0);
+    let is_named = |id: &IdentityId| all.get(*id).is_some_and(|i| !i.names.is_empty());
+    let (mut named, mut others): (Vec<_>, Vec<_>) = ids.into_iter().partition(is_named);
+    others.sort_by_key(|id| std::cmp::Reverse(size(id)));
+    let least = others.first().map_or(0.0, |id| TINY * size(id) as f64);
+    let tiny = others.split_off(others.partition_point(|id| size(id) as f64 >= least));
+    named.append(&mut others);
+    (named, tiny)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Level, NOBODY};
+
+    #[test]
+    fn the_large_come_first_the_tiny_apart_and_names_as_they_were() {
+        let mut all = Identities::default();
+        for name in ["", "mug", "", "", "lamp"] {
+            all.add(Level::Object, NOBODY, if name.is_empty() { vec![] } else { vec![name.into()] });
+        }
+        let sizes = [0, 20, 1, 19, 2_000, 3];
+        let ids: Vec<IdentityId> = (1..=5).collect();
+        assert_eq!(listed(&all, &sizes, ids), (vec![2, 5, 4, 1], vec![3]));
+        assert_eq!(listed(&all, &[], vec![1, 3]), (vec![1, 3], vec![]), "nothing is counted yet");
+    }
+
+    #[test]
+    fn a_name_comes_before_what_something_looks_like() {
+        let mut all = Identities::default();
+        let region = all.add(Level::Object, NOBODY, vec![]);
+        let part = all.add(Level::Part, region, vec![]);
+        let labels = ScreenNames(vec![Some("red region, 2 cm".into()), None]);
+        assert_eq!(labels.name(&all, region), "red region, 2 cm");
+        assert_eq!((labels.name(&all, part), labels.full_name(&all, part)), ("#2".into(), "#2 of the #1".into()));
+        all.rename(region, "apple");
+        assert_eq!(
+            (labels.name(&all, region), labels.full_name(&all, part)),
+            ("apple".into(), "#2 of the apple".into())
+        );
+        assert_eq!(labels.name(&all, NOBODY), "nothing");
+    }
+}

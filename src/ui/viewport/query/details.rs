@@ -1,0 +1,119 @@
+//! The pane beside the view that says all of the newest answer: hits with their scores, the target in space, where
+//! the time went, and how answers are found and drawn.
+
+use egui::{RichText, Ui};
+use strum::VariantArray;
+
+use super::super::Viewport;
+use super::card::Facts;
+use super::{Queries, settings, times};
+use crate::math::format;
+use crate::navigate::target::Side;
+use crate::pipeline::semantics::answer::Basis;
+use crate::scene::{GaussianCloud, IdentityId, SemanticMap};
+use crate::ui::actions::Action;
+use crate::ui::state::AppState;
+use crate::ui::theme;
+use crate::worker::Versioned;
+
+/// Hits that are listed.
+const LISTED: usize = 8;
+
+impl Viewport {
+    /// The pane of the query: its answer and the options.
+    pub(crate) fn show_query(&mut self, ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
+        let (Some(semantics), Some(cloud)) = (&state.semantics, &self.cloud) else {
+            ui.weak("Find objects first: they are what queries find.");
+            return;
+        };
+        self.queries.show_details(ui, state, semantics, cloud, actions);
+    }
+}
+
+impl Queries {
+    fn show_details(
+        &mut self,
+        ui: &mut Ui,
+        state: &AppState,
+        semantics: &Versioned<SemanticMap>,
+        cloud: &GaussianCloud,
+        actions: &mut Vec<Action>,
+    ) {
+        // Settings are for looking at maps.
+        self.wanted = true;
+        match self.newest().cloned() {
+            Some(newest) => {
+                self.show_hits(ui, &newest, state, semantics);
+                if let Some(&target) = newest.shown(&self.settings).first() {
+                    let facts = self.facts_of(target, semantics, cloud);
+                    show_target(ui, target, &facts, state, actions);
+                }
+                let basis = match newest.answered.basis {
+                    Basis::Names => "by name",
+                    Basis::Embedding => "by embedding",
+                };
+                times::show(ui, basis, &newest.answered.stages.and(self.paint_ms));
+            }
+            None => {
+                ui.weak("Nothing is asked yet: type into the box in the view ( / ).");
+            }
+        }
+        ui.add_space(6.0);
+        let heat = (!self.heat.is_empty()).then_some(self.heat.as_slice());
+        if settings::show(ui, &mut self.settings, heat) {
+            self.ask_again(semantics);
+        }
+    }
+
+    fn show_hits(&mut self, ui: &mut Ui, newest: &super::Asked, state: &AppState, semantics: &Versioned<SemanticMap>) {
+        let shown = newest.shown(&self.settings);
+        let hits = newest.answered.answer.hits().iter().filter(|h| h.score > 0.0).take(LISTED);
+        let mut chosen = None;
+        egui::Grid::new("hits").num_columns(4).striped(true).show(ui, |ui| {
+            for hit in hits {
+                let name = state.labels.full_name(&semantics.identities, hit.identity);
+                if ui.selectable_label(shown.contains(&hit.identity), RichText::new(name).strong()).clicked() {
+                    chosen = Some(hit.identity);
+                }
+                ui.weak(format!("{:.2}", hit.score)).on_hover_text("Score from 0 to 1");
+                ui.weak(format!("+{:.2}", hit.margin.max(0.0))).on_hover_text("Margin over the next");
+                let pixels = match self.area_of(semantics, hit.identity) {
+                    Some(0) => "not in this view".to_owned(),
+                    Some(n) => format!("{} px", format::count(n as u64)),
+                    None => String::new(),
+                };
+                ui.weak(pixels);
+                ui.end_row();
+            }
+        });
+        self.choose(chosen);
+    }
+}
+
+/// The target in space, and what can be done with it.
+fn show_target(ui: &mut Ui, target: IdentityId, facts: &Facts, state: &AppState, actions: &mut Vec<Action>) {
+    let unit = state.scene.as_ref().and_then(|s| s.meters_per_unit());
+    let edges = facts.bounds.map(|b| b.size().to_array().map(|edge| format::length(edge, unit)).join(" \u{00d7} "));
+    let size = edges.map(|e| format!("  \u{00b7}  box {e}")).unwrap_or_default();
+    let gaussians = format::things(facts.gaussians, "Gaussian");
+    ui.label(RichText::new(format!("{gaussians}{size}")).small().color(theme::WEAK));
+    ui.horizontal(|ui| {
+        ui.menu_button(RichText::new("Go there from\u{2026}").small(), |ui| {
+            for &side in Side::VARIANTS {
+                if ui.button(side.text()).clicked() {
+                    actions.push(Action::GoToTarget(target, side));
+                    ui.close();
+                }
+            }
+        });
+        for (action, text) in [
+            (Action::Isolate(Some(target)), "Isolate"),
+            (Action::Hide(target), "Hide"),
+            (Action::ExportTarget(target), "Export\u{2026}"),
+        ] {
+            if ui.small_button(text).on_hover_text(action.tooltip()).clicked() {
+                actions.push(action);
+            }
+        }
+    });
+}

@@ -1,0 +1,135 @@
+//! The newest answer against a true mask: hits, misses and false alarms in colors, and their IoU.
+
+use std::sync::Arc;
+
+use super::Queries;
+use crate::navigate::Pose;
+use crate::pipeline::semantics::matching::MatchMode;
+use crate::scene::Mask;
+
+/// Hits, misses and false alarms, told apart by those who see no red or no green too.
+const COLORS: [[u8; 3]; 3] = [[40, 200, 120], [230, 60, 60], [250, 180, 30]];
+
+/// A true mask of the view from one place.
+#[derive(Clone, Debug)]
+pub(super) struct ViewTruth {
+    mask: Arc<Mask>,
+    at: Pose,
+}
+
+/// Pixels by how the answer has them.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct TruthComparison {
+    pub(super) hits: usize,
+    pub(super) misses: usize,
+    pub(super) false_alarms: usize,
+    pub(super) iou: f64,
+}
+
+impl Queries {
+    /// Compares answers with a mask of the view from this pose; with none, shows them plainly again.
+    pub(crate) fn compare_with(&mut self, truth: Option<(Arc<Mask>, Pose)>) {
+        self.truth = truth.map(|(mask, at)| ViewTruth { mask, at });
+        (self.painted, self.comparison) = (None, None);
+    }
+
+    /// Says where the eye is: a mask is true of one view alone.
+    pub(crate) fn stand(&mut self, pose: Pose) {
+        if self.eye != Some(pose) {
+            self.eye = Some(pose);
+            if self.truth.is_some() {
+                (self.painted, self.comparison) = (None, None);
+            }
+        }
+    }
+
+    /// The mask that is true of the present view.
+    pub(crate) fn truth(&self) -> Option<Arc<Mask>> {
+        let here = |t: &&ViewTruth| self.eye.is_some_and(|eye| is_same(&eye, &t.at));
+        self.truth.as_ref().filter(here).map(|t| Arc::clone(&t.mask))
+    }
+
+    /// How pixels are matched, and the largest difference per channel.
+    pub(crate) fn matching(&self) -> (MatchMode, f32) {
+        (self.settings.mode, self.settings.tolerance)
+    }
+
+    /// The masks as they are drawn: the newest against the truth of this view, where there is one.
+    pub(super) fn compared(&mut self, masks: Vec<([u8; 3], Mask)>) -> Vec<([u8; 3], Mask)> {
+        let (Some(truth), Some((_, newest))) = (self.truth(), masks.last()) else { return masks };
+        let truth = truth.resized(newest.width_px(), newest.height_px());
+        let (comparison, masks) = compare(newest, &truth);
+        self.comparison = Some(comparison);
+        COLORS.into_iter().zip(masks).collect()
+    }
+}
+
+fn is_same(a: &Pose, b: &Pose) -> bool {
+    let turned = a.world_from_camera - b.world_from_camera;
+    let columns = [turned.x_axis, turned.y_axis, turned.z_axis];
+    a.center.distance(b.center) <= 1e-9 * (1.0 + a.center.length()) && columns.iter().all(|c| c.length() < 1e-9)
+}
+
+/// Hits, misses and false alarms of an answer.
+fn compare(answer: &Mask, truth: &Mask) -> (TruthComparison, [Mask; 3]) {
+    let (mut hits, mut misses, mut alarms) = (answer.clone(), truth.clone(), answer.clone());
+    hits.intersect(truth);
+    misses.subtract(answer);
+    alarms.subtract(truth);
+    let comparison = TruthComparison {
+        hits: hits.area(),
+        misses: misses.area(),
+        false_alarms: alarms.area(),
+        iou: answer.iou(truth),
+    };
+    (comparison, [hits, misses, alarms])
+}
+
+impl TruthComparison {
+    /// The figure, and what the colors mean.
+    pub(super) fn show(&self, ui: &mut egui::Ui) {
+        let Self { hits, misses, false_alarms, iou } = self;
+        ui.horizontal_wrapped(|ui| {
+            ui.strong(format!("IoU {iou:.3}"));
+            let texts = [format!("{hits} px hit"), format!("{misses} missed"), format!("{false_alarms} false alarms")];
+            for ([r, g, b], text) in COLORS.into_iter().zip(texts) {
+                ui.colored_label(egui::Color32::from_rgb(r, g, b), text);
+            }
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{DMat3, DVec3};
+
+    #[test]
+    fn hits_misses_and_false_alarms_are_told_apart() {
+        let answer = Mask::from_fn(10, 1, |i| i < 6);
+        let truth = Mask::from_fn(10, 1, |i| (4..8).contains(&i));
+        let (told, masks) = compare(&answer, &truth);
+        assert_eq!(told, TruthComparison { hits: 2, misses: 2, false_alarms: 4, iou: 0.25 });
+        assert_eq!(masks.map(|m| m.pixels().collect::<Vec<_>>()), [vec![4, 5], vec![6, 7], vec![0, 1, 2, 3]]);
+        // The control: the truth itself is met in full.
+        assert_eq!(compare(&truth, &truth).0, TruthComparison { hits: 4, misses: 0, false_alarms: 0, iou: 1.0 });
+    }
+
+    #[test]
+    fn a_mask_is_true_of_the_view_that_it_was_loaded_in() {
+        let pose = |x: f64| Pose { center: DVec3::X * x, world_from_camera: DMat3::IDENTITY, fov_y_rad: 0.8 };
+        let mut queries = Queries::default();
+        queries.stand(pose(0.0));
+        queries.compare_with(Some((Arc::new(Mask::from_fn(4, 4, |_| true)), pose(0.0))));
+        assert!(queries.truth().is_some());
+        queries.stand(pose(0.5));
+        assert!(queries.truth().is_none(), "seen from elsewhere");
+        queries.stand(pose(0.0));
+        assert!(queries.truth().is_some(), "back again");
+        let masks = queries.compared(vec![([1; 3], Mask::from_fn(2, 2, |i| i == 0))]);
+        assert_eq!(masks.iter().map(|m| m.1.area()).collect::<Vec<_>>(), [1, 3, 0]);
+        assert_eq!(queries.comparison.as_ref().map(|c| c.iou), Some(0.25));
+        queries.compare_with(None);
+        assert!(queries.truth().is_none() && queries.comparison.is_none());
+    }
+}
