@@ -7,6 +7,7 @@ use std::sync::Arc;
 use egui::{Color32, FontId, Painter, Pos2, Rect, Sense, Shape, Stroke, Ui, Vec2, pos2, vec2};
 use glam::DVec3;
 
+use super::super::labels::ScreenNames;
 use super::super::theme;
 use super::Viewport;
 use crate::navigate::target::Side;
@@ -92,7 +93,7 @@ impl Viewport {
         ui: &Ui,
         shown: Rect,
         cloud: &Versioned<GaussianCloud>,
-        semantics: &Versioned<SemanticMap>,
+        (semantics, names): (&Versioned<SemanticMap>, &ScreenNames),
         actions: &mut Vec<Action>,
     ) {
         let mut targets = self.queries.found_colors();
@@ -112,7 +113,7 @@ impl Viewport {
             let inside = places.iter().filter(|p| shown.contains(**p)).count();
             let size = self.queries.span_of(semantics, id).map(|span| span.map(|span| span * shown.size()));
             let painter = ui.painter_at(shown);
-            let name = text::elided(&semantics.identities.full_name(id), 40);
+            let name = text::elided(&names.full_name(&semantics.identities, id), 40);
             let at = match mark(inside as f32 / points.len() as f32, size) {
                 Mark::None => continue,
                 Mark::Arrow => arrow(&painter, shown, way(&eye, &points), color, &name),

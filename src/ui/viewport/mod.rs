@@ -248,9 +248,9 @@ impl Viewport {
         let meters = scene.meters_per_unit();
         self.show_ruler(ui, &response, shown, meters, actions);
         if let Some(semantics) = state.semantics.as_ref().filter(|_| self.brush.is_none() && !self.is_measuring()) {
-            self.show_picking(ui, &response, shown, semantics, on_camera, actions);
+            self.show_picking(ui, &response, shown, (semantics, &state.labels), on_camera, actions);
             if let Some(cloud) = self.cloud.clone() {
-                self.show_marks(ui, shown, &cloud, semantics, actions);
+                self.show_marks(ui, shown, &cloud, (semantics, &state.labels), actions);
             }
         }
         if let Some(pane) = route {

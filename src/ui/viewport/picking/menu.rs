@@ -5,9 +5,15 @@ use egui::{RichText, Ui};
 use crate::navigate::target::Side;
 use crate::scene::{Identities, IdentityId, text};
 use crate::ui::actions::Action;
+use crate::ui::labels::ScreenNames;
 
 /// The menu about an identity; about the view if there is none.
-pub(super) fn show(ui: &mut Ui, all: &Identities, id: Option<IdentityId>, actions: &mut Vec<Action>) {
+pub(super) fn show(
+    ui: &mut Ui,
+    (all, names): (&Identities, &ScreenNames),
+    id: Option<IdentityId>,
+    actions: &mut Vec<Action>,
+) {
     let mut row = |ui: &mut Ui, action: Action, name: &str| {
         if ui.button(name).on_hover_text(action.tooltip()).clicked() {
             actions.push(action);
@@ -20,7 +26,7 @@ pub(super) fn show(ui: &mut Ui, all: &Identities, id: Option<IdentityId>, action
         row(ui, Action::Isolate(None), "Show all objects");
         return;
     };
-    ui.label(RichText::new(text::elided(&all.full_name(id), 48)).strong());
+    ui.label(RichText::new(text::elided(&names.full_name(all, id), 48)).strong());
     ui.separator();
     row(ui, Action::GoToTarget(id, Side::Best), "Go there");
     row(ui, Action::Ask(all.full_name(id)), "Mark as a query");

@@ -7,6 +7,7 @@ mod menu;
 
 use egui::{Color32, FontId, Pos2, Rect, Response, TextureHandle, TextureOptions, Ui, pos2, vec2};
 
+use super::super::labels::ScreenNames;
 use super::super::theme;
 use super::{Viewport, outline};
 use crate::jobs::query::ViewMaps;
@@ -49,14 +50,14 @@ impl Viewport {
         ui: &Ui,
         response: &Response,
         shown: Rect,
-        semantics: &Versioned<SemanticMap>,
+        (semantics, names): (&Versioned<SemanticMap>, &ScreenNames),
         on_camera: bool,
         actions: &mut Vec<Action>,
     ) {
         let maps = self.queries.maps().map(|m| &***m);
-        self.picking.update(response, shown, semantics, maps.filter(|_| !on_camera), actions);
+        self.picking.update(response, shown, (semantics, names), maps.filter(|_| !on_camera), actions);
         if let Some(maps) = self.queries.shown_maps().cloned() {
-            self.picking.paint(ui, shown, semantics, &maps);
+            self.picking.paint(ui, shown, (semantics, names), &maps);
         }
     }
 }
@@ -87,7 +88,7 @@ impl Picking {
         &mut self,
         response: &Response,
         shown: Rect,
-        semantics: &SemanticMap,
+        (semantics, names): (&SemanticMap, &ScreenNames),
         maps: Option<&ViewMaps>,
         actions: &mut Vec<Action>,
     ) {
@@ -112,7 +113,7 @@ impl Picking {
                 actions.push(Action::Select(self.menu));
             }
         }
-        response.context_menu(|ui| menu::show(ui, all, self.menu, actions));
+        response.context_menu(|ui| menu::show(ui, (all, names), self.menu, actions));
     }
 
     /// Outlines over the frame in `shown`, and the name beside the cursor.
@@ -120,7 +121,7 @@ impl Picking {
         &mut self,
         ui: &Ui,
         shown: Rect,
-        semantics: &Versioned<SemanticMap>,
+        (semantics, names): (&Versioned<SemanticMap>, &ScreenNames),
         maps: &Versioned<ViewMaps>,
     ) {
         let hovered = self.hovered.filter(|id| Some(*id) != self.selected);
@@ -129,7 +130,7 @@ impl Picking {
             drawn.paint(ui, shown, semantics, maps, id, color);
         }
         if let (Some(id), Some(pos)) = (self.hovered, ui.input(|i| i.pointer.hover_pos())) {
-            label(ui, shown, pos, &text::elided(&semantics.identities.full_name(id), 60));
+            label(ui, shown, pos, &text::elided(&names.full_name(&semantics.identities, id), 60));
         }
     }
 }
