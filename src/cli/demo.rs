@@ -7,14 +7,14 @@ use glam::DVec3;
 use image::ColorType;
 use serde::Serialize;
 
-use super::demo_queries::{self, Queries};
 use super::progress::{Console, evaluation_line};
 use super::train::Settings;
 use super::{CliError, interrupt, output, synth};
 use crate::io;
+use crate::jobs::demo_questions::{self, Queries};
 use crate::jobs::evaluate::{self, Comparison, Options};
 use crate::jobs::open;
-use crate::jobs::plan;
+use crate::jobs::{Folders, demo as shipped, plan};
 use crate::math::stats::median;
 use crate::measure::studies::Input;
 use crate::measure::table::{markdown, rows};
@@ -30,15 +30,16 @@ const FLIGHT_PICTURES: usize = 24;
 
 /// Show the program on the demo scene: make photos, train, look around
 ///
-/// Opens the window and trains there. With --headless it needs no display: it renders the demo
-/// scene's photos, trains on them, measures the result on held-out photos, asks for objects and
-/// parts, flies around the scene, and leaves images and a report in the folder given by --out.
-/// Run again, it resumes where it was and reuses the photos.
+/// Opens the trained demo in the window. With --headless it needs no display: it asks the trained
+/// demo for objects and parts; then it renders the demo scene's photos, trains on them, measures the
+/// result on held-out photos, asks again, flies around the scene, and leaves images and a report in
+/// the folder given by --out. Run again, it resumes where it was and reuses the photos.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs demo\n  \
     fmlgs demo --headless\n  \
-    fmlgs demo --headless --steps 300 --out quick/      a first look in a fraction of the time")]
+    fmlgs demo --headless --steps 300 --out quick/      a first look in a fraction of the time\n  \
+    fmlgs demo --make assets/demo/demo.zip --out work/  make the trained demo that ships with the program")]
 pub(crate) struct Args {
     /// Do it without a window, and write images and a report
     #[arg(long)]
@@ -48,6 +49,9 @@ pub(crate) struct Args {
     out: PathBuf,
     #[command(flatten)]
     settings: Settings,
+    /// Make the trained demo that ships with the program, in the folder given by --out, and write it here
+    #[arg(long, value_name = "ZIP", conflicts_with = "headless")]
+    pub(crate) make: Option<PathBuf>,
     /// Print the report as one JSON document
     #[arg(long)]
     json: bool,
@@ -82,9 +86,13 @@ struct DemoReport {
 }
 
 pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+    let mut console = Console::new(quiet);
+    if let Some(file) = &args.make {
+        return make(file, &args.out, console);
+    }
+    show_shipped(&args.out.join("shipped"), &mut console);
     let started = Instant::now();
     let config = args.settings.over(config());
-    let mut console = Console::new(quiet);
     let [photos, scene, compare, queries, flight] =
         ["photos", "scene", "compare", "queries", "flight"].map(|f| args.out.join(f));
 
@@ -98,7 +106,8 @@ pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     let options = Options { pictures: Some(compare), ..Options::default() };
     let job = Comparison::new(open::scene(&scene)?, &photos, options)?;
     let Evaluation { psnr, ssim, views, .. } = evaluate::photometric(&job, &mut console).map_err(CliError::of_views)?;
-    let queries = demo_queries::run(&scene, &photos, &job, &queries, &mut console)?;
+    let queries = demo_questions::find_and_ask(&scene, &photos, &job, &queries, &mut console)
+        .map_err(|e| CliError::of_work(e, "the trained scene is saved"))?;
     let millis = fly(&job.cloud, &job.settings, &dataset, &flight)?;
 
     let document = document(&args.out, &outcome, [psnr, ssim], &queries);
@@ -129,6 +138,49 @@ pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     output::print(&format!("{}\nSee {}", summary(&report), args.out.join("report.md").display()))
 }
 
+/// Says what the trained demo answers, at once; without it the demo is trained all the same.
+fn show_shipped(pictures: &Path, console: &mut Console) {
+    match shipped::examine(&Folders::of_user(), pictures, console) {
+        Ok(([psnr, ssim], queries)) => {
+            let (objects, parts) = (queries.object_miou, queries.part_miou);
+            console.note(
+                Severity::Info,
+                format!(
+                    "The trained demo: held-out PSNR {psnr:.2} dB, SSIM {ssim:.3}; asked by name, objects {objects:.3} and \
+                     parts {parts:.3} mean IoU; heat maps in {}",
+                    pictures.display()
+                ),
+            );
+            for q in &queries.asked {
+                let answer = if q.answer.is_empty() { String::new() } else { format!(": {}", q.answer.join(", ")) };
+                let text = format!("  {} - {}{answer} ({} px, {:.1} ms)", q.question, q.verdict, q.pixels, q.millis);
+                console.note(Severity::Info, text);
+            }
+        }
+        Err(e) => console.note(Severity::Warning, format!("The trained demo cannot be shown: {e}")),
+    }
+}
+
+/// Makes the trained demo that ships with the program.
+fn make(file: &Path, work: &Path, mut console: Console) -> Result<(), CliError> {
+    let made = shipped::make(&shipped::Recipe::shipped(), work, &mut console);
+    let (bytes, record) = made.map_err(|e| CliError::of_work(e, "the same command resumes there"))?;
+    drop(console);
+    io::atomic::write(file, |w| w.write_all(&bytes))?;
+    let sum = format!("{}  demo.zip\n", shipped::digest(&bytes));
+    io::atomic::write(&file.with_extension("sha256"), |w| w.write_all(sum.as_bytes()))?;
+    output::print(&format!(
+        "{}: {:.1} MB, {} Gaussians, held-out PSNR {:.2} dB, SSIM {:.3}; asked by name, objects {:.3} and parts {:.3} mean IoU",
+        file.display(),
+        bytes.len() as f64 / 1e6,
+        record.gaussians,
+        record.psnr,
+        record.ssim,
+        record.object_miou,
+        record.part_miou
+    ))
+}
+
 /// The demo as a report that the window opens: training and queries, each with the one setting that it ran.
 fn document(out: &Path, outcome: &TrainOutcome, [psnr, ssim]: [f64; 2], queries: &Queries) -> Report {
     let share = |name: &str, meaning: &str| Measure::new(name, "", ErrorKind::Share, meaning);
@@ -155,11 +207,11 @@ fn document(out: &Path, outcome: &TrainOutcome, [psnr, ssim]: [f64; 2], queries:
 
 /// Renders the photos unless they are there; returns the seconds it took.
 fn make_photos(folder: &Path, console: &mut Console) -> Result<Option<f64>, CliError> {
-    if demo::demo_is_written(folder) {
+    if demo::demo_is_written(folder, &demo::demo_options()) {
         console.note(Severity::Info, format!("Using the photos in {}", folder.display()));
         return Ok(None);
     }
-    let report = demo::write_demo(folder, console).map_err(synth::failure)?;
+    let report = demo::write_demo(folder, &demo::demo_options(), console).map_err(synth::failure)?;
     console.note(Severity::Info, synth::summary(&report));
     Ok(Some(report.secs))
 }

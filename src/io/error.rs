@@ -4,6 +4,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::unposed::Unposed;
 use crate::scene::{CameraError, CloudError};
 
 /// A file that could not be read or written.
@@ -265,6 +266,9 @@ pub enum OpenError {
         /// What is there instead.
         found: String,
     },
+    /// Photos alone.
+    #[error("{}: {} photos, no camera poses", .0.images.display(), .0.photos.len())]
+    NoPoses(Box<Unposed>),
     /// Recognised, but broken.
     #[error(transparent)]
     Io(#[from] IoError),

@@ -3,6 +3,8 @@
 //! Jobs take plain inputs and an [`Observer`](crate::pipeline::observer::Observer) where they take long,
 //! and return a typed result or a [`JobError`]. Whoever calls them says the result in its own way.
 
+pub(crate) mod demo;
+pub(crate) mod demo_questions;
 pub mod edit;
 pub(crate) mod error;
 pub(crate) mod evaluate;
@@ -14,7 +16,9 @@ pub(crate) mod go_to;
 pub(crate) mod models;
 pub mod open;
 pub(crate) mod plan;
+pub(crate) mod poses;
 pub(crate) mod query;
+pub(crate) mod recent;
 pub(crate) mod render;
 pub(crate) mod segment;
 pub(crate) mod thumbnails;

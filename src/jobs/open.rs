@@ -11,7 +11,6 @@ use crate::io::trained::{self, History, SceneCamera};
 use crate::io::{self, Opened, TrainedScene};
 use crate::math::sh::SH_C0;
 use crate::pipeline::observer::{Observer, Severity};
-use crate::pipeline::synth::demo;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::plan::used_degree;
@@ -264,18 +263,6 @@ pub(crate) fn open(
     let facts = plan::facts(machine, scene.dataset.as_deref(), cloud, &TrainConfig::default());
     scene.facts = facts.with_semantics(scene.semantics.as_deref());
     Ok(scene)
-}
-
-/// Opens the demo scene, whose photos are made unless that was done before.
-///
-/// # Errors
-/// If they cannot be made or read, or the observer asks to stop.
-pub(crate) fn demo(folders: &Folders, machine: &Machine, observer: &mut dyn Observer) -> Result<OpenedScene, JobError> {
-    let out = folders.demo();
-    if !demo::demo_is_written(&out) {
-        demo::write_demo(&out, observer)?;
-    }
-    open(&out, folders, machine, observer)
 }
 
 /// The objects and parts stored with a trained scene; broken ones are told and left out.

@@ -29,9 +29,8 @@ impl App {
     /// Does what a user asked for.
     pub(super) fn act(&mut self, action: Action, ctx: &egui::Context) {
         match action {
-            Action::TryDemo => self.replace_scene(Action::TryDemo),
             Action::Open(path) if is_report(&path) => self.read_report(path, false),
-            Action::Open(path) => self.replace_scene(Action::Open(path)),
+            Action::OpenDemo | Action::TrainDemo | Action::Open(_) | Action::FindPoses(_) => self.replace_scene(action),
             Action::StartTraining => self.start_training(),
             Action::PauseTraining => {
                 if let Some(job) = self.state.job.as_ref().filter(|j| j.kind == JobKind::Train) {
@@ -151,6 +150,8 @@ impl App {
     fn open(&mut self, action: Action) {
         let command = match action {
             Action::Open(path) => Command::Open { path },
+            Action::TrainDemo => Command::DemoPhotos,
+            Action::FindPoses(photos) => Command::FindPoses(photos),
             _ => Command::Demo,
         };
         self.submit(command);

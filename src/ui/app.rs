@@ -13,8 +13,8 @@ use super::edits::EditStep;
 use super::layout::Layout;
 use super::palette::{Palette, shortcut_sheet};
 use super::panes::{
-    bars, dataset::PhotoThumbnails, empty, log, models::Models, object_thumbnails::ObjectThumbnails, objects, plan,
-    report::ReportPane, training,
+    bars, dataset::PhotoThumbnails, empty::FirstPage, log, models::Models, object_thumbnails::ObjectThumbnails,
+    objects, plan, report::ReportPane, training, unposed,
 };
 use super::state::AppState;
 use super::toasts::Toasts;
@@ -40,6 +40,7 @@ pub struct App {
     pub(super) question: Option<Question>,
     pub(super) palette: Palette,
     pub(super) sheet: bool,
+    first_page: FirstPage,
     photo_thumbnails: PhotoThumbnails,
     object_thumbnails: ObjectThumbnails,
     models: Models,
@@ -88,6 +89,7 @@ impl App {
             question: None,
             palette: Palette::default(),
             sheet: false,
+            first_page: FirstPage::default(),
             photo_thumbnails: PhotoThumbnails::default(),
             object_thumbnails: ObjectThumbnails::default(),
             models: Models::default(),
@@ -135,6 +137,7 @@ impl App {
         self.next_edit();
         self.send_chat();
         self.play(ctx);
+        self.first_page.update(ctx, &mut self.state, &self.viewport, &self.worker);
         self.photo_thumbnails.update(ctx, &mut self.state);
         self.object_thumbnails.update(ctx, &mut self.state, self.viewport.cloud().map(|c| &**c), &self.worker);
         while let Some(answer) = self.dialogs.answer() {
@@ -156,7 +159,12 @@ impl App {
     }
 
     fn keys_and_drops(&mut self, ctx: &egui::Context) {
-        if !self.palette.is_open() && self.state.error.is_none() && self.question.is_none() && !self.sheet {
+        if !self.palette.is_open()
+            && self.state.error.is_none()
+            && self.state.unposed.is_none()
+            && self.question.is_none()
+            && !self.sheet
+        {
             self.actions.extend(keys::pressed(ctx));
         }
         let dropped: Vec<PathBuf> =
@@ -200,7 +208,7 @@ impl App {
         }
         let Some(scene) = state.scene.clone() else {
             let canvas = Frame::new().fill(theme::CANVAS);
-            CentralPanel::no_frame().frame(canvas).show(ui, |ui| empty::show(ui, state, actions));
+            CentralPanel::no_frame().frame(canvas).show(ui, |ui| self.first_page.show(ui, state, actions));
             return;
         };
         if scene.dataset.is_some() && layout.shows(Pane::Dataset) {
@@ -274,6 +282,11 @@ impl App {
             && yes
         {
             self.give_up_and(question.action);
+        }
+        if let Some(photos) = &self.state.unposed
+            && !unposed::show(ctx, photos, &mut self.actions)
+        {
+            self.state.unposed = None;
         }
         if self.state.error.as_ref().is_some_and(|e| dialogs::show_error(ctx, e)) {
             self.state.error = None;

@@ -6,7 +6,9 @@ use std::sync::Arc;
 
 use super::actions::Action;
 pub(crate) use super::train_history::TrainHistory;
+use crate::io::unposed::Unposed;
 use crate::jobs::OpenedScene;
+use crate::jobs::demo::QUESTION;
 use crate::jobs::go_to::{Approached, Explored};
 use crate::jobs::models::ModelList;
 use crate::measure::Report;
@@ -122,8 +124,12 @@ pub struct AppState {
     pub(crate) toasts: Vec<Toast>,
     /// The error on screen.
     pub error: Option<ErrorBox>,
+    /// Photos that were opened and have no camera poses, until a user has decided what to do.
+    pub(crate) unposed: Option<Box<Unposed>>,
     /// Files and folders opened lately, newest first.
     pub recent: Vec<PathBuf>,
+    /// Small pictures of them, until the window takes them.
+    pub(crate) recent_pictures: Vec<(PathBuf, PhotoPixels)>,
     /// Photos loaded lately, by index and size limit; the window takes them out.
     pub(crate) photos: BTreeMap<(usize, u32), Arc<PhotoPixels>>,
     /// Photos that could not be loaded, by job, for the window to mark; the window takes them out.
@@ -286,9 +292,13 @@ impl AppState {
         let mut next = Vec::new();
         match outcome {
             Outcome::Opened(scene) => {
-                let is_demo = ended.is_some_and(|j| j.kind == JobKind::Demo);
-                self.opened(*scene, is_demo);
-                next.extend(is_demo.then_some(Action::StartTraining));
+                let kind = ended.map(|j| j.kind);
+                self.opened(*scene, matches!(kind, Some(JobKind::Demo | JobKind::DemoPhotos)));
+                next.extend(match kind {
+                    Some(JobKind::Demo) => Some(Action::Ask(QUESTION.into())),
+                    Some(JobKind::DemoPhotos) => Some(Action::StartTraining),
+                    _ => None,
+                });
             }
             Outcome::Trained { evaluations, out, semantics, facts } => {
                 let carried = semantics.is_some();
@@ -338,6 +348,9 @@ impl AppState {
             }
             Outcome::Thumbnails(map, pictures) => self.thumbnails = Some((map, pictures)),
             Outcome::Written(path) => self.toast(Tone::Good, format!("Wrote {}", path.display())),
+            Outcome::Unposed(photos) => self.unposed = Some(photos),
+            Outcome::Kept => {}
+            Outcome::RecentPictures(pictures) => self.recent_pictures = pictures,
             Outcome::Photo { index, max_side_px, pixels } => {
                 self.photos.insert((index, max_side_px), pixels);
             }

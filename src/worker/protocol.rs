@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::failure::Failure;
+use crate::io::unposed::Unposed;
 use crate::jobs::edit::EditRequest;
 use crate::jobs::go_to::{ApproachRequest, Approached, Explored};
 use crate::jobs::models::ModelList;
@@ -25,7 +26,7 @@ pub struct JobId(pub(crate) u64);
 /// What the window does first.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Start {
-    /// Makes the demo scene, opens it and trains it.
+    /// Opens the trained demo.
     Demo,
     /// Opens this scene.
     Scene(PathBuf),
@@ -40,8 +41,12 @@ pub enum Start {
 pub enum JobKind {
     /// Reads a file or folder.
     Open,
-    /// Makes the demo scene and reads it.
+    /// Reads the trained demo.
     Demo,
+    /// Makes the demo's photos and reads them.
+    DemoPhotos,
+    /// Finds camera poses.
+    Poses,
     /// Trains Gaussians.
     Train,
     /// Measures held-out quality.
@@ -80,6 +85,8 @@ impl JobKind {
         match self {
             Self::Open
             | Self::Demo
+            | Self::DemoPhotos
+            | Self::Poses
             | Self::Train
             | Self::Evaluate
             | Self::Objects
@@ -116,8 +123,12 @@ pub enum Command {
         /// File or folder.
         path: PathBuf,
     },
-    /// Render the demo scene into posed photos, unless that was done before, and read them.
+    /// Read the trained demo that ships with the program.
     Demo,
+    /// Render the demo scene into posed photos, unless that was done before, and read them.
+    DemoPhotos,
+    /// Find the camera poses of photos with programs that are installed, and read the result.
+    FindPoses(Box<Unposed>),
     /// Fit Gaussians to photos.
     Train {
         /// The photos.
@@ -176,6 +187,15 @@ pub enum Command {
         /// The file.
         path: PathBuf,
     },
+    /// Keep a small picture of a scene for the first page.
+    KeepPicture {
+        /// Where the scene lies.
+        of: PathBuf,
+        /// The picture.
+        pixels: Arc<PhotoPixels>,
+    },
+    /// Read the pictures that were kept of these scenes.
+    RecentPictures(Vec<PathBuf>),
     /// Fetch a model of the catalog, or take over files that somebody brings.
     InstallModel {
         /// Its name.
@@ -226,13 +246,15 @@ impl Command {
         match self {
             Self::Open { .. } => JobKind::Open,
             Self::Demo => JobKind::Demo,
+            Self::DemoPhotos => JobKind::DemoPhotos,
+            Self::FindPoses(_) => JobKind::Poses,
             Self::Train { .. } => JobKind::Train,
             Self::Evaluate { .. } => JobKind::Evaluate,
             Self::FindObjects(_) => JobKind::Objects,
             Self::EditObjects { .. } => JobKind::Edit,
             Self::Export { .. } => JobKind::Export,
             Self::Photo { .. } => JobKind::Photo,
-            Self::Picture { .. } => JobKind::Picture,
+            Self::Picture { .. } | Self::KeepPicture { .. } | Self::RecentPictures(_) => JobKind::Picture,
             Self::Thumbnails { .. } => JobKind::Thumbnails,
             Self::ListModels => JobKind::Models,
             Self::Explore { .. } => JobKind::Explore,
@@ -250,13 +272,17 @@ impl Command {
             |p: &PathBuf| p.file_name().map_or_else(|| p.display().to_string(), |n| n.to_string_lossy().into_owned());
         match self {
             Self::Open { path } => format!("Opening {}", name(path)),
-            Self::Demo => "Rendering the demo scene".into(),
+            Self::Demo => "Opening the demo".into(),
+            Self::DemoPhotos => "Rendering the demo scene".into(),
+            Self::FindPoses(photos) => format!("Finding camera poses of {}", name(&photos.folder)),
             Self::Train { dataset, .. } => format!("Training {}", dataset.name),
             Self::Evaluate { dataset, .. } => format!("Evaluating {}", dataset.name),
             Self::FindObjects(request) => format!("Finding objects in {}", request.dataset.name),
             Self::EditObjects { .. } => "Editing objects".into(),
             Self::Export { path, .. } | Self::Picture { path, .. } => format!("Writing {}", name(path)),
             Self::Photo { photo, .. } => format!("Loading {}", photo.name),
+            Self::KeepPicture { of, .. } => format!("Keeping a picture of {}", name(of)),
+            Self::RecentPictures(_) => "Reading pictures of recent scenes".into(),
             Self::Thumbnails { .. } => "Rendering thumbnails".into(),
             Self::ListModels => "Listing models".into(),
             Self::Explore { .. } => "Exploring where one can go".into(),
@@ -276,6 +302,8 @@ impl Command {
 pub enum Outcome {
     /// A scene was read.
     Opened(Box<OpenedScene>),
+    /// There are photos, and nobody knows from where they were taken.
+    Unposed(Box<Unposed>),
     /// Training is done; the Gaussians lie in the slot.
     Trained {
         /// Evaluations of the whole run, oldest first.
@@ -295,6 +323,10 @@ pub enum Outcome {
     Edited(Arc<SemanticMap>),
     /// A file was written.
     Written(PathBuf),
+    /// A picture was kept.
+    Kept,
+    /// Pictures that were kept, with the scenes that they are of.
+    RecentPictures(Vec<(PathBuf, PhotoPixels)>),
     /// A report was read or measured.
     Report {
         /// Where it lies.

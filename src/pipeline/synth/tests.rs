@@ -540,7 +540,7 @@ fn the_demo_shows_every_thing_and_part() {
         let enough = if identity.level == Level::Object { 40 } else { 4 };
         assert!(identity.views >= enough, "{} is seen in {} of 64 photos", identity.path, identity.views);
     }
-    assert!(!demo::demo_is_written(out.path()), "other settings than the demo's");
+    assert!(!demo::demo_is_written(out.path(), &demo::demo_options()), "other settings than the demo's");
 }
 
 /// Not a check: renders the scene named by `SYNTH_SCENE` (else the demo) into `SYNTH_OUT`, to look at.
@@ -553,7 +553,7 @@ fn render_to_look_at() {
             let options = SynthOptions { views: 6, held_out: 1, width_px: 480, height_px: 360, ..Default::default() };
             run(Path::new(&scene), &options, Path::new(&out), &mut Silent).unwrap()
         }
-        None => demo::write_demo(Path::new(&out), &mut Silent).unwrap(),
+        None => demo::write_demo(Path::new(&out), &demo::demo_options(), &mut Silent).unwrap(),
     };
     println!("{:.2} s, {} triangles, {} points", report.secs, report.triangles, report.points);
 }

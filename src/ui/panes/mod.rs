@@ -11,3 +11,4 @@ pub(crate) mod plan;
 pub(crate) mod plots;
 pub(crate) mod report;
 pub(crate) mod training;
+pub(crate) mod unposed;

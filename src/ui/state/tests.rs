@@ -95,9 +95,11 @@ fn opening_replaces_the_scene_and_is_remembered() {
 }
 
 #[test]
-fn the_demo_is_trained_at_once_and_not_listed_as_recent() {
-    let mut s = fold([started(JobKind::Demo)]);
+fn the_demo_is_asked_or_trained_at_once_and_not_listed_as_recent() {
+    let mut s = fold([started(JobKind::DemoPhotos)]);
     assert_eq!(s.apply(opened("demo", &[])), [Action::StartTraining]);
+    s.apply(started(JobKind::Demo));
+    assert_eq!(s.apply(opened("demo", &[])), [Action::Ask("a button of the red controller".into())]);
     assert!(s.recent.is_empty());
     s.apply(started(JobKind::Open));
     assert!(s.apply(opened("other", &[])).is_empty(), "nothing else is");

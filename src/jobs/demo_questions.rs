@@ -1,19 +1,17 @@
-//! The demo's questions: objects found from one labeled photo, asked for in a held-out view.
+//! The demo's questions: objects found from the labels of a few photos, asked for in held-out views.
 
 use std::path::Path;
 use std::time::Instant;
 
 use serde::Serialize;
 
-use super::progress::Console;
-use super::{CliError, output};
+use super::evaluate::Comparison;
+use super::{JobError, export, query};
 use crate::io::SceneFolder;
 use crate::io::labels::Labels;
-use crate::jobs::evaluate::Comparison;
-use crate::jobs::query;
 use crate::models;
 use crate::pipeline::observer::{Observer, Severity, Silent};
-use crate::pipeline::semantics::build_map::{FindOptions, Found, Tools, find_objects};
+use crate::pipeline::semantics::build_map::{FindOptions, Tools, find_objects};
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::protocols::{AskedScene, LabeledView, categories, masks};
 use crate::pipeline::semantics::query_engine::QueryEngine;
@@ -21,7 +19,7 @@ use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
 use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::Renderer;
-use crate::scene::{LevelFilter, Photo};
+use crate::scene::{LevelFilter, Photo, SemanticMap};
 
 /// What is asked; the last two are not in the scene.
 const QUESTIONS: [&str; 7] = [
@@ -33,6 +31,8 @@ const QUESTIONS: [&str; 7] = [
     "a giraffe",
     "the trunk of the elephant",
 ];
+/// Photos whose labels are used at most where objects are found while one waits.
+const MAX_SEEDS: usize = 3;
 
 /// What was asked and answered.
 #[derive(Debug, Serialize)]
@@ -64,15 +64,17 @@ pub(crate) struct Queries {
     pub(crate) asked: Vec<Asked>,
 }
 
-/// Finds objects from the masks of one photo in `photos` (and of more where much is unknown), stores
-/// them in `scene`, and asks. Heat maps of the answers go to `pictures`.
-pub(crate) fn run(
-    scene: &Path,
+/// Finds objects from the labels of one photo in `photos` (and of more, up to `max_seeds`, where much is
+/// unknown).
+///
+/// # Errors
+/// If a photo or its labels cannot be read, or the observer asks to stop.
+pub(crate) fn find(
     photos: &Path,
     job: &Comparison,
-    pictures: &Path,
-    console: &mut Console,
-) -> Result<Queries, CliError> {
+    max_seeds: usize,
+    observer: &mut dyn Observer,
+) -> Result<SemanticMap, JobError> {
     let mut segmenter = FileMasks(Labels::open(photos)?);
     let training: Vec<Photo> = (0..job.dataset.photos.len())
         .filter(|i| !job.views.contains(i))
@@ -80,25 +82,45 @@ pub(crate) fn run(
         .collect();
     let mut encoder = models::encoder(models::DEMO)?;
     let options =
-        FindOptions { track: TrackOptions { max_seeds: 3, ..TrackOptions::default() }, ..FindOptions::default() };
+        FindOptions { track: TrackOptions { max_seeds, ..TrackOptions::default() }, ..FindOptions::default() };
+    let tools = Tools { segmenter: &mut segmenter, follower: None, encoder: Some(&mut *encoder) };
+    Ok(find_objects(&job.cloud, &training, &job.settings, tools, &options, observer)?.map)
+}
+
+/// [`find`], stored in the folder `scene`; and [`ask`].
+///
+/// # Errors
+/// As these, and if the scene cannot be written.
+pub(crate) fn find_and_ask(
+    scene: &Path,
+    photos: &Path,
+    job: &Comparison,
+    pictures: &Path,
+    observer: &mut dyn Observer,
+) -> Result<Queries, JobError> {
     let start = Instant::now();
-    let found = find_objects(
-        &job.cloud,
-        &training,
-        &job.settings,
-        Tools { segmenter: &mut segmenter, follower: None, encoder: Some(&mut *encoder) },
-        &options,
-        console,
-    );
-    let Found { map, .. } = found.map_err(|e| CliError::of_work(e, "the trained scene is saved"))?;
+    let map = find(photos, job, MAX_SEEDS, observer)?;
     let find_secs = start.elapsed().as_secs_f64();
     let (kept, _) = SceneFolder::hold(scene, "storing objects")?.replace_map(job.state.as_deref(), &map, &job.cloud)?;
     if let Some(kept) = kept {
-        console.note(Severity::Info, format!("The objects and parts before are kept in {}", kept.display()));
+        observer.note(Severity::Info, format!("The objects and parts before are kept in {}", kept.display()));
     }
-    console.note(Severity::Info, format!("{} objects and parts found", map.identities.len()));
+    observer.note(Severity::Info, format!("{} objects and parts found", map.identities.len()));
+    Ok(Queries { find_secs, ..ask(&map, photos, job, Some(pictures))? })
+}
 
-    output::make_folder(pictures)?;
+/// Asks for every label of the views of `job`, which lie in `photos`, and the questions in the first of them.
+/// Heat maps of the answers go to `pictures`.
+///
+/// # Errors
+/// If a label cannot be read, a view not be drawn or a picture not be written.
+pub(crate) fn ask(
+    map: &SemanticMap,
+    photos: &Path,
+    job: &Comparison,
+    pictures: Option<&Path>,
+) -> Result<Queries, JobError> {
+    let mut segmenter = FileMasks(Labels::open(photos)?);
     let mut asker = QueryEngine::new(map.language.as_ref())?;
     let (mut units, mut asked) = (Vec::new(), Vec::new());
     let mut renderer = Renderer::new();
@@ -115,22 +137,25 @@ pub(crate) fn run(
         };
         let mut failed = None;
         let mut by_name = |text: &str| {
-            asker.ask(&map, text, LevelFilter::Auto).unwrap_or_else(|e| {
+            asker.ask(map, text, LevelFilter::Auto).unwrap_or_else(|e| {
                 failed.get_or_insert(e);
                 None
             })
         };
-        units.extend(masks::compare(&mut AskedScene { map: &map, ask: &mut by_name }, &labeled));
+        units.extend(masks::compare(&mut AskedScene { map, ask: &mut by_name }, &labeled));
         if let Some(error) = failed {
             return Err(error.into());
         }
         for (n, question) in QUESTIONS.iter().enumerate().filter(|_| k == 0) {
             let start = Instant::now();
-            let Some(answered) = asker.ask(&map, question, LevelFilter::Auto)? else { continue };
+            let Some(answered) = asker.ask(map, question, LevelFilter::Auto)? else { continue };
             let mask = answered.mask(&view, &map.identities, 1);
             let millis = start.elapsed().as_secs_f64() * 1e3;
-            let path = pictures.join(format!("{n}_{}.png", question.replace([' ', '\''], "_")));
-            query::write_heat(&path, (&job.cloud, &job.settings), &camera, &answered.heat(&view))?;
+            if let Some(pictures) = pictures {
+                export::make_folder(pictures)?;
+                let path = pictures.join(format!("{n}_{}.png", question.replace([' ', '\''], "_")));
+                query::write_heat(&path, (&job.cloud, &job.settings), &camera, &answered.heat(&view))?;
+            }
             asked.push(Asked {
                 question: (*question).to_owned(),
                 verdict: answered.answer.verdict(),
@@ -141,5 +166,5 @@ pub(crate) fn run(
         }
     }
     let [object_miou, part_miou] = masks::by_level(&units);
-    Ok(Queries { seeds: map.seeds.clone(), find_secs, object_miou, part_miou, asked })
+    Ok(Queries { seeds: map.seeds.clone(), find_secs: 0.0, object_miou, part_miou, asked })
 }
