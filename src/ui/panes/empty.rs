@@ -110,7 +110,7 @@ impl FirstPage {
                 let wide = vec2(ui.available_width(), 36.0);
                 let mut button = |ui: &mut Ui, button: Button<'_>, action: Action| {
                     let tip = format!("{}  {}", action.tooltip(), keys::label(ui.ctx(), &action));
-                    if ui.add(button.min_size(wide)).on_hover_text(tip).clicked() {
+                    if ui.add_sized(wide, button).on_hover_text(tip).clicked() {
                         actions.push(action);
                     }
                 };
