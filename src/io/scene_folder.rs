@@ -53,12 +53,7 @@ impl SceneFolder {
     ///
     /// # Errors
     /// If a file cannot be written, or the Gaussians are not valid.
-    pub(crate) fn save(
-        &self,
-        info: &SceneInfo,
-        cloud: &GaussianCloud,
-        map: Option<&SemanticMap>,
-    ) -> Result<String, IoError> {
+    pub fn save(&self, info: &SceneInfo, cloud: &GaussianCloud, map: Option<&SemanticMap>) -> Result<String, IoError> {
         let state = format!("{:032x}", rand::random::<u128>());
         let info = SceneInfo { version: VERSION, state: Some(state.clone()), ..info.clone() };
         let stored = map.map(|map| {

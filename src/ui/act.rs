@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::app::App;
 use super::chat::Snapshot;
+use super::color_by::ColorBy;
 use super::context::SceneContext;
 use super::dialogs::Question;
 use super::edits::EditStep;
@@ -17,13 +18,13 @@ use crate::jobs::find_objects::Request;
 use crate::jobs::go_to::{ApproachRequest, Approached};
 use crate::measure::is_report;
 use crate::navigate::FRAMES;
-use crate::navigate::target::Wish;
+use crate::navigate::target::{Side, Wish};
 use crate::pipeline::semantics::edit::Edit;
 use crate::pipeline::train::TrainConfig;
 use crate::scene::IdentityId;
 use crate::scene::plan::When;
 use crate::ui::actions::{Action, Pane};
-use crate::worker::{Command, JobId, JobKind};
+use crate::worker::{Command, JobId, JobKind, ViewMode};
 
 impl App {
     /// Does what a user asked for.
@@ -42,6 +43,8 @@ impl App {
                     self.worker.cancel(job.id);
                 }
             }
+            Action::Dismiss if self.viewport.picking.selected().is_some() => self.view(&Action::Select(None), ctx),
+            Action::Dismiss => self.act(Action::Cancel, ctx),
             Action::Evaluate => self.evaluate(),
             Action::FindObjects => self.find_objects(None),
             Action::FetchModel(id) => self.install_model(id, None),
@@ -51,7 +54,14 @@ impl App {
                     self.viewport.queries.ask(&text, &semantics);
                 }
             }
-            Action::Show(mode) => self.layout.mode = mode,
+            Action::Show(mode) => {
+                self.layout.mode = mode;
+                // The picture is the picture.
+                if mode == ViewMode::Rgb {
+                    self.viewport.queries.tint(ColorBy::Masks);
+                }
+            }
+            Action::Tint(by) => self.viewport.queries.tint(by),
             Action::OpenReport(path) => self.read_report(path, false),
             Action::CompareReport(path) => self.read_report(path, true),
             Action::EndComparison => self.state.second_report = None,
@@ -103,7 +113,9 @@ impl App {
             | Action::SavePath
             | Action::ExportVideo
             | Action::SaveChat => self.choose(action),
+            Action::IsolateSelected | Action::HideSelected | Action::GoToSelected => self.act_on_selected(&action, ctx),
             Action::FrameScene
+            | Action::Select(_)
             | Action::Paint(_)
             | Action::Isolate(_)
             | Action::Hide(_)
@@ -120,6 +132,19 @@ impl App {
     fn view(&mut self, action: &Action, ctx: &egui::Context) {
         let now = ctx.input(|i| i.time);
         self.viewport.act(action, &self.state, &self.worker, now);
+    }
+
+    /// Does what a key means for what is selected.
+    fn act_on_selected(&mut self, action: &Action, ctx: &egui::Context) {
+        let Some(id) = self.viewport.picking.selected() else {
+            return self.state.toast(Tone::Info, "Nothing is selected: click an object in the view.");
+        };
+        let action = match action {
+            Action::HideSelected => Action::Hide(id),
+            Action::GoToSelected => Action::GoToTarget(id, Side::Best),
+            _ => Action::Isolate(Some(id).filter(|_| !self.viewport.visibility.is_isolated())),
+        };
+        self.act(action, ctx);
     }
 
     /// Opens something else; asks first if that ends a running job.

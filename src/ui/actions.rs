@@ -12,6 +12,7 @@ use crate::measure::{Knobs, StageName};
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::edit::Edit;
 use crate::scene::{IdentityId, NOBODY};
+use crate::ui::color_by::ColorBy;
 use crate::worker::{Start, ViewMode};
 
 /// A part of the window that can be hidden; the order is that of the menu.
@@ -142,7 +143,9 @@ actions! {
     StartTraining: "Start training",
         "Fit Gaussians to the photos. Resumes from the last checkpoint if the settings are the same.", "Ctrl+T";
     PauseTraining: "Pause or resume training", "Pause training without losing its state.", "T";
-    Cancel: "Cancel the running job", "Stop the running job at its next step. What is trained so far stays.", "Escape";
+    Cancel: "Cancel the running job", "Stop the running job at its next step. What is trained so far stays.";
+    Dismiss: "Deselect, or cancel the running job", "Deselect what is selected; with nothing selected, stop the running job.",
+        "Escape";
     Evaluate: "Evaluate on held-out photos", "PSNR and SSIM on the photos that training does not see.";
     FindObjects: "Find objects and parts",
         "Lift the masks that came with the photos, or else regions of uniform color, to the Gaussians and every view.";
@@ -164,6 +167,12 @@ actions! {
     ExportVideo: "Export video\u{2026}", "H.264 (.mp4), .gif, .webp, or .png frames in a folder.";
     StartChat: "Chat", "Ask in plain sentences: show me the lid of the kettle, then step back.", "Enter";
     SaveChat: "Save conversation\u{2026}", "As Markdown, or .json, with every step and its result.";
+    Select(id: Option<IdentityId>): id.map_or_else(|| "Deselect".into(), |id| format!("Select #{id}")),
+        "Outline it in the view; keys and menus are about it.";
+    IsolateSelected: "Isolate the selected object or part",
+        "Draw nothing else, or everything again.", "I";
+    HideSelected: "Hide the selected object or part", "Leave it out of the view.", "H";
+    GoToSelected: "Go to the selected object or part", "Fly to where it is seen best.", "G";
     Isolate(only: Option<IdentityId>): only.map_or_else(|| "Show all objects".into(), |id| format!("Show only #{id}")),
         "Draw everything again that was hidden.";
     Hide(id: IdentityId): format!("Hide or show #{id}"), "Leave it out of the view, or draw it again.";
@@ -183,16 +192,18 @@ actions! {
     AddPainted: "Add what is painted", "Make the painted Gaussians a new object or part.";
     Undo: "Undo the last edit of objects", "Take the last edit of objects and parts back.", "Ctrl+Z";
     Redo: "Redo the last edit of objects", "Make the edit again that was undone.", "Ctrl+Y";
-    FrameScene: "Frame the scene", "Move back until all of the scene is in view.", "F";
+    FrameScene: "Frame the selection or the scene", "Move until all of what is selected is in view, or else the whole scene.", "F";
     ResetView: "Reset the view", "Return to the view with which the scene opened.", "Home";
     TurnUp(axis: Axis): format!("Make {} the up direction", axis.text()), "For scenes that lie on their side.";
-    PreviousPhoto: "Previous photo", "OverlaySettings through the camera of the previous photo.", "[";
-    NextPhoto: "Next photo", "OverlaySettings through the camera of the next photo.", "]";
-    GoToPhoto(index: usize): format!("Go to photo {}", index + 1), "OverlaySettings through the camera of this photo.";
+    PreviousPhoto: "Previous photo", "Look through the camera of the previous photo.", "[";
+    NextPhoto: "Next photo", "Look through the camera of the next photo.", "]";
+    GoToPhoto(index: usize): format!("Go to photo {}", index + 1), "Look through the camera of this photo.";
     Show(mode: ViewMode): match mode {
             ViewMode::Rgb => "Show RGB".to_owned(),
             other => format!("Show {}", other.text().to_lowercase()),
         }, "Choose what the viewport shows.";
+    Tint(by: ColorBy): format!("Color by {}", by.text().to_lowercase()),
+        "Color what is in view by what it is; once more for the picture.";
     ToggleCompare: "Compare with the photo", "Show the photo beside the rendering with a slider between them.", "C";
     ToggleCameras: "Show or hide cameras", "Draw the camera of every photo into the view.", "V";
     TogglePane(pane: Pane): format!("Show or hide the {} pane", pane.text().to_lowercase()),
@@ -222,6 +233,7 @@ impl Action {
         all.retain(|a| *a != Self::AddPainted);
         all.extend([Self::Isolate(None), Self::Paint(Some(NOBODY))]);
         all.extend(ViewMode::VARIANTS.iter().map(|mode| Self::Show(*mode)));
+        all.extend(ColorBy::VARIANTS.iter().map(|by| Self::Tint(*by)));
         all.extend(Pane::VARIANTS.iter().map(|pane| Self::TogglePane(*pane)));
         all.extend(Axis::VARIANTS.iter().map(|axis| Self::TurnUp(*axis)));
         all
@@ -245,6 +257,9 @@ impl Action {
     pub(crate) fn shortcut(&self) -> Option<Shortcut> {
         let key = match self {
             Self::Show(ViewMode::Rgb) => "1",
+            Self::Tint(ColorBy::Heat) => "2",
+            Self::Tint(ColorBy::Objects) => "3",
+            Self::Tint(ColorBy::Features) => "4",
             Self::Show(ViewMode::Depth) => "5",
             Self::Show(ViewMode::Difference) => "6",
             Self::Show(ViewMode::Alpha) => "7",

@@ -12,6 +12,7 @@ pub mod app;
 pub(crate) mod camera;
 pub(crate) mod chat;
 pub(crate) mod chat_model;
+pub mod color_by;
 mod context;
 pub(crate) mod dialogs;
 mod edits;

@@ -63,7 +63,7 @@ impl<T> Versioned<T> {
     }
 
     /// Its generation, from 1.
-    pub(crate) fn generation(&self) -> u64 {
+    pub fn generation(&self) -> u64 {
         self.generation
     }
 }

@@ -14,6 +14,7 @@ use super::view_renderer::ViewRenderer;
 pub use super::view_request::{QualityBudget, SkipPasses, ViewPicture, ViewRequest, ViewResult};
 use crate::jobs::query::ViewMaps;
 use crate::render::{RenderError, Renderer};
+use crate::scene::Camera;
 use crate::scene::resource_log::{self, Sort};
 
 /// How long the eye rests before working memory is given back.
@@ -23,6 +24,8 @@ const REST: Duration = Duration::from_secs(2);
 #[derive(Clone, Debug)]
 pub struct MappedView {
     pub(crate) ticket: u64,
+    /// Whether the eye rests; else they are of the resolution that keeps up with it.
+    pub(crate) exact: bool,
     /// The pixels, or why they could not be drawn.
     pub(crate) maps: Result<Arc<ViewMaps>, Failure>,
     /// Seconds that drawing them took.
@@ -68,12 +71,20 @@ impl ViewLane {
                     Some(known) => painter.insert(known),
                     None => painter.insert(ViewRenderer::without_gpu(request.skip.gpu)),
                 };
-                out.publish(painter.draw(&request));
-                repaint();
-                // What the pixels belong to comes second, and only if no one waits for a frame.
-                let start = Instant::now();
-                if lock(&box_.0).request.is_none()
-                    && let Some(maps) = maps_of(&mut mapper, &request)
+                let drawn = painter.draw(&request);
+                let (exact, start) = (request.budget == QualityBudget::Full, Instant::now());
+                let camera = match &drawn {
+                    // While the eye moves both come together, or masks would trail behind.
+                    Ok(picture) if !exact => picture.camera.clone(),
+                    _ => {
+                        out.publish(drawn.clone());
+                        repaint();
+                        request.camera.clone()
+                    }
+                };
+                // At rest it comes second, and only if no one waits for a frame.
+                if (!exact || lock(&box_.0).request.is_none())
+                    && let Some(maps) = maps_of(&mut mapper, &request, &camera)
                 {
                     let secs = start.elapsed().as_secs_f64();
                     if let Ok(maps) = &maps
@@ -86,7 +97,11 @@ impl ViewLane {
                         // Buffers may be in any state.
                         mapper = Renderer::new();
                     }
-                    mapped.publish(MappedView { ticket: request.ticket, maps: maps.map(Arc::new), secs });
+                    mapped.publish(MappedView { ticket: request.ticket, exact, maps: maps.map(Arc::new), secs });
+                    repaint();
+                }
+                if !exact {
+                    out.publish(drawn);
                     repaint();
                 }
             }
@@ -156,13 +171,13 @@ fn next(mailbox: &(Mutex<Mailbox>, Condvar), patience: Option<Duration>) -> Wait
     }
 }
 
-/// What the pixels of a resting view belong to; `None` if no one wants to know.
-fn maps_of(renderer: &mut Renderer, request: &ViewRequest) -> Option<Result<ViewMaps, Failure>> {
+/// What the pixels of a view belong to; `None` if no one wants to know.
+fn maps_of(renderer: &mut Renderer, request: &ViewRequest, camera: &Camera) -> Option<Result<ViewMaps, Failure>> {
     let semantics = request.semantics.as_ref().filter(|s| s.of.len() == request.cloud.len())?;
-    if request.budget != QualityBudget::Full {
+    if request.budget != QualityBudget::Full && !request.follow {
         return None;
     }
-    let (cloud, camera, settings) = (&request.cloud, &request.camera, &request.settings);
+    let (cloud, settings) = (&request.cloud, &request.settings);
     let draw = AssertUnwindSafe(|| {
         ViewMaps::draw(renderer, (cloud, settings), semantics, camera, request.codes, !request.skip.parts)
     });
@@ -180,7 +195,7 @@ fn maps_of(renderer: &mut Renderer, request: &ViewRequest) -> Option<Result<View
 mod tests {
     use super::*;
     use crate::render::RenderSettings;
-    use crate::scene::{Camera, GaussianCloud, SemanticMap};
+    use crate::scene::{GaussianCloud, SemanticMap};
     use crate::scene::{Identities, Level, NOBODY};
     use crate::worker::view_modes::ViewMode;
     use glam::DVec3;
@@ -209,6 +224,7 @@ mod tests {
                 budget: QualityBudget::Full,
                 photo: None,
                 semantics: Some(Arc::new(map.clone())),
+                follow: false,
                 codes: true,
                 skip: SkipPasses { depth: false, parts: false, gpu: true, buffers: false },
                 timed: false,

@@ -11,6 +11,9 @@ use super::view_request::{QualityBudget, ViewPicture, ViewRequest, ViewResult};
 use crate::render::{self, BackendChoice, Frame, RenderSettings, Renderer};
 use crate::scene::Camera;
 
+/// Moving frames are no smaller than this, px of their longer side: below, one does not see where one flies.
+const LEAST_SIDE_PX: f64 = 300.0;
+
 /// Draws requests, and learns how fast it can.
 pub(super) struct ViewRenderer {
     pub(super) renderer: Renderer,
@@ -47,7 +50,7 @@ impl ViewRenderer {
     }
 
     pub(super) fn draw(&mut self, request: &ViewRequest) -> ViewResult {
-        let camera = self.fitting_camera(&request.camera, request.budget);
+        let camera = self.fitting_camera(&request.camera, request.budget, request.follow);
         let full = camera == request.camera;
         // Without times there is still a frame.
         let _ = self.renderer.time_stages(request.timed);
@@ -108,17 +111,20 @@ impl ViewRenderer {
         });
     }
 
-    /// The camera at a resolution that is likely to keep to the budget.
-    fn fitting_camera(&self, camera: &Camera, budget: QualityBudget) -> Camera {
+    /// The camera at a resolution that is likely to keep to the budget, of which masks that follow take a half.
+    fn fitting_camera(&self, camera: &Camera, budget: QualityBudget, follow: bool) -> Camera {
         let pixels = f64::from(camera.width_px) * f64::from(camera.height_px);
         // The first frame says how fast this machine is with this scene; it must be quick itself.
         let cost = self.cost.unwrap_or(Speed { fixed_secs: 0.0, secs_per_px: 4e-7 });
-        let Some(secs) = budget.secs() else { return camera.clone() };
+        let Some(secs) = budget.secs().map(|secs| if follow { 0.5 * secs } else { secs }) else {
+            return camera.clone();
+        };
         // Where the fixed part alone breaks the budget, smaller frames would help no one.
         let left = (secs - cost.fixed_secs).max(0.4 * secs);
         let scale = (left / (cost.secs_per_px * pixels)).sqrt().clamp(0.2, 1.0);
         // In quarter-octave steps, so that the frame does not change its grain all the time.
         let scale = 2.0_f64.powf((scale.log2() * 4.0).floor() / 4.0);
+        let scale = scale.max(LEAST_SIDE_PX / f64::from(camera.width_px.max(camera.height_px)));
         if scale >= 1.0 {
             return camera.clone();
         }
@@ -142,13 +148,16 @@ mod tests {
             cost: Some(Speed { fixed_secs, secs_per_px }),
         };
         let slow = of(0.0, 1e-6);
-        let moving = slow.fitting_camera(&camera, QualityBudget::Moving);
-        assert!(moving.width_px < 300, "{}", moving.width_px);
+        let moving = slow.fitting_camera(&camera, QualityBudget::Moving, false);
+        assert_eq!(moving.width_px, 300, "never smaller");
+        let quicker = of(0.0, 2e-7);
+        let fits = |follow| quicker.fitting_camera(&camera, QualityBudget::Moving, follow).width_px;
+        assert!(300 < fits(true) && fits(true) < fits(false) && fits(false) < 1000, "{} {}", fits(true), fits(false));
         assert!((f64::from(moving.width_px) / f64::from(moving.height_px) - 5.0 / 3.0).abs() < 0.02);
-        assert!(slow.fitting_camera(&camera, QualityBudget::Shared).width_px > moving.width_px);
-        assert_eq!(slow.fitting_camera(&camera, QualityBudget::Full), camera);
-        assert_eq!(of(0.0, 1e-9).fitting_camera(&camera, QualityBudget::Moving), camera);
+        assert!(slow.fitting_camera(&camera, QualityBudget::Shared, false).width_px > moving.width_px);
+        assert_eq!(slow.fitting_camera(&camera, QualityBudget::Full, false), camera);
+        assert_eq!(of(0.0, 1e-9).fitting_camera(&camera, QualityBudget::Moving, false), camera);
         // A scene whose Gaussians alone take longer than the budget is not drawn any smaller for it.
-        assert_eq!(of(5.0, 1e-9).fitting_camera(&camera, QualityBudget::Moving), camera);
+        assert_eq!(of(5.0, 1e-9).fitting_camera(&camera, QualityBudget::Moving, false), camera);
     }
 }

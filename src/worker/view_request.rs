@@ -25,6 +25,8 @@ pub struct ViewRequest {
     pub photo: Option<Arc<PhotoPixels>>,
     /// Objects and parts of the Gaussians, to be drawn too once the eye rests.
     pub semantics: Option<Arc<SemanticMap>>,
+    /// Whether they are drawn while the eye moves too, at the frame's resolution: masks are on screen.
+    pub follow: bool,
     /// Whether blended codes are wanted too.
     pub codes: bool,
     /// What is left out.

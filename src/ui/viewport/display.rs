@@ -107,19 +107,19 @@ impl Display {
         self.error = None;
     }
 
-    /// What the pixels belong to, if that has come since for the request with this ticket: maps of an earlier one
-    /// are of another view.
-    pub(super) fn take_maps(&mut self, maps: &Slot<MappedView>, ticket: u64) -> Option<Versioned<ViewMaps>> {
+    /// What the pixels belong to, if that has come since, and whether the view rests: then maps of an earlier request
+    /// than that with this ticket are of another view; maps of a moving view are those of its newest frame.
+    pub(super) fn take_maps(&mut self, maps: &Slot<MappedView>, ticket: u64) -> Option<(Versioned<ViewMaps>, bool)> {
         let (generation, mapped) = maps.newer_than(self.mapped)?;
         self.mapped = generation;
         if let Some(times) = &mut self.times {
             times.add_maps(mapped.secs);
         }
-        if mapped.ticket != ticket {
+        if mapped.exact && mapped.ticket != ticket {
             return None;
         }
         match &mapped.maps {
-            Ok(maps) => return Some(Versioned::new(Arc::clone(maps))),
+            Ok(maps) => return Some((Versioned::new(Arc::clone(maps)), mapped.exact)),
             Err(failure) => self.unmapped = Some(report(failure)),
         }
         None
@@ -215,12 +215,15 @@ mod tests {
     #[test]
     fn maps_of_an_earlier_view_are_left_out() {
         let (mut display, maps) = (Display::default(), Slot::default());
-        let mapped = |ticket, maps| MappedView { ticket, maps, secs: 0.0 };
+        let mapped = |ticket, maps| MappedView { ticket, exact: true, maps, secs: 0.0 };
         maps.publish(mapped(1, Ok(Arc::default())));
         assert!(display.take_maps(&maps, 2).is_none());
         maps.publish(mapped(2, Ok(Arc::default())));
         assert!(display.take_maps(&maps, 2).is_some());
         assert!(display.take_maps(&maps, 2).is_none(), "taken once");
+        maps.publish(MappedView { exact: false, ..mapped(2, Ok(Arc::default())) });
+        let moving = display.take_maps(&maps, 9).map(|(_, exact)| exact);
+        assert_eq!(moving, Some(false), "those of a moving view come with its frames, whatever is asked for by now");
         maps.publish(mapped(3, Err(failure())));
         assert!(display.take_maps(&maps, 3).is_none() && display.errors().next().is_some());
         display.forget_maps();

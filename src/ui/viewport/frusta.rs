@@ -14,7 +14,7 @@ use crate::ui::actions::Action;
 const REACH: f32 = 12.0;
 
 impl Viewport {
-    /// Draws every camera; a click on one looks through it.
+    /// Draws every camera; a click on one looks through it. Whether the cursor points at one.
     pub(super) fn show_frusta(
         &self,
         ui: &Ui,
@@ -23,8 +23,8 @@ impl Viewport {
         response: &Response,
         layout: &Layout,
         actions: &mut Vec<Action>,
-    ) {
-        let Some(dataset) = &scene.dataset else { return };
+    ) -> bool {
+        let Some(dataset) = &scene.dataset else { return false };
         let painter = ui.painter_at(rect);
         let eye = self.overlay_camera(rect);
         let size = 0.09 * scene.home.bounds.radius();
@@ -61,6 +61,7 @@ impl Viewport {
                 actions.push(Action::GoToPhoto(i));
             }
         }
+        nearest.is_some()
     }
 }
 

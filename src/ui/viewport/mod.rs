@@ -6,9 +6,13 @@ pub mod eye;
 pub(crate) mod frame_times;
 mod frusta;
 mod input;
+mod legend;
+mod marks;
+mod outline;
 mod overlay;
 pub(crate) mod overrides;
 mod photo;
+pub mod picking;
 pub(crate) mod query;
 mod request;
 mod route;
@@ -22,10 +26,12 @@ use glam::{DVec2, DVec3};
 use self::brush::Brush;
 use self::display::Display;
 use self::eye::Eye;
+use self::marks::Marks;
 use self::overrides::RenderOverrides;
 use self::photo::PhotoView;
+use self::picking::Picking;
 use self::query::Queries;
-use self::request::{Requests, Wanted};
+use self::request::{Moved, Requests, Wanted};
 use self::visible::Visibility;
 use super::camera::CameraPane;
 use super::layout::Layout;
@@ -65,6 +71,9 @@ pub struct Viewport {
     pub queries: Queries,
     /// What is left out of the frame.
     pub(crate) visibility: Visibility,
+    /// What is under the cursor and what is selected.
+    pub picking: Picking,
+    marks: Marks,
     /// What is being marked by hand.
     pub(crate) brush: Option<Brush>,
     /// Render settings in place of the scene's own.
@@ -90,6 +99,8 @@ impl Viewport {
             moved_at: f64::NEG_INFINITY,
             queries: Queries::default(),
             visibility: Visibility::default(),
+            picking: Picking::default(),
+            marks: Marks::default(),
             brush: None,
             overrides: RenderOverrides::default(),
             zoom_anchor: None,
@@ -129,6 +140,7 @@ impl Viewport {
             self.up = None;
             self.queries.clear();
             self.visibility = Visibility::default();
+            self.picking = Picking::default();
             self.brush = None;
             self.overrides = RenderOverrides::default();
             self.eye = Eye::home(&scene.home, None);
@@ -156,9 +168,11 @@ impl Viewport {
         match action {
             Action::FrameScene => {
                 self.leave_photo();
-                self.eye.frame(&scene.home.bounds);
+                let selected = self.selected_bounds(state.semantics.as_ref());
+                self.eye.frame(selected.as_ref().unwrap_or(&scene.home.bounds));
             }
             Action::Paint(of) => self.brush = of.filter(|_| state.semantics.is_some()).map(Brush::new),
+            Action::Select(id) => return self.picking.select(*id),
             Action::Isolate(only) => self.visibility.isolate(*only),
             Action::Hide(id) => self.visibility.toggle(*id),
             Action::ResetView => {
@@ -202,7 +216,7 @@ impl Viewport {
     }
 
     /// Where the eye is.
-    pub(crate) fn pose(&self) -> Pose {
+    pub fn pose(&self) -> Pose {
         let (center, world_from_camera) = (self.eye.center, self.eye.world_from_eye);
         let fov_y_rad = match &self.photo {
             Some(photo) => photo.free_fov(self.eye.fov_y_rad),
@@ -291,8 +305,13 @@ impl Viewport {
         if let Some(photo) = self.photo.as_mut().filter(|_| layout.compare) {
             photo.show_split(ui, shown, &mut layout.split);
         }
-        if layout.cameras && self.photo.is_none() {
-            self.show_frusta(ui, rect, &scene, &response, layout, actions);
+        let on_camera =
+            layout.cameras && self.photo.is_none() && self.show_frusta(ui, rect, &scene, &response, layout, actions);
+        if let Some(semantics) = state.semantics.as_ref().filter(|_| self.brush.is_none()) {
+            self.show_picking(ui, &response, shown, semantics, on_camera, actions);
+            if let Some(cloud) = self.cloud.clone() {
+                self.show_marks(ui, shown, &cloud, semantics, actions);
+            }
         }
         if let Some(pane) = route {
             self.show_route(ui, rect, pane, state.explored.as_deref());
@@ -309,8 +328,8 @@ impl Viewport {
 
     /// Takes over the newest frame, and what its pixels belong to.
     fn take_frame(&mut self, ctx: &egui::Context) {
-        if let Some(maps) = self.display.take_maps(self.lane.maps(), self.requests.ticket()) {
-            self.queries.set_maps(Some(maps));
+        if let Some((maps, exact)) = self.display.take_maps(self.lane.maps(), self.requests.ticket()) {
+            self.queries.set_maps(maps, exact);
         }
         self.display.take(ctx, self.lane.pictures());
     }
@@ -322,7 +341,12 @@ impl Viewport {
         let (cloud, semantics) = match &state.semantics {
             Some(semantics) => {
                 let (cloud, semantics) = self.visibility.apply(&cloud, semantics);
-                (cloud, Some(semantics).filter(|_| plan.maps.now(self.queries.wanted() || self.brush.is_some())))
+                (
+                    cloud,
+                    Some(semantics).filter(|_| {
+                        plan.maps.now(self.queries.wanted() || self.picking.wanted() || self.brush.is_some())
+                    }),
+                )
             }
             None => (cloud, None),
         };
@@ -357,14 +381,15 @@ impl Viewport {
             budget,
             photo: self.photo.as_ref().and_then(PhotoView::pixels),
             codes: semantics.is_some() && self.queries.wants_codes(),
+            follow: budget == QualityBudget::Moving && (self.queries.tints() || self.picking.selected().is_some()),
             semantics,
             skip: SkipPasses::of(plan),
             timed: layout.times,
         };
         if let Some((request, moved)) = self.requests.next(wanted, always && drawn) {
             self.lane.request(request);
-            if moved {
-                self.queries.set_maps(None);
+            if moved != Moved::Nothing {
+                self.queries.forget_maps(moved == Moved::Eye);
                 self.display.forget_maps();
             }
         }

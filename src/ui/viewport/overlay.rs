@@ -6,7 +6,7 @@ use strum::VariantArray;
 use super::super::layout::Layout;
 use super::super::state::AppState;
 use super::super::{keys, theme};
-use super::Viewport;
+use super::{Viewport, legend};
 use crate::jobs::OpenedScene;
 use crate::math::format;
 use crate::scene::text;
@@ -15,7 +15,7 @@ use crate::worker::ViewMode;
 
 impl Viewport {
     pub(super) fn show_overlay(
-        &self,
+        &mut self,
         ui: &Ui,
         rect: Rect,
         scene: &OpenedScene,
@@ -51,6 +51,10 @@ impl Viewport {
                     }
                 }
             });
+        }
+        let depth = self.picture().and_then(|p| p.depth_range);
+        if legend::is_needed(self.queries.settings(), depth) && rect.height() > 330.0 {
+            card("legend", Align2::RIGHT_BOTTOM, 0.0, &mut |ui| legend::show(ui, self.queries.settings(), depth));
         }
         // A small view is for the frame.
         if let Some(times) = self.display.times().filter(|_| rect.height() > 330.0) {

@@ -18,6 +18,8 @@ pub(super) struct Wanted {
     /// Objects and parts, if it is wanted what pixels belong to; with their blended codes or without.
     pub(super) semantics: Option<Versioned<SemanticMap>>,
     pub(super) codes: bool,
+    /// Whether masks on screen follow the eye.
+    pub(super) follow: bool,
     pub(super) skip: SkipPasses,
     pub(super) timed: bool,
 }
@@ -33,8 +35,19 @@ struct Key {
     budget: QualityBudget,
     with_photo: bool,
     codes: bool,
+    follow: bool,
     skip: SkipPasses,
     timed: bool,
+}
+
+/// What is new of what a frame's pixels belong to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Moved {
+    Nothing,
+    /// They are seen from elsewhere.
+    Eye,
+    /// They are other Gaussians, or belong to something else.
+    Scene,
 }
 
 /// The requests so far.
@@ -55,10 +68,10 @@ impl Requests {
         self.last = None;
     }
 
-    /// The request for what is wanted, if it is not what was asked for last or wanted `again`; and whether its
-    /// pixels belong to something else than those before.
-    pub(super) fn next(&mut self, wanted: Wanted, again: bool) -> Option<(ViewRequest, bool)> {
-        let Wanted { cloud, camera, mode, settings, budget, photo, semantics, codes, skip, timed } = wanted;
+    /// The request for what is wanted, if it is not what was asked for last or wanted `again`; and what
+    /// of its pixels is new.
+    pub(super) fn next(&mut self, wanted: Wanted, again: bool) -> Option<(ViewRequest, Moved)> {
+        let Wanted { cloud, camera, mode, settings, budget, photo, semantics, codes, follow, skip, timed } = wanted;
         let key = Key {
             camera: camera.clone(),
             cloud: cloud.generation(),
@@ -68,21 +81,26 @@ impl Requests {
             budget,
             with_photo: photo.is_some(),
             codes,
+            follow,
             skip,
             timed,
         };
         if self.last.as_ref() == Some(&key) && !again {
             return None;
         }
-        // A change of resolution alone does not move what the pixels belong to.
-        let same = |k: &Key| k.camera == key.camera && k.cloud == key.cloud && k.semantics == key.semantics;
-        let moved = !self.last.as_ref().is_some_and(same);
+        let moved = match &self.last {
+            Some(last) if last.cloud == key.cloud && last.semantics == key.semantics => {
+                // A change of resolution alone does not move what the pixels belong to.
+                if last.camera == key.camera { Moved::Nothing } else { Moved::Eye }
+            }
+            _ => Moved::Scene,
+        };
         self.last = Some(key);
         self.ticket += 1;
         let (cloud, semantics) = (Arc::clone(&cloud), semantics.as_deref().cloned());
         let ticket = self.ticket;
         let request =
-            ViewRequest { cloud, camera, mode, settings, budget, photo, semantics, codes, skip, timed, ticket };
+            ViewRequest { cloud, camera, mode, settings, budget, photo, semantics, follow, codes, skip, timed, ticket };
         Some((request, moved))
     }
 }
@@ -106,6 +124,7 @@ mod tests {
                 photo: None,
                 semantics: None,
                 codes: false,
+                follow: false,
                 skip: SkipPasses { depth: true, parts: true, gpu: true, buffers: true },
                 timed: false,
             };
@@ -117,18 +136,18 @@ mod tests {
             let next = requests.next(wanted(change), again);
             next.map(|(request, moved)| (request.ticket, moved))
         };
-        assert_eq!(next(&|_| {}, false), Some((1, true)), "the first");
+        assert_eq!(next(&|_| {}, false), Some((1, Moved::Scene)), "the first");
         assert_eq!(next(&|_| {}, false), None, "nothing has changed");
-        assert_eq!(next(&|_| {}, true), Some((2, false)));
+        assert_eq!(next(&|_| {}, true), Some((2, Moved::Nothing)));
         // Each alone is a reason; the first three leave the pixels where they are.
-        assert_eq!(next(&|w| w.budget = QualityBudget::Moving, false), Some((3, false)));
-        assert_eq!(next(&|w| w.settings.sh_degree = 1, false), Some((4, false)));
-        assert_eq!(next(&|w| w.photo = Some(Arc::clone(&photo)), false), Some((5, false)));
-        assert_eq!(next(&|w| w.camera.center.x += 1.0, false), Some((6, true)));
-        assert_eq!(next(&|_| {}, false), Some((7, true)), "and back");
+        assert_eq!(next(&|w| w.budget = QualityBudget::Moving, false), Some((3, Moved::Nothing)));
+        assert_eq!(next(&|w| w.settings.sh_degree = 1, false), Some((4, Moved::Nothing)));
+        assert_eq!(next(&|w| w.photo = Some(Arc::clone(&photo)), false), Some((5, Moved::Nothing)));
+        assert_eq!(next(&|w| w.camera.center.x += 1.0, false), Some((6, Moved::Eye)));
+        assert_eq!(next(&|_| {}, false), Some((7, Moved::Eye)), "and back");
         // The same Gaussians, published anew.
         let newer = Versioned::new(Arc::clone(&cloud));
-        assert_eq!(next(&|w| w.cloud = newer.clone(), false), Some((8, true)));
+        assert_eq!(next(&|w| w.cloud = newer.clone(), false), Some((8, Moved::Scene)));
         assert_eq!(next(&|w| w.cloud = newer.clone(), false), None);
         requests.forget();
         assert!(requests.next(wanted(&|w| w.cloud = newer.clone()), false).is_some(), "another scene");

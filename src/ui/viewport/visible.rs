@@ -28,6 +28,11 @@ impl Visibility {
         self.only.is_some() || !self.hidden.is_empty()
     }
 
+    /// Whether one identity is shown alone.
+    pub(crate) fn is_isolated(&self) -> bool {
+        self.only.is_some()
+    }
+
     /// Whether an identity was hidden itself.
     pub(crate) fn is_hidden(&self, id: IdentityId) -> bool {
         self.hidden.contains(&id)

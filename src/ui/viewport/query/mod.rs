@@ -15,10 +15,10 @@ mod times;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use egui::{Color32, Rect, TextureHandle, TextureOptions, Ui};
+use egui::{Color32, Rect, TextureHandle, TextureOptions, Ui, Vec2, vec2};
 
 use self::embeddings::Embeddings;
-pub(crate) use self::settings::{ColorBy, OverlaySettings};
+pub(crate) use self::settings::OverlaySettings;
 use crate::jobs::query::ViewMaps;
 use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::matching::MatchMode;
@@ -26,6 +26,7 @@ use crate::pipeline::semantics::names;
 use crate::pipeline::semantics::query_engine::answer_encoded;
 use crate::pipeline::semantics::timing::{StagesMs, ms_since};
 use crate::scene::{IdentityId, Mask, ScenePlan, SemanticMap};
+use crate::ui::color_by::ColorBy;
 use crate::worker::Versioned;
 
 /// Colors of queries, in turn.
@@ -84,6 +85,8 @@ pub struct Queries {
     /// What was asked, oldest first.
     history: Vec<String>,
     maps: Option<Versioned<ViewMaps>>,
+    /// The same while the eye moves, at the resolution of the frame.
+    moving: Option<Versioned<ViewMaps>>,
     /// Generation of the objects and parts that were asked.
     answered_for: u64,
     /// Embeddings of the texts on screen.
@@ -105,7 +108,7 @@ pub struct Queries {
 struct Areas {
     /// View, objects and match that they were counted for.
     of: (u64, u64, MatchMode, u32),
-    known: BTreeMap<IdentityId, usize>,
+    known: BTreeMap<IdentityId, (usize, Option<Vec2>)>,
 }
 
 impl Queries {
@@ -117,6 +120,15 @@ impl Queries {
     /// The identities that are found on screen.
     pub fn found(&self) -> Vec<IdentityId> {
         self.all().flat_map(|asked| asked.shown(&self.settings)).collect()
+    }
+
+    /// The same with the colors of their queries.
+    pub(super) fn found_colors(&self) -> Vec<(IdentityId, Color32)> {
+        let color = |k: usize| {
+            Color32::from_rgb(COLORS[k % COLORS.len()][0], COLORS[k % COLORS.len()][1], COLORS[k % COLORS.len()][2])
+        };
+        let of = |(k, asked): (usize, &Asked)| asked.shown(&self.settings).into_iter().map(move |id| (id, color(k)));
+        self.all().enumerate().flat_map(of).collect()
     }
 
     /// What the present view's pixels belong to, once that is drawn.
@@ -186,9 +198,37 @@ impl Queries {
         *self = Self { settings: self.settings, open: self.open, history, embeddings, ..Self::default() };
     }
 
-    /// Takes over what the present view's pixels belong to; `None` while it is not known.
-    pub(crate) fn set_maps(&mut self, maps: Option<Versioned<ViewMaps>>) {
-        self.maps = maps;
+    /// Takes over what the present view's pixels belong to, exactly or as the eye moves.
+    pub(crate) fn set_maps(&mut self, maps: Versioned<ViewMaps>, exact: bool) {
+        (self.maps, self.moving) = if exact { (Some(maps), None) } else { (None, Some(maps)) };
+    }
+
+    /// What the pixels belong to is not known any more. What was drawn stays on screen until it is, if only the
+    /// eye has moved.
+    pub(crate) fn forget_maps(&mut self, only_moved: bool) {
+        let before = self.maps.take().or(self.moving.take());
+        self.moving = before.filter(|_| only_moved);
+    }
+
+    /// What is on screen of it: exact, or of the newest frame of a moving view.
+    pub fn shown_maps(&self) -> Option<&Versioned<ViewMaps>> {
+        self.maps.as_ref().or(self.moving.as_ref())
+    }
+
+    /// Colors the view by this; by nothing but masks if it is colored so.
+    pub(crate) fn tint(&mut self, by: ColorBy) {
+        self.settings.color_by = if self.settings.color_by == by { ColorBy::Masks } else { by };
+        self.wanted = true;
+    }
+
+    /// How answers are drawn.
+    pub(super) fn settings(&mut self) -> &mut OverlaySettings {
+        &mut self.settings
+    }
+
+    /// Whether anything is drawn over the frame that depends on what its pixels belong to.
+    pub(super) fn tints(&self) -> bool {
+        self.painted.is_some()
     }
 
     fn asked(&self, text: &str, semantics: &SemanticMap) -> Option<Asked> {
@@ -221,25 +261,38 @@ impl Queries {
         maps.mask(semantics, target, self.settings.mode, self.settings.tolerance)
     }
 
-    /// Pixels of an identity in the present view, if that is drawn; counted once for a view.
+    /// Pixels of an identity in the present view, if that is drawn.
     fn area_of(&mut self, semantics: &Versioned<SemanticMap>, id: IdentityId) -> Option<usize> {
+        Some(self.measured(semantics, id)?.0)
+    }
+
+    /// Shares of the present view's width and height that an identity spans, if that is drawn; `Some(None)` if it
+    /// has no pixel there.
+    pub(super) fn span_of(&mut self, semantics: &Versioned<SemanticMap>, id: IdentityId) -> Option<Option<Vec2>> {
+        Some(self.measured(semantics, id)?.1)
+    }
+
+    /// Both, found once for a view.
+    fn measured(&mut self, semantics: &Versioned<SemanticMap>, id: IdentityId) -> Option<(usize, Option<Vec2>)> {
         let maps = self.maps.clone()?;
         let OverlaySettings { mode, tolerance, .. } = self.settings;
         let of = (maps.generation(), semantics.generation(), mode, tolerance.to_bits());
         if self.areas.of != of {
             self.areas = Areas { of, known: BTreeMap::new() };
         }
-        if let Some(area) = self.areas.known.get(&id) {
-            return Some(*area);
+        if let Some(known) = self.areas.known.get(&id) {
+            return Some(*known);
         }
-        let area = self.mask_of(&maps, semantics, id).area();
-        self.areas.known.insert(id, area);
-        Some(area)
+        let mask = self.mask_of(&maps, semantics, id);
+        let of = vec2(mask.width_px() as f32, mask.height_px() as f32);
+        let span = mask.bounds().map(|b| vec2(b.x.len() as f32, b.y.len() as f32) / of);
+        self.areas.known.insert(id, (mask.area(), span));
+        Some((mask.area(), span))
     }
 
     /// Masks and tints over the frame in `rect`.
     pub(crate) fn paint(&mut self, ui: &Ui, rect: Rect, semantics: &Versioned<SemanticMap>) {
-        let Some(maps) = self.maps.clone() else { return };
+        let Some(maps) = self.shown_maps().cloned() else { return };
         let shown: Vec<Vec<IdentityId>> = self.all().map(|q| q.shown(&self.settings)).collect();
         let newest = self.all().last().map(|q| q.text.clone());
         let nothing =

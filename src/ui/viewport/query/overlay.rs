@@ -3,19 +3,16 @@
 use egui::{Color32, ColorImage};
 use rayon::prelude::*;
 
-use super::settings::{ColorBy, OverlaySettings};
-use crate::math::grid::neighbors;
+use super::super::outline::{Outline, with_alpha};
+use super::settings::OverlaySettings;
 use crate::math::vector::dot;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::matching::MatchMode;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::semantic_map::CODE_CHANNELS;
 use crate::scene::{Identities, IdentityId, Level, Mask};
+use crate::ui::color_by::ColorBy;
 
-/// Opacity of a mask's fill.
-const FILL: f32 = 0.35;
-/// Around outlines: whatever color is beside them, they stand out.
-const RIM: Color32 = Color32::from_black_alpha(170);
 /// Where blended codes differ.
 const DIFFERENT: [u8; 3] = [255, 60, 160];
 
@@ -44,15 +41,16 @@ impl Layers<'_> {
             .then(|| Mask::from_fn(w, h, |i| self.relevancy_of(self.map.identity[i]) >= self.settings.threshold));
         let codes: Vec<_> = (0..=self.identities.len() as IdentityId).map(|id| self.identities.codes(id)).collect();
         let pixel = |i: usize| {
-            if hot.as_ref().is_some_and(|m| is_edge(m, i)) {
+            if hot.as_ref().is_some_and(|m| Outline::at(m, i) == Outline::Line) {
                 return Color32::WHITE;
             }
-            let mask = self.masks.iter().rev().find(|(_, mask)| mask.contains(i));
-            match mask {
-                Some(([r, g, b], mask)) if is_edge(mask, i) => Color32::from_rgb(*r, *g, *b),
-                Some((color, _)) if self.settings.color_by == ColorBy::Masks => with_alpha(*color, FILL),
-                None if self.masks.iter().any(|(_, mask)| is_beside(mask, i)) => RIM,
-                _ => {
+            let outlines = self.masks.iter().rev().map(|(color, mask)| (color, Outline::at(mask, i)));
+            let filled = self.settings.color_by == ColorBy::Masks;
+            // A mask over another's halo; where something tints the frame, masks are lines alone.
+            let topmost = outlines.filter(|o| o.1 != Outline::Outside).min_by_key(|o| o.1 == Outline::Halo);
+            match topmost.filter(|o| filled || o.1 != Outline::Fill) {
+                Some((color, outline)) => outline.color(*color).unwrap_or_default(),
+                None => {
                     let own = || tints.get(self.map.identity[i] as usize).copied().flatten();
                     let tint = match self.settings.color_by {
                         ColorBy::Difference => {
@@ -106,21 +104,6 @@ impl Layers<'_> {
     }
 }
 
-fn with_alpha([r, g, b]: [u8; 3], alpha: f32) -> Color32 {
-    Color32::from_rgba_unmultiplied(r, g, b, (alpha * 255.0) as u8)
-}
-
-/// Whether a pixel outside of the mask has a neighbor in it.
-fn is_beside(mask: &Mask, i: usize) -> bool {
-    neighbors(i, mask.width_px(), mask.width_px() * mask.height_px()).any(|j| mask.contains(j))
-}
-
-/// Whether a pixel of the mask has a neighbor outside of it.
-fn is_edge(mask: &Mask, i: usize) -> bool {
-    let (w, h) = (mask.width_px(), mask.height_px());
-    mask.contains(i) && neighbors(i, w, w * h).any(|j| !mask.contains(j))
-}
-
 /// Colors of vectors by their three main directions (principal components), by number from 0; gray
 /// for those without one.
 pub(crate) fn main_directions(vectors: &[Option<&[f32]>]) -> Vec<[u8; 3]> {
@@ -172,8 +155,8 @@ mod tests {
         let mut all = Identities::default();
         let lamp = all.add(Level::Object, NOBODY, vec!["lamp".into()]);
         all.add(Level::Part, lamp, vec!["shade".into()]);
-        let identity = [[0, 0, 2, 2, 2, 1]; 3].concat();
-        (all, ViewMap { width_px: 6, height_px: 3, identity, share: vec![1.0; 18], alpha: vec![1.0; 18] })
+        let identity = [[0, 0, 2, 2, 2, 2, 2, 1]; 3].concat();
+        (all, ViewMap { width_px: 8, height_px: 3, identity, share: vec![1.0; 24], alpha: vec![1.0; 24] })
     }
 
     fn paint(settings: OverlaySettings) -> ColorImage {
@@ -195,30 +178,30 @@ mod tests {
     #[test]
     fn masks_have_an_outline_and_a_fill() {
         let image = paint(OverlaySettings::default());
-        assert_eq!((image.pixels[6], image.pixels[7]), (Color32::TRANSPARENT, RIM), "the rim");
-        assert_eq!(image.pixels[8], Color32::from_rgb(255, 179, 0), "the outline");
-        assert_eq!(image.pixels[9], Color32::from_rgba_unmultiplied(255, 179, 0, 89), "the fill");
+        let of = |outline: Outline| outline.color([255, 179, 0]).expect("a color");
+        assert_eq!((image.pixels[8], image.pixels[9]), (Color32::TRANSPARENT, of(Outline::Halo)));
+        assert_eq!((image.pixels[10], image.pixels[12]), (of(Outline::Line), of(Outline::Fill)));
     }
 
     #[test]
     fn heat_and_threshold_follow_relevancy() {
         let image = paint(OverlaySettings { color_by: ColorBy::Heat, opacity: 1.0, ..OverlaySettings::default() });
         let [r, g, b] = Colormap::Turbo.color(1.0);
-        assert_eq!(image.pixels[9], Color32::from_rgb(r, g, b));
+        assert_eq!(image.pixels[12], Color32::from_rgb(r, g, b));
         let image = paint(OverlaySettings { threshold: 0.4, ..OverlaySettings::default() });
-        assert_eq!(image.pixels[8], Color32::WHITE, "where it begins");
-        assert_eq!(image.pixels[6], Color32::TRANSPARENT);
+        assert_eq!(image.pixels[10], Color32::WHITE, "where it begins");
+        assert_eq!(image.pixels[8], Color32::TRANSPARENT);
     }
 
     #[test]
     fn blended_codes_that_are_not_their_own_are_shown() {
         let (identities, map) = scene();
-        let mut codes = CodeMap { width_px: 6, height_px: 3, ..CodeMap::default() };
+        let mut codes = CodeMap { width_px: 8, height_px: 3, ..CodeMap::default() };
         for (c, plane) in codes.planes.iter_mut().enumerate() {
             *plane = map.identity.iter().map(|id| identities.codes(*id)[c]).collect();
         }
         // One pixel of the shade is blended with something else; nothing is in the first.
-        codes.planes[4][9] += 0.1;
+        codes.planes[4][12] += 0.1;
         codes.planes[0][0] = f32::NAN;
         let settings = OverlaySettings { color_by: ColorBy::Difference, opacity: 1.0, ..OverlaySettings::default() };
         let layers = Layers {
@@ -232,8 +215,8 @@ mod tests {
         };
         let [r, g, b] = DIFFERENT;
         let image = layers.paint();
-        let different: Vec<usize> = (0..18).filter(|i| image.pixels[*i] != Color32::TRANSPARENT).collect();
-        assert_eq!((different, image.pixels[9]), (vec![9], Color32::from_rgb(r, g, b)));
+        let different: Vec<usize> = (0..24).filter(|i| image.pixels[*i] != Color32::TRANSPARENT).collect();
+        assert_eq!((different, image.pixels[12]), (vec![12], Color32::from_rgb(r, g, b)));
     }
 
     #[test]

@@ -1,10 +1,10 @@
-//! The box over the view: what is typed, how it is answered, and the name of what is under the cursor.
+//! The box over the view: what is typed, and how it is answered.
 
 use egui::{Align2, Area, Id, Order, Rect, Ui};
 
 use super::super::super::theme;
 use super::{Queries, settings};
-use crate::scene::{GaussianCloud, Identities, NOBODY, SemanticMap};
+use crate::scene::{GaussianCloud, SemanticMap};
 use crate::ui::actions::Action;
 use crate::worker::Versioned;
 
@@ -43,25 +43,6 @@ impl Queries {
                 self.show_answer(ui, semantics, cloud, actions);
                 self.show_kept(ui);
             });
-        });
-        self.show_name_under_cursor(ui, rect, &semantics.identities);
-    }
-
-    fn show_name_under_cursor(&self, ui: &Ui, rect: Rect, identities: &Identities) {
-        let Some(maps) = &self.maps else { return };
-        let map = &maps.identities;
-        let Some(pos) = ui.input(|i| i.pointer.hover_pos()).filter(|p| rect.contains(*p)) else { return };
-        let x = ((pos.x - rect.left()) / rect.width() * map.width_px as f32) as usize;
-        let y = ((pos.y - rect.top()) / rect.height() * map.height_px as f32) as usize;
-        let id = map.identity.get(y * map.width_px + x.min(map.width_px - 1)).copied().unwrap_or(NOBODY);
-        if identities.get(id).is_none() {
-            return;
-        }
-        let at = Align2::CENTER_BOTTOM.pos_in_rect(&rect.shrink(12.0));
-        let area =
-            Area::new(Id::unique("under cursor")).order(Order::Middle).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
-        area.interactable(false).show(ui.ctx(), |ui| {
-            theme::overlay().show(ui, |ui| ui.label(identities.full_name(id)));
         });
     }
 }

@@ -1,41 +1,14 @@
 //! How answers are drawn: the settings below the query box, and the histogram of relevancy.
 
 use egui::{Color32, ComboBox, Rect, Sense, Slider, Stroke, Ui, pos2, vec2};
-use strum::{IntoStaticStr, VariantArray};
+use strum::VariantArray;
 
 use super::super::super::theme;
 use crate::math::colormap::Colormap;
 use crate::pipeline::semantics::codes::TOLERANCE;
 use crate::pipeline::semantics::matching::MatchMode;
 use crate::scene::LevelFilter;
-
-/// What tints the frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, VariantArray, IntoStaticStr)]
-pub(crate) enum ColorBy {
-    /// Only the masks of the answers.
-    #[default]
-    Masks,
-    /// Relevancy for the newest query.
-    #[strum(serialize = "Relevancy")]
-    Heat,
-    /// A color per object.
-    Objects,
-    /// A color per part.
-    Parts,
-    /// The codes of the pixels, blended or exact.
-    Codes,
-    /// The three main directions of the language features.
-    Features,
-    /// Where blended codes mean something else than the winning identities.
-    #[strum(serialize = "Exact \u{2260} blended")]
-    Difference,
-}
-
-impl ColorBy {
-    pub(crate) fn text(self) -> &'static str {
-        self.into()
-    }
-}
+use crate::ui::color_by::ColorBy;
 
 /// How answers are found and drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,0 +1,249 @@
+//! Where something is that one does not see well: an arrow at the border of the view if it lies outside, a dashed
+//! outline if other things hide it, a ring if it is small. A click flies there.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use egui::{Color32, FontId, Painter, Pos2, Rect, Sense, Shape, Stroke, Ui, Vec2, pos2, vec2};
+use glam::DVec3;
+
+use super::super::theme;
+use super::Viewport;
+use crate::navigate::target::Side;
+use crate::scene::{Bounds, Camera, GaussianCloud, IdentityId, SemanticMap, text};
+use crate::ui::actions::Action;
+use crate::worker::Versioned;
+
+/// Gaussians that stand for an identity.
+const POINTS: usize = 256;
+/// Masks no wider and no higher than this are hard to see, points.
+const SMALL: f32 = 16.0;
+/// Share of the points in view from which something is in it.
+const IN_VIEW: f32 = 0.1;
+/// Identities that are marked at most.
+const MOST: usize = 6;
+/// Under every line.
+const HALO: Stroke = Stroke { width: 4.0, color: Color32::from_black_alpha(150) };
+
+/// The shapes of the identities that were marked, by number.
+#[derive(Default)]
+pub(super) struct Marks {
+    /// Gaussians and objects that they are of.
+    of: (u64, u64),
+    known: HashMap<IdentityId, Arc<[DVec3]>>,
+}
+
+/// How something is marked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mark {
+    None,
+    Arrow,
+    Ghost,
+    Ring,
+}
+
+impl Marks {
+    /// Some of the Gaussians of an identity, strays left out.
+    pub(super) fn points(
+        &mut self,
+        cloud: &Versioned<GaussianCloud>,
+        semantics: &Versioned<SemanticMap>,
+        id: IdentityId,
+    ) -> Arc<[DVec3]> {
+        let of = (cloud.generation(), semantics.generation());
+        if self.of != of {
+            (self.of, self.known) = (of, HashMap::new());
+        }
+        let sampled = || sample(cloud, semantics, id);
+        Arc::clone(self.known.entry(id).or_insert_with(sampled))
+    }
+}
+
+fn sample(cloud: &GaussianCloud, semantics: &SemanticMap, id: IdentityId) -> Arc<[DVec3]> {
+    let inside = semantics.identities.within(id);
+    let own = semantics.of.iter().enumerate().filter(|(_, of)| inside.get(**of as usize) == Some(&true));
+    let own: Vec<usize> = own.map(|(i, _)| i).filter(|i| *i < cloud.len()).collect();
+    let step = own.len().div_ceil(POINTS).max(1);
+    let points: Vec<DVec3> = own.iter().step_by(step).map(|i| cloud.world_position(*i)).collect();
+    let bounds = Bounds::robust(points.iter().copied());
+    points
+        .iter()
+        .filter(|p| bounds.as_ref().is_none_or(|b| p.cmpge(b.min).all() && p.cmple(b.max).all()))
+        .copied()
+        .collect()
+}
+
+/// How something is marked of whose points a share is `in_view` and whose pixels are known to span `size`, points;
+/// `Some(None)` if it has none.
+fn mark(in_view: f32, size: Option<Option<Vec2>>) -> Mark {
+    match size {
+        Some(Some(size)) if size.max_elem() <= SMALL => Mark::Ring,
+        Some(Some(_)) => Mark::None,
+        _ if in_view < IN_VIEW => Mark::Arrow,
+        Some(None) => Mark::Ghost,
+        None => Mark::None,
+    }
+}
+
+impl Viewport {
+    /// Marks what was found and what is selected, where it is hard to see.
+    pub(super) fn show_marks(
+        &mut self,
+        ui: &Ui,
+        shown: Rect,
+        cloud: &Versioned<GaussianCloud>,
+        semantics: &Versioned<SemanticMap>,
+        actions: &mut Vec<Action>,
+    ) {
+        let mut targets = self.queries.found_colors();
+        targets.extend(
+            self.picking.selected().map(|id| (id, theme::ACCENT)).filter(|t| targets.iter().all(|f| f.0 != t.0)),
+        );
+        targets.retain(|(id, _)| semantics.identities.get(*id).is_some() && !self.visibility.is_hidden(*id));
+        let eye = self.overlay_camera(shown);
+        for (id, color) in targets.into_iter().take(MOST) {
+            let points = self.marks.points(cloud, semantics, id);
+            if points.is_empty() {
+                continue;
+            }
+            let places: Vec<Pos2> = points.iter().filter_map(|p| eye.project(*p)).map(|p| place(shown, p)).collect();
+            let inside = places.iter().filter(|p| shown.contains(**p)).count();
+            let size = self.queries.span_of(semantics, id).map(|span| span.map(|span| span * shown.size()));
+            let painter = ui.painter_at(shown);
+            let name = text::elided(&semantics.identities.full_name(id), 40);
+            let at = match mark(inside as f32 / points.len() as f32, size) {
+                Mark::None => continue,
+                Mark::Arrow => arrow(&painter, shown, way(&eye, &points), color, &name),
+                Mark::Ghost => ghost(&painter, &hull(places), color, &format!("{name}, hidden from here")),
+                Mark::Ring => ring(&painter, middle(&places), color),
+            };
+            let button = ui.interact(at, ui.scope_id().with(("mark", id)), Sense::click());
+            button.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Fly to {name}")));
+            if button.on_hover_text("Click to fly there").on_hover_cursor(egui::CursorIcon::PointingHand).clicked() {
+                actions.push(Action::GoToTarget(id, Side::Best));
+            }
+        }
+    }
+
+    /// What the selected object or part spans, if anything is selected.
+    pub(super) fn selected_bounds(&mut self, semantics: Option<&Versioned<SemanticMap>>) -> Option<Bounds> {
+        let (id, cloud) = (self.picking.selected()?, self.cloud.clone()?);
+        Bounds::of(self.marks.points(&cloud, semantics?, id).iter().copied())
+    }
+}
+
+fn place(shown: Rect, p: glam::DVec2) -> Pos2 {
+    shown.min + vec2(p.x as f32, p.y as f32)
+}
+
+fn middle(places: &[Pos2]) -> Pos2 {
+    let sum = places.iter().fold(Vec2::ZERO, |sum, p| sum + p.to_vec2());
+    (sum / places.len().max(1) as f32).to_pos2()
+}
+
+/// Which way to turn to have the points in view: right and down of the view, length 1.
+fn way(eye: &Camera, points: &[DVec3]) -> Vec2 {
+    let sum: DVec3 = points.iter().map(|p| eye.camera_from_world(*p)).sum();
+    let way = sum.truncate().normalize_or(glam::DVec2::Y);
+    vec2(way.x as f32, way.y as f32)
+}
+
+/// An arrow at the border of the view, with a name beside it. Where it can be clicked.
+fn arrow(painter: &Painter, shown: Rect, way: Vec2, color: Color32, name: &str) -> Rect {
+    let room = shown.shrink(26.0);
+    let half = room.size() / 2.0;
+    let reach = (half.x / way.x.abs().max(1e-6)).min(half.y / way.y.abs().max(1e-6));
+    let tip = room.center() + way * reach;
+    let (back, across) = (tip - way * 20.0, way.rot90() * 10.0);
+    let corners = vec![tip, back + across, back - across];
+    painter.add(Shape::convex_polygon(corners, color, Stroke::new(2.0, HALO.color)));
+    let galley = painter.layout_no_wrap(name.to_owned(), FontId::proportional(12.5), theme::TEXT);
+    let beside = back - way * (14.0 + 0.5 * galley.size().x * way.x.abs()) - 0.5 * galley.size();
+    let label = Rect::from_min_size(beside, galley.size()).expand2(vec2(6.0, 3.0));
+    painter.rect_filled(label, 5.0, Color32::from_black_alpha(190));
+    painter.galley(beside, galley, theme::TEXT);
+    label.union(Rect::from_center_size(tip - way * 10.0, Vec2::splat(26.0)))
+}
+
+/// A dashed outline with a name over it. Where it can be clicked: at its name.
+fn ghost(painter: &Painter, outline: &[Pos2], color: Color32, name: &str) -> Rect {
+    let closed: Vec<Pos2> = outline.iter().chain(outline.first()).copied().collect();
+    painter.add(Shape::line(closed.clone(), HALO));
+    painter.extend(Shape::dashed_line(&closed, Stroke::new(2.0, color), 7.0, 5.0));
+    let galley = painter.layout_no_wrap(name.to_owned(), FontId::proportional(12.5), theme::TEXT);
+    let over = Rect::from_points(outline);
+    let room = painter.clip_rect().shrink(6.0);
+    let at = pos2(over.center().x - 0.5 * galley.size().x, over.top() - galley.size().y - 8.0);
+    let at = at.clamp(room.min, (room.max - galley.size()).max(room.min));
+    let label = Rect::from_min_size(at, galley.size()).expand2(vec2(6.0, 3.0));
+    painter.rect_filled(label, 5.0, Color32::from_black_alpha(190));
+    painter.galley(at, galley, theme::TEXT);
+    label
+}
+
+/// A ring around something small. Where it can be clicked.
+fn ring(painter: &Painter, at: Pos2, color: Color32) -> Rect {
+    painter.circle_stroke(at, 17.0, HALO);
+    painter.circle_stroke(at, 17.0, Stroke::new(2.0, color));
+    Rect::from_center_size(at, Vec2::splat(36.0))
+}
+
+/// The convex hull of points, around once (Andrew's monotone chain).
+fn hull(mut points: Vec<Pos2>) -> Vec<Pos2> {
+    points.retain(|p| p.is_finite());
+    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    points.dedup();
+    if points.len() < 3 {
+        return points;
+    }
+    let turns_left = |a: Pos2, b: Pos2, c: Pos2| (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x) > 0.0;
+    let chain = |points: &mut dyn Iterator<Item = &Pos2>| {
+        let mut chain: Vec<Pos2> = Vec::new();
+        for &p in points {
+            while chain.len() > 1 && !turns_left(chain[chain.len() - 2], chain[chain.len() - 1], p) {
+                chain.pop();
+            }
+            chain.push(p);
+        }
+        chain.pop();
+        chain
+    };
+    let mut around = chain(&mut points.iter());
+    around.extend(chain(&mut points.iter().rev()));
+    around
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_seen_well_is_not_marked() {
+        let size = |w: f32| Some(Some(vec2(w, w)));
+        assert_eq!((mark(1.0, size(80.0)), mark(0.0, size(80.0))), (Mark::None, Mark::None), "a corner of it is seen");
+        assert_eq!(mark(1.0, size(5.0)), Mark::Ring);
+        assert_eq!((mark(1.0, Some(None)), mark(0.05, Some(None))), (Mark::Ghost, Mark::Arrow));
+        assert_eq!((mark(1.0, None), mark(0.0, None)), (Mark::None, Mark::Arrow), "while the eye moves");
+    }
+
+    #[test]
+    fn arrows_point_where_one_has_to_turn() {
+        let eye = Camera::look_at(DVec3::ZERO, DVec3::X, DVec3::Z, 0.8, 100, 100).expect("valid");
+        // Looking along x with z upwards, the right is -y.
+        let at = |x: f64, y: f64, z: f64| way(&eye, &[DVec3::new(x, y, z)]);
+        assert!((at(1.0, -9.0, 0.0) - vec2(1.0, 0.0)).length() < 1e-6);
+        assert!((at(-5.0, -1.0, 0.0) - vec2(1.0, 0.0)).length() < 1e-6, "behind, to the right");
+        assert!((at(1.0, 0.0, 9.0) - vec2(0.0, -1.0)).length() < 1e-6, "above");
+        assert!(at(-5.0, 0.0, 0.0).is_finite(), "straight behind");
+    }
+
+    #[test]
+    fn a_hull_goes_around_all_points_once() {
+        let p = |x: f32, y: f32| pos2(x, y);
+        let around =
+            hull(vec![p(1.0, 1.0), p(0.0, 0.0), p(2.0, 0.0), p(2.0, 2.0), p(0.0, 2.0), p(1.0, 0.0), p(2.0, 0.0)]);
+        assert_eq!(around, [p(0.0, 0.0), p(2.0, 0.0), p(2.0, 2.0), p(0.0, 2.0)]);
+        assert_eq!(hull(vec![p(1.0, 1.0), p(1.0, 1.0)]), [p(1.0, 1.0)]);
+        assert_eq!(hull(vec![p(f32::NAN, 1.0)]), []);
+    }
+}

@@ -1,0 +1,33 @@
+//! The menu of a right click: what can be done with what is under the cursor.
+
+use egui::{RichText, Ui};
+
+use crate::navigate::target::Side;
+use crate::scene::{Identities, IdentityId, text};
+use crate::ui::actions::Action;
+
+/// The menu about an identity; about the view if there is none.
+pub(super) fn show(ui: &mut Ui, all: &Identities, id: Option<IdentityId>, actions: &mut Vec<Action>) {
+    let mut row = |ui: &mut Ui, action: Action, name: &str| {
+        if ui.button(name).on_hover_text(action.tooltip()).clicked() {
+            actions.push(action);
+            ui.close();
+        }
+    };
+    let Some(id) = id.filter(|id| all.get(*id).is_some()) else {
+        row(ui, Action::FrameScene, "Frame the scene");
+        row(ui, Action::ResetView, "Reset the view");
+        row(ui, Action::Isolate(None), "Show all objects");
+        return;
+    };
+    ui.label(RichText::new(text::elided(&all.full_name(id), 48)).strong());
+    ui.separator();
+    row(ui, Action::GoToTarget(id, Side::Best), "Go there");
+    row(ui, Action::Ask(all.full_name(id)), "Mark as a query");
+    row(ui, Action::Isolate(Some(id)), "Isolate");
+    row(ui, Action::Hide(id), "Hide");
+    row(ui, Action::Isolate(None), "Show all objects");
+    ui.separator();
+    row(ui, Action::Paint(Some(id)), "Paint a new part\u{2026}");
+    row(ui, Action::ExportTarget(id), "Export as .ply\u{2026}");
+}

@@ -1,0 +1,248 @@
+//! What is under the cursor and what is selected: outlined in the view, named beside the cursor.
+//!
+//! A click takes the object, a click on a selected object the part of it that is under the cursor, and so on
+//! inwards; with Alt the innermost at once.
+
+mod menu;
+
+use egui::{Color32, FontId, Pos2, Rect, Response, TextureHandle, TextureOptions, Ui, pos2, vec2};
+
+use super::super::theme;
+use super::{Viewport, outline};
+use crate::jobs::query::ViewMaps;
+use crate::pipeline::semantics::view_map::ViewMap;
+use crate::scene::{Identities, IdentityId, PixelBox, SemanticMap, text};
+use crate::ui::actions::Action;
+use crate::worker::Versioned;
+
+/// Color of what a click would select.
+const HOVERED: [u8; 3] = [255, 255, 255];
+/// Color of what is selected.
+const SELECTED: [u8; 3] = [0x6c, 0xb2, 0xf0];
+
+/// What is pointed at and what is selected.
+#[derive(Default)]
+pub struct Picking {
+    hovered: Option<IdentityId>,
+    selected: Option<IdentityId>,
+    /// Whether the cursor was in the view since the scene was opened: from then on it is needed what pixels are of.
+    wanted: bool,
+    /// What the open menu is about.
+    menu: Option<IdentityId>,
+    outlines: [Drawn; 2],
+}
+
+/// An outline on screen.
+#[derive(Default)]
+struct Drawn {
+    /// View, objects and identity that it was drawn for.
+    of: Option<(u64, u64, IdentityId)>,
+    /// Where it lies in the view, px; `None` if it has no pixel there.
+    at: Option<PixelBox>,
+    texture: Option<TextureHandle>,
+}
+
+impl Viewport {
+    /// Outlines what is selected and what the cursor points at, unless that is a camera, and takes clicks.
+    pub(super) fn show_picking(
+        &mut self,
+        ui: &Ui,
+        response: &Response,
+        shown: Rect,
+        semantics: &Versioned<SemanticMap>,
+        on_camera: bool,
+        actions: &mut Vec<Action>,
+    ) {
+        let maps = self.queries.maps().map(|m| &***m);
+        self.picking.update(response, shown, semantics, maps.filter(|_| !on_camera), actions);
+        if let Some(maps) = self.queries.shown_maps().cloned() {
+            self.picking.paint(ui, shown, semantics, &maps);
+        }
+    }
+}
+
+impl Picking {
+    /// What is selected.
+    pub fn selected(&self) -> Option<IdentityId> {
+        self.selected
+    }
+
+    /// What a click would select.
+    pub fn hovered(&self) -> Option<IdentityId> {
+        self.hovered
+    }
+
+    /// Whether it is needed what pixels belong to.
+    pub(super) fn wanted(&self) -> bool {
+        self.wanted
+    }
+
+    /// Selects an identity, or nothing.
+    pub(super) fn select(&mut self, id: Option<IdentityId>) {
+        self.selected = id;
+    }
+
+    /// Takes the cursor in: what it points at, what was clicked, and the menu of a right click.
+    pub(super) fn update(
+        &mut self,
+        response: &Response,
+        shown: Rect,
+        semantics: &SemanticMap,
+        maps: Option<&ViewMaps>,
+        actions: &mut Vec<Action>,
+    ) {
+        let all = &semantics.identities;
+        self.selected = self.selected.filter(|id| all.get(*id).is_some());
+        self.wanted |= response.hovered();
+        let alt = response.ctx.input(|i| i.modifiers.alt);
+        let under = |pos: Pos2| innermost(&maps?.identities, shown, pos).filter(|id| all.get(*id).is_some());
+        // A menu that is open is about what was clicked.
+        let open = response.context_menu_opened();
+        let cursor = response.hover_pos().filter(|_| !open && !response.dragged());
+        self.hovered = cursor.and_then(under).map(|id| picked(all, id, self.selected, alt));
+        if response.clicked() && maps.is_some() && self.selected != self.hovered {
+            actions.push(Action::Select(self.hovered));
+        }
+        if response.secondary_clicked() {
+            // On what is selected the menu is about that, else about the object.
+            let id = response.interact_pointer_pos().and_then(under);
+            let within = |s: &IdentityId| id.is_some_and(|id| all.line(id).any(|at| at == *s));
+            self.menu = self.selected.filter(within).or_else(|| id.map(|id| picked(all, id, None, alt)));
+            if self.menu.is_some() && self.menu != self.selected {
+                actions.push(Action::Select(self.menu));
+            }
+        }
+        response.context_menu(|ui| menu::show(ui, all, self.menu, actions));
+    }
+
+    /// Outlines over the frame in `shown`, and the name beside the cursor.
+    pub(super) fn paint(
+        &mut self,
+        ui: &Ui,
+        shown: Rect,
+        semantics: &Versioned<SemanticMap>,
+        maps: &Versioned<ViewMaps>,
+    ) {
+        let hovered = self.hovered.filter(|id| Some(*id) != self.selected);
+        for (drawn, (id, color)) in self.outlines.iter_mut().zip([(self.selected, SELECTED), (hovered, HOVERED)]) {
+            let Some(id) = id else { continue };
+            drawn.paint(ui, shown, semantics, maps, id, color);
+        }
+        if let (Some(id), Some(pos)) = (self.hovered, ui.input(|i| i.pointer.hover_pos())) {
+            label(ui, shown, pos, &text::elided(&semantics.identities.full_name(id), 60));
+        }
+    }
+}
+
+impl Drawn {
+    fn paint(
+        &mut self,
+        ui: &Ui,
+        shown: Rect,
+        semantics: &Versioned<SemanticMap>,
+        maps: &Versioned<ViewMaps>,
+        id: IdentityId,
+        color: [u8; 3],
+    ) {
+        let of = Some((maps.generation(), semantics.generation(), id));
+        let map = &maps.identities;
+        if self.of != of {
+            self.of = of;
+            let image = outline::image(&map.mask(&semantics.identities, id), color);
+            self.at = image.map(|(image, at)| {
+                match &mut self.texture {
+                    Some(texture) => texture.set(image, TextureOptions::LINEAR),
+                    None => self.texture = Some(ui.ctx().load_texture("outline", image, TextureOptions::LINEAR)),
+                }
+                at
+            });
+        }
+        let (Some(at), Some(texture)) = (&self.at, &self.texture) else { return };
+        let scale = vec2(shown.width() / map.width_px as f32, shown.height() / map.height_px as f32);
+        let corner = |x: usize, y: usize| shown.min + vec2(x as f32, y as f32) * scale;
+        let rect = Rect::from_min_max(corner(at.x.start, at.y.start), corner(at.x.end, at.y.end));
+        ui.painter().image(texture.id(), rect, Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0)), Color32::WHITE);
+    }
+}
+
+/// The innermost identity at a place of the window.
+fn innermost(map: &ViewMap, shown: Rect, pos: Pos2) -> Option<IdentityId> {
+    let at = (pos - shown.min) / shown.size();
+    let inside = |v: f32, n: usize| (0.0..1.0).contains(&v).then(|| (v * n as f32) as usize);
+    let (x, y) = (inside(at.x, map.width_px)?, inside(at.y, map.height_px)?);
+    map.identity.get(y * map.width_px + x).copied()
+}
+
+/// What a click on a pixel of `innermost` selects: the object, or, inside what is selected, one level deeper.
+fn picked(all: &Identities, innermost: IdentityId, selected: Option<IdentityId>, alt: bool) -> IdentityId {
+    let mut line: Vec<IdentityId> = all.line(innermost).collect();
+    line.reverse();
+    let Some(selected) = selected.filter(|s| !alt && all.object_of(*s) == line[0]) else {
+        return if alt { innermost } else { line[0] };
+    };
+    // Beside what is selected, in the same object: as deep as that.
+    let depth = all.line(selected).count() - usize::from(!line.contains(&selected));
+    line[depth.min(line.len() - 1)]
+}
+
+/// A name beside the cursor, inside the view.
+fn label(ui: &Ui, shown: Rect, pos: Pos2, name: &str) {
+    let galley = ui.painter().layout_no_wrap(name.to_owned(), FontId::proportional(13.0), theme::TEXT);
+    let size = galley.size() + vec2(12.0, 6.0);
+    let mut back = Rect::from_min_size(pos + vec2(16.0, 14.0), size);
+    // At the right and the lower border it is on the other side of the cursor.
+    if back.right() > shown.right() {
+        back = back.translate(vec2(-size.x - 24.0, 0.0));
+    }
+    if back.bottom() > shown.bottom() {
+        back = back.translate(vec2(0.0, -size.y - 22.0));
+    }
+    let back = back.translate(vec2((shown.left() - back.left()).max(0.0), 0.0));
+    ui.painter().rect_filled(back, 5.0, Color32::from_black_alpha(205));
+    ui.painter().galley(back.min + vec2(6.0, 3.0), galley, theme::TEXT);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Level, NOBODY};
+
+    fn doll() -> (Identities, [IdentityId; 5]) {
+        let mut all = Identities::default();
+        let doll = all.add(Level::Object, NOBODY, vec!["doll".into()]);
+        let table = all.add(Level::Object, NOBODY, vec!["table".into()]);
+        let face = all.add(Level::Part, doll, vec!["face".into()]);
+        let eye = all.add(Level::Part, face, vec!["eye".into()]);
+        let hand = all.add(Level::Part, doll, vec!["hand".into()]);
+        (all, [doll, table, face, eye, hand])
+    }
+
+    #[test]
+    fn clicks_go_inwards_and_stay_at_the_level_they_reached() {
+        let (all, [doll, table, face, eye, hand]) = doll();
+        assert_eq!(picked(&all, eye, None, false), doll);
+        assert_eq!(picked(&all, eye, Some(doll), false), face);
+        assert_eq!(picked(&all, eye, Some(face), false), eye);
+        assert_eq!(picked(&all, eye, Some(eye), false), eye, "there is nothing deeper");
+        assert_eq!(picked(&all, hand, Some(face), false), hand, "its neighbor, at the same level");
+        assert_eq!(picked(&all, hand, Some(eye), false), hand);
+        assert_eq!(picked(&all, doll, Some(doll), false), doll, "no part is there");
+        assert_eq!(picked(&all, eye, Some(table), false), doll, "another object is selected");
+        assert_eq!((picked(&all, eye, None, true), picked(&all, eye, Some(doll), true)), (eye, eye), "Alt");
+    }
+
+    #[test]
+    fn a_place_of_the_window_is_a_pixel_of_the_view() {
+        let map = ViewMap {
+            width_px: 4,
+            height_px: 2,
+            identity: vec![1, 2, 3, 4, 5, 6, 7, 8],
+            share: vec![1.0; 8],
+            alpha: vec![1.0; 8],
+        };
+        let shown = Rect::from_min_size(pos2(100.0, 50.0), vec2(400.0, 200.0));
+        let at = |x: f32, y: f32| innermost(&map, shown, pos2(x, y));
+        assert_eq!((at(100.0, 50.0), at(499.0, 249.0), at(250.0, 160.0)), (Some(1), Some(8), Some(6)));
+        assert_eq!((at(99.0, 60.0), at(500.0, 60.0), at(300.0, 250.0)), (None, None, None), "beside the frame");
+    }
+}

@@ -1,0 +1,245 @@
+//! Pointing, clicking and marking in the view, on a small scene made by hand: a table with a lamp on it, whose
+//! shade is a part, and a box behind the lamp.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod ui_common;
+
+use std::path::{Path, PathBuf};
+
+use egui::{Event, Key, Modifiers, PointerButton, Pos2, Rect, vec2};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
+
+use fmlgs::io::SceneFolder;
+use fmlgs::io::trained::SceneInfo;
+use fmlgs::jobs::Folders;
+use fmlgs::scene::{GaussianCloud, Identities, IdentityId, Level, NOBODY, SemanticMap};
+use fmlgs::ui::actions::Action;
+use fmlgs::ui::app::App;
+use fmlgs::ui::color_by::ColorBy;
+
+const TABLE: IdentityId = 1;
+const LAMP: IdentityId = 2;
+const SHADE: IdentityId = 3;
+const BOX: IdentityId = 4;
+
+/// Gaussians that fill a box evenly, all of one size.
+fn fill(cloud: &mut GaussianCloud, of: &mut Vec<IdentityId>, id: IdentityId, min: [f32; 3], max: [f32; 3]) {
+    const N: usize = 9;
+    let at = |k: usize, axis: usize| min[axis] + (max[axis] - min[axis]) * k as f32 / (N - 1) as f32;
+    for i in 0..N * N * N {
+        let p = [at(i % N, 0), at(i / N % N, 1), at(i / N / N, 2)];
+        let half = (0..3).map(|a| 0.6 * (max[a] - min[a]) / (N - 1) as f32).fold(0.0, f32::max);
+        cloud.positions.push(p);
+        cloud.log_scales.push([half.max(0.01).ln(); 3]);
+        cloud.quaternions.push([1.0, 0.0, 0.0, 0.0]);
+        cloud.opacity_logits.push(3.0);
+        cloud.sh.push([[1.2, 0.2, -0.8][id as usize % 3], 0.3 * id as f32, 0.5]);
+        of.push(id);
+    }
+}
+
+/// The scene, saved into `folder`. Up is -y, as where photos say nothing else.
+fn write_scene(folder: &Path) -> PathBuf {
+    let (mut cloud, mut of) = (GaussianCloud::default(), Vec::new());
+    fill(&mut cloud, &mut of, TABLE, [-2.0, 0.0, -2.0], [2.0, 0.3, 2.0]);
+    fill(&mut cloud, &mut of, LAMP, [-0.3, -0.7, -0.3], [0.3, -0.1, 0.3]);
+    fill(&mut cloud, &mut of, SHADE, [-0.6, -1.6, -0.6], [0.6, -0.8, 0.6]);
+    fill(&mut cloud, &mut of, BOX, [3.0, -0.2, 3.0], [3.2, 0.0, 3.2]);
+    let mut all = Identities::default();
+    all.add(Level::Object, NOBODY, vec!["table".into()]);
+    all.add(Level::Object, NOBODY, vec!["lamp".into()]);
+    all.add(Level::Part, LAMP, vec!["shade".into()]);
+    all.add(Level::Object, NOBODY, vec!["box".into()]);
+    for id in [TABLE, LAMP, SHADE, BOX] {
+        let code = 0.2 * id as f32;
+        all.get_mut(id).expect("there").code = [code, 1.0 - code, code];
+    }
+    let map = SemanticMap::of_identities(all, of, vec![1.0; cloud.len()], vec!["a.png".into()]);
+    let scene = folder.join("scene");
+    let info = SceneInfo { version: 1, name: "by hand".into(), ..SceneInfo::default() };
+    SceneFolder::hold(&scene, "a test").expect("ours").save(&info, &cloud, Some(&map)).expect("saved");
+    scene
+}
+
+struct Window {
+    harness: Harness<'static, App>,
+    _folder: tempfile::TempDir,
+}
+
+impl Window {
+    /// The scene with all that its pixels belong to.
+    fn new() -> Self {
+        let folder = tempfile::tempdir().expect("folder");
+        let first = Action::Open(write_scene(folder.path()));
+        let harness = ui_common::window(Folders { data: folder.path().join("data") }, Some(first));
+        let mut w = Self { harness, _folder: folder };
+        w.until("the scene", |a| a.state.semantics.is_some() && a.viewport.picture().is_some_and(|p| p.full));
+        w
+    }
+
+    fn app(&self) -> &App {
+        self.harness.state()
+    }
+
+    fn until(&mut self, what: &str, done: impl Fn(&App) -> bool) {
+        ui_common::until(&mut self.harness, what, done);
+    }
+
+    fn ask(&mut self, action: Action) {
+        ui_common::ask(&mut self.harness, action);
+    }
+
+    fn view(&self) -> Rect {
+        self.harness.get_by_label("Viewport").rect()
+    }
+
+    fn shows(&self, text: &str) -> bool {
+        self.harness.query_all_by_label_contains(text).next().is_some()
+    }
+
+    /// A place in the window, free of cards, where a pixel belongs to `id`, well inside of it.
+    fn place_of(&mut self, id: IdentityId) -> Pos2 {
+        self.harness.hover_at(self.view().center());
+        self.until("what the pixels belong to", |a| a.viewport.queries.maps().is_some());
+        let map = &self.app().viewport.queries.maps().expect("drawn").identities;
+        let (w, view, ctx) = (map.width_px, self.view(), &self.harness.ctx);
+        let place = |i: usize| {
+            view.min + vec2((i % w) as f32, (i / w) as f32) / vec2(w as f32, map.height_px as f32) * view.size()
+        };
+        let free = |at: Pos2| ctx.layer_id_at(at).is_none_or(|layer| layer.order == egui::Order::Background);
+        let inside = |i: usize| [i.wrapping_sub(4), i + 4].iter().all(|j| map.identity.get(*j) == Some(&id));
+        let found =
+            (0..map.identity.len()).filter(|i| map.identity[*i] == id && inside(*i)).map(place).find(|at| free(*at));
+        found.unwrap_or_else(|| panic!("no pixel of {id} is free"))
+    }
+
+    fn hover(&mut self, at: Pos2) {
+        self.harness.hover_at(at);
+        self.harness.run_steps(3);
+    }
+
+    fn click(&mut self, at: Pos2, button: PointerButton, modifiers: Modifiers) {
+        self.hover(at);
+        self.harness.event(Event::PointerButton { pos: at, button, pressed: true, modifiers });
+        self.harness.step();
+        self.harness.event(Event::PointerButton { pos: at, button, pressed: false, modifiers });
+        // Long enough that the next one makes no double click.
+        self.harness.run_steps(60);
+    }
+
+    /// Drags the view by so many points.
+    fn pan(&mut self, by: egui::Vec2) {
+        let (from, button, modifiers) = (self.view().center(), PointerButton::Secondary, Modifiers::NONE);
+        self.hover(from);
+        self.harness.event(Event::PointerButton { pos: from, button, pressed: true, modifiers });
+        for k in 1..=4 {
+            self.harness.hover_at(from + by * k as f32 / 4.0);
+            self.harness.step();
+        }
+        self.harness.event(Event::PointerButton { pos: from + by, button, pressed: false, modifiers });
+        self.harness.run_steps(3);
+    }
+
+    fn selected(&self) -> Option<IdentityId> {
+        self.app().viewport.picking.selected()
+    }
+
+    fn pixels_of(app: &App, id: IdentityId) -> Option<usize> {
+        let identities = &app.state.semantics.as_ref()?.identities;
+        Some(app.viewport.queries.maps()?.identities.mask(identities, id).area())
+    }
+}
+
+#[test]
+fn things_are_pointed_at_selected_isolated_and_hidden() {
+    let mut w = Window::new();
+    let (table, shade, lamp) = (w.place_of(TABLE), w.place_of(SHADE), w.place_of(LAMP));
+    w.hover(table);
+    assert_eq!((w.app().viewport.picking.hovered(), w.selected()), (Some(TABLE), None), "looking selects nothing");
+    let plain = Modifiers::NONE;
+    w.click(table, PointerButton::Primary, plain);
+    assert_eq!(w.selected(), Some(TABLE));
+    w.click(shade, PointerButton::Primary, plain);
+    assert_eq!(w.selected(), Some(LAMP), "its object first");
+    w.click(shade, PointerButton::Primary, plain);
+    assert_eq!(w.selected(), Some(SHADE), "then the part");
+    w.click(lamp, PointerButton::Primary, plain);
+    assert_eq!(w.selected(), Some(LAMP));
+    w.click(table, PointerButton::Primary, plain);
+    w.harness.event(Event::ModifiersChanged(Modifiers::ALT));
+    w.click(shade, PointerButton::Primary, Modifiers::ALT);
+    w.harness.event(Event::ModifiersChanged(plain));
+    assert_eq!(w.selected(), Some(SHADE), "Alt takes the part at once");
+
+    // Keys are about what is selected.
+    w.harness.key_press(Key::I);
+    w.until("it is alone", |a| Window::pixels_of(a, TABLE) == Some(0));
+    w.harness.key_press(Key::I);
+    w.until("all is back", |a| Window::pixels_of(a, TABLE).is_some_and(|n| n > 0));
+    w.harness.key_press(Key::H);
+    w.until("it is hidden", |a| Window::pixels_of(a, SHADE) == Some(0));
+    w.ask(Action::Isolate(None));
+    w.until("it is back", |a| Window::pixels_of(a, SHADE).is_some_and(|n| n > 0));
+    w.harness.key_press(Key::Escape);
+    w.harness.run_steps(3);
+    assert_eq!(w.selected(), None, "Escape deselects");
+    w.harness.key_press(Key::H);
+    w.harness.run_steps(3);
+    assert!(w.shows("Nothing is selected"), "a key without its object says so");
+
+    // The menu of a right click is about what is under the cursor.
+    w.click(shade, PointerButton::Secondary, plain);
+    assert_eq!(w.selected(), Some(LAMP));
+    assert!(w.shows("Mark as a query") && w.shows("Export as .ply"), "the menu");
+    w.harness.get_by_label("Mark as a query").click();
+    w.harness.run_steps(4);
+    assert_eq!(w.app().viewport.queries.found(), [LAMP]);
+    assert!(!w.shows("Mark as a query"), "a choice closes it");
+}
+
+#[test]
+fn what_is_not_in_view_is_marked_and_masks_follow_the_eye() {
+    let mut w = Window::new();
+    let shade = w.place_of(SHADE);
+    w.ask(Action::Ask("lamp".into()));
+    w.until("its mask", |a| Window::pixels_of(a, LAMP).is_some_and(|n| n > 0));
+    assert!(!w.shows("Fly to lamp"), "what is seen needs no arrow");
+    w.click(shade, PointerButton::Primary, Modifiers::NONE);
+    let before = w.app().viewport.pose();
+    w.harness.key_press(Key::F);
+    w.harness.run_steps(4);
+    let after = w.app().viewport.pose();
+    assert!(before.center.distance(after.center) > 0.1, "F frames what is selected");
+
+    // Moved out of view: an arrow, by which one flies there.
+    for _ in 0..3 {
+        w.pan(vec2(0.45, 0.0) * w.view().size());
+    }
+    w.until("nothing of it", |a| Window::pixels_of(a, LAMP) == Some(0));
+    w.harness.run_steps(3);
+    assert!(w.shows("Fly to lamp"), "an arrow");
+    w.harness.get_by_label("Fly to lamp").click();
+    w.until("where one can go is looked at", |a| a.state.explored.is_some());
+
+    // While the eye moves the mask is drawn too.
+    w.ask(Action::ResetView);
+    w.until("rest", |a| a.viewport.queries.maps().is_some());
+    let mut views = std::collections::BTreeSet::new();
+    w.harness.key_down(Key::D);
+    for _ in 0..60 {
+        w.harness.step();
+        std::thread::sleep(std::time::Duration::from_millis(10));
+        let queries = &w.app().viewport.queries;
+        assert!(queries.shown_maps().is_some(), "the mask stays on screen");
+        views.extend(queries.shown_maps().filter(|_| queries.maps().is_none()).map(|m| m.generation()));
+    }
+    w.harness.key_up(Key::D);
+    assert!(views.len() > 2, "drawn anew as the eye moves: {views:?}");
+
+    w.harness.key_press(Key::Num3);
+    w.harness.run_steps(3);
+    assert!(w.shows("One color per object"), "the legend");
+    w.ask(Action::Tint(ColorBy::Objects));
+    assert!(!w.shows("One color per object"), "once more for the picture");
+}
