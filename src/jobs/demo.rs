@@ -107,6 +107,10 @@ pub(crate) fn unpacked(folders: &Folders) -> Result<PathBuf, IoError> {
 /// As [`unpacked`] and [`open::open`].
 pub(crate) fn open(folders: &Folders, machine: &Machine, observer: &mut dyn Observer) -> Result<OpenedScene, JobError> {
     let mut scene = open::open(&unpacked(folders)?.join("scene"), folders, machine, observer)?;
+    scene.name = "Demo".into();
+    if let Some(dataset) = scene.dataset.as_mut().map(Arc::make_mut) {
+        dataset.name = "Demo".into();
+    }
     let photo = scene.dataset.as_ref().and_then(|d| d.photos.get(Recipe::shipped().home));
     scene.home.camera = photo.map(|p| p.camera.clone()).or(scene.home.camera);
     Ok(scene)

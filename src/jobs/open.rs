@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::{Folders, JobError, plan};
 use crate::io::labels::Labels;
+use crate::io::scene_files::CHECKPOINT_FILE;
 use crate::io::trained::{self, History, SceneCamera};
 use crate::io::{self, Opened, TrainedScene};
 use crate::math::sh::SH_C0;
@@ -199,6 +200,8 @@ pub struct OpenedScene {
     pub(crate) facts: Facts,
     /// Id of the save that its files are of, if it has one.
     pub(crate) state: Option<String>,
+    /// Settings of a training in `out` that can go on.
+    pub(crate) resumable: Option<TrainConfig>,
     /// Reports that may be of it.
     pub(crate) reports: Vec<PathBuf>,
     /// Folder for a report of it.
@@ -211,6 +214,7 @@ impl OpenedScene {
             Some(dataset) if scene.cameras.is_empty() => HomeView::new(&dataset.cameras(), Some(&scene.cloud)),
             _ => scene.home(),
         };
+        let has_checkpoint = scene.folder.as_ref().is_some_and(|f| f.join(CHECKPOINT_FILE).is_file());
         let semantics = scene.folder.is_some().then(|| known_objects(&scene, observer)).flatten();
         Self {
             path: scene.path,
@@ -226,6 +230,7 @@ impl OpenedScene {
             render: scene.settings,
             sh_stored: scene.sh_stored,
             state: scene.state,
+            resumable: has_checkpoint.then_some(scene.config),
             ..Self::default()
         }
     }

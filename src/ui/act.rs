@@ -1,6 +1,6 @@
 //! What each action does.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::app::App;
@@ -20,17 +20,18 @@ use crate::measure::is_report;
 use crate::navigate::FRAMES;
 use crate::navigate::target::{Side, Wish};
 use crate::pipeline::semantics::edit::Edit;
-use crate::pipeline::train::TrainConfig;
+use crate::pipeline::train::preset;
 use crate::scene::IdentityId;
 use crate::scene::plan::When;
 use crate::ui::actions::{Action, Pane};
-use crate::worker::{Command, JobId, JobKind, ViewMode};
+use crate::worker::{Command, Failure, JobId, JobKind, ViewMode};
 
 impl App {
     /// Does what a user asked for.
     pub(super) fn act(&mut self, action: Action, ctx: &egui::Context) {
         match action {
             Action::Open(path) if is_report(&path) => self.read_report(path, false),
+            Action::Open(path) if path.extension().is_some_and(|e| e == "toml") => self.read_preset(&path),
             Action::OpenDemo | Action::TrainDemo | Action::Open(_) | Action::FindPoses(_) => self.replace_scene(action),
             Action::StartTraining => self.start_training(),
             Action::PauseTraining => {
@@ -192,6 +193,17 @@ impl App {
         self.submit(Command::InstallModel { id, brought });
     }
 
+    /// Takes over settings for the next training.
+    fn read_preset(&mut self, path: &Path) {
+        match preset::read(path) {
+            Ok(config) => {
+                self.layout.config = config;
+                self.state.toast(Tone::Good, format!("The next training has the settings of {}", path.display()));
+            }
+            Err(e) => self.state.fail("Reading training settings", Failure::of(&e, "")),
+        }
+    }
+
     fn start_training(&mut self) {
         let scene = self.state.scene.as_ref();
         let Some((dataset, out)) = scene.and_then(|s| Some((s.dataset.clone()?, s.out.clone()))) else {
@@ -203,8 +215,10 @@ impl App {
             self.state.toast(Tone::Warning, text);
             return;
         }
-        let config = TrainConfig { max_side_px: self.state.plan.train_side_px, ..self.layout.config.clone() };
+        let config = self.state.next_training(&self.layout.config);
         self.state.antialias = config.antialias;
+        let reached = self.state.continues_at(&config).unwrap_or(0);
+        self.state.resumable = Some((config.clone(), reached));
         self.submit(Command::Train { dataset, config, out });
     }
 

@@ -87,7 +87,7 @@ fn dialog(action: &Action, name: &str) -> Option<(String, Dialog)> {
     let save = |ending: &str| Dialog::Save(format!("{name}{ending}"));
     let (title, dialog) = match action {
         Action::OpenFolder => ("Open a folder of photos or a trained scene", Dialog::Folder),
-        Action::OpenFile => ("Open a scene", Dialog::File("Scenes", &["ply", "json"])),
+        Action::OpenFile => ("Open a scene", Dialog::File("Scenes", &["ply", "json", "toml"])),
         Action::AddModel(id) => return Some((format!("Choose the folder with the files of {id}"), Dialog::Folder)),
         Action::ChooseMasks => ("Choose the folder with the masks", Dialog::Folder),
         Action::ExportPly | Action::ExportTarget(_) => ("Export Gaussians", save(".ply")),

@@ -18,6 +18,7 @@ pub(crate) mod dialogs;
 mod edits;
 pub(crate) mod keys;
 pub(crate) mod layout;
+mod message;
 pub(crate) mod palette;
 pub(crate) mod panes;
 pub(crate) mod state;

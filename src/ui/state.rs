@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::actions::Action;
+pub(crate) use super::message::{ErrorBox, LogLine, Toast, Tone};
 pub(crate) use super::train_history::TrainHistory;
 use crate::io::unposed::Unposed;
 use crate::jobs::OpenedScene;
@@ -14,6 +15,7 @@ use crate::jobs::models::ModelList;
 use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Progress, Severity};
 use crate::pipeline::semantics::thumbnails::Thumbnails;
+use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::undo::UndoHistory;
 use crate::scene::{Facts, Limits, Overrides, PhotoPixels, ScenePlan, SemanticMap, text};
@@ -23,35 +25,6 @@ use crate::worker::{Event, Failure, JobId, JobKind, Lane, Outcome, Versioned};
 const MAX_LOG: usize = 1_000;
 /// Files and folders kept in the recent list.
 const MAX_RECENT: usize = 8;
-
-/// How a message is meant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Tone {
-    Info,
-    Good,
-    /// Something was left out or changed.
-    Warning,
-    Error,
-}
-
-/// A line of the log.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LogLine {
-    /// How it is meant.
-    pub(crate) tone: Tone,
-    /// What it says.
-    pub text: String,
-}
-
-/// A message that goes away by itself.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Toast {
-    /// Names it, so that the window can time it.
-    pub(crate) id: u64,
-    /// How it is meant.
-    pub(crate) tone: Tone,
-    pub(crate) text: String,
-}
 
 /// The long job that runs now.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,15 +37,6 @@ pub struct RunningJob {
     pub(crate) progress: Option<Progress>,
     /// Whether it waits.
     pub paused: bool,
-}
-
-/// An error that is shown until a user has read it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ErrorBox {
-    /// What was being done: "Opening fox".
-    pub(crate) doing: String,
-    /// What went wrong, and what to do.
-    pub(crate) failure: Failure,
 }
 
 /// A report on screen.
@@ -116,6 +80,10 @@ pub struct AppState {
     pub job: Option<RunningJob>,
     /// Training of the present scene.
     pub history: TrainHistory,
+    /// The training before, while another is shown.
+    pub(crate) previous: TrainHistory,
+    /// Settings of the training that can go on, and the step that it has come to.
+    pub(crate) resumable: Option<(TrainConfig, u64)>,
     /// Job whose Gaussians are those of the present scene.
     pub(crate) training_job: Option<JobId>,
     /// The log, oldest first.
@@ -173,6 +141,10 @@ impl AppState {
             Event::Paused(job, paused) => self.with_job(job, |j| j.paused = paused),
             Event::Step(job, metrics) => {
                 if self.training_job == Some(job) {
+                    // One that starts over is another, to be compared with.
+                    if self.history.steps.first().is_some_and(|first| metrics.step <= first.step) {
+                        self.previous = std::mem::take(&mut self.history);
+                    }
                     self.history.push(metrics);
                 }
             }
@@ -182,6 +154,8 @@ impl AppState {
             Event::Finished(job, outcome) => return self.finished(job, outcome),
             Event::Cancelled(job) => {
                 if let Some(ended) = self.end(job) {
+                    let reached = ended.progress.as_ref().filter(|_| ended.kind == JobKind::Train).map(|p| p.done);
+                    self.resumable.iter_mut().zip(reached).for_each(|((_, step), reached)| *step = reached);
                     self.toast(Tone::Info, format!("{}: canceled", ended.title));
                     // What was measured before is worth seeing.
                     let scene = self.scene.as_ref().filter(|_| ended.kind == JobKind::Measure);
@@ -249,6 +223,17 @@ impl AppState {
         let scene = self.scene.as_ref().map(|s| s.render.clone()).unwrap_or_default();
         let sh_degree = if self.is_training() { scene.sh_degree } else { self.plan.sh_degree };
         RenderSettings { sh_degree, antialias: self.antialias, ..scene }
+    }
+
+    /// The settings that a training started now has.
+    pub(crate) fn next_training(&self, config: &TrainConfig) -> TrainConfig {
+        TrainConfig { max_side_px: self.plan.train_side_px, ..config.clone() }
+    }
+
+    /// The step at which a training with these settings goes on, if it does.
+    pub(crate) fn continues_at(&self, config: &TrainConfig) -> Option<u64> {
+        let (before, step) = self.resumable.as_ref()?;
+        (before.is_same_run(config) && (1..config.steps).contains(step)).then_some(*step)
     }
 
     fn set_facts(&mut self, facts: Facts) {
@@ -380,6 +365,9 @@ impl AppState {
         self.history =
             TrainHistory { steps: scene.history.steps.clone(), evaluations: scene.history.evaluations.clone() };
         self.training_job = None;
+        self.previous = TrainHistory::default();
+        let reached = self.history.steps.last().map(|s| s.step);
+        self.resumable = scene.resumable.clone().zip(reached);
         (self.explored, self.visited) = (None, None);
         self.photos.clear();
         if !is_demo {

@@ -15,6 +15,7 @@ pub(crate) mod geometry;
 pub(crate) mod init;
 mod outcome;
 mod photos;
+pub(crate) mod preset;
 mod run;
 pub(crate) mod schedule;
 pub mod trainer;

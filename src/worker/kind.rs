@@ -1,0 +1,80 @@
+//! Sorts of jobs, and which thread runs each.
+
+/// What sort of job it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum JobKind {
+    /// Reads a file or folder.
+    Open,
+    /// Reads the trained demo.
+    Demo,
+    /// Makes the demo's photos and reads them.
+    DemoPhotos,
+    /// Finds camera poses.
+    Poses,
+    /// Trains Gaussians.
+    Train,
+    /// Measures held-out quality.
+    Evaluate,
+    /// Finds objects and parts.
+    Objects,
+    /// Changes objects and parts.
+    Edit,
+    /// Writes a file.
+    Export,
+    /// Loads a photo's pixels.
+    Photo,
+    /// Writes a picture.
+    Picture,
+    /// Draws objects and parts alone.
+    Thumbnails,
+    /// Lists models.
+    Models,
+    /// Looks at where one can go.
+    Explore,
+    /// Puts a model in place.
+    Model,
+    /// Finds the way to an identity.
+    Approach,
+    /// Draws a video.
+    CameraSpline,
+    /// Measures drawing, knob by knob.
+    Measure,
+    /// Reads a report.
+    Report,
+}
+
+impl JobKind {
+    /// Which thread runs it.
+    pub(crate) fn lane(self) -> Lane {
+        match self {
+            Self::Open
+            | Self::Demo
+            | Self::DemoPhotos
+            | Self::Poses
+            | Self::Train
+            | Self::Evaluate
+            | Self::Objects
+            | Self::Model
+            | Self::CameraSpline
+            | Self::Measure => Lane::Long,
+            Self::Edit
+            | Self::Export
+            | Self::Photo
+            | Self::Picture
+            | Self::Thumbnails
+            | Self::Models
+            | Self::Explore
+            | Self::Approach
+            | Self::Report => Lane::Short,
+        }
+    }
+}
+
+/// Which thread a job runs on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lane {
+    /// One after another, minutes each.
+    Long,
+    /// Answered while a long job runs.
+    Short,
+}
