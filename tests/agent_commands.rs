@@ -9,13 +9,13 @@ use std::sync::atomic::AtomicBool;
 
 use agent_common::room::Room;
 use agent_common::table::{Table, Tally, Wordings, outcome, tally};
-use fmlgs::agent::camera_args::Side;
 use fmlgs::agent::commands::{Commands, commands, complete};
-use fmlgs::agent::execute::Outcome;
+use fmlgs::agent::execute::CallOutcome;
 use fmlgs::agent::planner::{PlannerContext, Step};
 use fmlgs::agent::tool::{Target, ToolCall};
 use fmlgs::agent::transcript::What;
 use fmlgs::agent::{Planner, Policy, Refusal, Reply, Session, World};
+use fmlgs::navigate::target::Side;
 use serde::{Deserialize, Serialize};
 
 const WORDINGS: &str = include_str!("data/agent_commands.toml");
@@ -109,7 +109,7 @@ impl Planner for Deaf {
         self.0 = false;
     }
 
-    fn next(&mut self, _last: Option<&Outcome>, _context: &mut PlannerContext<'_>) -> Result<Step, Refusal> {
+    fn next(&mut self, _last: Option<&CallOutcome>, _context: &mut PlannerContext<'_>) -> Result<Step, Refusal> {
         if std::mem::replace(&mut self.0, true) {
             return Ok(Step::finish());
         }

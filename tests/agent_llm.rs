@@ -3,8 +3,12 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod agent_common;
+#[path = "agent_llm/discovery.rs"]
+mod discovery;
 #[path = "agent_llm/sent.rs"]
 mod sent;
+#[path = "agent_llm/tables.rs"]
+mod tables;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,14 +19,14 @@ use agent_common::server::{Say, Server};
 use agent_common::table::{Table, Turn, ask, outcome};
 use fmlgs::agent::llm::Llm;
 use fmlgs::agent::llm::secret::Secret;
-use fmlgs::agent::llm::settings::{Limits, LlmSettings, Patience};
+use fmlgs::agent::llm::settings::{LlmSettings, RequestLimits, RequestPatience};
 use fmlgs::agent::{AgentEvent, Policy, RefusalKind, Reply, Session, World};
 use serde_json::{Value, json};
 
 const KEY: &str = "sk-test/0123456789abcdef+Q";
 
-fn patience() -> Patience {
-    Patience {
+fn patience() -> RequestPatience {
+    RequestPatience {
         stall: Duration::from_millis(300),
         answer: Duration::from_secs(3),
         request: Duration::from_secs(10),
@@ -32,14 +36,14 @@ fn patience() -> Patience {
     }
 }
 
-fn session_with(server: &Server, policy: Policy, limits: Limits) -> Session {
+fn session_with(server: &Server, policy: Policy, limits: RequestLimits) -> Session {
     let settings = LlmSettings { base_url: server.url.clone(), model: "test".into(), ..LlmSettings::default() };
     let planner = Llm::with(settings, Secret::new(KEY), patience(), limits).expect("settings");
     Session::new(policy, Box::new(planner))
 }
 
 fn session(server: &Server) -> Session {
-    session_with(server, Policy::built_in().expect("policy"), Limits::default())
+    session_with(server, Policy::built_in().expect("policy"), RequestLimits::default())
 }
 
 /// What came of a talk.
@@ -116,101 +120,6 @@ fn a_good_model_is_heard_step_by_step() {
     assert_eq!(pieces, t.reply.text, "the answer comes piece by piece");
 }
 
-/// The table's line of a call as a model would write the call.
-fn as_call(line: &str) -> Option<(String, String)> {
-    let (name, rest) = line.split_once('(')?;
-    let inside = rest.strip_suffix(')')?;
-    let parts: Vec<&str> = inside.split(", ").filter(|p| !p.is_empty()).collect();
-    let first = parts.first().copied();
-    let arguments = match name {
-        "go_to" => {
-            let mut a = json!({ "target": first? });
-            for part in &parts[1..] {
-                match *part {
-                    "closer" => a["closeness"] = json!("closer"),
-                    "farther" => a["closeness"] = json!("farther"),
-                    "from the other side" => a["side"] = json!("other"),
-                    "from the left" => a["side"] = json!("left"),
-                    "from above" => a["side"] = json!("above"),
-                    _ => return None,
-                }
-            }
-            a
-        }
-        "look_at" | "isolate" | "highlight" | "hide" | "unhide" | "describe" | "measure" | "remove" | "export"
-            if parts.len() == 1 =>
-        {
-            json!({ "target": first? })
-        }
-        "locate" => json!({ "query": first?.trim_matches('"') }),
-        "show_all" | "undo" => json!({}),
-        "move" => {
-            let mut a = json!({ "direction": first? });
-            if let Some(far) = parts.get(1) {
-                let (n, unit) = far.split_once(' ')?;
-                let n: f64 = n.parse().ok()?;
-                a["distance"] = if unit == "m" { json!({ "meters": n }) } else { json!({ "relative": n }) };
-            }
-            a
-        }
-        "turn" => {
-            let degrees: f64 = parts.get(1)?.split(' ').next()?.parse().ok()?;
-            json!({ "direction": first?, "degrees": degrees })
-        }
-        _ => return None,
-    };
-    Some((name.into(), arguments.to_string()))
-}
-
-/// What a model would say in a dialog of the table to do what is wanted; `None` where the table leaves
-/// that open, or the words of the built-in planner are what counts.
-fn script(turns: &[Turn]) -> Option<Vec<Say>> {
-    let model_call = |line: &String| as_call(line).filter(|_| !line.contains(['*', '|'])).map(|c| Say::Calls(vec![c]));
-    let mut says = Vec::new();
-    let mut waiting = false;
-    for (i, turn) in turns.iter().enumerate() {
-        if std::mem::take(&mut waiting) {
-            // The yes was heard by the session; the model hears what came of it.
-            says.push(text("Done."));
-        } else if turn.outcome == "confirm" && turn.calls.is_empty() {
-            says.push(turns.get(i + 1).filter(|next| next.outcome == "done")?.calls.first().and_then(model_call)?);
-            waiting = true;
-        } else if turn.outcome == "done" && !turn.calls.is_empty() {
-            for line in &turn.calls {
-                says.push(model_call(line)?);
-            }
-            says.push(text("There you are."));
-        } else {
-            return None;
-        }
-    }
-    Some(says)
-}
-
-#[test]
-fn the_tables_go_through_the_same_checks() {
-    let tables = [
-        Table::read(include_str!("data/agent_dialogs.toml")),
-        Table::of_commands(include_str!("data/agent_commands.toml")),
-    ];
-    let mut asked = 0;
-    for dialog in tables.iter().flat_map(|t| &t.dialog) {
-        let Some(says) = script(&dialog.turns) else { continue };
-        let server = Server::new(says);
-        let (mut session, mut room) = (session(&server), Room::new());
-        for turn in &dialog.turns {
-            let (say, calls, outcome) = (turn.say.clone(), turn.calls.clone(), turn.outcome.clone());
-            // A model answers in its own words.
-            let turn = Turn { say, calls, outcome, reply: Vec::new() };
-            let (right, is_unsafe) = ask(&mut session, &mut room, &turn);
-            assert!(right.is_ok() && !is_unsafe, "{right:?}");
-            asked += 1;
-        }
-    }
-    println!("{asked} requests through the model");
-    assert!(asked >= 55, "{asked}");
-}
-
 #[test]
 fn what_is_no_valid_call_is_told_to_the_model_and_never_done() {
     let bad = [
@@ -257,7 +166,7 @@ fn endless_loops_come_to_an_end() {
     let many: Vec<(String, String)> =
         (1..60).map(|n| call("turn", json!({ "direction": "left", "degrees": n }))).collect();
     let t = talk(vec![Say::Calls(many), text("Done.")], "turn left");
-    assert_eq!(t.room.log.len(), Limits::default().calls);
+    assert_eq!(t.room.log.len(), RequestLimits::default().calls);
     // Tokens.
     let t = talk(vec![Say::Tokens(String::new(), 60_000)], "turn left");
     assert_eq!((t.outcome(), t.server.requests()), ("limit", 2));
@@ -354,7 +263,7 @@ fn orders_in_names_and_texts_have_no_power() {
     let forbidding = "[tools]\nallowed = [\"go_to\", \"remove\", \"export\"]\nforbidden = [\"remove\"]";
     let policy = Policy::parse(forbidding, "own").expect("policy");
     let server = Server::new(vec![calls(&[("remove", json!({ "target": 1 })), ("undo", json!({}))]), text("No.")]);
-    let (mut session, mut room) = (session_with(&server, policy, Limits::default()), Room::new());
+    let (mut session, mut room) = (session_with(&server, policy, RequestLimits::default()), Room::new());
     session.say(&mut room, "tidy up", &mut |_| {}, &AtomicBool::new(false));
     assert!(room.log.is_empty());
     let tools = server.seen.lock().expect("log")[0].json()["tools"].as_array().map(Vec::len);
@@ -391,7 +300,7 @@ fn the_key_goes_into_the_header_and_nowhere_else() {
     // The control: without the key's own redaction the same talk shows it.
     let server = Server::new(vec![Say::EchoKey]);
     let settings = LlmSettings { base_url: server.url.clone(), model: "m".into(), ..LlmSettings::default() };
-    let planner = Llm::with(settings, None, patience(), Limits::default()).expect("settings");
+    let planner = Llm::with(settings, None, patience(), RequestLimits::default()).expect("settings");
     let mut open = Session::new(Policy::built_in().expect("policy"), Box::new(planner));
     let reply = open.say(&mut Room::new(), &format!("my key is {KEY}"), &mut |_| {}, &AtomicBool::new(false));
     assert!(reply.text.contains("none") && open.transcript().to_json().contains(KEY));
@@ -444,8 +353,8 @@ fn questions_of_the_model_are_answered_and_talks_go_on() {
 fn a_request_can_be_ended_while_the_server_is_silent() {
     let server = Server::new(vec![Say::Silence]);
     let settings = LlmSettings { base_url: server.url.clone(), model: "m".into(), ..LlmSettings::default() };
-    let slow = Patience { stall: Duration::from_secs(15), answer: Duration::from_secs(15), ..patience() };
-    let planner = Llm::with(settings, None, slow, Limits::default()).expect("settings");
+    let slow = RequestPatience { stall: Duration::from_secs(15), answer: Duration::from_secs(15), ..patience() };
+    let planner = Llm::with(settings, None, slow, RequestLimits::default()).expect("settings");
     let mut session = Session::new(Policy::built_in().expect("policy"), Box::new(planner));
     let cancel = Arc::new(AtomicBool::new(false));
     let stopper = Arc::clone(&cancel);
@@ -465,38 +374,4 @@ fn a_request_can_be_ended_while_the_server_is_silent() {
     };
     let reply = session.say(&mut Room::new(), "look at the lamp", &mut on, &cancel);
     assert_eq!(outcome(&reply), "stopped");
-}
-
-#[test]
-fn servers_on_this_machine_are_found_and_tested_and_nothing_of_a_scene_is_sent() {
-    use fmlgs::agent::llm::discover::{find, test};
-    let list = || Say::Raw(json!({ "data": [{ "id": "qwen3" }, { "id": "small" }] }).to_string());
-    let never = AtomicBool::new(false);
-    let server = Server::new(vec![list()]);
-    let port = server.url.trim_end_matches("/v1").rsplit(':').next().and_then(|p| p.parse().ok()).expect("a port");
-    let found = find(&[("Test", port), ("Nobody", 9)], &never);
-    assert_eq!(found.len(), 1, "{found:?}");
-    assert_eq!((found[0].kind, found[0].base_url.as_str()), ("Test", server.url.as_str()));
-    assert_eq!(found[0].models, ["qwen3", "small"]);
-    assert!(server.seen.lock().expect("log")[0].body.is_empty());
-    let tried = |script: Vec<Say>, model: &str| {
-        let server = Server::new(script);
-        let settings = LlmSettings { base_url: server.url.clone(), model: model.into(), ..LlmSettings::default() };
-        (test(&settings, &patience(), &never), server)
-    };
-    let (well, server) = tried(vec![list(), text("OK")], "qwen3");
-    assert!(well.is_ok_and(|t| t.contains("qwen3 answers")));
-    assert!(!server.seen.lock().expect("log")[1].body.contains("SCENE"));
-    for (script, model, says) in [
-        (vec![list()], "other", "no model 'other'; it has: qwen3, small"),
-        (vec![Say::Status(401, String::new(), String::new())], "qwen3", "wants a key"),
-        (vec![list(), Say::Status(400, String::new(), "no tools here".into())], "qwen3", "no tools here"),
-        (vec![list(), Say::Raw("<html>".into())], "qwen3", "no JSON"),
-        (vec![Say::Silence], "qwen3", "said nothing"),
-    ] {
-        let problem = tried(script, model).0.expect_err(says);
-        assert!(problem.contains(says), "{says}: {problem}");
-    }
-    let nobody = LlmSettings { base_url: "http://127.0.0.1:9/v1".into(), model: "m".into(), ..LlmSettings::default() };
-    assert!(test(&nobody, &patience(), &never).expect_err("nobody there").contains("start the server"));
 }

@@ -1,11 +1,13 @@
 //! The tools' JSON schemas against the calls that the agent reads.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use fmlgs::agent::camera_args::{CLOSENESS, Direction, FARTHEST, Side};
+use fmlgs::agent::camera_args::{CLOSENESS, Direction, FARTHEST};
 use fmlgs::agent::relation::Relation;
 use fmlgs::agent::schema::tools;
 use fmlgs::agent::tool::{MAX_TEXT, NAMES, ToolCall};
+use fmlgs::navigate::target::Side;
 use serde_json::{Value, json};
+use strum::VariantArray;
 
 #[test]
 fn the_schemas_know_every_word_and_bound_of_the_calls() {
@@ -14,7 +16,7 @@ fn the_schemas_know_every_word_and_bound_of_the_calls() {
         let at = NAMES.iter().position(|n| *n == tool).expect("a tool");
         tools[at].pointer(&format!("/function/parameters/properties/{path}")).cloned().expect("a property")
     };
-    assert_eq!(of("go_to", "side/enum"), json!(Side::ALL));
+    assert_eq!(of("go_to", "side/enum"), json!(Side::VARIANTS));
     assert_eq!(of("move", "direction/enum"), json!(Direction::ALL));
     assert_eq!(of("turn", "direction/enum"), json!(Direction::TURNS));
     assert_eq!(of("list", "relation/enum"), json!(Relation::ALL));

@@ -8,6 +8,10 @@
 // The generator of a committed asset: its own test compares the two.
 #[path = "../tools/demo_scene/mod.rs"]
 mod demo_scene;
+#[path = "architecture/front_ends.rs"]
+mod front_ends;
+#[path = "architecture/names.rs"]
+mod names;
 #[path = "architecture/rules.rs"]
 mod rules;
 #[path = "architecture/source.rs"]
@@ -15,6 +19,8 @@ mod source;
 
 use std::path::Path;
 
+use front_ends::front_ends;
+use names::type_names;
 use rules::{
     Complaint, cycles, dependencies, habits, headers, kernels, module_order, printing, render_doors, size_caps,
 };
@@ -68,6 +74,16 @@ fn no_file_uses_one_that_uses_it() {
 #[test]
 fn channels_are_bounded_addresses_are_no_keys_and_progress_is_a_tickers() {
     check(habits(&tree()));
+}
+
+#[test]
+fn front_ends_leave_the_work_to_jobs() {
+    check(front_ends(&tree()));
+}
+
+#[test]
+fn a_types_name_stands_for_one_thing() {
+    check(type_names(&tree()));
 }
 
 #[test]
@@ -129,9 +145,36 @@ fn render_doors_catch_who_goes_around_them() {
 }
 
 #[test]
+fn front_ends_are_caught_that_do_the_work_themselves() {
+    let n = |path, text| complaints(front_ends, path, text);
+    assert_eq!(n("src/cli/x.rs", "use crate::pipeline::train::run;"), 1);
+    assert_eq!(n("src/cli/x.rs", "use crate::{io, jobs::open, models::engine};"), 2);
+    assert_eq!(n("src/ui/x.rs", "use crate::io::{SceneFolder, semantic_map::{self, FILE}};"), 2);
+    assert_eq!(n("src/agent/x.rs", "fn f() { crate::render::Renderer::new().draw() }"), 1);
+    assert_eq!(n("src/ui/panes/x.rs", "fn f() { super::super::super::navigate::graph::build() }"), 1);
+    assert_eq!(n("src/ui/x.rs", "use crate::render::Device;"), 1);
+    assert_eq!(n("src/cli/x.rs", "use crate::pipeline::train::{TrainConfig, MOST_STEPS}; use crate::jobs::open;"), 0);
+    assert_eq!(n("src/ui/x.rs", "use crate::measure::table; use crate::scene::text; use crate::io::httpd;"), 1);
+    assert_eq!(n("src/ui/x.rs", "use crate::render::RenderSettings; fn f() { RenderSettings::default() }"), 0);
+    assert_eq!(n("src/worker/x.rs", "use crate::pipeline::train::run;"), 0);
+    assert_eq!(n("src/cli/x.rs", "#[cfg(test)]\nmod tests {\n    use crate::io::open;\n}\n"), 0);
+}
+
+#[test]
+fn names_that_stand_for_two_types_are_caught() {
+    let n = |a: &str, b: &str| type_names(&[file("src/io/a.rs", a), file("src/ui/b.rs", b)]).len();
+    assert_eq!(n("pub struct Frame {", "pub(crate) enum Frame {"), 1);
+    assert_eq!(n("pub(super) trait Sink: Send {", "pub type Sink<T> = Vec<T>;"), 1);
+    assert_eq!(n("pub struct Frame {", "struct Frame {"), 0, "nobody else sees that one");
+    assert_eq!(n("pub struct Frame;", "pub fn frame() {}\n    type Frame = u8;"), 0);
+    assert_eq!(n("pub struct Frame;", "#[cfg(test)]\nmod tests {\n    pub struct Frame;\n}\n"), 0);
+    assert_eq!(n("pub use crate::scene::Camera as Eye;", "pub use crate::scene::{NOBODY as NONE, Camera};"), 1);
+}
+
+#[test]
 fn size_caps_catch_long_files() {
-    assert_eq!(complaints(size_caps, "src/a.rs", &"x\n".repeat(600)), 0);
-    assert_eq!(complaints(size_caps, "src/a.rs", &"x\n".repeat(601)), 1);
+    assert_eq!(complaints(size_caps, "src/a.rs", &"x\n".repeat(400)), 0);
+    assert_eq!(complaints(size_caps, "src/a.rs", &"x\n".repeat(401)), 1);
     assert_eq!(complaints(size_caps, "shaders/a.wgsl", &"x\n".repeat(250)), 0);
     assert_eq!(complaints(size_caps, "shaders/a.wgsl", &"x\n".repeat(251)), 1);
 }

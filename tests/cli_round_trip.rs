@@ -11,7 +11,7 @@ use cli_support::{first_version, fmlgs, folder, tiny_dataset, tiny_splat};
 use fmlgs::io::splat_ply;
 use fmlgs::jobs::{
     self, Folders,
-    find_objects::{FindSettings, Request},
+    find_objects::{FindRequest, FindSettings},
 };
 use fmlgs::pipeline::observer::Silent;
 use fmlgs::pipeline::train::TrainConfig;
@@ -161,10 +161,10 @@ fn the_window_and_the_command_line_do_the_same() {
     let holdout_every = config.holdout_every;
     let masks = Some(photos.into());
     let folder = out.clone();
-    let request = Request { folder, cloud, settings, dataset, holdout_every, masks, side_px: 64, with };
+    let request = FindRequest { folder, cloud, settings, dataset, holdout_every, masks, side_px: 64, with };
     let command = Job::FindObjects(Box::new(request));
     let Outcome::Objects(found) = window(command) else { panic!("no objects") };
     let told = fmlgs(&["preprocess", &trained, "--masks", photos, "--encoder", "none"]).ok();
     let stored = jobs::open::scene(&out).unwrap().semantics().unwrap();
-    assert_eq!((&stored.of, &stored.seeds), (&found.of, &found.seeds), "{}", told.stderr);
+    assert_eq!((&stored.identity_of, &stored.seeds), (&found.identity_of, &found.seeds), "{}", told.stderr);
 }

@@ -5,7 +5,7 @@ mod common;
 
 use common::{camera, random_cloud, rng};
 use fmlgs::math::stats;
-use fmlgs::render::cpu::Renderer;
+use fmlgs::render::cpu::CpuRenderer;
 use fmlgs::render::{CloudGradient, Features, Frame, FrameGradient, RenderSettings};
 use fmlgs::scene::{Camera, GaussianCloud};
 use rand::RngExt;
@@ -39,14 +39,14 @@ impl Problem {
         Self { cloud, features, camera, settings, weights }
     }
 
-    fn draw(&self, renderer: &mut Renderer<f64>) -> Frame<f64> {
+    fn draw(&self, renderer: &mut CpuRenderer<f64>) -> Frame<f64> {
         let features = Features { channels: EXTRA, values: &self.features };
         renderer.render(&self.cloud, features, &self.camera, &self.settings).expect("renders")
     }
 
     /// A linear functional of the picture: its gradient is `weights`.
     fn loss(&self) -> f64 {
-        let f = self.draw(&mut Renderer::new());
+        let f = self.draw(&mut CpuRenderer::new());
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
         let w = &self.weights;
         (0..3).map(|c| dot(&f.color[c], &w.color[c])).sum::<f64>()
@@ -56,7 +56,7 @@ impl Problem {
     }
 
     fn gradient(&self) -> CloudGradient<f64> {
-        let mut renderer = Renderer::new();
+        let mut renderer = CpuRenderer::new();
         self.draw(&mut renderer);
         let features = Features { channels: EXTRA, values: &self.features };
         renderer.backward(&self.cloud, features, &self.weights)

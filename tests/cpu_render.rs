@@ -5,7 +5,7 @@ mod common;
 
 use common::{camera, psnr, random_cloud};
 use fmlgs::math::{rotation, sh, stats};
-use fmlgs::render::cpu::Renderer;
+use fmlgs::render::cpu::CpuRenderer;
 use fmlgs::render::{ALPHA_MAX, ALPHA_MIN, BLUR_PX2, Features, RenderSettings, TRANSMITTANCE_MIN};
 use fmlgs::scene::{Camera, GaussianCloud};
 use glam::{DMat2, DMat3, DVec2, DVec3};
@@ -100,7 +100,7 @@ fn worst_difference(
     s: &RenderSettings,
 ) -> f64 {
     let want = brute_force(other, camera, s);
-    let frame = Renderer::new().render(cloud, Features::NONE, camera, s).expect("renders");
+    let frame = CpuRenderer::new().render(cloud, Features::NONE, camera, s).expect("renders");
     let planes = [&frame.color[0], &frame.color[1], &frame.color[2], &frame.alpha, &frame.depth, &frame.median_depth];
     let pixels = want.iter().enumerate();
     stats::worst(pixels.flat_map(|(i, w)| planes.iter().zip(w).map(move |(plane, w)| (plane[i] - w).abs())))
@@ -127,14 +127,14 @@ fn single_precision_follows_the_oracle() {
     let camera = camera(160, 120);
     let cloud = random_cloud(3_000, 3, 0.03, 7);
     let s = RenderSettings::default();
-    let a = Renderer::new().render(&cloud, Features::NONE, &camera, &s).expect("renders");
-    let b = Renderer::new().render(&cloud.cast::<f32>(), Features::NONE, &camera, &s).expect("renders");
+    let a = CpuRenderer::new().render(&cloud, Features::NONE, &camera, &s).expect("renders");
+    let b = CpuRenderer::new().render(&cloud.cast::<f32>(), Features::NONE, &camera, &s).expect("renders");
     let db = psnr(&a.color, &b.color);
     assert!(db > 60.0, "{db} dB");
     let mut other = cloud.cast::<f32>();
     other.opacity_logits[1_500] += 3.0;
     other.log_scales[1_500] = [-2.0; 3];
-    let c = Renderer::new().render(&other, Features::NONE, &camera, &s).expect("renders");
+    let c = CpuRenderer::new().render(&other, Features::NONE, &camera, &s).expect("renders");
     assert!(psnr(&a.color, &c.color) < 60.0, "negative control");
 }
 
@@ -147,8 +147,8 @@ fn far_from_zero_renders_as_at_zero() {
     let here = camera(96, 64);
     let there = Camera { center: here.center + shift, ..here.clone() };
     let s = RenderSettings::default();
-    let a = Renderer::new().render(&near, Features::NONE, &here, &s).expect("renders");
-    let b = Renderer::new().render(&far, Features::NONE, &there, &s).expect("renders");
+    let a = CpuRenderer::new().render(&near, Features::NONE, &here, &s).expect("renders");
+    let b = CpuRenderer::new().render(&far, Features::NONE, &there, &s).expect("renders");
     let db = psnr(&a.color, &b.color);
     assert!(db > 100.0, "{db} dB");
 }
@@ -160,7 +160,7 @@ fn threads_do_not_change_the_picture() {
     let draw = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
         pool.install(|| {
-            Renderer::new().render(&cloud, Features::NONE, &camera, &RenderSettings::default()).expect("renders")
+            CpuRenderer::new().render(&cloud, Features::NONE, &camera, &RenderSettings::default()).expect("renders")
         })
     };
     assert_eq!(draw(1), draw(3));
@@ -173,7 +173,7 @@ fn poison_is_left_out_and_counted() {
     cloud.log_scales[4] = [60.0, -60.0, 0.0];
     cloud.opacity_logits[5] = f32::NAN;
     cloud.positions[6] = [f32::NAN; 3];
-    let mut renderer = Renderer::new();
+    let mut renderer = CpuRenderer::new();
     let frame = renderer.render(&cloud, Features::NONE, &camera(64, 48), &RenderSettings::default()).expect("renders");
     assert!(frame.color.iter().flatten().chain(&frame.alpha).all(|v| v.is_finite()));
     assert!(renderer.stats().degenerate >= 2, "{:?}", renderer.stats());
@@ -183,6 +183,6 @@ fn poison_is_left_out_and_counted() {
 fn nothing_to_draw_gives_the_background() {
     let empty = GaussianCloud::<f32>::default();
     let s = RenderSettings { background: [0.1, 0.2, 0.3], ..RenderSettings::default() };
-    let f = Renderer::new().render(&empty, Features::NONE, &camera(17, 1), &s).expect("renders");
+    let f = CpuRenderer::new().render(&empty, Features::NONE, &camera(17, 1), &s).expect("renders");
     assert!(f.color[2].iter().all(|&v| v == 0.3) && f.alpha.iter().all(|&v| v == 0.0));
 }

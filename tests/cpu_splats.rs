@@ -4,7 +4,7 @@ mod common;
 
 use common::psnr;
 use fmlgs::measure::bench::views_of;
-use fmlgs::render::cpu::Renderer;
+use fmlgs::render::cpu::CpuRenderer;
 use fmlgs::render::{Features, RenderSettings};
 use fmlgs::scene::Camera;
 
@@ -16,13 +16,13 @@ fn trained_splats_in_single_precision_are_within_60_db_of_the_oracle() {
         let oracle = cloud.cast::<f64>();
         for camera in views_of(&cloud, 320, 240) {
             let s = RenderSettings::default();
-            let a = Renderer::new().render(&oracle, Features::NONE, &camera, &s).expect("renders");
-            let b = Renderer::new().render(&cloud, Features::NONE, &camera, &s).expect("renders");
+            let a = CpuRenderer::new().render(&oracle, Features::NONE, &camera, &s).expect("renders");
+            let b = CpuRenderer::new().render(&cloud, Features::NONE, &camera, &s).expect("renders");
             let db = psnr(&a.color, &b.color);
             println!("{name}: {db:.1} dB");
             assert!(db > 60.0, "{name}: {db} dB");
             let tilted = Camera { center: camera.center * 1.002, ..camera.clone() };
-            let c = Renderer::new().render(&cloud, Features::NONE, &tilted, &s).expect("renders");
+            let c = CpuRenderer::new().render(&cloud, Features::NONE, &tilted, &s).expect("renders");
             assert!(psnr(&a.color, &c.color) < 60.0, "negative control: another camera");
         }
     }

@@ -6,7 +6,7 @@ mod common;
 mod gpu_common;
 
 use common::{camera, random_cloud, rng};
-use fmlgs::render::gpu::{GpuError, Renderer};
+use fmlgs::render::gpu::{GpuError, GpuRenderer};
 use fmlgs::render::{CloudGradient, Features, FrameGradient, RenderSettings, cpu};
 use fmlgs::scene::{Camera, GaussianCloud};
 use gpu_common::compare::{Bounds, INTERIOR, agree, agree_in_bands, bands, spread};
@@ -44,12 +44,12 @@ impl Problem {
 
     fn oracle(&self) -> CloudGradient<f64> {
         let features = Features { channels: self.channels, values: &self.features };
-        let mut renderer = cpu::Renderer::new();
+        let mut renderer = cpu::CpuRenderer::new();
         renderer.render(&self.cloud, features, &self.camera, &self.settings).unwrap();
         renderer.backward(&self.cloud, features, &self.weights)
     }
 
-    fn gpu(&self, renderer: &mut Renderer) -> CloudGradient<f32> {
+    fn gpu(&self, renderer: &mut GpuRenderer) -> CloudGradient<f32> {
         let narrow = |v: &Vec<f64>| v.iter().map(|&x| x as f32).collect::<Vec<f32>>();
         let values = narrow(&self.features);
         let features = Features { channels: self.channels, values: &values };
@@ -97,7 +97,7 @@ fn gradients_match_the_oracle_in_every_group() {
             kinds.push(true);
         }
         for float_atomics in kinds {
-            let mut renderer = Renderer::with_float_atomics(context, float_atomics).unwrap();
+            let mut renderer = GpuRenderer::with_float_atomics(context, float_atomics).unwrap();
             for (degree, channels, antialias) in [(0, 0, false), (2, 6, true), (3, 18, false)] {
                 let problem = Problem::new(60, degree, channels, antialias, 31);
                 let oracle = problem.oracle();
@@ -119,7 +119,7 @@ fn gradients_match_the_oracle_in_every_group() {
 fn many_splats_in_few_tiles_match_the_oracle() {
     with_context(|context| {
         // Several batches per tile, so that the walk goes from batch to batch.
-        let mut renderer = Renderer::new(context).unwrap();
+        let mut renderer = GpuRenderer::new(context).unwrap();
         let mut problem = Problem::new(900, 0, 0, false, 5);
         problem.cloud.opacity_logits.iter_mut().for_each(|o| *o -= 3.5);
         let complaints = problem.compare_loosely(&problem.gpu(&mut renderer), &problem.oracle());
@@ -150,7 +150,7 @@ impl Problem {
 #[test]
 fn a_gradient_of_the_wrong_size_is_refused() {
     with_context(|context| {
-        let mut renderer = Renderer::new(context).unwrap();
+        let mut renderer = GpuRenderer::new(context).unwrap();
         let problem = Problem::new(10, 0, 0, false, 3);
         problem.gpu(&mut renderer);
         let cloud = problem.cloud.cast();

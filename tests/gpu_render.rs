@@ -6,8 +6,8 @@ mod gpu_common;
 
 use common::{camera, random_cloud, rng};
 use fmlgs::math::{Real, stats};
-use fmlgs::render::cpu::project::{View, compensation, direction, geometry, raw_color};
-use fmlgs::render::gpu::{GpuError, Renderer};
+use fmlgs::render::cpu::project::{CameraView, compensation, direction, geometry, raw_color};
+use fmlgs::render::gpu::{GpuError, GpuRenderer};
 use fmlgs::render::{ALPHA_MIN, Features, Frame, RenderError, RenderSettings, TILE_PX, cpu};
 use fmlgs::scene::{Camera, GaussianCloud};
 use glam::DVec3;
@@ -36,10 +36,10 @@ impl Scene {
 
     fn oracle(&self) -> Frame<f64> {
         let features = Features { channels: self.channels, values: &self.features };
-        cpu::Renderer::new().render(&self.cloud, features, &self.camera, &self.settings).unwrap()
+        cpu::CpuRenderer::new().render(&self.cloud, features, &self.camera, &self.settings).unwrap()
     }
 
-    fn gpu(&self, renderer: &mut Renderer) -> Frame<f32> {
+    fn gpu(&self, renderer: &mut GpuRenderer) -> Frame<f32> {
         let features: Vec<f32> = self.features.iter().map(|&v| v as f32).collect();
         let features = Features { channels: self.channels, values: &features };
         renderer.render(&self.cloud.cast(), features, &self.camera, &self.settings).unwrap()
@@ -65,7 +65,7 @@ impl Scene {
 #[test]
 fn projection_matches_the_oracle() {
     with_context(|context| {
-        let mut renderer = Renderer::new(context).unwrap();
+        let mut renderer = GpuRenderer::new(context).unwrap();
         for antialias in [false, true] {
             let mut scene = Scene::new(400, 3, 0, [150, 110]);
             scene.settings.antialias = antialias;
@@ -73,7 +73,7 @@ fn projection_matches_the_oracle() {
             let found = renderer.inspect().unwrap().unwrap();
             let mut drawn = 0;
             let mut errors = Vec::new();
-            let view = View::<f64>::new(&scene.camera, scene.cloud.origin, scene.settings.near);
+            let view = CameraView::<f64>::new(&scene.camera, scene.cloud.origin, scene.settings.near);
             for (i, splat) in found.splats.iter().enumerate().filter(|(_, s)| s.radius > 0.0) {
                 drawn += 1;
                 let gaussian = scene.cloud.gaussian(i);
@@ -137,7 +137,7 @@ fn list_faults(scene: &Scene, found: &fmlgs::render::gpu::renderer::Inspection) 
 #[test]
 fn every_tile_lists_what_its_pixels_need_in_order_of_depth() {
     with_context(|context| {
-        let mut renderer = Renderer::new(context).unwrap();
+        let mut renderer = GpuRenderer::new(context).unwrap();
         let scene = Scene::new(300, 0, 0, [150, 110]);
         scene.gpu(&mut renderer);
         let mut found = renderer.inspect().unwrap().unwrap();
@@ -159,7 +159,7 @@ fn every_tile_lists_what_its_pixels_need_in_order_of_depth() {
 #[test]
 fn pictures_match_the_oracle() {
     with_context(|context| {
-        let mut renderer = Renderer::new(context).unwrap();
+        let mut renderer = GpuRenderer::new(context).unwrap();
         // Sizes beside multiples of the tile, every degree, channels below, at and over a pass.
         for (degree, channels, antialias, size) in
             [(0, 0, false, [33, 17]), (1, 1, false, [64, 48]), (2, 6, true, [70, 50]), (3, 20, false, [47, 31])]
@@ -185,7 +185,7 @@ fn pictures_match_the_oracle() {
 #[test]
 fn lower_degree_than_stored_is_honored() {
     with_context(|context| {
-        let mut renderer = Renderer::new(context).unwrap();
+        let mut renderer = GpuRenderer::new(context).unwrap();
         let mut scene = Scene::new(150, 3, 0, [48, 40]);
         scene.settings.sh_degree = 1;
         let oracle = scene.oracle();
@@ -198,7 +198,7 @@ fn lower_degree_than_stored_is_honored() {
 #[test]
 fn a_scene_far_from_zero_renders_like_one_at_zero() {
     with_context(|context| {
-        let mut renderer = Renderer::new(context).unwrap();
+        let mut renderer = GpuRenderer::new(context).unwrap();
         let mut scene = Scene::new(200, 1, 0, [60, 44]);
         let here = scene.gpu(&mut renderer);
         let away = DVec3::new(1e6, -2e6, 3e6 + 0.1);
@@ -217,7 +217,7 @@ fn a_scene_far_from_zero_renders_like_one_at_zero() {
 #[test]
 fn degenerate_gaussians_are_left_out_and_counted() {
     with_context(|context| {
-        let mut renderer = Renderer::new(context).unwrap();
+        let mut renderer = GpuRenderer::new(context).unwrap();
         let mut scene = Scene::new(60, 0, 0, [40, 30]);
         let clean = scene.gpu(&mut renderer);
         assert_eq!(renderer.counters().unwrap().degenerate, 0);
@@ -246,7 +246,7 @@ fn degenerate_gaussians_are_left_out_and_counted() {
 #[test]
 fn nothing_to_draw_gives_the_background() {
     with_context(|context| {
-        let mut renderer = Renderer::new(context).unwrap();
+        let mut renderer = GpuRenderer::new(context).unwrap();
         let mut scene = Scene::new(3, 0, 0, [20, 10]);
         scene.cloud = GaussianCloud { sh_degree: 0, ..GaussianCloud::default() };
         let empty = scene.gpu(&mut renderer);
@@ -258,7 +258,7 @@ fn nothing_to_draw_gives_the_background() {
 #[test]
 fn a_frame_of_more_pairs_than_fit_is_drawn_in_the_end() {
     with_context(|context| {
-        let mut renderer = Renderer::new(context).unwrap();
+        let mut renderer = GpuRenderer::new(context).unwrap();
         let mut scene = Scene::new(40, 0, 0, [320, 240]);
         scene.cloud.log_scales.iter_mut().for_each(|s| *s = [0.0; 3]);
         let ours = scene.gpu(&mut renderer);
@@ -273,7 +273,7 @@ fn a_frame_of_more_pairs_than_fit_is_drawn_in_the_end() {
 #[test]
 fn unusable_input_is_refused_by_name() {
     with_context(|context| {
-        let mut renderer = Renderer::new(context).unwrap();
+        let mut renderer = GpuRenderer::new(context).unwrap();
         let scene = Scene::new(5, 0, 0, [20, 10]);
         let cloud = scene.cloud.cast::<f32>();
         let mut bad = scene.camera.clone();

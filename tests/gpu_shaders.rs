@@ -5,14 +5,14 @@
 use std::collections::BTreeSet;
 
 use fmlgs::render::gpu::layout::{TWINS, Twin};
-use fmlgs::render::gpu::shader::{self, Variant};
+use fmlgs::render::gpu::shader::{self, ShaderVariant};
 use naga::TypeInner;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
-fn variants() -> impl Iterator<Item = Variant> {
+fn variants() -> impl Iterator<Item = ShaderVariant> {
     [0, 1, 6, 16]
         .into_iter()
-        .flat_map(|channels| [false, true].map(|float_atomics| Variant { channels, float_atomics }))
+        .flat_map(|channels| [false, true].map(|float_atomics| ShaderVariant { channels, float_atomics }))
 }
 
 /// Why `source` is not valid, if it is not.
@@ -60,10 +60,10 @@ fn every_shader_is_valid() {
 
 #[test]
 fn validation_catches_faults() {
-    let good = shader::source("blend", Variant::default()).unwrap();
+    let good = shader::source("blend", ShaderVariant::default()).unwrap();
     assert!(fault(&good, false).is_none());
     assert!(fault(&good.replace("var transmittance = 1.0;", "var transmittance = 1u;"), false).is_some());
-    let atomics = shader::source("blend_backward", Variant { channels: 0, float_atomics: true }).unwrap();
+    let atomics = shader::source("blend_backward", ShaderVariant { channels: 0, float_atomics: true }).unwrap();
     assert!(fault(&atomics, false).is_some(), "float atomics on an adapter without them");
 }
 
@@ -71,7 +71,7 @@ fn validation_catches_faults() {
 fn shared_structures_have_one_layout() {
     let mut seen = BTreeSet::new();
     for name in shader::kernels() {
-        let source = shader::source(name, Variant::default()).unwrap();
+        let source = shader::source(name, ShaderVariant::default()).unwrap();
         let complaints = compare(&source, TWINS, &mut seen);
         assert!(complaints.is_empty(), "{name}: {complaints:#?}");
     }
@@ -81,7 +81,7 @@ fn shared_structures_have_one_layout() {
 
 #[test]
 fn layout_comparison_catches_a_moved_field() {
-    let source = shader::source("sort", Variant::default()).unwrap();
+    let source = shader::source("sort", ShaderVariant::default()).unwrap();
     let swapped = [Twin { name: "Pass", size: 16, fields: &[("counter", 0), ("shift", 4), ("pad0", 8), ("pad1", 12)] }];
     assert_eq!(compare(&source, &swapped, &mut BTreeSet::new()).len(), 1);
     let shorter = [Twin { name: "Pass", size: 12, fields: &[("shift", 0), ("counter", 4), ("pad0", 8)] }];

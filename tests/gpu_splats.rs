@@ -6,7 +6,7 @@ mod gpu_common;
 
 use common::psnr;
 use fmlgs::measure::bench::views_of;
-use fmlgs::render::gpu::Renderer;
+use fmlgs::render::gpu::GpuRenderer;
 use fmlgs::render::{Features, RenderSettings, cpu};
 use fmlgs::scene::Camera;
 use gpu_common::with_context;
@@ -14,7 +14,7 @@ use gpu_common::with_context;
 #[test]
 fn trained_splats_on_the_gpu_are_within_60_db_of_the_oracle() {
     with_context(|context| {
-        let mut renderer = Renderer::new(context).unwrap();
+        let mut renderer = GpuRenderer::new(context).unwrap();
         for name in ["guitar_sh0_90854.ply", "statue_narcissus_sh0_101275.ply", "playbot_lod3_sh2_31000.ply"] {
             let Some(path) = common::data(&format!("splats/{name}")) else { return };
             let cloud = fmlgs::io::splat_ply::read(&path).expect("a readable splat file");
@@ -22,7 +22,7 @@ fn trained_splats_on_the_gpu_are_within_60_db_of_the_oracle() {
             renderer.upload(&cloud, Features::NONE).unwrap();
             for camera in views_of(&cloud, 320, 240) {
                 let s = RenderSettings::default();
-                let a = cpu::Renderer::new().render(&oracle, Features::NONE, &camera, &s).unwrap();
+                let a = cpu::CpuRenderer::new().render(&oracle, Features::NONE, &camera, &s).unwrap();
                 let b = renderer.draw(&camera, &s).unwrap();
                 let db = psnr(&a.color, &b.color);
                 println!("{name}: {db:.1} dB");

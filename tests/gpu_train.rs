@@ -9,7 +9,7 @@ use fmlgs::render::cpu::adam::AdamStep;
 use fmlgs::render::cpu::adam::Rates;
 use fmlgs::render::cpu::ssim::PhotoLoss;
 use fmlgs::render::gpu::ssim::photo_loss;
-use fmlgs::render::gpu::{Device, GpuError, Parameters, Trainer, TrainerSettings};
+use fmlgs::render::gpu::{Device, GpuError, GpuTrainer, Parameters, TrainerSettings};
 use fmlgs::render::{Features, FrameGradient, RenderSettings, cpu};
 use fmlgs::scene::{Camera, GaussianCloud, PhotoPixels};
 use gpu_common::compare::{INTERIOR, agree};
@@ -88,7 +88,7 @@ impl Lesson {
         let camera = camera(48, 36);
         let truth: GaussianCloud = random_cloud(80, degree, 0.2, 11).cast();
         let settings = RenderSettings::default();
-        let frame = cpu::Renderer::<f32>::new().render(&truth, Features::NONE, &camera, &settings).unwrap();
+        let frame = cpu::CpuRenderer::<f32>::new().render(&truth, Features::NONE, &camera, &settings).unwrap();
         let photo = PhotoPixels { width_px: 48, height_px: 36, rgb: frame.to_rgb8(), coverage: None };
         let mut cloud = truth;
         cloud.sh.iter_mut().for_each(|c| *c = c.map(|v| 0.3 * v));
@@ -114,7 +114,7 @@ impl Lesson {
         second: f32,
     ) -> (GaussianCloud, Vec<f32>, usize) {
         let wide = self.cloud.cast::<f64>();
-        let mut renderer = cpu::Renderer::new();
+        let mut renderer = cpu::CpuRenderer::new();
         renderer.render(&wide, Features::NONE, &self.camera, settings).unwrap();
         let g = renderer.backward(&wide, Features::NONE, gradient);
         let adam = AdamStep::new(t);
@@ -170,7 +170,7 @@ fn outliers_are_cut_and_counted_as_on_the_cpu() {
         let lesson = Lesson::new(0);
         let settings = RenderSettings { sh_degree: 0, ..RenderSettings::default() };
         let frame =
-            cpu::Renderer::new().render(&lesson.cloud.cast(), Features::NONE, &lesson.camera, &settings).unwrap();
+            cpu::CpuRenderer::new().render(&lesson.cloud.cast(), Features::NONE, &lesson.camera, &settings).unwrap();
         let [r, g, b] = &frame.color;
         let picture: Vec<[f64; 3]> = (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect();
         let gradient = of_planes(&oracle(&picture, &lesson.photo).1);
@@ -189,7 +189,7 @@ fn outliers_are_cut_and_counted_as_on_the_cpu() {
             }
             first.quaternions.fill([0.0; 4]);
             first.opacity_logits.fill(0.0);
-            let mut trainer = Trainer::new(context, &lesson.cloud, TrainerSettings::default()).unwrap();
+            let mut trainer = GpuTrainer::new(context, &lesson.cloud, TrainerSettings::default()).unwrap();
             trainer.upload(&lesson.cloud, Some([&first, &second]), t).unwrap();
             let photo = trainer.photo(photo).unwrap();
             trainer.step(&lesson.camera, &photo, &lesson.rates, 0).unwrap();
@@ -209,7 +209,7 @@ fn outliers_are_cut_and_counted_as_on_the_cpu() {
         let (_, _, outliers) = lesson.stepped(&settings, &gradient, t + 1, 1e-36);
         let (_, told) = stepped(1e-36);
         assert!(outliers > 100 && told.abs_diff(outliers) * 20 < outliers, "{told} of {outliers}");
-        let mut trainer = Trainer::new(context, &lesson.cloud, TrainerSettings::default()).unwrap();
+        let mut trainer = GpuTrainer::new(context, &lesson.cloud, TrainerSettings::default()).unwrap();
         let photo = trainer.photo(photo).unwrap();
         // Ordinary steps have none.
         (0..20).for_each(|_| trainer.step(&lesson.camera, &photo, &lesson.rates, 0).unwrap());
@@ -223,14 +223,14 @@ fn one_step_moves_every_group_as_the_cpu_does() {
         let lesson = Lesson::new(3);
         let settings = RenderSettings { sh_degree: 2, ..RenderSettings::default() };
         let wide = lesson.cloud.cast::<f64>();
-        let frame = cpu::Renderer::new().render(&wide, Features::NONE, &lesson.camera, &settings).unwrap();
+        let frame = cpu::CpuRenderer::new().render(&wide, Features::NONE, &lesson.camera, &settings).unwrap();
         let [r, g, b] = &frame.color;
         let picture: Vec<[f64; 3]> = (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect();
         let (loss, flat) = oracle(&picture, &lesson.photo);
         let gradient = of_planes(&flat);
         let (want, screen, _) = lesson.stepped(&settings, &gradient, 1, 0.0);
 
-        let mut trainer = Trainer::new(context, &lesson.cloud, TrainerSettings::default()).unwrap();
+        let mut trainer = GpuTrainer::new(context, &lesson.cloud, TrainerSettings::default()).unwrap();
         let photo = trainer.photo(&lesson.photo).unwrap();
         trainer.step(&lesson.camera, &photo, &lesson.rates, 2).unwrap();
         let found = trainer.metrics().unwrap();
@@ -259,14 +259,14 @@ fn one_step_moves_every_group_as_the_cpu_does() {
 fn training_lowers_the_loss_and_survives_down_and_up() {
     with_context(|context| {
         let lesson = Lesson::new(1);
-        let run = |trainer: &mut Trainer, steps: usize| {
+        let run = |trainer: &mut GpuTrainer, steps: usize| {
             let photo = trainer.photo(&lesson.photo).unwrap();
             for _ in 0..steps {
                 trainer.step(&lesson.camera, &photo, &lesson.rates, 1).unwrap();
             }
             trainer.metrics().unwrap().iter().map(|m| m.loss).collect::<Vec<_>>()
         };
-        let mut trainer = Trainer::new(context, &lesson.cloud, TrainerSettings::default()).unwrap();
+        let mut trainer = GpuTrainer::new(context, &lesson.cloud, TrainerSettings::default()).unwrap();
         let losses = run(&mut trainer, 70);
         assert_eq!(losses.len(), 70, "more steps than the ring holds are all told");
         assert!(losses[69] < 0.5 * losses[0], "{} to {}", losses[0], losses[69]);
@@ -274,9 +274,9 @@ fn training_lowers_the_loss_and_survives_down_and_up() {
         let (cloud, [first, second]) = trainer.download().unwrap();
         cloud.validate().unwrap();
         assert!(first.sh[0] != [0.0; 3] && second.sh.iter().flatten().all(|&v| v >= 0.0));
-        let mut copy = Trainer::new(context, &lesson.cloud, TrainerSettings::default()).unwrap();
+        let mut copy = GpuTrainer::new(context, &lesson.cloud, TrainerSettings::default()).unwrap();
         copy.upload(&cloud, Some([&first, &second]), 70).unwrap();
-        let mut forgetful = Trainer::new(context, &lesson.cloud, TrainerSettings::default()).unwrap();
+        let mut forgetful = GpuTrainer::new(context, &lesson.cloud, TrainerSettings::default()).unwrap();
         forgetful.upload(&cloud, None, 70).unwrap();
         let [a, b, c] = [&mut trainer, &mut copy, &mut forgetful].map(|t| run(t, 3)[2]);
         assert!((a - b).abs() < 2e-3 * a, "{a} {b}");
@@ -295,7 +295,7 @@ fn a_step_that_does_not_fit_is_skipped_told_and_made_up_for() {
         far.center *= 60.0;
         let near = lesson.camera.resized(480, 360);
         let photo = noise_photo([480, 360], false, 1);
-        let mut trainer = Trainer::new(context, &lesson.cloud, TrainerSettings::default()).unwrap();
+        let mut trainer = GpuTrainer::new(context, &lesson.cloud, TrainerSettings::default()).unwrap();
         let photo = trainer.photo(&photo).unwrap();
         trainer.step(&far, &photo, &lesson.rates, 0).unwrap();
         let before = trainer.cloud().unwrap();
@@ -334,7 +334,7 @@ fn a_lost_device_is_an_error_and_no_panic() {
     with_context(|_| {
         let own = Device::new().unwrap();
         let lesson = Lesson::new(0);
-        let mut trainer = Trainer::new(&own, &lesson.cloud, TrainerSettings::default()).unwrap();
+        let mut trainer = GpuTrainer::new(&own, &lesson.cloud, TrainerSettings::default()).unwrap();
         let photo = trainer.photo(&lesson.photo).unwrap();
         trainer.step(&lesson.camera, &photo, &lesson.rates, 0).unwrap();
         trainer.metrics().unwrap();

@@ -141,7 +141,10 @@ fn objects_being_found() {
         longest = longest.max(time(&mut find(round)));
         known.push(map_of(&out));
     }
-    assert!(known[0].of != known[1].of && known[0].identities != known[1].identities, "the same either way");
+    assert!(
+        known[0].identity_of != known[1].identity_of && known[0].identities != known[1].identities,
+        "the same either way"
+    );
     kill_often("preprocess", longest, &mut |round| find(round), &mut || {
         let map = map_of(&out);
         assert!(known.contains(&map), "a mixture of two saves");
@@ -169,10 +172,10 @@ fn edit_for_ever(scene: PathBuf) {
     let Outcome::Opened(opened) = outcome(Job::Open { path: scene.clone() }) else { panic!("not opened") };
     let (cloud, map) = (opened.cloud.clone().unwrap(), opened.semantics.clone().unwrap());
     let mut other = (*map).clone();
-    other.of.reverse();
+    other.identity_of.reverse();
     // What a kill left may be the one or the other.
     let seeds = if map.seeds == ["reversed"] { "straight" } else { "reversed" };
-    other = SemanticMap::of_identities(other.identities, other.of, other.margin, vec![seeds.into()]);
+    other = SemanticMap::from_identities(other.identities, other.identity_of, other.margin, vec![seeds.into()]);
     let other = Arc::new(other);
     for round in 0.. {
         let to = if round % 2 == 0 { &other } else { &map };
@@ -195,9 +198,9 @@ fn edits() {
     fmlgs(&train(photos, scene, "40")).ok();
     fmlgs(&["preprocess", scene, "--masks", photos, "--encoder", "none"]).ok();
     let before = map_of(&out);
-    let mut reversed = before.of.clone();
+    let mut reversed = before.identity_of.clone();
     reversed.reverse();
-    assert!(reversed != before.of);
+    assert!(reversed != before.identity_of);
     let mut changed = 0;
     let mut edit = |_| {
         let mut command = Command::new(std::env::current_exe().unwrap());
@@ -208,7 +211,10 @@ fn edits() {
         let map = map_of(&out);
         let is_reversed = map.seeds == ["reversed"];
         changed += u32::from(is_reversed);
-        assert!(map.of == if is_reversed { reversed.clone() } else { before.of.clone() }, "a mixture of two saves");
+        assert!(
+            map.identity_of == if is_reversed { reversed.clone() } else { before.identity_of.clone() },
+            "a mixture of two saves"
+        );
     });
     println!("edits: {changed} times the changed state was found");
     drop(SceneFolder::hold(&out, "test").unwrap());

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use fmlgs::math::stats;
-use fmlgs::models::catalog::{self, Entry, InstallError, State};
+use fmlgs::models::catalog::{self, InstallError, ModelEntry, ModelState};
 use fmlgs::models::fetch::{FetchError, Patience};
 
 mod cli_support;
@@ -20,7 +20,7 @@ fn fixtures() -> PathBuf {
 }
 
 /// The reduced CLIP as if it were listed.
-fn reduced() -> Entry {
+fn reduced() -> ModelEntry {
     let file = |name: &str| serde_json::json!({ "name": name, "megabytes": 1 });
     serde_json::from_value(serde_json::json!({
         "id": "reduced", "role": "encoder", "title": "Reduced", "adds": "Nothing.", "licence": "MIT", "source": "here",
@@ -75,16 +75,16 @@ fn the_list_is_sound() {
         }
     }
     assert!(matches!(catalog::entry("no-such-model"), Err(InstallError::Unknown(_))));
-    assert!(matches!(catalog::entry("demo").expect("listed").state(Path::new("/nowhere")), State::BuiltIn));
+    assert!(matches!(catalog::entry("demo").expect("listed").state(Path::new("/nowhere")), ModelState::BuiltIn));
 }
 
 #[test]
 fn files_that_somebody_brings_are_checked_and_copied() {
     let (here, entry) = (tempfile::tempdir().expect("folder"), reduced());
     let folder = here.path().join("models");
-    assert!(matches!(entry.state(&folder), State::Missing(files) if files.len() == 3));
+    assert!(matches!(entry.state(&folder), ModelState::Missing(files) if files.len() == 3));
     entry.add(&folder, &fixtures()).expect("added");
-    assert_eq!(entry.state(&folder), State::Here);
+    assert_eq!(entry.state(&folder), ModelState::Here);
     entry.verify(&folder).expect("right");
 
     // A swapped file of the same size, which only its content tells.
@@ -92,13 +92,13 @@ fn files_that_somebody_brings_are_checked_and_copied() {
     let mut bytes = fs::read(&image).expect("read");
     bytes[1000] ^= 1;
     fs::write(&image, &bytes).expect("written");
-    assert_eq!(entry.state(&folder), State::Here);
+    assert_eq!(entry.state(&folder), ModelState::Here);
     let error = entry.verify(&folder).expect_err("swapped").to_string();
     assert!(error.contains("clip_image.onnx") && error.contains("refused"), "{error}");
     // One of another size is seen at once.
     bytes.pop();
     fs::write(&image, &bytes).expect("written");
-    assert!(matches!(entry.state(&folder), State::Broken(problem) if problem.contains("clip_image.onnx")));
+    assert!(matches!(entry.state(&folder), ModelState::Broken(problem) if problem.contains("clip_image.onnx")));
 
     // What is wrong where it comes from changes nothing here.
     let other = here.path().join("other");
@@ -128,7 +128,7 @@ fn a_model_is_fetched_from_a_folder_on_a_server() {
         })
         .expect("fetched");
     assert_eq!(names, ["clip.json", "clip_image.onnx", "clip_text.onnx"]);
-    assert_eq!(entry.state(here.path()), State::Here);
+    assert_eq!(entry.state(here.path()), ModelState::Here);
     // What is here is not fetched again; what is broken is.
     fs::write(here.path().join("clip_text.onnx"), "broken").expect("written");
     names.clear();
@@ -149,7 +149,7 @@ fn a_model_is_fetched_from_a_folder_on_a_server() {
     let error = entry.fetch(fresh.path(), Some(&server(wrong.path())), impatient(), &mut |_, _, _| true);
     let error = error.expect_err("another graph");
     assert!(matches!(error, InstallError::Fetch(FetchError::OtherSize { .. })), "{error}");
-    assert!(matches!(entry.state(fresh.path()), State::Missing(files) if files == ["clip_text.onnx"]));
+    assert!(matches!(entry.state(fresh.path()), ModelState::Missing(files) if files == ["clip_text.onnx"]));
 }
 
 #[test]

@@ -3,170 +3,18 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 #![allow(clippy::disallowed_methods)] // A server for a second needs no name.
 
+#[path = "model_fetch/server.rs"]
+mod server;
+
 use std::fs;
-use std::io::{BufRead, BufReader, Write};
-use std::net::{TcpListener, TcpStream};
+use std::net::TcpListener;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use fmlgs::models::fetch::{FetchError, MOST_UNPROMISED, Patience, Wanted, fetch, sha256};
+use fmlgs::models::fetch::{FetchError, FileToFetch, MOST_UNPROMISED, Patience, fetch, sha256};
 
-/// What the server does with one request.
-#[derive(Clone, Copy, Debug)]
-enum Turn {
-    /// Serves it, or the range that was asked for.
-    Serve,
-    /// Breaks off after so many bytes of the body.
-    BreakAfter(usize),
-    /// Says nothing more after so many bytes.
-    StallAfter(usize),
-    /// Claims to send so many bytes.
-    Claim(usize),
-    /// A page for display.
-    Page,
-    /// This status and nothing else.
-    Status(u16),
-    /// From now on another file.
-    Change,
-    /// Serves all of it, whatever range was asked for.
-    IgnoreRange,
-    /// A range that was not asked for.
-    WrongRange,
-    /// Says a range, and sends it from the start of the file.
-    Restart,
-    /// Accepts, and says nothing at all.
-    Silent,
-    /// So many bytes, then one now and then.
-    DribbleAfter(usize),
-    /// Never ends, in chunks of unknown number.
-    Endless,
-    /// Never ends, without a length.
-    Unbounded,
-}
-
-/// Bytes that endless servers have sent.
-static ENDLESS: AtomicUsize = AtomicUsize::new(0);
-
-/// The requests that came, by their Range.
-type Log = Arc<Mutex<Vec<Option<String>>>>;
-
-struct Server {
-    url: String,
-    log: Log,
-}
-
-fn content(version: u8) -> Vec<u8> {
-    (0..200_000_u32).map(|i| (i % 251) as u8 ^ version).collect()
-}
-
-/// Takes `turns` one after another, the last again and again.
-fn server(turns: &[Turn]) -> Server {
-    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
-    let url = format!("http://{}/model.onnx", listener.local_addr().expect("bound"));
-    let log: Log = Arc::default();
-    let (turns, seen) = (turns.to_vec(), Arc::clone(&log));
-    std::thread::spawn(move || {
-        let mut version = 0;
-        for (n, stream) in listener.incoming().enumerate() {
-            let Ok(mut stream) = stream else { return };
-            let turn = turns[n.min(turns.len() - 1)];
-            if matches!(turn, Turn::Change) {
-                version += 1;
-            }
-            // One that stalls must not hold up the next.
-            let seen = Arc::clone(&seen);
-            std::thread::spawn(move || {
-                // Whoever called may have gone: then there is nobody to tell.
-                let _ = answer(&mut stream, turn, version, &seen);
-            });
-        }
-    });
-    Server { url, log }
-}
-
-fn answer(stream: &mut TcpStream, turn: Turn, version: u8, log: &Log) -> std::io::Result<()> {
-    let (mut range, mut if_range) = (None, None);
-    for line in BufReader::new(stream.try_clone()?).lines() {
-        let line = line?;
-        if line.is_empty() {
-            break;
-        }
-        if let Some((name, value)) = line.split_once(": ") {
-            match name.to_ascii_lowercase().as_str() {
-                "range" => range = Some(value.to_owned()),
-                "if-range" => if_range = Some(value.to_owned()),
-                _ => {}
-            }
-        }
-    }
-    log.lock().expect("log").push(range.clone());
-    let (all, tag) = (content(version), format!("\"v{version}\""));
-    let start = range.as_deref().and_then(|r| r.strip_prefix("bytes=")?.strip_suffix('-')?.parse::<usize>().ok());
-    let start = start.filter(|_| if_range.as_ref().is_none_or(|t| *t == tag));
-    let start = start.filter(|_| !matches!(turn, Turn::IgnoreRange));
-    let body = &all[start.unwrap_or(0).min(all.len())..];
-    if matches!(turn, Turn::Silent) {
-        std::thread::sleep(Duration::from_secs(20));
-        return Ok(());
-    }
-    if matches!(turn, Turn::Endless | Turn::Unbounded) {
-        return pour(stream, matches!(turn, Turn::Endless));
-    }
-    let body = if matches!(turn, Turn::Restart) { &all[..body.len()] } else { body };
-    let mut head = match (turn, start) {
-        (Turn::Page, _) => "HTTP/1.1 200 OK\r\nContent-Type: text/html; charset=utf-8\r\n".to_owned(),
-        (Turn::Status(status), _) => format!("HTTP/1.1 {status} No\r\n"),
-        (Turn::WrongRange, _) => format!("HTTP/1.1 206 Partial\r\nContent-Range: bytes 7-9/{}\r\n", all.len()),
-        (_, Some(start)) => {
-            format!("HTTP/1.1 206 Partial\r\nContent-Range: bytes {start}-{}/{}\r\n", all.len() - 1, all.len())
-        }
-        _ => "HTTP/1.1 200 OK\r\nContent-Type: application/octet-stream\r\n".to_owned(),
-    };
-    let claimed = match turn {
-        Turn::Claim(bytes) => bytes,
-        Turn::Status(_) => 0,
-        _ => body.len(),
-    };
-    head += &format!("ETag: {tag}\r\nContent-Length: {claimed}\r\nConnection: close\r\n\r\n");
-    stream.write_all(head.as_bytes())?;
-    match turn {
-        Turn::BreakAfter(n) => stream.write_all(&body[..n.min(body.len())]),
-        Turn::StallAfter(n) => {
-            stream.write_all(&body[..n.min(body.len())])?;
-            std::thread::sleep(Duration::from_secs(20));
-            Ok(())
-        }
-        Turn::DribbleAfter(n) => {
-            stream.write_all(&body[..n.min(body.len())])?;
-            for byte in &body[n.min(body.len())..] {
-                stream.write_all(&[*byte])?;
-                std::thread::sleep(Duration::from_millis(10));
-            }
-            Ok(())
-        }
-        Turn::Status(_) => Ok(()),
-        _ => stream.write_all(body),
-    }
-}
-
-/// Sends until nobody takes any more.
-fn pour(stream: &mut TcpStream, chunked: bool) -> std::io::Result<()> {
-    let coding = if chunked { "Transfer-Encoding: chunked\r\n" } else { "" };
-    stream.write_all(format!("HTTP/1.1 200 OK\r\n{coding}Connection: close\r\n\r\n").as_bytes())?;
-    let piece = [7; 1 << 16];
-    loop {
-        if chunked {
-            stream.write_all(b"10000\r\n")?;
-        }
-        stream.write_all(&piece)?;
-        if chunked {
-            stream.write_all(b"\r\n")?;
-        }
-        ENDLESS.fetch_add(piece.len(), Ordering::Relaxed);
-    }
-}
+use self::server::{ENDLESS, Server, Turn, content, server};
 
 fn impatient() -> Patience {
     Patience { stall: Duration::from_millis(300), attempts: 3, pause: Duration::from_millis(5) }
@@ -191,7 +39,7 @@ fn digest(version: u8) -> String {
 }
 
 fn get(server: &Server, to: &Path, bytes: Option<u64>, sha256: Option<&str>) -> Result<(), FetchError> {
-    fetch(&Wanted { url: &server.url, to, bytes, sha256 }, impatient(), &mut |_, _| true)
+    fetch(&FileToFetch { url: &server.url, to, bytes, sha256 }, impatient(), &mut |_, _| true)
 }
 
 fn is_right(to: &Path, version: u8) -> bool {
@@ -203,7 +51,7 @@ fn is_right(to: &Path, version: u8) -> bool {
 fn a_file_arrives_whole_and_is_checked() {
     let (s, p, digest) = (server(&[Turn::Serve]), place(), digest(0));
     let mut seen = Vec::new();
-    let wanted = Wanted { url: &s.url, to: &p.to, bytes: Some(200_000), sha256: Some(&digest) };
+    let wanted = FileToFetch { url: &s.url, to: &p.to, bytes: Some(200_000), sha256: Some(&digest) };
     fetch(&wanted, impatient(), &mut |there, all| {
         seen.push((there, all));
         true
@@ -303,7 +151,7 @@ fn without_a_network_the_error_says_what_to_do() {
     // A port that was free a moment ago.
     let port = TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("bound").port();
     let url = format!("http://127.0.0.1:{port}/model.onnx");
-    let error = fetch(&Wanted { url: &url, to: &p.to, bytes: None, sha256: None }, impatient(), &mut |_, _| true);
+    let error = fetch(&FileToFetch { url: &url, to: &p.to, bytes: None, sha256: None }, impatient(), &mut |_, _| true);
     let error = error.expect_err("nobody there");
     assert!(matches!(error, FetchError::Unreachable { .. }));
     assert!(error.to_string().contains("bring the file yourself"), "{error}");
@@ -312,7 +160,7 @@ fn without_a_network_the_error_says_what_to_do() {
 #[test]
 fn cancelling_keeps_what_arrived() {
     let (s, p) = (server(&[Turn::Serve]), place());
-    let wanted = Wanted { url: &s.url, to: &p.to, bytes: None, sha256: None };
+    let wanted = FileToFetch { url: &s.url, to: &p.to, bytes: None, sha256: None };
     let error = fetch(&wanted, impatient(), &mut |there, _| there < 60_000).expect_err("cancelled");
     let FetchError::Cancelled { got } = error else { panic!("{error}") };
     assert!((60_000..200_000).contains(&got));
@@ -367,7 +215,7 @@ fn a_silent_download_ends_when_somebody_asks() {
     let patient = Patience { stall: Duration::from_secs(60), ..impatient() };
     for (turn, kept) in [(Turn::Silent, 0), (Turn::StallAfter(10_000), 10_000), (Turn::DribbleAfter(10_000), 10_000)] {
         let (s, p) = (server(&[turn]), place());
-        let wanted = Wanted { url: &s.url, to: &p.to, bytes: Some(200_000), sha256: None };
+        let wanted = FileToFetch { url: &s.url, to: &p.to, bytes: Some(200_000), sha256: None };
         let mut asked: Option<Instant> = None;
         let error = fetch(&wanted, patient, &mut |there, _| {
             let is_asked = !s.log.lock().expect("log").is_empty();
@@ -386,7 +234,7 @@ fn a_silent_download_ends_when_somebody_asks() {
     let (s, p) = (server(&[Turn::Status(503)]), place());
     let slow = Patience { pause: Duration::from_secs(60), ..impatient() };
     let begin = Instant::now();
-    let wanted = Wanted { url: &s.url, to: &p.to, bytes: None, sha256: None };
+    let wanted = FileToFetch { url: &s.url, to: &p.to, bytes: None, sha256: None };
     let error = fetch(&wanted, slow, &mut |_, _| s.log.lock().expect("log").is_empty()).expect_err("ended");
     assert!(matches!(error, FetchError::Cancelled { .. }) && begin.elapsed() < SOON, "{error}");
 }

@@ -5,7 +5,7 @@ mod common;
 
 use common::{camera, random_cloud};
 use fmlgs::math::stats;
-use fmlgs::render::cpu::Renderer;
+use fmlgs::render::cpu::CpuRenderer;
 use fmlgs::render::cpu::normals::{self, SurfaceDepth};
 use fmlgs::render::{CloudGradient, Features, FrameGradient, RenderSettings};
 use fmlgs::scene::{Camera, GaussianCloud};
@@ -27,7 +27,7 @@ impl Problem {
             normals::of_gaussians(&self.cloud, &self.camera, &mut values);
             features = Features { channels: 3, values: &values };
         }
-        let mut renderer = Renderer::new();
+        let mut renderer = CpuRenderer::new();
         let frame = renderer.render(&self.cloud, features, &self.camera, &settings).expect("renders");
         let drawn = if self.surfels { &frame.normals[..] } else { &frame.features[..] };
         let [x, y, z] = drawn else { panic!("three channels") };

@@ -155,8 +155,8 @@ fn answers_say_when_nothing_or_several_fit() {
     let Some(scene) = load() else { return };
     let mut identities = Identities::default();
     let features = scene.single.iter().map(|f| ViewFeatures { raw: vec![f.clone()], deviated: vec![f.clone()] });
-    let language = LanguageFeatures { encoder: "clip".into(), dimension: 512, of: features.collect() };
-    language.of.iter().for_each(|_| {
+    let language = LanguageFeatures { encoder: "clip".into(), dimension: 512, by_identity: features.collect() };
+    language.by_identity.iter().for_each(|_| {
         identities.add(Level::Object, NOBODY, Vec::new());
     });
     let mut phrases = TextEmbeddings::default();
@@ -205,7 +205,7 @@ fn an_identity_counts_by_its_best_view() {
     let language = |views: &dyn Fn(&[Vec<f32>]) -> Views| {
         let of = scene.many.iter().map(|all| views(&all[..all.len().min(4)]));
         let of = of.map(|raw| ViewFeatures { deviated: raw.clone(), raw }).collect();
-        LanguageFeatures { encoder: "clip".into(), dimension: 512, of }
+        LanguageFeatures { encoder: "clip".into(), dimension: 512, by_identity: of }
     };
     let mean = |views: &[Vec<f32>]| {
         let sum: Vec<f32> = (0..512).map(|c| views.iter().map(|v| v[c]).sum()).collect();

@@ -17,9 +17,9 @@ use fmlgs::pipeline::semantics::view_map::ViewMap;
 use fmlgs::render::gpu::cloud::Packed;
 use fmlgs::render::{BackendChoice, Features, Frame, RenderSettings, Renderer};
 use fmlgs::scene::plan::{Item, NOISE_FLOOR, PlanOverride, When};
-use fmlgs::scene::resource_log::{self, Sort};
+use fmlgs::scene::resource_log::{self, ResourceKind};
 use fmlgs::scene::{
-    Camera, Facts, GaussianCloud, Identities, Level, Limits, Machine, NOBODY, Overrides, ScenePlan, SemanticMap,
+    Camera, GaussianCloud, Identities, Level, Limits, Machine, NOBODY, Overrides, SceneFacts, ScenePlan, SemanticMap,
 };
 use fmlgs::worker::ViewMode;
 use fmlgs::worker::view::{QualityBudget, SkipPasses, ViewLane, ViewRequest};
@@ -67,11 +67,12 @@ fn objects(cloud: &GaussianCloud, with_part: bool) -> SemanticMap {
         _ => right,
     });
     let of = of.collect();
-    SemanticMap::of_identities(all, of, vec![1.0; cloud.len()], vec![])
+    SemanticMap::from_identities(all, of, vec![1.0; cloud.len()], vec![])
 }
 
 fn plan(cloud: &GaussianCloud, map: Option<&SemanticMap>, cameras: &[Camera], overrides: &Overrides) -> ScenePlan {
-    let facts = Facts::of(Machine::default(), LIMITS).with_photos(cameras).with_cloud(cloud, cloud.sh_degree, cameras);
+    let facts =
+        SceneFacts::of(Machine::default(), LIMITS).with_photos(cameras).with_cloud(cloud, cloud.sh_degree, cameras);
     ScenePlan::new(facts.with_semantics(map), overrides)
 }
 
@@ -147,7 +148,7 @@ fn a_far_larger_photo_than_the_gaussians_resolve_is_looked_at_smaller() {
         let (map, view) = (objects(cloud, false), photo.limited_to(side_px));
         let mut renderer = Renderer::new();
         let settings = RenderSettings::default();
-        let drawn = ViewMap::render(&mut renderer, cloud, &map.of, &map.identities, &view, &settings);
+        let drawn = ViewMap::render(&mut renderer, cloud, &map.identity_of, &map.identities, &view, &settings);
         drawn.expect("drawn")
     };
     let small = side(&coarse);
@@ -225,7 +226,7 @@ fn working_memory_is_given_back_and_the_next_picture_is_the_same() {
 
 #[test]
 fn without_a_gpu_no_device_is_opened() {
-    let devices = || resource_log::since(0).iter().filter(|l| l.sort == Sort::Device).count();
+    let devices = || resource_log::since(0).iter().filter(|l| l.sort == ResourceKind::Device).count();
     let before = devices();
     let mut chosen = Renderer::choose(BackendChoice::Auto, |why| panic!("{why}")).expect("one that works");
     let real = fmlgs::render::real_gpu().is_some();

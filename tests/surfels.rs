@@ -5,7 +5,7 @@ mod common;
 
 use common::{camera, random_cloud, rng};
 use fmlgs::math::{Real, rotation, stats};
-use fmlgs::render::cpu::Renderer;
+use fmlgs::render::cpu::CpuRenderer;
 use fmlgs::render::{
     ALPHA_MAX, ALPHA_MIN, CloudGradient, Features, Frame, FrameGradient, RenderSettings, TRANSMITTANCE_MIN,
 };
@@ -115,7 +115,7 @@ fn deviation<R: Real>(frame: &Frame<R>, cloud: &GaussianCloud<f64>, camera: &Cam
 }
 
 fn draw(cloud: &GaussianCloud<f64>, camera: &Camera, s: &RenderSettings) -> Frame<f64> {
-    Renderer::new().render(cloud, Features::NONE, camera, s).expect("renders")
+    CpuRenderer::new().render(cloud, Features::NONE, camera, s).expect("renders")
 }
 
 /// The cases that formulas break at, by name.
@@ -177,7 +177,7 @@ fn special_cases_are_drawn_as_defined_and_stay_finite() {
         assert_eq!(drawn, !["behind the camera", "zero quaternion"].contains(&name), "{name}");
         // In single precision, with gradients of everything, nothing may become infinite or NaN.
         let single = cloud.cast::<f32>();
-        let mut renderer = Renderer::<f32>::new();
+        let mut renderer = CpuRenderer::<f32>::new();
         let frame = renderer.render(&single, Features::NONE, &camera, &settings()).expect("renders");
         assert!(frame.color.iter().flatten().chain(&frame.depth).chain(&frame.distortion).all(|v| v.is_finite()));
         let ones = || vec![1.0_f32; frame.alpha.len()];
@@ -209,7 +209,7 @@ fn the_fast_path_agrees_with_the_oracle() {
     for (n, scale) in [(200, 0.1), (2_000, 0.02)] {
         let cloud = random_cloud(n, 2, scale, 3).cast::<f32>();
         let s = RenderSettings { sh_degree: 2, ..settings() };
-        let fast = Renderer::<f32>::new().render(&cloud, Features::NONE, &camera, &s).expect("renders");
+        let fast = CpuRenderer::<f32>::new().render(&cloud, Features::NONE, &camera, &s).expect("renders");
         let exact = draw(&cloud.cast(), &camera, &s);
         for c in 0..3 {
             assert!(stats::worst_difference(&fast.color[c], &exact.color[c]) < 2e-3);
@@ -260,14 +260,14 @@ impl Problem {
         Self { cloud, features, camera, settings, weights }
     }
 
-    fn draw(&self, renderer: &mut Renderer<f64>) -> Frame<f64> {
+    fn draw(&self, renderer: &mut CpuRenderer<f64>) -> Frame<f64> {
         let features = Features { channels: EXTRA, values: &self.features };
         renderer.render(&self.cloud, features, &self.camera, &self.settings).expect("renders")
     }
 
     /// A linear functional of the picture: its gradient is `weights`.
     fn loss(&self) -> f64 {
-        let f = self.draw(&mut Renderer::new());
+        let f = self.draw(&mut CpuRenderer::new());
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
         let w = &self.weights;
         (0..3).map(|c| dot(&f.color[c], &w.color[c]) + dot(&f.normals[c], &w.normals[c])).sum::<f64>()
@@ -279,7 +279,7 @@ impl Problem {
     }
 
     fn gradient(&self) -> CloudGradient<f64> {
-        let mut renderer = Renderer::new();
+        let mut renderer = CpuRenderer::new();
         self.draw(&mut renderer);
         renderer.backward(&self.cloud, Features { channels: EXTRA, values: &self.features }, &self.weights)
     }

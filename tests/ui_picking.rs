@@ -55,7 +55,7 @@ fn write_scene(folder: &Path) -> PathBuf {
         let code = 0.2 * id as f32;
         all.get_mut(id).expect("there").code = [code, 1.0 - code, code];
     }
-    let map = SemanticMap::of_identities(all, of, vec![1.0; cloud.len()], vec!["a.png".into()]);
+    let map = SemanticMap::from_identities(all, of, vec![1.0; cloud.len()], vec!["a.png".into()]);
     let scene = folder.join("scene");
     let info = SceneInfo { version: 1, name: "by hand".into(), ..SceneInfo::default() };
     SceneFolder::hold(&scene, "a test").expect("ours").save(&info, &cloud, Some(&map)).expect("saved");

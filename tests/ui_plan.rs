@@ -15,7 +15,7 @@ use fmlgs::pipeline::observer::Silent;
 use fmlgs::pipeline::synth::{self, SynthOptions};
 use fmlgs::scene::IdentityId;
 use fmlgs::scene::plan::PlanOverride;
-use fmlgs::scene::resource_log::{self, Sort};
+use fmlgs::scene::resource_log::{self, ResourceKind};
 use fmlgs::ui::actions::{Action, Pane};
 use fmlgs::ui::app::App;
 
@@ -56,11 +56,11 @@ impl Window {
         }
     }
 
-    fn loaded(&self, sort: Sort) -> usize {
+    fn loaded(&self, sort: ResourceKind) -> usize {
         resource_log::since(self.traced).iter().filter(|l| l.sort == sort).count()
     }
 
-    fn until_loaded(&mut self, sort: Sort) {
+    fn until_loaded(&mut self, sort: ResourceKind) {
         let traced = self.traced;
         self.until(&format!("{sort:?} to be loaded"), |_| resource_log::since(traced).iter().any(|l| l.sort == sort));
     }
@@ -77,7 +77,8 @@ impl Window {
 }
 
 /// What is loaded only once it is used.
-const LATER: [Sort; 5] = [Sort::Maps, Sort::Thumbnails, Sort::Model, Sort::Paths, Sort::Agent];
+const LATER: [ResourceKind; 5] =
+    [ResourceKind::Maps, ResourceKind::Thumbnails, ResourceKind::Model, ResourceKind::Paths, ResourceKind::Agent];
 
 /// A trained scene with objects and their looks, and its photos.
 fn trained(folder: &Path) -> PathBuf {
@@ -91,7 +92,7 @@ fn trained(folder: &Path) -> PathBuf {
     w.harness.state_mut().layout.config.steps = 60;
     w.ask(Action::StartTraining);
     w.until("objects after training", |a| a.state.semantics.is_some());
-    assert!(w.loaded(Sort::Model) > 0, "finding objects looks at them");
+    assert!(w.loaded(ResourceKind::Model) > 0, "finding objects looks at them");
     w.app().state.scene.as_ref().expect("open").out.clone()
 }
 
@@ -121,9 +122,9 @@ fn nothing_is_loaded_or_drawn_before_it_is_used() {
     w.harness.key_press(egui::Key::Home);
     w.until("the first view", |a| a.viewport.photo_index().is_none() && a.viewport.picture().is_some_and(|p| p.full));
     w.rest();
-    let too_early: Vec<Sort> = LATER.into_iter().filter(|s| w.loaded(*s) > 0).collect();
+    let too_early: Vec<ResourceKind> = LATER.into_iter().filter(|s| w.loaded(*s) > 0).collect();
     assert!(too_early.is_empty(), "{too_early:?}: {:#?}", resource_log::since(w.traced));
-    assert_eq!((w.loaded(Sort::Gaussians), w.loaded(Sort::Objects)), (1, 1));
+    assert_eq!((w.loaded(ResourceKind::Gaussians), w.loaded(ResourceKind::Objects)), (1, 1));
 
     // An idle window draws nothing.
     let ticket = w.ticket();
@@ -132,16 +133,16 @@ fn nothing_is_loaded_or_drawn_before_it_is_used() {
 
     // Each is loaded by what needs it, and by nothing else.
     let lazy = answer(&mut w, "the table");
-    assert!(w.loaded(Sort::Maps) == 1 && lazy.1 > 0, "{lazy:?}");
-    w.until_loaded(Sort::Model);
-    assert_eq!(w.loaded(Sort::Model), 1, "one network understands phrases");
-    assert_eq!([Sort::Paths, Sort::Thumbnails, Sort::Agent].map(|s| w.loaded(s)), [0; 3]);
+    assert!(w.loaded(ResourceKind::Maps) == 1 && lazy.1 > 0, "{lazy:?}");
+    w.until_loaded(ResourceKind::Model);
+    assert_eq!(w.loaded(ResourceKind::Model), 1, "one network understands phrases");
+    assert_eq!([ResourceKind::Paths, ResourceKind::Thumbnails, ResourceKind::Agent].map(|s| w.loaded(s)), [0; 3]);
     w.ask(Action::TogglePane(Pane::Objects));
-    w.until_loaded(Sort::Thumbnails);
-    assert_eq!(w.loaded(Sort::Paths), 0);
+    w.until_loaded(ResourceKind::Thumbnails);
+    assert_eq!(w.loaded(ResourceKind::Paths), 0);
     w.ask(Action::GoToTarget(lazy.0[0], Side::default()));
     w.until("the graph", |a| a.state.explored.is_some());
-    assert_eq!((w.loaded(Sort::Paths), w.loaded(Sort::Agent)), (1, 0));
+    assert_eq!((w.loaded(ResourceKind::Paths), w.loaded(ResourceKind::Agent)), (1, 0));
     drop(w);
 
     // Everything on: all of that at opening, and the same answer.
@@ -149,7 +150,9 @@ fn nothing_is_loaded_or_drawn_before_it_is_used() {
     let mut all = Window::new(&data, scene, &overrides);
     all.until("a picture at rest", |a| a.viewport.picture().is_some_and(|p| p.full));
     all.until("the graph", |a| a.state.explored.is_some());
-    [Sort::Maps, Sort::Thumbnails, Sort::Model].into_iter().for_each(|sort| all.until_loaded(sort));
+    [ResourceKind::Maps, ResourceKind::Thumbnails, ResourceKind::Model]
+        .into_iter()
+        .for_each(|sort| all.until_loaded(sort));
     let ticket = all.ticket();
     all.harness.state_mut().override_plan(["redraw=always".parse::<PlanOverride>().expect("an override")]);
     all.rest();

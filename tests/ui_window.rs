@@ -1,6 +1,8 @@
 //! The whole window, headless: what the user sees and does, with the software adapter.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+#[path = "ui_window/report.rs"]
+mod report;
 mod ui_common;
 
 use std::path::{Path, PathBuf};
@@ -393,102 +395,6 @@ fn objects_are_found_asked_for_renamed_hidden_and_undone() {
     let stored = fmlgs::io::semantic_map::load(&out, scene.state.as_deref(), &scene.cloud);
     let stored = stored.expect("readable").expect("there");
     assert_eq!(stored.identities.name(red[0]), "Rosa");
-}
-
-/// A report of two stages, whose settings the window has.
-fn write_report(folder: &Path, times: f64, cores: usize) {
-    let sample = |v: f64| {
-        let mut s = Sample::default();
-        [v, 1.1 * v, 0.9 * v].iter().for_each(|v| s.add(*v));
-        s
-    };
-    let point = |method: &str, setting: &str, knobs: &[(&str, serde_json::Value)], secs: f64, error: f64| Point {
-        method: method.into(),
-        setting: setting.into(),
-        knobs: knobs.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect::<Knobs>(),
-        default: method == "default",
-        secs: sample(times * secs),
-        values: [("error".to_owned(), sample(error))].into(),
-        ..Point::default()
-    };
-    let stage = |name: StageName, points: Vec<Point>| Stage {
-        name,
-        secs_of: "it".into(),
-        reference: "the truth".into(),
-        input: Default::default(),
-        seeds: vec![0, 1, 2],
-        planned: 4,
-        measures: vec![Measure::new("error", "", ErrorKind::Error, "how wrong it is")],
-        rule: Rule { measure: "error".into(), times: 1.1, floor: 0.0, spare_secs: 0.0 },
-        points,
-        orders: Vec::new(),
-        left_out: Vec::new(),
-    };
-    let drawing = vec![
-        point("default", "as the scene says", &[], 0.02, 0.001),
-        point("filter", "on", &[("antialias", true.into())], 0.015, 0.01),
-        point("precision", "16 bits", &[("precision", "half".into())], 0.02, 0.003),
-    ];
-    let training =
-        vec![point("default", "all", &[], 20.0, 0.1), point("steps", "500", &[("steps", 500.into())], 5.0, 0.2)];
-    let report = Report {
-        version: measure::VERSION,
-        program: "test".into(),
-        scene: "dots".into(),
-        computer: measure::Computer { cores, ..Default::default() },
-        stages: vec![stage(StageName::Render, drawing), stage(StageName::Train, training)],
-    };
-    std::fs::create_dir_all(folder).expect("folder");
-    report.write(&folder.join(measure::FILE)).expect("written");
-}
-
-#[test]
-fn a_report_is_opened_compared_and_its_settings_are_applied() {
-    let folder = tempfile::tempdir().expect("folder");
-    let at = |name: &str| folder.path().join(name);
-    write_report(&at("one"), 1.0, 2);
-    write_report(&at("two"), 2.0, 64);
-    let mut w = Window::new(Some(Action::Open(write_splat(folder.path()))));
-    w.until("the splat", |a| a.viewport.picture().is_some_and(|p| p.full));
-    w.ask(Action::TogglePane(Pane::Report));
-    assert!(w.shows("Error against run time") && w.shows("fmlgs report") && w.shows("Benchmark rendering"));
-
-    // As if it was dropped: it is no scene, and takes no scene's place.
-    w.ask(Action::Open(at("one")));
-    w.until("the report", |a| a.state.report.is_some());
-    assert_eq!(w.app().state.scene.as_ref().map(|s| s.name.as_str()), Some("dots"));
-    assert!(w.shows("Not complete: 3 of 4"), "an incomplete sweep says so");
-    assert!(w.is_drawn());
-    w.click("precision: 16 bits");
-    assert!(w.shows("measured for comparison") && !w.shows("Apply to the view"), "what cannot be applied says why");
-    w.click("filter: on");
-    let before = w.app().viewport.picture().expect("drawn").rgb.clone();
-    w.click("Apply to the view");
-    assert_eq!(w.app().viewport.overrides.antialias, Some(true));
-    w.until("another picture", |a| a.viewport.picture().is_some_and(|p| p.full && p.rgb != before));
-    assert!(w.shows("rendered with filter on") && w.shows("Already active"));
-    w.click("default: as the scene says");
-    w.click("Apply to the view");
-    w.until("the first picture", |a| a.viewport.picture().is_some_and(|p| p.full && p.rgb == before));
-
-    w.ask(Action::TogglePane(Pane::Training));
-    w.click("Training");
-    w.click("steps: 500");
-    assert_ne!(w.app().layout.config.steps, 500);
-    w.click("Apply to the next training");
-    assert_eq!(w.app().layout.config.steps, 500);
-    assert!(w.app().layout.shows(Pane::Training), "where it can be seen");
-
-    w.ask(Action::CompareReport(at("two")));
-    w.until("the second report", |a| a.state.second_report.is_some());
-    assert!(w.shows("Both reports") && w.shows("\u{d7} 2.00") && w.shows("cores: 2 / 64"));
-    w.ask(Action::EndComparison);
-    assert!(!w.shows("Both reports"));
-
-    std::fs::write(at("two").join(measure::FILE), "{").expect("written");
-    w.ask(Action::OpenReport(at("two")));
-    w.until("the error", |a| a.state.error.is_some());
-    assert!(w.shows("not a report") && w.app().state.report.is_some(), "what was open stays");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use super::commands::is_command;
 use super::dialog::DialogState;
-use super::language::Language;
+use super::language::CommandLanguage;
 use super::resolve::{Resolved, name_words, resolve, words_of};
 use super::words::{number, ordinal};
 use super::world::World;
@@ -24,7 +24,7 @@ pub(crate) fn confirmation(text: &str) -> Confirmation {
     let words: Vec<String> = words_of(text).into_iter().filter(|w| w != ",").collect();
     let said = words.join(" ");
     let said = POLITE.iter().find_map(|p| said.strip_suffix(p)).unwrap_or(&said);
-    let language = Language::get();
+    let language = CommandLanguage::get();
     match said {
         said if language.yes.iter().any(|w| w == said) => Confirmation::Yes,
         said if language.no.iter().any(|w| w == said) => Confirmation::No,
@@ -62,7 +62,7 @@ pub(crate) fn choice(world: &mut dyn World, text: &str, candidates: &[IdentityId
     let all = world.identities();
     let fits = |id: &IdentityId| {
         let known: Vec<String> =
-            all.line(*id).filter_map(|i| all.get(i)).flat_map(|i| &i.names).flat_map(|n| name_words(n)).collect();
+            all.ancestors(*id).filter_map(|i| all.get(i)).flat_map(|i| &i.names).flat_map(|n| name_words(n)).collect();
         !content.is_empty() && content.iter().all(|w| name_words(w).iter().all(|w| known.contains(w)))
     };
     let fit: Vec<IdentityId> = candidates.iter().copied().filter(fits).collect();

@@ -1,41 +1,9 @@
-//! Arguments of camera commands as plain data: sides, directions, distances. Whoever moves the camera
+//! Arguments of camera commands as plain data: directions, distances, closeness. Whoever moves the camera
 //! decides what they come to in the scene.
 
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// From where to look at a target.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Side {
-    /// As it is seen now.
-    #[default]
-    Same,
-    Other,
-    /// The side that is turned to the scene's cameras.
-    Front,
-    Left,
-    Right,
-    Above,
-    Below,
-}
-
-impl Side {
-    /// All of them.
-    pub const ALL: [Self; 7] =
-        [Self::Same, Self::Other, Self::Front, Self::Left, Self::Right, Self::Above, Self::Below];
-
-    pub(crate) fn text(self) -> &'static str {
-        match self {
-            Self::Same => "this side",
-            Self::Other => "the other side",
-            Self::Front => "the front",
-            Self::Left => "the left",
-            Self::Right => "the right",
-            Self::Above => "above",
-            Self::Below => "below",
-        }
-    }
-}
+use crate::navigate::target::Side;
 
 /// Where to move or turn, as the viewer sees it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -130,4 +98,9 @@ pub(super) fn closeness<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Er
 /// The closeness that is meant if none is given.
 pub(super) fn normal() -> f64 {
     NORMAL
+}
+
+/// The side that is meant if none is given: as it is seen now.
+pub(super) fn same() -> Side {
+    Side::Same
 }

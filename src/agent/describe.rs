@@ -59,7 +59,7 @@ pub(crate) fn neighbors(world: &dyn World, id: IdentityId, relation: Relation) -
     let frame = world.view().frame();
     let mut found: Vec<(f64, IdentityId)> = Vec::new();
     for (other, identity) in all.iter().filter(|(_, i)| i.level == Level::Object) {
-        let related = all.line(id).any(|l| l == other) || identity.parent != NOBODY;
+        let related = all.ancestors(id).any(|l| l == other) || identity.parent != NOBODY;
         let bounds = if related { None } else { world.facts(other).and_then(|f| f.bounds) };
         found.extend(bounds.and_then(|b| fit(relation, &b, &anchor, &frame)).map(|d| (d, other)));
     }
@@ -100,7 +100,7 @@ pub(crate) fn thing(world: &dyn World, id: IdentityId) -> String {
     let name = the(world, id);
     let level = if facts.level == Level::Object { "an object" } else { "a part" };
     let mut text = format!("{} is {level}", capital(&name));
-    let pieces: Vec<IdentityId> = all.pieces(id).filter(|p| world.facts(*p).is_some()).collect();
+    let pieces: Vec<IdentityId> = all.children(id).filter(|p| world.facts(*p).is_some()).collect();
     if !pieces.is_empty() {
         let word = if pieces.len() == 1 { "one part".into() } else { format!("{} parts", pieces.len()) };
         text += &format!(" with {word}: {}", names(world, &pieces, 10));

@@ -1,7 +1,7 @@
 //! From a planned call to what happens: permission, target, the scene's facts, confirmation; then the
 //! world acts. Every planner's calls pass here, and only here.
 
-use super::camera_args::{Distance, NORMAL, Side};
+use super::camera_args::{Distance, NORMAL};
 use super::describe::{self, SEEN, capital, length, the};
 use super::dialog::DialogState;
 use super::listing::{list_ids, measure, say_list};
@@ -10,11 +10,12 @@ use super::refusal::{Refusal, RefusalKind};
 use super::resolve::{Resolved, resolve};
 use super::tool::{Reference, Target, ToolCall};
 use super::world::{Unreachable, World, WorldError};
+use crate::navigate::target::Side;
 use crate::scene::{IdentityId, LevelFilter, NOBODY};
 
 /// What became of a call.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Outcome {
+pub struct CallOutcome {
     /// The call, with targets by number where they were found.
     pub(crate) call: ToolCall,
     pub(crate) ids: Vec<IdentityId>,
@@ -23,7 +24,7 @@ pub struct Outcome {
     pub(crate) refused: Option<RefusalKind>,
 }
 
-impl Outcome {
+impl CallOutcome {
     /// Whether the text may name files of this machine: it is for the user alone.
     pub(crate) fn is_private(&self) -> bool {
         match self.refused {
@@ -44,7 +45,7 @@ impl Outcome {
 
 /// A call after its checks.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Checked {
+pub(crate) enum CheckedCall {
     Ready {
         call: ToolCall,
         ids: Vec<IdentityId>,
@@ -66,7 +67,7 @@ pub(crate) enum Checked {
     },
 }
 
-impl Checked {
+impl CheckedCall {
     fn refused(kind: RefusalKind, text: impl Into<String>) -> Self {
         Self::Refused { refusal: Refusal::new(kind, text), near: Vec::new() }
     }
@@ -79,12 +80,12 @@ pub(crate) fn check(
     policy: &Policy,
     dialog: &DialogState,
     is_confirmed: bool,
-) -> Checked {
+) -> CheckedCall {
     if let Err(problem) = call.sound() {
-        return Checked::refused(RefusalKind::Unclear, format!("That cannot be done: {problem}."));
+        return CheckedCall::refused(RefusalKind::Unclear, format!("That cannot be done: {problem}."));
     }
     if let Some(refusal) = policy.refusal(call) {
-        return Checked::Refused { refusal, near: Vec::new() };
+        return CheckedCall::Refused { refusal, near: Vec::new() };
     }
     let mut call = call.clone();
     let (mut ids, mut note) = (Vec::new(), String::new());
@@ -104,9 +105,9 @@ pub(crate) fn check(
             }
             Resolved::Several(candidates) => {
                 let question = format!("Which one do you mean: {}?", choices(world, &candidates));
-                return Checked::Choose { question, candidates };
+                return CheckedCall::Choose { question, candidates };
             }
-            Resolved::Missing { refusal, near } => return Checked::Refused { refusal, near },
+            Resolved::Missing { refusal, near } => return CheckedCall::Refused { refusal, near },
         }
     }
     if let ToolCall::Measure { to: Some(Reference::Thing(other)), .. } = &mut call {
@@ -117,18 +118,18 @@ pub(crate) fn check(
             }
             Resolved::Several(some) => {
                 let text = format!("From which one: {}? Please say it in full.", choices(world, &some));
-                return Checked::Refused { refusal: Refusal::new(RefusalKind::Unclear, text), near: some };
+                return CheckedCall::Refused { refusal: Refusal::new(RefusalKind::Unclear, text), near: some };
             }
-            Resolved::Missing { refusal, near } => return Checked::Refused { refusal, near },
+            Resolved::Missing { refusal, near } => return CheckedCall::Refused { refusal, near },
         }
     }
     if let Some(conflict) = conflict(world, &call, ids.first().copied()) {
-        return Checked::Refused { refusal: conflict, near: ids };
+        return CheckedCall::Refused { refusal: conflict, near: ids };
     }
     if !is_confirmed && let Some(question) = question(world, &call, policy, ids.first().copied()) {
-        return Checked::Confirm { question, call, ids };
+        return CheckedCall::Confirm { question, call, ids };
     }
-    Checked::Ready { call, ids, note }
+    CheckedCall::Ready { call, ids, note }
 }
 
 fn find(world: &mut dyn World, target: &Target, level: LevelFilter, dialog: &DialogState) -> Resolved {
@@ -205,7 +206,7 @@ pub(crate) fn perform(
     ids: Vec<IdentityId>,
     note: &str,
     dialog: &mut DialogState,
-) -> Outcome {
+) -> CallOutcome {
     let id = ids.first().copied().unwrap_or(NOBODY);
     let mut listed = Vec::new();
     let done = act(world, &call, id, ids.get(1).copied(), dialog, &mut listed);
@@ -227,7 +228,7 @@ pub(crate) fn perform(
         }
         dialog.group = listed;
     }
-    Outcome { call, ids, text, refused }
+    CallOutcome { call, ids, text, refused }
 }
 
 fn act(
@@ -258,7 +259,7 @@ fn act(
         ToolCall::GoTo { side, closeness, .. } => {
             let arrival = world.go_to(id, *side, *closeness).map_err(|e| unreachable(world, &it, &e))?;
             dialog.closeness = *closeness;
-            let from = if *side == Side::Same { String::new() } else { format!(" from {}", side.text()) };
+            let from = if *side == Side::Same { String::new() } else { format!(" {}", side.text()) };
             let close = match *closeness {
                 c if c > NORMAL => ", closer",
                 c if c < NORMAL => ", from farther away",

@@ -4,8 +4,9 @@ use std::sync::OnceLock;
 
 use serde::Deserialize;
 
-use super::camera_args::{Direction, Side};
+use super::camera_args::Direction;
 use super::relation::Relation;
+use crate::navigate::target::Side;
 
 /// What things are compared by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -26,7 +27,7 @@ pub(crate) enum Key {
 /// A command, as people read of it.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Command {
+pub struct CommandHelp {
     /// By which its task is found.
     pub(crate) id: String,
     /// What it does.
@@ -40,7 +41,7 @@ pub struct Command {
 /// The file. What each list is for is said there.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Language {
+pub(super) struct CommandLanguage {
     pub(crate) openers: Vec<String>,
     pub(crate) yes: Vec<String>,
     pub(crate) no: Vec<String>,
@@ -58,7 +59,7 @@ pub(super) struct Language {
     pub(crate) units: Vec<(String, f64)>,
     pub(crate) steps: Vec<(String, f64)>,
     pub(crate) angles: Vec<(String, f64)>,
-    pub(crate) command: Vec<Command>,
+    pub(crate) command: Vec<CommandHelp>,
 }
 
 /// What a list has for a text.
@@ -66,10 +67,10 @@ pub(super) fn find<T: Copy>(list: &[(String, T)], text: &str) -> Option<T> {
     list.iter().find(|(word, _)| word == text).map(|(_, value)| *value)
 }
 
-impl Language {
+impl CommandLanguage {
     /// The one that is built in: a test reads it, so that it is never none.
     pub(crate) fn get() -> &'static Self {
-        static READ: OnceLock<Language> = OnceLock::new();
+        static READ: OnceLock<CommandLanguage> = OnceLock::new();
         READ.get_or_init(|| Self::read().unwrap_or_default())
     }
 
@@ -97,8 +98,8 @@ impl Language {
 }
 
 /// All commands; of two that fit, the first is meant.
-pub fn commands() -> &'static [Command] {
-    &Language::get().command
+pub fn commands() -> &'static [CommandHelp] {
+    &CommandLanguage::get().command
 }
 
 #[cfg(test)]
@@ -107,8 +108,8 @@ mod tests {
 
     #[test]
     fn the_built_in_language_can_be_read() {
-        let read = Language::read().expect("the language");
+        let read = CommandLanguage::read().expect("the language");
         assert!(read.command.len() > 30 && read.relation_at(&["on", "top", "of", "it"]) == Some((Relation::On, 3)));
-        assert!(Language::get().is_no_name("and") && !Language::get().is_no_name("lamp"));
+        assert!(CommandLanguage::get().is_no_name("and") && !CommandLanguage::get().is_no_name("lamp"));
     }
 }

@@ -22,7 +22,7 @@ pub(super) fn list_ids(
         None => None,
     };
     let all = world.identities();
-    let inside = all.within(of);
+    let inside = all.descendants(of);
     let is_piece = |id: &IdentityId| *id != of && inside.get(*id as usize) == Some(&true);
     if of != NOBODY && relation != Relation::PartOf {
         // What is called so may be a part: the buttons on a controller, the handles on the table.
@@ -30,7 +30,7 @@ pub(super) fn list_ids(
         let bounds = |id: IdentityId| world.facts(id).and_then(|f| f.bounds);
         let (frame, anchor) = (world.view().frame(), bounds(of));
         let stands = |id: &IdentityId| {
-            let bearer = all.line(of).any(|whole| whole == *id);
+            let bearer = all.ancestors(of).any(|whole| whole == *id);
             let fits = || fit(relation, &bounds(*id)?, anchor.as_ref()?, &frame);
             !bearer && if is_piece(id) { matches!(relation, Relation::On | Relation::In) } else { fits().is_some() }
         };

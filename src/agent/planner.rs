@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::dialog::DialogState;
 use super::event::AgentEvent;
-use super::execute::Outcome;
+use super::execute::CallOutcome;
 use super::policy::Policy;
 use super::refusal::Refusal;
 use super::tool::ToolCall;
@@ -51,7 +51,7 @@ pub trait Planner: Send {
     ///
     /// # Errors
     /// If it cannot go on.
-    fn next(&mut self, last: Option<&Outcome>, context: &mut PlannerContext<'_>) -> Result<Step, Refusal>;
+    fn next(&mut self, last: Option<&CallOutcome>, context: &mut PlannerContext<'_>) -> Result<Step, Refusal>;
 
     /// Whether its last words stand for the calls' results, which are else said one by one.
     fn speaks(&self) -> bool {

@@ -6,7 +6,8 @@ use serde::Deserialize;
 
 use super::refusal::{Refusal, RefusalKind};
 use super::tool::{NAMES, ToolCall};
-use crate::io::{IoError, files};
+use crate::io::IoError;
+use crate::io::files::read;
 
 /// The environment variable with the path of a policy that takes the place of the built-in one.
 pub(crate) const VARIABLE: &str = "FMLGS_POLICY";
@@ -81,7 +82,7 @@ impl Policy {
     /// If it cannot be read or is no policy.
     pub(crate) fn load(path: &Path) -> Result<Self, PolicyError> {
         let place = path.display().to_string();
-        let bytes = files::read(path, MAX_BYTES)?;
+        let bytes = read(path, MAX_BYTES)?;
         let text = std::str::from_utf8(&bytes)
             .map_err(|e| PolicyError::Wrong { place: place.clone(), problem: format!("not UTF-8 text: {e}") })?;
         Self::parse(text, &place)

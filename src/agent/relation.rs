@@ -67,7 +67,7 @@ impl Relation {
 
 /// The eye and the scene's up, in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
+pub struct Viewpoint {
     /// Where the eye is.
     pub eye: DVec3,
     /// Where it looks; of any length.
@@ -78,7 +78,7 @@ pub struct View {
 
 /// Unit axes of a view that stand upright: to the right, up, and ahead.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Frame {
+pub struct UprightAxes {
     /// To the right.
     pub right: DVec3,
     /// Up in the scene.
@@ -87,13 +87,13 @@ pub struct Frame {
     pub ahead: DVec3,
 }
 
-impl View {
+impl Viewpoint {
     /// Its upright axes. A view straight up or down, or without a direction, has some level axis.
-    pub fn frame(&self) -> Frame {
+    pub fn frame(&self) -> UprightAxes {
         let up = self.up.try_normalize().unwrap_or(DVec3::Z);
         let level = self.forward.try_normalize().map(|f| f - up * f.dot(up)).filter(|l| l.length() > 1e-3);
         let ahead = level.and_then(DVec3::try_normalize).unwrap_or_else(|| up.any_orthonormal_vector());
-        Frame { right: ahead.cross(up), up, ahead }
+        UprightAxes { right: ahead.cross(up), up, ahead }
     }
 }
 
@@ -155,7 +155,7 @@ pub(crate) fn gap(a: &Bounds, b: &Bounds) -> f64 {
 
 /// How well `thing` stands in `relation` to `anchor`: a distance, smaller is better; `None` if it
 /// does not. [`Relation::PartOf`] never holds here.
-pub(crate) fn fit(relation: Relation, thing: &Bounds, anchor: &Bounds, frame: &Frame) -> Option<f64> {
+pub(crate) fn fit(relation: Relation, thing: &Bounds, anchor: &Bounds, frame: &UprightAxes) -> Option<f64> {
     let distance = gap(thing, anchor);
     let holds = match relation {
         Relation::PartOf => false,
@@ -201,7 +201,7 @@ fn beside(thing: &Bounds, anchor: &Bounds, side: DVec3, across: [DVec3; 2]) -> b
 }
 
 /// Whether the thing's middle is over the anchor's footprint, widened by a share of it.
-fn is_over(thing: &Bounds, anchor: &Bounds, frame: &Frame, widened: f64) -> bool {
+fn is_over(thing: &Bounds, anchor: &Bounds, frame: &UprightAxes, widened: f64) -> bool {
     [frame.right, frame.ahead].iter().all(|axis| {
         let (t, a) = (span(thing, *axis), span(anchor, *axis));
         let (middle, more) = (0.5 * (t.0 + t.1), widened * (a.1 - a.0));
@@ -210,7 +210,7 @@ fn is_over(thing: &Bounds, anchor: &Bounds, frame: &Frame, widened: f64) -> bool
 }
 
 /// Whether the thing rests on the anchor: over it, its bottom about where the anchor's top is.
-fn is_on(thing: &Bounds, anchor: &Bounds, frame: &Frame) -> bool {
+fn is_on(thing: &Bounds, anchor: &Bounds, frame: &UprightAxes) -> bool {
     let (t, a) = (span(thing, frame.up), span(anchor, frame.up));
     let (height, under) = (t.1 - t.0, a.1 - a.0);
     let gap = t.0 - a.1;
@@ -231,20 +231,20 @@ mod tests {
         Bounds { min: c - h, max: c + h }
     }
 
-    fn holds(relation: Relation, thing: &Bounds, anchor: &Bounds, view: &View) -> bool {
+    fn holds(relation: Relation, thing: &Bounds, anchor: &Bounds, view: &Viewpoint) -> bool {
         fit(relation, thing, anchor, &view.frame()).is_some()
     }
 
     #[test]
     fn sides_are_those_of_the_view() {
-        let view = View { eye: DVec3::new(0.0, -3.0, 1.0), forward: DVec3::new(0.0, 1.0, -0.3), up: DVec3::Z };
+        let view = Viewpoint { eye: DVec3::new(0.0, -3.0, 1.0), forward: DVec3::new(0.0, 1.0, -0.3), up: DVec3::Z };
         assert!((view.frame().right - DVec3::X).length() < 1e-9);
         let (laptop, mug) = (cube([0.0; 3], [0.4, 0.3, 0.2]), cube([-0.4, 0.0, 0.0], [0.1; 3]));
         assert!(holds(Relation::LeftOf, &mug, &laptop, &view) && !holds(Relation::RightOf, &mug, &laptop, &view));
         assert!(holds(Relation::RightOf, &laptop, &mug, &view) && !holds(Relation::InFrontOf, &mug, &laptop, &view));
-        let turned = View { forward: -view.forward, ..view };
+        let turned = Viewpoint { forward: -view.forward, ..view };
         assert!(holds(Relation::RightOf, &mug, &laptop, &turned), "seen from the other side");
-        let from_left = View { forward: DVec3::X, ..view };
+        let from_left = Viewpoint { forward: DVec3::X, ..view };
         assert!(holds(Relation::InFrontOf, &mug, &laptop, &from_left));
         assert!(holds(Relation::Behind, &laptop, &mug, &from_left));
         let far = cube([-0.4, 9.0, 0.0], [0.1; 3]);
@@ -254,7 +254,7 @@ mod tests {
 
     #[test]
     fn above_and_below_follow_the_scenes_up() {
-        let view = View { eye: DVec3::ZERO, forward: DVec3::Z, up: DVec3::NEG_Y };
+        let view = Viewpoint { eye: DVec3::ZERO, forward: DVec3::Z, up: DVec3::NEG_Y };
         // y points down: the table's top is at y = 0, its feet at y = 0.8.
         let table = cube([0.0, 0.4, 2.0], [1.6, 0.8, 0.8]);
         let mug = cube([0.3, -0.05, 2.1], [0.1, 0.1, 0.1]);
@@ -299,10 +299,10 @@ mod tests {
 
     #[test]
     fn broken_views_and_boxes_give_no_nonsense() {
-        let view = View { eye: DVec3::ZERO, forward: DVec3::Z, up: DVec3::Z };
+        let view = Viewpoint { eye: DVec3::ZERO, forward: DVec3::Z, up: DVec3::Z };
         let frame = view.frame();
         assert!(frame.right.is_normalized() && frame.ahead.is_normalized());
-        let nothing = View { eye: DVec3::ZERO, forward: DVec3::ZERO, up: DVec3::ZERO }.frame();
+        let nothing = Viewpoint { eye: DVec3::ZERO, forward: DVec3::ZERO, up: DVec3::ZERO }.frame();
         assert!(nothing.right.is_normalized());
         let point = cube([0.0; 3], [0.0; 3]);
         for relation in Relation::ALL {

@@ -5,18 +5,18 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
-use super::camera_args::{Direction, Distance, NORMAL, Side};
-use super::relation::{Extent, View};
+use super::camera_args::{Direction, Distance, NORMAL};
+use super::relation::{Extent, Viewpoint};
 pub use super::view_shares::Parts;
 use super::view_shares::{ViewShares, is_drawn};
-use super::world::{Arrival, Facts, Moved, Unreachable, World, WorldError};
-use crate::io;
-use crate::jobs::go_to::Explored;
-use crate::navigate::approach::{Approach, ApproachError, Place};
-use crate::navigate::target::{self, Wish};
-use crate::navigate::{FRAMES, Flight, Pose, Speed};
+use super::world::{Arrival, IdentityFacts, Moved, Unreachable, World, WorldError};
+use crate::jobs::export;
+use crate::jobs::go_to::{self, ApproachRequest, Approached, Explored};
+use crate::jobs::query::QueryEngine;
+use crate::navigate::approach::Approach;
+use crate::navigate::target::{Side, ViewPreference};
+use crate::navigate::{CameraTrajectory, FRAMES, Pose, Speed};
 use crate::pipeline::semantics::answer::QueryAnswer;
-use crate::pipeline::semantics::query_engine::QueryEngine;
 use crate::scene::undo::UndoHistory;
 use crate::scene::{Bounds, Identities, IdentityId, LevelFilter, SemanticMap, text};
 
@@ -29,7 +29,7 @@ const STEP: f64 = 6.0;
 #[derive(Clone, Debug)]
 pub enum Effect {
     /// The camera flies; the point is what it turns about from then on.
-    Fly(Box<Flight>, Option<DVec3>),
+    Fly(Box<CameraTrajectory>, Option<DVec3>),
     /// These are marked, and nothing else.
     Mark(Vec<IdentityId>),
     /// Which identities are left out of the picture.
@@ -125,7 +125,7 @@ impl SceneWorld {
         self.shares.of(&self.parts, self.eye, self.aspect, &self.hidden, id)
     }
 
-    fn fly(&mut self, flight: Flight, about: Option<DVec3>, what: String) {
+    fn fly(&mut self, flight: CameraTrajectory, about: Option<DVec3>, what: String) {
         self.done.record(Before::Eye(self.eye, what));
         if let Some(last) = flight.poses.last() {
             self.eye = *last;
@@ -158,7 +158,7 @@ impl SceneWorld {
     /// A turn or a straight way, without looking for one.
     fn straight(&mut self, to: Pose, what: String) -> Result<f64, Unreachable> {
         let eye = self.eye;
-        let flight = Flight::new(&[eye.center, to.center], [&eye, &to], None, None, FRAMES / 2, Speed::Eased);
+        let flight = CameraTrajectory::new(&[eye.center, to.center], [&eye, &to], None, None, FRAMES / 2, Speed::Eased);
         let mut flight = flight.ok_or_else(|| Unreachable { reason: "the view has no place".into(), nearest: None })?;
         flight.seconds = 1.2;
         let length = flight.length;
@@ -171,25 +171,10 @@ impl SceneWorld {
 fn bounds(parts: &Parts) -> Vec<Option<Bounds>> {
     let Parts { cloud, map, .. } = parts;
     let mut places: Vec<Vec<DVec3>> = vec![Vec::new(); map.identities.len() + 1];
-    for (i, &id) in map.of.iter().enumerate().take(cloud.len()) {
-        map.identities.line(id).for_each(|id| places[id as usize].push(cloud.world_position(i)));
+    for (i, &id) in map.identity_of.iter().enumerate().take(cloud.len()) {
+        map.identities.ancestors(id).for_each(|id| places[id as usize].push(cloud.world_position(i)));
     }
     places.into_iter().map(Bounds::robust).collect()
-}
-
-/// The side in navigation's terms. What is in view is seen from where it is seen now, unless another
-/// side is asked for; what is not, from wherever it is seen best.
-fn side(side: Side, in_view: bool) -> target::Side {
-    match side {
-        Side::Same if in_view => target::Side::Same,
-        Side::Same => target::Side::Best,
-        Side::Other => target::Side::Other,
-        Side::Front => target::Side::Front,
-        Side::Left => target::Side::Left,
-        Side::Right => target::Side::Right,
-        Side::Above => target::Side::Above,
-        Side::Below => target::Side::Below,
-    }
 }
 
 impl World for SceneWorld {
@@ -202,9 +187,9 @@ impl World for SceneWorld {
         Ok(answered.unwrap_or_else(|| super::world::locate_by_names(&self.parts.map.identities, query, kind)))
     }
 
-    fn facts(&self, id: IdentityId) -> Option<Facts> {
+    fn facts(&self, id: IdentityId) -> Option<IdentityFacts> {
         let identity = self.parts.map.identities.get(id)?;
-        Some(Facts {
+        Some(IdentityFacts {
             names: identity.names.clone(),
             level: identity.level,
             parent: identity.parent,
@@ -223,8 +208,8 @@ impl World for SceneWorld {
         Extent::new(&points, self.parts.up)
     }
 
-    fn view(&self) -> View {
-        View { eye: self.eye.center, forward: self.eye.forward(), up: self.parts.up }
+    fn view(&self) -> Viewpoint {
+        Viewpoint { eye: self.eye.center, forward: self.eye.forward(), up: self.parts.up }
     }
 
     fn metres_per_unit(&self) -> Option<f64> {
@@ -235,30 +220,41 @@ impl World for SceneWorld {
         let explored = self.explored();
         let in_view = self.share_of(id) > 0.0;
         let eye = self.eye;
-        let place = Place { cloud: &self.parts.cloud, settings: &self.parts.settings, map: &self.parts.map };
-        let distance = NORMAL / closeness.max(0.01);
-        let go = |side: target::Side| {
-            explored.navigator.visit(place, id, Wish { side, distance }, &eye, self.aspect, FRAMES)
+        let preference = |side: Side| ViewPreference { side, distance: NORMAL / closeness.max(0.01) };
+        let visit = |side: Side| {
+            let request = ApproachRequest {
+                explored: Some(Arc::clone(&explored)),
+                cloud: Arc::clone(&self.parts.cloud),
+                cameras: Vec::new(),
+                up: self.parts.up,
+                settings: self.parts.settings.clone(),
+                map: Arc::clone(&self.parts.map),
+                id,
+                preference: preference(side),
+                from: eye,
+                aspect: self.aspect,
+                frames: FRAMES,
+            };
+            go_to::visit(request).1
         };
-        let wanted = side(from, in_view);
-        let mut visit = go(wanted);
-        if visit.is_err() && from == Side::Same && wanted != target::Side::Best {
-            visit = go(target::Side::Best);
+        // What is in view is seen from where it is seen now; what is not, from wherever it is seen best.
+        let mut visited = visit(if from == Side::Same && !in_view { Side::Best } else { from });
+        if visited.problem.is_some() && from == Side::Same && in_view {
+            visited = visit(Side::Best);
         }
-        match visit {
-            Ok(Approach { view, target, flight }) => {
+        let Approached { name, flight, problem } = visited;
+        match (problem, flight.map(|f| *f)) {
+            (None, Some(Approach { view, target, flight })) => {
                 let arrival = Arrival { distance: flight.length, in_view: view.covers };
-                let what = format!("going to {}", self.name(id));
                 (self.emit)(Effect::Mark(vec![id]));
-                self.fly(flight, Some(target), what);
+                self.fly(flight, Some(target), format!("going to {name}"));
                 Ok(arrival)
             }
-            Err(ApproachError::NoRoute { why, nearest }) => {
+            (problem, nearest) => {
                 let center = self.bounds.get(id as usize).copied().flatten().map(|b| b.center());
                 let nearest = nearest.and_then(|n| Some(n.view.pose.center.distance(center?)));
-                Err(Unreachable { reason: why.to_string(), nearest })
+                Err(Unreachable { reason: problem.unwrap_or_default(), nearest })
             }
-            Err(e) => Err(Unreachable { reason: e.to_string(), nearest: None }),
         }
     }
 
@@ -318,8 +314,8 @@ impl World for SceneWorld {
 
     fn isolate(&mut self, id: IdentityId) -> Result<(), WorldError> {
         let all = &self.parts.map.identities;
-        let inside = all.within(id);
-        let line: Vec<IdentityId> = all.line(id).collect();
+        let inside = all.descendants(id);
+        let line: Vec<IdentityId> = all.ancestors(id).collect();
         let hidden = (0..=all.len() as IdentityId).map(|i| !inside[i as usize] && !line.contains(&i)).collect();
         let what = format!("showing only {}", self.name(id));
         self.set_hidden_list(hidden, what);
@@ -381,12 +377,11 @@ impl World for SceneWorld {
     fn export(&mut self, id: IdentityId) -> Result<String, WorldError> {
         let file = self.export_file(id);
         let failed = |e: &dyn std::fmt::Display| WorldError(format!("{}: {e}", file.display()));
-        std::fs::create_dir_all(&self.parts.exports).map_err(|e| failed(&e))?;
         let members = self.parts.map.members(id);
         if members.is_empty() {
             return Err(WorldError(format!("nothing in the scene belongs to {}", self.name(id))));
         }
-        io::splat_ply::write(&file, &self.parts.cloud.select(&members)).map_err(|e| failed(&e))?;
+        export::ply(&file, &self.parts.cloud.select(&members)).map_err(|e| failed(&e))?;
         Ok(file.display().to_string())
     }
 

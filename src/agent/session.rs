@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::answer::{Choice, Confirmation, choice, confirmation};
 use super::dialog::DialogState;
 use super::event::AgentEvent;
-use super::execute::{Checked, Outcome, check, perform};
+use super::execute::{CallOutcome, CheckedCall, check, perform};
 use super::planner::{Planner, PlannerContext, Step};
 use super::policy::Policy;
 use super::refusal::{Refusal, RefusalKind};
@@ -168,9 +168,9 @@ impl Session {
     ) -> Reply {
         // The scene may have changed since the question.
         let outcome = match check(world, &call, &self.policy, &self.dialog, true) {
-            Checked::Ready { call, note, .. } => self.perform(world, call, ids, &note, sink),
-            Checked::Refused { refusal, .. } => self.refused_call(call, refusal, sink),
-            Checked::Choose { question, .. } | Checked::Confirm { question, .. } => {
+            CheckedCall::Ready { call, note, .. } => self.perform(world, call, ids, &note, sink),
+            CheckedCall::Refused { refusal, .. } => self.refused_call(call, refusal, sink),
+            CheckedCall::Choose { question, .. } | CheckedCall::Confirm { question, .. } => {
                 self.refused_call(call, Refusal::new(RefusalKind::Unclear, question), sink)
             }
         };
@@ -198,8 +198,8 @@ impl Session {
     }
 
     /// The inner loop: one call after another, each planned after the last one's result.
-    fn run(&mut self, world: &mut dyn World, first: Option<Outcome>, sink: &mut ProgressSink<'_>) -> Reply {
-        let mut outcomes: Vec<Outcome> = first.into_iter().collect();
+    fn run(&mut self, world: &mut dyn World, first: Option<CallOutcome>, sink: &mut ProgressSink<'_>) -> Reply {
+        let mut outcomes: Vec<CallOutcome> = first.into_iter().collect();
         let mut alike = (None, 0);
         for calls in 0.. {
             if sink.cancel.load(Ordering::Relaxed) {
@@ -243,7 +243,7 @@ impl Session {
         world: &mut dyn World,
         call: ToolCall,
         sink: &mut ProgressSink<'_>,
-    ) -> Result<Outcome, Box<Reply>> {
+    ) -> Result<CallOutcome, Box<Reply>> {
         let said = call.line(world.identities());
         self.transcript.add(What::Call { call: call.clone(), line: said });
         if let ToolCall::AskUser { question, candidates } = &call {
@@ -256,19 +256,19 @@ impl Session {
             return Err(Box::new(reply));
         }
         match check(world, &call, &self.policy, &self.dialog, false) {
-            Checked::Ready { call, ids, note } => Ok(self.perform(world, call, ids, &note, sink)),
-            Checked::Refused { refusal, near } => {
+            CheckedCall::Ready { call, ids, note } => Ok(self.perform(world, call, ids, &note, sink)),
+            CheckedCall::Refused { refusal, near } => {
                 let mut outcome = self.refused_call(call, refusal, sink);
                 outcome.ids = near;
                 Ok(outcome)
             }
-            Checked::Choose { question, candidates } => {
+            CheckedCall::Choose { question, candidates } => {
                 self.note("ambiguous", &question);
                 let reply = Reply { text: question.clone(), candidates: candidates.clone(), ..Reply::default() };
                 self.pending = Some(Pending::Choose { call: Some(call), candidates, question });
                 Err(Box::new(reply))
             }
-            Checked::Confirm { question, call, ids } => {
+            CheckedCall::Confirm { question, call, ids } => {
                 self.note("needs a yes", &question);
                 self.dialog.last = ids.first().copied().or(self.dialog.last);
                 let reply = Reply { text: question, candidates: ids.clone(), ..Reply::default() };
@@ -285,7 +285,7 @@ impl Session {
         ids: Vec<IdentityId>,
         note: &str,
         sink: &mut ProgressSink<'_>,
-    ) -> Outcome {
+    ) -> CallOutcome {
         let said = call.line(world.identities());
         (sink.on)(AgentEvent::Call { call: call.clone(), line: said.clone() });
         let outcome = perform(world, call, ids, note, &mut self.dialog);
@@ -296,10 +296,10 @@ impl Session {
     }
 
     /// A call that a check has stopped.
-    fn refused_call(&mut self, call: ToolCall, refusal: Refusal, sink: &mut ProgressSink<'_>) -> Outcome {
+    fn refused_call(&mut self, call: ToolCall, refusal: Refusal, sink: &mut ProgressSink<'_>) -> CallOutcome {
         self.note("refused", &refusal.text);
         (sink.on)(AgentEvent::Result { text: refusal.text.clone(), done: false });
-        Outcome { call, ids: Vec::new(), text: refusal.text, refused: Some(refusal.kind) }
+        CallOutcome { call, ids: Vec::new(), text: refusal.text, refused: Some(refusal.kind) }
     }
 
     fn note(&mut self, verdict: &str, text: &str) {
@@ -312,7 +312,7 @@ impl Session {
     }
 
     /// The reply when a planner is through.
-    fn finished(&mut self, outcomes: &[Outcome], text: String, refusal: Option<Refusal>) -> Reply {
+    fn finished(&mut self, outcomes: &[CallOutcome], text: String, refusal: Option<Refusal>) -> Reply {
         let failed = outcomes.iter().rev().find_map(|o| Some((o, o.refused?)));
         let refused = refusal.or_else(|| {
             // What a planner got over is no refusal of the request.
@@ -336,7 +336,7 @@ impl Session {
     }
 
     /// The reply when a planner could not go on.
-    fn ended(&mut self, outcomes: &[Outcome], refusal: Refusal) -> Reply {
+    fn ended(&mut self, outcomes: &[CallOutcome], refusal: Refusal) -> Reply {
         self.note("ended", &refusal.text);
         let mut said: Vec<&str> = outcomes.iter().map(|o| o.text.as_str()).collect();
         said.push(&refusal.text);

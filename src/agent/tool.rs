@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::camera_args::{self, Direction, Distance, Side};
+use super::camera_args::{self, Direction, Distance};
 use super::relation::Relation;
+use crate::navigate::target::Side;
 use crate::scene::{IdentityId, LevelFilter};
 
 /// Longest text in a call, in characters.
@@ -39,7 +40,7 @@ pub enum ToolCall {
     GoTo {
         target: Target,
         /// From where to look at it.
-        #[serde(default)]
+        #[serde(default = "camera_args::same")]
         side: Side,
         /// 1 as usual, 2 twice as close, 0.5 from twice as far.
         #[serde(default = "camera_args::normal", deserialize_with = "camera_args::closeness")]

@@ -4,10 +4,11 @@ use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-use super::camera_args::{self, Distance, Side};
+use super::camera_args::{self, Distance};
 use super::relation::Relation;
 use super::tool::{Reference, Target, ToolCall};
 use crate::math::format::short;
+use crate::navigate::target::Side;
 use crate::scene::{Identities, LevelFilter, text};
 
 /// Entries that are kept; the oldest go first.
@@ -47,7 +48,7 @@ pub enum What {
 
 /// One line of the transcript.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Entry {
+pub struct TranscriptEntry {
     /// Milliseconds since the session began.
     pub(crate) elapsed_ms: u64,
     /// What happened.
@@ -58,7 +59,7 @@ pub struct Entry {
 /// Everything that happened in a session.
 #[derive(Clone, Debug, Serialize)]
 pub struct Transcript {
-    pub entries: Vec<Entry>,
+    pub entries: Vec<TranscriptEntry>,
     #[serde(skip)]
     start: Instant,
 }
@@ -75,7 +76,7 @@ impl Transcript {
             self.entries.drain(..MOST / 4);
         }
         let elapsed_ms = u64::try_from(self.start.elapsed().as_millis()).unwrap_or(u64::MAX);
-        self.entries.push(Entry { elapsed_ms, what });
+        self.entries.push(TranscriptEntry { elapsed_ms, what });
     }
 
     /// As JSON.
@@ -126,7 +127,7 @@ impl ToolCall {
             }
             Self::GoTo { side, closeness, .. } => {
                 if *side != Side::Same {
-                    parts.push(format!("from {}", side.text()));
+                    parts.push(side.text().into());
                 }
                 if *closeness > camera_args::NORMAL {
                     parts.push("closer".into());

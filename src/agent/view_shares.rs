@@ -7,9 +7,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use glam::DVec3;
 
 use crate::jobs::go_to::Explored;
+use crate::jobs::query;
 use crate::navigate::Pose;
-use crate::pipeline::semantics::view_map::ViewMap;
-use crate::render::{RenderSettings, Renderer};
+use crate::render::RenderSettings;
 use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, SemanticMap};
 
 /// What a scene is made of.
@@ -42,7 +42,7 @@ struct Counted {
 
 /// Whether neither an identity nor what it is a piece of is hidden.
 pub(super) fn is_drawn(identities: &Identities, hidden: &[bool], id: IdentityId) -> bool {
-    !identities.line(id).any(|i| hidden.get(i as usize).copied().unwrap_or(false))
+    !identities.ancestors(id).any(|i| hidden.get(i as usize).copied().unwrap_or(false))
 }
 
 impl ViewShares {
@@ -63,16 +63,15 @@ fn count(parts: &Parts, eye: Pose, aspect: f64, hidden: &[bool]) -> Vec<f64> {
     let (camera, identities) = (eye.camera(w, h), &map.identities);
     let mut shares = vec![0.0; identities.len() + 1];
     let view = if hidden.contains(&true) {
-        let is_kept = |i: &usize| map.of.get(*i).is_none_or(|id| is_drawn(identities, hidden, *id));
+        let is_kept = |i: &usize| map.identity_of.get(*i).is_none_or(|id| is_drawn(identities, hidden, *id));
         let kept: Vec<usize> = (0..cloud.len()).filter(is_kept).collect();
-        let of: Vec<IdentityId> = kept.iter().map(|i| map.of[*i]).collect();
-        ViewMap::render(&mut Renderer::new(), &cloud.select(&kept), &of, identities, &camera, settings)
+        query::identities_in_view((&cloud.select(&kept), settings), &map.select(&kept), &camera)
     } else {
-        ViewMap::render(&mut Renderer::new(), cloud, &map.of, identities, &camera, settings)
+        query::identities_in_view((cloud, settings), map, &camera)
     };
     // A view that cannot be drawn shows nothing.
     for id in view.map(|v| v.identity).unwrap_or_default() {
-        identities.line(id).for_each(|i| shares[i as usize] += 1.0);
+        identities.ancestors(id).for_each(|i| shares[i as usize] += 1.0);
     }
     shares.iter_mut().for_each(|s| *s /= f64::from(w * h));
     shares

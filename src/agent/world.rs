@@ -1,8 +1,9 @@
 //! What the agent needs of the scene. The window, the command line and tests supply it; everything
 //! that does not need a camera or a file is in [`super::resolve`] and [`super::describe`].
 
-use super::camera_args::{Direction, Distance, Side};
-use super::relation::{Extent, View};
+use super::camera_args::{Direction, Distance};
+use super::relation::{Extent, Viewpoint};
+use crate::navigate::target::Side;
 use crate::pipeline::semantics::answer::{QueryAnswer, by_name};
 use crate::pipeline::semantics::localize::Answer;
 use crate::pipeline::semantics::parse::ParsedQuery;
@@ -11,7 +12,7 @@ use crate::scene::{Bounds, Identities, IdentityId, Level, LevelFilter};
 
 /// What is known of one identity.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Facts {
+pub struct IdentityFacts {
     /// What it is called; the first is shown.
     pub names: Vec<String>,
     pub level: Level,
@@ -63,7 +64,7 @@ pub trait World {
     fn locate(&mut self, query: &str, kind: LevelFilter) -> Result<QueryAnswer, WorldError>;
 
     /// What is known of an identity; `None` if it is not (or no more) in the scene.
-    fn facts(&self, id: IdentityId) -> Option<Facts>;
+    fn facts(&self, id: IdentityId) -> Option<IdentityFacts>;
 
     /// The size of an identity, if it fills any space: that of its box, unless more is known.
     fn extent(&self, id: IdentityId) -> Option<Extent> {
@@ -71,7 +72,7 @@ pub trait World {
     }
 
     /// The present view.
-    fn view(&self) -> View;
+    fn view(&self) -> Viewpoint;
 
     /// Length of a scene unit in meters, if that is known.
     fn metres_per_unit(&self) -> Option<f64>;

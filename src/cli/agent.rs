@@ -8,12 +8,11 @@ use serde_json::json;
 
 use super::{CliError, interrupt, number, output, view};
 use crate::agent::commands::Commands;
-use crate::agent::llm::settings::{LlmSettings, Patience};
+use crate::agent::llm::settings::{LlmSettings, RequestPatience};
 use crate::agent::llm::{Llm, SENT, discover};
 use crate::agent::scene::{Effect, Parts, SceneWorld};
 use crate::agent::{AgentEvent, Planner, Policy, Session};
-use crate::io;
-use crate::jobs::open;
+use crate::jobs::{export, open, render};
 use crate::navigate::Pose;
 
 const EXAMPLES: &str = "Examples:\n  \
@@ -29,7 +28,7 @@ const EXAMPLES: &str = "Examples:\n  \
 /// address. Exit code 1 if the last request was refused.
 #[derive(Debug, clap::Args)]
 #[command(after_help = format!("{EXAMPLES}\n\n{SENT}"))]
-pub(crate) struct Args {
+pub(crate) struct AgentArgs {
     /// Trained scene with objects and parts ('fmlgs preprocess')
     #[arg(required_unless_present_any = ["find_model", "test_model"])]
     scene: Option<PathBuf>,
@@ -82,7 +81,7 @@ enum PlannerArg {
     Llm,
 }
 
-impl Args {
+impl AgentArgs {
     fn settings(&self) -> LlmSettings {
         LlmSettings {
             base_url: self.url.clone().unwrap_or_default(),
@@ -126,22 +125,22 @@ fn find_model(json: bool) -> Result<(), CliError> {
     output::print(&format!("{}\nChoose one with --planner llm --url ADDRESS --model NAME.\n{SENT}", lines.join("\n")))
 }
 
-pub(crate) fn run(args: Args) -> Result<(), CliError> {
+pub(crate) fn run(args: AgentArgs) -> Result<(), CliError> {
     if args.find_model {
         return find_model(args.json);
     }
     if args.test_model {
-        let text = discover::test(&args.settings(), &Patience::default(), interrupt::flag());
+        let text = discover::test(&args.settings(), &RequestPatience::default(), interrupt::flag());
         return output::print(&text.map_err(CliError::failed)?);
     }
     let (planner, policy) = (args.planner()?, args.policy()?);
     let folder = args.scene.as_deref().unwrap_or(Path::new(""));
     let scene = open::scene(folder)?;
     if let Some(view) = &args.view {
-        output::check(view, &[".png"], &scene.reads())?;
+        export::check(view, &[".png"], &scene.reads())?;
     }
     if let Some(transcript) = &args.transcript {
-        output::check(transcript, &[".json", ".md"], &scene.reads())?;
+        export::check(transcript, &[".json", ".md"], &scene.reads())?;
     }
     let map = scene.semantics()?;
     let camera = view::choose(args.from.as_deref(), &scene)?;
@@ -183,15 +182,11 @@ pub(crate) fn run(args: Args) -> Result<(), CliError> {
     if let Some(path) = &args.transcript {
         let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
         let text = if json { session.transcript().to_json() } else { session.transcript().to_markdown() };
-        output::make_parent(path)?;
-        io::atomic::write(path, |w| std::io::Write::write_all(w, text.as_bytes()))?;
+        export::text(path, &text)?;
     }
     if let Some(path) = &args.view {
         let camera = world.eye().camera(camera.width_px, camera.height_px).limited_to(1280);
-        let frame = crate::render::Renderer::new().draw(&cloud, &camera, &settings)?;
-        output::make_parent(path)?;
-        let size = [camera.width_px, camera.height_px];
-        output::write_png(path, frame.to_rgb8().as_flattened(), size, image::ColorType::Rgb8)?;
+        render::picture(path, &cloud, &camera, &settings)?;
     }
     if args.json {
         output::print_json(&json!({ "planner": session.planner(), "requests": talk.told }))?;

@@ -14,7 +14,7 @@ use crate::measure::stability::{self, Checked, Verdict, catalog};
 #[command(after_help = "Examples:\n  \
     fmlgs check-stability\n  \
     fmlgs check-stability --only drawing --json")]
-pub(crate) struct Args {
+pub(crate) struct CheckStabilityArgs {
     /// Only cases whose area or name contains this
     #[arg(long)]
     only: Option<String>,
@@ -23,7 +23,7 @@ pub(crate) struct Args {
     json: bool,
 }
 
-pub(crate) fn run(args: Args) -> Result<(), CliError> {
+pub(crate) fn run(args: CheckStabilityArgs) -> Result<(), CliError> {
     let all = catalog();
     let wanted = |area: &str, name: &str| args.only.as_ref().is_none_or(|o| area.contains(o) || name.contains(o));
     let checked: Vec<Checked> = all.iter().filter(|c| wanted(c.area, &c.name)).map(|c| c.check()).collect();

@@ -8,17 +8,17 @@ use image::ColorType;
 use serde::Serialize;
 
 use super::progress::{Console, evaluation_line};
-use super::train::Settings;
+use super::train::TrainOverrides;
 use super::{CliError, interrupt, output, synth};
 use crate::io;
-use crate::jobs::demo_questions::{self, Queries};
-use crate::jobs::evaluate::{self, Comparison, Options};
+use crate::jobs::demo_questions::{self, DemoQueries};
+use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::open;
 use crate::jobs::{Folders, demo as shipped, plan};
 use crate::math::stats::median;
-use crate::measure::studies::Input;
+use crate::measure::studies::StudyInput;
 use crate::measure::table::{markdown, rows};
-use crate::measure::{Case, ErrorKind, Measure, Report, Rule, Stage, StageName, Trial, computer};
+use crate::measure::{ErrorKind, Measure, Report, Rule, Stage, StageName, SweepCase, Trial, computer};
 use crate::pipeline::observer::{Evaluation, Observer, Severity, ViewScore};
 use crate::pipeline::synth::demo;
 use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainOutcome};
@@ -40,7 +40,7 @@ const FLIGHT_PICTURES: usize = 24;
     fmlgs demo --headless\n  \
     fmlgs demo --headless --steps 300 --out quick/      a first look in a fraction of the time\n  \
     fmlgs demo --make assets/demo/demo.zip --out work/  make the trained demo that ships with the program")]
-pub(crate) struct Args {
+pub(crate) struct DemoArgs {
     /// Do it without a window, and write images and a report
     #[arg(long)]
     pub(crate) headless: bool,
@@ -48,7 +48,7 @@ pub(crate) struct Args {
     #[arg(long, default_value = "out/demo")]
     out: PathBuf,
     #[command(flatten)]
-    settings: Settings,
+    settings: TrainOverrides,
     /// Make the trained demo that ships with the program, in the folder given by --out, and write it here
     #[arg(long, value_name = "ZIP", conflicts_with = "headless")]
     pub(crate) make: Option<PathBuf>,
@@ -79,13 +79,13 @@ struct DemoReport {
     ssim: f64,
     views: Vec<ViewScore>,
     curve: Vec<Evaluation>,
-    queries: Queries,
+    queries: DemoQueries,
     flight_pictures: usize,
     flight_ms_per_picture: f64,
     total_secs: f64,
 }
 
-pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+pub(crate) fn run(args: DemoArgs, quiet: bool) -> Result<(), CliError> {
     let mut console = Console::new(quiet);
     if let Some(file) = &args.make {
         return make(file, &args.out, console);
@@ -103,8 +103,8 @@ pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
         let (done, all) = (outcome.steps, config.steps);
         return Err(CliError::Cancelled(format!("{done} of {all} steps are saved; the same command resumes there")));
     }
-    let options = Options { pictures: Some(compare), ..Options::default() };
-    let job = Comparison::new(open::scene(&scene)?, &photos, options)?;
+    let options = EvaluateOptions { pictures: Some(compare), ..EvaluateOptions::default() };
+    let job = PhotoComparison::new(open::scene(&scene)?, &photos, options)?;
     let Evaluation { psnr, ssim, views, .. } = evaluate::photometric(&job, &mut console).map_err(CliError::of_views)?;
     let queries = demo_questions::find_and_ask(&scene, &photos, &job, &queries, &mut console)
         .map_err(|e| CliError::of_work(e, "the trained scene is saved"))?;
@@ -163,7 +163,7 @@ fn show_shipped(pictures: &Path, console: &mut Console) {
 
 /// Makes the trained demo that ships with the program.
 fn make(file: &Path, work: &Path, mut console: Console) -> Result<(), CliError> {
-    let made = shipped::make(&shipped::Recipe::shipped(), work, &mut console);
+    let made = shipped::make(&shipped::DemoRecipe::shipped(), work, &mut console);
     let (bytes, record) = made.map_err(|e| CliError::of_work(e, "the same command resumes there"))?;
     drop(console);
     io::atomic::write(file, |w| w.write_all(&bytes))?;
@@ -182,15 +182,15 @@ fn make(file: &Path, work: &Path, mut console: Console) -> Result<(), CliError> 
 }
 
 /// The demo as a report that the window opens: training and queries, each with the one setting that it ran.
-fn document(out: &Path, outcome: &TrainOutcome, [psnr, ssim]: [f64; 2], queries: &Queries) -> Report {
+fn document(out: &Path, outcome: &TrainOutcome, [psnr, ssim]: [f64; 2], queries: &DemoQueries) -> Report {
     let share = |name: &str, meaning: &str| Measure::new(name, "", ErrorKind::Share, meaning);
     let decibels = Measure::new("PSNR", "dB", ErrorKind::Decibels, "peak signal to noise ratio in held-out photos");
     let labels = "labels of held-out photos, asked for by name";
     let curve = outcome.evaluations.iter().map(|e| [e.secs, e.psnr]).collect();
     let stage = |name, words, measures: Vec<Measure>, trial: &Trial| {
         let rule = Rule::new(&measures[0].name, 1.0, 0.0, 0.0);
-        let mut stage = Stage { planned: 1, ..Stage::new(name, words, (Input::new(), 1), rule, measures) };
-        stage.add(&Case::default("the demo's settings"), trial);
+        let mut stage = Stage { planned: 1, ..Stage::new(name, words, (StudyInput::new(), 1), rule, measures) };
+        stage.add(&SweepCase::default("the demo's settings"), trial);
         stage
     };
     let trained = Trial { secs: outcome.secs, values: vec![("PSNR", psnr), ("SSIM", ssim)], curve };
@@ -211,7 +211,7 @@ fn make_photos(folder: &Path, console: &mut Console) -> Result<Option<f64>, CliE
         console.note(Severity::Info, format!("Using the photos in {}", folder.display()));
         return Ok(None);
     }
-    let report = demo::write_demo(folder, &demo::demo_options(), console).map_err(synth::failure)?;
+    let report = demo::write_demo(folder, &demo::demo_options(), console).map_err(|e| synth::failure(e.into()))?;
     console.note(Severity::Info, synth::summary(&report));
     Ok(Some(report.secs))
 }

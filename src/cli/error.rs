@@ -7,6 +7,7 @@ use super::output;
 use crate::io::OpenError;
 use crate::jobs::error::chain;
 use crate::jobs::{JobError, poses};
+use crate::measure::BeginError;
 use crate::pipeline::observer::Interrupted;
 
 /// Why a subcommand did not do what was asked.
@@ -37,6 +38,8 @@ impl CliError {
                 let commands: String = poses::commands(photos).iter().map(|line| format!("\n  {line}")).collect();
                 format!(". COLMAP finds them, and the window runs it where it is installed; by hand:{commands}")
             }
+            JobError::Output(_) => return Self::Usage(error.to_string()),
+            JobError::Report(BeginError::Other(..)) => " (--out); --fresh forgets it".into(),
             JobError::NothingHeldOut(_) => "; --holdout-every 0 compares with all photos".into(),
             JobError::NoObjects(path) => format!("; find them with 'fmlgs preprocess {}'", path.display()),
             JobError::UnknownPhoto(_) => "; see 'fmlgs info'".into(),

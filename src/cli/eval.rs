@@ -6,9 +6,9 @@ use serde_json::json;
 
 use super::progress::Console;
 use super::{CliError, eval_depth, eval_masks, number, output};
-use crate::jobs::evaluate::{self, Comparison, Options};
+use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::evaluate_masks::Protocol;
-use crate::jobs::open;
+use crate::jobs::{export, open};
 
 /// Measure PSNR and SSIM of a scene on held-out photos
 ///
@@ -23,7 +23,7 @@ use crate::jobs::open;
     fmlgs eval scene/ --masks photos/           objects and parts against labels\n  \
     fmlgs eval scene/ --masks photos/ --protocol part-recall\n  \
     fmlgs eval splat.ply --photos photos/ --max-side 1600 --json")]
-pub(crate) struct Args {
+pub(crate) struct EvalArgs {
     /// Trained scene or splat file
     scene: PathBuf,
     /// Dataset with the photos [default: where the scene's photos are]
@@ -59,24 +59,24 @@ pub(crate) struct Args {
     json: bool,
 }
 
-impl Args {
-    fn check(&self) -> Result<Comparison, CliError> {
+impl EvalArgs {
+    fn check(&self) -> Result<PhotoComparison, CliError> {
         let scene = open::scene(&self.scene)?;
         let photos = scene.photos(self.photos.as_deref())?;
         if let Some(folder) = &self.pictures {
-            output::check_folder(folder, &[&photos])?;
+            export::check_folder(folder, &[&photos])?;
         }
-        let options = Options {
+        let options = EvaluateOptions {
             max_side_px: self.max_side,
             holdout_every: self.holdout_every,
             keep_borders: self.keep_borders,
             pictures: self.pictures.clone(),
         };
-        Ok(Comparison::new(scene, &photos, options)?)
+        Ok(PhotoComparison::new(scene, &photos, options)?)
     }
 }
 
-pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+pub(crate) fn run(args: EvalArgs, quiet: bool) -> Result<(), CliError> {
     let comparison = args.check()?;
     if let Some(labels) = &args.masks {
         return eval_masks::run(&args.scene, labels, args.protocol, args.query.as_deref(), &comparison, args.json);

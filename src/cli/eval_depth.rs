@@ -5,11 +5,16 @@ use std::path::Path;
 use serde_json::json;
 
 use super::{CliError, output};
-use crate::jobs::evaluate::{self, Comparison};
-use crate::pipeline::depth::{self, DepthErrors};
+use crate::jobs::evaluate::{self, PhotoComparison};
+use crate::pipeline::depth::{DepthErrors, EDGE_JUMP, EDGE_PX};
 use crate::pipeline::observer::Observer;
 
-pub(crate) fn run(scene: &Path, job: &Comparison, as_json: bool, observer: &mut dyn Observer) -> Result<(), CliError> {
+pub(crate) fn run(
+    scene: &Path,
+    job: &PhotoComparison,
+    as_json: bool,
+    observer: &mut dyn Observer,
+) -> Result<(), CliError> {
     let (scores, median_render_ms) = evaluate::depth(job, observer).map_err(CliError::of_views)?;
     if as_json {
         return output::print_json(&json!({
@@ -18,8 +23,8 @@ pub(crate) fn run(scene: &Path, job: &Comparison, as_json: bool, observer: &mut 
             "surfels": job.settings.surfels,
             "max_side_px": job.max_side_px,
             "views": job.views.len(),
-            "edge_px": depth::EDGE_PX,
-            "edge_jump": depth::EDGE_JUMP,
+            "edge_px": EDGE_PX,
+            "edge_jump": EDGE_JUMP,
             "median_render_ms": median_render_ms,
             "scores": scores,
         }));

@@ -5,11 +5,10 @@ use std::path::Path;
 use serde_json::json;
 
 use super::{CliError, output};
-use crate::io;
-use crate::jobs::JobError;
-use crate::jobs::evaluate::Comparison;
-use crate::jobs::evaluate_masks::{self, Protocol, Summary};
-use crate::pipeline::semantics::protocols::{Unit, part_recall};
+use crate::jobs::evaluate::PhotoComparison;
+use crate::jobs::evaluate_masks::{self, Protocol, ProtocolSummary};
+use crate::pipeline::semantics::protocols::Unit;
+use crate::pipeline::semantics::protocols::part_recall::{HIT_IOU, Row};
 
 /// Rows of the table at most; the worst come first.
 const ROWS: usize = 12;
@@ -19,12 +18,10 @@ pub(crate) fn run(
     labels: &Path,
     protocol: Protocol,
     query: Option<&str>,
-    comparison: &Comparison,
+    comparison: &PhotoComparison,
     as_json: bool,
 ) -> Result<(), CliError> {
-    let map = io::semantic_map::load(scene, comparison.state.as_deref(), &comparison.cloud)?;
-    let map = map.ok_or_else(|| JobError::NoObjects(scene.into()))?;
-    let scores = evaluate_masks::run(comparison, &map, labels, protocol, query)?;
+    let scores = evaluate_masks::run(comparison, scene, labels, protocol, query)?;
     let name = clap::ValueEnum::to_possible_value(&protocol).map_or_else(String::new, |v| v.get_name().to_owned());
     let (views, trained, (miou, miou_by_view)) = (scores.views, scores.trained_on, scores.miou());
     if as_json {
@@ -56,31 +53,31 @@ pub(crate) fn run(
 }
 
 /// What the protocol counts, in words.
-fn summary(summary: &Summary) -> String {
+fn summary(summary: &ProtocolSummary) -> String {
     match summary {
-        Summary::Masks { object_miou, part_miou } => {
+        ProtocolSummary::Masks { object_miou, part_miou } => {
             format!("mean IoU: objects {object_miou:.4}, parts {part_miou:.4}")
         }
-        Summary::Langsplat { localization } => format!("localization accuracy {localization:.4}"),
-        Summary::FastlgsEx {} => {
+        ProtocolSummary::Langsplat { localization } => format!("localization accuracy {localization:.4}"),
+        ProtocolSummary::FastlgsEx {} => {
             "values are running pooled IoUs; not comparable with those of other protocols".to_owned()
         }
-        Summary::Selection3d { accuracy_25, accuracy_50 } => {
+        ProtocolSummary::Selection3d { accuracy_25, accuracy_50 } => {
             format!("accuracy at 0.25 {accuracy_25:.4}, at 0.5 {accuracy_50:.4}")
         }
-        Summary::SpinNerf { accuracy } => format!("pixel accuracy {accuracy:.4}"),
-        Summary::Ovs3d { argmax_miou, classes } => {
+        ProtocolSummary::SpinNerf { accuracy } => format!("pixel accuracy {accuracy:.4}"),
+        ProtocolSummary::Ovs3d { argmax_miou, classes } => {
             format!("arg-max over {classes} classes: mean IoU {argmax_miou:.4}")
         }
-        Summary::PartRecall { encoder, rows } => {
+        ProtocolSummary::PartRecall { encoder, rows } => {
             let table = output::table(&ablation(rows));
-            format!("recall at IoU {}, encoder '{encoder}'\n{table}", part_recall::HIT_IOU)
+            format!("recall at IoU {}, encoder '{encoder}'\n{table}", HIT_IOU)
         }
     }
 }
 
 /// The paper's ablation as a table.
-fn ablation(rows: &[part_recall::Row]) -> Vec<Vec<String>> {
+fn ablation(rows: &[Row]) -> Vec<Vec<String>> {
     let tick = |on: bool| if on { "x" } else { "" }.to_owned();
     let mut table = vec![["ME", "SD", "ML", "recall %", "mean IoU", "ms"].map(str::to_owned).to_vec()];
     table.extend(rows.iter().map(|r| {

@@ -15,7 +15,7 @@ use crate::jobs::{export, open};
     fmlgs export scene/ --out scene.ply\n  \
     fmlgs export big.compressed.ply --out big.ply\n  \
     fmlgs export scene.ply --out flat.ply --sh-degree 0      smaller, same color from everywhere")]
-pub(crate) struct Args {
+pub(crate) struct ExportArgs {
     /// Trained scene or splat file
     scene: PathBuf,
     /// The .ply to write
@@ -26,9 +26,9 @@ pub(crate) struct Args {
     sh_degree: Option<u8>,
 }
 
-pub(crate) fn run(args: Args) -> Result<(), CliError> {
+pub(crate) fn run(args: ExportArgs) -> Result<(), CliError> {
     let scene = open::scene(&args.scene)?;
-    output::check(&args.out, &[".ply"], &scene.reads())?;
+    export::check(&args.out, &[".ply"], &scene.reads())?;
     let cloud = match args.sh_degree {
         Some(degree) => Arc::unwrap_or_clone(scene.cloud).up_to_degree(degree).into(),
         None => scene.cloud,

@@ -7,7 +7,8 @@ use serde_json::{Value, json};
 
 use super::plan::PlanArgs;
 use super::{CliError, output};
-use crate::io::{semantic_map, trained};
+use crate::io::scene_files::MAP_FILE;
+use crate::io::trained::CLOUD_FILE;
 use crate::jobs::open::{self, Contents};
 use crate::jobs::{JobError, Scene, plan};
 use crate::pipeline::train::TrainConfig;
@@ -21,7 +22,7 @@ use crate::scene::{Bounds, Dataset, ScenePlan, SemanticMap};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  fmlgs info photos/\n  fmlgs info scene.ply --json | jq .gaussians\n  \
     fmlgs info scene/ --plan color=full --plan feature-maps=always")]
-pub(crate) struct Args {
+pub(crate) struct InfoArgs {
     /// Dataset folder, transforms.json, splat file or trained scene
     path: PathBuf,
     /// Training pictures are limited to this many px along the longer side; the plan depends on it
@@ -41,7 +42,7 @@ struct Facts {
     warnings: Vec<String>,
 }
 
-pub(crate) fn run(args: Args) -> Result<(), CliError> {
+pub(crate) fn run(args: InfoArgs) -> Result<(), CliError> {
     let defaults = TrainConfig::default();
     let config = TrainConfig { max_side_px: args.max_side, ..defaults.clone() };
     let machine = plan::machine();
@@ -152,13 +153,12 @@ fn of_trained(s: &Scene, folder: &Path) -> (Facts, Option<SemanticMap>) {
         Err(JobError::NoObjects(_)) => Ok(None),
         map => map.map(Some),
     };
-    let of_others = matches!(map, Ok(None)) && folder.join(semantic_map::FILE).exists();
+    let of_others = matches!(map, Ok(None)) && folder.join(MAP_FILE).exists();
     let warning = match &map {
         Err(e) => Some(format!("its objects cannot be read ('fmlgs preprocess' finds them anew): {e}")),
         Ok(None) if of_others => Some(format!(
             "{} is of other Gaussians than {}, so no objects are known; 'fmlgs preprocess' finds them anew",
-            semantic_map::FILE,
-            trained::CLOUD_FILE
+            MAP_FILE, CLOUD_FILE
         )),
         Ok(_) => None,
     };

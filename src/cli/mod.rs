@@ -93,22 +93,22 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    Info(info::Args),
-    Train(train::Args),
-    Render(render::Args),
-    Eval(eval::Args),
-    Preprocess(preprocess::Args),
-    Query(query::Args),
-    Models(models::Args),
-    Segment(segment::Args),
-    Path(path::Args),
-    Agent(agent::Args),
-    Synth(synth::Args),
-    Demo(demo::Args),
-    Export(export::Args),
-    Bench(bench::Args),
-    Report(report::Args),
-    CheckStability(check_stability::Args),
+    Info(info::InfoArgs),
+    Train(train::TrainArgs),
+    Render(render::RenderArgs),
+    Eval(eval::EvalArgs),
+    Preprocess(preprocess::PreprocessArgs),
+    Query(query::QueryArgs),
+    Models(models::ModelsArgs),
+    Segment(segment::SegmentArgs),
+    Path(path::PathArgs),
+    Agent(agent::AgentArgs),
+    Synth(synth::SynthArgs),
+    Demo(demo::DemoArgs),
+    Export(export::ExportArgs),
+    Bench(bench::BenchArgs),
+    Report(report::ReportArgs),
+    CheckStability(check_stability::CheckStabilityArgs),
 }
 
 /// Opens the window with what is wanted of plans, does these things first, and returns when the window is closed.
@@ -139,7 +139,7 @@ pub fn main(open_window: OpenWindow) -> ExitCode {
 
 fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
     let quiet = cli.quiet;
-    let wishes = cli.plan.wishes;
+    let overrides = cli.plan.overrides;
     if cli.trace {
         resource_log::listen(|load| output::note(&load.line()));
     }
@@ -149,7 +149,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         }
         let reports = cli.report.into_iter().zip([Start::Report, Start::SecondReport]);
         let first = cli.path.map(Start::Scene).into_iter().chain(reports.map(|(path, start)| start(path)));
-        return window(first.collect(), wishes, open_window);
+        return window(first.collect(), overrides, open_window);
     };
     if !cli.report.is_empty() {
         return Err(CliError::Usage("--report is for the window; a command has no use for it".into()));
@@ -157,7 +157,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
     if let Some(path) = cli.path {
         return Err(CliError::Usage(format!("'{}' before a command means nothing; put it after it", path.display())));
     }
-    if !wishes.is_empty() && !matches!(command, Command::Demo(_)) {
+    if !overrides.is_empty() && !matches!(command, Command::Demo(_)) {
         return Err(CliError::Usage("--plan before a command means nothing; put it after it".into()));
     }
     interrupt::listen();
@@ -174,7 +174,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Agent(args) => agent::run(args),
         Command::Synth(args) => synth::run(args, quiet),
         Command::Demo(args) if args.headless || args.make.is_some() => demo::run(args, quiet),
-        Command::Demo(_) => window(vec![Start::Demo], wishes, open_window),
+        Command::Demo(_) => window(vec![Start::Demo], overrides, open_window),
         Command::Export(args) => export::run(args),
         Command::Bench(args) => bench::run(args, quiet),
         Command::Report(args) => report::run(args, quiet),
@@ -182,7 +182,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
     }
 }
 
-fn window(first: Vec<Start>, wishes: Vec<PlanOverride>, open_window: OpenWindow) -> Result<(), CliError> {
+fn window(first: Vec<Start>, overrides: Vec<PlanOverride>, open_window: OpenWindow) -> Result<(), CliError> {
     for start in &first {
         match start {
             Start::Scene(path) if !path.exists() => {
@@ -203,7 +203,7 @@ fn window(first: Vec<Start>, wishes: Vec<PlanOverride>, open_window: OpenWindow)
         ));
     }
     process::settle();
-    open_window(first, wishes).map_err(|error| {
+    open_window(first, overrides).map_err(|error| {
         CliError::failed(format!("the window could not be opened: {error}. 'fmlgs demo --headless' works without one"))
     })
 }

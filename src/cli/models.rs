@@ -6,10 +6,7 @@ use serde_json::json;
 
 use super::progress::Console;
 use super::{CliError, output};
-use crate::jobs::models::{self, Source};
-use crate::models::Role;
-use crate::models::catalog::{self, Entry, State};
-use crate::models::engine::engine;
+use crate::jobs::models::{self, ModelEntry, ModelList, ModelRole, ModelState, Source};
 use crate::pipeline::observer::Silent;
 
 /// List, fetch and check the neural networks
@@ -23,7 +20,7 @@ use crate::pipeline::observer::Silent;
     fmlgs models fetch sam2.1-tiny --from https://files.example.org/models\n  \
     fmlgs models add clip-vit-b16 exported/        take over files that you bring\n  \
     fmlgs models check                             compare all files with their checksums")]
-pub(crate) struct Args {
+pub(crate) struct ModelsArgs {
     #[command(subcommand)]
     command: Option<Command>,
     /// Print one JSON document
@@ -54,7 +51,7 @@ enum Command {
     Bench,
 }
 
-pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+pub(crate) fn run(args: ModelsArgs, quiet: bool) -> Result<(), CliError> {
     match args.command {
         None => list(args.json),
         Some(Command::Fetch { id, from }) => fetch(&id, from.as_deref(), quiet),
@@ -67,57 +64,63 @@ pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
     }
 }
 
+/// All models, what runs them, and on what.
+fn listed() -> Result<(ModelList, [String; 2]), CliError> {
+    let mut list = models::list();
+    match list.engine.take() {
+        Some(engine) => Ok((list, engine)),
+        None => Err(CliError::failed(list.note.unwrap_or_default())),
+    }
+}
+
 fn list(as_json: bool) -> Result<(), CliError> {
-    let (engine, folder) = (engine()?, catalog::folder());
-    let all = catalog::entries()?;
+    let (ModelList { note, folder, models, .. }, [engine, device]) = listed()?;
     if as_json {
-        let one = |e: &Entry| {
+        let one = |(e, state): &(ModelEntry, ModelState)| {
             json!({ "id": e.id, "role": e.role, "title": e.title, "adds": e.adds, "license": e.license, "source": e.source,
-                "megabytes": e.megabytes(), "state": e.state(&folder) })
+                "megabytes": e.megabytes(), "state": state })
         };
         return output::print_json(&json!({
-            "engine": engine.name(), "device": engine.device(), "note": engine.note(), "folder": folder,
-            "models": all.iter().map(one).collect::<Vec<_>>(),
+            "engine": engine, "device": device, "note": note, "folder": folder,
+            "models": models.iter().map(one).collect::<Vec<_>>(),
         }));
     }
     let mut rows = vec![["model", "for", "state", "MB", "license"].map(str::to_owned).to_vec()];
     let mut notes = String::new();
-    for e in &all {
-        let (state, how) = state_text(e, &e.state(&folder));
+    for (e, state) in &models {
+        let (state, how) = state_text(e, state);
         let size = if e.built_in { String::new() } else { e.megabytes().to_string() };
         let role = match e.role {
-            Role::Encoder => "looks",
-            Role::Segmenter => "masks",
+            ModelRole::Encoder => "looks",
+            ModelRole::Segmenter => "masks",
         };
         rows.push(vec![e.id.clone(), role.into(), state, size, e.license.clone()]);
         notes.push_str(&format!("\n{}: {} {how}", e.id, e.adds));
     }
-    let note = engine.note().map(|n| format!("\nNote: {n}")).unwrap_or_default();
+    let note = note.map(|n| format!("\nNote: {n}")).unwrap_or_default();
     output::print(&format!(
-        "{}\n{notes}\n\nRun by {} on the {}. Models lie in {}.{note}",
+        "{}\n{notes}\n\nRun by {engine} on the {device}. Models lie in {}.{note}",
         output::table(&rows),
-        engine.name(),
-        engine.device(),
         folder.display()
     ))
 }
 
 /// The state of a model in a word, and what can be done about it.
-fn state_text(entry: &Entry, state: &State) -> (String, String) {
+fn state_text(entry: &ModelEntry, state: &ModelState) -> (String, String) {
     match state {
-        State::BuiltIn => ("built in".into(), String::new()),
-        State::Here => ("here".into(), String::new()),
-        State::Missing(_) if entry.url.is_some() => {
+        ModelState::BuiltIn => ("built in".into(), String::new()),
+        ModelState::Here => ("here".into(), String::new()),
+        ModelState::Missing(_) if entry.url.is_some() => {
             ("not here".into(), format!("Get it: fmlgs models fetch {}", entry.id))
         }
-        State::Missing(_) => (
+        ModelState::Missing(_) => (
             "not here".into(),
             format!(
                 "Nobody hosts its files yet. Make them: python tools/export/{} --out FOLDER, then: fmlgs models add {} FOLDER",
                 entry.export, entry.id
             ),
         ),
-        State::Broken(problem) => ("broken".into(), problem.clone()),
+        ModelState::Broken(problem) => ("broken".into(), problem.clone()),
     }
 }
 
@@ -147,18 +150,13 @@ fn check(as_json: bool) -> Result<(), CliError> {
 /// Times every encoder that can be used here on a picture and a phrase.
 fn bench(as_json: bool) -> Result<(), CliError> {
     const RUNS: usize = 20;
-    let engine = engine()?;
+    let (_, [engine, device]) = listed()?;
     let times = models::time_encoders(RUNS, &mut output::warn)?;
     if as_json {
-        return output::print_json(&json!({ "engine": engine.name(), "device": engine.device(), "models": times }));
+        return output::print_json(&json!({ "engine": engine, "device": device, "models": times }));
     }
     let mut rows = vec![["model", "load ms", "picture ms", "phrase ms"].map(str::to_owned).to_vec()];
     let ms = |v: f64| format!("{v:.2}");
     rows.extend(times.iter().map(|t| vec![t.id.clone(), ms(t.load_ms), ms(t.picture_ms), ms(t.phrase_ms)]));
-    output::print(&format!(
-        "{}\nmedians of {RUNS} runs, {} on the {}",
-        output::table(&rows),
-        engine.name(),
-        engine.device()
-    ))
+    output::print(&format!("{}\nmedians of {RUNS} runs, {engine} on the {device}", output::table(&rows)))
 }

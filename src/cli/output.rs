@@ -8,7 +8,6 @@ use image::ColorType;
 use serde::Serialize;
 
 use super::CliError;
-use crate::io::{atomic, scene_files, trained};
 use crate::jobs::export;
 use crate::scene::text;
 
@@ -53,41 +52,6 @@ pub(crate) fn table(rows: &[Vec<String>]) -> String {
         row.iter().enumerate().map(cell).collect::<Vec<_>>().join("  ").trim_end().to_owned()
     };
     rows.iter().map(line).collect::<Vec<_>>().join("\n")
-}
-
-/// Refuses a file for a result, before any work is done, that does not end as it should (`endings`, any
-/// if there are none) or is one of those that the command reads: `reads` are files and folders.
-/// Devices and pipes may be written into whatever they are called.
-pub(crate) fn check(path: &Path, endings: &[&str], reads: &[&Path]) -> Result<(), CliError> {
-    if atomic::is_stream(path) {
-        return Ok(());
-    }
-    let name = path.to_string_lossy().to_lowercase();
-    if !endings.is_empty() && !endings.iter().any(|e| name.ends_with(e)) {
-        return Err(CliError::Usage(format!("'{}' must end in {}", path.display(), endings.join(" or "))));
-    }
-    scene_files::refuse_scene_file(path)?;
-    let Ok(real) = path.canonicalize() else { return Ok(()) };
-    for read in reads {
-        let within = read.canonicalize().is_ok_and(|read| real.starts_with(read));
-        // Results may lie in a scene's folder; its own files are told above.
-        if within && !trained::is_scene(read) {
-            let (path, read) = (path.display(), read.display());
-            return Err(CliError::Usage(format!("'{path}' is read by this command ('{read}'); choose another name")));
-        }
-    }
-    Ok(())
-}
-
-/// Refuses a folder for pictures that holds what the command reads, as [`check`] does files.
-pub(crate) fn check_folder(folder: &Path, reads: &[&Path]) -> Result<(), CliError> {
-    // Where it does not exist yet, nothing in it is read.
-    if folder.exists() { check(folder, &[], reads) } else { Ok(()) }
-}
-
-/// Makes the folder that `path` lies in.
-pub(crate) fn make_parent(path: &Path) -> Result<(), CliError> {
-    Ok(export::make_parent(path)?)
 }
 
 /// Makes `folder` and those above it.

@@ -12,8 +12,8 @@ use crate::jobs::{Scene, export, open, query};
 use crate::measure::survey::{self, smoothness};
 use crate::measure::table::rows;
 use crate::navigate::flight::Smoothness;
-use crate::navigate::target::{Side, Wish};
-use crate::navigate::{FRAMES, Flight, Pose};
+use crate::navigate::target::{Side, ViewPreference};
+use crate::navigate::{CameraTrajectory, FRAMES, Pose};
 use crate::scene::LevelFilter;
 
 /// Find a way through a scene, to what is asked for or to a photo
@@ -26,7 +26,7 @@ use crate::scene::LevelFilter;
     fmlgs path scene/ --from 0 --to-photo 24 --compare\n  \
     fmlgs path scene/ --survey 100 --cameras 50 --cameras 200\n  \
     fmlgs render scene/ --path path.json --out video.mp4")]
-pub(crate) struct Args {
+pub(crate) struct PathArgs {
     /// Trained scene
     scene: PathBuf,
     /// Photo to start from, by index or name, or a JSON camera file [default: the first photo]
@@ -74,17 +74,16 @@ fn explored(scene: &Scene) -> Arc<Explored> {
     Arc::new(Explored::new(Arc::clone(&scene.cloud), &scene.views(), home.up))
 }
 
-pub(crate) fn run(args: Args) -> Result<(), CliError> {
+pub(crate) fn run(args: PathArgs) -> Result<(), CliError> {
     let scene = open::scene(&args.scene)?;
     if let Some(out) = &args.out {
-        output::check(out, &[".json"], &scene.reads())?;
+        export::check(out, &[".json"], &scene.reads())?;
     }
     if let Some(flights) = args.survey {
         let own = scene.views();
         let counts = if args.cameras.is_empty() { vec![own.len() as u32] } else { args.cameras };
         let frames = args.frames as usize;
-        let survey = |count: &u32| survey::surveyed(&scene.cloud, &own, *count as usize, flights, frames);
-        let found: Vec<_> = counts.iter().map(survey).collect();
+        let found = go_to::survey(&scene, &counts, flights, frames);
         return match args.json {
             true => output::print_json(&survey::documents(&found)),
             false => output::print(&output::table(&survey::table(&found))),
@@ -142,12 +141,12 @@ pub(crate) fn run(args: Args) -> Result<(), CliError> {
 }
 
 fn to_target(
-    args: &Args,
+    args: &PathArgs,
     query: &str,
     scene: &Scene,
     explored: &Arc<Explored>,
     from: Pose,
-) -> Result<(Flight, String), CliError> {
+) -> Result<(CameraTrajectory, String), CliError> {
     let map = scene.semantics()?;
     let id = query::identities(&map, query, LevelFilter::Auto, 1)?[0];
     let (_, visited) = go_to::visit(ApproachRequest {
@@ -158,7 +157,7 @@ fn to_target(
         settings: scene.settings.clone(),
         map: Arc::new(map),
         id,
-        wish: Wish { side: args.side, distance: args.distance },
+        preference: ViewPreference { side: args.side, distance: args.distance },
         from,
         aspect: args.aspect,
         frames: args.frames as usize,

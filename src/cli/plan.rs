@@ -10,13 +10,13 @@ pub(crate) struct PlanArgs {
     /// feature-maps=always, parts=on, thumbnails=eager, encoder=eager, navigation=eager, depth=always,
     /// photos=full, objects=full, backend=cpu, redraw=always, buffers=keep; =auto resets one
     #[arg(long = "plan", value_name = "ITEM=VALUE")]
-    pub(crate) wishes: Vec<PlanOverride>,
+    pub(crate) overrides: Vec<PlanOverride>,
 }
 
 impl PlanArgs {
     /// All of them together.
     pub(crate) fn overrides(&self) -> Overrides {
-        self.wishes.iter().copied().collect()
+        self.overrides.iter().copied().collect()
     }
 }
 

@@ -8,9 +8,9 @@ use serde_json::json;
 use super::plan::PlanArgs;
 use super::progress::Console;
 use super::{CliError, number, output};
-use crate::jobs::find_objects::{self, FindSettings, FoundObjects, Request};
+use crate::jobs::find_objects::{self, FindRequest, FindSettings, FoundObjects};
+use crate::jobs::models::SAM2;
 use crate::jobs::{JobError, open, plan};
-use crate::models::catalog;
 use crate::pipeline::semantics::build_map::{CODE_STEPS, Carry, Found, Lifting};
 use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::scene::Level;
@@ -26,7 +26,7 @@ use crate::scene::Level;
     fmlgs preprocess scene/ --masks photos/               masks that came with the photos\n  \
     fmlgs preprocess scene/ --masks labels/ --max-seeds 1  one labeled photo is enough to begin\n  \
     fmlgs preprocess scene/ --segmenter regions           no masks: regions of the photos, unnamed and rough")]
-pub(crate) struct Args {
+pub(crate) struct PreprocessArgs {
     /// Trained scene
     scene: PathBuf,
     /// Where the masks are: id maps of 'fmlgs synth', ISAT files as in lerf_ovs, the folders of SPIn-NeRF,
@@ -42,7 +42,7 @@ pub(crate) struct Args {
     #[arg(long, value_enum, default_value_t = Carry::Gaussians)]
     tracker: Carry,
     /// The SAM 2 that follows masks: a model of 'fmlgs models', or the path of a model's .json
-    #[arg(long, default_value = catalog::SAM2)]
+    #[arg(long, default_value = SAM2)]
     tracker_model: String,
     /// Dataset with the photos [default: where the scene's photos are]
     #[arg(long)]
@@ -74,7 +74,7 @@ pub(crate) struct Args {
 }
 
 /// Whether the arguments agree on where masks come from.
-fn check_segmenter(args: &Args) -> Result<(), CliError> {
+fn check_segmenter(args: &PreprocessArgs) -> Result<(), CliError> {
     match (&args.masks, args.segmenter.as_deref()) {
         (None, Some("files")) => Err(CliError::Usage("--segmenter files needs --masks".into())),
         (Some(_), Some(other)) if other != "files" => {
@@ -84,7 +84,7 @@ fn check_segmenter(args: &Args) -> Result<(), CliError> {
     }
 }
 
-impl Args {
+impl PreprocessArgs {
     fn settings(&self) -> FindSettings {
         FindSettings {
             segmenter: self.segmenter.clone().filter(|s| s != "files"),
@@ -100,13 +100,13 @@ impl Args {
     }
 }
 
-pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+pub(crate) fn run(args: PreprocessArgs, quiet: bool) -> Result<(), CliError> {
     let mut observer = Console::new(quiet);
     check_segmenter(&args)?;
     let scene = open::scene(&args.scene)?;
     let folder = scene.folder.clone().ok_or_else(|| JobError::NoScene(args.scene.clone()))?;
     let dataset = open::dataset(&scene.photos(args.photos.as_deref())?)?;
-    let request = Request {
+    let request = FindRequest {
         folder,
         cloud: scene.cloud.clone(),
         settings: scene.settings.clone(),

@@ -6,8 +6,8 @@ use std::time::Instant;
 use serde_json::{Value, json};
 
 use super::{CliError, number, output, view};
-use crate::jobs::open;
-use crate::jobs::query::{self, QueryResult, Request};
+use crate::jobs::query::{self, QueryRequest, QueryResult};
+use crate::jobs::{export, open, render};
 use crate::pipeline::semantics::answer::Basis;
 use crate::pipeline::semantics::codes::TOLERANCE;
 use crate::pipeline::semantics::localize::{Answer, Hit};
@@ -24,7 +24,7 @@ use crate::scene::{LevelFilter, SemanticMap};
     fmlgs query scene/ \"a button of the red controller\"\n  \
     fmlgs query scene/ \"the lamp's shade\" --camera 12 --mask mask.png --heat heat.png\n  \
     fmlgs query scene/ lamp --kind object --json")]
-pub(crate) struct Args {
+pub(crate) struct QueryArgs {
     /// Trained scene with objects and parts ('fmlgs preprocess')
     scene: PathBuf,
     /// What to look for
@@ -58,15 +58,15 @@ pub(crate) struct Args {
     json: bool,
 }
 
-pub(crate) fn run(args: Args) -> Result<(), CliError> {
+pub(crate) fn run(args: QueryArgs) -> Result<(), CliError> {
     let scene = open::scene(&args.scene)?;
     for out in args.mask.iter().chain(&args.heat) {
-        output::check(out, &[".png"], &scene.reads())?;
+        export::check(out, &[".png"], &scene.reads())?;
     }
     let map = scene.semantics()?;
     let camera = view::choose(args.camera.as_deref(), &scene)?.limited_to(args.max_side);
-    view::check_room(camera.width_px, camera.height_px)?;
-    let request = Request {
+    render::check_room(camera.width_px, camera.height_px)?;
+    let request = QueryRequest {
         text: &args.text,
         level: args.kind,
         camera: &camera,
@@ -89,7 +89,7 @@ pub(crate) fn run(args: Args) -> Result<(), CliError> {
     tell(&args, &map, &result)
 }
 
-fn tell(args: &Args, map: &SemanticMap, result: &QueryResult) -> Result<(), CliError> {
+fn tell(args: &QueryArgs, map: &SemanticMap, result: &QueryResult) -> Result<(), CliError> {
     let QueryResult { answered, mask, unknown_words: unknown, query_ms, .. } = result;
     let full_name = |hit: &Hit| map.identities.full_name(hit.identity);
     let basis = if answered.basis == Basis::Names { "names" } else { "looks" };

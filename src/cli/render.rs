@@ -8,11 +8,10 @@ use serde_json::json;
 use super::plan::PlanArgs;
 use super::progress::Console;
 use super::{CliError, number, output, view};
-use crate::io;
-use crate::io::video::{Encoder, Settings};
+use crate::io::video::{VideoEncoder, VideoSettings};
 use crate::jobs::render::{self, Quantity};
 use crate::jobs::video::{self, Video, VideoRequest};
-use crate::jobs::{Scene, open, plan, query};
+use crate::jobs::{Scene, export, open, plan, query};
 use crate::navigate::camera_spline::MOST_PICTURES;
 use crate::navigate::{CameraSpline, Speed};
 use crate::render::{BackendChoice, RenderSettings};
@@ -32,7 +31,7 @@ use crate::scene::{Camera, CameraPath, LevelFilter};
     fmlgs render splat.ply --photos photos/ --camera 0 --out view.png\n  \
     fmlgs render scene/ --path path.json --size 1280x720 --out video.mp4\n\n\
     A camera file holds one entry of 'cameras' in the output of 'fmlgs info photos/ --json'.")]
-pub(crate) struct Args {
+pub(crate) struct RenderArgs {
     /// Trained scene or splat file
     scene: PathBuf,
     /// Photo by index from 0 or by name, or a JSON camera file [default: the first photo, or all of the splat]
@@ -78,7 +77,7 @@ pub(crate) struct Args {
     json: bool,
 }
 
-impl Args {
+impl RenderArgs {
     fn check(&self) -> Result<(Scene, Camera), CliError> {
         let name = self.out.to_string_lossy().to_lowercase();
         if !self.what.endings().iter().any(|e| name.ends_with(e)) {
@@ -89,7 +88,7 @@ impl Args {
         if let Some(photos) = &self.photos {
             scene.cameras = open::cameras(&open::dataset(photos)?, scene.config.holdout_every);
         }
-        output::check(&self.out, &[], &scene.reads())?;
+        export::check(&self.out, &[], &scene.reads())?;
         let mut camera = view::choose(self.camera.as_deref(), &scene)?;
         if let Some([width, height]) = self.size {
             camera = camera.with_size(width, height);
@@ -97,12 +96,12 @@ impl Args {
         if let Some(side) = self.max_side {
             camera = camera.limited_to(side);
         }
-        view::check_room(camera.width_px, camera.height_px)?;
+        render::check_room(camera.width_px, camera.height_px)?;
         Ok((scene, camera))
     }
 }
 
-pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+pub(crate) fn run(args: RenderArgs, quiet: bool) -> Result<(), CliError> {
     if let Some(path) = args.path.clone() {
         return video(&args, &path, quiet);
     }
@@ -135,16 +134,16 @@ pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
 }
 
 /// Draws a video along the camera path in `path`.
-fn video(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
-    let keys = io::camera_path::open(path)?;
+fn video(args: &RenderArgs, path: &Path, quiet: bool) -> Result<(), CliError> {
+    let keys = video::camera_path(path)?;
     let spline = CameraSpline::new(&keys, Speed::Constant);
     let spline = spline.ok_or_else(|| CliError::failed(format!("{}: there are no keys in it", path.display())))?;
     let scene = open::scene(&args.scene)?;
     let reads: Vec<&Path> = scene.reads().into_iter().chain([path]).collect();
     if args.out.is_dir() {
-        output::check_folder(&args.out, &reads)?
+        export::check_folder(&args.out, &reads)?
     } else {
-        output::check(&args.out, &[], &reads)?
+        export::check(&args.out, &[], &reads)?
     }
     let plan = plan::of_scene(&scene, &args.plan.overrides());
     let draw = RenderSettings { sh_degree: plan.sh_degree, ..scene.settings.clone() };
@@ -153,11 +152,11 @@ fn video(args: &Args, path: &Path, quiet: bool) -> Result<(), CliError> {
         let limit = args.max_side.unwrap_or(1280);
         [limit, (f64::from(limit) * 9.0 / 16.0).round().max(1.0) as u32]
     });
-    view::check_room(width, height)?;
-    let mut settings = Settings::new(width, height, fps);
+    render::check_room(width, height)?;
+    let mut settings = VideoSettings::new(width, height, fps);
     (settings.quality, settings.overwrite) = (args.quality, true);
     if let Some(program) = &args.ffmpeg {
-        settings.encoder = Encoder::Ffmpeg { program: program.clone(), args: Vec::new() };
+        settings.encoder = VideoEncoder::Ffmpeg { program: program.clone(), args: Vec::new() };
     }
     let cameras: Vec<Camera> = spline.pictures(fps, MOST_PICTURES).iter().map(|p| p.camera(width, height)).collect();
     let marked = match &args.mark {

@@ -1,14 +1,13 @@
 //! `fmlgs report`: error against run time.
 
-use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::path::PathBuf;
 
 use super::progress::Console;
 use super::{CliError, number, output};
-use crate::io;
-use crate::jobs::open;
-use crate::measure::subject::{Options, Subject};
-use crate::measure::{BeginError, End, FILE, Report, Stage, StageName, computer, defaults, page, plot};
+use crate::jobs::export;
+use crate::jobs::report::{self, Measured, ReportRequest};
+use crate::measure::subject::StudyOptions;
+use crate::measure::{End, FILE, Report, Stage, StageName, defaults};
 use crate::pipeline::observer::{Observer, Severity};
 
 /// Measure error against run time, knob by knob
@@ -25,7 +24,7 @@ use crate::pipeline::observer::{Observer, Severity};
     fmlgs report scene/ --masks photos/ --budget 600\n  \
     fmlgs report scene/ --stages render,path --repeats 5\n  \
     fmlgs report --defaults DEFAULTS.md --from report/ --from other/")]
-pub(crate) struct Args {
+pub(crate) struct ReportArgs {
     /// Trained scene
     #[arg(required_unless_present = "defaults")]
     scene: Option<PathBuf>,
@@ -36,7 +35,7 @@ pub(crate) struct Args {
     #[arg(long, value_parser = number::within(1e-3..=1e9))]
     budget: Option<f64>,
     /// How often every setting is measured; trainings take another seed each time
-    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100))]
+    #[arg(long, default_value_t = StudyOptions::default().repeats, value_parser = clap::value_parser!(u32).range(1..=100))]
     repeats: u32,
     /// Labels of the photos, for the stages 'features' and 'query'
     #[arg(long)]
@@ -67,85 +66,38 @@ pub(crate) struct Args {
     from: Vec<PathBuf>,
 }
 
-pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+pub(crate) fn run(args: ReportArgs, quiet: bool) -> Result<(), CliError> {
     if let Some(path) = &args.defaults {
         let reports = args.from.iter().map(|p| Report::read(p)).collect::<Result<Vec<_>, _>>();
         let text = defaults::markdown(&reports?);
-        return Ok(io::atomic::write(path, |w| w.write_all(text.as_bytes()))?);
+        return Ok(export::text(path, &text)?);
     }
-    let Some(scene) = args.scene.clone() else { return Err(CliError::Usage("a scene is needed".into())) };
+    let Some(scene) = &args.scene else { return Err(CliError::Usage("a scene is needed".into())) };
     let console = &mut Console::new(quiet);
-    let (name, computer) = (scene.display().to_string(), computer::look());
-    let mut report = match args.fresh {
-        true => Report::empty(&name, &computer),
-        false => Report::begin(&args.out, &name, &computer).map_err(|e| match e {
-            BeginError::Other(..) => CliError::failed(format!("{e} (--out); --fresh forgets it")),
-            other => other.into(),
-        })?,
-    };
-    let options = Options {
-        masks: args.masks.clone(),
-        steps: args.steps.clone(),
+    let options = StudyOptions {
+        masks: args.masks,
+        steps: args.steps,
         train_steps: args.train_steps,
         max_side_px: args.max_side,
         views: args.views as usize,
         repeats: args.repeats,
     };
-    let subject = subject(&scene, options)?;
-    let (stages, missing) = subject.stages(&args.stages)?;
-    missing.iter().for_each(|m| console.note(Severity::Info, m.clone()));
-    output::make_folder(&args.out)?;
-    let start = Instant::now();
-    let mut stopped = None;
-    for (k, name) in stages.iter().enumerate() {
-        let left = args.budget.map_or(f64::INFINITY, |b| (b - start.elapsed().as_secs_f64()).max(0.0));
-        let share = left / (stages.len() - k) as f64;
-        let study = subject.study(*name);
-        let end = match study.and_then(|mut study| report.measure(&mut study, &args.out, share, console)) {
-            // A stage that nobody named may turn out impossible; the others go on.
-            Err(why) if args.stages.is_empty() => {
-                console.note(Severity::Warning, format!("Stage '{}' left out: {why}", name.name()));
-                continue;
-            }
-            other => other?,
-        };
-        write(&args.out, &report)?;
-        if end != End::Finished {
-            stopped = Some(end);
-        }
-        if end == End::Cancelled {
-            break;
-        }
-    }
+    let subject = report::subject(scene, options)?;
+    let ReportArgs { stages, out, fresh, budget, .. } = args;
+    let request = ReportRequest { subject, stages, out, fresh, budget_secs: budget.unwrap_or(f64::INFINITY) };
+    let Measured { report, stages, end } = report::run(&request, console)?;
     let tables = report.stages.iter().filter(|s| stages.contains(&s.name)).map(printed);
     output::print(&tables.collect::<Vec<_>>().join("\n"))?;
-    match stopped {
-        Some(End::Cancelled) => {
-            Err(CliError::Cancelled(format!("{} holds what was measured", args.out.join(FILE).display())))
+    match end {
+        End::Cancelled => {
+            Err(CliError::Cancelled(format!("{} holds what was measured", request.out.join(FILE).display())))
         }
-        Some(_) => {
+        End::OutOfTime => {
             console.note(Severity::Info, "The budget is used up; the same command resumes with the rest".into());
             Ok(())
         }
-        None => Ok(()),
+        End::Finished => Ok(()),
     }
-}
-
-/// A trained scene with its photos, if they are there.
-fn subject(path: &Path, options: Options) -> Result<Subject, CliError> {
-    let scene = open::scene(path)?;
-    let dataset = scene.dataset_path.as_ref().filter(|p| p.exists()).map(|p| open::dataset(p)).transpose()?;
-    let map = if path.is_dir() { io::semantic_map::load(path, scene.state.as_deref(), &scene.cloud)? } else { None };
-    Ok(Subject {
-        name: path.display().to_string(),
-        cloud: scene.cloud,
-        settings: scene.settings,
-        cameras: scene.cameras.into_iter().map(|c| (c.camera, c.held_out)).collect(),
-        holdout_every: scene.config.holdout_every,
-        dataset,
-        map,
-        options,
-    })
 }
 
 fn printed(stage: &Stage) -> String {
@@ -156,17 +108,4 @@ fn printed(stage: &Stage) -> String {
     });
     let left_out = stage.left_out.iter().map(|text| format!("left out: {text}\n"));
     format!("{head}\n{}\n{}", output::table(&stage.table()), orders.chain(left_out).collect::<String>())
-}
-
-/// Everything but the JSON, which is there already.
-fn write(folder: &Path, report: &Report) -> Result<(), CliError> {
-    let mut files = vec![("report.csv".to_owned(), report.csv()), ("report.html".to_owned(), page::html(report))];
-    for stage in &report.stages {
-        let plot = stage.measures.first().and_then(|m| plot::svg(stage, m).ok());
-        files.extend(plot.map(|p| (format!("{}.svg", stage.name.name()), p)));
-    }
-    for (name, text) in files {
-        io::atomic::write(&folder.join(name), |w| w.write_all(text.as_bytes()))?;
-    }
-    Ok(())
 }

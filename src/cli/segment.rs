@@ -17,7 +17,7 @@ use crate::scene::LevelFilter;
     fmlgs segment scene/ \"the kettle\" --out kettle.ply\n  \
     fmlgs segment scene/ \"lid of the kettle\" --out lid.ply\n  \
     fmlgs segment scene/ \"the kettle\" --rest --out without_kettle.ply")]
-pub(crate) struct Args {
+pub(crate) struct SegmentArgs {
     /// Trained scene with objects and parts ('fmlgs preprocess')
     scene: PathBuf,
     /// What to look for
@@ -42,9 +42,9 @@ pub(crate) struct Args {
     tolerance: f32,
 }
 
-pub(crate) fn run(args: Args) -> Result<(), CliError> {
+pub(crate) fn run(args: SegmentArgs) -> Result<(), CliError> {
     let scene = open::scene(&args.scene)?;
-    output::check(&args.out, &[".ply"], &scene.reads())?;
+    export::check(&args.out, &[".ply"], &scene.reads())?;
     let map = scene.semantics()?;
     let targets = query::identities(&map, &args.text, args.kind, args.top)?;
     let mode = if args.blend { MatchMode::Blend } else { MatchMode::Exact };

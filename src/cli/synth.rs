@@ -6,8 +6,8 @@ use serde_json::json;
 
 use super::progress::Console;
 use super::{CliError, output, view};
-use crate::pipeline::observer::{Observer, Severity};
-use crate::pipeline::synth::{self, Levels, Rig, SynthError, SynthOptions, SynthReport};
+use crate::jobs::JobError;
+use crate::jobs::synth::{self, Levels, Rig, SynthOptions, SynthReport};
 
 /// Render a glTF scene into posed photos with object and part ids
 ///
@@ -18,7 +18,7 @@ use crate::pipeline::synth::{self, Levels, Rig, SynthError, SynthOptions, SynthR
 #[command(after_help = "Examples:\n  \
     fmlgs synth table.glb --out photos/\n  \
     fmlgs synth table.glb --views 200 --held-out 25 --size 1280x960 --rig survey --out photos/")]
-pub(crate) struct Args {
+pub(crate) struct SynthArgs {
     /// The scene: .glb or .gltf with named nodes
     scene: PathBuf,
     /// Folder for the dataset
@@ -56,7 +56,7 @@ pub(crate) struct Args {
     json: bool,
 }
 
-impl Args {
+impl SynthArgs {
     fn check(&self) -> Result<SynthOptions, CliError> {
         let base = SynthOptions::default();
         let [width_px, height_px] = self.size.unwrap_or([base.width_px, base.height_px]);
@@ -78,19 +78,16 @@ impl Args {
     }
 }
 
-pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+pub(crate) fn run(args: SynthArgs, quiet: bool) -> Result<(), CliError> {
     let options = args.check()?;
     let mut console = Console::new(quiet);
     let report = synth::run(&args.scene, &options, &args.out, &mut console).map_err(failure)?;
-    for warning in &report.warnings {
-        console.note(Severity::Warning, warning.clone());
-    }
     drop(console);
     if args.json { output::print_json(&as_json(&report)) } else { output::print(&summary(&report)) }
 }
 
 /// A cancelled run has its own exit code.
-pub(crate) fn failure(error: SynthError) -> CliError {
+pub(crate) fn failure(error: JobError) -> CliError {
     CliError::of_work(error, "the dataset is not complete; run the same command again")
 }
 

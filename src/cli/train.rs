@@ -26,7 +26,7 @@ use crate::scene::Dataset;
     fmlgs train photos/ --out quick/ --steps 500 --max-side 256 --no-densify\n  \
     fmlgs train other/ --preset scene/training.toml\n  \
     fmlgs train scene/                       go on with a scene that was cancelled, same settings")]
-pub(crate) struct Args {
+pub(crate) struct TrainArgs {
     /// Dataset folder or transforms.json; or a trained scene, to go on with it
     data: PathBuf,
     /// Folder of the trained scene [default: out/NAME, the name of the dataset; out/NAME-2 and so on where that
@@ -34,7 +34,7 @@ pub(crate) struct Args {
     #[arg(long)]
     out: Option<PathBuf>,
     #[command(flatten)]
-    settings: Settings,
+    settings: TrainOverrides,
     /// Settings to start from, a TOML file as every trained scene has one ("training.toml"); others given here
     /// go before
     #[arg(long, value_name = "TOML")]
@@ -48,7 +48,7 @@ pub(crate) struct Args {
 
 /// Settings of a run as given; those left out keep their defaults.
 #[derive(Debug, Default, clap::Args)]
-pub(crate) struct Settings {
+pub(crate) struct TrainOverrides {
     /// Optimizer steps in all; every schedule scales with it [default: 7000]
     #[arg(long, value_parser = number::within(1..=1_000_000_000_u64))]
     pub(crate) steps: Option<u64>,
@@ -104,7 +104,7 @@ pub(crate) struct Settings {
     pub(crate) distortion_weight: Option<f64>,
 }
 
-impl Settings {
+impl TrainOverrides {
     /// `base` with what was given on the command line.
     pub(crate) fn over(&self, base: TrainConfig) -> TrainConfig {
         TrainConfig {
@@ -129,7 +129,7 @@ impl Settings {
     }
 }
 
-impl Args {
+impl TrainArgs {
     /// What to train on, how, and in which folders: the one that is given, or else the first that holds no
     /// training with other settings.
     fn check(&self) -> Result<(Dataset, TrainConfig, Vec<PathBuf>), CliError> {
@@ -170,7 +170,7 @@ fn usual_folders(first: &Path) -> Vec<PathBuf> {
     (1..=there + 1).map(folder).collect()
 }
 
-pub(crate) fn run(args: Args, quiet: bool) -> Result<(), CliError> {
+pub(crate) fn run(args: TrainArgs, quiet: bool) -> Result<(), CliError> {
     let (dataset, config, folders) = args.check()?;
     let mut console = Console::new(quiet);
     for warning in &dataset.warnings {
@@ -209,8 +209,8 @@ mod tests {
     #[test]
     fn what_is_not_given_keeps_its_value() {
         let base = TrainConfig { steps: 3, seed: 9, densify: false, ..TrainConfig::default() };
-        assert_eq!(Settings::default().over(base.clone()), base);
-        let given = Settings { steps: Some(5), no_densify: true, antialias: true, ..Settings::default() };
+        assert_eq!(TrainOverrides::default().over(base.clone()), base);
+        let given = TrainOverrides { steps: Some(5), no_densify: true, antialias: true, ..TrainOverrides::default() };
         let config = given.over(TrainConfig::default());
         assert_eq!((config.steps, config.densify, config.antialias), (5, false, true));
     }
@@ -218,7 +218,7 @@ mod tests {
     #[test]
     fn the_help_states_the_real_defaults() {
         let d = TrainConfig::default();
-        let command = <Settings as clap::Args>::augment_args(clap::Command::new("x"));
+        let command = <TrainOverrides as clap::Args>::augment_args(clap::Command::new("x"));
         let stated = |id: &str| {
             let argument = command.get_arguments().find(|a| a.get_id() == id).expect("argument");
             let help = argument.get_help().expect("help").to_string();

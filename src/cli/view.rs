@@ -3,9 +3,8 @@
 use std::path::Path;
 
 use super::CliError;
-use crate::io;
 use crate::io::trained::SceneCamera;
-use crate::jobs::Scene;
+use crate::jobs::{Scene, render};
 use crate::scene::Camera;
 
 /// The camera that `wanted` names: an index from 0, a photo's name (its end is enough where that
@@ -22,7 +21,7 @@ pub(crate) fn choose(wanted: Option<&str>, scene: &Scene) -> Result<Camera, CliE
     }
     let path = Path::new(wanted);
     if path.is_file() {
-        return Ok(io::camera_file::read(path)?);
+        return Ok(render::camera(path)?);
     }
     let known = match scene.cameras.as_slice() {
         [] => "The scene has no photos: give a JSON camera file, or --photos with their dataset".to_owned(),
@@ -54,17 +53,6 @@ fn of_photo(wanted: &str, cameras: &[SceneCamera]) -> Result<Option<Camera>, Cli
 fn ends_with_path(name: &str, wanted: &str) -> bool {
     let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
     [name, stem].iter().any(|n| *n == wanted || n.strip_suffix(wanted).is_some_and(|front| front.ends_with('/')))
-}
-
-/// Bytes that drawing a pixel takes: color, depth and opacity, their copies on the way to the file.
-const BYTES_PER_PX: u64 = 64;
-
-/// Whether a picture of this size can be drawn in the memory that is free.
-pub(crate) fn check_room(width_px: u32, height_px: u32) -> Result<(), CliError> {
-    let bytes = u64::from(width_px) * u64::from(height_px) * BYTES_PER_PX;
-    let what = format!("drawing {width_px} x {height_px} px");
-    io::memory::room(what, bytes, "make it smaller with --size or --max-side")
-        .map_err(|e| CliError::failed(e.to_string()))
 }
 
 /// Parses `640x480`.
@@ -114,15 +102,15 @@ mod tests {
         let camera = scene(&["a"]).cameras[0].camera.clone();
         let path = folder.path().join("camera.json");
         std::fs::write(&path, serde_json::to_string(&camera).expect("json")).expect("write");
-        assert_eq!(io::camera_file::read(&path).expect("alone"), camera);
+        assert_eq!(render::camera(&path).expect("alone"), camera);
         let entry = serde_json::json!({ "name": "a", "camera": camera, "held_out": false });
         std::fs::write(&path, entry.to_string()).expect("write");
-        assert_eq!(io::camera_file::read(&path).expect("entry"), camera);
+        assert_eq!(render::camera(&path).expect("entry"), camera);
         let bad = Camera { width_px: 0, ..camera };
         std::fs::write(&path, serde_json::to_string(&bad).expect("json")).expect("write");
-        assert!(io::camera_file::read(&path).is_err());
+        assert!(render::camera(&path).is_err());
         std::fs::write(&path, "[]").expect("write");
-        assert!(io::camera_file::read(&path).is_err());
+        assert!(render::camera(&path).is_err());
     }
 
     #[test]

@@ -26,7 +26,7 @@ use gltf::json::{self, Root};
 use super::{IoError, files};
 use crate::scene::text;
 
-pub(crate) use model::{AlphaMode, Material, Mesh, MeshNode, MeshScene, Primitive, TextureImage, TextureUse, Wrap};
+pub(crate) use model::{AlphaMode, Material, Mesh, MeshNode, MeshPrimitive, MeshScene, TextureImage, TextureUse, Wrap};
 
 /// Largest file that is read, in bytes.
 const MAX_FILE_BYTES: u64 = 2 << 30;

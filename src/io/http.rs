@@ -15,7 +15,7 @@ use ureq::{Agent, Body};
 pub(crate) const TICK: Duration = Duration::from_millis(20);
 
 /// What arrives, in this order.
-pub(crate) enum Piece {
+pub(crate) enum ResponsePart {
     /// Once: the status and the headers.
     Head(StatusCode, HeaderMap),
     /// Some of the body.
@@ -52,19 +52,19 @@ pub(crate) fn config(url: &str, stall: Duration) -> ConfigBuilder<AgentScope> {
 /// If there is no thread for it.
 pub(crate) fn ask(
     request: impl FnOnce() -> Result<Response<Body>, ureq::Error> + Send + 'static,
-) -> io::Result<Receiver<Piece>> {
+) -> io::Result<Receiver<ResponsePart>> {
     let (send, receive) = bounded(4);
     let talk = move || {
         let response = match request() {
             Ok(response) => response,
             Err(e) => {
                 // Whoever asked may have gone.
-                let _ = send.send(Piece::Failed(e.to_string()));
+                let _ = send.send(ResponsePart::Failed(e.to_string()));
                 return;
             }
         };
         let (head, body) = response.into_parts();
-        if send.send(Piece::Head(head.status, head.headers)).is_err() {
+        if send.send(ResponsePart::Head(head.status, head.headers)).is_err() {
             return;
         }
         let mut reader = body.into_reader();
@@ -74,11 +74,11 @@ pub(crate) fn ask(
                 Ok(0) => return,
                 Ok(n) => {
                     bytes.truncate(n);
-                    Piece::Bytes(bytes)
+                    ResponsePart::Bytes(bytes)
                 }
-                Err(e) => Piece::Failed(e.to_string()),
+                Err(e) => ResponsePart::Failed(e.to_string()),
             };
-            let failed = matches!(piece, Piece::Failed(_));
+            let failed = matches!(piece, ResponsePart::Failed(_));
             if send.send(piece).is_err() || failed {
                 return;
             }

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::photo_list::{self, Focal, Lens, Listed, photos};
+use super::photo_list::{self, Focal, Lens, ListedPhoto, photos};
 use super::{IoError, files, npy};
 use crate::scene::{Camera, Dataset, Distortion};
 
@@ -93,7 +93,7 @@ pub(super) fn names(folder: &Path) -> Result<Vec<String>, IoError> {
     Ok(names)
 }
 
-fn listed(row: &[f64; ROW], name: &str, folder: &str, source: &Path) -> Result<Listed, IoError> {
+fn listed(row: &[f64; ROW], name: &str, folder: &str, source: &Path) -> Result<ListedPhoto, IoError> {
     let column = |c: usize| DVec3::new(row[c], row[5 + c], row[10 + c]);
     let DVec3 { x: height, y: width, z: focal } = column(4);
     let side = |v: f64| (v >= 1.0 && v <= f64::from(Camera::MAX_SIDE_PX)).then_some(v.round() as u32);
@@ -104,7 +104,7 @@ fn listed(row: &[f64; ROW], name: &str, folder: &str, source: &Path) -> Result<L
             reason: format!("size {width} x {height} px is not between 1 and {} px a side", Camera::MAX_SIDE_PX),
         });
     };
-    Ok(Listed {
+    Ok(ListedPhoto {
         name: name.into(),
         entry: format!("{folder}/{name}"),
         lens: Lens {

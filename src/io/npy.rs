@@ -10,7 +10,7 @@ use super::{IoError, files};
 const MAX_HEADER_BYTES: usize = 1024;
 
 /// An array whose header has been checked and whose numbers are still to be read.
-pub struct Array<'a> {
+pub struct NpyArray<'a> {
     path: &'a Path,
     npy: NpyFile<&'a [u8]>,
     /// Bytes per number, 4 or 8.
@@ -24,7 +24,7 @@ pub struct Array<'a> {
 /// # Errors
 /// If it is no row-major array of 32- or 64-bit floating-point numbers, or cannot hold what its
 /// shape says.
-pub fn open<'a>(bytes: &'a [u8], path: &'a Path) -> Result<Array<'a>, IoError> {
+pub fn open<'a>(bytes: &'a [u8], path: &'a Path) -> Result<NpyArray<'a>, IoError> {
     let bad = |reason: String| syntax(path, reason);
     let header = header_len(bytes).ok_or_else(|| bad("not an .npy file, or its header is cut off".into()))?;
     // The library that reads the header multiplies sizes and the shape's entries unchecked.
@@ -42,10 +42,10 @@ pub fn open<'a>(bytes: &'a [u8], path: &'a Path) -> Result<Array<'a>, IoError> {
         return Err(bad("the array is stored column by column; save it with order='C'".into()));
     }
     let item = npy.dtype().num_bytes().filter(|b| *b > 0).ok_or_else(|| bad("the array holds no numbers".into()))?;
-    Ok(Array { path, npy, item, possible: possible / item as u64 })
+    Ok(NpyArray { path, npy, item, possible: possible / item as u64 })
 }
 
-impl Array<'_> {
+impl NpyArray<'_> {
     /// Entries along each axis.
     pub(crate) fn shape(&self) -> &[u64] {
         self.npy.shape()

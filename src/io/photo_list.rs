@@ -43,7 +43,7 @@ pub(super) struct Lens {
 
 /// A photo as a file lists it.
 #[derive(Clone, Debug)]
-pub(super) struct Listed {
+pub(super) struct ListedPhoto {
     /// Its name in the dataset.
     pub(crate) name: String,
     /// Its file, relative to the dataset's folder, from [`files::relative`].
@@ -63,7 +63,7 @@ pub(super) struct Listed {
 ///
 /// `root` is the dataset's folder, `source` the file that lists them.
 pub(super) fn photos(
-    listed: Vec<Listed>,
+    listed: Vec<ListedPhoto>,
     root: &Path,
     source: &Path,
     warnings: &mut Vec<String>,
@@ -97,7 +97,7 @@ pub(super) fn photos(
     Ok(photos)
 }
 
-fn resolve(l: &Listed, root: &Path, source: &Path) -> Result<Option<Photo>, IoError> {
+fn resolve(l: &ListedPhoto, root: &Path, source: &Path) -> Result<Option<Photo>, IoError> {
     let bad = |cause| IoError::Camera { path: source.into(), photo: l.name.clone(), cause };
     let rotation = rotation(l.world_from_camera).map_err(bad)?;
     let d = l.lens.distortion;

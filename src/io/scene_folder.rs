@@ -129,7 +129,7 @@ impl SceneFolder {
             return Ok(None);
         };
         let stored = semantic_map::load(self.path(), Some(&state), &cloud).ok().flatten();
-        let gaussians = |m: &SemanticMap| (m.of.clone(), m.margin.clone(), m.codes.clone());
+        let gaussians = |m: &SemanticMap| (m.identity_of.clone(), m.margin.clone(), m.codes.clone());
         let same = stored.is_some_and(|s| gaussians(&s) == gaussians(map));
         Ok((same && semantic_map::encode(map, Some(&state), &path)? == bytes).then_some(state))
     }
@@ -201,7 +201,7 @@ mod tests {
     fn named(name: &str) -> SemanticMap {
         let mut identities = Identities::default();
         let id = identities.add(Level::Object, NOBODY, vec![name.into()]);
-        SemanticMap::of_identities(identities, vec![id], vec![1.0], vec![])
+        SemanticMap::from_identities(identities, vec![id], vec![1.0], vec![])
     }
 
     /// The name of the only object of the scene in `folder`.

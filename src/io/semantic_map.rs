@@ -67,7 +67,8 @@ pub fn encode(map: &SemanticMap, state: Option<&str>, path: &Path) -> Result<Vec
     let parents: Vec<u32> = map.identities.iter().map(|(_, i)| i.parent).collect();
     let view = |dtype, shape, bytes| TensorView::new(dtype, shape, bytes).map_err(|e| broken(&e));
     let n = map.identities.len();
-    let views: Vec<u32> = language.map_or_else(Vec::new, |l| l.of.iter().map(|f| f.raw.len() as u32).collect());
+    let views: Vec<u32> =
+        language.map_or_else(Vec::new, |l| l.by_identity.iter().map(|f| f.raw.len() as u32).collect());
     let raw = language.map_or_else(Vec::new, |l| packed(l, |f| &f.raw));
     let deviated = language.map_or_else(Vec::new, |l| packed(l, |f| &f.deviated));
     let mut tensors = vec![
@@ -116,7 +117,7 @@ fn packed(language: &LanguageFeatures, of: impl Fn(&ViewFeatures) -> &Vec<Vec<f3
     let missing = vec![0.0; language.dimension];
     let view =
         |f: &ViewFeatures, k: usize| of(f).get(k).unwrap_or(&missing).iter().map(|v| f16::from_f32(*v)).collect();
-    language.of.iter().flat_map(|f| (0..MAX_VIEWS).flat_map(move |k| -> Vec<f16> { view(f, k) })).collect()
+    language.by_identity.iter().flat_map(|f| (0..MAX_VIEWS).flat_map(move |k| -> Vec<f16> { view(f, k) })).collect()
 }
 
 fn features(path: &Path, bytes: &[u8], encoder: String, identities: &Identities) -> Result<LanguageFeatures, IoError> {
@@ -147,7 +148,7 @@ fn features(path: &Path, bytes: &[u8], encoder: String, identities: &Identities)
         .enumerate()
         .map(|(i, n)| ViewFeatures { raw: rows(raw.data(), i, n), deviated: rows(deviated.data(), i, n) })
         .collect();
-    let language = LanguageFeatures { encoder, dimension, of };
+    let language = LanguageFeatures { encoder, dimension, by_identity: of };
     if language.is_valid(identities) { Ok(language) } else { Err(broken("raw", "a value that is no number")) }
 }
 
@@ -189,13 +190,13 @@ mod tests {
             sh: vec![[0.0; 3]; 2],
             ..GaussianCloud::default()
         };
-        let mut map = SemanticMap::of_identities(identities, vec![eye, NOBODY], vec![0.25, 0.0], vec!["a".into()]);
+        let mut map = SemanticMap::from_identities(identities, vec![eye, NOBODY], vec![0.25, 0.0], vec!["a".into()]);
         let views = |raw: [f32; 2], deviated: [f32; 2]| ViewFeatures {
             raw: vec![raw.to_vec(); 2],
             deviated: vec![deviated.to_vec(); 2],
         };
         let of = vec![views([1.0, 0.0], [1.0, 0.0]), views([0.0, 1.0], [0.25, 0.75])];
-        map.language = Some(LanguageFeatures { encoder: "test".into(), dimension: 2, of });
+        map.language = Some(LanguageFeatures { encoder: "test".into(), dimension: 2, by_identity: of });
         (map, cloud)
     }
 

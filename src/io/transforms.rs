@@ -9,7 +9,7 @@ use std::path::Path;
 use glam::{DMat3, DVec2, DVec3};
 use serde::Deserialize;
 
-use super::photo_list::{Focal, Lens, Listed, photos};
+use super::photo_list::{Focal, Lens, ListedPhoto, photos};
 use super::{IoError, files, points_ply};
 use crate::scene::{Camera, Dataset, Distortion};
 
@@ -140,7 +140,7 @@ pub fn read_blender(root: &Path) -> Result<Dataset, IoError> {
 }
 
 impl Frame {
-    fn listed(&self, shared: &Intrinsics, root: &Path, source: &Path) -> Result<Listed, IoError> {
+    fn listed(&self, shared: &Intrinsics, root: &Path, source: &Path) -> Result<ListedPhoto, IoError> {
         let name = files::relative(root, &self.file_path, source)?;
         let bad = |reason: String| IoError::Syntax { path: source.into(), place: format!("frame '{name}'"), reason };
         let (world_from_camera, center) = pose(&self.transform_matrix).map_err(|r| bad(r.into()))?;
@@ -148,7 +148,15 @@ impl Frame {
             Flaw::Reason(r) => bad(r),
             Flaw::Error(e) => e,
         })?;
-        Ok(Listed { entry: name.clone(), name, lens, world_from_camera, center, test_split: false, background: None })
+        Ok(ListedPhoto {
+            entry: name.clone(),
+            name,
+            lens,
+            world_from_camera,
+            center,
+            test_split: false,
+            background: None,
+        })
     }
 }
 

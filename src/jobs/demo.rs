@@ -9,8 +9,8 @@ use image::{DynamicImage, ImageFormat};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::demo_questions::{self, Queries};
-use super::evaluate::{self, Comparison, Options};
+use super::demo_questions::{self, DemoQueries};
+use super::evaluate::{self, EvaluateOptions, PhotoComparison};
 use super::{Folders, JobError, OpenedScene, Scene, open};
 use crate::io::trained::{self, DatasetReference, History};
 use crate::io::{IoError, bundle, files, semantic_map, splat_ply};
@@ -34,7 +34,7 @@ const PICTURE_PX: [u32; 2] = [640, 480];
 
 /// How a trained demo is made.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Recipe {
+pub(crate) struct DemoRecipe {
     photos: SynthOptions,
     training: TrainConfig,
     /// Photos whose labels objects are found with at most.
@@ -44,7 +44,7 @@ pub(crate) struct Recipe {
     jpeg_quality: u8,
 }
 
-impl Recipe {
+impl DemoRecipe {
     /// That of the demo that ships: minutes on two cores, and always the same on one machine.
     pub(crate) fn shipped() -> Self {
         let training = TrainConfig {
@@ -61,8 +61,8 @@ impl Recipe {
 
 /// What a trained demo says of itself: how it was made, and how good it is on photos that training did not see.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Record {
-    recipe: Recipe,
+pub(crate) struct DemoRecord {
+    recipe: DemoRecipe,
     /// Fingerprint of the scene that was photographed.
     scene: u64,
     pub(crate) gaussians: usize,
@@ -111,7 +111,7 @@ pub(crate) fn open(folders: &Folders, machine: &Machine, observer: &mut dyn Obse
     if let Some(dataset) = scene.dataset.as_mut().map(Arc::make_mut) {
         dataset.name = "Demo".into();
     }
-    let photo = scene.dataset.as_ref().and_then(|d| d.photos.get(Recipe::shipped().home));
+    let photo = scene.dataset.as_ref().and_then(|d| d.photos.get(DemoRecipe::shipped().home));
     scene.home.camera = photo.map(|p| p.camera.clone()).or(scene.home.camera);
     Ok(scene)
 }
@@ -138,11 +138,11 @@ pub(crate) fn examine(
     folders: &Folders,
     pictures: &Path,
     observer: &mut dyn Observer,
-) -> Result<([f64; 2], Queries), JobError> {
+) -> Result<([f64; 2], DemoQueries), JobError> {
     let folder = unpacked(folders)?;
     let (scene, photos) = (open::scene(&folder.join("scene"))?, folder.join("photos"));
     let map = scene.semantics()?;
-    let job = Comparison::new(scene, &photos, Options::default())?;
+    let job = PhotoComparison::new(scene, &photos, EvaluateOptions::default())?;
     let quality = evaluate::photometric(&job, observer)?;
     Ok(([quality.psnr, quality.ssim], demo_questions::ask(&map, &photos, &job, Some(pictures))?))
 }
@@ -152,7 +152,11 @@ pub(crate) fn examine(
 ///
 /// # Errors
 /// If anything fails on the way, or the observer asks to stop.
-pub(crate) fn make(recipe: &Recipe, work: &Path, observer: &mut dyn Observer) -> Result<(Vec<u8>, Record), JobError> {
+pub(crate) fn make(
+    recipe: &DemoRecipe,
+    work: &Path,
+    observer: &mut dyn Observer,
+) -> Result<(Vec<u8>, DemoRecord), JobError> {
     let (photos, scene) = (work.join("photos"), work.join("scene"));
     photograph(&photos, &recipe.photos, observer)?;
     let dataset = Arc::new(open::dataset(&photos)?);
@@ -171,14 +175,21 @@ pub(crate) fn make(recipe: &Recipe, work: &Path, observer: &mut dyn Observer) ->
         config: recipe.training.clone(),
         ..Scene::default()
     };
-    let job = Comparison::of(&seen, Arc::clone(&dataset), Options::default())?;
+    let job = PhotoComparison::of(&seen, Arc::clone(&dataset), EvaluateOptions::default())?;
     let mut map = demo_questions::find(&photos, &job, recipe.max_seeds, observer)?;
     let quality = evaluate::photometric(&job, observer)?;
-    let Queries { object_miou, part_miou, .. } = demo_questions::ask(&map, &photos, &job, None)?;
+    let DemoQueries { object_miou, part_miou, .. } = demo_questions::ask(&map, &photos, &job, None)?;
     let (psnr, ssim) = (quality.psnr, quality.ssim);
     let gaussians = cloud.len();
-    let record =
-        Record { recipe: recipe.clone(), scene: demo::fingerprint(), gaussians, psnr, ssim, object_miou, part_miou };
+    let record = DemoRecord {
+        recipe: recipe.clone(),
+        scene: demo::fingerprint(),
+        gaussians,
+        psnr,
+        ssim,
+        object_miou,
+        part_miou,
+    };
 
     // Labels of the photos that objects were found with, and of those to compare with.
     let held_out = job.views.iter().map(|i| dataset.photos[*i].name.clone());

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::evaluate::Comparison;
+use super::evaluate::PhotoComparison;
 use super::{JobError, export, query};
 use crate::io::SceneFolder;
 use crate::io::labels::Labels;
@@ -36,7 +36,7 @@ const MAX_SEEDS: usize = 3;
 
 /// What was asked and answered.
 #[derive(Debug, Serialize)]
-pub(crate) struct Asked {
+pub(crate) struct DemoQuestion {
     /// The question.
     pub(crate) question: String,
     /// "found", "ambiguous" or "not found".
@@ -51,7 +51,7 @@ pub(crate) struct Asked {
 
 /// How well every name was found in all held-out views, and the questions.
 #[derive(Debug, Serialize)]
-pub(crate) struct Queries {
+pub(crate) struct DemoQueries {
     /// Photos whose masks were used.
     pub(crate) seeds: Vec<String>,
     /// Seconds that finding objects took.
@@ -61,7 +61,7 @@ pub(crate) struct Queries {
     /// Mean IoU of parts.
     pub(crate) part_miou: f64,
     /// The questions.
-    pub(crate) asked: Vec<Asked>,
+    pub(crate) asked: Vec<DemoQuestion>,
 }
 
 /// Finds objects from the labels of one photo in `photos` (and of more, up to `max_seeds`, where much is
@@ -71,7 +71,7 @@ pub(crate) struct Queries {
 /// If a photo or its labels cannot be read, or the observer asks to stop.
 pub(crate) fn find(
     photos: &Path,
-    job: &Comparison,
+    job: &PhotoComparison,
     max_seeds: usize,
     observer: &mut dyn Observer,
 ) -> Result<SemanticMap, JobError> {
@@ -94,10 +94,10 @@ pub(crate) fn find(
 pub(crate) fn find_and_ask(
     scene: &Path,
     photos: &Path,
-    job: &Comparison,
+    job: &PhotoComparison,
     pictures: &Path,
     observer: &mut dyn Observer,
-) -> Result<Queries, JobError> {
+) -> Result<DemoQueries, JobError> {
     let start = Instant::now();
     let map = find(photos, job, MAX_SEEDS, observer)?;
     let find_secs = start.elapsed().as_secs_f64();
@@ -106,7 +106,7 @@ pub(crate) fn find_and_ask(
         observer.note(Severity::Info, format!("The objects and parts before are kept in {}", kept.display()));
     }
     observer.note(Severity::Info, format!("{} objects and parts found", map.identities.len()));
-    Ok(Queries { find_secs, ..ask(&map, photos, job, Some(pictures))? })
+    Ok(DemoQueries { find_secs, ..ask(&map, photos, job, Some(pictures))? })
 }
 
 /// Asks for every label of the views of `job`, which lie in `photos`, and the questions in the first of them.
@@ -117,9 +117,9 @@ pub(crate) fn find_and_ask(
 pub(crate) fn ask(
     map: &SemanticMap,
     photos: &Path,
-    job: &Comparison,
+    job: &PhotoComparison,
     pictures: Option<&Path>,
-) -> Result<Queries, JobError> {
+) -> Result<DemoQueries, JobError> {
     let mut segmenter = FileMasks(Labels::open(photos)?);
     let mut asker = QueryEngine::new(map.language.as_ref())?;
     let (mut units, mut asked) = (Vec::new(), Vec::new());
@@ -127,7 +127,8 @@ pub(crate) fn ask(
     for (k, &i) in job.views.iter().enumerate() {
         let photo = &job.dataset.photos[i];
         let camera = photo.camera.limited_to(job.max_side_px);
-        let view = ViewMap::render(&mut renderer, &job.cloud, &map.of, &map.identities, &camera, &job.settings)?;
+        let view =
+            ViewMap::render(&mut renderer, &job.cloud, &map.identity_of, &map.identities, &camera, &job.settings)?;
         let labeled = LabeledView {
             name: &photo.name,
             camera: &camera,
@@ -156,7 +157,7 @@ pub(crate) fn ask(
                 let path = pictures.join(format!("{n}_{}.png", question.replace([' ', '\''], "_")));
                 query::write_heat(&path, (&job.cloud, &job.settings), &camera, &answered.heat(&view))?;
             }
-            asked.push(Asked {
+            asked.push(DemoQuestion {
                 question: (*question).to_owned(),
                 verdict: answered.answer.verdict(),
                 answer: answered.chosen(1).iter().map(|id| map.identities.full_name(*id)).collect(),
@@ -166,5 +167,5 @@ pub(crate) fn ask(
         }
     }
     let [object_miou, part_miou] = masks::by_level(&units);
-    Ok(Queries { seeds: map.seeds.clone(), find_secs: 0.0, object_miou, part_miou, asked })
+    Ok(DemoQueries { seeds: map.seeds.clone(), find_secs: 0.0, object_miou, part_miou, asked })
 }

@@ -113,7 +113,7 @@ mod tests {
         assert_eq!(found.len(), n / 2, "{found:?}");
         assert!(painted(&cloud, &camera, &settings, &Mask::empty(64, 64)).expect("drawn").is_empty());
 
-        let map = SemanticMap::of_identities(Identities::default(), vec![NOBODY; n], vec![1.0; n], vec![]);
+        let map = SemanticMap::from_identities(Identities::default(), vec![NOBODY; n], vec![1.0; n], vec![]);
         let request = EditRequest::Paint { of: NOBODY, name: "left".into(), camera: Box::new(camera), mask: left };
         let Ok(new) = apply(&cloud, &map, &settings, &request) else {
             panic!("not edited");

@@ -3,7 +3,9 @@
 use std::error::Error;
 use std::path::PathBuf;
 
+use crate::io::memory::NoRoom;
 use crate::io::{IoError, OpenError};
+use crate::measure::{BeginError, ReportError, StudyError};
 use crate::models::ModelError;
 use crate::models::catalog::InstallError;
 use crate::models::fetch::FetchError;
@@ -15,6 +17,7 @@ use crate::pipeline::semantics::segmenter::SegmentError;
 use crate::pipeline::synth::SynthError;
 use crate::pipeline::train::TrainError;
 use crate::pipeline::train::config::UnreadableConfig;
+use crate::pipeline::train::trainer::StepError;
 use crate::pipeline::video::VideoError;
 use crate::render::{DrawError, GpuError, RenderError};
 
@@ -78,6 +81,9 @@ pub enum JobError {
     /// Photos that do not hang together.
     #[error("{}: no camera poses were found; the photos overlap too little or show too little texture", .0.display())]
     NoPosesFound(PathBuf),
+    /// The memory that is free is not enough.
+    #[error(transparent)]
+    Room(#[from] NoRoom),
     /// A file cannot be read or written.
     #[error(transparent)]
     Io(#[from] IoError),
@@ -87,6 +93,9 @@ pub enum JobError {
     /// Training failed.
     #[error(transparent)]
     Train(#[from] TrainError),
+    /// A step of training failed.
+    #[error(transparent)]
+    Step(#[from] StepError),
     /// Objects could not be found.
     #[error(transparent)]
     Find(#[from] FindError),
@@ -117,6 +126,18 @@ pub enum JobError {
     /// A video could not be made.
     #[error(transparent)]
     Video(#[from] VideoError),
+    /// A report cannot be resumed.
+    #[error(transparent)]
+    Report(#[from] BeginError),
+    /// A report cannot be read.
+    #[error(transparent)]
+    ReadReport(#[from] ReportError),
+    /// A measurement failed.
+    #[error(transparent)]
+    Study(#[from] StudyError),
+    /// A file for a result that is not as it must be.
+    #[error("{0}")]
+    Output(String),
     /// Synthetic photos could not be made.
     #[error(transparent)]
     Synth(#[from] SynthError),

@@ -38,7 +38,7 @@ pub(crate) fn held_out(
 
 /// What is compared; what is not given is as in training.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Options {
+pub(crate) struct EvaluateOptions {
     /// Longer side of the compared pictures in px.
     pub(crate) max_side_px: Option<u32>,
     /// Which photos count as held out: every n-th, 0 = all photos.
@@ -50,7 +50,7 @@ pub(crate) struct Options {
 }
 
 /// A scene beside the photos that it is compared with.
-pub(crate) struct Comparison {
+pub(crate) struct PhotoComparison {
     pub(crate) cloud: Arc<GaussianCloud>,
     /// How they are drawn.
     pub(crate) settings: RenderSettings,
@@ -66,12 +66,12 @@ pub(crate) struct Comparison {
     pub(crate) state: Option<String>,
 }
 
-impl Comparison {
+impl PhotoComparison {
     /// Of `scene` with `photos`.
     ///
     /// # Errors
     /// If they cannot be read, or none is held out.
-    pub(crate) fn new(scene: Scene, photos: &Path, options: Options) -> Result<Self, JobError> {
+    pub(crate) fn new(scene: Scene, photos: &Path, options: EvaluateOptions) -> Result<Self, JobError> {
         let dataset = Arc::new(open::dataset(photos)?);
         let mut comparison = Self::of(&scene, dataset, options)?;
         comparison.state = scene.state;
@@ -82,8 +82,8 @@ impl Comparison {
     ///
     /// # Errors
     /// If they cannot be read, or none is held out.
-    pub(crate) fn of(scene: &Scene, dataset: Arc<Dataset>, options: Options) -> Result<Self, JobError> {
-        let Options { max_side_px, holdout_every, keep_borders, pictures } = options;
+    pub(crate) fn of(scene: &Scene, dataset: Arc<Dataset>, options: EvaluateOptions) -> Result<Self, JobError> {
+        let EvaluateOptions { max_side_px, holdout_every, keep_borders, pictures } = options;
         let default_every = scene.config.holdout_every;
         let views = match holdout_every {
             Some(0) => (0..dataset.photos.len()).collect(),
@@ -130,11 +130,11 @@ impl Comparison {
 ///
 /// # Errors
 /// If a photo cannot be read or drawn, a picture cannot be written, or the observer asks to stop.
-pub(crate) fn photometric(comparison: &Comparison, observer: &mut dyn Observer) -> Result<Evaluation, JobError> {
+pub(crate) fn photometric(comparison: &PhotoComparison, observer: &mut dyn Observer) -> Result<Evaluation, JobError> {
     for warning in &comparison.dataset.warnings {
         observer.note(Severity::Warning, warning.clone());
     }
-    let Comparison { cloud, settings, .. } = comparison;
+    let PhotoComparison { cloud, settings, .. } = comparison;
     let mut views: Vec<ViewScore> = Vec::with_capacity(comparison.views.len());
     comparison.walk("Measuring", observer, |index| {
         let view = comparison.view(index)?;
@@ -153,7 +153,7 @@ pub(crate) fn photometric(comparison: &Comparison, observer: &mut dyn Observer) 
 ///
 /// # Errors
 /// If a true depth is missing, a view cannot be drawn, or the observer asks to stop.
-pub(crate) fn depth(comparison: &Comparison, observer: &mut dyn Observer) -> Result<(DepthScores, f64), JobError> {
+pub(crate) fn depth(comparison: &PhotoComparison, observer: &mut dyn Observer) -> Result<(DepthScores, f64), JobError> {
     let mut renderer = Renderer::new();
     let mut counter = DepthCounter::default();
     let mut millis = Vec::with_capacity(comparison.views.len());

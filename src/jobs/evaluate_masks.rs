@@ -5,7 +5,7 @@ use std::path::Path;
 use image::ColorType;
 use serde::Serialize;
 
-use super::evaluate::Comparison;
+use super::evaluate::PhotoComparison;
 use super::{JobError, export};
 use crate::io::{self, labels::Labels};
 use crate::math::stats::mean;
@@ -45,7 +45,7 @@ pub(crate) enum Protocol {
 /// What a protocol counts besides the IoU of each query.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
-pub(crate) enum Summary {
+pub(crate) enum ProtocolSummary {
     /// Of the protocol [`Protocol::Masks`].
     Masks {
         /// Mean IoU of objects.
@@ -93,7 +93,7 @@ pub(crate) struct MaskScores {
     /// Every query of every view.
     pub(crate) units: Vec<Unit>,
     /// What the protocol counts.
-    pub(crate) summary: Summary,
+    pub(crate) summary: ProtocolSummary,
 }
 
 impl MaskScores {
@@ -103,18 +103,20 @@ impl MaskScores {
     }
 }
 
-/// Compares the objects and parts `map` with `labels`; `query` is what to ask for where those do not name it.
+/// Compares the objects and parts of a scene with `labels`; `query` is what to ask for where those do not name it.
 /// Pictures show the identities over the photos.
 ///
 /// # Errors
 /// If labels or photos cannot be read, no view has labels, or a protocol lacks what it needs.
 pub(crate) fn run(
-    comparison: &Comparison,
-    map: &SemanticMap,
+    comparison: &PhotoComparison,
+    scene: &Path,
     labels: &Path,
     protocol: Protocol,
     query: Option<&str>,
 ) -> Result<MaskScores, JobError> {
+    let map = io::semantic_map::load(scene, comparison.state.as_deref(), &comparison.cloud)?;
+    let map = &map.ok_or_else(|| JobError::NoObjects(scene.into()))?;
     let mut known = FileMasks(Labels::open(labels)?);
     let views = labeled(comparison, map, &mut known)?;
     if views.is_empty() {
@@ -148,33 +150,33 @@ pub(crate) fn run(
 fn compare(
     protocol: Protocol,
     query: Option<&str>,
-    comparison: &Comparison,
+    comparison: &PhotoComparison,
     scene: &mut AskedScene<'_>,
     views: &[LabeledView<'_>],
-) -> Result<(Vec<Unit>, Summary), JobError> {
+) -> Result<(Vec<Unit>, ProtocolSummary), JobError> {
     let mut units: Vec<Unit> = Vec::new();
     let summary = match protocol {
         Protocol::Masks => {
             views.iter().for_each(|v| units.extend(masks::compare(scene, v)));
             let [object_miou, part_miou] = masks::by_level(&units);
-            Summary::Masks { object_miou, part_miou }
+            ProtocolSummary::Masks { object_miou, part_miou }
         }
         Protocol::Langsplat => {
             views.iter().for_each(|v| units.extend(langsplat::compare(scene, v)));
             let hits = units.iter().filter(|u| u.hit == Some(true)).count();
-            Summary::Langsplat { localization: hits as f64 / units.len().max(1) as f64 }
+            ProtocolSummary::Langsplat { localization: hits as f64 / units.len().max(1) as f64 }
         }
         Protocol::FastlgsEx | Protocol::PartRecall => {
             let mut pool = fastlgs_ex::Pool::default();
             views.iter().for_each(|v| units.extend(fastlgs_ex::compare(scene, v, &mut pool)));
-            Summary::FastlgsEx {}
+            ProtocolSummary::FastlgsEx {}
         }
         Protocol::Selection3d => {
             for view in views {
                 units.extend(selection_3d::compare(scene, view, &comparison.cloud, &comparison.settings)?);
             }
             let [accuracy_25, accuracy_50] = [0.25, 0.5].map(|least| selection_3d::accuracy(&units, least));
-            Summary::Selection3d { accuracy_25, accuracy_50 }
+            ProtocolSummary::Selection3d { accuracy_25, accuracy_50 }
         }
         Protocol::SpinNerf => {
             let missing = || JobError::Protocol("the protocol spin-nerf needs the object's name (--query)".into());
@@ -182,7 +184,7 @@ fn compare(
             let found: Vec<_> = views.iter().filter_map(|v| spin_nerf::compare(scene, v, query)).collect();
             let accuracy = mean(&found.iter().map(|f| f.accuracy).collect::<Vec<_>>());
             units.extend(found.into_iter().map(|f| f.unit));
-            Summary::SpinNerf { accuracy }
+            ProtocolSummary::SpinNerf { accuracy }
         }
         Protocol::Ovs3d => {
             let mut classes: Vec<String> = views.iter().flat_map(|v| &v.categories).map(|c| c.name.clone()).collect();
@@ -194,13 +196,13 @@ fn compare(
                 units.extend(own);
                 of_winner.extend(winner);
             }
-            Summary::Ovs3d { argmax_miou: means(&of_winner).0, classes: classes.len() }
+            ProtocolSummary::Ovs3d { argmax_miou: means(&of_winner).0, classes: classes.len() }
         }
     };
     Ok((units, summary))
 }
 
-fn recall(map: &SemanticMap, views: &[LabeledView<'_>]) -> Result<(Vec<Unit>, Summary), JobError> {
+fn recall(map: &SemanticMap, views: &[LabeledView<'_>]) -> Result<(Vec<Unit>, ProtocolSummary), JobError> {
     let language = map.language.as_ref().ok_or_else(|| {
         let text = "no encoder has looked at this scene; run 'fmlgs preprocess' on it with --encoder demo";
         JobError::Protocol(text.into())
@@ -212,7 +214,7 @@ fn recall(map: &SemanticMap, views: &[LabeledView<'_>]) -> Result<(Vec<Unit>, Su
     }
     // The paper's full method, not ours, is what others can compare with.
     let units = rows.iter().rfind(|r| r.components.localization).map(|r| r.units.clone()).unwrap_or_default();
-    Ok((units, Summary::PartRecall { encoder: language.encoder.clone(), rows }))
+    Ok((units, ProtocolSummary::PartRecall { encoder: language.encoder.clone(), rows }))
 }
 
 /// A labeled photo and what is drawn of its view.
@@ -240,8 +242,8 @@ impl Drawn {
 
 /// The held-out photos with labels; else those that were trained on, as long as no mask of theirs was
 /// used.
-fn labeled(comparison: &Comparison, map: &SemanticMap, labels: &mut FileMasks) -> Result<Vec<Drawn>, JobError> {
-    let Comparison { cloud, settings, max_side_px, .. } = comparison;
+fn labeled(comparison: &PhotoComparison, map: &SemanticMap, labels: &mut FileMasks) -> Result<Vec<Drawn>, JobError> {
+    let PhotoComparison { cloud, settings, max_side_px, .. } = comparison;
     let photos = &comparison.dataset.photos;
     let held: Vec<usize> = comparison.views.iter().copied().filter(|&i| labels.covers(&photos[i])).collect();
     let trained_on = held.is_empty();
@@ -252,7 +254,7 @@ fn labeled(comparison: &Comparison, map: &SemanticMap, labels: &mut FileMasks) -
     for index in views {
         let photo = &photos[index];
         let camera = photo.camera.limited_to(*max_side_px);
-        let exact = ViewMap::render(&mut renderer, cloud, &map.of, &map.identities, &camera, settings)?;
+        let exact = ViewMap::render(&mut renderer, cloud, &map.identity_of, &map.identities, &camera, settings)?;
         let blended = CodeMap::render(&mut renderer, cloud, &map.codes, map.has_parts(), &camera, settings)?;
         let categories = categories(&labels.segment(photo, *max_side_px, &mut Silent)?);
         drawn.push(Drawn { index, name: photo.name.clone(), camera, trained_on, exact, blended, categories });
@@ -260,7 +262,7 @@ fn labeled(comparison: &Comparison, map: &SemanticMap, labels: &mut FileMasks) -
     Ok(drawn)
 }
 
-fn pictures(folder: &Path, comparison: &Comparison, map: &SemanticMap, views: &[Drawn]) -> Result<(), JobError> {
+fn pictures(folder: &Path, comparison: &PhotoComparison, map: &SemanticMap, views: &[Drawn]) -> Result<(), JobError> {
     export::make_folder(folder)?;
     for view in views {
         let pixels = io::photo::load(&comparison.dataset.photos[view.index], comparison.max_side_px)?;

@@ -7,7 +7,8 @@ use image::codecs::png::PngEncoder;
 use image::{ColorType, ImageEncoder};
 use npyz::WriterBuilder;
 
-use crate::io::{self, IoError, atomic, splat_ply};
+use super::JobError;
+use crate::io::{self, IoError, atomic, scene_files, splat_ply, trained};
 use crate::navigate::{CameraSpline, Pose, Speed};
 use crate::scene::{CameraPath, GaussianCloud, PathKey, PhotoPixels};
 
@@ -18,6 +19,15 @@ use crate::scene::{CameraPath, GaussianCloud, PathKey, PhotoPixels};
 pub(crate) fn ply(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
     make_parent(path)?;
     splat_ply::write(path, cloud)
+}
+
+/// Writes a text.
+///
+/// # Errors
+/// If the file cannot be written.
+pub(crate) fn text(path: &Path, text: &str) -> Result<(), IoError> {
+    make_parent(path)?;
+    atomic::write(path, |w| w.write_all(text.as_bytes()))
 }
 
 /// Writes pixels as a `.png`.
@@ -85,6 +95,42 @@ pub(crate) fn make_parent(path: &Path) -> Result<(), IoError> {
 pub(crate) fn make_folder(folder: &Path) -> Result<(), IoError> {
     let remedy = "the folder cannot be created: choose another place";
     std::fs::create_dir_all(folder).map_err(|cause| IoError::Write { path: folder.into(), remedy, cause })
+}
+
+/// Refuses a file for a result, before any work is done, that does not end as it should (`endings`, any
+/// if there are none) or is one of those that the job reads: `reads` are files and folders.
+/// Devices and pipes may be written into whatever they are called.
+///
+/// # Errors
+/// If it is refused.
+pub(crate) fn check(path: &Path, endings: &[&str], reads: &[&Path]) -> Result<(), JobError> {
+    if atomic::is_stream(path) {
+        return Ok(());
+    }
+    let name = path.to_string_lossy().to_lowercase();
+    if !endings.is_empty() && !endings.iter().any(|e| name.ends_with(e)) {
+        return Err(JobError::Output(format!("'{}' must end in {}", path.display(), endings.join(" or "))));
+    }
+    scene_files::refuse_scene_file(path)?;
+    let Ok(real) = path.canonicalize() else { return Ok(()) };
+    for read in reads {
+        let within = read.canonicalize().is_ok_and(|read| real.starts_with(read));
+        // Results may lie in a scene's folder; its own files are told above.
+        if within && !trained::is_scene(read) {
+            let (path, read) = (path.display(), read.display());
+            return Err(JobError::Output(format!("'{path}' is read by this command ('{read}'); choose another name")));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a folder for pictures that holds what the job reads, as [`check`] does files.
+///
+/// # Errors
+/// If it is refused.
+pub(crate) fn check_folder(folder: &Path, reads: &[&Path]) -> Result<(), JobError> {
+    // Where it does not exist yet, nothing in it is read.
+    if folder.exists() { check(folder, &[], reads) } else { Ok(()) }
 }
 
 #[cfg(test)]

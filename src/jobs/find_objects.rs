@@ -10,7 +10,7 @@ use super::{JobError, evaluate};
 use crate::io::trained::{self, CLOUD_FILE};
 use crate::io::{IoError, SceneFolder, splat_ply};
 use crate::models;
-use crate::models::catalog::{self, Role, SAM2};
+use crate::models::catalog::{self, ModelRole, SAM2};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::semantics::build_map::{
     CODE_STEPS, Carry, FindOptions, Found, Lifting, REGIONS, Tools, find_objects, segmenter,
@@ -66,7 +66,7 @@ impl Default for FindSettings {
 
 /// A scene whose objects are to be found.
 #[derive(Clone, Debug)]
-pub struct Request {
+pub struct FindRequest {
     /// Folder of the trained scene.
     pub folder: PathBuf,
     /// Its Gaussians.
@@ -104,11 +104,11 @@ pub(crate) struct FoundObjects {
 /// If the folder cannot be written or has changed, a model or photo cannot be read, no mask is found, or the
 /// observer asks to stop.
 pub(crate) fn run(
-    request: &Request,
+    request: &FindRequest,
     known: Option<&str>,
     observer: &mut dyn Observer,
 ) -> Result<FoundObjects, JobError> {
-    let Request { folder, cloud, settings, dataset, with, .. } = request;
+    let FindRequest { folder, cloud, settings, dataset, with, .. } = request;
     let masks = request.masks.as_deref();
     if !trained::is_scene(folder) {
         return Err(JobError::NoScene(folder.into()));
@@ -139,7 +139,7 @@ pub(crate) fn run(
     let network = match (masks, with.segmenter.as_deref()) {
         (Some(_), _) | (None, Some(REGIONS)) => None,
         (None, Some(name)) => Some(name.to_owned()),
-        (None, None) => catalog::usable(Role::Segmenter, &mut warn)?.into_iter().next(),
+        (None, None) => catalog::usable(ModelRole::Segmenter, &mut warn)?.into_iter().next(),
     };
     let mut segmenter = segmenter(masks, cloud, settings, network.as_deref())?;
     let mut encoder = match with.encoder.as_deref() {

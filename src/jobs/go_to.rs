@@ -4,12 +4,14 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use crate::navigate::approach::{Approach, ApproachError, Place};
+use super::Scene;
+use crate::measure::survey::{Surveyed, surveyed};
+use crate::navigate::approach::{Approach, ApproachError, SceneRef};
 use crate::navigate::flight::Smoothness;
-use crate::navigate::target::Wish;
-use crate::navigate::{Flight, Navigator, NoRoute, Pose, Speed};
+use crate::navigate::target::ViewPreference;
+use crate::navigate::{CameraTrajectory, Navigator, NoRoute, Pose, Speed};
 use crate::render::RenderSettings;
-use crate::scene::resource_log::{self, Sort};
+use crate::scene::resource_log::{self, ResourceKind};
 use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 
 /// A scene in which one can move about.
@@ -32,7 +34,7 @@ impl Explored {
     pub(crate) fn new(cloud: Arc<GaussianCloud>, cameras: &[Camera], up: DVec3) -> Self {
         let navigator = Navigator::new(&cloud, cameras, up);
         resource_log::record(
-            Sort::Paths,
+            ResourceKind::Paths,
             "occupancy grid, graph of keypoints",
             "the camera is to fly",
             navigator.bytes(),
@@ -45,16 +47,16 @@ impl Explored {
     ///
     /// # Errors
     /// If there is no way.
-    pub(crate) fn fly(&self, from: &Pose, to: &Pose, frames: usize) -> Result<Flight, NoRoute> {
+    pub(crate) fn fly(&self, from: &Pose, to: &Pose, frames: usize) -> Result<CameraTrajectory, NoRoute> {
         self.navigator.fly(from, to, None, frames, Speed::Eased)
     }
 
     /// How smooth the paper's interpolation of a flight's ends is, and that through all keypoints of the route.
-    pub(crate) fn of_paper(&self, flight: &Flight) -> [Option<Smoothness>; 2] {
+    pub(crate) fn of_paper(&self, flight: &CameraTrajectory) -> [Option<Smoothness>; 2] {
         let [first, .., last] = flight.poses.as_slice() else { return [None, None] };
         let (navigator, frames) = (&self.navigator, flight.poses.len());
         let keys = navigator.keys(first, last).unwrap_or_default();
-        [Flight::of_paper(&[*first, *last], frames), Flight::of_paper_through(&keys, frames)]
+        [CameraTrajectory::of_paper(&[*first, *last], frames), CameraTrajectory::of_paper_through(&keys, frames)]
             .map(|p| p.map(|p| p.smoothness(&navigator.occupancy, navigator.clearance)))
     }
 
@@ -63,6 +65,12 @@ impl Explored {
         let count = self.parts.iter().max().map_or(0, |m| m + 1);
         format!("{why} ({} keypoints in {count} parts that are not connected)", self.parts.len())
     }
+}
+
+/// How flights through a scene fare, with each of these counts of cameras.
+pub(crate) fn survey(scene: &Scene, counts: &[u32], flights: usize, frames: usize) -> Vec<Surveyed> {
+    let own = scene.views();
+    counts.iter().map(|count| surveyed(&scene.cloud, &own, *count as usize, flights, frames)).collect()
 }
 
 /// What is to be visited.
@@ -80,7 +88,7 @@ pub struct ApproachRequest {
     pub(crate) map: Arc<SemanticMap>,
     pub(crate) id: IdentityId,
     /// How it is to be seen.
-    pub(crate) wish: Wish,
+    pub(crate) preference: ViewPreference,
     /// Where the eye is.
     pub(crate) from: Pose,
     /// Width by height of the picture.
@@ -91,12 +99,12 @@ pub struct ApproachRequest {
 
 /// Finds the flight to an identity. What was learned about the scene comes back with it.
 pub(crate) fn visit(request: ApproachRequest) -> (Arc<Explored>, Approached) {
-    let ApproachRequest { explored, cloud, cameras, up, settings, map, id, wish, from, aspect, frames } = request;
+    let ApproachRequest { explored, cloud, cameras, up, settings, map, id, preference, from, aspect, frames } = request;
     let known = explored.filter(|e| Arc::ptr_eq(&e.cloud, &cloud));
     let explored = known.unwrap_or_else(|| Arc::new(Explored::new(Arc::clone(&cloud), &cameras, up)));
-    let place = Place { cloud: &cloud, settings: &settings, map: &map };
+    let place = SceneRef { cloud: &cloud, settings: &settings, map: &map };
     let name = map.identities.full_name(id);
-    let visit = match explored.navigator.visit(place, id, wish, &from, aspect, frames) {
+    let visit = match explored.navigator.visit(place, id, preference, &from, aspect, frames) {
         Ok(visit) => Approached { name, flight: Some(Box::new(visit)), problem: None },
         Err(ApproachError::NoRoute { why, nearest }) => {
             Approached { name, flight: nearest, problem: Some(explored.no_route(&why)) }

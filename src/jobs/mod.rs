@@ -3,6 +3,7 @@
 //! Jobs take plain inputs and an [`Observer`](crate::pipeline::observer::Observer) where they take long,
 //! and return a typed result or a [`JobError`]. Whoever calls them says the result in its own way.
 
+pub(crate) mod bench;
 pub(crate) mod demo;
 pub(crate) mod demo_questions;
 pub mod edit;
@@ -20,7 +21,9 @@ pub(crate) mod poses;
 pub(crate) mod query;
 pub(crate) mod recent;
 pub(crate) mod render;
+pub(crate) mod report;
 pub(crate) mod segment;
+pub(crate) mod synth;
 pub(crate) mod thumbnails;
 pub(crate) mod train;
 pub(crate) mod video;

@@ -1,24 +1,26 @@
 //! Putting networks in place, and checking those that are there.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use super::JobError;
 use crate::math::stats::median;
 use crate::models::catalog;
-pub(crate) use crate::models::catalog::{Entry as ModelEntry, Role as ModelRole, SAM2, State as ModelState};
+pub(crate) use crate::models::catalog::{ModelEntry, ModelRole, ModelState, SAM2};
 use crate::models::engine::engine;
 use crate::models::fetch::Patience;
-use crate::models::{self, ModelError, Tile};
+use crate::models::{self, IdentityCrop, ModelError};
 use crate::pipeline::observer::{Observer, Ticker};
 
 /// Engine and models of this machine.
 #[derive(Clone, Debug)]
 pub struct ModelList {
-    /// What runs them, and where.
-    pub(crate) engine: String,
+    /// What runs them, and on what; `None` if that cannot be used.
+    pub(crate) engine: Option<[String; 2]>,
     /// What is wrong with it, or could be better.
     pub(crate) note: Option<String>,
+    /// Where they lie.
+    pub(crate) folder: PathBuf,
     /// All models of the catalog.
     pub(crate) models: Vec<(ModelEntry, ModelState)>,
 }
@@ -26,15 +28,16 @@ pub struct ModelList {
 /// Lists the models, installed or not: reads and verifies files.
 pub(crate) fn list() -> ModelList {
     let (engine, mut note) = match engine() {
-        Ok(engine) => (format!("{}, {}", engine.name(), engine.device()), engine.note().map(str::to_owned)),
-        Err(e) => ("none".to_owned(), Some(e.to_string())),
+        Ok(engine) => (Some([engine.name(), engine.device()].map(str::to_owned)), engine.note().map(str::to_owned)),
+        Err(e) => (None, Some(e.to_string())),
     };
     let folder = catalog::folder();
     let models = catalog::entries().unwrap_or_else(|e| {
         note = Some(e.to_string());
         Vec::new()
     });
-    ModelList { engine, note, models: models.into_iter().map(|e| (e.clone(), e.state(&folder))).collect() }
+    let models = models.into_iter().map(|e| (e.clone(), e.state(&folder))).collect();
+    ModelList { engine, note, folder, models }
 }
 
 /// Where the files of a model come from.
@@ -112,7 +115,7 @@ pub(crate) fn time_encoders(runs: usize, told: &mut dyn FnMut(String)) -> Result
             let (x, y) = (i % side_px, i / side_px);
             [x as f32 / side_px as f32, y as f32 / side_px as f32, ((x / 8 + y / 8) % 2) as f32]
         };
-        let tile = Tile { side_px, rgb: (0..side_px * side_px).map(color).collect() };
+        let tile = IdentityCrop { side_px, rgb: (0..side_px * side_px).map(color).collect() };
         // The first run prepares the networks.
         let (picture, phrase) = (encoder.image(&tile)?, encoder.text(PHRASE)?);
         let load_ms = start.elapsed().as_secs_f64() * 1e3;

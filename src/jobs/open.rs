@@ -15,8 +15,8 @@ use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::plan::used_degree;
-use crate::scene::resource_log::{self, Sort};
-use crate::scene::{Bounds, Camera, Dataset, Facts, GaussianCloud, HomeView, Machine, SemanticMap};
+use crate::scene::resource_log::{self, ResourceKind};
+use crate::scene::{Bounds, Camera, Dataset, GaussianCloud, HomeView, Machine, SceneFacts, SemanticMap};
 
 /// Gaussians that can be drawn, and what came with them.
 #[derive(Clone, Debug, Default)]
@@ -197,7 +197,7 @@ pub struct OpenedScene {
     /// Degree of the harmonics in its file.
     pub(crate) sh_stored: u8,
     /// What its plan is computed from.
-    pub(crate) facts: Facts,
+    pub(crate) facts: SceneFacts,
     /// Id of the save that its files are of, if it has one.
     pub(crate) state: Option<String>,
     /// Settings of a training in `out` that can go on.
@@ -275,7 +275,7 @@ pub(crate) fn known_objects(scene: &Scene, observer: &mut dyn Observer) -> Optio
     match scene.semantics() {
         Ok(map) => {
             let what = format!("{} objects and parts", map.identities.len());
-            resource_log::record(Sort::Objects, what, "the scene was opened", map.bytes());
+            resource_log::record(ResourceKind::Objects, what, "the scene was opened", map.bytes());
             Some(Arc::new(map))
         }
         Err(JobError::NoObjects(_)) => None,
@@ -335,7 +335,12 @@ fn compact(cloud: GaussianCloud) -> (Arc<GaussianCloud>, u8) {
     let stored = cloud.sh_degree;
     let used = used_degree(&cloud);
     let cloud = cloud.up_to_degree(used);
-    resource_log::record(Sort::Gaussians, format!("{} Gaussians", cloud.len()), "the scene was opened", cloud.bytes());
+    resource_log::record(
+        ResourceKind::Gaussians,
+        format!("{} Gaussians", cloud.len()),
+        "the scene was opened",
+        cloud.bytes(),
+    );
     (Arc::new(cloud), stored)
 }
 

@@ -4,7 +4,7 @@ use super::Scene;
 use crate::io::memory;
 use crate::pipeline::train::{TrainConfig, budget};
 use crate::render::real_gpu;
-use crate::scene::{Dataset, Facts, GaussianCloud, Machine, Overrides, ScenePlan};
+use crate::scene::{Dataset, GaussianCloud, Machine, Overrides, SceneFacts, ScenePlan};
 
 /// Looks at memory, cores and the graphics adapter. Takes some milliseconds: not for the window's
 /// thread.
@@ -19,9 +19,9 @@ pub(crate) fn facts(
     dataset: Option<&Dataset>,
     cloud: Option<(&GaussianCloud, u8)>,
     config: &TrainConfig,
-) -> Facts {
+) -> SceneFacts {
     let cameras = dataset.map(Dataset::cameras).unwrap_or_default();
-    let facts = Facts::of(machine.clone(), config.limits()).with_photos(&cameras);
+    let facts = SceneFacts::of(machine.clone(), config.limits()).with_photos(&cameras);
     match cloud {
         Some((cloud, sh_stored)) => facts.with_cloud(cloud, sh_stored, &cameras),
         None => facts,
@@ -29,9 +29,9 @@ pub(crate) fn facts(
 }
 
 /// Facts about a scene and its cameras, without looking at its photos.
-pub(crate) fn scene_facts(machine: &Machine, scene: &Scene, config: &TrainConfig) -> Facts {
+pub(crate) fn scene_facts(machine: &Machine, scene: &Scene, config: &TrainConfig) -> SceneFacts {
     let cameras = scene.views();
-    let facts = Facts::of(machine.clone(), config.limits()).with_photos(&cameras);
+    let facts = SceneFacts::of(machine.clone(), config.limits()).with_photos(&cameras);
     facts.with_cloud(&scene.cloud, scene.sh_stored, &cameras)
 }
 

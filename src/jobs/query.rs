@@ -10,7 +10,7 @@ use crate::math::colormap::Colormap;
 use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::matching::{self, MatchMode};
-use crate::pipeline::semantics::query_engine::QueryEngine;
+pub(crate) use crate::pipeline::semantics::query_engine::{QueryEngine, answer_encoded};
 use crate::pipeline::semantics::timing::ms_since;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{Features, RenderSettings, Renderer};
@@ -38,7 +38,7 @@ impl ViewMaps {
         wanted: bool,
         parts: bool,
     ) -> Result<Self, crate::render::RenderError> {
-        let identities = ViewMap::render(renderer, cloud, &map.of, &map.identities, camera, settings)?;
+        let identities = ViewMap::render(renderer, cloud, &map.identity_of, &map.identities, camera, settings)?;
         let codes = match wanted {
             true => Some(CodeMap::render(renderer, cloud, &map.codes, parts, camera, settings)?),
             false => None,
@@ -55,9 +55,21 @@ impl ViewMaps {
     }
 }
 
+/// What the pixels of a view belong to.
+///
+/// # Errors
+/// If the view cannot be drawn.
+pub(crate) fn identities_in_view(
+    drawn: (&GaussianCloud, &RenderSettings),
+    map: &SemanticMap,
+    camera: &Camera,
+) -> Result<ViewMap, JobError> {
+    Ok(ViewMaps::draw(&mut Renderer::new(), drawn, map, camera, false, false)?.identities)
+}
+
 /// A question about a scene in a view.
 #[derive(Clone, Debug)]
-pub(crate) struct Request<'a> {
+pub(crate) struct QueryRequest<'a> {
     /// As it was typed.
     pub(crate) text: &'a str,
     /// Which level is asked for.
@@ -90,7 +102,7 @@ pub(crate) struct QueryResult {
 ///
 /// # Errors
 /// If there is nothing in it, the encoder fails, or the view cannot be drawn.
-pub(crate) fn run(scene: &Scene, map: &SemanticMap, request: &Request<'_>) -> Result<QueryResult, JobError> {
+pub(crate) fn run(scene: &Scene, map: &SemanticMap, request: &QueryRequest<'_>) -> Result<QueryResult, JobError> {
     let drawn = (&*scene.cloud, &scene.settings);
     let blend = request.mode == MatchMode::Blend;
     let maps = ViewMaps::draw(&mut Renderer::new(), drawn, map, request.camera, blend, map.has_parts())?;

@@ -1,15 +1,16 @@
 //! Drawing a scene from a camera, and writing what was drawn.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 use image::ColorType;
 
 use super::{JobError, Scene, export, plan, video};
-use crate::io::IoError;
+use crate::io::{IoError, camera_file, memory};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::render::{BackendChoice, Frame, RenderSettings, Renderer, normals};
-use crate::scene::{Camera, Overrides};
+use crate::scene::{Camera, GaussianCloud, Overrides};
 
 /// What of a scene is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -70,6 +71,42 @@ pub(crate) fn run(
     let frame = renderer.draw(&scene.cloud, camera, &settings)?;
     let millis = start.elapsed().as_secs_f64() * 1e3;
     Ok(Rendered { frame, backend: renderer.name().to_owned(), millis, sh_degree: settings.sh_degree, flat })
+}
+
+/// Draws the colors of Gaussians into a `.png`.
+///
+/// # Errors
+/// If they cannot be drawn, or the file cannot be written.
+pub(crate) fn picture(
+    path: &Path,
+    cloud: &Arc<GaussianCloud>,
+    camera: &Camera,
+    settings: &RenderSettings,
+) -> Result<(), JobError> {
+    let frame = Renderer::new().draw(cloud, camera, settings)?;
+    write(path, &frame, camera, Quantity::Picture)?;
+    Ok(())
+}
+
+/// A camera from a file.
+///
+/// # Errors
+/// If it cannot be read or is none.
+pub(crate) fn camera(path: &Path) -> Result<Camera, IoError> {
+    camera_file::read(path)
+}
+
+/// Bytes that drawing a pixel takes: color, depth and opacity, their copies on the way to the file.
+const BYTES_PER_PX: u64 = 64;
+
+/// Whether a picture of this size can be drawn in the memory that is free.
+///
+/// # Errors
+/// If it cannot.
+pub(crate) fn check_room(width_px: u32, height_px: u32) -> Result<(), JobError> {
+    let bytes = u64::from(width_px) * u64::from(height_px) * BYTES_PER_PX;
+    let what = format!("drawing {width_px} x {height_px} px");
+    Ok(memory::room(what, bytes, "make it smaller with --size or --max-side")?)
 }
 
 /// Writes a frame as a `.png`, or as an array where the name ends in `.npy`. Returns the depth that 65535 stands

@@ -1,15 +1,17 @@
 //! Drawing a video of a scene along a path.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
 use super::{JobError, export};
-use crate::io::video::{Settings, Summary};
+use crate::io::IoError;
+use crate::io::camera_path::open;
+use crate::io::video::{VideoSettings, VideoSummary};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::video::{self, Marked};
 use crate::render::{BackendChoice, RenderSettings, Renderer};
-use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
+use crate::scene::{Camera, CameraPath, GaussianCloud, IdentityId, SemanticMap};
 
 /// The color of what is marked.
 const MARK: [u8; 3] = [255, 64, 160];
@@ -25,7 +27,7 @@ pub struct VideoRequest {
     pub(crate) marked: Option<(Arc<SemanticMap>, Vec<IdentityId>)>,
     pub(crate) out: PathBuf,
     /// How it is written.
-    pub(crate) settings: Settings,
+    pub(crate) settings: VideoSettings,
     pub(crate) backend: BackendChoice,
 }
 
@@ -33,7 +35,7 @@ pub struct VideoRequest {
 #[derive(Clone, Debug)]
 pub(crate) struct Video {
     /// The file or folder.
-    pub(crate) summary: Summary,
+    pub(crate) summary: VideoSummary,
     /// What drew it: "CPU", or the name of the GPU.
     pub(crate) backend: String,
     /// Seconds that it took.
@@ -61,4 +63,12 @@ pub(crate) fn run(request: VideoRequest, observer: &mut dyn Observer) -> Result<
     export::make_parent(&out)?;
     let summary = video::write(&cloud, &draw, &cameras, marked, &mut renderer, (&out, &settings), observer)?;
     Ok(Video { summary, backend: renderer.name().to_owned(), secs: start.elapsed().as_secs_f64() })
+}
+
+/// A camera path from a file: this program's or nerfstudio's.
+///
+/// # Errors
+/// If it cannot be read or is none.
+pub(crate) fn camera_path(path: &Path) -> Result<CameraPath, IoError> {
+    open(path)
 }

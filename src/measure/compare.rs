@@ -25,7 +25,7 @@ impl Pair<'_> {
 
 /// A stage of two reports, by what they have in common.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Comparison<'a> {
+pub(crate) struct StageComparison<'a> {
     /// Settings of both, in the order of the first.
     pub(crate) pairs: Vec<Pair<'a>>,
     /// How many settings only the first has, and only the second.
@@ -34,7 +34,7 @@ pub(crate) struct Comparison<'a> {
 
 impl Stage {
     /// This stage beside `other`, by the names of knobs and settings and by `measure`.
-    pub(crate) fn beside<'a>(&'a self, other: &'a Stage, measure: &Measure) -> Comparison<'a> {
+    pub(crate) fn beside<'a>(&'a self, other: &'a Stage, measure: &Measure) -> StageComparison<'a> {
         let value = |p: &Point| p.values.get(&measure.name).map(|s| s.median);
         let pair = |one: &'a Point| {
             let other = other.points.iter().find(|p| p.is_setting(one))?;
@@ -44,7 +44,7 @@ impl Stage {
         };
         let pairs: Vec<Pair<'_>> = self.points.iter().filter_map(pair).collect();
         let alone = [self.points.len() - pairs.len(), other.points.len().saturating_sub(pairs.len())];
-        Comparison { pairs, alone }
+        StageComparison { pairs, alone }
     }
 }
 

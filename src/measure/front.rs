@@ -29,7 +29,7 @@ impl Stage {
 
 /// What a rule makes of one knob.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Choice<'a> {
+pub(crate) struct KnobChoice<'a> {
     pub(crate) method: &'a str,
     pub(crate) default: &'a Point,
     /// The fastest that is good enough.
@@ -47,7 +47,7 @@ pub(crate) const NOISE: f64 = 0.15;
 impl Stage {
     /// The choice for each knob: among its settings and the default. Knobs of stages without a
     /// default, and settings without the rule's measure, are left out.
-    pub(crate) fn choices(&self) -> Vec<Choice<'_>> {
+    pub(crate) fn choices(&self) -> Vec<KnobChoice<'_>> {
         let Some(measure) = self.measure(&self.rule.measure) else { return Vec::new() };
         let Some(default) = self.points.iter().find(|p| p.default) else { return Vec::new() };
         let Some(default_error) = default.error(measure) else { return Vec::new() };
@@ -65,7 +65,7 @@ impl Stage {
             let (chosen, _) = *good.min_by(|a, b| a.0.secs.median.total_cmp(&b.0.secs.median))?;
             let as_fast = default.secs.median <= (1.0 + NOISE) * chosen.secs.median + self.rule.spare_secs
                 || default.secs.least < chosen.secs.most;
-            Some(Choice { method, default, chosen, best, holds: default_error <= enough && as_fast })
+            Some(KnobChoice { method, default, chosen, best, holds: default_error <= enough && as_fast })
         };
         methods.filter_map(choice).collect()
     }

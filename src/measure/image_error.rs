@@ -8,7 +8,7 @@ use crate::math::Real;
 use crate::math::resize::{Filter, resize};
 use crate::math::stats::{mean, psnr_of, quantile, worst};
 use crate::pipeline::metrics::psnr;
-use crate::render::cpu::Renderer;
+use crate::render::cpu::CpuRenderer;
 use crate::render::{Features, Frame, RenderError, RenderSettings};
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
 
@@ -17,7 +17,7 @@ const MOST_PSNR: f64 = 150.0;
 
 /// Red, green and blue as they are shown, 0 to 1.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Planes {
+pub(crate) struct RgbPlanes {
     /// Width in px.
     pub(crate) width: usize,
     /// Height in px.
@@ -26,16 +26,16 @@ pub(crate) struct Planes {
 }
 
 /// The colors of a frame, clamped to what a screen shows.
-pub(crate) fn planes<R: Real>(frame: &Frame<R>) -> Planes {
+pub(crate) fn planes<R: Real>(frame: &Frame<R>) -> RgbPlanes {
     let color = std::array::from_fn(|c| frame.color[c].iter().map(|v| v.f64().clamp(0.0, 1.0)).collect());
-    Planes { width: frame.width_px, height: frame.height_px, color }
+    RgbPlanes { width: frame.width_px, height: frame.height_px, color }
 }
 
 /// A picture at the size of a camera's.
-pub(crate) fn resized(p: &Planes, camera: &Camera, filter: Filter) -> Planes {
+pub(crate) fn resized(p: &RgbPlanes, camera: &Camera, filter: Filter) -> RgbPlanes {
     let (width, height) = (camera.width_px as usize, camera.height_px as usize);
     let color = p.color.each_ref().map(|plane| resize(plane, (p.width, p.height), (width, height), filter));
-    Planes { width, height, color }
+    RgbPlanes { width, height, color }
 }
 
 /// How far an image is from another: root mean square, largest, what one value in a thousand exceeds, mean of FLIP,
@@ -43,7 +43,7 @@ pub(crate) fn resized(p: &Planes, camera: &Camera, filter: Filter) -> Planes {
 pub(crate) type Errors = [f64; 5];
 
 /// Errors of `b` against `a`, of the same size.
-pub(crate) fn errors(a: &Planes, b: &Planes) -> Errors {
+pub(crate) fn errors(a: &RgbPlanes, b: &RgbPlanes) -> Errors {
     let pairs = a.color.iter().flatten().zip(b.color.iter().flatten());
     let off: Vec<f64> = pairs.map(|(a, b)| (a - b).abs()).collect();
     let rms = mean(&off.iter().map(|e| e * e).collect::<Vec<_>>()).sqrt();
@@ -64,14 +64,14 @@ pub(crate) fn named([rms, largest, tail, flip, flip_tail]: Errors) -> Vec<(&'sta
 }
 
 /// PSNR in dB of an image in a photo of its size; what the photo does not cover does not count.
-pub(crate) fn psnr_in_photo(p: &Planes, photo: &PhotoPixels) -> f64 {
+pub(crate) fn psnr_in_photo(p: &RgbPlanes, photo: &PhotoPixels) -> f64 {
     psnr(&p.color, (p.width, p.height), photo).min(MOST_PSNR)
 }
 
 /// Mean and 99th percentile of FLIP.
-fn flip(a: &Planes, b: &Planes) -> (f64, f64) {
+fn flip(a: &RgbPlanes, b: &RgbPlanes) -> (f64, f64) {
     let (w, h) = (a.width as u32, a.height as u32);
-    let bytes = |p: &Planes| -> Vec<u8> {
+    let bytes = |p: &RgbPlanes| -> Vec<u8> {
         let [r, g, b] = &p.color;
         r.iter().zip(g).zip(b).flat_map(|((r, g), b)| [*r, *g, *b].map(|v| (v * 255.0).round() as u8)).collect()
     };
@@ -92,7 +92,7 @@ pub(crate) fn footprint_order(
     camera: &Camera,
     settings: &RenderSettings,
 ) -> Result<Order, RenderError> {
-    let mut renderer = Renderer::<f64>::new();
+    let mut renderer = CpuRenderer::<f64>::new();
     let mut sampled = |n: usize| -> Result<[Vec<f64>; 3], RenderError> {
         let mut sums: [Vec<f64>; 3] = Default::default();
         for k in 0..n * n {
@@ -124,9 +124,9 @@ pub(crate) fn footprint_order(
 mod tests {
     use super::*;
 
-    fn image(width: usize, height: usize, f: impl Fn(usize, usize) -> f64) -> Planes {
+    fn image(width: usize, height: usize, f: impl Fn(usize, usize) -> f64) -> RgbPlanes {
         let plane: Vec<f64> = (0..width * height).map(|i| f(i % width, i / width)).collect();
-        Planes { width, height, color: std::array::from_fn(|_| plane.clone()) }
+        RgbPlanes { width, height, color: std::array::from_fn(|_| plane.clone()) }
     }
 
     #[test]

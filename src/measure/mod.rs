@@ -28,12 +28,12 @@ pub(crate) mod survey;
 pub(crate) mod sweep;
 pub(crate) mod table;
 
-pub(crate) use compare::Comparison;
+pub(crate) use compare::StageComparison;
 pub use document::{Computer, ErrorKind, Measure, Order, Point, Report, Rule, Sample, Stage, StageName, VERSION};
 pub use file::{BeginError, FILE, ReportError, is_report};
 pub use knobs::Knobs;
 pub(crate) use knobs::turned;
-pub(crate) use sweep::{Case, End, Study, StudyError, Trial};
+pub(crate) use sweep::{End, Study, StudyError, SweepCase, Trial};
 
 #[cfg(test)]
 mod tests {

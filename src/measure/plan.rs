@@ -19,7 +19,7 @@ use crate::pipeline::semantics::thumbnails::portraits;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{BackendChoice, Device, RenderSettings, Renderer, real_gpu};
 use crate::scene::plan::{Overrides, ScenePlan, When};
-use crate::scene::{Camera, Facts, GaussianCloud, SemanticMap, resource_log};
+use crate::scene::{Camera, GaussianCloud, SceneFacts, SemanticMap, resource_log};
 
 /// Size of the images, px.
 pub(crate) const SIZE: [u32; 2] = [1_008, 567];
@@ -27,7 +27,7 @@ pub(crate) const SIZE: [u32; 2] = [1_008, 567];
 /// Which plan a process follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum Variant {
+pub(crate) enum PlanVariant {
     Plan,
     Everything,
 }
@@ -42,12 +42,12 @@ pub(crate) struct OpenScene {
     /// The first view, of [`SIZE`].
     pub(crate) first: Camera,
     /// What its plan is made of.
-    pub(crate) facts: Facts,
+    pub(crate) facts: SceneFacts,
 }
 
 /// What one process has measured; medians where several have.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Cost {
+pub struct PlanCost {
     /// Reading, until the scene can be drawn.
     open_secs: f64,
     /// From the start of reading until the first image.
@@ -68,7 +68,7 @@ pub struct Cost {
     loaded: Vec<String>,
 }
 
-impl Cost {
+impl PlanCost {
     /// The medians of several processes, and what the last has loaded; `None` of none.
     pub(crate) fn median(costs: &[Self]) -> Option<Self> {
         let of = |f: fn(&Self) -> f64| costs.iter().map(f).collect::<Sample>().median;
@@ -90,10 +90,10 @@ impl Cost {
 /// after the other. Nothing else may run in this process.
 pub(crate) fn cost(
     open: impl FnOnce() -> Result<OpenScene, StudyError>,
-    variant: Variant,
+    variant: PlanVariant,
     repeats: usize,
-) -> Result<Cost, StudyError> {
-    let overrides = if variant == Variant::Plan { Overrides::default() } else { Overrides::everything() };
+) -> Result<PlanCost, StudyError> {
+    let overrides = if variant == PlanVariant::Plan { Overrides::default() } else { Overrides::everything() };
     // The program has looked for a GPU before it opens anything, and keeps the driver that it found.
     let _ = real_gpu();
     let before = resident();
@@ -137,7 +137,7 @@ pub(crate) fn cost(
     }
     let frame_ms = times.into_iter().collect::<Sample>().median;
     let device_bytes = device_bytes(&scene, &settings)? as f64;
-    Ok(Cost {
+    Ok(PlanCost {
         open_secs,
         first_picture_secs,
         ready_secs,
@@ -159,7 +159,8 @@ fn maps(
     settings: &RenderSettings,
 ) -> Result<(ViewMap, CodeMap), StudyError> {
     let (cloud, camera) = (&scene.cloud, &scene.first);
-    let exact = ViewMap::render(renderer, cloud, &map.of, &map.identities, camera, settings).map_err(failed)?;
+    let exact =
+        ViewMap::render(renderer, cloud, &map.identity_of, &map.identities, camera, settings).map_err(failed)?;
     let codes = CodeMap::render(renderer, cloud, &map.codes, plan.parts, camera, settings).map_err(failed)?;
     Ok((exact, codes))
 }
@@ -222,12 +223,12 @@ pub(crate) struct Saving {
     scene: String,
     /// Bytes of its files by what they serve.
     disk: Vec<(&'static str, u64)>,
-    plan: Cost,
-    everything: Cost,
+    plan: PlanCost,
+    everything: PlanCost,
 }
 
 impl Saving {
-    pub(crate) fn new(path: &Path, plan: Cost, everything: Cost) -> Self {
+    pub(crate) fn new(path: &Path, plan: PlanCost, everything: PlanCost) -> Self {
         Self { scene: super::bench::label(path), disk: disk(path), plan, everything }
     }
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::studies::views::{held_out, spread};
-use super::studies::{Input, depth, features, path, query, render, train};
+use super::studies::{StudyInput, depth, features, path, query, render, train};
 use super::sweep::failed;
 use super::{StageName, Study, StudyError};
 use crate::io::labels::Labels;
@@ -19,7 +19,8 @@ use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::{Camera, Dataset, GaussianCloud, Identities, IdentityId, NOBODY, Photo, SemanticMap};
 
-pub(crate) struct Options {
+#[derive(Clone, Debug)]
+pub struct StudyOptions {
     pub(crate) masks: Option<PathBuf>,
     pub(crate) steps: Vec<u64>,
     pub(crate) train_steps: u64,
@@ -31,7 +32,8 @@ pub(crate) struct Options {
 }
 
 /// A scene and what came with it.
-pub(crate) struct Subject {
+#[derive(Clone, Debug)]
+pub struct Subject {
     /// Its name in the report.
     pub(crate) name: String,
     pub(crate) cloud: Arc<GaussianCloud>,
@@ -41,9 +43,15 @@ pub(crate) struct Subject {
     /// Every how-manieth photo is held out.
     pub(crate) holdout_every: usize,
     /// Its photos, if they are there.
-    pub(crate) dataset: Option<Dataset>,
-    pub(crate) map: Option<SemanticMap>,
-    pub(crate) options: Options,
+    pub(crate) dataset: Option<Arc<Dataset>>,
+    pub(crate) map: Option<Arc<SemanticMap>>,
+    pub(crate) options: StudyOptions,
+}
+
+impl Default for StudyOptions {
+    fn default() -> Self {
+        Self { masks: None, steps: vec![300, 1_000], train_steps: 1_000, max_side_px: 256, views: 4, repeats: 3 }
+    }
 }
 
 impl Subject {
@@ -110,12 +118,12 @@ impl Subject {
 
     /// Objects and parts, if an encoder has embedded them.
     fn language(&self) -> Option<(&SemanticMap, &str)> {
-        self.map.as_ref().and_then(|m| Some((m, m.language.as_ref()?.encoder.as_str())))
+        self.map.as_deref().and_then(|m| Some((m, m.language.as_ref()?.encoder.as_str())))
     }
 
     /// What is swept on, in words.
-    fn input(&self, more: &[(&str, String)]) -> Input {
-        let mut input = Input::from([
+    fn input(&self, more: &[(&str, String)]) -> StudyInput {
+        let mut input = StudyInput::from([
             ("scene".to_owned(), self.name.clone()),
             ("Gaussians".to_owned(), self.cloud.len().to_string()),
             ("longer side".to_owned(), format!("{} px", self.options.max_side_px)),
@@ -125,7 +133,7 @@ impl Subject {
     }
 
     fn dataset(&self) -> Result<&Dataset, StudyError> {
-        self.dataset.as_ref().ok_or_else(|| failed("photos are needed"))
+        self.dataset.as_deref().ok_or_else(|| failed("photos are needed"))
     }
 
     fn labels(&self) -> Result<FileMasks, StudyError> {
@@ -184,7 +192,7 @@ impl Subject {
             let photo = &dataset.photos[i];
             let categories = categories(&labels.segment(photo, side, &mut Silent).map_err(failed)?);
             let camera = photo.camera.limited_to(side);
-            views.push(query::Asked { name: photo.name.clone(), camera, categories });
+            views.push(query::LabeledScene { name: photo.name.clone(), camera, categories });
         }
         if views.is_empty() {
             return Err(self.few_labels("there are no labels of this scene's photos"));

@@ -13,7 +13,7 @@ use super::table::{Rows, rows};
 use crate::math::stats::worst;
 use crate::navigate::flight::Smoothness;
 use crate::navigate::keypoints::{Keypoint, spacing};
-use crate::navigate::{Flight, Navigator, Pose, Speed};
+use crate::navigate::{CameraTrajectory, Navigator, Pose, Speed};
 use crate::scene::{Camera, GaussianCloud};
 
 /// Seed of the pairs of places and of added cameras.
@@ -108,11 +108,12 @@ pub(crate) fn survey(navigator: &Navigator, which: Ends, count: usize, frames: u
         found.secs.add(start.elapsed().as_secs_f64());
         match flight {
             Ok(flight) => {
-                let smoothness = |f: &Flight| f.smoothness(&navigator.occupancy, navigator.clearance);
+                let smoothness = |f: &CameraTrajectory| f.smoothness(&navigator.occupancy, navigator.clearance);
                 found.ours.add(&smoothness(&flight));
-                let paper = Flight::of_paper(&[from, to], frames);
+                let paper = CameraTrajectory::of_paper(&[from, to], frames);
                 paper.iter().for_each(|p| found.paper.add(&smoothness(p)));
-                let through = navigator.keys(&from, &to).and_then(|keys| Flight::of_paper_through(&keys, frames));
+                let through =
+                    navigator.keys(&from, &to).and_then(|keys| CameraTrajectory::of_paper_through(&keys, frames));
                 through.iter().for_each(|p| found.paper_through.add(&smoothness(p)));
             }
             Err(_) => found.no_route += 1,

@@ -11,7 +11,7 @@ use crate::pipeline::observer::{Observer, Severity, Ticker};
 
 /// A setting to be measured.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Case {
+pub(crate) struct SweepCase {
     pub(crate) method: String,
     pub(crate) setting: String,
     /// Its setting, for the program.
@@ -20,7 +20,7 @@ pub(crate) struct Case {
     pub(crate) default: bool,
 }
 
-impl Case {
+impl SweepCase {
     pub(crate) fn new(method: &str, setting: impl Into<String>, knobs: &[(&str, serde_json::Value)]) -> Self {
         let knobs = knobs.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();
         Self { method: method.into(), setting: setting.into(), knobs, default: false }
@@ -44,7 +44,7 @@ pub(crate) struct Trial {
 /// Why a measurement failed, in words.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{0}")]
-pub(crate) struct StudyError(pub(crate) String);
+pub struct StudyError(pub(crate) String);
 
 /// Makes a study's error of another.
 pub(crate) fn failed(error: impl std::fmt::Display) -> StudyError {
@@ -58,7 +58,7 @@ type Run<'a> = Box<dyn FnMut(usize, u64, &mut dyn Observer) -> Result<Option<Tri
 pub(crate) struct Study<'a> {
     /// The stage without points: what is measured, on what, compared with what.
     pub(crate) stage: Stage,
-    cases: Vec<Case>,
+    cases: Vec<SweepCase>,
     run: Run<'a>,
     /// Checks of convergence. They are the same at every time, so they run once.
     orders: Box<dyn Fn() -> Result<Vec<Order>, StudyError> + 'a>,
@@ -68,10 +68,10 @@ impl<'a> Study<'a> {
     /// A sweep of settings, each with what it means to the study itself.
     pub(crate) fn new<V: 'a>(
         stage: Stage,
-        variants: Vec<(Case, V)>,
+        variants: Vec<(SweepCase, V)>,
         mut measure: impl FnMut(&V, u64, &mut dyn Observer) -> Result<Option<Trial>, StudyError> + 'a,
     ) -> Self {
-        let (cases, variants): (Vec<Case>, Vec<V>) = variants.into_iter().unzip();
+        let (cases, variants): (Vec<SweepCase>, Vec<V>) = variants.into_iter().unzip();
         let run: Run<'a> = Box::new(move |k, seed, observer| measure(&variants[k], seed, observer));
         Self { stage: Stage { planned: cases.len(), ..stage }, cases, run, orders: Box::new(|| Ok(Vec::new())) }
     }
@@ -85,7 +85,7 @@ impl<'a> Study<'a> {
     /// Measures the setting of a knob whose words contain these.
     #[cfg(test)]
     pub(crate) fn measured(&mut self, method: &str, setting: &str, seed: u64) -> Trial {
-        let is = |c: &Case| c.method == method && c.setting.contains(setting);
+        let is = |c: &SweepCase| c.method == method && c.setting.contains(setting);
         let k = self.cases.iter().position(is).expect("a case");
         (self.run)(k, seed, &mut crate::pipeline::observer::Silent).expect("runs").expect("not cancelled")
     }
@@ -181,14 +181,14 @@ impl Report {
     }
 }
 
-impl Case {
+impl SweepCase {
     fn is(&self, point: &Point) -> bool {
         self.method == point.method && self.setting == point.setting
     }
 }
 
 impl Stage {
-    pub(crate) fn add(&mut self, case: &Case, trial: &Trial) {
+    pub(crate) fn add(&mut self, case: &SweepCase, trial: &Trial) {
         let at = self.points.iter().position(|p| case.is(p)).unwrap_or_else(|| {
             self.points.push(Point {
                 method: case.method.clone(),
@@ -218,7 +218,8 @@ mod tests {
     /// What ran of three settings that are measured three times, until it stops; one may be broken.
     fn kept(stop_after: usize, broken: &str, before: Option<Stage>, budget: f64) -> (Stage, End, Vec<(String, u64)>) {
         let stage = Stage { points: vec![], orders: vec![], ..example().stages.remove(0) };
-        let cases = [Case::default("all"), Case::new("knob", "left", &[]), Case::new("knob", "right", &[])];
+        let cases =
+            [SweepCase::default("all"), SweepCase::new("knob", "left", &[]), SweepCase::new("knob", "right", &[])];
         let variants: Vec<_> = cases.map(|c| (c.clone(), c.setting)).into();
         let mut ran = Vec::new();
         let mut keeps = 0;

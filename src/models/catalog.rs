@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::fetch::{self, FetchError, Patience, Wanted};
+use super::fetch::{self, FetchError, FileToFetch, Patience};
 use super::{ModelError, manifest};
 use crate::io::data_folder::data_folder;
 
@@ -22,7 +22,7 @@ pub(crate) const SAM2: &str = "sam2.1-tiny";
 /// What a model is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum Role {
+pub(crate) enum ModelRole {
     /// Compares pictures with phrases.
     Encoder,
     Segmenter,
@@ -31,11 +31,11 @@ pub(crate) enum Role {
 /// A model of the list.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Entry {
+pub struct ModelEntry {
     /// Its name in commands.
     pub id: String,
     /// What it is for.
-    pub(crate) role: Role,
+    pub(crate) role: ModelRole,
     /// Its name for display.
     pub title: String,
     /// What it adds, in plain words.
@@ -76,13 +76,13 @@ pub struct ListedFile {
 
 #[derive(Deserialize)]
 struct List {
-    model: Vec<Entry>,
+    model: Vec<ModelEntry>,
 }
 
 /// Whether a model can be used.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum State {
+pub enum ModelState {
     /// Part of the program.
     BuiltIn,
     /// All files are here.
@@ -127,7 +127,7 @@ pub enum InstallError {
 ///
 /// # Errors
 /// If the list that came with the program is damaged.
-pub fn entries() -> Result<Vec<Entry>, ModelError> {
+pub fn entries() -> Result<Vec<ModelEntry>, ModelError> {
     let damaged =
         |e: toml::de::Error| ModelError::Metadata { path: "assets/models.toml".into(), problem: e.to_string() };
     toml::from_str::<List>(LIST).map(|list| list.model).map_err(damaged)
@@ -137,7 +137,7 @@ pub fn entries() -> Result<Vec<Entry>, ModelError> {
 ///
 /// # Errors
 /// If there is none.
-pub fn entry(id: &str) -> Result<Entry, InstallError> {
+pub fn entry(id: &str) -> Result<ModelEntry, InstallError> {
     entries()?.into_iter().find(|e| e.id == id).ok_or_else(|| InstallError::Unknown(id.to_owned()))
 }
 
@@ -147,7 +147,7 @@ pub(crate) fn folder() -> PathBuf {
     set.map_or_else(|| data_folder().join("models"), PathBuf::from)
 }
 
-impl Entry {
+impl ModelEntry {
     /// The file that describes it, if it were in `folder`.
     pub(crate) fn description_in(&self, folder: &Path) -> PathBuf {
         folder.join(&self.description)
@@ -165,20 +165,20 @@ impl Entry {
 
     /// Whether it can be used from `folder`. Sizes are compared, contents are not: see
     /// [`Self::verify`].
-    pub fn state(&self, folder: &Path) -> State {
+    pub fn state(&self, folder: &Path) -> ModelState {
         if self.built_in {
-            return State::BuiltIn;
+            return ModelState::BuiltIn;
         }
         let missing = |name: &&str| !folder.join(name).is_file();
         let missing: Vec<String> = self.files().into_iter().filter(missing).map(str::to_owned).collect();
         if !missing.is_empty() {
-            return State::Missing(missing);
+            return ModelState::Missing(missing);
         }
         let sizes = manifest::graphs(&self.description_in(folder))
             .and_then(|graphs| graphs.iter().try_for_each(|graph| graph.check_size(folder)));
         match sizes {
-            Ok(()) => State::Here,
-            Err(e) => State::Broken(e.to_string()),
+            Ok(()) => ModelState::Here,
+            Err(e) => ModelState::Broken(e.to_string()),
         }
     }
 
@@ -226,7 +226,7 @@ impl Entry {
         let address = |name: &str| format!("{}/{name}", base.trim_end_matches('/'));
         let mut get = |name: &str, bytes: Option<u64>, sha256: Option<&str>| {
             let to = folder.join(name);
-            let wanted = Wanted { url: &address(name), to: &to, bytes, sha256 };
+            let wanted = FileToFetch { url: &address(name), to: &to, bytes, sha256 };
             fetch::fetch(&wanted, patience, &mut |there, all| progress(name, there, all))
         };
         // The description says what the graphs must be; fetched anew, it is that of these graphs.
@@ -272,13 +272,13 @@ impl Entry {
 ///
 /// # Errors
 /// If it is neither.
-pub(crate) fn find(name: &str, role: Role) -> Result<PathBuf, ModelError> {
+pub(crate) fn find(name: &str, role: ModelRole) -> Result<PathBuf, ModelError> {
     let listed = entries()?.into_iter().find(|e| e.id == name && e.role == role && !e.built_in);
     if let Some(entry) = listed {
         let folder = folder();
         return match entry.state(&folder) {
-            State::Missing(_) => Err(ModelError::NotHere { id: entry.id }),
-            State::Broken(problem) => Err(ModelError::Metadata { path: entry.description_in(&folder), problem }),
+            ModelState::Missing(_) => Err(ModelError::NotHere { id: entry.id }),
+            ModelState::Broken(problem) => Err(ModelError::Metadata { path: entry.description_in(&folder), problem }),
             _ => Ok(entry.description_in(&folder)),
         };
     }
@@ -295,18 +295,18 @@ pub(crate) fn find(name: &str, role: Role) -> Result<PathBuf, ModelError> {
 ///
 /// # Errors
 /// If the list that came with the program is damaged.
-pub(crate) fn usable(role: Role, told: &mut dyn FnMut(String)) -> Result<Vec<String>, ModelError> {
+pub(crate) fn usable(role: ModelRole, told: &mut dyn FnMut(String)) -> Result<Vec<String>, ModelError> {
     Ok(usable_of(&entries()?, role, &folder(), told))
 }
 
-fn usable_of(all: &[Entry], role: Role, folder: &Path, told: &mut dyn FnMut(String)) -> Vec<String> {
+fn usable_of(all: &[ModelEntry], role: ModelRole, folder: &Path, told: &mut dyn FnMut(String)) -> Vec<String> {
     let (mut here, mut built_in) = (Vec::new(), Vec::new());
     for entry in all.iter().filter(|e| e.role == role) {
         match entry.state(folder) {
-            State::BuiltIn => built_in.push(entry.id.clone()),
-            State::Here => here.push(entry.id.clone()),
-            State::Missing(_) => {}
-            State::Broken(problem) => {
+            ModelState::BuiltIn => built_in.push(entry.id.clone()),
+            ModelState::Here => here.push(entry.id.clone()),
+            ModelState::Missing(_) => {}
+            ModelState::Broken(problem) => {
                 let id = &entry.id;
                 told(format!("the model '{id}' is here but broken and is not used: {problem}; fetch or add it again"));
             }
@@ -324,10 +324,10 @@ mod tests {
     fn a_broken_model_is_told() {
         let folder = tempfile::tempdir().expect("folder");
         let all = entries().expect("the list");
-        let listed = all.iter().find(|e| e.role == Role::Encoder && !e.built_in).expect("an encoder");
+        let listed = all.iter().find(|e| e.role == ModelRole::Encoder && !e.built_in).expect("an encoder");
         let told = |folder: &Path| {
             let mut told = Vec::new();
-            let usable = usable_of(&all, Role::Encoder, folder, &mut |text| told.push(text));
+            let usable = usable_of(&all, ModelRole::Encoder, folder, &mut |text| told.push(text));
             assert_eq!(usable, ["demo"]);
             told
         };

@@ -2,9 +2,9 @@
 //! renders (`tools/encoder`), so that queries work with nothing to download.
 
 use super::engine::engine;
-use super::network::{Array, Network};
+use super::network::{Network, Tensor};
 use super::vocabulary::Vocabulary;
-use super::{Encoder, ModelError, Tile};
+use super::{Encoder, IdentityCrop, ModelError};
 
 const IMAGE: (&str, &[u8]) = ("demo_image.onnx", include_bytes!("../../assets/models/demo_image.onnx"));
 const TEXT: (&str, &[u8]) = ("demo_text.onnx", include_bytes!("../../assets/models/demo_text.onnx"));
@@ -49,13 +49,13 @@ impl Encoder for DemoEncoder {
         Some(self.words.tile_side_px)
     }
 
-    fn images(&mut self, tiles: &[Tile]) -> Result<Vec<Vec<f32>>, ModelError> {
+    fn images(&mut self, tiles: &[IdentityCrop]) -> Result<Vec<Vec<f32>>, ModelError> {
         tiles.iter().map(|tile| self.look(tile)).collect()
     }
 
     fn text(&mut self, phrase: &str) -> Result<Vec<f32>, ModelError> {
         let tokens = self.words.encode(phrase)?;
-        let tokens = Array::new(&[1, tokens.len()], tokens);
+        let tokens = Tensor::new(&[1, tokens.len()], tokens);
         only(ready(&mut self.text, TEXT)?.unit_rows(
             vec![("tokens", tokens.into())],
             "embedding",
@@ -69,7 +69,7 @@ impl Encoder for DemoEncoder {
 }
 
 impl DemoEncoder {
-    fn look(&mut self, tile: &Tile) -> Result<Vec<f32>, ModelError> {
+    fn look(&mut self, tile: &IdentityCrop) -> Result<Vec<f32>, ModelError> {
         let side = self.words.tile_side_px;
         if tile.side_px != side || tile.rgb.len() != side * side {
             return Err(ModelError::TileSize { side_px: tile.side_px, pixels: tile.rgb.len(), expected_px: side });
@@ -79,7 +79,7 @@ impl DemoEncoder {
         }
         let channel = |c: usize| tile.rgb.iter().map(move |p| p[c].clamp(0.0, 1.0));
         let planes: Vec<f32> = (0..3).flat_map(channel).collect();
-        let pixels = Array::new(&[1, 3, side, side], planes);
+        let pixels = Tensor::new(&[1, 3, side, side], planes);
         only(ready(&mut self.image, IMAGE)?.unit_rows(
             vec![("tile", pixels.into())],
             "embedding",

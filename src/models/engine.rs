@@ -18,7 +18,7 @@ use ort::session::builder::GraphOptimizationLevel;
 use super::ModelError;
 use super::network::{Network, guarded};
 use super::session_cache;
-use crate::scene::resource_log::{self, Sort};
+use crate::scene::resource_log::{self, ResourceKind};
 
 /// Why networks are loaded, for the trace.
 const MODEL_USE: &str = "it is about to run for the first time";
@@ -182,7 +182,7 @@ impl Engine {
     /// # Errors
     /// If it is no network, or one that this engine cannot run.
     pub(crate) fn load(&self, bytes: &[u8], name: &str) -> Result<Network, ModelError> {
-        resource_log::record(Sort::Model, format!("network {name}"), MODEL_USE, bytes.len() as u64);
+        resource_log::record(ResourceKind::Model, format!("network {name}"), MODEL_USE, bytes.len() as u64);
         Ok(Network::new(self.prepare(name, |builder| builder.commit_from_memory(bytes))?, name))
     }
 
@@ -199,7 +199,7 @@ impl Engine {
     /// A session of a network in a file, for which room is made.
     pub(super) fn session(&self, path: &Path) -> Result<Session, ModelError> {
         let bytes = std::fs::metadata(path).map_or(0, |m| m.len());
-        resource_log::record(Sort::Model, format!("network {}", path.display()), MODEL_USE, bytes);
+        resource_log::record(ResourceKind::Model, format!("network {}", path.display()), MODEL_USE, bytes);
         session_cache::make(bytes);
         self.prepare(&path.display().to_string(), |builder| builder.commit_from_file(path))
     }
@@ -221,7 +221,7 @@ impl Engine {
         // A device that refuses a network is no reason to do without it, but is told among what was loaded.
         let refused = |device: Device, e: ort::Error| {
             let what = format!("network {name}, on the processor, because {} refused it: {e}", device.text());
-            resource_log::record(Sort::Model, what, MODEL_USE, 0);
+            resource_log::record(ResourceKind::Model, what, MODEL_USE, 0);
             load(None)
         };
         let session = guarded(name, || match self.device {

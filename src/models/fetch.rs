@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 use ureq::Agent;
 use ureq::http::StatusCode;
 
-use crate::io::http::{self, Piece, TICK};
+use crate::io::http::{self, ResponsePart, TICK};
 
 /// Least that has to arrive within the patience for a stall: a server that sends a byte now and then is
 /// as good as silent.
@@ -22,7 +22,7 @@ pub const MOST_UNPROMISED: u64 = 16 << 20;
 
 /// A file to fetch.
 #[derive(Clone, Copy, Debug)]
-pub struct Wanted<'a> {
+pub struct FileToFetch<'a> {
     /// From where.
     pub url: &'a str,
     /// The file that it becomes, once it is complete and right.
@@ -53,95 +53,31 @@ impl Default for Patience {
 /// Why a file could not be fetched. What arrived before stays, and is resumed the next time,
 /// unless it was wrong.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum FetchError {
-    /// No connection.
     #[error("{url} cannot be reached: {problem}; check the network (and HTTPS_PROXY), or bring the file yourself")]
-    Unreachable {
-        /// From where.
-        url: String,
-        /// What happened.
-        problem: String,
-    },
-    /// The server answered, but not with the file.
+    Unreachable { url: String, problem: String },
     #[error("{url} answered {status}; the address may have changed")]
-    Refused {
-        /// From where.
-        url: String,
-        /// HTTP status.
-        status: u16,
-    },
-    /// The server went silent.
+    Refused { url: String, status: u16 },
     #[error("{url} sent nothing for {secs} s, after {got} bytes; try again, what arrived is kept")]
-    Stalled {
-        /// From where.
-        url: String,
-        /// How long it was waited.
-        secs: u64,
-        /// Bytes that are there.
-        got: u64,
-    },
-    /// The connection ended early.
+    Stalled { url: String, secs: u64, got: u64 },
     #[error("{url} ended after {got} of {expected} bytes; try again, what arrived is kept")]
-    Truncated {
-        /// From where.
-        url: String,
-        /// Bytes that are there.
-        got: u64,
-        /// Bytes that were promised.
-        expected: u64,
-    },
-    /// Another size than the catalog's.
+    Truncated { url: String, got: u64, expected: u64 },
     #[error("{url} offers {offered} bytes, but the file has {expected}; it is another file, and was not taken")]
-    OtherSize {
-        /// From where.
-        url: String,
-        /// Bytes that the server has.
-        offered: u64,
-        /// Bytes that it should have.
-        expected: u64,
-    },
-    /// More than a file without a promised size may have.
+    OtherSize { url: String, offered: u64, expected: u64 },
     #[error("{url} is larger than the {most} bytes that a description may have; it is another file, and was not taken")]
-    TooLarge {
-        /// From where.
-        url: String,
-        /// Most bytes.
-        most: u64,
-    },
-    /// A page for people in place of the file.
+    TooLarge { url: String, most: u64 },
     #[error("{url} is a web page, not a file (a sign-in, or an error page?)")]
-    WebPage {
-        /// From where.
-        url: String,
-    },
-    /// The content is not what it should be.
+    WebPage { url: String },
     #[error("{path} has SHA-256 {got}, expected {expected}; it is broken or another file, and was refused")]
-    Checksum {
-        /// The file.
-        path: PathBuf,
-        /// What it has.
-        got: String,
-        /// What it should have.
-        expected: String,
-    },
-    /// The file cannot be written.
+    Checksum { path: PathBuf, got: String, expected: String },
     #[error("{path}: {source}")]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// Somebody asked to stop.
+    File { path: PathBuf, source: io::Error },
     #[error("cancelled after {got} bytes; what arrived is kept")]
-    Cancelled {
-        /// Bytes that are there.
-        got: u64,
-    },
+    Cancelled { got: u64 },
 }
 
 impl FetchError {
-    /// Whether trying again may help.
     fn is_passing(&self) -> bool {
         match self {
             Self::Unreachable { .. } | Self::Stalled { .. } | Self::Truncated { .. } => true,
@@ -153,11 +89,8 @@ impl FetchError {
 
 /// Fetches a file. `progress` is told the bytes that are there and those that there will be, and
 /// whether to go on.
-///
-/// # Errors
-/// See [`FetchError`].
 pub fn fetch(
-    wanted: &Wanted<'_>,
+    wanted: &FileToFetch<'_>,
     patience: Patience,
     progress: &mut dyn FnMut(u64, Option<u64>) -> bool,
 ) -> Result<(), FetchError> {
@@ -197,9 +130,6 @@ pub fn fetch(
 }
 
 /// Compares a file with its SHA-256.
-///
-/// # Errors
-/// If they differ, or the file cannot be read.
 pub(crate) fn check(path: &Path, expected: &str) -> Result<(), FetchError> {
     let got = sha256(path).map_err(|source| FetchError::File { path: path.into(), source })?;
     if got.eq_ignore_ascii_case(expected) {
@@ -209,9 +139,6 @@ pub(crate) fn check(path: &Path, expected: &str) -> Result<(), FetchError> {
 }
 
 /// SHA-256 of a file, in hexadecimal digits.
-///
-/// # Errors
-/// If it cannot be read.
 pub fn sha256(path: &Path) -> io::Result<String> {
     let mut file = File::open(path)?;
     let mut hasher = Sha256::new();
@@ -235,7 +162,7 @@ struct Part {
 }
 
 impl Part {
-    fn of(wanted: &Wanted<'_>) -> Self {
+    fn of(wanted: &FileToFetch<'_>) -> Self {
         let beside = |ending: &str| {
             let mut name = wanted.to.as_os_str().to_owned();
             name.push(ending);
@@ -282,7 +209,7 @@ impl Part {
 /// One connection: goes on from what is there.
 fn receive(
     agent: &Agent,
-    wanted: &Wanted<'_>,
+    wanted: &FileToFetch<'_>,
     part: &Part,
     stall: Duration,
     progress: &mut dyn FnMut(u64, Option<u64>) -> bool,
@@ -308,8 +235,8 @@ fn receive(
     let pieces = http::ask(move || request.call()).map_err(|e| part.failed(e))?;
     let mut wait = Wait { pieces, stall, since: Instant::now(), got: 0 };
     let (status, headers) = match wait.next(there, wanted.bytes, progress) {
-        Ok(Some(Piece::Head(status, headers))) => (status, headers),
-        Ok(Some(Piece::Failed(problem))) => return Err(FetchError::Unreachable { url, problem }),
+        Ok(Some(ResponsePart::Head(status, headers))) => (status, headers),
+        Ok(Some(ResponsePart::Failed(problem))) => return Err(FetchError::Unreachable { url, problem }),
         Ok(_) => return Err(FetchError::Unreachable { url, problem: "the connection ended".into() }),
         Err(ended) => return Err(ended.error(url, stall, there)),
     };
@@ -350,7 +277,7 @@ fn receive(
     let expected = wanted.bytes.or(total);
     loop {
         match wait.next(there, expected, progress) {
-            Ok(Some(Piece::Bytes(piece))) => {
+            Ok(Some(ResponsePart::Bytes(piece))) => {
                 if there + piece.len() as u64 > most {
                     // What is longer than it should be is another file from its start.
                     part.forget();
@@ -360,7 +287,7 @@ fn receive(
                 file.write_all(&piece).map_err(|e| part.failed(e))?;
             }
             // Where no size is known, only a whole answer is a whole file.
-            Ok(Some(Piece::Failed(problem))) if expected.is_none() => {
+            Ok(Some(ResponsePart::Failed(problem))) if expected.is_none() => {
                 return Err(FetchError::Unreachable { url, problem });
             }
             Ok(_) => break,
@@ -391,7 +318,7 @@ impl Ended {
 
 /// Waits for pieces, for as long as enough of them come and nobody wants it to end.
 struct Wait {
-    pieces: Receiver<Piece>,
+    pieces: Receiver<ResponsePart>,
     stall: Duration,
     /// When enough came last.
     since: Instant,
@@ -406,7 +333,7 @@ impl Wait {
         there: u64,
         expected: Option<u64>,
         progress: &mut dyn FnMut(u64, Option<u64>) -> bool,
-    ) -> Result<Option<Piece>, Ended> {
+    ) -> Result<Option<ResponsePart>, Ended> {
         loop {
             if !progress(there, expected) {
                 return Err(Ended::Cancelled);
@@ -418,7 +345,7 @@ impl Wait {
                 Err(RecvTimeoutError::Timeout) => continue,
             };
             self.got += match &piece {
-                Piece::Bytes(bytes) => bytes.len() as u64,
+                ResponsePart::Bytes(bytes) => bytes.len() as u64,
                 _ => LEAST_BYTES,
             };
             if self.got >= LEAST_BYTES {

@@ -17,7 +17,7 @@ pub(crate) const MAX_BYTES: u64 = super::fetch::MOST_UNPROMISED;
 
 /// A graph of a model.
 #[derive(Clone, Debug, Deserialize)]
-pub struct Graph {
+pub struct GraphFile {
     /// Its file, in the same folder.
     pub(crate) file: String,
     pub(crate) bytes: u64,
@@ -25,7 +25,7 @@ pub struct Graph {
     pub(crate) sha256: String,
 }
 
-impl Graph {
+impl GraphFile {
     /// The network in the slot; loaded from a folder if it is not there yet, and only if the file is
     /// what its description says.
     ///
@@ -111,17 +111,17 @@ pub(crate) fn check_length(path: &Path, name: &str, length: usize, most: usize) 
 
 #[derive(Deserialize)]
 struct AnyModel {
-    graphs: BTreeMap<String, Graph>,
+    graphs: BTreeMap<String, GraphFile>,
 }
 
 /// The graphs that a description names.
 ///
 /// # Errors
 /// If the file cannot be read, or is no description.
-pub fn graphs(path: &Path) -> Result<Vec<Graph>, ModelError> {
+pub fn graphs(path: &Path) -> Result<Vec<GraphFile>, ModelError> {
     let kind = kind(path)?;
     let graphs: AnyModel = read(path, &kind)?;
-    let all: Vec<Graph> = graphs.graphs.into_values().collect();
+    let all: Vec<GraphFile> = graphs.graphs.into_values().collect();
     // A name with a path in it would reach out of the folder.
     match all.iter().find(|g| Path::new(&g.file).file_name() != Some(std::ffi::OsStr::new(&g.file))) {
         Some(g) => Err(ModelError::Metadata { path: path.into(), problem: format!("'{}' is no file name", g.file) }),

@@ -20,14 +20,14 @@ pub mod session_cache;
 mod tile;
 mod vocabulary;
 
-pub(crate) use catalog::Role;
+pub(crate) use catalog::ModelRole;
 pub use clip::ClipEncoder;
 pub(crate) use demo::DemoEncoder;
 pub use error::ModelError;
 
 /// A picture of one identity: mask on black, padded to a square, side x side, sRGB 0..1, row-major.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tile {
+pub struct IdentityCrop {
     /// Side in px.
     pub side_px: usize,
     /// Colors.
@@ -46,10 +46,10 @@ pub trait Encoder: Send {
     fn tile_side_px(&self) -> Option<usize>;
 
     /// The vectors of pictures; of unit length.
-    fn images(&mut self, tiles: &[Tile]) -> Result<Vec<Vec<f32>>, ModelError>;
+    fn images(&mut self, tiles: &[IdentityCrop]) -> Result<Vec<Vec<f32>>, ModelError>;
 
     /// The vector of one picture.
-    fn image(&mut self, tile: &Tile) -> Result<Vec<f32>, ModelError> {
+    fn image(&mut self, tile: &IdentityCrop) -> Result<Vec<f32>, ModelError> {
         let mut one = self.images(std::slice::from_ref(tile))?;
         one.pop().ok_or_else(|| ModelError::NoOutput { model: self.name().to_owned(), output: "embedding".into() })
     }
@@ -70,7 +70,7 @@ pub(crate) const DEMO: &str = "demo";
 /// # Errors
 /// If it cannot be loaded.
 pub(crate) fn best_encoder(told: &mut dyn FnMut(String)) -> Result<Box<dyn Encoder>, ModelError> {
-    let best = catalog::usable(Role::Encoder, told)?.into_iter().next();
+    let best = catalog::usable(ModelRole::Encoder, told)?.into_iter().next();
     encoder(best.as_deref().unwrap_or(DEMO))
 }
 
@@ -81,6 +81,6 @@ pub(crate) fn best_encoder(told: &mut dyn FnMut(String)) -> Result<Box<dyn Encod
 pub fn encoder(name: &str) -> Result<Box<dyn Encoder>, ModelError> {
     match name {
         DEMO => Ok(Box::new(DemoEncoder::new()?)),
-        name => Ok(Box::new(ClipEncoder::open(&catalog::find(name, Role::Encoder)?)?.called(name))),
+        name => Ok(Box::new(ClipEncoder::open(&catalog::find(name, ModelRole::Encoder)?)?.called(name))),
     }
 }

@@ -6,21 +6,20 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use ort::session::{Session, SessionInputValue};
-use ort::value::Tensor;
 
 use super::ModelError;
-use super::session_cache::{self, Place};
+use super::session_cache::{self, CachedSession};
 
 /// Numbers with a shape, row-major.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Array<T = f32> {
+pub struct Tensor<T = f32> {
     /// Length of each axis.
     pub shape: Vec<usize>,
     /// As many numbers as the axes' product.
     pub values: Vec<T>,
 }
 
-impl<T: Clone> Array<T> {
+impl<T: Clone> Tensor<T> {
     /// An array; its numbers have to fill its shape.
     pub fn new(shape: &[usize], values: Vec<T>) -> Self {
         debug_assert_eq!(shape.iter().product::<usize>(), values.len(), "{shape:?}");
@@ -60,27 +59,27 @@ impl<T: Clone> Array<T> {
 }
 
 /// What goes into a network.
-pub(crate) enum Input {
+pub(crate) enum NetworkInput {
     /// Floating-point numbers.
-    Floats(Array<f32>),
+    Floats(Tensor<f32>),
     /// Whole numbers.
-    Ints(Array<i64>),
+    Ints(Tensor<i64>),
 }
 
-impl From<Array<f32>> for Input {
-    fn from(array: Array<f32>) -> Self {
+impl From<Tensor<f32>> for NetworkInput {
+    fn from(array: Tensor<f32>) -> Self {
         Self::Floats(array)
     }
 }
 
-impl From<&Array<f32>> for Input {
-    fn from(array: &Array<f32>) -> Self {
+impl From<&Tensor<f32>> for NetworkInput {
+    fn from(array: &Tensor<f32>) -> Self {
         Self::Floats(array.clone())
     }
 }
 
-impl From<Array<i64>> for Input {
-    fn from(array: Array<i64>) -> Self {
+impl From<Tensor<i64>> for NetworkInput {
+    fn from(array: Tensor<i64>) -> Self {
         Self::Ints(array)
     }
 }
@@ -89,7 +88,7 @@ impl From<Array<i64>> for Input {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Outputs {
     model: String,
-    arrays: BTreeMap<String, Array<f32>>,
+    arrays: BTreeMap<String, Tensor<f32>>,
 }
 
 impl Outputs {
@@ -97,7 +96,7 @@ impl Outputs {
     ///
     /// # Errors
     /// If there is none of that name.
-    pub(crate) fn take(&mut self, name: &str) -> Result<Array<f32>, ModelError> {
+    pub(crate) fn take(&mut self, name: &str) -> Result<Tensor<f32>, ModelError> {
         self.arrays.remove(name).ok_or_else(|| ModelError::NoOutput { model: self.model.clone(), output: name.into() })
     }
 }
@@ -107,7 +106,7 @@ type Reopen = Box<dyn Fn() -> Result<Session, ModelError> + Send + Sync>;
 
 /// A network that is ready to run.
 pub(crate) struct Network {
-    place: Arc<Mutex<Place>>,
+    place: Arc<Mutex<CachedSession>>,
     name: String,
     /// What opens its file again, if it has one; without, it stays open.
     reopen: Option<Reopen>,
@@ -116,7 +115,7 @@ pub(crate) struct Network {
 impl Network {
     /// Of a session, with the file name for messages.
     pub(super) fn new(session: Session, name: &str) -> Self {
-        Self { place: Place::of(session), name: name.into(), reopen: None }
+        Self { place: CachedSession::of(session), name: name.into(), reopen: None }
     }
 
     /// The same, known to lie in a file that `reopen` opens: it may be closed where memory is short.
@@ -129,7 +128,7 @@ impl Network {
     ///
     /// # Errors
     /// If the engine fails, an input is missing or of another shape, or an output is not finite.
-    pub(crate) fn run(&mut self, inputs: Vec<(&'static str, Input)>) -> Result<Outputs, ModelError> {
+    pub(crate) fn run(&mut self, inputs: Vec<(&'static str, NetworkInput)>) -> Result<Outputs, ModelError> {
         let name = self.name.clone();
         // A panic while it ran leaves a session that runs again.
         let mut place = self.place.lock().unwrap_or_else(PoisonError::into_inner);
@@ -144,8 +143,8 @@ impl Network {
         let mut given: Vec<(&'static str, SessionInputValue<'_>)> = Vec::with_capacity(inputs.len());
         for (input, value) in inputs {
             let value: SessionInputValue<'_> = match value {
-                Input::Floats(a) => tensor(a).map_err(failed)?,
-                Input::Ints(a) => tensor(a).map_err(failed)?,
+                NetworkInput::Floats(a) => tensor(a).map_err(failed)?,
+                NetworkInput::Ints(a) => tensor(a).map_err(failed)?,
             };
             given.push((input, value));
         }
@@ -170,7 +169,7 @@ impl Network {
                 return Err(ModelError::NotFinite { model: name.clone(), index, value: values[index] });
             }
             let shape = shape.iter().map(|n| usize::try_from(*n).unwrap_or(0)).collect();
-            arrays.insert(output.to_owned(), Array { shape, values: values.to_vec() });
+            arrays.insert(output.to_owned(), Tensor { shape, values: values.to_vec() });
         }
         Ok(Outputs { model: name.clone(), arrays })
     }
@@ -181,7 +180,7 @@ impl Network {
     /// As [`Self::run`]; and if rows are of another length, or have no direction.
     pub(crate) fn unit_rows(
         &mut self,
-        inputs: Vec<(&'static str, Input)>,
+        inputs: Vec<(&'static str, NetworkInput)>,
         output: &str,
         length: usize,
     ) -> Result<Vec<Vec<f32>>, ModelError> {
@@ -194,12 +193,12 @@ impl Network {
     }
 }
 
-fn tensor<T>(array: Array<T>) -> ort::Result<SessionInputValue<'static>>
+fn tensor<T>(array: Tensor<T>) -> ort::Result<SessionInputValue<'static>>
 where
     T: ort::value::PrimitiveTensorElementType + std::fmt::Debug + Clone + 'static,
 {
     let shape: Vec<i64> = array.shape.iter().map(|n| *n as i64).collect();
-    Ok(SessionInputValue::from(Tensor::from_array((shape, array.values))?))
+    Ok(SessionInputValue::from(ort::value::Tensor::from_array((shape, array.values))?))
 }
 
 /// What an engine makes of a model; a panic in it is an error as any other.
@@ -234,9 +233,9 @@ mod tests {
 
     #[test]
     fn arrays_join_and_part_along_their_first_axis() {
-        let (a, b) = (Array::new(&[1, 2], vec![1.0, 2.0]), Array::new(&[2, 2], vec![3.0, 4.0, 5.0, 6.0]));
-        let both = Array::joined([&a, &b]);
-        assert_eq!((both.shape.as_slice(), both.row(2)), ([3, 2].as_slice(), Array::new(&[1, 2], vec![5.0, 6.0])));
-        assert_eq!(Array::<f32>::joined([]).values.len(), 0);
+        let (a, b) = (Tensor::new(&[1, 2], vec![1.0, 2.0]), Tensor::new(&[2, 2], vec![3.0, 4.0, 5.0, 6.0]));
+        let both = Tensor::joined([&a, &b]);
+        assert_eq!((both.shape.as_slice(), both.row(2)), ([3, 2].as_slice(), Tensor::new(&[1, 2], vec![5.0, 6.0])));
+        assert_eq!(Tensor::<f32>::joined([]).values.len(), 0);
     }
 }

@@ -1,13 +1,13 @@
 //! Pictures as networks take them: resized as Pillow does, which the networks were trained with,
 //! then normalized.
 
-use super::network::Array;
+use super::network::Tensor;
 use crate::math::resize::{Filter, resize};
 use crate::scene::PhotoPixels;
 
 /// What of a picture becomes the side of the network's square.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
+pub enum FitSide {
     /// The shorter; the rest is cut off around the middle.
     Shorter,
     /// The longer; zeros fill up to the right and below, after normalizing.
@@ -24,7 +24,7 @@ pub struct Prepare {
     /// How pixels are mixed.
     pub filter: Filter,
     /// What is fitted.
-    pub side: Side,
+    pub side: FitSide,
     /// Subtracted from colors in 0..1.
     pub mean: [f32; 3],
     /// Divides what is left.
@@ -33,7 +33,7 @@ pub struct Prepare {
 
 impl Prepare {
     /// A picture as `[1, 3, S, S]`; `None` for one without pixels.
-    pub fn picture(&self, picture: &PhotoPixels) -> Option<Array> {
+    pub fn picture(&self, picture: &PhotoPixels) -> Option<Tensor> {
         let (w, h) = (picture.width_px as usize, picture.height_px as usize);
         let (to_w, to_h) = self.resized(w, h)?;
         let resized = resize(&picture.rgb, (w, h), (to_w, to_h), self.filter);
@@ -43,7 +43,7 @@ impl Prepare {
         let s = self.side_px;
         // Where the square's first pixel is in what was resized; halves are rounded to even.
         let offset = |n: usize| ((n as f64 - s as f64) / 2.0).round_ties_even() as i64;
-        let (left, top) = if self.side == Side::Shorter { (offset(to_w), offset(to_h)) } else { (0, 0) };
+        let (left, top) = if self.side == FitSide::Shorter { (offset(to_w), offset(to_h)) } else { (0, 0) };
         let mut values = vec![0.0; 3 * s * s];
         for y in 0..s {
             for x in 0..s {
@@ -59,7 +59,7 @@ impl Prepare {
                 }
             }
         }
-        Some(Array::new(&[1, 3, s, s], values))
+        Some(Tensor::new(&[1, 3, s, s], values))
     }
 
     /// The size to which a picture is resized.
@@ -69,12 +69,12 @@ impl Prepare {
         }
         let s = self.side_px;
         Some(match self.side {
-            Side::Both => (s, s),
+            FitSide::Both => (s, s),
             // The official code truncates here, ...
-            Side::Shorter if w <= h => (s, (s * h / w).max(1)),
-            Side::Shorter => ((s * w / h).max(1), s),
+            FitSide::Shorter if w <= h => (s, (s * h / w).max(1)),
+            FitSide::Shorter => ((s * w / h).max(1), s),
             // ... and rounds there.
-            Side::Longer => {
+            FitSide::Longer => {
                 let scale = s as f64 / w.max(h) as f64;
                 ((w as f64 * scale + 0.5) as usize, (h as f64 * scale + 0.5) as usize)
             }
@@ -84,8 +84,8 @@ impl Prepare {
 
 /// A network's plane of logits, `low` px a side, at the size of the picture that lies in its square
 /// of `square` px as `side` says: as the official code enlarges it.
-pub fn enlarge(plane: &[f32], low: usize, square: usize, side: Side, to: (usize, usize)) -> Vec<f32> {
-    if side != Side::Longer {
+pub fn enlarge(plane: &[f32], low: usize, square: usize, side: FitSide, to: (usize, usize)) -> Vec<f32> {
+    if side != FitSide::Longer {
         return resize(plane, (low, low), to, Filter::Linear);
     }
     // The rest of the square is empty.
@@ -105,8 +105,8 @@ mod tests {
     fn a_wide_picture_uses_the_upper_part_of_the_square() {
         // 8 x 4 px in a square of 8: the lower half of the logits is of nothing.
         let plane: Vec<f32> = (0..16).map(|i| if i / 4 < 2 { 1.0 } else { -9.0 }).collect();
-        let out = enlarge(&plane, 4, 8, Side::Longer, (8, 4));
+        let out = enlarge(&plane, 4, 8, FitSide::Longer, (8, 4));
         assert!(out[..24].iter().all(|v| *v == 1.0), "{out:?}");
-        assert!(enlarge(&plane, 4, 8, Side::Both, (8, 4))[24..].iter().all(|v| *v == -9.0));
+        assert!(enlarge(&plane, 4, 8, FitSide::Both, (8, 4))[24..].iter().all(|v| *v == -9.0));
     }
 }

@@ -15,24 +15,24 @@ const PER_FILE_BYTE: u64 = 4;
 const SPARE: u64 = 512 << 20;
 
 /// An open network, or the place of one that was closed.
-pub(super) struct Place {
+pub(super) struct CachedSession {
     /// `None` while it is closed.
     pub(crate) session: Option<Session>,
     /// When it was last asked.
     pub(crate) used: Instant,
 }
 
-impl Place {
+impl CachedSession {
     /// The place of a network that was opened just now.
     pub(crate) fn of(session: Session) -> Arc<Mutex<Self>> {
         Arc::new(Mutex::new(Self { session: Some(session), used: Instant::now() }))
     }
 }
 
-static PLACES: Mutex<Vec<Weak<Mutex<Place>>>> = Mutex::new(Vec::new());
+static PLACES: Mutex<Vec<Weak<Mutex<CachedSession>>>> = Mutex::new(Vec::new());
 
 /// Makes a network known that can be opened again.
-pub(super) fn register(place: &Arc<Mutex<Place>>) {
+pub(super) fn register(place: &Arc<Mutex<CachedSession>>) {
     if let Ok(mut places) = PLACES.lock() {
         places.retain(|p| p.strong_count() > 0);
         places.push(Arc::downgrade(place));
@@ -49,7 +49,7 @@ pub(super) fn make(bytes: u64) -> usize {
 /// Closes networks, the one that was idle longest first, until there is room or none is left.
 fn close_until(there_is_room: impl Fn() -> bool) -> usize {
     let Ok(places) = PLACES.lock() else { return 0 };
-    let mut idle: Vec<(Instant, Arc<Mutex<Place>>)> = Vec::new();
+    let mut idle: Vec<(Instant, Arc<Mutex<CachedSession>>)> = Vec::new();
     for place in places.iter().filter_map(Weak::upgrade) {
         // One that cannot be locked is at work.
         let used = place.try_lock().ok().filter(|p| p.session.is_some()).map(|p| p.used);

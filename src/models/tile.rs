@@ -1,10 +1,10 @@
 //! Cutting a tile: the same arithmetic as `tools/encoder/tiles.py`, held equal by a test.
 
-use super::Tile;
+use super::IdentityCrop;
 use crate::math::resize::{Filter, resize};
 use crate::scene::Mask;
 
-impl Tile {
+impl IdentityCrop {
     /// The region of a picture on black: its bounding box, padded to a square, resized. `None` for
     /// an empty mask, and for a picture that does not have the mask's size.
     pub(crate) fn cut(rgb: &[[f32; 3]], mask: &Mask, side_px: usize) -> Option<Self> {
@@ -34,7 +34,7 @@ mod tests {
     fn the_masked_box_is_centered_on_black() {
         let rgb: Vec<[f32; 3]> = (0..200).map(|i| [i as f32 / 200.0, 0.5, 1.0]).collect();
         let inside = |i: usize| (3..11).contains(&(i % 20)) && (2..6).contains(&(i / 20)) && i != 2 * 20 + 3;
-        let tile = Tile::cut(&rgb, &Mask::from_fn(20, 10, inside), 8).expect("not empty");
+        let tile = IdentityCrop::cut(&rgb, &Mask::from_fn(20, 10, inside), 8).expect("not empty");
         // 8 x 4 px from row 2 on, centered in 8 x 8: row 2 again.
         for i in 0..64_usize {
             let (x, y) = (i % 8, i / 8);
@@ -48,7 +48,7 @@ mod tests {
     fn flat_color_keeps_its_value_at_any_size() {
         let rgb = vec![[0.25, 0.5, 0.75]; 37 * 37];
         for side_px in [1, 5, 37, 64] {
-            let tile = Tile::cut(&rgb, &Mask::from_fn(37, 37, |_| true), side_px).expect("not empty");
+            let tile = IdentityCrop::cut(&rgb, &Mask::from_fn(37, 37, |_| true), side_px).expect("not empty");
             assert_eq!(tile.rgb.len(), side_px * side_px);
             let off = |p: &[f32; 3]| (p[0] - 0.25).abs().max((p[2] - 0.75).abs());
             assert!(tile.rgb.iter().all(|p| off(p) < 1e-6), "{side_px}");
@@ -57,10 +57,10 @@ mod tests {
 
     #[test]
     fn nothing_gives_nothing() {
-        assert_eq!(Tile::cut(&[[0.0; 3]; 12], &Mask::empty(4, 3), 8), None);
-        assert_eq!(Tile::cut(&[[0.0; 3]; 11], &Mask::from_fn(4, 3, |_| true), 8), None);
-        assert_eq!(Tile::cut(&[[0.0; 3]; 12], &Mask::from_fn(4, 3, |_| true), 0), None);
-        let one = Tile::cut(&[[0.5; 3]; 12], &Mask::from_fn(4, 3, |i| i == 11), 4).expect("one pixel");
+        assert_eq!(IdentityCrop::cut(&[[0.0; 3]; 12], &Mask::empty(4, 3), 8), None);
+        assert_eq!(IdentityCrop::cut(&[[0.0; 3]; 11], &Mask::from_fn(4, 3, |_| true), 8), None);
+        assert_eq!(IdentityCrop::cut(&[[0.0; 3]; 12], &Mask::from_fn(4, 3, |_| true), 0), None);
+        let one = IdentityCrop::cut(&[[0.5; 3]; 12], &Mask::from_fn(4, 3, |i| i == 11), 4).expect("one pixel");
         assert!(one.rgb.iter().all(|p| *p == [0.5; 3]));
     }
 }

@@ -2,10 +2,10 @@
 
 use glam::DVec3;
 
-use super::flight::{Flight, Speed};
+use super::flight::{CameraTrajectory, Speed};
 use super::navigator::{Navigator, NoRoute};
 use super::pose::Pose;
-use super::target::{Search, Target, View, Wish};
+use super::target::{Search, TargetGaussians, TargetView, ViewPreference};
 use crate::render::{RenderError, RenderSettings};
 use crate::scene::{Bounds, GaussianCloud, IdentityId, SemanticMap};
 
@@ -14,7 +14,7 @@ const LEAST_VISIBLE: f64 = 0.05;
 
 /// A scene with what is known of it.
 #[derive(Clone, Copy)]
-pub(crate) struct Place<'a> {
+pub(crate) struct SceneRef<'a> {
     pub(crate) cloud: &'a GaussianCloud,
     /// How they are drawn.
     pub(crate) settings: &'a RenderSettings,
@@ -25,10 +25,10 @@ pub(crate) struct Place<'a> {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Approach {
     /// The view at its end.
-    pub(crate) view: View,
+    pub(crate) view: TargetView,
     /// The middle of the target.
     pub(crate) target: DVec3,
-    pub(crate) flight: Flight,
+    pub(crate) flight: CameraTrajectory,
 }
 
 /// Why a target cannot be visited.
@@ -53,7 +53,7 @@ pub(crate) enum ApproachError {
 }
 
 /// The Gaussians of an identity as a target; `None` if it has none.
-pub(crate) fn target(place: Place<'_>, id: IdentityId) -> Option<(Target, Bounds)> {
+pub(crate) fn target(place: SceneRef<'_>, id: IdentityId) -> Option<(TargetGaussians, Bounds)> {
     let bounds = |id: IdentityId| {
         let members = place.map.members(id);
         let inside = members.iter().filter(|i| **i < place.cloud.len());
@@ -63,7 +63,7 @@ pub(crate) fn target(place: Place<'_>, id: IdentityId) -> Option<(Target, Bounds
     let (members, own) = bounds(id)?;
     let object = place.map.identities.object_of(id);
     let whole = (object != id).then(|| bounds(object)).flatten().map(|(_, b)| b.center());
-    Some((Target { members, whole }, own))
+    Some((TargetGaussians { members, whole }, own))
 }
 
 impl Navigator {
@@ -73,9 +73,9 @@ impl Navigator {
     /// If it cannot be seen or reached.
     pub(crate) fn visit(
         &self,
-        place: Place<'_>,
+        place: SceneRef<'_>,
         id: IdentityId,
-        wish: Wish,
+        preference: ViewPreference,
         eye: &Pose,
         aspect: f64,
         frames: usize,
@@ -90,8 +90,8 @@ impl Navigator {
             clearance: self.clearance,
         };
         let center = bounds.center();
-        let views = search.views(&target, wish, eye, aspect)?;
-        let seen: Vec<View> = views.into_iter().filter(|v| v.visible >= LEAST_VISIBLE).collect();
+        let views = search.views(&target, preference, eye, aspect)?;
+        let seen: Vec<TargetView> = views.into_iter().filter(|v| v.visible >= LEAST_VISIBLE).collect();
         let mut first = None;
         for view in seen {
             match self.fly(eye, &view.pose, Some(center), frames, Speed::Eased) {
@@ -106,7 +106,7 @@ impl Navigator {
                 let pose = Pose::looking_at(at, center, self.up, eye.fov_y_rad, &eye.world_from_camera);
                 let flight = self.fly(eye, &pose, Some(center), frames, Speed::Eased).ok();
                 let clearance = self.occupancy.clearance(at);
-                let view = View { pose, visible: 0.0, covers: 0.0, clearance, score: 0.0 };
+                let view = TargetView { pose, visible: 0.0, covers: 0.0, clearance, score: 0.0 };
                 flight.map(|flight| Box::new(Approach { view, target: center, flight }))
             }
             _ => None,

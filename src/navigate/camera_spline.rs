@@ -3,7 +3,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::flight::{Flight, Speed};
+use super::flight::{CameraTrajectory, Speed};
 use super::pose::{Pose, RotationSpline, between, quaternion};
 use crate::scene::{CameraPath, PathKey};
 
@@ -104,11 +104,11 @@ impl CameraSpline {
     }
 
     /// Its poses at even times, as a flight.
-    pub(crate) fn flight(&self, frames: usize) -> Flight {
+    pub(crate) fn flight(&self, frames: usize) -> CameraTrajectory {
         let last = frames.max(2) - 1;
         let poses: Vec<Pose> = (0..=last).map(|i| self.at(self.seconds * i as f64 / last as f64)).collect();
         let length = poses.windows(2).map(|w| w[0].center.distance(w[1].center)).sum();
-        Flight { poses, seconds: self.seconds, length, sharp: 0, repaired: 0 }
+        CameraTrajectory { poses, seconds: self.seconds, length, sharp: 0, repaired: 0 }
     }
 }
 

@@ -35,7 +35,7 @@ impl Speed {
 
 /// A flight, picture by picture.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Flight {
+pub struct CameraTrajectory {
     /// At even times.
     pub poses: Vec<Pose>,
     /// How long it takes.
@@ -65,7 +65,7 @@ pub(crate) struct Smoothness {
     pub(crate) rotation_error: f64,
 }
 
-impl Flight {
+impl CameraTrajectory {
     /// The flight as a path with a key per pose.
     pub(crate) fn camera_path(&self) -> CameraPath {
         let last = (self.poses.len() - 1).max(1) as f64;
@@ -194,7 +194,7 @@ mod tests {
     fn a_flight_begins_and_ends_where_it_should() {
         let (a, b) = (pose(DVec3::ZERO, DMat3::IDENTITY), pose(DVec3::X * 2.0, DMat3::from_rotation_y(1.5)));
         let legs = [a.center, DVec3::new(1.0, 1.0, 0.0), b.center];
-        let flight = Flight::new(&legs, [&a, &b], None, None, FRAMES, Speed::Eased).expect("a flight");
+        let flight = CameraTrajectory::new(&legs, [&a, &b], None, None, FRAMES, Speed::Eased).expect("a flight");
         assert_eq!(flight.poses.len(), FRAMES);
         let ends = [&flight.poses[0], &flight.poses[FRAMES - 1]];
         for (end, wanted) in ends.into_iter().zip([&a, &b]) {
@@ -213,7 +213,8 @@ mod tests {
         let (a, b) = (pose(DVec3::ZERO, DMat3::from_rotation_y(2.5)), pose(DVec3::X * 2.0, DMat3::IDENTITY));
         let target = DVec3::new(1.0, 0.0, 3.0);
         let look = Some((target, DVec3::NEG_Y));
-        let flight = Flight::new(&[a.center, b.center], [&a, &b], look, None, 101, Speed::Constant).expect("a flight");
+        let flight =
+            CameraTrajectory::new(&[a.center, b.center], [&a, &b], look, None, 101, Speed::Constant).expect("a flight");
         let p = &flight.poses[40];
         assert!(p.forward().angle_between(target - p.center) < 1e-6);
     }
@@ -225,37 +226,38 @@ mod tests {
             pose(DVec3::new(1.0, 5.0, 0.0), DMat3::IDENTITY),
             pose(DVec3::X * 2.0, DMat3::from_rotation_z(2.5)),
         ];
-        let flight = Flight::of_paper(&keys, 151).expect("a flight");
+        let flight = CameraTrajectory::of_paper(&keys, 151).expect("a flight");
         assert!(flight.poses.iter().all(|p| p.center.y == 0.0), "the keypoint in between is passed by");
         assert!(rotation_error(&flight.poses[75].world_from_camera) > 0.5);
-        assert!(Flight::of_paper(&[], 150).is_none());
+        assert!(CameraTrajectory::of_paper(&[], 150).is_none());
         // From keypoint to keypoint it passes the one in between, and turns on the second step only.
-        let through = Flight::of_paper_through(&keys, 151).expect("a flight");
+        let through = CameraTrajectory::of_paper_through(&keys, 151).expect("a flight");
         assert!(through.poses[75].center.distance(keys[1].center) < 1e-12);
         assert!(through.poses[50].center.distance(DVec3::new(2.0, 10.0, 0.0) / 3.0) < 1e-12);
         assert!(rotation_error(&through.poses[60].world_from_camera) < 1e-12);
         assert!(rotation_error(&through.poses[112].world_from_camera) > 0.5);
         let ends = [&through.poses[0], &through.poses[150]].map(|p| p.center);
         assert!(ends == [keys[0].center, keys[2].center] && (through.length - 2.0 * 26.0_f64.sqrt()).abs() < 1e-12);
-        assert!(Flight::of_paper_through(&[], 150).is_none());
-        let still = Flight::of_paper_through(&keys[..1], 3).expect("it stays");
+        assert!(CameraTrajectory::of_paper_through(&[], 150).is_none());
+        let still = CameraTrajectory::of_paper_through(&keys[..1], 3).expect("it stays");
         assert!(still.length == 0.0 && still.poses.iter().all(|p| *p == keys[0]));
     }
 
     #[test]
     fn degenerate_flights_are_defined() {
         let a = pose(DVec3::ONE, DMat3::IDENTITY);
-        let still = Flight::new(&[a.center], [&a, &a], None, None, 150, Speed::Eased).expect("it stays");
+        let still = CameraTrajectory::new(&[a.center], [&a, &a], None, None, 150, Speed::Eased).expect("it stays");
         assert!(still.length == 0.0 && still.poses.iter().all(|p| p.center == a.center));
         let b = pose(DVec3::ONE, DMat3::from_rotation_y(std::f64::consts::PI));
         let look = Some((DVec3::ONE, DVec3::Z));
-        let turn = Flight::new(&[a.center, a.center], [&a, &b], look, None, 150, Speed::Constant).expect("it turns");
+        let turn =
+            CameraTrajectory::new(&[a.center, a.center], [&a, &b], look, None, 150, Speed::Constant).expect("it turns");
         assert!(turn.poses.windows(2).all(|w| angle(&w[0].world_from_camera, &w[1].world_from_camera) < 0.03));
         let long: Vec<DVec3> = (0..10_000).map(|i| DVec3::new(f64::from(i), f64::from(i % 7), 0.0)).collect();
         let end = pose(long[9_999], DMat3::IDENTITY);
         let start = pose(long[0], DMat3::IDENTITY);
-        let flight = Flight::new(&long, [&start, &end], None, None, 150, Speed::Eased).expect("long");
+        let flight = CameraTrajectory::new(&long, [&start, &end], None, None, 150, Speed::Eased).expect("long");
         assert!(flight.poses.iter().all(|p| p.center.is_finite()));
-        assert!(Flight::new(&[], [&a, &b], None, None, 150, Speed::Eased).is_none());
+        assert!(CameraTrajectory::new(&[], [&a, &b], None, None, 150, Speed::Eased).is_none());
     }
 }

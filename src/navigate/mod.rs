@@ -17,12 +17,13 @@ pub mod keypoints;
 pub(crate) mod navigator;
 pub(crate) mod occupancy;
 pub(crate) mod pose;
+mod preference;
 pub mod target;
 #[cfg(test)]
 pub(crate) mod testing;
 
 pub(crate) use camera_spline::CameraSpline;
-pub use flight::{FRAMES, Flight, Speed};
+pub use flight::{CameraTrajectory, FRAMES, Speed};
 pub use navigator::{Navigator, NoRoute};
 pub use pose::Pose;
 

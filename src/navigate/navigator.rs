@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec3};
 
 use super::curve::shortened;
-use super::flight::{Flight, Speed};
+use super::flight::{CameraTrajectory, Speed};
 use super::graph::{Graph, Route};
 use super::is_place;
 use super::keypoints::{keypoints, spacing};
@@ -190,7 +190,7 @@ impl Navigator {
         look_at: Option<DVec3>,
         frames: usize,
         speed: Speed,
-    ) -> Result<Flight, NoRoute> {
+    ) -> Result<CameraTrajectory, NoRoute> {
         let around = look_at.and_then(|target| self.around(from.center, to.center, target));
         let legs = match around {
             Some(legs) => legs,
@@ -199,7 +199,8 @@ impl Navigator {
         let ends = self.occupancy.clearance(from.center).min(self.occupancy.clearance(to.center));
         let clearance = self.clearance.min(0.99 * ends);
         let look_at = look_at.map(|target| (target, self.up));
-        let flight = Flight::new(&legs, [from, to], look_at, Some((&self.occupancy, clearance)), frames, speed);
+        let flight =
+            CameraTrajectory::new(&legs, [from, to], look_at, Some((&self.occupancy, clearance)), frames, speed);
         flight.ok_or(NoRoute::Inside)
     }
 
@@ -247,7 +248,7 @@ mod tests {
         let ours = flight.smoothness(&n.occupancy, n.clearance);
         assert_eq!(ours.violations, 0, "{ours:?}");
         let keys = [from, to];
-        let paper = Flight::of_paper(&keys, FRAMES).expect("a line").smoothness(&n.occupancy, n.clearance);
+        let paper = CameraTrajectory::of_paper(&keys, FRAMES).expect("a line").smoothness(&n.occupancy, n.clearance);
         assert!(paper.violations > 0, "straight through the wall: {paper:?}");
     }
 

@@ -3,10 +3,12 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
-use strum::{IntoStaticStr, VariantArray};
 
 use super::occupancy::OccupancyGrid;
 use super::pose::Pose;
+pub use super::preference::Side;
+pub(crate) use super::preference::ViewPreference;
+use super::preference::{fit, wanted};
 use crate::render::{Features, RenderError, RenderSettings, Renderer};
 use crate::scene::{Bounds, Camera, GaussianCloud};
 
@@ -25,59 +27,9 @@ const DRAWN_PX: u32 = 128;
 /// Angle to the nearest photo at which a view is trusted half as much, radians.
 const PHOTO_ANGLE: f64 = 0.6;
 
-/// From which side.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, clap::ValueEnum, IntoStaticStr, VariantArray)]
-pub enum Side {
-    /// Whichever shows it best
-    #[default]
-    #[strum(serialize = "where it is seen best")]
-    Best,
-    /// As it is seen now
-    #[strum(serialize = "from this side")]
-    Same,
-    /// The opposite
-    #[strum(serialize = "from the other side")]
-    Other,
-    /// Its front: away from what it is a part of, or where most photos were taken
-    #[strum(serialize = "from its front")]
-    Front,
-    /// Its left, seen from the start
-    #[strum(serialize = "from its left")]
-    Left,
-    /// Its right, seen from the start
-    #[strum(serialize = "from its right")]
-    Right,
-    /// From above
-    #[strum(serialize = "from above")]
-    Above,
-    /// From below
-    #[strum(serialize = "from below")]
-    Below,
-}
-
-impl Side {
-    pub(crate) fn text(self) -> &'static str {
-        self.into()
-    }
-}
-
-/// What is wanted of a view.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Wish {
-    pub(crate) side: Side,
-    /// Distance as a multiple of the usual one; under 1 is nearer.
-    pub(crate) distance: f64,
-}
-
-impl Default for Wish {
-    fn default() -> Self {
-        Self { side: Side::Best, distance: 1.0 }
-    }
-}
-
 /// What is to be seen.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Target {
+pub(crate) struct TargetGaussians {
     /// Gaussians of it by number, rising.
     pub(crate) members: Vec<usize>,
     /// The middle of what it is a part of, if it is one.
@@ -86,7 +38,7 @@ pub(crate) struct Target {
 
 /// A view of a target.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct View {
+pub(crate) struct TargetView {
     pub(crate) pose: Pose,
     /// Share of its picture alone that is still seen in the scene, 0 to 1.
     pub(crate) visible: f64,
@@ -119,7 +71,13 @@ impl Search<'_> {
     ///
     /// # Errors
     /// If a view cannot be drawn.
-    pub(crate) fn views(&self, target: &Target, wish: Wish, eye: &Pose, aspect: f64) -> Result<Vec<View>, RenderError> {
+    pub(crate) fn views(
+        &self,
+        target: &TargetGaussians,
+        preference: ViewPreference,
+        eye: &Pose,
+        aspect: f64,
+    ) -> Result<Vec<TargetView>, RenderError> {
         let place = |i: &usize| self.cloud.world_position(*i);
         let inside = target.members.iter().filter(|i| **i < self.cloud.len());
         let Some(bounds) = Bounds::robust(inside.clone().map(place)) else { return Ok(Vec::new()) };
@@ -135,8 +93,8 @@ impl Search<'_> {
         let least = self.clearance + 0.5 * self.occupancy.voxel();
         let now = (eye.center - center).try_normalize().unwrap_or(-eye.forward());
         let front = self.front(target, center);
-        let wanted = wanted(wish.side, now, front, self.up);
-        let distance = usual * wish.distance.clamp(0.05, 50.0);
+        let wanted = wanted(preference.side, now, front, self.up);
+        let distance = usual * preference.distance.clamp(0.05, 50.0);
         let directions = directions(DIRECTIONS).chain(wanted).chain([now]);
         let mut rough: Vec<(f64, DVec3)> = directions
             .collect::<Vec<_>>()
@@ -144,7 +102,7 @@ impl Search<'_> {
             .flat_map_iter(|d| DISTANCES.iter().map(move |k| (d, (k * distance).max(least))))
             .filter_map(|(direction, distance)| {
                 let at = center + direction * distance;
-                let fits = fit(wish.side, wanted, now, direction)?;
+                let fits = fit(preference.side, wanted, now, direction)?;
                 let clearance = self.occupancy.clearance(at);
                 if clearance < self.clearance {
                     return None;
@@ -152,7 +110,7 @@ impl Search<'_> {
                 let skip = 1.5 * self.occupancy.voxel();
                 let light = |p: &DVec3| self.occupancy.transmittance(at, *p, skip);
                 let visible = points.iter().map(light).sum::<f64>() / points.len() as f64;
-                let size = usual * wish.distance / distance;
+                let size = usual * preference.distance / distance;
                 let size = size.min(1.0 / size);
                 let facing = front.map_or(0.5, |f| 0.5 + 0.5 * f.dot(direction));
                 let room = (clearance / (4.0 * self.clearance.max(1e-9))).min(1.0);
@@ -179,14 +137,14 @@ impl Search<'_> {
             let (visible, covers) = drawing.look(&pose.camera(width, height))?;
             // What the grid is too coarse for, the picture knows.
             let score = score * (0.05 + visible);
-            views.push(View { pose, visible, covers, clearance: self.occupancy.clearance(at), score });
+            views.push(TargetView { pose, visible, covers, clearance: self.occupancy.clearance(at), score });
         }
         views.sort_by(|a, b| b.score.total_cmp(&a.score));
         Ok(views)
     }
 
     /// The direction in which a target faces.
-    fn front(&self, target: &Target, center: DVec3) -> Option<DVec3> {
+    fn front(&self, target: &TargetGaussians, center: DVec3) -> Option<DVec3> {
         if let Some(outwards) = target.whole.and_then(|whole| (center - whole).try_normalize()) {
             return Some(outwards);
         }
@@ -224,41 +182,6 @@ fn spread_out(rough: &[(f64, DVec3)], center: DVec3) -> Vec<(f64, DVec3)> {
     chosen
 }
 
-/// The direction from the target in which the eye is wanted.
-fn wanted(side: Side, now: DVec3, front: Option<DVec3>, up: DVec3) -> Option<DVec3> {
-    let flat = (now - up * now.dot(up)).try_normalize();
-    let flat = flat.unwrap_or_else(|| up.any_orthonormal_vector());
-    let height = now.dot(up);
-    let level = |d: DVec3| (d * (1.0 - height * height).max(0.0).sqrt() + up * height).try_normalize();
-    match side {
-        Side::Best => None,
-        Side::Same => Some(now),
-        Side::Other => level(-flat),
-        Side::Front => front.or(Some(now)),
-        // Seen from the eye, the target's left side is where the eye's left hand points.
-        Side::Left => level(flat.cross(up)),
-        Side::Right => level(up.cross(flat)),
-        Side::Above => (up * 2.0 + flat).try_normalize(),
-        Side::Below => (-up * 2.0 + flat).try_normalize(),
-    }
-}
-
-/// How well a direction fits the wish, 0 to 1; `None` if it is not that side at all.
-fn fit(side: Side, wanted: Option<DVec3>, now: DVec3, direction: DVec3) -> Option<f64> {
-    match wanted {
-        // A little for staying near: a view that is as good from here is better from here.
-        None => Some(0.9 + 0.1 * now.dot(direction)),
-        Some(wanted) => {
-            let cosine = wanted.dot(direction);
-            let least = match side {
-                Side::Same => 0.85,
-                _ => 0.5,
-            };
-            (cosine >= least).then(|| cosine.powi(4))
-        }
-    }
-}
-
 /// Directions evenly spread over the sphere (Fibonacci's).
 fn directions(n: usize) -> impl Iterator<Item = DVec3> {
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
@@ -281,7 +204,7 @@ struct Drawing<'a> {
 }
 
 impl<'a> Drawing<'a> {
-    fn new(search: &Search<'a>, target: &Target) -> Self {
+    fn new(search: &Search<'a>, target: &TargetGaussians) -> Self {
         let mut inside = vec![0.0; search.cloud.len()];
         let members: Vec<usize> = target.members.iter().copied().filter(|i| *i < inside.len()).collect();
         members.iter().for_each(|i| inside[*i] = 1.0);
@@ -309,7 +232,7 @@ mod tests {
     use glam::DMat3;
 
     /// A ball of Gaussians behind a wall, seen from its side of the wall only.
-    fn scene() -> (GaussianCloud, Target, Vec<Camera>) {
+    fn scene() -> (GaussianCloud, TargetGaussians, Vec<Camera>) {
         let mut ball = GaussianCloud::default();
         for d in directions(120) {
             ball.positions.push((d * 0.2 + DVec3::Z * 1.0).to_array().map(|v| v as f32));
@@ -323,12 +246,12 @@ mod tests {
         let cameras = [[0.0, 0.0, 3.0], [1.5, 0.0, 2.0], [-1.5, 0.3, 2.0], [0.0, 0.0, -2.0]];
         (
             joined(&wall, &ball),
-            Target { members, whole: None },
+            TargetGaussians { members, whole: None },
             cameras.map(|c| camera_at(DVec3::from_array(c))).to_vec(),
         )
     }
 
-    fn best(wish: Wish, from: DVec3) -> View {
+    fn best(preference: ViewPreference, from: DVec3) -> TargetView {
         let (cloud, target, cameras) = scene();
         let eyes: Vec<DVec3> = cameras.iter().map(|c| c.center).collect();
         let occupancy = OccupancyGrid::of(&cloud, &eyes, 0.05);
@@ -342,12 +265,12 @@ mod tests {
             clearance: 0.05,
         };
         let eye = Pose::looking_at(from, DVec3::Z, DVec3::NEG_Y, 0.8, &DMat3::IDENTITY);
-        *search.views(&target, wish, &eye, 4.0 / 3.0).expect("drawn").first().expect("a view")
+        *search.views(&target, preference, &eye, 4.0 / 3.0).expect("drawn").first().expect("a view")
     }
 
     #[test]
     fn the_target_is_seen_from_its_side_of_the_wall() {
-        let view = best(Wish::default(), DVec3::new(0.0, 0.0, -2.0));
+        let view = best(ViewPreference::default(), DVec3::new(0.0, 0.0, -2.0));
         assert!(view.visible > 0.8, "{view:?}");
         assert!(view.pose.center.z > 0.1, "beyond the wall: {view:?}");
         assert!(view.pose.forward().angle_between(DVec3::Z - view.pose.center) < 0.1);
@@ -357,7 +280,8 @@ mod tests {
     #[test]
     fn sides_and_distances_are_as_wished() {
         let eye = DVec3::new(0.0, 0.0, 3.0);
-        let side = |side: Side| (best(Wish { side, distance: 1.0 }, eye).pose.center - DVec3::Z).normalize_or_zero();
+        let side =
+            |side: Side| (best(ViewPreference { side, distance: 1.0 }, eye).pose.center - DVec3::Z).normalize_or_zero();
         assert!(side(Side::Same).z > 0.8);
         assert!(side(Side::Above).y < -0.5, "{}", side(Side::Above));
         // The eye looks along -z with -y upwards: its left is +x... seen from behind the camera.
@@ -365,8 +289,8 @@ mod tests {
         assert!(left.x * right.x < 0.0 && left.x.abs() > 0.5, "{left} {right}");
         let pose = Pose::looking_at(eye, DVec3::Z, DVec3::NEG_Y, 0.8, &DMat3::IDENTITY);
         assert!(left.dot(pose.world_from_camera.x_axis) < -0.5, "left is left in the picture");
-        let far = best(Wish { side: Side::Same, distance: 1.2 }, eye).pose.center.distance(DVec3::Z);
-        let near = best(Wish { side: Side::Same, distance: 0.6 }, eye).pose.center.distance(DVec3::Z);
+        let far = best(ViewPreference { side: Side::Same, distance: 1.2 }, eye).pose.center.distance(DVec3::Z);
+        let near = best(ViewPreference { side: Side::Same, distance: 0.6 }, eye).pose.center.distance(DVec3::Z);
         assert!(far > 1.4 * near, "{far} {near}");
     }
 
@@ -385,7 +309,9 @@ mod tests {
         };
         let eye = Pose::of(&cameras[0]);
         for members in [vec![], vec![usize::MAX]] {
-            let none = search.views(&Target { members, whole: None }, Wish::default(), &eye, 1.0).expect("drawn");
+            let none = search
+                .views(&TargetGaussians { members, whole: None }, ViewPreference::default(), &eye, 1.0)
+                .expect("drawn");
             assert!(none.is_empty());
         }
     }

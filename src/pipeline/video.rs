@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::observer::{Interrupted, Observer, Ticker};
 use super::semantics::view_map::ViewMap;
-use crate::io::video::{Settings, Summary, VideoFileError, VideoWriter};
+use crate::io::video::{VideoFileError, VideoSettings, VideoSummary, VideoWriter};
 
 use crate::render::{DrawError, RenderError, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
@@ -48,9 +48,9 @@ pub(crate) fn write(
     cameras: &[Camera],
     marked: Option<Marked<'_>>,
     renderer: &mut Renderer,
-    out: (&Path, &Settings),
+    out: (&Path, &VideoSettings),
     observer: &mut dyn Observer,
-) -> Result<Summary, VideoError> {
+) -> Result<VideoSummary, VideoError> {
     let mut ticker = Ticker::new("Drawing the video", cameras.len());
     observer.proceed()?;
     let mut writer = VideoWriter::create(out.0, out.1)?;
@@ -58,7 +58,7 @@ pub(crate) fn write(
         let mut pixels = renderer.draw(cloud, camera, draw)?.to_rgb8();
         if let Some(marked) = marked.filter(|m| !m.ids.is_empty()) {
             let Marked { map, ids, .. } = marked;
-            let view = ViewMap::render(renderer, cloud, &map.of, &map.identities, camera, draw)?;
+            let view = ViewMap::render(renderer, cloud, &map.identity_of, &map.identities, camera, draw)?;
             for id in ids {
                 let mask = view.mask(&map.identities, *id);
                 mark(&mut pixels, camera.width_px as usize, |i| mask.contains(i), marked.color);
@@ -115,7 +115,7 @@ mod tests {
         let mut backend = Renderer::new();
         let mut video = |name: &str, observer: &mut dyn Observer| {
             let path = folder.path().join(name);
-            let settings = Settings::new(32, 16, 10.0);
+            let settings = VideoSettings::new(32, 16, 10.0);
             let made =
                 write(&cloud, &RenderSettings::default(), &cameras, None, &mut backend, (&path, &settings), observer);
             (made, path)

@@ -62,7 +62,7 @@ const STAGES: [&str; 4] = ["project", "sort", "bin", "blend"];
 
 /// Seconds of a picture: the part that every Gaussian has at any size, and that of the pixels.
 #[derive(Clone, Copy, Debug)]
-pub struct Cost {
+pub struct FrameCost {
     /// For every Gaussian, whatever the picture's size.
     pub(crate) fixed_secs: f64,
     /// For the pixels.
@@ -73,16 +73,16 @@ pub struct Cost {
 /// the CPU everything else.
 #[derive(Default)]
 pub struct Renderer {
-    cpu: cpu::Renderer<f32>,
+    cpu: cpu::CpuRenderer<f32>,
     gpu: Option<Box<Gpu>>,
 }
 
 /// The renderer with a way back, for training on the CPU.
-pub type DifferentiableRenderer = cpu::Renderer<f32>;
+pub type DifferentiableRenderer = cpu::CpuRenderer<f32>;
 
 /// The GPU renderer and the cloud that it holds.
 struct Gpu {
-    renderer: gpu::Renderer,
+    renderer: gpu::GpuRenderer,
     name: String,
     uploaded: Weak<GaussianCloud>,
     /// Degree of the harmonics that were sent.
@@ -115,10 +115,10 @@ impl Renderer {
 
     /// This GPU, whether real or emulated.
     pub fn on_gpu(device: &Device) -> Result<Self, GpuError> {
-        let renderer = gpu::Renderer::new(device)?;
+        let renderer = gpu::GpuRenderer::new(device)?;
         let name = device.info().name.clone();
         let gpu = Gpu { renderer, name, uploaded: Weak::new(), degree: 0, timed: false };
-        Ok(Self { cpu: cpu::Renderer::new(), gpu: Some(Box::new(gpu)) })
+        Ok(Self { cpu: cpu::CpuRenderer::new(), gpu: Some(Box::new(gpu)) })
     }
 
     /// Whether a GPU draws the pictures.
@@ -196,7 +196,7 @@ impl Renderer {
     /// Gives back working memory that the next picture can make again: on the CPU all of it; a
     /// device keeps its own, which nobody else needs.
     pub fn rest(&mut self) {
-        self.cpu = cpu::Renderer::new();
+        self.cpu = cpu::CpuRenderer::new();
     }
 
     /// Bytes of buffers on the device; 0 on the CPU.
@@ -229,12 +229,12 @@ impl Renderer {
     }
 
     /// What the last picture cost, `secs` in all.
-    pub(crate) fn cost(&self, secs: f64) -> Cost {
+    pub(crate) fn cost(&self, secs: f64) -> FrameCost {
         if self.is_gpu() {
-            return Cost { fixed_secs: 0.0, pixels_secs: secs };
+            return FrameCost { fixed_secs: 0.0, pixels_secs: secs };
         }
         let [project, sort, bin, blend] = self.cpu.stats().stage_secs;
-        Cost { fixed_secs: project + sort, pixels_secs: bin + blend }
+        FrameCost { fixed_secs: project + sort, pixels_secs: bin + blend }
     }
 }
 

@@ -117,11 +117,11 @@ impl Identities {
 
     /// The name of an identity with those of its wholes: "button a of the red controller".
     pub fn full_name(&self, id: IdentityId) -> String {
-        self.line(id).map(|i| self.name(i)).collect::<Vec<_>>().join(" of the ")
+        self.ancestors(id).map(|i| self.name(i)).collect::<Vec<_>>().join(" of the ")
     }
 
-    /// An identity and what it is a piece of, inside out. Ends at an object.
-    pub fn line(&self, id: IdentityId) -> impl Iterator<Item = IdentityId> + '_ {
+    /// An identity and what it is a piece of, inside out: itself first, its object last.
+    pub fn ancestors(&self, id: IdentityId) -> impl Iterator<Item = IdentityId> + '_ {
         let known = |id: IdentityId| self.get(id).map(|_| id);
         // Parents come before their pieces, so numbers fall and the walk ends.
         std::iter::successors(known(id), move |&at| self.get(at).and_then(|i| known(i.parent)).filter(|p| *p < at))
@@ -129,11 +129,11 @@ impl Identities {
 
     /// The object that an identity is, or is a piece of.
     pub(crate) fn object_of(&self, id: IdentityId) -> IdentityId {
-        self.line(id).last().unwrap_or(NOBODY)
+        self.ancestors(id).last().unwrap_or(NOBODY)
     }
 
     /// For each number from 0, whether it is `id` or a piece of it.
-    pub(crate) fn within(&self, id: IdentityId) -> Vec<bool> {
+    pub(crate) fn descendants(&self, id: IdentityId) -> Vec<bool> {
         let mut inside = vec![false; self.list.len() + 1];
         for (i, identity) in self.iter() {
             inside[i as usize] = i == id || inside[identity.parent as usize];
@@ -152,7 +152,7 @@ impl Identities {
     }
 
     /// The direct pieces of an identity.
-    pub(crate) fn pieces(&self, id: IdentityId) -> impl Iterator<Item = IdentityId> + '_ {
+    pub(crate) fn children(&self, id: IdentityId) -> impl Iterator<Item = IdentityId> + '_ {
         self.iter().filter(move |(_, i)| i.parent == id && id != NOBODY).map(|(i, _)| i)
     }
 }
@@ -168,11 +168,11 @@ mod tests {
         let piano = all.add(Level::Object, NOBODY, vec![]);
         let face = all.add(Level::Part, doll, vec!["face".into()]);
         let eye = all.add(Level::Part, face, vec!["eye".into()]);
-        assert_eq!(all.line(eye).collect::<Vec<_>>(), [eye, face, doll]);
+        assert_eq!(all.ancestors(eye).collect::<Vec<_>>(), [eye, face, doll]);
         assert_eq!((all.object_of(eye), all.object_of(piano), all.object_of(99)), (doll, piano, NOBODY));
-        assert_eq!(all.within(doll), [false, true, false, true, true]);
-        assert_eq!(all.within(face), [false, false, false, true, true]);
-        assert_eq!(all.pieces(doll).collect::<Vec<_>>(), [face]);
+        assert_eq!(all.descendants(doll), [false, true, false, true, true]);
+        assert_eq!(all.descendants(face), [false, false, false, true, true]);
+        assert_eq!(all.children(doll).collect::<Vec<_>>(), [face]);
         assert_eq!((all.name(piano), all.name(eye), all.name(0)), ("#2".into(), "eye".into(), "nothing".into()));
         assert_eq!(all.add(Level::Part, 77, vec![]), 5);
         assert_eq!(all.get(5).map(|i| i.parent), Some(NOBODY));
@@ -188,7 +188,7 @@ mod tests {
         let eye = all.add(Level::Part, face, vec!["eye".into()]);
         assert!(!all.is_empty() && all.len() == 3);
         assert_eq!(all.full_name(eye), "eye of the #2 of the red doll");
-        assert_eq!((all.pieces(NOBODY).count(), all.line(NOBODY).count(), all.line(9).count()), (0, 0, 0));
+        assert_eq!((all.children(NOBODY).count(), all.ancestors(NOBODY).count(), all.ancestors(9).count()), (0, 0, 0));
         // An object's own code and none of a part; a part's both.
         all.get_mut(doll).expect("there").code = [0.1; 3];
         all.get_mut(eye).expect("there").code = [0.9; 3];

@@ -14,7 +14,7 @@ pub struct LanguageFeatures {
     /// Numbers per embedding.
     pub dimension: usize,
     /// By identity number less one.
-    pub of: Vec<ViewFeatures>,
+    pub by_identity: Vec<ViewFeatures>,
 }
 
 /// Embeddings of one identity, one per view, unit length.
@@ -30,8 +30,8 @@ impl LanguageFeatures {
     /// Whether the numbers fit together, and fit these identities.
     pub fn is_valid(&self, identities: &Identities) -> bool {
         let good = |v: &Vec<f32>| v.len() == self.dimension && v.iter().all(|x| x.is_finite());
-        self.of.len() == identities.len()
-            && self.of.iter().all(|f| {
+        self.by_identity.len() == identities.len()
+            && self.by_identity.iter().all(|f| {
                 f.raw.len() == f.deviated.len() && f.raw.len() <= MAX_VIEWS && f.raw.iter().chain(&f.deviated).all(good)
             })
     }
@@ -52,18 +52,18 @@ mod tests {
             raw: vec![vec![0.5; dimension]; views],
             deviated: vec![vec![0.5; dimension]; views],
         };
-        let of = |of: Vec<ViewFeatures>| LanguageFeatures { encoder: "t".into(), dimension: 3, of };
+        let of = |of: Vec<ViewFeatures>| LanguageFeatures { encoder: "t".into(), dimension: 3, by_identity: of };
         let good = of(vec![seen(MAX_VIEWS, 3), seen(0, 3)]);
         assert!(good.is_valid(&all));
         assert!(!of(vec![seen(1, 3)]).is_valid(&all), "one is missing");
         assert!(!of(vec![seen(1, 3), seen(1, 2)]).is_valid(&all), "too short");
         assert!(!of(vec![seen(1, 3), seen(MAX_VIEWS + 1, 3)]).is_valid(&all), "too many");
         let mut odd = good.clone();
-        odd.of[0].deviated.pop();
+        odd.by_identity[0].deviated.pop();
         assert!(!odd.is_valid(&all), "raw and deviated are pairs");
         for (k, bad) in [f32::NAN, f32::INFINITY].into_iter().enumerate() {
             let mut poisoned = good.clone();
-            let of = &mut poisoned.of[0];
+            let of = &mut poisoned.by_identity[0];
             (if k == 0 { &mut of.raw } else { &mut of.deviated })[2][1] = bad;
             assert!(!poisoned.is_valid(&all), "{bad}");
         }

@@ -28,5 +28,5 @@ pub use identity::{Identities, Identity, IdentityId, Level, LevelFilter, NOBODY}
 pub use language::{LanguageFeatures, ViewFeatures};
 pub use mask::{Mask, PixelBox};
 pub use photo::{Distortion, Photo, PhotoPixels};
-pub use plan::{Facts, Limits, Machine, Overrides, PlanLine, ScenePlan};
+pub use plan::{Limits, Machine, Overrides, PlanLine, SceneFacts, ScenePlan};
 pub use semantic_map::SemanticMap;

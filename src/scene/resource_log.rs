@@ -12,7 +12,7 @@ use crate::math::format::bytes;
 /// What sort of thing was loaded or built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Sort {
+pub enum ResourceKind {
     /// Gaussians of a scene.
     Gaussians,
     /// Objects and parts of a scene.
@@ -37,11 +37,11 @@ pub enum Sort {
 
 /// Something that was loaded or built.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Load {
+pub struct ResourceEntry {
     /// Seconds since the trace began.
     pub(crate) at_secs: f64,
     /// Its sort.
-    pub sort: Sort,
+    pub sort: ResourceKind,
     pub(crate) what: String,
     /// What it was needed for.
     pub(crate) why: &'static str,
@@ -49,7 +49,7 @@ pub struct Load {
     pub(crate) bytes: u64,
 }
 
-impl Load {
+impl ResourceEntry {
     /// As a line: "2.31 s  loaded the network demo, 1.2 MB: a phrase is compared with looks".
     pub(crate) fn line(&self) -> String {
         let size = if self.bytes > 0 { format!(", {}", bytes(self.bytes)) } else { String::new() };
@@ -58,26 +58,26 @@ impl Load {
 }
 
 /// Called with everything that is traced from then on.
-type Listener = fn(&Load);
+type Listener = fn(&ResourceEntry);
 
 #[derive(Default)]
-struct Trace {
-    loads: Vec<Load>,
+struct ResourceLog {
+    loads: Vec<ResourceEntry>,
     listener: Option<Listener>,
 }
 
-static TRACE: Mutex<Trace> = Mutex::new(Trace { loads: Vec::new(), listener: None });
+static TRACE: Mutex<ResourceLog> = Mutex::new(ResourceLog { loads: Vec::new(), listener: None });
 static START: OnceLock<Instant> = OnceLock::new();
 
 // A load is added in one call, so a panicking holder leaves nothing half done.
-fn lock() -> MutexGuard<'static, Trace> {
+fn lock() -> MutexGuard<'static, ResourceLog> {
     TRACE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Adds to the trace.
-pub(crate) fn record(sort: Sort, what: impl Into<String>, why: &'static str, bytes: u64) {
+pub(crate) fn record(sort: ResourceKind, what: impl Into<String>, why: &'static str, bytes: u64) {
     let at_secs = START.get_or_init(Instant::now).elapsed().as_secs_f64();
-    let load = Load { at_secs, sort, what: what.into(), why, bytes };
+    let load = ResourceEntry { at_secs, sort, what: what.into(), why, bytes };
     let mut trace = lock();
     if let Some(listener) = trace.listener {
         listener(&load);
@@ -92,8 +92,8 @@ pub(crate) fn listen(listener: Listener) {
 }
 
 /// What was traced, the first `from` left out.
-pub fn since(from: usize) -> Vec<Load> {
-    lock().loads.get(from..).map_or_else(Vec::new, <[Load]>::to_vec)
+pub fn since(from: usize) -> Vec<ResourceEntry> {
+    lock().loads.get(from..).map_or_else(Vec::new, <[ResourceEntry]>::to_vec)
 }
 
 #[cfg(test)]
@@ -102,7 +102,7 @@ mod tests {
 
     #[test]
     fn what_is_recorded_can_be_read_from_any_point_on() {
-        record(Sort::Model, "loaded the network 'x'", "a test of the trace", 1_500_000);
+        record(ResourceKind::Model, "loaded the network 'x'", "a test of the trace", 1_500_000);
         let all = since(0);
         let at = all.iter().rposition(|l| l.why == "a test of the trace").expect("recorded");
         assert!(all[at].line().ends_with("loaded the network 'x', 2 MB: a test of the trace"));

@@ -26,7 +26,7 @@ pub struct SemanticMap {
     /// Objects and parts.
     pub identities: Identities,
     /// The innermost identity of each Gaussian; `NOBODY` for none.
-    pub of: Vec<IdentityId>,
+    pub identity_of: Vec<IdentityId>,
     /// How clearly each Gaussian belongs there, 0 (a guess) to 1.
     pub margin: Vec<f32>,
     /// Codes of each Gaussian, of its object and its part: those of its identity, or trained ones.
@@ -39,10 +39,10 @@ pub struct SemanticMap {
 
 impl SemanticMap {
     /// A map whose Gaussians have the codes of their identities.
-    pub fn of_identities(identities: Identities, of: Vec<IdentityId>, margin: Vec<f32>, seeds: Vec<String>) -> Self {
+    pub fn from_identities(identities: Identities, of: Vec<IdentityId>, margin: Vec<f32>, seeds: Vec<String>) -> Self {
         let by_id: Vec<_> = (0..=identities.len() as IdentityId).map(|id| identities.codes(id)).collect();
         let codes = of.iter().map(|id| by_id.get(*id as usize).copied().unwrap_or(by_id[0])).collect();
-        Self { identities, of, margin, codes, language: None, seeds }
+        Self { identities, identity_of: of, margin, codes, language: None, seeds }
     }
 
     /// Writes identities, margins and codes into the cloud's extra properties.
@@ -51,7 +51,7 @@ impl SemanticMap {
         cloud.extras.retain(|e| !ours(&e.name));
         let mut add = |name: &str, values: Vec<f32>| cloud.extras.push(ExtraProperty { name: name.into(), values });
         // Whole numbers up to 2^24 are exact.
-        add(IDENTITY, self.of.iter().map(|id| *id as f32).collect());
+        add(IDENTITY, self.identity_of.iter().map(|id| *id as f32).collect());
         add(MARGIN, self.margin.clone());
         for (c, name) in CODES.iter().enumerate() {
             add(name, self.codes.iter().map(|codes| codes[c]).collect());
@@ -68,7 +68,7 @@ impl SemanticMap {
         };
         let of: Vec<IdentityId> = values(IDENTITY)?.iter().map(id).collect::<Option<_>>()?;
         let margin = values(MARGIN).map_or_else(|| vec![0.0; of.len()], <[f32]>::to_vec);
-        let mut map = Self::of_identities(identities, of, margin, seeds);
+        let mut map = Self::from_identities(identities, of, margin, seeds);
         for (c, name) in CODES.iter().enumerate() {
             let stored = values(name).into_iter().flatten().filter(|v| v.is_finite());
             map.codes.iter_mut().zip(stored).for_each(|(codes, v)| codes[c] = *v);
@@ -78,9 +78,9 @@ impl SemanticMap {
 
     /// Indices of the Gaussians of an identity and its pieces, rising.
     pub(crate) fn members(&self, id: IdentityId) -> Vec<usize> {
-        let inside = self.identities.within(id);
-        let is_in = |i: &usize| inside.get(self.of[*i] as usize) == Some(&true);
-        (0..self.of.len()).filter(is_in).collect()
+        let inside = self.identities.descendants(id);
+        let is_in = |i: &usize| inside.get(self.identity_of[*i] as usize) == Some(&true);
+        (0..self.identity_of.len()).filter(is_in).collect()
     }
 
     /// The map of these Gaussians alone, as [`GaussianCloud::select`] has them. Without language
@@ -88,7 +88,7 @@ impl SemanticMap {
     pub(crate) fn select(&self, gaussians: &[usize]) -> Self {
         Self {
             identities: self.identities.clone(),
-            of: gaussians.iter().map(|&i| self.of[i]).collect(),
+            identity_of: gaussians.iter().map(|&i| self.identity_of[i]).collect(),
             margin: gaussians.iter().map(|&i| self.margin[i]).collect(),
             codes: gaussians.iter().map(|&i| self.codes[i]).collect(),
             language: None,
@@ -100,9 +100,9 @@ impl SemanticMap {
     pub(crate) fn bytes(&self) -> u64 {
         let each = size_of::<IdentityId>() + size_of::<f32>() * (1 + CODE_CHANNELS);
         let numbers = |l: &LanguageFeatures| {
-            l.dimension * l.of.iter().map(|f| f.raw.len() + f.deviated.len()).sum::<usize>() * size_of::<f32>()
+            l.dimension * l.by_identity.iter().map(|f| f.raw.len() + f.deviated.len()).sum::<usize>() * size_of::<f32>()
         };
-        (self.of.len() * each + self.language.as_ref().map_or(0, numbers)) as u64
+        (self.identity_of.len() * each + self.language.as_ref().map_or(0, numbers)) as u64
     }
 
     /// Whether any identity is a part.
@@ -113,11 +113,11 @@ impl SemanticMap {
     /// Number of Gaussians of each identity, pieces included, by number; those of nobody first.
     pub(crate) fn sizes(&self) -> Vec<usize> {
         let mut sizes = vec![0; self.identities.len() + 1];
-        for &id in &self.of {
+        for &id in &self.identity_of {
             if id == NOBODY {
                 sizes[0] += 1;
             }
-            for i in self.identities.line(id) {
+            for i in self.identities.ancestors(id) {
                 sizes[i as usize] += 1;
             }
         }
@@ -136,7 +136,7 @@ mod tests {
         let doll = identities.add(Level::Object, NOBODY, vec!["doll".into()]);
         let eye = identities.add(Level::Part, doll, vec!["eye".into()]);
         let (of, margin) = (vec![eye, NOBODY, doll], vec![0.5, 0.0, 1.0]);
-        let mut map = SemanticMap::of_identities(identities.clone(), of, margin, vec!["a.jpg".into()]);
+        let mut map = SemanticMap::from_identities(identities.clone(), of, margin, vec!["a.jpg".into()]);
         map.codes[2][4] = 0.25;
         let mut cloud = GaussianCloud { positions: vec![[0.0; 3]; 3], ..GaussianCloud::default() };
         cloud.extras.push(ExtraProperty { name: "kept".into(), values: vec![7.0; 3] });
@@ -147,7 +147,7 @@ mod tests {
         assert_eq!(map.sizes(), [1, 2, 1]);
         assert_eq!((map.members(doll), map.members(eye), map.members(77)), (vec![0, 2], vec![0], vec![]));
         let left = map.select(&[2]);
-        assert_eq!((left.of, left.margin, left.codes[0][4]), (vec![doll], vec![1.0], 0.25));
+        assert_eq!((left.identity_of, left.margin, left.codes[0][4]), (vec![doll], vec![1.0], 0.25));
         assert_eq!(SemanticMap::restore(Identities::default(), vec![], &cloud), None, "identities are missing");
         for bad in [-1.0, 0.5, 3.0, f32::NAN] {
             cloud.extras[1].values[0] = bad;
@@ -164,14 +164,14 @@ mod tests {
         let eye = all.add(Level::Part, doll, vec![]);
         all.get_mut(doll).expect("there").code = [0.1, 0.2, 0.3];
         all.get_mut(eye).expect("there").code = [0.7, 0.8, 0.9];
-        let mut map = SemanticMap::of_identities(all, vec![doll, eye, NOBODY, 99], vec![1.0; 4], vec![]);
+        let mut map = SemanticMap::from_identities(all, vec![doll, eye, NOBODY, 99], vec![1.0; 4], vec![]);
         assert!(map.has_parts());
         let codes = [[0.1, 0.2, 0.3, 0.5, 0.5, 0.5], [0.1, 0.2, 0.3, 0.7, 0.8, 0.9], [0.5; 6], [0.5; 6]];
         assert_eq!(map.codes, codes);
         // Eight numbers of 4 bytes a Gaussian; two views of three numbers, raw and deviated.
         assert_eq!(map.bytes(), 4 * 32);
         let seen = crate::scene::ViewFeatures { raw: vec![vec![0.0; 3]; 2], deviated: vec![vec![0.0; 3]; 2] };
-        map.language = Some(LanguageFeatures { encoder: "t".into(), dimension: 3, of: vec![seen] });
+        map.language = Some(LanguageFeatures { encoder: "t".into(), dimension: 3, by_identity: vec![seen] });
         assert_eq!(map.bytes(), 4 * 32 + 4 * 3 * 4);
         assert_eq!(map.sizes(), [1, 2, 1]);
     }

@@ -14,11 +14,11 @@ use super::viewport::brush::Brush;
 use super::viewport::overrides::RenderOverrides;
 use crate::agent::scene::{Effect, Parts};
 use crate::jobs::edit::EditRequest;
-use crate::jobs::find_objects::Request;
+use crate::jobs::find_objects::FindRequest;
 use crate::jobs::go_to::{ApproachRequest, Approached};
 use crate::measure::is_report;
 use crate::navigate::FRAMES;
-use crate::navigate::target::{Side, Wish};
+use crate::navigate::target::{Side, ViewPreference};
 use crate::pipeline::semantics::edit::Edit;
 use crate::pipeline::train::preset;
 use crate::scene::IdentityId;
@@ -89,7 +89,7 @@ impl App {
             }
             Action::Undo => self.edit(EditStep::Undo),
             Action::Redo => self.edit(EditStep::Redo),
-            Action::GoToTarget(id, side) => self.visit(id, Wish { side, ..Wish::default() }),
+            Action::GoToTarget(id, side) => self.visit(id, ViewPreference { side, ..ViewPreference::default() }),
             Action::PlayPath => self.camera.toggle(),
             Action::StepBack => self.step_in_time(-1.0, ctx),
             Action::StepForward => self.step_in_time(1.0, ctx),
@@ -246,7 +246,7 @@ impl App {
         let masks = masks.or_else(|| scene.masks.clone());
         match self.viewport.cloud().cloned().filter(|_| self.state.is_trained()) {
             Some(cloud) => {
-                self.submit(Command::FindObjects(Box::new(Request {
+                self.submit(Command::FindObjects(Box::new(FindRequest {
                     folder: scene.out.clone(),
                     cloud: Arc::clone(&cloud),
                     settings: self.state.render_settings(),
@@ -280,7 +280,7 @@ impl App {
     }
 
     /// Looks for the way to an identity; the flight begins when it is found.
-    fn visit(&mut self, id: IdentityId, wish: Wish) {
+    fn visit(&mut self, id: IdentityId, preference: ViewPreference) {
         let Some(SceneContext { cloud, map: Some(map), settings, cameras, up, eye, aspect, explored, .. }) =
             self.context()
         else {
@@ -288,7 +288,8 @@ impl App {
         };
         let (cloud, map, from) = (Arc::clone(&cloud), Arc::clone(&map), eye);
         let frames = FRAMES;
-        let request = ApproachRequest { explored, cloud, cameras, up, settings, map, id, wish, from, aspect, frames };
+        let request =
+            ApproachRequest { explored, cloud, cameras, up, settings, map, id, preference, from, aspect, frames };
         self.submit(Command::Approach(Box::new(request)));
     }
 

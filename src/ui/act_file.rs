@@ -101,7 +101,7 @@ impl App {
     fn save_chat(&mut self, path: &Path) {
         let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
         let Some(text) = self.chat.transcript(json).map(str::to_owned) else { return };
-        match crate::io::atomic::write(path, |w| w.write_all(text.as_bytes())) {
+        match crate::jobs::export::text(path, &text) {
             Ok(()) => self.state.toast(Tone::Good, format!("Wrote {}", path.display())),
             Err(e) => self.state.fail("Saving the conversation", Failure::of(&e, "")),
         }

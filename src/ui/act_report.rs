@@ -5,9 +5,11 @@ use std::sync::Arc;
 
 use super::app::App;
 use super::state::Tone;
+use crate::jobs::report::ReportRequest;
+use crate::measure::subject::{StudyOptions, Subject};
 use crate::measure::{Knobs, StageName, turned};
 use crate::ui::actions::Pane;
-use crate::worker::{Command, MeasureRequest};
+use crate::worker::Command;
 
 impl App {
     /// Reads a report and shows its pane.
@@ -29,15 +31,18 @@ impl App {
             self.state.toast(Tone::Warning, text);
             return;
         }
-        let request = MeasureRequest {
-            scene: scene.path.display().to_string(),
+        let subject = Subject {
+            name: scene.path.display().to_string(),
             cloud: Arc::clone(&cloud),
             settings: scene.render.clone(),
-            dataset: scene.dataset.clone(),
+            cameras: vec![(self.viewport.camera(), false)],
             holdout_every: self.layout.config.holdout_every,
-            camera: self.viewport.camera(),
-            out: scene.report_out.clone(),
+            dataset: scene.dataset.clone(),
+            map: None,
+            options: StudyOptions::default(),
         };
+        let (stages, out) = (vec![StageName::Render], scene.report_out.clone());
+        let request = ReportRequest { subject, stages, out, fresh: false, budget_secs: f64::INFINITY };
         self.layout.hidden.retain(|p| *p != Pane::Report);
         self.submit(Command::Measure(Box::new(request)));
     }

@@ -22,7 +22,7 @@ use super::viewport::Viewport;
 use super::{keys, theme};
 use crate::measure::is_report;
 use crate::scene::plan::PlanOverride;
-use crate::scene::resource_log::{self, Sort};
+use crate::scene::resource_log::{self, ResourceKind};
 use crate::ui::actions::{Action, Pane};
 use crate::worker::{JobId, Jobs, Repaint, Worker};
 
@@ -75,7 +75,7 @@ impl App {
         // Frames answer a user's hand. Progress can be read no faster than it is written, and
         // every frame takes from what it reports on.
         let (repaint, unhurried) = (super::repainter(&cc.egui_ctx, 8), super::repainter(&cc.egui_ctx, 120));
-        resource_log::record(Sort::Window, "window", "the program was started", 0);
+        resource_log::record(ResourceKind::Window, "window", "the program was started", 0);
         let layout = Layout::load(cc.storage);
         let mut state = AppState::new(layout.recent.clone());
         state.say(super::state::Tone::Info, format!("FMLGS {}", env!("CARGO_PKG_VERSION")));

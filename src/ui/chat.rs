@@ -17,7 +17,7 @@ use crate::agent::llm::Llm;
 use crate::agent::scene::{Effect, Parts, SceneWorld};
 use crate::agent::{AgentEvent, Planner, Policy, Refusal, Session};
 use crate::navigate::Pose;
-use crate::scene::resource_log::{self, Sort};
+use crate::scene::resource_log::{self, ResourceKind};
 use crate::scene::{Identities, IdentityId, SemanticMap, text};
 use crate::ui::actions::Action;
 use crate::worker::Repaint;
@@ -376,7 +376,7 @@ impl Agent {
             } else {
                 Box::new(Commands::default())
             };
-            resource_log::record(Sort::Agent, "agent with its policy", "a message was sent to it", 0);
+            resource_log::record(ResourceKind::Agent, "agent with its policy", "a message was sent to it", 0);
             self.session = Some((settings, Session::new(policy, planner)));
         }
         Ok(())

@@ -18,8 +18,8 @@ use crate::pipeline::semantics::thumbnails::Thumbnails;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::undo::UndoHistory;
-use crate::scene::{Facts, Limits, Overrides, PhotoPixels, ScenePlan, SemanticMap, text};
-use crate::worker::{Event, Failure, JobId, JobKind, Lane, Outcome, Versioned};
+use crate::scene::{Limits, Overrides, PhotoPixels, SceneFacts, ScenePlan, SemanticMap, text};
+use crate::worker::{Event, Failure, JobId, JobKind, Outcome, Versioned, WorkerThread};
 
 /// Lines kept in the log.
 const MAX_LOG: usize = 1_000;
@@ -120,7 +120,7 @@ impl AppState {
     /// Takes in one event; what the window is to do next because of it.
     pub(crate) fn apply(&mut self, event: Event) -> Vec<Action> {
         match event {
-            Event::Started { job, kind, title } if kind.lane() == Lane::Short => {
+            Event::Started { job, kind, title } if kind.lane() == WorkerThread::Short => {
                 self.short_jobs.insert(job, (kind, text::line(&title).into_owned()));
             }
             Event::Started { job, kind, title } => {
@@ -236,7 +236,7 @@ impl AppState {
         (before.is_same_run(config) && (1..config.steps).contains(step)).then_some(*step)
     }
 
-    fn set_facts(&mut self, facts: Facts) {
+    fn set_facts(&mut self, facts: SceneFacts) {
         self.plan = ScenePlan::new(facts, &self.plan.overrides);
     }
 

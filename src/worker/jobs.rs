@@ -5,17 +5,17 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::failure::{Failure, Stop};
-use super::measure as measuring;
 use super::protocol::{Command, Outcome};
 use super::thread::Jobs;
 use crate::io::{self, OpenError, trained};
-use crate::jobs::evaluate::{self, Comparison, Options};
+use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::models::Source;
 use crate::jobs::train::Trained;
 use crate::jobs::{
     Folders, JobError, OpenedScene, Scene, demo, edit, export, find_objects, go_to, models, open, plan, poses, recent,
-    thumbnails, train, video,
+    report, thumbnails, train, video,
 };
+use crate::measure::{End, FILE, Report};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::train::TrainConfig;
 use crate::scene::{Dataset, GaussianCloud, Machine};
@@ -51,7 +51,7 @@ impl PipelineJobs {
     }
 
     fn opened(&self, mut scene: OpenedScene) -> Outcome {
-        scene.reports = measuring::known(&scene.path, &scene.report_out);
+        scene.reports = report::known(&scene.path, &scene.report_out);
         self.knows(&scene.out, scene.state.clone());
         Outcome::Opened(Box::new(scene))
     }
@@ -86,7 +86,7 @@ impl Jobs for PipelineJobs {
                 opened => self.opened(opened?),
             },
             Command::FindPoses(photos) => {
-                let tools = poses::Tools::installed().ok_or(JobError::NoTools)?;
+                let tools = poses::PoseTools::installed().ok_or(JobError::NoTools)?;
                 let found = poses::find(&photos, &tools, &self.folders, observer)?;
                 self.opened(open::open(&found, &self.folders, self.machine(), observer)?)
             }
@@ -145,8 +145,19 @@ impl Jobs for PipelineJobs {
                 Outcome::Explored(Arc::new(go_to::Explored::new(cloud, &cameras, up)))
             }
             Command::CameraSpline(request) => Outcome::Written(video::run(*request, observer)?.summary.path),
-            Command::Measure(request) => return measuring::run(*request, observer),
-            Command::ReadReport { path, second } => return measuring::read(path, second),
+            Command::Measure(request) => {
+                let done = report::run(&request, observer)?;
+                if done.end == End::Cancelled {
+                    let kept = request.out.join(FILE);
+                    observer.note(Severity::Info, format!("What was measured so far is kept in {}", kept.display()));
+                    return Err(Stop::Cancelled);
+                }
+                Outcome::Report { path: request.out, report: Arc::new(done.report), second: false }
+            }
+            Command::ReadReport { path, second } => {
+                let report = Arc::new(Report::read(&path)?);
+                Outcome::Report { path, report, second }
+            }
             Command::Thumbnails { cloud, map, settings, home } => {
                 let drawn = thumbnails::draw(&cloud, &map, &settings, &home)?;
                 Outcome::Thumbnails(map, drawn)
@@ -166,5 +177,5 @@ fn measured(
     let cameras = if trained::is_scene(out) { trained::load_info(out)?.cameras } else { Vec::new() };
     let settings = config.render_settings(dataset.background);
     let scene = Scene { cloud, cameras, settings, config, ..Scene::default() };
-    evaluate::photometric(&Comparison::of(&scene, dataset, Options::default())?, observer)
+    evaluate::photometric(&PhotoComparison::of(&scene, dataset, EvaluateOptions::default())?, observer)
 }

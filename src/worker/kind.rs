@@ -45,7 +45,7 @@ pub enum JobKind {
 
 impl JobKind {
     /// Which thread runs it.
-    pub(crate) fn lane(self) -> Lane {
+    pub(crate) fn lane(self) -> WorkerThread {
         match self {
             Self::Open
             | Self::Demo
@@ -56,7 +56,7 @@ impl JobKind {
             | Self::Objects
             | Self::Model
             | Self::CameraSpline
-            | Self::Measure => Lane::Long,
+            | Self::Measure => WorkerThread::Long,
             Self::Edit
             | Self::Export
             | Self::Photo
@@ -65,14 +65,14 @@ impl JobKind {
             | Self::Models
             | Self::Explore
             | Self::Approach
-            | Self::Report => Lane::Short,
+            | Self::Report => WorkerThread::Short,
         }
     }
 }
 
 /// Which thread a job runs on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Lane {
+pub enum WorkerThread {
     /// One after another, minutes each.
     Long,
     /// Answered while a long job runs.

@@ -6,11 +6,12 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::failure::Failure;
-pub use super::kind::{JobKind, Lane};
+pub use super::kind::{JobKind, WorkerThread};
 use crate::io::unposed::Unposed;
 use crate::jobs::edit::EditRequest;
 use crate::jobs::go_to::{ApproachRequest, Approached, Explored};
 use crate::jobs::models::ModelList;
+use crate::jobs::report::ReportRequest;
 use crate::jobs::video::VideoRequest;
 use crate::jobs::{OpenedScene, find_objects};
 use crate::measure::Report;
@@ -18,7 +19,7 @@ use crate::pipeline::observer::{Evaluation, Progress, Severity, StepMetrics};
 use crate::pipeline::semantics::thumbnails::Thumbnails;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
-use crate::scene::{Camera, Dataset, Facts, GaussianCloud, HomeView, Photo, PhotoPixels, SemanticMap};
+use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, Photo, PhotoPixels, SceneFacts, SemanticMap};
 
 /// Names one job of one worker.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -72,7 +73,7 @@ pub enum Command {
         out: PathBuf,
     },
     /// Find the objects and parts of a trained scene, and store them with it.
-    FindObjects(Box<find_objects::Request>),
+    FindObjects(Box<find_objects::FindRequest>),
     /// Change the objects and parts of a scene, and store them with it.
     EditObjects {
         /// The Gaussians.
@@ -141,7 +142,7 @@ pub enum Command {
     /// Draw a video.
     CameraSpline(Box<VideoRequest>),
     /// Measure error against run time of drawing, and write it as a report.
-    Measure(Box<MeasureRequest>),
+    Measure(Box<ReportRequest>),
     /// Read a report.
     ReadReport {
         /// Its folder or file.
@@ -235,7 +236,7 @@ pub enum Outcome {
         /// Objects and parts that were carried over from the scene before.
         semantics: Option<Arc<SemanticMap>>,
         /// What the plan of the result is computed from.
-        facts: Box<Facts>,
+        facts: Box<SceneFacts>,
     },
     /// Held-out quality was measured.
     Evaluated(Evaluation),
@@ -330,22 +331,4 @@ impl Event {
     pub fn is_end(&self) -> bool {
         matches!(self, Self::Finished(..) | Self::Cancelled(_) | Self::Failed(..))
     }
-}
-
-/// What is to be drawn in many ways.
-#[derive(Clone, Debug)]
-pub struct MeasureRequest {
-    /// The scene, for display.
-    pub(crate) scene: String,
-    pub(crate) cloud: Arc<GaussianCloud>,
-    /// How they are drawn.
-    pub(crate) settings: RenderSettings,
-    /// Its photos; those that are held out are compared with, too.
-    pub(crate) dataset: Option<Arc<Dataset>>,
-    /// Every how-manieth photo is held out.
-    pub(crate) holdout_every: usize,
-    /// From where it is drawn without held-out photos.
-    pub(crate) camera: Camera,
-    /// Folder of the report. What is measured there already is resumed.
-    pub(crate) out: PathBuf,
 }

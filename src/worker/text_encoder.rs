@@ -116,7 +116,7 @@ fn encode(encoder: &mut dyn Encoder, known: &mut TextEmbeddings, texts: Vec<Stri
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::models::Tile;
+    use crate::models::IdentityCrop;
 
     /// Knows one word, and fails at another as a damaged network does.
     #[derive(Default)]
@@ -137,7 +137,7 @@ mod tests {
             None
         }
 
-        fn images(&mut self, _tiles: &[Tile]) -> Result<Vec<Vec<f32>>, ModelError> {
+        fn images(&mut self, _tiles: &[IdentityCrop]) -> Result<Vec<Vec<f32>>, ModelError> {
             Ok(Vec::new())
         }
 

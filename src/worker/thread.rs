@@ -12,7 +12,7 @@ use crossbeam_channel::{Receiver, Sender, bounded};
 
 use super::failure::{Failure, Stop};
 use super::observer::{CloudSnapshot, JobObserver, Repaint};
-use super::protocol::{Command, Event, JobId, JobKind, Lane, Outcome};
+use super::protocol::{Command, Event, JobId, JobKind, Outcome, WorkerThread};
 use super::{Control, Slot};
 use crate::pipeline::observer::{Observer, Signal};
 
@@ -90,8 +90,8 @@ impl Worker {
         let control = Arc::new(Control::default());
         lock(&self.controls).insert(job, Arc::clone(&control));
         let lane = match command.kind().lane() {
-            Lane::Long => &self.long,
-            Lane::Short => &self.short,
+            WorkerThread::Long => &self.long,
+            WorkerThread::Short => &self.short,
         };
         let queued = Queued { job, command, control };
         if lane.as_ref().is_some_and(|l| l.try_send(queued).is_ok()) {

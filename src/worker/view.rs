@@ -15,7 +15,7 @@ pub use super::view_request::{QualityBudget, SkipPasses, ViewPicture, ViewReques
 use crate::jobs::query::ViewMaps;
 use crate::render::{RenderError, Renderer};
 use crate::scene::Camera;
-use crate::scene::resource_log::{self, Sort};
+use crate::scene::resource_log::{self, ResourceKind};
 
 /// How long the eye rests before working memory is given back.
 const REST: Duration = Duration::from_secs(2);
@@ -91,7 +91,12 @@ impl ViewLane {
                         && !std::mem::replace(&mut mapped_before, true)
                     {
                         let pixels = maps.identities.identity.len() as u64;
-                        resource_log::record(Sort::Maps, "maps of the view", "something is asked of it", pixels * 12);
+                        resource_log::record(
+                            ResourceKind::Maps,
+                            "maps of the view",
+                            "something is asked of it",
+                            pixels * 12,
+                        );
                     }
                     if maps.is_err() {
                         // Buffers may be in any state.
@@ -173,7 +178,7 @@ fn next(mailbox: &(Mutex<Mailbox>, Condvar), patience: Option<Duration>) -> Wait
 
 /// What the pixels of a view belong to; `None` if no one wants to know.
 fn maps_of(renderer: &mut Renderer, request: &ViewRequest, camera: &Camera) -> Option<Result<ViewMaps, Failure>> {
-    let semantics = request.semantics.as_ref().filter(|s| s.of.len() == request.cloud.len())?;
+    let semantics = request.semantics.as_ref().filter(|s| s.identity_of.len() == request.cloud.len())?;
     if request.budget != QualityBudget::Full && !request.follow {
         return None;
     }
@@ -212,7 +217,7 @@ mod tests {
         };
         let mut all = Identities::default();
         all.add(Level::Object, NOBODY, Vec::new());
-        let mut map = SemanticMap::of_identities(all, vec![1], vec![1.0], vec![]);
+        let mut map = SemanticMap::from_identities(all, vec![1], vec![1.0], vec![]);
         let lane = ViewLane::start(Arc::new(|| {})).expect("a thread");
         let mapped = |ticket: u64, map: &SemanticMap| {
             lane.request(ViewRequest {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::failure::Failure;
 use super::view_modes::ViewMode;
-use crate::render::{RenderSettings, StageTimes};
+use crate::render::{RenderSettings, Renderer, StageTimes};
 use crate::scene::plan::When;
 use crate::scene::{Camera, GaussianCloud, PhotoPixels, ScenePlan, SemanticMap};
 
@@ -109,6 +109,13 @@ pub struct ViewPicture {
     pub(crate) drawn_by: String,
     /// Why the CPU drew it though there is a GPU.
     pub(crate) instead_of_gpu: Option<String>,
+}
+
+impl ViewPicture {
+    /// Whether a GPU drew it.
+    pub(crate) fn on_gpu(&self) -> bool {
+        self.drawn_by != Renderer::CPU
+    }
 }
 
 /// The result of a request.

@@ -1,8 +1,9 @@
 //! A room with some forty things and parts, on boxes only, that remembers what was done to it.
 
-use fmlgs::agent::camera_args::{Direction, Distance, Side};
-use fmlgs::agent::relation::View;
-use fmlgs::agent::world::{Arrival, Facts, Moved, Unreachable, World, WorldError, locate_by_names};
+use fmlgs::agent::camera_args::{Direction, Distance};
+use fmlgs::agent::relation::Viewpoint;
+use fmlgs::agent::world::{Arrival, IdentityFacts, Moved, Unreachable, World, WorldError, locate_by_names};
+use fmlgs::navigate::target::Side;
 use fmlgs::pipeline::semantics::answer::QueryAnswer;
 use fmlgs::scene::LevelFilter;
 use fmlgs::scene::{Bounds, Identities, IdentityId, Level, NOBODY};
@@ -130,11 +131,11 @@ impl World for Room {
         Ok(locate_by_names(&self.identities, query, kind))
     }
 
-    fn facts(&self, id: IdentityId) -> Option<Facts> {
+    fn facts(&self, id: IdentityId) -> Option<IdentityFacts> {
         let identity = self.identities.get(id)?;
-        let gone = self.identities.line(id).any(|i| self.removed[i as usize]);
-        let hidden = self.identities.line(id).any(|i| self.hidden[i as usize]);
-        (!gone).then(|| Facts {
+        let gone = self.identities.ancestors(id).any(|i| self.removed[i as usize]);
+        let hidden = self.identities.ancestors(id).any(|i| self.hidden[i as usize]);
+        (!gone).then(|| IdentityFacts {
             names: identity.names.clone(),
             level: identity.level,
             parent: identity.parent,
@@ -144,8 +145,8 @@ impl World for Room {
         })
     }
 
-    fn view(&self) -> View {
-        View { eye: self.eye, forward: self.forward, up: DVec3::Z }
+    fn view(&self) -> Viewpoint {
+        Viewpoint { eye: self.eye, forward: self.forward, up: DVec3::Z }
     }
 
     fn metres_per_unit(&self) -> Option<f64> {
@@ -161,7 +162,7 @@ impl World for Room {
         let b = self.boxes[id as usize].expect("a box");
         let level = DVec3::new(self.forward.x, self.forward.y, 0.0).normalize_or(DVec3::Y);
         let ahead = match side {
-            Side::Same => level,
+            Side::Same | Side::Best => level,
             Side::Other | Side::Front => -level,
             Side::Left => level.cross(DVec3::Z),
             Side::Right => DVec3::Z.cross(level),

@@ -42,7 +42,7 @@ fn kettle(exports: &Path) -> SceneWorld {
     let parts = Parts {
         cloud: Arc::new(cloud),
         settings: RenderSettings::default(),
-        map: Arc::new(SemanticMap::of_identities(identities, of, vec![1.0; 64], Vec::new())),
+        map: Arc::new(SemanticMap::from_identities(identities, of, vec![1.0; 64], Vec::new())),
         cameras: vec![camera.clone()],
         up: DVec3::NEG_Y,
         meters: Some(1.0),

@@ -23,7 +23,7 @@ const MODULES: [(&str, &[&str]); 13] = [
 ];
 
 /// Longest Rust file in lines.
-const RUST_LINES: usize = 600;
+const RUST_LINES: usize = 400;
 /// Longest WGSL file in lines.
 const WGSL_LINES: usize = 250;
 
@@ -147,7 +147,7 @@ fn dependency_names(manifest: &str) -> Vec<String> {
 
 /// The files of the library, without those declared as `#[cfg(test)] mod name;` and what is
 /// below them.
-fn library_files(files: &[SourceFile]) -> impl Iterator<Item = &SourceFile> {
+pub fn library_files(files: &[SourceFile]) -> impl Iterator<Item = &SourceFile> {
     let mut test_modules = Vec::new();
     for file in files.iter().filter(|f| f.path.starts_with("src/")) {
         let folder = file.path.strip_suffix("/mod.rs").or(file.path.strip_suffix(".rs")).unwrap_or(&file.path);
@@ -160,7 +160,7 @@ fn library_files(files: &[SourceFile]) -> impl Iterator<Item = &SourceFile> {
 }
 
 /// `io` for `src/io/ply.rs`; `None` for the crate's own roots.
-fn top_module(path: &str) -> Option<&str> {
+pub fn top_module(path: &str) -> Option<&str> {
     let inside = path.strip_prefix("src/")?;
     match inside.split_once('/') {
         Some((module, _)) => Some(module),
@@ -262,11 +262,7 @@ fn is_literal(flat: &str, at: usize) -> bool {
 /// are one thing here: what they share, the folder defines.
 pub fn cycles(files: &[SourceFile]) -> Vec<Complaint> {
     let files: Vec<&SourceFile> = library_files(files).collect();
-    let place = |path: &str| -> Vec<String> {
-        let inside = path.strip_prefix("src/").unwrap_or(path).trim_end_matches(".rs").trim_end_matches("/mod");
-        inside.split('/').map(str::to_owned).collect()
-    };
-    let places: Vec<Vec<String>> = files.iter().map(|f| place(&f.path)).collect();
+    let places: Vec<Vec<String>> = files.iter().map(|f| place_of(&f.path)).collect();
     let find =
         |path: &[String]| (0..=path.len()).rev().find_map(|n| places.iter().position(|p| p[..] == path[..n] && n > 0));
     let uses = |i: usize| -> Vec<usize> {
@@ -301,8 +297,14 @@ pub fn cycles(files: &[SourceFile]) -> Vec<Complaint> {
     complaints
 }
 
+/// Where a file of `src` stands below the crate's root.
+pub fn place_of(path: &str) -> Vec<String> {
+    let inside = path.strip_prefix("src/").unwrap_or(path).trim_end_matches(".rs").trim_end_matches("/mod");
+    inside.split('/').map(str::to_owned).collect()
+}
+
 /// Paths below the crate's root that `code`, which stands at `place`, names by `crate::` or `super::`.
-fn used_paths(code: &str, place: &[String]) -> Vec<Vec<String>> {
+pub fn used_paths(code: &str, place: &[String]) -> Vec<Vec<String>> {
     let flat: String = code.split_whitespace().collect::<Vec<_>>().join(" ");
     let mut paths = Vec::new();
     let starts = |at: usize| !flat[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ':');

@@ -77,8 +77,8 @@ pub fn map() -> SemanticMap {
     let eye = identities.add(Level::Part, doll, vec![]);
     let views = |raw: [f32; 2]| ViewFeatures { raw: vec![raw.to_vec(); 2], deviated: vec![raw.to_vec(); 2] };
     let of = vec![views([1.0, 0.0]), views([0.0, 1.0])];
-    let mut map = SemanticMap::of_identities(identities, vec![eye, NOBODY], vec![0.25, 0.0], vec!["a".into()]);
-    map.language = Some(LanguageFeatures { encoder: "test".into(), dimension: 2, of });
+    let mut map = SemanticMap::from_identities(identities, vec![eye, NOBODY], vec![0.25, 0.0], vec!["a".into()]);
+    map.language = Some(LanguageFeatures { encoder: "test".into(), dimension: 2, by_identity: of });
     map
 }
 

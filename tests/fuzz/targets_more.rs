@@ -4,7 +4,7 @@ use std::convert::Infallible;
 use std::fs;
 use std::path::Path;
 
-use fmlgs::agent::llm::wire::Collector;
+use fmlgs::agent::llm::wire::ReplyCollector;
 use fmlgs::agent::{Policy, ToolCall};
 use fmlgs::io::{self, IoError};
 use fmlgs::measure::{self, Report};
@@ -154,7 +154,7 @@ fn model(path: &Path) -> Result<(), ModelError> {
 
 /// A chat model's answer, and the calls in it.
 fn answer(bytes: &[u8], is_stream: bool) -> Result<(), String> {
-    let mut collector = Collector::default();
+    let mut collector = ReplyCollector::default();
     bytes.chunks(61).any(|piece| collector.take(is_stream, piece));
     let answer = collector.finish(is_stream)?;
     for call in &answer.calls {

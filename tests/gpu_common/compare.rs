@@ -3,7 +3,7 @@
 //! has hard cut-offs, and a splat that falls on the other side of one by rounding is no fault.
 
 use fmlgs::math::{Real, stats};
-use fmlgs::render::cpu::project::{View, compensation, geometry};
+use fmlgs::render::cpu::project::{CameraView, compensation, geometry};
 use fmlgs::render::{ALPHA_MAX, ALPHA_MIN, RenderSettings, TRANSMITTANCE_MIN};
 use fmlgs::scene::{Camera, GaussianCloud};
 
@@ -69,7 +69,7 @@ pub struct Bands {
 /// `margin` of a cut-off (relative), or of the median's one half, make a pixel boundary; a
 /// Gaussian is boundary if it is drawn in such a pixel.
 pub fn bands(cloud: &GaussianCloud<f64>, camera: &Camera, settings: &RenderSettings, margin: f64) -> Bands {
-    let view = View::<f64>::new(camera, cloud.origin, settings.near);
+    let view = CameraView::<f64>::new(camera, cloud.origin, settings.near);
     let [w, h] = [camera.width_px as usize, camera.height_px as usize];
     let mut splats = Vec::new();
     for i in 0..cloud.len() {

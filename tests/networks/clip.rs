@@ -4,9 +4,9 @@ use fmlgs::math::resize::Filter;
 use fmlgs::math::vector::{dot, unit};
 use fmlgs::models::clip::ClipEncoder;
 use fmlgs::models::clip::tokens::{Tokens, clean};
-use fmlgs::models::network::Array;
-use fmlgs::models::preprocess::{Prepare, Side};
-use fmlgs::models::{Encoder, ModelError, Tile};
+use fmlgs::models::network::Tensor;
+use fmlgs::models::preprocess::{FitSide, Prepare};
+use fmlgs::models::{Encoder, IdentityCrop, ModelError};
 use fmlgs::scene::PhotoPixels;
 
 use super::common;
@@ -55,19 +55,19 @@ fn pictures_are_prepared_as_by_pillow() {
 fn embeddings_are_those_of_open_clip() {
     let (t, mut clip) =
         (Tensors::open("clip.safetensors"), ClipEncoder::open(&fixture::path("clip.json")).expect("opens"));
-    let units = |a: &Array| -> Vec<f32> {
+    let units = |a: &Tensor| -> Vec<f32> {
         a.values.chunks_exact(a.shape[1]).flat_map(|row| unit(row).expect("a direction")).collect()
     };
-    let pixels: Vec<Array> = (0..5)
+    let pixels: Vec<Tensor> = (0..5)
         .map(|k| {
             let p = t.floats(&format!("pixels{k}"));
-            Array::new(&[1, 3, 64, 64], p.values)
+            Tensor::new(&[1, 3, 64, 64], p.values)
         })
         .collect();
-    let got = clip.embed_pixels(Array::joined(&pixels)).expect("embeds").concat();
-    let mirrored: Vec<Array> =
-        pixels.iter().map(|p| Array::new(&p.shape, p.values.iter().rev().copied().collect())).collect();
-    let wrong = clip.embed_pixels(Array::joined(&mirrored)).expect("embeds").concat();
+    let got = clip.embed_pixels(Tensor::joined(&pixels)).expect("embeds").concat();
+    let mirrored: Vec<Tensor> =
+        pixels.iter().map(|p| Tensor::new(&p.shape, p.values.iter().rev().copied().collect())).collect();
+    let wrong = clip.embed_pixels(Tensor::joined(&mirrored)).expect("embeds").concat();
     agrees("image embeddings", &got, &wrong, &units(&t.floats("image_embedding")));
 
     let tokens = t.ints("tokens");
@@ -82,8 +82,10 @@ fn embeddings_are_those_of_open_clip() {
 fn tiles_of_any_size_and_phrases_without_words() {
     let mut clip = ClipEncoder::open(&fixture::path("clip.json")).expect("opens");
     assert_eq!((clip.name(), clip.dimension(), clip.tile_side_px()), ("clip", 32, None));
-    let tile =
-        |side_px: usize| Tile { side_px, rgb: (0..side_px * side_px).map(|i| [(i % 7) as f32 / 7.0; 3]).collect() };
+    let tile = |side_px: usize| IdentityCrop {
+        side_px,
+        rgb: (0..side_px * side_px).map(|i| [(i % 7) as f32 / 7.0; 3]).collect(),
+    };
     let both = clip.images(&[tile(9), tile(300)]).expect("embeds");
     assert_eq!(both.len(), 2);
     for v in &both {
@@ -96,9 +98,9 @@ fn tiles_of_any_size_and_phrases_without_words() {
     for empty in ["", "  ", "?!"] {
         assert!(matches!(clip.text(empty), Err(ModelError::NoKnownWord { .. })), "{empty:?}");
     }
-    let broken = Tile { side_px: 3, rgb: vec![[0.0; 3]; 8] };
+    let broken = IdentityCrop { side_px: 3, rgb: vec![[0.0; 3]; 8] };
     assert!(matches!(clip.image(&broken), Err(ModelError::TileSize { .. })));
-    let poisoned = Tile { side_px: 1, rgb: vec![[f32::NAN; 3]] };
+    let poisoned = IdentityCrop { side_px: 1, rgb: vec![[f32::NAN; 3]] };
     assert!(matches!(clip.image(&poisoned), Err(ModelError::TileColor { pixel: 0 })));
 }
 
@@ -143,7 +145,7 @@ fn a_real_photo_is_prepared_as_the_golden_tensor() {
     let prepare = Prepare {
         side_px: 224,
         filter: Filter::Bicubic,
-        side: Side::Shorter,
+        side: FitSide::Shorter,
         mean: [0.481_454_66, 0.457_827_5, 0.408_210_73],
         std: [0.268_629_54, 0.261_302_6, 0.275_777_1],
     };

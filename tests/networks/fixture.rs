@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use fmlgs::math::stats;
-use fmlgs::models::network::Array;
+use fmlgs::models::network::Tensor;
 use fmlgs::scene::PhotoPixels;
 use safetensors::{Dtype, SafeTensors};
 use serde_json::Value;
@@ -38,18 +38,18 @@ impl Tensors {
     }
 
     /// Floating-point numbers.
-    pub fn floats(&self, name: &str) -> Array {
+    pub fn floats(&self, name: &str) -> Tensor {
         let (shape, dtype, data) = self.raw(name);
         assert_eq!(dtype, Dtype::F32, "{name}");
-        Array::new(&shape, data.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
+        Tensor::new(&shape, data.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
     }
 
     /// Whole numbers of 64 bits.
-    pub fn ints(&self, name: &str) -> Array<i64> {
+    pub fn ints(&self, name: &str) -> Tensor<i64> {
         let (shape, dtype, data) = self.raw(name);
         assert_eq!(dtype, Dtype::I64, "{name}");
         let values = data.chunks_exact(8).map(|b| i64::from_le_bytes(b.try_into().expect("eight"))).collect();
-        Array::new(&shape, values)
+        Tensor::new(&shape, values)
     }
 
     /// Bytes.

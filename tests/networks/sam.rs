@@ -1,9 +1,9 @@
 //! SAM and SAM 2 on single pictures, and their automatic masks.
 
 use fmlgs::math::resize::{Filter, resize};
-use fmlgs::models::network::Array;
-use fmlgs::models::preprocess::{Side, enlarge};
-use fmlgs::models::sam::automatic::{AutomaticMask, AutomaticOptions, Collector, crops, everything};
+use fmlgs::models::network::Tensor;
+use fmlgs::models::preprocess::{FitSide, enlarge};
+use fmlgs::models::sam::automatic::{AutomaticMask, AutomaticOptions, MaskCollector, crops, everything};
 use fmlgs::models::sam::{PromptedMasks, Sam};
 use fmlgs::models::sam2::Sam2;
 use fmlgs::models::session_cache::close_idle;
@@ -23,7 +23,7 @@ fn decoder_agrees(network: &mut dyn PromptedMasks, t: &Tensors) {
         swapped.values.chunks_exact_mut(2).for_each(<[f32]>::reverse);
         let mut right = network.masks(coords, labels.clone(), earlier()).expect("masks");
         let wrong = network.masks(swapped, labels, earlier()).expect("masks");
-        if network.fit() == Side::Both {
+        if network.fit() == FitSide::Both {
             // SAM 2's predictor gives low-resolution logits clamped; larger masks are made of unclamped ones.
             right.masks.values.iter_mut().for_each(|v| *v = v.clamp(-32.0, 32.0));
         }
@@ -79,18 +79,18 @@ fn full_size_agrees(network: &mut dyn PromptedMasks, t: &Tensors) {
     let answer = network.masks(t.floats("click.coords"), t.floats("click.labels"), None).expect("masks");
     let (low, expected) = (answer.masks.shape[3], t.floats("click.full"));
     let (h, w) = (expected.shape[1], expected.shape[2]);
-    let full = |j: usize, fit: Side| {
+    let full = |j: usize, fit: FitSide| {
         enlarge(&answer.masks.values[j * low * low..(j + 1) * low * low], low, network.side_px(), fit, (w, h))
     };
-    let all = |fit: Side| (1..4).flat_map(|j| full(j, fit)).collect::<Vec<f32>>();
-    let other = if network.fit() == Side::Longer { Side::Both } else { Side::Longer };
+    let all = |fit: FitSide| (1..4).flat_map(|j| full(j, fit)).collect::<Vec<f32>>();
+    let other = if network.fit() == FitSide::Longer { FitSide::Both } else { FitSide::Longer };
     agrees("at full size", &all(network.fit()), &all(other), &expected.values);
 }
 
 #[test]
 fn refusals_have_a_reason() {
     let mut sam = Sam::open(&fixture::path("sam.json")).expect("opens");
-    let point = || (Array::filled(&[1, 2, 2], 0.0), Array::filled(&[1, 2], -1.0));
+    let point = || (Tensor::filled(&[1, 2, 2], 0.0), Tensor::filled(&[1, 2], -1.0));
     assert!(sam.masks(point().0, point().1, None).is_err(), "no picture was looked at");
     let nothing = fmlgs::scene::PhotoPixels { width_px: 0, height_px: 0, rgb: vec![], coverage: None };
     assert!(sam.look(&nothing).is_err());
@@ -133,9 +133,9 @@ fn kept(known: &Value, t: &Tensors, kind: &str, options: &AutomaticOptions) -> V
     let (shape, logits) = t.bytes(&format!("{kind}.logits"));
     let iou = t.floats(&format!("{kind}.iou"));
     let (points, plane) = (shape[1], shape[3] * shape[4]);
-    let fit = if kind == "sam" { Side::Longer } else { Side::Both };
+    let fit = if kind == "sam" { FitSide::Longer } else { FitSide::Both };
     let side = known["side"].as_u64().expect("side") as usize;
-    let mut collector = Collector { size, side, fit, options, found: Vec::new() };
+    let mut collector = MaskCollector { size, side, fit, options, found: Vec::new() };
     let boxes = crops(size.0, size.1, options.crop_layers);
     for (c, (crop, _)) in boxes.iter().enumerate() {
         let answers: Vec<_> = (0..points)

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use fmlgs::math::stats;
-use fmlgs::models::network::Array;
+use fmlgs::models::network::Tensor;
 use fmlgs::models::sam2::Sam2;
-use fmlgs::models::sam2::track::{Frames, InMemory, ObjectId, Output, Prompt, Track, mask_of};
-use fmlgs::models::{ModelError, sam2::Frame};
+use fmlgs::models::sam2::track::{FrameSource, InMemory, ObjectId, Output, Prompt, Track, mask_of};
+use fmlgs::models::{ModelError, sam2::EncodedFrame};
 use fmlgs::scene::Mask;
 use serde_json::Value;
 
@@ -37,12 +37,12 @@ fn give(track: &mut Track<'_>, entry: &Value, t: &Tensors) {
 /// Frames whose objects are asked for in another order than they were taken in: a negative control.
 struct Shuffled(InMemory);
 
-impl Frames for Shuffled {
+impl FrameSource for Shuffled {
     fn len(&self) -> usize {
         self.0.len()
     }
 
-    fn get(&mut self, model: &mut Sam2, index: usize) -> Result<Frame, ModelError> {
+    fn get(&mut self, model: &mut Sam2, index: usize) -> Result<EncodedFrame, ModelError> {
         let n = self.0.len();
         self.0.get(model, (index * 5 + 4) % n)
     }
@@ -50,7 +50,7 @@ impl Frames for Shuffled {
 
 type Pass = BTreeMap<usize, BTreeMap<ObjectId, Output>>;
 
-fn run(model: &mut Sam2, frames: &mut dyn Frames, described: &Value, t: &Tensors) -> BTreeMap<String, Pass> {
+fn run(model: &mut Sam2, frames: &mut dyn FrameSource, described: &Value, t: &Tensors) -> BTreeMap<String, Pass> {
     let mut track = Track::new(model, frames, SIZE);
     described["prompts"].as_array().expect("prompts").iter().for_each(|p| give(&mut track, p, t));
     let mut passes = BTreeMap::new();
@@ -145,7 +145,7 @@ fn three_objects_are_followed_as_by_the_official_predictor() {
 fn logits_and_memories_agree(t: &Tensors, of_track: &Value, passes: &BTreeMap<String, Pass>) {
     for (pass, found) in passes {
         let order: Vec<usize> = floats(&of_track["passes"][pass]).into_iter().map(|f| f as usize).collect();
-        let all = |of: &dyn Fn(&Output) -> Array| -> Vec<f32> {
+        let all = |of: &dyn Fn(&Output) -> Tensor| -> Vec<f32> {
             order.iter().flat_map(|f| (1..=3).flat_map(|o| of(&found[f][&o]).values).collect::<Vec<_>>()).collect()
         };
         let expected = t.floats(&format!("first.{pass}.logits"));

@@ -1,9 +1,9 @@
 //! Completion while typing: how a text can go on, by the commands and by the names in the scene.
 
-use super::form::{Item, Request, Slot, sequences};
+use super::form::{FormItem, FormRequest, FormSlot, sequences};
 use super::{SEPARATORS, clauses, request_tokens};
-use crate::agent::language::Language;
-use crate::agent::resolve::{Vocabulary, is_thing};
+use crate::agent::language::CommandLanguage;
+use crate::agent::resolve::{NameWords, is_thing};
 use crate::scene::Identities;
 
 /// The texts that `text` can become with its next words, at most `most`: names of things first, else in the order of
@@ -11,11 +11,11 @@ use crate::scene::Identities;
 pub fn complete(text: &str, identities: &Identities, most: usize) -> Vec<String> {
     let tokens = request_tokens(text);
     let words: Vec<&str> = tokens.iter().map(|t| t.low.as_str()).collect();
-    let known = Vocabulary::new(identities);
+    let known = NameWords::new(identities);
     // Commands before the last one must be understood; courtesy is passed over.
     let starts = |at: usize| {
-        let before = Request { tokens: &tokens[..at], words: &words[..at], known: &known, strict: true };
-        let opens = Language::get().openers.contains(&words[..at].join(" "));
+        let before = FormRequest { tokens: &tokens[..at], words: &words[..at], known: &known, strict: true };
+        let opens = CommandLanguage::get().openers.contains(&words[..at].join(" "));
         at == 0 || opens || (SEPARATORS.contains(&words[at - 1]) && clauses(&before, true).is_some())
     };
     let ends_word = text.is_empty() || text.ends_with(char::is_whitespace);
@@ -45,25 +45,25 @@ pub fn complete(text: &str, identities: &Identities, most: usize) -> Vec<String>
 
 struct Kept<'a> {
     identities: &'a Identities,
-    known: &'a Vocabulary,
+    known: &'a NameWords,
     /// The word that is being typed; empty if the next has not begun.
     begun: &'a str,
 }
 
 impl Kept<'_> {
     /// Adds what may stand after `words` in a sequence, and whether it is a name.
-    fn follow(&self, items: &[Item], words: &[&str], next: &mut Vec<(bool, String)>) {
+    fn follow(&self, items: &[FormItem], words: &[&str], next: &mut Vec<(bool, String)>) {
         match (items.split_first(), words) {
             (None, _) => {}
-            (Some((Item::Word(word), _)), []) => self.offer(word, false, next),
-            (Some((Item::Word(word), items)), [first, words @ ..]) => {
+            (Some((FormItem::Word(word), _)), []) => self.offer(word, false, next),
+            (Some((FormItem::Word(word), items)), [first, words @ ..]) => {
                 if word == first {
                     self.follow(items, words, next);
                 }
             }
-            (Some((Item::Slot(slot), items)), words) => {
+            (Some((FormItem::Slot(slot), items)), words) => {
                 let options = self.options(*slot);
-                let is_name = matches!(slot, Slot::Thing | Slot::Things);
+                let is_name = matches!(slot, FormSlot::Thing | FormSlot::Things);
                 let typed = words.join(" ");
                 for option in &options {
                     // "the left stick" after "the left".
@@ -73,18 +73,18 @@ impl Kept<'_> {
                 }
                 for end in 1..=words.len() {
                     let said = words[..end].join(" ");
-                    let names = matches!(slot, Slot::Thing | Slot::Things | Slot::Kind);
+                    let names = matches!(slot, FormSlot::Thing | FormSlot::Things | FormSlot::Kind);
                     let fits = match slot {
                         _ if names => is_thing(&words[..end], self.known, true),
-                        Slot::Name => true,
-                        Slot::Distance | Slot::Angle => words[0].starts_with(|c: char| c.is_ascii_digit()),
+                        FormSlot::Name => true,
+                        FormSlot::Distance | FormSlot::Angle => words[0].starts_with(|c: char| c.is_ascii_digit()),
                         _ => options.contains(&said),
                     };
                     if fits {
                         self.follow(items, &words[end..], next);
                     }
                     if fits && names && end == words.len() {
-                        Language::get().relations.iter().for_each(|(r, _)| self.offer(r, false, next));
+                        CommandLanguage::get().relations.iter().for_each(|(r, _)| self.offer(r, false, next));
                     }
                 }
             }
@@ -97,24 +97,26 @@ impl Kept<'_> {
         }
     }
 
-    fn options(&self, slot: Slot) -> Vec<String> {
-        let language = Language::get();
+    fn options(&self, slot: FormSlot) -> Vec<String> {
+        let language = CommandLanguage::get();
         let fixed = |words: &[&str]| words.iter().map(|w| (*w).to_owned()).collect();
         let full = || self.identities.iter().filter(|(_, i)| !i.names.is_empty()).map(|(id, _)| id);
         match slot {
-            Slot::Thing | Slot::Things => full().map(|id| format!("the {}", self.identities.full_name(id))).collect(),
-            Slot::Kind => {
+            FormSlot::Thing | FormSlot::Things => {
+                full().map(|id| format!("the {}", self.identities.full_name(id))).collect()
+            }
+            FormSlot::Kind => {
                 let names = self.identities.iter().filter_map(|(_, i)| i.names.first());
                 ["objects".to_owned(), "parts".into()].into_iter().chain(names.cloned()).collect()
             }
-            Slot::Side => language.sides.iter().map(|(w, _)| (*w).to_owned()).collect(),
-            Slot::Relation => language.relations.iter().map(|(w, _)| (*w).to_owned()).collect(),
-            Slot::Direction => language.directions.iter().map(|(w, _)| (*w).to_owned()).collect(),
-            Slot::Turn => fixed(&["left", "right", "up", "down"]),
-            Slot::Distance => fixed(&["20 cm", "half a meter", "two steps", "a bit"]),
-            Slot::Angle => fixed(&["90 degrees", "45 degrees"]),
-            Slot::Most => language.most.iter().chain(&language.least).map(|(w, _)| w.clone()).collect(),
-            Slot::Name => Vec::new(),
+            FormSlot::Side => language.sides.iter().map(|(w, _)| (*w).to_owned()).collect(),
+            FormSlot::Relation => language.relations.iter().map(|(w, _)| (*w).to_owned()).collect(),
+            FormSlot::Direction => language.directions.iter().map(|(w, _)| (*w).to_owned()).collect(),
+            FormSlot::Turn => fixed(&["left", "right", "up", "down"]),
+            FormSlot::Distance => fixed(&["20 cm", "half a meter", "two steps", "a bit"]),
+            FormSlot::Angle => fixed(&["90 degrees", "45 degrees"]),
+            FormSlot::Most => language.most.iter().chain(&language.least).map(|(w, _)| w.clone()).collect(),
+            FormSlot::Name => Vec::new(),
         }
     }
 }

@@ -4,15 +4,16 @@
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
-use crate::agent::camera_args::{Direction, Distance, Side};
-use crate::agent::language::{Command, Language, commands, find};
+use crate::agent::camera_args::{Direction, Distance};
+use crate::agent::language::{CommandHelp, CommandLanguage, commands, find};
 use crate::agent::relation::Relation;
-use crate::agent::resolve::{Vocabulary, is_thing};
+use crate::agent::resolve::{NameWords, is_thing};
 use crate::agent::words::{Token, number};
+use crate::navigate::target::Side;
 
 /// What stands in a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Slot {
+pub(super) enum FormSlot {
     Thing,
     Things,
     Kind,
@@ -28,12 +29,12 @@ pub(super) enum Slot {
 
 /// A word of a form, or a slot.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Item {
+pub(super) enum FormItem {
     Word(String),
-    Slot(Slot),
+    Slot(FormSlot),
 }
 
-impl Item {
+impl FormItem {
     /// Its word, if it is none of the slots.
     pub(super) fn word(&self) -> Option<&str> {
         if let Self::Word(word) = self { Some(word) } else { None }
@@ -42,8 +43,8 @@ impl Item {
 
 /// A form without choices, and the command it is of.
 pub(super) struct Sequence {
-    pub(crate) items: Vec<Item>,
-    pub(crate) command: &'static Command,
+    pub(crate) items: Vec<FormItem>,
+    pub(crate) command: &'static CommandHelp,
 }
 
 /// What the slots of a form hold.
@@ -65,7 +66,7 @@ pub(crate) struct Slots {
 pub(super) fn sequences() -> &'static [Sequence] {
     static ALL: OnceLock<Vec<Sequence>> = OnceLock::new();
     ALL.get_or_init(|| {
-        let of = |command: &'static Command| {
+        let of = |command: &'static CommandHelp| {
             command.forms.iter().flat_map(|f| expand(f)).map(move |items| Sequence { items, command })
         };
         commands().iter().flat_map(of).collect()
@@ -76,7 +77,7 @@ pub(super) fn sequences() -> &'static [Sequence] {
 pub(super) fn beginning_with(word: &str) -> impl Iterator<Item = &'static Sequence> {
     static FIRST: OnceLock<HashMap<&str, Vec<usize>>> = OnceLock::new();
     let first = |sequence: &'static Sequence| match sequence.items.first() {
-        Some(Item::Word(word)) => word.as_str(),
+        Some(FormItem::Word(word)) => word.as_str(),
         // Any word may begin a slot.
         _ => "",
     };
@@ -92,15 +93,15 @@ pub(super) fn beginning_with(word: &str) -> impl Iterator<Item = &'static Sequen
 }
 
 /// The sequences that a form stands for.
-pub(super) fn expand(form: &str) -> Vec<Vec<Item>> {
+pub(super) fn expand(form: &str) -> Vec<Vec<FormItem>> {
     let spaced = ['(', ')', '[', ']', '|'].iter().fold(form.to_owned(), |f, c| f.replace(*c, &format!(" {c} ")));
     let words: Vec<&str> = spaced.split_whitespace().collect();
     let mut at = 0;
     alternatives(&words, &mut at)
 }
 
-fn alternatives(words: &[&str], at: &mut usize) -> Vec<Vec<Item>> {
-    let (mut done, mut open): (Vec<Vec<Item>>, Vec<Vec<Item>>) = (Vec::new(), vec![Vec::new()]);
+fn alternatives(words: &[&str], at: &mut usize) -> Vec<Vec<FormItem>> {
+    let (mut done, mut open): (Vec<Vec<FormItem>>, Vec<Vec<FormItem>>) = (Vec::new(), vec![Vec::new()]);
     while let Some(word) = words.get(*at) {
         let more = match *word {
             ")" | "]" => break,
@@ -127,45 +128,45 @@ fn alternatives(words: &[&str], at: &mut usize) -> Vec<Vec<Item>> {
     done
 }
 
-fn item(word: &str) -> Item {
-    Item::Slot(match word {
-        "{thing}" => Slot::Thing,
-        "{things}" => Slot::Things,
-        "{kind}" => Slot::Kind,
-        "{name}" => Slot::Name,
-        "{side}" => Slot::Side,
-        "{relation}" => Slot::Relation,
-        "{direction}" => Slot::Direction,
-        "{turn}" => Slot::Turn,
-        "{distance}" => Slot::Distance,
-        "{angle}" => Slot::Angle,
-        "{most}" => Slot::Most,
-        word => return Item::Word(word.to_owned()),
+fn item(word: &str) -> FormItem {
+    FormItem::Slot(match word {
+        "{thing}" => FormSlot::Thing,
+        "{things}" => FormSlot::Things,
+        "{kind}" => FormSlot::Kind,
+        "{name}" => FormSlot::Name,
+        "{side}" => FormSlot::Side,
+        "{relation}" => FormSlot::Relation,
+        "{direction}" => FormSlot::Direction,
+        "{turn}" => FormSlot::Turn,
+        "{distance}" => FormSlot::Distance,
+        "{angle}" => FormSlot::Angle,
+        "{most}" => FormSlot::Most,
+        word => return FormItem::Word(word.to_owned()),
     })
 }
 
 /// A request that is matched.
-pub(super) struct Request<'a> {
+pub(super) struct FormRequest<'a> {
     pub(crate) tokens: &'a [Token],
     pub(crate) words: &'a [&'a str],
-    pub(crate) known: &'a Vocabulary,
+    pub(crate) known: &'a NameWords,
     /// Whether things must be called by words that names in the scene have.
     pub(crate) strict: bool,
 }
 
-impl Request<'_> {
+impl FormRequest<'_> {
     /// What the slots hold if these words are said as a sequence has it.
-    pub(super) fn fit(&self, items: &[Item]) -> Option<Slots> {
+    pub(super) fn fit(&self, items: &[FormItem]) -> Option<Slots> {
         let mut slots = Slots::default();
         self.rest(items, 0, &mut slots).then_some(slots)
     }
 
-    fn rest(&self, items: &[Item], at: usize, slots: &mut Slots) -> bool {
+    fn rest(&self, items: &[FormItem], at: usize, slots: &mut Slots) -> bool {
         let Some((first, items)) = items.split_first() else { return at == self.words.len() };
         match first {
-            Item::Word(word) => self.words.get(at) == Some(&word.as_str()) && self.rest(items, at + 1, slots),
+            FormItem::Word(word) => self.words.get(at) == Some(&word.as_str()) && self.rest(items, at + 1, slots),
             // The longest that fits: "left stick", not "left".
-            Item::Slot(slot) => (at + 1..=self.words.len()).rev().any(|end| {
+            FormItem::Slot(slot) => (at + 1..=self.words.len()).rev().any(|end| {
                 let before = slots.clone();
                 let fits = self.take(*slot, at, end, slots) && self.rest(items, end, slots);
                 if !fits {
@@ -177,21 +178,21 @@ impl Request<'_> {
     }
 
     /// Fills a slot with the words from `at` to `end`, if they can stand there.
-    fn take(&self, slot: Slot, at: usize, end: usize, slots: &mut Slots) -> bool {
+    fn take(&self, slot: FormSlot, at: usize, end: usize, slots: &mut Slots) -> bool {
         let words = &self.words[at..end];
         let text = words.join(" ");
-        let language = Language::get();
+        let language = CommandLanguage::get();
         match slot {
-            Slot::Thing => {
+            FormSlot::Thing => {
                 slots.texts.push(quoted(words));
                 is_thing(words, self.known, self.strict)
             }
-            Slot::Kind => {
+            FormSlot::Kind => {
                 slots.texts.push(quoted(words));
                 let words = if words[0] == "all" { &words[1..] } else { words };
                 is_thing(words, self.known, self.strict)
             }
-            Slot::Things => {
+            FormSlot::Things => {
                 let parts: Vec<&[&str]> =
                     words.split(|w| matches!(*w, "," | "and")).filter(|p| !p.is_empty()).collect();
                 let whole = is_thing(words, self.known, self.strict);
@@ -200,33 +201,33 @@ impl Request<'_> {
                 slots.texts.push(text);
                 parts.iter().all(|p| is_thing(many(p).unwrap_or(p), self.known, self.strict))
             }
-            Slot::Name => {
+            FormSlot::Name => {
                 let raw: Vec<&str> = self.tokens[at..end].iter().map(|t| t.raw.as_str()).collect();
                 slots.name = Some(raw.join(" ").replace(" 's", "'s"));
                 !words.contains(&",")
             }
-            Slot::Side => {
+            FormSlot::Side => {
                 slots.side = find(&language.sides, text.strip_suffix(" side").unwrap_or(&text));
                 slots.side.is_some()
             }
-            Slot::Relation => {
+            FormSlot::Relation => {
                 slots.relation = language.relation_at(words).filter(|(_, n)| *n == words.len()).map(|(r, _)| r);
                 slots.relation.is_some()
             }
-            Slot::Direction | Slot::Turn => {
+            FormSlot::Direction | FormSlot::Turn => {
                 slots.direction = find(&language.directions, &text)
-                    .filter(|d| slot == Slot::Direction || Direction::TURNS.contains(d));
+                    .filter(|d| slot == FormSlot::Direction || Direction::TURNS.contains(d));
                 slots.direction.is_some()
             }
-            Slot::Distance => {
+            FormSlot::Distance => {
                 slots.distance = distance(words);
                 slots.distance.is_some()
             }
-            Slot::Angle => {
+            FormSlot::Angle => {
                 slots.degrees = find(&language.angles, &text).or_else(|| angle(words));
                 slots.degrees.is_some()
             }
-            Slot::Most => {
+            FormSlot::Most => {
                 slots.most = Some(text);
                 language.most.iter().chain(&language.least).any(|(w, _)| w == words[0]) && words.len() == 1
             }
@@ -251,17 +252,17 @@ pub(super) fn many<'a, 'b>(words: &'b [&'a str]) -> Option<&'b [&'a str]> {
 /// "20", "half a", "thirty five".
 fn amount(words: &[&str]) -> Option<f64> {
     match words {
-        [only] => number(only).or_else(|| find(&Language::get().amounts, only)),
+        [only] => number(only).or_else(|| find(&CommandLanguage::get().amounts, only)),
         [tens, ones] if number(ones).is_some_and(|n| n < 10.0) => {
             Some(number(tens).filter(|n| *n >= 20.0)? + number(ones)?)
         }
-        _ => find(&Language::get().amounts, &words.join(" ")),
+        _ => find(&CommandLanguage::get().amounts, &words.join(" ")),
     }
 }
 
 /// "20 cm", "half a meter", "two steps", "a bit".
 fn distance(words: &[&str]) -> Option<Distance> {
-    let (language, (unit, before)) = (Language::get(), words.split_last()?);
+    let (language, (unit, before)) = (CommandLanguage::get(), words.split_last()?);
     if let Some(steps) = find(&language.steps, &words.join(" ")) {
         return Some(Distance::Relative(steps));
     }

@@ -5,23 +5,25 @@ mod complete;
 mod form;
 mod task;
 
-pub use super::language::{Command, commands};
+pub use super::language::{CommandHelp, commands};
 pub use complete::complete;
 
 use std::collections::VecDeque;
 
-use self::form::{Item, Request, beginning_with, many, sequences};
+use self::form::{FormItem, FormRequest, beginning_with, many, sequences};
 use self::task::{Task, task};
-use super::camera_args::{CLOSENESS, CLOSER, Direction, Distance, FARTHER, NORMAL, Side};
+use super::camera_args::{CLOSENESS, CLOSER, Direction, Distance, FARTHER, NORMAL};
+use super::describe::capital;
 use super::dialog::DialogState;
-use super::execute::Outcome;
-use super::language::Language;
+use super::execute::CallOutcome;
+use super::language::CommandLanguage;
 use super::planner::{Planner, PlannerContext, Step};
 use super::refusal::{Refusal, RefusalKind};
-use super::resolve::{Resolved, Vocabulary, is_thing, name_words, resolve, resolve_all, words_of};
+use super::resolve::{NameWords, Resolved, is_thing, name_words, resolve, resolve_all, words_of};
 use super::tool::{Reference, Target, ToolCall};
 use super::words::{Token, alike, is_mark, tokens};
 use super::world::World;
+use crate::navigate::target::Side;
 use crate::scene::{Identities, LevelFilter};
 
 /// Most tasks of one request.
@@ -54,7 +56,7 @@ impl Planner for Commands {
         }
     }
 
-    fn next(&mut self, last: Option<&Outcome>, context: &mut PlannerContext<'_>) -> Result<Step, Refusal> {
+    fn next(&mut self, last: Option<&CallOutcome>, context: &mut PlannerContext<'_>) -> Result<Step, Refusal> {
         if last.is_some_and(|outcome| outcome.refused.is_some()) {
             // What comes after may rest on what was not done.
             if !self.tasks.is_empty() {
@@ -92,7 +94,7 @@ impl Commands {
             }
             (Task::From(side), Some(id)) => go(Target::Identity(id), side, dialog.closeness),
             (Task::From(side), None) => {
-                let text = format!("From {}: of what? Name a thing, such as 'the lamp from above'.", side.text());
+                let text = format!("{}: of what? Name a thing, such as 'the lamp from above'.", capital(side.text()));
                 self.refuse(Refusal::new(RefusalKind::Unclear, text))
             }
             (Task::Again, _) => match dialog.moved.clone() {
@@ -128,9 +130,9 @@ fn request_tokens(request: &str) -> Vec<Token> {
 /// The tasks that a request asks for; `None` unless all of it is understood. Things that the scene's
 /// names do not know are accepted where nothing else fits: it is said then that they are not there.
 pub(crate) fn parse(request: &str, identities: &Identities) -> Option<Vec<Task>> {
-    let (tokens, known) = (request_tokens(request), Vocabulary::new(identities));
+    let (tokens, known) = (request_tokens(request), NameWords::new(identities));
     let words: Vec<&str> = tokens.iter().map(|t| t.low.as_str()).collect();
-    let with = |strict| clauses(&Request { tokens: &tokens, words: &words, known: &known, strict }, true);
+    let with = |strict| clauses(&FormRequest { tokens: &tokens, words: &words, known: &known, strict }, true);
     with(true).or_else(|| with(false)).filter(|tasks| tasks.len() <= MOST_TASKS)
 }
 
@@ -138,11 +140,11 @@ pub(crate) fn parse(request: &str, identities: &Identities) -> Option<Vec<Task>>
 pub(crate) fn is_command(text: &str, identities: &Identities) -> bool {
     let words = words_of(text);
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
-    !is_thing(&words, &Vocabulary::new(identities), false) && parse(text, identities).is_some()
+    !is_thing(&words, &NameWords::new(identities), false) && parse(text, identities).is_some()
 }
 
 /// A request as one command, or as several in a row.
-fn clauses(request: &Request<'_>, is_first: bool) -> Option<Vec<Task>> {
+fn clauses(request: &FormRequest<'_>, is_first: bool) -> Option<Vec<Task>> {
     let request = trimmed(request);
     if let Some(tasks) = one(&request, is_first) {
         return Some(tasks);
@@ -159,13 +161,13 @@ fn clauses(request: &Request<'_>, is_first: bool) -> Option<Vec<Task>> {
     })
 }
 
-fn part<'a>(request: &Request<'a>, from: usize, to: usize) -> Request<'a> {
-    let Request { tokens, words, known, strict } = *request;
-    Request { tokens: &tokens[from..to], words: &words[from..to], known, strict }
+fn part<'a>(request: &FormRequest<'a>, from: usize, to: usize) -> FormRequest<'a> {
+    let FormRequest { tokens, words, known, strict } = *request;
+    FormRequest { tokens: &tokens[from..to], words: &words[from..to], known, strict }
 }
 
 /// Without separators and courtesy around it.
-fn trimmed<'a>(request: &Request<'a>) -> Request<'a> {
+fn trimmed<'a>(request: &FormRequest<'a>) -> FormRequest<'a> {
     let (mut from, mut to) = (0, request.words.len());
     loop {
         let words = &request.words[from..to];
@@ -173,7 +175,7 @@ fn trimmed<'a>(request: &Request<'a>) -> Request<'a> {
             to -= 1;
         } else if words.first().is_some_and(|w| SEPARATORS.contains(w)) {
             from += 1;
-        } else if let Some(n) = Language::get().openers.iter().find_map(|o| opens(words, o)) {
+        } else if let Some(n) = CommandLanguage::get().openers.iter().find_map(|o| opens(words, o)) {
             from += n;
         } else {
             return part(request, from, to);
@@ -188,10 +190,10 @@ fn opens(words: &[&str], phrase: &str) -> Option<usize> {
 }
 
 /// One command: the first that fits.
-fn one(request: &Request<'_>, is_first: bool) -> Option<Vec<Task>> {
+fn one(request: &FormRequest<'_>, is_first: bool) -> Option<Vec<Task>> {
     beginning_with(request.words.first()?).find_map(|sequence| {
         // A name alone is a command only if it is one, and the first: "hide the lamp and the mug from above".
-        let begins_with_word = matches!(sequence.items.first(), Some(Item::Word(_)));
+        let begins_with_word = matches!(sequence.items.first(), Some(FormItem::Word(_)));
         if !(begins_with_word || request.strict && is_first) {
             return None;
         }
@@ -275,7 +277,7 @@ fn all_of(phrase: &str, world: &mut dyn World, dialog: &DialogState) -> Result<O
 }
 
 /// An example of a command with a name of this scene.
-fn example(command: &Command, identities: &Identities, request: &[&str]) -> String {
+fn example(command: &CommandHelp, identities: &Identities, request: &[&str]) -> String {
     let names = || identities.iter().filter_map(|(_, i)| i.names.first());
     let spoken = names().find(|n| name_words(n).iter().all(|w| request.iter().any(|r| name_words(r).contains(w))));
     let name = spoken.or_else(|| names().next()).map_or("lamp", String::as_str);
@@ -287,13 +289,13 @@ pub(crate) fn nearest(request: &str, identities: &Identities) -> Vec<String> {
     let tokens = request_tokens(request);
     let words: Vec<&str> = tokens.iter().map(|t| t.low.as_str()).filter(|w| *w != ",").collect();
     let common = ["the", "a", "is", "to", "of", "in", "it", "me", "and"];
-    let score = |items: &[Item]| {
-        let own: Vec<&str> = items.iter().filter_map(Item::word).collect();
+    let score = |items: &[FormItem]| {
+        let own: Vec<&str> = items.iter().filter_map(FormItem::word).collect();
         let verb = own.first().is_some_and(|w| words.first().is_some_and(|f| alike(f, w)));
         let shared = words.iter().filter(|w| !common.contains(*w) && own.iter().any(|o| alike(o, w))).count();
         3 * usize::from(verb) + 2 * shared
     };
-    let mut best: Vec<(usize, &Command)> = Vec::new();
+    let mut best: Vec<(usize, &CommandHelp)> = Vec::new();
     for sequence in sequences() {
         let score = score(&sequence.items);
         match best.last_mut() {
@@ -317,9 +319,9 @@ pub(crate) fn nearest(request: &str, identities: &Identities) -> Vec<String> {
 
 /// The request with slips of one letter mended, if that makes it a command. It is shown, never done.
 fn corrected(request: &str, identities: &Identities) -> Option<String> {
-    let known = Vocabulary::new(identities);
-    let mut words: Vec<&str> = sequences().iter().flat_map(|s| &s.items).filter_map(Item::word).collect();
-    words.extend(Language::get().relations.iter().flat_map(|(r, _)| r.split(' ')));
+    let known = NameWords::new(identities);
+    let mut words: Vec<&str> = sequences().iter().flat_map(|s| &s.items).filter_map(FormItem::word).collect();
+    words.extend(CommandLanguage::get().relations.iter().flat_map(|(r, _)| r.split(' ')));
     words.extend(known.words());
     words.sort_unstable();
     words.dedup();

@@ -1,9 +1,10 @@
 //! What each command comes to: from its id in `assets/commands.toml` and what its slots hold to a task.
 
 use super::form::Slots;
-use crate::agent::camera_args::{CLOSER, Direction, FARTHER, NORMAL, Side};
+use crate::agent::camera_args::{CLOSER, Direction, FARTHER, NORMAL};
 use crate::agent::relation::Relation;
 use crate::agent::tool::{Reference, Target, ToolCall};
+use crate::navigate::target::Side;
 use crate::scene::LevelFilter;
 
 /// One step of a plan.

@@ -7,8 +7,8 @@ use std::time::Duration;
 use serde_json::{Value, json};
 
 use super::http::{Broken, Head, exchange};
-use super::settings::{LlmSettings, Patience};
-use super::wire::Collector;
+use super::settings::{LlmSettings, RequestPatience};
+use super::wire::ReplyCollector;
 
 /// Servers of the usual kind and their ports.
 pub(crate) const PORTS: [(&str, u16); 4] =
@@ -26,7 +26,8 @@ pub struct LocalServer {
 
 /// The servers that answer on these ports of this machine.
 pub fn find(ports: &[(&'static str, u16)], cancel: &AtomicBool) -> Vec<LocalServer> {
-    let patience = Patience { stall: Duration::from_secs(1), answer: Duration::from_secs(2), ..Patience::default() };
+    let patience =
+        RequestPatience { stall: Duration::from_secs(1), answer: Duration::from_secs(2), ..RequestPatience::default() };
     let ask = |(kind, port): (&'static str, u16)| {
         let base_url = format!("http://127.0.0.1:{port}/v1");
         let settings = LlmSettings { base_url: base_url.clone(), ..LlmSettings::default() };
@@ -40,7 +41,7 @@ pub fn find(ports: &[(&'static str, u16)], cancel: &AtomicBool) -> Vec<LocalServ
 }
 
 /// The names of a server's models.
-fn models(settings: &LlmSettings, patience: &Patience, cancel: &AtomicBool) -> Result<Vec<String>, Broken> {
+fn models(settings: &LlmSettings, patience: &RequestPatience, cancel: &AtomicBool) -> Result<Vec<String>, Broken> {
     let url = format!("{}/models", settings.base_url.trim().trim_end_matches('/'));
     let key = settings.key().ok().flatten();
     let mut bytes = Vec::new();
@@ -58,7 +59,7 @@ fn models(settings: &LlmSettings, patience: &Patience, cancel: &AtomicBool) -> R
 ///
 /// # Errors
 /// What is wrong, and what helps.
-pub fn test(settings: &LlmSettings, patience: &Patience, cancel: &AtomicBool) -> Result<String, String> {
+pub fn test(settings: &LlmSettings, patience: &RequestPatience, cancel: &AtomicBool) -> Result<String, String> {
     let key = settings.key().map_err(|e| e.to_string())?;
     let clean = |text: &str| key.as_ref().map_or_else(|| text.to_owned(), |k| k.redact(text));
     let url = settings.endpoint(key.is_some()).map_err(|e| e.to_string())?;
@@ -77,7 +78,7 @@ pub fn test(settings: &LlmSettings, patience: &Patience, cancel: &AtomicBool) ->
         "tools": crate::agent::schema::tools().into_iter().filter(|t| t["function"]["name"] == "undo").collect::<Vec<_>>(),
         "stream": false
     });
-    let mut collector = Collector::default();
+    let mut collector = ReplyCollector::default();
     let mut take = |_: &Head, piece: &[u8]| collector.take(false, piece);
     exchange(&url, key.as_ref(), Some(body.to_string()), patience, MAX_LIST_BYTES, cancel, &mut take)
         .map_err(|broken| clean(&problem(settings, &broken)))?;

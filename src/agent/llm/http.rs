@@ -8,8 +8,8 @@ use crossbeam_channel::{Receiver, RecvTimeoutError};
 use ureq::Agent;
 
 use super::secret::Secret;
-use super::settings::Patience;
-use crate::io::http::{self, Piece, TICK};
+use super::settings::RequestPatience;
+use crate::io::http::{self, ResponsePart, TICK};
 
 /// Why there is no answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -51,7 +51,7 @@ pub(crate) fn exchange(
     url: &str,
     key: Option<&Secret>,
     body: Option<String>,
-    patience: &Patience,
+    patience: &RequestPatience,
     most_bytes: usize,
     cancel: &AtomicBool,
     take: &mut dyn FnMut(&Head, &[u8]) -> bool,
@@ -71,8 +71,8 @@ pub(crate) fn exchange(
         match pieces.recv_timeout(TICK) {
             Err(RecvTimeoutError::Timeout) => continue,
             Err(RecvTimeoutError::Disconnected) => break,
-            Ok(Piece::Failed(problem)) => return Err(Broken::Connection(problem)),
-            Ok(Piece::Head(status, headers)) => {
+            Ok(ResponsePart::Failed(problem)) => return Err(Broken::Connection(problem)),
+            Ok(ResponsePart::Head(status, headers)) => {
                 heard = Instant::now();
                 let header = |name: &str| headers.get(name).and_then(|v| v.to_str().ok());
                 let retry_after = header("retry-after").and_then(|v| v.trim().parse::<f64>().ok());
@@ -80,7 +80,7 @@ pub(crate) fn exchange(
                 let is_stream = header("content-type").is_some_and(|t| t.starts_with("text/event-stream"));
                 head = Some((Head { is_stream }, status.as_u16(), retry_after));
             }
-            Ok(Piece::Bytes(piece)) => {
+            Ok(ResponsePart::Bytes(piece)) => {
                 heard = Instant::now();
                 bytes += piece.len();
                 if bytes > most_bytes {
@@ -106,7 +106,12 @@ pub(crate) fn exchange(
     }
 }
 
-fn ask(url: &str, key: Option<&Secret>, body: Option<String>, patience: &Patience) -> std::io::Result<Receiver<Piece>> {
+fn ask(
+    url: &str,
+    key: Option<&Secret>,
+    body: Option<String>,
+    patience: &RequestPatience,
+) -> std::io::Result<Receiver<ResponsePart>> {
     let config = http::config(url, 2 * patience.stall)
         // Neither the key nor the user's words follow a server elsewhere.
         .max_redirects(0)

@@ -19,10 +19,10 @@ use serde_json::{Value, json};
 
 use self::http::{Broken, exchange, wait};
 use self::secret::Secret;
-use self::settings::{Limits, LlmError, LlmSettings, Patience};
-use self::wire::{Answer, Collector, RawCall, assistant};
+use self::settings::{LlmError, LlmSettings, RequestLimits, RequestPatience};
+use self::wire::{ModelReply, RawCall, ReplyCollector, assistant};
 use super::event::AgentEvent;
-use super::execute::Outcome;
+use super::execute::CallOutcome;
 use super::planner::{Planner, PlannerContext, Step};
 use super::refusal::{Refusal, RefusalKind};
 use super::schema;
@@ -39,8 +39,8 @@ pub struct Llm {
     settings: LlmSettings,
     url: String,
     key: Option<Secret>,
-    patience: Patience,
-    limits: Limits,
+    patience: RequestPatience,
+    limits: RequestLimits,
     talk: Vec<Value>,
     /// Calls of the last answer that are still to be made.
     waiting: VecDeque<RawCall>,
@@ -61,7 +61,7 @@ impl Llm {
     /// If the settings cannot be used.
     pub fn new(settings: LlmSettings) -> Result<Self, LlmError> {
         let key = settings.key()?;
-        Self::with(settings, key, Patience::default(), Limits::default())
+        Self::with(settings, key, RequestPatience::default(), RequestLimits::default())
     }
 
     /// A planner with this key and these limits.
@@ -71,8 +71,8 @@ impl Llm {
     pub fn with(
         settings: LlmSettings,
         key: Option<Secret>,
-        patience: Patience,
-        limits: Limits,
+        patience: RequestPatience,
+        limits: RequestLimits,
     ) -> Result<Self, LlmError> {
         let url = settings.endpoint(key.is_some())?;
         let stream = settings.stream;
@@ -161,7 +161,7 @@ impl Llm {
     }
 
     /// One answer of the model, asked for as often as patience has it.
-    fn ask(&mut self, context: &mut PlannerContext<'_>) -> Result<Answer, Refusal> {
+    fn ask(&mut self, context: &mut PlannerContext<'_>) -> Result<ModelReply, Refusal> {
         let mut pause = self.patience.pause;
         for attempt in 1.. {
             let (problem, asked_wait) = match self.attempt(context) {
@@ -194,12 +194,12 @@ impl Llm {
         Err(self.failed("The chat model gave no answer."))
     }
 
-    fn attempt(&mut self, context: &mut PlannerContext<'_>) -> Result<Answer, Problem> {
+    fn attempt(&mut self, context: &mut PlannerContext<'_>) -> Result<ModelReply, Problem> {
         let body = self.body(context);
         let sent = body.len() as u64;
         let left = self.patience.request.saturating_sub(self.begun.elapsed());
-        let patience = Patience { answer: self.patience.answer.min(left), ..self.patience };
-        let mut collector = Collector::default();
+        let patience = RequestPatience { answer: self.patience.answer.min(left), ..self.patience };
+        let mut collector = ReplyCollector::default();
         let mut is_stream = false;
         let mut told = 0;
         let key = self.key.as_ref();
@@ -252,7 +252,7 @@ impl Llm {
     }
 
     /// An answer without the key, whose calls all have numbers of their own.
-    fn cleaned(&self, mut answer: Answer) -> Answer {
+    fn cleaned(&self, mut answer: ModelReply) -> ModelReply {
         answer.text = self.clean(&answer.text);
         for (i, call) in answer.calls.iter_mut().enumerate() {
             let mut fixed = [&call.id, &call.name, &call.arguments].map(|t| match &self.key {
@@ -338,7 +338,7 @@ impl Planner for Llm {
         self.stream = self.settings.stream;
     }
 
-    fn next(&mut self, last: Option<&Outcome>, context: &mut PlannerContext<'_>) -> Result<Step, Refusal> {
+    fn next(&mut self, last: Option<&CallOutcome>, context: &mut PlannerContext<'_>) -> Result<Step, Refusal> {
         if let (Some(call), Some(outcome)) = (self.current.take(), last) {
             let result = json!({ "done": outcome.refused.is_none(), "result": outcome.heard(), "ids": outcome.ids });
             self.push_result(&call, &result);

@@ -30,7 +30,7 @@ impl Default for LlmSettings {
 
 /// How patient the agent is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Patience {
+pub struct RequestPatience {
     /// How long the server may say nothing.
     pub stall: Duration,
     pub answer: Duration,
@@ -43,7 +43,7 @@ pub struct Patience {
     pub longest_pause: Duration,
 }
 
-impl Default for Patience {
+impl Default for RequestPatience {
     fn default() -> Self {
         Self {
             stall: Duration::from_secs(45),
@@ -58,7 +58,7 @@ impl Default for Patience {
 
 /// How much one request may take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Limits {
+pub struct RequestLimits {
     pub(crate) answers: u32,
     /// Calls in an answer that are looked at.
     pub calls: usize,
@@ -69,7 +69,7 @@ pub struct Limits {
     pub(crate) bytes: usize,
 }
 
-impl Default for Limits {
+impl Default for RequestLimits {
     fn default() -> Self {
         Self { answers: 12, calls: 8, wrong: 3, tokens: 100_000, bytes: 1 << 20 }
     }

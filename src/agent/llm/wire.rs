@@ -18,7 +18,7 @@ pub struct RawCall {
 
 /// An answer.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Answer {
+pub struct ModelReply {
     pub(crate) text: String,
     pub calls: Vec<RawCall>,
     /// Tokens, as the server counted them.
@@ -38,14 +38,14 @@ fn arguments(given: &Value) -> String {
 
 /// Collects an answer from pieces.
 #[derive(Default)]
-pub struct Collector {
+pub struct ReplyCollector {
     events: Events,
     whole: Vec<u8>,
-    answer: Answer,
+    answer: ModelReply,
     problem: Option<String>,
 }
 
-impl Collector {
+impl ReplyCollector {
     /// Takes a piece of a stream or of a whole answer; says whether the answer is complete.
     pub fn take(&mut self, is_stream: bool, bytes: &[u8]) -> bool {
         if !is_stream {
@@ -110,7 +110,7 @@ impl Collector {
     ///
     /// # Errors
     /// In words, if it is none or broke off.
-    pub fn finish(mut self, is_stream: bool) -> Result<Answer, String> {
+    pub fn finish(mut self, is_stream: bool) -> Result<ModelReply, String> {
         if is_stream {
             if let Some(rest) = self.events.end() {
                 self.event(&rest);
@@ -138,7 +138,7 @@ impl Collector {
 }
 
 /// The model's turn as it goes back to it.
-pub(crate) fn assistant(answer: &Answer) -> Value {
+pub(crate) fn assistant(answer: &ModelReply) -> Value {
     let mut message = json!({ "role": "assistant", "content": answer.text });
     if !answer.calls.is_empty() {
         let calls = answer.calls.iter().map(
@@ -153,8 +153,8 @@ pub(crate) fn assistant(answer: &Answer) -> Value {
 mod tests {
     use super::*;
 
-    fn stream(events: &[&str]) -> Result<Answer, String> {
-        let mut collector = Collector::default();
+    fn stream(events: &[&str]) -> Result<ModelReply, String> {
+        let mut collector = ReplyCollector::default();
         for event in events {
             collector.take(true, format!("data: {event}\n\n").as_bytes());
         }
@@ -172,7 +172,7 @@ mod tests {
             "[DONE]",
         ]);
         let call = RawCall { id: "a".into(), name: "go_to".into(), arguments: r#"{"target":1}"#.into() };
-        let wanted = Answer { text: "On it.".into(), calls: vec![call], tokens: Some(7), is_whole: true };
+        let wanted = ModelReply { text: "On it.".into(), calls: vec![call], tokens: Some(7), is_whole: true };
         assert_eq!(answer, Ok(wanted));
     }
 
@@ -183,7 +183,7 @@ mod tests {
         assert!(stream(&[r#"{"error":{"message":"x"}}"#, "[DONE]"]).is_err());
         assert!(stream(&[r#"{"choices":[{"delta":{"tool_calls":[{"index":999999999}]}}]}"#, "[DONE]"]).is_err());
         let whole = |text: &str| {
-            let mut collector = Collector::default();
+            let mut collector = ReplyCollector::default();
             collector.take(false, text.as_bytes());
             collector.finish(false)
         };

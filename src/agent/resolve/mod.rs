@@ -4,7 +4,7 @@
 
 mod noun;
 
-pub(crate) use noun::{Vocabulary, is_thing, name_words, words_of};
+pub(crate) use noun::{NameWords, is_thing, name_words, words_of};
 
 use self::noun::{ANYTHING, Noun, PARTS, Pick, readings};
 use super::describe::{join, the};
@@ -105,7 +105,7 @@ impl Resolver<'_> {
     fn phrase(&mut self, phrase: &str) -> Result<Set, Lost> {
         let words = words_of(phrase);
         let words: Vec<&str> = words.iter().map(String::as_str).collect();
-        let known = Vocabulary::new(self.world.identities());
+        let known = NameWords::new(self.world.identities());
         let mut nouns = readings(&words, &known, false);
         // What is called "left stick" is not the left one of the sticks.
         nouns.sort_by_key(|n| matches!(n, Noun::Picked(..)));
@@ -192,7 +192,7 @@ impl Resolver<'_> {
         let Some((head, rest)) = words.split_last() else { return Err(self.not_found("that", &[])) };
         let own = |id: IdentityId| all.get(id).map(|i| i.names.as_slice()).unwrap_or_default();
         let line_has = |id: IdentityId, word: &String| {
-            all.line(id).any(|i| own(i).iter().any(|name| name_words(name).contains(word)))
+            all.ancestors(id).any(|i| own(i).iter().any(|name| name_words(name).contains(word)))
         };
         let is_object = |id: &IdentityId| all.object_of(*id) == *id;
         let generic = match head.as_str() {
@@ -273,7 +273,7 @@ impl Resolver<'_> {
         let all = self.world.identities();
         let mut inside = vec![false; all.len() + 1];
         for whole in &wholes {
-            all.within(*whole).iter().enumerate().for_each(|(i, is_in)| inside[i] |= *is_in);
+            all.descendants(*whole).iter().enumerate().for_each(|(i, is_in)| inside[i] |= *is_in);
         }
         wholes.iter().for_each(|id| inside[*id as usize] = false);
         let is_in = |id: &IdentityId| inside.get(*id as usize) == Some(&true);
@@ -319,7 +319,8 @@ impl Resolver<'_> {
         let set = self.set(thing)?;
         let all = self.world.identities();
         let place = self.bounds(anchor);
-        let apart = |id: &IdentityId| !all.line(*id).any(|l| l == anchor) && !all.line(anchor).any(|l| l == *id);
+        let apart =
+            |id: &IdentityId| !all.ancestors(*id).any(|l| l == anchor) && !all.ancestors(anchor).any(|l| l == *id);
         let holds = |id: &IdentityId| score(&self.bounds(*id)?, place.as_ref()?).map(|s| (s, *id));
         let mut found: Vec<(f64, IdentityId)> = set.ids.iter().filter(|id| apart(id)).filter_map(holds).collect();
         found.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -1,6 +1,6 @@
 //! How a phrase names a thing: its readings, by words alone. Every word must have a place in one.
 
-use crate::agent::language::{Key, Language, find};
+use crate::agent::language::{CommandLanguage, Key, find};
 use crate::agent::relation::Relation;
 use crate::agent::words::{singular, tokens};
 use crate::scene::Identities;
@@ -32,7 +32,7 @@ pub(super) enum Pick {
 
 /// How a word chooses, if it does.
 pub(super) fn pick(word: &str) -> Option<Pick> {
-    let all = Language::get();
+    let all = CommandLanguage::get();
     let most = || find(&all.most, word).map(|key| Pick::Most(key, true));
     let least = || find(&all.least, word).map(|key| Pick::Most(key, false));
     let more = || find(&all.more, word).map(|key| Pick::More(key, true));
@@ -53,13 +53,13 @@ pub(crate) fn name_words(name: &str) -> Vec<String> {
 }
 
 /// Words as the names in the scene have them.
-pub(crate) struct Vocabulary {
+pub(crate) struct NameWords {
     words: Vec<String>,
     /// Whole names of more than one word: what they are made of means nothing else.
     whole: Vec<Vec<String>>,
 }
 
-impl Vocabulary {
+impl NameWords {
     /// The words of all names.
     pub(crate) fn new(identities: &Identities) -> Self {
         let names: Vec<Vec<String>> = identities.iter().flat_map(|(_, i)| &i.names).map(|n| name_words(n)).collect();
@@ -89,8 +89,8 @@ pub(crate) fn words_of(phrase: &str) -> Vec<String> {
 }
 
 /// All ways to read words as a thing. With `strict`, every word must be one that the scene's names have.
-pub(super) fn readings(words: &[&str], known: &Vocabulary, strict: bool) -> Vec<Noun> {
-    let (language, mut found) = (Language::get(), Vec::new());
+pub(super) fn readings(words: &[&str], known: &NameWords, strict: bool) -> Vec<Noun> {
+    let (language, mut found) = (CommandLanguage::get(), Vec::new());
     let is_determiner = |word: &str| language.determiners.iter().any(|d| d == word);
     let words = match words {
         [first, rest @ ..] if is_determiner(first) && !rest.is_empty() && !known.is_name(words) => rest,
@@ -159,7 +159,7 @@ fn named(words: &[&str]) -> Noun {
 /// Without "that is standing" at the end.
 fn stood<'a, 'b>(mut words: &'b [&'a str]) -> &'b [&'a str] {
     while let [rest @ .., last] = words
-        && Language::get().standing.iter().any(|w| w == last)
+        && CommandLanguage::get().standing.iter().any(|w| w == last)
     {
         words = rest;
     }
@@ -167,6 +167,6 @@ fn stood<'a, 'b>(mut words: &'b [&'a str]) -> &'b [&'a str] {
 }
 
 /// Whether words can be read as a thing.
-pub(crate) fn is_thing(words: &[&str], known: &Vocabulary, strict: bool) -> bool {
+pub(crate) fn is_thing(words: &[&str], known: &NameWords, strict: bool) -> bool {
     !readings(words, known, strict).is_empty()
 }

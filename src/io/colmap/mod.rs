@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
 
-use super::photo_list::{Lens, Listed, photos};
+use super::photo_list::{Lens, ListedPhoto, photos};
 use super::{IoError, files, photo_list};
 use crate::math::rotation::matrix_from_quaternion;
 use crate::scene::{CameraError, Dataset, SparsePoint};
@@ -92,7 +92,7 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
     })
 }
 
-fn listed(image: &Image, cameras: &Cameras, root: &Path, folder: &str, source: &Path) -> Result<Listed, IoError> {
+fn listed(image: &Image, cameras: &Cameras, root: &Path, folder: &str, source: &Path) -> Result<ListedPhoto, IoError> {
     let Some(lens) = cameras.get(&image.camera) else {
         return Err(IoError::Syntax {
             path: source.into(),
@@ -105,7 +105,7 @@ fn listed(image: &Image, cameras: &Cameras, root: &Path, folder: &str, source: &
     // The rows of camera_from_world are the columns of world_from_camera.
     let world_from_camera = DMat3::from_cols(x.into(), y.into(), z.into());
     let name = files::relative(root, &image.name, source)?;
-    Ok(Listed {
+    Ok(ListedPhoto {
         entry: format!("{folder}/{name}"),
         name,
         lens: lens.clone(),

@@ -7,7 +7,7 @@ use super::File;
 use crate::io::IoError;
 
 /// Values of an accessor as `f32`, those of one element together.
-pub(crate) struct Values {
+pub(crate) struct AccessorValues {
     pub(crate) width: usize,
     /// `[count * width]`, finite.
     pub(crate) data: Vec<f32>,
@@ -15,7 +15,7 @@ pub(crate) struct Values {
     pub(crate) signed_integer: bool,
 }
 
-impl Values {
+impl AccessorValues {
     /// Elements as arrays, filled up with `fill` where the accessor has fewer components.
     pub(crate) fn arrays<const N: usize>(&self, fill: f32) -> impl Iterator<Item = [f32; N]> + '_ {
         self.data.chunks_exact(self.width).map(move |c| std::array::from_fn(|i| c.get(i).copied().unwrap_or(fill)))
@@ -24,7 +24,7 @@ impl Values {
 
 impl File<'_> {
     /// Reads a numeric accessor; integers are scaled to 0..1 or -1..1 where it says `normalized`.
-    pub(crate) fn values(&self, index: usize, place: &str) -> Result<Values, IoError> {
+    pub(crate) fn values(&self, index: usize, place: &str) -> Result<AccessorValues, IoError> {
         let root = self.root;
         let accessor = self.item(&root.accessors, index, "accessors", place)?;
         let place = format!("accessors[{index}]");
@@ -78,7 +78,7 @@ impl File<'_> {
             let (path, index) = (self.path.into(), i / width);
             return Err(IoError::NotFinite { path, element: "element", index, property: place });
         }
-        Ok(Values { width, data, signed_integer: matches!(component, ComponentType::I8 | ComponentType::I16) })
+        Ok(AccessorValues { width, data, signed_integer: matches!(component, ComponentType::I8 | ComponentType::I16) })
     }
 
     /// Reads an index accessor.

@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3, Vec4};
 use gltf::json::mesh::{Mode, Primitive as JsonPrimitive, Semantic};
 use gltf::json::validation::Checked;
 
-use super::{File, MAX_ITEMS, Material, Mesh, MeshNode, Primitive};
+use super::{File, MAX_ITEMS, Material, Mesh, MeshNode, MeshPrimitive};
 use crate::io::IoError;
 use crate::scene::text;
 
@@ -39,7 +39,7 @@ impl File<'_> {
         primitive: &JsonPrimitive,
         place: &str,
         materials: &[Material],
-    ) -> Result<Option<Primitive>, IoError> {
+    ) -> Result<Option<MeshPrimitive>, IoError> {
         let mode = match primitive.mode {
             Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) => mode,
             Checked::Valid(_) => {
@@ -94,7 +94,7 @@ impl File<'_> {
             None => materials.len() - 1,
         };
         let triangles = triangles(&order, mode);
-        Ok(Some(Primitive { positions, normals, uv_sets, colors, triangles, material }))
+        Ok(Some(MeshPrimitive { positions, normals, uv_sets, colors, triangles, material }))
     }
 }
 

@@ -39,12 +39,12 @@ pub(crate) struct MeshNode {
 pub(crate) struct Mesh {
     pub(crate) name: Option<String>,
     /// Its primitives that are made of triangles.
-    pub(crate) primitives: Vec<Primitive>,
+    pub(crate) primitives: Vec<MeshPrimitive>,
 }
 
 /// Indexed triangles with one material. All vertex lists are as long as `positions` or empty.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Primitive {
+pub(crate) struct MeshPrimitive {
     /// Vertex positions in node space, finite.
     pub(crate) positions: Vec<Vec3>,
     /// Vertex normals, not necessarily of unit length; empty means flat shading.

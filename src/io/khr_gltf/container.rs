@@ -19,18 +19,18 @@ pub(super) struct Meshes {
 
 #[derive(Deserialize)]
 struct Mesh {
-    primitives: Vec<Primitive>,
+    primitives: Vec<SplatPrimitive>,
 }
 
 #[derive(Deserialize)]
-pub(super) struct Primitive {
+pub(super) struct SplatPrimitive {
     pub(crate) attributes: BTreeMap<String, usize>,
     #[serde(default)]
     pub(crate) extensions: BTreeMap<String, serde_json::Value>,
 }
 
 /// The values of an accessor.
-pub(super) struct Values<const N: usize> {
+pub(super) struct AttributeValues<const N: usize> {
     pub(crate) rows: Vec<[f32; N]>,
     /// Whether the type is a signed integer.
     pub(crate) signed_integer: bool,
@@ -76,18 +76,18 @@ impl<'a> Gltf<'a> {
     }
 
     /// What a node shows.
-    pub(crate) fn primitives(&self, node: &MeshNode) -> &[Primitive] {
+    pub(crate) fn primitives(&self, node: &MeshNode) -> &[SplatPrimitive] {
         node.mesh.and_then(|mesh| self.meshes.meshes.get(mesh)).map_or(&[], |mesh| &mesh.primitives)
     }
 
     /// The values of accessor `index`, integers as the accessor says: normalized or as they are.
-    pub(crate) fn values<const N: usize>(&self, index: usize) -> Result<Values<N>, IoError> {
+    pub(crate) fn values<const N: usize>(&self, index: usize) -> Result<AttributeValues<N>, IoError> {
         let values = self.file.values(index, "a splat primitive")?;
         if values.width != N {
             let reason = format!("it has {} components, expected {N}", values.width);
             return Err(self.bad(&format!("accessors[{index}]"), reason));
         }
         let (rows, _) = values.data.as_chunks::<N>();
-        Ok(Values { rows: rows.to_vec(), signed_integer: values.signed_integer })
+        Ok(AttributeValues { rows: rows.to_vec(), signed_integer: values.signed_integer })
     }
 }

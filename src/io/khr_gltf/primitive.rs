@@ -3,7 +3,7 @@
 use glam::{DMat3, DMat4, DQuat, DVec3};
 
 use super::EXTENSION;
-use super::container::{Gltf, Primitive};
+use super::container::{Gltf, SplatPrimitive};
 use crate::io::IoError;
 use crate::io::quantized::logit;
 use crate::math::rotation::{nearest_rotation, rotation_error};
@@ -16,7 +16,7 @@ const SMALLEST_SCALE: f32 = 1e-12;
 
 pub(super) fn cloud(
     gltf: &Gltf<'_>,
-    primitive: &Primitive,
+    primitive: &SplatPrimitive,
     extension: &serde_json::Value,
     world: DMat4,
 ) -> Result<GaussianCloud, IoError> {

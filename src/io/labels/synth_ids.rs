@@ -13,12 +13,12 @@ pub(crate) const LIST_FILE: &str = "identities.json";
 
 #[derive(Deserialize)]
 struct File {
-    identities: Vec<Listed>,
+    identities: Vec<ListedIdentity>,
 }
 
 /// An object or part as listed.
 #[derive(Clone, Debug, Deserialize)]
-pub(crate) struct Listed {
+pub(crate) struct ListedIdentity {
     /// Value in the id maps.
     pub(crate) id: u16,
     #[serde(deserialize_with = "text::read_name")]
@@ -32,7 +32,7 @@ pub(crate) struct Listed {
 /// A folder with id maps.
 pub struct SynthIds {
     root: PathBuf,
-    list: Vec<Listed>,
+    list: Vec<ListedIdentity>,
 }
 
 impl SynthIds {

@@ -15,17 +15,17 @@ pub(super) struct Meta {
     /// Pictures with the low and the high bytes of the positions.
     pub(crate) means_files: [String; 2],
     /// Log-scales.
-    pub(crate) scales: Levels<3>,
+    pub(crate) scales: Codebook<3>,
     pub(crate) scales_file: String,
     pub(crate) quats_file: String,
-    pub(crate) sh0: Levels<3>,
+    pub(crate) sh0: Codebook<3>,
     pub(crate) opacity: Opacity,
     pub(crate) sh0_file: String,
     pub(crate) rest: Option<Rest>,
 }
 
 /// What the 256 values of a byte stand for, by channel.
-pub(super) struct Levels<const N: usize>(pub [[f32; 256]; N]);
+pub(super) struct Codebook<const N: usize>(pub [[f32; 256]; N]);
 
 pub(super) enum Opacity {
     /// 0 to 1.
@@ -39,7 +39,7 @@ pub(super) struct Rest {
     pub(crate) degree: Option<u8>,
     /// Palette entries, where the file says.
     pub(crate) count: Option<u64>,
-    pub(crate) levels: Levels<1>,
+    pub(crate) levels: Codebook<1>,
     pub(crate) centroids_file: String,
     pub(crate) labels_file: String,
 }
@@ -99,13 +99,13 @@ fn convert(file: File, codebooks: bool) -> Result<Meta, Flaw> {
     let [quats_file] = file.quats.files("quats")?;
     let [sh0_file] = file.sh0.files("sh0")?;
     let (scales, sh0, opacity) = if codebooks {
-        let shared = |p: &Part, name| p.codebook(name).map(|c| Levels([c; 3]));
+        let shared = |p: &Part, name| p.codebook(name).map(|c| Codebook([c; 3]));
         (shared(&file.scales, "scales")?, shared(&file.sh0, "sh0")?, Opacity::Linear)
     } else {
         let (min, max) = (file.sh0.bounds::<4>("sh0", true)?, file.sh0.bounds::<4>("sh0", false)?);
-        let sh0 = Levels([0, 1, 2].map(|k| between(min[k], max[k])));
+        let sh0 = Codebook([0, 1, 2].map(|k| between(min[k], max[k])));
         let (lo, hi) = (file.scales.bounds::<3>("scales", true)?, file.scales.bounds::<3>("scales", false)?);
-        (Levels([0, 1, 2].map(|k| between(lo[k], hi[k]))), sh0, Opacity::Logit(min[3], max[3]))
+        (Codebook([0, 1, 2].map(|k| between(lo[k], hi[k]))), sh0, Opacity::Logit(min[3], max[3]))
     };
     let rest = match &file.rest {
         None => None,
@@ -121,7 +121,13 @@ fn convert(file: File, codebooks: bool) -> Result<Meta, Flaw> {
                 return Err(flaw("shN", "more than 3 bands"));
             }
             let count = if codebooks { part.count } else { None };
-            (degree != Some(0)).then_some(Rest { degree, count, levels: Levels([levels]), centroids_file, labels_file })
+            (degree != Some(0)).then_some(Rest {
+                degree,
+                count,
+                levels: Codebook([levels]),
+                centroids_file,
+                labels_file,
+            })
         }
     };
     Ok(Meta { count, means, means_files: [low, high], scales, scales_file, quats_file, sh0, opacity, sh0_file, rest })

@@ -8,7 +8,7 @@ use std::thread::JoinHandle;
 
 use tempfile::NamedTempFile;
 
-use super::{Result, Settings, Sink, VideoFileError};
+use super::{Result, Sink, VideoFileError, VideoSettings};
 use crate::io::atomic::put;
 use crate::io::error::write_error;
 use crate::io::temporary::temporary_file;
@@ -30,7 +30,7 @@ pub(super) struct Ffmpeg {
 }
 
 impl Ffmpeg {
-    pub(super) fn create(path: &Path, settings: &Settings, program: &Path, args: &[String]) -> Result<Self> {
+    pub(super) fn create(path: &Path, settings: &VideoSettings, program: &Path, args: &[String]) -> Result<Self> {
         let extension = path.extension().map(|e| e.to_string_lossy().into_owned()).unwrap_or_default();
         // The program chooses the format by the ending, so the temporary file has the same one.
         let draft = temporary_file(path, &extension).map_err(|cause| write_error(path, cause))?;
@@ -129,7 +129,7 @@ impl Drop for Ffmpeg {
 
 /// Arguments that the usual containers get unless the person's own say otherwise: H.264 of the wanted
 /// quality that every player takes, its colors said.
-fn usual(extension: &str, settings: &Settings) -> Vec<String> {
+fn usual(extension: &str, settings: &VideoSettings) -> Vec<String> {
     if !["mp4", "m4v", "mov", "mkv"].contains(&extension.to_ascii_lowercase().as_str()) {
         return Vec::new();
     }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Result, Settings, VideoFileError};
+use super::{Result, VideoFileError, VideoSettings};
 
 /// A format that is written without other programs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,7 +53,7 @@ impl Format {
     }
 
     /// Refuses settings that this format cannot hold.
-    pub(super) fn check(self, path: &Path, settings: &Settings) -> Result<()> {
+    pub(super) fn check(self, path: &Path, settings: &VideoSettings) -> Result<()> {
         /// What H.264's level 5.2, and with it openh264, can hold along the longer and the shorter side.
         const MP4_PX: (u32, u32) = (3840, 2160);
         const MP4_LEAST_PX: u32 = 16;

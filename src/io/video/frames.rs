@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder, ImageError};
 
-use super::{Result, Settings, Sink, VideoFileError};
+use super::{Result, Sink, VideoFileError, VideoSettings};
 use crate::io::error::write_error;
 use crate::io::files::{folder_of, sync_folder};
 use crate::io::temporary::{TemporaryFolder, temporary_folder};
@@ -27,7 +27,7 @@ pub(super) struct Frames {
 }
 
 impl Frames {
-    pub(super) fn create(folder: &Path, settings: &Settings) -> Result<Self> {
+    pub(super) fn create(folder: &Path, settings: &VideoSettings) -> Result<Self> {
         let failed = |cause| write_error(folder, cause);
         let existed = folder.is_dir();
         if !existed {

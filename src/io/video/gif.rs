@@ -4,20 +4,20 @@ use std::path::{Path, PathBuf};
 
 use gif::{DisposalMethod, EncodingError, Frame, Repeat};
 
-use super::{Result, Settings, Sink, VideoFileError};
+use super::{Result, Sink, VideoFileError, VideoSettings};
 use crate::io::atomic::Draft;
 use crate::io::error::write_error;
 
 pub(super) struct Gif {
     path: PathBuf,
-    settings: Settings,
+    settings: VideoSettings,
     side_px: (u16, u16),
     encoder: gif::Encoder<Draft>,
     frames: u64,
 }
 
 impl Gif {
-    pub(super) fn create(path: &Path, settings: &Settings) -> Result<Self> {
+    pub(super) fn create(path: &Path, settings: &VideoSettings) -> Result<Self> {
         let side = |px: u32| u16::try_from(px).unwrap_or(u16::MAX);
         let side_px = (side(settings.width_px), side(settings.height_px));
         let draft = Draft::create(path)?;

@@ -32,14 +32,14 @@ use std::path::{Path, PathBuf};
 
 pub(crate) use error::VideoFileError;
 pub(crate) use format::Format;
-pub(crate) use settings::{Encoder, Settings};
+pub(crate) use settings::{VideoEncoder, VideoSettings};
 
 /// Result of this module's functions.
 pub(crate) type Result<T> = std::result::Result<T, VideoFileError>;
 
 /// What was written.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Summary {
+pub(crate) struct VideoSummary {
     /// The file, or the folder of PNG frames.
     pub(crate) path: PathBuf,
     /// Its format; `None` where ffmpeg chose it by the file's name.
@@ -59,7 +59,7 @@ pub(crate) struct Summary {
 pub(crate) struct VideoWriter {
     path: PathBuf,
     format: Option<Format>,
-    settings: Settings,
+    settings: VideoSettings,
     size_px: (u32, u32),
     frames: u64,
     /// `None` once a frame has failed.
@@ -78,20 +78,20 @@ trait Sink: Send {
 
 impl VideoWriter {
     /// Starts a video at `path`, in the format that the path's ending names (see [`Format::of`]);
-    /// with [`Encoder::Ffmpeg`] any ending that the program knows.
+    /// with [`VideoEncoder::Ffmpeg`] any ending that the program knows.
     ///
     /// # Errors
     /// [`VideoFileError`]: an ending that no format has, a size or rate that the format cannot hold,
-    /// a file that exists (unless [`Settings::overwrite`]), a folder that cannot be written to, a
+    /// a file that exists (unless [`VideoSettings::overwrite`]), a folder that cannot be written to, a
     /// program that is missing.
-    pub(crate) fn create(path: &Path, settings: &Settings) -> Result<Self> {
+    pub(crate) fn create(path: &Path, settings: &VideoSettings) -> Result<Self> {
         settings.check(path)?;
         let (format, sink): (_, Box<dyn Sink>) = match &settings.encoder {
-            Encoder::Ffmpeg { program, args } => {
+            VideoEncoder::Ffmpeg { program, args } => {
                 settings.check_free(path)?;
                 (None, Box::new(ffmpeg::Ffmpeg::create(path, settings, program, args)?))
             }
-            Encoder::BuiltIn => {
+            VideoEncoder::BuiltIn => {
                 let format = Format::of(path)?;
                 format.check(path, settings)?;
                 if format != Format::Frames {
@@ -137,14 +137,21 @@ impl VideoWriter {
     ///
     /// # Errors
     /// [`VideoFileError`]: no frames, a frame that failed before, a full disk. Nothing is left then.
-    pub(crate) fn finish(mut self) -> Result<Summary> {
+    pub(crate) fn finish(mut self) -> Result<VideoSummary> {
         let Some(sink) = self.sink.take() else { return Err(VideoFileError::Broken { path: self.path }) };
         if self.frames == 0 {
             return Err(VideoFileError::NoFrames { path: self.path });
         }
         let bytes = sink.finish()?;
         let secs = self.frames as f64 / self.settings.fps;
-        Ok(Summary { path: self.path, format: self.format, frames: self.frames, bytes, secs, size_px: self.size_px })
+        Ok(VideoSummary {
+            path: self.path,
+            format: self.format,
+            frames: self.frames,
+            bytes,
+            secs,
+            size_px: self.size_px,
+        })
     }
 }
 

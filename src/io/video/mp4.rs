@@ -20,15 +20,15 @@ use shiguredo_mp4::bitstream::h264::{
 use shiguredo_mp4::boxes::SampleEntry;
 use shiguredo_mp4::mux::{Mp4FileMuxer, Sample};
 
-use super::yuv::Planes;
-use super::{Result, Settings, Sink, VideoFileError};
+use super::yuv::YuvPlanes;
+use super::{Result, Sink, VideoFileError, VideoSettings};
 use crate::io::atomic::Draft;
 use crate::io::error::write_error;
 
 pub(super) struct Mp4 {
     path: PathBuf,
     row_px: usize,
-    planes: Planes,
+    planes: YuvPlanes,
     encoder: Encoder,
     muxer: Mp4FileMuxer,
     draft: Draft,
@@ -39,7 +39,7 @@ pub(super) struct Mp4 {
 }
 
 impl Mp4 {
-    pub(super) fn create(path: &Path, settings: &Settings) -> Result<Self> {
+    pub(super) fn create(path: &Path, settings: &VideoSettings) -> Result<Self> {
         let encoder = Encoder::with_api_config(OpenH264API::from_source(), config(settings));
         let encoder = encoder.map_err(|e| failed(path, &e))?;
         let muxer = Mp4FileMuxer::new().map_err(|e| failed(path, &e))?;
@@ -50,7 +50,7 @@ impl Mp4 {
         Ok(Self {
             path: path.into(),
             row_px: settings.width_px as usize,
-            planes: Planes::new(even(settings.width_px), even(settings.height_px)),
+            planes: YuvPlanes::new(even(settings.width_px), even(settings.height_px)),
             encoder,
             position: head.len() as u64,
             muxer,
@@ -126,7 +126,7 @@ fn picture(stream: &[u8]) -> std::result::Result<Vec<u8>, shiguredo_mp4::Error> 
     Ok(frame)
 }
 
-fn config(settings: &Settings) -> EncoderConfig {
+fn config(settings: &VideoSettings) -> EncoderConfig {
     // openh264 takes 1 to 60 here; the file's times are the muxer's.
     let rate = settings.fps.clamp(1.0, 60.0) as f32;
     // Chooses the level only: the quantizer is fixed. Half a bit per pixel is plenty.

@@ -7,7 +7,7 @@ use crate::scene::Camera;
 
 /// Size, rate and quality of a video.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Settings {
+pub(crate) struct VideoSettings {
     /// Width of the frames in px.
     pub(crate) width_px: u32,
     /// Height of the frames in px.
@@ -18,12 +18,12 @@ pub(crate) struct Settings {
     pub(crate) quality: u8,
     /// Whether a video or frames of the same name may be replaced.
     pub(crate) overwrite: bool,
-    pub(crate) encoder: Encoder,
+    pub(crate) encoder: VideoEncoder,
 }
 
 /// What encodes a video.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) enum Encoder {
+pub(crate) enum VideoEncoder {
     /// What is built into the program.
     #[default]
     BuiltIn,
@@ -36,10 +36,10 @@ pub(crate) enum Encoder {
     },
 }
 
-impl Settings {
+impl VideoSettings {
     /// A video of this size and rate: quality 80, built-in encoder, nothing is overwritten.
     pub(crate) fn new(width_px: u32, height_px: u32, fps: f64) -> Self {
-        Self { width_px, height_px, fps, quality: 80, overwrite: false, encoder: Encoder::BuiltIn }
+        Self { width_px, height_px, fps, quality: 80, overwrite: false, encoder: VideoEncoder::BuiltIn }
     }
 
     /// Refuses what no format can hold.

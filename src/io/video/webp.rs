@@ -11,7 +11,7 @@ use std::thread::JoinHandle;
 use crossbeam_channel::{Receiver, Sender, bounded};
 use webp_animation::{ColorMode, EncoderOptions, EncodingConfig, EncodingType, Error};
 
-use super::{Result, Settings, Sink, VideoFileError};
+use super::{Result, Sink, VideoFileError, VideoSettings};
 use crate::io::atomic::Draft;
 use crate::io::error::write_error;
 
@@ -32,7 +32,7 @@ enum Message {
 }
 
 impl WebP {
-    pub(super) fn create(path: &Path, settings: &Settings) -> Result<Self> {
+    pub(super) fn create(path: &Path, settings: &VideoSettings) -> Result<Self> {
         let draft = Draft::create(path)?;
         // One frame waits while another is being encoded.
         let (to_encoder, inbox) = bounded(1);
@@ -80,7 +80,7 @@ impl Sink for WebP {
 }
 
 /// Encodes frames until the end and returns the file.
-fn encode(settings: &Settings, inbox: &Receiver<Message>) -> Film {
+fn encode(settings: &VideoSettings, inbox: &Receiver<Message>) -> Film {
     let encoding_type = if settings.quality == 100 { EncodingType::Lossless } else { EncodingType::new_lossy() };
     let options = EncoderOptions {
         // Every frame whole: in a flight nothing stays the same from frame to frame.

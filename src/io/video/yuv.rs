@@ -1,7 +1,7 @@
 //! RGB to the planes of video: BT.709, limited range, color at half the size.
 
 /// The planes of a picture of even sides, each row by row.
-pub(super) struct Planes {
+pub(super) struct YuvPlanes {
     pub(super) width: usize,
     pub(super) height: usize,
     pub(super) y: Vec<u8>,
@@ -13,7 +13,7 @@ pub(super) struct Planes {
 const RED: f32 = 0.2126;
 const BLUE: f32 = 0.0722;
 
-impl Planes {
+impl YuvPlanes {
     pub(super) fn new(width: usize, height: usize) -> Self {
         let color = vec![128; width / 2 * (height / 2)];
         Self { width, height, y: vec![16; width * height], u: color.clone(), v: color }
@@ -84,7 +84,7 @@ mod tests {
             ([128, 128, 128], [126, 128, 128]),
         ];
         for (rgb, [y, u, v]) in cases {
-            let mut planes = Planes::new(4, 2);
+            let mut planes = YuvPlanes::new(4, 2);
             planes.fill(&rgb.repeat(8), 4);
             assert_eq!((planes.y, planes.u, planes.v), (vec![y; 8], vec![u; 2], vec![v; 2]), "{rgb:?}");
         }
@@ -96,7 +96,7 @@ mod tests {
         for (i, px) in rgb.chunks_exact_mut(3).enumerate() {
             px.fill(if i % 5 == 4 || i >= 10 { 255 } else { 90 });
         }
-        let mut planes = Planes::new(4, 2);
+        let mut planes = YuvPlanes::new(4, 2);
         planes.fill(&rgb, 5);
         assert_eq!(planes.y, vec![93; 8]);
     }

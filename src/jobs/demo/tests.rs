@@ -7,16 +7,16 @@ use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::{LevelFilter, SemanticMap};
 
 /// The recipe's way with a fraction of its photos, pixels and steps.
-fn small(seed: u64) -> Recipe {
-    let full = Recipe::shipped();
+fn small(seed: u64) -> DemoRecipe {
+    let full = DemoRecipe::shipped();
     let photos =
         SynthOptions { views: 8, held_out: 2, width_px: 80, height_px: 60, samples: 1, points: 1_500, ..full.photos };
     let training = TrainConfig { steps: 40, max_side_px: 80, seed, ..full.training };
-    Recipe { photos, training, max_seeds: 2, home: 3, ..full }
+    DemoRecipe { photos, training, max_seeds: 2, home: 3, ..full }
 }
 
 /// What the recipe makes in `work`, of the photos that are there already and nothing else.
-fn made(recipe: &Recipe, work: &Path) -> Vec<u8> {
+fn made(recipe: &DemoRecipe, work: &Path) -> Vec<u8> {
     let _ = std::fs::remove_dir_all(work.join("scene"));
     make(recipe, work, &mut Silent).expect("made").0
 }
@@ -38,10 +38,10 @@ fn the_recipe_always_makes_the_same() {
 
 #[test]
 fn what_ships_was_made_by_the_recipe_and_is_whole() {
-    let record: Record =
+    let record: DemoRecord =
         serde_json::from_slice(&bundle::read(BUNDLE, RECORD, Path::new(NAME)).expect("read")).expect("parsed");
     let remedy = "make it anew: fmlgs demo --make assets/demo/demo.zip";
-    assert_eq!((&record.recipe, record.scene), (&Recipe::shipped(), demo::fingerprint()), "{remedy}");
+    assert_eq!((&record.recipe, record.scene), (&DemoRecipe::shipped(), demo::fingerprint()), "{remedy}");
     let sum = include_str!("../../../assets/demo/demo.sha256");
     assert_eq!(sum.split_whitespace().next(), Some(digest(BUNDLE).as_str()), "{remedy}");
     assert!(BUNDLE.len() < 6_000_000, "{} bytes", BUNDLE.len());
@@ -53,10 +53,10 @@ fn what_ships_was_made_by_the_recipe_and_is_whole() {
 #[test]
 fn what_ships_is_as_good_as_its_record_says() {
     let (_data, folder, scene) = opened();
-    let record: Record = files::read_json(&folder.join(RECORD)).expect("read");
+    let record: DemoRecord = files::read_json(&folder.join(RECORD)).expect("read");
     assert_eq!(scene.cloud.len(), record.gaussians);
     let mut map = scene.semantics().expect("objects");
-    let mut job = Comparison::new(scene, &folder.join("photos"), Options::default()).expect("photos");
+    let mut job = PhotoComparison::new(scene, &folder.join("photos"), EvaluateOptions::default()).expect("photos");
     assert_eq!(job.views.len(), 8);
     // Two of the eight views are a sample; the photos are JPEG here.
     job.views.truncate(2);
@@ -70,7 +70,7 @@ fn what_ships_is_as_good_as_its_record_says() {
     assert!(verdicts[..5].iter().all(|v| *v != "not found"), "{verdicts:?}");
     // The control: everything belongs to something else.
     let count = map.identities.len() as u32;
-    map.of.iter_mut().for_each(|id| *id = (*id + count / 2) % count + 1);
+    map.identity_of.iter_mut().for_each(|id| *id = (*id + count / 2) % count + 1);
     let wrong = asked(&map);
     assert!(wrong.object_miou < 0.3 && wrong.part_miou < 0.3, "{wrong:?}");
 }
@@ -80,9 +80,10 @@ fn the_first_question_is_answered_by_buttons_that_are_seen() {
     let (_data, folder, scene) = opened();
     let map = scene.semantics().expect("objects");
     let photos = open::dataset(&folder.join("photos")).expect("photos");
-    let camera = photos.photos[Recipe::shipped().home].camera.limited_to(400);
+    let camera = photos.photos[DemoRecipe::shipped().home].camera.limited_to(400);
     let mut renderer = Renderer::new();
-    let view = ViewMap::render(&mut renderer, &scene.cloud, &map.of, &map.identities, &camera, &scene.settings);
+    let view =
+        ViewMap::render(&mut renderer, &scene.cloud, &map.identity_of, &map.identities, &camera, &scene.settings);
     let view = view.expect("drawn");
     let mut engine = QueryEngine::new(map.language.as_ref()).expect("an engine");
     let answered = engine.ask(&map, QUESTION, LevelFilter::Auto).expect("asked").expect("words");

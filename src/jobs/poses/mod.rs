@@ -16,7 +16,7 @@ use crate::pipeline::observer::Observer;
 
 /// Programs that find camera poses.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Tools {
+pub(crate) struct PoseTools {
     colmap: PathBuf,
     /// Maps in place of COLMAP, several times faster.
     glomap: Option<PathBuf>,
@@ -24,14 +24,14 @@ pub(crate) struct Tools {
 
 /// What has to be run, in order.
 #[derive(Clone, Debug, PartialEq, Eq)]
-struct Stage {
+struct PoseStage {
     /// What it does, for display.
     title: &'static str,
     program: PathBuf,
     args: Vec<String>,
 }
 
-impl Tools {
+impl PoseTools {
     /// Those that are installed. GLOMAP works on what COLMAP has matched, so without that there is nothing.
     pub(crate) fn installed() -> Option<Self> {
         Self::on(&std::env::var_os("PATH").unwrap_or_default())
@@ -53,7 +53,7 @@ impl Tools {
     }
 
     /// What brings the poses of photos in `out/images` into `out/sparse`.
-    fn stages(&self, out: &Path, one_camera: bool, gpu: &Gpu) -> Vec<Stage> {
+    fn stages(&self, out: &Path, one_camera: bool, gpu: &Gpu) -> Vec<PoseStage> {
         let at = |name: &str| out.join(name).to_string_lossy().into_owned();
         let args = |command: &str, pairs: &[(&str, String)]| {
             let options = pairs.iter().flat_map(|(name, value)| [format!("--{name}"), value.clone()]);
@@ -70,8 +70,8 @@ impl Tools {
             matching.push((option.1, "0".into()));
         }
         let mapping = [database, images, ("output_path", at("sparse"))];
-        let colmap = |title, args| Stage { title, program: self.colmap.clone(), args };
-        let mapper = Stage {
+        let colmap = |title, args| PoseStage { title, program: self.colmap.clone(), args };
+        let mapper = PoseStage {
             title: "Finding camera poses",
             program: self.glomap.clone().unwrap_or_else(|| self.colmap.clone()),
             args: args("mapper", &mapping),
@@ -111,7 +111,7 @@ pub(crate) fn commands(photos: &Unposed) -> Vec<String> {
     } else {
         photos.folder.clone()
     };
-    let tools = Tools { colmap: "colmap".into(), glomap: None };
+    let tools = PoseTools { colmap: "colmap".into(), glomap: None };
     let quoted = |text: &str| {
         let plain = |c: char| c.is_alphanumeric() || "-_./,:+".contains(c);
         if !text.is_empty() && text.chars().all(plain) {
@@ -140,7 +140,7 @@ pub(crate) fn commands(photos: &Unposed) -> Vec<String> {
 /// If a tool fails or finds nothing, or the observer asks to stop.
 pub(crate) fn find(
     photos: &Unposed,
-    tools: &Tools,
+    tools: &PoseTools,
     folders: &Folders,
     observer: &mut dyn Observer,
 ) -> Result<PathBuf, JobError> {

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use crossbeam_channel::{RecvTimeoutError, Sender, bounded};
 
-use super::Stage;
+use super::PoseStage;
 use crate::jobs::JobError;
 use crate::pipeline::observer::{Observer, Ticker};
 
@@ -40,7 +40,7 @@ pub(super) fn output(program: &Path, args: &[&str]) -> String {
 ///
 /// # Errors
 /// If it cannot be started or fails, or the observer asks to stop.
-pub(super) fn run(stage: &Stage, photos: usize, observer: &mut dyn Observer) -> Result<(), JobError> {
+pub(super) fn run(stage: &PoseStage, photos: usize, observer: &mut dyn Observer) -> Result<(), JobError> {
     let failed = |why: String, said: &VecDeque<String>| JobError::Program {
         program: stage.program.clone(),
         doing: stage.title,

@@ -64,7 +64,7 @@ impl Fake {
 
     fn find(&self, observer: &mut dyn Observer) -> Result<PathBuf, JobError> {
         let here = self.guard.path();
-        let tools = Tools::on(here.as_os_str()).expect("it is on the path");
+        let tools = PoseTools::on(here.as_os_str()).expect("it is on the path");
         find(&self.photos, &tools, &Folders { data: here.join("data") }, observer)
     }
 
@@ -155,5 +155,5 @@ fn the_commands_can_be_copied_into_a_shell() {
         lines[3],
         "colmap mapper --database_path /data/fox/database.db --image_path /data/fox/images --output_path /data/fox/sparse"
     );
-    assert_eq!(Tools::on(OsStr::new("/no/such/place")), None, "without the program it is not offered");
+    assert_eq!(PoseTools::on(OsStr::new("/no/such/place")), None, "without the program it is not offered");
 }

@@ -11,7 +11,7 @@ use super::views_of;
 use crate::math::stats::median;
 use crate::pipeline::train::{TrainConfig, TrainView, init};
 use crate::render::{
-    Device, DeviceTrainer, DrawError, GpuError, Rates, RenderSettings, Renderer, StageTimes, TrainerSettings,
+    Device, DrawError, GpuError, GpuTrainer, Rates, RenderSettings, Renderer, StageTimes, TrainerSettings,
 };
 use crate::scene::{Camera, Dataset, GaussianCloud, PhotoPixels};
 
@@ -67,7 +67,7 @@ pub fn training_step(
     photo: &PhotoPixels,
     repeats: usize,
 ) -> Result<Measurement, GpuError> {
-    let mut trainer = DeviceTrainer::new(device, cloud, TrainerSettings::default())?;
+    let mut trainer = GpuTrainer::new(device, cloud, TrainerSettings::default())?;
     let photo = trainer.photo(photo)?;
     // Steps of no length, so that every repetition does the same work.
     let still = 1e-30;

@@ -147,7 +147,7 @@ fn features(rng: &mut Pcg64Mcg, all: &Identities, encoder: &dyn Encoder) -> Lang
     };
     let mut views = || (0..MAX_VIEWS).map(|_| vector()).collect::<Vec<_>>();
     let of = (0..all.len()).map(|_| ViewFeatures { raw: views(), deviated: views() }).collect();
-    LanguageFeatures { encoder: encoder.name().into(), dimension, of }
+    LanguageFeatures { encoder: encoder.name().into(), dimension, by_identity: of }
 }
 
 /// A view whose pixels belong to the nearest of scattered points, one per identity.

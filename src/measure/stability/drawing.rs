@@ -5,7 +5,7 @@ use glam::{DMat3, DVec2, DVec3};
 use super::{Case, Finding, Verdict};
 use crate::math::sh;
 use crate::math::stats::{worst, worst_difference};
-use crate::render::cpu::{RenderStats, Renderer};
+use crate::render::cpu::{CpuRenderer, RenderStats};
 use crate::render::{Features, Frame, FrameGradient, RenderError, RenderSettings};
 use crate::scene::{Camera, GaussianCloud};
 
@@ -43,9 +43,9 @@ pub(crate) fn pair(
     camera: &Camera,
     settings: &RenderSettings,
 ) -> Result<(Frame<f64>, Frame<f32>, RenderStats), RenderError> {
-    let mut renderer = Renderer::<f64>::new();
+    let mut renderer = CpuRenderer::<f64>::new();
     let exact = renderer.render(cloud, Features::NONE, camera, settings)?;
-    let single = Renderer::<f32>::new().render(&cloud.cast::<f32>(), Features::NONE, camera, settings)?;
+    let single = CpuRenderer::<f32>::new().render(&cloud.cast::<f32>(), Features::NONE, camera, settings)?;
     Ok((exact, single, renderer.stats()))
 }
 
@@ -333,7 +333,7 @@ fn gradients() -> Vec<Case> {
     let length = |antialias: bool, faulty: bool| {
         let (cloud, at) = (one([0.3, 5e13, 0.2], TURNED, 2.0).cast::<f32>(), camera(64, 48));
         let settings = RenderSettings { antialias, ..RenderSettings::default() };
-        let mut renderer = Renderer::<f32>::new();
+        let mut renderer = CpuRenderer::<f32>::new();
         let frame = renderer.render(&cloud, Features::NONE, &at, &settings)?;
         let mut up = FrameGradient { color: frame.color, ..FrameGradient::default() };
         if faulty {

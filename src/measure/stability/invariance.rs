@@ -9,7 +9,7 @@ use rand_pcg::Pcg64Mcg;
 use super::drawing::camera;
 use super::{Case, Finding};
 use crate::math::stats::worst_difference;
-use crate::render::cpu::Renderer;
+use crate::render::cpu::CpuRenderer;
 use crate::render::{Features, RenderSettings, TILE_PX};
 use crate::scene::{Camera, GaussianCloud};
 
@@ -32,7 +32,7 @@ fn scene() -> GaussianCloud<f64> {
 
 fn image(cloud: &GaussianCloud<f64>, camera: &Camera) -> Option<Vec<f32>> {
     let single = cloud.cast::<f32>();
-    let frame = Renderer::<f32>::new().render(&single, Features::NONE, camera, &RenderSettings::default()).ok()?;
+    let frame = CpuRenderer::<f32>::new().render(&single, Features::NONE, camera, &RenderSettings::default()).ok()?;
     Some(frame.color.concat())
 }
 

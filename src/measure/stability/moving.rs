@@ -6,7 +6,7 @@ use super::drawing::{camera, one};
 use super::{Case, Finding};
 use crate::math::stats::worst;
 use crate::navigate::pose::{RotationSpline, angle};
-use crate::navigate::{FRAMES, Flight, Navigator, NoRoute, Pose, Speed};
+use crate::navigate::{CameraTrajectory, FRAMES, Navigator, NoRoute, Pose, Speed};
 use crate::scene::{Camera, GaussianCloud};
 
 fn cameras(places: &[[f64; 3]]) -> Vec<Camera> {
@@ -34,7 +34,7 @@ fn pose(x: f64, turn: f64) -> Pose {
 
 /// A flight is whole: as many poses as wanted, finite, and rotations. The fault is one entry of one of them
 /// that is NaN.
-fn whole(flight: Option<Flight>, faulty: bool) -> Finding {
+fn whole(flight: Option<CameraTrajectory>, faulty: bool) -> Finding {
     let Some(mut flight) = flight else { return Finding::is("there is no flight", false) };
     if faulty && let Some(pose) = flight.poses.last_mut() {
         pose.world_from_camera.y_axis.z = f64::NAN;
@@ -93,16 +93,16 @@ pub(crate) fn cases() -> Vec<Case> {
         }),
         moving("a flight of no length", |faulty| {
             let p = pose(0.0, 0.4);
-            whole(Flight::new(&[p.center], [&p, &p], None, None, FRAMES, Speed::Eased), faulty)
+            whole(CameraTrajectory::new(&[p.center], [&p, &p], None, None, FRAMES, Speed::Eased), faulty)
         }),
         moving("a flight of half a turn on the spot", |faulty| {
             let (a, b) = (pose(0.0, 0.0), pose(0.0, std::f64::consts::PI));
-            whole(Flight::new(&[a.center, b.center], [&a, &b], None, None, FRAMES, Speed::Constant), faulty)
+            whole(CameraTrajectory::new(&[a.center, b.center], [&a, &b], None, None, FRAMES, Speed::Constant), faulty)
         }),
         moving("legs over places 1e300 units away", |faulty| {
             let (a, b) = (pose(0.0, 0.0), pose(1.0, 0.5));
             let legs = [a.center, DVec3::splat(1e300), DVec3::splat(-1e300), b.center];
-            whole(Flight::new(&legs, [&a, &b], None, None, FRAMES, Speed::Eased), faulty)
+            whole(CameraTrajectory::new(&legs, [&a, &b], None, None, FRAMES, Speed::Eased), faulty)
         }),
         moving("looking at what is 1e30 units away, from outside of the scene", |faulty| {
             let n = navigator(&[[-1.0, 0.0, -2.0], [1.0, 0.0, -2.0]]);
@@ -126,7 +126,7 @@ pub(crate) fn cases() -> Vec<Case> {
             let legs: Vec<DVec3> =
                 (0..10_000).map(|i| DVec3::new(f64::from(i % 100), f64::from(i / 100), 0.0)).collect();
             let (a, b) = (Pose { center: legs[0], ..pose(0.0, 0.0) }, Pose { center: legs[9_999], ..pose(0.0, 1.0) });
-            whole(Flight::new(&legs, [&a, &b], None, None, FRAMES, Speed::Eased), faulty)
+            whole(CameraTrajectory::new(&legs, [&a, &b], None, None, FRAMES, Speed::Eased), faulty)
         }),
         moving("rotations half a turn apart, in between", |faulty| {
             let turn = if faulty { 0.99 } else { 1.0 } * std::f64::consts::PI;
@@ -137,7 +137,7 @@ pub(crate) fn cases() -> Vec<Case> {
         }),
         moving("the paper's interpolation is no rotation there", |faulty| {
             let keys = [pose(0.0, 0.0), pose(1.0, if faulty { 0.1 } else { std::f64::consts::PI })];
-            let flight = Flight::of_paper(&keys, FRAMES);
+            let flight = CameraTrajectory::of_paper(&keys, FRAMES);
             let middle = flight.and_then(|f| f.poses.get(FRAMES / 2).copied());
             let determinant = middle.map_or(f64::NAN, |p| p.world_from_camera.determinant());
             // The negative control of this area: it must be seen to break.

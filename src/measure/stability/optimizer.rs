@@ -4,7 +4,7 @@ use super::training::{blob, ends, start, train, trainer};
 use super::{Case, Finding};
 use crate::math::stats::worst;
 use crate::pipeline::train::TrainView;
-use crate::render::cpu::Renderer;
+use crate::render::cpu::CpuRenderer;
 use crate::render::cpu::adam::AdamStep;
 use crate::render::{Features, RenderSettings};
 use crate::scene::GaussianCloud;
@@ -104,7 +104,7 @@ fn stiff(faulty: bool) -> Finding {
 fn curvatures(cloud: &GaussianCloud, view: &TrainView) -> [f64; 3] {
     let wide = cloud.cast::<f64>();
     let error = |c: &GaussianCloud<f64>| {
-        let frame = Renderer::<f64>::new().render(c, Features::NONE, &view.camera, &RenderSettings::default());
+        let frame = CpuRenderer::<f64>::new().render(c, Features::NONE, &view.camera, &RenderSettings::default());
         let Ok(frame) = frame else { return f64::NAN };
         let each = frame.color.iter().enumerate().flat_map(|(k, plane)| {
             plane.iter().zip(&view.pixels.rgb).map(move |(v, p)| (v - f64::from(p[k]) / 255.0).powi(2))

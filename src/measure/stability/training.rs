@@ -11,7 +11,7 @@ use crate::pipeline::train::checkpoint::{self, Header};
 use crate::pipeline::train::density;
 use crate::pipeline::train::trainer::Trainer;
 use crate::pipeline::train::{TrainConfig, TrainView};
-use crate::render::cpu::Renderer;
+use crate::render::cpu::CpuRenderer;
 use crate::render::cpu::ssim::ssim;
 use crate::render::{Features, RenderSettings};
 use crate::scene::{GaussianCloud, PhotoPixels};
@@ -34,7 +34,7 @@ pub(crate) fn flat(level: u8) -> TrainView {
 pub(super) fn blob() -> TrainView {
     let mut view = flat(0);
     let cloud = one([0.5, 0.3, 0.4], [0.9, 0.1, 0.2, 0.0], 3.0).cast::<f32>();
-    let frame = Renderer::new().render(&cloud, Features::NONE, &view.camera, &RenderSettings::default());
+    let frame = CpuRenderer::new().render(&cloud, Features::NONE, &view.camera, &RenderSettings::default());
     if let Ok(frame) = frame {
         view.pixels.rgb = frame.to_rgb8();
     }
@@ -59,7 +59,7 @@ pub(crate) fn trainer(cloud: GaussianCloud, steps: u64, densify: bool, extent: f
 }
 
 /// What a short training came to.
-pub(super) struct Trained {
+pub(super) struct ShortTraining {
     pub(super) trainer: Trainer,
     pub(super) losses: Vec<f64>,
     /// Gaussians left as they were, and gradients cut.
@@ -73,7 +73,7 @@ pub(super) fn train(
     view: TrainView,
     steps: u64,
     mut before: impl FnMut(&mut Trainer, &mut TrainView),
-) -> Result<Trained, Finding> {
+) -> Result<ShortTraining, Finding> {
     let mut views = [view];
     let (mut losses, mut left) = (Vec::new(), [0; 2]);
     for _ in 0..steps {
@@ -88,7 +88,7 @@ pub(super) fn train(
     }
     let finite = trainer.moments.iter().try_for_each(GaussianCloud::validate);
     match trainer.cloud.validate().and(finite) {
-        Ok(()) => Ok(Trained { trainer, losses, left }),
+        Ok(()) => Ok(ShortTraining { trainer, losses, left }),
         Err(e) => Err(Finding::is(format!("after training: {e}"), false)),
     }
 }
@@ -105,7 +105,7 @@ fn improved(faulty: bool, mut trainer: Trainer, view: TrainView) -> Finding {
         trainer.schedule.damping = 0.0;
     }
     match train(trainer, view, STEPS, |_, _| {}) {
-        Ok(Trained { losses, left, .. }) => {
+        Ok(ShortTraining { losses, left, .. }) => {
             let (first, last) = ends(&losses);
             let outcome = format!("loss {first:.4} to {last:.4}, {} left as they were, {} cut", left[0], left[1]);
             Finding::within(outcome, last / first, 1.0).and(last < first)

@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use super::{Input, Variants, error, timed};
+use super::{StudyInput, Variants, error, timed};
 use crate::math::stats::mean;
 use crate::measure::sweep::failed;
 use crate::measure::{ErrorKind, Measure, Rule, Stage, StageName, Study, Trial};
@@ -24,7 +24,7 @@ pub(crate) fn study<'a>(
     settings: &RenderSettings,
     views: Vec<(Camera, TrueDepth)>,
     repeats: u32,
-    input: Input,
+    input: StudyInput,
 ) -> Study<'a> {
     let measures = vec![
         error("relative error", "mean of |drawn - true| over the true depth"),

@@ -6,11 +6,10 @@ use std::time::Instant;
 
 use serde_json::json;
 
-use super::{Input, Variants, overlap};
+use super::{StudyInput, Variants, overlap};
 use crate::math::stats::mean;
 use crate::measure::sweep::failed;
 use crate::measure::{Rule, Stage, StageName, Study, Trial};
-use crate::pipeline::semantics::build_map::centers;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::codes::{self, TOLERANCE};
 use crate::pipeline::semantics::matching;
@@ -38,11 +37,11 @@ pub(crate) fn study<'a>(
     [training, held_out]: [Vec<CodeView>; 2],
     steps: &[u64],
     repeats: u32,
-    input: Input,
+    input: StudyInput,
 ) -> Result<Study<'a>, RenderError> {
     let voted = vote(drawn, &identities, &training)?;
     // Codes are chosen once it is known who is next to whom.
-    let centers = centers(drawn.0, &voted, &identities);
+    let centers = codes::centers(drawn.0, &voted, &identities);
     codes::assign(&mut identities, &centers);
     let measures = vec![
         overlap("mIoU", "mean overlap of every identity's mask in the held-out photos with its label"),
@@ -100,7 +99,7 @@ fn score(
             }
         };
         for (id, identity) in all.iter() {
-            let inside = all.within(id);
+            let inside = all.descendants(id);
             let truth = Mask::from_fn(w, h, |i| inside.get(labels[i] as usize).copied().unwrap_or(false));
             if !truth.is_empty() {
                 ious.entry(identity.level).or_default().push(find(id).iou(&truth));

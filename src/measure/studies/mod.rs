@@ -12,22 +12,22 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use super::document::{ErrorKind, Measure};
-use super::sweep::{Case, StudyError};
+use super::sweep::{StudyError, SweepCase};
 
 /// What a sweep is run on, in words: name and value.
-pub(crate) type Input = BTreeMap<String, String>;
+pub(crate) type StudyInput = BTreeMap<String, String>;
 
 /// Settings of a stage, each with what it means to the study: the default first.
-struct Variants<V>(Vec<(Case, V)>);
+struct Variants<V>(Vec<(SweepCase, V)>);
 
 impl<V> Variants<V> {
     fn new(default: impl Into<String>, variant: V) -> Self {
-        Self(vec![(Case::default(default), variant)])
+        Self(vec![(SweepCase::default(default), variant)])
     }
 
     /// Adds a setting of a knob.
     fn add(&mut self, method: &str, setting: impl Into<String>, knobs: &[(&str, serde_json::Value)], variant: V) {
-        self.0.push((Case::new(method, setting, knobs), variant));
+        self.0.push((SweepCase::new(method, setting, knobs), variant));
     }
 }
 

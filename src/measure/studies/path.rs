@@ -7,14 +7,14 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde_json::json;
 
-use super::{Input, Variants, error};
+use super::{StudyInput, Variants, error};
 use crate::math::stats::{mean, worst};
 use crate::measure::sweep::failed;
 use crate::measure::{Order, Rule, Stage, StageName, Study, Trial};
 use crate::navigate::curve::{Curve, bend};
 use crate::navigate::graph::Graph;
 use crate::navigate::pose::{RotationSpline, angle};
-use crate::navigate::{FRAMES, Flight, Navigator, Pose, Speed};
+use crate::navigate::{CameraTrajectory, FRAMES, Navigator, Pose, Speed};
 use crate::scene::{Camera, GaussianCloud};
 
 /// Flights of one measurement.
@@ -43,7 +43,7 @@ enum Way {
 }
 
 /// The sweep of camera paths through `cloud`, whose photos were taken by these cameras.
-pub(crate) fn study(cloud: &GaussianCloud, cameras: &[Camera], repeats: u32, mut input: Input) -> Study<'static> {
+pub(crate) fn study(cloud: &GaussianCloud, cameras: &[Camera], repeats: u32, mut input: StudyInput) -> Study<'static> {
     let up = Camera::up_of(cameras.iter()).unwrap_or(DVec3::NEG_Y);
     let mut navigator = Navigator::new(cloud, cameras, up);
     input.insert("keypoints".into(), navigator.graph.keypoints.len().to_string());
@@ -99,15 +99,15 @@ pub(crate) fn study(cloud: &GaussianCloud, cameras: &[Camera], repeats: u32, mut
 }
 
 /// A flight from one keypoint to another, if there is a way.
-fn fly(navigator: &Navigator, variant: Variant, ends: [usize; 2]) -> Option<Flight> {
+fn fly(navigator: &Navigator, variant: Variant, ends: [usize; 2]) -> Option<CameraTrajectory> {
     let pose = |i: usize| {
         let k = &navigator.graph.keypoints[i];
         Pose { center: k.center, world_from_camera: k.world_from_camera, fov_y_rad: 0.8 }
     };
     let [from, to] = ends.map(pose);
     match variant.way {
-        Way::Printed => Flight::of_paper(&[from, to], variant.frames),
-        Way::Through => Flight::of_paper_through(&navigator.keys(&from, &to)?, variant.frames),
+        Way::Printed => CameraTrajectory::of_paper(&[from, to], variant.frames),
+        Way::Through => CameraTrajectory::of_paper_through(&navigator.keys(&from, &to)?, variant.frames),
         Way::Ours => navigator.fly(&from, &to, None, variant.frames, Speed::Eased).ok(),
     }
 }
@@ -145,7 +145,7 @@ struct Faults {
     turn: f64,
 }
 
-fn faults(flight: &Flight, navigator: &Navigator) -> Faults {
+fn faults(flight: &CameraTrajectory, navigator: &Navigator) -> Faults {
     let (mut wrong, mut near, mut gone, mut largest) = (0, 0, 0.0, 0.0_f64);
     for pair in flight.poses.windows(2) {
         gone += pair[0].center.distance(pair[1].center);
@@ -230,7 +230,7 @@ mod tests {
 
     #[test]
     fn too_few_looks_fly_through_walls_and_the_default_does_not() {
-        let study = |cameras: &[Camera]| study(&wall_with_hole(0.0, 0.6), cameras, 1, Input::new());
+        let study = |cameras: &[Camera]| study(&wall_with_hole(0.0, 0.6), cameras, 1, StudyInput::new());
         let measured = |study: &mut Study<'_>, method: &str, setting: &str, name: &str| {
             let trial = study.measured(method, setting, 3);
             trial.values.iter().find(|v| v.0 == name).expect("measured").1

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 
-use super::{Input, Variants, error, overlap};
+use super::{StudyInput, Variants, error, overlap};
 use crate::math::stats::mean;
 use crate::measure::sweep::failed;
 use crate::measure::{Rule, Stage, StageName, Study, StudyError, Trial};
@@ -23,7 +23,7 @@ use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, IdentityId, LanguageFeatures, Level, LevelFilter, Mask, SemanticMap};
 
-pub(crate) struct Asked {
+pub(crate) struct LabeledScene {
     pub(crate) name: String,
     /// Its camera, of the labels' size.
     pub(crate) camera: Camera,
@@ -55,9 +55,9 @@ pub(crate) fn study<'a>(
     (cloud, settings): (&'a GaussianCloud, &'a RenderSettings),
     map: &'a SemanticMap,
     mut encoder: Box<dyn Encoder>,
-    views: Vec<Asked>,
+    views: Vec<LabeledScene>,
     repeats: u32,
-    mut input: Input,
+    mut input: StudyInput,
 ) -> Result<Study<'a>, StudyError> {
     let language = map.language.as_ref().ok_or_else(|| failed("no encoder has looked at this scene"))?;
     let queries: usize = views.iter().map(|v| v.categories.len()).sum();
@@ -92,7 +92,7 @@ pub(crate) fn study<'a>(
             }
             let (w, h) = (view.camera.width_px, view.camera.height_px);
             let small = view.camera.resized((w / variant.smaller).max(1), (h / variant.smaller).max(1));
-            let (of, all) = (&map.of, &map.identities);
+            let (of, all) = (&map.identity_of, &map.identities);
             let exact = ViewMap::render(&mut renderer, cloud, of, all, &small, settings).map_err(failed)?;
             let blended = match variant.blend {
                 true => CodeMap::render(&mut renderer, cloud, &map.codes, true, &small, settings).map_err(failed)?,
@@ -150,7 +150,7 @@ fn reduced(language: &LanguageFeatures, map: &SemanticMap, variant: &Variant) ->
         map.identities.iter().filter(|(_, i)| i.level == Level::Object).map(|(id, _)| id).collect();
     let known = (variant.share * objects.len() as f64).ceil() as usize;
     let dropped = &objects[known.min(objects.len())..];
-    for ((id, _), of) in map.identities.iter().zip(&mut features.of) {
+    for ((id, _), of) in map.identities.iter().zip(&mut features.by_identity) {
         if dropped.contains(&map.identities.object_of(id)) {
             *of = Default::default();
         }

@@ -5,12 +5,12 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 
-use super::views::View;
-use super::{Input, Variants, error, timed};
+use super::views::StudyView;
+use super::{StudyInput, Variants, error, timed};
 use crate::math::Real;
 use crate::math::resize::Filter;
 use crate::math::stats::mean;
-use crate::measure::image_error::{Errors, Planes, errors, footprint_order, named, planes, psnr_in_photo, resized};
+use crate::measure::image_error::{Errors, RgbPlanes, errors, footprint_order, named, planes, psnr_in_photo, resized};
 use crate::measure::sweep::failed;
 use crate::measure::{ErrorKind, Measure, Rule, Stage, StageName, Study, StudyError, Trial};
 use crate::render::{BackendChoice, Cutoffs, Features, Frame, GpuError, RenderError, RenderSettings, Renderer, cpu};
@@ -55,9 +55,9 @@ struct Drawing {
 pub(crate) fn study(
     cloud: Arc<GaussianCloud>,
     settings: &RenderSettings,
-    views: Vec<View>,
+    views: Vec<StudyView>,
     repeats: u32,
-    mut input: Input,
+    mut input: StudyInput,
 ) -> Result<Study<'static>, RenderError> {
     let settings = RenderSettings { depth: false, ..settings.clone() };
     let why = |e: GpuError| drop(input.insert("GPU".into(), format!("not measured: {e}")));
@@ -79,12 +79,12 @@ pub(crate) fn study(
 
     let double = cloud.cast::<f64>();
     let exactly = RenderSettings { cutoffs: EXACT, ..settings.clone() };
-    let mut renderer = cpu::Renderer::<f64>::new();
+    let mut renderer = cpu::CpuRenderer::<f64>::new();
     let mut exact = Vec::with_capacity(views.len());
     for (camera, _) in &views {
         exact.push(planes(&renderer.render(&double, Features::NONE, camera, &exactly)?));
     }
-    let afar: Vec<Planes> =
+    let afar: Vec<RgbPlanes> =
         exact.iter().zip(&views).map(|(p, v)| resized(p, &v.0.reduced(AFAR), Filter::Area)).collect();
     let variants = variants(&cloud, &settings, gpu.as_ref());
     let first = views.first().map(|v| v.0.limited_to(96));
@@ -120,9 +120,9 @@ pub(crate) fn study(
 
 impl Drawing {
     /// Draws one view; returns it with the seconds that took.
-    fn draw(&mut self, (way, settings): &Variant, camera: &Camera) -> Result<(Planes, f64), StudyError> {
+    fn draw(&mut self, (way, settings): &Variant, camera: &Camera) -> Result<(RgbPlanes, f64), StudyError> {
         let mut renderer = Renderer::new();
-        fn shown<R: Real>((frame, secs): (Frame<R>, f64)) -> (Planes, f64) {
+        fn shown<R: Real>((frame, secs): (Frame<R>, f64)) -> (RgbPlanes, f64) {
             (planes(&frame), secs)
         }
         let mut cpu = |cloud: &GaussianCloud, camera: &Camera| {
@@ -139,7 +139,7 @@ impl Drawing {
                 Ok((large, secs + start.elapsed().as_secs_f64()))
             }
             Way::Double => {
-                let mut renderer = cpu::Renderer::<f64>::new();
+                let mut renderer = cpu::CpuRenderer::<f64>::new();
                 let draw = || renderer.render(&self.double, Features::NONE, camera, settings).map_err(failed);
                 timed(draw).map(shown)
             }

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::{Input, Variants, error, overlap};
+use super::{StudyInput, Variants, error, overlap};
 use crate::measure::sweep::failed;
 use crate::measure::{ErrorKind, Measure, Rule, Stage, StageName, Study, StudyError, Trial, turned};
 use crate::pipeline::evaluate::evaluate;
@@ -17,7 +17,12 @@ const EVALUATIONS: u64 = 8;
 ///
 /// # Errors
 /// If a photo cannot be read, or none is held out.
-pub(crate) fn study(dataset: &Dataset, base: TrainConfig, repeats: u32, input: Input) -> Result<Study<'_>, StudyError> {
+pub(crate) fn study(
+    dataset: &Dataset,
+    base: TrainConfig,
+    repeats: u32,
+    input: StudyInput,
+) -> Result<Study<'_>, StudyError> {
     let base = TrainConfig { eval_every: (base.steps / EVALUATIONS).max(1), checkpoint_secs: 0.0, ..base };
     let held = dataset.split(base.holdout_every).1;
     let tests = load_views(dataset, &held, &base, "Loading held-out photos", &mut Silent).map_err(failed)?;

@@ -5,7 +5,7 @@ use crate::pipeline::train::{TrainConfig, TrainError, load_views};
 use crate::scene::{Camera, Dataset, PhotoPixels};
 
 /// A camera, and what a photo shows from there if there is one.
-pub(crate) type View = (Camera, Option<PhotoPixels>);
+pub(crate) type StudyView = (Camera, Option<PhotoPixels>);
 
 /// At most `count` held-out photos, their longer side at most `max_side_px`; `None` if the observer
 /// cancels.
@@ -15,7 +15,7 @@ pub(crate) fn held_out(
     max_side_px: u32,
     count: usize,
     observer: &mut dyn Observer,
-) -> Result<Option<Vec<View>>, TrainError> {
+) -> Result<Option<Vec<StudyView>>, TrainError> {
     let config = TrainConfig { max_side_px, holdout_every, ..TrainConfig::default() };
     let chosen = spread(&dataset.split(holdout_every).1, count);
     let loaded = load_views(dataset, &chosen, &config, "Loading held-out photos", observer)?;

@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use self::tokens::Tokens;
-use super::network::{Array, Network};
-use super::preprocess::{Prepare, Side};
-use super::{Encoder, ModelError, Tile, manifest};
+use super::network::{Network, Tensor};
+use super::preprocess::{FitSide, Prepare};
+use super::{Encoder, IdentityCrop, ModelError, manifest};
 use crate::math::resize::Filter;
 use crate::scene::PhotoPixels;
 
@@ -40,8 +40,8 @@ struct TokenizerKind {
 
 #[derive(Clone, Debug, Deserialize)]
 struct Graphs {
-    image: manifest::Graph,
-    text: manifest::Graph,
+    image: manifest::GraphFile,
+    text: manifest::GraphFile,
 }
 
 /// Tokens that CLIP's own vocabulary has.
@@ -81,8 +81,8 @@ impl ClipEncoder {
         let filter = Filter::named(&about.interpolation)
             .ok_or_else(|| refused(format!("interpolation '{}' is not known", about.interpolation)))?;
         let side = match about.resize_mode.as_str() {
-            "shortest" => Side::Shorter,
-            "squash" => Side::Both,
+            "shortest" => FitSide::Shorter,
+            "squash" => FitSide::Both,
             other => return Err(refused(format!("resize mode '{other}' is not known; there is: shortest, squash"))),
         };
         let prepare = Prepare { side_px: width, filter, side, mean: about.mean, std: about.std };
@@ -106,7 +106,7 @@ impl ClipEncoder {
     ///
     /// # Errors
     /// If the network cannot be loaded, or fails.
-    pub fn embed_pixels(&mut self, pixels: Array) -> Result<Vec<Vec<f32>>, ModelError> {
+    pub fn embed_pixels(&mut self, pixels: Tensor) -> Result<Vec<Vec<f32>>, ModelError> {
         let network = self.about.graphs.image.ready(&mut self.image, &self.folder)?;
         network.unit_rows(vec![("pixels", pixels.into())], "embedding", self.about.embed_dim)
     }
@@ -115,7 +115,7 @@ impl ClipEncoder {
     ///
     /// # Errors
     /// If the network cannot be loaded, or fails.
-    pub fn embed_tokens(&mut self, tokens: Array<i64>) -> Result<Vec<Vec<f32>>, ModelError> {
+    pub fn embed_tokens(&mut self, tokens: Tensor<i64>) -> Result<Vec<Vec<f32>>, ModelError> {
         let network = self.about.graphs.text.ready(&mut self.text, &self.folder)?;
         network.unit_rows(vec![("tokens", tokens.into())], "embedding", self.about.embed_dim)
     }
@@ -134,12 +134,12 @@ impl Encoder for ClipEncoder {
         None
     }
 
-    fn images(&mut self, tiles: &[Tile]) -> Result<Vec<Vec<f32>>, ModelError> {
+    fn images(&mut self, tiles: &[IdentityCrop]) -> Result<Vec<Vec<f32>>, ModelError> {
         let mut all = Vec::with_capacity(tiles.len());
         for batch in tiles.chunks(BATCH) {
-            let pixels: Result<Vec<Array>, ModelError> =
+            let pixels: Result<Vec<Tensor>, ModelError> =
                 batch.iter().map(|tile| self.prepare.picture(&picture(tile)?).ok_or(tile_error(tile))).collect();
-            all.extend(self.embed_pixels(Array::joined(&pixels?))?);
+            all.extend(self.embed_pixels(Tensor::joined(&pixels?))?);
         }
         Ok(all)
     }
@@ -154,7 +154,7 @@ impl Encoder for ClipEncoder {
             let (model, tokens) = (self.about.name.clone(), self.about.vocab_size);
             return Err(ModelError::Token { model, token: *token, tokens });
         }
-        let mut rows = self.embed_tokens(Array::new(&[1, row.len()], row))?;
+        let mut rows = self.embed_tokens(Tensor::new(&[1, row.len()], row))?;
         rows.pop().ok_or(ModelError::NoKnownWord { unknown: Vec::new() })
     }
 
@@ -164,12 +164,12 @@ impl Encoder for ClipEncoder {
     }
 }
 
-fn tile_error(tile: &Tile) -> ModelError {
+fn tile_error(tile: &IdentityCrop) -> ModelError {
     ModelError::TileSize { side_px: tile.side_px, pixels: tile.rgb.len(), expected_px: tile.side_px }
 }
 
 /// A tile as bytes.
-fn picture(tile: &Tile) -> Result<PhotoPixels, ModelError> {
+fn picture(tile: &IdentityCrop) -> Result<PhotoPixels, ModelError> {
     if tile.rgb.len() != tile.side_px * tile.side_px {
         return Err(tile_error(tile));
     }

@@ -45,7 +45,7 @@ fn golden() -> Golden {
     serde_json::from_slice(&data("golden.json")).unwrap()
 }
 
-fn held_out() -> (HeldOut, Vec<Tile>) {
+fn held_out() -> (HeldOut, Vec<IdentityCrop>) {
     let list: HeldOut = serde_json::from_slice(&data("held_out.json")).unwrap();
     let sheet = image::load_from_memory(&data("held_out.png")).unwrap().to_rgb8();
     let side = 2 * list.side_px;
@@ -54,7 +54,7 @@ fn held_out() -> (HeldOut, Vec<Tile>) {
             let (x, y) = (k % list.across * list.side_px + i % side / 2, k / list.across * list.side_px + i / side / 2);
             sheet.get_pixel(x as u32, y as u32).0.map(|c| f32::from(c) / 255.0)
         };
-        Tile { side_px: side, rgb: (0..side * side).map(at).collect() }
+        IdentityCrop { side_px: side, rgb: (0..side * side).map(at).collect() }
     };
     let tiles = (0..list.tiles.len()).map(cell).collect();
     (list, tiles)
@@ -95,7 +95,7 @@ fn tiles_are_cut_as_in_training() {
     let inside = golden.cut_mask.as_bytes();
     let mask = Mask::from_fn(31, 23, |i| inside[i] == b'#');
     for (side_px, expected) in [(16, &golden.cut_16), (64, &golden.cut_64)] {
-        let tile = Tile::cut(&rgb, &mask, side_px).unwrap();
+        let tile = IdentityCrop::cut(&rgb, &mask, side_px).unwrap();
         let got: Vec<f32> = tile.rgb.as_flattened().iter().step_by(37).copied().collect();
         assert_eq!(got.len(), expected.len());
         assert!(worst_difference(&got, expected) < 2e-5, "{side_px}: {}", worst_difference(&got, expected));
@@ -119,9 +119,9 @@ fn what_cannot_be_encoded_is_refused() {
     assert!(matches!(encoder.text("giraffe"), Err(ModelError::NoKnownWord { unknown }) if unknown == ["giraffe"]));
     assert!(matches!(encoder.text(""), Err(ModelError::NoKnownWord { .. })));
     assert!(encoder.text(&"red mug ".repeat(1_250)).is_ok(), "10,000 characters");
-    let black = Tile { side_px: 64, rgb: vec![[0.0; 3]; 64 * 64] };
+    let black = IdentityCrop { side_px: 64, rgb: vec![[0.0; 3]; 64 * 64] };
     assert!(encoder.image(&black).is_ok());
-    let small = Tile { side_px: 32, rgb: vec![[0.0; 3]; 32 * 32] };
+    let small = IdentityCrop { side_px: 32, rgb: vec![[0.0; 3]; 32 * 32] };
     assert!(matches!(encoder.image(&small), Err(ModelError::TileSize { expected_px: 64, .. })));
     let mut poisoned = black;
     poisoned.rgb[7][1] = f32::NAN;

@@ -7,8 +7,8 @@ use rayon::prelude::*;
 use super::PromptedMasks;
 use crate::math::grid::regions;
 use crate::models::ModelError;
-use crate::models::network::Array;
-use crate::models::preprocess::{Side, enlarge};
+use crate::models::network::Tensor;
+use crate::models::preprocess::{FitSide, enlarge};
 use crate::scene::{Mask, PhotoPixels};
 
 /// Settings; the defaults are LangSplat's.
@@ -113,7 +113,7 @@ pub fn everything(
     let size = (picture.width_px as usize, picture.height_px as usize);
     let boxes = crops(size.0, size.1, options.crop_layers);
     let (side, fit) = (network.side_px(), network.fit());
-    let mut collector = Collector { size, side, fit, options, found: Vec::new() };
+    let mut collector = MaskCollector { size, side, fit, options, found: Vec::new() };
     for (done, (crop, layer)) in boxes.iter().enumerate() {
         let (w, h) = (crop[2] - crop[0], crop[3] - crop[1]);
         network.look(&cut(picture, crop))?;
@@ -127,7 +127,7 @@ pub fn everything(
             }
             let scale = match fit {
                 // Whole pixels of the square, as the picture itself is resized.
-                Side::Longer => [w, h].map(|n| {
+                FitSide::Longer => [w, h].map(|n| {
                     let used = (n as f64 * side as f64 / w.max(h) as f64 + 0.5).floor();
                     used / n as f64
                 }),
@@ -138,8 +138,8 @@ pub fn everything(
                 .iter()
                 .flat_map(|[x, y]| [(x * w as f64 * scale[0]) as f32, (y * h as f64 * scale[1]) as f32, 0.0, 0.0]);
             let n = batch.len();
-            let coords = Array::new(&[n, 2, 2], coords.collect());
-            let labels = Array::new(&[n, 2], [1.0, -1.0].repeat(n));
+            let coords = Tensor::new(&[n, 2, 2], coords.collect());
+            let labels = Tensor::new(&[n, 2], [1.0, -1.0].repeat(n));
             let answer = network.masks(coords, labels, None)?;
             // The three masks for ambiguous prompts.
             let low = answer.masks.shape[3];
@@ -158,25 +158,25 @@ pub fn everything(
 }
 
 /// A point's three planes of logits, their predicted IoU, and the point.
-pub(crate) type Answer = ([Vec<f32>; 3], [f32; 3], [f64; 2]);
+pub(crate) type PointMasks = ([Vec<f32>; 3], [f32; 3], [f64; 2]);
 
 /// Keeps the good ones of what a network answers.
-pub struct Collector<'a> {
+pub struct MaskCollector<'a> {
     /// Size of the picture, px.
     pub size: (usize, usize),
     /// Side of the network's square, px.
     pub side: usize,
     /// How the picture lies in it.
-    pub fit: Side,
+    pub fit: FitSide,
     /// Settings.
     pub options: &'a AutomaticOptions,
     /// What is kept so far.
     pub found: Vec<AutomaticMask>,
 }
 
-impl Collector<'_> {
+impl MaskCollector<'_> {
     /// Takes the answers to the points of a crop.
-    pub fn add_crop(&mut self, crop: [usize; 4], answers: &[Answer]) {
+    pub fn add_crop(&mut self, crop: [usize; 4], answers: &[PointMasks]) {
         let judged = answers.par_iter().flat_map_iter(|(planes, iou, point)| {
             planes.iter().zip(iou).filter_map(|(plane, iou)| self.judge(plane, *iou, *point, crop)).collect::<Vec<_>>()
         });
@@ -195,7 +195,7 @@ impl Collector<'_> {
         let low = plane.len().isqrt();
         let (w, h) = (crop[2] - crop[0], crop[3] - crop[1]);
         // SAM 2 cleans before it enlarges.
-        let full = if self.fit == Side::Longer || options.least_region_px == 0 {
+        let full = if self.fit == FitSide::Longer || options.least_region_px == 0 {
             enlarge(plane, low, self.side, self.fit, (w, h))
         } else {
             enlarge(&cleaned_logits(plane, low, options.least_region_px), low, self.side, self.fit, (w, h))
@@ -232,7 +232,7 @@ impl Collector<'_> {
             let scores: Vec<f32> = found.iter().map(|f| 1.0 / area(f)).collect();
             found = suppress(&boxes(&found), &scores, options.crop_nms).into_iter().map(|i| found[i].clone()).collect();
         }
-        if fit == Side::Longer && options.least_region_px > 0 {
+        if fit == FitSide::Longer && options.least_region_px > 0 {
             let mut untouched = Vec::with_capacity(found.len());
             for f in &mut found {
                 let (filled, changed) = cleaned(&f.mask, options.least_region_px, true);

@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::network::{Array, Network};
-use super::preprocess::{Prepare, Side};
+use super::network::{Network, Tensor};
+use super::preprocess::{FitSide, Prepare};
 use super::{ModelError, manifest};
 use crate::math::resize::Filter;
 use crate::scene::PhotoPixels;
@@ -19,9 +19,9 @@ use crate::scene::PhotoPixels;
 pub struct Prompted {
     /// Low-resolution logits, `[prompts, 4, S/4, S/4]`: one mask for unambiguous prompts, then three
     /// of growing size for ambiguous ones.
-    pub masks: Array,
+    pub masks: Tensor,
     /// Predicted IoU of each, `[prompts, 4]`.
-    pub iou: Array,
+    pub iou: Tensor,
 }
 
 /// A network that gives masks for prompts on the picture that it has looked at last.
@@ -40,13 +40,13 @@ pub trait PromptedMasks {
     ///
     /// # Errors
     /// If no picture was looked at, or the network fails.
-    fn masks(&mut self, points: Array, labels: Array, earlier: Option<Array>) -> Result<Prompted, ModelError>;
+    fn masks(&mut self, points: Tensor, labels: Tensor, earlier: Option<Tensor>) -> Result<Prompted, ModelError>;
 
     /// Side of the network's square, px.
     fn side_px(&self) -> usize;
 
     /// How a picture lies in that square.
-    fn fit(&self) -> Side;
+    fn fit(&self) -> FitSide;
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -60,8 +60,8 @@ struct Metadata {
 
 #[derive(Clone, Debug, Deserialize)]
 struct Graphs {
-    encoder: manifest::Graph,
-    decoder: manifest::Graph,
+    encoder: manifest::GraphFile,
+    decoder: manifest::GraphFile,
 }
 
 /// SAM of the first generation.
@@ -71,7 +71,7 @@ pub struct Sam {
     prepare: Prepare,
     encoder: Option<Network>,
     decoder: Option<Network>,
-    embeddings: Option<Array>,
+    embeddings: Option<Tensor>,
 }
 
 impl Sam {
@@ -83,13 +83,13 @@ impl Sam {
         let about: Metadata = manifest::read(path, "sam")?;
         let Metadata { image_size, mean, std, .. } = about;
         manifest::check_pictures(path, image_size, mean, std)?;
-        let prepare = Prepare { side_px: image_size, filter: Filter::Bilinear, side: Side::Longer, mean, std };
+        let prepare = Prepare { side_px: image_size, filter: Filter::Bilinear, side: FitSide::Longer, mean, std };
         let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
         Ok(Self { folder, about, prepare, encoder: None, decoder: None, embeddings: None })
     }
 
     /// What the network made of the picture it looked at.
-    pub fn embeddings(&self) -> Option<&Array> {
+    pub fn embeddings(&self) -> Option<&Tensor> {
         self.embeddings.as_ref()
     }
 }
@@ -107,7 +107,7 @@ impl PromptedMasks for Sam {
         Ok(())
     }
 
-    fn masks(&mut self, points: Array, labels: Array, earlier: Option<Array>) -> Result<Prompted, ModelError> {
+    fn masks(&mut self, points: Tensor, labels: Tensor, earlier: Option<Tensor>) -> Result<Prompted, ModelError> {
         let embeddings = self.embeddings.as_ref().ok_or(ModelError::NoPicture)?;
         let decoder = self.about.graphs.decoder.ready(&mut self.decoder, &self.folder)?;
         let mut inputs = prompt_inputs(points, labels, earlier, self.about.image_size);
@@ -120,21 +120,21 @@ impl PromptedMasks for Sam {
         self.about.image_size
     }
 
-    fn fit(&self) -> Side {
-        Side::Longer
+    fn fit(&self) -> FitSide {
+        FitSide::Longer
     }
 }
 
 /// The decoder's inputs that describe prompts.
 pub(super) fn prompt_inputs(
-    points: Array,
-    labels: Array,
-    earlier: Option<Array>,
+    points: Tensor,
+    labels: Tensor,
+    earlier: Option<Tensor>,
     side_px: usize,
-) -> Vec<(&'static str, super::network::Input)> {
+) -> Vec<(&'static str, super::network::NetworkInput)> {
     let (n, low) = (points.shape[0], side_px / 4);
-    let has = Array::filled(&[n], if earlier.is_some() { 1.0 } else { 0.0 });
-    let mask = earlier.unwrap_or_else(|| Array::filled(&[n, 1, low, low], 0.0));
+    let has = Tensor::filled(&[n], if earlier.is_some() { 1.0 } else { 0.0 });
+    let mask = earlier.unwrap_or_else(|| Tensor::filled(&[n, 1, low, low], 0.0));
     vec![
         ("point_coords", points.into()),
         ("point_labels", labels.into()),

@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::network::{Array, Network};
-use super::preprocess::{Prepare, Side};
+use super::network::{Network, Tensor};
+use super::preprocess::{FitSide, Prepare};
 use super::sam::{Prompted, PromptedMasks, prompt_inputs};
 use super::{ModelError, manifest};
 use crate::math::resize::{Filter, resize};
@@ -61,35 +61,35 @@ pub(crate) struct Metadata {
 
 #[derive(Clone, Debug, Deserialize)]
 struct Graphs {
-    encoder: manifest::Graph,
-    decoder: manifest::Graph,
-    mask_prompt: manifest::Graph,
-    memory_encoder: manifest::Graph,
-    memory_attention: manifest::Graph,
+    encoder: manifest::GraphFile,
+    decoder: manifest::GraphFile,
+    mask_prompt: manifest::GraphFile,
+    memory_encoder: manifest::GraphFile,
+    memory_attention: manifest::GraphFile,
 }
 
 /// What the encoder makes of a frame.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Frame {
+pub struct EncodedFrame {
     /// `[1, C, S/16, S/16]`.
-    pub embeddings: Array,
+    pub embeddings: Tensor,
     /// `[1, C/8, S/4, S/4]`.
-    pub fine: Array,
+    pub fine: Tensor,
     /// `[1, C/4, S/8, S/8]`.
-    pub middle: Array,
+    pub middle: Tensor,
 }
 
 /// What the decoder says about one object in a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Decoded {
     /// Low-resolution logits of four masks, `[1, 4, S/4, S/4]`.
-    pub(crate) masks: Array,
+    pub(crate) masks: Tensor,
     /// Predicted IoU of each, `[1, 4]`.
-    pub(crate) iou: Array,
+    pub(crate) iou: Tensor,
     /// Logit of the object being there at all.
     pub(crate) score: f32,
     /// Pointer of each mask, `[1, 4, C]`.
-    pub(crate) pointers: Array,
+    pub(crate) pointers: Tensor,
 }
 
 /// SAM 2's networks, each loaded when it is first needed.
@@ -104,7 +104,7 @@ pub struct Sam2 {
     memory_encoder: Option<Network>,
     memory_attention: Option<Network>,
     /// The picture that [`PromptedMasks`] is about.
-    looked: Option<Frame>,
+    looked: Option<EncodedFrame>,
 }
 
 impl Sam2 {
@@ -122,7 +122,7 @@ impl Sam2 {
             let problem = format!("a side of {image_size} px and {} memories make no sense", about.memories);
             return Err(ModelError::Metadata { path: path.into(), problem });
         }
-        let prepare = Prepare { side_px: image_size, filter: Filter::Bicubic, side: Side::Both, mean, std };
+        let prepare = Prepare { side_px: image_size, filter: Filter::Bicubic, side: FitSide::Both, mean, std };
         let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
         Ok(Self {
             folder,
@@ -146,14 +146,14 @@ impl Sam2 {
     ///
     /// # Errors
     /// If it has no pixels, or the network fails.
-    pub(crate) fn encode(&mut self, picture: &PhotoPixels) -> Result<Frame, ModelError> {
+    pub(crate) fn encode(&mut self, picture: &PhotoPixels) -> Result<EncodedFrame, ModelError> {
         let image = self.prepare.picture(picture).ok_or(ModelError::NoPicture)?;
         self.encode_pixels(image)
     }
 
     /// A picture that is no frame of a sequence, `[1, 3, S, S]`: the official code resizes it in
     /// floating point, where it resizes frames in bytes.
-    fn single_picture(&self, picture: &PhotoPixels) -> Option<Array> {
+    fn single_picture(&self, picture: &PhotoPixels) -> Option<Tensor> {
         let (w, h) = (picture.width_px as usize, picture.height_px as usize);
         if w == 0 || h == 0 || picture.rgb.len() != w * h {
             return None;
@@ -165,17 +165,17 @@ impl Sam2 {
                 .into_iter()
                 .map(move |v| (v - mean[c]) / std[c])
         };
-        Some(Array::new(&[1, 3, image_size, image_size], (0..3).flat_map(plane).collect()))
+        Some(Tensor::new(&[1, 3, image_size, image_size], (0..3).flat_map(plane).collect()))
     }
 
     /// Looks at a prepared picture, `[1, 3, S, S]`.
     ///
     /// # Errors
     /// If the network fails.
-    pub fn encode_pixels(&mut self, image: Array) -> Result<Frame, ModelError> {
+    pub fn encode_pixels(&mut self, image: Tensor) -> Result<EncodedFrame, ModelError> {
         let encoder = self.about.graphs.encoder.ready(&mut self.encoder, &self.folder)?;
         let mut out = encoder.run(vec![("image", image.into())])?;
-        Ok(Frame {
+        Ok(EncodedFrame {
             embeddings: out.take("image_embeddings")?,
             fine: out.take("high_res_features1")?,
             middle: out.take("high_res_features2")?,
@@ -183,7 +183,7 @@ impl Sam2 {
     }
 
     /// The embeddings of a frame of which nothing is remembered.
-    pub fn without_memory(&self, frame: &Frame) -> Array {
+    pub fn without_memory(&self, frame: &EncodedFrame) -> Tensor {
         let mut embeddings = frame.embeddings.clone();
         let plane = embeddings.values.len() / self.about.no_memory_embedding.len().max(1);
         for (values, add) in embeddings.values.chunks_exact_mut(plane.max(1)).zip(&self.about.no_memory_embedding) {
@@ -193,8 +193,8 @@ impl Sam2 {
     }
 
     /// The pointer of an object that is not there, `[1, C]`.
-    pub(crate) fn no_pointer(&self) -> Array {
-        Array::new(&[1, self.about.no_object_pointer.len()], self.about.no_object_pointer.clone())
+    pub(crate) fn no_pointer(&self) -> Tensor {
+        Tensor::new(&[1, self.about.no_object_pointer.len()], self.about.no_object_pointer.clone())
     }
 
     /// Masks for prompts on a frame whose embeddings may be conditioned on memories.
@@ -203,11 +203,11 @@ impl Sam2 {
     /// If the network fails.
     pub(crate) fn decode(
         &mut self,
-        frame: &Frame,
-        embeddings: &Array,
-        points: Array,
-        labels: Array,
-        mask: Option<Array>,
+        frame: &EncodedFrame,
+        embeddings: &Tensor,
+        points: Tensor,
+        labels: Tensor,
+        mask: Option<Tensor>,
     ) -> Result<Decoded, ModelError> {
         let decoder = self.about.graphs.decoder.ready(&mut self.decoder, &self.folder)?;
         let mut inputs = prompt_inputs(points, labels, mask, self.about.image_size);
@@ -223,20 +223,26 @@ impl Sam2 {
 
     /// A mask of the square's size, `[1, 1, S, S]` of 0 and 1, as the decoder's prompt and as
     /// low-resolution logits.
-    fn mask_prompt(&mut self, mask: Array) -> Result<(Array, Array), ModelError> {
+    fn mask_prompt(&mut self, mask: Tensor) -> Result<(Tensor, Tensor), ModelError> {
         let network = self.about.graphs.mask_prompt.ready(&mut self.mask_prompt, &self.folder)?;
         let mut out = network.run(vec![("mask", mask.into())])?;
         Ok((out.take("mask_input")?, out.take("low_res_mask")?))
     }
 
     /// What is remembered of an object's mask in a frame.
-    fn remember(&mut self, frame: &Frame, logits: &Array, score: f32, binarise: bool) -> Result<Array, ModelError> {
+    fn remember(
+        &mut self,
+        frame: &EncodedFrame,
+        logits: &Tensor,
+        score: f32,
+        binarise: bool,
+    ) -> Result<Tensor, ModelError> {
         let network = self.about.graphs.memory_encoder.ready(&mut self.memory_encoder, &self.folder)?;
         let inputs = vec![
             ("image_embeddings", (&frame.embeddings).into()),
             ("mask_logits", logits.into()),
-            ("object_score", Array::filled(&[1, 1], score).into()),
-            ("binarise", Array::filled(&[1], f32::from(u8::from(binarise))).into()),
+            ("object_score", Tensor::filled(&[1, 1], score).into()),
+            ("binarise", Tensor::filled(&[1], f32::from(u8::from(binarise))).into()),
         ];
         let mut memory = network.run(inputs)?.take("memory_features")?;
         memory.values.iter_mut().for_each(|v| *v = half::bf16::from_f32(*v).to_f32());
@@ -247,30 +253,30 @@ impl Sam2 {
     /// pointers with their distances in time.
     fn condition(
         &mut self,
-        frame: &Frame,
-        memories: &[(i64, &Array)],
-        pointers: &[(f32, &Array)],
-    ) -> Result<Array, ModelError> {
+        frame: &EncodedFrame,
+        memories: &[(i64, &Tensor)],
+        pointers: &[(f32, &Tensor)],
+    ) -> Result<Tensor, ModelError> {
         let nothing = self.no_pointer();
         let network = self.about.graphs.memory_attention.ready(&mut self.memory_attention, &self.folder)?;
         let n = memories.len();
         let mut inputs = vec![
             ("image_embeddings", (&frame.embeddings).into()),
-            ("memory_features", Array::joined(memories.iter().map(|m| m.1)).into()),
-            ("memory_time", Array::new(&[n], memories.iter().map(|m| m.0).collect::<Vec<i64>>()).into()),
-            ("memory_valid", Array::filled(&[n], 1.0).into()),
+            ("memory_features", Tensor::joined(memories.iter().map(|m| m.1)).into()),
+            ("memory_time", Tensor::new(&[n], memories.iter().map(|m| m.0).collect::<Vec<i64>>()).into()),
+            ("memory_valid", Tensor::filled(&[n], 1.0).into()),
         ];
         // No engine likes empty arrays: one row that counts for nothing.
         let (rows, offsets, valid) = match pointers {
             [] => (nothing, vec![0.0], 0.0),
-            some => (Array::joined(some.iter().map(|p| p.1)), some.iter().map(|p| p.0).collect(), 1.0),
+            some => (Tensor::joined(some.iter().map(|p| p.1)), some.iter().map(|p| p.0).collect(), 1.0),
         };
         let m = offsets.len();
         inputs.push(("object_pointers", rows.into()));
         if self.about.pointer_time {
-            inputs.push(("pointer_offset", Array::new(&[m], offsets).into()));
+            inputs.push(("pointer_offset", Tensor::new(&[m], offsets).into()));
         }
-        inputs.push(("pointer_valid", Array::filled(&[m], valid).into()));
+        inputs.push(("pointer_valid", Tensor::filled(&[m], valid).into()));
         network.run(inputs)?.take("conditioned")
     }
 }
@@ -287,7 +293,7 @@ impl PromptedMasks for Sam2 {
         Ok(())
     }
 
-    fn masks(&mut self, points: Array, labels: Array, earlier: Option<Array>) -> Result<Prompted, ModelError> {
+    fn masks(&mut self, points: Tensor, labels: Tensor, earlier: Option<Tensor>) -> Result<Prompted, ModelError> {
         let frame = self.looked.take().ok_or(ModelError::NoPicture)?;
         let embeddings = self.without_memory(&frame);
         let decoded = self.decode(&frame, &embeddings, points, labels, earlier);
@@ -300,7 +306,7 @@ impl PromptedMasks for Sam2 {
         self.about.image_size
     }
 
-    fn fit(&self) -> Side {
-        Side::Both
+    fn fit(&self) -> FitSide {
+        FitSide::Both
     }
 }

@@ -3,11 +3,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{Decoded, Frame, Sam2};
+use super::{Decoded, EncodedFrame, Sam2};
 use crate::math::grid::regions;
 use crate::math::resize::{Filter, resize};
 use crate::models::ModelError;
-use crate::models::network::Array;
+use crate::models::network::Tensor;
 use crate::scene::{Mask, PhotoPixels};
 
 /// The caller's number of an object.
@@ -31,13 +31,13 @@ pub enum Prompt {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Output {
     /// Low-resolution logits, `[1, 1, S/4, S/4]`; the object is where they are positive.
-    pub logits: Array,
+    pub logits: Tensor,
     /// What points to it, `[1, C]`.
-    pub pointer: Array,
+    pub pointer: Tensor,
     /// Logit of it being there at all.
     pub score: f32,
     /// What is remembered of it.
-    pub memory: Option<Array>,
+    pub memory: Option<Tensor>,
 }
 
 /// What is known of one object, by frame.
@@ -54,7 +54,7 @@ struct Known {
 }
 
 /// The frames of a sequence, as the encoder sees them: all in memory, or from a cache on disk.
-pub trait Frames {
+pub trait FrameSource {
     /// How many there are.
     fn len(&self) -> usize;
 
@@ -67,12 +67,12 @@ pub trait Frames {
     ///
     /// # Errors
     /// If it cannot be read, or encoded.
-    fn get(&mut self, model: &mut Sam2, index: usize) -> Result<Frame, ModelError>;
+    fn get(&mut self, model: &mut Sam2, index: usize) -> Result<EncodedFrame, ModelError>;
 }
 
 /// Frames that are kept in memory.
 #[derive(Clone, Debug, Default)]
-pub struct InMemory(pub Vec<Frame>);
+pub struct InMemory(pub Vec<EncodedFrame>);
 
 impl InMemory {
     /// Looks at all pictures.
@@ -84,12 +84,12 @@ impl InMemory {
     }
 }
 
-impl Frames for InMemory {
+impl FrameSource for InMemory {
     fn len(&self) -> usize {
         self.0.len()
     }
 
-    fn get(&mut self, _: &mut Sam2, index: usize) -> Result<Frame, ModelError> {
+    fn get(&mut self, _: &mut Sam2, index: usize) -> Result<EncodedFrame, ModelError> {
         self.0.get(index).cloned().ok_or(ModelError::NoPicture)
     }
 }
@@ -97,7 +97,7 @@ impl Frames for InMemory {
 /// A sequence and the objects in it.
 pub struct Track<'a> {
     model: &'a mut Sam2,
-    frames: &'a mut dyn Frames,
+    frames: &'a mut dyn FrameSource,
     /// Size of the pictures, px.
     size: (usize, usize),
     objects: BTreeMap<ObjectId, Known>,
@@ -112,7 +112,7 @@ const GIVEN: f32 = 10.0;
 
 impl<'a> Track<'a> {
     /// A sequence of pictures of one size (width, height), in which nothing is marked yet.
-    pub fn new(model: &'a mut Sam2, frames: &'a mut dyn Frames, size: (usize, usize)) -> Self {
+    pub fn new(model: &'a mut Sam2, frames: &'a mut dyn FrameSource, size: (usize, usize)) -> Self {
         Self { model, frames, size, objects: BTreeMap::new() }
     }
 
@@ -172,7 +172,7 @@ impl<'a> Track<'a> {
         let square = resize(&plane, (w, h), (side, side), Filter::Bilinear);
         let square: Vec<f32> = square.into_iter().map(|v| f32::from(u8::from(v >= 0.5))).collect();
         let is_there = square.contains(&1.0);
-        let (as_prompt, logits) = self.model.mask_prompt(Array::new(&[1, 1, side, side], square))?;
+        let (as_prompt, logits) = self.model.mask_prompt(Tensor::new(&[1, 1, side, side], square))?;
         // The pointer comes from the decoder, prompted with the mask and without memory; the mask
         // itself is taken as it is.
         let image = self.frames.get(self.model, frame)?;
@@ -195,10 +195,10 @@ impl<'a> Track<'a> {
     /// The best mask of one object in a frame, its pointer, and whether it is there.
     fn decode(
         &mut self,
-        frame: &Frame,
-        embeddings: &Array,
+        frame: &EncodedFrame,
+        embeddings: &Tensor,
         points: &[([f32; 2], f32)],
-        mask: Option<Array>,
+        mask: Option<Tensor>,
         three: bool,
     ) -> Result<Output, ModelError> {
         // Without points there is one that is none; and one more always ends the list.
@@ -206,8 +206,8 @@ impl<'a> Track<'a> {
         let padding = if points.is_empty() { 2 } else { 1 };
         let all: Vec<([f32; 2], f32)> = points.iter().copied().chain(std::iter::repeat_n(none, padding)).collect();
         let n = all.len();
-        let coords = Array::new(&[1, n, 2], all.iter().flat_map(|p| p.0).collect());
-        let labels = Array::new(&[1, n], all.iter().map(|p| p.1).collect());
+        let coords = Tensor::new(&[1, n, 2], all.iter().flat_map(|p| p.0).collect());
+        let labels = Tensor::new(&[1, n], all.iter().map(|p| p.1).collect());
         let decoded = self.model.decode(frame, embeddings, coords, labels, mask)?;
         let (which, pointer) = self.choose(&decoded, three);
         let low = decoded.masks.shape[3];
@@ -216,8 +216,8 @@ impl<'a> Track<'a> {
         let logits = if decoded.score <= 0.0 { vec![absent; low * low] } else { plane(which) };
         let c = decoded.pointers.shape[2];
         Ok(Output {
-            logits: Array::new(&[1, 1, low, low], logits),
-            pointer: Array::new(&[1, c], decoded.pointers.values[pointer * c..(pointer + 1) * c].to_vec()),
+            logits: Tensor::new(&[1, 1, low, low], logits),
+            pointer: Tensor::new(&[1, c], decoded.pointers.values[pointer * c..(pointer + 1) * c].to_vec()),
             score: decoded.score,
             memory: None,
         })
@@ -243,7 +243,7 @@ impl<'a> Track<'a> {
         (0, 0)
     }
 
-    fn fill(&self, logits: &mut Array) {
+    fn fill(&self, logits: &mut Tensor) {
         let most = self.model.about.fill_hole_area;
         if most == 0 {
             return;
@@ -258,13 +258,19 @@ impl<'a> Track<'a> {
     }
 
     /// A frame's embeddings, conditioned on what is known of an object.
-    fn recall(&mut self, image: &Frame, object: ObjectId, frame: usize, backward: bool) -> Result<Array, ModelError> {
+    fn recall(
+        &mut self,
+        image: &EncodedFrame,
+        object: ObjectId,
+        frame: usize,
+        backward: bool,
+    ) -> Result<Tensor, ModelError> {
         let about = &self.model.about;
         let known = &self.objects[&object];
         let (chosen, others) = closest(&known.prompted, frame, about.max_conditioning_frames);
         let before = |age: usize| if backward { frame.checked_add(age) } else { frame.checked_sub(age) };
         let at = |t: usize| known.followed.get(&t).or_else(|| others.get(&t).copied());
-        let mut memories: Vec<(i64, &Array)> = Vec::new();
+        let mut memories: Vec<(i64, &Tensor)> = Vec::new();
         for out in chosen.values() {
             memories.extend(out.memory.as_ref().map(|m| (about.memories as i64 - 1, m)));
         }
@@ -274,7 +280,7 @@ impl<'a> Track<'a> {
             memories.extend(memory.map(|m| (age as i64 - 1, m)));
         }
         let most = self.frames.len().min(about.pointers);
-        let mut pointers: Vec<(f32, &Array)> = Vec::new();
+        let mut pointers: Vec<(f32, &Tensor)> = Vec::new();
         let offset = |distance: f32| distance / most.saturating_sub(1).max(1) as f32;
         for (&t, out) in &chosen {
             let ahead = if backward { t as i64 - frame as i64 } else { frame as i64 - t as i64 };
@@ -347,7 +353,13 @@ impl<'a> Track<'a> {
         Ok(())
     }
 
-    fn follow(&mut self, image: &Frame, id: ObjectId, frame: usize, backward: bool) -> Result<Output, ModelError> {
+    fn follow(
+        &mut self,
+        image: &EncodedFrame,
+        id: ObjectId,
+        frame: usize,
+        backward: bool,
+    ) -> Result<Output, ModelError> {
         let embeddings = self.recall(image, id, frame, backward)?;
         let three = self.may_be_three(false, 0);
         let mut out = self.decode(image, &embeddings, &[], None, three)?;

@@ -208,7 +208,7 @@ mod tests {
         all.add(Level::Object, NOBODY, vec!["mug".into()]);
         let f = |v: [f32; 3]| ViewFeatures { raw: vec![v.to_vec()], deviated: vec![v.to_vec()] };
         let of = vec![f([0.0, 1.0, 0.0]), f([0.0, 0.8, 0.6]), f([1.0, 0.0, 0.0])];
-        (all, LanguageFeatures { encoder: "test".into(), dimension: 3, of })
+        (all, LanguageFeatures { encoder: "test".into(), dimension: 3, by_identity: of })
     }
 
     fn ask(text: &str, with_meaning: bool) -> QueryAnswer {

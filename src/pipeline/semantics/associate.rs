@@ -43,7 +43,7 @@ pub(crate) fn link(found: &[FoundMask], known: Option<&ViewMap>, identities: &Id
             (Level::Object, _) => {
                 identities.iter().filter(|(_, i)| i.level == Level::Object).map(|(id, _)| id).collect()
             }
-            (Level::Part, Some(Link::Known(whole))) => identities.pieces(whole).collect(),
+            (Level::Part, Some(Link::Known(whole))) => identities.children(whole).collect(),
             (Level::Part, Some(_)) => Vec::new(),
             (Level::Part, None) => {
                 identities.iter().filter(|(_, i)| i.level == Level::Part).map(|(id, _)| id).collect()
@@ -119,13 +119,13 @@ pub(crate) fn disagreements(
         };
         let covered: Vec<IdentityId> = peers.map(|(id, _)| id).filter(|id| inside(*id)).collect();
         // A part of a part is no peer of its whole.
-        let apart = |id: &IdentityId| covered.iter().all(|o| o == id || !identities.line(*id).any(|i| i == *o));
+        let apart = |id: &IdentityId| covered.iter().all(|o| o == id || !identities.ancestors(*id).any(|i| i == *o));
         let covered: Vec<IdentityId> = covered.iter().copied().filter(apart).collect();
         let own = if let Link::Known(id) = link { *id } else { NOBODY };
         let merged: Vec<IdentityId> = covered.iter().copied().filter(|id| *id == own || !has_mask(*id)).collect();
         match (link, covered.as_slice()) {
             (_, [_, _, ..]) if merged.len() > 1 => list.push(Disagreement::Merge(merged)),
-            (Link::Known(is), [other]) if is != other && !identities.line(*other).any(|i| i == *is) => {
+            (Link::Known(is), [other]) if is != other && !identities.ancestors(*other).any(|i| i == *is) => {
                 list.push(Disagreement::Switch(*is, *other));
             }
             _ => {}

@@ -3,7 +3,6 @@
 use std::path::Path;
 use std::time::Instant;
 
-use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::associate::Disagreement;
@@ -21,7 +20,7 @@ use crate::models::Encoder;
 use crate::pipeline::observer::{Observer, Severity};
 use crate::render::{RenderError, RenderSettings, Renderer};
 use crate::scene::semantic_map::{BACKGROUND_CODE, CODE_CHANNELS};
-use crate::scene::{GaussianCloud, Identities, IdentityId, Photo, SemanticMap};
+use crate::scene::{GaussianCloud, IdentityId, Photo, SemanticMap};
 
 /// Longer side of the masks that codes are trained on, px.
 const CODE_SIDE_PX: u32 = 256;
@@ -149,11 +148,11 @@ pub(crate) fn find_objects(
     }
     let mut identities = tracked.identities.clone();
     let of: Vec<IdentityId> = tracked.assignments.iter().map(|b| b.identity).collect();
-    let centers = centers(cloud, &of, &identities);
+    let centers = codes::centers(cloud, &of, &identities);
     codes::assign(&mut identities, &centers);
     let margin = tracked.assignments.iter().map(|b| b.margin).collect();
     let seeds = tracked.seeds.iter().map(|&i| photos[i].name.clone()).collect();
-    let mut map = SemanticMap::of_identities(identities, of, margin, seeds);
+    let mut map = SemanticMap::from_identities(identities, of, margin, seeds);
     let Tracked { views, disagreements, mut secs, .. } = tracked;
     let mut timed = |stage: &'static str, start: Instant| secs.push((stage, start.elapsed().as_secs_f64()));
     let start = Instant::now();
@@ -183,7 +182,7 @@ fn lift(
     let mut views = Vec::with_capacity(photos.len());
     for photo in photos {
         let camera = photo.camera.limited_to(CODE_SIDE_PX);
-        let seen = ViewMap::render(&mut renderer, cloud, &map.of, &map.identities, &camera, settings)?;
+        let seen = ViewMap::render(&mut renderer, cloud, &map.identity_of, &map.identities, &camera, settings)?;
         views.push(CodeView { camera, labels: seen.identity });
     }
     if options.lifting == Lifting::Paper {
@@ -194,7 +193,7 @@ fn lift(
     train_codes(cloud, &mut map.codes, &views, &map.identities, settings, training, observer)?;
     observer.proceed().map_err(TrackError::from)?;
     if options.lifting == Lifting::Paper {
-        map.of = decode(&map.codes, &map.identities);
+        map.identity_of = decode(&map.codes, &map.identities);
     }
     Ok(())
 }
@@ -214,26 +213,16 @@ fn unknown(views: &[ViewReport], photos: &[Photo], share: f64) -> Option<String>
     ))
 }
 
-/// Mean position of each identity's Gaussians, pieces included, by number less one.
-pub(crate) fn centers(cloud: &GaussianCloud, of: &[IdentityId], identities: &Identities) -> Vec<DVec3> {
-    let mut sums = vec![(DVec3::ZERO, 0.0); identities.len()];
-    for (i, &id) in of.iter().enumerate() {
-        for id in identities.line(id) {
-            let sum = &mut sums[id as usize - 1];
-            *sum = (sum.0 + cloud.world_position(i), sum.1 + 1.0);
-        }
-    }
-    sums.iter().map(|(sum, n)| if *n > 0.0 { *sum / *n } else { DVec3::ZERO }).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use std::path::PathBuf;
 
+    use glam::DVec3;
+
     use super::*;
     use crate::pipeline::observer::{Interrupted, Signal, Silent};
     use crate::pipeline::semantics::segmenter::FoundMask;
-    use crate::scene::{Camera, Level as Of, Mask, NOBODY};
+    use crate::scene::{Camera, Identities, Level as Of, Mask, NOBODY};
 
     /// A doll with an eye on the left, a cat on the right: whose the Gaussians are.
     const TRUTH: [IdentityId; 15] = [1, 1, 1, 1, 1, 1, 2, 2, 2, 3, 3, 3, 3, 3, 3];
@@ -333,14 +322,17 @@ mod tests {
         for named in [true, false] {
             let found = find(Told { named, covers: true }, (Lifting::Votes, 0), 12, &mut Silent).expect("found");
             let map = &found.map;
-            assert_eq!((map.of.as_slice(), map.seeds.as_slice()), (&TRUTH[..], &["near".into(), "far".to_owned()][..]));
+            assert_eq!(
+                (map.identity_of.as_slice(), map.seeds.as_slice()),
+                (&TRUTH[..], &["near".into(), "far".to_owned()][..])
+            );
             let list: Vec<_> = map.identities.iter().map(|(_, i)| (i.level, i.parent, i.names.clone())).collect();
             let names = |name: &str| if named { vec![name.to_owned()] } else { vec![] };
             let expected = [(Of::Object, 0, names("doll")), (Of::Part, 1, names("eye")), (Of::Object, 0, names("cat"))];
             assert_eq!(list, expected);
             assert!(found.disagreements.is_empty(), "{:?}", found.disagreements);
             assert!(map.margin.iter().all(|m| *m > 0.0), "{:?}", map.margin);
-            let codes: Vec<_> = map.of.iter().map(|id| map.identities.codes(*id)).collect();
+            let codes: Vec<_> = map.identity_of.iter().map(|id| map.identities.codes(*id)).collect();
             assert_eq!(map.codes, codes);
             let seen = |k: usize| found.views[k].seen.iter().map(|s| s.identity).collect::<Vec<_>>();
             assert_eq!((seen(0), seen(1)), (vec![1, 2], vec![1, 2, 3]));
@@ -361,7 +353,7 @@ mod tests {
         let mut notes = Notes(vec![]);
         let found = find(Told { named: true, covers: true }, (Lifting::Votes, 0), 1, &mut notes).expect("found");
         assert_eq!(found.map.identities.len(), 2);
-        assert_eq!((&found.map.of[..9], &found.map.of[9..]), (&TRUTH[..9], &[NOBODY; 6][..]));
+        assert_eq!((&found.map.identity_of[..9], &found.map.identity_of[9..]), (&TRUTH[..9], &[NOBODY; 6][..]));
         // The far photo shows the cat, too different in color to be taken for a piece of what is near.
         assert!((0.01..0.3).contains(&found.views[1].unknown) && found.views[0].unknown == 0.0);
         assert!(
@@ -381,7 +373,7 @@ mod tests {
         let votes = find(told(), (Lifting::Votes, 0), 12, &mut Silent).expect("found").map;
         for lifting in [(Lifting::Refined, 20), (Lifting::Paper, 120)] {
             let map = find(told(), lifting, 12, &mut Silent).expect("found").map;
-            assert_eq!(map.of, TRUTH, "{lifting:?}");
+            assert_eq!(map.identity_of, TRUTH, "{lifting:?}");
             assert_ne!(map.codes, votes.codes, "{lifting:?} trains");
             let far = |a: &[f32; 6], b: &[f32; 6]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
             let worst = map.codes.iter().zip(&votes.codes).map(|(a, b)| far(a, b)).fold(0.0, f32::max);
@@ -403,20 +395,5 @@ mod tests {
         let stopped =
             find(Told { named: true, covers: true }, (Lifting::Votes, 0), 12, &mut Stop).expect_err("stopped");
         assert!(Interrupted::is_cause_of(&stopped), "{stopped}");
-    }
-
-    #[test]
-    fn centers_are_means_and_wholes_count_their_pieces() {
-        let mut all = Identities::default();
-        let doll = all.add(Of::Object, NOBODY, vec![]);
-        let eye = all.add(Of::Part, doll, vec![]);
-        all.add(Of::Object, NOBODY, vec![]);
-        let cloud = GaussianCloud {
-            origin: DVec3::new(10.0, 0.0, 0.0),
-            positions: vec![[1.0, 0.0, 0.0], [3.0, 6.0, 0.0], [5.0, 0.0, 3.0], [9.0; 3]],
-            ..GaussianCloud::default()
-        };
-        let found = centers(&cloud, &[doll, eye, eye, NOBODY], &all);
-        assert_eq!(found, [DVec3::new(13.0, 2.0, 1.0), DVec3::new(14.0, 3.0, 1.5), DVec3::ZERO]);
     }
 }

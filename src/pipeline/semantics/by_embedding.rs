@@ -105,7 +105,7 @@ impl<'a> EmbeddingScorer<'a> {
             let each = query.into_iter().flat_map(|q| views.iter().map(move |v| (v, q)));
             each.map(|(v, q)| advantage(v, q, &canonical)).fold(f32::NEG_INFINITY, f32::max)
         };
-        self.features.of.par_iter().with_min_len(IDENTITIES_PER_TASK).map(best).collect()
+        self.features.by_identity.par_iter().with_min_len(IDENTITIES_PER_TASK).map(best).collect()
     }
 }
 
@@ -146,7 +146,7 @@ mod tests {
         LanguageFeatures {
             encoder: "test".into(),
             dimension: 2,
-            of: vec![f([1.0, 0.0], [1.0, 0.0]), f([0.0, 1.0], [0.6, 0.8]), ViewFeatures::default()],
+            by_identity: vec![f([1.0, 0.0], [1.0, 0.0]), f([0.0, 1.0], [0.6, 0.8]), ViewFeatures::default()],
         }
     }
 

@@ -24,9 +24,9 @@ pub(crate) fn carry(map: &SemanticMap, from: &GaussianCloud, to: &GaussianCloud)
         (distance_2.sqrt() <= REACH * f64::from(longest).exp()).then_some(near.data)
     };
     let nearest: Vec<Option<usize>> = (0..to.len()).into_par_iter().map(nearest).collect();
-    let of = nearest.iter().map(|n| n.map_or(NOBODY, |i| map.of[i])).collect();
+    let of = nearest.iter().map(|n| n.map_or(NOBODY, |i| map.identity_of[i])).collect();
     let margin = nearest.iter().map(|n| n.map_or(0.0, |i| map.margin[i])).collect();
-    let mut carried = SemanticMap::of_identities(map.identities.clone(), of, margin, map.seeds.clone());
+    let mut carried = SemanticMap::from_identities(map.identities.clone(), of, margin, map.seeds.clone());
     // Codes may have been trained, so that they are not those of the identities.
     for (codes, near) in carried.codes.iter_mut().zip(&nearest) {
         *codes = near.map_or(*codes, |i| map.codes[i]);
@@ -58,21 +58,21 @@ mod tests {
     fn gaussians_take_what_reaches_them() {
         let mut identities = Identities::default();
         let (a, b) = (identities.add(Level::Object, NOBODY, vec![]), identities.add(Level::Object, NOBODY, vec![]));
-        let mut map = SemanticMap::of_identities(identities, vec![a, b], vec![0.5, 1.0], vec!["photo".into()]);
+        let mut map = SemanticMap::from_identities(identities, vec![a, b], vec![0.5, 1.0], vec!["photo".into()]);
         map.codes[1][0] = 0.125;
         let from = cloud(&[0.0, 1.0], DVec3::ZERO);
         // Moved, cloned, exchanged, in another frame, and one that is nobody's: 0.3 off, three deviations.
         let to = cloud(&[-8.95, -9.99, -10.19, -8.7], DVec3::X * 10.0);
         let (carried, share) = carry(&map, &from, &to);
-        assert_eq!(carried.of, [b, a, a, NOBODY]);
+        assert_eq!(carried.identity_of, [b, a, a, NOBODY]);
         assert_eq!(carried.margin, [1.0, 0.5, 0.5, 0.0]);
         assert_eq!((carried.codes[0], carried.codes[1]), (map.codes[1], map.codes[0]));
         assert_eq!(
             carried.codes[3],
-            SemanticMap::of_identities(Identities::default(), vec![0], vec![0.0], vec![]).codes[0]
+            SemanticMap::from_identities(Identities::default(), vec![0], vec![0.0], vec![]).codes[0]
         );
         assert_eq!((share, carried.seeds), (0.75, map.seeds.clone()));
         assert_eq!(carry(&map, &from, &from).0, map, "the same Gaussians keep everything");
-        assert!(carry(&map, &from, &GaussianCloud::default()).0.of.is_empty());
+        assert!(carry(&map, &from, &GaussianCloud::default()).0.identity_of.is_empty());
     }
 }

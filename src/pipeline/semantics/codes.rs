@@ -7,7 +7,7 @@
 use glam::{DVec3, Vec3};
 
 use crate::math::finite::{all_finite, insist};
-use crate::scene::{Identities, IdentityId};
+use crate::scene::{GaussianCloud, Identities, IdentityId};
 
 /// Radius of the sphere.
 pub const RADIUS: f32 = 0.5;
@@ -77,6 +77,18 @@ pub fn assign(identities: &mut Identities, centers: &[DVec3]) {
 /// Whether a code blended with alpha and divided by it is `code`, within `tolerance` per channel.
 pub fn matches(blended: [f32; 3], code: [f32; 3], tolerance: f32) -> bool {
     blended.iter().zip(code).all(|(b, c)| (b - c).abs() <= tolerance)
+}
+
+/// Mean position of each identity's Gaussians, pieces included, by number less one.
+pub(crate) fn centers(cloud: &GaussianCloud, of: &[IdentityId], identities: &Identities) -> Vec<DVec3> {
+    let mut sums = vec![(DVec3::ZERO, 0.0); identities.len()];
+    for (i, &id) in of.iter().enumerate() {
+        for id in identities.ancestors(id) {
+            let sum = &mut sums[id as usize - 1];
+            *sum = (sum.0 + cloud.world_position(i), sum.1 + 1.0);
+        }
+    }
+    sums.iter().map(|(sum, n)| if *n > 0.0 { *sum / *n } else { DVec3::ZERO }).collect()
 }
 
 #[cfg(test)]
@@ -188,5 +200,20 @@ mod tests {
             let on_sphere = |c: [f32; 3]| ((Vec3::from(c) - Vec3::splat(0.5)).length() - RADIUS).abs() < 1e-5;
             assert!(all.iter().all(|(_, i)| on_sphere(i.code)));
         }
+    }
+
+    #[test]
+    fn centers_are_means_and_wholes_count_their_pieces() {
+        let mut all = Identities::default();
+        let doll = all.add(Level::Object, NOBODY, vec![]);
+        let eye = all.add(Level::Part, doll, vec![]);
+        all.add(Level::Object, NOBODY, vec![]);
+        let cloud = GaussianCloud {
+            origin: DVec3::new(10.0, 0.0, 0.0),
+            positions: vec![[1.0, 0.0, 0.0], [3.0, 6.0, 0.0], [5.0, 0.0, 3.0], [9.0; 3]],
+            ..GaussianCloud::default()
+        };
+        let found = centers(&cloud, &[doll, eye, eye, NOBODY], &all);
+        assert_eq!(found, [DVec3::new(13.0, 2.0, 1.0), DVec3::new(14.0, 3.0, 1.5), DVec3::ZERO]);
     }
 }

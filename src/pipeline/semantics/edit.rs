@@ -68,13 +68,13 @@ pub(crate) fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Re
         }
         Edit::Merge(from, into) => {
             let (from, into) = (known(*from)?, known(*into)?);
-            if all.within(from)[into as usize] {
+            if all.descendants(from)[into as usize] {
                 return Err(EditError::Related(all.name(from), all.name(into)));
             }
             merge(&mut new, from, into);
         }
         Edit::Split(id) => {
-            let own: Vec<usize> = (0..map.of.len()).filter(|&i| map.of[i] == *id).collect();
+            let own: Vec<usize> = (0..map.identity_of.len()).filter(|&i| map.identity_of[i] == *id).collect();
             let parts = pieces(cloud, &own).ok_or_else(|| EditError::TooSmall(all.name(*id)))?;
             let (level, parent) = all.get(known(*id)?).map_or((Level::Object, NOBODY), |i| (i.level, i.parent));
             for part in parts.iter().skip(1) {
@@ -82,8 +82,8 @@ pub(crate) fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Re
             }
         }
         Edit::AddPiece { of, name, gaussians } => {
-            let inside = if *of == NOBODY { vec![true] } else { all.within(known(*of)?) };
-            let is_in = |i: &usize| map.of.get(*i).is_some_and(|id| inside.get(*id as usize) == Some(&true));
+            let inside = if *of == NOBODY { vec![true] } else { all.descendants(known(*of)?) };
+            let is_in = |i: &usize| map.identity_of.get(*i).is_some_and(|id| inside.get(*id as usize) == Some(&true));
             let own: Vec<usize> = gaussians.iter().map(|i| *i as usize).filter(is_in).collect();
             if own.is_empty() {
                 return Err(EditError::Nothing(all.name(*of)));
@@ -103,11 +103,11 @@ fn add(map: &mut SemanticMap, level: Level, parent: IdentityId, name: String, ga
         identity.code = code;
     }
     if let Some(language) = &mut map.language {
-        language.of.push(ViewFeatures::default());
+        language.by_identity.push(ViewFeatures::default());
     }
     let codes = map.identities.codes(id);
     for &i in gaussians {
-        (map.of[i], map.codes[i]) = (id, codes);
+        (map.identity_of[i], map.codes[i]) = (id, codes);
     }
 }
 
@@ -146,13 +146,13 @@ fn merge(map: &mut SemanticMap, from: IdentityId, into: IdentityId) {
         if let Some(new) = map.identities.get_mut(number[id as usize]) {
             new.code = identity.code;
         }
-        features.extend(map.language.as_ref().map(|l| l.of.get(id as usize - 1).cloned().unwrap_or_default()));
+        features.extend(map.language.as_ref().map(|l| l.by_identity.get(id as usize - 1).cloned().unwrap_or_default()));
     }
     number[from as usize] = number[into as usize];
     if let Some(language) = &mut map.language {
-        language.of = features;
+        language.by_identity = features;
     }
-    for (of, codes) in map.of.iter_mut().zip(&mut map.codes) {
+    for (of, codes) in map.identity_of.iter_mut().zip(&mut map.codes) {
         let before = *of as usize;
         *of = number.get(before).copied().unwrap_or(NOBODY);
         let now = map.identities.codes(*of);
@@ -243,9 +243,9 @@ mod tests {
             sh: vec![[0.0; 3]; n],
             ..GaussianCloud::default()
         };
-        let mut map = SemanticMap::of_identities(all, of, vec![1.0; n], vec![]);
+        let mut map = SemanticMap::from_identities(all, of, vec![1.0; n], vec![]);
         map.language =
-            Some(LanguageFeatures { encoder: "t".into(), dimension: 1, of: vec![ViewFeatures::default(); 4] });
+            Some(LanguageFeatures { encoder: "t".into(), dimension: 1, by_identity: vec![ViewFeatures::default(); 4] });
         (map, cloud)
     }
 
@@ -253,7 +253,7 @@ mod tests {
         for (id, identity) in map.identities.iter() {
             assert!(identity.parent < id, "wholes come before their pieces");
         }
-        let codes: Vec<_> = map.of.iter().map(|id| map.identities.codes(*id)).collect();
+        let codes: Vec<_> = map.identity_of.iter().map(|id| map.identities.codes(*id)).collect();
         assert_eq!(map.codes, codes);
         assert!(map.language.as_ref().is_some_and(|l| l.is_valid(&map.identities)));
     }
@@ -275,7 +275,7 @@ mod tests {
             let new = apply(&map, &cloud, &Edit::Merge(from, into)).expect("merged");
             check(&new);
             assert_eq!((new.identities.len(), new.sizes()[1]), (3, 60));
-            assert_eq!(new.identities.pieces(1).count(), 2);
+            assert_eq!(new.identities.children(1).count(), 2);
             assert_eq!(new.identities.get(1).map(|i| i.names.len()), Some(2), "both names are understood");
         }
         let new = apply(&map, &cloud, &Edit::Merge(2, 1)).expect("a part can go back into its whole");
@@ -292,7 +292,10 @@ mod tests {
         let new = apply(&map, &cloud, &Edit::Split(1)).expect("split");
         check(&new);
         assert_eq!((new.identities.len(), new.sizes()[5]), (5, 10));
-        assert!(new.of[..10].iter().all(|id| *id == new.of[0]) && new.of[0] != new.of[10]);
+        assert!(
+            new.identity_of[..10].iter().all(|id| *id == new.identity_of[0])
+                && new.identity_of[0] != new.identity_of[10]
+        );
         // In one place: two halves.
         let new = apply(&map, &cloud, &Edit::Split(3)).expect("split");
         assert_eq!((new.sizes()[3], new.sizes()[5]), (20, 10), "its eye stays with it");

@@ -5,7 +5,7 @@ use std::collections::{BTreeSet, HashMap};
 use super::relevancy::{PART_WEIGHT, deviate};
 use super::view_map::ViewMap;
 use crate::io::{self, IoError};
-use crate::models::{Encoder, ModelError, Tile};
+use crate::models::{Encoder, IdentityCrop, ModelError};
 use crate::pipeline::observer::{Interrupted, Observer, Ticker};
 use crate::render::{RenderError, RenderSettings, Renderer};
 use crate::scene::language::MAX_VIEWS;
@@ -88,7 +88,7 @@ pub(crate) fn embed(
         }
         ticker.tick(done + 1, observer)?;
     }
-    Ok(LanguageFeatures { encoder: encoder.name().into(), dimension: encoder.dimension(), of })
+    Ok(LanguageFeatures { encoder: encoder.name().into(), dimension: encoder.dimension(), by_identity: of })
 }
 
 struct Looker<'a> {
@@ -102,7 +102,7 @@ impl Looker<'_> {
     fn draw(&mut self, photo: &Photo, max_side_px: u32) -> Result<ViewMap, EmbedError> {
         let camera = photo.camera.limited_to(max_side_px);
         let Self { cloud, map, settings, renderer } = self;
-        ViewMap::render(renderer, cloud, &map.of, &map.identities, &camera, settings)
+        ViewMap::render(renderer, cloud, &map.identity_of, &map.identities, &camera, settings)
             .map_err(|e| EmbedError::Render(photo.name.clone(), e))
     }
 }
@@ -122,9 +122,9 @@ impl Eye<'_> {
         let tile = |id: &IdentityId| {
             let mask: Mask = self.view.mask(self.identities, *id);
             let own_side = mask.bounds().map_or(0, |b| b.x.len().max(b.y.len()));
-            Some((*id, Tile::cut(&self.rgb, &mask, encoder.tile_side_px().unwrap_or(own_side))?))
+            Some((*id, IdentityCrop::cut(&self.rgb, &mask, encoder.tile_side_px().unwrap_or(own_side))?))
         };
-        let (ids, tiles): (Vec<IdentityId>, Vec<Tile>) = ids.iter().filter_map(tile).unzip();
+        let (ids, tiles): (Vec<IdentityId>, Vec<IdentityCrop>) = ids.iter().filter_map(tile).unzip();
         self.looked = ids.into_iter().zip(encoder.images(&tiles)?).collect();
         Ok(())
     }
@@ -147,7 +147,7 @@ fn counts(view: &ViewMap, identities: &Identities) -> Vec<f64> {
         }
         let (x, y) = (i % w, i / w);
         let edge = x == 0 || y == 0 || x + 1 == w || y + 1 == h;
-        for id in identities.line(id) {
+        for id in identities.ancestors(id) {
             inside[id as usize] += 1;
             at_edge[id as usize] += usize::from(edge);
         }
@@ -187,9 +187,9 @@ mod tests {
             self.side_px
         }
 
-        fn images(&mut self, tiles: &[Tile]) -> Result<Vec<Vec<f32>>, ModelError> {
+        fn images(&mut self, tiles: &[IdentityCrop]) -> Result<Vec<Vec<f32>>, ModelError> {
             self.tiles.extend(tiles.iter().map(|t| t.side_px));
-            let red = |t: &Tile| t.rgb.iter().any(|c| c[0] > 0.5);
+            let red = |t: &IdentityCrop| t.rgb.iter().any(|c| c[0] > 0.5);
             Ok(tiles.iter().map(|t| if red(t) { vec![1.0, 0.0] } else { vec![0.0, 1.0] }).collect())
         }
 
@@ -229,7 +229,7 @@ mod tests {
             Photo { name: k.to_string(), path, camera, distortion: None, test_split: false, background: None }
         };
         let photos = (0..MAX_VIEWS + 2).map(|k| photo(k, DVec3::new(0.0, 0.0, -3.0 - 0.2 * k as f64))).collect();
-        let map = SemanticMap::of_identities(all, vec![doll, eye], vec![1.0; 2], vec![]);
+        let map = SemanticMap::from_identities(all, vec![doll, eye], vec![1.0; 2], vec![]);
         (cloud, map, photos)
     }
 
@@ -242,7 +242,7 @@ mod tests {
         let language = embed(&cloud, &map, &photos, &settings, &mut encoder, &mut Silent).expect("looks");
         assert_eq!((language.encoder.as_str(), language.dimension), ("reddish", 2));
         assert!(language.is_valid(&map.identities));
-        let [doll, eye, nowhere] = &language.of[..] else { panic!("{language:?}") };
+        let [doll, eye, nowhere] = &language.by_identity[..] else { panic!("{language:?}") };
         // The doll is partly red, its eye is not: 0.3 of the doll and 0.7 of the eye, of unit length.
         let length = 0.3_f32.hypot(0.7);
         assert_eq!((doll.raw.len(), eye.raw.len(), nowhere.raw.len()), (MAX_VIEWS, MAX_VIEWS, 0));

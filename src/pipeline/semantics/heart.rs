@@ -3,9 +3,12 @@
 //! photos, by names and by looks. The bars stand clear of the spread of seeds ([`spread`] prints it), and
 //! shuffled names, shuffled looks and a deviation with its weights exchanged must fail them.
 
+mod controls;
+
 use std::collections::HashMap;
 use std::path::Path;
 
+use self::controls::{ABSENT, Harm, harmed, wrong_colors};
 use super::answer::{Language, QueryAnswer, by_embedding, by_name, phrases_of};
 use super::build_map::{FindOptions, Lifting, Tools, find_objects};
 use super::by_embedding::{EmbeddingOptions, TextEmbeddings};
@@ -15,7 +18,7 @@ use super::names;
 use super::parse::ParsedQuery;
 use super::protocols::part_recall::{self, Components};
 use super::protocols::{AskedScene, Category, LabeledView, categories, masks};
-use super::relevancy::{CANONICAL, PART_WEIGHT, deviate};
+use super::relevancy::CANONICAL;
 use super::segmenter::{FileMasks, Segmenter};
 use super::view_map::ViewMap;
 use crate::io::{self, Opened, labels::Labels};
@@ -25,9 +28,7 @@ use crate::pipeline::observer::Silent;
 use crate::pipeline::synth::{self, Rig, SynthOptions};
 use crate::pipeline::train::{self, TrainConfig};
 use crate::render::{BackendChoice, RenderSettings, Renderer};
-use crate::scene::{
-    Camera, GaussianCloud, Identities, IdentityId, LanguageFeatures, Level, LevelFilter, Photo, SemanticMap,
-};
+use crate::scene::{Camera, GaussianCloud, LanguageFeatures, Level, LevelFilter, Photo, SemanticMap};
 
 /// What is measured on.
 const SCENES: [&str; 2] = ["desk", "kitchen"];
@@ -46,45 +47,6 @@ const STEPS: u64 = 150;
 const CODE_STEPS: u64 = 100;
 /// Sparse points, each of which becomes a Gaussian.
 const POINTS: usize = 16_000;
-/// Colors that things of these scenes may have.
-const COLORS: [&str; 12] =
-    ["black", "blue", "brown", "green", "grey", "orange", "pink", "purple", "red", "turquoise", "white", "yellow"];
-/// What is in neither scene: things, and parts of them.
-const ABSENT: [&str; 32] = [
-    "toy car",
-    "rocket",
-    "house",
-    "boat",
-    "duck",
-    "pot plant",
-    "candle",
-    "umbrella",
-    "bag",
-    "teddy bear",
-    "alarm clock",
-    "smartphone",
-    "headphones",
-    "green toy car",
-    "red rocket",
-    "brown house",
-    "white boat",
-    "yellow duck",
-    "turquoise bag",
-    "pink candle",
-    "sail of the boat",
-    "hull of the boat",
-    "beak of the duck",
-    "wings of the duck",
-    "roof of the house",
-    "chimney of the house",
-    "handle of the umbrella",
-    "canopy of the umbrella",
-    "buckle of the bag",
-    "flap of the bag",
-    "wheels of the toy car",
-    "leaves of the pot plant",
-];
-
 /// A trained scene with labeled photos.
 struct Scene {
     cloud: GaussianCloud,
@@ -113,20 +75,6 @@ struct Figures {
     false_names: [f64; 2],
     /// Highest score of a thing in a wrong color, by names.
     wrong_color: f64,
-}
-
-/// What is done to a scene before it is asked.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Harm {
-    Nothing,
-    /// Everything has the name of another thing, or another part.
-    Names,
-    /// Everything has the looks of another thing, or another part.
-    Looks,
-    /// Parts take most of their whole's looks.
-    Deviation,
-    /// Canonical phrases mean nothing, so that anything is more relevant.
-    Canonical,
 }
 
 fn open(name: &str, seed: u64, folder: &Path) -> Scene {
@@ -184,7 +132,7 @@ impl Scene {
         let mut renderer = Renderer::new();
         let mut draw = |camera: &Camera| {
             let (cloud, settings) = (&self.cloud, &self.settings);
-            ViewMap::render(&mut renderer, cloud, &map.of, &map.identities, camera, settings).expect("drawn")
+            ViewMap::render(&mut renderer, cloud, &map.identity_of, &map.identities, camera, settings).expect("drawn")
         };
         self.held.iter().map(|h| draw(&h.1)).collect()
     }
@@ -195,48 +143,6 @@ impl Scene {
         };
         self.held.iter().zip(drawn).map(view).collect()
     }
-}
-
-/// The place of each identity after everything has gone on to the next of its level.
-fn next_of_level(identities: &Identities) -> Vec<usize> {
-    let of_level = |level: Level| identities.iter().filter(move |(_, i)| i.level == level).map(|(id, _)| id);
-    let mut next: Vec<usize> = (0..identities.len()).collect();
-    for level in [Level::Object, Level::Part] {
-        let all: Vec<IdentityId> = of_level(level).collect();
-        // Far enough that a part goes to another thing.
-        let step = all.len() / 2;
-        all.iter().enumerate().for_each(|(k, id)| next[*id as usize - 1] = all[(k + step) % all.len()] as usize - 1);
-    }
-    next
-}
-
-fn harmed(map: &SemanticMap, harm: Harm) -> SemanticMap {
-    let mut map = map.clone();
-    let next = next_of_level(&map.identities);
-    match (harm, &mut map.language) {
-        (Harm::Names, _) => {
-            let names: Vec<Vec<String>> = map.identities.iter().map(|(_, i)| i.names.clone()).collect();
-            for (k, from) in next.iter().enumerate() {
-                if let Some(identity) = map.identities.get_mut(k as IdentityId + 1) {
-                    identity.names = names[*from].clone();
-                }
-            }
-        }
-        (Harm::Looks, Some(language)) => language.of = next.iter().map(|k| language.of[*k].clone()).collect(),
-        (Harm::Deviation, Some(language)) => {
-            let wholes = language.of.clone();
-            for (id, identity) in map.identities.iter().filter(|(_, i)| i.level == Level::Part) {
-                let whole = &wholes[map.identities.object_of(id) as usize - 1].raw;
-                let of = &mut language.of[id as usize - 1];
-                let Some(whole) = whole.first() else { continue };
-                let exchanged = |raw: &Vec<f32>| deviate(whole, raw, PART_WEIGHT).expect("a direction");
-                of.deviated = of.raw.iter().map(exchanged).collect();
-                assert_ne!(identity.parent, 0);
-            }
-        }
-        _ => {}
-    }
-    map
 }
 
 /// Mean IoU of objects and of parts asked for by name.
@@ -261,20 +167,6 @@ fn by_looks(
     book.learn(&phrases_of(&phrase), |p| encoder.text(p)).ok()?;
     let language = Language { features, phrases: book, options: EmbeddingOptions::default() };
     Some(by_embedding(&map.identities, &phrase, LevelFilter::Auto, language))
-}
-
-/// Objects of the scene in colors that no object of their kind has.
-fn wrong_colors(identities: &Identities) -> Vec<String> {
-    let objects = identities.iter().filter(|(_, i)| i.level == Level::Object).flat_map(|(_, i)| &i.names);
-    let names: Vec<&String> = objects.collect();
-    let mut wrong = Vec::new();
-    for (k, name) in names.iter().enumerate() {
-        let Some((_, kind)) = name.split_once(' ') else { continue };
-        let absent = |c: &&&str| !names.iter().any(|n| **n == format!("{c} {kind}"));
-        let others: Vec<&&str> = COLORS.iter().filter(absent).collect();
-        (0..3).for_each(|j| wrong.push(format!("{} {kind}", others[(k + 4 * j) % others.len()])));
-    }
-    wrong
 }
 
 /// Measures the scenes made from this seed, unharmed and harmed.
@@ -347,7 +239,7 @@ fn figures(scene: &Scene, map: &SemanticMap, trained: &SemanticMap, encoder: &mu
         }
     }
     let share = |list: &[bool]| list.iter().filter(|found| **found).count() as f64 / list.len() as f64;
-    let not_there = [ABSENT.map(str::to_owned).to_vec(), wrong_colors(&map.identities)];
+    let not_there = [ABSENT.split(", ").map(str::to_owned).collect(), wrong_colors(&map.identities)];
     let is_found = |answered: QueryAnswer| !matches!(answered.answer, Answer::NotFound(_));
     let mut seen = |name: &String| by_looks(map, features, &mut book, encoder, name).map(is_found);
     let named =

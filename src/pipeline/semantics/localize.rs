@@ -142,24 +142,24 @@ fn jointly(identities: &Identities, text: &str, whole: &str, scorer: &mut dyn Sc
         .iter()
         .map(|(id, _)| {
             // The nearest thing around it that fits the whole best; parts may have parts.
-            let around = identities.line(id).skip(1).map(|i| by_whole[i as usize - 1]).fold(0.0, f32::max);
+            let around = identities.ancestors(id).skip(1).map(|i| by_whole[i as usize - 1]).fold(0.0, f32::max);
             1.0 / (1.0 + (-0.5 * (logit(by_text[id as usize - 1]) + logit(around))).exp())
         })
         .collect();
-    let pieces = identities.iter().filter(|(id, _)| identities.line(*id).nth(1).is_some()).map(|(id, _)| id);
+    let pieces = identities.iter().filter(|(id, _)| identities.ancestors(*id).nth(1).is_some()).map(|(id, _)| id);
     judge(identities, rank(pieces, &both), scorer)
 }
 
 /// Whether `id` is a piece of `whole`, directly or not.
 fn is_piece(identities: &Identities, id: IdentityId, whole: IdentityId) -> bool {
-    identities.line(id).skip(1).any(|i| i == whole)
+    identities.ancestors(id).skip(1).any(|i| i == whole)
 }
 
 /// Step 1 finds the whole; in step 2 only its pieces compete.
 fn piece_of(identities: &Identities, piece: &str, whole: &str, scorer: &mut dyn Scorer) -> Answer {
     let step1 = scorer.scores(whole, None);
     // Wholes may be parts themselves: "the pupil of the eye".
-    let with_pieces = identities.iter().map(|(id, _)| id).filter(|id| identities.pieces(*id).next().is_some());
+    let with_pieces = identities.iter().map(|(id, _)| id).filter(|id| identities.children(*id).next().is_some());
     let wholes = rank(with_pieces, &step1);
     let Some(best) = wholes.first().filter(|w| w.score >= scorer.threshold()) else {
         return Answer::NotFound(wholes);
@@ -195,7 +195,7 @@ fn judge(identities: &Identities, hits: Vec<Hit>, scorer: &dyn Scorer) -> Answer
     };
     // A piece and its whole with the same name are not two things.
     let related = |id: IdentityId| {
-        identities.line(id).any(|i| i == first.identity) || identities.line(first.identity).any(|i| i == id)
+        identities.ancestors(id).any(|i| i == first.identity) || identities.ancestors(first.identity).any(|i| i == id)
     };
     let rival = hits.iter().skip(1).find(|h| !related(h.identity));
     match rival {
@@ -227,7 +227,7 @@ mod tests {
         let phrase = ParsedQuery::parse(query).expect("a phrase");
         let answer = localize(&all, &phrase, level, &mut ByName(&all));
         let names = answer.hits().iter().map(|h| {
-            let line: Vec<String> = all.line(h.identity).map(|i| all.name(i)).collect();
+            let line: Vec<String> = all.ancestors(h.identity).map(|i| all.name(i)).collect();
             line.join(" < ")
         });
         let names = names.collect();

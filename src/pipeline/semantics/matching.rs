@@ -64,7 +64,7 @@ pub(crate) fn gaussians(map: &SemanticMap, target: IdentityId, mode: MatchMode, 
     match mode {
         MatchMode::Exact => {
             let found = matching(&map.identities, target, tolerance);
-            map.of.iter().map(|id| found.get(*id as usize).copied().unwrap_or(false)).collect()
+            map.identity_of.iter().map(|id| found.get(*id as usize).copied().unwrap_or(false)).collect()
         }
         MatchMode::Blend => {
             let wanted = codes_of(&map.identities, target);
@@ -81,7 +81,7 @@ pub(crate) fn gaussians(map: &SemanticMap, target: IdentityId, mode: MatchMode, 
 /// The codes that mean the target: its own, and for a part those of its pieces.
 fn codes_of(identities: &Identities, target: IdentityId) -> Vec<(Level, [f32; 3])> {
     let Some(wanted) = identities.get(target) else { return Vec::new() };
-    let inside = identities.within(target);
+    let inside = identities.descendants(target);
     let meant = identities.iter().filter(|(id, i)| inside[*id as usize] && i.level == wanted.level);
     meant.map(|(_, i)| (i.level, i.code)).collect()
 }
@@ -104,7 +104,7 @@ mod tests {
         {
             all.get_mut(id).expect("there").code = code;
         }
-        SemanticMap::of_identities(all, vec![doll, cat, face, eye, NOBODY], vec![1.0; 5], vec![])
+        SemanticMap::from_identities(all, vec![doll, cat, face, eye, NOBODY], vec![1.0; 5], vec![])
     }
 
     #[test]
@@ -123,8 +123,13 @@ mod tests {
     #[test]
     fn pixels_match_like_gaussians() {
         let map = scene();
-        let view =
-            ViewMap { width_px: 5, height_px: 1, identity: map.of.clone(), share: vec![1.0; 5], alpha: vec![1.0; 5] };
+        let view = ViewMap {
+            width_px: 5,
+            height_px: 1,
+            identity: map.identity_of.clone(),
+            share: vec![1.0; 5],
+            alpha: vec![1.0; 5],
+        };
         let planes = std::array::from_fn(|c| map.codes.iter().map(|codes| codes[c]).collect());
         let mut codes = CodeMap { width_px: 5, height_px: 1, planes };
         for (target, tolerance) in [(1, 0.02), (1, 0.06), (2, 0.02), (3, 0.02), (4, 0.02)] {

@@ -4,7 +4,7 @@
 use super::filters::{self, FilterOptions};
 use super::segmenter::{FoundMask, SegmentError, Segmenter};
 use crate::io;
-use crate::models::catalog::{self, Role};
+use crate::models::catalog::{self, ModelRole};
 use crate::models::sam::automatic::{AutomaticMask, AutomaticOptions, everything};
 use crate::models::sam::{PromptedMasks, Sam};
 use crate::models::sam2::Sam2;
@@ -37,7 +37,7 @@ impl NetworkMasks {
     /// # Errors
     /// If it is not on this machine, or finds no masks.
     pub(crate) fn open(name: &str) -> Result<Self, ModelError> {
-        let path = catalog::find(name, Role::Segmenter)?;
+        let path = catalog::find(name, ModelRole::Segmenter)?;
         let mut options = AutomaticOptions::default();
         let network: Box<dyn PromptedMasks> = match manifest::kind(&path)?.as_str() {
             "sam" => Box::new(Sam::open(&path)?),

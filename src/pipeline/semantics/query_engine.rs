@@ -101,7 +101,7 @@ pub(crate) fn ask_by_embedding<E>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::models::Tile;
+    use crate::models::IdentityCrop;
     use crate::pipeline::semantics::answer::Basis;
     use crate::scene::{Level, NOBODY, ViewFeatures};
 
@@ -121,7 +121,7 @@ mod tests {
             None
         }
 
-        fn images(&mut self, _: &[Tile]) -> Result<Vec<Vec<f32>>, ModelError> {
+        fn images(&mut self, _: &[IdentityCrop]) -> Result<Vec<Vec<f32>>, ModelError> {
             Ok(Vec::new())
         }
 
@@ -144,7 +144,7 @@ mod tests {
         let mut map = SemanticMap::default();
         map.identities.add(Level::Object, NOBODY, vec!["lamp".into()]);
         let red = ViewFeatures { raw: vec![vec![1.0, 0.0]], deviated: vec![vec![1.0, 0.0]] };
-        map.language = Some(LanguageFeatures { encoder: "small".into(), dimension: 2, of: vec![red] });
+        map.language = Some(LanguageFeatures { encoder: "small".into(), dimension: 2, by_identity: vec![red] });
         let mut engine = QueryEngine { encoder: Some(Box::new(Small)), ..QueryEngine::default() };
         let mut ask = |text: &str| engine.ask(&map, text, LevelFilter::Auto);
         let answered = ask("red").expect("encodes").expect("words");

@@ -11,10 +11,10 @@ use super::segmenter::FoundMask;
 use super::votes::UNKNOWN;
 use crate::io::{self, atomic, files};
 use crate::models::ModelError;
-use crate::models::catalog::{self, Role};
-use crate::models::network::Array;
-use crate::models::sam2::track::{Frames, ObjectId, Prompt, Track, mask_of};
-use crate::models::sam2::{Frame, Sam2};
+use crate::models::catalog::{self, ModelRole};
+use crate::models::network::Tensor;
+use crate::models::sam2::track::{FrameSource, ObjectId, Prompt, Track, mask_of};
+use crate::models::sam2::{EncodedFrame, Sam2};
 use crate::pipeline::observer::{Interrupted, Observer, Ticker};
 use crate::scene::{IdentityId, Photo};
 
@@ -50,7 +50,7 @@ impl Sam2Tracker {
     /// # Errors
     /// If it is not on this machine.
     pub(crate) fn open(name: &str, cache: Option<PathBuf>) -> Result<Self, ModelError> {
-        Ok(Self { model: Sam2::open(&catalog::find(name, Role::Segmenter)?)?, cache, encode_secs: 0.0 })
+        Ok(Self { model: Sam2::open(&catalog::find(name, ModelRole::Segmenter)?)?, cache, encode_secs: 0.0 })
     }
 
     /// The label of every pixel of every photo, scaled to at most [`LABEL_SIDE_PX`], row-major: the
@@ -109,16 +109,16 @@ struct Cached<'a> {
     photos: &'a [Photo],
     folder: Option<PathBuf>,
     /// The frame that was used last: it is asked for by every object.
-    kept: Option<(usize, Frame)>,
+    kept: Option<(usize, EncodedFrame)>,
     secs: &'a mut f64,
 }
 
-impl Frames for Cached<'_> {
+impl FrameSource for Cached<'_> {
     fn len(&self) -> usize {
         self.photos.len()
     }
 
-    fn get(&mut self, model: &mut Sam2, index: usize) -> Result<Frame, ModelError> {
+    fn get(&mut self, model: &mut Sam2, index: usize) -> Result<EncodedFrame, ModelError> {
         if let Some((_, frame)) = self.kept.as_ref().filter(|(at, _)| *at == index) {
             return Ok(frame.clone());
         }
@@ -172,7 +172,7 @@ fn first_name((model, digest): (&str, &str), photo: &Photo, written: Option<Syst
     format!("{model}-{:016x}.frame", hasher.finish())
 }
 
-fn write(path: &Path, frame: &Frame) -> std::io::Result<()> {
+fn write(path: &Path, frame: &EncodedFrame) -> std::io::Result<()> {
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)?;
     }
@@ -189,14 +189,14 @@ fn write(path: &Path, frame: &Frame) -> std::io::Result<()> {
 }
 
 /// A frame that was kept; `None` if there is none, or it is damaged.
-fn read(path: &Path) -> Option<Frame> {
+fn read(path: &Path) -> Option<EncodedFrame> {
     parse(&files::read(path, files::MAX_PICTURE_BYTES).ok()?)
 }
 
 /// The frame in the bytes of a kept file; `None` if they are damaged.
-pub fn parse(bytes: &[u8]) -> Option<Frame> {
+pub fn parse(bytes: &[u8]) -> Option<EncodedFrame> {
     let mut rest = bytes;
-    let mut array = || -> Option<Array> {
+    let mut array = || -> Option<Tensor> {
         let mut number = || {
             let (head, tail) = rest.split_first_chunk::<8>()?;
             rest = tail;
@@ -208,9 +208,9 @@ pub fn parse(bytes: &[u8]) -> Option<Frame> {
         let (values, tail) = rest.split_at_checked(n)?;
         rest = tail;
         let values = values.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
-        Some(Array { shape, values })
+        Some(Tensor { shape, values })
     };
-    let frame = Frame { embeddings: array()?, fine: array()?, middle: array()? };
+    let frame = EncodedFrame { embeddings: array()?, fine: array()?, middle: array()? };
     rest.is_empty().then_some(frame)
 }
 
@@ -222,8 +222,8 @@ mod tests {
     fn frames_survive_the_disk_and_damaged_ones_are_made_anew() {
         let folder = tempfile::tempdir().expect("folder");
         let path = folder.path().join("deep").join("a.frame");
-        let array = |n: usize| Array::new(&[1, n], (0..n).map(|i| i as f32 - 0.5).collect());
-        let frame = Frame { embeddings: array(3), fine: array(5), middle: array(0) };
+        let array = |n: usize| Tensor::new(&[1, n], (0..n).map(|i| i as f32 - 0.5).collect());
+        let frame = EncodedFrame { embeddings: array(3), fine: array(5), middle: array(0) };
         write(&path, &frame).expect("written");
         assert_eq!(read(&path), Some(frame));
         let bytes = std::fs::read(&path).expect("read");

@@ -77,7 +77,7 @@ mod tests {
             ..GaussianCloud::default()
         };
         let of = (0..n).map(|i| if i < n / 2 { doll } else { cat }).collect();
-        let map = SemanticMap::of_identities(all, of, vec![1.0; n], vec![]);
+        let map = SemanticMap::from_identities(all, of, vec![1.0; n], vec![]);
         let settings = RenderSettings::default();
         // From above too, where up and the line of sight are the same.
         for from in [DVec3::new(5.0, 1.0, 0.0), DVec3::new(0.0, 0.0, 9.0)] {

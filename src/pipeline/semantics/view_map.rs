@@ -60,7 +60,7 @@ impl ViewMap {
 
     /// The pixels of an identity and its pieces.
     pub fn mask(&self, identities: &Identities, id: IdentityId) -> Mask {
-        let inside = identities.within(id);
+        let inside = identities.descendants(id);
         Mask::from_fn(self.width_px, self.height_px, |i| {
             inside.get(self.identity[i] as usize).copied().unwrap_or(false)
         })

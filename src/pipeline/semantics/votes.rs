@@ -18,7 +18,7 @@ const KEPT: usize = 8;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Votes {
     /// Per Gaussian: identity and weight in px, any order, each identity once.
-    of: Vec<Vec<(IdentityId, f32)>>,
+    by_gaussian: Vec<Vec<(IdentityId, f32)>>,
 }
 
 /// What a Gaussian belongs to.
@@ -34,13 +34,13 @@ pub(crate) struct Assignment {
 impl Votes {
     /// No votes for `n` Gaussians.
     pub(crate) fn new(n: usize) -> Self {
-        Self { of: vec![Vec::new(); n] }
+        Self { by_gaussian: vec![Vec::new(); n] }
     }
 
     /// Weight of all votes for Gaussian `i`, px.
     #[cfg(test)]
     fn weight(&self, i: usize) -> f32 {
-        self.of[i].iter().map(|v| v.1).sum()
+        self.by_gaussian[i].iter().map(|v| v.1).sum()
     }
 
     /// Adds the votes of one view. `labels` holds the innermost identity of each pixel, row-major.
@@ -63,11 +63,11 @@ impl Votes {
         for mut row in rows {
             row.finish();
             for (gaussian, identity, weight) in row.found {
-                add(&mut self.of[gaussian as usize], identity, weight);
+                add(&mut self.by_gaussian[gaussian as usize], identity, weight);
             }
         }
         if CHECKED {
-            let weights = self.of.iter().flatten().map(|v| &v.1);
+            let weights = self.by_gaussian.iter().flatten().map(|v| &v.1);
             all_finite("voting", "vote", weights)?;
         }
         Ok(())
@@ -77,7 +77,7 @@ impl Votes {
     /// identity with most. Gaussians with less than `least` px of votes count as unseen.
     pub(crate) fn decide(&self, identities: &Identities, least: f32) -> Vec<Assignment> {
         let objects: Vec<IdentityId> = (0..=identities.len() as IdentityId).map(|i| identities.object_of(i)).collect();
-        self.of.par_iter().map(|votes| decide(votes, &objects, least)).collect()
+        self.by_gaussian.par_iter().map(|votes| decide(votes, &objects, least)).collect()
     }
 }
 
@@ -162,7 +162,7 @@ mod tests {
         let cat = all.add(Level::Object, NOBODY, vec![]);
         let (eye, ear) = (all.add(Level::Part, doll, vec![]), all.add(Level::Part, doll, vec![]));
         let votes = Votes {
-            of: vec![vec![(eye, 2.0), (ear, 3.0), (cat, 4.0)], vec![(NOBODY, 1.0)], vec![], vec![(cat, 0.01)]],
+            by_gaussian: vec![vec![(eye, 2.0), (ear, 3.0), (cat, 4.0)], vec![(NOBODY, 1.0)], vec![], vec![(cat, 0.01)]],
         };
         let b = votes.decide(&all, 0.05);
         assert_eq!(b[0].identity, ear);
@@ -216,7 +216,7 @@ mod tests {
         assert!(votes.iter().all(|v| v.0 != 51), "as light as the lightest");
         add(&mut votes, 52, 1.5);
         assert!(votes.contains(&(52, 1.5)) && votes.iter().all(|v| v.0 != 1) && votes.len() == KEPT);
-        let all = Votes { of: vec![votes, vec![]] };
+        let all = Votes { by_gaussian: vec![votes, vec![]] };
         assert_eq!(all.weight(1), 0.0);
         assert_eq!(all.weight(0), 2.0 + 3.5 + 4.0 + 5.0 + 6.0 + 7.0 + 8.0 + 1.5);
     }
@@ -227,7 +227,7 @@ mod tests {
         (0..3).for_each(|_| {
             all.add(Level::Object, NOBODY, vec![]);
         });
-        let votes = Votes { of: vec![vec![(3, 1.0), (2, 1.0), (1, 0.5)], vec![(2, 0.05)], vec![(1, 0.0)]] };
+        let votes = Votes { by_gaussian: vec![vec![(3, 1.0), (2, 1.0), (1, 0.5)], vec![(2, 0.05)], vec![(1, 0.0)]] };
         let b = votes.decide(&all, 0.05);
         assert_eq!(
             (b[0], b[1].identity),

@@ -27,7 +27,7 @@ use crate::scene::Level;
 
 /// A thing or a piece of one that the id maps show.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Identity {
+pub struct TrueIdentity {
     /// Value in the id maps, from 1.
     pub(crate) id: u16,
     pub(crate) name: String,
@@ -54,9 +54,9 @@ pub(crate) struct NodeIds {
 }
 
 /// All identities of a scene, and whose each node is.
-pub struct Identities {
+pub struct TrueIdentities {
     /// In order of their ids, from 1.
-    pub(crate) list: Vec<Identity>,
+    pub(crate) list: Vec<TrueIdentity>,
     pub(crate) of_node: Vec<NodeIds>,
 }
 
@@ -68,7 +68,7 @@ struct Surface {
 }
 
 /// Finds objects and parts; `file` names the object of [`Levels::File`].
-pub(crate) fn identities(scene: &MeshScene, levels: Levels, file: &str) -> Result<Identities, SynthError> {
+pub(crate) fn identities(scene: &MeshScene, levels: Levels, file: &str) -> Result<TrueIdentities, SynthError> {
     let bearing = bearing(scene);
     let has_mesh = |n: usize| has_mesh(scene, n);
     let objects: Vec<Vec<usize>> = match levels {
@@ -117,7 +117,7 @@ pub(crate) fn identities(scene: &MeshScene, levels: Levels, file: &str) -> Resul
         };
         of_node[s.node] = NodeIds { object, part };
     }
-    Ok(Identities { list, of_node })
+    Ok(TrueIdentities { list, of_node })
 }
 
 fn has_mesh(scene: &MeshScene, node: usize) -> bool {
@@ -157,9 +157,9 @@ fn identity(
     level: Level,
     parent: Option<u16>,
     path: String,
-) -> Result<Identity, SynthError> {
+) -> Result<TrueIdentity, SynthError> {
     let id = u16::try_from(index + 1).map_err(|_| SynthError::TooManyIdentities)?;
-    Ok(Identity { id, name, level, parent, path, color: color(index), pixels: 0, views: 0 })
+    Ok(TrueIdentity { id, name, level, parent, path, color: color(index), pixels: 0, views: 0 })
 }
 
 /// The node's name, else its mesh's, else its number.

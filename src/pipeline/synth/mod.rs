@@ -42,7 +42,7 @@ use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
 pub use demo::demo_glb;
-pub(crate) use levels::Identity;
+pub(crate) use levels::TrueIdentity;
 pub use options::{Levels, Rig, SynthOptions};
 
 use crate::io::IoError;
@@ -107,7 +107,7 @@ pub struct SynthReport {
     pub(crate) train_views: usize,
     pub(crate) held_out_views: usize,
     /// Objects and parts, pixels counted.
-    pub(crate) identities: Vec<Identity>,
+    pub(crate) identities: Vec<TrueIdentity>,
     pub(crate) points: usize,
     /// Triangles of the scene after splitting for light.
     pub(crate) triangles: usize,
@@ -199,12 +199,12 @@ fn render_scene(
 }
 
 /// Makes a scene ready for rendering.
-fn stage(scene: &MeshScene, identities: &levels::Identities) -> Result<view::Stage, SynthError> {
+fn stage(scene: &MeshScene, identities: &levels::TrueIdentities) -> Result<view::SynthScene, SynthError> {
     let surface = surface::Surface::of(scene, identities)?;
     let tracer = trace::Tracer::new(&surface);
     let materials = material::Materials::of(scene);
     let light = light::Light::new(&surface, &materials);
-    Ok(view::Stage { surface, tracer, materials, light })
+    Ok(view::SynthScene { surface, tracer, materials, light })
 }
 
 /// Which photos are held out: one at random from each of as many equal stretches of the list.

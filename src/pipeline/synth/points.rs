@@ -5,13 +5,13 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg32;
 
 use super::options::SynthOptions;
-use super::view::View;
+use super::view::SynthView;
 use crate::scene::{Camera, SparsePoint};
 
 /// `count` points on surfaces that the photo shows, in its colors, each off by
 /// `point_noise_px` pixels of it in every direction. None if the photo shows no surface.
 pub(crate) fn sample(
-    view: &View,
+    view: &SynthView,
     camera: &Camera,
     index: usize,
     count: usize,

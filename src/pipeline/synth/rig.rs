@@ -20,7 +20,7 @@ const ATTEMPTS: usize = 24;
 
 /// What the cameras look at.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Subject {
+pub(crate) struct RigSubject {
     pub(crate) focus: DVec3,
     /// Radius around it that should fill a picture.
     pub(crate) radius: f64,
@@ -33,7 +33,7 @@ pub(crate) fn cameras(surface: &Surface, tracer: &Tracer, options: &SynthOptions
     let things: Vec<&Bounds> = objects.iter().zip(&supports).filter(|(_, s)| !**s).map(|(b, _)| b).collect();
     let found = subject(&things);
     let subject =
-        Subject { focus: options.focus.unwrap_or(found.focus), radius: options.radius.unwrap_or(found.radius) };
+        RigSubject { focus: options.focus.unwrap_or(found.focus), radius: options.radius.unwrap_or(found.radius) };
     let placer = Placer { surface, tracer, options };
     let mut rng = Pcg32::seed_from_u64(options.seed);
     let start = rng.random::<f64>() * TAU;
@@ -53,7 +53,7 @@ pub(crate) fn cameras(surface: &Surface, tracer: &Tracer, options: &SynthOptions
                     let elevation = (32.0 + 14.0 * sway(2.0, 0.1) + 3.0 * sway(11.0, 0.4)).to_radians();
                     let away = 1.0 + 0.12 * sway(3.0, 0.7) + 0.02 * sway(13.0, 0.2);
                     let shift = DVec3::new(sway(5.0, 0.3), sway(7.0, 0.6), sway(9.0, 0.9)) * (0.06 * subject.radius);
-                    let aim = Subject { focus: subject.focus + shift, ..subject };
+                    let aim = RigSubject { focus: subject.focus + shift, ..subject };
                     placer.around(aim, elevation, start + TAU * 1.25 * share, away)
                 }
                 Rig::Survey if i % 2 == 1 && !things.is_empty() => {
@@ -74,13 +74,13 @@ struct Placer<'a> {
 
 impl Placer<'_> {
     /// From 12 to 70 degrees of elevation, evenly over the dome's area, steeper as `share` grows.
-    fn dome(&self, subject: Subject, share: f64, azimuth: f64) -> Camera {
+    fn dome(&self, subject: RigSubject, share: f64, azimuth: f64) -> Camera {
         let (low, high) = (12.0_f64.to_radians().sin(), 70.0_f64.to_radians().sin());
         self.around(subject, (low + (high - low) * share).asin(), azimuth, 1.0)
     }
 
     /// A camera that sees the subject whole from the given direction, `away` times as far as needed.
-    fn around(&self, subject: Subject, elevation: f64, azimuth: f64, away: f64) -> Camera {
+    fn around(&self, subject: RigSubject, elevation: f64, azimuth: f64, away: f64) -> Camera {
         let o = self.options;
         let (e, a) = (elevation.sin_cos(), azimuth.sin_cos());
         let direction = DVec3::new(e.1 * a.1, e.0, e.1 * a.0);
@@ -101,10 +101,10 @@ impl Placer<'_> {
     }
 
     /// A near view of one object, from where nothing stands between.
-    fn close_up(&self, scene: Subject, object: &Bounds, k: usize, rng: &mut Pcg32) -> Camera {
+    fn close_up(&self, scene: RigSubject, object: &Bounds, k: usize, rng: &mut Pcg32) -> Camera {
         // Nearer than a third of the whole scene's radius would show a spoon and nothing else.
         let radius = (object.radius() * 1.5).clamp(0.3 * scene.radius, scene.radius);
-        let aim = Subject { focus: object.center(), radius };
+        let aim = RigSubject { focus: object.center(), radius };
         let mut best = None;
         for attempt in 0..ATTEMPTS {
             let elevation = (18.0 + 42.0 * rng.random::<f64>()).to_radians();
@@ -139,7 +139,7 @@ fn supports(objects: &[Bounds]) -> Vec<bool> {
     objects.iter().map(|b| objects.len() >= 4 && 2 * count(b) > objects.len()).collect()
 }
 
-fn subject(things: &[&Bounds]) -> Subject {
+fn subject(things: &[&Bounds]) -> RigSubject {
     let all = Bounds::of(things.iter().flat_map(|b| [b.min, b.max]));
-    all.map_or(Subject { focus: DVec3::ZERO, radius: 1.0 }, |b| Subject { focus: b.center(), radius: b.radius() })
+    all.map_or(RigSubject { focus: DVec3::ZERO, radius: 1.0 }, |b| RigSubject { focus: b.center(), radius: b.radius() })
 }

@@ -9,8 +9,8 @@ use std::collections::HashMap;
 use glam::{DMat3, DVec3, Vec2, Vec3, Vec3A, Vec4};
 
 use super::SynthError;
-use super::levels::{Identities, NodeIds};
-use crate::io::gltf_mesh::{Material, MeshScene, Primitive};
+use super::levels::{NodeIds, TrueIdentities};
+use crate::io::gltf_mesh::{Material, MeshPrimitive, MeshScene};
 use crate::scene::Bounds;
 
 /// Most triangles that are drawn, before splitting.
@@ -57,7 +57,7 @@ pub(crate) struct Surface {
 }
 
 impl Surface {
-    pub(crate) fn of(scene: &MeshScene, identities: &Identities) -> Result<Self, SynthError> {
+    pub(crate) fn of(scene: &MeshScene, identities: &TrueIdentities) -> Result<Self, SynthError> {
         let instances: Vec<Instance<'_>> = scene
             .nodes
             .iter()
@@ -248,7 +248,7 @@ impl Surface {
 struct Instance<'a> {
     node: usize,
     world: glam::DMat4,
-    primitive: &'a Primitive,
+    primitive: &'a MeshPrimitive,
     ids: NodeIds,
 }
 

@@ -1,5 +1,8 @@
 //! Photos, ids and depth against exact geometry.
 
+mod dataset;
+mod node_levels;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
@@ -24,7 +27,7 @@ fn two_cubes() -> MeshScene {
 
 const BOXES: [(DVec3, f64); 2] = [(DVec3::new(0.3, 0.2, -0.4), 0.5), (DVec3::new(-0.2, 0.1, 0.9), 0.2)];
 
-fn stage_of(scene: &MeshScene) -> view::Stage {
+fn stage_of(scene: &MeshScene) -> view::SynthScene {
     stage(scene, &levels::identities(scene, Levels::Nodes, "test").unwrap()).unwrap()
 }
 
@@ -110,7 +113,7 @@ fn anti_aliasing_covers_edges_by_area() {
     let stage = stage_of(&scene);
     let camera = Camera::look_at(DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, DVec3::Y, 0.5, 41, 41).unwrap();
     let options = SynthOptions { samples: 8, background: [255; 3], ..small() };
-    let covered = |stage: &view::Stage| -> f64 {
+    let covered = |stage: &view::SynthScene| -> f64 {
         let view = stage.render(&camera, 0, &options);
         view.rgb.iter().map(|p| 1.0 - f64::from(crate::math::srgb::linear(f32::from(p[0]) / 255.0))).sum()
     };
@@ -211,121 +214,6 @@ fn light_is_brightest_from_above_and_shadows_fall() {
     assert!(below > 0.05 && (1.5..=3.3).contains(&corner), "{below} {corner}");
 }
 
-fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    let mut found = BTreeMap::new();
-    for entry in fs::read_dir(folder).unwrap().flatten() {
-        let name = entry.file_name().into_string().unwrap();
-        if entry.path().is_dir() {
-            found.extend(files(&entry.path()).into_iter().map(|(k, v)| (format!("{name}/{k}"), v)));
-        } else {
-            found.insert(name, fs::read(entry.path()).unwrap());
-        }
-    }
-    found
-}
-
-fn write(options: &SynthOptions) -> (tempfile::TempDir, SynthReport) {
-    let out = tempfile::tempdir().unwrap();
-    let report = render_scene(&two_cubes(), "two", None, options, out.path(), &mut Silent).unwrap();
-    (out, report)
-}
-
-#[test]
-fn the_same_seed_gives_the_same_bytes() {
-    let (a, _) = write(&small());
-    let (b, _) = write(&small());
-    assert!(files(a.path()) == files(b.path()));
-    let (c, _) = write(&SynthOptions { seed: 1, ..small() });
-    let changed = files(c.path());
-    let before = files(a.path());
-    let photos = before.iter().filter(|(name, _)| name.starts_with("images/"));
-    assert!(photos.clone().count() == 6);
-    assert!(photos.into_iter().all(|(name, bytes)| changed[name] != *bytes), "photos for another seed differ");
-}
-
-#[test]
-fn a_data_set_agrees_with_itself() {
-    for rig in [Rig::Dome, Rig::Orbit, Rig::Handheld, Rig::Survey] {
-        let options = SynthOptions { rig, views: 9, held_out: 3, ..small() };
-        let (out, report) = write(&options);
-        let json = |name: &str| -> Value { serde_json::from_slice(&fs::read(out.path().join(name)).unwrap()).unwrap() };
-        let transforms = json("transforms.json");
-        let list = |key: &str| -> BTreeSet<String> {
-            transforms[key].as_array().unwrap().iter().map(|v| v.as_str().unwrap().to_owned()).collect()
-        };
-        let (train, test) = (list("train_filenames"), list("test_filenames"));
-        assert!(train.is_disjoint(&test));
-        assert_eq!((train.len(), test.len()), (6, 3));
-        assert_eq!((report.train_views, report.held_out_views), (6, 3));
-        let frames = transforms["frames"].as_array().unwrap();
-        let named: BTreeSet<String> = frames.iter().map(|f| f["file_path"].as_str().unwrap().to_owned()).collect();
-        assert_eq!(named, train.union(&test).cloned().collect());
-        let mut counted: BTreeMap<u64, u64> = BTreeMap::new();
-        for name in &named {
-            let photo = image::open(out.path().join(name)).unwrap();
-            assert_eq!((photo.width(), photo.height()), (64, 48));
-            let stem = Path::new(name).file_stem().unwrap().to_str().unwrap();
-            for level in ["object_ids", "part_ids"] {
-                let ids = image::open(out.path().join(level).join(format!("{stem}.png"))).unwrap().into_luma16();
-                for id in ids.into_raw().into_iter().filter(|id| *id != 0) {
-                    *counted.entry(u64::from(id)).or_default() += 1;
-                }
-            }
-        }
-        let identities = json("identities.json");
-        let listed = identities["identities"].as_array().unwrap();
-        let pixels = |i: &Value| (i["id"].as_u64().unwrap(), i["pixels"].as_u64().unwrap());
-        let listed: BTreeMap<u64, u64> = listed.iter().map(pixels).filter(|(_, n)| *n > 0).collect();
-        assert_eq!(listed, counted, "{rig:?}");
-        assert!(counted.len() == 2, "{rig:?}: both cubes are seen");
-    }
-}
-
-#[test]
-fn poses_and_points_fit_the_photos() {
-    let (out, report) = write(&SynthOptions { point_noise_px: 0.0, ..small() });
-    assert_eq!(report.points, 300);
-    let bytes = fs::read(out.path().join("points3D.ply")).unwrap();
-    let end = b"end_header\n";
-    let start = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
-    let body = &bytes[start..];
-    assert_eq!(body.len(), 300 * 15);
-    for point in body.chunks(15) {
-        let c: Vec<f64> = point[..12].chunks(4).map(|b| f64::from(f32::from_le_bytes(b.try_into().unwrap()))).collect();
-        let p = DVec3::new(c[0], c[1], c[2]);
-        let nearest = BOXES.iter().map(|(m, h)| ((p - *m).abs().max_element() - h).abs()).fold(f64::INFINITY, f64::min);
-        assert!(nearest < 1e-5, "{p} is {nearest} off");
-    }
-    // A pose written in OpenGL axes looks along its own -z at the scene.
-    let transforms: Value = serde_json::from_slice(&fs::read(out.path().join("transforms.json")).unwrap()).unwrap();
-    for frame in transforms["frames"].as_array().unwrap() {
-        let m = |r: usize, c: usize| frame["transform_matrix"][r][c].as_f64().unwrap();
-        let (eye, back) = (DVec3::new(m(0, 3), m(1, 3), m(2, 3)), DVec3::new(m(0, 2), m(1, 2), m(2, 2)));
-        let towards = (DVec3::new(0.15, 0.15, 0.1) - eye).normalize_or_zero();
-        assert!(towards.dot(-back) > 0.98, "{towards} {back}");
-        assert!(m(1, 1) > 0.2, "up is up");
-    }
-}
-
-#[test]
-fn the_reader_gets_back_what_was_rendered() {
-    let options = SynthOptions { background: [255, 51, 0], ..small() };
-    let (out, report) = write(&options);
-    let dataset = crate::io::transforms::read(&out.path().join("transforms.json")).unwrap();
-    assert!(dataset.warnings.is_empty(), "{:?}", dataset.warnings);
-    assert_eq!((dataset.photos.len(), dataset.points.len()), (6, report.points));
-    assert_eq!(dataset.background, Some([1.0, 0.2, 0.0]));
-    let (train, test) = dataset.split(8);
-    assert_eq!((train.len(), test.len()), (report.train_views, report.held_out_views));
-    let stage = stage_of(&two_cubes());
-    for (photo, camera) in dataset.photos.iter().zip(rig::cameras(&stage.surface, &stage.tracer, &options)) {
-        assert!(photo.distortion.is_none());
-        assert!(photo.camera.center.distance(camera.center) < 1e-9);
-        let p = DVec3::new(0.2, 0.3, 0.1);
-        assert!(photo.camera.project(p).unwrap().distance(camera.project(p).unwrap()) < 1e-6);
-    }
-}
-
 #[test]
 fn noise_moves_points_by_its_size() {
     let stage = stage_of(&two_cubes());
@@ -341,49 +229,6 @@ fn noise_moves_points_by_its_size() {
     assert_eq!((exact.len(), noisy.len()), (400, 400));
     let sigma = (offsets.map(|o| o * o).sum::<f64>() / 400.0).sqrt();
     assert!((1.3..1.7).contains(&sigma), "{sigma} px");
-}
-
-#[test]
-fn wrong_settings_are_named() {
-    let changes: [fn(&mut SynthOptions); 7] = [
-        |o| o.views = 0,
-        |o| o.held_out = o.views,
-        |o| o.width_px = 0,
-        |o| o.samples = 99,
-        |o| o.fov_y_deg = f64::NAN,
-        |o| o.radius = Some(-1.0),
-        |o| o.specular = f32::NAN,
-    ];
-    for change in changes {
-        let mut options = small();
-        change(&mut options);
-        let result = run(Path::new("absent.glb"), &options, Path::new("nowhere"), &mut Silent);
-        assert!(matches!(result, Err(SynthError::Options(_))), "{result:?}");
-    }
-}
-
-#[test]
-fn cancelling_leaves_no_data_set() {
-    struct Stop;
-    impl Observer for Stop {
-        fn signal(&self) -> Signal {
-            Signal::Cancel
-        }
-    }
-    let (out, _) = write(&small());
-    assert!(out.path().join("transforms.json").is_file());
-    let result = render_scene(&two_cubes(), "two", None, &small(), out.path(), &mut Stop);
-    assert!(matches!(result, Err(SynthError::Interrupted(_))));
-    assert!(!out.path().join("transforms.json").exists());
-}
-
-#[test]
-fn a_folder_that_cannot_be_written_is_named() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("file");
-    fs::write(&file, b"in the way").unwrap();
-    let error = render_scene(&two_cubes(), "two", None, &small(), &file, &mut Silent).unwrap_err();
-    assert!(matches!(&error, SynthError::Write { path, .. } if path.starts_with(&file)), "{error}");
 }
 
 #[test]
@@ -444,76 +289,6 @@ fn scenes_far_away_and_tiny_are_as_exact() {
     assert_eq!(view.object[0], 0);
 }
 
-/// Names of objects and, in brackets, of their parts.
-fn named(scene: &MeshScene, levels: Levels) -> Vec<(String, Vec<String>)> {
-    let list = levels::identities(scene, levels, "file").unwrap().list;
-    assert!(list.iter().enumerate().all(|(i, identity)| usize::from(identity.id) == i + 1));
-    let parts = |id| list.iter().filter(|p| p.parent == Some(id)).map(|p| p.name.clone()).collect();
-    list.iter().filter(|i| i.level == Level::Object).map(|i| (i.name.clone(), parts(i.id))).collect()
-}
-
-fn expect(found: &[(String, Vec<String>)], expected: &[(&str, &[&str])]) {
-    let expected: Vec<(String, Vec<String>)> =
-        expected.iter().map(|(o, p)| ((*o).to_owned(), p.iter().map(|p| (*p).to_owned()).collect())).collect();
-    assert_eq!(found, expected);
-}
-
-#[test]
-fn levels_of_node_trees() {
-    let tree = |nodes: Value, roots: Value| {
-        let (root, bin) = cubes(nodes, roots, json!([]));
-        gltf_mesh::read_slice(&glb(&root, &bin), "t.glb").unwrap()
-    };
-    // Wrappers are skipped, a group without a name hands its meshes up, a lone mesh is a whole object.
-    let scene = tree(
-        json!([
-            { "name": "Scene", "children": [1] },
-            { "name": "RootNode", "children": [2, 6, 8] },
-            { "name": "mug", "children": [3, 4] },
-            { "name": "body", "mesh": 0 },
-            { "name": "handle", "children": [5] },
-            { "mesh": 0 },
-            { "name": "ball", "children": [7] },
-            { "name": "Object_1", "mesh": 0 },
-            { "name": "empty" },
-        ]),
-        json!([0]),
-    );
-    expect(&named(&scene, Levels::Nodes), &[("mug", &["body", "handle"]), ("ball", &[])]);
-    expect(&named(&scene, Levels::File), &[("file", &["body", "handle", "Object_1"])]);
-    // A lone group of plain meshes is an object; parts may lie below parts; own meshes are no part.
-    let scene = tree(
-        json!([
-            { "name": "bike", "children": [1, 2] },
-            { "name": "wheel", "mesh": 0 },
-            { "name": "frame", "mesh": 0, "children": [3] },
-            { "name": "fork", "mesh": 0 },
-        ]),
-        json!([0]),
-    );
-    expect(&named(&scene, Levels::Nodes), &[("bike", &["wheel", "frame", "fork"])]);
-    let scene = tree(json!([{ "mesh": 0, "children": [1] }, { "name": "lid", "mesh": 0 }]), json!([0]));
-    expect(&named(&scene, Levels::Nodes), &[("node 0", &["lid"])]);
-    let ids = levels::identities(&scene, Levels::Nodes, "t").unwrap().of_node;
-    assert_eq!((ids[0].object, ids[0].part, ids[1].object, ids[1].part), (1, 0, 1, 2));
-}
-
-#[test]
-fn levels_of_real_scenes() {
-    let Some(folder) = real_scenes() else { return };
-    let of = |file: &str| named(&gltf_mesh::read(&folder.join(file)).unwrap(), Levels::Nodes);
-    expect(&of("CesiumMilkTruck/CesiumMilkTruck.glb"), &[("Cesium_Milk_Truck", &["Wheels", "Wheels.001"])]);
-    expect(
-        &of("kenney_vehicles/vehicle-motorcycle.glb"),
-        &[("motorcycle", &["wheel-back", "wheel-front", "body", "fork"])],
-    );
-    expect(&of("ToyCar/ToyCar.gltf"), &[("ToyCar", &[]), ("Fabric", &[]), ("Glass", &[])]);
-    assert_eq!(of("sunglasses/sunglasses.glb").len(), 8);
-    assert_eq!(of("kenney_vehicles/vehicle-truck-red.glb").len(), 6);
-    let truck = gltf_mesh::read(&folder.join("kenney_vehicles/vehicle-truck-red.glb")).unwrap();
-    assert_eq!(named(&truck, Levels::File)[0].1.len(), 6);
-}
-
 #[test]
 fn real_scenes_are_rendered() {
     let Some(folder) = real_scenes() else { return };
@@ -541,21 +316,6 @@ fn the_demo_shows_every_thing_and_part() {
         assert!(identity.views >= enough, "{} is seen in {} of 64 photos", identity.path, identity.views);
     }
     assert!(!demo::demo_is_written(out.path(), &demo::demo_options()), "other settings than the demo's");
-}
-
-/// Not a check: renders the scene named by `SYNTH_SCENE` (else the demo) into `SYNTH_OUT`, to look at.
-#[test]
-#[ignore = "renders a scene to look at, and times it"]
-fn render_to_look_at() {
-    let Some(out) = std::env::var_os("SYNTH_OUT") else { return };
-    let report = match std::env::var_os("SYNTH_SCENE") {
-        Some(scene) => {
-            let options = SynthOptions { views: 6, held_out: 1, width_px: 480, height_px: 360, ..Default::default() };
-            run(Path::new(&scene), &options, Path::new(&out), &mut Silent).unwrap()
-        }
-        None => demo::write_demo(Path::new(&out), &demo::demo_options(), &mut Silent).unwrap(),
-    };
-    println!("{:.2} s, {} triangles, {} points", report.secs, report.triangles, report.points);
 }
 
 #[test]

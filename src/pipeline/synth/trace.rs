@@ -20,7 +20,7 @@ const MAX_SHARE: f32 = 0.02;
 
 /// Where a ray meets the surface.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Hit {
+pub(crate) struct SurfaceHit {
     /// Distance in lengths of the ray's direction.
     pub(crate) t: f32,
     /// Index of the triangle.
@@ -61,7 +61,7 @@ impl Tracer {
     }
 
     /// The nearest surface from `origin` along `direction`, from `t_min` on.
-    pub(crate) fn nearest(&self, origin: Vec3A, direction: Vec3A, t_min: f32) -> Option<Hit> {
+    pub(crate) fn nearest(&self, origin: Vec3A, direction: Vec3A, t_min: f32) -> Option<SurfaceHit> {
         let ray = Ray::new(origin, direction, t_min, f32::INFINITY);
         let mut hit = RayHit::none();
         if !self.bvh.ray_traverse(ray, &mut hit, |ray, i| distance(&self.triangles[i], ray)) {
@@ -70,7 +70,7 @@ impl Tracer {
         let i = hit.primitive_id as usize;
         let w = self.triangles[i].0.compute_barycentric(&ray);
         let weights = Vec3::new(1.0 - w.x - w.y, w.x, w.y);
-        Some(Hit { t: hit.t, triangle: self.original[i] as usize, weights })
+        Some(SurfaceHit { t: hit.t, triangle: self.original[i] as usize, weights })
     }
 
     /// Whether the way from `origin` to `origin + direction` is free of surfaces, those left out

@@ -8,7 +8,7 @@ use super::light::{Light, Lit, highlight};
 use super::material::Materials;
 use super::options::SynthOptions;
 use super::surface::Surface;
-use super::trace::{Hit, Tracer};
+use super::trace::{SurfaceHit, Tracer};
 use crate::math::srgb;
 use crate::scene::Camera;
 
@@ -20,7 +20,7 @@ const MIN_TRANSMITTANCE: f32 = 1.0 / 512.0;
 const MAX_DIFFERENCE: f32 = 0.02;
 
 /// A rendered photo; all lists are row-major.
-pub(crate) struct View {
+pub(crate) struct SynthView {
     /// sRGB.
     pub(crate) rgb: Vec<[u8; 3]>,
     /// Depth along the camera's axis at the pixel's center in scene units; 0 = nothing there.
@@ -32,7 +32,7 @@ pub(crate) struct View {
 }
 
 /// Everything that rendering needs.
-pub struct Stage {
+pub struct SynthScene {
     pub(crate) surface: Surface,
     pub(crate) tracer: Tracer,
     pub(crate) materials: Materials,
@@ -40,14 +40,14 @@ pub struct Stage {
     pub(crate) light: Light,
 }
 
-impl Stage {
+impl SynthScene {
     /// Renders the scene from `camera`; `view` is the photo's number, for its random numbers.
-    pub(crate) fn render(&self, camera: &Camera, view: usize, options: &SynthOptions) -> View {
+    pub(crate) fn render(&self, camera: &Camera, view: usize, options: &SynthOptions) -> SynthView {
         let (w, h) = (camera.width_px as usize, camera.height_px as usize);
         let rows: Vec<Vec<Pixel>> =
             (0..h).into_par_iter().map(|y| (0..w).map(|x| self.pixel(camera, x, y, view, options)).collect()).collect();
         let pixels = || rows.iter().flatten();
-        View {
+        SynthView {
             rgb: pixels().map(|p| p.rgb).collect(),
             depth: pixels().map(|p| p.depth).collect(),
             object: pixels().map(|p| p.object).collect(),
@@ -119,7 +119,7 @@ impl Stage {
     }
 
     /// Color and cover of a point.
-    fn shade(&self, hit: &Hit, direction: Vec3A, step: f32, specular: f32) -> (Vec3A, f32) {
+    fn shade(&self, hit: &SurfaceHit, direction: Vec3A, step: f32, specular: f32) -> (Vec3A, f32) {
         let triangle = &self.surface.triangles[hit.triangle];
         let material = self.materials.get(triangle.material);
         let look = self.materials.look(&self.surface, triangle, hit.weights, hit.t * step);

@@ -8,9 +8,9 @@ use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use npyz::WriterBuilder;
 use serde_json::json;
 
-use super::levels::Identity;
+use super::levels::TrueIdentity;
 use super::options::SynthOptions;
-use super::view::View;
+use super::view::SynthView;
 use super::{SynthError, opengl_pose};
 use crate::io::folder_lock::FolderLock;
 use crate::io::{IoError, atomic};
@@ -59,7 +59,7 @@ impl Writer {
     }
 
     /// Writes the files of photo `index`.
-    pub(crate) fn photo(&self, index: usize, camera: &Camera, view: &View) -> Result<(), SynthError> {
+    pub(crate) fn photo(&self, index: usize, camera: &Camera, view: &SynthView) -> Result<(), SynthError> {
         let (w, h) = (camera.width_px, camera.height_px);
         let stem = self.stem(index);
         self.file(&format!("images/{stem}.png"), |f| png(f, view.rgb.as_flattened(), w, h, ExtendedColorType::Rgb8))?;
@@ -84,7 +84,7 @@ impl Writer {
         options: &SynthOptions,
         cameras: &[Camera],
         test: &[bool],
-        identities: &[Identity],
+        identities: &[TrueIdentity],
         points: &[SparsePoint],
     ) -> Result<(), SynthError> {
         let identities = json!({ "version": 1, "scene": scene, "identities": identities });

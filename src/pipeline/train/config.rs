@@ -82,6 +82,31 @@ impl TrainConfig {
         read.map_err(|cause| UnreadableConfig { path: folder.join(SCENE_FILE).display().to_string(), cause })
     }
 
+    /// Whether these settings make sense.
+    pub(super) fn check(&self) -> Result<(), String> {
+        let bad = |text: &str| Err(text.to_owned());
+        if self.steps == 0 {
+            return bad("the number of steps must be at least 1");
+        }
+        if self.max_side_px < 16 {
+            return bad("the longest side of the training pictures must be at least 16 px");
+        }
+        if !(0.0..=1.0).contains(&self.coarse_share) {
+            return bad("the share of steps at half the size must be 0 to 1");
+        }
+        if self.sh_degree > 3 {
+            return bad("the spherical-harmonics degree must be 0 to 3");
+        }
+        let (normals, distortion) = self.geometry_weights();
+        if ![normals, distortion].iter().all(|w| w.is_finite() && *w >= 0.0) {
+            return bad("the weights of normals and distortion must be numbers, 0 or more");
+        }
+        if self.needs_cpu() && self.backend == BackendChoice::Gpu {
+            return bad("surfels and the term for normals train on the CPU only: choose --backend cpu");
+        }
+        Ok(())
+    }
+
     /// Weights of the terms for normals and distortion.
     pub(crate) fn geometry_weights(&self) -> (f64, f64) {
         let or = |weight: Option<f64>, surfels: f64| weight.unwrap_or(if self.surfels { surfels } else { 0.0 });

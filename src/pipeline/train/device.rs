@@ -3,7 +3,7 @@
 
 use super::TrainView;
 use crate::render::{
-    DensityStats, Device, DevicePhoto, DeviceTrainer, GpuError, Rates, RenderSettings, StepLoss, TrainerSettings,
+    DensityStats, Device, DevicePhoto, GpuError, GpuTrainer, Rates, RenderSettings, StepLoss, TrainerSettings,
 };
 use crate::scene::GaussianCloud;
 
@@ -25,7 +25,7 @@ pub struct StepResult {
 
 /// A run on a GPU.
 pub(crate) struct DeviceRun {
-    trainer: DeviceTrainer,
+    trainer: GpuTrainer,
     photos: Vec<DevicePhoto>,
 }
 
@@ -40,7 +40,7 @@ impl DeviceRun {
         views: &[TrainView],
     ) -> Result<Self, GpuError> {
         let settings = TrainerSettings { render, lambda: LAMBDA };
-        let mut trainer = DeviceTrainer::new(device, cloud, settings)?;
+        let mut trainer = GpuTrainer::new(device, cloud, settings)?;
         trainer.upload(cloud, Some([&moments[0], &moments[1]]), step)?;
         let photos = views.iter().map(|v| trainer.photo(&v.pixels)).collect::<Result<_, _>>()?;
         Ok(Self { trainer, photos })

@@ -16,7 +16,7 @@ const THICKNESS: f64 = 1e-7;
 
 /// Weights of the terms and their buffers.
 #[derive(Debug, Default)]
-pub(crate) struct Geometry {
+pub(crate) struct GeometryLoss {
     surfels: bool,
     normal_weight: f64,
     /// Of distortion in inverse depth times the scene's extent, so that units cancel.
@@ -26,7 +26,7 @@ pub(crate) struct Geometry {
     d_normals: [Vec<f32>; 3],
 }
 
-impl Geometry {
+impl GeometryLoss {
     /// The terms of a run in a scene of this extent.
     pub(crate) fn new(config: &TrainConfig, extent: f64) -> Self {
         let (normal_weight, distortion) = config.geometry_weights();

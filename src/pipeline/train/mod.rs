@@ -13,6 +13,7 @@ pub(crate) mod device;
 mod folder;
 pub(crate) mod geometry;
 pub(crate) mod init;
+mod optimizer;
 mod outcome;
 mod photos;
 pub(crate) mod preset;

@@ -20,7 +20,7 @@ use crate::io::trained::{History, SceneInfo};
 use crate::math::stats::{mean, median};
 use crate::pipeline::evaluate::evaluate;
 use crate::pipeline::observer::{Observer, Severity, StepMetrics, Ticker};
-use crate::render::{BackendChoice, Device};
+use crate::render::Device;
 use crate::scene::{Dataset, GaussianCloud};
 
 /// Steps between copies of the cloud to roll back to.
@@ -43,7 +43,7 @@ pub(crate) fn run(
     out: Option<&Path>,
     observer: &mut dyn Observer,
 ) -> Result<TrainOutcome, TrainError> {
-    check(config)?;
+    config.check().map_err(TrainError::Config)?;
     let (train, held) = dataset.split(config.holdout_every);
     if train.is_empty() {
         return Err(TrainError::NoPhotos(dataset.name.clone(), dataset.photos.len()));
@@ -79,30 +79,6 @@ pub(crate) fn run(
     }
     let end = job.train(observer)?;
     job.finish(end, observer)
-}
-
-fn check(config: &TrainConfig) -> Result<(), TrainError> {
-    let bad = |text: &str| Err(TrainError::Config(text.into()));
-    if config.steps == 0 {
-        return bad("the number of steps must be at least 1");
-    }
-    if config.max_side_px < 16 {
-        return bad("the longest side of the training pictures must be at least 16 px");
-    }
-    if !(0.0..=1.0).contains(&config.coarse_share) {
-        return bad("the share of steps at half the size must be 0 to 1");
-    }
-    if config.sh_degree > 3 {
-        return bad("the spherical-harmonics degree must be 0 to 3");
-    }
-    let (normals, distortion) = config.geometry_weights();
-    if ![normals, distortion].iter().all(|w| w.is_finite() && *w >= 0.0) {
-        return bad("the weights of normals and distortion must be numbers, 0 or more");
-    }
-    if config.needs_cpu() && config.backend == BackendChoice::Gpu {
-        return bad("surfels and the term for normals train on the CPU only: choose --backend cpu");
-    }
-    Ok(())
 }
 
 /// Steps that see the photos at half their size.

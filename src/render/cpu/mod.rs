@@ -23,7 +23,7 @@ pub(crate) mod walk;
 
 use self::contributions::ContributionSink;
 use self::project_backward::GaussianGradient;
-use self::rasterizer::Rasterizer;
+use self::rasterizer::CpuRasterizer;
 use self::splat::Splats;
 use self::surfel::Surfels;
 use super::{CloudGradient, Features, Frame, FrameGradient, MAX_CHANNELS, RenderError, RenderSettings};
@@ -48,10 +48,10 @@ pub struct RenderStats {
 
 /// A renderer with its buffers, to be kept from frame to frame.
 #[derive(Debug)]
-pub struct Renderer<R> {
-    splats: Rasterizer<R, Splats<R>>,
+pub struct CpuRenderer<R> {
+    splats: CpuRasterizer<R, Splats<R>>,
     /// What drew the last frame, if that was of surfels.
-    surfels: Option<Box<Rasterizer<R, Surfels<R>>>>,
+    surfels: Option<Box<CpuRasterizer<R, Surfels<R>>>>,
 }
 
 /// Asks the rasterizer that drew the last frame.
@@ -67,13 +67,13 @@ macro_rules! last {
     };
 }
 
-impl<R: Real> Default for Renderer<R> {
+impl<R: Real> Default for CpuRenderer<R> {
     fn default() -> Self {
-        Self { splats: Rasterizer::default(), surfels: None }
+        Self { splats: CpuRasterizer::default(), surfels: None }
     }
 }
 
-impl<R: Real> Renderer<R> {
+impl<R: Real> CpuRenderer<R> {
     /// A renderer with empty buffers.
     pub fn new() -> Self {
         Self::default()

@@ -9,7 +9,7 @@ pub(crate) const CHUNK: usize = 2_048;
 
 /// A camera in the renderer's precision, relative to a cloud's origin.
 #[derive(Clone, Debug)]
-pub struct View<R> {
+pub struct CameraView<R> {
     /// Rows of camera_from_world.
     pub(crate) rows: [[R; 3]; 3],
     /// Cloud origin minus camera center in world axes; kept in f64 so that far-off scenes stay exact.
@@ -25,7 +25,7 @@ pub struct View<R> {
     pub(crate) size: [usize; 2],
 }
 
-impl<R: Real> View<R> {
+impl<R: Real> CameraView<R> {
     /// The view of `camera` on a cloud with this origin.
     pub fn new(camera: &Camera, origin: glam::DVec3, near: f64) -> Self {
         let m = camera.world_from_camera;
@@ -80,7 +80,7 @@ pub(crate) struct Splat<R> {
 }
 
 /// Everything between a Gaussian's raw parameters and its splat that the backward pass needs too.
-pub struct Geometry<R> {
+pub struct SplatGeometry<R> {
     /// Center relative to the camera, world axes.
     pub relative: [R; 3],
     /// Center in camera axes.
@@ -110,7 +110,7 @@ pub(crate) fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
 /// Projects the ellipsoid; `None` behind the near plane, for a degenerate quaternion, or where the
 /// depth or the covariance overflows.
 #[inline(always)]
-pub fn geometry<R: Real>(gaussian: &Gaussian<'_, R>, view: &View<R>) -> Option<Geometry<R>> {
+pub fn geometry<R: Real>(gaussian: &Gaussian<'_, R>, view: &CameraView<R>) -> Option<SplatGeometry<R>> {
     let relative = view.relative(gaussian.position);
     let local = [dot(view.rows[0], relative), dot(view.rows[1], relative), dot(view.rows[2], relative)];
     let z = local[2];
@@ -152,7 +152,7 @@ pub fn geometry<R: Real>(gaussian: &Gaussian<'_, R>, view: &View<R>) -> Option<G
     if !blurred.is_finite() {
         return None;
     }
-    Some(Geometry {
+    Some(SplatGeometry {
         relative,
         local,
         tangent,
@@ -200,7 +200,7 @@ pub(crate) fn color<R: Real>(coefficients: &[[R; 3]], basis: &[R; 16], degree: u
 
 /// Factor on the opacity that keeps a splat's energy under the blur, `sqrt(det / det_blurred)`.
 #[inline(always)]
-pub fn compensation<R: Real>(g: &Geometry<R>) -> R {
+pub fn compensation<R: Real>(g: &SplatGeometry<R>) -> R {
     (g.determinants[0] / g.determinants[1]).sqrt()
 }
 
@@ -217,7 +217,7 @@ pub(crate) struct Chunk<R> {
 
 /// What is to be drawn, and how.
 #[derive(Clone, Copy)]
-pub(crate) struct Scene<'a, R> {
+pub(crate) struct DrawInput<'a, R> {
     pub(crate) cloud: &'a GaussianCloud<R>,
     pub(crate) features: Features<'a, R>,
     pub(crate) settings: &'a RenderSettings,
@@ -238,7 +238,7 @@ pub(crate) fn splat<R: Real>(
     gaussian: &Gaussian<'_, R>,
     mut opacity: R,
     alpha_min: R,
-    view: &View<R>,
+    view: &CameraView<R>,
     settings: &RenderSettings,
 ) -> Projected<R, [R; 0], [R; 1]> {
     let Some(g) = geometry(gaussian, view) else { return Projected::Degenerate };

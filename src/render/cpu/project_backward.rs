@@ -1,6 +1,6 @@
 //! From the moments of a splat back to the raw parameters of its Gaussian.
 
-use super::project::{Geometry, Splat, View, direction, geometry, raw_color};
+use super::project::{CameraView, Splat, SplatGeometry, direction, geometry, raw_color};
 use crate::math::{Real, rotation::unit_quaternion, sh};
 use crate::render::RenderSettings;
 use crate::scene::Gaussian;
@@ -37,7 +37,7 @@ pub(crate) struct GaussianGradient<R> {
 pub(crate) fn project_backward<R: Real>(
     gaussian: &Gaussian<'_, R>,
     splat: &Splat<R>,
-    view: &View<R>,
+    view: &CameraView<R>,
     settings: &RenderSettings,
     record: &[R],
     depth_channel: Option<usize>,
@@ -176,7 +176,7 @@ fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
 /// inverse of the covariance, `dK = -K dC K`, and from the compensation where it is on (`m0`).
 #[inline(always)]
 fn factor_gradient<R: Real>(
-    g: &Geometry<R>,
+    g: &SplatGeometry<R>,
     [a, b, c]: [R; 3],
     [mxx, mxy, myy]: [R; 3],
     compensated: Option<R>,

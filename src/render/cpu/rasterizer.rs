@@ -8,7 +8,7 @@ use super::bin::{self, Tiles};
 use super::blend::{BlendRow, RowOut};
 use super::blend_backward::{BlendRowBackward, RowIn};
 use super::contributions::{ContributionRow, ContributionSink};
-use super::project::{CHUNK, Chunk, Projected, Scene, Splat, View, color, direction, dot};
+use super::project::{CHUNK, CameraView, Chunk, DrawInput, Projected, Splat, color, direction, dot};
 use super::project_backward::GaussianGradient;
 use super::sort::{self, Ordered};
 use super::walk::{Primitive, TileRow, Values};
@@ -24,7 +24,7 @@ const MOST: usize = MAX_CHANNELS + 16;
 
 /// A rasterizer with its buffers, to be kept from frame to frame.
 #[derive(Debug)]
-pub(crate) struct Rasterizer<R, P> {
+pub(crate) struct CpuRasterizer<R, P> {
     lists: Lists<R>,
     pixels: Pixels<R>,
     /// For each Gaussian its splat, or `NONE`; filled by the backward pass.
@@ -71,15 +71,14 @@ struct Pixels<R> {
 #[derive(Debug, Clone)]
 struct FrameInfo<R, P> {
     primitive: P,
-    view: View<R>,
+    view: CameraView<R>,
     settings: RenderSettings,
-    /// Size of the cloud.
     gaussians: usize,
     extra: usize,
     channels: usize,
 }
 
-impl<R: Real, P> Default for Rasterizer<R, P> {
+impl<R: Real, P> Default for CpuRasterizer<R, P> {
     fn default() -> Self {
         let (lists, pixels) = (Lists::default(), Pixels::default());
         Self { lists, pixels, splat_of: Vec::new(), records: Vec::new(), frame: None, stats: RenderStats::default() }
@@ -97,7 +96,7 @@ fn lap(clock: &mut Instant) -> f64 {
     now.duration_since(std::mem::replace(clock, now)).as_secs_f64()
 }
 
-impl<R: Real, P: Primitive<R>> Rasterizer<R, P> {
+impl<R: Real, P: Primitive<R>> CpuRasterizer<R, P> {
     /// Bytes of working memory that it keeps for the next frame.
     pub(crate) fn working_bytes(&self) -> usize {
         fn of<T>(v: &Vec<T>) -> usize {
@@ -127,11 +126,11 @@ impl<R: Real, P: Primitive<R>> Rasterizer<R, P> {
         self.frame = None;
         let extra = features.channels;
         let channels = P::padded(P::channels(extra, settings.depth));
-        let view = View::new(camera, cloud.origin, settings.near);
+        let view = CameraView::new(camera, cloud.origin, settings.near);
         let Lists { parts, ordered, tiles } = &mut self.lists;
         let mut clock = Instant::now();
         let primitive = P::new(&view, settings);
-        project(parts, Scene { cloud, features, settings }, &view, primitive, channels);
+        project(parts, DrawInput { cloud, features, settings }, &view, primitive, channels);
         let project = lap(&mut clock);
         sort::sort(ordered, parts, P::SHAPE + channels, settings.keep_order);
         let sort = lap(&mut clock);
@@ -293,7 +292,6 @@ impl<R: Real, P: Primitive<R>> Rasterizer<R, P> {
 }
 
 impl<R: Real, P: Primitive<R>> FrameInfo<R, P> {
-    /// Values of a record.
     #[inline(always)]
     fn stride(&self) -> usize {
         P::Sums::all(R::ZERO).as_ref().len() + self.channels
@@ -342,8 +340,8 @@ fn finish<R: Real>(frame: &mut Frame<R>, transmittance: &[R], background: [f32; 
 /// being color, extra channels, what depth needs, padding zeros.
 pub(crate) fn project<R: Real, P: Primitive<R>>(
     parts: &mut Vec<Chunk<R>>,
-    scene: Scene<'_, R>,
-    view: &View<R>,
+    scene: DrawInput<'_, R>,
+    view: &CameraView<R>,
     primitive: P,
     channels: usize,
 ) {
@@ -360,13 +358,13 @@ pub(crate) fn project<R: Real, P: Primitive<R>>(
 #[multiversion::multiversion(targets("x86_64+avx2+fma"))]
 fn project_chunk<R: Real, P: Primitive<R>>(
     part: &mut Chunk<R>,
-    scene: Scene<'_, R>,
-    view: &View<R>,
+    scene: DrawInput<'_, R>,
+    view: &CameraView<R>,
     primitive: P,
     channels: usize,
     range: std::ops::Range<usize>,
 ) {
-    let Scene { cloud, features, settings } = scene;
+    let DrawInput { cloud, features, settings } = scene;
     let degree = settings.sh_degree.min(cloud.sh_degree);
     for i in range {
         // Cheap tests first: most Gaussians of a scene are outside the picture.

@@ -1,6 +1,6 @@
 //! Gaussians drawn as splats: ellipses in the picture plane, each of one depth.
 
-use super::project::{Projected, Splat, View, splat};
+use super::project::{CameraView, Projected, Splat, splat};
 use super::project_backward::{GaussianGradient, MOMENTS, project_backward};
 use super::walk::{GROUPS, Planes, Primitive, Reach, RowPass, With, with_channels};
 use crate::math::Real;
@@ -27,7 +27,7 @@ pub(crate) struct Constants<R: Real, L: Lanes<R>> {
 
 /// What a splat gives eight pixels.
 #[derive(Clone, Copy)]
-pub(crate) struct Hit<V> {
+pub(crate) struct SplatHit<V> {
     offset: [V; 2],
     depth: V,
     alpha: V,
@@ -41,9 +41,9 @@ impl<R: Real> Primitive<R> for Splats<R> {
     type State<V: Copy> = [V; 0];
     type Sums<V: Copy> = [V; MOMENTS];
     type Constants<L: Lanes<R>> = Constants<R, L>;
-    type Hit<L: Lanes<R>> = Hit<L::V>;
+    type Hit<L: Lanes<R>> = SplatHit<L::V>;
 
-    fn new(_: &View<R>, settings: &RenderSettings) -> Self {
+    fn new(_: &CameraView<R>, settings: &RenderSettings) -> Self {
         Self { alpha_min: R::of(settings.cutoffs.alpha) }
     }
 
@@ -74,7 +74,7 @@ impl<R: Real> Primitive<R> for Splats<R> {
         self,
         gaussian: &Gaussian<'_, R>,
         opacity: R,
-        view: &View<R>,
+        view: &CameraView<R>,
         settings: &RenderSettings,
     ) -> Projected<R, [R; 0], [R; 1]> {
         splat(gaussian, opacity, self.alpha_min, view, settings)
@@ -107,7 +107,7 @@ impl<R: Real> Primitive<R> for Splats<R> {
     fn project_backward(
         gaussian: &Gaussian<'_, R>,
         splat: &Splat<R>,
-        view: &View<R>,
+        view: &CameraView<R>,
         settings: &RenderSettings,
         record: &[R],
         extra: usize,
@@ -129,28 +129,28 @@ impl<R: Real> Primitive<R> for Splats<R> {
     }
 
     #[inline(always)]
-    fn hit<L: Lanes<R>>(l: L, s: &Constants<R, L>, reach: &Reach<R>, slot: usize) -> Hit<L::V> {
+    fn hit<L: Lanes<R>>(l: L, s: &Constants<R, L>, reach: &Reach<R>, slot: usize) -> SplatHit<L::V> {
         let (dx, row) = (s.dx[slot / TILE_PX], slot % TILE_PX);
         let [linear, constant] = reach.row(l, row);
         let q = l.mul_add(l.mul_add(s.a, dx, linear), dx, constant);
         let raw = l.mul(s.opacity, l.exp_neg(l.mul(s.minus_half, q)));
         let alpha = l.min(raw, s.largest);
         let alpha = l.keep(l.ge(alpha, s.smallest), alpha);
-        Hit { offset: [dx, l.splat(reach.dy[row])], depth: s.depth, alpha }
+        SplatHit { offset: [dx, l.splat(reach.dy[row])], depth: s.depth, alpha }
     }
 
     #[inline(always)]
-    fn alpha<L: Lanes<R>>(hit: &Hit<L::V>) -> L::V {
+    fn alpha<L: Lanes<R>>(hit: &SplatHit<L::V>) -> L::V {
         hit.alpha
     }
 
     #[inline(always)]
-    fn gather<L: Lanes<R>>(l: L, [median]: &mut [L::V; 1], hit: &Hit<L::V>, _: L::V, crossed: L::M, _: L::V) {
+    fn gather<L: Lanes<R>>(l: L, [median]: &mut [L::V; 1], hit: &SplatHit<L::V>, _: L::V, crossed: L::M, _: L::V) {
         *median = l.select(crossed, hit.depth, *median);
     }
 
     #[inline(always)]
-    fn along<L: Lanes<R>>(_: L, _: &[L::V; 0], _: &Hit<L::V>, along: L::V) -> L::V {
+    fn along<L: Lanes<R>>(_: L, _: &[L::V; 0], _: &SplatHit<L::V>, along: L::V) -> L::V {
         along
     }
 
@@ -159,7 +159,7 @@ impl<R: Real> Primitive<R> for Splats<R> {
         l: L,
         sums: &mut [L::V; MOMENTS],
         _: &Constants<R, L>,
-        hit: &Hit<L::V>,
+        hit: &SplatHit<L::V>,
         _: &[L::V; 0],
         [power, ..]: [L::V; 3],
     ) {

@@ -73,7 +73,7 @@ mod tests {
 
     use super::*;
     use crate::math::finite::CHECKED;
-    use crate::render::cpu::Renderer;
+    use crate::render::cpu::CpuRenderer;
     use crate::render::{Features, FrameGradient, RenderError, RenderSettings};
     use crate::scene::Camera;
 
@@ -108,7 +108,7 @@ mod tests {
         let stage = |value: f32, background: f32| {
             let settings = RenderSettings { background: [background; 3], ..RenderSettings::default() };
             let features = Features { channels: 1, values: &[value] };
-            match Renderer::new().render(&cloud, features, &camera, &settings) {
+            match CpuRenderer::new().render(&cloud, features, &camera, &settings) {
                 Ok(_) => None,
                 Err(RenderError::NotFinite(e)) => Some(e.stage),
                 Err(e) => panic!("{e}"),
@@ -117,8 +117,8 @@ mod tests {
         assert_eq!(stage(0.5, 0.5), None);
         assert_eq!(stage(f32::NAN, 0.5), CHECKED.then_some("projection"));
         assert_eq!(stage(0.5, f32::INFINITY), CHECKED.then_some("blending"));
-        let mut renderer = Renderer::new();
-        let backward = |renderer: &mut Renderer<f32>, value: f32| {
+        let mut renderer = CpuRenderer::new();
+        let backward = |renderer: &mut CpuRenderer<f32>, value: f32| {
             let gradient = FrameGradient { color: [vec![value; 400], vec![], vec![]], ..FrameGradient::default() };
             renderer.backward_tiles(&gradient);
             renderer.check_backward().map_err(|e| e.stage)

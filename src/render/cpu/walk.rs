@@ -6,7 +6,7 @@
 use std::sync::atomic::Ordering::Relaxed;
 
 use super::bin::Tiles;
-use super::project::{Projected, Splat, View};
+use super::project::{CameraView, Projected, Splat};
 use super::project_backward::GaussianGradient;
 use crate::math::Real;
 use crate::math::lanes::{LANES, Lane, LaneOp, Lanes};
@@ -57,7 +57,7 @@ pub(crate) trait Primitive<R: Real>: Copy + Send + Sync {
     type Hit<L: Lanes<R>>: Copy;
 
     /// The kind as these settings draw it.
-    fn new(view: &View<R>, settings: &RenderSettings) -> Self;
+    fn new(view: &CameraView<R>, settings: &RenderSettings) -> Self;
     /// A pixel is closed before its transmittance falls under this.
     fn least_transmittance(settings: &RenderSettings) -> f64;
     /// Channels: color, extra channels, and what depth needs.
@@ -73,7 +73,7 @@ pub(crate) trait Primitive<R: Real>: Copy + Send + Sync {
         self,
         gaussian: &Gaussian<'_, R>,
         opacity: R,
-        view: &View<R>,
+        view: &CameraView<R>,
         settings: &RenderSettings,
     ) -> Projected<R, Self::Shape, Self::Depth>;
     /// The planes of a frame that are composited, and those of [`Self::Extra`], of which `kept` is for the
@@ -94,7 +94,7 @@ pub(crate) trait Primitive<R: Real>: Copy + Send + Sync {
     fn project_backward(
         gaussian: &Gaussian<'_, R>,
         splat: &Splat<R>,
-        view: &View<R>,
+        view: &CameraView<R>,
         settings: &RenderSettings,
         record: &[R],
         extra: usize,

@@ -1,9 +1,9 @@
 //! The optimizer; `shaders/adam.wgsl`.
 
 use super::cloud::{Parameters, strides};
-use super::kernel::{Access, Kernel, Module, Stage};
+use super::kernel::{Access, Kernel, Module, RecordedStage};
 use super::layout::AdamStep;
-use super::shader::Variant;
+use super::shader::ShaderVariant;
 use super::{Device, GpuError};
 use crate::math::sh;
 use crate::render::cpu::adam::{AdamStep as Constants, BETA1, BETA2, CLIP, EPSILON, GROWTH, OUTLIER, Rates};
@@ -46,7 +46,7 @@ pub(crate) struct AdamBuffers<'a> {
 impl Adam {
     pub(crate) fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
-        let module = Module::new(device, "adam", Variant::default())?;
+        let module = Module::new(device, "adam", ShaderVariant::default())?;
         let slots = [(0, Uniform), (1, Write), (2, Read), (3, Write), (4, Write), (5, Read), (6, Read), (7, Write)];
         let step = || device.uniform("Adam step", bytemuck::bytes_of(&AdamStep::default()));
         Ok(Self {
@@ -81,7 +81,7 @@ impl Adam {
 
     pub(crate) fn encode(
         &self,
-        stage: &mut Stage<'_>,
+        stage: &mut RecordedStage<'_>,
         on: AdamBuffers<'_>,
         counters: &wgpu::Buffer,
         gaussians: u32,

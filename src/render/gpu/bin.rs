@@ -1,8 +1,8 @@
 //! Splats in depth order to each tile's list; `shaders/bin.wgsl`.
 
-use super::kernel::{Access, FrameBindings, Kernel, Module, Stage};
+use super::kernel::{Access, FrameBindings, Kernel, Module, RecordedStage};
 use super::scratch::{BIN_BLOCK, PerGaussian, PerPair};
-use super::shader::Variant;
+use super::shader::ShaderVariant;
 use super::{Device, GpuError};
 
 /// Workgroups of the kernel that looks for the ends of tiles; they stride over the pairs.
@@ -19,7 +19,7 @@ pub(crate) struct Bin {
 impl Bin {
     pub(crate) fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
-        let module = Module::new(device, "bin", Variant::default())?;
+        let module = Module::new(device, "bin", ShaderVariant::default())?;
         let kernel = |entry, slots: &[_]| Kernel::new(device, &module, entry, slots);
         Ok(Self {
             sum_counts: kernel("sum_counts", &[(0, Uniform), (1, Read), (2, Read), (3, Write)])?,
@@ -33,7 +33,12 @@ impl Bin {
     }
 
     /// Records the count of pairs, after which the counters say whether they fit.
-    pub(crate) fn encode_count(&self, stage: &mut Stage<'_>, bindings: FrameBindings<'_>, scratch: &PerGaussian) {
+    pub(crate) fn encode_count(
+        &self,
+        stage: &mut RecordedStage<'_>,
+        bindings: FrameBindings<'_>,
+        scratch: &PerGaussian,
+    ) {
         let order = &scratch.by_depth.values[scratch.by_depth.result()];
         let blocks = [bindings.gaussians.div_ceil(BIN_BLOCK), 1, 1];
         stage.run(&self.sum_counts, &[bindings.view, order, &scratch.tile_counts, &scratch.sums], blocks);
@@ -43,7 +48,7 @@ impl Bin {
     /// Records the emission of pairs.
     pub(crate) fn encode_emit(
         &self,
-        stage: &mut Stage<'_>,
+        stage: &mut RecordedStage<'_>,
         bindings: FrameBindings<'_>,
         scratch: &PerGaussian,
         pairs: &PerPair,
@@ -65,7 +70,7 @@ impl Bin {
     /// Records the search for each tile's range, after the sort. `ranges` must be zero.
     pub(crate) fn encode_ranges(
         &self,
-        stage: &mut Stage<'_>,
+        stage: &mut RecordedStage<'_>,
         bindings: FrameBindings<'_>,
         pairs: &PerPair,
         ranges: &wgpu::Buffer,

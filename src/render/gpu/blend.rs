@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::kernel::{Access, FrameBindings, Kernel, Module, Stage};
+use super::kernel::{Access, FrameBindings, Kernel, Module, RecordedStage};
 use super::scratch::{PerGaussian, PerPair, PerPicture};
-use super::shader::Variant;
+use super::shader::ShaderVariant;
 use super::{Device, GpuError};
 
 /// A kernel over the tiles of a frame, one pipeline for each number of extra channels in a pass.
@@ -34,7 +34,7 @@ impl TileKernel {
         if self.kernels.contains_key(&channels) {
             return Ok(());
         }
-        let module = Module::new(device, self.shader, Variant { channels, float_atomics: self.float_atomics })?;
+        let module = Module::new(device, self.shader, ShaderVariant { channels, float_atomics: self.float_atomics })?;
         let accesses = [Uniform, Uniform, Read, Read, Read, Read].into_iter().chain(self.own);
         let slots: Vec<_> = (0..).zip(accesses).collect();
         self.kernels.insert(channels, Kernel::new(device, &module, "main", &slots)?);
@@ -43,7 +43,7 @@ impl TileKernel {
 
     pub(crate) fn encode(
         &self,
-        stage: &mut Stage<'_>,
+        stage: &mut RecordedStage<'_>,
         bindings: FrameBindings<'_>,
         (gaussians, pairs, picture): (&PerGaussian, &PerPair, &PerPicture),
         features: &wgpu::Buffer,

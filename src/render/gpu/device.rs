@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 
 use super::GpuError;
-use crate::scene::resource_log::{self, Sort};
+use crate::scene::resource_log::{self, ResourceKind};
 
 /// Features that are used where an adapter offers them. Everything works without any of them.
 const WANTED: wgpu::Features =
@@ -74,7 +74,12 @@ impl Device {
         if !suits || held.is_some() {
             return false;
         }
-        resource_log::record(Sort::Device, format!("the window's device on {}", info.name), "the window was opened", 0);
+        resource_log::record(
+            ResourceKind::Device,
+            format!("the window's device on {}", info.name),
+            "the window was opened",
+            0,
+        );
         *held = Some(Self::from_parts(info, device.clone(), queue.clone()));
         true
     }
@@ -98,7 +103,7 @@ impl Device {
     /// Opens a device on an adapter of the caller's choice.
     pub(crate) fn open(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
         resource_log::record(
-            Sort::Device,
+            ResourceKind::Device,
             format!("device on {}", adapter.get_info().name),
             "something is drawn on it",
             0,

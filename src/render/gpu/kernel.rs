@@ -1,6 +1,6 @@
 //! One compute pipeline with its bindings, and the recording of passes.
 
-use super::shader::{self, Variant};
+use super::shader::{self, ShaderVariant};
 use super::timing::Timer;
 use super::{Device, GpuError};
 
@@ -23,7 +23,7 @@ pub(crate) struct Module {
 
 impl Module {
     /// Compiles kernel file `name`.
-    pub(crate) fn new(device: &Device, name: &'static str, variant: Variant) -> Result<Self, GpuError> {
+    pub(crate) fn new(device: &Device, name: &'static str, variant: ShaderVariant) -> Result<Self, GpuError> {
         let source = shader::source(name, variant)?;
         let module = device.scoped(name, 0, || {
             device.wgpu().create_shader_module(wgpu::ShaderModuleDescriptor {
@@ -128,12 +128,12 @@ pub(crate) struct FrameBindings<'a> {
 
 /// One stage that is being recorded.
 #[derive(Debug)]
-pub(crate) struct Stage<'a> {
+pub(crate) struct RecordedStage<'a> {
     device: &'a Device,
     pass: wgpu::ComputePass<'a>,
 }
 
-impl Stage<'_> {
+impl RecordedStage<'_> {
     /// Records a dispatch. `buffers` are in the order of the kernel's slots.
     pub(crate) fn run(&mut self, kernel: &Kernel, buffers: &[&wgpu::Buffer], groups: [u32; 3]) {
         kernel.dispatch(self.device, &mut self.pass, buffers, groups);
@@ -154,11 +154,11 @@ impl<'a> Recorder<'a> {
         Self { device, encoder, timer }
     }
 
-    pub(crate) fn stage(&mut self, name: &'static str, record: impl FnOnce(&mut Stage<'_>)) {
+    pub(crate) fn stage(&mut self, name: &'static str, record: impl FnOnce(&mut RecordedStage<'_>)) {
         let timestamp_writes = self.timer.as_mut().and_then(|t| t.stage(name));
         let pass =
             self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(name), timestamp_writes });
-        record(&mut Stage { device: self.device, pass });
+        record(&mut RecordedStage { device: self.device, pass });
     }
 
     /// Records that a buffer is filled with zeros.

@@ -2,7 +2,7 @@
 //!
 //! Forward: [`project`], [`sort`] by depth, [`bin`] (pairs of tile and splat, sorted by tile),
 //! [`blend`]. Backward: [`blend_backward`], [`project_backward`]. Training adds [`ssim`] (loss and
-//! its gradient) and [`adam`]. [`Renderer`] answers like the CPU renderer; [`Trainer`] keeps
+//! its gradient) and [`adam`]. [`GpuRenderer`] answers like the CPU renderer; [`GpuTrainer`] keeps
 //! everything on the device from step to step.
 
 pub(crate) mod adam;
@@ -28,6 +28,6 @@ pub(crate) mod trainer;
 pub use cloud::Parameters;
 pub use device::{Device, real_gpu};
 pub use error::GpuError;
-pub use renderer::Renderer;
+pub use renderer::GpuRenderer;
 pub use ssim::DevicePhoto;
-pub use trainer::{Trainer, TrainerSettings};
+pub use trainer::{GpuTrainer, TrainerSettings};

@@ -1,9 +1,9 @@
 //! Gaussians to splats in the picture; `shaders/project.wgsl`.
 
-use super::kernel::{Access, FrameBindings, Kernel, Module, Stage};
+use super::kernel::{Access, FrameBindings, Kernel, Module, RecordedStage};
 use super::layout::View;
 use super::scratch::PerGaussian;
-use super::shader::Variant;
+use super::shader::ShaderVariant;
 use super::{Device, GpuError, Parameters};
 use crate::render::{RenderSettings, TANGENT_CLAMP, TILE_PX};
 use crate::scene::Camera;
@@ -16,7 +16,7 @@ pub(crate) struct Project {
 impl Project {
     pub(crate) fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
-        let module = Module::new(device, "project", Variant::default())?;
+        let module = Module::new(device, "project", ShaderVariant::default())?;
         let slots =
             [(0, Uniform), (1, Read), (2, Read), (3, Read), (4, Write), (5, Write), (6, Write), (7, Write), (8, Write)];
         Ok(Self { kernel: Kernel::new(device, &module, "main", &slots)? })
@@ -24,7 +24,7 @@ impl Project {
 
     pub(crate) fn encode(
         &self,
-        stage: &mut Stage<'_>,
+        stage: &mut RecordedStage<'_>,
         bindings: FrameBindings<'_>,
         cloud: &Parameters,
         scratch: &PerGaussian,

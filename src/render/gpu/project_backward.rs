@@ -1,7 +1,7 @@
 //! Gradient of projection, and statistics for density control; `shaders/project_backward.wgsl`.
 
-use super::kernel::{Access, FrameBindings, Kernel, Module, Stage};
-use super::shader::Variant;
+use super::kernel::{Access, FrameBindings, Kernel, Module, RecordedStage};
+use super::shader::ShaderVariant;
 use super::{Device, GpuError, Parameters};
 
 #[derive(Debug)]
@@ -13,7 +13,7 @@ pub(crate) struct ProjectBackward {
 impl ProjectBackward {
     pub(crate) fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
-        let module = Module::new(device, "project_backward", Variant::default())?;
+        let module = Module::new(device, "project_backward", ShaderVariant::default())?;
         let slots =
             [(0, Uniform), (1, Read), (2, Read), (3, Read), (4, Read), (5, Read), (6, Write), (7, Write), (8, Write)];
         let statistics = [(0, Uniform), (4, Read), (6, Write), (9, Write), (10, Write)];
@@ -26,7 +26,7 @@ impl ProjectBackward {
     /// Records the gradient of all parameters.
     pub(crate) fn encode(
         &self,
-        stage: &mut Stage<'_>,
+        stage: &mut RecordedStage<'_>,
         bindings: FrameBindings<'_>,
         cloud: &Parameters,
         (splats, splat_gradient): (&wgpu::Buffer, &wgpu::Buffer),
@@ -41,7 +41,7 @@ impl ProjectBackward {
     /// Records the gathering of screen gradients and radii into `growth`.
     pub(crate) fn encode_statistics(
         &self,
-        stage: &mut Stage<'_>,
+        stage: &mut RecordedStage<'_>,
         bindings: FrameBindings<'_>,
         splats: &wgpu::Buffer,
         gradient: &Parameters,

@@ -18,7 +18,7 @@ const HEADROOM: f64 = 1.5;
 
 /// The kernels of the forward pass with their buffers.
 #[derive(Debug)]
-pub(crate) struct Rasterizer {
+pub(crate) struct GpuRasterizer {
     project: Project,
     sort: Sort,
     bin: Bin,
@@ -35,7 +35,7 @@ pub(crate) struct Rasterizer {
     extent: (u32, [u32; 2]),
 }
 
-impl Rasterizer {
+impl GpuRasterizer {
     /// Compiles the kernels; the buffers are as small as they can be.
     pub(crate) fn new(device: &Device) -> Result<Self, GpuError> {
         Ok(Self {

@@ -7,7 +7,7 @@ use super::kernel::Recorder;
 use super::layout::{Counters, Splat};
 use super::project::CloudShape;
 use super::project_backward::ProjectBackward;
-use super::rasterizer::{Rasterizer, counters_of};
+use super::rasterizer::{GpuRasterizer, counters_of};
 use super::scratch::GRADIENT_BASE;
 use super::timing::{StageTimes, Timer};
 use super::{Device, GpuError};
@@ -16,9 +16,9 @@ use crate::scene::{Camera, GaussianCloud};
 
 /// A renderer with its buffers and the cloud that was uploaded last.
 #[derive(Debug)]
-pub struct Renderer {
+pub struct GpuRenderer {
     device: Device,
-    rasterizer: Rasterizer,
+    rasterizer: GpuRasterizer,
     blend_backward: TileKernel,
     project_backward: ProjectBackward,
     cloud: Parameters,
@@ -49,7 +49,7 @@ struct Drawn {
     counters: Counters,
 }
 
-impl Renderer {
+impl GpuRenderer {
     /// A renderer on `device`.
     pub fn new(device: &Device) -> Result<Self, GpuError> {
         Self::with_float_atomics(device, device.has_float_atomics())
@@ -60,7 +60,7 @@ impl Renderer {
     pub fn with_float_atomics(device: &Device, float_atomics: bool) -> Result<Self, GpuError> {
         Ok(Self {
             device: device.clone(),
-            rasterizer: Rasterizer::new(device)?,
+            rasterizer: GpuRasterizer::new(device)?,
             blend_backward: blend_backward(float_atomics),
             project_backward: ProjectBackward::new(device)?,
             cloud: Parameters::new(device, "cloud", 0, 0)?,

@@ -37,7 +37,7 @@ pub(crate) const FILES: &[(&str, &str)] = files![
 
 /// What differs between pipelines made from one file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Variant {
+pub struct ShaderVariant {
     /// Extra channels that a blending pass carries.
     pub channels: usize,
     /// Whether sums use the adapter's float atomics.
@@ -52,13 +52,13 @@ pub fn kernels() -> impl Iterator<Item = &'static str> {
 /// The complete source of kernel `name`. A line `#include "path"` is replaced by that file, once;
 /// `constants` and `atomic_add` stand for the constants of [`crate::render`] and for the variant's
 /// way to add floats.
-pub fn source(name: &str, variant: Variant) -> Result<String, GpuError> {
+pub fn source(name: &str, variant: ShaderVariant) -> Result<String, GpuError> {
     let mut out = String::new();
     include(&mut out, &mut BTreeSet::new(), &format!("{name}.wgsl"), variant)?;
     Ok(out)
 }
 
-fn include(out: &mut String, seen: &mut BTreeSet<String>, path: &str, variant: Variant) -> Result<(), GpuError> {
+fn include(out: &mut String, seen: &mut BTreeSet<String>, path: &str, variant: ShaderVariant) -> Result<(), GpuError> {
     let path = match path {
         "constants" => {
             out.push_str(&constants(variant));
@@ -85,7 +85,7 @@ fn include(out: &mut String, seen: &mut BTreeSet<String>, path: &str, variant: V
     Ok(())
 }
 
-fn constants(variant: Variant) -> String {
+fn constants(variant: ShaderVariant) -> String {
     let mut out = format!("const TILE_PX: u32 = {TILE_PX}u;\n");
     let floats = [
         ("ALPHA_MIN", ALPHA_MIN),
@@ -109,15 +109,16 @@ mod tests {
 
     #[test]
     fn a_fragment_is_included_once() {
-        let text = source("project", Variant::default()).expect("known");
+        let text = source("project", ShaderVariant::default()).expect("known");
         assert_eq!(text.matches("struct View {").count(), 1);
         assert!(!text.contains("#include"));
-        assert!(source("nonesuch", Variant::default()).is_err());
+        assert!(source("nonesuch", ShaderVariant::default()).is_err());
     }
 
     #[test]
     fn variants_differ() {
-        let with = |float_atomics| source("blend_backward", Variant { channels: 2, float_atomics }).expect("known");
+        let with =
+            |float_atomics| source("blend_backward", ShaderVariant { channels: 2, float_atomics }).expect("known");
         assert!(with(true).contains("atomic<f32>") && !with(true).contains("atomicCompareExchangeWeak"));
         assert!(with(false).contains("atomicCompareExchangeWeak") && !with(false).contains("atomic<f32>"));
         assert!(with(true).contains("const CHANNELS: u32 = 2u;"));

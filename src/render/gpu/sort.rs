@@ -1,8 +1,8 @@
 //! Stable radix sort of (key, value) pairs by the low bits of their keys; `shaders/sort.wgsl`.
 
-use super::kernel::{Access, Kernel, Module, Recorder, Stage};
+use super::kernel::{Access, Kernel, Module, RecordedStage, Recorder};
 use super::layout::Pass;
-use super::shader::Variant;
+use super::shader::ShaderVariant;
 use super::{Device, GpuError};
 
 /// Pairs of one workgroup.
@@ -68,7 +68,7 @@ impl SortBuffers {
 impl Sort {
     pub(crate) fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
-        let module = Module::new(device, "sort", Variant::default())?;
+        let module = Module::new(device, "sort", ShaderVariant::default())?;
         let kernel = |entry, slots: &[_]| Kernel::new(device, &module, entry, slots);
         Ok(Self {
             count: kernel("count", &[(0, Uniform), (1, Read), (2, Read), (6, Write)])?,
@@ -80,7 +80,7 @@ impl Sort {
         })
     }
 
-    pub(crate) fn encode(&self, stage: &mut Stage<'_>, on: &SortBuffers, counters: &wgpu::Buffer) {
+    pub(crate) fn encode(&self, stage: &mut RecordedStage<'_>, on: &SortBuffers, counters: &wgpu::Buffer) {
         let blocks = [on.blocks, 1, 1];
         for (p, digit) in on.passes.iter().enumerate() {
             let (from, to) = (p % 2, (p + 1) % 2);

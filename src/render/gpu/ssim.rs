@@ -1,9 +1,9 @@
 //! The training loss and its gradient; `shaders/ssim.wgsl`.
 
-use super::kernel::{Access, Kernel, Module, Recorder, Stage};
+use super::kernel::{Access, Kernel, Module, RecordedStage, Recorder};
 use super::layout::Loss;
 use super::scratch::extent;
-use super::shader::Variant;
+use super::shader::ShaderVariant;
 use super::{Device, GpuError};
 use crate::math::stats::psnr_of;
 use crate::render::TILE_PX;
@@ -84,7 +84,7 @@ impl Ssim {
     /// Compiles the kernels; the buffers grow with the first photo.
     pub(crate) fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
-        let module = Module::new(device, "ssim", Variant::default())?;
+        let module = Module::new(device, "ssim", ShaderVariant::default())?;
         let kernel = |entry, slots: &[_]| Kernel::new(device, &module, entry, slots);
         Ok(Self {
             moments: kernel("moments", &[(0, Uniform), (1, Read), (2, Read), (3, Write), (5, Write)])?,
@@ -132,7 +132,7 @@ impl Ssim {
     /// Records the loss of `colors` and its gradient into `pixel_gradient`.
     pub(crate) fn encode(
         &self,
-        stage: &mut Stage<'_>,
+        stage: &mut RecordedStage<'_>,
         colors: &wgpu::Buffer,
         photo: &DevicePhoto,
         pixel_gradient: &wgpu::Buffer,
@@ -144,7 +144,7 @@ impl Ssim {
 
     /// Records the last sums into the ring, with the frame's counters and the optimizer's number of
     /// outliers as they then are.
-    pub(crate) fn encode_sums(&self, stage: &mut Stage<'_>, counters: &wgpu::Buffer, outliers: &wgpu::Buffer) {
+    pub(crate) fn encode_sums(&self, stage: &mut RecordedStage<'_>, counters: &wgpu::Buffer, outliers: &wgpu::Buffer) {
         stage.run(&self.reduce, &[&self.loss, &self.partials, &self.ring, counters, outliers], [1, 1, 1]);
     }
 

@@ -10,7 +10,7 @@ use super::cloud::{Packed, Parameters};
 use super::kernel::Recorder;
 use super::project::CloudShape;
 use super::project_backward::ProjectBackward;
-use super::rasterizer::Rasterizer;
+use super::rasterizer::GpuRasterizer;
 use super::scratch::extent;
 use super::ssim::{DevicePhoto, LossSums, RING, Ssim};
 use super::timing::{StageTimes, Timer};
@@ -51,10 +51,10 @@ pub struct StepLoss {
 
 /// The state of a training run on the device.
 #[derive(Debug)]
-pub struct Trainer {
+pub struct GpuTrainer {
     device: Device,
     settings: TrainerSettings,
-    rasterizer: Rasterizer,
+    rasterizer: GpuRasterizer,
     ssim: Ssim,
     blend_backward: TileKernel,
     project_backward: ProjectBackward,
@@ -81,14 +81,14 @@ pub struct Trainer {
     times: StageTimes,
 }
 
-impl Trainer {
+impl GpuTrainer {
     /// Starts a run from `cloud`.
     pub fn new(device: &Device, cloud: &GaussianCloud, settings: TrainerSettings) -> Result<Self, GpuError> {
         let empty = |what| Parameters::new(device, what, 0, 0);
         let mut trainer = Self {
             device: device.clone(),
             settings,
-            rasterizer: Rasterizer::new(device)?,
+            rasterizer: GpuRasterizer::new(device)?,
             ssim: Ssim::new(device)?,
             blend_backward: blend_backward(device.has_float_atomics()),
             project_backward: ProjectBackward::new(device)?,

@@ -75,7 +75,7 @@ pub struct SemanticFacts {
 
 /// All that a plan depends on.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Facts {
+pub struct SceneFacts {
     /// The Gaussians, if they are a result.
     pub(crate) cloud: Option<CloudFacts>,
     /// The photos, if there are any.
@@ -87,7 +87,7 @@ pub struct Facts {
     pub(crate) limits: Limits,
 }
 
-impl Facts {
+impl SceneFacts {
     /// Facts of a machine with nothing open.
     pub fn of(machine: Machine, limits: Limits) -> Self {
         Self { machine, limits, ..Self::default() }
@@ -144,7 +144,8 @@ impl PhotoFacts {
 impl SemanticFacts {
     fn of(map: &SemanticMap) -> Self {
         let of = |level: Level| map.identities.iter().filter(|(_, i)| i.level == level).count();
-        let vectors = |l: &LanguageFeatures| -> usize { l.of.iter().map(|f| f.raw.len() + f.deviated.len()).sum() };
+        let vectors =
+            |l: &LanguageFeatures| -> usize { l.by_identity.iter().map(|f| f.raw.len() + f.deviated.len()).sum() };
         let numbers = map.language.as_ref().map_or(0, |l| l.dimension * vectors(l));
         let encoder = map.language.as_ref().map(|l| l.encoder.clone());
         Self { objects: of(Level::Object), parts: of(Level::Part), encoder, numbers }

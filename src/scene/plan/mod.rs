@@ -1,6 +1,6 @@
 //! What a scene needs and what is left out, each with its reason and what it saves.
 //!
-//! [`Facts`] are gathered from the data once; [`ScenePlan::new`] is a pure function of them and of
+//! [`SceneFacts`] are gathered from the data once; [`ScenePlan::new`] is a pure function of them and of
 //! what the user wants instead. The program reads its decisions here and makes none of them itself.
 
 mod facts;
@@ -12,7 +12,7 @@ mod tests;
 use serde::{Deserialize, Serialize};
 
 pub use facts::{
-    CloudFacts, Facts, Limits, Machine, NOISE_FLOOR, PhotoFacts, SemanticFacts, resolved_side_px, used_degree,
+    CloudFacts, Limits, Machine, NOISE_FLOOR, PhotoFacts, SceneFacts, SemanticFacts, resolved_side_px, used_degree,
     visible_degree,
 };
 pub use item::{Item, Overrides, PlanOverride};
@@ -61,7 +61,7 @@ pub struct PlanLine {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ScenePlan {
     /// What they were computed from.
-    pub(crate) facts: Facts,
+    pub(crate) facts: SceneFacts,
     /// What the user wants otherwise.
     pub(crate) overrides: Overrides,
     /// Highest spherical-harmonics degree that is drawn.
@@ -98,7 +98,7 @@ pub struct ScenePlan {
 
 impl ScenePlan {
     /// The plan for these facts, except for what the user wants otherwise.
-    pub fn new(facts: Facts, overrides: &Overrides) -> Self {
+    pub fn new(facts: SceneFacts, overrides: &Overrides) -> Self {
         let wants = |item: Item| overrides.has(item);
         let when = |there: bool, item: Item| match (there, wants(item)) {
             (false, _) => When::Never,

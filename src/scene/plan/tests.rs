@@ -43,14 +43,14 @@ fn objects(with_part: bool, with_looks: bool) -> SemanticMap {
     }
     let looks = ViewFeatures { raw: vec![vec![0.5; 4]], deviated: vec![vec![0.5; 4]] };
     let of = vec![looks; identities.len()];
-    let language = with_looks.then(|| LanguageFeatures { encoder: "demo".into(), dimension: 4, of });
+    let language = with_looks.then(|| LanguageFeatures { encoder: "demo".into(), dimension: 4, by_identity: of });
     SemanticMap { identities, language, ..SemanticMap::default() }
 }
 
 /// The plan of a scene with everything, of which `change` takes something away.
-fn plan(change: impl FnOnce(Facts) -> Facts) -> ScenePlan {
+fn plan(change: impl FnOnce(SceneFacts) -> SceneFacts) -> ScenePlan {
     let cameras = vec![camera(1_000); 9];
-    let facts = Facts::of(Machine { max_gaussians: 1_234_567, cores: 2, ..Machine::default() }, limits());
+    let facts = SceneFacts::of(Machine { max_gaussians: 1_234_567, cores: 2, ..Machine::default() }, limits());
     let facts = facts.with_photos(&cameras).with_cloud(&colored(0.2, 0.1), 3, &cameras);
     ScenePlan::new(change(facts.with_semantics(Some(&objects(true, true)))), &Overrides::default())
 }
@@ -131,7 +131,7 @@ fn objects_without_parts_or_looks_have_no_level_and_no_encoder_for_them() {
 
 #[test]
 fn a_finished_splat_has_nothing_to_train_or_to_fly_between() {
-    let p = plan(|facts| Facts { photos: None, ..facts });
+    let p = plan(|facts| SceneFacts { photos: None, ..facts });
     assert_eq!((p.navigation, p.holdout_every), (When::Never, 0));
     assert_eq!(p.line(Item::Photos).expect("said").choice, "none");
     assert!([Item::Holdout, Item::Objects, Item::Gaussians].iter().all(|i| p.line(*i).is_none()));
@@ -193,7 +193,7 @@ fn lines_say_what_is_left_out_and_how_much_that_is() {
     // Only zero bands: they leave memory, 16 - 9 coefficients.
     let zero = plan(|facts| facts.with_cloud(&colored(0.2, 0.1), 3, &[camera(4_000)]));
     assert_eq!(line(&zero, Item::Color).2, format!("{} of memory", bytes(84)));
-    let training = plan(|facts| Facts { cloud: None, ..facts });
+    let training = plan(|facts| SceneFacts { cloud: None, ..facts });
     assert_eq!(line(&training, Item::Color).2, "15 of 16 coefficients at the start");
     let all = ScenePlan::new(p.facts.clone(), &Overrides::everything());
     let (auto, wanted) = (line(&p, Item::Photos).1, line(&all, Item::Photos).1);
@@ -204,7 +204,7 @@ fn lines_say_what_is_left_out_and_how_much_that_is() {
     assert_eq!(line(&none, Item::Parts).2, "3 of 6 channels of blended codes");
     assert_eq!(line(&p, Item::Parts).0, "on");
     assert_eq!(line(&p, Item::Thumbnails).2, "2 renderings at opening");
-    let lost = plan(|facts| Facts { photos: None, ..facts });
+    let lost = plan(|facts| SceneFacts { photos: None, ..facts });
     assert!(line(&lost, Item::Navigation).1.contains("no reachable viewpoint"));
     // The narrower Gaussians resolve a share of the pixels; the rest is saved.
     let coarse = plan(|facts| facts.with_cloud(&blobs(40, -2.0), 3, &[camera(1_000)]));

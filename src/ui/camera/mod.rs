@@ -12,9 +12,9 @@ use egui::{Button, ComboBox, DragValue, RichText, Slider, Ui};
 use self::player::{Clip, Player};
 use super::state::AppState;
 use super::theme;
-use crate::io::video::Settings;
+use crate::io::video::VideoSettings;
 use crate::navigate::camera_spline::{MOST_PICTURES, steps_of};
-use crate::navigate::{CameraSpline, Flight, Pose, Speed};
+use crate::navigate::{CameraSpline, CameraTrajectory, Pose, Speed};
 use crate::scene::undo::UndoHistory;
 use crate::scene::{Camera, CameraPath, PathKey};
 use crate::ui::actions::Action;
@@ -37,7 +37,7 @@ pub(crate) struct CameraPane {
     /// Whether what was found is marked in videos.
     pub(crate) mark: bool,
     /// Flights that follow the one that is played.
-    next: VecDeque<Flight>,
+    next: VecDeque<CameraTrajectory>,
     /// The scene that it belongs to.
     scene: u64,
 }
@@ -73,7 +73,7 @@ impl CameraPane {
     }
 
     /// Plays a flight, after those that were asked for before it.
-    pub(crate) fn play_flight(&mut self, flight: Flight) {
+    pub(crate) fn play_flight(&mut self, flight: CameraTrajectory) {
         self.next.push_back(flight);
         self.go_on();
     }
@@ -161,14 +161,14 @@ impl CameraPane {
     }
 
     /// The cameras of a video of what is played, and how it is written; `None` if there is nothing.
-    pub(crate) fn video(&self, out: &Path, aspect: f64) -> Option<(Vec<Camera>, Settings)> {
+    pub(crate) fn video(&self, out: &Path, aspect: f64) -> Option<(Vec<Camera>, VideoSettings)> {
         let height = self.film_height;
         let width = (((f64::from(height) * aspect) / 2.0).round().max(1.0) * 2.0) as u32;
         let clip = self.player.clip()?;
         let frames = steps_of(clip.seconds(), self.path.fps, MOST_PICTURES);
         let time = |i: usize| clip.seconds() * i as f64 / frames as f64;
         let cameras = (0..=frames).filter_map(|i| clip.at(time(i))).map(|p| p.camera(width, height)).collect();
-        let mut settings = Settings::new(width, height, self.path.fps);
+        let mut settings = VideoSettings::new(width, height, self.path.fps);
         // The dialog has asked whether it may be replaced.
         (settings.quality, settings.overwrite) = (self.quality, out.exists());
         Some((cameras, settings))
@@ -263,7 +263,7 @@ impl CameraPane {
     }
 
     /// Makes keys of a flight: enough of them that the path follows it.
-    fn keep(&mut self, flight: &Flight) {
+    fn keep(&mut self, flight: &CameraTrajectory) {
         let last = flight.poses.len().saturating_sub(1);
         let count = last.min(8);
         let at = |i: usize| flight.poses.get(i * last / count.max(1));
@@ -328,7 +328,7 @@ impl CameraPane {
 
 /// Reads a path's file; the error for the user.
 pub(crate) fn read(path: &Path) -> Result<CameraPath, String> {
-    crate::io::camera_path::open(path).map_err(|e| e.to_string())
+    crate::jobs::video::camera_path(path).map_err(|e| e.to_string())
 }
 
 /// Writes a path's file, in nerfstudio's format if its name says so.

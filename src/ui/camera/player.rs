@@ -1,6 +1,6 @@
 //! Plays a flight or a path, and counts the frames that are shown while it runs.
 
-use crate::navigate::{CameraSpline, Flight, Pose};
+use crate::navigate::{CameraSpline, CameraTrajectory, Pose};
 
 /// Seconds over which frames are counted.
 const COUNTED_SECS: f64 = 1.0;
@@ -8,7 +8,7 @@ const COUNTED_SECS: f64 = 1.0;
 #[derive(Clone, Debug)]
 pub(crate) enum Clip {
     /// A flight to a target.
-    Flight(Box<Flight>),
+    Flight(Box<CameraTrajectory>),
     /// The path that is being edited.
     Path(Box<CameraSpline>),
 }
@@ -127,7 +127,7 @@ mod tests {
 
     fn clip() -> Clip {
         let pose = |i: usize| Pose { center: DVec3::X * i as f64, world_from_camera: DMat3::IDENTITY, fov_y_rad: 0.8 };
-        Clip::Flight(Box::new(Flight {
+        Clip::Flight(Box::new(CameraTrajectory {
             poses: (0..11).map(pose).collect(),
             seconds: 2.0,
             length: 10.0,

@@ -39,7 +39,8 @@ impl Models {
             one(ui, entry, model, state.job.is_none(), actions);
         }
         choose(ui, &known.models, finding);
-        ui.label(RichText::new(format!("Inference engine: {}", known.engine)).small().color(theme::WEAK));
+        let engine = known.engine.as_ref().map_or_else(|| "none".to_owned(), |names| names.join(", "));
+        ui.label(RichText::new(format!("Inference engine: {engine}")).small().color(theme::WEAK));
         if let Some(note) = &known.note {
             ui.label(RichText::new(note).small().color(theme::WARNING));
         }

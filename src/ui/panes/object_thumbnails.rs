@@ -38,7 +38,7 @@ impl ObjectThumbnails {
             return;
         };
         let wanted = state.plan.thumbnails.now(self.used.take());
-        if wanted && self.asked.as_ref().is_none_or(|a| !Arc::ptr_eq(a, map)) && map.of.len() == cloud.len() {
+        if wanted && self.asked.as_ref().is_none_or(|a| !Arc::ptr_eq(a, map)) && map.identity_of.len() == cloud.len() {
             let command = Command::Thumbnails {
                 cloud: Arc::clone(cloud),
                 map: Arc::clone(map),

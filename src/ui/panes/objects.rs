@@ -64,7 +64,7 @@ struct Tree<'a> {
 
 impl Tree<'_> {
     fn branch(&self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
-        let pieces: Vec<IdentityId> = self.identities.pieces(id).collect();
+        let pieces: Vec<IdentityId> = self.identities.children(id).collect();
         if pieces.is_empty() {
             return self.leaf(ui, id, actions);
         }

@@ -9,14 +9,14 @@ use super::super::theme;
 use crate::pipeline::observer::{Evaluation, StepMetrics};
 
 /// PSNR over seconds of another training, with its name.
-pub(crate) type Curve = (String, Vec<[f64; 2]>);
+pub(crate) type PsnrCurve = (String, Vec<[f64; 2]>);
 
 /// Draws both plots with a common horizontal axis: this training and the one before. The `curves` are of others, and
 /// drawn over seconds only: how many steps they had does not matter to them.
 pub(crate) fn show(
     ui: &mut Ui,
     [history, previous]: [&TrainHistory; 2],
-    curves: &[Curve],
+    curves: &[PsnrCurve],
     settings: &mut PlotSettings,
 ) {
     let axis = &mut settings.axis;

@@ -5,7 +5,7 @@ use egui::{DragValue, Grid, RichText, Slider, Ui};
 use super::super::layout::Layout;
 use super::super::state::{AppState, RunningJob};
 use super::super::{keys, theme};
-use super::plots::{self, Curve};
+use super::plots::{self, PsnrCurve};
 use crate::math::format;
 use crate::pipeline::train::{TrainConfig, preset};
 use crate::ui::actions::Action;
@@ -13,7 +13,13 @@ use crate::worker::JobKind;
 
 /// Draws the pane.
 /// Curves of a report stand beside this training's.
-pub(crate) fn show(ui: &mut Ui, state: &AppState, layout: &mut Layout, curves: &[Curve], actions: &mut Vec<Action>) {
+pub(crate) fn show(
+    ui: &mut Ui,
+    state: &AppState,
+    layout: &mut Layout,
+    curves: &[PsnrCurve],
+    actions: &mut Vec<Action>,
+) {
     let Some(scene) = &state.scene else { return };
     let Some(dataset) = &scene.dataset else {
         ui.add_space(6.0);

@@ -4,7 +4,7 @@ use egui::{Button, Id, Modal, RichText, ScrollArea, vec2};
 
 use super::super::theme;
 use crate::io::unposed::Unposed;
-use crate::jobs::poses::{self, Tools};
+use crate::jobs::poses::{self, PoseTools};
 use crate::scene::text;
 use crate::ui::actions::Action;
 
@@ -18,7 +18,7 @@ pub(crate) fn show(ctx: &egui::Context, photos: &Unposed, actions: &mut Vec<Acti
         ui.label("Training needs to know from where each photo was taken. COLMAP finds that from the photos alone.");
         ui.add_space(10.0);
         let mut stays = true;
-        let tools = Tools::installed();
+        let tools = PoseTools::installed();
         if let Some(tools) = &tools {
             let find = theme::primary_button(&format!("Find the poses with {}", tools.name()));
             if ui.add(find.min_size(vec2(240.0, 32.0))).clicked() {

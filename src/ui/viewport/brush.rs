@@ -68,7 +68,7 @@ impl Brush {
         if rgb.len() != w * h || map.identity.len() != w * h || at[0] >= w || at[1] >= h {
             return;
         }
-        let inside = identities.within(self.of);
+        let inside = identities.descendants(self.of);
         let mine = |i: usize| {
             let id = map.identity[i];
             if self.of == NOBODY { id == NOBODY } else { inside.get(id as usize) == Some(&true) }

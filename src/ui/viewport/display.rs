@@ -10,7 +10,7 @@ use super::super::theme;
 use super::eye::Eye;
 use super::frame_times::FrameTimes;
 use crate::jobs::query::ViewMaps;
-use crate::scene::resource_log::{self, Sort};
+use crate::scene::resource_log::{self, ResourceKind};
 use crate::worker::view::{MappedView, ViewPicture, ViewResult};
 use crate::worker::{Failure, Slot, Versioned};
 
@@ -98,7 +98,7 @@ impl Display {
             None => self.texture = Some(ctx.load_texture("viewport", image, TextureOptions::LINEAR)),
         }
         if self.picture.is_none() {
-            resource_log::record(Sort::Picture, "first frame", "the scene is on screen", 0);
+            resource_log::record(ResourceKind::Picture, "first frame", "the scene is on screen", 0);
         }
         if let Some(times) = &mut self.times {
             times.add(picture, start.elapsed().as_secs_f64());

@@ -60,8 +60,8 @@ impl Marks {
 }
 
 fn sample(cloud: &GaussianCloud, semantics: &SemanticMap, id: IdentityId) -> Arc<[DVec3]> {
-    let inside = semantics.identities.within(id);
-    let own = semantics.of.iter().enumerate().filter(|(_, of)| inside.get(**of as usize) == Some(&true));
+    let inside = semantics.identities.descendants(id);
+    let own = semantics.identity_of.iter().enumerate().filter(|(_, of)| inside.get(**of as usize) == Some(&true));
     let own: Vec<usize> = own.map(|(i, _)| i).filter(|i| *i < cloud.len()).collect();
     let step = own.len().div_ceil(POINTS).max(1);
     let points: Vec<DVec3> = own.iter().step_by(step).map(|i| cloud.world_position(*i)).collect();

@@ -38,7 +38,6 @@ use super::layout::Layout;
 use super::state::{AppState, Tone};
 use crate::jobs::OpenedScene;
 use crate::navigate::Pose;
-use crate::render::Renderer;
 use crate::scene::plan::When;
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
 use crate::ui::actions::Action;
@@ -397,7 +396,7 @@ impl Viewport {
 
     /// Whether a GPU draws the view.
     pub(crate) fn on_gpu(&self) -> bool {
-        self.display.picture().is_some_and(|p| p.drawn_by != Renderer::CPU)
+        self.display.picture().is_some_and(|p| p.on_gpu())
     }
 
     /// The world point under a window position: at the drawn depth, else at the pivot's.

@@ -67,14 +67,15 @@ impl Visibility {
         cloud: &Versioned<GaussianCloud>,
         semantics: &Versioned<SemanticMap>,
     ) -> (Versioned<GaussianCloud>, Versioned<SemanticMap>) {
-        if !self.is_partial() || semantics.of.len() != cloud.len() {
+        if !self.is_partial() || semantics.identity_of.len() != cloud.len() {
             return (cloud.clone(), semantics.clone());
         }
         let of = (cloud.generation(), semantics.generation());
         if self.left.as_ref().is_none_or(|l| l.of != of) {
             let shown = self.shown(semantics);
-            let kept: Vec<usize> =
-                (0..cloud.len()).filter(|&i| shown.get(semantics.of[i] as usize).copied().unwrap_or(true)).collect();
+            let kept: Vec<usize> = (0..cloud.len())
+                .filter(|&i| shown.get(semantics.identity_of[i] as usize).copied().unwrap_or(true))
+                .collect();
             let (cloud, semantics) = (cloud.select(&kept), semantics.select(&kept));
             let (cloud, semantics) = (Versioned::new(Arc::new(cloud)), Versioned::new(Arc::new(semantics)));
             self.left = Some(Left { of, cloud, semantics });
@@ -89,11 +90,11 @@ impl Visibility {
     fn shown(&self, semantics: &SemanticMap) -> Vec<bool> {
         let all = &semantics.identities;
         let mut shown = match self.only {
-            Some(id) => all.within(id),
+            Some(id) => all.descendants(id),
             None => vec![true; all.len() + 1],
         };
         for &id in &self.hidden {
-            shown.iter_mut().zip(all.within(id)).for_each(|(s, inside)| *s &= !inside);
+            shown.iter_mut().zip(all.descendants(id)).for_each(|(s, inside)| *s &= !inside);
         }
         shown
     }
@@ -110,7 +111,7 @@ mod tests {
         let doll = all.add(Level::Object, NOBODY, vec![]);
         let eye = all.add(Level::Part, doll, vec![]);
         let cat = all.add(Level::Object, NOBODY, vec![]);
-        let map = SemanticMap::of_identities(all, vec![doll, eye, cat, NOBODY], vec![1.0; 4], vec![]);
+        let map = SemanticMap::from_identities(all, vec![doll, eye, cat, NOBODY], vec![1.0; 4], vec![]);
         let map = Versioned::new(Arc::new(map));
         let n = 4;
         let cloud = GaussianCloud {
@@ -125,7 +126,7 @@ mod tests {
         let mut v = Visibility::default();
         let xs = |v: &mut Visibility| {
             let (cloud, map) = v.apply(&cloud, &map);
-            assert_eq!(cloud.len(), map.of.len());
+            assert_eq!(cloud.len(), map.identity_of.len());
             cloud.positions.iter().map(|p| p[0] as i32).collect::<Vec<_>>()
         };
         assert_eq!(xs(&mut v), [0, 1, 2, 3]);

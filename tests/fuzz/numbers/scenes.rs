@@ -9,7 +9,7 @@ use fmlgs::math::rotation::unit_quaternion;
 use fmlgs::math::stats::worst;
 use fmlgs::pipeline::train::density::{self, DensityStats};
 use fmlgs::pipeline::train::{TrainConfig, TrainView, trainer::Trainer};
-use fmlgs::render::cpu::Renderer;
+use fmlgs::render::cpu::CpuRenderer;
 use fmlgs::render::{ALPHA_MIN, COLOR_MAX, CloudGradient, Features, Frame, FrameGradient, RenderSettings};
 use fmlgs::scene::{Camera, GaussianCloud, PhotoPixels};
 
@@ -125,14 +125,14 @@ fn planes<R>(frame: &Frame<R>) -> impl Iterator<Item = &Vec<R>> {
 /// What both precisions drew, if the input was taken.
 struct Drawn {
     wide: GaussianCloud<f64>,
-    single: Renderer<f32>,
-    double: Renderer<f64>,
+    single: CpuRenderer<f32>,
+    double: CpuRenderer<f64>,
     frames: (Frame<f32>, Frame<f64>),
 }
 
 fn draw(cloud: &GaussianCloud, camera: &Camera, settings: &RenderSettings) -> Option<Drawn> {
     cloud.validate().ok()?;
-    let (mut single, mut double) = (Renderer::<f32>::new(), Renderer::<f64>::new());
+    let (mut single, mut double) = (CpuRenderer::<f32>::new(), CpuRenderer::<f64>::new());
     let wide = cloud.cast::<f64>();
     let frame = single.render(cloud, Features::NONE, camera, settings).ok()?;
     let exact = double.render(&wide, Features::NONE, camera, settings).ok()?;
@@ -187,7 +187,7 @@ pub fn drawing(n: &mut Numbers) -> Verdict {
             break;
         }
         let near = moved(&drawn.wide, &camera, n);
-        let Ok(near) = Renderer::<f64>::new().render(&near, Features::NONE, &camera, &settings) else { continue };
+        let Ok(near) = CpuRenderer::<f64>::new().render(&near, Features::NONE, &camera, &settings) else { continue };
         let planes = near.color.iter().chain([&near.alpha]).zip(exact.color.iter().chain([&exact.alpha]));
         for (c, (a, b)) in planes.enumerate() {
             spread.iter_mut().zip(a.iter().zip(b)).for_each(|(s, (a, b))| s[c] = s[c].max((a - b).abs()));
@@ -249,7 +249,7 @@ pub fn gradients(n: &mut Numbers) -> Verdict {
             break;
         }
         let near = moved(&drawn.wide, &camera, n);
-        let mut renderer = Renderer::<f64>::new();
+        let mut renderer = CpuRenderer::<f64>::new();
         if renderer.render(&near, Features::NONE, &camera, &settings).is_ok() {
             let g = all_numbers(&renderer.backward(&near, Features::NONE, &up64));
             let spread = norm(g.iter().zip(&double).map(|(a, b)| a - b));

@@ -7,7 +7,7 @@ use super::{Verdict, promise};
 use fmlgs::math::rotation::rotation_error;
 use fmlgs::navigate::curve::Curve;
 use fmlgs::navigate::keypoints::spacing;
-use fmlgs::navigate::{Flight, Navigator, Pose, Speed};
+use fmlgs::navigate::{CameraTrajectory, Navigator, Pose, Speed};
 use fmlgs::scene::{Camera, GaussianCloud};
 
 /// Poses of a flight.
@@ -35,7 +35,7 @@ fn pose(n: &mut Numbers) -> Pose {
 }
 
 /// Finite poses, rotations, and so many of them.
-fn whole(flight: &Flight) -> Result<(), String> {
+fn whole(flight: &CameraTrajectory) -> Result<(), String> {
     if flight.poses.len() != FRAMES || !flight.seconds.is_finite() || !flight.length.is_finite() {
         return Err(format!("{} poses, {} s, length {}", flight.poses.len(), flight.seconds, flight.length));
     }
@@ -66,7 +66,7 @@ pub fn moving(n: &mut Numbers) -> Verdict {
     let speed = n.pick(&[Speed::Constant, Speed::Eased]);
     let look_at = n.chance(0.5).then(|| (place(n), DVec3::NEG_Y));
     let mut refused = true;
-    if let Some(flight) = Flight::new(&legs, [&from, &to], look_at, None, FRAMES, speed) {
+    if let Some(flight) = CameraTrajectory::new(&legs, [&from, &to], look_at, None, FRAMES, speed) {
         let found = whole(&flight);
         promise!(found.is_ok(), "{}", found.err().unwrap_or_default());
         refused = false;

@@ -28,7 +28,7 @@ fn picture(t: u64, (width, height): (u32, u32)) -> Vec<u8> {
 }
 
 /// Writes the test video and returns what was said of it.
-fn film(path: &Path, settings: &Settings) -> Summary {
+fn film(path: &Path, settings: &VideoSettings) -> VideoSummary {
     let mut writer = VideoWriter::create(path, settings).expect("create");
     for t in 0..FRAMES {
         writer.push(&picture(t, (settings.width_px, settings.height_px))).expect("push");
@@ -37,8 +37,8 @@ fn film(path: &Path, settings: &Settings) -> Summary {
     writer.finish().expect("finish")
 }
 
-fn settings() -> Settings {
-    Settings::new(SIZE.0, SIZE.1, FPS)
+fn settings() -> VideoSettings {
+    VideoSettings::new(SIZE.0, SIZE.1, FPS)
 }
 
 /// Peak signal-to-noise ratio in dB of two pictures.
@@ -93,7 +93,7 @@ fn quality_is_size() {
     let folder = tempfile::tempdir().expect("folder");
     for name in ["a.mp4", "a.webp"] {
         let path = folder.path().join(name);
-        let with = |quality| film(&path, &Settings { quality, overwrite: true, ..settings() }).bytes;
+        let with = |quality| film(&path, &VideoSettings { quality, overwrite: true, ..settings() }).bytes;
         let sizes = [5, 50, 95].map(with);
         assert!(sizes[0] < sizes[1] && sizes[1] < sizes[2], "{name}: {sizes:?}");
     }
@@ -103,14 +103,14 @@ fn quality_is_size() {
 fn webp_of_highest_quality_is_exact() {
     let folder = tempfile::tempdir().expect("folder");
     let path = folder.path().join("a.webp");
-    film(&path, &Settings { quality: 100, ..settings() });
+    film(&path, &VideoSettings { quality: 100, ..settings() });
     assert!(worst_psnr(&decode(&path, Format::WebP), 0) > 90.0);
 }
 
 #[test]
 fn an_odd_last_column_and_row_are_left_out_of_mp4_only() {
     let folder = tempfile::tempdir().expect("folder");
-    let odd = Settings::new(51, 35, 30.0);
+    let odd = VideoSettings::new(51, 35, 30.0);
     for (name, format, size) in [
         ("a.mp4", Format::Mp4, (50, 34)),
         ("a.gif", Format::Gif, (51, 35)),
@@ -140,7 +140,7 @@ fn smallest_and_thin_films_are_written() {
         ("frames", Format::Frames, (1, 7)),
     ] {
         let path = folder.path().join(name);
-        let summary = film(&path, &Settings::new(size.0, size.1, 30.0));
+        let summary = film(&path, &VideoSettings::new(size.0, size.1, 30.0));
         let film = decode(&path, format);
         assert_eq!((film.frames.len() as u64, film.size_px), (FRAMES, summary.size_px), "{name}");
     }
@@ -171,7 +171,7 @@ fn frames_that_repeat_keep_their_time() {
 fn times_of_gif_do_not_drift() {
     let folder = tempfile::tempdir().expect("folder");
     let path = folder.path().join("a.gif");
-    film(&path, &Settings { fps: 30.0, ..settings() });
+    film(&path, &VideoSettings { fps: 30.0, ..settings() });
     let secs = decode(&path, Format::Gif).secs.expect("times");
     assert!((secs - 0.8).abs() < 0.0051, "{secs}");
 }
@@ -189,7 +189,7 @@ fn a_film_that_is_dropped_leaves_nothing() {
         assert_eq!(entries(folder.path()), [""; 0], "{name}");
         film(&path, &settings());
         let before = decode(&path, Format::of(&path).expect("format")).bytes;
-        let mut writer = VideoWriter::create(&path, &Settings { overwrite: true, ..settings() }).expect("create");
+        let mut writer = VideoWriter::create(&path, &VideoSettings { overwrite: true, ..settings() }).expect("create");
         writer.push(&picture(0, SIZE)).expect("push");
         drop(writer);
         assert_eq!(entries(folder.path()), [name], "{name}");

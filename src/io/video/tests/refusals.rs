@@ -5,9 +5,9 @@ use std::path::Path;
 
 use super::{FRAMES, SIZE, decode, entries, film, picture, settings};
 use crate::io::IoError;
-use crate::io::video::{Encoder, Format, Settings, VideoFileError, VideoWriter};
+use crate::io::video::{Format, VideoEncoder, VideoFileError, VideoSettings, VideoWriter};
 
-fn refused(path: &Path, settings: &Settings) -> String {
+fn refused(path: &Path, settings: &VideoSettings) -> String {
     VideoWriter::create(path, settings).err().expect("refused").to_string()
 }
 
@@ -35,17 +35,17 @@ fn formats_are_chosen_by_ending() {
 fn settings_that_a_format_cannot_hold_are_named() {
     let folder = tempfile::tempdir().expect("folder");
     let cases = [
-        ("a.mp4", Settings::new(0, 10, 30.0), "0 x 10 px"),
-        ("a.mp4", Settings::new(20_000, 10, 30.0), "20000 x 10 px"),
-        ("a.mp4", Settings::new(64, 15, 30.0), "64 x 15 px"),
-        ("a.mp4", Settings::new(4000, 2000, 30.0), "3840 x 2160 px"),
-        ("a.mp4", Settings::new(3000, 3000, 30.0), "3840 x 2160 px"),
-        ("a.webp", Settings::new(16_384, 10, 30.0), "16383 px"),
-        ("a.gif", Settings::new(64, 64, 60.0), "60 frames per second"),
-        ("a.mp4", Settings::new(64, 64, f64::NAN), "NaN frames per second"),
-        ("a.mp4", Settings::new(64, 64, -1.0), "-1 frames per second"),
-        ("a.mp4", Settings::new(64, 64, 1e9), "1000000000 frames per second"),
-        ("a.mp4", Settings { quality: 101, ..settings() }, "quality 101"),
+        ("a.mp4", VideoSettings::new(0, 10, 30.0), "0 x 10 px"),
+        ("a.mp4", VideoSettings::new(20_000, 10, 30.0), "20000 x 10 px"),
+        ("a.mp4", VideoSettings::new(64, 15, 30.0), "64 x 15 px"),
+        ("a.mp4", VideoSettings::new(4000, 2000, 30.0), "3840 x 2160 px"),
+        ("a.mp4", VideoSettings::new(3000, 3000, 30.0), "3840 x 2160 px"),
+        ("a.webp", VideoSettings::new(16_384, 10, 30.0), "16383 px"),
+        ("a.gif", VideoSettings::new(64, 64, 60.0), "60 frames per second"),
+        ("a.mp4", VideoSettings::new(64, 64, f64::NAN), "NaN frames per second"),
+        ("a.mp4", VideoSettings::new(64, 64, -1.0), "-1 frames per second"),
+        ("a.mp4", VideoSettings::new(64, 64, 1e9), "1000000000 frames per second"),
+        ("a.mp4", VideoSettings { quality: 101, ..settings() }, "quality 101"),
         ("a.avi", settings(), "a.avi"),
         ("no/a.mp4", settings(), "does not exist"),
         ("no/a.gif", settings(), "does not exist"),
@@ -68,11 +68,11 @@ fn what_exists_is_not_overwritten_unasked() {
         let text = refused(&path, &settings());
         assert!(text.contains(name) && text.contains("exists"), "{text}");
         assert_eq!(fs::read(&path).expect("read"), b"mine");
-        film(&path, &Settings { overwrite: true, ..settings() });
+        film(&path, &VideoSettings { overwrite: true, ..settings() });
         assert!(fs::metadata(&path).expect("film").len() > 100);
     }
     fs::create_dir(folder.path().join("b.mp4")).expect("create");
-    let text = refused(&folder.path().join("b.mp4/"), &Settings { width_px: 0, ..settings() });
+    let text = refused(&folder.path().join("b.mp4/"), &VideoSettings { width_px: 0, ..settings() });
     assert!(text.contains("0 x 68"), "{text}");
 }
 
@@ -89,7 +89,7 @@ fn a_folder_of_frames_keeps_other_files() {
     assert!(text.contains("frame_00000.png") && text.contains("exists"), "{text}");
 
     // A shorter video replaces a longer one entirely.
-    let mut writer = VideoWriter::create(&frames, &Settings { overwrite: true, ..settings() }).expect("create");
+    let mut writer = VideoWriter::create(&frames, &VideoSettings { overwrite: true, ..settings() }).expect("create");
     writer.push(&picture(3, SIZE)).expect("push");
     writer.push(&picture(4, SIZE)).expect("push");
     let summary = writer.finish().expect("finish");
@@ -155,9 +155,9 @@ fn a_folder_that_cannot_be_written_to_is_named() {
     assert_eq!(entries(folder.path()), [""; 0]);
 }
 
-fn with_program(program: &Path, args: &[&str]) -> Settings {
+fn with_program(program: &Path, args: &[&str]) -> VideoSettings {
     let args = args.iter().map(|a| (*a).to_owned()).collect();
-    Settings { encoder: Encoder::Ffmpeg { program: program.into(), args }, ..settings() }
+    VideoSettings { encoder: VideoEncoder::Ffmpeg { program: program.into(), args }, ..settings() }
 }
 
 #[test]
@@ -200,7 +200,7 @@ fn a_program_gets_every_frame_and_its_words_are_passed_on() {
     // It complains at length and gives up while frames are coming.
     let fails =
         script(folder.path(), "for i in $(seq 50); do echo \"line $i\" >&2; done; head -c 100 >/dev/null; exit 3");
-    let failure = |path: &Path, settings: &Settings| {
+    let failure = |path: &Path, settings: &VideoSettings| {
         let mut writer = VideoWriter::create(path, settings).expect("create");
         for t in 0..FRAMES {
             if let Err(e) = writer.push(&picture(t, SIZE)) {

@@ -28,7 +28,7 @@ fn scene(of: Vec<IdentityId>) -> SemanticMap {
         all.get_mut(id).expect("there").code = code;
     }
     let n = of.len();
-    SemanticMap::of_identities(all, of, vec![1.0; n], vec![])
+    SemanticMap::from_identities(all, of, vec![1.0; n], vec![])
 }
 
 fn exact(width_px: usize, identity: Vec<IdentityId>) -> ViewMap {
@@ -289,7 +289,7 @@ fn kitchen() -> (SemanticMap, LanguageFeatures) {
     };
     let of = [&of_mug, &of_pan].into_iter().map(whole).chain(parts.iter().map(part)).collect();
     let map = SemanticMap { identities: all, ..SemanticMap::default() };
-    (map, LanguageFeatures { encoder: "test".into(), dimension: 7, of })
+    (map, LanguageFeatures { encoder: "test".into(), dimension: 7, by_identity: of })
 }
 
 #[test]

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 const SCALES: [(f32, f32); 3] = [(0.8, 0.3), (1.6, 0.35), (3.2, 0.35)];
 
 /// A picture's planes, row-major, and its width in px.
-pub(crate) struct Planes<'a> {
+pub(crate) struct ImagePlanes<'a> {
     /// Width in px.
     pub(crate) width: usize,
     /// Values of each channel.
@@ -15,7 +15,7 @@ pub(crate) struct Planes<'a> {
 }
 
 /// Length of the gradient, in values per px times the width of the blur, at each pixel.
-pub(crate) fn strength(planes: &Planes<'_>) -> Vec<f32> {
+pub(crate) fn strength(planes: &ImagePlanes<'_>) -> Vec<f32> {
     let n = planes.channels.first().map_or(0, Vec::len);
     let mut total = vec![0.0_f32; n];
     for (sigma, share) in SCALES {
@@ -81,7 +81,7 @@ mod tests {
 
     fn strongest(picture: impl Fn(usize) -> f32) -> f32 {
         let plane: Vec<f32> = (0..64 * 32).map(|i| picture(i % 64)).collect();
-        strength(&Planes { width: 64, channels: &[plane] }).into_iter().fold(0.0, f32::max)
+        strength(&ImagePlanes { width: 64, channels: &[plane] }).into_iter().fold(0.0, f32::max)
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use super::basins::{OUTSIDE, basins};
-use super::edges::{Planes, strength};
+use super::edges::{ImagePlanes, strength};
 use super::lab::lab;
 use super::tree::{Border, Piece, Tree, grow};
 use crate::scene::Mask;
@@ -101,7 +101,7 @@ impl Mosaic {
         let colors = lab(picture.rgb);
         let weights = [LIGHTNESS, 1.0, 1.0];
         let channels = [0, 1, 2].map(|c| colors.iter().map(|p| weights[c] * p[c]).collect::<Vec<f32>>());
-        let strength = strength(&Planes { width, channels: &channels });
+        let strength = strength(&ImagePlanes { width, channels: &channels });
         let domain: Vec<bool> = (0..n).map(|i| picture.coverage.is_none_or(|c| c[i] > 0)).collect();
         // Where a surface ends there is an edge, whatever the colors.
         let end = |i: usize| picture.ends.map_or(0.0, |e| e[i]);

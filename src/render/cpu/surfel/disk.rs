@@ -39,7 +39,7 @@ pub(crate) struct Disk<R: Real, L: Lanes<R>> {
 
 /// What a surfel gives eight pixels.
 #[derive(Clone, Copy)]
-pub(crate) struct Hit<R: Real, L: Lanes<R>> {
+pub(crate) struct SurfelHit<R: Real, L: Lanes<R>> {
     /// Offsets of the pixel centers from the projected center.
     pub(crate) offset: [L::V; 2],
     /// `p, q`.
@@ -78,7 +78,7 @@ impl<R: Real, L: Lanes<R>> Disk<R, L> {
 
     /// What the pixels of a slot get.
     #[inline(always)]
-    pub(crate) fn hit(&self, l: L, reach: &Reach<R>, slot: usize) -> Hit<R, L> {
+    pub(crate) fn hit(&self, l: L, reach: &Reach<R>, slot: usize) -> SurfelHit<R, L> {
         let (dx, dy) = (self.dx[slot / TILE_PX], l.splat(reach.dy[slot % TILE_PX] + self.down));
         let zero = l.splat(R::ZERO);
         let [[ax, ay], [bx, by]] = self.across;
@@ -95,7 +95,7 @@ impl<R: Real, L: Lanes<R>> Disk<R, L> {
         let square = l.select(through, plane, picture);
         let alpha = l.mul(self.opacity, l.exp_neg(l.mul(l.splat(-R::HALF), square)));
         let alpha = l.min(alpha, l.splat(R::of(ALPHA_MAX)));
-        Hit {
+        SurfelHit {
             offset: [dx, dy],
             raw,
             at: [l.keep(through, u), l.keep(through, v)],

@@ -14,11 +14,11 @@ pub(crate) mod disk;
 pub(crate) mod project;
 pub(crate) mod project_backward;
 
-use self::disk::{Disk, Hit};
+use self::disk::{Disk, SurfelHit};
 use self::project::INVERSE_BLUR;
 use self::project::{SHAPE, surfel};
 use self::project_backward::project_backward;
-use super::project::{Projected, Splat, View};
+use super::project::{CameraView, Projected, Splat};
 use super::project_backward::GaussianGradient;
 use super::walk::{GROUPS, Planes, Primitive, Reach, RowPass, With, with_channels};
 use crate::math::Real;
@@ -49,9 +49,9 @@ impl<R: Real> Primitive<R> for Surfels<R> {
     type State<V: Copy> = [V; 7];
     type Sums<V: Copy> = [V; RECORD];
     type Constants<L: Lanes<R>> = Disk<R, L>;
-    type Hit<L: Lanes<R>> = Hit<R, L>;
+    type Hit<L: Lanes<R>> = SurfelHit<R, L>;
 
-    fn new(view: &View<R>, _: &RenderSettings) -> Self {
+    fn new(view: &CameraView<R>, _: &RenderSettings) -> Self {
         Self { near: view.near }
     }
 
@@ -82,7 +82,7 @@ impl<R: Real> Primitive<R> for Surfels<R> {
         self,
         gaussian: &Gaussian<'_, R>,
         opacity: R,
-        view: &View<R>,
+        view: &CameraView<R>,
         _: &RenderSettings,
     ) -> Projected<R, [R; SHAPE], [R; 3]> {
         surfel(gaussian, opacity, self.alpha_min(), view)
@@ -131,7 +131,7 @@ impl<R: Real> Primitive<R> for Surfels<R> {
     fn project_backward(
         gaussian: &Gaussian<'_, R>,
         _: &Splat<R>,
-        view: &View<R>,
+        view: &CameraView<R>,
         settings: &RenderSettings,
         record: &[R],
         extra: usize,
@@ -146,12 +146,12 @@ impl<R: Real> Primitive<R> for Surfels<R> {
     }
 
     #[inline(always)]
-    fn hit<L: Lanes<R>>(l: L, disk: &Disk<R, L>, reach: &Reach<R>, slot: usize) -> Hit<R, L> {
+    fn hit<L: Lanes<R>>(l: L, disk: &Disk<R, L>, reach: &Reach<R>, slot: usize) -> SurfelHit<R, L> {
         disk.hit(l, reach, slot)
     }
 
     #[inline(always)]
-    fn alpha<L: Lanes<R>>(hit: &Hit<R, L>) -> L::V {
+    fn alpha<L: Lanes<R>>(hit: &SurfelHit<R, L>) -> L::V {
         hit.alpha
     }
 
@@ -159,7 +159,7 @@ impl<R: Real> Primitive<R> for Surfels<R> {
     fn gather<L: Lanes<R>>(
         l: L,
         [depth, first, second, median, at]: &mut [L::V; 5],
-        hit: &Hit<R, L>,
+        hit: &SurfelHit<R, L>,
         weight: L::V,
         crossed: L::M,
         place: L::V,
@@ -174,7 +174,7 @@ impl<R: Real> Primitive<R> for Surfels<R> {
     }
 
     #[inline(always)]
-    fn along<L: Lanes<R>>(l: L, state: &[L::V; 7], hit: &Hit<R, L>, along: L::V) -> L::V {
+    fn along<L: Lanes<R>>(l: L, state: &[L::V; 7], hit: &SurfelHit<R, L>, along: L::V) -> L::V {
         // Distortion A s - m² with A, m, s the sums of w, w / z and w / z².
         let [d_depth, d_distortion, _, first, second, _, transmittance] = *state;
         let alpha = l.sub(l.splat(R::ONE), transmittance);
@@ -188,7 +188,7 @@ impl<R: Real> Primitive<R> for Surfels<R> {
         l: L,
         sums: &mut [L::V; RECORD],
         disk: &Disk<R, L>,
-        hit: &Hit<R, L>,
+        hit: &SurfelHit<R, L>,
         state: &[L::V; 7],
         [power, weight, place]: [L::V; 3],
     ) {

@@ -1,6 +1,6 @@
 //! Projection of surfels: what the compositing needs of each, and an ellipse around what it touches.
 
-use super::super::project::{Projected, Splat, View};
+use super::super::project::{CameraView, Projected, Splat};
 use crate::math::{Real, rotation};
 use crate::scene::Gaussian;
 
@@ -12,7 +12,7 @@ pub(crate) const INVERSE_BLUR: f64 = 2.0;
 pub(crate) const SHAPE: usize = 8;
 
 /// Everything between a surfel's raw parameters and its splat that the backward pass needs too.
-pub(crate) struct Geometry<R> {
+pub(crate) struct SurfelGeometry<R> {
     /// Center relative to the camera, world axes.
     pub(crate) relative: [R; 3],
     /// Center in camera axes.
@@ -42,7 +42,7 @@ fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
 /// The disk in camera axes; `None` behind the near plane, for a degenerate quaternion, or where
 /// sizes overflow.
 #[inline(always)]
-pub(crate) fn geometry<R: Real>(gaussian: &Gaussian<'_, R>, view: &View<R>) -> Option<Geometry<R>> {
+pub(crate) fn geometry<R: Real>(gaussian: &Gaussian<'_, R>, view: &CameraView<R>) -> Option<SurfelGeometry<R>> {
     let relative = view.relative(gaussian.position);
     let local: [R; 3] = std::array::from_fn(|k| dot(view.rows[k], relative));
     let z = local[2];
@@ -72,7 +72,7 @@ pub(crate) fn geometry<R: Real>(gaussian: &Gaussian<'_, R>, view: &View<R>) -> O
         return None;
     }
     let center = [view.focal[0] * tangent[0] + view.principal[0], view.focal[1] * tangent[1] + view.principal[1]];
-    Some(Geometry {
+    Some(SurfelGeometry {
         relative,
         local,
         axes,
@@ -99,7 +99,7 @@ pub(crate) struct Bound<R> {
 /// The bound for squared distances up to `reach`; `None` if the disk so far out crosses the
 /// camera's plane, so that it may touch any pixel.
 #[inline(always)]
-pub(crate) fn bound<R: Real>(g: &Geometry<R>, reach: R) -> Option<Bound<R>> {
+pub(crate) fn bound<R: Real>(g: &SurfelGeometry<R>, reach: R) -> Option<Bound<R>> {
     let (along, z) = ([g.axes[0][2], g.axes[1][2]], g.local[2]);
     // How far depth changes across the disk, as a share of the center's depth, squared.
     let slope = reach * (along[0] * along[0] + along[1] * along[1]) / (z * z);
@@ -133,7 +133,7 @@ pub(crate) fn surfel<R: Real>(
     gaussian: &Gaussian<'_, R>,
     opacity: R,
     alpha_min: R,
-    view: &View<R>,
+    view: &CameraView<R>,
 ) -> Projected<R, [R; SHAPE], [R; 3]> {
     let Some(g) = geometry(gaussian, view) else { return Projected::Degenerate };
     let reach = R::of(2.0) * (opacity / alpha_min).ln();

@@ -1,6 +1,6 @@
 //! From the sums of a surfel's tile records back to the raw parameters of its Gaussian.
 
-use super::super::project::View;
+use super::super::project::CameraView;
 use super::super::project_backward::{ColorGradient, GaussianGradient, color_gradient, quaternion_gradient, radius};
 use super::RECORD;
 use super::project::{bound, geometry};
@@ -18,7 +18,7 @@ fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
 #[inline(always)]
 pub(crate) fn project_backward<R: Real>(
     gaussian: &Gaussian<'_, R>,
-    view: &View<R>,
+    view: &CameraView<R>,
     settings: &RenderSettings,
     record: &[R],
     normal: Option<usize>,

@@ -5,7 +5,7 @@ use egui::{Color32, Grid, RichText, Ui};
 use super::super::super::theme;
 use super::scatter;
 use crate::math::format;
-use crate::measure::{Comparison, Measure, Point, Report, Stage, table};
+use crate::measure::{Measure, Point, Report, Stage, StageComparison, table};
 use crate::scene::text;
 
 /// Letters of a setting that are shown in a table.
@@ -90,7 +90,7 @@ pub(crate) fn orders(ui: &mut Ui, stage: &Stage) {
 }
 
 /// Two reports side by side.
-pub(crate) fn comparison(ui: &mut Ui, comparison: &Comparison<'_>, measure: &Measure) {
+pub(crate) fn comparison(ui: &mut Ui, comparison: &StageComparison<'_>, measure: &Measure) {
     if comparison.pairs.is_empty() {
         ui.colored_label(theme::WARNING, "The two reports have no setting in common.");
     }

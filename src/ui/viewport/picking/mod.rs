@@ -106,7 +106,7 @@ impl Picking {
         if response.secondary_clicked() {
             // On what is selected the menu is about that, else about the object.
             let id = response.interact_pointer_pos().and_then(under);
-            let within = |s: &IdentityId| id.is_some_and(|id| all.line(id).any(|at| at == *s));
+            let within = |s: &IdentityId| id.is_some_and(|id| all.ancestors(id).any(|at| at == *s));
             self.menu = self.selected.filter(within).or_else(|| id.map(|id| picked(all, id, None, alt)));
             if self.menu.is_some() && self.menu != self.selected {
                 actions.push(Action::Select(self.menu));
@@ -175,13 +175,13 @@ fn innermost(map: &ViewMap, shown: Rect, pos: Pos2) -> Option<IdentityId> {
 
 /// What a click on a pixel of `innermost` selects: the object, or, inside what is selected, one level deeper.
 fn picked(all: &Identities, innermost: IdentityId, selected: Option<IdentityId>, alt: bool) -> IdentityId {
-    let mut line: Vec<IdentityId> = all.line(innermost).collect();
+    let mut line: Vec<IdentityId> = all.ancestors(innermost).collect();
     line.reverse();
     let Some(selected) = selected.filter(|s| !alt && all.object_of(*s) == line[0]) else {
         return if alt { innermost } else { line[0] };
     };
     // Beside what is selected, in the same object: as deep as that.
-    let depth = all.line(selected).count() - usize::from(!line.contains(&selected));
+    let depth = all.ancestors(selected).count() - usize::from(!line.contains(&selected));
     line[depth.min(line.len() - 1)]
 }
 

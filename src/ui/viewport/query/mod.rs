@@ -19,11 +19,10 @@ use egui::{Color32, Rect, TextureHandle, TextureOptions, Ui, Vec2, vec2};
 
 use self::embeddings::Embeddings;
 pub(crate) use self::settings::OverlaySettings;
-use crate::jobs::query::ViewMaps;
+use crate::jobs::query::{ViewMaps, answer_encoded};
 use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::matching::MatchMode;
 use crate::pipeline::semantics::names;
-use crate::pipeline::semantics::query_engine::answer_encoded;
 use crate::pipeline::semantics::timing::{StagesMs, ms_since};
 use crate::scene::{IdentityId, Mask, ScenePlan, SemanticMap};
 use crate::ui::color_by::ColorBy;
@@ -339,7 +338,8 @@ impl Queries {
         let features = match (&semantics.language, self.settings.color_by) {
             (Some(language), ColorBy::Features) => {
                 let of = |f: &crate::scene::ViewFeatures| f.deviated.first().cloned();
-                let vectors: Vec<Option<Vec<f32>>> = std::iter::once(None).chain(language.of.iter().map(of)).collect();
+                let vectors: Vec<Option<Vec<f32>>> =
+                    std::iter::once(None).chain(language.by_identity.iter().map(of)).collect();
                 overlay::main_directions(&vectors.iter().map(Option::as_deref).collect::<Vec<_>>())
             }
             _ => Vec::new(),

@@ -1,0 +1,115 @@
+//! How long drawing, training and queries take on this machine, and what a scene costs as the window opens it.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::{Folders, JobError, open, plan};
+use crate::io::{self, Opened};
+use crate::measure::StudyError;
+use crate::measure::bench::{self, Timings, cpu, gpu, query};
+use crate::measure::plan::{OpenScene, PlanCost, PlanVariant, SIZE, cost};
+use crate::models;
+use crate::pipeline::observer::{Interrupted, Observer, Severity, Silent};
+use crate::pipeline::train::{TrainConfig, TrainView, load_views};
+use crate::render::Device;
+use crate::scene::Dataset;
+
+/// Objects and parts of the view that is asked.
+const QUERY_IDENTITIES: usize = 300;
+/// Its size in px.
+const QUERY_SIZE: [usize; 2] = [1_008, 567];
+
+/// What is timed, and how.
+pub(crate) struct BenchRequest {
+    /// Splats or trained scenes to draw, posed photos to train on.
+    pub(crate) paths: Vec<PathBuf>,
+    /// Sizes of the drawn images.
+    pub(crate) sizes: Vec<[u32; 2]>,
+    /// Longer side of the training images in px.
+    pub(crate) max_side_px: u32,
+    pub(crate) repeats: usize,
+    /// Whether the GPU is timed beside the CPU.
+    pub(crate) gpu: bool,
+    /// So many queries are timed.
+    pub(crate) queries: Option<usize>,
+}
+
+/// Times stage by stage.
+///
+/// # Errors
+/// If something cannot be opened, drawn or trained on, or the observer asks to stop.
+pub(crate) fn run(request: &BenchRequest, observer: &mut dyn Observer) -> Result<Timings, JobError> {
+    let repeats = request.repeats;
+    let device = request.gpu.then(Device::shared).transpose()?;
+    let gpu_name = device.as_ref().map(Device::describe);
+    let one_core_products_per_sec = bench::one_core_limit();
+    let mut timings = Timings { gpu: gpu_name, one_core_products_per_sec, ..Timings::default() };
+    if let Some(count) = request.queries {
+        let mut encoder = models::encoder(models::DEMO)?;
+        timings.queries = Some(query::time(encoder.as_mut(), QUERY_IDENTITIES, QUERY_SIZE, count)?);
+    }
+    for path in &request.paths {
+        let name = bench::label(path);
+        let cloud = match io::open(path)? {
+            Opened::Dataset(dataset) => {
+                let (config, views) = photos(&dataset, request.max_side_px, observer)?;
+                timings.train.push(cpu::train_steps(&dataset, &views, &config, repeats)?);
+                if let Some(context) = &device {
+                    timings.gpu_train.push(gpu::train_steps(context, &dataset, &views, &config, repeats)?);
+                }
+                continue;
+            }
+            Opened::Cloud(cloud) => Arc::new(cloud),
+            Opened::Trained(scene) => Arc::new(scene.cloud),
+        };
+        for &size in &request.sizes {
+            observer.proceed()?;
+            observer.note(Severity::Info, format!("Drawing {name} at {} x {}", size[0], size[1]));
+            timings.render.push(cpu::render(&name, &cloud, size, repeats)?);
+            if let Some(context) = &device {
+                timings.gpu_render.push(gpu::render(context, &name, &cloud, size, repeats)?);
+            }
+        }
+    }
+    Ok(timings)
+}
+
+/// The photos to train on, and how.
+fn photos(
+    dataset: &Dataset,
+    max_side_px: u32,
+    observer: &mut dyn Observer,
+) -> Result<(TrainConfig, Vec<TrainView>), JobError> {
+    let config = TrainConfig { max_side_px, densify: false, ..TrainConfig::default() };
+    let (indices, _) = dataset.split(config.holdout_every);
+    let views = load_views(dataset, &indices, &config, "Loading photos", observer)?.ok_or(Interrupted)?;
+    if views.is_empty() {
+        return Err(StudyError(format!("{} has no photo to train on", dataset.root.display())).into());
+    }
+    observer.note(Severity::Info, format!("Training on {}", dataset.name));
+    Ok((config, views))
+}
+
+/// What opening and drawing a scene as the window does costs this process.
+///
+/// # Errors
+/// If it cannot be opened or drawn.
+pub(crate) fn cost_of(scene: &Path, variant: PlanVariant, repeats: usize) -> Result<PlanCost, JobError> {
+    Ok(cost(|| as_the_window(scene), variant, repeats)?)
+}
+
+/// Opens a scene as the window does, with the window's first view.
+fn as_the_window(path: &Path) -> Result<OpenScene, StudyError> {
+    let opened = open::open(path, &Folders::of_user(), &plan::machine(), &mut Silent);
+    let scene = opened.map_err(|e| StudyError(e.to_string()))?;
+    let cloud = scene.cloud.clone().ok_or_else(|| StudyError("there is nothing to draw".into()))?;
+    let first = scene.home.camera(SIZE).with_size(SIZE[0], SIZE[1]);
+    let cameras = scene.dataset.as_ref().map(|d| d.cameras()).unwrap_or_default();
+    let (settings, map) = (scene.render.clone(), scene.semantics.clone());
+    Ok(OpenScene { cloud, settings, map, cameras, up: scene.home.up, first, facts: scene.facts.clone() })
+}
+
+/// The GPU of this machine, if there is one.
+pub(crate) fn adapter() -> Option<String> {
+    Device::shared().ok().map(|device| device.describe())
+}

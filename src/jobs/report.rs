@@ -1,0 +1,167 @@
+//! Measuring error against run time, stage by stage, into a report that resumes; and which reports there are.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::{JobError, export, open};
+use crate::measure::subject::{StudyOptions, Subject};
+use crate::measure::{End, Report, StageName, computer, is_report, page, plot};
+use crate::pipeline::observer::{Observer, Severity};
+
+/// What is measured, and where it is kept.
+#[derive(Clone, Debug)]
+pub struct ReportRequest {
+    pub(crate) subject: Subject,
+    /// Stages to measure; none for all that the scene allows.
+    pub(crate) stages: Vec<StageName>,
+    /// Folder of the report. What is measured there already is resumed.
+    pub(crate) out: PathBuf,
+    /// Whether what is measured there is forgotten.
+    pub(crate) fresh: bool,
+    /// Seconds for everything.
+    pub(crate) budget_secs: f64,
+}
+
+pub(crate) struct Measured {
+    pub(crate) report: Report,
+    /// Those that were measured.
+    pub(crate) stages: Vec<StageName>,
+    pub(crate) end: End,
+}
+
+/// Measures, and writes the report after every measurement.
+///
+/// # Errors
+/// If a stage that was asked for is not possible, the folder holds another report, or it cannot be written.
+pub(crate) fn run(request: &ReportRequest, observer: &mut dyn Observer) -> Result<Measured, JobError> {
+    let ReportRequest { subject, out, budget_secs, .. } = request;
+    let computer = computer::look();
+    let mut report = match request.fresh {
+        true => Report::empty(&subject.name, &computer),
+        false => Report::begin(out, &subject.name, &computer)?,
+    };
+    let (stages, missing) = subject.stages(&request.stages)?;
+    missing.into_iter().for_each(|m| observer.note(Severity::Info, m));
+    export::make_folder(out)?;
+    let start = Instant::now();
+    let mut end = End::Finished;
+    for (k, name) in stages.iter().enumerate() {
+        let left = (budget_secs - start.elapsed().as_secs_f64()).max(0.0);
+        let share = left / (stages.len() - k) as f64;
+        let study = subject.study(*name);
+        let stage_end = match study.and_then(|mut study| report.measure(&mut study, out, share, observer)) {
+            // A stage that nobody named may turn out impossible; the others go on.
+            Err(why) if request.stages.is_empty() => {
+                observer.note(Severity::Warning, format!("Stage '{}' left out: {why}", name.name()));
+                continue;
+            }
+            other => other?,
+        };
+        write(out, &report)?;
+        if stage_end != End::Finished {
+            end = stage_end;
+        }
+        if end == End::Cancelled {
+            break;
+        }
+    }
+    Ok(Measured { report, stages, end })
+}
+
+/// A trained scene with its photos, if they are there.
+///
+/// # Errors
+/// If something of it cannot be read.
+pub(crate) fn subject(path: &Path, options: StudyOptions) -> Result<Subject, JobError> {
+    let scene = open::scene(path)?;
+    let dataset = scene.dataset_path.as_ref().filter(|p| p.exists()).map(|p| open::dataset(p)).transpose()?;
+    let map = match scene.semantics() {
+        Err(JobError::NoObjects(_)) => None,
+        map => Some(map?),
+    };
+    Ok(Subject {
+        name: path.display().to_string(),
+        cloud: scene.cloud,
+        settings: scene.settings,
+        cameras: scene.cameras.into_iter().map(|c| (c.camera, c.held_out)).collect(),
+        holdout_every: scene.config.holdout_every,
+        dataset: dataset.map(Arc::new),
+        map: map.map(Arc::new),
+        options,
+    })
+}
+
+/// Everything but the JSON, which is there already.
+fn write(folder: &Path, report: &Report) -> Result<(), JobError> {
+    export::text(&folder.join("report.csv"), &report.csv())?;
+    export::text(&folder.join("report.html"), &page::html(report))?;
+    for stage in &report.stages {
+        if let Some(plot) = stage.measures.first().and_then(|m| plot::svg(stage, m).ok()) {
+            export::text(&folder.join(format!("{}.svg", stage.name.name())), &plot)?;
+        }
+    }
+    Ok(())
+}
+
+/// Where reports of a scene may lie: where this program writes them, beside it, and where the command
+/// line writes them.
+pub(crate) fn known(scene: &Path, own: &Path) -> Vec<PathBuf> {
+    let usual = Path::new("out/report");
+    let mut found = Vec::new();
+    for folder in [own.to_owned(), scene.join("report"), usual.to_owned()] {
+        if is_report(&folder) && !found.contains(&folder) {
+            found.push(folder);
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::{BeginError, FILE};
+    use crate::pipeline::observer::Silent;
+    use crate::render::RenderSettings;
+    use crate::scene::Camera;
+    use glam::DVec3;
+
+    #[test]
+    fn a_report_beside_a_scene_is_found() {
+        let folder = tempfile::tempdir().expect("folder");
+        let (scene, out) = (folder.path().join("scene"), folder.path().join("out"));
+        let known_here = || known(&scene, &out).into_iter().filter(|p| p.starts_with(folder.path())).count();
+        assert_eq!(known_here(), 0);
+        std::fs::create_dir_all(scene.join("report")).expect("folder");
+        std::fs::write(scene.join("report").join(FILE), "{}").expect("written");
+        assert_eq!(known_here(), 1);
+    }
+
+    #[test]
+    fn what_is_no_report_is_not_written_over() {
+        let folder = tempfile::tempdir().expect("folder");
+        let camera = Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid");
+        let subject = Subject {
+            name: "nothing".into(),
+            cloud: Arc::default(),
+            settings: RenderSettings::default(),
+            cameras: vec![(camera, false)],
+            holdout_every: 8,
+            dataset: None,
+            map: None,
+            options: StudyOptions::default(),
+        };
+        let out = folder.path().join("report");
+        let stages = vec![StageName::Render];
+        let mut request = ReportRequest { subject, stages, out, fresh: false, budget_secs: f64::INFINITY };
+        std::fs::create_dir_all(&request.out).expect("folder");
+        std::fs::write(request.out.join(FILE), "{").expect("written");
+        let refused = run(&request, &mut Silent).err().expect("refused");
+        assert!(matches!(&refused, JobError::Report(BeginError::Read(e)) if e.to_string().contains("not a report")));
+        request.fresh = true;
+        request.stages = vec![StageName::Train];
+        let refused = run(&request, &mut Silent).err().expect("refused").to_string();
+        assert!(refused.contains("needs the scene's photos"), "{refused}");
+        assert_eq!(std::fs::read_to_string(request.out.join(FILE)).expect("there"), "{");
+    }
+}

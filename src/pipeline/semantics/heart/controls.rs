@@ -1,0 +1,86 @@
+//! What must fail the bars: scenes that were harmed before they are asked, and questions for what is not there.
+
+use crate::pipeline::semantics::relevancy::{PART_WEIGHT, deviate};
+use crate::scene::{Identities, IdentityId, Level, SemanticMap};
+
+/// Colors that things of these scenes may have.
+const COLORS: [&str; 12] =
+    ["black", "blue", "brown", "green", "grey", "orange", "pink", "purple", "red", "turquoise", "white", "yellow"];
+/// What is in neither scene: things, and parts of them.
+pub(super) const ABSENT: &str = "toy car, rocket, house, boat, duck, pot plant, candle, umbrella, bag, teddy bear, alarm clock, smartphone, \
+    headphones, green toy car, red rocket, brown house, white boat, yellow duck, turquoise bag, pink candle, \
+    sail of the boat, hull of the boat, beak of the duck, wings of the duck, roof of the house, \
+    chimney of the house, handle of the umbrella, canopy of the umbrella, buckle of the bag, flap of the bag, \
+    wheels of the toy car, leaves of the pot plant";
+
+/// What is done to a scene before it is asked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Harm {
+    Nothing,
+    /// Everything has the name of another thing, or another part.
+    Names,
+    /// Everything has the looks of another thing, or another part.
+    Looks,
+    /// Parts take most of their whole's looks.
+    Deviation,
+    /// Canonical phrases mean nothing, so that anything is more relevant.
+    Canonical,
+}
+
+/// The place of each identity after everything has gone on to the next of its level.
+fn next_of_level(identities: &Identities) -> Vec<usize> {
+    let of_level = |level: Level| identities.iter().filter(move |(_, i)| i.level == level).map(|(id, _)| id);
+    let mut next: Vec<usize> = (0..identities.len()).collect();
+    for level in [Level::Object, Level::Part] {
+        let all: Vec<IdentityId> = of_level(level).collect();
+        // Far enough that a part goes to another thing.
+        let step = all.len() / 2;
+        all.iter().enumerate().for_each(|(k, id)| next[*id as usize - 1] = all[(k + step) % all.len()] as usize - 1);
+    }
+    next
+}
+
+pub(super) fn harmed(map: &SemanticMap, harm: Harm) -> SemanticMap {
+    let mut map = map.clone();
+    let next = next_of_level(&map.identities);
+    match (harm, &mut map.language) {
+        (Harm::Names, _) => {
+            let names: Vec<Vec<String>> = map.identities.iter().map(|(_, i)| i.names.clone()).collect();
+            for (k, from) in next.iter().enumerate() {
+                if let Some(identity) = map.identities.get_mut(k as IdentityId + 1) {
+                    identity.names = names[*from].clone();
+                }
+            }
+        }
+        (Harm::Looks, Some(language)) => {
+            language.by_identity = next.iter().map(|k| language.by_identity[*k].clone()).collect()
+        }
+        (Harm::Deviation, Some(language)) => {
+            let wholes = language.by_identity.clone();
+            for (id, identity) in map.identities.iter().filter(|(_, i)| i.level == Level::Part) {
+                let whole = &wholes[map.identities.object_of(id) as usize - 1].raw;
+                let of = &mut language.by_identity[id as usize - 1];
+                let Some(whole) = whole.first() else { continue };
+                let exchanged = |raw: &Vec<f32>| deviate(whole, raw, PART_WEIGHT).expect("a direction");
+                of.deviated = of.raw.iter().map(exchanged).collect();
+                assert_ne!(identity.parent, 0);
+            }
+        }
+        _ => {}
+    }
+    map
+}
+
+/// Objects of the scene in colors that no object of their kind has.
+pub(super) fn wrong_colors(identities: &Identities) -> Vec<String> {
+    let objects = identities.iter().filter(|(_, i)| i.level == Level::Object).flat_map(|(_, i)| &i.names);
+    let names: Vec<&String> = objects.collect();
+    let mut wrong = Vec::new();
+    for (k, name) in names.iter().enumerate() {
+        let Some((_, kind)) = name.split_once(' ') else { continue };
+        let absent = |c: &&&str| !names.iter().any(|n| **n == format!("{c} {kind}"));
+        let others: Vec<&&str> = COLORS.iter().filter(absent).collect();
+        (0..3).for_each(|j| wrong.push(format!("{} {kind}", others[(k + 4 * j) % others.len()])));
+    }
+    wrong
+}

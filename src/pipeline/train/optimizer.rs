@@ -1,0 +1,179 @@
+//! Backward of the projection and Adam on the CPU, fused per Gaussian: gradients never reach memory, and Gaussians
+//! that were not drawn cost nothing.
+
+use rayon::prelude::*;
+
+use super::density::DensityStats;
+use crate::render::{AdamStep, DifferentiableRenderer, Rates, normals};
+use crate::scene::{Gaussian, GaussianCloud};
+
+/// Gaussians that one task updates.
+const BLOCK: usize = 512;
+
+/// What a step left out.
+#[derive(Clone, Copy, Default)]
+pub(super) struct StepStats {
+    /// Gaussians whose gradient was not finite.
+    pub(super) skipped: usize,
+    /// The first of them.
+    pub(super) first: Option<usize>,
+    /// Gradients that were cut as outliers.
+    pub(super) outliers: usize,
+}
+
+impl StepStats {
+    fn add(self, other: Self) -> Self {
+        Self {
+            skipped: self.skipped + other.skipped,
+            first: self.first.into_iter().chain(other.first).min(),
+            outliers: self.outliers + other.outliers,
+        }
+    }
+}
+
+/// Constants of a step's update.
+pub(super) struct Update {
+    pub(super) rates: Rates,
+    pub(super) adam: AdamStep,
+    pub(super) stride: usize,
+    pub(super) active: usize,
+    pub(super) radius_scale: f32,
+    /// Center of the camera relative to the cloud's origin, where Gaussians carry their normals as
+    /// extra channels.
+    pub(super) eye: Option<[f32; 3]>,
+}
+
+impl Update {
+    /// Moves the Gaussians that were drawn, and counts what density control asks for.
+    pub(super) fn apply(
+        &self,
+        renderer: &DifferentiableRenderer,
+        cloud: &mut GaussianCloud,
+        [first, second]: &mut [GaussianCloud; 2],
+        stats: &mut DensityStats,
+    ) -> StepStats {
+        let blocks: Vec<Block<'_>> = blocks(cloud)
+            .zip(blocks(first))
+            .zip(blocks(second))
+            .zip(stats.gradient.chunks_mut(BLOCK))
+            .zip(stats.seen.chunks_mut(BLOCK))
+            .zip(stats.radius.chunks_mut(BLOCK))
+            .enumerate()
+            .map(|(b, (((((p, m), v), gradient), seen), radius))| Block {
+                first: b * BLOCK,
+                p,
+                m,
+                v,
+                gradient,
+                seen,
+                radius,
+            })
+            .collect();
+        blocks
+            .into_par_iter()
+            .map(|mut block| step_block(renderer, &mut block, self))
+            .reduce(StepStats::default, StepStats::add)
+    }
+}
+
+/// The arrays of some consecutive Gaussians.
+struct Slices<'a> {
+    positions: &'a mut [[f32; 3]],
+    log_scales: &'a mut [[f32; 3]],
+    quaternions: &'a mut [[f32; 4]],
+    opacity_logits: &'a mut [f32],
+    sh: &'a mut [[f32; 3]],
+}
+
+/// Everything that the update of some consecutive Gaussians touches.
+struct Block<'a> {
+    first: usize,
+    p: Slices<'a>,
+    m: Slices<'a>,
+    v: Slices<'a>,
+    gradient: &'a mut [f32],
+    seen: &'a mut [u32],
+    radius: &'a mut [f32],
+}
+
+fn blocks(cloud: &mut GaussianCloud) -> impl Iterator<Item = Slices<'_>> {
+    let stride = cloud.sh_stride();
+    cloud
+        .positions
+        .chunks_mut(BLOCK)
+        .zip(cloud.log_scales.chunks_mut(BLOCK))
+        .zip(cloud.quaternions.chunks_mut(BLOCK))
+        .zip(cloud.opacity_logits.chunks_mut(BLOCK))
+        .zip(cloud.sh.chunks_mut(BLOCK * stride))
+        .map(|((((positions, log_scales), quaternions), opacity_logits), sh)| Slices {
+            positions,
+            log_scales,
+            quaternions,
+            opacity_logits,
+            sh,
+        })
+}
+
+/// Updates a block and returns what it left out.
+#[multiversion::multiversion(targets("x86_64+avx2+fma"))]
+fn step_block(renderer: &DifferentiableRenderer, block: &mut Block<'_>, update: &Update) -> StepStats {
+    let Update { rates, adam, stride, active, radius_scale, eye } = update;
+    let Block { first, p, m, v, gradient, seen, radius } = block;
+    let mut left = StepStats::default();
+    for i in 0..p.positions.len() {
+        let own = i * stride..(i + 1) * stride;
+        let gaussian = Gaussian {
+            position: p.positions[i],
+            log_scale: p.log_scales[i],
+            quaternion: p.quaternions[i],
+            opacity_logit: p.opacity_logits[i],
+            sh: &p.sh[own.clone()],
+        };
+        let Some(mut g) = renderer.gaussian_gradient(&gaussian, *first + i) else { continue };
+        let mut d_normal = [0.0; 3];
+        if let Some(eye) = eye
+            && renderer.feature_gradient(*first + i, &mut d_normal)
+        {
+            let turn = normals::backward(&gaussian, *eye, d_normal);
+            g.quaternion.iter_mut().zip(turn).for_each(|(q, t)| *q += t);
+        }
+        let finite = g.position.iter().chain(&g.log_scale).chain(&g.quaternion).chain(&g.color).all(|x| x.is_finite())
+            && g.opacity_logit.is_finite();
+        if !finite {
+            left.skipped += 1;
+            left.first = left.first.or(Some(*first + i));
+            continue;
+        }
+        gradient[i] += g.screen;
+        seen[i] += 1;
+        radius[i] = radius[i].max(g.radius_px * radius_scale);
+        let mut step = |p: &mut [f32], m: &mut [f32], v: &mut [f32], g: &[f32], rate: f32| {
+            for (((p, m), v), g) in p.iter_mut().zip(m).zip(v).zip(g) {
+                left.outliers += usize::from(adam.update(p, *g, m, v, rate));
+            }
+        };
+        step(&mut p.positions[i], &mut m.positions[i], &mut v.positions[i], &g.position, rates.position);
+        step(&mut p.log_scales[i], &mut m.log_scales[i], &mut v.log_scales[i], &g.log_scale, rates.log_scale);
+        step(&mut p.quaternions[i], &mut m.quaternions[i], &mut v.quaternions[i], &g.quaternion, rates.quaternion);
+        let o = i..i + 1;
+        step(
+            &mut p.opacity_logits[o.clone()],
+            &mut m.opacity_logits[o.clone()],
+            &mut v.opacity_logits[o],
+            &[g.opacity_logit],
+            rates.opacity_logit,
+        );
+        // All SH coefficients in one loop, which then runs in vectors.
+        let mut d_sh = [0.0; 48];
+        for (d, (k, c)) in d_sh.iter_mut().zip((0..*active).flat_map(|k| (0..3).map(move |c| (k, c)))) {
+            *d = g.color[c] * g.basis[k];
+        }
+        let own = own.start..own.start + active;
+        let (p, m, v) = (&mut p.sh[own.clone()], &mut m.sh[own.clone()], &mut v.sh[own]);
+        let (p, m, v) = (p.as_flattened_mut(), m.as_flattened_mut(), v.as_flattened_mut());
+        let ((p0, p1), (m0, m1), (v0, v1)) = (p.split_at_mut(3), m.split_at_mut(3), v.split_at_mut(3));
+        step(p0, m0, v0, &d_sh[..3], rates.sh_constant);
+        step(p1, m1, v1, &d_sh[3..3 * active], rates.sh_rest);
+    }
+    left
+}
