@@ -1,6 +1,12 @@
 //! The whole window, headless: what the user sees and does, with the software adapter.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+#[path = "ui_window/edits.rs"]
+mod edits;
+#[path = "ui_window/hands.rs"]
+mod hands;
+#[path = "ui_window/problems.rs"]
+mod problems;
 #[path = "ui_window/report.rs"]
 mod report;
 mod ui_common;
@@ -13,7 +19,6 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
 use fmlgs::jobs::Folders;
-use fmlgs::measure::{self, ErrorKind, Knobs, Measure, Point, Report, Rule, Sample, Stage, StageName};
 use fmlgs::pipeline::observer::Silent;
 use fmlgs::pipeline::semantics::edit::Edit;
 use fmlgs::pipeline::synth::{self, SynthOptions};
@@ -56,6 +61,32 @@ impl Window {
     fn click(&mut self, label: &str) {
         self.harness.get_by_label(label).click();
         self.harness.run_steps(2);
+    }
+
+    fn press(&mut self, key: egui::Key) {
+        self.harness.key_press(key);
+        self.harness.run_steps(2);
+    }
+
+    /// Clicks twice in one frame: any time between the clicks would be too long on a slow machine.
+    fn double_click(&mut self, pos: egui::Pos2) {
+        let (button, modifiers) = (egui::PointerButton::Primary, egui::Modifiers::NONE);
+        let click = |pressed| egui::Event::PointerButton { pos, button, pressed, modifiers };
+        self.harness.hover_at(pos);
+        self.harness.step();
+        self.harness.input_mut().events.extend([true, false, true, false].map(click));
+        self.harness.run_steps(3);
+    }
+
+    /// Types into whatever has the keyboard.
+    fn types(&mut self, text: &str) {
+        for letter in text.chars() {
+            let key = egui::Key::from_name(&letter.to_uppercase().to_string());
+            key.into_iter().for_each(|key| self.harness.key_down(key));
+            self.harness.event(egui::Event::Text(letter.into()));
+            key.into_iter().for_each(|key| self.harness.key_up(key));
+            self.harness.step();
+        }
     }
 
     fn shows(&self, text: &str) -> bool {
@@ -148,23 +179,6 @@ fn keys_move_the_eye_and_home_brings_it_back() {
     w.harness.run_steps(2);
     w.harness.key_press(egui::Key::Home);
     w.until("the first view", |a| center(a).distance(home) < 1e-9);
-}
-
-#[test]
-fn the_palette_and_the_shortcut_sheet_list_the_actions() {
-    let mut w = Window::new(None);
-    w.ask(Action::Palette);
-    assert!(w.shows("Start training"));
-    w.harness.get_by_label("Search actions").type_text("scene plan");
-    w.harness.run_steps(2);
-    assert!(!w.shows("Start training"));
-    assert!(w.app().layout.shows(Pane::Plan));
-    w.harness.key_press(egui::Key::Enter);
-    w.harness.run_steps(3);
-    assert!(!w.app().layout.shows(Pane::Plan), "the found action was run");
-    w.harness.key_press(egui::Key::F1);
-    w.harness.run_steps(3);
-    assert!(w.shows("Keyboard and mouse") && w.shows("Ctrl+P"));
 }
 
 /// A few photos of the demo scene, as the program's own ray caster makes them; the same for all tests.
@@ -395,21 +409,4 @@ fn objects_are_found_asked_for_renamed_hidden_and_undone() {
     let stored = fmlgs::io::semantic_map::load(&out, scene.state.as_deref(), &scene.cloud);
     let stored = stored.expect("readable").expect("there");
     assert_eq!(stored.identities.name(red[0]), "Rosa");
-}
-
-#[test]
-fn frame_times_are_shown_and_cost_nothing_when_they_are_not() {
-    let folder = tempfile::tempdir().expect("folder");
-    let mut w = Window::new(Some(Action::Open(write_splat(folder.path()))));
-    w.until("a picture", |a| a.viewport.picture().is_some_and(|p| p.full));
-    assert!(!w.shows("median of"));
-    w.harness.key_press(egui::Key::F3);
-    w.harness.run_steps(2);
-    assert!(w.app().layout.times);
-    w.until("times of a picture", |a| a.viewport.picture().is_some_and(|p| p.full && p.ticket > 1));
-    w.harness.run_steps(3);
-    assert!(w.shows("median of") && w.shows("total") && w.shows("upload"));
-    w.harness.key_press(egui::Key::F3);
-    w.harness.run_steps(3);
-    assert!(!w.shows("median of"));
 }

@@ -14,6 +14,7 @@ say() { printf 'setup: %s\n' "$*" >&2; }
 libraries=$(PATH="$PATH:/sbin:/usr/sbin" ldconfig -p 2>/dev/null || true)
 has_library() { [[ "$libraries" == *"$1"* ]]; }
 has_command() { command -v "$1" >/dev/null 2>&1; }
+has_chinese_font() { [ -e /usr/share/fonts/truetype/droid/DroidSansFallbackFull.ttf ] || [ -n "$(fc-list :lang=zh file 2>/dev/null)" ]; }
 has_vulkan_driver() { compgen -G '/usr/share/vulkan/icd.d/*.json' >/dev/null || compgen -G '/etc/vulkan/icd.d/*.json' >/dev/null; }
 
 # need PACKAGE CHECK ARGUMENT...: remembers PACKAGE if the check fails.
@@ -46,6 +47,8 @@ need libxkbcommon0 has_library libxkbcommon.so.0
 need libxkbcommon-x11-0 has_library libxkbcommon-x11.so.0
 need libwayland-client0 has_library libwayland-client.so.0
 if [ "$mode" = test ]; then
+    # A font with Chinese letters, for the test that types some.
+    need fonts-droid-fallback has_chinese_font
     # A virtual display for the test that opens a real window.
     need xvfb has_command Xvfb
 fi

@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3};
 use super::camera_args::{Direction, Distance, NORMAL};
 use super::relation::{Extent, Viewpoint};
 pub use super::view_shares::Parts;
-use super::view_shares::{ViewShares, is_drawn};
+use super::view_shares::ViewShares;
 use super::world::{Arrival, IdentityFacts, Moved, Unreachable, World, WorldError};
 use crate::jobs::export;
 use crate::jobs::go_to::{self, ApproachRequest, Approached, Explored};
@@ -32,8 +32,12 @@ pub enum Effect {
     Fly(Box<CameraTrajectory>, Option<DVec3>),
     /// These are marked, and nothing else.
     Mark(Vec<IdentityId>),
-    /// Which identities are left out of the picture.
+    /// Whose own Gaussians are left out of the picture.
     Hidden(Vec<IdentityId>),
+    /// The last change of that was undone: these are left out again.
+    HiddenUndone(Vec<IdentityId>),
+    /// What the user did last is to be undone.
+    Undo,
     Renamed(IdentityId, String),
     /// The last change of a name was undone: it is called this again.
     RenameUndone(IdentityId, String),
@@ -53,6 +57,8 @@ pub struct SceneWorld {
     bounds: Vec<Option<Bounds>>,
     shares: ViewShares,
     done: UndoHistory<Before>,
+    /// What the user did last, which the window can undo.
+    pub(crate) undoable: Option<String>,
     emit: Emit,
 }
 
@@ -71,7 +77,7 @@ impl SceneWorld {
     pub fn new(parts: Parts, eye: Pose, aspect: f64, emit: Emit) -> Result<Self, WorldError> {
         let engine = QueryEngine::new(parts.map.language.as_ref()).map_err(|e| WorldError(e.to_string()))?;
         let n = parts.map.identities.len() + 1;
-        let bounds = bounds(&parts);
+        let bounds = parts.bounds();
         Ok(Self {
             parts,
             engine,
@@ -81,6 +87,7 @@ impl SceneWorld {
             bounds,
             shares: ViewShares::default(),
             done: UndoHistory::default(),
+            undoable: None,
             emit,
         })
     }
@@ -95,9 +102,13 @@ impl SceneWorld {
                 self.done = UndoHistory::default();
             }
             self.parts.map = Arc::clone(map);
-            self.bounds = bounds(&self.parts);
+            self.bounds = self.parts.bounds();
         }
-        self.hidden = (0..=map.identities.len() as IdentityId).map(|id| hidden.contains(&id)).collect();
+        let hidden: Vec<bool> = (0..=map.identities.len() as IdentityId).map(|id| hidden.contains(&id)).collect();
+        if hidden != self.hidden {
+            self.done = UndoHistory::default();
+            self.hidden = hidden;
+        }
     }
 
     /// Where the eye is.
@@ -115,9 +126,10 @@ impl SceneWorld {
         new
     }
 
-    /// Whether the user sees an identity's Gaussians.
+    /// Whether the user sees an identity's Gaussians, or those of any of its pieces.
     fn drawn(&self, id: IdentityId) -> bool {
-        is_drawn(&self.parts.map.identities, &self.hidden, id)
+        let inside = self.parts.map.identities.descendants(id);
+        inside.iter().zip(&self.hidden).any(|(inside, hidden)| *inside && !hidden)
     }
 
     /// Share of the present view that an identity covers, pieces included.
@@ -133,15 +145,15 @@ impl SceneWorld {
         (self.emit)(Effect::Fly(Box::new(flight), about));
     }
 
-    fn emit_hidden(&mut self) {
-        let hidden = (0..self.hidden.len()).filter(|i| self.hidden[*i]).map(|i| i as IdentityId).collect();
-        (self.emit)(Effect::Hidden(hidden));
+    fn hidden_list(&self) -> Vec<IdentityId> {
+        (0..).zip(&self.hidden).filter(|(_, hidden)| **hidden).map(|(id, _)| id).collect()
     }
 
     fn set_hidden_list(&mut self, hidden: Vec<bool>, what: String) {
         let before = std::mem::replace(&mut self.hidden, hidden);
         self.done.record(Before::Hidden(before, what));
-        self.emit_hidden();
+        let hidden = self.hidden_list();
+        (self.emit)(Effect::Hidden(hidden));
     }
 
     fn name(&self, id: IdentityId) -> String {
@@ -165,16 +177,6 @@ impl SceneWorld {
         self.fly(flight, None, what);
         Ok(length)
     }
-}
-
-/// The boxes of all identities, by number.
-fn bounds(parts: &Parts) -> Vec<Option<Bounds>> {
-    let Parts { cloud, map, .. } = parts;
-    let mut places: Vec<Vec<DVec3>> = vec![Vec::new(); map.identities.len() + 1];
-    for (i, &id) in map.identity_of.iter().enumerate().take(cloud.len()) {
-        map.identities.ancestors(id).for_each(|id| places[id as usize].push(cloud.world_position(i)));
-    }
-    places.into_iter().map(Bounds::robust).collect()
 }
 
 impl World for SceneWorld {
@@ -314,18 +316,17 @@ impl World for SceneWorld {
 
     fn isolate(&mut self, id: IdentityId) -> Result<(), WorldError> {
         let all = &self.parts.map.identities;
-        let inside = all.descendants(id);
-        let line: Vec<IdentityId> = all.ancestors(id).collect();
-        let hidden = (0..=all.len() as IdentityId).map(|i| !inside[i as usize] && !line.contains(&i)).collect();
+        let hidden = all.descendants(id).into_iter().map(|inside| !inside).collect();
         let what = format!("showing only {}", self.name(id));
         self.set_hidden_list(hidden, what);
         Ok(())
     }
 
     fn set_hidden(&mut self, id: IdentityId, hide: bool) -> Result<(), WorldError> {
-        let mut hidden = self.hidden.clone();
-        let slot = hidden.get_mut(id as usize).ok_or_else(|| WorldError(format!("there is no #{id}")))?;
-        *slot = hide;
+        let all = &self.parts.map.identities;
+        all.get(id).ok_or_else(|| WorldError(format!("there is no #{id}")))?;
+        let now = |(inside, hidden): (bool, &bool)| if inside { hide } else { *hidden };
+        let hidden = all.descendants(id).into_iter().zip(&self.hidden).map(now).collect();
         let what = format!("{} {}", if hide { "hiding" } else { "showing" }, self.name(id));
         self.set_hidden_list(hidden, what);
         Ok(())
@@ -353,10 +354,16 @@ impl World for SceneWorld {
     }
 
     fn undo(&mut self) -> Result<String, WorldError> {
-        match self.done.take().ok_or_else(|| WorldError("There is nothing to take back.".into()))? {
+        let Some(done) = self.done.take() else {
+            let what = self.undoable.take().ok_or_else(|| WorldError("There is nothing to take back.".into()))?;
+            (self.emit)(Effect::Undo);
+            return Ok(what);
+        };
+        match done {
             Before::Hidden(hidden, what) => {
                 self.hidden = hidden;
-                self.emit_hidden();
+                let hidden = self.hidden_list();
+                (self.emit)(Effect::HiddenUndone(hidden));
                 Ok(what)
             }
             Before::Named(map, id, old) => {

@@ -60,3 +60,14 @@ fn what_the_user_has_edited_since_is_not_undone() {
     assert!(world.undo().is_err());
     assert_eq!((world.identities().name(1).as_str(), effects.lock().expect("no panic").len()), ("sun", 1));
 }
+
+#[test]
+fn what_the_user_did_last_is_undone_by_the_window() {
+    let (mut world, effects) = renamed();
+    // The user has hidden the lamp since.
+    world.keep_up(EYE, 1.0, &[1], &map(Some("torch")));
+    world.undoable = Some("hid torch".into());
+    assert_eq!(world.undo().expect("the user's"), "hid torch");
+    assert!(matches!(effects.lock().expect("no panic").last(), Some(Effect::Undo)));
+    assert!(world.undo().is_err(), "once");
+}

@@ -10,7 +10,7 @@ use crate::jobs::go_to::Explored;
 use crate::jobs::query;
 use crate::navigate::Pose;
 use crate::render::RenderSettings;
-use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, SemanticMap};
+use crate::scene::{Bounds, Camera, GaussianCloud, IdentityId, SemanticMap};
 
 /// What a scene is made of.
 pub struct Parts {
@@ -26,6 +26,18 @@ pub struct Parts {
     pub explored: Option<Arc<Explored>>,
 }
 
+impl Parts {
+    /// The boxes of all identities, by number.
+    pub(super) fn bounds(&self) -> Vec<Option<Bounds>> {
+        let Self { cloud, map, .. } = self;
+        let mut places: Vec<Vec<DVec3>> = vec![Vec::new(); map.identities.len() + 1];
+        for (i, &id) in map.identity_of.iter().enumerate().take(cloud.len()) {
+            map.identities.ancestors(id).for_each(|id| places[id as usize].push(cloud.world_position(i)));
+        }
+        places.into_iter().map(Bounds::robust).collect()
+    }
+}
+
 /// Longer side of the picture in which pixels of identities are counted, px.
 const COUNT_SIDE_PX: f64 = 256.0;
 
@@ -38,11 +50,6 @@ struct Counted {
     eye: Pose,
     hidden: Vec<bool>,
     shares: Vec<f64>,
-}
-
-/// Whether neither an identity nor what it is a piece of is hidden.
-pub(super) fn is_drawn(identities: &Identities, hidden: &[bool], id: IdentityId) -> bool {
-    !identities.ancestors(id).any(|i| hidden.get(i as usize).copied().unwrap_or(false))
 }
 
 impl ViewShares {
@@ -63,7 +70,7 @@ fn count(parts: &Parts, eye: Pose, aspect: f64, hidden: &[bool]) -> Vec<f64> {
     let (camera, identities) = (eye.camera(w, h), &map.identities);
     let mut shares = vec![0.0; identities.len() + 1];
     let view = if hidden.contains(&true) {
-        let is_kept = |i: &usize| map.identity_of.get(*i).is_none_or(|id| is_drawn(identities, hidden, *id));
+        let is_kept = |i: &usize| map.identity_of.get(*i).is_none_or(|id| hidden.get(*id as usize) != Some(&true));
         let kept: Vec<usize> = (0..cloud.len()).filter(is_kept).collect();
         query::identities_in_view((&cloud.select(&kept), settings), &map.select(&kept), &camera)
     } else {

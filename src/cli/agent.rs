@@ -289,7 +289,8 @@ fn line(effect: &Effect) -> Option<String> {
             Some(format!("flies {length:.2} units in {secs:.1} s, {} poses", flight.poses.len()))
         }
         Effect::Mark(ids) => Some(format!("marks {} of them", ids.len())),
-        Effect::Hidden(ids) => Some(format!("leaves {} out of the picture", ids.len())),
+        Effect::Undo => None,
+        Effect::Hidden(ids) | Effect::HiddenUndone(ids) => Some(format!("leaves {} out of the picture", ids.len())),
         Effect::Renamed(id, name) | Effect::RenameUndone(id, name) => Some(format!("calls #{id} {name}")),
         Effect::Explored(_) => None,
     }

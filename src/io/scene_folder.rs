@@ -72,12 +72,23 @@ impl SceneFolder {
             }
             None => commit.remove(semantic_map::FILE),
         }
-        commit.add(SCENE_FILE, |w| {
-            serde_json::to_writer_pretty(&mut *w, &info)?;
-            w.write_all(b"\n")
-        })?;
+        commit.add(SCENE_FILE, |w| write_info(w, &info))?;
         commit.finish()?;
         Ok(state)
+    }
+
+    /// Stores how long a unit of the scene is, in meters; its state stays what it is.
+    ///
+    /// # Errors
+    /// If it cannot be written; [`IoError::Changed`] if the scene is not in the state `known` any more.
+    pub(crate) fn save_scale(&self, known: Option<&str>, meters_per_unit: f64) -> Result<(), IoError> {
+        let info = SceneInfo { metres_per_unit: Some(meters_per_unit), ..load_info(self.path())? };
+        if info.state.as_deref() != known {
+            return Err(IoError::Changed { folder: self.path().into() });
+        }
+        let mut commit = Commit::new(self.path());
+        commit.add(SCENE_FILE, |w| write_info(w, &info))?;
+        commit.finish()
     }
 
     /// Saves another map of the Gaussians `cloud`, which are those of the scene in the state `known`.
@@ -178,6 +189,11 @@ impl SceneFolder {
         keep().map_err(|cause| write_error(&place, cause))?;
         Ok(Some(place))
     }
+}
+
+fn write_info(w: &mut dyn Write, info: &SceneInfo) -> io::Result<()> {
+    serde_json::to_writer_pretty(&mut *w, info)?;
+    w.write_all(b"\n")
 }
 
 #[cfg(test)]

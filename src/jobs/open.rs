@@ -209,6 +209,11 @@ pub struct OpenedScene {
 }
 
 impl OpenedScene {
+    /// Length of a unit in meters, if it is known of the scene or of its photos.
+    pub(crate) fn meters_per_unit(&self) -> Option<f64> {
+        self.metres_per_unit.or_else(|| self.dataset.as_ref().and_then(|d| d.metres_per_unit))
+    }
+
     fn of(scene: Scene, dataset: Option<Arc<Dataset>>, observer: &mut dyn Observer) -> Self {
         let home = match &dataset {
             Some(dataset) if scene.cameras.is_empty() => HomeView::new(&dataset.cameras(), Some(&scene.cloud)),
@@ -280,7 +285,10 @@ pub(crate) fn known_objects(scene: &Scene, observer: &mut dyn Observer) -> Optio
         }
         Err(JobError::NoObjects(_)) => None,
         Err(e) => {
-            observer.note(Severity::Warning, format!("Its objects cannot be shown: {e}"));
+            observer.note(
+                Severity::Warning,
+                format!("Its objects cannot be shown: {e}. Find them again (Objects pane, or fmlgs preprocess)"),
+            );
             None
         }
     }
@@ -292,7 +300,8 @@ fn photos(dataset: Dataset, folders: &Folders, observer: &mut dyn Observer) -> O
     let before = trained::is_scene(&out).then(|| trained::load(&out)).and_then(|loaded| match loaded {
         Ok(scene) => Some(scene),
         Err(e) => {
-            observer.note(Severity::Warning, format!("Earlier training of these photos cannot be shown: {e}"));
+            observer
+                .note(Severity::Warning, format!("Earlier training of these photos cannot be shown: {e}. Train again"));
             None
         }
     });
@@ -312,7 +321,10 @@ fn photos(dataset: Dataset, folders: &Folders, observer: &mut dyn Observer) -> O
 /// A trained scene; where its settings cannot be read this is told, and it is drawn with the defaults.
 fn tolerant(path: &Path, scene: TrainedScene, observer: &mut dyn Observer) -> Scene {
     let config = TrainConfig::stored(&scene.folder, scene.info.config.clone()).unwrap_or_else(|e| {
-        observer.note(Severity::Warning, format!("It may not look as it was trained: {e}"));
+        observer.note(
+            Severity::Warning,
+            format!("It may not look as it was trained: {e}. Train again, or restore the file"),
+        );
         TrainConfig::default()
     });
     Scene::trained(path, scene, config)

@@ -98,6 +98,16 @@ pub(crate) fn short(v: f64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
+/// A length: in m, cm or mm where the length of a unit in meters is known, else in units.
+pub(crate) fn length(units: f64, meters_per_unit: Option<f64>) -> String {
+    let Some(scale) = meters_per_unit else { return format!("{} units", short(units)) };
+    match units * scale {
+        m if m >= 1.0 => format!("{} m", short((m * 100.0).round() / 100.0)),
+        m if m >= 0.01 => format!("{} cm", short((m * 1000.0).round() / 10.0)),
+        m => format!("{} mm", short((m * 10_000.0).round() / 10.0)),
+    }
+}
+
 /// A number of an axis: at most four significant digits, none of them needless.
 pub(crate) fn tick(v: f64) -> String {
     match v.abs() {

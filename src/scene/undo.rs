@@ -51,18 +51,6 @@ impl<T> UndoHistory<T> {
         self.past.pop()
     }
 
-    /// Takes in that `old` has given way to a state that [`Self::last`] or [`Self::next`] may be, as `is_it` says:
-    /// then this was an undo or a redo, else a change.
-    pub(crate) fn replaced(&mut self, mut old: T, is_it: impl Fn(&T) -> bool) {
-        if self.last().is_some_and(&is_it) {
-            self.undo(&mut old);
-        } else if self.next().is_some_and(&is_it) {
-            self.redo(&mut old);
-        } else {
-            self.record(old);
-        }
-    }
-
     fn step(from: &mut Vec<T>, to: &mut Vec<T>, now: &mut T) -> bool {
         let Some(other) = from.pop() else { return false };
         to.push(std::mem::replace(now, other));
@@ -88,18 +76,6 @@ mod tests {
         assert!(!history.redo(&mut now), "a change ends what could be redone");
         assert!(history.undo(&mut now) && now == 2);
         assert_eq!((history.take(), history.take(), history.take()), (Some(1), Some(0), None));
-    }
-
-    #[test]
-    fn states_that_come_back_are_no_changes() {
-        let mut history = UndoHistory::default();
-        history.replaced('a', |s| *s == 'b');
-        history.replaced('b', |s| *s == 'a');
-        assert_eq!((history.last(), history.next()), (None, Some(&'b')));
-        history.replaced('a', |s| *s == 'b');
-        assert_eq!((history.last(), history.next()), (Some(&'a'), None));
-        history.replaced('b', |s| *s == 'c');
-        assert_eq!((history.last(), history.next()), (Some(&'b'), None));
     }
 
     #[test]

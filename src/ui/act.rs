@@ -1,6 +1,6 @@
 //! What each action does.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::app::App;
@@ -20,11 +20,10 @@ use crate::measure::is_report;
 use crate::navigate::FRAMES;
 use crate::navigate::target::{Side, ViewPreference};
 use crate::pipeline::semantics::edit::Edit;
-use crate::pipeline::train::preset;
 use crate::scene::IdentityId;
 use crate::scene::plan::When;
 use crate::ui::actions::{Action, Pane};
-use crate::worker::{Command, Failure, JobId, JobKind, ViewMode};
+use crate::worker::{Command, JobId, JobKind, ViewMode};
 
 impl App {
     /// Does what a user asked for.
@@ -44,6 +43,7 @@ impl App {
                     self.worker.cancel(job.id);
                 }
             }
+            Action::Dismiss if self.viewport.is_measuring() => self.view(&Action::Measure, ctx),
             Action::Dismiss if self.viewport.picking.selected().is_some() => self.view(&Action::Select(None), ctx),
             Action::Dismiss => self.act(Action::Cancel, ctx),
             Action::Evaluate => self.evaluate(),
@@ -53,6 +53,12 @@ impl App {
             Action::Ask(text) => {
                 if let Some(semantics) = self.state.semantics.clone() {
                     self.viewport.queries.ask(&text, &semantics);
+                }
+            }
+            Action::SetScale(meters_per_unit) => {
+                if let Some(scene) = &self.state.scene {
+                    let out = scene.out.clone();
+                    self.submit(Command::SetScale { out, meters_per_unit });
                 }
             }
             Action::Show(mode) => {
@@ -78,6 +84,8 @@ impl App {
             }
             Action::ToggleCameras => self.layout.cameras = !self.layout.cameras,
             Action::TogglePane(pane) => self.layout.toggle(pane),
+            Action::ShowPane(pane) => self.bring_up(pane),
+            Action::Rename => self.start_renaming(),
             Action::Palette => self.palette.toggle(),
             Action::Shortcuts => self.sheet = !self.sheet,
             Action::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
@@ -95,10 +103,10 @@ impl App {
             Action::StepForward => self.step_in_time(1.0, ctx),
             Action::AddKey => {
                 self.camera.record(&self.viewport.pose());
-                self.layout.hidden.retain(|p| *p != Pane::Camera);
+                self.layout.show(Pane::Camera);
             }
             Action::StartChat => {
-                self.layout.hidden.retain(|p| *p != Pane::Chat);
+                self.bring_up(Pane::Chat);
                 self.chat.start_typing();
             }
             Action::OpenFolder
@@ -122,6 +130,8 @@ impl App {
             | Action::Hide(_)
             | Action::ResetView
             | Action::TurnUp(_)
+            | Action::SetUp(_)
+            | Action::Measure
             | Action::PreviousPhoto
             | Action::NextPhoto
             | Action::GoToPhoto(_) => {
@@ -191,17 +201,6 @@ impl App {
 
     pub(super) fn install_model(&mut self, id: String, brought: Option<PathBuf>) {
         self.submit(Command::InstallModel { id, brought });
-    }
-
-    /// Takes over settings for the next training.
-    fn read_preset(&mut self, path: &Path) {
-        match preset::read(path) {
-            Ok(config) => {
-                self.layout.config = config;
-                self.state.toast(Tone::Good, format!("The next training has the settings of {}", path.display()));
-            }
-            Err(e) => self.state.fail("Reading training settings", Failure::of(&e, "")),
-        }
     }
 
     fn start_training(&mut self) {
@@ -326,14 +325,15 @@ impl App {
                 map: Arc::clone(&map),
                 cameras,
                 up,
-                meters: scene.metres_per_unit.or_else(|| scene.dataset.as_ref().and_then(|d| d.metres_per_unit)),
+                meters: scene.meters_per_unit(),
                 exports: scene.out.join("exports"),
                 explored,
             },
             scene: self.state.scene_number,
             eye,
             aspect,
-            hidden: self.viewport.visibility.hidden().collect(),
+            hidden: self.viewport.visibility.hidden().iter().copied().collect(),
+            undoable: self.state.changes.last().map(str::to_owned),
         };
         self.chat.send(text, snapshot, self.layout.chat.clone(), &self.repaint);
     }
@@ -354,34 +354,33 @@ impl App {
                 }
             }
             Effect::Hidden(ids) => self.viewport.visibility.set_hidden(ids),
+            Effect::Undo => self.edit(EditStep::Undo),
+            Effect::HiddenUndone(ids) => self.edit(EditStep::UndoHidden(ids)),
             Effect::Renamed(id, name) => self.edit(EditStep::Request(EditRequest::Apply(Edit::Rename(id, name)))),
             Effect::RenameUndone(id, name) => self.edit(EditStep::UndoRename(id, name)),
             Effect::Explored(explored) => self.state.explored = Some(explored),
         }
     }
 
-    /// Changes objects and parts, after the changes that were asked for before.
-    fn edit(&mut self, step: EditStep) {
-        self.edits.push_back(step);
-        self.next_edit();
+    /// Shows a pane, unfolded.
+    fn bring_up(&mut self, pane: Pane) {
+        self.layout.show(pane);
+        self.unfold = Some(pane);
     }
 
-    /// Begins the next change of objects and parts, if none is under way: each builds on the one before.
-    pub(super) fn next_edit(&mut self) {
-        if self.editing.is_some_and(|job| job > self.state.short_jobs_done) {
-            return;
+    /// Makes a text field of the name that was chosen last.
+    fn start_renaming(&mut self) {
+        let found = || self.viewport.queries.found().first().copied();
+        let chosen = self.viewport.picking.selected().or_else(found);
+        match (chosen, self.state.semantics.clone()) {
+            (Some(id), Some(map)) => {
+                self.bring_up(Pane::Objects);
+                self.objects.rename(id, &map.identities);
+            }
+            _ => self
+                .state
+                .toast(Tone::Info, "Choose what to rename first: click it in the view or its name in the list."),
         }
-        let Some(step) = self.edits.pop_front() else { return };
-        let Some(SceneContext { scene, cloud, map: Some(map), settings, .. }) = self.context() else {
-            self.edits.clear();
-            return;
-        };
-        let Some(request) = step.request(&self.state.edits) else {
-            self.state.toast(Tone::Warning, "There is no such edit of objects and parts.");
-            return;
-        };
-        let (cloud, map, out) = (Arc::clone(&cloud), Arc::clone(&map), scene.out.clone());
-        self.editing = self.submit(Command::EditObjects { cloud, map, settings, request, out });
     }
 
     fn type_question(&mut self) {

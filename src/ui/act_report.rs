@@ -14,7 +14,7 @@ use crate::worker::Command;
 impl App {
     /// Reads a report and shows its pane.
     pub(super) fn read_report(&mut self, path: PathBuf, second: bool) {
-        self.layout.hidden.retain(|p| *p != Pane::Report);
+        self.layout.show(Pane::Report);
         self.submit(Command::ReadReport { path, second });
     }
 
@@ -43,7 +43,7 @@ impl App {
         };
         let (stages, out) = (vec![StageName::Render], scene.report_out.clone());
         let request = ReportRequest { subject, stages, out, fresh: false, budget_secs: f64::INFINITY };
-        self.layout.hidden.retain(|p| *p != Pane::Report);
+        self.layout.show(Pane::Report);
         self.submit(Command::Measure(Box::new(request)));
     }
 
@@ -52,7 +52,7 @@ impl App {
         let done = match stage {
             StageName::Train => turned(&self.layout.config, knobs).map(|config| {
                 self.layout.config = config;
-                self.layout.hidden.retain(|p| *p != Pane::Training);
+                self.layout.show(Pane::Training);
                 "The next training will use it (pane Training)"
             }),
             StageName::Render => turned(&self.viewport.overrides, knobs).map(|drawing| {

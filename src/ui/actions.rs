@@ -99,7 +99,7 @@ macro_rules! actions {
     };
     ($($name:ident $(($($arg:ident: $ty:ty),+))?: $text:expr, $tip:literal $(, $key:literal)?;)*) => {
         /// What a user wants.
-        #[derive(Clone, Debug, PartialEq, Eq)]
+        #[derive(Clone, Debug, PartialEq)]
         pub enum Action {
             $(#[doc = $tip] $name $(($($ty),+))?,)*
         }
@@ -190,11 +190,17 @@ actions! {
             Some(id) => format!("Paint a new part of #{id}"),
         }, "Drag over it or click on it in the view; its Gaussians become a new object or part.";
     AddPainted: "Add what is painted", "Make the painted Gaussians a new object or part.";
-    Undo: "Undo the last edit of objects", "Take the last edit of objects and parts back.", "Ctrl+Z";
-    Redo: "Redo the last edit of objects", "Make the edit again that was undone.", "Ctrl+Y";
+    Rename: "Rename", "Type a new name for the object or part that was chosen last.", "F2";
+    Undo: "Undo", "Take the last change of objects, of what is shown or of the camera path back.", "Ctrl+Z";
+    Redo: "Redo", "Make the change again that was undone.", "Ctrl+Y";
     FrameScene: "Frame the selection or the scene", "Move until all of what is selected is in view, or else the whole scene.", "F";
     ResetView: "Reset the view", "Return to the view with which the scene opened.", "Home";
     TurnUp(axis: Axis): format!("Make {} the up direction", axis.text()), "For scenes that lie on their side.";
+    SetUp(up: DVec3): format!("Make ({:.2}, {:.2}, {:.2}) the up direction", up.x, up.y, up.z),
+        "The plane that was picked becomes the floor.";
+    Measure: "Measure a distance", "Click two points on surfaces; set the scale from a length that you know.", "M";
+    SetScale(meters: f64): format!("Set the scale to {meters} m per unit"),
+        "Lengths are shown in meters from now on; kept with the scene.";
     PreviousPhoto: "Previous photo", "Look through the camera of the previous photo.", "[";
     NextPhoto: "Next photo", "Look through the camera of the next photo.", "]";
     GoToPhoto(index: usize): format!("Go to photo {}", index + 1), "Look through the camera of this photo.";
@@ -207,7 +213,8 @@ actions! {
     ToggleCompare: "Compare with the photo", "Show the photo beside the rendering with a slider between them.", "C";
     ToggleCameras: "Show or hide cameras", "Draw the camera of every photo into the view.", "V";
     TogglePane(pane: Pane): format!("Show or hide the {} pane", pane.text().to_lowercase()),
-        "Show or hide this part of the window.";
+        "Show this part of the window, or make room for others.";
+    ShowPane(pane: Pane): format!("Show the {} pane", pane.text().to_lowercase()), "Bring this part of the window up.";
     ChooseReport: "Open a report\u{2026}", "A report.json of fmlgs report: error against run time of every setting.";
     ChooseSecondReport: "Compare with another report\u{2026}", "Plotted with hollow markers, its numbers side by side.";
     OpenReport(path: PathBuf): format!("Open the report {}", path.display()), "Read this report.";
@@ -233,6 +240,7 @@ impl Action {
         all.retain(|a| *a != Self::AddPainted);
         all.extend([Self::Isolate(None), Self::Paint(Some(NOBODY))]);
         all.extend(ViewMode::VARIANTS.iter().map(|mode| Self::Show(*mode)));
+        all.extend(Pane::VARIANTS.iter().map(|pane| Self::ShowPane(*pane)));
         all.extend(ColorBy::VARIANTS.iter().map(|by| Self::Tint(*by)));
         all.extend(Pane::VARIANTS.iter().map(|pane| Self::TogglePane(*pane)));
         all.extend(Axis::VARIANTS.iter().map(|axis| Self::TurnUp(*axis)));

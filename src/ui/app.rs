@@ -8,13 +8,14 @@ use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 
 use super::camera::CameraPane;
 use super::chat::Chat;
-use super::dialogs::{self, FileDialogs, Question};
-use super::edits::EditStep;
+use super::dialogs::{self, Question};
+use super::edits::{EditStep, Editing};
+use super::file_dialogs::FileDialogs;
 use super::layout::Layout;
 use super::palette::{Palette, shortcut_sheet};
 use super::panes::{
     bars, dataset::PhotoThumbnails, empty::FirstPage, log, models::Models, object_thumbnails::ObjectThumbnails,
-    objects, plan, report::ReportPane, training, unposed,
+    objects::ObjectsPane, plan, problems, report::ReportPane, training, unposed,
 };
 use super::state::AppState;
 use super::toasts::Toasts;
@@ -24,7 +25,7 @@ use crate::measure::is_report;
 use crate::scene::plan::PlanOverride;
 use crate::scene::resource_log::{self, ResourceKind};
 use crate::ui::actions::{Action, Pane};
-use crate::worker::{JobId, Jobs, Repaint, Worker};
+use crate::worker::{Jobs, Repaint, Worker};
 
 /// The window's application.
 pub struct App {
@@ -43,6 +44,7 @@ pub struct App {
     first_page: FirstPage,
     photo_thumbnails: PhotoThumbnails,
     object_thumbnails: ObjectThumbnails,
+    pub(super) objects: ObjectsPane,
     models: Models,
     /// Error against run time.
     pub(crate) report: ReportPane,
@@ -60,7 +62,9 @@ pub struct App {
     traced: usize,
     /// Edits of objects and parts that wait for the one that is under way.
     pub(super) edits: VecDeque<EditStep>,
-    pub(super) editing: Option<JobId>,
+    pub(super) editing: Option<Editing>,
+    /// A pane that is to be unfolded.
+    pub(super) unfold: Option<Pane>,
 }
 
 impl App {
@@ -92,6 +96,7 @@ impl App {
             first_page: FirstPage::default(),
             photo_thumbnails: PhotoThumbnails::default(),
             object_thumbnails: ObjectThumbnails::default(),
+            objects: ObjectsPane::default(),
             models: Models::default(),
             report: ReportPane::default(),
             camera: CameraPane::default(),
@@ -102,6 +107,7 @@ impl App {
             traced: 0,
             edits: VecDeque::new(),
             editing: None,
+            unfold: None,
             actions: first.into_iter().collect(),
         })
     }
@@ -109,6 +115,16 @@ impl App {
     /// Asks for an action, as a key or a button would.
     pub fn ask(&mut self, action: Action) {
         self.actions.push(action);
+    }
+
+    /// Whether a file is being chosen in a dialog of the window's own.
+    pub fn chooses_file(&self) -> bool {
+        self.dialogs.is_own_open()
+    }
+
+    /// The conversation so far, as Markdown, once all of it is answered.
+    pub fn conversation(&self) -> Option<&str> {
+        self.chat.transcript(false).filter(|_| self.chat.is_idle())
     }
 
     /// Takes what a user wants of scene plans, for this run and, as it is kept, later ones.
@@ -132,6 +148,7 @@ impl App {
         self.camera.on_scene(self.state.scene_number);
         self.visited();
         for effect in self.chat.news() {
+            self.settle(false);
             self.effect(effect);
         }
         self.next_edit();
@@ -140,9 +157,6 @@ impl App {
         self.first_page.update(ctx, &mut self.state, &self.viewport, &self.worker);
         self.photo_thumbnails.update(ctx, &mut self.state);
         self.object_thumbnails.update(ctx, &mut self.state, self.viewport.cloud().map(|c| &**c), &self.worker);
-        while let Some(answer) = self.dialogs.answer() {
-            self.chosen(answer);
-        }
     }
 
     /// Moves the eye along what is played.
@@ -159,12 +173,12 @@ impl App {
     }
 
     fn keys_and_drops(&mut self, ctx: &egui::Context) {
-        if !self.palette.is_open()
-            && self.state.error.is_none()
-            && self.state.unposed.is_none()
-            && self.question.is_none()
-            && !self.sheet
-        {
+        keys::watch_typing(ctx);
+        let has_dialog = self.state.error.is_some()
+            || self.state.unposed.is_some()
+            || self.question.is_some()
+            || self.dialogs.is_own_open();
+        if !self.palette.is_open() && !has_dialog && !self.sheet {
             self.actions.extend(keys::pressed(ctx));
         }
         let dropped: Vec<PathBuf> =
@@ -181,8 +195,11 @@ impl App {
         let bar = Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(10, 6));
         let pane = Frame::new().fill(theme::PANEL).inner_margin(Margin::same(12));
         let Self { state, layout, actions, viewport, .. } = self;
+        let unfold = self.unfold.take();
+        let header = |pane: Pane| egui::CollapsingHeader::new(pane.text()).open((unfold == Some(pane)).then_some(true));
         Panel::top("menus").frame(bar).show(ui, |ui| bars::top(ui, state, layout, actions));
         Panel::bottom("status").frame(bar).show(ui, |ui| bars::status(ui, state, layout, viewport.picture(), actions));
+        problems::show(ui, state);
         if layout.shows(Pane::Log) {
             Panel::bottom("log")
                 .frame(pane)
@@ -224,16 +241,18 @@ impl App {
                 ui,
                 |ui| {
                     ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-                        let objects = layout.shows(Pane::Objects) && scene.dataset.is_some();
-                        let show_objects = |ui: &mut Ui, actions: &mut Vec<Action>| {
-                            egui::CollapsingHeader::new(Pane::Objects.text()).default_open(true).show(ui, |ui| {
-                                objects::show(ui, state, &self.object_thumbnails, &viewport.visibility, actions)
+                        let can_have = scene.dataset.is_some() || state.semantics.is_some();
+                        let objects = layout.shows(Pane::Objects) && can_have;
+                        let mut show_objects = |ui: &mut Ui, actions: &mut Vec<Action>| {
+                            header(Pane::Objects).default_open(true).show(ui, |ui| {
+                                let (thumbnails, visibility) = (&self.object_thumbnails, &viewport.visibility);
+                                self.objects.show(ui, state, thumbnails, visibility, actions);
                             });
                             ui.add_space(10.0);
                         };
                         if layout.shows(Pane::Chat) {
                             let map = state.semantics.clone();
-                            egui::CollapsingHeader::new(Pane::Chat.text()).default_open(map.is_some()).show(ui, |ui| {
+                            header(Pane::Chat).default_open(map.is_some()).show(ui, |ui| {
                                 let identities = map.as_deref().map(|map| &map.identities);
                                 self.chat.show(ui, &mut layout.chat, &self.object_thumbnails, identities, actions);
                             });
@@ -252,12 +271,12 @@ impl App {
                             show_objects(ui, actions);
                         }
                         if layout.shows(Pane::Plan) {
-                            egui::CollapsingHeader::new(Pane::Plan.text())
+                            header(Pane::Plan)
                                 .default_open(state.history.steps.is_empty())
                                 .show(ui, |ui| plan::show(ui, &state.plan, &mut layout.plan));
                         }
                         if layout.shows(Pane::Models) {
-                            egui::CollapsingHeader::new(Pane::Models.text())
+                            header(Pane::Models)
                                 .show(ui, |ui| self.models.show(ui, state, &mut layout.finding, &self.worker, actions));
                         }
                     });
@@ -272,12 +291,12 @@ impl App {
         if ctx.input(|i| !i.raw.hovered_files.is_empty()) {
             drop_hint(ctx);
         }
-        if let Some(action) = self.palette.show(ctx) {
+        if let Some(action) = self.palette.show(ctx, &self.layout) {
             self.actions.push(action);
         }
         shortcut_sheet(ctx, &mut self.sheet);
         if let Some(question) = &self.question
-            && let Some(yes) = dialogs::show_question(ctx, question)
+            && let Some(yes) = dialogs::show_question(ctx, &question.text, question.yes, question.no)
             && let Some(question) = self.question.take()
             && yes
         {
@@ -290,6 +309,9 @@ impl App {
         }
         if self.state.error.as_ref().is_some_and(|e| dialogs::show_error(ctx, e)) {
             self.state.error = None;
+        }
+        if let Some((action, path)) = self.dialogs.show(ctx) {
+            self.chosen(action, path);
         }
         self.toasts.show(ctx, &mut self.state, ctx.content_rect().shrink2(egui::vec2(0.0, 44.0)));
     }
@@ -306,9 +328,11 @@ impl eframe::App for App {
         self.panes(ui);
         self.over_everything(&ctx);
         for action in std::mem::take(&mut self.actions) {
+            self.settle(false);
             self.act(action, &ctx);
             ctx.request_repaint();
         }
+        self.settle(!ctx.input(|i| i.pointer.any_down()) && !ctx.text_edit_focused());
     }
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {

@@ -1,16 +1,17 @@
 //! The chat: what is asked in plain sentences goes to the agent on a thread of its own, what it does
 //! comes back as effects. Below the box stands how a command can go on.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crossbeam_channel::{Receiver, Sender, bounded};
-use egui::text::{CCursor, CCursorRange};
 use egui::{Button, Key, Modifiers, Response, RichText, ScrollArea, TextEdit, Ui};
 
 pub(crate) use super::chat_model::ChatSettings;
 use super::chat_model::ModelChooser;
 use super::panes::object_thumbnails::ObjectThumbnails;
+use super::text_field::cursor_to_end;
 use super::theme;
 use crate::agent::commands::{Commands, complete};
 use crate::agent::llm::Llm;
@@ -18,7 +19,7 @@ use crate::agent::scene::{Effect, Parts, SceneWorld};
 use crate::agent::{AgentEvent, Planner, Policy, Refusal, Session};
 use crate::navigate::Pose;
 use crate::scene::resource_log::{self, ResourceKind};
-use crate::scene::{Identities, IdentityId, SemanticMap, text};
+use crate::scene::{Identities, IdentityId, text};
 use crate::ui::actions::Action;
 use crate::worker::Repaint;
 
@@ -44,6 +45,8 @@ pub(crate) struct Snapshot {
     pub(crate) aspect: f64,
     /// What is left out of the frame.
     pub(crate) hidden: Vec<IdentityId>,
+    /// What was done last, which the window can undo.
+    pub(crate) undoable: Option<String>,
 }
 
 /// A line of the conversation.
@@ -77,8 +80,8 @@ pub(crate) struct Chat {
     cancel: Option<Arc<AtomicBool>>,
     /// The talk so far, as JSON and as Markdown.
     transcript: Option<[String; 2]>,
-    /// A sentence to be sent with the next snapshot.
-    waiting: Option<String>,
+    /// Sentences to be sent, each with a snapshot of its own, when those before are answered.
+    waiting: VecDeque<String>,
     /// Set while the box is to take the keyboard.
     focus: bool,
     /// What was typed, and how it can go on.
@@ -111,6 +114,11 @@ impl Chat {
         effects
     }
 
+    /// Whether everything that was said is answered.
+    pub fn is_idle(&self) -> bool {
+        self.cancel.is_none() && self.waiting.is_empty()
+    }
+
     /// The talk as text: JSON if the file is called so, else Markdown.
     pub(crate) fn transcript(&self, json: bool) -> Option<&str> {
         self.transcript.as_ref().map(|t| t[usize::from(!json)].as_str())
@@ -118,7 +126,7 @@ impl Chat {
 
     /// What is to be sent, once a snapshot of the scene is there.
     pub(crate) fn wants(&mut self) -> Option<String> {
-        self.waiting.take()
+        if self.cancel.is_some() { None } else { self.waiting.pop_front() }
     }
 
     /// Sends a sentence to the agent.
@@ -180,6 +188,9 @@ impl Chat {
                         ui.weak("working\u{2026}");
                     });
                 }
+                for text in &self.waiting {
+                    ui.weak(format!("next: {text}"));
+                }
             });
         }
         ui.horizontal(|ui| {
@@ -188,25 +199,29 @@ impl Chat {
             let takes_tab = !self.continuations.1.is_empty();
             let edit = TextEdit::singleline(&mut self.typed).hint_text(hint).desired_width(width).char_limit(1000);
             let edit = edit.lock_focus(takes_tab);
-            let response = ui.add_enabled(ready && self.cancel.is_none(), edit);
+            let response = ui.add_enabled(ready, edit).accessible_name("Chat box");
             if std::mem::take(&mut self.focus) {
                 response.request_focus();
             }
             self.take_continuation(ui, &response);
             let enter = response.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
-            match &self.cancel {
+            let some = !self.typed.trim().is_empty();
+            let clicked = match &self.cancel {
                 Some(cancel) => {
                     if ui.button("Stop").clicked() {
                         cancel.store(true, Ordering::Relaxed);
+                        self.waiting.clear();
                     }
+                    false
                 }
-                None => {
-                    let send = ui.add_enabled(ready && !self.typed.trim().is_empty(), Button::new("Send"));
-                    if (enter || send.clicked()) && !self.typed.trim().is_empty() {
-                        say = Some(std::mem::take(&mut self.typed));
-                        self.focus = true;
-                    }
-                }
+                None => ui.add_enabled(ready && some, Button::new("Send")).clicked(),
+            };
+            // The next sentence goes into the box, too, whether this one is answered yet or not.
+            if enter || clicked {
+                response.request_focus();
+            }
+            if some && (enter || clicked) {
+                say = Some(std::mem::take(&mut self.typed));
             }
         });
         self.show_continuations(ui, identities.filter(|_| !settings.use_model));
@@ -222,9 +237,7 @@ impl Chat {
                 *self = Self::default();
             }
         });
-        if self.cancel.is_none() && say.is_some() {
-            self.waiting = say;
-        }
+        self.waiting.extend(say);
     }
 }
 
@@ -247,11 +260,7 @@ impl Chat {
         let pressed = || ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Tab));
         let Some(first) = self.continuations.1.first().filter(|_| response.has_focus() && pressed()) else { return };
         self.typed = format!("{first} ");
-        if let Some(mut state) = TextEdit::load_state(ui.ctx(), response.id) {
-            let end = CCursor::new(self.typed.chars().count());
-            state.cursor.set_char_range(Some(CCursorRange::one(end)));
-            state.store(ui.ctx(), response.id);
-        }
+        cursor_to_end(ui.ctx(), response.id, &self.typed);
     }
 }
 
@@ -353,8 +362,8 @@ impl Agent {
 
     /// Brings session and world up to date.
     fn get_ready(&mut self, snapshot: Snapshot, settings: ChatSettings) -> Result<(), String> {
-        let Snapshot { parts, cloud, scene, eye, aspect, hidden } = snapshot;
-        let key = (scene, cloud);
+        let Snapshot { parts, cloud, scene, eye, aspect, hidden, undoable } = snapshot;
+        let (key, map) = ((scene, cloud), Arc::clone(&parts.map));
         if self.world.as_ref().is_none_or(|(known, _)| *known != key) {
             let (news, repaint) = (self.news.clone(), Arc::clone(&self.repaint));
             let emit = Box::new(move |effect: Effect| {
@@ -365,9 +374,10 @@ impl Agent {
             self.world = Some((key, world));
             // What was spoken of belongs to another scene.
             self.session = None;
-        } else if let Some((_, world)) = &mut self.world {
-            let map: Arc<SemanticMap> = parts.map;
+        }
+        if let Some((_, world)) = &mut self.world {
             world.keep_up(eye, aspect, &hidden, &map);
+            world.undoable = undoable;
         }
         if self.session.as_ref().is_none_or(|(known, _)| *known != settings) {
             let policy = Policy::from_environment().map_err(|e| e.to_string())?;

@@ -1,65 +1,178 @@
-//! Edits of objects and parts as they are asked for: one history for the user's and the agent's.
+//! Changes of objects and parts as they are asked for, undo and redo among them: each builds on the one before.
 
 use std::sync::Arc;
 
+use super::app::App;
+use super::context::SceneContext;
+use super::history::{Snapshot, ViewState, edit_text};
+use super::state::Tone;
 use crate::jobs::edit::EditRequest;
 use crate::pipeline::semantics::edit::Edit;
-use crate::scene::undo::UndoHistory;
-use crate::scene::{IdentityId, SemanticMap};
+use crate::scene::IdentityId;
+use crate::worker::{Command, JobId};
 
-/// A step that waits for those before it: what it comes to depends on where they lead.
+/// A step that waits for those before it.
 pub(super) enum EditStep {
     Request(EditRequest),
     Undo,
     Redo,
     /// The agent took a rename back, after which the identity is called this again.
     UndoRename(IdentityId, String),
+    /// The agent took back what it hid or showed, after which these are left out again.
+    UndoHidden(Vec<IdentityId>),
 }
 
-impl EditStep {
-    /// What it comes to now; `None` if there is nothing to undo or redo.
-    pub(super) fn request(self, history: &UndoHistory<Arc<SemanticMap>>) -> Option<EditRequest> {
-        let restore = |map: Option<&Arc<SemanticMap>>| map.cloned().map(EditRequest::Restore);
-        match self {
-            Self::Request(request) => Some(request),
-            Self::Undo => restore(history.last()),
-            Self::Redo => restore(history.next()),
-            Self::UndoRename(id, name) => {
-                let called = |map: &&Arc<SemanticMap>| {
-                    map.identities.get(id).is_some_and(|i| i.names.first().map_or("", |n| n) == name)
-                };
-                // Where the user has edited since, the name alone is taken back.
-                restore(history.last().filter(called)).or(Some(EditRequest::Apply(Edit::Rename(id, name))))
+/// A change of objects and parts that is under way.
+pub(super) struct Editing {
+    job: JobId,
+    /// What it does, in words; `None` if it is the way back or forth to an earlier state.
+    what: Option<String>,
+    /// Whether the way leads forth.
+    redo: bool,
+}
+
+impl App {
+    /// Does a step after those that were asked for before.
+    pub(super) fn edit(&mut self, step: EditStep) {
+        self.edits.push_back(step);
+        self.next_edit();
+    }
+
+    /// Begins the next steps, up to one that takes time.
+    pub(super) fn next_edit(&mut self) {
+        loop {
+            match self.editing.take() {
+                Some(editing) if editing.job > self.state.short_jobs_done => {
+                    self.editing = Some(editing);
+                    return;
+                }
+                Some(editing) => self.edited(editing),
+                None => {}
             }
+            let Some(step) = self.edits.pop_front() else { return };
+            self.settle(true);
+            match step {
+                EditStep::Request(request) => self.request(request),
+                EditStep::Undo => self.go_in_history(false),
+                EditStep::Redo => self.go_in_history(true),
+                // Where the user has done something since, what the agent did is undone alone.
+                EditStep::UndoRename(id, name) if self.was(|s| s.is_called(id, &name)) => self.go_in_history(false),
+                EditStep::UndoRename(id, name) => self.request(EditRequest::Apply(Edit::Rename(id, name))),
+                EditStep::UndoHidden(ids) if self.was(|s| s.view.hidden.iter().eq(&ids)) => self.go_in_history(false),
+                EditStep::UndoHidden(ids) => self.viewport.visibility.set_hidden(ids),
+            }
+        }
+    }
+
+    /// Whether undoing leads to a state like this.
+    fn was(&self, like: impl Fn(&Snapshot) -> bool) -> bool {
+        self.state.changes.before().is_some_and(like)
+    }
+
+    fn request(&mut self, request: EditRequest) {
+        let Some(map) = &self.state.semantics else { return };
+        let what = Some(edit_text(&request, &map.identities));
+        self.editing = self.submit_edit(request).map(|job| Editing { job, what, redo: false });
+    }
+
+    fn submit_edit(&mut self, request: EditRequest) -> Option<JobId> {
+        let SceneContext { scene, cloud, map: Some(map), settings, .. } = self.context()? else { return None };
+        let (cloud, map, out) = (Arc::clone(&cloud), Arc::clone(&map), scene.out.clone());
+        self.submit(Command::EditObjects { cloud, map, settings, request, out })
+    }
+
+    /// Takes in that an edit is over.
+    fn edited(&mut self, editing: Editing) {
+        if self.state.changes.now().is_none_or(|now| now.scene != self.state.scene_number) {
+            return;
+        }
+        let map = self.state.semantics.as_deref().cloned();
+        let Some(what) = editing.what else {
+            // One that could not be stored leaves all as it was.
+            if !self.state.changes.has_map(&map)
+                && let Some((_, back)) = self.state.changes.go(!editing.redo)
+            {
+                self.show_state(back.view);
+            }
+            return;
+        };
+        let before = self.state.changes.now().and_then(|now| now.map.clone());
+        if let (Some(old), Some(new)) = (before, map)
+            && old.identities.len() > new.identities.len()
+        {
+            self.viewport.visibility.renumber(&old.identities, &new.identities);
+        }
+        // Where it was refused or failed that was said, and there is nothing to undo.
+        if let Some(what) = self.state.changes.settle(&self.snapshot(), Some(&what)) {
+            self.state.toast(Tone::Good, sentence(&what));
+        }
+    }
+
+    /// Undoes the last change, or redoes the next.
+    fn go_in_history(&mut self, redo: bool) {
+        let Some((what, to)) = self.state.changes.go(redo) else {
+            self.state.toast(Tone::Info, if redo { "Nothing to redo." } else { "Nothing to undo." });
+            return;
+        };
+        let map = self.state.semantics.as_deref().cloned();
+        if let Some(other) = to.map.filter(|_| !self.state.changes.has_map(&map)) {
+            let Some(job) = self.submit_edit(EditRequest::Restore(other)) else {
+                self.state.changes.go(!redo);
+                return;
+            };
+            self.editing = Some(Editing { job, what: None, redo });
+        }
+        self.show_state(to.view);
+        self.state.toast(Tone::Info, format!("{}: {what}", if redo { "Redone" } else { "Undone" }));
+    }
+
+    fn show_state(&mut self, view: ViewState) {
+        let ViewState { hidden, mode, cameras, path, kept } = view;
+        if self.viewport.visibility.hidden() != &hidden {
+            self.viewport.visibility.set_hidden(hidden);
+        }
+        (self.layout.mode, self.layout.cameras) = (mode, cameras);
+        self.camera.set_path(path);
+        if let Some(map) = self.state.semantics.clone() {
+            self.viewport.queries.keep_only(&kept, &map);
+        }
+    }
+
+    fn snapshot(&self) -> Snapshot {
+        let (layout, viewport) = (&self.layout, &self.viewport);
+        let view = ViewState {
+            hidden: viewport.visibility.hidden().clone(),
+            mode: layout.mode,
+            cameras: layout.cameras,
+            path: self.camera.path.clone(),
+            kept: viewport.queries.kept_texts(),
+        };
+        let map = self.state.semantics.as_deref().cloned();
+        Snapshot { scene: self.state.scene_number, map, view }
+    }
+
+    /// Takes into the history what was done since, unless objects and parts are about to change. The path only
+    /// `at_rest`, when no drag and no typing is under way.
+    pub(super) fn settle(&mut self, at_rest: bool) {
+        if self.editing.is_some() {
+            return;
+        }
+        let mut now = self.snapshot();
+        let before = self.state.changes.now().filter(|before| before.scene == now.scene);
+        if let Some(path) = before.filter(|_| !at_rest).map(|before| before.view.path.clone()) {
+            now.view.path = path;
+        }
+        let shown = before.is_some_and(|before| before.view.hidden != now.view.hidden);
+        let Some(what) = self.state.changes.settle(&now, None) else { return };
+        match shown {
+            true => self.state.toast(Tone::Info, sentence(&what)),
+            false => self.state.say(Tone::Info, sentence(&what)),
         }
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::{Identities, Level, NOBODY};
-
-    fn called(name: &str) -> Arc<SemanticMap> {
-        let mut identities = Identities::default();
-        identities.add(Level::Object, NOBODY, vec![name.into()]);
-        Arc::new(SemanticMap { identities, ..SemanticMap::default() })
-    }
-
-    #[test]
-    fn an_agent_takes_its_rename_back_as_ctrl_z_would() {
-        let lamp = called("lamp");
-        let mut history = UndoHistory::default();
-        let step = || EditStep::UndoRename(1, "lamp".into());
-        history.record(Arc::clone(&lamp));
-        let restored = |request| matches!(request, Some(EditRequest::Restore(map)) if Arc::ptr_eq(&map, &lamp));
-        assert!(restored(step().request(&history)) && restored(EditStep::Undo.request(&history)));
-        // The user has renamed it once more.
-        history.record(called("torch"));
-        let Some(EditRequest::Apply(Edit::Rename(1, name))) = step().request(&history) else {
-            panic!("the user's edit would be lost");
-        };
-        assert_eq!(name, "lamp");
-        assert!(EditStep::Redo.request(&history).is_none());
-    }
+/// What was done, as a sentence.
+fn sentence(what: &str) -> String {
+    let mut letters = what.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }

@@ -1,6 +1,6 @@
 //! Key bindings, read off the actions.
 
-use egui::{Key, KeyboardShortcut, Modifiers};
+use egui::{Event, Id, Key, KeyboardShortcut, Modifiers};
 
 use crate::ui::actions::{Action, Shortcut};
 
@@ -32,13 +32,64 @@ pub(crate) fn label(ctx: &egui::Context, action: &Action) -> String {
     binding(shortcut).map_or_else(String::new, |b| ctx.format_shortcut(&b))
 }
 
-/// Takes every bound key that was pressed off the input, as often as it was pressed. Plain keys
-/// belong to a text field while one has the focus.
+/// How long keys belong to a text field that has lost the keyboard, seconds: whoever types on means no shortcuts.
+const TYPING_SECS: f64 = 1.0;
+
+/// Who typed where, and when.
+#[derive(Clone, Copy, Default)]
+struct Typing {
+    /// Until when letters are no shortcuts.
+    until: f64,
+    /// The field with the keyboard, if something was typed into it since Enter: undo belongs to it then.
+    unsent: Option<Id>,
+}
+
+/// Looks who types; once per frame, before anybody takes keys.
+pub(crate) fn watch_typing(ctx: &egui::Context) {
+    let field = ctx.memory(|m| m.focused()).filter(|_| ctx.text_edit_focused());
+    let typing = typing(ctx);
+    let typing = ctx.input(|i| {
+        let is_text = |e: &Event| matches!(e, Event::Text(_) | Event::Paste(_));
+        let typed = i.events.iter().any(is_text);
+        let goes_on = field.is_some() || (typed && i.time < typing.until);
+        let unsent = field.filter(|id| typed || typing.unsent == Some(*id)).filter(|_| !i.key_pressed(Key::Enter));
+        let until = match goes_on {
+            true => i.time + TYPING_SECS,
+            // Whoever clicks somewhere or cancels has ended typing.
+            false if i.pointer.any_pressed() || i.key_pressed(Key::Escape) => 0.0,
+            false => typing.until,
+        };
+        Typing { until, unsent }
+    });
+    ctx.data_mut(|d| d.insert_temp(Id::NULL, typing));
+}
+
+fn typing(ctx: &egui::Context) -> Typing {
+    ctx.data(|d| d.get_temp(Id::NULL)).unwrap_or_default()
+}
+
+/// Whether letters belong to a text field: it has the keyboard, or lost it while it was typed into.
+pub(crate) fn is_typing(ctx: &egui::Context) -> bool {
+    ctx.text_edit_focused() || ctx.input(|i| i.time) < typing(ctx).until
+}
+
+/// Takes every bound key that was pressed off the input, as often as it was pressed, unless it belongs to a text
+/// field.
 pub(crate) fn pressed(ctx: &egui::Context) -> Vec<Action> {
-    let typing = ctx.text_edit_focused();
+    let (has_field, is_typing) = (ctx.text_edit_focused(), is_typing(ctx));
+    let has_focus = ctx.memory(|m| m.focused()).is_some();
+    let unsent = has_field && typing(ctx).unsent.is_some();
+    let is_fields = |action: &Action, shortcut: Shortcut| match shortcut {
+        Shortcut { ctrl: true, .. } => unsent && matches!(action, Action::Undo | Action::Redo),
+        // What a field does not take: F1 to F12.
+        Shortcut { key, .. } if key.len() > 1 && key.starts_with('F') => false,
+        // Space presses the button that has the focus.
+        Shortcut { key: "Space", .. } => has_focus || is_typing,
+        Shortcut { key, .. } => has_field || is_typing && key.len() == 1,
+    };
     let mut found = Vec::new();
     for action in Action::all() {
-        let Some(shortcut) = action.shortcut().filter(|s| s.ctrl || !typing) else { continue };
+        let Some(shortcut) = action.shortcut().filter(|s| !is_fields(&action, *s)) else { continue };
         let Some(key) = binding(shortcut) else { continue };
         let times = ctx.input_mut(|i| i.count_and_consume_key(key.modifiers, key.logical_key));
         found.extend(std::iter::repeat_n(action, times));

@@ -47,7 +47,7 @@ pub struct Layout {
     /// Panes that are hidden.
     pub hidden: Vec<Pane>,
     /// Whether cameras are drawn into the view.
-    pub(crate) cameras: bool,
+    pub cameras: bool,
     /// Whether the photo is shown beside the frame.
     pub compare: bool,
     /// Where the split between frame and photo is, 0 to 1.
@@ -68,6 +68,8 @@ pub struct Layout {
     pub(crate) chat: ChatSettings,
     /// Files and folders opened lately.
     pub(crate) recent: Vec<PathBuf>,
+    /// Where a file was chosen last.
+    pub folder: Option<PathBuf>,
 }
 
 impl Default for Layout {
@@ -85,6 +87,7 @@ impl Default for Layout {
             finding: FindSettings::default(),
             chat: ChatSettings::default(),
             recent: Vec::new(),
+            folder: None,
         }
     }
 }
@@ -106,13 +109,14 @@ impl Layout {
         !self.hidden.contains(&pane)
     }
 
+    /// Shows a pane.
+    pub(crate) fn show(&mut self, pane: Pane) {
+        self.hidden.retain(|p| *p != pane);
+    }
+
     /// Shows a hidden pane or hides a shown one.
     pub(crate) fn toggle(&mut self, pane: Pane) {
-        if self.shows(pane) {
-            self.hidden.push(pane);
-        } else {
-            self.hidden.retain(|p| *p != pane);
-        }
+        if self.shows(pane) { self.hidden.push(pane) } else { self.show(pane) }
     }
 }
 

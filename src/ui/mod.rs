@@ -16,12 +16,15 @@ pub mod color_by;
 mod context;
 pub(crate) mod dialogs;
 mod edits;
+mod file_dialogs;
+mod fonts;
+mod history;
 pub(crate) mod keys;
 pub(crate) mod layout;
-mod message;
 pub(crate) mod palette;
 pub(crate) mod panes;
 pub(crate) mod state;
+mod text_field;
 pub(crate) mod theme;
 pub(crate) mod toasts;
 mod train_history;
@@ -68,6 +71,8 @@ fn open(
     // Shades that dithering would smooth do not occur in a flat theme.
     let mut options =
         eframe::NativeOptions { viewport, renderer, dithering: false, ..eframe::NativeOptions::default() };
+    // The theme brings them.
+    options.system_font_fallback = false;
     // A device that can draw and train too.
     if let WgpuSetup::CreateNew(setup) = &mut options.wgpu_options.wgpu_setup {
         setup.power_preference = eframe::wgpu::PowerPreference::HighPerformance;

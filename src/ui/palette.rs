@@ -3,6 +3,7 @@
 use egui::{Align2, Key, Modifiers, RichText, ScrollArea, TextEdit};
 
 use super::keys;
+use super::layout::Layout;
 use super::theme;
 use crate::ui::actions::Action;
 
@@ -25,11 +26,11 @@ impl Palette {
     }
 
     /// Draws it, and returns the action that was chosen.
-    pub(crate) fn show(&mut self, ctx: &egui::Context) -> Option<Action> {
+    pub(crate) fn show(&mut self, ctx: &egui::Context, layout: &Layout) -> Option<Action> {
         if !self.open {
             return None;
         }
-        let found = matches(&self.query);
+        let found = matches(&self.query, layout);
         let last = found.len().saturating_sub(1);
         let step = |key| ctx.input_mut(|i| i.consume_key(Modifiers::NONE, key));
         if step(Key::ArrowDown) {
@@ -61,7 +62,7 @@ impl Palette {
                         ui.weak("No action of that name.");
                     }
                     for (i, action) in found.iter().enumerate() {
-                        let row = egui::Button::selectable(i == self.selected, action.text())
+                        let row = egui::Button::selectable(i == self.selected, title(action))
                             .shortcut_text(keys::label(ui.ctx(), action))
                             .min_size(egui::vec2(ui.available_width(), 28.0));
                         let row = ui.add(row).on_hover_text(action.tooltip());
@@ -85,9 +86,17 @@ fn step_keys(ui: &egui::Ui) -> bool {
     ui.input(|i| i.key_down(Key::ArrowDown) || i.key_down(Key::ArrowUp))
 }
 
-/// Actions whose names hold every word of the query, those that begin with it first. A query that
+/// What an action does now: what is shown already can only be hidden by its switch.
+fn title(action: &Action) -> String {
+    match action {
+        Action::TogglePane(pane) => format!("Hide the {} pane", pane.text().to_lowercase()),
+        other => other.text(),
+    }
+}
+
+/// Actions whose titles hold every word of the query, those that begin with it first. A query that
 /// looks like a path can also be opened.
-fn matches(query: &str) -> Vec<Action> {
+fn matches(query: &str, layout: &Layout) -> Vec<Action> {
     let path = query.trim();
     if path.starts_with(['/', '.', '~']) || path.contains(":\\") {
         let home = path.strip_prefix("~/").and_then(|rest| Some(std::env::home_dir()?.join(rest)));
@@ -95,9 +104,10 @@ fn matches(query: &str) -> Vec<Action> {
     }
     let query = path.to_lowercase();
     let words: Vec<&str> = query.split_whitespace().collect();
-    let mut found: Vec<Action> =
-        Action::all().into_iter().filter(|a| words.iter().all(|w| a.text().to_lowercase().contains(w))).collect();
-    found.sort_by_key(|a| !a.text().to_lowercase().starts_with(&query));
+    let can_be_done = |a: &Action| !matches!(a, Action::TogglePane(pane) if !layout.shows(*pane));
+    let is_asked_for = |a: &Action| words.iter().all(|w| title(a).to_lowercase().contains(w));
+    let mut found: Vec<Action> = Action::all().into_iter().filter(|a| can_be_done(a) && is_asked_for(a)).collect();
+    found.sort_by_key(|a| !title(a).to_lowercase().starts_with(&query));
     found
 }
 
@@ -150,21 +160,34 @@ fn sheet_grid(ui: &mut egui::Ui, title: &str, rows: &[(String, String)]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ui::actions::Pane;
+
+    fn found(query: &str) -> Vec<Action> {
+        matches(query, &Layout::default())
+    }
 
     #[test]
-    fn an_empty_query_lists_everything() {
-        assert_eq!(matches("").len(), Action::all().len());
+    fn an_empty_query_lists_everything_that_can_be_done() {
+        let hidden = Layout::default().hidden.len();
+        assert_eq!(found("").len(), Action::all().len() - hidden);
     }
 
     #[test]
     fn every_word_counts_and_a_beginning_wins() {
-        assert_eq!(matches("train start"), vec![Action::StartTraining]);
-        assert_eq!(matches("open").first(), Some(&Action::OpenFolder));
-        assert!(matches("no such thing").is_empty());
+        assert_eq!(found("train start"), vec![Action::StartTraining]);
+        assert_eq!(found("open").first(), Some(&Action::OpenFolder));
+        assert!(found("no such thing").is_empty());
+    }
+
+    #[test]
+    fn what_is_to_be_shown_is_not_hidden() {
+        assert_eq!(found("show scene plan"), vec![Action::ShowPane(Pane::Plan)]);
+        assert_eq!(found("hide scene plan"), vec![Action::TogglePane(Pane::Plan)]);
+        assert!(found("hide camera path").is_empty(), "it is hidden already");
     }
 
     #[test]
     fn a_path_can_be_opened() {
-        assert_eq!(matches(" /data/My Fox "), vec![Action::Open("/data/My Fox".into())]);
+        assert_eq!(found(" /data/My Fox "), vec![Action::Open("/data/My Fox".into())]);
     }
 }

@@ -4,25 +4,27 @@ use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
 use std::sync::Arc;
 
+pub use self::messages::{ErrorBox, LogLine};
+pub(crate) use self::messages::{Toast, Tone};
 use super::actions::Action;
-pub(crate) use super::message::{ErrorBox, LogLine, Toast, Tone};
+use super::history::History;
 pub(crate) use super::train_history::TrainHistory;
 use crate::io::unposed::Unposed;
 use crate::jobs::OpenedScene;
 use crate::jobs::demo::QUESTION;
 use crate::jobs::go_to::{Approached, Explored};
 use crate::jobs::models::ModelList;
+use crate::math::format;
 use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Progress, Severity};
 use crate::pipeline::semantics::thumbnails::Thumbnails;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
-use crate::scene::undo::UndoHistory;
 use crate::scene::{Limits, Overrides, PhotoPixels, SceneFacts, ScenePlan, SemanticMap, text};
 use crate::worker::{Event, Failure, JobId, JobKind, Outcome, Versioned, WorkerThread};
 
-/// Lines kept in the log.
-const MAX_LOG: usize = 1_000;
+mod messages;
+
 /// Files and folders kept in the recent list.
 const MAX_RECENT: usize = 8;
 
@@ -72,8 +74,8 @@ pub struct AppState {
     pub(crate) models: Option<Arc<ModelList>>,
     /// Models that were put in place so far.
     pub(crate) models_installed: u64,
-    /// Earlier states of objects and parts, whoever changed them.
-    pub(crate) edits: UndoHistory<Arc<SemanticMap>>,
+    /// What can be undone and redone, whoever did it.
+    pub(crate) changes: History,
     /// The newest short job that is over; they end in order.
     pub(crate) short_jobs_done: JobId,
     /// The long job that runs.
@@ -88,6 +90,8 @@ pub struct AppState {
     pub(crate) training_job: Option<JobId>,
     /// The log, oldest first.
     pub log: VecDeque<LogLine>,
+    /// What is wrong with what is open, with the job that told it.
+    pub problems: Vec<(Option<JobId>, String)>,
     /// Messages on screen, oldest first.
     pub(crate) toasts: Vec<Toast>,
     /// The error on screen.
@@ -128,7 +132,6 @@ impl AppState {
                 if kind == JobKind::Train {
                     // They belong to Gaussians that are about to change.
                     self.set_semantics(None);
-                    self.edits = UndoHistory::default();
                     self.training_job = Some(job);
                 }
                 self.say(Tone::Info, title.clone());
@@ -150,7 +153,12 @@ impl AppState {
             }
             Event::Evaluation(job, evaluation) => self.evaluated(job, evaluation),
             Event::Note(_, Severity::Info, text) => self.say(Tone::Info, text),
-            Event::Note(_, Severity::Warning, text) => self.say(Tone::Warning, text),
+            Event::Note(job, Severity::Warning, text) => {
+                if self.job.as_ref().is_some_and(|j| j.id == job && j.kind.makes_scene()) {
+                    self.problem(Some(job), &text);
+                }
+                self.say(Tone::Warning, text);
+            }
             Event::Finished(job, outcome) => return self.finished(job, outcome),
             Event::Cancelled(job) => {
                 if let Some(ended) = self.end(job) {
@@ -165,31 +173,6 @@ impl AppState {
             Event::Failed(job, failure) => self.failed(job, failure),
         }
         Vec::new()
-    }
-
-    /// Adds a line to the log.
-    pub(crate) fn say(&mut self, tone: Tone, text: impl Into<String>) {
-        if self.log.len() == MAX_LOG {
-            self.log.pop_front();
-        }
-        self.log.push_back(LogLine { tone, text: text::line(&text.into()).into_owned() });
-    }
-
-    /// Shows a message that goes away by itself, and logs it.
-    pub(crate) fn toast(&mut self, tone: Tone, text: impl Into<String>) {
-        let text = text::lines(&text.into()).into_owned();
-        self.say(tone, text.clone());
-        self.toasts.push(Toast { id: self.next_toast, tone, text });
-        self.next_toast += 1;
-    }
-
-    /// Shows an error until it is dismissed, and logs it.
-    pub(crate) fn fail(&mut self, doing: impl Into<String>, failure: Failure) {
-        let doing = text::line(&doing.into()).into_owned();
-        let [message, remedy] = [&failure.message, &failure.remedy].map(|t| text::lines(t).into_owned());
-        let failure = Failure { message, remedy };
-        self.say(Tone::Error, format!("{doing}: {}", failure.message));
-        self.error = Some(ErrorBox { doing, failure });
     }
 
     /// Puts a path on top of the recent list.
@@ -274,6 +257,9 @@ impl AppState {
 
     fn finished(&mut self, job: JobId, outcome: Outcome) -> Vec<Action> {
         let ended = self.end(job);
+        if ended.as_ref().is_some_and(|j| j.kind.makes_scene()) {
+            self.problems.retain(|(of, _)| *of == Some(job));
+        }
         let mut next = Vec::new();
         match outcome {
             Outcome::Opened(scene) => {
@@ -311,9 +297,15 @@ impl AppState {
             Outcome::Objects(map) => {
                 self.toast(Tone::Good, format!("{} objects and parts found; query one", map.identities.len()));
                 self.set_semantics(Some(map));
-                self.edits = UndoHistory::default();
             }
-            Outcome::Edited(map) => self.edited(map),
+            Outcome::Edited(map) => self.set_semantics(Some(map)),
+            Outcome::Refused(why) => self.toast(Tone::Warning, why),
+            Outcome::Scale(meters, stored) => {
+                let scaled = |s: &Arc<OpenedScene>| OpenedScene { metres_per_unit: Some(meters), ..(**s).clone() };
+                self.scene = self.scene.as_ref().map(scaled).map(Arc::new);
+                let kept = if stored { "kept with the scene" } else { "not kept: the scene is not saved yet" };
+                self.toast(Tone::Good, format!("1 unit is {}, {kept}", format::length(1.0, Some(meters))));
+            }
             Outcome::Models(models) => self.models = Some(models),
             Outcome::ModelInstalled(id) => {
                 self.models_installed += 1;
@@ -343,19 +335,11 @@ impl AppState {
         next
     }
 
-    /// Sets objects and parts, with what is counted of them; those that were there before.
-    fn set_semantics(&mut self, map: Option<Arc<SemanticMap>>) -> Option<Versioned<SemanticMap>> {
+    /// Sets objects and parts, with what is counted of them.
+    fn set_semantics(&mut self, map: Option<Arc<SemanticMap>>) {
         self.sizes = map.as_ref().map_or_else(Vec::new, |m| m.sizes());
         self.set_facts(self.plan.facts.clone().with_semantics(map.as_deref()));
-        std::mem::replace(&mut self.semantics, map.map(Versioned::new))
-    }
-
-    /// Takes over a changed map. Going back and forth moves along the changes; a new one ends what
-    /// could be redone.
-    fn edited(&mut self, map: Arc<SemanticMap>) {
-        if let Some(old) = self.set_semantics(Some(Arc::clone(&map))) {
-            self.edits.replaced(Arc::clone(&old), |other| Arc::ptr_eq(other, &map));
-        }
+        self.semantics = map.map(Versioned::new);
     }
 
     fn opened(&mut self, scene: OpenedScene, is_demo: bool) {
@@ -377,7 +361,6 @@ impl AppState {
         self.set_facts(scene.facts.clone());
         self.antialias = scene.render.antialias;
         self.set_semantics(scene.semantics.clone());
-        self.edits = UndoHistory::default();
         self.scene = Some(Arc::new(scene));
     }
 

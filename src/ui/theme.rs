@@ -34,6 +34,7 @@ pub(crate) fn tone_color(tone: Tone) -> Color32 {
 /// Puts the theme on the window.
 pub(crate) fn install(ctx: &egui::Context) {
     ctx.set_theme(Theme::Dark);
+    super::fonts::install(ctx);
     ctx.style_mut_of(Theme::Dark, |style| {
         style.visuals = visuals();
         spacing(style);

@@ -13,7 +13,7 @@ use crate::jobs::models::Source;
 use crate::jobs::train::Trained;
 use crate::jobs::{
     Folders, JobError, OpenedScene, Scene, demo, edit, export, find_objects, go_to, models, open, plan, poses, recent,
-    report, thumbnails, train, video,
+    report, scale, thumbnails, train, video,
 };
 use crate::measure::{End, FILE, Report};
 use crate::pipeline::observer::{Observer, Severity};
@@ -104,12 +104,19 @@ impl Jobs for PipelineJobs {
             }
             Command::EditObjects { cloud, map, settings, request, out } => {
                 let failed = |remedy| move |e: JobError| Stop::Failed(Failure::of(&e, remedy));
-                let new = edit::apply(&cloud, &map, &settings, &request).map_err(failed("Nothing has changed."))?;
+                let new = match edit::apply(&cloud, &map, &settings, &request) {
+                    Err(JobError::Edit(why)) => return Ok(Outcome::Refused(why.to_string())),
+                    done => done.map_err(failed("Nothing has changed."))?,
+                };
                 let stored = edit::store(&out, self.known(&out).as_deref(), &new, &cloud);
                 if let Some(state) = stored.map_err(failed("The change is not stored."))? {
                     self.knows(&out, Some(state));
                 }
                 Outcome::Edited(new)
+            }
+            Command::SetScale { out, meters_per_unit } => {
+                let stored = scale::store(&out, self.known(&out).as_deref(), meters_per_unit)?;
+                Outcome::Scale(meters_per_unit, stored)
             }
             Command::Export { cloud, path } => {
                 export::ply(&path, &cloud)?;
@@ -144,7 +151,7 @@ impl Jobs for PipelineJobs {
             Command::Explore { cloud, cameras, up } => {
                 Outcome::Explored(Arc::new(go_to::Explored::new(cloud, &cameras, up)))
             }
-            Command::CameraSpline(request) => Outcome::Written(video::run(*request, observer)?.summary.path),
+            Command::Video(request) => Outcome::Written(video::run(*request, observer)?.summary.path),
             Command::Measure(request) => {
                 let done = report::run(&request, observer)?;
                 if done.end == End::Cancelled {

@@ -36,36 +36,28 @@ pub enum JobKind {
     /// Finds the way to an identity.
     Approach,
     /// Draws a video.
-    CameraSpline,
+    Video,
     /// Measures drawing, knob by knob.
     Measure,
     /// Reads a report.
     Report,
+    /// Stores the scene's scale.
+    Scale,
 }
 
 impl JobKind {
+    /// Whether its outcome is what is on screen then: what it warns of is wrong with that.
+    pub(crate) fn makes_scene(self) -> bool {
+        matches!(self, Self::Open | Self::Demo | Self::DemoPhotos | Self::Poses | Self::Train | Self::Objects)
+    }
+
     /// Which thread runs it.
     pub(crate) fn lane(self) -> WorkerThread {
         match self {
-            Self::Open
-            | Self::Demo
-            | Self::DemoPhotos
-            | Self::Poses
-            | Self::Train
-            | Self::Evaluate
-            | Self::Objects
-            | Self::Model
-            | Self::CameraSpline
-            | Self::Measure => WorkerThread::Long,
-            Self::Edit
-            | Self::Export
-            | Self::Photo
-            | Self::Picture
-            | Self::Thumbnails
-            | Self::Models
-            | Self::Explore
-            | Self::Approach
-            | Self::Report => WorkerThread::Short,
+            Self::Open | Self::Demo | Self::Train | Self::Evaluate | Self::Objects => WorkerThread::Long,
+            Self::DemoPhotos | Self::Poses | Self::Model | Self::Video | Self::Measure => WorkerThread::Long,
+            Self::Edit | Self::Export | Self::Photo | Self::Picture | Self::Thumbnails => WorkerThread::Short,
+            Self::Models | Self::Explore | Self::Approach | Self::Scale | Self::Report => WorkerThread::Short,
         }
     }
 }

@@ -140,9 +140,16 @@ pub enum Command {
     /// Find the way to where an identity is seen best.
     Approach(Box<ApproachRequest>),
     /// Draw a video.
-    CameraSpline(Box<VideoRequest>),
+    Video(Box<VideoRequest>),
     /// Measure error against run time of drawing, and write it as a report.
     Measure(Box<ReportRequest>),
+    /// Store how long a unit of the scene is.
+    SetScale {
+        /// Folder of the trained scene.
+        out: PathBuf,
+        /// Meters.
+        meters_per_unit: f64,
+    },
     /// Read a report.
     ReadReport {
         /// Its folder or file.
@@ -183,8 +190,9 @@ impl Command {
             Self::Explore { .. } => JobKind::Explore,
             Self::InstallModel { .. } => JobKind::Model,
             Self::Approach(_) => JobKind::Approach,
-            Self::CameraSpline(_) => JobKind::CameraSpline,
+            Self::Video(_) => JobKind::Video,
             Self::Measure(_) => JobKind::Measure,
+            Self::SetScale { .. } => JobKind::Scale,
             Self::ReadReport { .. } => JobKind::Report,
         }
     }
@@ -202,6 +210,7 @@ impl Command {
             Self::Evaluate { dataset, .. } => format!("Evaluating {}", dataset.name),
             Self::FindObjects(request) => format!("Finding objects in {}", request.dataset.name),
             Self::EditObjects { .. } => "Editing objects".into(),
+            Self::SetScale { .. } => "Storing the scale".into(),
             Self::Export { path, .. } | Self::Picture { path, .. } => format!("Writing {}", name(path)),
             Self::Photo { photo, .. } => format!("Loading {}", photo.name),
             Self::KeepPicture { of, .. } => format!("Keeping a picture of {}", name(of)),
@@ -213,7 +222,7 @@ impl Command {
             Self::Approach(request) => {
                 format!("Planning the flight to {}", request.map.identities.full_name(request.id))
             }
-            Self::CameraSpline(request) => format!("Rendering {}", name(&request.out)),
+            Self::Video(request) => format!("Rendering {}", name(&request.out)),
             Self::Measure(_) => "Benchmarking rendering".into(),
             Self::ReadReport { path, .. } => format!("Opening the report {}", name(path)),
         }
@@ -244,6 +253,10 @@ pub enum Outcome {
     Objects(Arc<SemanticMap>),
     /// Objects and parts were changed.
     Edited(Arc<SemanticMap>),
+    /// The length of a unit in meters, and whether it was stored.
+    Scale(f64, bool),
+    /// Such a change makes no sense, and why.
+    Refused(String),
     /// A file was written.
     Written(PathBuf),
     /// A picture was kept.

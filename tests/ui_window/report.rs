@@ -1,5 +1,7 @@
 //! Reports in the window: opened, compared, their settings applied.
 
+use fmlgs::measure::{self, ErrorKind, Knobs, Measure, Point, Report, Rule, Sample, Stage, StageName};
+
 use super::*;
 
 /// A report of two stages, whose settings the window has.
@@ -96,4 +98,21 @@ fn a_report_is_opened_compared_and_its_settings_are_applied() {
     w.ask(Action::OpenReport(at("two")));
     w.until("the error", |a| a.state.error.is_some());
     assert!(w.shows("not a report") && w.app().state.report.is_some(), "what was open stays");
+}
+
+#[test]
+fn frame_times_are_shown_and_cost_nothing_when_they_are_not() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = Window::new(Some(Action::Open(write_splat(folder.path()))));
+    w.until("a picture", |a| a.viewport.picture().is_some_and(|p| p.full));
+    assert!(!w.shows("median of"));
+    w.harness.key_press(egui::Key::F3);
+    w.harness.run_steps(2);
+    assert!(w.app().layout.times);
+    w.until("times of a picture", |a| a.viewport.picture().is_some_and(|p| p.full && p.ticket > 1));
+    w.harness.run_steps(3);
+    assert!(w.shows("median of") && w.shows("total") && w.shows("upload"));
+    w.harness.key_press(egui::Key::F3);
+    w.harness.run_steps(3);
+    assert!(!w.shows("median of"));
 }

@@ -43,11 +43,32 @@ pub enum EditError {
     #[error("'{0}' and '{1}' cannot become one: one is the other, or a piece of it")]
     Related(String, String),
     /// Nothing to split.
-    #[error("'{0}' has too few Gaussians to be split")]
-    TooSmall(String),
+    #[error("'{name}' has {own} Gaussians; a split needs at least {}", 2 * LEAST)]
+    TooSmall {
+        /// What was to be split.
+        name: String,
+        /// Its Gaussians.
+        own: usize,
+    },
+    /// Too little of it is not its parts'.
+    #[error("'{name}' consists of its parts: only {own} of its {all} Gaussians are its own; split one of the parts")]
+    OfParts {
+        /// What was to be split.
+        name: String,
+        /// Gaussians that belong to none of its parts.
+        own: usize,
+        /// All of them.
+        all: usize,
+    },
+    /// Nothing that is visible was painted.
+    #[error("no Gaussian shows where you painted; paint over something that is visible")]
+    NoPaint,
+    /// What was painted belongs to others.
+    #[error("what you painted belongs to other objects already; choose 'Paint a new part' in the menu of one of them")]
+    Taken,
     /// None of the Gaussians belongs to the whole.
-    #[error("nothing of '{0}' was marked")]
-    Nothing(String),
+    #[error("what you painted is not a piece of '{0}'; paint inside it")]
+    Outside(String),
 }
 
 /// The map after an edit.
@@ -75,8 +96,13 @@ pub(crate) fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Re
         }
         Edit::Split(id) => {
             let own: Vec<usize> = (0..map.identity_of.len()).filter(|&i| map.identity_of[i] == *id).collect();
-            let parts = pieces(cloud, &own).ok_or_else(|| EditError::TooSmall(all.name(*id)))?;
-            let (level, parent) = all.get(known(*id)?).map_or((Level::Object, NOBODY), |i| (i.level, i.parent));
+            let (name, whole) = (all.name(known(*id)?), map.members(*id).len());
+            let too_small = || match own.len() {
+                own if whole > own => EditError::OfParts { name, own, all: whole },
+                own => EditError::TooSmall { name, own },
+            };
+            let parts = pieces(cloud, &own).ok_or_else(too_small)?;
+            let (level, parent) = all.get(*id).map_or((Level::Object, NOBODY), |i| (i.level, i.parent));
             for part in parts.iter().skip(1) {
                 add(&mut new, level, parent, String::new(), part);
             }
@@ -86,7 +112,11 @@ pub(crate) fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Re
             let is_in = |i: &usize| map.identity_of.get(*i).is_some_and(|id| inside.get(*id as usize) == Some(&true));
             let own: Vec<usize> = gaussians.iter().map(|i| *i as usize).filter(is_in).collect();
             if own.is_empty() {
-                return Err(EditError::Nothing(all.name(*of)));
+                return Err(match *of {
+                    _ if gaussians.is_empty() => EditError::NoPaint,
+                    NOBODY => EditError::Taken,
+                    of => EditError::Outside(all.name(of)),
+                });
             }
             let level = if *of == NOBODY { Level::Object } else { Level::Part };
             add(&mut new, level, *of, name.trim().to_owned(), &own);
@@ -299,7 +329,13 @@ mod tests {
         // In one place: two halves.
         let new = apply(&map, &cloud, &Edit::Split(3)).expect("split");
         assert_eq!((new.sizes()[3], new.sizes()[5]), (20, 10), "its eye stays with it");
-        assert!(matches!(apply(&map, &cloud, &Edit::Split(2)), Err(EditError::TooSmall(_))));
+        let refused = |id| apply(&map, &cloud, &Edit::Split(id)).expect_err("too few").to_string();
+        assert_eq!(refused(2), "'eye' has 10 Gaussians; a split needs at least 16");
+        let mut of_parts = map.clone();
+        of_parts.identity_of[..15].fill(2);
+        let refused = apply(&of_parts, &cloud, &Edit::Split(1)).expect_err("its parts have them").to_string();
+        assert!(refused.contains("only 5 of its 30 Gaussians are its own"), "{refused}");
+        assert_eq!(apply(&map, &cloud, &Edit::Split(9)), Err(EditError::Unknown(9)));
     }
 
     #[test]
@@ -311,8 +347,9 @@ mod tests {
         let new = add(1, 15..40).expect("added");
         check(&new);
         assert_eq!((new.identities.name(5), new.sizes()[5]), ("foot".into(), 15));
-        assert!(matches!(add(1, 40..50), Err(EditError::Nothing(_))));
-        assert!(matches!(add(NOBODY, 0..5), Err(EditError::Nothing(_))), "all of it is somebody's");
+        assert_eq!(add(1, 40..50), Err(EditError::Outside("red doll".into())));
+        assert_eq!(add(NOBODY, 0..5), Err(EditError::Taken), "all of it is somebody's");
+        assert_eq!(add(1, 0..0), Err(EditError::NoPaint));
     }
 
     #[test]

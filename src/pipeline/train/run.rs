@@ -261,8 +261,7 @@ impl<'a> Job<'a> {
             self.outliers += result.outliers as u64;
             if self.outliers > 0 && self.trainer.step % 100 == 0 {
                 let count = std::mem::take(&mut self.outliers);
-                observer
-                    .note(Severity::Warning, format!("{count} gradients were far above what is usual, and were cut"));
+                observer.note(Severity::Info, format!("{count} gradients were far above what is usual, and were cut"));
             }
             if self.diverges(result.loss) {
                 self.roll_back(result.loss, observer)?;

@@ -19,7 +19,6 @@ enum KeyChange {
 
 /// Draws it. The pose of the key that a user wants to see.
 pub(crate) fn show(ui: &mut Ui, pane: &mut CameraPane, eye: &Pose) -> Option<Pose> {
-    let mut keys = pane.path.keys.clone();
     let mut wanted_change: Option<(usize, KeyChange)> = None;
     ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
         Grid::new("keys").num_columns(12).striped(true).spacing([10.0, 4.0]).show(ui, |ui| {
@@ -27,7 +26,7 @@ pub(crate) fn show(ui: &mut Ui, pane: &mut CameraPane, eye: &Pose) -> Option<Pos
                 ui.label(caption(text));
             }
             ui.end_row();
-            for (i, key) in keys.iter_mut().enumerate() {
+            for (i, key) in pane.path.keys.iter_mut().enumerate() {
                 if let Some(wanted) = row(ui, i, key, pane.selected == Some(i)) {
                     wanted_change = Some((i, wanted));
                 }
@@ -35,28 +34,26 @@ pub(crate) fn show(ui: &mut Ui, pane: &mut CameraPane, eye: &Pose) -> Option<Pos
             }
         });
     });
-    if pane.path.keys != keys {
-        pane.change(|path| path.keys = keys);
-    }
     let (i, wanted_change) = wanted_change?;
     pane.selected = Some(i);
+    let keys = &mut pane.path.keys;
     match wanted_change {
         KeyChange::Choose => {}
-        KeyChange::Go => return pane.path.keys.get(i).map(Pose::of_key),
-        KeyChange::Update => pane.change(|path| {
-            let old = &path.keys[i];
-            path.keys[i] =
+        KeyChange::Go => return keys.get(i).map(Pose::of_key),
+        KeyChange::Update => {
+            let old = &keys[i];
+            keys[i] =
                 PathKey { name: old.name.clone(), dwell_secs: old.dwell_secs, time_secs: old.time_secs, ..eye.key() };
-        }),
-        KeyChange::Copy => pane.change(|path| {
-            let copy = PathKey { time_secs: None, ..path.keys[i].clone() };
-            path.keys.insert(i + 1, copy);
-        }),
-        KeyChange::Up if i > 0 => pane.change(|path| swap(path.keys.as_mut_slice(), i, i - 1)),
-        KeyChange::Down if i + 1 < pane.path.keys.len() => pane.change(|path| swap(path.keys.as_mut_slice(), i, i + 1)),
+        }
+        KeyChange::Copy => {
+            let copy = PathKey { time_secs: None, ..keys[i].clone() };
+            keys.insert(i + 1, copy);
+        }
+        KeyChange::Up if i > 0 => swap(keys, i, i - 1),
+        KeyChange::Down if i + 1 < keys.len() => swap(keys, i, i + 1),
         KeyChange::Up | KeyChange::Down => {}
         KeyChange::Delete => {
-            pane.change(|path| drop(path.keys.remove(i)));
+            keys.remove(i);
             pane.selected = None;
         }
     }

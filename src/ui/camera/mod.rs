@@ -10,12 +10,12 @@ use std::path::Path;
 use egui::{Button, ComboBox, DragValue, RichText, Slider, Ui};
 
 use self::player::{Clip, Player};
+use super::panes::bars;
 use super::state::AppState;
 use super::theme;
 use crate::io::video::VideoSettings;
 use crate::navigate::camera_spline::{MOST_PICTURES, steps_of};
 use crate::navigate::{CameraSpline, CameraTrajectory, Pose, Speed};
-use crate::scene::undo::UndoHistory;
 use crate::scene::{Camera, CameraPath, PathKey};
 use crate::ui::actions::Action;
 
@@ -27,7 +27,6 @@ pub(crate) struct CameraPane {
     pub(crate) player: Player,
     /// The key that was chosen.
     selected: Option<usize>,
-    edits: UndoHistory<CameraPath>,
     /// The path as it was last made a video of.
     filmed: Option<(CameraPath, Speed)>,
     /// Height of videos, px.
@@ -49,7 +48,6 @@ impl Default for CameraPane {
             speed: Speed::Constant,
             player: Player::default(),
             selected: None,
-            edits: UndoHistory::default(),
             filmed: None,
             film_height: 720,
             quality: 80,
@@ -111,32 +109,22 @@ impl CameraPane {
     /// Records the present view as a key behind the chosen one.
     pub(crate) fn record(&mut self, pose: &Pose) {
         let place = self.selected.map_or(self.path.keys.len(), |i| (i + 1).min(self.path.keys.len()));
-        self.change(|path| path.keys.insert(place, pose.key()));
+        self.path.keys.insert(place, pose.key());
         self.selected = Some(place);
         self.put_path_in();
     }
 
     /// Takes over a path that was read.
     pub(crate) fn open(&mut self, path: CameraPath) {
-        self.change(|p| *p = path);
+        self.path = path;
         self.selected = None;
         self.put_path_in();
     }
 
-    /// Changes the path, so that it can be undone.
-    fn change(&mut self, change: impl FnOnce(&mut CameraPath)) {
-        let before = self.path.clone();
-        change(&mut self.path);
-        if self.path != before {
-            self.edits.record(before);
-        }
-    }
-
-    fn step_back_in_time(&mut self, redo: bool) {
-        let stepped = if redo { self.edits.redo(&mut self.path) } else { self.edits.undo(&mut self.path) };
-        if stepped {
-            self.selected = self.selected.filter(|i| *i < self.path.keys.len());
-        }
+    /// Takes over an earlier or later state of the path.
+    pub(crate) fn set_path(&mut self, path: CameraPath) {
+        self.path = path;
+        self.selected = self.selected.filter(|i| *i < self.path.keys.len());
     }
 
     /// Makes the path what is played.
@@ -270,7 +258,7 @@ impl CameraPane {
         let time = |i: usize| flight.seconds * (i * last / count.max(1)) as f64 / last.max(1) as f64;
         let keys = (0..=count).filter_map(|i| Some(PathKey { time_secs: Some(time(i)), ..at(i)?.key() })).collect();
         let (closed, fps) = (false, self.path.fps);
-        self.change(|path| *path = CameraPath { keys, closed, fps, seconds: flight.seconds });
+        self.path = CameraPath { keys, closed, fps, seconds: flight.seconds };
         self.selected = None;
         self.player.replace(None);
         self.put_path_in();
@@ -281,13 +269,7 @@ impl CameraPane {
         if ui.button("Add keyframe").on_hover_text(tip).clicked() {
             self.record(eye);
         }
-        for (text, redo, any) in
-            [("Undo", false, self.edits.last().is_some()), ("Redo", true, self.edits.next().is_some())]
-        {
-            if ui.add_enabled(any, Button::new(text)).clicked() {
-                self.step_back_in_time(redo);
-            }
-        }
+        bars::history_buttons(ui, &state.changes, actions);
         for (text, action, enabled) in
             [("Open\u{2026}", Action::OpenPath, true), ("Save\u{2026}", Action::SavePath, !self.path.keys.is_empty())]
         {
@@ -296,10 +278,10 @@ impl CameraPane {
             }
         }
         ui.separator();
-        let mut path = self.path.clone();
         ui.label("Duration");
-        ui.add(DragValue::new(&mut path.seconds).range(0.1..=3600.0).speed(0.05));
-        ui.checkbox(&mut path.closed, "Closed loop").on_hover_text("Continue from the last keyframe to the first.");
+        ui.add(DragValue::new(&mut self.path.seconds).range(0.1..=3600.0).speed(0.05));
+        ui.checkbox(&mut self.path.closed, "Closed loop")
+            .on_hover_text("Continue from the last keyframe to the first.");
         let mut eased = self.speed == Speed::Eased;
         ui.checkbox(&mut eased, "Ease in/out").on_hover_text("Start and stop smoothly, at waits too.");
         self.speed = if eased { Speed::Eased } else { Speed::Constant };
@@ -318,11 +300,10 @@ impl CameraPane {
                 }
             },
         );
-        ui.add(DragValue::new(&mut path.fps).range(1.0..=120.0).speed(0.2).suffix(" fps"));
+        ui.add(DragValue::new(&mut self.path.fps).range(1.0..=120.0).speed(0.2).suffix(" fps"));
         ui.add(Slider::new(&mut self.quality, 0..=100).text("Quality"));
         ui.checkbox(&mut self.mark, "Highlight")
             .on_hover_text("Highlight what the query found in every frame of the video.");
-        self.change(|p| *p = path);
     }
 }
 

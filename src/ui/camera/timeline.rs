@@ -47,8 +47,9 @@ pub(crate) fn show(ui: &mut Ui, pane: &mut CameraPane) -> Option<Pose> {
         match held.filter(|_| response.dragged()) {
             Some(key) => {
                 let t = between_neighbors(pane, key, time(at.x), &times);
-                let one_step = response.drag_started();
-                retime(pane, key, t, one_step);
+                if let Some(key) = pane.path.keys.get_mut(key) {
+                    key.time_secs = Some(t);
+                }
             }
             None if response.dragged() || response.clicked() => {
                 pane.selected = near(at).or(pane.selected);
@@ -103,16 +104,4 @@ fn between_neighbors(pane: &CameraPane, key: usize, time: f64, times: &[[f64; 2]
     let wait = pane.path.keys.get(key).map_or(0.0, |k| k.dwell_secs);
     let highest = times.get(key + 1).map_or(f64::INFINITY, |t| t[0] - wait - GAP);
     time.clamp(lowest, highest.max(lowest))
-}
-
-/// Fixes a key's time. All steps of one drag are undone together.
-fn retime(pane: &mut CameraPane, key: usize, time: f64, first: bool) {
-    if key >= pane.path.keys.len() {
-        return;
-    }
-    if first {
-        pane.change(|path| path.keys[key].time_secs = Some(time));
-    } else {
-        pane.path.keys[key].time_secs = Some(time);
-    }
 }

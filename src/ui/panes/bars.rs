@@ -3,6 +3,7 @@
 use egui::{Align, Button, RichText, Ui};
 use strum::VariantArray;
 
+use super::super::history::History;
 use super::super::layout::Layout;
 use super::super::state::AppState;
 use super::super::{keys, theme};
@@ -41,6 +42,14 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut 
             item(ui, has_scene, None, Action::Screenshot, actions);
             ui.separator();
             item(ui, true, None, Action::Quit, actions);
+        });
+        ui.menu_button("Edit", |ui| {
+            ui.set_min_width(260.0);
+            item(ui, state.changes.last().is_some(), None, Action::Undo, actions);
+            item(ui, state.changes.next().is_some(), None, Action::Redo, actions);
+            ui.separator();
+            item(ui, state.semantics.is_some(), None, Action::Rename, actions);
+            item(ui, state.semantics.is_some(), None, Action::Isolate(None), actions);
         });
         ui.menu_button("View", |ui| {
             ui.set_min_width(280.0);
@@ -92,6 +101,17 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut 
             }
         });
     });
+}
+
+/// Undo and Redo, which say what of.
+pub(crate) fn history_buttons(ui: &mut Ui, changes: &History, actions: &mut Vec<Action>) {
+    for (action, what) in [(Action::Undo, changes.last()), (Action::Redo, changes.next())] {
+        let button = ui.add_enabled(what.is_some(), Button::new(action.text()));
+        let tip = format!("{}  {}", what.unwrap_or_default(), keys::label(ui.ctx(), &action));
+        if button.on_hover_text(tip).clicked() {
+            actions.push(action);
+        }
+    }
 }
 
 /// A menu entry; `on` marks a switch.

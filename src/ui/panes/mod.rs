@@ -9,6 +9,7 @@ pub(crate) mod object_thumbnails;
 pub(crate) mod objects;
 pub(crate) mod plan;
 pub(crate) mod plots;
+pub(crate) mod problems;
 pub(crate) mod report;
 pub(crate) mod training;
 pub(crate) mod unposed;

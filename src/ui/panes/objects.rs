@@ -1,11 +1,13 @@
 //! The objects and parts of the scene, as a tree; a click asks for one.
 
 use egui::collapsing_header::CollapsingState;
-use egui::{Button, Color32, Id, Key, RichText, ScrollArea, TextEdit, Ui, vec2};
+use egui::{Button, Checkbox, Color32, Id, Key, RichText, ScrollArea, TextEdit, Ui, vec2};
 
 use super::super::state::AppState;
+use super::super::text_field::select_all;
 use super::super::theme;
 use super::super::viewport::visible::Visibility;
+use super::bars;
 use super::object_thumbnails::ObjectThumbnails;
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::edit::Edit;
@@ -15,42 +17,60 @@ use crate::ui::actions::Action;
 /// Side of a thumbnail, points.
 const THUMBNAIL_PX: f32 = 30.0;
 
-pub(crate) fn show(
-    ui: &mut Ui,
-    state: &AppState,
-    object_thumbnails: &ObjectThumbnails,
-    visibility: &Visibility,
-    actions: &mut Vec<Action>,
-) {
-    let Some(map) = &state.semantics else {
-        return show_how_to_begin(ui, state, actions);
-    };
-    let identities = &map.identities;
-    let count = |level: Level| identities.iter().filter(|(_, i)| i.level == level).count();
-    let from = if map.seeds.len() == 1 { "1 photo".to_owned() } else { format!("{} photos", map.seeds.len()) };
-    ui.weak(format!("{} objects, {} parts, from the masks of {from}", count(Level::Object), count(Level::Part)));
-    if identities.iter().all(|(_, i)| i.names.is_empty()) {
-        ui.weak("Regions of the photos: unnamed and rough. Query them by number, such as #1.");
+/// The list, and the name in it that is being typed.
+#[derive(Default)]
+pub(crate) struct ObjectsPane {
+    renaming: Option<Renaming>,
+}
+
+/// A name that is being typed in its row.
+struct Renaming {
+    id: IdentityId,
+    name: String,
+    /// Whether the field has the keyboard already.
+    begun: bool,
+}
+
+impl ObjectsPane {
+    /// Makes a text field of a name.
+    pub(crate) fn rename(&mut self, id: IdentityId, all: &Identities) {
+        self.renaming = Some(Renaming { id, name: all.name(id), begun: false });
     }
-    ui.add_space(4.0);
-    ui.horizontal(|ui| {
-        if visibility.is_partial() && ui.button("Show all").clicked() {
-            actions.push(Action::Isolate(None));
+
+    pub(crate) fn show(
+        &mut self,
+        ui: &mut Ui,
+        state: &AppState,
+        object_thumbnails: &ObjectThumbnails,
+        visibility: &Visibility,
+        actions: &mut Vec<Action>,
+    ) {
+        let Some(map) = &state.semantics else {
+            return show_how_to_begin(ui, state, actions);
+        };
+        let identities = &map.identities;
+        let count = |level: Level| identities.iter().filter(|(_, i)| i.level == level).count();
+        let from = if map.seeds.len() == 1 { "1 photo".to_owned() } else { format!("{} photos", map.seeds.len()) };
+        ui.weak(format!("{} objects, {} parts, from the masks of {from}", count(Level::Object), count(Level::Part)));
+        if identities.iter().all(|(_, i)| i.names.is_empty()) {
+            ui.weak("Regions of the photos: unnamed and rough. Query them by number, such as #1.");
         }
-        let new = Action::Paint(Some(NOBODY));
-        if ui.button("Paint an object\u{2026}").on_hover_text(new.tooltip()).clicked() {
-            actions.push(new);
-        }
-        let edits = [(Action::Undo, "Undo", state.edits.last()), (Action::Redo, "Redo", state.edits.next())];
-        for (action, text, other) in edits {
-            if ui.add_enabled(other.is_some(), Button::new(text)).on_hover_text(action.tooltip()).clicked() {
-                actions.push(action);
+        ui.add_space(4.0);
+        ui.horizontal(|ui| {
+            if visibility.is_partial() && ui.button("Show all").clicked() {
+                actions.push(Action::Isolate(None));
             }
+            let new = Action::Paint(Some(NOBODY));
+            if ui.button("Paint an object\u{2026}").on_hover_text(new.tooltip()).clicked() {
+                actions.push(new);
+            }
+            bars::history_buttons(ui, &state.changes, actions);
+        });
+        let renaming = &mut self.renaming;
+        let mut tree = Tree { identities, sizes: &state.sizes, object_thumbnails, visibility, renaming };
+        for (id, _) in identities.iter().filter(|(_, i)| i.parent == NOBODY) {
+            tree.branch(ui, id, actions);
         }
-    });
-    let tree = Tree { identities, sizes: &state.sizes, object_thumbnails, visibility };
-    for (id, _) in identities.iter().filter(|(_, i)| i.parent == NOBODY) {
-        tree.branch(ui, id, actions);
     }
 }
 
@@ -60,55 +80,84 @@ struct Tree<'a> {
     sizes: &'a [usize],
     object_thumbnails: &'a ObjectThumbnails,
     visibility: &'a Visibility,
+    renaming: &'a mut Option<Renaming>,
 }
 
 impl Tree<'_> {
-    fn branch(&self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
+    fn branch(&mut self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
         let pieces: Vec<IdentityId> = self.identities.children(id).collect();
         if pieces.is_empty() {
             return self.leaf(ui, id, actions);
         }
-        let state = CollapsingState::load_with_default_open(ui.ctx(), Id::unique("branch").with(id), false);
+        let mut state = CollapsingState::load_with_default_open(ui.ctx(), Id::unique("branch").with(id), false);
+        let is_within = |r: &Renaming| !r.begun && self.identities.ancestors(r.id).skip(1).any(|whole| whole == id);
+        if self.renaming.as_ref().is_some_and(is_within) {
+            state.set_open(true);
+        }
         let header = state.show_header(ui, |ui| self.leaf(ui, id, actions));
         header.body(|ui| pieces.into_iter().for_each(|piece| self.branch(ui, piece, actions)));
     }
 
-    fn leaf(&self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
-        let Self { identities, sizes, object_thumbnails, visibility } = self;
+    fn leaf(&mut self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
         ui.horizontal(|ui| {
-            let mut drawn = !visibility.is_hidden(id);
-            if ui.checkbox(&mut drawn, "").on_hover_text("Visible").changed() {
+            let drawn = self.visibility.draws(self.identities, id);
+            let mut ticked = drawn != Some(false);
+            let tick = Checkbox::new(&mut ticked, "").indeterminate(drawn.is_none());
+            let tick = ui.add(tick).on_hover_text("Visible");
+            if tick.accessible_name(format!("{} is visible", self.identities.full_name(id))).changed() {
                 actions.push(Action::Hide(id));
             }
-            object_thumbnails.show(ui, id, THUMBNAIL_PX);
-            let code = identities.get(id).map_or([0.5; 3], |i| i.code).map(|c| (c * 255.0) as u8);
+            self.object_thumbnails.show(ui, id, THUMBNAIL_PX);
+            let code = self.identities.get(id).map_or([0.5; 3], |i| i.code).map(|c| (c * 255.0) as u8);
             let (rect, _) = ui.allocate_exact_size(vec2(11.0, 11.0), egui::Sense::hover());
             ui.painter().rect_filled(rect, 3.0, Color32::from_rgb(code[0], code[1], code[2]));
-            let button = Button::new(identities.name(id)).frame_when_inactive(false);
-            if ui.add(button).on_hover_text("Highlight it in the view").clicked() {
-                actions.push(Action::Ask(identities.full_name(id)));
+            if self.renaming.as_ref().is_some_and(|r| r.id == id) {
+                return self.name_field(ui, actions);
+            }
+            let name = ui.add(Button::new(self.identities.name(id)).frame_when_inactive(false));
+            if name.double_clicked() {
+                self.start_renaming(id);
+            } else if name.on_hover_text("Highlight it in the view; double-click to rename it").clicked() {
+                actions.push(Action::Ask(self.identities.full_name(id)));
             }
             self.menu(ui, id, actions);
-            let size = sizes.get(id as usize).unwrap_or(&0).to_string();
+            let size = self.sizes.get(id as usize).unwrap_or(&0).to_string();
             ui.label(RichText::new(size).small().color(theme::WEAK)).on_hover_text("Gaussians");
         });
     }
 
+    fn start_renaming(&mut self, id: IdentityId) {
+        *self.renaming = Some(Renaming { id, name: self.identities.name(id), begun: false });
+    }
+
+    /// The name as a field with all of it selected. Enter and leaving it take the new name over, Escape does not.
+    fn name_field(&mut self, ui: &mut Ui, actions: &mut Vec<Action>) {
+        let Some(Renaming { id, name, begun }) = self.renaming.as_mut() else { return };
+        let field = Id::unique("name").with(*id);
+        let first = !std::mem::replace(begun, true);
+        if first {
+            select_all(ui.ctx(), field, name);
+        }
+        let edit = ui.add(TextEdit::singleline(name).id(field).char_limit(80).desired_width(170.0));
+        let edit = edit.accessible_name("New name");
+        if first {
+            edit.request_focus();
+            edit.scroll_to_me(None);
+        } else if !edit.has_focus() {
+            let is_new = name.trim() != self.identities.name(*id) && !ui.input(|i| i.key_pressed(Key::Escape));
+            actions.extend(is_new.then(|| Action::Change(Edit::Rename(*id, name.clone()))));
+            *self.renaming = None;
+        }
+    }
+
     /// What can be corrected about an identity.
-    fn menu(&self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
+    fn menu(&mut self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
         let all = self.identities;
         ui.menu_button("\u{2026}", |ui| {
-            let key = Id::unique("new name").with(id);
-            let mut name = ui.data(|d| d.get_temp::<String>(key)).unwrap_or_else(|| all.name(id));
-            ui.horizontal(|ui| {
-                let edit = ui.add(TextEdit::singleline(&mut name).char_limit(80).desired_width(130.0));
-                let enter = edit.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
-                if ui.button("Rename").clicked() || enter {
-                    actions.push(Action::Change(Edit::Rename(id, name.clone())));
-                    ui.close();
-                }
-            });
-            ui.data_mut(|d| d.insert_temp(key, name));
+            if ui.add(Button::new("Rename").shortcut_text("F2")).clicked() {
+                self.start_renaming(id);
+                ui.close();
+            }
             let level = all.get(id).map(|i| i.level);
             ui.menu_button("Merge into", |ui| {
                 ScrollArea::vertical().max_height(300.0).show(ui, |ui| {

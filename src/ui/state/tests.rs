@@ -178,30 +178,6 @@ fn objects_carried_by_masks_are_found_after_training() {
 }
 
 #[test]
-fn edits_are_undone_and_redone_whoever_made_them() {
-    let maps: Vec<Arc<SemanticMap>> = (0..3).map(|_| Arc::default()).collect();
-    let arrived = |s: &mut AppState, map: &Arc<SemanticMap>| {
-        s.apply(started(JobKind::Edit));
-        s.apply(Event::Finished(JOB, Outcome::Edited(Arc::clone(map))));
-    };
-    let mut s = fold([started(JobKind::Objects), Event::Finished(JOB, Outcome::Objects(Arc::clone(&maps[0])))]);
-    let generations: Vec<u64> = maps[1..]
-        .iter()
-        .map(|map| {
-            arrived(&mut s, map);
-            s.semantics.as_ref().expect("there").generation()
-        })
-        .collect();
-    assert!(generations[0] < generations[1] && s.short_jobs_done == JOB);
-    let is = |state: Option<&Arc<SemanticMap>>, map: usize| state.is_some_and(|m| Arc::ptr_eq(m, &maps[map]));
-    assert!(is(s.edits.last(), 1) && s.edits.next().is_none());
-    arrived(&mut s, &maps[1]);
-    assert!(is(s.edits.last(), 0) && is(s.edits.next(), 2), "an undo is no edit");
-    arrived(&mut s, &maps[2]);
-    assert!(is(s.edits.last(), 1) && s.edits.next().is_none(), "nor is a redo");
-}
-
-#[test]
 fn the_recent_list_is_short_and_has_no_doubles() {
     let mut s = AppState::default();
     for i in (0..20).chain([19, 15]) {

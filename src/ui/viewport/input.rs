@@ -3,6 +3,7 @@
 use egui::{Key, PointerButton, Rect, Response, Ui};
 use glam::{DVec2, DVec3};
 
+use super::super::keys;
 use super::Viewport;
 use crate::jobs::OpenedScene;
 
@@ -64,7 +65,7 @@ impl Viewport {
     }
 
     fn fly(&mut self, ui: &Ui, scene: &OpenedScene) -> bool {
-        if ui.ctx().text_edit_focused() || !ui.is_enabled() || ui.memory(|m| m.top_modal_layer().is_some()) {
+        if keys::is_typing(ui.ctx()) || !ui.is_enabled() || ui.memory(|m| m.top_modal_layer().is_some()) {
             return false;
         }
         let (direction, speed, dt) = ui.input(|i| {

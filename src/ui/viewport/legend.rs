@@ -1,6 +1,6 @@
 //! What the colors over the view mean, with the threshold and the opacity beside it.
 
-use egui::{Color32, Mesh, Rect, RichText, Sense, Slider, Ui, vec2};
+use egui::{Color32, FontId, Mesh, Rect, RichText, Sense, Slider, Ui, vec2};
 
 use super::query::OverlaySettings;
 use crate::math::colormap::Colormap;
@@ -17,16 +17,10 @@ pub(super) fn is_needed(settings: &OverlaySettings, depth: Option<(f32, f32)>) -
 
 /// The legend of the tint, or of the depths that the frame shows.
 pub(super) fn show(ui: &mut Ui, settings: &mut OverlaySettings, depth: Option<(f32, f32)>) {
-    let small = |text: String| RichText::new(text).small().color(theme::WEAK);
     ui.vertical(|ui| {
         if let Some((near, far)) = depth {
-            ui.label(RichText::new("Depth").small());
-            bar(ui, Colormap::Turbo);
-            ui.horizontal(|ui| {
-                ui.label(small(format!("{near:.2}")));
-                ui.add_space(70.0);
-                ui.label(small(format!("{far:.2} units")));
-            });
+            ui.label(RichText::new("Depth, units").small());
+            bar(ui, Colormap::Turbo, [near, far].map(|d| format!("{d:.2}")));
         }
         let meaning = match settings.color_by {
             ColorBy::Masks => return,
@@ -39,7 +33,7 @@ pub(super) fn show(ui: &mut Ui, settings: &mut OverlaySettings, depth: Option<(f
         };
         ui.label(RichText::new(meaning).small());
         if settings.color_by == ColorBy::Heat {
-            bar(ui, settings.colormap);
+            bar(ui, settings.colormap, ["0", "1"].map(String::from));
             ui.add(Slider::new(&mut settings.threshold, 0.0..=1.0).fixed_decimals(2).text("threshold"))
                 .on_hover_text("Outline all pixels of at least this relevancy; 0 = none");
         }
@@ -47,9 +41,14 @@ pub(super) fn show(ui: &mut Ui, settings: &mut OverlaySettings, depth: Option<(f
     });
 }
 
-/// A color map from 0 on the left to 1 on the right.
-fn bar(ui: &mut Ui, map: Colormap) {
-    let (rect, _) = ui.allocate_exact_size(vec2(170.0, 10.0), Sense::hover());
+/// A color map between what its ends stand for.
+fn bar(ui: &mut Ui, map: Colormap, ends: [String; 2]) {
+    let (all, _) = ui.allocate_exact_size(vec2(220.0, 12.0), Sense::hover());
+    let [from, to] = ends.map(|text| ui.painter().layout_no_wrap(text, FontId::proportional(11.5), theme::WEAK));
+    let (left, right) = (all.left() + from.size().x + 6.0, all.right() - to.size().x - 6.0);
+    ui.painter().galley(all.left_top() + vec2(0.0, -1.0), from, theme::WEAK);
+    ui.painter().galley(egui::pos2(right + 6.0, all.top() - 1.0), to, theme::WEAK);
+    let rect = Rect::from_x_y_ranges(left..=right, all.y_range());
     let mut mesh = Mesh::default();
     for step in 0..STEPS {
         let at = |k: usize| rect.left() + rect.width() * k as f32 / STEPS as f32;

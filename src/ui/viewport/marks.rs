@@ -99,7 +99,9 @@ impl Viewport {
         targets.extend(
             self.picking.selected().map(|id| (id, theme::ACCENT)).filter(|t| targets.iter().all(|f| f.0 != t.0)),
         );
-        targets.retain(|(id, _)| semantics.identities.get(*id).is_some() && !self.visibility.is_hidden(*id));
+        targets.retain(|(id, _)| {
+            semantics.identities.get(*id).is_some() && self.visibility.draws(&semantics.identities, *id) != Some(false)
+        });
         let eye = self.overlay_camera(shown);
         for (id, color) in targets.into_iter().take(MOST) {
             let points = self.marks.points(cloud, semantics, id);

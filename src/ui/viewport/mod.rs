@@ -1,5 +1,6 @@
 //! The viewport: shows what the drawing lane rendered, and moves the eye.
 
+mod act;
 pub(crate) mod brush;
 mod display;
 pub mod eye;
@@ -16,6 +17,7 @@ pub mod picking;
 pub(crate) mod query;
 mod request;
 mod route;
+mod ruler;
 pub(crate) mod visible;
 
 use std::sync::Arc;
@@ -32,6 +34,7 @@ use self::photo::PhotoView;
 use self::picking::Picking;
 use self::query::Queries;
 use self::request::{Moved, Requests, Wanted};
+use self::ruler::Ruler;
 use self::visible::Visibility;
 use super::camera::CameraPane;
 use super::layout::Layout;
@@ -73,6 +76,8 @@ pub struct Viewport {
     /// What is under the cursor and what is selected.
     pub picking: Picking,
     marks: Marks,
+    /// What is being measured.
+    ruler: Option<Ruler>,
     /// What is being marked by hand.
     pub(crate) brush: Option<Brush>,
     /// Render settings in place of the scene's own.
@@ -100,6 +105,7 @@ impl Viewport {
             visibility: Visibility::default(),
             picking: Picking::default(),
             marks: Marks::default(),
+            ruler: None,
             brush: None,
             overrides: RenderOverrides::default(),
             zoom_anchor: None,
@@ -140,6 +146,7 @@ impl Viewport {
             self.queries.clear();
             self.visibility = Visibility::default();
             self.picking = Picking::default();
+            self.ruler = None;
             self.brush = None;
             self.overrides = RenderOverrides::default();
             self.eye = Eye::home(&scene.home, None);
@@ -154,56 +161,17 @@ impl Viewport {
         if let Some(why) = self.display.newly_instead_of_gpu() {
             state.toast(Tone::Warning, why);
         }
+        if let Some(why) = self.queries.newly_failed() {
+            let remedy = "Install the encoder (Models pane), or find the objects again with another";
+            state.problem(None, &format!("Queries find names only, the text encoder failed: {why}. {remedy}."));
+        }
         if let Some(photo) = &mut self.photo {
             photo.take_loaded(state);
         }
     }
 
-    /// Does what a user asked of the view.
-    pub(crate) fn act(&mut self, action: &Action, state: &AppState, worker: &Worker, now: f64) {
-        let Some(scene) = state.scene.clone() else { return };
-        let photos = scene.dataset.as_ref().map_or(0, |d| d.photos.len());
-        let here = self.photo_index();
-        match action {
-            Action::FrameScene => {
-                self.leave_photo();
-                let selected = self.selected_bounds(state.semantics.as_ref());
-                self.eye.frame(selected.as_ref().unwrap_or(&scene.home.bounds));
-            }
-            Action::Paint(of) => self.brush = of.filter(|_| state.semantics.is_some()).map(Brush::new),
-            Action::Select(id) => return self.picking.select(*id),
-            Action::Isolate(only) => self.visibility.isolate(*only),
-            Action::Hide(id) => self.visibility.toggle(*id),
-            Action::ResetView => {
-                self.photo = None;
-                self.eye = Eye::home(&scene.home, self.up);
-            }
-            Action::TurnUp(axis) => {
-                self.leave_photo();
-                self.up = Some(axis.vector());
-                self.eye.set_up(axis.vector());
-            }
-            Action::NextPhoto if photos > 0 => self.look_through(here.map_or(0, |i| (i + 1) % photos), &scene, worker),
-            Action::PreviousPhoto if photos > 0 => {
-                self.look_through(here.map_or(photos - 1, |i| (i + photos - 1) % photos), &scene, worker);
-            }
-            Action::GoToPhoto(i) if *i < photos => self.look_through(*i, &scene, worker),
-            _ => return,
-        }
-        self.moved_at = now;
-    }
-
     fn set_cloud(&mut self, cloud: Option<Arc<GaussianCloud>>) {
         self.cloud = cloud.map(Versioned::new);
-    }
-
-    fn look_through(&mut self, index: usize, scene: &OpenedScene, worker: &Worker) {
-        let Some(photo) = scene.dataset.as_ref().and_then(|d| d.photos.get(index)) else { return };
-        let c = &photo.camera;
-        let ahead = (scene.home.bounds.center() - c.center).dot(c.forward());
-        let pivot = c.center + c.forward() * ahead.max(0.1 * scene.home.bounds.radius());
-        self.eye = Eye::of_camera(c, pivot, self.up.unwrap_or(scene.home.up));
-        self.photo = Some(PhotoView::new(index, photo, worker));
     }
 
     /// The camera for what is drawn over the frame: the frame's own, so that both move together.
@@ -239,23 +207,6 @@ impl Viewport {
         self.up.unwrap_or(scene.home.up)
     }
 
-    /// Puts the eye into a pose.
-    pub(crate) fn stand(&mut self, pose: &Pose, state: &AppState, now: f64) {
-        let Some(scene) = state.scene.clone() else { return };
-        self.photo = None;
-        // What it turns about stays ahead, at the distance that it has.
-        let ahead = (self.eye.pivot - pose.center).dot(pose.forward());
-        let distance = if ahead > 0.0 { ahead } else { 0.5 * scene.home.bounds.radius() };
-        self.eye = Eye {
-            center: pose.center,
-            world_from_eye: pose.world_from_camera,
-            pivot: pose.center + pose.forward() * distance,
-            up: self.up(&scene),
-            fov_y_rad: pose.fov_y_rad,
-        };
-        self.moved_at = now;
-    }
-
     /// Turns about this point from now on.
     pub(crate) fn turn_about(&mut self, point: DVec3) {
         self.eye.pivot = point;
@@ -264,13 +215,6 @@ impl Viewport {
     /// Whether a frame has come since this was asked last.
     pub(crate) fn take_new_picture(&mut self) -> bool {
         self.display.take_new()
-    }
-
-    /// Goes on freely from the photo's place, at the scale that the frame had.
-    fn leave_photo(&mut self) {
-        if let Some(photo) = self.photo.take() {
-            self.eye.fov_y_rad = photo.free_fov(self.eye.fov_y_rad);
-        }
     }
 
     /// Draws the viewport into all that is left of `ui`.
@@ -306,7 +250,9 @@ impl Viewport {
         }
         let on_camera =
             layout.cameras && self.photo.is_none() && self.show_frusta(ui, rect, &scene, &response, layout, actions);
-        if let Some(semantics) = state.semantics.as_ref().filter(|_| self.brush.is_none()) {
+        let meters = scene.meters_per_unit();
+        self.show_ruler(ui, &response, shown, meters, actions);
+        if let Some(semantics) = state.semantics.as_ref().filter(|_| self.brush.is_none() && !self.is_measuring()) {
             self.show_picking(ui, &response, shown, semantics, on_camera, actions);
             if let Some(cloud) = self.cloud.clone() {
                 self.show_marks(ui, shown, &cloud, semantics, actions);

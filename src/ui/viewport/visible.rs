@@ -3,14 +3,14 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use crate::scene::{GaussianCloud, IdentityId, SemanticMap};
+use crate::scene::{GaussianCloud, Identities, IdentityId, NOBODY, SemanticMap};
 use crate::worker::Versioned;
 
 /// What of a scene is drawn.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Visibility {
+    /// Whose own Gaussians are left out; nobody's have the number of nobody.
     hidden: BTreeSet<IdentityId>,
-    only: Option<IdentityId>,
     /// The Gaussians that are left, with what they were made from.
     left: Option<Left>,
 }
@@ -25,40 +25,57 @@ struct Left {
 impl Visibility {
     /// Whether anything is left out.
     pub(crate) fn is_partial(&self) -> bool {
-        self.only.is_some() || !self.hidden.is_empty()
+        !self.hidden.is_empty()
     }
 
-    /// Whether one identity is shown alone.
+    /// Whether what belongs to nobody is left out: only some objects or parts are shown.
     pub(crate) fn is_isolated(&self) -> bool {
-        self.only.is_some()
+        self.hidden.contains(&NOBODY)
     }
 
-    /// Whether an identity was hidden itself.
-    pub(crate) fn is_hidden(&self, id: IdentityId) -> bool {
-        self.hidden.contains(&id)
+    /// Whether an identity is drawn with its pieces; `None` if only some of them are.
+    pub(crate) fn draws(&self, all: &Identities, id: IdentityId) -> Option<bool> {
+        let mut drawn = pieces(all, id).map(|i| !self.hidden.contains(&i));
+        let first = drawn.next().unwrap_or(true);
+        drawn.all(|d| d == first).then_some(first)
     }
 
-    /// Identities that were hidden themselves.
-    pub(crate) fn hidden(&self) -> impl Iterator<Item = IdentityId> + '_ {
-        self.hidden.iter().copied()
+    /// Identities whose own Gaussians are left out.
+    pub(crate) fn hidden(&self) -> &BTreeSet<IdentityId> {
+        &self.hidden
     }
 
-    /// Hides these and no others.
+    /// Leaves out these and no others.
     pub(crate) fn set_hidden(&mut self, ids: impl IntoIterator<Item = IdentityId>) {
-        *self = Self { hidden: ids.into_iter().collect(), ..Self::default() };
+        *self = Self { hidden: ids.into_iter().collect(), left: None };
     }
 
-    /// Hides an identity, or shows it again.
-    pub(crate) fn toggle(&mut self, id: IdentityId) {
-        if !self.hidden.remove(&id) {
-            self.hidden.insert(id);
+    /// Hides an identity with its pieces, or shows them again if none is drawn.
+    pub(crate) fn toggle(&mut self, all: &Identities, id: IdentityId) {
+        let hide = self.draws(all, id) != Some(false);
+        for piece in pieces(all, id) {
+            if hide {
+                self.hidden.insert(piece)
+            } else {
+                self.hidden.remove(&piece)
+            };
         }
         self.left = None;
     }
 
-    /// Shows one identity alone; `None` shows all.
-    pub(crate) fn isolate(&mut self, only: Option<IdentityId>) {
-        *self = Self { only, ..Self::default() };
+    /// Shows one identity with its pieces alone; `None` shows all.
+    pub(crate) fn isolate(&mut self, all: &Identities, only: Option<IdentityId>) {
+        let inside = only.map_or_else(Vec::new, |id| all.descendants(id));
+        self.set_hidden((0..).zip(inside).filter(|(_, inside)| !inside).map(|(id, _)| id));
+    }
+
+    /// Follows identities to their new numbers: each keeps its code.
+    pub(crate) fn renumber(&mut self, old: &Identities, new: &Identities) {
+        let now = |id: &IdentityId| match old.get(*id) {
+            None => Some(NOBODY),
+            Some(identity) => new.iter().find(|(_, i)| i.code == identity.code).map(|(id, _)| id),
+        };
+        self.set_hidden(self.hidden.iter().filter_map(now).collect::<Vec<_>>());
     }
 
     /// The Gaussians to draw and what they belong to.
@@ -72,10 +89,8 @@ impl Visibility {
         }
         let of = (cloud.generation(), semantics.generation());
         if self.left.as_ref().is_none_or(|l| l.of != of) {
-            let shown = self.shown(semantics);
-            let kept: Vec<usize> = (0..cloud.len())
-                .filter(|&i| shown.get(semantics.identity_of[i] as usize).copied().unwrap_or(true))
-                .collect();
+            let kept: Vec<usize> =
+                (0..cloud.len()).filter(|&i| !self.hidden.contains(&semantics.identity_of[i])).collect();
             let (cloud, semantics) = (cloud.select(&kept), semantics.select(&kept));
             let (cloud, semantics) = (Versioned::new(Arc::new(cloud)), Versioned::new(Arc::new(semantics)));
             self.left = Some(Left { of, cloud, semantics });
@@ -85,25 +100,17 @@ impl Visibility {
             None => (cloud.clone(), semantics.clone()),
         }
     }
+}
 
-    /// For each number from 0, whether it is drawn.
-    fn shown(&self, semantics: &SemanticMap) -> Vec<bool> {
-        let all = &semantics.identities;
-        let mut shown = match self.only {
-            Some(id) => all.descendants(id),
-            None => vec![true; all.len() + 1],
-        };
-        for &id in &self.hidden {
-            shown.iter_mut().zip(all.descendants(id)).for_each(|(s, inside)| *s &= !inside);
-        }
-        shown
-    }
+/// An identity and all its pieces.
+fn pieces(all: &Identities, id: IdentityId) -> impl Iterator<Item = IdentityId> {
+    (0..).zip(all.descendants(id)).filter(|(_, inside)| *inside).map(|(id, _)| id)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Identities, Level, NOBODY};
+    use crate::scene::Level;
 
     #[test]
     fn what_is_hidden_is_not_drawn() {
@@ -129,14 +136,36 @@ mod tests {
             assert_eq!(cloud.len(), map.identity_of.len());
             cloud.positions.iter().map(|p| p[0] as i32).collect::<Vec<_>>()
         };
+        let all = &map.identities;
         assert_eq!(xs(&mut v), [0, 1, 2, 3]);
-        v.toggle(eye);
-        assert_eq!((xs(&mut v), v.is_hidden(eye)), (vec![0, 2, 3], true));
-        v.toggle(doll);
-        assert_eq!(xs(&mut v), [2, 3]);
-        v.isolate(Some(doll));
-        assert_eq!(xs(&mut v), [0, 1]);
-        v.isolate(None);
+        v.toggle(all, eye);
+        assert_eq!((xs(&mut v), v.draws(all, eye), v.draws(all, doll)), (vec![0, 2, 3], Some(false), None));
+        v.toggle(all, doll);
+        assert_eq!((xs(&mut v), v.draws(all, doll)), (vec![2, 3], Some(false)), "all of it goes first");
+        v.toggle(all, eye);
+        assert_eq!(xs(&mut v), [1, 2, 3], "a piece can be shown without its whole");
+        v.isolate(all, Some(doll));
+        assert_eq!((xs(&mut v), v.draws(all, doll), v.draws(all, cat)), (vec![0, 1], Some(true), Some(false)));
+        v.toggle(all, cat);
+        assert_eq!(xs(&mut v), [0, 1, 2], "a tick adds to what is isolated");
+        v.isolate(all, None);
         assert_eq!((xs(&mut v).len(), v.is_partial()), (4, false));
+    }
+
+    #[test]
+    fn what_is_hidden_stays_hidden_under_another_number() {
+        let named = |codes: &[f32]| {
+            let mut all = Identities::default();
+            for code in codes {
+                let id = all.add(Level::Object, NOBODY, vec![]);
+                all.get_mut(id).expect("there").code = [*code; 3];
+            }
+            all
+        };
+        let (old, new) = (named(&[0.1, 0.2, 0.3]), named(&[0.2, 0.3]));
+        let mut v = Visibility::default();
+        v.set_hidden([NOBODY, 1, 3]);
+        v.renumber(&old, &new);
+        assert_eq!(v.hidden().iter().copied().collect::<Vec<_>>(), [NOBODY, 2], "the first is gone");
     }
 }

@@ -26,6 +26,7 @@ pub(super) fn show(ui: &mut Ui, all: &Identities, id: Option<IdentityId>, action
     row(ui, Action::Ask(all.full_name(id)), "Mark as a query");
     row(ui, Action::Isolate(Some(id)), "Isolate");
     row(ui, Action::Hide(id), "Hide");
+    row(ui, Action::Rename, "Rename");
     row(ui, Action::Isolate(None), "Show all objects");
     ui.separator();
     row(ui, Action::Paint(Some(id)), "Paint a new part\u{2026}");

@@ -168,7 +168,7 @@ impl Drawn {
 /// The innermost identity at a place of the window.
 fn innermost(map: &ViewMap, shown: Rect, pos: Pos2) -> Option<IdentityId> {
     let at = (pos - shown.min) / shown.size();
-    let inside = |v: f32, n: usize| (0.0..1.0).contains(&v).then(|| (v * n as f32) as usize);
+    let inside = |v: f32, n: usize| (0.0..1.0).contains(&v).then_some((v * n as f32) as usize);
     let (x, y) = (inside(at.x, map.width_px)?, inside(at.y, map.height_px)?);
     map.identity.get(y * map.width_px + x).copied()
 }

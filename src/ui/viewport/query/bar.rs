@@ -1,10 +1,11 @@
 //! The query box: typing, completion from known names, history.
 
-use egui::{Key, Modifiers, RichText, TextEdit, Ui};
+use egui::{Id, Key, Modifiers, RichText, TextEdit, Ui};
 
-use super::{COLORS, Queries};
+use super::{COLORS, MOST, Queries};
 use crate::pipeline::semantics::names;
 use crate::scene::SemanticMap;
+use crate::ui::text_field::cursor_to_end;
 use crate::ui::theme;
 
 /// Completions that are offered.
@@ -18,7 +19,7 @@ impl Queries {
         // Settings are for looking at maps.
         self.wanted |= focused || self.open;
         if focused {
-            self.recall(ui, semantics);
+            self.recall(ui, id, semantics);
         }
         let offered = self.offered(semantics);
         let complete = focused && !offered.is_empty() && ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Tab));
@@ -28,13 +29,16 @@ impl Queries {
                 .id(id)
                 .hint_text("Query an object, or \"the button of the red controller\"   ( / )")
                 .char_limit(2_000)
+                // Tab completes, as long as there is something to complete to.
+                .lock_focus(!offered.is_empty())
                 .desired_width(width);
-            let response = ui.add(edit);
+            let response = ui.add(edit).accessible_name("Query");
             if std::mem::take(&mut self.focus) || complete {
                 response.request_focus();
             }
             if complete {
                 self.typed.clone_from(&offered[0]);
+                cursor_to_end(ui.ctx(), id, &self.typed);
             }
             if response.changed() || complete {
                 self.recalled = None;
@@ -74,7 +78,7 @@ impl Queries {
     }
 
     /// Goes through what was asked before with the arrow keys.
-    fn recall(&mut self, ui: &Ui, semantics: &SemanticMap) {
+    fn recall(&mut self, ui: &Ui, field: Id, semantics: &SemanticMap) {
         let pressed = |key| ui.input_mut(|i| i.consume_key(Modifiers::NONE, key));
         let n = self.history.len();
         let next = match self.recalled {
@@ -86,7 +90,34 @@ impl Queries {
         };
         let text = next.and_then(|i| self.history.get(i)).cloned().unwrap_or_default();
         self.ask(&text, semantics);
+        cursor_to_end(ui.ctx(), field, &text);
         self.recalled = next;
+    }
+
+    /// The queries that stay on screen.
+    pub(crate) fn kept_texts(&self) -> Vec<String> {
+        self.kept.iter().map(|q| q.text.clone()).collect()
+    }
+
+    /// Keeps these queries on screen, and no others.
+    pub(crate) fn keep_only(&mut self, texts: &[String], semantics: &SemanticMap) {
+        if self.kept.iter().map(|q| &q.text).ne(texts) {
+            self.kept = texts.iter().filter_map(|text| self.asked(text, semantics)).collect();
+        }
+    }
+
+    /// Keeps the query being typed on screen, and makes room for the next.
+    pub(super) fn keep(&mut self) {
+        let Some(live) = self.live.take() else { return };
+        self.kept.retain(|q| q.text != live.text);
+        if self.kept.len() == MOST {
+            self.kept.remove(0);
+        }
+        self.history.retain(|t| *t != live.text);
+        self.history.push(live.text.clone());
+        self.recalled = None;
+        self.kept.push(live);
+        self.typed.clear();
     }
 
     /// Chips of the queries that stay on screen.

@@ -90,6 +90,8 @@ pub struct Queries {
     answered_for: u64,
     /// Embeddings of the texts on screen.
     embeddings: Embeddings,
+    /// Why there are none, once that was reported.
+    reported: Option<String>,
     /// Relevancy of the pixels, for the histogram.
     heat: Vec<f32>,
     texture: Option<TextureHandle>,
@@ -197,6 +199,12 @@ impl Queries {
         *self = Self { settings: self.settings, open: self.open, history, embeddings, ..Self::default() };
     }
 
+    /// Why only names are understood, once for each reason.
+    pub(crate) fn newly_failed(&mut self) -> Option<String> {
+        let why = self.embeddings.problem()?.to_owned();
+        (self.reported.replace(why.clone()).as_ref() != Some(&why)).then_some(why)
+    }
+
     /// Takes over what the present view's pixels belong to, exactly or as the eye moves.
     pub(crate) fn set_maps(&mut self, maps: Versioned<ViewMaps>, exact: bool) {
         (self.maps, self.moving) = if exact { (Some(maps), None) } else { (None, Some(maps)) };
@@ -239,20 +247,6 @@ impl Queries {
         let unknown = names::unknown_to_all(&semantics.identities, text, to_encoder);
         let pending = semantics.language.is_some() && self.embeddings.is_pending(text);
         Some(Asked { text: text.to_owned(), answered, pending, chosen: None, unknown })
-    }
-
-    /// Keeps the query being typed on screen, and makes room for the next.
-    fn keep(&mut self) {
-        let Some(live) = self.live.take() else { return };
-        self.kept.retain(|q| q.text != live.text);
-        if self.kept.len() == MOST {
-            self.kept.remove(0);
-        }
-        self.history.retain(|t| *t != live.text);
-        self.history.push(live.text.clone());
-        self.recalled = None;
-        self.kept.push(live);
-        self.typed.clear();
     }
 
     /// The target's pixels in the present view.

@@ -1,6 +1,6 @@
 //! The box over the view: what is typed, and how it is answered.
 
-use egui::{Align2, Area, Id, Order, Rect, Ui};
+use egui::{Align2, Area, Context, Id, LayerId, Order, Rect, ScrollArea, Ui};
 
 use super::super::super::theme;
 use super::{Queries, settings};
@@ -8,10 +8,15 @@ use crate::scene::{GaussianCloud, SemanticMap};
 use crate::ui::actions::Action;
 use crate::worker::Versioned;
 
-/// Views narrower than this have no room for the query beside the view's own buttons, points.
-const BESIDE: f32 = 700.0;
-/// How far it is below them then: both rows of them.
-const BELOW: f32 = 92.0;
+/// Around cards, points.
+const MARGIN: f32 = 12.0;
+
+/// Where a card of the view is on screen.
+fn on_screen(ctx: &Context, name: &'static str) -> Option<Rect> {
+    let id = Id::unique(name);
+    let is_shown = |m: &egui::Memory| m.areas().visible_last_frame(&LayerId::new(Order::Middle, id));
+    ctx.memory(|m| m.area_rect(id).filter(|_| is_shown(m)))
+}
 
 impl Queries {
     /// The box, the answers, and the queries that are kept.
@@ -24,24 +29,30 @@ impl Queries {
         actions: &mut Vec<Action>,
     ) {
         // In the corner: what is looked for is mostly in the middle.
-        let mut at = Align2::RIGHT_TOP.pos_in_rect(&rect.shrink(12.0));
-        if rect.width() < BESIDE {
-            at.y += BELOW;
+        let mut at = Align2::RIGHT_TOP.pos_in_rect(&rect.shrink(MARGIN));
+        let width = (rect.width() - 410.0).clamp(300.0, 380.0).min(rect.width() - 40.0);
+        for card in ["modes", "photo"].into_iter().filter_map(|name| on_screen(ui.ctx(), name)) {
+            // Below the view's own cards where they reach that far.
+            if card.right() + MARGIN > at.x - width - 2.0 * MARGIN {
+                at.y = at.y.max(card.bottom() + 0.5 * MARGIN);
+            }
         }
         let area = Area::new(Id::unique("question")).order(Order::Middle).pivot(Align2::RIGHT_TOP).fixed_pos(at);
         area.constrain_to(rect).show(ui.ctx(), |ui| {
             theme::overlay().show(ui, |ui| {
-                // Beside the view's own buttons, as long as there is room.
-                ui.set_width((rect.width() - 410.0).clamp(300.0, 380.0).min(rect.width() - 40.0));
-                self.show_bar(ui, semantics);
-                if self.open {
-                    let heat = (!self.heat.is_empty()).then_some(self.heat.as_slice());
-                    if settings::show(ui, &mut self.settings, heat) {
-                        self.ask_again(semantics);
+                ui.set_width(width);
+                let height = (rect.bottom() - at.y - 2.5 * MARGIN).max(60.0);
+                ScrollArea::vertical().max_height(height).show(ui, |ui| {
+                    self.show_bar(ui, semantics);
+                    if self.open {
+                        let heat = (!self.heat.is_empty()).then_some(self.heat.as_slice());
+                        if settings::show(ui, &mut self.settings, heat) {
+                            self.ask_again(semantics);
+                        }
                     }
-                }
-                self.show_answer(ui, semantics, cloud, actions);
-                self.show_kept(ui);
+                    self.show_answer(ui, semantics, cloud, actions);
+                    self.show_kept(ui);
+                });
             });
         });
     }

@@ -1,0 +1,218 @@
+//! Choosing files and folders: with the system's dialog where there is one, else with one of the window's own.
+
+use std::path::{Path, PathBuf};
+use std::pin::Pin;
+use std::time::{Duration, Instant};
+
+use crossbeam_channel::{Receiver, Sender, bounded};
+use egui::{Align2, Context, Id, LayerId, Order};
+use egui_file::FileDialog;
+use rfd::{AsyncFileDialog, FileHandle};
+
+use super::actions::Action;
+use super::dialogs::show_question;
+use crate::worker::Repaint;
+
+/// Nobody closes a dialog this soon: the system has none.
+const NO_DIALOG: Duration = Duration::from_millis(500);
+
+/// What is to be chosen.
+#[derive(Clone, Debug, PartialEq)]
+enum Kind {
+    Folder,
+    /// A file of this kind, with these endings.
+    File(&'static str, &'static [&'static str]),
+    /// Where to write a file, with the name that is proposed.
+    Save(String),
+}
+
+/// A path that is asked for.
+#[derive(Clone, Debug)]
+struct Request {
+    action: Action,
+    title: String,
+    kind: Kind,
+    /// Where to begin.
+    folder: PathBuf,
+}
+
+/// The window's own dialog.
+struct Own {
+    request: Request,
+    dialog: FileDialog,
+    /// A file that may be replaced, if the user says so.
+    replaces: Option<PathBuf>,
+}
+
+/// What the system's dialog came to.
+enum Answer {
+    Path(PathBuf),
+    Closed,
+    NoDialog,
+}
+
+/// Asks for paths, off the window's thread where that takes a dialog of the system.
+pub(crate) struct FileDialogs {
+    sender: Sender<Answer>,
+    answers: Receiver<Answer>,
+    /// What the system's dialog is asked for.
+    asked: Option<Request>,
+    own: Option<Own>,
+    /// Whether the system has shown that it has no dialog.
+    own_only: bool,
+}
+
+impl Default for FileDialogs {
+    fn default() -> Self {
+        let (sender, answers) = bounded(1);
+        Self { sender, answers, asked: None, own: None, own_only: false }
+    }
+}
+
+impl FileDialogs {
+    /// Shows a dialog for an action that needs a path, unless one is open already. `name` is proposed for a file that
+    /// is written, `folder` is where to begin.
+    pub(crate) fn ask(
+        &mut self,
+        action: Action,
+        name: &str,
+        folder: Option<&Path>,
+        repaint: Repaint,
+    ) -> std::io::Result<()> {
+        let Some((title, kind)) = dialog(&action, name).filter(|_| self.asked.is_none() && self.own.is_none()) else {
+            return Ok(());
+        };
+        let folder = folder.filter(|f| f.is_dir()).map(Path::to_path_buf);
+        let folder = folder.or_else(std::env::home_dir).unwrap_or_else(|| "/".into());
+        let request = Request { action, title, kind, folder };
+        if self.own_only {
+            self.own = Some(Own::new(request));
+            return Ok(());
+        }
+        let system = AsyncFileDialog::new().set_title(&request.title).set_directory(&request.folder);
+        // Some systems want the dialog made on the window's thread; waiting for it is what must not happen here.
+        let answer: Pin<Box<dyn Future<Output = Option<FileHandle>> + Send>> = match &request.kind {
+            Kind::Folder => Box::pin(system.pick_folder()),
+            Kind::File(files, endings) => {
+                Box::pin(system.add_filter(*files, endings).add_filter("All files", &["*"]).pick_file())
+            }
+            Kind::Save(file) => Box::pin(system.set_file_name(file).save_file()),
+        };
+        let sender = self.sender.clone();
+        std::thread::Builder::new().name("file dialog".into()).spawn(move || {
+            let start = Instant::now();
+            let answer = match pollster::block_on(answer) {
+                Some(file) => Answer::Path(file.path().to_path_buf()),
+                None if start.elapsed() < NO_DIALOG => Answer::NoDialog,
+                None => Answer::Closed,
+            };
+            // The window may be gone by now.
+            let _ = sender.send(answer);
+            repaint();
+        })?;
+        self.asked = Some(request);
+        Ok(())
+    }
+
+    /// Whether the window's own dialog is on screen, which has the keyboard then.
+    pub(crate) fn is_own_open(&self) -> bool {
+        self.own.is_some()
+    }
+
+    /// Draws the window's own dialog. What was chosen, there or in the system's, and what it is for.
+    pub(crate) fn show(&mut self, ctx: &Context) -> Option<(Action, PathBuf)> {
+        if let Ok(answer) = self.answers.try_recv()
+            && let Some(request) = self.asked.take()
+        {
+            match answer {
+                Answer::Path(path) => return Some((request.action, path)),
+                Answer::Closed => {}
+                Answer::NoDialog => {
+                    self.own_only = true;
+                    self.own = Some(Own::new(request));
+                }
+            }
+        }
+        let own = self.own.as_mut()?;
+        let chosen = own.show(ctx)?;
+        let Own { request, .. } = self.own.take()?;
+        chosen.map(|path| (request.action, path))
+    }
+}
+
+impl Own {
+    fn new(request: Request) -> Self {
+        let dialog = match &request.kind {
+            Kind::Folder => FileDialog::select_folder(),
+            Kind::File(_, endings) => {
+                let endings = *endings;
+                let fits = move |path: &Path| {
+                    path.extension().is_some_and(|e| endings.iter().any(|one| e.eq_ignore_ascii_case(one)))
+                };
+                FileDialog::open_file().show_files_filter(Box::new(fits))
+            }
+            Kind::Save(name) => FileDialog::save_file().default_filename(name),
+        };
+        let mut dialog = dialog
+            .id(Self::layer().id)
+            .title(&request.title)
+            .initial_path(&request.folder)
+            .show_rename(false)
+            .show_new_folder(matches!(request.kind, Kind::Save(_)))
+            .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
+            .default_size([560.0, 380.0])
+            .keep_on_top(true);
+        dialog.open();
+        Self { request, dialog, replaces: None }
+    }
+
+    fn layer() -> LayerId {
+        LayerId::new(Order::Middle, Id::unique("file dialog"))
+    }
+
+    /// Draws it. `Some(None)` once it is closed without a path.
+    fn show(&mut self, ctx: &Context) -> Option<Option<PathBuf>> {
+        if let Some(path) = &self.replaces {
+            let text = format!("{} is there already. Replace it?", path.display());
+            let replace = show_question(ctx, &text, "Replace", "Choose another name")?;
+            let path = self.replaces.take();
+            if replace {
+                return Some(path);
+            }
+            self.dialog.open();
+        }
+        ctx.memory_mut(|m| m.set_modal_layer(Self::layer()));
+        match self.dialog.show(ctx).state() {
+            egui_file::State::Open => None,
+            egui_file::State::Selected => {
+                let path = self.dialog.path().map(Path::to_path_buf)?;
+                if matches!(self.request.kind, Kind::Save(_)) && path.exists() {
+                    self.replaces = Some(path);
+                    return None;
+                }
+                Some(Some(path))
+            }
+            egui_file::State::Cancelled | egui_file::State::Closed => Some(None),
+        }
+    }
+}
+
+/// Title and kind of dialog of an action that needs a path; `name` is what is proposed for a new file.
+fn dialog(action: &Action, name: &str) -> Option<(String, Kind)> {
+    let save = |ending: &str| Kind::Save(format!("{name}{ending}"));
+    let (title, kind) = match action {
+        Action::OpenFolder => ("Open a folder of photos or a trained scene", Kind::Folder),
+        Action::OpenFile => ("Open a scene", Kind::File("Scenes", &["ply", "json", "toml"])),
+        Action::AddModel(id) => return Some((format!("Choose the folder with the files of {id}"), Kind::Folder)),
+        Action::ChooseMasks => ("Choose the folder with the masks", Kind::Folder),
+        Action::ExportPly | Action::ExportTarget(_) => ("Export Gaussians", save(".ply")),
+        Action::OpenPath => ("Open a camera path", Kind::File("Camera paths", &["json"])),
+        Action::ChooseReport | Action::ChooseSecondReport => ("Open a report", Kind::File("Reports", &["json"])),
+        Action::SavePath => ("Save the camera path", save("-path.json")),
+        Action::SaveChat => ("Save the conversation", save("-conversation.md")),
+        Action::ExportVideo => ("Export video", save(".mp4")),
+        Action::Screenshot => ("Save the view", save(".png")),
+        _ => return None,
+    };
+    Some((title.to_owned(), kind))
+}

@@ -1,0 +1,271 @@
+//! The one history of the window: what is done to objects, to what is shown and to the camera's path, by the user
+//! and by the agent, is undone and redone in the order in which it was done.
+//!
+//! Nobody reports a change: the window's state is compared with how it was, whenever nobody is about to change it
+//! further, so a drag or a name that is typed is one change.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use crate::jobs::edit::EditRequest;
+use crate::pipeline::semantics::edit::Edit;
+use crate::scene::undo::UndoHistory;
+use crate::scene::{CameraPath, Identities, IdentityId, NOBODY, SemanticMap};
+use crate::worker::ViewMode;
+
+/// What can be changed back beside objects and parts.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ViewState {
+    /// Whose own Gaussians are left out.
+    pub(crate) hidden: BTreeSet<IdentityId>,
+    pub(crate) mode: ViewMode,
+    pub(crate) cameras: bool,
+    pub(crate) path: CameraPath,
+    /// Queries that are kept on screen.
+    pub(crate) kept: Vec<String>,
+}
+
+/// All that can be changed back.
+#[derive(Clone, Debug)]
+pub(crate) struct Snapshot {
+    /// Counts scenes: what was done to another is forgotten.
+    pub(crate) scene: u64,
+    pub(crate) map: Option<Arc<SemanticMap>>,
+    pub(crate) view: ViewState,
+}
+
+/// A change, in words, with the state on its other side.
+#[derive(Clone, Debug)]
+struct Change {
+    what: String,
+    other: Snapshot,
+}
+
+/// What was done, and how it is now.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct History {
+    changes: UndoHistory<Change>,
+    now: Option<Snapshot>,
+}
+
+impl Snapshot {
+    /// Whether an identity has this name.
+    pub(crate) fn is_called(&self, id: IdentityId, name: &str) -> bool {
+        let identity = self.map.as_ref().and_then(|map| map.identities.get(id));
+        identity.is_some_and(|i| i.names.first().map_or("", |n| n) == name)
+    }
+}
+
+impl History {
+    /// How it was when it was looked at last.
+    pub(crate) fn now(&self) -> Option<&Snapshot> {
+        self.now.as_ref()
+    }
+
+    /// Whether it knows these objects and parts.
+    pub(crate) fn has_map(&self, map: &Option<Arc<SemanticMap>>) -> bool {
+        self.now.as_ref().is_some_and(|now| is_same(&now.map, map))
+    }
+
+    /// Takes in how it is now. A change of objects and parts is called what `edit` says; without it they are others
+    /// than before, and what was done is forgotten. What has changed, in words.
+    pub(crate) fn settle(&mut self, now: &Snapshot, edit: Option<&str>) -> Option<String> {
+        let before = self.now.as_ref().filter(|before| before.scene == now.scene);
+        let is_edited = before.is_some_and(|before| !is_same(&before.map, &now.map));
+        let Some(before) = before.filter(|_| !is_edited || edit.is_some()) else {
+            *self = Self { now: Some(now.clone()), ..Self::default() };
+            return None;
+        };
+        if !is_edited && before.view == now.view {
+            return None;
+        }
+        let what = match edit.filter(|_| is_edited) {
+            Some(edit) => edit.to_owned(),
+            None => described(&before.view, &now.view, now.map.as_ref().map(|map| &map.identities)),
+        };
+        if let Some(other) = self.now.replace(now.clone()) {
+            self.changes.record(Change { what: what.clone(), other });
+        }
+        Some(what)
+    }
+
+    /// What undoing takes back.
+    pub(crate) fn last(&self) -> Option<&str> {
+        self.changes.last().map(|c| c.what.as_str())
+    }
+
+    /// What redoing does again.
+    pub(crate) fn next(&self) -> Option<&str> {
+        self.changes.next().map(|c| c.what.as_str())
+    }
+
+    /// The state that undoing would lead to.
+    pub(crate) fn before(&self) -> Option<&Snapshot> {
+        self.changes.last().map(|c| &c.other)
+    }
+
+    /// Goes back by one change, or forth: what it was, and the state to be in then.
+    pub(crate) fn go(&mut self, redo: bool) -> Option<(String, Snapshot)> {
+        let what = if redo { self.next() } else { self.last() }?.to_owned();
+        let mut change = Change { what: what.clone(), other: self.now.clone()? };
+        if redo {
+            self.changes.redo(&mut change)
+        } else {
+            self.changes.undo(&mut change)
+        };
+        self.now = Some(change.other.clone());
+        Some((what, change.other))
+    }
+}
+
+fn is_same(a: &Option<Arc<SemanticMap>>, b: &Option<Arc<SemanticMap>>) -> bool {
+    match (a, b) {
+        (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+        (a, b) => a.is_none() && b.is_none(),
+    }
+}
+
+/// What an edit does, in words.
+pub(crate) fn edit_text(request: &EditRequest, all: &Identities) -> String {
+    let added = |of: IdentityId, name: &str| match (name.trim(), of) {
+        ("", NOBODY) => "added an object".to_owned(),
+        ("", of) => format!("added a part of {}", all.name(of)),
+        (name, _) => format!("added {name}"),
+    };
+    match request {
+        EditRequest::Apply(Edit::Rename(id, name)) => format!("renamed {} to {}", all.name(*id), name.trim()),
+        EditRequest::Apply(Edit::Merge(from, into)) => format!("merged {} into {}", all.name(*from), all.name(*into)),
+        EditRequest::Apply(Edit::Split(id)) => format!("split {}", all.name(*id)),
+        EditRequest::Apply(Edit::AddPiece { of, name, .. }) | EditRequest::Paint { of, name, .. } => added(*of, name),
+        EditRequest::Restore(_) => "restored objects and parts".to_owned(),
+    }
+}
+
+/// What became another, in words.
+fn described(before: &ViewState, now: &ViewState, all: Option<&Identities>) -> String {
+    if before.hidden != now.hidden {
+        return all.map_or_else(String::new, |all| shown_text(&before.hidden, &now.hidden, all));
+    }
+    if before.path != now.path {
+        let (n, keys) = (now.path.keys.len(), before.path.keys.len());
+        let what = match n.abs_diff(keys) {
+            0 => "changed the camera path",
+            1 if n > keys => "added a keyframe",
+            1 => "deleted a keyframe",
+            _ => "replaced the camera path",
+        };
+        return what.to_owned();
+    }
+    if before.mode != now.mode {
+        return match now.mode {
+            ViewMode::Rgb => "showed RGB".to_owned(),
+            other => format!("showed {}", other.text().to_lowercase()),
+        };
+    }
+    if before.cameras != now.cameras {
+        return format!("{} the cameras", if now.cameras { "showed" } else { "hid" });
+    }
+    "changed the queries on screen".to_owned()
+}
+
+fn shown_text(before: &BTreeSet<IdentityId>, now: &BTreeSet<IdentityId>, all: &Identities) -> String {
+    if now.is_empty() {
+        return "showed everything".to_owned();
+    }
+    // Wholes stand for their pieces.
+    let outermost = |ids: &BTreeSet<IdentityId>| -> Vec<IdentityId> {
+        let whole = |id: &IdentityId| all.get(*id).is_some_and(|i| ids.contains(&i.parent));
+        ids.iter().copied().filter(|id| all.get(*id).is_some() && !whole(id)).collect()
+    };
+    let drawn: BTreeSet<IdentityId> = all.iter().map(|(id, _)| id).filter(|id| !now.contains(id)).collect();
+    if let (true, [only]) = (now.contains(&NOBODY), outermost(&drawn).as_slice()) {
+        return format!("showed only {}", all.full_name(*only));
+    }
+    let named = |ids: BTreeSet<IdentityId>| match outermost(&ids).as_slice() {
+        [one] => all.full_name(*one),
+        [one, other] => format!("{} and {}", all.full_name(*one), all.full_name(*other)),
+        more => format!("{} objects and parts", more.len()),
+    };
+    let (gone, back): (BTreeSet<_>, BTreeSet<_>) = (now - before, before - now);
+    match (gone.is_empty(), back.is_empty()) {
+        (false, true) => format!("hid {}", named(gone)),
+        (true, _) => format!("showed {}", named(back)),
+        _ => format!("hid {}, showed {}", named(gone), named(back)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DMat3, DVec3};
+
+    use super::*;
+    use crate::scene::{Level, PathKey};
+
+    fn lamp() -> Arc<SemanticMap> {
+        let mut identities = Identities::default();
+        let lamp = identities.add(Level::Object, NOBODY, vec!["lamp".into()]);
+        identities.add(Level::Part, lamp, vec!["shade".into()]);
+        identities.add(Level::Object, NOBODY, vec!["table".into()]);
+        Arc::new(SemanticMap { identities, ..SemanticMap::default() })
+    }
+
+    fn start() -> (History, Snapshot) {
+        let path = CameraPath { keys: Vec::new(), closed: false, fps: 30.0, seconds: 5.0 };
+        let view = ViewState { hidden: BTreeSet::new(), mode: ViewMode::Rgb, cameras: true, path, kept: Vec::new() };
+        let now = Snapshot { scene: 1, map: Some(lamp()), view };
+        let mut history = History::default();
+        assert_eq!(history.settle(&now, None), None);
+        (history, now)
+    }
+
+    #[test]
+    fn changes_of_every_kind_come_back_in_order() {
+        let (mut history, mut now) = start();
+        let done = |history: &mut History, now: &Snapshot, edit| history.settle(now, edit).expect("a change");
+        now.view.hidden = [0, 3].into();
+        assert_eq!(done(&mut history, &now, None), "showed only lamp");
+        now.map = Some(lamp());
+        assert_eq!(done(&mut history, &now, Some("split lamp")), "split lamp");
+        now.view.path.keys.push(PathKey::of_pose(DVec3::ZERO, DMat3::IDENTITY, 1.0));
+        assert_eq!(done(&mut history, &now, None), "added a keyframe");
+        now.view.mode = ViewMode::Depth;
+        assert_eq!(done(&mut history, &now, None), "showed depth");
+        assert_eq!(history.settle(&now, None), None, "nothing has changed");
+        let back: Vec<String> = std::iter::from_fn(|| history.go(false)).map(|(what, _)| what).collect();
+        assert_eq!(back, ["showed depth", "added a keyframe", "split lamp", "showed only lamp"]);
+        assert_eq!((history.last(), history.next()), (None, Some("showed only lamp")));
+        let (_, again) = history.go(true).expect("something to redo");
+        assert!(again.view.hidden.len() == 2 && again.view.path.keys.is_empty());
+        assert_eq!(history.settle(&again, None), None, "redoing is no change");
+        let mut other = again;
+        other.view.hidden.clear();
+        assert_eq!(done(&mut history, &other, None), "showed everything");
+        assert!(history.go(true).is_none(), "a change ends what could be redone");
+        assert!(history.go(false).is_some_and(|(_, back)| back.view.hidden.len() == 2));
+    }
+
+    #[test]
+    fn another_scene_and_objects_found_anew_have_no_past() {
+        for change in [|now: &mut Snapshot| now.scene = 2, |now: &mut Snapshot| now.map = Some(lamp())] {
+            let (mut history, mut now) = start();
+            now.view.cameras = false;
+            assert_eq!(history.settle(&now, None).as_deref(), Some("hid the cameras"));
+            change(&mut now);
+            assert_eq!((history.settle(&now, None), history.last()), (None, None));
+        }
+    }
+
+    #[test]
+    fn what_is_hidden_is_named_by_its_whole() {
+        let map = lamp();
+        let text = |before: &[IdentityId], now: &[IdentityId]| {
+            let set = |ids: &[IdentityId]| ids.iter().copied().collect();
+            shown_text(&set(before), &set(now), &map.identities)
+        };
+        assert_eq!(text(&[], &[1, 2]), "hid lamp");
+        assert_eq!(text(&[], &[2]), "hid shade of the lamp");
+        assert_eq!(text(&[1, 2, 3], &[3]), "showed lamp");
+        assert_eq!(text(&[], &[0, 1, 3]), "showed only shade of the lamp");
+        assert_eq!(text(&[2], &[3]), "hid table, showed shade of the lamp");
+    }
+}

@@ -1,0 +1,39 @@
+//! What is wrong with what is open, over the view: what is missing, why, and what to do.
+
+use egui::{Button, Frame, Margin, Panel, RichText, Ui};
+
+use super::super::state::{AppState, Tone};
+use super::super::theme;
+
+/// Problems that are on screen at once; the log has all.
+const MOST: usize = 3;
+
+/// Draws a line for each, until it is dismissed.
+pub(crate) fn show(ui: &mut Ui, state: &mut AppState) {
+    if state.problems.is_empty() {
+        return;
+    }
+    let bar = Frame::new().fill(theme::WARNING.gamma_multiply(0.16)).inner_margin(Margin::symmetric(10, 6));
+    let mut dismissed = None;
+    Panel::top("problems").frame(bar).show(ui, |ui| {
+        for (i, (_, text)) in state.problems.iter().enumerate().take(MOST) {
+            ui.horizontal(|ui| {
+                theme::mark(ui, Tone::Warning, 18.0);
+                let width = ui.available_width() - 90.0;
+                ui.allocate_ui(egui::vec2(width, 0.0), |ui| ui.add(egui::Label::new(text).wrap()));
+                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                    if ui.add(Button::new("Dismiss").small()).clicked() {
+                        dismissed = Some(i);
+                    }
+                });
+            });
+        }
+        let more = state.problems.len().saturating_sub(MOST);
+        if more > 0 {
+            ui.label(RichText::new(format!("{more} more in the log")).small().color(theme::WEAK));
+        }
+    });
+    if let Some(i) = dismissed {
+        state.problems.remove(i);
+    }
+}

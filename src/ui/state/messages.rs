@@ -1,0 +1,81 @@
+//! What the window says to the user: lines of the log, messages that go away, errors, and problems over the view.
+
+use super::AppState;
+use crate::scene::text;
+use crate::worker::{Failure, JobId};
+
+/// Lines kept in the log.
+const MAX_LOG: usize = 1_000;
+
+/// How a message is meant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Tone {
+    Info,
+    Good,
+    /// Something was left out or changed.
+    Warning,
+    Error,
+}
+
+/// A line of the log.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LogLine {
+    /// How it is meant.
+    pub(crate) tone: Tone,
+    /// What it says.
+    pub text: String,
+}
+
+/// A message that goes away by itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Toast {
+    /// Names it, so that the window can time it.
+    pub(crate) id: u64,
+    /// How it is meant.
+    pub(crate) tone: Tone,
+    pub(crate) text: String,
+}
+
+/// An error that is shown until a user has read it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ErrorBox {
+    /// What was being done: "Opening fox".
+    pub(crate) doing: String,
+    /// What went wrong, and what to do.
+    pub(crate) failure: Failure,
+}
+
+impl AppState {
+    /// Adds a line to the log.
+    pub(crate) fn say(&mut self, tone: Tone, text: impl Into<String>) {
+        if self.log.len() == MAX_LOG {
+            self.log.pop_front();
+        }
+        self.log.push_back(LogLine { tone, text: text::line(&text.into()).into_owned() });
+    }
+
+    /// Shows over the view what is wrong with what is open, until it is dismissed or another job makes it anew.
+    pub(crate) fn problem(&mut self, job: Option<JobId>, text: &str) {
+        let text = text::line(text).into_owned();
+        if self.problems.iter().all(|(_, known)| *known != text) {
+            self.problems.push((job, text));
+        }
+    }
+
+    /// Shows a message that goes away by itself, and logs it.
+    pub(crate) fn toast(&mut self, tone: Tone, text: impl Into<String>) {
+        let text = text::lines(&text.into()).into_owned();
+        self.say(tone, text.clone());
+        self.toasts.push(Toast { id: self.next_toast, tone, text });
+        self.next_toast += 1;
+    }
+
+    /// Shows an error until it is dismissed, and logs it.
+    pub(crate) fn fail(&mut self, doing: impl Into<String>, failure: Failure) {
+        let doing = text::line(&doing.into()).into_owned();
+        let [message, remedy] = [&failure.message, &failure.remedy].map(|t| text::lines(t).into_owned());
+        let failure = Failure { message, remedy };
+        self.say(Tone::Error, format!("{doing}: {}", failure.message));
+        self.error = Some(ErrorBox { doing, failure });
+    }
+}

@@ -1,0 +1,88 @@
+//! What the actions about the view do, and where they put the eye.
+
+use glam::DVec3;
+
+use super::brush::Brush;
+use super::eye::Eye;
+use super::photo::PhotoView;
+use super::ruler::Ruler;
+use super::{AppState, OpenedScene, Viewport};
+use crate::navigate::Pose;
+use crate::ui::actions::Action;
+use crate::worker::Worker;
+
+impl Viewport {
+    /// Does what a user asked of the view.
+    pub(crate) fn act(&mut self, action: &Action, state: &AppState, worker: &Worker, now: f64) {
+        let Some(scene) = state.scene.clone() else { return };
+        let photos = scene.dataset.as_ref().map_or(0, |d| d.photos.len());
+        let (here, all) = (self.photo_index(), state.semantics.as_ref().map(|map| &map.identities));
+        match action {
+            Action::FrameScene => {
+                self.leave_photo();
+                let selected = self.selected_bounds(state.semantics.as_ref());
+                self.eye.frame(selected.as_ref().unwrap_or(&scene.home.bounds));
+            }
+            Action::Paint(of) => self.brush = of.filter(|_| state.semantics.is_some()).map(Brush::new),
+            Action::Select(id) => return self.picking.select(*id),
+            Action::Isolate(only) => return all.map_or((), |all| self.visibility.isolate(all, *only)),
+            Action::Hide(id) => return all.map_or((), |all| self.visibility.toggle(all, *id)),
+            Action::ResetView => {
+                self.photo = None;
+                self.eye = Eye::home(&scene.home, self.up);
+            }
+            Action::Measure => {
+                self.ruler = if self.ruler.is_some() { None } else { Some(Ruler::default()) };
+                return;
+            }
+            Action::TurnUp(axis) => self.turn_up(axis.vector()),
+            Action::SetUp(up) => self.turn_up(*up),
+            Action::NextPhoto if photos > 0 => self.look_through(here.map_or(0, |i| (i + 1) % photos), &scene, worker),
+            Action::PreviousPhoto if photos > 0 => {
+                self.look_through(here.map_or(photos - 1, |i| (i + photos - 1) % photos), &scene, worker);
+            }
+            Action::GoToPhoto(i) if *i < photos => self.look_through(*i, &scene, worker),
+            _ => return,
+        }
+        self.moved_at = now;
+    }
+
+    fn look_through(&mut self, index: usize, scene: &OpenedScene, worker: &Worker) {
+        let Some(photo) = scene.dataset.as_ref().and_then(|d| d.photos.get(index)) else { return };
+        let c = &photo.camera;
+        let ahead = (scene.home.bounds.center() - c.center).dot(c.forward());
+        let pivot = c.center + c.forward() * ahead.max(0.1 * scene.home.bounds.radius());
+        self.eye = Eye::of_camera(c, pivot, self.up.unwrap_or(scene.home.up));
+        self.photo = Some(PhotoView::new(index, photo, worker));
+    }
+
+    fn turn_up(&mut self, up: DVec3) {
+        self.leave_photo();
+        self.up = Some(up);
+        self.eye.set_up(up);
+    }
+
+    /// Puts the eye into a pose.
+    pub(crate) fn stand(&mut self, pose: &Pose, state: &AppState, now: f64) {
+        let Some(scene) = state.scene.clone() else { return };
+        self.photo = None;
+        // What it turns about stays ahead, at the distance that it has.
+        let ahead = (self.eye.pivot - pose.center).dot(pose.forward());
+        let distance = if ahead > 0.0 { ahead } else { 0.5 * scene.home.bounds.radius() };
+        self.eye = Eye {
+            center: pose.center,
+            world_from_eye: pose.world_from_camera,
+            pivot: pose.center + pose.forward() * distance,
+            up: self.up(&scene),
+            fov_y_rad: pose.fov_y_rad,
+        };
+        self.moved_at = now;
+    }
+
+    /// Goes on freely from the photo's place, at the scale that the frame had.
+    pub(super) fn leave_photo(&mut self) {
+        if let Some(photo) = self.photo.take() {
+            self.eye.fov_y_rad = photo.free_fov(self.eye.fov_y_rad);
+        }
+    }
+}

@@ -1,0 +1,187 @@
+//! Measuring in the view: clicks put points on surfaces; two are a distance, from which the scene's scale can be
+//! set, three are a plane, which can be made the floor.
+
+use egui::{Align2, Area, Color32, FontId, Id, Order, Pos2, Rect, Response, RichText, Stroke, TextEdit, Ui, vec2};
+use glam::{DVec2, DVec3};
+
+use super::super::theme;
+use super::Viewport;
+use crate::math::format;
+use crate::ui::actions::Action;
+
+/// Points at most; the next click begins anew.
+const MOST: usize = 3;
+
+/// The points that were put, and what is typed beside them.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Ruler {
+    points: Vec<DVec3>,
+    /// The true length of the distance, as it is typed.
+    known: String,
+}
+
+impl Ruler {
+    fn put(&mut self, point: DVec3) {
+        if self.points.len() == MOST {
+            self.points.clear();
+        }
+        self.points.push(point);
+    }
+
+    /// The last distance, scene units.
+    fn distance(&self) -> Option<f64> {
+        let [.., a, b] = self.points.as_slice() else { return None };
+        Some(a.distance(*b)).filter(|d| *d > 0.0)
+    }
+
+    /// The direction away from the plane of three points, towards where `eye` is.
+    fn normal(&self, eye: DVec3) -> Option<DVec3> {
+        let [a, b, c] = self.points.as_slice() else { return None };
+        let normal = (*b - *a).cross(*c - *a).try_normalize()?;
+        Some(if normal.dot(eye - *a) < 0.0 { -normal } else { normal })
+    }
+
+    /// Meters per unit, if what is typed is a length.
+    fn scale(&self) -> Option<f64> {
+        let meters: f64 = self.known.trim().replace(',', ".").parse().ok()?;
+        Some(meters / self.distance()?).filter(|s| s.is_finite() && *s > 0.0)
+    }
+}
+
+impl Viewport {
+    /// Whether distances are being measured.
+    pub(crate) fn is_measuring(&self) -> bool {
+        self.ruler.is_some()
+    }
+
+    /// Takes clicks, draws the points and what lies between them, and says what that measures.
+    pub(super) fn show_ruler(
+        &mut self,
+        ui: &Ui,
+        response: &Response,
+        shown: Rect,
+        meters_per_unit: Option<f64>,
+        actions: &mut Vec<Action>,
+    ) {
+        let Some(mut ruler) = self.ruler.take() else { return };
+        let surface = |pos: Pos2| {
+            let at = (pos - shown.min) / shown.size();
+            self.display.picked(DVec2::new(f64::from(at.x), f64::from(at.y)), &self.eye)
+        };
+        if let Some(point) = response.interact_pointer_pos().filter(|_| response.clicked()).and_then(surface) {
+            ruler.put(point);
+        }
+        let eye = self.overlay_camera(shown);
+        let painter = ui.painter_at(shown);
+        let place = |p: DVec3| eye.project(p).map(|q| shown.min + vec2(q.x as f32, q.y as f32));
+        let places: Vec<Option<Pos2>> = ruler.points.iter().map(|p| place(*p)).collect();
+        for (i, pair) in places.windows(2).enumerate() {
+            let [Some(a), Some(b)] = pair else { continue };
+            for stroke in [Stroke::new(4.5, Color32::from_black_alpha(150)), Stroke::new(2.0, theme::WARNING)] {
+                painter.line_segment([*a, *b], stroke);
+            }
+            let length = format::length(ruler.points[i].distance(ruler.points[i + 1]), meters_per_unit);
+            let galley = painter.layout_no_wrap(length, FontId::proportional(14.0), theme::TEXT);
+            let at = a.lerp(*b, 0.5) + vec2(10.0, -0.5 * galley.size().y);
+            painter.rect_filled(
+                Rect::from_min_size(at, galley.size()).expand(5.0),
+                5.0,
+                Color32::from_black_alpha(205),
+            );
+            painter.galley(at, galley, theme::TEXT);
+        }
+        for at in places.iter().flatten() {
+            painter.circle(*at, 5.0, theme::WARNING, Stroke::new(1.5, Color32::from_black_alpha(200)));
+        }
+        self.ruler = ruler_card(ui, shown, ruler, self.eye.center, meters_per_unit, actions);
+    }
+}
+
+/// What to do next and what the points measure; `None` once it is closed.
+fn ruler_card(
+    ui: &Ui,
+    shown: Rect,
+    mut ruler: Ruler,
+    eye: DVec3,
+    meters_per_unit: Option<f64>,
+    actions: &mut Vec<Action>,
+) -> Option<Ruler> {
+    let mut open = true;
+    let at = Align2::CENTER_BOTTOM.pos_in_rect(&shown.shrink(12.0));
+    let area = Area::new(Id::unique("ruler")).order(Order::Middle).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
+    area.constrain_to(shown).show(ui.ctx(), |ui| {
+        theme::overlay().show(ui, |ui| {
+            ui.horizontal(|ui| {
+                let next = match ruler.points.len() {
+                    0 => "Click a surface: the first end".to_owned(),
+                    1 => "Click the second end".to_owned(),
+                    _ => ruler.distance().map_or_else(
+                        || "The points are the same: click anew".to_owned(),
+                        |d| match meters_per_unit {
+                            Some(_) => format!("{}, {}", format::length(d, meters_per_unit), format::length(d, None)),
+                            None => format!("{}; the scale is not known", format::length(d, None)),
+                        },
+                    ),
+                };
+                ui.label(RichText::new(next).strong());
+                if ui.button("Clear").clicked() {
+                    ruler.points.clear();
+                }
+                open = !ui.button("Close").on_hover_text(Action::Measure.tooltip()).clicked();
+            });
+            if ruler.distance().is_some() {
+                ui.horizontal(|ui| {
+                    ui.label("It is really");
+                    ui.add(TextEdit::singleline(&mut ruler.known).hint_text("0.30").desired_width(60.0)).widget_info(
+                        || egui::WidgetInfo::labeled(egui::Role::TextInput, true, "True length in meters"),
+                    );
+                    ui.label("m long:");
+                    let scale = ruler.scale();
+                    let set = ui.add_enabled(scale.is_some(), egui::Button::new("Set the scale"));
+                    if let Some(scale) = scale.filter(|_| set.clicked()) {
+                        actions.push(Action::SetScale(scale));
+                    }
+                });
+            }
+            match ruler.normal(eye) {
+                Some(normal) if ui.button("Make these three points the floor").clicked() => {
+                    actions.push(Action::SetUp(normal));
+                }
+                None if ruler.points.len() == 2 => {
+                    ui.weak("A third click on the floor, and these three can be made the floor.");
+                }
+                _ => {}
+            }
+        });
+    });
+    open.then_some(ruler)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_points_are_a_distance_and_three_a_floor() {
+        let mut ruler = Ruler::default();
+        assert_eq!((ruler.distance(), ruler.scale(), ruler.normal(DVec3::ZERO)), (None, None, None));
+        ruler.put(DVec3::new(1.0, 0.0, 0.0));
+        ruler.put(DVec3::new(1.0, 2.0, 0.0));
+        assert_eq!((ruler.distance(), ruler.scale()), (Some(2.0), None), "nothing was typed");
+        for (typed, scale) in
+            [("0.5", Some(0.25)), (" 1,0 ", Some(0.5)), ("0", None), ("-1", None), ("x", None), ("inf", None)]
+        {
+            ruler.known = typed.into();
+            assert_eq!(ruler.scale(), scale, "{typed}");
+        }
+        ruler.put(DVec3::new(3.0, 1.0, 0.0));
+        assert_eq!(ruler.normal(DVec3::new(0.0, 0.0, -5.0)), Some(DVec3::NEG_Z), "towards the eye");
+        assert_eq!(ruler.normal(DVec3::new(0.0, 0.0, 5.0)), Some(DVec3::Z));
+        ruler.put(DVec3::ZERO);
+        assert_eq!((ruler.points.len(), ruler.distance()), (1, None), "the fourth begins anew");
+        ruler.put(DVec3::ZERO);
+        assert_eq!((ruler.distance(), ruler.scale()), (None, None), "twice the same point");
+        ruler.put(DVec3::ZERO);
+        assert_eq!(ruler.normal(DVec3::Z), None, "no plane");
+    }
+}

@@ -1,0 +1,192 @@
+//! Keyboard, mouse and files: what has the keyboard keeps it, what is drawn is in the window.
+
+use egui::accesskit::Role;
+use egui::{Key, Rect};
+use egui_kittest::kittest::{NodeT, Queryable};
+
+use fmlgs::ui::actions::{Action, Pane};
+use fmlgs::ui::app::App;
+
+use super::edits::window;
+use super::{Window, write_splat};
+
+#[test]
+fn the_chat_box_keeps_the_keyboard_while_an_answer_runs() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    let center = |a: &App| a.viewport.picture().expect("drawn").camera.center;
+    let home = center(w.app());
+    w.press(Key::Enter);
+    for sentence in ["where was box 0", "what was seen", "describe box 1"] {
+        w.types(sentence);
+        // No step in between: the answer before is still under way.
+        w.harness.key_press(Key::Enter);
+        w.harness.step();
+    }
+    w.types("wasd");
+    w.until("the answers", |a| a.conversation().is_some_and(|talk| talk.contains("describe box 1")));
+    let talk = w.app().conversation().expect("it was said").to_owned();
+    assert!(talk.contains("where was box 0") && talk.contains("what was seen"), "{talk}");
+    assert_eq!(center(w.app()), home, "no letter flew the camera");
+    assert_eq!(w.harness.get_by_role_and_label(Role::TextInput, "Chat box").value().as_deref(), Some("wasd"));
+}
+
+#[test]
+fn letters_are_no_shortcuts_where_a_field_was_just_used() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    let cameras = |w: &Window| w.app().layout.cameras;
+    w.press(Key::Slash);
+    w.types("vo");
+    // The field loses the keyboard while it is typed into.
+    w.harness.ctx.memory_mut(|m| m.stop_text_input());
+    w.types("vvv");
+    assert!(cameras(&w), "V goes on what was typed");
+    // A click somewhere else ends typing.
+    w.harness.get_by_label("Viewport").click();
+    w.harness.run_steps(2);
+    w.press(Key::V);
+    assert!(!cameras(&w), "now it is a shortcut");
+}
+
+#[test]
+fn the_query_box_has_tab_and_arrows() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    w.press(Key::Slash);
+    w.types("bo");
+    w.press(Key::Tab);
+    let typed = |w: &Window| w.harness.get_by_role_and_label(Role::TextInput, "Query").value().unwrap_or_default();
+    let first = typed(&w);
+    assert!(first.starts_with("box"), "{first}");
+    w.types("x");
+    assert_eq!(typed(&w), format!("{first}x"), "the cursor is behind it, and in the box");
+    w.press(Key::Enter);
+    w.types("lamp");
+    w.press(Key::Enter);
+    w.press(Key::ArrowUp);
+    w.types("s");
+    assert_eq!(typed(&w), "lamps", "so it is after going back");
+}
+
+/// Where the area of this name is on screen.
+fn area(w: &Window, name: &'static str) -> Rect {
+    w.harness.ctx.memory(|m| m.area_rect(egui::Id::unique(name))).expect("on screen")
+}
+
+#[test]
+fn cards_lie_beside_each_other_and_inside_the_view() {
+    let folder = tempfile::tempdir().expect("folder");
+    for size in [[800.0, 600.0], [1200.0, 800.0], [1440.0, 900.0]] {
+        let mut w = window(folder.path());
+        w.harness.set_size(size.into());
+        w.ask(Action::NextPhoto);
+        w.ask(Action::Ask("box 1".into()));
+        w.until("maps", |a| a.viewport.queries.maps().is_some());
+        w.harness.run_steps(4);
+        let (card, screen) = (area(&w, "question"), w.harness.ctx.content_rect());
+        assert!(screen.contains_rect(card), "{size:?}: {card}");
+        for other in ["photo", "modes"].map(|name| area(&w, name)) {
+            assert!(!card.intersects(other), "{size:?}: {card} covers {other}");
+        }
+        w.press(Key::F1);
+        w.harness.run_steps(3);
+        let close = w.harness.get_by_label("Close").rect();
+        assert!(screen.contains_rect(close), "{size:?}: the sheet ends at {close}");
+        let heading = w.harness.get_by_label("Keyboard and mouse").rect();
+        assert!(screen.contains_rect(heading), "{size:?}: the sheet begins at {heading}");
+    }
+}
+
+#[test]
+fn what_a_card_covers_is_not_under_the_cursor() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    w.harness.set_size([800.0, 600.0].into());
+    w.ask(Action::Ask("box 1".into()));
+    w.until("maps", |a| a.viewport.queries.maps().is_some());
+    w.harness.run_steps(4);
+    let (card, view) = (area(&w, "question"), w.harness.get_by_label("Viewport").rect());
+    let maps = w.app().viewport.queries.maps().cloned().expect("maps");
+    let (cols, rows) = (maps.identities.width_px, maps.identities.height_px);
+    let at = |i: usize| {
+        let (x, y) = ((i % cols) as f32 + 0.5, (i / cols) as f32 + 0.5);
+        view.min + egui::vec2(x / cols as f32 * view.width(), y / rows as f32 * view.height())
+    };
+    let places: Vec<egui::Pos2> = (0..cols * rows).filter(|i| maps.identities.identity[*i] != 0).map(at).collect();
+    let hovered = |w: &mut Window, pos: Option<&egui::Pos2>| {
+        w.harness.hover_at(*pos.expect("a box is there"));
+        w.harness.run_steps(3);
+        w.app().viewport.picking.hovered()
+    };
+    let photo = area(&w, "photo");
+    let free = places
+        .iter()
+        .find(|p| view.shrink(60.0).contains(**p) && !card.expand(9.0).contains(**p) && p.y > photo.bottom() + 9.0);
+    assert!(hovered(&mut w, free).is_some());
+    let covered = places.iter().find(|p| card.shrink(9.0).contains(**p));
+    assert_eq!(hovered(&mut w, covered), None);
+}
+
+#[test]
+fn enter_goes_to_the_chat_whatever_has_the_focus() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    w.harness.query_all_by_label("Objects").next().expect("a header").focus();
+    w.harness.run_steps(2);
+    w.press(Key::Enter);
+    w.harness.run_steps(3);
+    assert!(w.harness.query_by_role_and_label(Role::CheckBox, "box 0 is visible").is_some(), "it is not folded");
+    assert!(w.harness.get_by_role_and_label(Role::TextInput, "Chat box").accesskit_node().is_focused());
+}
+
+#[test]
+fn without_a_dialog_of_the_system_files_are_chosen_in_the_window() {
+    let folder = tempfile::tempdir().expect("folder");
+    let splat = write_splat(folder.path());
+    let mut w = Window::new(Some(Action::Open(splat.clone())));
+    w.until("a picture", |a| a.viewport.picture().is_some_and(|p| p.full));
+    w.harness.state_mut().layout.folder = Some(folder.path().to_path_buf());
+    w.ask(Action::ExportPly);
+    w.until("a dialog", |a| a.chooses_file());
+    assert!(w.shows("Export Gaussians"));
+    let field = |w: &Window| w.harness.query_all_by_role(Role::TextInput).filter_map(|n| n.value()).collect::<Vec<_>>();
+    assert!(field(&w).iter().any(|v| v == "dots.ply"), "a name is proposed: {:?}", field(&w));
+    assert!(field(&w).iter().any(|v| std::path::Path::new(v) == folder.path()), "in the last folder");
+    // It is there already: it was opened.
+    let before = std::fs::read(&splat).expect("there");
+    w.click("Save");
+    assert!(w.shows("is there already. Replace it?"));
+    w.click("Choose another name");
+    assert!(w.app().chooses_file(), "it goes on");
+    assert_eq!(std::fs::read(&splat).expect("there"), before);
+    w.click("Save");
+    w.click("Replace");
+    w.until("it is written", |a| a.state.log.iter().any(|l| l.text.starts_with("Wrote ")));
+    assert!(!w.app().chooses_file());
+
+    w.ask(Action::OpenFile);
+    w.until("a dialog", |a| a.chooses_file());
+    w.press(Key::Escape);
+    w.until("it is closed", |a| !a.chooses_file());
+    assert!(w.app().state.error.is_none());
+}
+
+#[test]
+fn the_palette_and_the_shortcut_sheet_list_the_actions() {
+    let mut w = Window::new(None);
+    w.ask(Action::Palette);
+    assert!(w.shows("Start training"));
+    w.harness.get_by_label("Search actions").type_text("scene plan");
+    w.harness.run_steps(2);
+    assert!(!w.shows("Start training"));
+    w.press(egui::Key::Enter);
+    assert!(w.app().layout.shows(Pane::Plan), "what is asked to be shown stays");
+    w.ask(Action::Palette);
+    w.types("hide scene plan");
+    w.press(egui::Key::Enter);
+    assert!(!w.app().layout.shows(Pane::Plan), "the found action was run");
+    w.harness.key_press(egui::Key::F1);
+    w.harness.run_steps(3);
+    assert!(w.shows("Keyboard and mouse") && w.shows("Ctrl+P"));
+}
