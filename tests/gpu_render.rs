@@ -290,12 +290,12 @@ fn unusable_input_is_refused_by_name() {
 fn dots(shift: f32) -> Arc<GaussianCloud> {
     let n = 60;
     Arc::new(GaussianCloud {
-        positions: (0..n).map(|i| [(i % 8) as f32 * 0.1 - 0.4 + shift, (i / 8) as f32 * 0.1 - 0.4, 0.0]).collect(),
-        log_scales: vec![[-3.0; 3]; n],
-        quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
-        opacity_logits: vec![1.0; n],
         sh: (0..n).map(|i| [(i % 3) as f32 * 0.5, 0.2, 0.4]).collect(),
-        ..GaussianCloud::default()
+        ..GaussianCloud::isotropic(
+            (0..n).map(|i| [(i % 8) as f32 * 0.1 - 0.4 + shift, (i / 8) as f32 * 0.1 - 0.4, 0.0]).collect(),
+            -3.0,
+            1.0,
+        )
     })
 }
 

@@ -225,13 +225,12 @@ fn masklets_of_a_video() {
     use glam::DVec3;
 
     let Some(path) = data("sam2_media/sav_example") else { return };
-    let frame = |number: usize| Photo {
-        name: format!("{number:05}.jpg"),
-        path: path.clone(),
-        camera: Camera::look_at(DVec3::X, DVec3::ZERO, DVec3::Z, 0.8, 480, 848).expect("valid"),
-        distortion: None,
-        test_split: false,
-        background: None,
+    let frame = |number: usize| {
+        Photo::new(
+            format!("{number:05}.jpg"),
+            path.clone(),
+            Camera::look_at(DVec3::X, DVec3::ZERO, DVec3::Z, 0.8, 480, 848).expect("valid"),
+        )
     };
     // Areas by an independent decoder.
     for (file, first, areas) in [

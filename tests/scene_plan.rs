@@ -41,15 +41,7 @@ fn ball(n: usize, log_scale: f32, shine: f32) -> GaussianCloud {
     let mut three = |scale: f32| [random() * scale, random() * scale, random() * scale];
     let positions = (0..n).map(|_| three(2.4)).collect();
     let sh = (0..n * 16).map(|k| three(if k % 16 == 0 { 2.0 } else { shine })).collect();
-    GaussianCloud {
-        positions,
-        log_scales: vec![[log_scale; 3]; n],
-        quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
-        opacity_logits: vec![1.5; n],
-        sh_degree: 3,
-        sh,
-        ..GaussianCloud::default()
-    }
+    GaussianCloud { sh_degree: 3, sh, ..GaussianCloud::isotropic(positions, log_scale, 1.5) }
 }
 
 /// Two objects beside each other, the left one with a part if wanted.
@@ -226,7 +218,7 @@ fn working_memory_is_given_back_and_the_next_picture_is_the_same() {
 
 #[test]
 fn without_a_gpu_no_device_is_opened() {
-    let devices = || resource_log::since(0).iter().filter(|l| l.sort == ResourceKind::Device).count();
+    let devices = || resource_log::since(0).iter().filter(|l| l.kind == ResourceKind::Device).count();
     let before = devices();
     let mut chosen = Renderer::choose(BackendChoice::Auto, |why| panic!("{why}")).expect("one that works");
     let real = fmlgs::render::real_gpu().is_some();

@@ -57,12 +57,12 @@ impl Window {
     }
 
     fn loaded(&self, sort: ResourceKind) -> usize {
-        resource_log::since(self.traced).iter().filter(|l| l.sort == sort).count()
+        resource_log::since(self.traced).iter().filter(|l| l.kind == sort).count()
     }
 
     fn until_loaded(&mut self, sort: ResourceKind) {
         let traced = self.traced;
-        self.until(&format!("{sort:?} to be loaded"), |_| resource_log::since(traced).iter().any(|l| l.sort == sort));
+        self.until(&format!("{sort:?} to be loaded"), |_| resource_log::since(traced).iter().any(|l| l.kind == sort));
     }
 
     /// After how long the window wants to be drawn again by itself.

@@ -105,12 +105,12 @@ impl Window {
 fn write_splat(folder: &Path) -> PathBuf {
     let n = 40;
     let cloud = fmlgs::scene::GaussianCloud {
-        positions: (0..n).map(|i| [(i % 7) as f32 * 0.1, (i / 7) as f32 * 0.1, 0.0]).collect(),
-        log_scales: vec![[-3.0; 3]; n],
-        quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
-        opacity_logits: vec![2.0; n],
         sh: vec![[0.5, 0.1, -0.3]; n],
-        ..Default::default()
+        ..fmlgs::scene::GaussianCloud::isotropic(
+            (0..n).map(|i| [(i % 7) as f32 * 0.1, (i / 7) as f32 * 0.1, 0.0]).collect(),
+            -3.0,
+            2.0,
+        )
     };
     let path = folder.join("dots.ply");
     fmlgs::io::splat_ply::write(&path, &cloud).expect("write");

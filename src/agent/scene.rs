@@ -9,7 +9,7 @@ use super::camera_args::{Direction, Distance, NORMAL};
 use super::relation::{Extent, Viewpoint};
 pub use super::view_shares::Parts;
 use super::view_shares::ViewShares;
-use super::world::{Arrival, IdentityFacts, Moved, Unreachable, World, WorldError};
+use super::world::{Arrival, IdentityFacts, Movement, Unreachable, World, WorldError};
 use crate::jobs::export;
 use crate::jobs::go_to::{self, ApproachRequest, Approached, Explored};
 use crate::jobs::query::QueryEngine;
@@ -271,7 +271,7 @@ impl World for SceneWorld {
         Ok(Arrival { distance: 0.0, in_view: self.share_of(id) })
     }
 
-    fn move_eye(&mut self, direction: Direction, distance: Distance) -> Result<Moved, Unreachable> {
+    fn move_eye(&mut self, direction: Direction, distance: Distance) -> Result<Movement, Unreachable> {
         let explored = self.explored();
         let step = STEP * explored.navigator.clearance;
         let wanted = match (distance, self.parts.meters) {
@@ -291,7 +291,7 @@ impl World for SceneWorld {
         let (center, stopped_by_obstacle) = explored.navigator.step(&self.eye, axis, wanted);
         let to = Pose { center, ..self.eye };
         let distance_done = self.straight(to, format!("moving {}", direction.text()))?;
-        Ok(Moved { distance_done, stopped_by_obstacle })
+        Ok(Movement { distance_done, stopped_by_obstacle })
     }
 
     fn turn(&mut self, direction: Direction, degrees: f64) -> Result<(), Unreachable> {

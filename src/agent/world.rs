@@ -45,7 +45,7 @@ pub struct Unreachable {
 
 /// What came of a movement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Moved {
+pub struct Movement {
     pub distance_done: f64,
     pub stopped_by_obstacle: bool,
 }
@@ -84,7 +84,7 @@ pub trait World {
     fn look_at(&mut self, id: IdentityId) -> Result<Arrival, Unreachable>;
 
     /// Moves the eye; stops before occupied space.
-    fn move_eye(&mut self, direction: Direction, distance: Distance) -> Result<Moved, Unreachable>;
+    fn move_eye(&mut self, direction: Direction, distance: Distance) -> Result<Movement, Unreachable>;
 
     /// Turns the eye by degrees.
     fn turn(&mut self, direction: Direction, degrees: f64) -> Result<(), Unreachable>;

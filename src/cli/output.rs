@@ -1,14 +1,11 @@
-//! What the subcommands write: results on standard output, notes on standard error, pictures and arrays in
-//! files. All text for a terminal goes through here, so that nothing foreign in it acts on one.
+//! What the subcommands write: results on standard output, notes on standard error.
+//! All text for a terminal goes through here, so that nothing foreign in it acts on one.
 
 use std::io::{ErrorKind, Write};
-use std::path::Path;
 
-use image::ColorType;
 use serde::Serialize;
 
 use super::CliError;
-use crate::jobs::export;
 use crate::scene::text;
 
 /// Prints `text` and a line break to standard output. A reader that has closed its end (`| head`)
@@ -52,16 +49,6 @@ pub(crate) fn table(rows: &[Vec<String>]) -> String {
         row.iter().enumerate().map(cell).collect::<Vec<_>>().join("  ").trim_end().to_owned()
     };
     rows.iter().map(line).collect::<Vec<_>>().join("\n")
-}
-
-/// Makes `folder` and those above it.
-pub(crate) fn make_folder(folder: &Path) -> Result<(), CliError> {
-    Ok(export::make_folder(folder)?)
-}
-
-/// Writes a PNG of `size_px` from raw samples, those of 16 bits in the machine's byte order.
-pub(crate) fn write_png(path: &Path, samples: &[u8], size_px: [u32; 2], color: ColorType) -> Result<(), CliError> {
-    Ok(export::png(path, samples, size_px, color)?)
 }
 
 #[cfg(test)]

@@ -10,9 +10,6 @@ const LARGE_BYTES: i32 = 1 << 20;
 
 /// Starts the threads that share the work: as many as there are cores, or as `RAYON_NUM_THREADS` says
 /// within reason.
-///
-/// # Errors
-/// In words, if the system does not give as many.
 pub(crate) fn start_threads() -> Result<(), String> {
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let wanted = std::env::var("RAYON_NUM_THREADS").ok().and_then(|v| v.trim().parse().ok()).filter(|n| *n > 0);

@@ -91,7 +91,7 @@ impl Observer for Console {
 
     fn evaluation(&mut self, e: Evaluation) {
         if !self.quiet {
-            self.line(&evaluation_line(&e));
+            self.line(&e.line());
         }
     }
 
@@ -110,19 +110,6 @@ impl Drop for Console {
             bar.finish_and_clear();
         }
     }
-}
-
-/// `step 500, 12.3 s: held-out PSNR 21.34 dB, SSIM 0.712, 23,121 Gaussians`.
-pub(crate) fn evaluation_line(e: &Evaluation) -> String {
-    let gaussians = HumanCount(e.gaussians as u64);
-    format!(
-        "step {}, {:.1} s: held-out PSNR {:.2} dB, SSIM {:.3} over {} views, {gaussians} Gaussians",
-        e.step,
-        e.secs,
-        e.psnr,
-        e.ssim,
-        e.views.len()
-    )
 }
 
 fn rate_and_times(p: &Progress) -> String {

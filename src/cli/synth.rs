@@ -6,7 +6,6 @@ use serde_json::json;
 
 use super::progress::Console;
 use super::{CliError, output, view};
-use crate::jobs::JobError;
 use crate::jobs::synth::{self, Levels, Rig, SynthOptions, SynthReport};
 
 /// Render a glTF scene into posed photos with object and part ids
@@ -81,27 +80,10 @@ impl SynthArgs {
 pub(crate) fn run(args: SynthArgs, quiet: bool) -> Result<(), CliError> {
     let options = args.check()?;
     let mut console = Console::new(quiet);
-    let report = synth::run(&args.scene, &options, &args.out, &mut console).map_err(failure)?;
+    let report = synth::run(&args.scene, &options, &args.out, &mut console)
+        .map_err(|e| CliError::of_work(e, "the dataset is not complete; run the same command again"))?;
     drop(console);
-    if args.json { output::print_json(&as_json(&report)) } else { output::print(&summary(&report)) }
-}
-
-/// A cancelled run has its own exit code.
-pub(crate) fn failure(error: JobError) -> CliError {
-    CliError::of_work(error, "the dataset is not complete; run the same command again")
-}
-
-/// What was made, as one line.
-pub(crate) fn summary(r: &SynthReport) -> String {
-    format!(
-        "{}: {} photos to train on, {} held out, {} objects and parts, {} sparse points, in {:.1} s",
-        r.out.display(),
-        r.train_views,
-        r.held_out_views,
-        r.identities.len(),
-        r.points,
-        r.secs
-    )
+    if args.json { output::print_json(&as_json(&report)) } else { output::print(&report.summary()) }
 }
 
 fn as_json(r: &SynthReport) -> serde_json::Value {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::plan::PlanArgs;
-use super::progress::{Console, evaluation_line};
+use super::progress::Console;
 use super::{CliError, number, output};
 use crate::jobs::open::{self, Contents};
 use crate::jobs::{plan, train};
@@ -191,7 +191,7 @@ pub(crate) fn run(args: TrainArgs, quiet: bool) -> Result<(), CliError> {
         }))?;
     } else if finished {
         if let Some(last) = outcome.evaluations.last() {
-            output::print(&evaluation_line(last))?;
+            output::print(&last.line())?;
         }
         output::print(&format!("trained scene: {out} (look at it with 'fmlgs {out}')"))?;
     }

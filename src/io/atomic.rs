@@ -16,10 +16,6 @@ use super::temporary::temporary_file;
 /// and renamed over it, and the folder is synced. On any failure the temporary file is removed
 /// and what was at `path` before stays as it was. Links are followed; what is no regular file (a
 /// device, a pipe) is written into.
-///
-/// # Errors
-/// [`IoError::Write`] with the system's reason and a remedy; errors of `fill` arrive the same way.
-/// [`IoError::Protected`] where `path` is a file of a trained scene.
 pub(crate) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), IoError> {
     let mut draft = Draft::create(path)?;
     fill(&mut draft).map_err(|cause| write_error(path, cause))?;
@@ -42,10 +38,6 @@ enum Into {
 
 impl Draft {
     /// Starts a file at `path`; what is there stays until [`Draft::commit`].
-    ///
-    /// # Errors
-    /// [`IoError::Write`] where the folder is missing or not writable, or `path` is a folder;
-    /// [`IoError::Protected`] where it is a file of a trained scene.
     pub(crate) fn create(path: &Path) -> Result<Self, IoError> {
         let failed = |cause| write_error(path, cause);
         let real = behind_links(path).map_err(failed)?;

@@ -7,7 +7,6 @@ use serde::Deserialize;
 use super::{IoError, files};
 use crate::scene::Camera;
 
-/// Largest file that is read, bytes.
 const MAX_BYTES: u64 = 16 << 20;
 
 #[derive(Deserialize)]
@@ -18,22 +17,18 @@ enum CameraFile {
 }
 
 /// Reads a camera.
-///
-/// # Errors
-/// If the file cannot be read, or is no camera or one that nothing can be seen with.
 pub fn read(path: &Path) -> Result<Camera, IoError> {
     let bytes = files::read(path, MAX_BYTES)?;
     let camera = match serde_json::from_slice(&bytes) {
         Ok(CameraFile::Entry { camera } | CameraFile::Alone(camera)) => camera,
         Err(_) => {
-            return Err(IoError::Syntax {
-                path: path.into(),
-                place: "camera".into(),
-                reason: "this is no camera: width_px, height_px, focal_px [x, y], principal_px [x, y], \
+            return Err(IoError::syntax(
+                path,
+                "camera",
+                "this is no camera: width_px, height_px, focal_px [x, y], principal_px [x, y], \
                          world_from_camera (9 numbers, the right, down and forward axes) and center [x, y, z] are \
-                         needed, as in the output of 'fmlgs info --json'"
-                    .into(),
-            });
+                         needed, as in the output of 'fmlgs info --json'",
+            ));
         }
     };
     let named = |cause| IoError::Camera { path: path.into(), photo: "the camera".into(), cause };

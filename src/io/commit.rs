@@ -18,7 +18,6 @@ use super::temporary::{is_temporary, temporary_file};
 use super::{IoError, files};
 use tempfile::NamedTempFile;
 
-/// Largest journal that is read.
 const MAX_BYTES: u64 = 1 << 16;
 
 #[derive(Default, Serialize, Deserialize)]
@@ -109,11 +108,7 @@ pub(super) fn carry_out(folder: &Path) -> Result<(), IoError> {
     let plain = |name: &str| !name.is_empty() && !name.contains(['/', '\\']) && name != ".." && name != ".";
     let names = journal.put.iter().map(|(_, to)| to).chain(&journal.remove);
     if !journal.put.iter().all(|(from, _)| is_temporary(from) && plain(from)) || !names.clone().all(|n| plain(n)) {
-        return Err(IoError::Syntax {
-            path,
-            place: "names".into(),
-            reason: "they are not those of an interrupted save; remove the file".into(),
-        });
+        return Err(IoError::syntax(&path, "names", "they are not those of an interrupted save; remove the file"));
     }
     let rename = || {
         for (from, to) in &journal.put {

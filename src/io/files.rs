@@ -9,10 +9,8 @@ use crate::scene::text;
 
 /// Largest text file (JSON, COLMAP text) in bytes.
 pub(crate) const MAX_TEXT_BYTES: u64 = 512 << 20;
-/// Largest picture file in bytes.
 pub(crate) const MAX_PICTURE_BYTES: u64 = 256 << 20;
 
-/// The folder that a file is in.
 pub(crate) fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(p) if !p.as_os_str().is_empty() => p,
@@ -28,9 +26,6 @@ pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
 /// Opens a file to be read, if it is a regular one. A pipe would keep the program waiting and a
 /// device has no end, so both are refused before they are opened; every read of a file that a
 /// person or another file names goes through here.
-///
-/// # Errors
-/// [`IoError::NotAFile`] for folders, pipes and devices; [`IoError::Read`] with the system's reason.
 pub fn open(path: &Path) -> Result<File, IoError> {
     let failed = |cause| IoError::Read { path: path.into(), cause };
     if !fs::metadata(path).map_err(failed)?.is_file() {
@@ -40,9 +35,6 @@ pub fn open(path: &Path) -> Result<File, IoError> {
 }
 
 /// The whole file, if it is a regular one of at most `limit` bytes that [`memory::budget`] allows.
-///
-/// # Errors
-/// As [`open`]; and [`IoError::OverBudget`] for one that is larger.
 pub(crate) fn read(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
     let failed = |cause| IoError::Read { path: path.into(), cause };
     let file = open(path)?;
@@ -68,9 +60,6 @@ pub(crate) fn read(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
 }
 
 /// The first `limit` bytes of a file, or all of it if it is shorter.
-///
-/// # Errors
-/// As [`open`].
 pub(crate) fn read_start(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
     let mut bytes = Vec::new();
     let read = open(path)?.take(limit).read_to_end(&mut bytes);
@@ -80,14 +69,10 @@ pub(crate) fn read_start(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
 
 /// The text of a UTF-8 file of at most [`MAX_TEXT_BYTES`].
 pub(crate) fn read_text(path: &Path) -> Result<String, IoError> {
-    String::from_utf8(read(path, MAX_TEXT_BYTES)?).map_err(|e| IoError::Syntax {
-        path: path.into(),
-        place: format!("byte {}", e.utf8_error().valid_up_to()),
-        reason: "not UTF-8 text".into(),
-    })
+    String::from_utf8(read(path, MAX_TEXT_BYTES)?)
+        .map_err(|e| IoError::syntax(path, format!("byte {}", e.utf8_error().valid_up_to()), "not UTF-8 text"))
 }
 
-/// A JSON file as `T`.
 pub(crate) fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, IoError> {
     let bytes = read(path, MAX_TEXT_BYTES)?;
     serde_json::from_slice(&bytes).map_err(|e| json_error(path, &e))
@@ -97,11 +82,7 @@ pub(crate) fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T
 pub(crate) fn json_error(path: &Path, e: &serde_json::Error) -> IoError {
     let text = e.to_string();
     let reason = text.rsplit_once(" at line ").map_or(text.as_str(), |(reason, _)| reason);
-    IoError::Syntax {
-        path: path.into(),
-        place: format!("line {} column {}", e.line(), e.column()),
-        reason: reason.into(),
-    }
+    IoError::syntax(path, format!("line {} column {}", e.line(), e.column()), reason)
 }
 
 /// A path that a dataset's file `source` refers to, relative to the dataset's folder `root`:
@@ -143,11 +124,11 @@ pub(crate) fn inside(root: &Path, entry: &str, source: &Path) -> Result<Option<P
 pub(crate) fn photo_name(name: &str, source: &Path) -> Result<(), IoError> {
     let most = text::LONGEST_PHOTO_NAME;
     match name.chars().count() {
-        length if length > most => Err(IoError::Syntax {
-            path: source.into(),
-            place: format!("photo '{}'", text::shortened(name, 40)),
-            reason: format!("its name has {length} letters, at most {most} are read; rename the photo"),
-        }),
+        length if length > most => Err(IoError::syntax(
+            source,
+            format!("photo '{}'", text::shortened(name, 40)),
+            format!("its name has {length} letters, at most {most} are read; rename the photo"),
+        )),
         _ => Ok(()),
     }
 }

@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 use super::IoError;
 use super::error::write_error;
 
-/// The locked file's name.
 const FILE: &str = ".fmlgs.lock";
 /// Longest description of a writer that is read.
 const MAX_BYTES: u64 = 200;
@@ -24,9 +23,6 @@ pub(crate) struct FolderLock {
 
 impl FolderLock {
     /// Locks `folder`, which exists, for `what` ("training").
-    ///
-    /// # Errors
-    /// [`IoError::Busy`] if somebody else does something there, [`IoError::Write`] if nobody may.
     pub(crate) fn take(folder: &Path, what: &str) -> Result<Self, IoError> {
         let path = folder.join(FILE);
         let failed = |cause| write_error(&path, cause);

@@ -63,7 +63,6 @@ fn read_bytes(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<MeshSc
     Ok(MeshScene { nodes, roots, meshes, materials, images, warnings: file.warnings })
 }
 
-/// The JSON part of a file.
 pub(super) fn parse<T: serde::de::DeserializeOwned>(text: &[u8], path: &Path) -> Result<T, IoError> {
     serde_json::from_slice(text).map_err(|e| files::json_error(path, &e))
 }

@@ -14,11 +14,9 @@ use ureq::{Agent, Body};
 /// How often a wait looks whether it is to end.
 pub(crate) const TICK: Duration = Duration::from_millis(20);
 
-/// What arrives, in this order.
 pub(crate) enum ResponsePart {
     /// Once: the status and the headers.
     Head(StatusCode, HeaderMap),
-    /// Some of the body.
     Bytes(Vec<u8>),
     /// The connection failed; nothing follows. Without it, the body was read to its end.
     Failed(String),
@@ -47,9 +45,6 @@ pub(crate) fn config(url: &str, stall: Duration) -> ConfigBuilder<AgentScope> {
 
 /// Makes a request on a thread of its own. The thread ends by the request's own time limits, or at the
 /// first piece that nobody takes.
-///
-/// # Errors
-/// If there is no thread for it.
 pub(crate) fn ask(
     request: impl FnOnce() -> Result<Response<Body>, ureq::Error> + Send + 'static,
 ) -> io::Result<Receiver<ResponsePart>> {

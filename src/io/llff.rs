@@ -13,7 +13,6 @@ use super::photo_list::{self, Focal, Lens, ListedPhoto, photos};
 use super::{IoError, files, npy};
 use crate::scene::{Camera, Dataset, Distortion};
 
-/// The file with the poses.
 pub(crate) const POSES_FILE: &str = "poses_bounds.npy";
 /// Numbers per photo.
 const ROW: usize = 17;
@@ -41,10 +40,8 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
         root: root.into(),
         format: "LLFF".into(),
         photos: photos(listed, root, &file, &mut warnings)?,
-        points: Vec::new(),
-        background: None,
-        metres_per_unit: None,
         warnings,
+        ..Dataset::default()
     })
 }
 
@@ -98,11 +95,11 @@ fn listed(row: &[f64; ROW], name: &str, folder: &str, source: &Path) -> Result<L
     let DVec3 { x: height, y: width, z: focal } = column(4);
     let side = |v: f64| (v >= 1.0 && v <= f64::from(Camera::MAX_SIDE_PX)).then_some(v.round() as u32);
     let (Some(w), Some(h)) = (side(width), side(height)) else {
-        return Err(IoError::Syntax {
-            path: source.into(),
-            place: format!("photo '{name}'"),
-            reason: format!("size {width} x {height} px is not between 1 and {} px a side", Camera::MAX_SIDE_PX),
-        });
+        return Err(IoError::syntax(
+            source,
+            format!("photo '{name}'"),
+            format!("size {width} x {height} px is not between 1 and {} px a side", Camera::MAX_SIDE_PX),
+        ));
     };
     Ok(ListedPhoto {
         name: name.into(),

@@ -35,9 +35,6 @@ pub struct NoRoom {
 }
 
 /// Whether `what` fits, which takes about so many bytes. To be asked before it is begun.
-///
-/// # Errors
-/// If it does not.
 pub(crate) fn room(what: impl Into<String>, bytes: u64, remedy: &'static str) -> Result<(), NoRoom> {
     let free = free();
     if bytes <= free { Ok(()) } else { Err(NoRoom { what: what.into(), bytes, free, remedy }) }

@@ -20,10 +20,6 @@ pub struct NpyArray<'a> {
 }
 
 /// Opens the array in `bytes`, which come from `path`.
-///
-/// # Errors
-/// If it is no row-major array of 32- or 64-bit floating-point numbers, or cannot hold what its
-/// shape says.
 pub fn open<'a>(bytes: &'a [u8], path: &'a Path) -> Result<NpyArray<'a>, IoError> {
     let bad = |reason: String| syntax(path, reason);
     let header = header_len(bytes).ok_or_else(|| bad("not an .npy file, or its header is cut off".into()))?;
@@ -46,15 +42,11 @@ pub fn open<'a>(bytes: &'a [u8], path: &'a Path) -> Result<NpyArray<'a>, IoError
 }
 
 impl NpyArray<'_> {
-    /// Entries along each axis.
     pub(crate) fn shape(&self) -> &[u64] {
         self.npy.shape()
     }
 
     /// The numbers, row by row; they may be infinite or NaN.
-    ///
-    /// # Errors
-    /// If the file ends too early.
     pub(crate) fn values(self) -> Result<Vec<f64>, IoError> {
         let failed = |e: std::io::Error| syntax(self.path, e.to_string());
         match self.item {
@@ -65,17 +57,11 @@ impl NpyArray<'_> {
 }
 
 /// A map of one number per pixel, such as `fmlgs synth` writes depths: width, height, rows from the top.
-///
-/// # Errors
-/// If the file is not such an array, or a number is negative or not finite.
 pub(crate) fn read_map(path: &Path) -> Result<(usize, usize, Vec<f32>), IoError> {
     map(&files::read(path, files::MAX_PICTURE_BYTES)?, path)
 }
 
 /// The same from the file's bytes.
-///
-/// # Errors
-/// As [`read_map`].
 pub fn map(bytes: &[u8], path: &Path) -> Result<(usize, usize, Vec<f32>), IoError> {
     let array = open(bytes, path)?;
     let &[height, width] = array.shape() else {

@@ -17,9 +17,6 @@ const HEADER_BYTES: u64 = 256 << 10;
 /// The photo's pixels: undistorted to its pinhole camera and averaged down to at most
 /// `max_side_px` along the longer side. `photo.camera.limited_to(max_side_px)` is the camera that
 /// goes with them.
-///
-/// # Errors
-/// If the file is missing, too large, not of the camera's size, or does not decode.
 pub fn load(photo: &Photo, max_side_px: u32) -> Result<PhotoPixels, IoError> {
     let expected = (photo.camera.width_px, photo.camera.height_px);
     let mut pixels = decode(&photo.path, expected)?;

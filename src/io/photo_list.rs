@@ -29,7 +29,6 @@ pub(super) enum Focal {
     Angle(f64, Option<f64>),
 }
 
-/// A lens as files give it.
 #[derive(Clone, Debug)]
 pub(super) struct Lens {
     /// The picture size that the other values refer to; `None` = the file's own.
@@ -37,14 +36,11 @@ pub(super) struct Lens {
     pub(crate) focal: Focal,
     /// Principal point in px; `None` = the middle.
     pub(crate) principal_px: Option<DVec2>,
-    /// Radial and tangential coefficients.
     pub(crate) distortion: Distortion,
 }
 
-/// A photo as a file lists it.
 #[derive(Clone, Debug)]
 pub(super) struct ListedPhoto {
-    /// Its name in the dataset.
     pub(crate) name: String,
     /// Its file, relative to the dataset's folder, from [`files::relative`].
     pub(crate) entry: String,
@@ -53,7 +49,6 @@ pub(super) struct ListedPhoto {
     pub(crate) world_from_camera: DMat3,
     /// Camera center in the world.
     pub(crate) center: DVec3,
-    /// Whether the dataset marks it as a test photo.
     pub(crate) test_split: bool,
     /// What transparent pixels are composited over.
     pub(crate) background: Option<[f32; 3]>,
@@ -104,11 +99,11 @@ fn resolve(l: &ListedPhoto, root: &Path, source: &Path) -> Result<Option<Photo>,
     for (property, value) in [("k1", d.k1), ("k2", d.k2), ("p1", d.p1), ("p2", d.p2)] {
         if !value.is_finite() {
             let property = format!("distortion {property}");
-            return Err(IoError::Syntax {
-                path: source.into(),
-                place: format!("photo '{}'", l.name),
-                reason: format!("{property} = {value} is not finite"),
-            });
+            return Err(IoError::syntax(
+                source,
+                format!("photo '{}'", l.name),
+                format!("{property} = {value} is not finite"),
+            ));
         }
     }
     let Some(path) = find(root, &l.entry, source)? else { return Ok(None) };
@@ -116,15 +111,15 @@ fn resolve(l: &ListedPhoto, root: &Path, source: &Path) -> Result<Option<Photo>,
     let declared = l.lens.camera(found, rotation, l.center);
     declared.believe().map_err(bad)?;
     if d != Distortion::default() && !covers(&declared, &d) {
-        return Err(IoError::Syntax {
-            path: source.into(),
-            place: format!("photo '{}'", l.name),
-            reason: format!(
+        return Err(IoError::syntax(
+            source,
+            format!("photo '{}'", l.name),
+            format!(
                 "its lens distortion (k1 {:e}, k2 {:e}, p1 {:e}, p2 {:e}) leaves nothing of the picture; calibrate the camera \
                  anew or undistort the photo",
                 d.k1, d.k2, d.p1, d.p2
             ),
-        });
+        ));
     }
     let expected = (declared.width_px, declared.height_px);
     if !is_scaled(expected, found) {
@@ -149,11 +144,11 @@ pub(super) fn place(p: DVec3, element: &'static str, index: usize, path: &Path) 
     if !value.is_finite() {
         return Err(IoError::NotFinite { path: path.into(), element, index, property: property.into() });
     }
-    Err(IoError::Syntax {
-        path: path.into(),
-        place: format!("{element} {index}"),
-        reason: format!("{property} = {value:e} is farther than {:e} units from the origin", Camera::FARTHEST),
-    })
+    Err(IoError::syntax(
+        path,
+        format!("{element} {index}"),
+        format!("{property} = {value:e} is farther than {:e} units from the origin", Camera::FARTHEST),
+    ))
 }
 
 /// The listed file, with one of the usual endings if it has none.
@@ -189,11 +184,11 @@ pub(super) fn photo_folder(root: &Path, source: &Path) -> Result<String, IoError
     }
     match best {
         Some((_, name)) => Ok(name),
-        None => Err(IoError::Syntax {
-            path: source.into(),
-            place: "photos".into(),
-            reason: format!("there is neither a folder 'images' nor 'images_<factor>' in {}", root.display()),
-        }),
+        None => Err(IoError::syntax(
+            source,
+            "photos",
+            format!("there is neither a folder 'images' nor 'images_<factor>' in {}", root.display()),
+        )),
     }
 }
 

@@ -12,7 +12,6 @@ use crate::scene::{Camera, SparsePoint};
 /// Color of points that have none.
 const GREY: u8 = 128;
 
-/// Reads the points of a `.ply`.
 pub(crate) fn read(path: &Path) -> Result<Vec<SparsePoint>, IoError> {
     parse(&files::read(path, u64::MAX)?, path)
 }

@@ -12,7 +12,6 @@ pub(super) fn unorm(value: u32, bits: u32) -> f32 {
     (value & mask) as f32 / mask as f32
 }
 
-/// The inverse of the sigmoid.
 pub(super) fn logit(opacity: f32) -> f32 {
     let p = opacity.clamp(OPACITY_MARGIN, 1.0 - OPACITY_MARGIN);
     (p / (1.0 - p)).ln()

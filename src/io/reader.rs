@@ -29,7 +29,6 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The next `N` bytes.
     pub(crate) fn array<const N: usize>(&mut self, place: &str) -> Result<[u8; N], IoError> {
         match self.rest.split_first_chunk::<N>() {
             Some((head, tail)) => {
@@ -40,12 +39,10 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The next 32-bit unsigned integer.
     pub(crate) fn u32(&mut self, place: &str) -> Result<u32, IoError> {
         self.array(place).map(u32::from_le_bytes)
     }
 
-    /// The next 64-bit unsigned integer.
     pub(crate) fn u64(&mut self, place: &str) -> Result<u64, IoError> {
         self.array(place).map(u64::from_le_bytes)
     }

@@ -11,9 +11,7 @@ use crate::math::resize::{Filter, Tap, taps};
 use crate::scene::{Camera, Distortion, PhotoPixels};
 
 pub(super) struct Pixels {
-    /// Width in px.
     pub(crate) width: usize,
-    /// Height in px.
     pub(crate) height: usize,
     /// 3 (RGB) or 4 (RGBA).
     pub(crate) channels: usize,

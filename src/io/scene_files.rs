@@ -16,7 +16,6 @@ pub const CHECKPOINT_FILE: &str = "checkpoint.bin";
 /// What a save has decided on and not carried out yet.
 pub(super) const JOURNAL: &str = ".fmlgs_commit.json";
 
-/// The files of a scene.
 pub(super) const FILES: [&str; 4] = [SCENE_FILE, CLOUD_FILE, MAP_FILE, CHECKPOINT_FILE];
 
 /// Whether `folder` is a trained scene.
@@ -30,9 +29,6 @@ pub(super) fn is_pending(folder: &Path) -> bool {
 }
 
 /// Refuses `path` if it is a file of a trained scene.
-///
-/// # Errors
-/// [`IoError::Protected`].
 pub(crate) fn refuse_scene_file(path: &Path) -> Result<(), IoError> {
     let folder = folder_of(path);
     let named = path.file_name().is_some_and(|n| FILES.iter().any(|f| n.eq_ignore_ascii_case(f)));

@@ -29,9 +29,6 @@ pub struct SceneFolder {
 impl SceneFolder {
     /// Holds `folder`, which is created if need be, for `what` ("training"). A save that was
     /// interrupted there is finished first, and what dead processes left is removed.
-    ///
-    /// # Errors
-    /// [`IoError::Busy`] if somebody else writes there, [`IoError::Write`] if nobody may.
     pub fn hold(folder: &Path, what: &str) -> Result<Self, IoError> {
         fs::create_dir_all(folder).map_err(|cause| IoError::Write {
             path: folder.into(),
@@ -50,9 +47,6 @@ impl SceneFolder {
 
     /// Saves the scene: all of its files change, or none. Without a map, the folder has none afterwards.
     /// Returns the id of this state.
-    ///
-    /// # Errors
-    /// If a file cannot be written, or the Gaussians are not valid.
     pub fn save(&self, info: &SceneInfo, cloud: &GaussianCloud, map: Option<&SemanticMap>) -> Result<String, IoError> {
         let state = format!("{:032x}", rand::random::<u128>());
         let info = SceneInfo { version: VERSION, state: Some(state.clone()), ..info.clone() };
@@ -93,9 +87,6 @@ impl SceneFolder {
 
     /// Saves another map of the Gaussians `cloud`, which are those of the scene in the state `known`.
     /// Returns the id of the new state.
-    ///
-    /// # Errors
-    /// As [`Self::save`]; [`IoError::Changed`] if the scene has another state by now.
     pub(crate) fn save_map(
         &self,
         known: Option<&str>,
@@ -111,9 +102,6 @@ impl SceneFolder {
 
     /// As [`Self::save_map`], but what was there before is kept (see [`Self::keep_earlier`]): where, and the
     /// id of the new state. The map that is there already changes nothing.
-    ///
-    /// # Errors
-    /// As [`Self::save_map`].
     pub(crate) fn replace_map(
         &self,
         known: Option<&str>,
@@ -158,9 +146,6 @@ impl SceneFolder {
 
     /// Keeps the scene as it is now beside what will replace it, as a scene of its own; `None` if it
     /// has no objects and parts, which are what took somebody time. Returns where.
-    ///
-    /// # Errors
-    /// If that cannot be written.
     pub(crate) fn keep_earlier(&self) -> Result<Option<PathBuf>, IoError> {
         if !self.path().join(semantic_map::FILE).exists() || !is_scene(self.path()) {
             return Ok(None);
@@ -204,14 +189,7 @@ mod tests {
     use crate::scene::{Identities, Level, NOBODY};
 
     fn cloud(x: f32) -> GaussianCloud {
-        GaussianCloud {
-            positions: vec![[x; 3]],
-            log_scales: vec![[0.0; 3]],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]],
-            opacity_logits: vec![0.0],
-            sh: vec![[0.0; 3]],
-            ..GaussianCloud::default()
-        }
+        GaussianCloud::isotropic(vec![[x; 3]], 0.0, 0.0)
     }
 
     fn named(name: &str) -> SemanticMap {

@@ -49,7 +49,6 @@ pub struct SceneInfo {
 pub struct DatasetReference {
     /// Path of the dataset's folder or file, relative to the scene's folder where it can be.
     pub(crate) path: PathBuf,
-    /// Which layout it has, for display.
     pub(crate) format: String,
 }
 

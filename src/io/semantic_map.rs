@@ -26,9 +26,7 @@ use crate::scene::{GaussianCloud, Identities, LanguageFeatures, SemanticMap, Vie
 pub use super::scene_files::MAP_FILE as FILE;
 /// Version that this program writes, and the highest it reads.
 const VERSION: u64 = 1;
-/// Key of the metadata.
 const KEY: &str = "fmlgs";
-/// Largest file that is read.
 const MAX_BYTES: u64 = 256 << 20;
 
 #[derive(Serialize, Deserialize)]
@@ -45,9 +43,6 @@ struct Header {
 }
 
 /// The bytes of a map that belongs to a scene's state; `path` is for errors.
-///
-/// # Errors
-/// If it is too large for the format.
 pub fn encode(map: &SemanticMap, state: Option<&str>, path: &Path) -> Result<Vec<u8>, IoError> {
     let language = map.language.as_ref();
     let header = Header {
@@ -57,11 +52,7 @@ pub fn encode(map: &SemanticMap, state: Option<&str>, path: &Path) -> Result<Vec
         encoder: language.map(|l| l.encoder.clone()),
         identities: map.identities.clone(),
     };
-    let broken = |e: &dyn std::fmt::Display| IoError::Syntax {
-        path: path.into(),
-        place: "semantic map".into(),
-        reason: e.to_string(),
-    };
+    let broken = |e: &dyn std::fmt::Display| IoError::syntax(path, "semantic map", e.to_string());
     let text = serde_json::to_string(&header).map_err(|e| broken(&e))?;
     let codes: Vec<[f32; 3]> = map.identities.iter().map(|(_, i)| i.code).collect();
     let parents: Vec<u32> = map.identities.iter().map(|(_, i)| i.parent).collect();
@@ -86,9 +77,6 @@ pub fn encode(map: &SemanticMap, state: Option<&str>, path: &Path) -> Result<Vec
 }
 
 /// The map of the scene in `folder`, whose Gaussians `cloud` are of the save `state`; `None` if it has none.
-///
-/// # Errors
-/// If its file is broken, or [`IoError::Torn`] if it is of other Gaussians.
 pub fn load(folder: &Path, state: Option<&str>, cloud: &GaussianCloud) -> Result<Option<SemanticMap>, IoError> {
     let path = folder.join(FILE);
     if !path.exists() {
@@ -121,11 +109,7 @@ fn packed(language: &LanguageFeatures, of: impl Fn(&ViewFeatures) -> &Vec<Vec<f3
 }
 
 fn features(path: &Path, bytes: &[u8], encoder: String, identities: &Identities) -> Result<LanguageFeatures, IoError> {
-    let broken = |place: &str, reason: &str| IoError::Syntax {
-        path: path.into(),
-        place: format!("tensor '{place}'"),
-        reason: reason.into(),
-    };
+    let broken = |place: &str, reason: &str| IoError::syntax(path, format!("tensor '{place}'"), reason);
     let file = SafeTensors::deserialize(bytes).map_err(|e| broken("", &e.to_string()))?;
     let tensor = |name: &str, dtype: Dtype| {
         let found = file.tensor(name).map_err(|e| broken(name, &e.to_string()))?;
@@ -182,14 +166,7 @@ mod tests {
         let mut identities = Identities::default();
         let doll = identities.add(Level::Object, NOBODY, vec!["doll".into(), "人形".into()]);
         let eye = identities.add(Level::Part, doll, vec![]);
-        let cloud = GaussianCloud {
-            positions: vec![[0.0; 3]; 2],
-            log_scales: vec![[0.0; 3]; 2],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 2],
-            opacity_logits: vec![0.0; 2],
-            sh: vec![[0.0; 3]; 2],
-            ..GaussianCloud::default()
-        };
+        let cloud = GaussianCloud::isotropic(vec![[0.0; 3]; 2], 0.0, 0.0);
         let mut map = SemanticMap::from_identities(identities, vec![eye, NOBODY], vec![0.25, 0.0], vec!["a".into()]);
         let views = |raw: [f32; 2], deviated: [f32; 2]| ViewFeatures {
             raw: vec![raw.to_vec(); 2],

@@ -25,7 +25,6 @@ pub use super::scene_info::{DatasetReference, History, SceneCamera, SceneInfo, V
 /// A trained scene with its folder.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainedScene {
-    /// The folder.
     pub(crate) folder: PathBuf,
     /// What `scene.json` says.
     pub info: SceneInfo,
@@ -44,9 +43,6 @@ impl TrainedScene {
 }
 
 /// Writes a scene into `folder`, which is created if need be. All of its files change, or none.
-///
-/// # Errors
-/// As [`SceneFolder::hold`] and [`SceneFolder::save`].
 #[cfg(test)]
 pub(crate) fn save(
     folder: &Path,
@@ -58,9 +54,6 @@ pub(crate) fn save(
 }
 
 /// Reads a scene. A save that was interrupted is finished first.
-///
-/// # Errors
-/// If a file is broken, or [`IoError::Torn`] if its files were not saved together.
 pub fn load(folder: &Path) -> Result<TrainedScene, IoError> {
     // Somebody may be saving at this moment, which takes milliseconds once the files are written.
     const TRIES: u32 = 20;

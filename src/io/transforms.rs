@@ -16,7 +16,6 @@ use crate::scene::{Camera, Dataset, Distortion};
 /// Blender's synthetic scenes have no backdrop; the literature shows them on white.
 const WHITE: [f32; 3] = [1.0; 3];
 
-/// A `transforms*.json`.
 #[derive(Deserialize)]
 struct File {
     #[serde(flatten)]
@@ -30,12 +29,10 @@ struct File {
     fmlgs: Own,
 }
 
-/// See [`File::fmlgs`].
 #[derive(Default, Deserialize)]
 struct Own {
     /// sRGB color behind everything, 0 to 1.
     background: Option<[f32; 3]>,
-    /// Length of a unit in meters.
     metres_per_unit: Option<f64>,
 }
 
@@ -132,10 +129,9 @@ pub fn read_blender(root: &Path) -> Result<Dataset, IoError> {
         root: root.into(),
         format: "Blender synthetic".into(),
         photos: all,
-        points: Vec::new(),
         background: Some(WHITE),
-        metres_per_unit: None,
         warnings,
+        ..Dataset::default()
     })
 }
 
@@ -144,10 +140,7 @@ impl Frame {
         let name = files::relative(root, &self.file_path, source)?;
         let bad = |reason: String| IoError::Syntax { path: source.into(), place: format!("frame '{name}'"), reason };
         let (world_from_camera, center) = pose(&self.transform_matrix).map_err(|r| bad(r.into()))?;
-        let lens = self.lens.or(shared).lens(source).map_err(|e| match e {
-            Flaw::Reason(r) => bad(r),
-            Flaw::Error(e) => e,
-        })?;
+        let lens = self.lens.or(shared).lens(source, &bad)?;
         Ok(ListedPhoto {
             entry: name.clone(),
             name,
@@ -171,12 +164,6 @@ fn pose(m: &[Vec<f64>]) -> Result<(DMat3, DVec3), &'static str> {
     }
     let column = |c: usize| DVec3::new(rows[0][c], rows[1][c], rows[2][c]);
     Ok((DMat3::from_cols(column(0), -column(1), -column(2)), column(3)))
-}
-
-/// Why a lens is refused.
-enum Flaw {
-    Reason(String),
-    Error(IoError),
 }
 
 impl Intrinsics {
@@ -205,14 +192,10 @@ impl Intrinsics {
         }
     }
 
-    fn lens(&self, source: &Path) -> Result<Lens, Flaw> {
-        let unsupported = |what: String| {
-            Flaw::Error(IoError::Unsupported {
-                path: source.into(),
-                what,
-                remedy: "undistort the photos to a pinhole camera first",
-            })
-        };
+    /// The lens; `bad` makes an error of a value that cannot be.
+    fn lens(&self, source: &Path, bad: &dyn Fn(String) -> IoError) -> Result<Lens, IoError> {
+        let remedy = "undistort the photos to a pinhole camera first";
+        let unsupported = |what: String| IoError::Unsupported { path: source.into(), what, remedy };
         let known = ["SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "PERSPECTIVE"];
         if let Some(model) = self.camera_model.as_deref().filter(|m| !known.contains(m)) {
             return Err(unsupported(format!("the camera model {model}")));
@@ -226,30 +209,29 @@ impl Intrinsics {
         let focal = match (self.fl_x, self.camera_angle_x) {
             (Some(x), _) => Focal::Px(DVec2::new(x, self.fl_y.unwrap_or(x))),
             (None, Some(x)) => Focal::Angle(x, self.camera_angle_y),
-            (None, None) => return Err(Flaw::Reason("neither fl_x nor camera_angle_x is given".into())),
+            (None, None) => return Err(bad("neither fl_x nor camera_angle_x is given".into())),
         };
         let size_px = match (self.w, self.h) {
-            (Some(w), Some(h)) => Some((side("w", w)?, side("h", h)?)),
+            (Some(w), Some(h)) => Some((side("w", w).map_err(bad)?, side("h", h).map_err(bad)?)),
             _ => None,
         };
         let principal_px = match (self.cx, self.cy) {
             (Some(x), Some(y)) => Some(DVec2::new(x, y)),
             _ => None,
         };
-        let or_zero = |v: Option<f64>| v.unwrap_or(0.0);
-        let distortion =
-            Distortion { k1: or_zero(self.k1), k2: or_zero(self.k2), p1: or_zero(self.p1), p2: or_zero(self.p2) };
+        let [k1, k2, p1, p2] = [self.k1, self.k2, self.p1, self.p2].map(Option::unwrap_or_default);
+        let distortion = Distortion { k1, k2, p1, p2 };
         Ok(Lens { size_px, focal, principal_px, distortion })
     }
 }
 
 /// A picture side in px, which files give as a floating-point number.
-fn side(name: &str, value: f64) -> Result<u32, Flaw> {
+fn side(name: &str, value: f64) -> Result<u32, String> {
     let max = f64::from(Camera::MAX_SIDE_PX);
     if value >= 1.0 && value <= max && value.fract() == 0.0 {
         Ok(value as u32)
     } else {
-        Err(Flaw::Reason(format!("{name} = {value} is not a whole number of px between 1 and {max}")))
+        Err(format!("{name} = {value} is not a whole number of px between 1 and {max}"))
     }
 }
 

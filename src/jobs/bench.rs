@@ -19,7 +19,6 @@ const QUERY_IDENTITIES: usize = 300;
 /// Its size in px.
 const QUERY_SIZE: [usize; 2] = [1_008, 567];
 
-/// What is timed, and how.
 pub(crate) struct BenchRequest {
     /// Splats or trained scenes to draw, posed photos to train on.
     pub(crate) paths: Vec<PathBuf>,
@@ -35,9 +34,6 @@ pub(crate) struct BenchRequest {
 }
 
 /// Times stage by stage.
-///
-/// # Errors
-/// If something cannot be opened, drawn or trained on, or the observer asks to stop.
 pub(crate) fn run(request: &BenchRequest, observer: &mut dyn Observer) -> Result<Timings, JobError> {
     let repeats = request.repeats;
     let device = request.gpu.then(Device::shared).transpose()?;
@@ -91,9 +87,6 @@ fn photos(
 }
 
 /// What opening and drawing a scene as the window does costs this process.
-///
-/// # Errors
-/// If it cannot be opened or drawn.
 pub(crate) fn cost_of(scene: &Path, variant: PlanVariant, repeats: usize) -> Result<PlanCost, JobError> {
     Ok(cost(|| as_the_window(scene), variant, repeats)?)
 }

@@ -6,7 +6,8 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::evaluate::PhotoComparison;
-use super::{JobError, export, query};
+use super::query::{self, QueryEngine};
+use super::{JobError, export};
 use crate::io::SceneFolder;
 use crate::io::labels::Labels;
 use crate::models;
@@ -14,7 +15,6 @@ use crate::pipeline::observer::{Observer, Severity, Silent};
 use crate::pipeline::semantics::build_map::{FindOptions, Tools, find_objects};
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::protocols::{AskedScene, LabeledView, categories, masks};
-use crate::pipeline::semantics::query_engine::QueryEngine;
 use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
 use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::pipeline::semantics::view_map::ViewMap;
@@ -34,10 +34,8 @@ const QUESTIONS: [&str; 7] = [
 /// Photos whose labels are used at most where objects are found while one waits.
 const MAX_SEEDS: usize = 3;
 
-/// What was asked and answered.
 #[derive(Debug, Serialize)]
 pub(crate) struct DemoQuestion {
-    /// The question.
     pub(crate) question: String,
     /// "found", "ambiguous" or "not found".
     pub(crate) verdict: &'static str,
@@ -54,13 +52,10 @@ pub(crate) struct DemoQuestion {
 pub(crate) struct DemoQueries {
     /// Photos whose masks were used.
     pub(crate) seeds: Vec<String>,
-    /// Seconds that finding objects took.
     pub(crate) find_secs: f64,
     /// Mean IoU of whole objects in held-out photos, asked for by name.
     pub(crate) object_miou: f64,
-    /// Mean IoU of parts.
     pub(crate) part_miou: f64,
-    /// The questions.
     pub(crate) asked: Vec<DemoQuestion>,
 }
 

@@ -54,9 +54,6 @@ pub(crate) fn apply(
 
 /// Stores the map of the scene in `folder`, which is known in the state `known`. Returns its state then; `None`
 /// if nothing is stored because there is no scene yet.
-///
-/// # Errors
-/// If it cannot be written, or somebody else has changed the scene.
 pub(crate) fn store(
     folder: &Path,
     known: Option<&str>,
@@ -97,14 +94,7 @@ mod tests {
     #[test]
     fn painting_takes_what_the_paint_covers() {
         let n = 20;
-        let cloud = GaussianCloud {
-            positions: (0..n).map(|i| [i as f32 * 0.1 - 0.95, 0.0, 0.0]).collect(),
-            log_scales: vec![[-3.2; 3]; n],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
-            opacity_logits: vec![3.0; n],
-            sh: vec![[0.0; 3]; n],
-            ..GaussianCloud::default()
-        };
+        let cloud = GaussianCloud::isotropic((0..n).map(|i| [i as f32 * 0.1 - 0.95, 0.0, 0.0]).collect(), -3.2, 3.0);
         let camera =
             Camera::look_at(DVec3::new(0.0, 0.0, -3.0), DVec3::ZERO, DVec3::NEG_Y, 0.9, 64, 64).expect("valid");
         let left = Mask::from_fn(64, 64, |i| i % 64 < 32);

@@ -52,12 +52,9 @@ pub(crate) struct EvaluateOptions {
 /// A scene beside the photos that it is compared with.
 pub(crate) struct PhotoComparison {
     pub(crate) cloud: Arc<GaussianCloud>,
-    /// How they are drawn.
     pub(crate) settings: RenderSettings,
     pub(crate) dataset: Arc<Dataset>,
-    /// Indices of the photos to compare with.
     pub(crate) views: Vec<usize>,
-    /// Longer side of the compared pictures in px.
     pub(crate) max_side_px: u32,
     /// Borders of the photos, which are left out.
     pub(crate) borders: Option<Borders>,
@@ -68,9 +65,6 @@ pub(crate) struct PhotoComparison {
 
 impl PhotoComparison {
     /// Of `scene` with `photos`.
-    ///
-    /// # Errors
-    /// If they cannot be read, or none is held out.
     pub(crate) fn new(scene: Scene, photos: &Path, options: EvaluateOptions) -> Result<Self, JobError> {
         let dataset = Arc::new(open::dataset(photos)?);
         let mut comparison = Self::of(&scene, dataset, options)?;
@@ -79,9 +73,6 @@ impl PhotoComparison {
     }
 
     /// Of `scene` with the photos of `dataset`.
-    ///
-    /// # Errors
-    /// If they cannot be read, or none is held out.
     pub(crate) fn of(scene: &Scene, dataset: Arc<Dataset>, options: EvaluateOptions) -> Result<Self, JobError> {
         let EvaluateOptions { max_side_px, holdout_every, keep_borders, pictures } = options;
         let default_every = scene.config.holdout_every;
@@ -127,9 +118,6 @@ impl PhotoComparison {
 }
 
 /// PSNR and SSIM of every view, one at a time so that memory holds one photo. Writes the pictures.
-///
-/// # Errors
-/// If a photo cannot be read or drawn, a picture cannot be written, or the observer asks to stop.
 pub(crate) fn photometric(comparison: &PhotoComparison, observer: &mut dyn Observer) -> Result<Evaluation, JobError> {
     for warning in &comparison.dataset.warnings {
         observer.note(Severity::Warning, warning.clone());
@@ -150,9 +138,6 @@ pub(crate) fn photometric(comparison: &PhotoComparison, observer: &mut dyn Obser
 }
 
 /// Drawn depth against the true depth of synthetic photos, and the median milliseconds of drawing it.
-///
-/// # Errors
-/// If a true depth is missing, a view cannot be drawn, or the observer asks to stop.
 pub(crate) fn depth(comparison: &PhotoComparison, observer: &mut dyn Observer) -> Result<(DepthScores, f64), JobError> {
     let mut renderer = Renderer::new();
     let mut counter = DepthCounter::default();
@@ -215,13 +200,12 @@ mod tests {
 
     #[test]
     fn a_scene_says_by_name_which_photos_it_has_not_seen() {
-        let photo = |name: &str| Photo {
-            name: name.into(),
-            path: PathBuf::new(),
-            camera: Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid"),
-            distortion: None,
-            test_split: false,
-            background: None,
+        let photo = |name: &str| {
+            Photo::new(
+                name,
+                PathBuf::new(),
+                Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid"),
+            )
         };
         let trained_on = Dataset { photos: ["a", "b", "c", "d"].map(photo).to_vec(), ..Dataset::default() };
         let cameras = open::cameras(&trained_on, 2);

@@ -42,57 +42,45 @@ pub(crate) enum Protocol {
     PartRecall,
 }
 
-/// What a protocol counts besides the IoU of each query.
+/// What the [`Protocol`] of the same name counts besides the IoU of each query.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub(crate) enum ProtocolSummary {
-    /// Of the protocol [`Protocol::Masks`].
     Masks {
-        /// Mean IoU of objects.
         object_miou: f64,
-        /// Mean IoU of parts.
         part_miou: f64,
     },
-    /// Of the protocol [`Protocol::Langsplat`].
     Langsplat {
         /// Share of queries whose most relevant pixel lies in their box.
         localization: f64,
     },
-    /// Of the protocol [`Protocol::FastlgsEx`]: nothing.
     FastlgsEx {},
-    /// Of the protocol [`Protocol::Selection3d`].
     Selection3d {
         /// Share of queries with an IoU of 0.25 or more.
         accuracy_25: f64,
         /// Share of queries with an IoU of 0.5 or more.
         accuracy_50: f64,
     },
-    /// Of the protocol [`Protocol::SpinNerf`].
     SpinNerf {
-        /// Share of pixels that are right.
         accuracy: f64,
     },
-    /// Of the protocol [`Protocol::Ovs3d`].
     Ovs3d {
         /// Mean IoU where every pixel is of the class that fits best.
         argmax_miou: f64,
         #[serde(skip)]
         classes: usize,
     },
-    /// Of the protocol [`Protocol::PartRecall`].
-    PartRecall { encoder: String, rows: Vec<part_recall::Row> },
+    PartRecall {
+        encoder: String,
+        rows: Vec<part_recall::Row>,
+    },
 }
 
-/// What a comparison comes to.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct MaskScores {
-    /// The views that were compared.
     pub(crate) views: usize,
-    /// How many of them were trained on.
     pub(crate) trained_on: usize,
-    /// Every query of every view.
     pub(crate) units: Vec<Unit>,
-    /// What the protocol counts.
     pub(crate) summary: ProtocolSummary,
 }
 
@@ -105,9 +93,6 @@ impl MaskScores {
 
 /// Compares the objects and parts of a scene with `labels`; `query` is what to ask for where those do not name it.
 /// Pictures show the identities over the photos.
-///
-/// # Errors
-/// If labels or photos cannot be read, no view has labels, or a protocol lacks what it needs.
 pub(crate) fn run(
     comparison: &PhotoComparison,
     scene: &Path,

@@ -6,28 +6,30 @@ use std::path::Path;
 use image::codecs::png::PngEncoder;
 use image::{ColorType, ImageEncoder};
 use npyz::WriterBuilder;
+use serde::Serialize;
 
 use super::JobError;
 use crate::io::{self, IoError, atomic, scene_files, splat_ply, trained};
 use crate::navigate::{CameraSpline, Pose, Speed};
 use crate::scene::{CameraPath, GaussianCloud, PathKey, PhotoPixels};
 
-/// Writes Gaussians as a `.ply`.
-///
-/// # Errors
-/// If the file cannot be written.
 pub(crate) fn ply(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
     make_parent(path)?;
     splat_ply::write(path, cloud)
 }
 
-/// Writes a text.
-///
-/// # Errors
-/// If the file cannot be written.
 pub(crate) fn text(path: &Path, text: &str) -> Result<(), IoError> {
     make_parent(path)?;
     atomic::write(path, |w| w.write_all(text.as_bytes()))
+}
+
+/// Writes a value as indented JSON.
+///
+/// # Errors
+/// If the file cannot be written.
+pub(crate) fn json(path: &Path, value: &impl Serialize) -> Result<(), IoError> {
+    make_parent(path)?;
+    atomic::write(path, |w| Ok(serde_json::to_writer_pretty(w, value)?))
 }
 
 /// Writes pixels as a `.png`.
@@ -39,9 +41,6 @@ pub(crate) fn picture(path: &Path, pixels: &PhotoPixels) -> Result<(), IoError> 
 }
 
 /// Writes a `.png` of `size_px` from raw samples, those of 16 bits in the machine's byte order.
-///
-/// # Errors
-/// If the file cannot be written.
 pub(crate) fn png(path: &Path, samples: &[u8], size_px: [u32; 2], color: ColorType) -> Result<(), IoError> {
     atomic::write(path, |w| {
         PngEncoder::new(w).write_image(samples, size_px[0], size_px[1], color.into()).map_err(std::io::Error::other)
@@ -49,9 +48,6 @@ pub(crate) fn png(path: &Path, samples: &[u8], size_px: [u32; 2], color: ColorTy
 }
 
 /// Writes rows of `f32` values as a NumPy array of shape `[height, width]`.
-///
-/// # Errors
-/// If the file cannot be written.
 pub(crate) fn npy(path: &Path, values: &[f32], size_px: [u32; 2]) -> Result<(), IoError> {
     atomic::write(path, |w: &mut dyn Write| {
         let shape = [u64::from(size_px[1]), u64::from(size_px[0])];
@@ -63,9 +59,6 @@ pub(crate) fn npy(path: &Path, values: &[f32], size_px: [u32; 2]) -> Result<(), 
 
 /// Writes a camera path: this program's `.json`, or frames of this `aspect` for nerfstudio where the name ends in
 /// `.nerfstudio.json`.
-///
-/// # Errors
-/// If the file cannot be written.
 pub(crate) fn camera_path(file: &Path, path: &CameraPath, aspect: f64) -> Result<(), IoError> {
     make_parent(file)?;
     if !file.to_string_lossy().ends_with(".nerfstudio.json") {
@@ -77,10 +70,6 @@ pub(crate) fn camera_path(file: &Path, path: &CameraPath, aspect: f64) -> Result
     io::camera_path::nerfstudio::write(file, path, &frames, (1280, (1280.0 / aspect.max(0.01)) as u32))
 }
 
-/// Makes the folder that `path` lies in.
-///
-/// # Errors
-/// If that is not possible.
 pub(crate) fn make_parent(path: &Path) -> Result<(), IoError> {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => make_folder(folder),
@@ -89,9 +78,6 @@ pub(crate) fn make_parent(path: &Path) -> Result<(), IoError> {
 }
 
 /// Makes `folder` and those above it.
-///
-/// # Errors
-/// If that is not possible.
 pub(crate) fn make_folder(folder: &Path) -> Result<(), IoError> {
     let remedy = "the folder cannot be created: choose another place";
     std::fs::create_dir_all(folder).map_err(|cause| IoError::Write { path: folder.into(), remedy, cause })
@@ -100,9 +86,6 @@ pub(crate) fn make_folder(folder: &Path) -> Result<(), IoError> {
 /// Refuses a file for a result, before any work is done, that does not end as it should (`endings`, any
 /// if there are none) or is one of those that the job reads: `reads` are files and folders.
 /// Devices and pipes may be written into whatever they are called.
-///
-/// # Errors
-/// If it is refused.
 pub(crate) fn check(path: &Path, endings: &[&str], reads: &[&Path]) -> Result<(), JobError> {
     if atomic::is_stream(path) {
         return Ok(());
@@ -125,9 +108,6 @@ pub(crate) fn check(path: &Path, endings: &[&str], reads: &[&Path]) -> Result<()
 }
 
 /// Refuses a folder for pictures that holds what the job reads, as [`check`] does files.
-///
-/// # Errors
-/// If it is refused.
 pub(crate) fn check_folder(folder: &Path, reads: &[&Path]) -> Result<(), JobError> {
     // Where it does not exist yet, nothing in it is read.
     if folder.exists() { check(folder, &[], reads) } else { Ok(()) }

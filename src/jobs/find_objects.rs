@@ -88,21 +88,14 @@ pub struct FindRequest {
 /// Objects and parts that were found and stored.
 #[derive(Clone, Debug)]
 pub(crate) struct FoundObjects {
-    /// They, and how they were found.
     pub(crate) found: Found,
     /// The photos that were looked at; what was found counts them.
     pub(crate) photos: Vec<Photo>,
-    /// The state of the scene now.
     pub(crate) state: String,
-    /// Seconds that it took.
     pub(crate) secs: f64,
 }
 
 /// Finds objects and parts of the scene in the state `known`, and stores them. Held-out photos are never used.
-///
-/// # Errors
-/// If the folder cannot be written or has changed, a model or photo cannot be read, no mask is found, or the
-/// observer asks to stop.
 pub(crate) fn run(
     request: &FindRequest,
     known: Option<&str>,

@@ -17,7 +17,6 @@ use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 /// A scene in which one can move about.
 pub struct Explored {
     pub(crate) navigator: Navigator,
-    /// The Gaussians that it knows.
     pub(crate) cloud: Arc<GaussianCloud>,
     /// The number of the connected part that each keypoint belongs to, the largest part first.
     pub(crate) parts: Vec<usize>,
@@ -30,7 +29,6 @@ impl std::fmt::Debug for Explored {
 }
 
 impl Explored {
-    /// Looks at a scene.
     pub(crate) fn new(cloud: Arc<GaussianCloud>, cameras: &[Camera], up: DVec3) -> Self {
         let navigator = Navigator::new(&cloud, cameras, up);
         resource_log::record(
@@ -44,9 +42,6 @@ impl Explored {
     }
 
     /// The flight from one pose to another; `frames` poses long.
-    ///
-    /// # Errors
-    /// If there is no way.
     pub(crate) fn fly(&self, from: &Pose, to: &Pose, frames: usize) -> Result<CameraTrajectory, NoRoute> {
         self.navigator.fly(from, to, None, frames, Speed::Eased)
     }
@@ -79,21 +74,14 @@ pub struct ApproachRequest {
     /// The scene, if it was looked at before.
     pub(crate) explored: Option<Arc<Explored>>,
     pub(crate) cloud: Arc<GaussianCloud>,
-    /// The photos' cameras.
     pub(crate) cameras: Vec<Camera>,
-    /// Which way is up.
     pub(crate) up: DVec3,
-    /// How the Gaussians are drawn.
     pub(crate) settings: RenderSettings,
     pub(crate) map: Arc<SemanticMap>,
     pub(crate) id: IdentityId,
-    /// How it is to be seen.
     pub(crate) preference: ViewPreference,
-    /// Where the eye is.
     pub(crate) from: Pose,
-    /// Width by height of the picture.
     pub(crate) aspect: f64,
-    /// Poses of the flight.
     pub(crate) frames: usize,
 }
 
@@ -117,7 +105,6 @@ pub(crate) fn visit(request: ApproachRequest) -> (Arc<Explored>, Approached) {
 /// What came of a visit.
 #[derive(Clone, Debug)]
 pub struct Approached {
-    /// What was to be visited.
     pub(crate) name: String,
     /// The flight there, or to the nearest place that can be reached.
     pub(crate) flight: Option<Box<Approach>>,

@@ -6,6 +6,7 @@
 pub(crate) mod bench;
 pub(crate) mod demo;
 pub(crate) mod demo_questions;
+pub(crate) mod demo_tour;
 pub mod edit;
 pub(crate) mod error;
 pub(crate) mod evaluate;

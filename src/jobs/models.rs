@@ -21,7 +21,6 @@ pub struct ModelList {
     pub(crate) note: Option<String>,
     /// Where they lie.
     pub(crate) folder: PathBuf,
-    /// All models of the catalog.
     pub(crate) models: Vec<(ModelEntry, ModelState)>,
 }
 
@@ -49,9 +48,6 @@ pub(crate) enum Source<'a> {
 }
 
 /// Puts the model called `id` in place.
-///
-/// # Errors
-/// If there is none, its files cannot be had or are not right, or the observer asks to stop.
 pub(crate) fn install(id: &str, source: Source<'_>, observer: &mut dyn Observer) -> Result<ModelEntry, JobError> {
     let (folder, mut ticker) = (catalog::folder(), Ticker::new("", 0));
     let entry = catalog::entry(id)?;
@@ -66,9 +62,6 @@ pub(crate) fn install(id: &str, source: Source<'_>, observer: &mut dyn Observer)
 }
 
 /// Compares all files that are here with their checksums: what is wrong with each model, if anything.
-///
-/// # Errors
-/// If the list that came with the program is damaged.
 pub fn check() -> Result<Vec<(String, Option<String>)>, JobError> {
     let folder = catalog::folder();
     let here = |e: &ModelEntry| !matches!(e.state(&folder), ModelState::Missing(_));
@@ -76,7 +69,6 @@ pub fn check() -> Result<Vec<(String, Option<String>)>, JobError> {
     Ok(catalog::entries()?.into_iter().filter(here).map(check).collect())
 }
 
-/// How long an encoder takes.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub(crate) struct EncoderTimes {
     pub(crate) id: String,
@@ -84,17 +76,12 @@ pub(crate) struct EncoderTimes {
     pub(crate) load_ms: f64,
     pub(crate) picture_ms: f64,
     pub(crate) phrase_ms: f64,
-    /// What it made of the picture.
     pub(crate) picture: Vec<f32>,
-    /// What it made of the phrase.
     pub(crate) phrase: Vec<f32>,
 }
 
 /// Times every encoder that can be used here on a picture and a phrase: medians of so many `runs`. `told` hears
 /// of each that is here and cannot be used.
-///
-/// # Errors
-/// If one fails.
 pub(crate) fn time_encoders(runs: usize, told: &mut dyn FnMut(String)) -> Result<Vec<EncoderTimes>, JobError> {
     const PHRASE: &str = "a red wooden chair";
     let times = |run: &mut dyn FnMut() -> Result<(), ModelError>| -> Result<f64, ModelError> {

@@ -21,11 +21,9 @@ use crate::scene::{Bounds, Camera, Dataset, GaussianCloud, HomeView, Machine, Sc
 /// Gaussians that can be drawn, and what came with them.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
-    /// Where it was read from.
     pub(crate) path: PathBuf,
     /// Folder of the trained scene, if it is one.
     pub(crate) folder: Option<PathBuf>,
-    /// Short name for titles.
     pub(crate) name: String,
     /// The Gaussians, without bands of harmonics that are zero.
     pub(crate) cloud: Arc<GaussianCloud>,
@@ -37,13 +35,10 @@ pub struct Scene {
     pub(crate) settings: RenderSettings,
     /// How it was trained; defaults where that is not known.
     pub(crate) config: TrainConfig,
-    /// Measurements of its training.
     pub(crate) history: History,
-    /// Where its photos were, for display.
     pub(crate) photos: Option<PathBuf>,
     /// Where its photos are, if they are still there.
     pub(crate) dataset_path: Option<PathBuf>,
-    /// Length of a scene unit in meters, if that is known.
     pub(crate) metres_per_unit: Option<f64>,
     /// Id of the save that its files are of, if it has one.
     pub(crate) state: Option<String>,
@@ -55,7 +50,6 @@ impl Scene {
         std::iter::once(self.path.as_path()).chain(self.dataset_path.as_deref()).collect()
     }
 
-    /// The cameras alone.
     pub(crate) fn views(&self) -> Vec<Camera> {
         self.cameras.iter().map(|c| c.camera.clone()).collect()
     }
@@ -66,9 +60,6 @@ impl Scene {
     }
 
     /// Its objects and parts.
-    ///
-    /// # Errors
-    /// If it has none, or they cannot be read.
     pub fn semantics(&self) -> Result<SemanticMap, JobError> {
         let map = match &self.folder {
             Some(folder) => io::semantic_map::load(folder, self.state.as_deref(), &self.cloud)?,
@@ -78,9 +69,6 @@ impl Scene {
     }
 
     /// Where its photos are, unless they are somewhere else.
-    ///
-    /// # Errors
-    /// If nobody knows.
     pub(crate) fn photos(&self, elsewhere: Option<&Path>) -> Result<PathBuf, JobError> {
         let known = elsewhere.map(Path::to_path_buf).or_else(|| self.dataset_path.clone());
         known.ok_or_else(|| JobError::PhotosGone(self.path.clone()))
@@ -120,14 +108,10 @@ impl Scene {
 #[derive(Debug)]
 pub(crate) enum Contents {
     Photos(Dataset),
-    /// A splat or a trained scene.
     Scene(Scene),
 }
 
 /// Reads what lies at `path`.
-///
-/// # Errors
-/// If it cannot be read, the settings of a trained scene included.
 pub(crate) fn contents(path: &Path) -> Result<Contents, JobError> {
     Ok(match io::open(path)? {
         Opened::Dataset(dataset) => Contents::Photos(dataset),
@@ -140,9 +124,6 @@ pub(crate) fn contents(path: &Path) -> Result<Contents, JobError> {
 }
 
 /// Reads a trained scene or a splat.
-///
-/// # Errors
-/// If it cannot be read, or is something else.
 pub fn scene(path: &Path) -> Result<Scene, JobError> {
     match contents(path)? {
         Contents::Scene(scene) => Ok(scene),
@@ -150,10 +131,6 @@ pub fn scene(path: &Path) -> Result<Scene, JobError> {
     }
 }
 
-/// Reads posed photos.
-///
-/// # Errors
-/// If they cannot be read, or it is something else.
 pub(crate) fn dataset(path: &Path) -> Result<Dataset, JobError> {
     match io::open(path)? {
         Opened::Dataset(dataset) => Ok(dataset),
@@ -170,7 +147,6 @@ pub(crate) fn cameras(dataset: &Dataset, every: usize) -> Vec<SceneCamera> {
 /// A scene with all that is known of it, as it is looked at and worked on.
 #[derive(Clone, Debug, Default)]
 pub struct OpenedScene {
-    /// Where it was read from.
     pub(crate) path: PathBuf,
     /// Short name for titles.
     pub name: String,
@@ -186,25 +162,19 @@ pub struct OpenedScene {
     pub(crate) masks: Option<PathBuf>,
     /// Folder in which training keeps its results and checkpoints.
     pub out: PathBuf,
-    /// Measurements of earlier training.
     pub(crate) history: History,
-    /// Length of a scene unit in meters, if that is known.
     pub(crate) metres_per_unit: Option<f64>,
     /// How to look at it at first.
     pub home: HomeView,
     /// How to draw it: background and filter.
     pub render: RenderSettings,
-    /// Degree of the harmonics in its file.
     pub(crate) sh_stored: u8,
-    /// What its plan is computed from.
     pub(crate) facts: SceneFacts,
     /// Id of the save that its files are of, if it has one.
     pub(crate) state: Option<String>,
     /// Settings of a training in `out` that can go on.
     pub(crate) resumable: Option<TrainConfig>,
-    /// Reports that may be of it.
     pub(crate) reports: Vec<PathBuf>,
-    /// Folder for a report of it.
     pub(crate) report_out: PathBuf,
 }
 
@@ -243,9 +213,6 @@ impl OpenedScene {
 
 /// Opens a path with all that is known of it: photos with the Gaussians that were trained on them before, a
 /// trained scene with its photos. What is missing or broken beside the scene itself is told and left out.
-///
-/// # Errors
-/// If nothing that is known lies there, or it cannot be read.
 pub(crate) fn open(
     path: &Path,
     folders: &Folders,
@@ -364,17 +331,15 @@ pub(crate) fn sparse_cloud(dataset: &Dataset) -> Option<GaussianCloud> {
     let points: Vec<_> = dataset.points.iter().filter(|p| p.position.is_finite()).collect();
     let spacing = bounds.radius() / (points.len() as f64).sqrt();
     let sigma = (0.35 * spacing).max(1e-9).ln() as f32;
-    let n = points.len();
     let sh = |rgb: [u8; 3]| rgb.map(|c| ((f64::from(c) / 255.0 - 0.5) / SH_C0) as f32);
     Some(GaussianCloud {
         origin,
-        positions: points.iter().map(|p| DVec3::to_array(&(p.position - origin)).map(|v| v as f32)).collect(),
-        log_scales: vec![[sigma; 3]; n],
-        quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
-        opacity_logits: vec![3.0; n],
-        sh_degree: 0,
         sh: points.iter().map(|p| sh(p.rgb)).collect(),
-        extras: Vec::new(),
+        ..GaussianCloud::isotropic(
+            points.iter().map(|p| DVec3::to_array(&(p.position - origin)).map(|v| v as f32)).collect(),
+            sigma,
+            3.0,
+        )
     })
 }
 

@@ -27,9 +27,6 @@ pub struct ViewMaps {
 
 impl ViewMaps {
     /// Draws them; codes where they are `wanted`, those of parts too if `parts` are.
-    ///
-    /// # Errors
-    /// If the view cannot be drawn.
     pub(crate) fn draw(
         renderer: &mut Renderer,
         (cloud, settings): (&GaussianCloud, &RenderSettings),
@@ -56,9 +53,6 @@ impl ViewMaps {
 }
 
 /// What the pixels of a view belong to.
-///
-/// # Errors
-/// If the view cannot be drawn.
 pub(crate) fn identities_in_view(
     drawn: (&GaussianCloud, &RenderSettings),
     map: &SemanticMap,
@@ -70,12 +64,9 @@ pub(crate) fn identities_in_view(
 /// A question about a scene in a view.
 #[derive(Clone, Debug)]
 pub(crate) struct QueryRequest<'a> {
-    /// As it was typed.
     pub(crate) text: &'a str,
-    /// Which level is asked for.
     pub(crate) level: LevelFilter,
     pub(crate) camera: &'a Camera,
-    /// How pixels are matched.
     pub(crate) mode: MatchMode,
     /// Largest difference per channel of a match.
     pub(crate) tolerance: f32,
@@ -83,25 +74,17 @@ pub(crate) struct QueryRequest<'a> {
     pub(crate) top: usize,
 }
 
-/// A question with its answer.
 #[derive(Clone, Debug)]
 pub(crate) struct QueryResult {
     /// What is meant, and how long that took.
     pub(crate) answered: QueryAnswer,
-    /// Its pixels.
     pub(crate) mask: Mask,
-    /// Words that nothing here knows.
     pub(crate) unknown_words: Vec<String>,
     /// Milliseconds from the text to the mask, the view there.
     pub(crate) query_ms: f64,
-    /// What the view's pixels belong to.
     pub(crate) maps: ViewMaps,
 }
 
-/// Answers a question.
-///
-/// # Errors
-/// If there is nothing in it, the encoder fails, or the view cannot be drawn.
 pub(crate) fn run(scene: &Scene, map: &SemanticMap, request: &QueryRequest<'_>) -> Result<QueryResult, JobError> {
     let drawn = (&*scene.cloud, &scene.settings);
     let blend = request.mode == MatchMode::Blend;
@@ -121,9 +104,6 @@ pub(crate) fn run(scene: &Scene, map: &SemanticMap, request: &QueryRequest<'_>) 
 }
 
 /// The identities that are meant, at most `top` of them.
-///
-/// # Errors
-/// If none is, or the encoder fails.
 pub(crate) fn identities(
     map: &SemanticMap,
     text: &str,
@@ -136,9 +116,6 @@ pub(crate) fn identities(
 }
 
 /// Writes the mask, white on black.
-///
-/// # Errors
-/// If the file cannot be written.
 pub(crate) fn write_mask(path: &Path, mask: &Mask) -> Result<(), JobError> {
     let (width, height) = (mask.width_px(), mask.height_px());
     let pixels: Vec<u8> = (0..width * height).map(|i| if mask.contains(i) { 255 } else { 0 }).collect();
@@ -147,9 +124,6 @@ pub(crate) fn write_mask(path: &Path, mask: &Mask) -> Result<(), JobError> {
 }
 
 /// Writes the relevancy of every pixel over the picture in gray.
-///
-/// # Errors
-/// If the picture cannot be drawn or the file not be written.
 pub(crate) fn write_heat(
     path: &Path,
     (cloud, settings): (&GaussianCloud, &RenderSettings),

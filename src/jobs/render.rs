@@ -12,7 +12,6 @@ use crate::pipeline::observer::{Observer, Severity};
 use crate::render::{BackendChoice, Frame, RenderSettings, Renderer, normals};
 use crate::scene::{Camera, GaussianCloud, Overrides};
 
-/// What of a scene is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum Quantity {
     /// Colors
@@ -41,7 +40,6 @@ pub(crate) struct Rendered {
     pub(crate) frame: Frame<f32>,
     /// What drew it: "CPU", or the name of the GPU.
     pub(crate) backend: String,
-    /// Milliseconds that drawing took.
     pub(crate) millis: f64,
     /// Degree of the spherical harmonics that were drawn.
     pub(crate) sh_degree: u8,
@@ -50,9 +48,6 @@ pub(crate) struct Rendered {
 }
 
 /// Draws `what` of a scene.
-///
-/// # Errors
-/// If the renderer that is demanded is not there, or fails.
 pub(crate) fn run(
     scene: &Scene,
     camera: &Camera,
@@ -74,9 +69,6 @@ pub(crate) fn run(
 }
 
 /// Draws the colors of Gaussians into a `.png`.
-///
-/// # Errors
-/// If they cannot be drawn, or the file cannot be written.
 pub(crate) fn picture(
     path: &Path,
     cloud: &Arc<GaussianCloud>,
@@ -88,10 +80,6 @@ pub(crate) fn picture(
     Ok(())
 }
 
-/// A camera from a file.
-///
-/// # Errors
-/// If it cannot be read or is none.
 pub(crate) fn camera(path: &Path) -> Result<Camera, IoError> {
     camera_file::read(path)
 }
@@ -100,9 +88,6 @@ pub(crate) fn camera(path: &Path) -> Result<Camera, IoError> {
 const BYTES_PER_PX: u64 = 64;
 
 /// Whether a picture of this size can be drawn in the memory that is free.
-///
-/// # Errors
-/// If it cannot.
 pub(crate) fn check_room(width_px: u32, height_px: u32) -> Result<(), JobError> {
     let bytes = u64::from(width_px) * u64::from(height_px) * BYTES_PER_PX;
     let what = format!("drawing {width_px} x {height_px} px");
@@ -111,9 +96,6 @@ pub(crate) fn check_room(width_px: u32, height_px: u32) -> Result<(), JobError> 
 
 /// Writes a frame as a `.png`, or as an array where the name ends in `.npy`. Returns the depth that 65535 stands
 /// for, where that is how it is stored.
-///
-/// # Errors
-/// If the file cannot be written.
 pub fn write(path: &Path, frame: &Frame<f32>, camera: &Camera, what: Quantity) -> Result<Option<f32>, IoError> {
     export::make_parent(path)?;
     let size = [frame.width_px as u32, frame.height_px as u32];

@@ -25,15 +25,11 @@ pub struct ReportRequest {
 
 pub(crate) struct Measured {
     pub(crate) report: Report,
-    /// Those that were measured.
     pub(crate) stages: Vec<StageName>,
     pub(crate) end: End,
 }
 
 /// Measures, and writes the report after every measurement.
-///
-/// # Errors
-/// If a stage that was asked for is not possible, the folder holds another report, or it cannot be written.
 pub(crate) fn run(request: &ReportRequest, observer: &mut dyn Observer) -> Result<Measured, JobError> {
     let ReportRequest { subject, out, budget_secs, .. } = request;
     let computer = computer::look();
@@ -70,9 +66,6 @@ pub(crate) fn run(request: &ReportRequest, observer: &mut dyn Observer) -> Resul
 }
 
 /// A trained scene with its photos, if they are there.
-///
-/// # Errors
-/// If something of it cannot be read.
 pub(crate) fn subject(path: &Path, options: StudyOptions) -> Result<Subject, JobError> {
     let scene = open::scene(path)?;
     let dataset = scene.dataset_path.as_ref().filter(|p| p.exists()).map(|p| open::dataset(p)).transpose()?;

@@ -5,9 +5,6 @@ use crate::pipeline::semantics::matching::{MatchMode, gaussians};
 use crate::scene::{GaussianCloud, IdentityId, SemanticMap};
 
 /// The Gaussians of `targets`, or all others, `tolerance` being the largest difference per channel of a match.
-///
-/// # Errors
-/// If none is left.
 pub(crate) fn select(
     cloud: &GaussianCloud,
     map: &SemanticMap,

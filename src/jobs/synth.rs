@@ -8,9 +8,6 @@ use crate::pipeline::synth;
 pub(crate) use crate::pipeline::synth::{Levels, Rig, SynthOptions, SynthReport};
 
 /// Renders the scene in a file into a folder of posed photos.
-///
-/// # Errors
-/// If the scene cannot be read or shows nothing, a file cannot be written, or the observer asks to stop.
 pub(crate) fn run(
     scene: &Path,
     options: &SynthOptions,

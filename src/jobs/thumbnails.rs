@@ -7,9 +7,6 @@ use crate::scene::resource_log::{self, ResourceKind};
 use crate::scene::{GaussianCloud, HomeView, SemanticMap};
 
 /// Draws every object and part alone, by number less one.
-///
-/// # Errors
-/// If one cannot be drawn.
 pub(crate) fn draw(
     cloud: &GaussianCloud,
     map: &SemanticMap,

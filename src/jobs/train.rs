@@ -10,12 +10,9 @@ use crate::pipeline::train::checkpoint::CheckpointError;
 use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainError, TrainOutcome, preset};
 use crate::scene::{Dataset, SemanticMap};
 
-/// A training that has ended.
 #[derive(Clone, Debug)]
 pub(crate) struct Trained {
-    /// What came of it.
     pub(crate) outcome: TrainOutcome,
-    /// Folder of the trained scene.
     pub(crate) out: PathBuf,
     /// Id of its save.
     pub(crate) state: Option<String>,
@@ -32,9 +29,6 @@ impl Trained {
 
 /// Trains into the first of these `folders` that holds no training with other settings: that is another training,
 /// and the earlier one stays. A training that was stopped there goes on.
-///
-/// # Errors
-/// If the photos cannot be read, training fails, or all folders hold something else.
 pub(crate) fn run(
     dataset: &Dataset,
     config: &TrainConfig,

@@ -13,32 +13,25 @@ use crate::pipeline::video::{self, Marked};
 use crate::render::{BackendChoice, RenderSettings, Renderer};
 use crate::scene::{Camera, CameraPath, GaussianCloud, IdentityId, SemanticMap};
 
-/// The color of what is marked.
 const MARK: [u8; 3] = [255, 64, 160];
 
 /// A video to be made.
 #[derive(Clone, Debug)]
 pub struct VideoRequest {
     pub(crate) cloud: Arc<GaussianCloud>,
-    /// How they are drawn.
     pub(crate) draw: RenderSettings,
     pub(crate) cameras: Vec<Camera>,
-    /// What is marked in every frame.
     pub(crate) marked: Option<(Arc<SemanticMap>, Vec<IdentityId>)>,
     pub(crate) out: PathBuf,
-    /// How it is written.
     pub(crate) settings: VideoSettings,
     pub(crate) backend: BackendChoice,
 }
 
-/// A video that was made.
 #[derive(Clone, Debug)]
 pub(crate) struct Video {
-    /// The file or folder.
     pub(crate) summary: VideoSummary,
     /// What drew it: "CPU", or the name of the GPU.
     pub(crate) backend: String,
-    /// Seconds that it took.
     pub(crate) secs: f64,
 }
 
@@ -66,9 +59,6 @@ pub(crate) fn run(request: VideoRequest, observer: &mut dyn Observer) -> Result<
 }
 
 /// A camera path from a file: this program's or nerfstudio's.
-///
-/// # Errors
-/// If it cannot be read or is none.
 pub(crate) fn camera_path(path: &Path) -> Result<CameraPath, IoError> {
     open(path)
 }

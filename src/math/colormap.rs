@@ -63,14 +63,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn turbo_runs_from_blue_over_green_to_red() {
-        let [low, middle, high] = [0.1, 0.5, 0.9].map(turbo);
-        assert!(low[2] > low[0] && low[2] > low[1], "{low:?}");
-        assert!(middle[1] > middle[0] && middle[1] > middle[2], "{middle:?}");
-        assert!(high[0] > high[1] && high[0] > high[2], "{high:?}");
-    }
-
-    #[test]
     fn outside_values_are_clamped_and_holes_are_black() {
         assert_eq!(turbo(-1.0), turbo(0.0));
         assert_eq!(turbo(f32::INFINITY), turbo(1.0));
@@ -113,6 +105,5 @@ mod tests {
             let found = map.color(t);
             assert!(found.iter().zip(expected).all(|(a, b)| a.abs_diff(b) <= 1), "{map:?} {t}: {found:?}");
         }
-        assert_eq!((Colormap::Gray.color(0.25), Colormap::Gray.color(0.0)), ([64; 3], [0; 3]));
     }
 }

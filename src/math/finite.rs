@@ -10,7 +10,6 @@ pub(crate) const CHECKED: bool = cfg!(feature = "debug-validation");
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("after {stage}: {field} {index} is not finite")]
 pub struct NotFinite {
-    /// The stage that left it.
     pub(crate) stage: &'static str,
     pub(crate) field: &'static str,
     /// Which of these, from 0.
@@ -18,9 +17,6 @@ pub struct NotFinite {
 }
 
 /// Looks for the first number that is none.
-///
-/// # Errors
-/// Names it.
 pub(crate) fn all_finite<'a, R: Real>(
     stage: &'static str,
     field: &'static str,

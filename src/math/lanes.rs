@@ -14,9 +14,7 @@ pub type Lane<R> = [R; LANES];
 /// A computation that can run on any vectors. Implementations must be `#[inline(always)]` down to
 /// the arithmetic, so that all of it is compiled for the instructions of `L`.
 pub trait LaneOp<R: Real> {
-    /// What it returns.
     type Output;
-    /// Does it.
     fn run<L: Lanes<R>>(self, lanes: L) -> Self::Output;
 }
 
@@ -28,23 +26,14 @@ pub trait Lanes<R: Real>: Copy + Send + Sync {
     type M: Copy;
     /// The same number in every lane.
     fn splat(self, x: R) -> Self::V;
-    /// From memory.
     fn load(self, x: &Lane<R>) -> Self::V;
-    /// To memory.
     fn store(self, v: Self::V) -> Lane<R>;
-    /// `a + b`.
     fn add(self, a: Self::V, b: Self::V) -> Self::V;
-    /// `a - b`.
     fn sub(self, a: Self::V, b: Self::V) -> Self::V;
-    /// `a b`.
     fn mul(self, a: Self::V, b: Self::V) -> Self::V;
-    /// `a / b`.
     fn div(self, a: Self::V, b: Self::V) -> Self::V;
-    /// `a b + c`.
     fn mul_add(self, a: Self::V, b: Self::V, c: Self::V) -> Self::V;
-    /// The smaller.
     fn min(self, a: Self::V, b: Self::V) -> Self::V;
-    /// The larger.
     fn max(self, a: Self::V, b: Self::V) -> Self::V;
     /// Square root; NaN below 0.
     fn sqrt(self, v: Self::V) -> Self::V;
@@ -52,7 +41,6 @@ pub trait Lanes<R: Real>: Copy + Send + Sync {
     fn ge(self, a: Self::V, b: Self::V) -> Self::M;
     /// `a > b`, false for NaN.
     fn gt(self, a: Self::V, b: Self::V) -> Self::M;
-    /// Both.
     fn both(self, a: Self::M, b: Self::M) -> Self::M;
     /// `a` where the mask holds, else `b`.
     fn select(self, mask: Self::M, a: Self::V, b: Self::V) -> Self::V;
@@ -90,6 +78,15 @@ fn each<R: Real>(f: impl Fn(usize) -> R) -> Lane<R> {
     std::array::from_fn(f)
 }
 
+macro_rules! by_lane {
+    ($($name:ident $op:tt),*) => {$(
+        #[inline(always)]
+        fn $name(self, a: Lane<R>, b: Lane<R>) -> Lane<R> {
+            each(|l| a[l] $op b[l])
+        }
+    )*};
+}
+
 impl<R: Real> Lanes<R> for Plain {
     type V = Lane<R>;
     type M = [bool; LANES];
@@ -105,22 +102,7 @@ impl<R: Real> Lanes<R> for Plain {
     fn store(self, v: Lane<R>) -> Lane<R> {
         v
     }
-    #[inline(always)]
-    fn add(self, a: Lane<R>, b: Lane<R>) -> Lane<R> {
-        each(|l| a[l] + b[l])
-    }
-    #[inline(always)]
-    fn sub(self, a: Lane<R>, b: Lane<R>) -> Lane<R> {
-        each(|l| a[l] - b[l])
-    }
-    #[inline(always)]
-    fn mul(self, a: Lane<R>, b: Lane<R>) -> Lane<R> {
-        each(|l| a[l] * b[l])
-    }
-    #[inline(always)]
-    fn div(self, a: Lane<R>, b: Lane<R>) -> Lane<R> {
-        each(|l| a[l] / b[l])
-    }
+    by_lane! { add +, sub -, mul *, div / }
     #[inline(always)]
     fn mul_add(self, a: Lane<R>, b: Lane<R>, c: Lane<R>) -> Lane<R> {
         each(|l| a[l] * b[l] + c[l])
@@ -171,6 +153,15 @@ mod avx2 {
 
     use super::{LANES, Lane, LaneOp, Lanes};
 
+    macro_rules! instructions {
+        ($($name:ident $instruction:ident),*) => {$(
+            #[inline(always)]
+            fn $name(self, a: f32x8, b: f32x8) -> f32x8 {
+                self.$instruction(a, b)
+            }
+        )*};
+    }
+
     impl Lanes<f32> for V3 {
         type V = f32x8;
         type M = m32x8;
@@ -186,33 +177,10 @@ mod avx2 {
         fn store(self, v: f32x8) -> Lane<f32> {
             bytemuck::cast(v)
         }
-        #[inline(always)]
-        fn add(self, a: f32x8, b: f32x8) -> f32x8 {
-            self.add_f32x8(a, b)
-        }
-        #[inline(always)]
-        fn sub(self, a: f32x8, b: f32x8) -> f32x8 {
-            self.sub_f32x8(a, b)
-        }
-        #[inline(always)]
-        fn mul(self, a: f32x8, b: f32x8) -> f32x8 {
-            self.mul_f32x8(a, b)
-        }
-        #[inline(always)]
-        fn div(self, a: f32x8, b: f32x8) -> f32x8 {
-            self.div_f32x8(a, b)
-        }
+        instructions! { add add_f32x8, sub sub_f32x8, mul mul_f32x8, div div_f32x8, min min_f32x8, max max_f32x8 }
         #[inline(always)]
         fn mul_add(self, a: f32x8, b: f32x8, c: f32x8) -> f32x8 {
             self.mul_add_f32x8(a, b, c)
-        }
-        #[inline(always)]
-        fn min(self, a: f32x8, b: f32x8) -> f32x8 {
-            self.min_f32x8(a, b)
-        }
-        #[inline(always)]
-        fn max(self, a: f32x8, b: f32x8) -> f32x8 {
-            self.max_f32x8(a, b)
         }
         #[inline(always)]
         fn ge(self, a: f32x8, b: f32x8) -> m32x8 {

@@ -6,6 +6,7 @@ use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssi
 
 /// A real number: the few operations that splatting needs, with stable forms of the
 /// transcendental ones.
+#[allow(missing_docs, reason = "each name says what it is")]
 pub trait Real:
     Copy
     + Default
@@ -25,36 +26,24 @@ pub trait Real:
     + Sum
     + 'static
 {
-    /// 0.
     const ZERO: Self;
-    /// 1.
     const ONE: Self;
-    /// One half.
     const HALF: Self;
-    /// The nearest value to `x`.
     fn of(x: f64) -> Self;
-    /// This value in double precision.
     fn f64(self) -> f64;
-    /// This value in single precision.
     fn f32(self) -> f32;
-    /// Square root.
     fn sqrt(self) -> Self;
     /// Natural exponential, correctly rounded to a few ulp.
     fn exp(self) -> Self;
     /// Natural exponential of `x <= 0`, free of branches so that loops over it vectorize.
     /// Below -87 it returns a value under 2e-38. Relative error under 3e-7 in `f32`.
     fn exp_neg(self) -> Self;
-    /// Natural logarithm.
     fn ln(self) -> Self;
-    /// Absolute value.
     fn abs(self) -> Self;
     /// The smaller; the other operand if one is NaN.
     fn min(self, other: Self) -> Self;
     /// The larger; the other operand if one is NaN.
     fn max(self, other: Self) -> Self;
-    /// `self * a + b`, fused where the machine fuses it cheaply.
-    fn mul_add(self, a: Self, b: Self) -> Self;
-    /// Neither infinite nor NaN.
     fn is_finite(self) -> bool;
 
     /// Runs a vector computation with the best vectors that this machine has for this type.
@@ -75,10 +64,23 @@ pub trait Real:
     }
 }
 
+/// The constants, and the methods that are the type's own.
+macro_rules! own {
+    ($type:ident: $($method:ident($($other:ident)?) -> $out:ty),*) => {
+        const ZERO: Self = 0.0;
+        const ONE: Self = 1.0;
+        const HALF: Self = 0.5;
+        $(
+            #[inline(always)]
+            fn $method(self $(, $other: Self)?) -> $out {
+                $type::$method(self $(, $other)?)
+            }
+        )*
+    };
+}
+
 impl Real for f64 {
-    const ZERO: Self = 0.0;
-    const ONE: Self = 1.0;
-    const HALF: Self = 0.5;
+    own!(f64: sqrt() -> Self, ln() -> Self, abs() -> Self, min(other) -> Self, max(other) -> Self, is_finite() -> bool);
     fn of(x: f64) -> Self {
         x
     }
@@ -88,39 +90,16 @@ impl Real for f64 {
     fn f32(self) -> f32 {
         self as f32
     }
-    fn sqrt(self) -> Self {
-        f64::sqrt(self)
-    }
     fn exp(self) -> Self {
         f64::exp(self)
     }
     fn exp_neg(self) -> Self {
         f64::exp(self)
     }
-    fn ln(self) -> Self {
-        f64::ln(self)
-    }
-    fn abs(self) -> Self {
-        f64::abs(self)
-    }
-    fn min(self, other: Self) -> Self {
-        f64::min(self, other)
-    }
-    fn max(self, other: Self) -> Self {
-        f64::max(self, other)
-    }
-    fn mul_add(self, a: Self, b: Self) -> Self {
-        self * a + b
-    }
-    fn is_finite(self) -> bool {
-        f64::is_finite(self)
-    }
 }
 
 impl Real for f32 {
-    const ZERO: Self = 0.0;
-    const ONE: Self = 1.0;
-    const HALF: Self = 0.5;
+    own!(f32: sqrt() -> Self, ln() -> Self, abs() -> Self, min(other) -> Self, max(other) -> Self, is_finite() -> bool);
     #[inline(always)]
     fn of(x: f64) -> Self {
         x as f32
@@ -132,10 +111,6 @@ impl Real for f32 {
     #[inline(always)]
     fn f32(self) -> f32 {
         self
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        f32::sqrt(self)
     }
     #[inline(always)]
     fn exp(self) -> Self {
@@ -154,26 +129,6 @@ impl Real for f32 {
         f32::from_bits(y.to_bits().wrapping_add(shifted.to_bits() << 23))
     }
     #[inline(always)]
-    fn ln(self) -> Self {
-        f32::ln(self)
-    }
-    #[inline(always)]
-    fn abs(self) -> Self {
-        f32::abs(self)
-    }
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        f32::min(self, other)
-    }
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        f32::max(self, other)
-    }
-    #[inline(always)]
-    fn mul_add(self, a: Self, b: Self) -> Self {
-        self * a + b
-    }
-    #[inline(always)]
     fn vectorize<O: LaneOp<Self>>(op: O) -> O::Output {
         #[cfg(target_arch = "x86_64")]
         let op = match super::lanes::run_avx2(op) {
@@ -181,10 +136,6 @@ impl Real for f32 {
             Err(op) => op,
         };
         op.run(Plain)
-    }
-    #[inline(always)]
-    fn is_finite(self) -> bool {
-        f32::is_finite(self)
     }
 }
 
@@ -228,7 +179,6 @@ mod tests {
             close(r.abs(), x.abs(), "abs");
             close(r.abs().sqrt(), x.abs().sqrt(), "sqrt");
             close((r.abs() + R::ONE).ln(), (x.abs() + 1.0).ln(), "ln");
-            close(r.mul_add(R::of(1.5), R::of(-0.25)), x * 1.5 - 0.25, "mul_add");
             close(Real::sigmoid(r), 1.0 / (1.0 + (-x).exp()), "sigmoid");
             for y in [-2.0, 0.25] {
                 close(r.min(R::of(y)), x.min(y), "min");

@@ -98,7 +98,6 @@ impl<P: Pixel> Tap<P> {
         Self { first, weights: shares.map(P::weight).collect() }
     }
 
-    /// The resized pixel, from the pixels of the line.
     pub(crate) fn mix(&self, pixel: impl Fn(usize) -> P) -> P {
         P::mix(self.weights.iter().enumerate().map(|(k, weight)| (pixel(self.first + k), *weight)))
     }

@@ -3,12 +3,9 @@
 use super::document::{Measure, Point, Report, Stage};
 use super::front::NOISE;
 
-/// A setting that both reports have measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Pair<'a> {
-    /// As the first has it.
     pub(crate) one: &'a Point,
-    /// As the second has it.
     pub(crate) other: &'a Point,
     /// Times of the second by times of the first.
     pub(crate) times: f64,

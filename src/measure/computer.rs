@@ -3,7 +3,6 @@
 use super::document::Computer;
 use crate::render::real_gpu;
 
-/// Looks at this machine.
 pub(crate) fn look() -> Computer {
     let (mut processor, mut memory_bytes) = (String::new(), 0);
     if let Ok(mut system) = sysinfo::System::new() {

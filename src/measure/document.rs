@@ -11,50 +11,54 @@ use crate::math::stats::median;
 /// Version of the JSON document.
 pub const VERSION: u32 = 2;
 
-/// A part of the program whose knobs are measured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, clap::ValueEnum)]
+/// A part of the program whose knobs are measured, in the order of the program; its message is its title.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Serialize,
+    Deserialize,
+    clap::ValueEnum,
+    strum::EnumMessage,
+    strum::IntoStaticStr,
+    strum::VariantArray,
+)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum StageName {
     /// Images against the exact image.
+    #[strum(message = "Drawing")]
     Render,
     /// Training against held-out photos.
+    #[strum(message = "Training")]
     Train,
     /// Identities of Gaussians against labels.
+    #[strum(message = "Finding objects")]
     Features,
     /// Answers to typed queries against labels.
+    #[strum(message = "Queries")]
     Query,
     /// Flights against occupied space and their own length.
+    #[strum(message = "Camera paths")]
     Path,
     /// Drawn depth against true depth.
+    #[strum(message = "Depth")]
     Depth,
 }
 
 impl StageName {
-    /// All, in the order of the program.
-    pub(crate) const ALL: [Self; 6] = [Self::Render, Self::Train, Self::Features, Self::Query, Self::Path, Self::Depth];
-
     /// As in JSON and on the command line.
     pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Render => "render",
-            Self::Train => "train",
-            Self::Features => "features",
-            Self::Query => "query",
-            Self::Path => "path",
-            Self::Depth => "depth",
-        }
+        self.into()
     }
 
-    /// As it is shown.
     pub(crate) fn title(self) -> &'static str {
-        match self {
-            Self::Render => "Drawing",
-            Self::Train => "Training",
-            Self::Features => "Finding objects",
-            Self::Query => "Queries",
-            Self::Path => "Camera paths",
-            Self::Depth => "Depth",
-        }
+        strum::EnumMessage::get_message(&self).unwrap_or_default()
     }
 }
 
@@ -76,10 +80,8 @@ pub struct Measure {
     pub(crate) name: String,
     /// Its unit; empty for plain numbers.
     pub(crate) unit: String,
-    /// How it becomes an error.
     #[serde(rename = "form")]
     pub(crate) kind: ErrorKind,
-    /// What it is, in a sentence.
     pub(crate) meaning: String,
 }
 
@@ -180,7 +182,6 @@ pub struct Order {
     /// The order that was seen (see [`super::order`]).
     pub(crate) observed: f64,
     pub(crate) agrees: bool,
-    /// What that means, in a sentence.
     pub(crate) meaning: String,
 }
 
@@ -291,7 +292,6 @@ impl Stage {
         names
     }
 
-    /// The measure of this name.
     pub(crate) fn measure(&self, name: &str) -> Option<&Measure> {
         self.measures.iter().find(|m| m.name == name)
     }
@@ -335,7 +335,6 @@ pub struct Report {
 }
 
 impl Report {
-    /// The stage of this name.
     pub(crate) fn stage(&self, name: StageName) -> Option<&Stage> {
         self.stages.iter().find(|s| s.name == name)
     }

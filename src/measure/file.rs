@@ -7,37 +7,27 @@ use crate::io::{self, IoError};
 
 /// Name of the document in a report's folder.
 pub const FILE: &str = "report.json";
-/// Version of this program.
 const PROGRAM: &str = env!("CARGO_PKG_VERSION");
-/// Largest document that is read.
 const MOST_BYTES: u64 = 256 << 20;
 
 /// Why a report cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum ReportError {
-    /// It is not one.
     #[error("{path}: not a report: {cause}", path = .0.display(), cause = .1)]
     Json(PathBuf, serde_json::Error),
-    /// It is one of another version.
     #[error("{path}: a report of version {found}, this program reads {VERSION}; make it anew with 'fmlgs report'", path = .path.display())]
-    Version {
-        /// The file.
-        path: PathBuf,
-        /// Its version.
-        found: u64,
-    },
-    /// It cannot be read or written, or is too large to be one.
+    Version { path: PathBuf, found: u64 },
     #[error(transparent)]
     File(#[from] IoError),
 }
 
 /// Why a report cannot be resumed.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum BeginError {
-    /// It cannot be read.
     #[error(transparent)]
     Read(#[from] ReportError),
-    /// It is one of something else.
     #[error("{path}: a report of another {what}; move it away, or write to another folder", path = .0.display(), what = .1)]
     Other(PathBuf, &'static str),
 }
@@ -60,9 +50,6 @@ pub fn is_report(path: &Path) -> bool {
 
 impl Report {
     /// The report of `scene` in a folder, to go on with, or an empty one.
-    ///
-    /// # Errors
-    /// If the one that is there cannot be read, or is of another scene, machine or program.
     pub(crate) fn begin(folder: &Path, scene: &str, computer: &Computer) -> Result<Self, BeginError> {
         let path = folder.join(FILE);
         if !path.exists() {
@@ -76,16 +63,12 @@ impl Report {
         }
     }
 
-    /// A report of nothing yet.
     pub(crate) fn empty(scene: &str, computer: &Computer) -> Self {
         let (scene, computer) = (scene.into(), computer.clone());
         Self { version: VERSION, program: PROGRAM.into(), scene, computer, stages: Vec::new() }
     }
 
     /// Reads a report: the JSON file, or the folder that it is in.
-    ///
-    /// # Errors
-    /// If there is none, or it is damaged, or of another version.
     pub fn read(path: &Path) -> Result<Self, ReportError> {
         let path = if path.is_dir() { path.join(FILE) } else { path.to_owned() };
         let text = io::files::read(&path, MOST_BYTES)?;

@@ -18,9 +18,7 @@ const MOST_PSNR: f64 = 150.0;
 /// Red, green and blue as they are shown, 0 to 1.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct RgbPlanes {
-    /// Width in px.
     pub(crate) width: usize,
-    /// Height in px.
     pub(crate) height: usize,
     pub(crate) color: [Vec<f64>; 3],
 }
@@ -51,7 +49,6 @@ pub(crate) fn errors(a: &RgbPlanes, b: &RgbPlanes) -> Errors {
     [rms, worst(off.iter().copied()), quantile(&off, 0.999), flip, flip_tail]
 }
 
-/// By the names of measures.
 pub(crate) fn named([rms, largest, tail, flip, flip_tail]: Errors) -> Vec<(&'static str, f64)> {
     vec![
         ("RMS error", rms),

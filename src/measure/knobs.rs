@@ -10,9 +10,6 @@ use serde_json::Value;
 pub type Knobs = BTreeMap<String, Value>;
 
 /// `settings` with some fields as a point has them.
-///
-/// # Errors
-/// If a field does not exist, or takes no such value; in words.
 pub(crate) fn turned<T: Serialize + DeserializeOwned>(settings: &T, knobs: &Knobs) -> Result<T, String> {
     let mut fields = serde_json::to_value(settings).map_err(|e| e.to_string())?;
     for (name, value) in knobs {

@@ -40,7 +40,6 @@ mod tests {
     use super::*;
     use std::collections::BTreeMap;
 
-    /// A report of one small stage.
     pub(crate) fn example() -> Report {
         let sample = |v: f64| {
             let mut s = Sample::default();

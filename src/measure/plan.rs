@@ -21,10 +21,8 @@ use crate::render::{BackendChoice, Device, RenderSettings, Renderer, real_gpu};
 use crate::scene::plan::{Overrides, ScenePlan, When};
 use crate::scene::{Camera, GaussianCloud, SceneFacts, SemanticMap, resource_log};
 
-/// Size of the images, px.
 pub(crate) const SIZE: [u32; 2] = [1_008, 567];
 
-/// Which plan a process follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum PlanVariant {
@@ -32,7 +30,6 @@ pub(crate) enum PlanVariant {
     Everything,
 }
 
-/// A scene that was opened.
 pub(crate) struct OpenScene {
     pub(crate) cloud: Arc<GaussianCloud>,
     pub(crate) settings: RenderSettings,
@@ -41,7 +38,6 @@ pub(crate) struct OpenScene {
     pub(crate) up: glam::DVec3,
     /// The first view, of [`SIZE`].
     pub(crate) first: Camera,
-    /// What its plan is made of.
     pub(crate) facts: SceneFacts,
 }
 
@@ -64,7 +60,6 @@ pub struct PlanCost {
     frame_ms: f64,
     /// Drawing all that belongs to a view at rest.
     view_ms: f64,
-    /// What was loaded and built.
     loaded: Vec<String>,
 }
 
@@ -165,7 +160,6 @@ fn maps(
     Ok((exact, codes))
 }
 
-/// What a plan wants at opening.
 struct AtOpening {
     navigator: Option<Navigator>,
     thumbnails: Option<crate::pipeline::semantics::thumbnails::Thumbnails>,
@@ -239,7 +233,6 @@ impl Saving {
     }
 }
 
-/// A row for each plan of each scene.
 pub(crate) fn table(all: &[Saving]) -> Rows {
     let head =
         ["scene", "", "open s", "picture s", "ready s", "at rest", "peak", "GPU", "frame ms", "view ms", "loaded"];

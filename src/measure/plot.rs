@@ -6,7 +6,6 @@ use plotters::prelude::*;
 
 use super::document::{Measure, Point, Stage};
 
-/// Size of the image in px.
 const SIZE: (u32, u32) = (860, 520);
 /// How much further than its points a plot reaches to the right, where the legend is, as a share.
 const LEGEND: f64 = 0.4;
@@ -24,10 +23,6 @@ pub(crate) fn place(point: &Point, measure: &Measure) -> Option<(f64, f64)> {
     (secs.is_finite() && error.is_finite()).then(|| (secs.max(1e-9), error.max(LEAST)))
 }
 
-/// The stage as SVG, for one of its measures.
-///
-/// # Errors
-/// If there is nothing to draw, in words.
 pub(crate) fn svg(stage: &Stage, measure: &Measure) -> Result<String, String> {
     let mut image = String::new();
     draw(stage, measure, &mut image).map_err(|e| e.to_string())?;
@@ -127,9 +122,6 @@ fn series(stage: &Stage, measure: &Measure, method: &str, k: usize, chart: &mut 
 }
 
 /// An order of convergence as SVG: error over work, with the slope that theory gives.
-///
-/// # Errors
-/// If there is nothing to draw, in words.
 pub(crate) fn order_svg(order: &super::document::Order) -> Result<String, String> {
     let mut image = String::new();
     draw_order(order, &mut image).map_err(|e| e.to_string())?;

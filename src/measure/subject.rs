@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use strum::VariantArray;
+
 use super::studies::views::{held_out, spread};
 use super::studies::{StudyInput, depth, features, path, query, render, train};
 use super::sweep::failed;
@@ -24,25 +26,20 @@ pub struct StudyOptions {
     pub(crate) masks: Option<PathBuf>,
     pub(crate) steps: Vec<u64>,
     pub(crate) train_steps: u64,
-    /// Longer side of compared images, px.
     pub(crate) max_side_px: u32,
     /// Most views that are compared.
     pub(crate) views: usize,
     pub(crate) repeats: u32,
 }
 
-/// A scene and what came with it.
 #[derive(Clone, Debug)]
 pub struct Subject {
-    /// Its name in the report.
     pub(crate) name: String,
     pub(crate) cloud: Arc<GaussianCloud>,
     pub(crate) settings: RenderSettings,
     /// Cameras of its photos, and whether training did not see them.
     pub(crate) cameras: Vec<(Camera, bool)>,
-    /// Every how-manieth photo is held out.
     pub(crate) holdout_every: usize,
-    /// Its photos, if they are there.
     pub(crate) dataset: Option<Arc<Dataset>>,
     pub(crate) map: Option<Arc<SemanticMap>>,
     pub(crate) options: StudyOptions,
@@ -56,12 +53,9 @@ impl Default for StudyOptions {
 
 impl Subject {
     /// The stages that are wanted, and for each that is not possible why.
-    ///
-    /// # Errors
-    /// If one was asked for that is not possible.
     pub(crate) fn stages(&self, wanted: &[StageName]) -> Result<(Vec<StageName>, Vec<String>), StudyError> {
         let (mut stages, mut missing) = (Vec::new(), Vec::new());
-        for name in StageName::ALL {
+        for &name in StageName::VARIANTS {
             let asked = wanted.contains(&name);
             match self.lacks(name) {
                 None if asked || wanted.is_empty() => stages.push(name),
@@ -100,7 +94,6 @@ impl Subject {
         }
     }
 
-    /// The study of a stage.
     pub(crate) fn study(&self, name: StageName) -> Result<Study<'_>, StudyError> {
         match name {
             StageName::Render => self.drawing(),
@@ -121,7 +114,6 @@ impl Subject {
         self.map.as_deref().and_then(|m| Some((m, m.language.as_ref()?.encoder.as_str())))
     }
 
-    /// What is swept on, in words.
     fn input(&self, more: &[(&str, String)]) -> StudyInput {
         let mut input = StudyInput::from([
             ("scene".to_owned(), self.name.clone()),

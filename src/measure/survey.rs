@@ -19,18 +19,15 @@ use crate::scene::{Camera, GaussianCloud};
 /// Seed of the pairs of places and of added cameras.
 const SEED: u64 = 1;
 
-/// Flights of one kind, taken together.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Sum {
     pub(crate) flights: usize,
     /// Flights of which a pose has less distance to occupied space than wanted.
     pub(crate) flights_too_near: usize,
     pub(crate) poses_too_near: usize,
-    /// The worst of each over all flights.
     pub(crate) worst: Smoothness,
 }
 
-/// What a survey found.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Survey {
     pub(crate) ours: Sum,
@@ -159,7 +156,6 @@ pub(crate) fn surveyed(cloud: &GaussianCloud, own: &[Camera], count: usize, flig
     Surveyed { cameras: count, navigator, parts, occupancy_secs, build_secs, found }
 }
 
-/// A row for each kind of flight.
 pub(crate) fn table(all: &[Surveyed]) -> Rows {
     let head = [
         "cameras",
@@ -234,7 +230,6 @@ pub(crate) fn documents(all: &[Surveyed]) -> Value {
     all.iter().flat_map(|s| s.found.iter().map(move |(between, found)| document(s, between, found))).collect()
 }
 
-/// How smooth a flight is, as JSON.
 pub(crate) fn smoothness(s: &Smoothness) -> Value {
     json!({
         "largest_step": s.largest_step,

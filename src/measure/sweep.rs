@@ -9,14 +9,11 @@ use super::file::FILE;
 use super::knobs::Knobs;
 use crate::pipeline::observer::{Observer, Severity, Ticker};
 
-/// A setting to be measured.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SweepCase {
     pub(crate) method: String,
     pub(crate) setting: String,
-    /// Its setting, for the program.
     pub(crate) knobs: Knobs,
-    /// Whether these are the defaults.
     pub(crate) default: bool,
 }
 
@@ -31,7 +28,6 @@ impl SweepCase {
     }
 }
 
-/// What one measurement gave.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Trial {
     pub(crate) secs: f64,
@@ -41,12 +37,10 @@ pub(crate) struct Trial {
     pub(crate) curve: Vec<[f64; 2]>,
 }
 
-/// Why a measurement failed, in words.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{0}")]
 pub struct StudyError(pub(crate) String);
 
-/// Makes a study's error of another.
 pub(crate) fn failed(error: impl std::fmt::Display) -> StudyError {
     StudyError(error.to_string())
 }
@@ -76,7 +70,6 @@ impl<'a> Study<'a> {
         Self { stage: Stage { planned: cases.len(), ..stage }, cases, run, orders: Box::new(|| Ok(Vec::new())) }
     }
 
-    /// The same with checks of convergence.
     #[must_use]
     pub(crate) fn with_orders(self, orders: impl Fn() -> Result<Vec<Order>, StudyError> + 'a) -> Self {
         Self { orders: Box::new(orders), ..self }
@@ -91,12 +84,10 @@ impl<'a> Study<'a> {
     }
 }
 
-/// How a sweep ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum End {
     Finished,
     OutOfTime,
-    /// The observer asked to stop.
     Cancelled,
 }
 

@@ -6,7 +6,6 @@ use crate::math::format::{number, seconds};
 /// Rows of cells, the header first.
 pub(crate) type Rows = Vec<Vec<String>>;
 
-/// A header and what is below it.
 pub(crate) fn rows(head: &[&str], body: impl IntoIterator<Item = Vec<String>>) -> Rows {
     std::iter::once(head.iter().map(|h| (*h).to_owned()).collect()).chain(body).collect()
 }
@@ -42,7 +41,6 @@ pub(crate) fn spread(sample: &Sample, show: impl Fn(f64) -> String) -> String {
     }
 }
 
-/// Header of a measure.
 pub(crate) fn title(measure: &Measure) -> String {
     if measure.unit.is_empty() { measure.name.clone() } else { format!("{} {}", measure.name, measure.unit) }
 }

@@ -13,13 +13,11 @@ use super::fetch::{self, FetchError, FileToFetch, Patience};
 use super::{ModelError, manifest};
 use crate::io::data_folder::data_folder;
 
-/// The list that comes with the program.
 const LIST: &str = include_str!("../../assets/models.toml");
 
 /// Name of the model that follows masks.
 pub(crate) const SAM2: &str = "sam2.1-tiny";
 
-/// What a model is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum ModelRole {
@@ -34,7 +32,6 @@ pub(crate) enum ModelRole {
 pub struct ModelEntry {
     /// Its name in commands.
     pub id: String,
-    /// What it is for.
     pub(crate) role: ModelRole,
     /// Its name for display.
     pub title: String,
@@ -43,7 +40,6 @@ pub struct ModelEntry {
     /// License of its weights.
     #[serde(alias = "licence")]
     pub license: String,
-    /// Where its weights come from.
     pub(crate) source: String,
     /// The command that makes its files, of those in `tools/export`.
     #[serde(default)]
@@ -67,9 +63,7 @@ pub struct ModelEntry {
 #[serde(deny_unknown_fields)]
 pub struct ListedFile {
     pub(crate) name: String,
-    /// About how large it is.
     pub(crate) megabytes: u64,
-    /// Its SHA-256, if that is fixed.
     #[serde(default)]
     pub(crate) sha256: Option<String>,
 }
@@ -95,38 +89,24 @@ pub enum ModelState {
 
 /// Why a model could not be put in place.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum InstallError {
-    /// Not in the list.
     #[error("there is no model called '{0}'; 'fmlgs models' lists them")]
     Unknown(String),
-    /// Nothing to fetch.
     #[error("'{0}' is part of the program")]
     BuiltIn(String),
-    /// Nobody hosts its files.
     #[error(
         "no address is known for '{id}'. Make its files of the official checkpoint ({source_page}): python tools/export/{export} \
          --out FOLDER, then 'fmlgs models add {id} FOLDER'; or give the address of a folder that has them with --from"
     )]
-    NoAddress {
-        /// Which model.
-        id: String,
-        /// Where its weights are.
-        source_page: String,
-        /// The command that makes its files.
-        export: String,
-    },
-    /// A file could not be fetched or written.
+    NoAddress { id: String, source_page: String, export: String },
     #[error(transparent)]
     Fetch(#[from] FetchError),
-    /// A file does not fit.
     #[error(transparent)]
     Model(#[from] ModelError),
 }
 
 /// All models of the list, in its order.
-///
-/// # Errors
-/// If the list that came with the program is damaged.
 pub fn entries() -> Result<Vec<ModelEntry>, ModelError> {
     let damaged =
         |e: toml::de::Error| ModelError::Metadata { path: "assets/models.toml".into(), problem: e.to_string() };
@@ -134,14 +114,10 @@ pub fn entries() -> Result<Vec<ModelEntry>, ModelError> {
 }
 
 /// The model with this name.
-///
-/// # Errors
-/// If there is none.
 pub fn entry(id: &str) -> Result<ModelEntry, InstallError> {
     entries()?.into_iter().find(|e| e.id == id).ok_or_else(|| InstallError::Unknown(id.to_owned()))
 }
 
-/// Where models lie on this machine.
 pub(crate) fn folder() -> PathBuf {
     let set = std::env::var_os("FMLGS_MODELS").filter(|p| !p.is_empty());
     set.map_or_else(|| data_folder().join("models"), PathBuf::from)
@@ -183,9 +159,6 @@ impl ModelEntry {
     }
 
     /// Compares all its graphs in `folder` with their SHA-256.
-    ///
-    /// # Errors
-    /// If one differs, or cannot be read.
     pub fn verify(&self, folder: &Path) -> Result<(), InstallError> {
         if self.built_in {
             return Ok(());
@@ -205,9 +178,6 @@ impl ModelEntry {
     /// Fetches what is not here yet from its address, or from that of another `from` folder, into
     /// `folder`, and checks it. `progress` is told the file, its bytes that are there and those that
     /// there will be, and says whether to go on.
-    ///
-    /// # Errors
-    /// If there is no address, a download fails, or a file is not what its description says.
     pub fn fetch(
         &self,
         folder: &Path,
@@ -244,9 +214,6 @@ impl ModelEntry {
 
     /// Takes over its files from a folder that somebody brings. They are checked there before
     /// anything here changes.
-    ///
-    /// # Errors
-    /// If files are missing there or are not what the description says, or cannot be copied.
     pub fn add(&self, folder: &Path, brought: &Path) -> Result<(), InstallError> {
         if self.built_in {
             return Err(InstallError::BuiltIn(self.id.clone()));
@@ -269,9 +236,6 @@ impl ModelEntry {
 
 /// The description of a model that is here, by its name in the list; of any other, by the path of
 /// its description.
-///
-/// # Errors
-/// If it is neither.
 pub(crate) fn find(name: &str, role: ModelRole) -> Result<PathBuf, ModelError> {
     let listed = entries()?.into_iter().find(|e| e.id == name && e.role == role && !e.built_in);
     if let Some(entry) = listed {
@@ -292,9 +256,6 @@ pub(crate) fn find(name: &str, role: ModelRole) -> Result<PathBuf, ModelError> {
 
 /// Names of the models of a role that can be used now, best first; the built-in ones last. `told` hears of
 /// each that is here and cannot be used.
-///
-/// # Errors
-/// If the list that came with the program is damaged.
 pub(crate) fn usable(role: ModelRole, told: &mut dyn FnMut(String)) -> Result<Vec<String>, ModelError> {
     Ok(usable_of(&entries()?, role, &folder(), told))
 }

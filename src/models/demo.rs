@@ -18,7 +18,6 @@ pub(crate) struct DemoEncoder {
 }
 
 impl DemoEncoder {
-    /// Ready to be asked.
     pub(crate) fn new() -> Result<Self, ModelError> {
         Ok(Self { words: Vocabulary::parse(WORDS.1, WORDS.0)?, image: None, text: None })
     }
@@ -88,7 +87,6 @@ impl DemoEncoder {
     }
 }
 
-/// The one row of a result.
 fn only(mut rows: Vec<Vec<f32>>) -> Result<Vec<f32>, ModelError> {
     rows.pop().ok_or_else(|| ModelError::NoOutput { model: super::DEMO.into(), output: "embedding".into() })
 }

@@ -20,10 +20,8 @@ use super::network::{Network, guarded};
 use super::session_cache;
 use crate::scene::resource_log::{self, ResourceKind};
 
-/// Why networks are loaded, for the trace.
 const MODEL_USE: &str = "it is about to run for the first time";
 
-/// What runs networks in this process.
 pub(crate) struct Engine {
     environment: Environment,
     name: String,
@@ -162,12 +160,10 @@ impl Engine {
         Ok(Self { environment, name, device, note })
     }
 
-    /// Which engine it is, for display.
     pub(crate) fn name(&self) -> &str {
         &self.name
     }
 
-    /// What it computes on, for display.
     pub(crate) fn device(&self) -> &'static str {
         self.device.map_or("processor", Device::text)
     }
@@ -177,19 +173,11 @@ impl Engine {
         self.note.as_deref()
     }
 
-    /// Prepares a network that is in memory.
-    ///
-    /// # Errors
-    /// If it is no network, or one that this engine cannot run.
     pub(crate) fn load(&self, bytes: &[u8], name: &str) -> Result<Network, ModelError> {
         resource_log::record(ResourceKind::Model, format!("network {name}"), MODEL_USE, bytes.len() as u64);
         Ok(Network::new(self.prepare(name, |builder| builder.commit_from_memory(bytes))?, name))
     }
 
-    /// Prepares a network in a file.
-    ///
-    /// # Errors
-    /// If it is no network, or one that this engine cannot run.
     pub(crate) fn load_file(&self, path: &Path) -> Result<Network, ModelError> {
         let file = path.to_path_buf();
         let network = Network::new(self.session(path)?, &path.display().to_string());
@@ -233,7 +221,6 @@ impl Engine {
     }
 }
 
-/// Loads an ONNX Runtime library.
 fn loaded(path: &Path) -> Result<ort::environment::EnvironmentBuilder, String> {
     // A missing file would make the loader's own message a riddle.
     if path.is_absolute() && !path.is_file() {

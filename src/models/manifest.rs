@@ -12,25 +12,19 @@ use super::network::Network;
 
 /// Version of the file that this program reads.
 const VERSION: u64 = 1;
-/// Largest file that is read, bytes.
 pub(crate) const MAX_BYTES: u64 = super::fetch::MOST_UNPROMISED;
 
 /// A graph of a model.
 #[derive(Clone, Debug, Deserialize)]
 pub struct GraphFile {
-    /// Its file, in the same folder.
     pub(crate) file: String,
     pub(crate) bytes: u64,
-    /// Its SHA-256, in hexadecimal digits.
     pub(crate) sha256: String,
 }
 
 impl GraphFile {
     /// The network in the slot; loaded from a folder if it is not there yet, and only if the file is
     /// what its description says.
-    ///
-    /// # Errors
-    /// If it is missing, broken or another file, or the engine cannot run it.
     pub(crate) fn ready<'a>(
         &self,
         slot: &'a mut Option<Network>,
@@ -47,9 +41,6 @@ impl GraphFile {
     }
 
     /// Compares its size with what the description says.
-    ///
-    /// # Errors
-    /// If it is missing, or of another size.
     pub fn check_size(&self, folder: &Path) -> Result<(), ModelError> {
         let path = folder.join(&self.file);
         let refused = |problem: String| ModelError::Metadata { path: path.clone(), problem };
@@ -66,9 +57,6 @@ impl GraphFile {
     }
 
     /// Compares its content with what the description says.
-    ///
-    /// # Errors
-    /// If it is missing, broken or another file.
     pub(crate) fn check(&self, folder: &Path) -> Result<(), ModelError> {
         self.check_size(folder)?;
         let path = folder.join(&self.file);
@@ -81,9 +69,6 @@ impl GraphFile {
 const MAX_SIDE_PX: usize = 4096;
 
 /// Checks what a description says of the pictures that a network takes.
-///
-/// # Errors
-/// If their side is none, or a color would be divided by nothing.
 pub(crate) fn check_pictures(path: &Path, side_px: usize, mean: [f32; 3], std: [f32; 3]) -> Result<(), ModelError> {
     let refused = |problem: String| Err(ModelError::Metadata { path: path.into(), problem });
     if !(1..=MAX_SIDE_PX).contains(&side_px) {
@@ -95,10 +80,6 @@ pub(crate) fn check_pictures(path: &Path, side_px: usize, mean: [f32; 3], std: [
     Ok(())
 }
 
-/// Checks a length that a description gives.
-///
-/// # Errors
-/// If it is 0, or over `most`.
 pub(crate) fn check_length(path: &Path, name: &str, length: usize, most: usize) -> Result<(), ModelError> {
     match (1..=most).contains(&length) {
         true => Ok(()),
@@ -115,9 +96,6 @@ struct AnyModel {
 }
 
 /// The graphs that a description names.
-///
-/// # Errors
-/// If the file cannot be read, or is no description.
 pub fn graphs(path: &Path) -> Result<Vec<GraphFile>, ModelError> {
     let kind = kind(path)?;
     let graphs: AnyModel = read(path, &kind)?;
@@ -136,9 +114,6 @@ struct Head {
 }
 
 /// Reads the metadata of a model of a `kind`: "clip", "sam" or "sam2".
-///
-/// # Errors
-/// If the file cannot be read, is of another kind or version, or lacks something.
 pub(crate) fn read<T: DeserializeOwned>(path: &Path, kind: &str) -> Result<T, ModelError> {
     let refused = |problem: String| ModelError::Metadata { path: path.into(), problem };
     let bytes = crate::io::files::read(path, MAX_BYTES).map_err(|e| refused(e.to_string()))?;
@@ -153,9 +128,6 @@ pub(crate) fn read<T: DeserializeOwned>(path: &Path, kind: &str) -> Result<T, Mo
 }
 
 /// The kind of model that a metadata file describes.
-///
-/// # Errors
-/// If the file cannot be read or is no metadata.
 pub fn kind(path: &Path) -> Result<String, ModelError> {
     let refused = |problem: String| ModelError::Metadata { path: path.into(), problem };
     let bytes = crate::io::files::read(path, MAX_BYTES).map_err(|e| refused(e.to_string()))?;

@@ -66,18 +66,12 @@ pub trait Encoder: Send {
 pub(crate) const DEMO: &str = "demo";
 
 /// The best encoder that can be used on this machine. `told` hears of better ones that are broken.
-///
-/// # Errors
-/// If it cannot be loaded.
 pub(crate) fn best_encoder(told: &mut dyn FnMut(String)) -> Result<Box<dyn Encoder>, ModelError> {
     let best = catalog::usable(ModelRole::Encoder, told)?.into_iter().next();
     encoder(best.as_deref().unwrap_or(DEMO))
 }
 
 /// The encoder of this name: 'demo', a model of the catalog, or the path of a model's description.
-///
-/// # Errors
-/// If there is none, or it cannot be loaded.
 pub fn encoder(name: &str) -> Result<Box<dyn Encoder>, ModelError> {
     match name {
         DEMO => Ok(Box::new(DemoEncoder::new()?)),

@@ -58,11 +58,8 @@ impl<T: Clone> Tensor<T> {
     }
 }
 
-/// What goes into a network.
 pub(crate) enum NetworkInput {
-    /// Floating-point numbers.
     Floats(Tensor<f32>),
-    /// Whole numbers.
     Ints(Tensor<i64>),
 }
 
@@ -92,19 +89,13 @@ pub(crate) struct Outputs {
 }
 
 impl Outputs {
-    /// Takes an output.
-    ///
-    /// # Errors
-    /// If there is none of that name.
     pub(crate) fn take(&mut self, name: &str) -> Result<Tensor<f32>, ModelError> {
         self.arrays.remove(name).ok_or_else(|| ModelError::NoOutput { model: self.model.clone(), output: name.into() })
     }
 }
 
-/// Opens a network's file.
 type Reopen = Box<dyn Fn() -> Result<Session, ModelError> + Send + Sync>;
 
-/// A network that is ready to run.
 pub(crate) struct Network {
     place: Arc<Mutex<CachedSession>>,
     name: String,
@@ -125,9 +116,6 @@ impl Network {
     }
 
     /// Runs it. Every number that comes out is finite.
-    ///
-    /// # Errors
-    /// If the engine fails, an input is missing or of another shape, or an output is not finite.
     pub(crate) fn run(&mut self, inputs: Vec<(&'static str, NetworkInput)>) -> Result<Outputs, ModelError> {
         let name = self.name.clone();
         // A panic while it ran leaves a session that runs again.
@@ -175,9 +163,6 @@ impl Network {
     }
 
     /// The rows of an output, each scaled to unit length; `length` numbers in each are expected.
-    ///
-    /// # Errors
-    /// As [`Self::run`]; and if rows are of another length, or have no direction.
     pub(crate) fn unit_rows(
         &mut self,
         inputs: Vec<(&'static str, NetworkInput)>,

@@ -15,11 +15,8 @@ const UNKNOWN_CHARS: usize = 40;
 /// What a text encoder knows, and what else it says of itself.
 #[derive(Clone, Debug, Deserialize)]
 pub(crate) struct Vocabulary {
-    /// Version of this file's form.
     pub(crate) version: u32,
-    /// Length of the vectors.
     pub(crate) dimension: usize,
-    /// Side of an image tile, px.
     pub(crate) tile_side_px: usize,
     /// Words that are looked at.
     pub(crate) tokens: usize,

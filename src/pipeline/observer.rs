@@ -84,18 +84,12 @@ impl Ticker {
     }
 
     /// Reports that `done` units are done, and waits out a pause.
-    ///
-    /// # Errors
-    /// If the work should stop.
     pub(crate) fn tick(&mut self, done: usize, observer: &mut dyn Observer) -> Result<(), Interrupted> {
         self.report(done as u64, observer);
         self.proceed(observer)
     }
 
     /// Waits out a pause.
-    ///
-    /// # Errors
-    /// If the work should stop.
     pub(crate) fn proceed(&mut self, observer: &dyn Observer) -> Result<(), Interrupted> {
         let before = Instant::now();
         let result = observer.proceed();
@@ -144,9 +138,6 @@ pub trait Observer: Send {
         Signal::Continue
     }
     /// Waits out a pause.
-    ///
-    /// # Errors
-    /// If the work should stop.
     fn proceed(&self) -> Result<(), Interrupted> {
         loop {
             match self.signal() {

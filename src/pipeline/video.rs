@@ -13,7 +13,6 @@ use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 /// How much of a marked pixel is the mark, of 8.
 const MARK: u32 = 3;
 
-/// Identities that are marked in every picture.
 #[derive(Clone, Copy)]
 pub(crate) struct Marked<'a> {
     pub(crate) map: &'a SemanticMap,
@@ -23,14 +22,12 @@ pub(crate) struct Marked<'a> {
 
 /// Why a video could not be made.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum VideoError {
-    /// A picture could not be drawn.
     #[error(transparent)]
     Draw(#[from] DrawError),
-    /// Identities could not be drawn.
     #[error(transparent)]
     Identities(#[from] RenderError),
-    /// It could not be written.
     #[error(transparent)]
     Animation(#[from] VideoFileError),
     /// The observer asked to stop; nothing is left of the video.
@@ -39,9 +36,6 @@ pub enum VideoError {
 }
 
 /// Draws the scene from every camera into a video at `out`.
-///
-/// # Errors
-/// If a picture cannot be drawn or written, or the observer asks to stop.
 pub(crate) fn write(
     cloud: &Arc<GaussianCloud>,
     draw: &RenderSettings,

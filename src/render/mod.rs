@@ -49,24 +49,16 @@ pub(crate) const MAX_CHANNELS: usize = 32;
 
 /// Why a picture could not be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum RenderError {
-    /// The camera is not usable.
     #[error("camera: {0}")]
     Camera(#[from] CameraError),
-    /// More extra channels than one pass composites.
     #[error("{0} extra channels are too many for one pass (at most {max}); render them in groups", max = MAX_CHANNELS - 4)]
     Channels(usize),
-    /// Cut-offs other than the defaults, on a GPU.
     #[error("the GPU draws with the default cut-offs only; choose the CPU for others")]
     Cutoffs,
-    /// A feature array of the wrong length.
     #[error("the feature array holds {have} values, expected {want}")]
-    FeatureLength {
-        /// Values given.
-        have: usize,
-        /// Gaussians times channels.
-        want: usize,
-    },
+    FeatureLength { have: usize, want: usize },
     /// A stage left a number that is none; looked for under `debug-validation` only.
     #[error(transparent)]
     NotFinite(#[from] NotFinite),
@@ -186,37 +178,26 @@ impl<R: Real> Frame<R> {
 
 /// Gradient of a loss with respect to a [`Frame`]; empty vectors mean zero.
 #[derive(Clone, Debug, Default)]
+#[allow(missing_docs, reason = "each name says what it is")]
 pub struct FrameGradient<R> {
-    /// With respect to `Frame::color`.
     pub color: [Vec<R>; 3],
-    /// With respect to `Frame::features`.
     pub features: Vec<Vec<R>>,
-    /// With respect to `Frame::alpha`.
     pub alpha: Vec<R>,
-    /// With respect to `Frame::depth`.
     pub depth: Vec<R>,
-    /// With respect to `Frame::median_depth`, of surfels.
     pub median_depth: Vec<R>,
-    /// With respect to `Frame::normals`.
     pub normals: [Vec<R>; 3],
-    /// With respect to `Frame::distortion`.
     pub distortion: Vec<R>,
 }
 
 /// Gradient with respect to every parameter of a cloud, laid out like the cloud.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[allow(missing_docs, reason = "each name says what it is")]
 pub struct CloudGradient<R> {
-    /// With respect to `positions`.
     pub positions: Vec<[R; 3]>,
-    /// With respect to `log_scales`.
     pub log_scales: Vec<[R; 3]>,
-    /// With respect to the raw `quaternions`.
     pub quaternions: Vec<[R; 4]>,
-    /// With respect to `opacity_logits`.
     pub opacity_logits: Vec<R>,
-    /// With respect to `sh`.
     pub sh: Vec<[R; 3]>,
-    /// With respect to the features' values.
     pub features: Vec<R>,
     /// Length of the gradient with respect to the center's position in the picture, in loss per
     /// half picture side (normalized device coordinates, as 3DGS thresholds it); 0 where unseen.

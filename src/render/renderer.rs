@@ -24,9 +24,6 @@ pub enum BackendChoice {
 impl BackendChoice {
     /// The GPU to use; `None` = the CPU. `Auto` takes a GPU only if it is a real one: the CPU
     /// renderer is faster than an emulated GPU. `told` hears why one that is there is not used.
-    ///
-    /// # Errors
-    /// If a GPU is demanded and there is none.
     pub(crate) fn gpu(self, told: impl FnOnce(String)) -> Result<Option<Device>, GpuError> {
         match self {
             Self::Cpu => Ok(None),
@@ -48,11 +45,10 @@ pub fn instead_of_gpu(why: &impl std::fmt::Display) -> String {
 
 /// Why a view could not be drawn.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum DrawError {
-    /// By the CPU.
     #[error(transparent)]
     Cpu(#[from] RenderError),
-    /// By the GPU.
     #[error(transparent)]
     Gpu(#[from] GpuError),
 }
@@ -100,9 +96,6 @@ impl Renderer {
     }
 
     /// The renderer that `choice` asks for. `told` hears why a GPU that is there is not used.
-    ///
-    /// # Errors
-    /// If a GPU is demanded and there is none that works.
     pub fn choose(choice: BackendChoice, mut told: impl FnMut(String)) -> Result<Self, GpuError> {
         match choice.gpu(&mut told)? {
             None => Ok(Self::new()),
@@ -132,9 +125,6 @@ impl Renderer {
     }
 
     /// Draws a cloud; it is sent to the GPU only if it is another one than last time.
-    ///
-    /// # Errors
-    /// If the camera is not usable, or the GPU fails.
     pub fn draw(
         &mut self,
         cloud: &Arc<GaussianCloud>,
@@ -155,9 +145,6 @@ impl Renderer {
     }
 
     /// Draws a cloud with values of its Gaussians composited like colors, on the CPU.
-    ///
-    /// # Errors
-    /// If the camera is not usable, or the values are too many or of another cloud.
     pub fn render(
         &mut self,
         cloud: &GaussianCloud,
@@ -170,9 +157,6 @@ impl Renderer {
 
     /// Hands the weight of every Gaussian at every pixel of a view to `sinks`, one for each row of
     /// tiles, which are `height.div_ceil(TILE_PX)`; on the CPU. Surfels count as flat Gaussians.
-    ///
-    /// # Errors
-    /// If the camera is not usable.
     pub(crate) fn contributions<S: ContributionSink<f32>>(
         &mut self,
         cloud: &GaussianCloud,
@@ -206,9 +190,6 @@ impl Renderer {
 
     /// Whether the stages of later pictures are timed. The CPU always does; a GPU does it only where
     /// it is asked to, and can.
-    ///
-    /// # Errors
-    /// If the GPU gives no memory for it.
     pub fn time_stages(&mut self, timed: bool) -> Result<(), GpuError> {
         let Some(gpu) = &mut self.gpu else { return Ok(()) };
         if std::mem::replace(&mut gpu.timed, timed) != timed {

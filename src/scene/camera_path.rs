@@ -14,13 +14,11 @@ pub struct CameraPath {
     pub(crate) keys: Vec<PathKey>,
     /// Whether the flight goes on from the last key to the first.
     pub(crate) closed: bool,
-    /// Frames per second of a video of the flight.
     pub(crate) fps: f64,
     /// Seconds that the whole flight takes, waits included.
     pub(crate) seconds: f64,
 }
 
-/// One camera that a flight passes.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PathKey {
     /// Camera center in the world, in scene units.
@@ -35,36 +33,19 @@ pub(crate) struct PathKey {
     pub(crate) dwell_secs: f64,
     /// When the camera arrives, in seconds from the start, where that is fixed.
     pub(crate) time_secs: Option<f64>,
-    /// What the user calls this key.
     pub(crate) name: Option<String>,
 }
 
 /// What is wrong with a camera path.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum PathError {
-    /// More keys than any path may have.
     #[error("{0} keys are more than the {max} that a path may have", max = CameraPath::MAX_KEYS)]
     TooManyKeys(usize),
-    /// A value of the path as a whole.
     #[error("{field} {reason}")]
-    Path {
-        /// The field.
-        field: &'static str,
-        /// What is wrong with it.
-        reason: String,
-    },
-    /// A value of one key.
+    Path { field: &'static str, reason: String },
     #[error("key {}, {field} {reason}", key_name(*.key, .name.as_deref()))]
-    Key {
-        /// Which key, from 0.
-        key: usize,
-        /// What it is called.
-        name: Option<String>,
-        /// Which of its fields.
-        field: &'static str,
-        /// What is wrong with it.
-        reason: String,
-    },
+    Key { key: usize, name: Option<String>, field: &'static str, reason: String },
 }
 
 /// `3` or `3 ('window')`.
@@ -73,7 +54,6 @@ fn key_name(key: usize, name: Option<&str>) -> String {
 }
 
 impl CameraPath {
-    /// Most keys of a path.
     pub(crate) const MAX_KEYS: usize = 100_000;
     /// Most frames per second.
     pub(crate) const MAX_FPS: f64 = 1000.0;

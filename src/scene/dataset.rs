@@ -90,14 +90,11 @@ mod tests {
             .map(|i| {
                 let a = i as f64 / n as f64 * std::f64::consts::TAU;
                 let eye = DVec3::new(3.0 * a.cos(), 3.0 * a.sin(), 1.0);
-                Photo {
-                    name: format!("{i:03}.png"),
-                    path: PathBuf::new(),
-                    camera: Camera::look_at(eye, DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid"),
-                    distortion: None,
-                    test_split: false,
-                    background: None,
-                }
+                Photo::new(
+                    format!("{i:03}.png"),
+                    PathBuf::new(),
+                    Camera::look_at(eye, DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid"),
+                )
             })
             .collect();
         Dataset { photos, ..Dataset::default() }

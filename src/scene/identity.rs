@@ -67,6 +67,15 @@ pub struct Identities {
 }
 
 impl Identities {
+    /// So many nameless objects.
+    pub(crate) fn objects(count: usize) -> Self {
+        let mut all = Self::default();
+        for _ in 0..count {
+            all.add(Level::Object, NOBODY, Vec::new());
+        }
+        all
+    }
+
     /// Adds an identity. A parent that does not exist yet is nobody.
     pub fn add(&mut self, level: Level, parent: IdentityId, names: Vec<String>) -> IdentityId {
         let parent = if self.get(parent).is_some() { parent } else { NOBODY };
@@ -127,7 +136,6 @@ impl Identities {
         std::iter::successors(known(id), move |&at| self.get(at).and_then(|i| known(i.parent)).filter(|p| *p < at))
     }
 
-    /// The object that an identity is, or is a piece of.
     pub(crate) fn object_of(&self, id: IdentityId) -> IdentityId {
         self.ancestors(id).last().unwrap_or(NOBODY)
     }
@@ -151,7 +159,6 @@ impl Identities {
         std::array::from_fn(|c| if c < 3 { object[c] } else { part[c - 3] })
     }
 
-    /// The direct pieces of an identity.
     pub(crate) fn children(&self, id: IdentityId) -> impl Iterator<Item = IdentityId> + '_ {
         self.iter().filter(move |(_, i)| i.parent == id && id != NOBODY).map(|(i, _)| i)
     }

@@ -40,14 +40,10 @@ impl LanguageFeatures {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Level, NOBODY};
 
     #[test]
     fn features_fit_their_identities_or_are_refused() {
-        let mut all = Identities::default();
-        (0..2).for_each(|_| {
-            all.add(Level::Object, NOBODY, vec![]);
-        });
+        let all = Identities::objects(2);
         let seen = |views: usize, dimension: usize| ViewFeatures {
             raw: vec![vec![0.5; dimension]; views],
             deviated: vec![vec![0.5; dimension]; views],

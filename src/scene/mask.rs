@@ -20,14 +20,11 @@ pub struct Mask {
 /// Columns and rows that a region spans, ends exclusive.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PixelBox {
-    /// Columns.
     pub(crate) x: Range<usize>,
-    /// Rows.
     pub(crate) y: Range<usize>,
 }
 
 impl PixelBox {
-    /// Whether a pixel is inside.
     pub(crate) fn contains(&self, x: usize, y: usize) -> bool {
         self.x.contains(&x) && self.y.contains(&y)
     }
@@ -89,7 +86,6 @@ impl Mask {
         self.words[index / 64] |= 1 << (index % 64);
     }
 
-    /// Whether the pixel with this index is in it.
     pub(crate) fn contains(&self, index: usize) -> bool {
         self.words[index / 64] >> (index % 64) & 1 == 1
     }

@@ -26,6 +26,12 @@ pub struct Photo {
 }
 
 impl Photo {
+    /// A photo without a lens of its own.
+    pub fn new(name: impl Into<String>, path: impl Into<PathBuf>, camera: Camera) -> Self {
+        let (name, path) = (name.into(), path.into());
+        Self { name, path, camera, distortion: None, test_split: false, background: None }
+    }
+
     /// Its name as it may be shown.
     pub(crate) fn title(&self) -> Cow<'_, str> {
         text::line(&self.name)
@@ -40,7 +46,6 @@ pub struct Distortion {
     pub k1: f64,
     pub(crate) k2: f64,
     pub(crate) p1: f64,
-    /// Second tangential coefficient.
     pub(crate) p2: f64,
 }
 
@@ -59,12 +64,10 @@ pub struct PhotoPixels {
 }
 
 impl PhotoPixels {
-    /// Number of pixels.
     pub(crate) fn len(&self) -> usize {
         self.rgb.len()
     }
 
-    /// Whether there are none.
     pub(crate) fn is_empty(&self) -> bool {
         self.rgb.is_empty()
     }

@@ -105,7 +105,6 @@ impl SemanticMap {
         (self.identity_of.len() * each + self.language.as_ref().map_or(0, numbers)) as u64
     }
 
-    /// Whether any identity is a part.
     pub(crate) fn has_parts(&self) -> bool {
         self.identities.iter().any(|(_, i)| i.level == super::Level::Part)
     }

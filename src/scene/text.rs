@@ -79,7 +79,6 @@ pub(crate) fn elided(text: &str, most: usize) -> String {
     text.chars().take(head).chain(['\u{2026}']).chain(text.chars().skip(n - tail)).collect()
 }
 
-/// A path on one line.
 pub(crate) fn path(path: &std::path::Path) -> String {
     line(&path.to_string_lossy()).into_owned()
 }
@@ -110,25 +109,16 @@ pub(crate) fn json(text: &str) -> Cow<'_, str> {
 }
 
 /// Reads a name: see [`name`].
-///
-/// # Errors
-/// If it is no text.
 pub(crate) fn read_name<'de, D: Deserializer<'de>>(from: D) -> Result<String, D::Error> {
     String::deserialize(from).map(|text| name(&text))
 }
 
 /// Reads a name, if there is one.
-///
-/// # Errors
-/// If it is no text.
 pub(crate) fn read_optional_name<'de, D: Deserializer<'de>>(from: D) -> Result<Option<String>, D::Error> {
     Ok(Option::<String>::deserialize(from)?.map(|text| name(&text)))
 }
 
 /// Reads names: see [`name`].
-///
-/// # Errors
-/// If it is no list of texts.
 pub(crate) fn read_names<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
     Ok(Vec::<String>::deserialize(from)?.iter().map(|text| name(text)).collect())
 }

@@ -26,12 +26,10 @@ impl<T> UndoHistory<T> {
         }
     }
 
-    /// What undoing brings back.
     pub(crate) fn last(&self) -> Option<&T> {
         self.past.last()
     }
 
-    /// What redoing brings back.
     pub(crate) fn next(&self) -> Option<&T> {
         self.future.last()
     }

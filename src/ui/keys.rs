@@ -5,7 +5,7 @@ use egui::{Event, Id, Key, KeyboardShortcut, Modifiers};
 use crate::ui::actions::{Action, Shortcut};
 
 /// Mouse gestures and held keys in the viewport, which are no actions: for the shortcut sheet.
-pub(crate) const GESTURES: [(&str, &str); 8] = [
+pub(crate) const GESTURES: [(&str, &str); 10] = [
     ("W A S D", "Fly forward, left, back, right"),
     ("Q  E", "Fly down, up"),
     ("Shift  Alt", "Fly faster, slower (held)"),
@@ -13,6 +13,8 @@ pub(crate) const GESTURES: [(&str, &str); 8] = [
     ("Right drag", "Pan"),
     ("Wheel", "Zoom toward the cursor"),
     ("Double click", "Set the pivot to what is under the cursor"),
+    ("Click", "Select the object under the cursor; again, its part; with Alt, the part at once"),
+    ("Right click", "What can be done with it"),
     ("Click on a camera", "Look through it"),
 ];
 

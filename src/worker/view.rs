@@ -207,14 +207,7 @@ mod tests {
 
     #[test]
     fn maps_that_cannot_be_drawn_are_told() {
-        let cloud = GaussianCloud {
-            positions: vec![[0.0; 3]],
-            log_scales: vec![[-1.0; 3]],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]],
-            opacity_logits: vec![2.0],
-            sh: vec![[0.5; 3]],
-            ..GaussianCloud::default()
-        };
+        let cloud = GaussianCloud { sh: vec![[0.5; 3]], ..GaussianCloud::isotropic(vec![[0.0; 3]], -1.0, 2.0) };
         let mut all = Identities::default();
         all.add(Level::Object, NOBODY, Vec::new());
         let mut map = SemanticMap::from_identities(all, vec![1], vec![1.0], vec![]);

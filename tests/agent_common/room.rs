@@ -2,7 +2,7 @@
 
 use fmlgs::agent::camera_args::{Direction, Distance};
 use fmlgs::agent::relation::Viewpoint;
-use fmlgs::agent::world::{Arrival, IdentityFacts, Moved, Unreachable, World, WorldError, locate_by_names};
+use fmlgs::agent::world::{Arrival, IdentityFacts, Movement, Unreachable, World, WorldError, locate_by_names};
 use fmlgs::navigate::target::Side;
 use fmlgs::pipeline::semantics::answer::QueryAnswer;
 use fmlgs::scene::LevelFilter;
@@ -181,7 +181,7 @@ impl World for Room {
         Ok(Arrival { distance: 0.0, in_view: self.share(id) })
     }
 
-    fn move_eye(&mut self, direction: Direction, distance: Distance) -> Result<Moved, Unreachable> {
+    fn move_eye(&mut self, direction: Direction, distance: Distance) -> Result<Movement, Unreachable> {
         self.log.push(format!("move {}", direction.text()));
         let far = match distance {
             Distance::Meters(m) => m,
@@ -200,7 +200,7 @@ impl World for Room {
         let (wanted, wall) = (self.eye + way * far, 6.0);
         self.eye = wanted.clamp(DVec3::splat(-wall), DVec3::splat(wall));
         let stopped_by_obstacle = self.eye != wanted;
-        Ok(Moved { distance_done: far.min(wall), stopped_by_obstacle })
+        Ok(Movement { distance_done: far.min(wall), stopped_by_obstacle })
     }
 
     fn turn(&mut self, way: Direction, degrees: f64) -> Result<(), Unreachable> {

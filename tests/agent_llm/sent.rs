@@ -23,14 +23,8 @@ fn kettle(exports: &Path) -> SceneWorld {
     let handle = identities.add(Level::Part, kettle, vec!["handle".into()]);
     let of: Vec<u32> = (0..64).map(|i| if i % 4 == 0 { handle } else { kettle }).collect();
     let place = |i: usize| [(i % 4) as f32 * 0.1, (i / 4 % 4) as f32 * 0.1, 3.0 + (i / 16) as f32 * 0.1];
-    let cloud = GaussianCloud {
-        positions: (0..64).map(place).collect(),
-        log_scales: vec![[-2.5; 3]; 64],
-        quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 64],
-        opacity_logits: vec![4.0; 64],
-        sh: vec![[1.0; 3]; 64],
-        ..GaussianCloud::default()
-    };
+    let cloud =
+        GaussianCloud { sh: vec![[1.0; 3]; 64], ..GaussianCloud::isotropic((0..64).map(place).collect(), -2.5, 4.0) };
     let camera = Camera {
         width_px: 64,
         height_px: 48,

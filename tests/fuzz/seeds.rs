@@ -60,13 +60,10 @@ pub fn encode(picture: &RgbaImage, format: ImageFormat) -> Vec<u8> {
 fn splat(sh_degree: u8, origin: DVec3) -> Vec<u8> {
     let cloud = GaussianCloud {
         origin,
-        positions: vec![[1.0, 2.0, 3.0], [-1.0, 0.5, 0.25]],
-        log_scales: vec![[-2.0; 3]; 2],
-        quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 2],
-        opacity_logits: vec![0.5; 2],
         sh_degree,
         sh: vec![[0.25; 3]; 2 * coefficients(sh_degree)],
         extras: vec![ExtraProperty { name: "label".into(), values: vec![3.0; 2] }],
+        ..GaussianCloud::isotropic(vec![[1.0, 2.0, 3.0], [-1.0, 0.5, 0.25]], -2.0, 0.5)
     };
     let mut out = Vec::new();
     splat_ply::encode(&mut out, &cloud, None).expect("encode");

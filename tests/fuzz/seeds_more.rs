@@ -58,14 +58,8 @@ pub fn all() -> Vec<Seed> {
 
 /// Two Gaussians of a doll and its eye.
 pub fn mapped_cloud() -> GaussianCloud {
-    let mut cloud = GaussianCloud {
-        positions: vec![[0.0, 1.0, 2.0]; 2],
-        log_scales: vec![[-1.0; 3]; 2],
-        quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 2],
-        opacity_logits: vec![0.5; 2],
-        sh: vec![[0.25; 3]; 2],
-        ..GaussianCloud::default()
-    };
+    let mut cloud =
+        GaussianCloud { sh: vec![[0.25; 3]; 2], ..GaussianCloud::isotropic(vec![[0.0, 1.0, 2.0]; 2], -1.0, 0.5) };
     map().store(&mut cloud);
     cloud
 }

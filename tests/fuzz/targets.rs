@@ -217,10 +217,10 @@ fn classes(folder: &Path) {
 }
 
 fn photo(folder: &Path) -> Photo {
-    Photo {
-        name: "photo".into(),
-        path: folder.join("photo"),
-        camera: Camera {
+    Photo::new(
+        "photo",
+        folder.join("photo"),
+        Camera {
             width_px: 16,
             height_px: 12,
             focal_px: DVec2::splat(15.0),
@@ -228,8 +228,5 @@ fn photo(folder: &Path) -> Photo {
             world_from_camera: DMat3::IDENTITY,
             center: DVec3::ZERO,
         },
-        distortion: None,
-        test_split: false,
-        background: None,
-    }
+    )
 }

@@ -23,7 +23,7 @@ pub(crate) enum Task {
 pub(super) fn task(id: &str, slots: &Slots) -> Option<Task> {
     let text = |n: usize| slots.texts.get(n).map(String::as_str);
     let thing = |n: usize| slots.texts.get(n).map(Target::query);
-    let go = |closeness| Some(ToolCall::GoTo { target: thing(0)?, side: slots.side.unwrap_or_default(), closeness });
+    let go = |closeness| Some(ToolCall::GoTo { target: thing(0)?, side: slots.side.unwrap_or(Side::Same), closeness });
     let shift = |direction| ToolCall::Move { direction, distance: slots.distance.unwrap_or_default() };
     let turn = |usual| {
         let (direction, degrees) = (slots.direction.unwrap_or(Direction::Right), slots.degrees.unwrap_or(usual));

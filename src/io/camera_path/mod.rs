@@ -17,9 +17,6 @@ pub use own::{FORMAT, VERSION, write};
 pub(crate) const MAX_BYTES: u64 = 128 << 20;
 
 /// Reads a camera path, of the program's own format or of nerfstudio's, whichever the file is.
-///
-/// # Errors
-/// [`IoError`] names the file, the key and the field.
 pub(crate) fn open(path: &Path) -> Result<CameraPath, IoError> {
     parse(&files::read(path, MAX_BYTES)?, path)
 }

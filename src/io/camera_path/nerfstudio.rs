@@ -189,15 +189,7 @@ fn key(rows: &[f64; 16], fov_deg: f64) -> Result<PathKey, String> {
     if !(fov_deg > 0.0 && fov_deg < 180.0) {
         return Err(format!("fov = {fov_deg} is not between 0 and 180 degrees"));
     }
-    Ok(PathKey {
-        center: column(3),
-        world_from_camera: nearest_rotation(&rotation),
-        fov_y_rad: fov_deg.to_radians(),
-        roll_rad: 0.0,
-        dwell_secs: 0.0,
-        time_secs: None,
-        name: None,
-    })
+    Ok(PathKey::of_pose(column(3), nearest_rotation(&rotation), fov_deg.to_radians()))
 }
 
 impl Matrix {

@@ -13,11 +13,9 @@ use crate::scene::SparsePoint;
 const CAMERA_BYTES: usize = 4 + 4 + 16 + 24;
 /// Least bytes of an image: id, pose, camera, empty name, number of 2-D points.
 const IMAGE_BYTES: usize = 4 + 56 + 4 + 1 + 8;
-/// Bytes of an image's 2-D point.
 const OBSERVATION_BYTES: usize = 24;
 /// Least bytes of a point: id, position, color, error, length of its track.
 const POINT_BYTES: usize = 8 + 24 + 3 + 8 + 8;
-/// Bytes of an entry of a point's track.
 const TRACK_BYTES: usize = 8;
 
 /// `cameras.bin`.
@@ -61,11 +59,8 @@ pub(super) fn images(bytes: &[u8], path: &Path) -> Result<Vec<Image>, IoError> {
         }
         let translation = DVec3::new(r.f64(&place)?, r.f64(&place)?, r.f64(&place)?);
         let camera = r.u32(&place)?;
-        let name = std::str::from_utf8(r.c_string(&place)?).map_err(|_| IoError::Syntax {
-            path: path.into(),
-            place: place.clone(),
-            reason: "its name is not UTF-8 text".into(),
-        })?;
+        let name = std::str::from_utf8(r.c_string(&place)?)
+            .map_err(|_| IoError::syntax(path, place.clone(), "its name is not UTF-8 text"))?;
         let observations = r.count(&format!("2-D points of {place}"), OBSERVATION_BYTES)?;
         r.take(observations * OBSERVATION_BYTES, &place)?;
         images.push(Image { name: name.into(), camera, quaternion: q, translation });

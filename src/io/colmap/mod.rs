@@ -23,7 +23,6 @@ pub use text::{check_text_cameras, check_text_images, check_text_points};
 /// Where a reconstruction may lie, relative to the dataset's folder.
 const FOLDERS: [&str; 3] = ["sparse/0", "sparse", "."];
 
-/// The photos of a reconstruction.
 struct Image {
     name: String,
     camera: u32,
@@ -46,7 +45,6 @@ fn find(root: &Path) -> Option<(PathBuf, bool)> {
     })
 }
 
-/// Whether `root` holds a reconstruction.
 pub(crate) fn is_colmap(root: &Path) -> bool {
     find(root).is_some()
 }
@@ -86,19 +84,18 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
         format: if is_binary { "COLMAP binary" } else { "COLMAP text" }.into(),
         photos: photos(listed, root, &images_file, &mut warnings)?,
         points,
-        background: None,
-        metres_per_unit: None,
         warnings,
+        ..Dataset::default()
     })
 }
 
 fn listed(image: &Image, cameras: &Cameras, root: &Path, folder: &str, source: &Path) -> Result<ListedPhoto, IoError> {
     let Some(lens) = cameras.get(&image.camera) else {
-        return Err(IoError::Syntax {
-            path: source.into(),
-            place: format!("photo '{}'", image.name),
-            reason: format!("there is no camera {}", image.camera),
-        });
+        return Err(IoError::syntax(
+            source,
+            format!("photo '{}'", image.name),
+            format!("there is no camera {}", image.camera),
+        ));
     };
     let bad = |cause| IoError::Camera { path: source.into(), photo: image.name.clone(), cause };
     let [x, y, z] = matrix_from_quaternion(image.quaternion).ok_or_else(|| bad(CameraError::Rotation(f64::NAN)))?;
@@ -125,11 +122,11 @@ fn distinct(mut ids: Vec<u64>, what: &str, path: &Path) -> Result<(), IoError> {
     ids.sort_unstable();
     match ids.windows(2).find(|w| w[0] == w[1]) {
         None => Ok(()),
-        Some(w) => Err(IoError::Syntax {
-            path: path.into(),
-            place: format!("{what} {}", w[0]),
-            reason: "its number is given twice; which of the two is meant cannot be told".into(),
-        }),
+        Some(w) => Err(IoError::syntax(
+            path,
+            format!("{what} {}", w[0]),
+            "its number is given twice; which of the two is meant cannot be told",
+        )),
     }
 }
 

@@ -9,7 +9,6 @@ use super::{Cameras, Image, distinct, lens, point};
 use crate::io::IoError;
 use crate::scene::SparsePoint;
 
-/// The words of a line.
 struct Line<'a> {
     words: SplitAsciiWhitespace<'a>,
     number: usize,

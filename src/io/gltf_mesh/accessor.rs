@@ -11,7 +11,6 @@ pub(crate) struct AccessorValues {
     pub(crate) width: usize,
     /// `[count * width]`, finite.
     pub(crate) data: Vec<f32>,
-    /// Whether the type is a signed integer.
     pub(crate) signed_integer: bool,
 }
 
@@ -81,7 +80,6 @@ impl File<'_> {
         Ok(AccessorValues { width, data, signed_integer: matches!(component, ComponentType::I8 | ComponentType::I16) })
     }
 
-    /// Reads an index accessor.
     pub(super) fn indices(&self, index: usize, place: &str) -> Result<Vec<u32>, IoError> {
         let root = self.root;
         let accessor = self.item(&root.accessors, index, "accessors", place)?;
@@ -132,7 +130,6 @@ impl File<'_> {
         Ok((0..count).map(move |i| &bytes[offset + i * stride..][..size]))
     }
 
-    /// The bytes of a buffer view.
     pub(super) fn view_bytes(&self, index: usize, place: &str) -> Result<&[u8], IoError> {
         let view = self.item(&self.root.buffer_views, index, "bufferViews", place)?;
         let buffer = self.item(&self.buffers, view.buffer.value(), "buffers", &format!("bufferViews[{index}]"))?;

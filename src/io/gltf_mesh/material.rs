@@ -10,7 +10,6 @@ use gltf::json::validation::Checked;
 use super::{AlphaMode, File, MAX_FILE_BYTES, Material, TextureImage, TextureUse, Wrap, resource};
 use crate::io::IoError;
 
-/// Largest side of a texture in px.
 const MAX_TEXTURE_SIDE_PX: u32 = 16_384;
 /// Most bytes that all decoded textures together may take.
 const MAX_TEXTURE_BYTES: u64 = 1 << 30;

@@ -15,20 +15,15 @@ pub struct MeshScene {
     pub(crate) materials: Vec<Material>,
     /// Decoded images, indexed by [`TextureUse::image`].
     pub(crate) images: Vec<TextureImage>,
-    /// What was left out, for display.
     pub(crate) warnings: Vec<String>,
 }
 
-/// A node of the tree.
 #[derive(Clone, Debug)]
 pub(crate) struct MeshNode {
     /// Its name, never blank.
     pub(crate) name: Option<String>,
-    /// Index of its parent.
     pub(crate) parent: Option<usize>,
-    /// Indices of its children.
     pub(crate) children: Vec<usize>,
-    /// Index of its own mesh.
     pub(crate) mesh: Option<usize>,
     /// Points of the node to world points (glTF axes: y up, meters).
     pub(crate) world_from_node: DMat4,
@@ -68,7 +63,6 @@ pub(crate) struct Material {
     pub(crate) base_texture: Option<TextureUse>,
     /// Linear emitted color.
     pub(crate) emission: Vec3,
-    /// Texture multiplied with the emission.
     pub(crate) emission_texture: Option<TextureUse>,
     /// 0 for plastic, 1 for metal.
     pub(crate) metallic: f32,
@@ -79,7 +73,6 @@ pub(crate) struct Material {
     pub(crate) unlit: bool,
 }
 
-/// What a material's alpha means.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum AlphaMode {
     Opaque,
@@ -89,7 +82,6 @@ pub(crate) enum AlphaMode {
     Blend,
 }
 
-/// A texture as a material uses it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TextureUse {
     /// Index into [`MeshScene::images`].

@@ -29,10 +29,8 @@ pub(super) struct SplatPrimitive {
     pub(crate) extensions: BTreeMap<String, serde_json::Value>,
 }
 
-/// The values of an accessor.
 pub(super) struct AttributeValues<const N: usize> {
     pub(crate) rows: Vec<[f32; N]>,
-    /// Whether the type is a signed integer.
     pub(crate) signed_integer: bool,
 }
 
@@ -70,12 +68,10 @@ impl<'a> Gltf<'a> {
         IoError::Unsupported { path: self.path.into(), what, remedy }
     }
 
-    /// The nodes of the scene.
     pub(crate) fn nodes(&self) -> Result<Vec<MeshNode>, IoError> {
         Ok(self.file.nodes()?.0)
     }
 
-    /// What a node shows.
     pub(crate) fn primitives(&self, node: &MeshNode) -> &[SplatPrimitive] {
         node.mesh.and_then(|mesh| self.meshes.meshes.get(mesh)).map_or(&[], |mesh| &mesh.primitives)
     }

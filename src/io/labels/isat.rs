@@ -11,7 +11,6 @@ use super::{Region, Sheet};
 use crate::io::{IoError, files};
 use crate::scene::{Level, Mask};
 
-/// Most vertices of one file.
 const MAX_VERTICES: usize = 4_000_000;
 
 #[derive(Deserialize)]

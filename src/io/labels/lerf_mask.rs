@@ -8,7 +8,6 @@ use super::entries;
 use super::pictures::{Pictures, png_stem};
 use crate::io::IoError;
 
-/// Folder of the masks.
 const FOLDER: &str = "test_mask";
 
 /// The masks of the dataset in `root`, or in the folder `test_mask` itself; `None` if there are none.

@@ -65,9 +65,6 @@ pub enum Labels {
 
 impl Labels {
     /// Finds out what is at `path`.
-    ///
-    /// # Errors
-    /// If there are no labels of a known kind, or what lists them does not parse.
     pub fn open(path: &Path) -> Result<Self, IoError> {
         if path.join(synth_ids::LIST_FILE).is_file() {
             return Ok(Self::SynthIds(synth_ids::SynthIds::open(path)?));
@@ -122,9 +119,6 @@ impl Labels {
 
     /// The regions of a photo, undistorted and scaled to at most `max_side_px`; regions without a
     /// pixel are left out, and pieces of them then have no parent. Empty if it has no labels.
-    ///
-    /// # Errors
-    /// If its file is broken, of another shape than the photo, or needs more memory than there is.
     pub fn of(&self, photo: &Photo, max_side_px: u32) -> Result<Vec<Region>, IoError> {
         let name = stem(&photo.name);
         let sheet = Sheet(photo);

@@ -19,7 +19,6 @@ pub struct Pictures {
 }
 
 impl Pictures {
-    /// Whether the photo `stem` has masks.
     pub(crate) fn has(&self, stem: &str) -> bool {
         self.of.contains_key(stem)
     }

@@ -11,7 +11,6 @@ use serde::Deserialize;
 
 use crate::scene::Mask;
 
-/// A mask as written.
 #[derive(Clone, Debug, Deserialize)]
 pub(crate) struct Rle {
     /// Height and width in px.

@@ -8,7 +8,6 @@ use super::{Region, Sheet, read_ids};
 use crate::io::{IoError, files};
 use crate::scene::{Level, Mask, text};
 
-/// The list of identities.
 pub(crate) const LIST_FILE: &str = "identities.json";
 
 #[derive(Deserialize)]
@@ -16,7 +15,6 @@ struct File {
     identities: Vec<ListedIdentity>,
 }
 
-/// An object or part as listed.
 #[derive(Clone, Debug, Deserialize)]
 pub(crate) struct ListedIdentity {
     /// Value in the id maps.
@@ -47,7 +45,6 @@ impl SynthIds {
         self.root.join(folder).join(format!("{stem}.png"))
     }
 
-    /// Whether the photo `stem` has maps.
     pub(crate) fn has(&self, stem: &str) -> bool {
         self.path(Level::Object, stem).is_file()
     }

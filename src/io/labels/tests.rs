@@ -9,7 +9,7 @@ use crate::scene::Camera;
 
 fn photo(name: &str, w: u32, h: u32) -> Photo {
     let camera = Camera::look_at(DVec3::new(0.0, -3.0, 0.0), DVec3::ZERO, DVec3::Z, 0.8, w, h).expect("valid");
-    Photo { name: name.into(), path: name.into(), camera, distortion: None, test_split: false, background: None }
+    Photo::new(name, name, camera)
 }
 
 const LABEL: &str = r#"{"info": {"name": "a.jpg", "width": 20, "height": 10}, "objects": [

@@ -10,16 +10,11 @@ use super::{entries, stem};
 use crate::io::{IoError, files, llff, photo_list};
 use crate::scene::Level;
 
-/// Folder of the masks.
 const FOLDER: &str = "segmentations";
-/// The list of classes in it.
 const LIST_FILE: &str = "classes.txt";
 
 /// The masks of the dataset in `root`, or in the folder `segmentations` itself; `None` if there
 /// are none.
-///
-/// # Errors
-/// If the list of classes or the photos cannot be read, or masks belong to a photo that is not there.
 pub(crate) fn find(root: &Path) -> Result<Option<Pictures>, IoError> {
     // A folder given as `.` has a name only once it is made whole.
     let whole = std::path::absolute(root).unwrap_or_else(|_| root.into());

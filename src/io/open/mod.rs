@@ -70,10 +70,6 @@ const FILES: &str = "splats (.ply, .compressed.ply, .sog, SOG's meta.json, .gltf
 const MAGIC_BYTES: u64 = 4;
 
 /// Opens a dataset's folder or its `transforms.json`, a splat file, or a trained scene.
-///
-/// # Errors
-/// [`OpenError::Unrecognized`] says what was looked for and what was found instead; what is
-/// recognized but broken arrives as [`OpenError::Io`] from its reader.
 pub fn open(path: &Path) -> Result<Opened> {
     let meta = fs::metadata(path).map_err(|cause| match cause.kind() {
         std::io::ErrorKind::NotFound => OpenError::NotFound { path: path.into() },

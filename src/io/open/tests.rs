@@ -48,14 +48,7 @@ fn photos_without_poses_are_counted_and_one_picture_is_none() {
 #[test]
 fn splats_and_scenes_are_told_apart() {
     let (_guard, path) = folder();
-    let cloud = GaussianCloud {
-        positions: vec![[1.0; 3]],
-        log_scales: vec![[0.0; 3]],
-        quaternions: vec![[1.0, 0.0, 0.0, 0.0]],
-        opacity_logits: vec![0.0],
-        sh: vec![[0.0; 3]],
-        ..GaussianCloud::default()
-    };
+    let cloud = GaussianCloud::isotropic(vec![[1.0; 3]], 0.0, 0.0);
     splat_ply::write(&path.join("any.name"), &cloud).expect("write");
     assert!(matches!(open(&path.join("any.name")), Ok(Opened::Cloud(c)) if c == cloud));
     let scene = path.join("scene");

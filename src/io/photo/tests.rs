@@ -9,10 +9,10 @@ use image::{ImageFormat, Rgb, RgbImage, Rgba, RgbaImage};
 use super::*;
 
 fn photo(path: PathBuf, width_px: u32, height_px: u32) -> Photo {
-    Photo {
-        name: "a".into(),
+    Photo::new(
+        "a",
         path,
-        camera: Camera {
+        Camera {
             width_px,
             height_px,
             focal_px: DVec2::splat(f64::from(width_px)),
@@ -20,10 +20,7 @@ fn photo(path: PathBuf, width_px: u32, height_px: u32) -> Photo {
             world_from_camera: DMat3::IDENTITY,
             center: DVec3::ZERO,
         },
-        distortion: None,
-        test_split: false,
-        background: None,
-    }
+    )
 }
 
 fn gradient(w: u32, h: u32) -> RgbImage {

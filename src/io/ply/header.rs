@@ -5,38 +5,25 @@ use std::path::Path;
 use super::Ply;
 use crate::io::IoError;
 
-/// Longest header in bytes.
 const MAX_HEADER_BYTES: usize = 1 << 20;
 
-/// How rows are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Encoding {
-    /// Numbers as text.
     Ascii,
-    /// Binary, least significant byte first.
     LittleEndian,
-    /// Binary, most significant byte first.
     BigEndian,
 }
 
 /// Type of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Scalar {
-    /// `char`.
     I8,
-    /// `uchar`.
     U8,
-    /// `short`.
     I16,
-    /// `ushort`.
     U16,
-    /// `int`.
     I32,
-    /// `uint`.
     U32,
-    /// `float`.
     F32,
-    /// `double`.
     F64,
 }
 
@@ -55,7 +42,6 @@ impl Scalar {
         })
     }
 
-    /// Bytes in a binary file.
     pub(crate) const fn bytes(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
@@ -104,7 +90,6 @@ impl Scalar {
 /// A number, or a list of them with its length in front.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// One number.
     Scalar(Scalar),
     List {
         /// Type of the length.
@@ -114,32 +99,25 @@ pub(crate) enum Kind {
     },
 }
 
-/// A property of an element.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Property {
     pub(crate) name: String,
     pub(crate) kind: Kind,
 }
 
-/// A kind of row.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Element {
     /// Its name: `vertex`, `face`, `chunk`.
     pub(crate) name: String,
     /// Rows, as the file claims.
     pub(crate) count: u64,
-    /// What each row holds.
     pub(crate) properties: Vec<Property>,
 }
 
 pub(super) fn parse<'a>(bytes: &'a [u8], path: &'a Path) -> Result<Ply<'a>, IoError> {
     let mut rest = bytes;
     let mut number = 0_usize;
-    let bad = |line: usize, reason: &str| IoError::Syntax {
-        path: path.into(),
-        place: format!("header line {line}"),
-        reason: reason.into(),
-    };
+    let bad = |line: usize, reason: &str| IoError::syntax(path, format!("header line {line}"), reason);
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
     let mut comments = Vec::new();

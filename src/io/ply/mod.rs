@@ -15,13 +15,10 @@ use super::IoError;
 
 /// A PLY file whose header has been read.
 pub(crate) struct Ply<'a> {
-    /// Where it came from, for errors.
     pub(crate) path: &'a Path,
-    /// How the rows are stored.
     pub(crate) encoding: Encoding,
     /// The comment lines, without the word `comment`.
     pub(crate) comments: Vec<&'a str>,
-    /// The elements in file order.
     pub(crate) elements: Vec<Element>,
     body: &'a [u8],
 }
@@ -32,7 +29,6 @@ impl<'a> Ply<'a> {
         header::parse(bytes, path)
     }
 
-    /// The element of that name.
     pub(crate) fn element(&self, name: &str) -> Option<&Element> {
         self.elements.iter().find(|e| e.name == name)
     }
@@ -44,15 +40,11 @@ impl<'a> Ply<'a> {
         self.columns(element).ok()
     }
 
-    /// Bytes after the header.
     pub(crate) fn body_len(&self) -> usize {
         self.body.len()
     }
 
     /// The rows of the element of that name; `None` if the file has no such element.
-    ///
-    /// # Errors
-    /// If the file is too short for the element, or the element has list properties.
     pub(crate) fn table(&self, name: &str) -> Result<Option<Table<'a>>, IoError> {
         let Some(at) = self.elements.iter().position(|e| e.name == name) else { return Ok(None) };
         let element = &self.elements[at];

@@ -14,13 +14,11 @@ pub(crate) struct Column {
 }
 
 impl Column {
-    /// The value in `row`.
     #[inline]
     pub(crate) fn f64(&self, row: &[u8]) -> f64 {
         self.scalar.read(&row[self.offset..])
     }
 
-    /// The value in `row`, in single precision.
     #[inline]
     pub(crate) fn f32(&self, row: &[u8]) -> f32 {
         self.f64(row) as f32
@@ -35,24 +33,19 @@ impl Column {
 
 /// Rows of fixed size, little-endian.
 pub(crate) struct Table<'a> {
-    /// Number of rows.
     pub(crate) rows: usize,
-    /// Bytes per row.
     pub(crate) stride: usize,
-    /// The columns in file order.
     pub(crate) columns: Vec<Column>,
     /// `rows * stride` bytes.
     pub(crate) data: Cow<'a, [u8]>,
 }
 
 impl Table<'_> {
-    /// The bytes of row `i`.
     #[inline]
     pub(crate) fn row(&self, i: usize) -> &[u8] {
         &self.data[i * self.stride..(i + 1) * self.stride]
     }
 
-    /// The column of that name.
     pub(crate) fn column(&self, name: &str) -> Option<&Column> {
         self.columns.iter().find(|c| c.name == name)
     }

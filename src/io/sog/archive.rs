@@ -15,7 +15,6 @@ const FREE_BYTES: u64 = 1 << 20;
 /// Unpacked bytes per byte of the archive beyond that. Pictures hardly shrink, JSON by 20 at most.
 const MAX_RATIO: u64 = 32;
 
-/// An archive in memory.
 pub(super) struct Archive<'a> {
     zip: ZipArchive<Cursor<&'a [u8]>>,
     /// Folder of `meta.json` in the archive, with its slash.

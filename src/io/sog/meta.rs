@@ -82,11 +82,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Meta, IoError> {
     if !(1..=2).contains(&version) {
         return Err(IoError::Version { path: path.into(), found: version, supported: 2 });
     }
-    convert(file, version == 2).map_err(|(part, reason)| IoError::Syntax {
-        path: path.into(),
-        place: format!("'{part}'"),
-        reason,
-    })
+    convert(file, version == 2).map_err(|(part, reason)| IoError::syntax(path, format!("'{part}'"), reason))
 }
 
 type Flaw = (&'static str, String);

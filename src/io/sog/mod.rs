@@ -31,7 +31,6 @@ pub fn read_folder(meta_file: &Path) -> Result<GaussianCloud, IoError> {
     decode::cloud(&meta, load, meta_file)
 }
 
-/// Reads a bundled `.sog`.
 pub(crate) fn read_archive(path: &Path) -> Result<GaussianCloud, IoError> {
     parse_archive(&files::read(path, u64::MAX)?, path)
 }

@@ -23,7 +23,6 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
     Reading { ply: &ply, table: &table, first: 0 }.cloud()
 }
 
-/// Some rows of a splat.
 pub(super) struct Reading<'a> {
     pub(crate) ply: &'a Ply<'a>,
     pub(crate) table: &'a Table<'a>,

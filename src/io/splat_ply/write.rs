@@ -23,11 +23,11 @@ pub fn write(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
 pub fn check(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
     cloud.validate().map_err(|cause| IoError::Cloud { path: path.into(), cause })?;
     if let Some(e) = cloud.extras.iter().find(|e| is_standard(&e.name) || !is_word(&e.name)) {
-        return Err(IoError::Syntax {
-            path: path.into(),
-            place: format!("extra property '{}'", e.name),
-            reason: "its name is taken or is not one printable word; rename it".into(),
-        });
+        return Err(IoError::syntax(
+            path,
+            format!("extra property '{}'", e.name),
+            "its name is taken or is not one printable word; rename it",
+        ));
     }
     Ok(())
 }

@@ -6,90 +6,28 @@ use crate::io::IoError;
 
 /// A video that could not be written.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum VideoFileError {
-    /// An ending that no format has.
     #[error("{path} does not say a format that can be written: use one of {known}; other formats need ffmpeg")]
-    UnknownFormat {
-        /// The path.
-        path: PathBuf,
-        /// The endings there are.
-        known: String,
-    },
-    /// A setting that no video can have, or not this format.
+    UnknownFormat { path: PathBuf, known: String },
     #[error("{path}: {what}; {remedy}")]
-    Setting {
-        /// The path.
-        path: PathBuf,
-        /// The setting and its value.
-        what: String,
-        /// What the person can do.
-        remedy: &'static str,
-    },
-    /// Something of that name is there already.
+    Setting { path: PathBuf, what: String, remedy: &'static str },
     #[error("{path} exists; choose another name, or allow overwriting")]
-    Exists {
-        /// The file in the way.
-        path: PathBuf,
-    },
-    /// A frame of another size than announced.
+    Exists { path: PathBuf },
     #[error("frame {frame} has {found} bytes instead of {expected} (width x height x 3)")]
-    FrameBytes {
-        /// Which frame, from 0.
-        frame: u64,
-        /// Its bytes.
-        found: u64,
-        /// What it should have.
-        expected: u64,
-    },
-    /// More frames than a video may have.
+    FrameBytes { frame: u64, found: u64, expected: u64 },
     #[error("{path}: a video has at most {most} frames; write several videos")]
-    TooManyFrames {
-        /// The video.
-        path: PathBuf,
-        /// The limit.
-        most: u64,
-    },
-    /// A video without a frame.
+    TooManyFrames { path: PathBuf, most: u64 },
     #[error("{path} was not written: it has no frames")]
-    NoFrames {
-        /// The video.
-        path: PathBuf,
-    },
-    /// The video was given up at an earlier error.
+    NoFrames { path: PathBuf },
     #[error("{path} was not written: an earlier frame failed")]
-    Broken {
-        /// The video.
-        path: PathBuf,
-    },
-    /// An encoder that gives up.
+    Broken { path: PathBuf },
     #[error("{path} was not written: the encoder failed ({reason}); try another format or size")]
-    Encoder {
-        /// The video.
-        path: PathBuf,
-        /// What the encoder says.
-        reason: String,
-    },
-    /// A program that does not start.
+    Encoder { path: PathBuf, reason: String },
     #[error("cannot start '{program}': {cause}; install ffmpeg or give its path, or use the built-in encoder")]
-    Program {
-        /// The program.
-        program: PathBuf,
-        /// What the system says.
-        cause: std::io::Error,
-    },
-    /// A program that ended with an error.
+    Program { program: PathBuf, cause: std::io::Error },
     #[error("{path} was not written: '{program}' ended with {status}. Its last words:\n{last_words}")]
-    ProgramFailed {
-        /// The video.
-        path: PathBuf,
-        /// The program.
-        program: PathBuf,
-        /// Exit status or signal.
-        status: String,
-        /// The last lines of its error output.
-        last_words: String,
-    },
-    /// The disk, the folder.
+    ProgramFailed { path: PathBuf, program: PathBuf, status: String, last_words: String },
     #[error(transparent)]
     Io(#[from] IoError),
 }

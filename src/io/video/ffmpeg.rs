@@ -21,8 +21,6 @@ const LINE_BYTES: u64 = 2000;
 pub(super) struct Ffmpeg {
     path: PathBuf,
     program: PathBuf,
-    size_px: (u32, u32),
-    /// What the program writes to.
     draft: Option<NamedTempFile>,
     child: Child,
     frames_in: Option<ChildStdin>,
@@ -53,15 +51,8 @@ impl Ffmpeg {
             .stderr
             .take()
             .map(|words| std::thread::Builder::new().name("ffmpeg errors".into()).spawn(move || last_lines(words)));
-        let mut ffmpeg = Self {
-            path: path.into(),
-            program: program.into(),
-            size_px: (width, height),
-            draft: Some(draft),
-            child,
-            frames_in,
-            last_words: None,
-        };
+        let mut ffmpeg =
+            Self { path: path.into(), program: program.into(), draft: Some(draft), child, frames_in, last_words: None };
         // From here on dropping `ffmpeg` ends the program.
         ffmpeg.last_words = last_words.transpose().map_err(start)?;
         Ok(ffmpeg)
@@ -83,10 +74,6 @@ impl Ffmpeg {
 }
 
 impl Sink for Ffmpeg {
-    fn size_px(&self) -> (u32, u32) {
-        self.size_px
-    }
-
     fn push(&mut self, rgb: &[u8]) -> Result<()> {
         let Some(frames_in) = &mut self.frames_in else {
             return Err(VideoFileError::Broken { path: self.path.clone() });

@@ -20,7 +20,6 @@ pub(crate) enum Format {
 impl Format {
     pub(crate) const ALL: [Self; 4] = [Self::Mp4, Self::Gif, Self::WebP, Self::Frames];
 
-    /// How a path of this format ends.
     pub(crate) fn ending(self) -> &'static str {
         match self {
             Self::Mp4 => ".mp4",
@@ -32,9 +31,6 @@ impl Format {
 
     /// The format that a path names: by its ending, or [`Format::Frames`] for a folder that exists, a
     /// path with `/` at its end, or one without an ending.
-    ///
-    /// # Errors
-    /// [`VideoFileError::UnknownFormat`] lists the endings there are.
     pub(crate) fn of(path: &Path) -> Result<Self> {
         let folder = path.is_dir() || path.as_os_str().to_string_lossy().ends_with(std::path::is_separator);
         if folder && path.file_name().is_some() {
@@ -52,7 +48,6 @@ impl Format {
         }
     }
 
-    /// Refuses settings that this format cannot hold.
     pub(super) fn check(self, path: &Path, settings: &VideoSettings) -> Result<()> {
         /// What H.264's level 5.2, and with it openh264, can hold along the longer and the shorter side.
         const MP4_PX: (u32, u32) = (3840, 2160);

@@ -69,10 +69,6 @@ impl Frames {
 }
 
 impl Sink for Frames {
-    fn size_px(&self) -> (u32, u32) {
-        self.size_px
-    }
-
     fn push(&mut self, rgb: &[u8]) -> Result<()> {
         let path = self.draft.folder.path().join(name(self.frames));
         let mut file = Vec::new();
@@ -98,7 +94,6 @@ impl Sink for Frames {
     }
 }
 
-/// File name of a frame.
 fn name(frame: u64) -> String {
     format!("frame_{frame:05}.png")
 }
@@ -109,7 +104,6 @@ fn number(path: &Path) -> Option<u64> {
     digits.parse().ok().filter(|n| path.file_name().is_some_and(|f| f.to_str() == Some(&name(*n))))
 }
 
-/// The frames in a folder, in order.
 fn numbered(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder)? {

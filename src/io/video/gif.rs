@@ -32,10 +32,6 @@ impl Gif {
 }
 
 impl Sink for Gif {
-    fn size_px(&self) -> (u32, u32) {
-        (self.settings.width_px, self.settings.height_px)
-    }
-
     fn push(&mut self, rgb: &[u8]) -> Result<()> {
         // NeuQuant's step through the pixels: 1 looks at all of them, 30 at every thirtieth. It learns
         // little from fewer than this many.

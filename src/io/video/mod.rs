@@ -1,18 +1,5 @@
 //! Videos of pictures: MP4, GIF, WebP, or PNG frames in a folder; or whatever an ffmpeg program writes.
 //!
-//! ```no_run
-//! use fmlgs::io::video::{Settings, VideoWriter};
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let mut video = VideoWriter::create("flight.mp4".as_ref(), &Settings::new(640, 480, 30.0))?;
-//! for _ in 0..90 {
-//!     video.push(&[0; 640 * 480 * 3])?; // sRGB, row by row from the top
-//! }
-//! let summary = video.finish()?;
-//! assert_eq!((summary.frames, summary.secs), (90, 3.0));
-//! # Ok(())
-//! # }
-//! ```
-//!
 //! Frames go through one at a time and are not kept. What is written lies in a temporary place and
 //! appears under its name when [`VideoWriter::finish`] succeeds; a writer that is dropped before
 //! leaves nothing behind. Two formats keep more than a frame in memory: WebP all *compressed* frames
@@ -34,19 +21,15 @@ pub(crate) use error::VideoFileError;
 pub(crate) use format::Format;
 pub(crate) use settings::{VideoEncoder, VideoSettings};
 
-/// Result of this module's functions.
 pub(crate) type Result<T> = std::result::Result<T, VideoFileError>;
 
-/// What was written.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct VideoSummary {
     /// The file, or the folder of PNG frames.
     pub(crate) path: PathBuf,
     /// Its format; `None` where ffmpeg chose it by the file's name.
     pub(crate) format: Option<Format>,
-    /// Frames pushed.
     pub(crate) frames: u64,
-    /// Bytes on disk.
     pub(crate) bytes: u64,
     /// Playing time in seconds.
     pub(crate) secs: f64,
@@ -55,7 +38,6 @@ pub(crate) struct VideoSummary {
     pub(crate) size_px: (u32, u32),
 }
 
-/// Writes a video frame by frame.
 pub(crate) struct VideoWriter {
     path: PathBuf,
     format: Option<Format>,
@@ -68,8 +50,6 @@ pub(crate) struct VideoWriter {
 
 /// Where the frames of one format go. Dropped without `finish`, it removes what it wrote.
 trait Sink: Send {
-    /// Width and height of the video in px.
-    fn size_px(&self) -> (u32, u32);
     /// Takes the next frame: sRGB, `width * height * 3` bytes.
     fn push(&mut self, rgb: &[u8]) -> Result<()>;
     /// Completes the video, puts it in its place and returns its bytes.
@@ -79,11 +59,7 @@ trait Sink: Send {
 impl VideoWriter {
     /// Starts a video at `path`, in the format that the path's ending names (see [`Format::of`]);
     /// with [`VideoEncoder::Ffmpeg`] any ending that the program knows.
-    ///
-    /// # Errors
-    /// [`VideoFileError`]: an ending that no format has, a size or rate that the format cannot hold,
     /// a file that exists (unless [`VideoSettings::overwrite`]), a folder that cannot be written to, a
-    /// program that is missing.
     pub(crate) fn create(path: &Path, settings: &VideoSettings) -> Result<Self> {
         settings.check(path)?;
         let (format, sink): (_, Box<dyn Sink>) = match &settings.encoder {
@@ -106,15 +82,13 @@ impl VideoWriter {
                 (Some(format), sink)
             }
         };
-        let size_px = sink.size_px();
+        let even = if format == Some(Format::Mp4) { !1 } else { !0 };
+        let size_px = (settings.width_px & even, settings.height_px & even);
         Ok(Self { path: path.into(), format, settings: settings.clone(), size_px, frames: 0, sink: Some(sink) })
     }
 
     /// Adds the next frame: sRGB, `width * height * 3` bytes, row by row from the top. After an error of
     /// the encoder or the disk the video is lost: every further call fails, and nothing is left on disk.
-    ///
-    /// # Errors
-    /// [`VideoFileError`]: wrong length, an encoder that gives up, a full disk.
     pub(crate) fn push(&mut self, rgb: &[u8]) -> Result<()> {
         let expected = self.settings.frame_bytes();
         if rgb.len() as u64 != expected {

@@ -61,10 +61,6 @@ impl Mp4 {
 }
 
 impl Sink for Mp4 {
-    fn size_px(&self) -> (u32, u32) {
-        (self.planes.width as u32, self.planes.height as u32)
-    }
-
     fn push(&mut self, rgb: &[u8]) -> Result<()> {
         let path = &self.path;
         self.planes.fill(rgb, self.row_px);

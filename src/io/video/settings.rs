@@ -5,14 +5,10 @@ use std::path::{Path, PathBuf};
 use super::{Result, VideoFileError};
 use crate::scene::Camera;
 
-/// Size, rate and quality of a video.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct VideoSettings {
-    /// Width of the frames in px.
     pub(crate) width_px: u32,
-    /// Height of the frames in px.
     pub(crate) height_px: u32,
-    /// Frames per second, the same throughout.
     pub(crate) fps: f64,
     /// From 0 (smallest file) to 100 (best picture).
     pub(crate) quality: u8,
@@ -21,10 +17,8 @@ pub(crate) struct VideoSettings {
     pub(crate) encoder: VideoEncoder,
 }
 
-/// What encodes a video.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) enum VideoEncoder {
-    /// What is built into the program.
     #[default]
     BuiltIn,
     /// A program with ffmpeg's command line, fed through a pipe.
@@ -70,7 +64,6 @@ impl VideoSettings {
         Ok(())
     }
 
-    /// Bytes of a frame.
     pub(super) fn frame_bytes(&self) -> u64 {
         u64::from(self.width_px) * u64::from(self.height_px) * 3
     }

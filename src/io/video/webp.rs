@@ -17,7 +17,6 @@ use crate::io::error::write_error;
 
 pub(super) struct WebP {
     path: PathBuf,
-    size_px: (u32, u32),
     draft: Draft,
     encoder: Option<(Sender<Message>, JoinHandle<Film>)>,
 }
@@ -41,8 +40,7 @@ impl WebP {
             .name("webp".into())
             .spawn(move || encode(&of_thread, &inbox))
             .map_err(|e| VideoFileError::Encoder { path: path.into(), reason: e.to_string() })?;
-        let size_px = (settings.width_px, settings.height_px);
-        Ok(Self { path: path.into(), size_px, draft, encoder: Some((to_encoder, thread)) })
+        Ok(Self { path: path.into(), draft, encoder: Some((to_encoder, thread)) })
     }
 
     /// Waits for the encoder's result.
@@ -58,10 +56,6 @@ impl WebP {
 }
 
 impl Sink for WebP {
-    fn size_px(&self) -> (u32, u32) {
-        self.size_px
-    }
-
     fn push(&mut self, rgb: &[u8]) -> Result<()> {
         let sent = self.encoder.as_ref().is_some_and(|(to, _)| to.send(Message::Frame(rgb.to_vec())).is_ok());
         if sent { Ok(()) } else { self.result().map(drop) }

@@ -58,12 +58,10 @@ impl YuvPlanes {
     }
 }
 
-/// Luma of a pixel, on its scale.
 fn luma([r, g, b]: [f32; 3]) -> f32 {
     RED * r + (1.0 - RED - BLUE) * g + BLUE * b
 }
 
-/// The nearest byte.
 fn byte(value: f32) -> u8 {
     (value + 0.5) as u8
 }

@@ -19,7 +19,6 @@ use crate::pipeline::train::{TrainConfig, TrainView};
 use crate::render::{DrawError, RenderSettings, Renderer};
 use crate::scene::{Dataset, GaussianCloud};
 
-/// Timing of one scene at one size.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct RenderTiming {
     pub(crate) name: String,
@@ -36,7 +35,6 @@ pub(crate) struct RenderTiming {
     pub(crate) products_per_sec: f64,
 }
 
-/// Timing of training steps.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct StepTiming {
     pub(crate) name: String,
@@ -45,11 +43,9 @@ pub(crate) struct StepTiming {
     pub(crate) size: [u32; 2],
     /// Milliseconds of a step, median.
     pub(crate) step_ms: f64,
-    /// Steps per second, from the median.
     pub(crate) steps_per_sec: f64,
 }
 
-/// Times the CPU renderer on a cloud.
 pub(crate) fn render(
     name: &str,
     cloud: &Arc<GaussianCloud>,

@@ -26,9 +26,6 @@ pub struct Measurement {
 
 /// Draws a cloud `repeats` times, after one that does not count; the copy of the image to the host is included. On a
 /// GPU, where timing the stages is not free, they are timed in as many runs of their own.
-///
-/// # Errors
-/// If the device fails.
 pub fn frame(
     renderer: &mut Renderer,
     cloud: &Arc<GaussianCloud>,
@@ -57,9 +54,6 @@ pub fn frame(
 
 /// Makes `repeats` training steps on one photo, after one that does not count. The whole is the mean over steps
 /// that follow each other without waiting.
-///
-/// # Errors
-/// If the device fails.
 pub fn training_step(
     device: &Device,
     cloud: &GaussianCloud,
@@ -97,16 +91,13 @@ pub fn training_step(
     Ok(Measurement { stages: medians(&runs), whole_secs })
 }
 
-/// Medians over runs that had the same stages.
 fn medians(runs: &[StageTimes]) -> StageTimes {
     let stage = |k: usize| median(&runs.iter().filter_map(|r| r.get(k)).map(|s| s.1).collect::<Vec<_>>());
     runs.first().into_iter().flatten().enumerate().map(|(k, (name, _))| (*name, stage(k))).collect()
 }
 
-/// Timing of frames or training steps.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Timing {
-    /// The scene or dataset.
     pub(crate) name: String,
     pub(crate) gaussians: usize,
     /// Width and height, px.
@@ -118,9 +109,6 @@ pub(crate) struct Timing {
 }
 
 /// Times the GPU renderer on a cloud, from the same views as [`super::cpu::render`].
-///
-/// # Errors
-/// If the device fails.
 pub(crate) fn render(
     device: &Device,
     name: &str,
@@ -135,9 +123,6 @@ pub(crate) fn render(
 }
 
 /// Times GPU training steps from the dataset's own starting cloud, on a few of its photos.
-///
-/// # Errors
-/// If the device fails.
 pub(crate) fn train_steps(
     device: &Device,
     dataset: &Dataset,

@@ -30,18 +30,13 @@ pub fn views_of<R: Real>(cloud: &GaussianCloud<R>, width: u32, height: u32) -> V
         .collect()
 }
 
-/// Everything that one run has measured.
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct Timings {
-    /// Drawing on the CPU.
     pub(crate) render: Vec<RenderTiming>,
-    /// Training on the CPU.
     pub(crate) train: Vec<StepTiming>,
     /// Name and features of the GPU, if it was asked for.
     pub(crate) gpu: Option<String>,
-    /// Drawing on the GPU.
     pub(crate) gpu_render: Vec<Timing>,
-    /// Training on the GPU.
     pub(crate) gpu_train: Vec<Timing>,
     /// What one core could do at most (see [`one_core_limit`]).
     pub(crate) one_core_products_per_sec: f64,

@@ -23,13 +23,10 @@ use crate::scene::{Identities, IdentityId, LanguageFeatures, Level, NOBODY, View
 /// Median and 95th percentile, ms.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub(crate) struct Percentiles {
-    /// Half of the queries take no longer.
     pub(crate) p50_ms: f64,
-    /// 95 of 100 take no longer.
     pub(crate) p95_ms: f64,
 }
 
-/// Times of the stages of a query.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct QueryTiming {
     pub(crate) encoder: String,
@@ -41,7 +38,6 @@ pub(crate) struct QueryTiming {
     #[serde(flatten)]
     pub(crate) stages: Stages<Percentiles>,
     pub(crate) without_encoding: Percentiles,
-    /// From the text to the mask.
     pub(crate) whole: Percentiles,
 }
 
@@ -68,7 +64,6 @@ impl QueryTiming {
     }
 }
 
-/// Words that queries are made of.
 const COLORS: [&str; 6] = ["red", "blue", "green", "yellow", "white", "black"];
 const THINGS: [&str; 8] = ["controller", "mug", "kettle", "lamp", "camera", "book", "car", "jar"];
 const PARTS: [&str; 6] = ["button", "handle", "lid", "shade", "lens", "wheel"];
@@ -124,7 +119,6 @@ pub(crate) fn time(
     })
 }
 
-/// Objects with four parts each.
 fn scene(identities: usize) -> Identities {
     let mut all = Identities::default();
     let mut object = NOBODY;
@@ -159,11 +153,5 @@ fn view(rng: &mut Pcg64Mcg, identities: usize, [w, h]: [usize; 2]) -> ViewMap {
         let far = |k: &usize| (points[*k][0] - x).pow(2) + (points[*k][1] - y).pow(2);
         (0..points.len()).min_by_key(far).map_or(NOBODY, |k| k as IdentityId + 1)
     };
-    ViewMap {
-        width_px: w,
-        height_px: h,
-        identity: (0..w * h).map(nearest).collect(),
-        share: vec![1.0; w * h],
-        alpha: vec![1.0; w * h],
-    }
+    ViewMap::certain(w, (0..w * h).map(nearest).collect())
 }

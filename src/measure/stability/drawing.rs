@@ -319,12 +319,8 @@ fn crowds(all: &mut Scenes) {
 /// Many alike, small and round.
 fn many(n: usize, place: impl Fn(usize) -> [f64; 3], scale: f64, logit: f64) -> GaussianCloud<f64> {
     GaussianCloud {
-        positions: (0..n).map(place).collect(),
-        log_scales: vec![[scale.ln(); 3]; n],
-        quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
-        opacity_logits: vec![logit; n],
         sh: vec![[0.5, 0.1, -0.2]; n],
-        ..GaussianCloud::default()
+        ..GaussianCloud::isotropic((0..n).map(place).collect(), scale.ln(), logit)
     }
 }
 

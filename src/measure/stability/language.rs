@@ -9,21 +9,17 @@ use crate::pipeline::semantics::codes::{self, TOLERANCE};
 use crate::pipeline::semantics::localize::{Scorer, localize};
 use crate::pipeline::semantics::parse::ParsedQuery;
 use crate::pipeline::semantics::relevancy::{advantage, deviate, score};
-use crate::scene::{Identities, Level, LevelFilter, NOBODY};
+use crate::scene::{Identities, LevelFilter};
 
 /// Identities whose codes are assigned, each an object.
 fn identities(n: usize) -> Identities {
-    let mut all = Identities::default();
-    for _ in 0..n {
-        all.add(Level::Object, NOBODY, Vec::new());
-    }
+    let mut all = Identities::objects(n);
     let centers: Vec<DVec3> =
         (0..n).map(|i| DVec3::new((i % 16) as f64, (i / 16 % 16) as f64, (i / 256) as f64)).collect();
     codes::assign(&mut all, &centers);
     all
 }
 
-/// The same scores for everything.
 struct Fixed([f32; 4]);
 
 impl Scorer for Fixed {

@@ -21,7 +21,6 @@ use serde::Serialize;
 
 use super::table::{Rows, rows};
 
-/// Whether a promise holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Verdict {
@@ -45,7 +44,6 @@ impl Verdict {
     }
 }
 
-/// What happened in a case.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Finding {
     pub(crate) outcome: String,
@@ -86,12 +84,10 @@ pub(crate) struct Case {
     run: Box<dyn Fn(bool) -> Finding + Send + Sync>,
 }
 
-/// A case and what was found.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Checked {
     pub(crate) area: &'static str,
     pub(crate) name: String,
-    /// How long it took, seconds.
     pub(crate) secs: f64,
     pub(crate) finding: Finding,
 }
@@ -121,7 +117,6 @@ impl Case {
     }
 }
 
-/// What was found, a row for each case.
 pub(crate) fn table(checked: &[Checked]) -> Rows {
     let number = |v: f64| if v.is_nan() { String::new() } else { format!("{v:.1e}") };
     rows(

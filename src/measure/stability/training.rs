@@ -16,7 +16,6 @@ use crate::render::cpu::ssim::ssim;
 use crate::render::{Features, RenderSettings};
 use crate::scene::{GaussianCloud, PhotoPixels};
 
-/// Steps of a short training.
 const STEPS: u64 = 60;
 
 /// A photo of one gray level.
@@ -30,7 +29,6 @@ pub(crate) fn flat(level: u8) -> TrainView {
     }
 }
 
-/// A photo of a colored blob.
 pub(super) fn blob() -> TrainView {
     let mut view = flat(0);
     let cloud = one([0.5, 0.3, 0.4], [0.9, 0.1, 0.2, 0.0], 3.0).cast::<f32>();
@@ -41,7 +39,6 @@ pub(super) fn blob() -> TrainView {
     view
 }
 
-/// Some Gaussians around the middle.
 pub(super) fn start() -> GaussianCloud {
     let mut cloud = one([0.2; 3], [1.0, 0.0, 0.0, 0.0], -1.0).cast::<f32>();
     cloud = cloud.select(&[0; 24]);
@@ -52,13 +49,11 @@ pub(super) fn start() -> GaussianCloud {
     cloud
 }
 
-/// A trainer of these Gaussians.
 pub(crate) fn trainer(cloud: GaussianCloud, steps: u64, densify: bool, extent: f64) -> Trainer {
     let config = TrainConfig { steps, densify, sh_degree: 0, ..TrainConfig::default() };
     Trainer::new(cloud, &config, [0.0; 3], extent, Pcg64Mcg::seed_from_u64(5))
 }
 
-/// What a short training came to.
 pub(super) struct ShortTraining {
     pub(super) trainer: Trainer,
     pub(super) losses: Vec<f64>,

@@ -13,7 +13,6 @@ use crate::scene::{Camera, GaussianCloud};
 struct Variant {
     /// Whether the mean along the ray is taken, not the depth at which half of the light is spent.
     expected: bool,
-    /// Images are smaller by this factor.
     smaller: u32,
     settings: RenderSettings,
 }

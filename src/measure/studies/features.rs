@@ -133,7 +133,6 @@ fn variants(views: usize, steps: &[u64]) -> Variants<Variant> {
     all
 }
 
-/// The identity of each Gaussian by votes.
 fn vote(
     (cloud, settings): (&GaussianCloud, &RenderSettings),
     identities: &Identities,

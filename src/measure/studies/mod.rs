@@ -25,7 +25,6 @@ impl<V> Variants<V> {
         Self(vec![(SweepCase::default(default), variant)])
     }
 
-    /// Adds a setting of a knob.
     fn add(&mut self, method: &str, setting: impl Into<String>, knobs: &[(&str, serde_json::Value)], variant: V) {
         self.0.push((SweepCase::new(method, setting, knobs), variant));
     }
@@ -39,7 +38,6 @@ fn timed<F>(mut draw: impl FnMut() -> Result<F, StudyError>) -> Result<(F, f64),
     Ok((drawn, start.elapsed().as_secs_f64()))
 }
 
-/// A measure that is an error.
 fn error(name: &str, meaning: &str) -> Measure {
     Measure::new(name, "", ErrorKind::Error, meaning)
 }

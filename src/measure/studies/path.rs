@@ -17,14 +17,12 @@ use crate::navigate::pose::{RotationSpline, angle};
 use crate::navigate::{CameraTrajectory, FRAMES, Navigator, Pose, Speed};
 use crate::scene::{Camera, GaussianCloud};
 
-/// Flights of one measurement.
 const FLIGHTS: usize = 24;
 /// A turn from one pose to the next that is seen as a jerk, radians.
 const JERK: f64 = 3.0 * std::f64::consts::PI / 180.0;
 /// Places between two poses that are looked at.
 const BETWEEN: usize = 16;
 
-/// One way to fly.
 #[derive(Clone, Copy)]
 struct Variant {
     frames: usize,
@@ -36,7 +34,6 @@ struct Variant {
 #[derive(Clone, Copy)]
 enum Way {
     Ours,
-    /// The paper's, as it is printed.
     Printed,
     /// The paper's, through all keypoints of the route.
     Through,
@@ -133,7 +130,6 @@ fn variants() -> Variants<Variant> {
     all
 }
 
-/// What is wrong with a flight.
 struct Faults {
     /// Share of its steps that come too near to occupied space or turn too far.
     steps: f64,

@@ -25,12 +25,10 @@ use crate::scene::{Camera, GaussianCloud, IdentityId, LanguageFeatures, Level, L
 
 pub(crate) struct LabeledScene {
     pub(crate) name: String,
-    /// Its camera, of the labels' size.
     pub(crate) camera: Camera,
     pub(crate) categories: Vec<Category>,
 }
 
-/// How stored embeddings are kept.
 #[derive(Clone, Copy, PartialEq)]
 enum Precision {
     Stored,
@@ -143,7 +141,6 @@ pub(crate) fn study<'a>(
     }))
 }
 
-/// The features that a variant leaves.
 fn reduced(language: &LanguageFeatures, map: &SemanticMap, variant: &Variant) -> LanguageFeatures {
     let mut features = language.clone();
     let objects: Vec<IdentityId> =

@@ -23,7 +23,6 @@ const AFAR: u32 = 4;
 /// Turn of the camera, degrees, since an order of splats was found that is used again.
 const TURNS: [f64; 3] = [0.5, 2.0, 8.0];
 
-/// One way to draw.
 #[derive(Clone, Copy, PartialEq)]
 enum Way {
     /// In single precision on the CPU.
@@ -41,7 +40,6 @@ enum Way {
     Afar(u32),
 }
 
-/// A way and its settings.
 type Variant = (Way, RenderSettings);
 
 struct Drawing {

@@ -14,9 +14,6 @@ use crate::scene::Dataset;
 const EVALUATIONS: u64 = 8;
 
 /// The sweep of training on `dataset`; `base` is what is turned one knob at a time.
-///
-/// # Errors
-/// If a photo cannot be read, or none is held out.
 pub(crate) fn study(
     dataset: &Dataset,
     base: TrainConfig,

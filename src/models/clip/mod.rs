@@ -14,10 +14,8 @@ use super::{Encoder, IdentityCrop, ModelError, manifest};
 use crate::math::resize::Filter;
 use crate::scene::PhotoPixels;
 
-/// Tiles that go through the network together.
 const BATCH: usize = 8;
 
-/// What the metadata file says.
 #[derive(Clone, Debug, Deserialize)]
 struct Metadata {
     name: String,
@@ -44,7 +42,6 @@ struct Graphs {
     text: manifest::GraphFile,
 }
 
-/// Tokens that CLIP's own vocabulary has.
 const VOCABULARY: usize = 49_408;
 
 /// A CLIP with its networks, each prepared when it is first needed.
@@ -59,9 +56,6 @@ pub struct ClipEncoder {
 
 impl ClipEncoder {
     /// The model that a metadata file describes; its graphs lie beside it.
-    ///
-    /// # Errors
-    /// If the file cannot be read, or describes what this program cannot do.
     pub fn open(path: &Path) -> Result<Self, ModelError> {
         let about: Metadata = manifest::read(path, "clip")?;
         let refused = |problem: String| ModelError::Metadata { path: path.into(), problem };
@@ -103,18 +97,12 @@ impl ClipEncoder {
     }
 
     /// Embeddings of prepared pictures `[n, 3, S, S]`, of unit length.
-    ///
-    /// # Errors
-    /// If the network cannot be loaded, or fails.
     pub fn embed_pixels(&mut self, pixels: Tensor) -> Result<Vec<Vec<f32>>, ModelError> {
         let network = self.about.graphs.image.ready(&mut self.image, &self.folder)?;
         network.unit_rows(vec![("pixels", pixels.into())], "embedding", self.about.embed_dim)
     }
 
     /// Embeddings of rows of tokens, of unit length.
-    ///
-    /// # Errors
-    /// If the network cannot be loaded, or fails.
     pub fn embed_tokens(&mut self, tokens: Tensor<i64>) -> Result<Vec<Vec<f32>>, ModelError> {
         let network = self.about.graphs.text.ready(&mut self.text, &self.folder)?;
         network.unit_rows(vec![("tokens", tokens.into())], "embedding", self.about.embed_dim)
@@ -168,7 +156,6 @@ fn tile_error(tile: &IdentityCrop) -> ModelError {
     ModelError::TileSize { side_px: tile.side_px, pixels: tile.rgb.len(), expected_px: tile.side_px }
 }
 
-/// A tile as bytes.
 fn picture(tile: &IdentityCrop) -> Result<PhotoPixels, ModelError> {
     if tile.rgb.len() != tile.side_px * tile.side_px {
         return Err(tile_error(tile));

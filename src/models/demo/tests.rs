@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use serde::Deserialize;
 
@@ -214,33 +213,6 @@ fn both_engines_agree() {
     let mut others = b;
     others.rotate_left(1);
     assert!(largest(&others) > 1e-2);
-}
-
-/// Not a check: prints how long a phrase and a tile take.
-#[test]
-#[ignore = "prints times"]
-fn times() {
-    let mut encoder = DemoEncoder::new().unwrap();
-    let (_, tiles) = held_out();
-    let start = Instant::now();
-    encoder.text("red mug").unwrap();
-    let first_text = start.elapsed();
-    let start = Instant::now();
-    encoder.image(&tiles[0]).unwrap();
-    let first_image = start.elapsed();
-    let mut ms = [vec![], vec![]];
-    for tile in &tiles[..60] {
-        let start = Instant::now();
-        encoder.text("handle of the red mug").unwrap();
-        ms[0].push(start.elapsed().as_secs_f64() * 1e3);
-        let start = Instant::now();
-        encoder.image(tile).unwrap();
-        ms[1].push(start.elapsed().as_secs_f64() * 1e3);
-    }
-    ms.iter_mut().for_each(|m| m.sort_by(f64::total_cmp));
-    println!("{}: first text {first_text:?}, first tile {first_image:?}", engine().unwrap().name());
-    println!("least: text {:.2} ms, tile {:.2} ms", ms[0][0], ms[1][0]);
-    println!("text p50 {:.2} p95 {:.2} ms, tile p50 {:.2} p95 {:.2} ms", ms[0][30], ms[0][57], ms[1][30], ms[1][57]);
 }
 
 /// Bars, a little under what was measured when the networks were made.

@@ -101,9 +101,6 @@ fn grid(per_side: usize) -> Vec<[f64; 2]> {
 
 /// Masks of everything in a picture, best first. `go_on` is told the share that is done, and says
 /// whether to go on; what was found until then is returned.
-///
-/// # Errors
-/// If the network fails.
 pub fn everything(
     network: &mut dyn PromptedMasks,
     picture: &PhotoPixels,

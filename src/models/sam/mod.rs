@@ -30,16 +30,10 @@ pub trait PromptedMasks {
     fn name(&self) -> &str;
 
     /// Looks at a picture.
-    ///
-    /// # Errors
-    /// If the picture has no pixels or the network fails.
     fn look(&mut self, picture: &PhotoPixels) -> Result<(), ModelError>;
 
     /// Masks for points `[prompts, points, 2]` in px of the network's square, with labels
     /// `[prompts, points]` (-1 none, 0 background, 1 foreground, 2 and 3 a box's corners).
-    ///
-    /// # Errors
-    /// If no picture was looked at, or the network fails.
     fn masks(&mut self, points: Tensor, labels: Tensor, earlier: Option<Tensor>) -> Result<Prompted, ModelError>;
 
     /// Side of the network's square, px.
@@ -76,9 +70,6 @@ pub struct Sam {
 
 impl Sam {
     /// The model that a metadata file describes; its graphs lie beside it.
-    ///
-    /// # Errors
-    /// If the file cannot be read, or describes another kind of model.
     pub fn open(path: &Path) -> Result<Self, ModelError> {
         let about: Metadata = manifest::read(path, "sam")?;
         let Metadata { image_size, mean, std, .. } = about;
@@ -125,7 +116,6 @@ impl PromptedMasks for Sam {
     }
 }
 
-/// The decoder's inputs that describe prompts.
 pub(super) fn prompt_inputs(
     points: Tensor,
     labels: Tensor,

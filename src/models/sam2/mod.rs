@@ -17,11 +17,9 @@ use super::{ModelError, manifest};
 use crate::math::resize::{Filter, resize};
 use crate::scene::PhotoPixels;
 
-/// What the metadata file says.
 #[derive(Clone, Debug, Deserialize)]
 pub(crate) struct Metadata {
     pub(crate) name: String,
-    /// Side of its square, px.
     pub(crate) image_size: usize,
     mean: [f32; 3],
     std: [f32; 3],
@@ -41,7 +39,6 @@ pub(crate) struct Metadata {
     pub(crate) multimask_points: [usize; 2],
     /// Whether three masks are tried while following.
     pub(crate) multimask_when_tracking: bool,
-    /// Whether the pointer is that of the best mask of three.
     pub(crate) pointer_of_best_mask: bool,
     /// Shift of the threshold that stability is measured with, logits.
     pub(crate) stability_delta: f32,
@@ -95,7 +92,6 @@ pub(crate) struct Decoded {
 /// SAM 2's networks, each loaded when it is first needed.
 pub struct Sam2 {
     folder: PathBuf,
-    /// What the model's metadata says.
     pub(crate) about: Metadata,
     prepare: Prepare,
     encoder: Option<Network>,
@@ -109,9 +105,6 @@ pub struct Sam2 {
 
 impl Sam2 {
     /// The model that a metadata file describes; its graphs lie beside it.
-    ///
-    /// # Errors
-    /// If the file cannot be read, or describes another kind of model.
     pub fn open(path: &Path) -> Result<Self, ModelError> {
         let about: Metadata = manifest::read(path, "sam2")?;
         let Metadata { image_size, mean, std, .. } = about;
@@ -143,9 +136,6 @@ impl Sam2 {
     }
 
     /// Looks at a frame of a sequence.
-    ///
-    /// # Errors
-    /// If it has no pixels, or the network fails.
     pub(crate) fn encode(&mut self, picture: &PhotoPixels) -> Result<EncodedFrame, ModelError> {
         let image = self.prepare.picture(picture).ok_or(ModelError::NoPicture)?;
         self.encode_pixels(image)
@@ -169,9 +159,6 @@ impl Sam2 {
     }
 
     /// Looks at a prepared picture, `[1, 3, S, S]`.
-    ///
-    /// # Errors
-    /// If the network fails.
     pub fn encode_pixels(&mut self, image: Tensor) -> Result<EncodedFrame, ModelError> {
         let encoder = self.about.graphs.encoder.ready(&mut self.encoder, &self.folder)?;
         let mut out = encoder.run(vec![("image", image.into())])?;
@@ -198,9 +185,6 @@ impl Sam2 {
     }
 
     /// Masks for prompts on a frame whose embeddings may be conditioned on memories.
-    ///
-    /// # Errors
-    /// If the network fails.
     pub(crate) fn decode(
         &mut self,
         frame: &EncodedFrame,

@@ -64,9 +64,6 @@ pub trait FrameSource {
     }
 
     /// One of them.
-    ///
-    /// # Errors
-    /// If it cannot be read, or encoded.
     fn get(&mut self, model: &mut Sam2, index: usize) -> Result<EncodedFrame, ModelError>;
 }
 
@@ -76,9 +73,6 @@ pub struct InMemory(pub Vec<EncodedFrame>);
 
 impl InMemory {
     /// Looks at all pictures.
-    ///
-    /// # Errors
-    /// If one has no pixels, or the network fails.
     pub fn of(model: &mut Sam2, pictures: &[PhotoPixels]) -> Result<Self, ModelError> {
         pictures.iter().map(|p| model.encode(p)).collect::<Result<_, _>>().map(Self)
     }
@@ -117,9 +111,6 @@ impl<'a> Track<'a> {
     }
 
     /// Marks an object in a frame.
-    ///
-    /// # Errors
-    /// If a network fails.
     pub fn prompt(&mut self, frame: usize, object: ObjectId, prompt: &Prompt) -> Result<(), ModelError> {
         self.objects.entry(object).or_default();
         let out = match prompt {
@@ -318,9 +309,6 @@ impl<'a> Track<'a> {
 
     /// Follows all objects from the first prompted frame on, or back from it. `seen` is told every
     /// frame with its objects, and says whether to go on.
-    ///
-    /// # Errors
-    /// If a network fails, or nothing is marked.
     pub fn run(
         &mut self,
         backward: bool,

@@ -4,7 +4,6 @@ use serde::Serialize;
 
 use crate::math::stats::{mean, median};
 
-/// The errors of some pixels.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct DepthErrors {
     /// Pixels that truly show something.
@@ -17,17 +16,13 @@ pub(crate) struct DepthErrors {
     pub(crate) median_abs: f64,
     /// Root of the mean squared error, scene units.
     pub(crate) rmse: f64,
-    /// Mean of error over true depth.
     pub(crate) mean_rel: f64,
     /// Share of all pixels whose depth is within 1 % of the truth.
     pub(crate) within_1: f64,
-    /// The same for 2 %.
     pub(crate) within_2: f64,
-    /// The same for 5 %.
     pub(crate) within_5: f64,
 }
 
-/// Drawn and true depths side by side.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Samples {
     abs: Vec<f64>,

@@ -55,38 +55,26 @@ pub(crate) const FOLDER: &str = "depth";
 
 /// Why depths could not be compared.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum DepthError {
-    /// The data set has none, or a damaged one.
     #[error(
         "{0}; true depths are needed, as 'fmlgs synth' and 'fmlgs demo' write them into the folder 'depth' beside the \
          photos"
     )]
     Truth(#[from] IoError),
-    /// A map of another shape than its photo.
     #[error("{path}: {found:?} px, but its photo has {photo:?} px; the folder belongs to other photos")]
-    Size {
-        /// The depth map.
-        path: PathBuf,
-        /// Its width and height.
-        found: [usize; 2],
-        /// The photo's.
-        photo: [usize; 2],
-    },
-    /// The view could not be drawn.
+    Size { path: PathBuf, found: [usize; 2], photo: [usize; 2] },
     #[error(transparent)]
     Render(#[from] RenderError),
 }
 
-/// The errors of one kind of depth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Split {
-    /// Of all pixels that show something.
     pub(crate) all: DepthErrors,
     /// Of those within [`EDGE_PX`] of a jump of the true depth.
     pub(crate) edges: DepthErrors,
 }
 
-/// The errors of both kinds of depth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct DepthScores {
     /// Of `sum(w z) / sum(w)`.
@@ -95,7 +83,6 @@ pub(crate) struct DepthScores {
     pub(crate) median: Split,
 }
 
-/// Counts errors view after view.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DepthCounter {
     /// Of expected depth: all pixels, edges.
@@ -119,9 +106,6 @@ impl DepthCounter {
     }
 
     /// Draws `cloud` as `camera` sees it and adds its depths.
-    ///
-    /// # Errors
-    /// If the view cannot be drawn.
     pub(crate) fn draw(
         &mut self,
         renderer: &mut Renderer,
@@ -137,7 +121,6 @@ impl DepthCounter {
         Ok(())
     }
 
-    /// The errors so far.
     pub(crate) fn scores(&self) -> DepthScores {
         let split = |[all, edges]: &[Samples; 2]| Split { all: all.errors(), edges: edges.errors() };
         DepthScores { expected: split(&self.expected), median: split(&self.median) }
@@ -145,9 +128,6 @@ impl DepthCounter {
 }
 
 /// The true depth of `photo`, in the folder `depth` of the data set at `root`, at full size.
-///
-/// # Errors
-/// If there is none, or one of another size.
 pub(crate) fn of_photo(root: &Path, photo: &Photo) -> Result<TrueDepth, DepthError> {
     let stem = Path::new(&photo.name).file_stem().unwrap_or_default();
     let path = root.join(FOLDER).join(stem).with_extension("npy");

@@ -14,9 +14,7 @@ pub(crate) const EDGE_PX: usize = 2;
 /// Depths along the camera's axis at pixel centers, row by row; 0 where nothing is.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TrueDepth {
-    /// Pixels per row.
     pub(crate) width: usize,
-    /// Rows.
     pub(crate) height: usize,
     /// Scene units.
     pub(crate) values: Vec<f32>,
@@ -24,9 +22,6 @@ pub(crate) struct TrueDepth {
 
 impl TrueDepth {
     /// Reads an `.npy` file.
-    ///
-    /// # Errors
-    /// If it is no map of depths.
     pub(crate) fn read(path: &Path) -> Result<Self, IoError> {
         let (width, height, values) = npy::read_map(path)?;
         Ok(Self { width, height, values })

@@ -12,7 +12,6 @@ use super::timing::{StagesMs, ms_since};
 use super::view_map::ViewMap;
 use crate::scene::{Identities, IdentityId, LanguageFeatures, LevelFilter, Mask};
 
-/// What an answer rests on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Basis {
     /// Names that people or label files gave.
@@ -25,7 +24,6 @@ pub(crate) enum Basis {
 #[derive(Clone, Debug, PartialEq)]
 pub struct QueryAnswer {
     pub(crate) answer: Answer,
-    /// What that rests on.
     pub(crate) basis: Basis,
     /// Relevancy of every identity by number, 0 to 1; a piece is at least as relevant as its whole
     /// where names decide.
@@ -37,7 +35,6 @@ pub struct QueryAnswer {
 /// Features and encoded phrases for answers by meaning.
 #[derive(Clone, Copy)]
 pub(crate) struct Language<'a> {
-    /// Of the scene's identities.
     pub(crate) features: &'a LanguageFeatures,
     /// With the query's phrases learnt; see [`phrases_of`].
     pub(crate) phrases: &'a TextEmbeddings,
@@ -70,7 +67,6 @@ pub(crate) fn answer(
     QueryAnswer { stages, ..taken }
 }
 
-/// Counts the time that scores take.
 struct Timed<'a, S> {
     scorer: &'a mut S,
     ms: f64,
@@ -117,7 +113,6 @@ fn judged<S: Scorer>(
     QueryAnswer { answer, basis, relevancy, stages }
 }
 
-/// Answers by names alone.
 pub(crate) fn by_name(identities: &Identities, phrase: &ParsedQuery, level: LevelFilter) -> QueryAnswer {
     judged((identities, phrase, level), Basis::Names, &mut ByName(identities), |answer, _| {
         let alone = names::scores(identities, &phrase.target);
@@ -244,8 +239,7 @@ mod tests {
         assert_eq!(stages.whole(), stages.relevancy + stages.localize, "nothing else happens here");
         let a = ask("lamp", true);
         assert_eq!(a.chosen(2), [1], "only what fits");
-        let map =
-            ViewMap { width_px: 3, height_px: 1, identity: vec![1, 2, 3], share: vec![1.0; 3], alpha: vec![1.0; 3] };
+        let map = ViewMap::certain(3, vec![1, 2, 3]);
         let (all, _) = scene();
         assert_eq!(a.mask(&map, &all, 1).area(), 2, "a piece belongs to its whole");
         assert_eq!(a.heat(&map)[2], 0.0);

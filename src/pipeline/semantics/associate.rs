@@ -10,7 +10,6 @@ const SAME: f64 = 0.5;
 /// Pixels that must be the same at least.
 const LEAST_PX: usize = 12;
 
-/// What a mask is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Link {
     Known(IdentityId),
@@ -157,7 +156,7 @@ mod tests {
         identity[20..40].fill(pot);
         identity[40..55].fill(lid);
         identity[60..].fill(UNKNOWN);
-        let map = ViewMap { width_px: 100, height_px: 1, identity, share: vec![1.0; 100], alpha: vec![1.0; 100] };
+        let map = ViewMap::certain(100, identity);
         let masks = [
             // The pot with its far side, of which nothing is known yet.
             found(Level::Object, None, Mask::from_fn(100, 1, |i| (22..55).contains(&i) || i >= 70)),
@@ -177,13 +176,7 @@ mod tests {
     fn two_masks_cannot_be_the_same_identity() {
         let mut all = Identities::default();
         let cup = all.add(Level::Object, NOBODY, vec![]);
-        let map = ViewMap {
-            width_px: 100,
-            height_px: 1,
-            identity: vec![cup; 100],
-            share: vec![1.0; 100],
-            alpha: vec![1.0; 100],
-        };
+        let map = ViewMap::certain(100, vec![cup; 100]);
         let masks = [found(Level::Object, None, mask(0, 55)), found(Level::Object, None, mask(40, 100))];
         let links = link(&masks, Some(&map), &all);
         assert_eq!(links, [Link::Split(cup), Link::Known(cup)]);
@@ -199,7 +192,7 @@ mod tests {
         let mut identity = vec![cup; 50];
         identity.extend(vec![pot; 30]);
         identity.extend(vec![lid; 20]);
-        let map = ViewMap { width_px: 100, height_px: 1, identity, share: vec![1.0; 100], alpha: vec![1.0; 100] };
+        let map = ViewMap::certain(100, identity);
         let both = [found(Level::Object, None, mask(5, 100))];
         let links = link(&both, Some(&map), &all);
         assert_eq!(disagreements(&both, &links, &map, &all), [Disagreement::Merge(vec![cup, pot])]);
@@ -217,7 +210,7 @@ mod tests {
         let pot = all.add(Level::Object, NOBODY, vec!["pot".into()]);
         let mut identity = vec![NOBODY; 100];
         identity[..50].fill(pot);
-        let map = ViewMap { width_px: 100, height_px: 1, identity, share: vec![1.0; 100], alpha: vec![1.0; 100] };
+        let map = ViewMap::certain(100, identity);
         let named = |name: &str, level, parent, from, to| FoundMask {
             name: Some(name.into()),
             ..found(level, parent, mask(from, to))
@@ -243,7 +236,7 @@ mod tests {
         let cup = all.add(Level::Object, NOBODY, vec![]);
         let view = |from: usize, to: usize| {
             let identity = (0..100).map(|i| if (from..to).contains(&i) { cup } else { NOBODY }).collect();
-            ViewMap { width_px: 100, height_px: 1, identity, share: vec![1.0; 100], alpha: vec![1.0; 100] }
+            ViewMap::certain(100, identity)
         };
         let one = |known: (usize, usize), seen: (usize, usize)| {
             link(&[found(Level::Object, None, mask(seen.0, seen.1))], Some(&view(known.0, known.1)), &all)[0]

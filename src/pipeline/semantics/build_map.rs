@@ -7,24 +7,24 @@ use serde::{Deserialize, Serialize};
 
 use super::associate::Disagreement;
 use super::codes;
-use super::embed::{EmbedError, embed};
+use super::embed::embed;
+use super::error::FindError;
 use super::network_segmenter::NetworkMasks;
 use super::regions::Regions;
 use super::sam2_tracker::Sam2Tracker;
-use super::segmenter::{FileMasks, SegmentError, Segmenter};
-use super::tracker::{TrackError, TrackOptions, Tracked, ViewReport, track};
+use super::segmenter::{FileMasks, Segmenter};
+use super::tracker::{TrackOptions, Tracked, ViewReport, track};
 use super::train_codes::{CodeTraining, CodeView, decode, train_codes};
 use super::view_map::ViewMap;
 use crate::io::labels::Labels;
 use crate::models::Encoder;
 use crate::pipeline::observer::{Observer, Severity};
-use crate::render::{RenderError, RenderSettings, Renderer};
+use crate::render::{RenderSettings, Renderer};
 use crate::scene::semantic_map::{BACKGROUND_CODE, CODE_CHANNELS};
 use crate::scene::{GaussianCloud, IdentityId, Photo, SemanticMap};
 
 /// Longer side of the masks that codes are trained on, px.
 const CODE_SIDE_PX: u32 = 256;
-/// Steps of training codes.
 pub(crate) const CODE_STEPS: u64 = 1_000;
 /// Seed of the order in which views are trained on.
 const SEED: u64 = 0;
@@ -57,12 +57,9 @@ pub enum Carry {
 /// Name of the masks that need no model.
 pub(crate) const REGIONS: &str = "regions";
 
-/// Settings of the whole way.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct FindOptions {
-    /// How masks become identities.
     pub(crate) track: TrackOptions,
-    /// How identities become codes of Gaussians.
     pub(crate) lifting: Lifting,
     /// Steps of training codes, where they are trained.
     pub(crate) code_steps: u64,
@@ -76,7 +73,6 @@ impl Default for FindOptions {
 
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Found {
-    /// Objects and parts of the scene.
     pub(crate) map: SemanticMap,
     /// What masks of the first photos explain of each photo.
     pub(crate) views: Vec<ViewReport>,
@@ -86,31 +82,14 @@ pub(crate) struct Found {
     pub(crate) secs: Vec<(&'static str, f64)>,
 }
 
-/// Why objects could not be found.
-#[derive(Debug, thiserror::Error)]
-pub enum FindError {
-    /// In making identities of masks.
-    #[error(transparent)]
-    Track(#[from] TrackError),
-    /// In training codes.
-    #[error("training codes: {0}")]
-    Lift(#[from] RenderError),
-    /// In looking at the identities.
-    #[error(transparent)]
-    Embed(#[from] EmbedError),
-}
-
 /// What finds the masks of photos that `cloud` was trained on: files, where there are any, else the
 /// network of this name, else regions of the photos.
-///
-/// # Errors
-/// If there are no masks at `files`, or the network cannot be used.
 pub(crate) fn segmenter<'a>(
     files: Option<&Path>,
     cloud: &'a GaussianCloud,
     settings: &'a RenderSettings,
     network: Option<&str>,
-) -> Result<Box<dyn Segmenter + 'a>, SegmentError> {
+) -> Result<Box<dyn Segmenter + 'a>, FindError> {
     Ok(match (files, network) {
         (Some(files), _) => Box::new(FileMasks(Labels::open(files)?)),
         (None, Some(network)) => Box::new(NetworkMasks::open(network)?),
@@ -129,10 +108,6 @@ pub(crate) struct Tools<'a> {
 
 /// Finds the objects and parts of `cloud`, which was trained on `photos`, gives them codes, and lets
 /// an encoder look at them, if there is one.
-///
-/// # Errors
-/// If masks or photos cannot be read, a view cannot be drawn, the encoder fails, or the observer asks
-/// to stop.
 pub(crate) fn find_objects(
     cloud: &GaussianCloud,
     photos: &[Photo],
@@ -191,7 +166,7 @@ fn lift(
     }
     let training = CodeTraining { steps: options.code_steps, seed: SEED };
     train_codes(cloud, &mut map.codes, &views, &map.identities, settings, training, observer)?;
-    observer.proceed().map_err(TrackError::from)?;
+    observer.proceed()?;
     if options.lifting == Lifting::Paper {
         map.identity_of = decode(&map.codes, &map.identities);
     }
@@ -240,25 +215,20 @@ mod tests {
         };
         let color = |i: usize| if i < 9 { [10.0, 0.0, 0.0] } else { [0.0, 0.0, 10.0] };
         GaussianCloud {
-            positions: (0..15).map(place).collect(),
-            log_scales: vec![[-2.4; 3]; 15],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 15],
-            opacity_logits: vec![5.0; 15],
             sh: (0..15).map(color).collect(),
-            ..GaussianCloud::default()
+            ..GaussianCloud::isotropic((0..15).map(place).collect(), -2.4, 5.0)
         }
     }
 
     /// The first photo shows the doll alone, the second everything.
     fn photos() -> Vec<Photo> {
-        let photo = |name: &str, x: f64, away: f64| Photo {
-            name: name.into(),
-            path: PathBuf::new(),
-            camera: Camera::look_at(DVec3::new(x, 0.0, -away), DVec3::new(x, 0.0, 0.0), DVec3::NEG_Y, 0.7, 96, 64)
-                .expect("valid"),
-            distortion: None,
-            test_split: false,
-            background: None,
+        let photo = |name: &str, x: f64, away: f64| {
+            Photo::new(
+                name,
+                PathBuf::new(),
+                Camera::look_at(DVec3::new(x, 0.0, -away), DVec3::new(x, 0.0, 0.0), DVec3::NEG_Y, 0.7, 96, 64)
+                    .expect("valid"),
+            )
         };
         vec![photo("near", -0.75, 1.6), photo("far", 0.0, 3.2)]
     }
@@ -283,7 +253,7 @@ mod tests {
             photo: &Photo,
             max_side_px: u32,
             _: &mut dyn Observer,
-        ) -> Result<Vec<FoundMask>, SegmentError> {
+        ) -> Result<Vec<FoundMask>, FindError> {
             let mut all = Identities::default();
             let doll = all.add(Of::Object, NOBODY, vec![]);
             all.add(Of::Part, doll, vec![]);

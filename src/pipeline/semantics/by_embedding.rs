@@ -9,7 +9,6 @@ use super::relevancy::{CANONICAL, TEMPERATURE, advantage, score};
 use crate::math::finite::{all_finite, insist};
 use crate::scene::{LanguageFeatures, ViewFeatures};
 
-/// Which features of parts are compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum PartFeatures {
     /// Moved towards their whole's: the paper's semantic deviation.
@@ -21,9 +20,7 @@ pub(crate) enum PartFeatures {
 /// How scores are made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmbeddingOptions {
-    /// Which features of parts are compared.
     pub(crate) parts: PartFeatures,
-    /// How pieces of wholes are looked for.
     pub(crate) strategy: Strategy,
     /// Spread of the scores; the order does not depend on it.
     pub(crate) temperature: f32,
@@ -45,9 +42,6 @@ impl TextEmbeddings {
 
     /// Adds the embedding that `encode` makes of each phrase, and of the canonical ones, unless it is
     /// there already.
-    ///
-    /// # Errors
-    /// What `encode` fails with.
     pub fn learn<E>(&mut self, phrases: &[&str], mut encode: impl FnMut(&str) -> Result<Vec<f32>, E>) -> Result<(), E> {
         if self.0.len() > Self::MOST {
             self.0.clear();
@@ -60,7 +54,6 @@ impl TextEmbeddings {
         Ok(())
     }
 
-    /// The embedding of a phrase that was learnt.
     pub(crate) fn get(&self, phrase: &str) -> Option<&[f32]> {
         self.0.get(phrase).map(Vec::as_slice)
     }
@@ -79,12 +72,10 @@ const IDENTITIES_PER_TASK: usize = 32;
 
 /// Scores by language features.
 pub struct EmbeddingScorer<'a> {
-    /// Features of the identities.
     pub(crate) features: &'a LanguageFeatures,
     /// Embeddings of the phrases that will be asked for; others score nothing.
     pub(crate) phrases: &'a TextEmbeddings,
     pub(crate) options: EmbeddingOptions,
-    /// Scores that were asked for already.
     known: Vec<(String, Option<String>, Vec<f32>)>,
 }
 

@@ -45,12 +45,8 @@ mod tests {
     fn cloud(xs: &[f32], origin: DVec3) -> GaussianCloud {
         GaussianCloud {
             origin,
-            positions: xs.iter().map(|x| [*x, 0.0, 0.0]).collect(),
             log_scales: vec![[0.1_f32.ln(), -9.0, -9.0]; xs.len()],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; xs.len()],
-            opacity_logits: vec![0.0; xs.len()],
-            sh: vec![[0.0; 3]; xs.len()],
-            ..GaussianCloud::default()
+            ..GaussianCloud::isotropic(xs.iter().map(|x| [*x, 0.0, 0.0]).collect(), 0.0, 0.0)
         }
     }
 

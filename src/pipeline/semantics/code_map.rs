@@ -10,9 +10,7 @@ const OBJECT_CHANNELS: usize = CODE_CHANNELS / 2;
 /// Blended codes of a view.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CodeMap {
-    /// Width in px.
     pub(crate) width_px: usize,
-    /// Height in px.
     pub(crate) height_px: usize,
     /// Planes of the object's code, then of the part's, row-major. NaN, which nothing matches, where
     /// less than half of the light is blocked. The part's are empty where they were left out.
@@ -21,9 +19,6 @@ pub struct CodeMap {
 
 impl CodeMap {
     /// Blends the `codes` of the Gaussians of `cloud`, those of parts only if there are `parts`.
-    ///
-    /// # Errors
-    /// If the camera is not usable or there is not one set of codes per Gaussian.
     pub fn render(
         renderer: &mut Renderer,
         cloud: &GaussianCloud,
@@ -50,7 +45,6 @@ impl CodeMap {
         Ok(Self { width_px: frame.width_px, height_px: frame.height_px, planes })
     }
 
-    /// The three planes of a level.
     pub(crate) fn level(&self, level: Level) -> &[Vec<f32>] {
         let (object, part) = self.planes.split_at(OBJECT_CHANNELS);
         if level == Level::Object { object } else { part }
@@ -67,12 +61,8 @@ mod tests {
     fn codes_are_means_weighed_by_what_is_seen() {
         // Two Gaussians in one place: both blend, and half of their light is not blocked further out.
         let cloud = GaussianCloud {
-            positions: vec![[0.0; 3], [0.0, 0.0, 0.1]],
-            log_scales: vec![[-1.2; 3]; 2],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 2],
             opacity_logits: vec![0.0, 4.0],
-            sh: vec![[0.0; 3]; 2],
-            ..GaussianCloud::default()
+            ..GaussianCloud::isotropic(vec![[0.0; 3], [0.0, 0.0, 0.1]], -1.2, 0.0)
         };
         let camera =
             Camera::look_at(DVec3::new(0.0, 0.0, -4.0), DVec3::ZERO, DVec3::NEG_Y, 0.8, 61, 41).expect("valid");

@@ -97,25 +97,8 @@ mod tests {
     use crate::scene::{Level, NOBODY};
 
     #[test]
-    fn points_are_on_the_sphere_and_apart() {
-        for n in [1, 2, 3, 50, 300] {
-            let points = sphere(n);
-            assert_eq!(points.len(), n);
-            assert!(points.iter().all(|p| (p.length() - 1.0).abs() < 1e-4));
-            let closest = (0..n).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| points[i].distance(points[j]));
-            let closest = closest.fold(f32::INFINITY, f32::min);
-            let spacing = (4.0 * std::f32::consts::PI / n as f32).sqrt();
-            assert!(closest > 0.6 * spacing, "{n}: {closest} of {spacing}");
-        }
-        assert!(sphere(0).is_empty());
-    }
-
-    #[test]
     fn no_blend_of_two_codes_is_a_third() {
-        let mut all = Identities::default();
-        (0..100).for_each(|_| {
-            all.add(Level::Object, NOBODY, vec![]);
-        });
+        let mut all = Identities::objects(100);
         let centers: Vec<DVec3> = (0..100).map(|i| DVec3::new(f64::from(i % 10), f64::from(i / 10), 0.0)).collect();
         assign(&mut all, &centers);
         let codes: Vec<[f32; 3]> =
@@ -152,10 +135,7 @@ mod tests {
 
     #[test]
     fn neighbors_get_distant_codes() {
-        let mut all = Identities::default();
-        (0..60).for_each(|_| {
-            all.add(Level::Object, NOBODY, vec![]);
-        });
+        let mut all = Identities::objects(60);
         let centers: Vec<DVec3> = (0..60).map(|i| DVec3::new(f64::from(i), 0.0, 0.0)).collect();
         assign(&mut all, &centers);
         let code = |i: u32| Vec3::from(all.get(i).expect("there").code);
@@ -173,8 +153,10 @@ mod tests {
             let nearest = pairs.map(|(i, j)| points[i].dot(points[j])).fold(-1.0, f32::max);
             assert!((nearest - cosine).abs() < 0.2, "{n}: {nearest}");
         }
+        assert!(sphere(0).is_empty() && sphere(1).len() == 1);
         // Of many, none is much nearer to another than they are on average.
         let points = sphere(120);
+        assert!(points.len() == 120 && points.iter().all(|p| (p.length() - 1.0).abs() < 1e-4));
         let next = |i: usize| (0..120).filter(|j| *j != i).map(|j| points[i].distance(points[j])).fold(9.0, f32::min);
         let spacing = (4.0 * std::f32::consts::PI / 120.0_f32).sqrt();
         let (least, mean) = (0..120).map(next).fold((9.0_f32, 0.0), |(l, m), d| (l.min(d), m + d / 120.0));
@@ -184,10 +166,7 @@ mod tests {
     #[test]
     fn of_three_the_near_pair_is_farther_apart_in_code_space() {
         for (place, near, far) in [(1.0, [1, 2], [1, 3]), (9.0, [2, 3], [1, 2])] {
-            let mut all = Identities::default();
-            (0..8).for_each(|_| {
-                all.add(Level::Object, NOBODY, vec![]);
-            });
+            let mut all = Identities::objects(8);
             let mut centers: Vec<DVec3> = (0..8).map(|i| DVec3::new(0.0, 100.0 * f64::from(i), 0.0)).collect();
             (centers[0], centers[1], centers[2]) =
                 (DVec3::ZERO, DVec3::new(place, 0.0, 0.0), DVec3::new(10.0, 0.0, 0.0));

@@ -32,41 +32,22 @@ pub enum Edit {
 
 /// Why an edit cannot be made.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum EditError {
-    /// The identity is not there.
     #[error("there is no object or part number {0}")]
     Unknown(IdentityId),
-    /// A name without a letter.
     #[error("a name needs at least one letter or digit")]
     NoName,
-    /// An identity with itself or with a piece of itself.
     #[error("'{0}' and '{1}' cannot become one: one is the other, or a piece of it")]
     Related(String, String),
-    /// Nothing to split.
     #[error("'{name}' has {own} Gaussians; a split needs at least {}", 2 * LEAST)]
-    TooSmall {
-        /// What was to be split.
-        name: String,
-        /// Its Gaussians.
-        own: usize,
-    },
-    /// Too little of it is not its parts'.
+    TooSmall { name: String, own: usize },
     #[error("'{name}' consists of its parts: only {own} of its {all} Gaussians are its own; split one of the parts")]
-    OfParts {
-        /// What was to be split.
-        name: String,
-        /// Gaussians that belong to none of its parts.
-        own: usize,
-        /// All of them.
-        all: usize,
-    },
-    /// Nothing that is visible was painted.
+    OfParts { name: String, own: usize, all: usize },
     #[error("no Gaussian shows where you painted; paint over something that is visible")]
     NoPaint,
-    /// What was painted belongs to others.
     #[error("what you painted belongs to other objects already; choose 'Paint a new part' in the menu of one of them")]
     Taken,
-    /// None of the Gaussians belongs to the whole.
     #[error("what you painted is not a piece of '{0}'; paint inside it")]
     Outside(String),
 }
@@ -125,7 +106,6 @@ pub(crate) fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Re
     Ok(new)
 }
 
-/// Adds an identity that takes over these Gaussians.
 fn add(map: &mut SemanticMap, level: Level, parent: IdentityId, name: String, gaussians: &[usize]) {
     let code = free_code(&map.identities);
     let id = map.identities.add(level, parent, Some(name).filter(|n| !n.is_empty()).into_iter().collect());
@@ -265,14 +245,7 @@ mod tests {
         let of = [vec![red; 20], vec![red_eye; 10], vec![blue; 20], vec![blue_eye; 10]].concat();
         let n = of.len();
         let place = |i: usize| if i < 10 { [i as f32 * 0.01, 0.0, 0.0] } else { [5.0 + i as f32 * 0.01, 0.0, 0.0] };
-        let cloud = GaussianCloud {
-            positions: (0..n).map(place).collect(),
-            log_scales: vec![[-4.0; 3]; n],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
-            opacity_logits: vec![0.0; n],
-            sh: vec![[0.0; 3]; n],
-            ..GaussianCloud::default()
-        };
+        let cloud = GaussianCloud::isotropic((0..n).map(place).collect(), -4.0, 0.0);
         let mut map = SemanticMap::from_identities(all, of, vec![1.0; n], vec![]);
         map.language =
             Some(LanguageFeatures { encoder: "t".into(), dimension: 1, by_identity: vec![ViewFeatures::default(); 4] });

@@ -2,12 +2,13 @@
 
 use std::collections::{BTreeSet, HashMap};
 
+use super::error::FindError;
 use super::relevancy::{PART_WEIGHT, deviate};
 use super::view_map::ViewMap;
-use crate::io::{self, IoError};
+use crate::io;
 use crate::models::{Encoder, IdentityCrop, ModelError};
-use crate::pipeline::observer::{Interrupted, Observer, Ticker};
-use crate::render::{RenderError, RenderSettings, Renderer};
+use crate::pipeline::observer::{Observer, Ticker};
+use crate::render::{RenderSettings, Renderer};
 use crate::scene::language::MAX_VIEWS;
 use crate::scene::{
     GaussianCloud, Identities, IdentityId, LanguageFeatures, Level, Mask, Photo, PhotoPixels, SemanticMap, ViewFeatures,
@@ -20,27 +21,7 @@ const COUNT_SIDE_PX: u32 = 256;
 /// Pixels of such a view that must show an identity for it to be looked at.
 const LEAST_PX: usize = 12;
 
-/// Why identities could not be looked at.
-#[derive(Debug, thiserror::Error)]
-pub enum EmbedError {
-    /// A photo could not be read.
-    #[error(transparent)]
-    Photo(#[from] IoError),
-    /// A view could not be drawn.
-    #[error("photo {0}: {1}")]
-    Render(String, RenderError),
-    /// The encoder failed.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    /// The observer asked to stop.
-    #[error("cancelled")]
-    Interrupted(#[from] Interrupted),
-}
-
 /// Lets `encoder` look at every identity of `map`, in up to [`MAX_VIEWS`] of the `photos`.
-///
-/// # Errors
-/// If a photo cannot be read, the encoder fails, or the observer asks to stop.
 pub(crate) fn embed(
     cloud: &GaussianCloud,
     map: &SemanticMap,
@@ -48,7 +29,7 @@ pub(crate) fn embed(
     settings: &RenderSettings,
     encoder: &mut dyn Encoder,
     observer: &mut dyn Observer,
-) -> Result<LanguageFeatures, EmbedError> {
+) -> Result<LanguageFeatures, FindError> {
     let mut looker = Looker { cloud, map, settings, renderer: Renderer::new() };
     let mut ticker = Ticker::new("Choosing views of the objects", photos.len());
     let n = map.identities.len();
@@ -99,11 +80,11 @@ struct Looker<'a> {
 }
 
 impl Looker<'_> {
-    fn draw(&mut self, photo: &Photo, max_side_px: u32) -> Result<ViewMap, EmbedError> {
+    fn draw(&mut self, photo: &Photo, max_side_px: u32) -> Result<ViewMap, FindError> {
         let camera = photo.camera.limited_to(max_side_px);
         let Self { cloud, map, settings, renderer } = self;
         ViewMap::render(renderer, cloud, &map.identity_of, &map.identities, &camera, settings)
-            .map_err(|e| EmbedError::Render(photo.name.clone(), e))
+            .map_err(|e| FindError::Render(photo.name.clone(), e))
     }
 }
 
@@ -116,7 +97,6 @@ struct Eye<'a> {
 }
 
 impl Eye<'_> {
-    /// Looks at these identities, all together.
     fn look(&mut self, ids: impl Iterator<Item = IdentityId>, encoder: &mut dyn Encoder) -> Result<(), ModelError> {
         let ids: BTreeSet<IdentityId> = ids.collect();
         let tile = |id: &IdentityId| {
@@ -210,14 +190,7 @@ mod tests {
         let eye = all.add(Level::Part, doll, vec![]);
         let nowhere = all.add(Level::Object, NOBODY, vec![]);
         assert_eq!((doll, eye, nowhere), (1, 2, 3));
-        let cloud = GaussianCloud {
-            positions: vec![[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]],
-            log_scales: vec![[-1.4; 3]; 2],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 2],
-            opacity_logits: vec![4.0; 2],
-            sh: vec![[0.0; 3]; 2],
-            ..GaussianCloud::default()
-        };
+        let cloud = GaussianCloud::isotropic(vec![[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]], -1.4, 4.0);
         let photo = |k: usize, eye: DVec3| {
             let camera = Camera::look_at(eye, DVec3::ZERO, DVec3::NEG_Y, 0.8, 96, 64).expect("valid");
             let left = camera.project(DVec3::new(-0.5, 0.0, 0.0)).expect("in front").x;
@@ -226,7 +199,7 @@ mod tests {
             let pixel = |x: u32, _: u32| image::Rgb(if red(x) { [255, 0, 0] } else { [0, 0, 255] });
             let path = folder.join(format!("{k}.png"));
             image::RgbImage::from_fn(96, 64, pixel).save(&path).expect("written");
-            Photo { name: k.to_string(), path, camera, distortion: None, test_split: false, background: None }
+            Photo::new(k.to_string(), path, camera)
         };
         let photos = (0..MAX_VIEWS + 2).map(|k| photo(k, DVec3::new(0.0, 0.0, -3.0 - 0.2 * k as f64))).collect();
         let map = SemanticMap::from_identities(all, vec![doll, eye], vec![1.0; 2], vec![]);
@@ -269,7 +242,7 @@ mod tests {
         let (cloud, map, photos) = doll(folder.path());
         let mut encoder = Reddish { side_px: None, tiles: vec![] };
         let stopped = embed(&cloud, &map, &photos, &RenderSettings::default(), &mut encoder, &mut Stop);
-        assert!(matches!(stopped, Err(EmbedError::Interrupted(_))), "{stopped:?}");
+        assert!(matches!(stopped, Err(FindError::Interrupted(_))), "{stopped:?}");
     }
 
     #[test]
@@ -283,7 +256,7 @@ mod tests {
         identity[45] = doll;
         identity[0] = cat;
         identity[11] = cat;
-        let view = ViewMap { width_px: 10, height_px: 10, identity, share: vec![1.0; 100], alpha: vec![1.0; 100] };
+        let view = ViewMap::certain(10, identity);
         let c = counts(&view, &all);
         assert_eq!(c[..2], [2.0, 1.0]);
         assert!(c[2] < 1.0, "{c:?}");
@@ -291,15 +264,12 @@ mod tests {
 
     #[test]
     fn every_edge_of_the_picture_cuts() {
-        let mut all = Identities::default();
-        (0..5).for_each(|_| {
-            all.add(Level::Object, NOBODY, vec![]);
-        });
+        let all = Identities::objects(5);
         // Left, right, upper and lower edge: four pixels each, two of them at the edge; one in the middle.
         let places = [[20, 21, 30, 31], [28, 29, 38, 39], [4, 5, 14, 15], [84, 85, 94, 95], [44, 45, 54, 55]];
         let mut identity = vec![NOBODY; 100];
         places.iter().enumerate().for_each(|(k, p)| p.iter().for_each(|i| identity[*i] = k as IdentityId + 1));
-        let view = ViewMap { width_px: 10, height_px: 10, identity, share: vec![1.0; 100], alpha: vec![1.0; 100] };
+        let view = ViewMap::certain(10, identity);
         // 4 / (1 + 4 x 2 / sqrt(4)) = 0.8.
         let c = counts(&view, &all);
         assert!(c[..4].iter().all(|c| (c - 0.8).abs() < 1e-12) && c[4] == 4.0, "{c:?}");

@@ -28,9 +28,7 @@ impl Default for FilterOptions {
 /// A mask that was kept, less what it lost.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Kept {
-    /// Its place in the list.
     pub(crate) index: usize,
-    /// Its pixels.
     pub(crate) mask: Mask,
 }
 

@@ -43,7 +43,6 @@ const TRAIN_PX: u32 = 160;
 /// Longer side of the masks that are compared, px.
 const COMPARE_PX: u32 = 200;
 const STEPS: u64 = 150;
-/// Steps of training codes.
 const CODE_STEPS: u64 = 100;
 /// Sparse points, each of which becomes a Gaussian.
 const POINTS: usize = 16_000;
@@ -169,7 +168,6 @@ fn by_looks(
     Some(by_embedding(&map.identities, &phrase, LevelFilter::Auto, language))
 }
 
-/// Measures the scenes made from this seed, unharmed and harmed.
 fn measure(seed: u64, harms: &[Harm]) -> Vec<Figures> {
     let mut encoder = models::encoder(models::DEMO).expect("comes with the program");
     let mut all = vec![Vec::new(); harms.len()];

@@ -123,13 +123,7 @@ mod tests {
     #[test]
     fn pixels_match_like_gaussians() {
         let map = scene();
-        let view = ViewMap {
-            width_px: 5,
-            height_px: 1,
-            identity: map.identity_of.clone(),
-            share: vec![1.0; 5],
-            alpha: vec![1.0; 5],
-        };
+        let view = ViewMap::certain(5, map.identity_of.clone());
         let planes = std::array::from_fn(|c| map.codes.iter().map(|codes| codes[c]).collect());
         let mut codes = CodeMap { width_px: 5, height_px: 1, planes };
         for (target, tolerance) in [(1, 0.02), (1, 0.06), (2, 0.02), (3, 0.02), (4, 0.02)] {

@@ -16,6 +16,7 @@ pub mod code_map;
 pub mod codes;
 pub mod edit;
 pub(crate) mod embed;
+pub(crate) mod error;
 pub(crate) mod filters;
 #[cfg(test)]
 mod heart;

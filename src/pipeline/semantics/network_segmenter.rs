@@ -1,8 +1,9 @@
 //! Masks found by a network (SAM, SAM 2) that is asked for everything in a photo, sorted into objects
 //! and parts by the paper's filters.
 
+use super::error::FindError;
 use super::filters::{self, FilterOptions};
-use super::segmenter::{FoundMask, SegmentError, Segmenter};
+use super::segmenter::{FoundMask, Segmenter};
 use crate::io;
 use crate::models::catalog::{self, ModelRole};
 use crate::models::sam::automatic::{AutomaticMask, AutomaticOptions, everything};
@@ -12,10 +13,8 @@ use crate::models::{ModelError, manifest};
 use crate::pipeline::observer::{Interrupted, Observer, Ticker};
 use crate::scene::{Level, Mask, Photo, PhotoPixels};
 
-/// Masks by a network.
 pub(crate) struct NetworkMasks {
     network: Box<dyn PromptedMasks>,
-    /// Which of its answers are taken.
     pub(crate) options: AutomaticOptions,
     /// Which of those are objects, and parts.
     pub(crate) filters: FilterOptions,
@@ -33,9 +32,6 @@ const LEAST_TILE_PX: usize = 32;
 
 impl NetworkMasks {
     /// The network of this name: a model of the catalog, or the path of a model's description.
-    ///
-    /// # Errors
-    /// If it is not on this machine, or finds no masks.
     pub(crate) fn open(name: &str) -> Result<Self, ModelError> {
         let path = catalog::find(name, ModelRole::Segmenter)?;
         let mut options = AutomaticOptions::default();
@@ -57,7 +53,7 @@ impl NetworkMasks {
         picture: &PhotoPixels,
         options: &AutomaticOptions,
         watch: &mut Watch<'_>,
-    ) -> Result<Vec<Mask>, SegmentError> {
+    ) -> Result<Vec<Mask>, FindError> {
         let mut end = Ok(());
         let found = everything(&mut *self.network, picture, options, &mut |share| {
             end = watch.tick(share);
@@ -74,7 +70,7 @@ impl NetworkMasks {
         picture: &PhotoPixels,
         object: &Mask,
         watch: &mut Watch<'_>,
-    ) -> Result<Vec<Mask>, SegmentError> {
+    ) -> Result<Vec<Mask>, FindError> {
         let Some(at) = object.bounds().filter(|b| b.x.len().min(b.y.len()) >= LEAST_TILE_PX) else {
             return Ok(Vec::new());
         };
@@ -142,7 +138,7 @@ impl Segmenter for NetworkMasks {
         photo: &Photo,
         max_side_px: u32,
         observer: &mut dyn Observer,
-    ) -> Result<Vec<FoundMask>, SegmentError> {
+    ) -> Result<Vec<FoundMask>, FindError> {
         let picture = io::photo::load(photo, max_side_px)?;
         let ticker = Ticker::new(format!("Finding masks in {}", photo.name), 0);
         let mut watch = Watch { observer, ticker, done: 0.0, all: 1.0 };

@@ -85,12 +85,8 @@ mod tests {
     /// A row of Gaussians, red up to `edge`, blue from there.
     fn row(n: usize, edge: usize) -> GaussianCloud {
         GaussianCloud {
-            positions: (0..n).map(|i| [i as f32 * 0.01, 0.0, 0.0]).collect(),
-            log_scales: vec![[-5.0; 3]; n],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
-            opacity_logits: vec![2.0; n],
             sh: (0..n).map(|i| if i < edge { [1.5, -1.5, -1.5] } else { [-1.5, -1.5, 1.5] }).collect(),
-            ..GaussianCloud::default()
+            ..GaussianCloud::isotropic((0..n).map(|i| [i as f32 * 0.01, 0.0, 0.0]).collect(), -5.0, 2.0)
         }
     }
 

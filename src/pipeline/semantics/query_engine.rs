@@ -20,18 +20,12 @@ pub(crate) struct QueryEngine {
 
 impl QueryEngine {
     /// With the encoder that looked at the scene's identities, if one has.
-    ///
-    /// # Errors
-    /// If it cannot be loaded.
     pub(crate) fn new(language: Option<&LanguageFeatures>) -> Result<Self, ModelError> {
         let encoder = language.map(|language| models::encoder(&language.encoder)).transpose()?;
         Ok(Self { encoder, ..Self::default() })
     }
 
     /// Answers a question; `None` if there is nothing in it.
-    ///
-    /// # Errors
-    /// If the encoder fails.
     pub(crate) fn ask(
         &mut self,
         map: &SemanticMap,
@@ -78,9 +72,6 @@ pub(crate) fn answer_encoded(
 
 /// Answers a question by these `features` alone, whatever identities are called; `None` if there is nothing in
 /// it. `encode` gives the embedding of a phrase, and `phrases` keeps it.
-///
-/// # Errors
-/// What `encode` fails with.
 pub(crate) fn ask_by_embedding<E>(
     identities: &Identities,
     (features, options): (&LanguageFeatures, EmbeddingOptions),

@@ -7,6 +7,7 @@ use std::time::SystemTime;
 
 use sha2::{Digest, Sha256};
 
+use super::error::FindError;
 use super::segmenter::FoundMask;
 use super::votes::UNKNOWN;
 use crate::io::{self, atomic, files};
@@ -15,29 +16,15 @@ use crate::models::catalog::{self, ModelRole};
 use crate::models::network::Tensor;
 use crate::models::sam2::track::{FrameSource, ObjectId, Prompt, Track, mask_of};
 use crate::models::sam2::{EncodedFrame, Sam2};
-use crate::pipeline::observer::{Interrupted, Observer, Ticker};
+use crate::pipeline::observer::{Observer, Ticker};
 use crate::scene::{IdentityId, Photo};
 
 /// Objects that are followed together; memory grows with it.
 const BATCH: usize = 16;
-/// Longer side of the labels, px.
 pub(crate) const LABEL_SIDE_PX: u32 = 512;
 
-/// Why masks could not be followed.
-#[derive(Debug, thiserror::Error)]
-pub enum Sam2TrackError {
-    /// A network fails.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    /// The observer asked to stop.
-    #[error("cancelled")]
-    Interrupted(#[from] Interrupted),
-}
-
-/// Follows masks through a sequence of photos.
 pub(crate) struct Sam2Tracker {
     model: Sam2,
-    /// Where frames are kept, if anywhere.
     cache: Option<PathBuf>,
     /// Seconds that looking at frames has taken, reading kept ones included.
     pub(crate) encode_secs: f64,
@@ -46,9 +33,6 @@ pub(crate) struct Sam2Tracker {
 impl Sam2Tracker {
     /// With the SAM 2 of this name: a model of the catalog, or the path of a description. Frames
     /// are kept in `cache`.
-    ///
-    /// # Errors
-    /// If it is not on this machine.
     pub(crate) fn open(name: &str, cache: Option<PathBuf>) -> Result<Self, ModelError> {
         Ok(Self { model: Sam2::open(&catalog::find(name, ModelRole::Segmenter)?)?, cache, encode_secs: 0.0 })
     }
@@ -56,9 +40,6 @@ impl Sam2Tracker {
     /// The label of every pixel of every photo, scaled to at most [`LABEL_SIDE_PX`], row-major: the
     /// number in `ids` of the innermost mask that was followed there; `UNKNOWN` elsewhere, because
     /// what was not marked may be anything.
-    ///
-    /// # Errors
-    /// If a photo cannot be read, a network fails, or the observer asks to stop.
     pub(crate) fn follow(
         &mut self,
         photos: &[Photo],
@@ -66,7 +47,7 @@ impl Sam2Tracker {
         found: &[FoundMask],
         ids: &[IdentityId],
         observer: &mut dyn Observer,
-    ) -> Result<Vec<Vec<IdentityId>>, Sam2TrackError> {
+    ) -> Result<Vec<Vec<IdentityId>>, FindError> {
         let size = |photo: &Photo| {
             let camera = photo.camera.limited_to(LABEL_SIDE_PX);
             (camera.width_px as usize, camera.height_px as usize)
@@ -245,15 +226,8 @@ mod tests {
     fn frames_of_the_first_version_are_used_on() {
         let folder = tempfile::tempdir().expect("folder");
         let camera = crate::scene::Camera::look_at(glam::DVec3::ONE, glam::DVec3::ZERO, glam::DVec3::Z, 0.8, 64, 48);
-        let photo = Photo {
-            name: "a.jpg".into(),
-            // It is not there, so nobody knows when it was written.
-            path: "/one/fox/a.jpg".into(),
-            camera: camera.expect("valid"),
-            distortion: None,
-            test_split: false,
-            background: None,
-        };
+        // It is not there, so nobody knows when it was written.
+        let photo = Photo::new("a.jpg", "/one/fox/a.jpg", camera.expect("valid"));
         let model = ("sam2.1-tiny", "00ff");
         let old = folder.path().join("sam2.1-tiny-7228bc543858c811.frame");
         assert_eq!(folder.path().join(first_name(model, &photo, None)), old, "as the first version called it");

@@ -1,9 +1,8 @@
 //! Masks of one photo, and where they come from.
 
-use crate::io::IoError;
+use super::error::FindError;
 use crate::io::labels::{Labels, Region};
-use crate::models::ModelError;
-use crate::pipeline::observer::{Interrupted, Observer};
+use crate::pipeline::observer::Observer;
 use crate::scene::{Level, Mask, Photo};
 
 /// A mask that a segmenter found in one photo.
@@ -28,29 +27,12 @@ pub trait Segmenter {
 
     /// Masks of a photo, undistorted and scaled to at most `max_side_px`, wholes before pieces.
     /// Empty where it finds nothing.
-    ///
-    /// # Errors
-    /// If the photo or what is known about it cannot be read, or the observer asks to stop.
     fn segment(
         &mut self,
         photo: &Photo,
         max_side_px: u32,
         observer: &mut dyn Observer,
-    ) -> Result<Vec<FoundMask>, SegmentError>;
-}
-
-/// Why a photo could not be segmented.
-#[derive(Debug, thiserror::Error)]
-pub enum SegmentError {
-    /// The photo or what is known about it cannot be read.
-    #[error(transparent)]
-    Io(#[from] IoError),
-    /// A network fails.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    /// The observer asked to stop.
-    #[error("cancelled")]
-    Interrupted(#[from] Interrupted),
+    ) -> Result<Vec<FoundMask>, FindError>;
 }
 
 /// Masks that come with the dataset. Regions that do not say what they are count as objects where
@@ -69,12 +51,7 @@ impl Segmenter for FileMasks {
         self.0.has(photo)
     }
 
-    fn segment(
-        &mut self,
-        photo: &Photo,
-        max_side_px: u32,
-        _: &mut dyn Observer,
-    ) -> Result<Vec<FoundMask>, SegmentError> {
+    fn segment(&mut self, photo: &Photo, max_side_px: u32, _: &mut dyn Observer) -> Result<Vec<FoundMask>, FindError> {
         Ok(found(self.0.of(photo, max_side_px)?))
     }
 }

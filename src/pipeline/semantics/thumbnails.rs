@@ -15,9 +15,6 @@ const FOV_RAD: f64 = 0.5;
 pub(crate) type Thumbnails = Vec<Option<Vec<[u8; 3]>>>;
 
 /// A picture of every identity as somebody at `from` sees it.
-///
-/// # Errors
-/// If one cannot be drawn.
 pub(crate) fn portraits(
     cloud: &GaussianCloud,
     map: &SemanticMap,
@@ -69,12 +66,9 @@ mod tests {
         };
         let scale = |i: usize| if i < n / 2 { 0.004_f32.ln() } else { 0.4_f32.ln() };
         let cloud = GaussianCloud {
-            positions: (0..n).map(place).collect(),
             log_scales: (0..n).map(|i| [scale(i); 3]).collect(),
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
-            opacity_logits: vec![4.0; n],
             sh: vec![[1.7; 3]; n],
-            ..GaussianCloud::default()
+            ..GaussianCloud::isotropic((0..n).map(place).collect(), 0.0, 4.0)
         };
         let of = (0..n).map(|i| if i < n / 2 { doll } else { cat }).collect();
         let map = SemanticMap::from_identities(all, of, vec![1.0; n], vec![]);

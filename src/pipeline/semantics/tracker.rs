@@ -5,13 +5,14 @@
 use std::time::Instant;
 
 use super::associate::{Disagreement, Link, disagreements, link};
+use super::error::FindError;
 use super::propagate::extend;
-use super::sam2_tracker::{LABEL_SIDE_PX, Sam2TrackError, Sam2Tracker};
-use super::segmenter::{FoundMask, SegmentError, Segmenter};
+use super::sam2_tracker::{LABEL_SIDE_PX, Sam2Tracker};
+use super::segmenter::{FoundMask, Segmenter};
 use super::view_map::ViewMap;
 use super::votes::{Assignment, UNKNOWN, Votes};
-use crate::pipeline::observer::{Interrupted, Observer, Severity, Ticker};
-use crate::render::{RenderError, RenderSettings, Renderer};
+use crate::pipeline::observer::{Observer, Severity, Ticker};
+use crate::render::{RenderSettings, Renderer};
 use crate::scene::{GaussianCloud, Identities, IdentityId, NOBODY, Photo};
 
 /// Least weight of votes, in px of the photos voted on, that says something about a Gaussian.
@@ -22,7 +23,6 @@ const DRIFT: f64 = 0.2;
 /// Pixels from which each of them says something.
 const DRIFT_PX: usize = 30;
 
-/// Settings of a tracking.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TrackOptions {
     /// Photo to begin with; `None` = the first that the segmenter can say something about.
@@ -43,7 +43,6 @@ impl Default for TrackOptions {
     }
 }
 
-/// An identity in a view.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub(crate) struct Sighting {
     /// Whose pixels.
@@ -53,10 +52,8 @@ pub(crate) struct Sighting {
     pub(crate) confidence: f64,
 }
 
-/// What became of one view.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub(crate) struct ViewReport {
-    /// Index of the photo.
     pub(crate) photo: usize,
     /// Share of its pixels that only Gaussians without a vote cover.
     pub(crate) unknown: f64,
@@ -64,7 +61,6 @@ pub(crate) struct ViewReport {
     pub(crate) seen: Vec<Sighting>,
 }
 
-/// The result of a tracking.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Tracked {
     pub(crate) identities: Identities,
@@ -79,26 +75,6 @@ pub(crate) struct Tracked {
     pub(crate) secs: Vec<(&'static str, f64)>,
 }
 
-/// Why tracking failed.
-#[derive(Debug, thiserror::Error)]
-pub enum TrackError {
-    /// There is nothing to begin with.
-    #[error("the '{0}' masks say nothing about any photo; give masks of at least one")]
-    NoSeed(String),
-    /// Masks could not be read.
-    #[error(transparent)]
-    Masks(#[from] SegmentError),
-    /// Masks could not be followed.
-    #[error(transparent)]
-    Follow(#[from] Sam2TrackError),
-    /// A view could not be drawn.
-    #[error("photo {0}: {1}")]
-    Render(String, RenderError),
-    /// The observer asked to stop.
-    #[error("cancelled")]
-    Interrupted(#[from] Interrupted),
-}
-
 /// Finds the identities of `cloud` in `photos`. With a `follower`, the first photo's masks are followed
 /// to the others and vote there too.
 pub(crate) fn track(
@@ -109,13 +85,13 @@ pub(crate) fn track(
     follower: Option<&mut Sam2Tracker>,
     options: &TrackOptions,
     observer: &mut dyn Observer,
-) -> Result<Tracked, TrackError> {
+) -> Result<Tracked, FindError> {
     let usable = |i: &usize| segmenter.covers(&photos[*i]);
     let first = match options.seed {
         Some(seed) => Some(seed).filter(|s| *s < photos.len()).filter(usable),
         None => (0..photos.len()).find(usable),
     };
-    let first = first.ok_or(TrackError::NoSeed(segmenter.name().to_owned()))?;
+    let first = first.ok_or(FindError::NoSeed(segmenter.name().to_owned()))?;
     let mut t = Tracker {
         cloud,
         photos,
@@ -184,7 +160,7 @@ impl Tracker<'_> {
         photo: usize,
         segmenter: &mut dyn Segmenter,
         observer: &mut dyn Observer,
-    ) -> Result<Option<Seeded>, TrackError> {
+    ) -> Result<Option<Seeded>, FindError> {
         let start = Instant::now();
         let found = segmenter.segment(&self.photos[photo], self.options.max_side_px, observer);
         self.segment_secs += start.elapsed().as_secs_f64();
@@ -215,7 +191,7 @@ impl Tracker<'_> {
         let labels = labels_of(&found, &ids, camera.width_px as usize * camera.height_px as usize);
         self.votes
             .add_view(&mut self.renderer, self.cloud, &camera, self.settings, &labels)
-            .map_err(|e| TrackError::Render(self.photos[photo].name.clone(), e))?;
+            .map_err(|e| FindError::Render(self.photos[photo].name.clone(), e))?;
         Ok(Some((found, ids)))
     }
 
@@ -227,7 +203,7 @@ impl Tracker<'_> {
         found: &[FoundMask],
         ids: &[IdentityId],
         observer: &mut dyn Observer,
-    ) -> Result<(), TrackError> {
+    ) -> Result<(), FindError> {
         let mut followed = follower.follow(self.photos, seed, found, ids, observer)?;
         // What is known from the seed alone: it shall not be judged by what it is to judge.
         let of: Vec<IdentityId> = self.votes.decide(&self.identities, LEAST_VOTES).iter().map(|b| b.identity).collect();
@@ -243,12 +219,11 @@ impl Tracker<'_> {
             let camera = self.photos[photo].camera.limited_to(LABEL_SIDE_PX);
             self.votes
                 .add_view(&mut self.renderer, self.cloud, &camera, self.settings, labels)
-                .map_err(|e| TrackError::Render(self.photos[photo].name.clone(), e))?;
+                .map_err(|e| FindError::Render(self.photos[photo].name.clone(), e))?;
         }
         Ok(())
     }
 
-    /// A disagreement, for display.
     fn told(&self, what: &Disagreement) -> String {
         let name = |id: &IdentityId| self.identities.full_name(*id);
         match what {
@@ -264,20 +239,19 @@ impl Tracker<'_> {
     }
 
     /// What is known of a view by now.
-    fn map(&mut self, photo: usize, max_side_px: u32) -> Result<ViewMap, TrackError> {
+    fn map(&mut self, photo: usize, max_side_px: u32) -> Result<ViewMap, FindError> {
         let of: Vec<IdentityId> = self.votes.decide(&self.identities, LEAST_VOTES).iter().map(|b| b.identity).collect();
         self.map_of(photo, max_side_px, &of)
     }
 
-    fn map_of(&mut self, photo: usize, max_side_px: u32, of: &[IdentityId]) -> Result<ViewMap, TrackError> {
+    fn map_of(&mut self, photo: usize, max_side_px: u32, of: &[IdentityId]) -> Result<ViewMap, FindError> {
         let photo = &self.photos[photo];
         let camera = photo.camera.limited_to(max_side_px);
         ViewMap::render(&mut self.renderer, self.cloud, of, &self.identities, &camera, self.settings)
-            .map_err(|e| TrackError::Render(photo.name.clone(), e))
+            .map_err(|e| FindError::Render(photo.name.clone(), e))
     }
 
-    /// Draws what is known into every view.
-    fn look(&mut self, round: usize, observer: &mut dyn Observer) -> Result<Vec<ViewReport>, TrackError> {
+    fn look(&mut self, round: usize, observer: &mut dyn Observer) -> Result<Vec<ViewReport>, FindError> {
         let mut ticker = Ticker::new(format!("Carrying identities to all views, round {round}"), self.photos.len());
         observer.proceed()?;
         // To see how much is unknown, small pictures will do.

@@ -19,7 +19,6 @@ use crate::scene::{Camera, GaussianCloud, Identities, IdentityId};
 /// Learning rate at the first and at the last step, in units of code space.
 const RATES: [f64; 2] = [0.02, 0.002];
 
-/// The masks of one view.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct CodeView {
     pub(crate) camera: Camera,
@@ -27,7 +26,6 @@ pub(crate) struct CodeView {
     pub(crate) labels: Vec<IdentityId>,
 }
 
-/// Settings of a training of codes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CodeTraining {
     pub(crate) steps: u64,
@@ -37,9 +35,6 @@ pub(crate) struct CodeTraining {
 
 /// Trains `codes`, one set per Gaussian of `cloud`, from where they stand. Returns the loss of the
 /// last tenth of the steps. The observer may stop it; codes are then those of the last step.
-///
-/// # Errors
-/// If a camera is not usable.
 pub(crate) fn train_codes(
     cloud: &GaussianCloud,
     codes: &mut [[f32; CODE_CHANNELS]],
@@ -169,14 +164,7 @@ mod tests {
         for (id, code) in [(doll, [0.9, 0.2, 0.5]), (eye, [0.1, 0.3, 0.8])] {
             all.get_mut(id).expect("there").code = code;
         }
-        let cloud = GaussianCloud {
-            positions: vec![[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]],
-            log_scales: vec![[-1.6; 3]; 2],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 2],
-            opacity_logits: vec![4.0; 2],
-            sh: vec![[0.0; 3]; 2],
-            ..GaussianCloud::default()
-        };
+        let cloud = GaussianCloud::isotropic(vec![[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]], -1.6, 4.0);
         let camera =
             Camera::look_at(DVec3::new(0.0, 0.0, -3.0), DVec3::ZERO, DVec3::NEG_Y, 0.6, 48, 32).expect("valid");
         let label = |i: usize| {

@@ -27,10 +27,13 @@ pub struct ViewMap {
 }
 
 impl ViewMap {
+    /// Opaque pixels without a doubt, in rows of `width_px`.
+    pub(crate) fn certain(width_px: usize, identity: Vec<IdentityId>) -> Self {
+        let n = identity.len();
+        Self { width_px, height_px: n / width_px.max(1), identity, share: vec![1.0; n], alpha: vec![1.0; n] }
+    }
+
     /// Draws the identities `of` the Gaussians of `cloud`.
-    ///
-    /// # Errors
-    /// If the camera is not usable.
     pub fn render(
         renderer: &mut Renderer,
         cloud: &GaussianCloud,
@@ -146,12 +149,8 @@ mod tests {
         let mut all = Identities::default();
         let (front, behind) = (all.add(Level::Object, NOBODY, vec![]), all.add(Level::Object, NOBODY, vec![]));
         let cloud = GaussianCloud {
-            positions: vec![[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]],
             log_scales: vec![[-1.8; 3], [-0.9; 3]],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 2],
-            opacity_logits: vec![4.0; 2],
-            sh: vec![[0.0; 3]; 2],
-            ..GaussianCloud::default()
+            ..GaussianCloud::isotropic(vec![[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]], 0.0, 4.0)
         };
         let camera =
             Camera::look_at(DVec3::new(0.0, 0.0, -3.0), DVec3::ZERO, DVec3::NEG_Y, 0.6, 50, 37).expect("valid");

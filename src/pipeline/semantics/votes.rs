@@ -21,7 +21,6 @@ pub(crate) struct Votes {
     by_gaussian: Vec<Vec<(IdentityId, f32)>>,
 }
 
-/// What a Gaussian belongs to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Assignment {
     /// The innermost identity; `NOBODY` if none claims it, `UNKNOWN` without a vote.
@@ -44,9 +43,6 @@ impl Votes {
     }
 
     /// Adds the votes of one view. `labels` holds the innermost identity of each pixel, row-major.
-    ///
-    /// # Errors
-    /// If the camera is not usable or has another number of pixels.
     pub(crate) fn add_view(
         &mut self,
         renderer: &mut Renderer,
@@ -173,24 +169,14 @@ mod tests {
     #[test]
     fn pixels_vote_for_what_they_show() {
         // Two Gaussians side by side, labeled left and right; the middle columns say nothing.
-        let cloud = GaussianCloud {
-            positions: vec![[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]],
-            log_scales: vec![[-2.0; 3]; 2],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 2],
-            opacity_logits: vec![2.0; 2],
-            sh: vec![[0.0; 3]; 2],
-            ..GaussianCloud::default()
-        };
+        let cloud = GaussianCloud::isotropic(vec![[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]], -2.0, 2.0);
         let camera =
             Camera::look_at(DVec3::new(0.0, 0.0, -3.0), DVec3::ZERO, DVec3::NEG_Y, 0.6, 45, 33).expect("valid");
         let labels: Vec<IdentityId> = (0..45 * 33).map(|i| [1, UNKNOWN, 2][(i % 45) / 15]).collect();
         let mut votes = Votes::new(2);
         let mut renderer = Renderer::new();
         votes.add_view(&mut renderer, &cloud, &camera, &RenderSettings::default(), &labels).expect("drawn");
-        let mut all = Identities::default();
-        (0..2).for_each(|_| {
-            all.add(Level::Object, NOBODY, vec![]);
-        });
+        let all = Identities::objects(2);
         let left = camera.project(DVec3::new(-0.5, 0.0, 0.0)).map(|p| p.x).expect("in front");
         let expected = if left < 22.0 { [1, 2] } else { [2, 1] };
         let b = votes.decide(&all, 0.0);
@@ -223,10 +209,7 @@ mod tests {
 
     #[test]
     fn votes_are_decided_by_weight_and_ties_by_number() {
-        let mut all = Identities::default();
-        (0..3).for_each(|_| {
-            all.add(Level::Object, NOBODY, vec![]);
-        });
+        let all = Identities::objects(3);
         let votes = Votes { by_gaussian: vec![vec![(3, 1.0), (2, 1.0), (1, 0.5)], vec![(2, 0.05)], vec![(1, 0.0)]] };
         let b = votes.decide(&all, 0.05);
         assert_eq!(

@@ -44,7 +44,6 @@ pub struct TrueIdentity {
     pub(crate) views: u32,
 }
 
-/// Ids of the surfaces of one node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct NodeIds {
     /// Object, 0 for none.

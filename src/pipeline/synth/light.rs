@@ -33,7 +33,6 @@ const BOUNCE: f32 = 0.42;
 /// Rays start this far above the surface, in the frame's units.
 const LIFT: f32 = 2e-4;
 
-/// Light on one face of a vertex.
 #[derive(Clone, Copy, Debug, Default)]
 struct Face {
     /// Irradiance over pi: what a white surface shows.
@@ -123,7 +122,6 @@ impl Light {
     }
 }
 
-/// What light falls on.
 #[derive(Clone, Copy)]
 pub(crate) struct Lit<'a> {
     pub(crate) surface: &'a Surface,

@@ -57,45 +57,24 @@ const BYTES_PER_PX: u64 = 48;
 
 /// Why no data set was made.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum SynthError {
-    /// A setting is out of its range.
     #[error("{0}")]
     Options(String),
-    /// The scene shows nothing.
     #[error("the scene has no triangles with any area; a scene of meshes is needed")]
     Empty,
-    /// Transforms take a node's vertices beyond what numbers hold.
     #[error("node {node} of the scene lies at a position that is not finite; check its transforms")]
-    NotFinite {
-        /// Number of the node, parents counted before children.
-        node: usize,
-    },
-    /// More geometry than is drawn.
+    NotFinite { node: usize },
     #[error("the scene has {count} triangles; at most {limit} are drawn. Simplify it first")]
-    TooManyTriangles {
-        /// Triangles, instances counted.
-        count: usize,
-        /// The limit.
-        limit: usize,
-    },
-    /// Photos that do not fit into memory.
+    TooManyTriangles { count: usize, limit: usize },
     #[error(transparent)]
     NoRoom(#[from] memory::NoRoom),
-    /// More identities than a 16-bit id map holds.
     #[error("the scene has more than 65535 objects and parts; name fewer nodes")]
     TooManyIdentities,
-    /// A file could not be written.
     #[error("{path}: {source}; is there space, and may the folder be written to?", path = path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// The folder is not for this.
+    Write { path: PathBuf, source: std::io::Error },
     #[error(transparent)]
     Folder(#[from] IoError),
-    /// The observer asked to stop.
     #[error("cancelled")]
     Interrupted(#[from] Interrupted),
 }
@@ -111,10 +90,24 @@ pub struct SynthReport {
     pub(crate) points: usize,
     /// Triangles of the scene after splitting for light.
     pub(crate) triangles: usize,
-    /// Seconds in all.
     pub(crate) secs: f64,
     /// What was left out of the scene.
     pub(crate) warnings: Vec<String>,
+}
+
+impl SynthReport {
+    /// What was made, as one line.
+    pub(crate) fn summary(&self) -> String {
+        format!(
+            "{}: {} photos to train on, {} held out, {} objects and parts, {} sparse points, in {:.1} s",
+            self.out.display(),
+            self.train_views,
+            self.held_out_views,
+            self.identities.len(),
+            self.points,
+            self.secs
+        )
+    }
 }
 
 /// Renders the scene in `glb` (any glTF file) into a data set in the folder `out`, which is made.

@@ -18,7 +18,6 @@ const GOLDEN: f64 = TAU * 0.381_966_011_250_105;
 /// Attempts to find a close-up with a free line of sight.
 const ATTEMPTS: usize = 24;
 
-/// What the cameras look at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RigSubject {
     pub(crate) focus: DVec3,

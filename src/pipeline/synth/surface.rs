@@ -30,7 +30,6 @@ pub(crate) struct Vertex {
     pub(crate) normal: Vec3A,
     /// Texture coordinates of the base color and of the emission, transformed.
     pub(crate) uv: [Vec2; 2],
-    /// Linear vertex color.
     pub(crate) color: Vec4,
 }
 
@@ -232,7 +231,6 @@ impl Surface {
         2.0 * self.area(t) < f64::from(longest) * THIN
     }
 
-    /// Area of a triangle in the frame.
     pub(crate) fn area(&self, t: &Triangle) -> f64 {
         let [a, b, c] = t.vertices.map(|v| self.vertices[v as usize].position.as_dvec3());
         0.5 * (b - a).cross(c - a).length()

@@ -5,7 +5,6 @@ use glam::{Vec2, Vec4};
 use crate::io::gltf_mesh::{TextureImage, TextureUse, Wrap};
 use crate::math::srgb;
 
-/// An image at all resolutions.
 pub(crate) struct Texture {
     levels: Vec<TextureImage>,
     decode: [f32; 256],

@@ -18,7 +18,6 @@ const REACH: f32 = 1e-6;
 /// The same as a share of a triangle's size, for slivers at most.
 const MAX_SHARE: f32 = 0.02;
 
-/// Where a ray meets the surface.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SurfaceHit {
     /// Distance in lengths of the ray's direction.

@@ -36,7 +36,6 @@ pub struct SynthScene {
     pub(crate) surface: Surface,
     pub(crate) tracer: Tracer,
     pub(crate) materials: Materials,
-    /// The light on them.
     pub(crate) light: Light,
 }
 
@@ -146,7 +145,6 @@ impl SynthScene {
     }
 }
 
-/// What one ray sees.
 #[derive(Clone, Copy, Default)]
 struct Sample {
     /// Linear, 0 to 1.
@@ -166,7 +164,6 @@ impl Sample {
     }
 }
 
-/// What a pixel shows.
 #[derive(Clone, Copy, Default)]
 struct Pixel {
     rgb: [u8; 3],

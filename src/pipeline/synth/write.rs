@@ -20,7 +20,6 @@ use crate::scene::{Camera, SparsePoint};
 pub(crate) const TRANSFORMS: &str = "transforms.json";
 pub(crate) const SETTINGS: &str = "synth.json";
 
-/// Writes into one folder.
 pub(crate) struct Writer {
     out: PathBuf,
     _lock: FolderLock,
@@ -75,7 +74,6 @@ impl Writer {
         })
     }
 
-    /// Writes what is about all photos.
     #[expect(clippy::too_many_arguments, reason = "one call, each argument a file's content")]
     pub(crate) fn finish(
         &self,

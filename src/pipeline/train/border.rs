@@ -36,9 +36,6 @@ pub(crate) struct Borders {
 impl Borders {
     /// Looks for borders in a sample of the photos with these indices, which should be those of
     /// training, scaled to `max_side_px`.
-    ///
-    /// # Errors
-    /// If a photo cannot be read.
     pub(crate) fn of(dataset: &Dataset, photos: &[usize], max_side_px: u32) -> Result<Self, IoError> {
         let mut cameras: BTreeMap<[u64; 6], Vec<&Photo>> = BTreeMap::new();
         for photo in photos.iter().map(|&i| &dataset.photos[i]).filter(|p| may_have_border(p)) {
@@ -57,9 +54,6 @@ impl Borders {
     }
 
     /// The photo's pixels, without the border of its camera.
-    ///
-    /// # Errors
-    /// If the photo cannot be read.
     pub(crate) fn load(&self, photo: &Photo) -> Result<PhotoPixels, IoError> {
         let mut pixels = photo::load(photo, self.max_side_px)?;
         if let Some(border) = self.by_camera.get(&intrinsics(&photo.camera)).filter(|_| may_have_border(photo)) {
@@ -111,7 +105,6 @@ fn find(photos: &[&PhotoPixels]) -> Option<Vec<bool>> {
     (any_black && sharp && small).then_some(border)
 }
 
-/// Takes the border's pixels out of a photo.
 fn leave_out(border: &[bool], photo: &mut PhotoPixels) {
     let n = photo.len();
     let coverage = photo.coverage.get_or_insert_with(|| vec![u8::MAX; n]);

@@ -29,22 +29,17 @@ const MAGIC_1: &[u8; 8] = b"FMLGSCP1";
 
 /// Everything about a run but its arrays.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs, reason = "each name says what it is")]
 pub struct Header {
-    /// Settings of the run.
     pub config: TrainConfig,
     /// Names of the photos trained on.
     pub photos: Vec<String>,
-    /// Steps done.
     pub step: u64,
-    /// Seconds of training so far.
     pub secs: f64,
     /// Gaussians.
     pub count: usize,
-    /// Their SH degree.
     pub sh_degree: u8,
-    /// Their origin.
     pub origin: DVec3,
-    /// State of the random generator.
     pub rng: Pcg64Mcg,
     /// Photos left in the round.
     pub round: Vec<u32>,
@@ -52,38 +47,21 @@ pub struct Header {
     pub budget: usize,
     /// Factor on the learning rates.
     pub damping: f64,
-    /// What was measured so far.
     pub history: History,
 }
 
 /// Why a checkpoint cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum CheckpointError {
-    /// It cannot be read or written.
     #[error(transparent)]
     Io(#[from] IoError),
-    /// It is not a checkpoint, or a damaged one.
     #[error("{path} is damaged or no checkpoint ({reason}); choose another folder to train anew")]
-    Damaged {
-        /// The file.
-        path: std::path::PathBuf,
-        /// What is wrong.
-        reason: String,
-    },
-    /// There is a scene, but nothing to go on from.
+    Damaged { path: std::path::PathBuf, reason: String },
     #[error("{folder} holds a trained scene, but no checkpoint to go on from; choose another folder for the result")]
-    Missing {
-        /// The scene's folder.
-        folder: std::path::PathBuf,
-    },
-    /// It belongs to another run.
+    Missing { folder: std::path::PathBuf },
     #[error("{path} belongs to a run with other {what}; choose another folder for the result")]
-    OtherRun {
-        /// The file.
-        path: std::path::PathBuf,
-        /// What differs.
-        what: &'static str,
-    },
+    OtherRun { path: std::path::PathBuf, what: &'static str },
 }
 
 /// Writes the state atomically.

@@ -6,7 +6,6 @@ use crate::io::photo;
 /// Halves have at least this many px along their sides.
 const LEAST_PX: u32 = 16;
 
-/// The views at half their size.
 pub(crate) fn halved(views: &[TrainView]) -> Vec<TrainView> {
     views.iter().map(half).collect()
 }

@@ -69,9 +69,6 @@ pub struct UnreadableConfig {
 impl TrainConfig {
     /// The settings that the scene in `folder` stores; the defaults for what it does not say, or if it says
     /// nothing.
-    ///
-    /// # Errors
-    /// If they cannot be read.
     pub(crate) fn stored(folder: &Path, config: serde_json::Value) -> Result<Self, UnreadableConfig> {
         let read = match config {
             serde_json::Value::Null => Ok(Self::default()),

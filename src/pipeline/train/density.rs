@@ -142,12 +142,8 @@ mod tests {
 
     fn setup(n: usize) -> (GaussianCloud, [GaussianCloud; 2], DensityStats, Pcg64Mcg) {
         let cloud = GaussianCloud {
-            positions: (0..n).map(|i| [i as f32, 0.0, 0.0]).collect(),
-            log_scales: vec![[-9.0; 3]; n],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
-            opacity_logits: vec![0.0; n],
             sh: vec![[1.0; 3]; n],
-            ..GaussianCloud::default()
+            ..GaussianCloud::isotropic((0..n).map(|i| [i as f32, 0.0, 0.0]).collect(), -9.0, 0.0)
         };
         let m = cloud.clone();
         (cloud, [m.clone(), m], DensityStats { seen: vec![1; n], ..DensityStats::new(n) }, Pcg64Mcg::seed_from_u64(1))

@@ -23,7 +23,6 @@ pub struct StepResult {
     pub(crate) outliers: usize,
 }
 
-/// A run on a GPU.
 pub(crate) struct DeviceRun {
     trainer: GpuTrainer,
     photos: Vec<DevicePhoto>,
@@ -46,7 +45,6 @@ impl DeviceRun {
         Ok(Self { trainer, photos })
     }
 
-    /// Replaces cloud and moments.
     pub(crate) fn upload(
         &mut self,
         cloud: &GaussianCloud,

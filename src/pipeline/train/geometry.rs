@@ -14,7 +14,6 @@ const NORMALS_FROM: f64 = 7.0 / 30.0;
 /// ordinary Gaussian, by other programs or on a GPU, it is as good as flat.
 const THICKNESS: f64 = 1e-7;
 
-/// Weights of the terms and their buffers.
 #[derive(Debug, Default)]
 pub(crate) struct GeometryLoss {
     surfels: bool,

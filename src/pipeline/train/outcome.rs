@@ -9,16 +9,13 @@ use crate::pipeline::observer::Evaluation;
 use crate::render::{GpuError, RenderError};
 use crate::scene::GaussianCloud;
 
-/// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum TrainEnd {
-    /// All steps were done.
     Finished,
     /// The observer asked to stop; the state is saved.
     Cancelled,
 }
 
-/// What a run leaves behind.
 #[derive(Clone, Debug)]
 pub(crate) struct TrainOutcome {
     pub(crate) cloud: Arc<GaussianCloud>,
@@ -26,38 +23,31 @@ pub(crate) struct TrainOutcome {
     pub(crate) evaluations: Vec<Evaluation>,
     pub(crate) end: TrainEnd,
     pub(crate) steps: u64,
-    /// Seconds of training.
     pub(crate) secs: f64,
 }
 
 /// Why a run failed.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum TrainError {
-    /// No photo to train on.
     #[error("{0} has no photo to train on: {1} photos, all held out; lower --holdout or add photos")]
     NoPhotos(String, usize),
-    /// A photo could not be read.
     #[error(transparent)]
     Photo(IoError),
-    /// A view could not be drawn.
     #[error("photo {0}: {1}")]
     Render(String, RenderError),
     /// The GPU failed. The last checkpoint is intact.
     #[error("the GPU failed: {0}; --backend cpu does without")]
     Gpu(#[from] GpuError),
-    /// The checkpoint in the result's folder cannot be used.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
-    /// The result could not be saved.
     #[error(transparent)]
     Save(IoError),
-    /// The loss kept growing.
     #[error("the training diverged {0} times even with lowered rates; the photos' poses may be wrong")]
     Diverged(u32),
     /// A stage left a number that is none; looked for under `debug-validation` only.
     #[error(transparent)]
     NotFinite(#[from] NotFinite),
-    /// Settings that make no sense.
     #[error("{0}")]
     Config(String),
 }

@@ -353,7 +353,6 @@ impl<'a> Job<'a> {
         checkpoint::save(scene, t, &header).map_err(TrainError::Save)
     }
 
-    /// Scores and saves the final state.
     fn finish(mut self, end: TrainEnd, observer: &mut dyn Observer) -> Result<TrainOutcome, TrainError> {
         self.trainer.fetch_cloud()?;
         let checkpoint = self.checkpoint();

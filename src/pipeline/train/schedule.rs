@@ -22,9 +22,7 @@ pub struct Schedule {
     pub(crate) densify_from: u64,
     /// Last step at which Gaussians may be added.
     pub(crate) densify_until: u64,
-    /// Steps between density control.
     pub(crate) densify_interval: u64,
-    /// Steps between opacity resets.
     pub(crate) reset_interval: u64,
 }
 

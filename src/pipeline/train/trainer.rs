@@ -25,11 +25,10 @@ pub(crate) const REPORT_STEPS: u64 = 10;
 
 /// Why a step failed.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum StepError {
-    /// The view cannot be drawn.
     #[error(transparent)]
     Render(#[from] RenderError),
-    /// The GPU failed.
     #[error(transparent)]
     Gpu(#[from] GpuError),
     /// A stage left a number that is none; looked for under `debug-validation` only.
@@ -91,7 +90,6 @@ impl Trainer {
         }
     }
 
-    /// Goes on on a GPU.
     pub(crate) fn move_to(&mut self, device: &Device, views: &[TrainView]) -> Result<(), GpuError> {
         let device = DeviceRun::new(device, &self.cloud, &self.moments, self.step, self.settings.clone(), views)?;
         self.device = Some(device);

@@ -9,18 +9,13 @@
 
 /// Learning rates of one step, in units of the parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[allow(missing_docs, reason = "each name says what it is")]
 pub struct Rates {
-    /// Positions, scene units.
     pub position: f32,
-    /// Log-scales.
     pub log_scale: f32,
-    /// Quaternions.
     pub quaternion: f32,
-    /// Opacity logits.
     pub opacity_logit: f32,
-    /// Constant color.
     pub sh_constant: f32,
-    /// Other coefficients.
     pub sh_rest: f32,
 }
 

@@ -94,7 +94,6 @@ fn each_tile<R: Real>(s: &Splat<R>, size: [usize; 2], columns: usize, mut found:
     }
 }
 
-/// One task's share of the splats.
 struct Share {
     tiles: Vec<u32>,
     lengths: Vec<u32>,

@@ -95,9 +95,6 @@ impl<R: Real> CpuRenderer<R> {
     }
 
     /// Draws `cloud` as `camera` sees it.
-    ///
-    /// # Errors
-    /// If the camera is not usable, or the features are too many or of another cloud.
     pub fn render(
         &mut self,
         cloud: &GaussianCloud<R>,
@@ -123,9 +120,6 @@ impl<R: Real> CpuRenderer<R> {
 
     /// Hands the weight of every Gaussian at every pixel of a view to `sinks`, one for each row
     /// of tiles, which are `height.div_ceil(TILE_PX)`. Surfels count as flat Gaussians.
-    ///
-    /// # Errors
-    /// If the camera is not usable.
     pub(crate) fn contributions<S: ContributionSink<R>>(
         &mut self,
         cloud: &GaussianCloud<R>,
@@ -150,9 +144,6 @@ impl<R: Real> CpuRenderer<R> {
     }
 
     /// Whether the backward pass over the tiles left finite numbers.
-    ///
-    /// # Errors
-    /// Names the first that is none.
     pub(crate) fn check_backward(&self) -> Result<(), NotFinite> {
         all_finite("blending backward", "record", last!(self, r => &r.records))
     }

@@ -73,7 +73,6 @@ pub(crate) struct Splat<R> {
     pub(crate) reach: R,
     /// Half width and half height of the ellipse at `reach`, px.
     pub(crate) half: [R; 2],
-    /// Camera-space depth.
     pub(crate) depth: R,
     /// Index in the cloud.
     pub(crate) gaussian: u32,
@@ -87,7 +86,6 @@ pub struct SplatGeometry<R> {
     pub local: [R; 3],
     /// Tangents `x/z`, `y/z` after clamping, and whether they were clamped.
     pub(crate) tangent: [R; 2],
-    /// Whether each tangent was clamped.
     pub(crate) clamped: [bool; 2],
     /// Rows of the linearized projection in world axes, `J W`.
     pub(crate) jacobian: [[R; 3]; 2],
@@ -232,7 +230,6 @@ pub(crate) enum Projected<R, S, D> {
     Degenerate,
 }
 
-/// A Gaussian as a splat of at least this alpha.
 #[inline(always)]
 pub(crate) fn splat<R: Real>(
     gaussian: &Gaussian<'_, R>,

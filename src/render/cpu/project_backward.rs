@@ -12,13 +12,9 @@ pub(crate) const MOMENTS: usize = 6;
 /// Gradient with respect to the raw parameters of one Gaussian.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct GaussianGradient<R> {
-    /// With respect to its position.
     pub(crate) position: [R; 3],
-    /// With respect to its log-scales.
     pub(crate) log_scale: [R; 3],
-    /// With respect to its raw quaternion.
     pub(crate) quaternion: [R; 4],
-    /// With respect to its opacity logit.
     pub(crate) opacity_logit: R,
     /// With respect to its color before the clamp; the gradient of SH coefficient `k` is
     /// `basis[k]` times this.

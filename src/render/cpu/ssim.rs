@@ -31,7 +31,6 @@ pub struct PhotoLoss<R> {
 pub struct LossParts {
     pub(crate) l1: f64,
     pub(crate) ssim: f64,
-    /// Mean squared difference.
     pub(crate) mse: f64,
 }
 

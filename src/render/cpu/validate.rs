@@ -97,12 +97,8 @@ mod tests {
     #[test]
     fn poisoned_stages_of_a_renderer_are_named_under_the_feature() {
         let cloud = GaussianCloud::<f32> {
-            positions: vec![[0.0, 0.0, 3.0]],
-            log_scales: vec![[-1.0; 3]],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]],
-            opacity_logits: vec![2.0],
             sh: vec![[0.5; 3]],
-            ..GaussianCloud::default()
+            ..GaussianCloud::<f32>::isotropic(vec![[0.0, 0.0, 3.0]], -1.0, 2.0)
         };
         let camera = Camera::of_pose(DVec3::ZERO, DMat3::IDENTITY, 0.8, 20, 20);
         let stage = |value: f32, background: f32| {
@@ -149,14 +145,7 @@ mod tests {
         assert_eq!(drawn(&frame), Ok(()));
         frame.alpha[1] = f64::INFINITY;
         assert_eq!(drawn(&frame), Err(NotFinite { stage: "blending", field: "alpha of pixel", index: 1 }));
-        let mut gaussians = GaussianCloud::<f64> {
-            positions: vec![[0.0; 3]],
-            log_scales: vec![[0.0; 3]],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]],
-            opacity_logits: vec![0.0],
-            sh: vec![[0.0; 3]],
-            ..GaussianCloud::default()
-        };
+        let mut gaussians = GaussianCloud::<f64>::isotropic(vec![[0.0; 3]], 0.0, 0.0);
         assert_eq!(cloud("Adam", &gaussians), Ok(()));
         gaussians.opacity_logits[0] = f64::NAN;
         assert_eq!(cloud("Adam", &gaussians), Err(NotFinite { stage: "Adam", field: "opacity", index: 0 }));

@@ -33,10 +33,8 @@ pub(crate) struct Adam {
     pub(crate) outliers: wgpu::Buffer,
 }
 
-/// What one step works on.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AdamBuffers<'a> {
-    /// Parameters to move.
     pub(crate) parameters: &'a Parameters,
     /// Their gradient, with the marks of `project_backward`.
     pub(crate) gradient: &'a Parameters,

@@ -45,7 +45,6 @@ impl Bin {
         stage.run(&self.scan_sums, &[bindings.view, &scratch.sums, bindings.counters], [1, 1, 1]);
     }
 
-    /// Records the emission of pairs.
     pub(crate) fn encode_emit(
         &self,
         stage: &mut RecordedStage<'_>,

@@ -23,7 +23,6 @@ impl TileKernel {
         Self::new("blend", false, [Access::Write; 4])
     }
 
-    /// The kernel of a shader.
     pub(crate) fn new(shader: &'static str, float_atomics: bool, own: [Access; 4]) -> Self {
         Self { shader, float_atomics, own, kernels: BTreeMap::new() }
     }

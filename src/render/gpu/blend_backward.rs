@@ -16,7 +16,6 @@ pub(crate) fn blend_backward(float_atomics: bool) -> TileKernel {
 pub(crate) struct BlendGradients {
     /// Of the picture's color and alpha, and, behind those, of its depth.
     pub(crate) pixels: wgpu::Buffer,
-    /// Of its extra channels.
     pub(crate) features: wgpu::Buffer,
     /// Of the splats, `GRADIENT_BASE + channels` floats each.
     pub(crate) splats: wgpu::Buffer,

@@ -19,7 +19,6 @@ pub struct Device {
     fault: Arc<Mutex<Option<GpuError>>>,
 }
 
-/// The fastest adapter, or a software one.
 fn adapter(software: bool) -> Result<wgpu::Adapter, wgpu::RequestAdapterError> {
     let mut description = wgpu::InstanceDescriptor::new_without_display_handle();
     description.backends = wgpu::Backends::PRIMARY;
@@ -55,9 +54,6 @@ impl Device {
     }
 
     /// The process's device where it is a real GPU's. No device of an emulated adapter is opened to find that out.
-    ///
-    /// # Errors
-    /// If there is one that does not open.
     pub(crate) fn shared_real() -> Result<Option<Self>, GpuError> {
         Ok(held_or(&SHARED, Self::real)?.filter(|device| !device.is_software()))
     }
@@ -92,9 +88,6 @@ impl Device {
 
     /// Opens the best real GPU; `None` where there is none. No device of an emulated adapter is opened
     /// to find that out.
-    ///
-    /// # Errors
-    /// If there is one that does not open.
     pub(crate) fn real() -> Result<Option<Self>, GpuError> {
         let adapter = adapter(false).ok().filter(|a| a.get_info().device_type != wgpu::DeviceType::Cpu);
         adapter.map(|a| Self::open(&a)).transpose()
@@ -236,14 +229,12 @@ impl Device {
         self.buffer(what, bytes, usage)
     }
 
-    /// A storage buffer with contents.
     pub(super) fn storage_with(&self, what: &str, contents: &[u8]) -> Result<wgpu::Buffer, GpuError> {
         let buffer = self.storage(what, contents.len() as u64)?;
         self.queue.write_buffer(&buffer, 0, contents);
         Ok(buffer)
     }
 
-    /// A uniform buffer with contents.
     pub(super) fn uniform(&self, what: &str, contents: &[u8]) -> Result<wgpu::Buffer, GpuError> {
         let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
         let buffer = self.buffer(what, contents.len() as u64, usage)?;

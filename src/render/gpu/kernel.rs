@@ -35,7 +35,6 @@ impl Module {
     }
 }
 
-/// One entry point, ready to run.
 #[derive(Debug)]
 pub(crate) struct Kernel {
     pipeline: wgpu::ComputePipeline,
@@ -113,20 +112,16 @@ impl Kernel {
     }
 }
 
-/// What every kernel of one frame is told.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FrameBindings<'a> {
     /// The camera and the picture, see [`super::layout::View`].
     pub(crate) view: &'a wgpu::Buffer,
     /// See [`super::layout::Counters`].
     pub(crate) counters: &'a wgpu::Buffer,
-    /// Gaussians in the cloud.
     pub(crate) gaussians: u32,
-    /// Picture size in tiles.
     pub(crate) tiles: [u32; 2],
 }
 
-/// One stage that is being recorded.
 #[derive(Debug)]
 pub(crate) struct RecordedStage<'a> {
     device: &'a Device,
@@ -166,7 +161,6 @@ impl<'a> Recorder<'a> {
         self.encoder.clear_buffer(buffer, 0, None);
     }
 
-    /// Hands the commands to the device.
     pub(crate) fn submit(mut self) -> wgpu::SubmissionIndex {
         if let Some(timer) = self.timer {
             timer.resolve(&mut self.encoder);

@@ -18,6 +18,7 @@ macro_rules! twins {
     ($($(#[$meta:meta])* struct $name:ident { $($(#[$field_meta:meta])* $field:ident: $ty:ty,)* })*) => {
         $(
             $(#[$meta])*
+            #[allow(missing_docs, reason = "the other fields say what they are")]
             #[repr(C)]
             #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
             pub struct $name { $($(#[$field_meta])* pub $field: $ty,)* }
@@ -38,9 +39,7 @@ twins! {
     struct View {
         /// The camera's right axis in the world; the last entry is unused here and below.
         right: [f32; 4],
-        /// Its down axis.
         down: [f32; 4],
-        /// Its forward axis.
         forward: [f32; 4],
         /// Cloud origin minus camera center, leading part.
         offset_hi: [f32; 4],
@@ -48,19 +47,14 @@ twins! {
         offset_lo: [f32; 4],
         /// Color behind everything.
         background: [f32; 4],
-        /// Focal lengths in px.
         focal: [f32; 2],
-        /// Principal point in px.
         principal: [f32; 2],
         /// Smallest viewing tangents at which the projection is linearized.
         tangent_min: [f32; 2],
         /// Largest ones.
         tangent_max: [f32; 2],
-        /// Picture size in px.
         size_px: [u32; 2],
-        /// Picture size in tiles.
         tiles: [u32; 2],
-        /// Gaussians in the cloud.
         gaussians: u32,
         /// Spherical-harmonics degree to use.
         sh_degree: u32,
@@ -68,21 +62,16 @@ twins! {
         sh_stored: u32,
         /// (Splat, tile) pairs that fit.
         capacity: u32,
-        /// Near plane.
         near: f32,
         /// 1 = anti-aliasing compensation.
         antialias: u32,
-        /// Extra channels per Gaussian.
         channels: u32,
-        /// Unused.
         pad0: u32,
     }
 
     /// A Gaussian in the picture; see `shaders/shared/splat.wgsl`.
     struct Splat {
-        /// Center in px.
         mean: [f32; 2],
-        /// Camera-space depth.
         depth: f32,
         /// Peak opacity.
         opacity: f32,
@@ -90,7 +79,6 @@ twins! {
         factor: [f32; 3],
         /// Largest squared Mahalanobis distance that is drawn.
         reach: f32,
-        /// Color towards the camera.
         color: [f32; 3],
         /// 3 sigma along the longer axis in px; 0 = not drawn.
         radius: f32,
@@ -102,27 +90,21 @@ twins! {
         shift: u32,
         /// Which counter holds the number of pairs.
         counter: u32,
-        /// Unused.
         pad0: u32,
-        /// Unused.
         pad1: u32,
     }
 
     /// Which extra channels a blending pass draws.
     struct Chunk {
-        /// Channels per Gaussian in the buffers.
         channels: u32,
-        /// First channel of the pass.
         first: u32,
         /// 1 = there is a gradient with respect to expected depth.
         depth_gradient: u32,
-        /// Unused.
         pad0: u32,
     }
 
     /// One evaluation of the training loss; see `shaders/ssim.wgsl`.
     struct Loss {
-        /// Picture size in px.
         size_px: [u32; 2],
         /// Place in the ring of sums.
         slot: u32,
@@ -132,9 +114,7 @@ twins! {
         l1: f32,
         /// Weight of D-SSIM, likewise.
         dssim: f32,
-        /// Unused.
         pad0: u32,
-        /// Unused.
         pad1: u32,
     }
 
@@ -142,17 +122,13 @@ twins! {
     struct AdamStep {
         /// Rate of each float of a record; a rate of 0 leaves the float and its moments alone.
         rates: [[f32; 4]; 7],
-        /// Floats in all.
         floats: u32,
-        /// Floats per record.
         stride: u32,
         /// `1 / (1 - beta1^t)`.
         unbias_first: f32,
         /// `1 / (1 - beta2^t)`.
         unbias_second: f32,
-        /// Decay of the first moment.
         beta_first: f32,
-        /// Decay of the second moment.
         beta_second: f32,
         /// Added to the root of the second moment.
         epsilon: f32,
@@ -162,9 +138,7 @@ twins! {
         growth: f32,
         /// A gradient this many times too large is counted.
         outlier: f32,
-        /// Unused.
         pad0: f32,
-        /// Unused.
         pad1: f32,
     }
 }
@@ -173,7 +147,6 @@ twins! {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct Counters {
-    /// Gaussians in the cloud.
     pub(crate) gaussians: u32,
     /// (Splat, tile) pairs blended; 0 when they did not fit.
     pub pairs: u32,
@@ -187,6 +160,5 @@ pub struct Counters {
     pub degenerate: u32,
     /// Gaussians whose gradient was not finite.
     pub(crate) bad_gradients: u32,
-    /// Unused.
     pub(crate) pad: u32,
 }

@@ -93,7 +93,6 @@ pub(crate) fn view(
 pub(crate) struct CloudShape {
     /// World position that the Gaussians are relative to.
     pub(crate) origin: glam::DVec3,
-    /// How many there are.
     pub(crate) gaussians: u32,
     /// Spherical-harmonics degree that is stored.
     pub(crate) degree: u8,

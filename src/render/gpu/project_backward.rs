@@ -23,7 +23,6 @@ impl ProjectBackward {
         })
     }
 
-    /// Records the gradient of all parameters.
     pub(crate) fn encode(
         &self,
         stage: &mut RecordedStage<'_>,

@@ -23,13 +23,9 @@ pub(crate) struct GpuRasterizer {
     sort: Sort,
     bin: Bin,
     blend: TileKernel,
-    /// Camera and picture.
     pub(crate) view: wgpu::Buffer,
-    /// Counters of the frame.
     pub(crate) counters: wgpu::Buffer,
-    /// Buffers by number of Gaussians.
     pub(crate) gaussians: PerGaussian,
-    /// Buffers by number of pairs.
     pub(crate) pairs: PerPair,
     pub(crate) picture: PerPicture,
     extent: (u32, [u32; 2]),
@@ -129,7 +125,6 @@ impl GpuRasterizer {
         Ok(())
     }
 
-    /// Bytes of its buffers on the device.
     pub(crate) fn device_bytes(&self) -> u64 {
         let (g, p) = (&self.gaussians, &self.picture);
         let own = [&self.view, &self.counters, &g.splats, &g.tile_counts, &g.sums];
@@ -139,14 +134,12 @@ impl GpuRasterizer {
         all.map(wgpu::Buffer::size).sum::<u64>() + sorts
     }
 
-    /// Reads the frame's counters.
     pub(crate) fn read_counters(&self, device: &Device) -> Result<Counters, GpuError> {
         let bytes = device.read(&[(&self.counters, size_of::<Counters>() as u64)])?;
         Ok(counters_of(&bytes[0]))
     }
 }
 
-/// Counters from their bytes.
 pub(crate) fn counters_of(bytes: &[u8]) -> Counters {
     bytemuck::pod_read_unaligned(&bytes[..size_of::<Counters>()])
 }

@@ -85,7 +85,6 @@ pub(crate) struct PerPicture {
 }
 
 impl PerPicture {
-    /// Room for a picture of this size.
     pub(crate) fn new(device: &Device, size_px: [u32; 2], channels: usize) -> Result<Self, GpuError> {
         let [pixels, tiles] = extent(size_px);
         let n = pixels as u64;

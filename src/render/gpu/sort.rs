@@ -53,7 +53,6 @@ impl SortBuffers {
         })
     }
 
-    /// Bytes of its buffers on the device.
     pub(crate) fn device_bytes(&self) -> u64 {
         let all = self.keys.iter().chain(&self.values).chain([&self.histogram, &self.totals]).chain(&self.passes);
         all.map(wgpu::Buffer::size).sum()

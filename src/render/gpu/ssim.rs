@@ -18,12 +18,10 @@ const SLOT_BYTES: u64 = 32;
 #[derive(Clone, Debug)]
 pub struct DevicePhoto {
     pixels: wgpu::Buffer,
-    /// Width and height in px.
     pub(crate) size_px: [u32; 2],
 }
 
 impl DevicePhoto {
-    /// Sends a photo to the device.
     pub(crate) fn new(device: &Device, photo: &PhotoPixels) -> Result<Self, GpuError> {
         let size_px = [photo.width_px, photo.height_px];
         let [want, _] = extent(size_px);
@@ -42,7 +40,6 @@ impl DevicePhoto {
 pub struct LossSums {
     pub(crate) l1: f64,
     pub(crate) ssim: f64,
-    /// Mean squared difference.
     pub(crate) mse: f64,
     /// The frame's (splat, tile) pairs did not fit, so it was not drawn and nothing moved.
     pub overflow: bool,
@@ -67,7 +64,6 @@ impl LossSums {
     }
 }
 
-/// The kernels with their buffers.
 #[derive(Debug)]
 pub(crate) struct Ssim {
     moments: Kernel,

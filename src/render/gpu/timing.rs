@@ -61,8 +61,7 @@ impl Timer {
     pub(crate) fn finish(&mut self, device: &Device) -> Result<StageTimes, GpuError> {
         let names = std::mem::take(&mut self.names);
         let bytes = device.read(&[(&self.resolved, names.len() as u64 * 16)])?;
-        let ticks: Vec<u64> =
-            bytes.iter().flatten().copied().collect::<Vec<u8>>().chunks_exact(8).map(read_u64).collect();
+        let ticks: Vec<u64> = bytes.concat().as_chunks().0.iter().map(|b| u64::from_le_bytes(*b)).collect();
         let mut out: StageTimes = Vec::new();
         for (name, span) in names.into_iter().zip(ticks.chunks_exact(2)) {
             let secs = span[1].saturating_sub(span[0]) as f64 * self.secs_per_tick;
@@ -73,8 +72,4 @@ impl Timer {
         }
         Ok(out)
     }
-}
-
-fn read_u64(bytes: &[u8]) -> u64 {
-    bytes.iter().rev().fold(0, |sum, &b| sum << 8 | u64::from(b))
 }

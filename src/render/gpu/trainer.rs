@@ -120,7 +120,6 @@ impl GpuTrainer {
         DevicePhoto::new(&self.device, pixels)
     }
 
-    /// Number of Gaussians.
     pub(crate) fn len(&self) -> usize {
         self.shape.gaussians as usize
     }

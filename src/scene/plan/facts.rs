@@ -56,7 +56,6 @@ pub struct PhotoFacts {
     pub(crate) size_px: [u32; 2],
     /// Longest side of all of them, px.
     pub(crate) longest_px: u32,
-    /// Pixels of all of them.
     pub(crate) pixels: u64,
     /// Pixels of all of them once they are limited to the training's size.
     pub(crate) limited_pixels: u64,
@@ -69,7 +68,6 @@ pub struct SemanticFacts {
     pub(crate) parts: usize,
     /// The encoder that looked at them, if one has.
     pub(crate) encoder: Option<String>,
-    /// Numbers in their stored features.
     pub(crate) numbers: usize,
 }
 
@@ -78,12 +76,10 @@ pub struct SemanticFacts {
 pub struct SceneFacts {
     /// The Gaussians, if they are a result.
     pub(crate) cloud: Option<CloudFacts>,
-    /// The photos, if there are any.
     pub(crate) photos: Option<PhotoFacts>,
     /// Objects and parts, if they were found.
     pub(crate) semantics: Option<SemanticFacts>,
     pub(crate) machine: Machine,
-    /// What the user has set.
     pub(crate) limits: Limits,
 }
 

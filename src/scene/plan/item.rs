@@ -85,12 +85,10 @@ const AUTO: &str = "auto";
 const FORMER_EAGER: &str = "open";
 
 impl Item {
-    /// Its name on the command line.
     pub(crate) fn id(self) -> &'static str {
         self.into()
     }
 
-    /// Its name for the user.
     pub(crate) fn subject(self) -> &'static str {
         self.get_str("subject").unwrap_or_default()
     }
@@ -155,7 +153,6 @@ impl Overrides {
         Self(all.collect())
     }
 
-    /// Whether the alternative is wanted.
     pub(crate) fn has(&self, item: Item) -> bool {
         self.0.contains(&item)
     }

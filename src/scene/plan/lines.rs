@@ -35,7 +35,6 @@ struct Said {
     choice: String,
     reason: String,
     saving: String,
-    /// Whether the alternative would make a difference.
     differs: bool,
 }
 

@@ -60,9 +60,7 @@ pub struct PlanLine {
 /// The decisions for a scene.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ScenePlan {
-    /// What they were computed from.
     pub(crate) facts: SceneFacts,
-    /// What the user wants otherwise.
     pub(crate) overrides: Overrides,
     /// Highest spherical-harmonics degree that is drawn.
     pub sh_degree: u8,
@@ -70,11 +68,9 @@ pub struct ScenePlan {
     pub maps: When,
     /// Whether these maps have a level for parts.
     pub parts: bool,
-    /// When objects and parts are drawn alone.
     pub(crate) thumbnails: When,
     /// When the encoder of typed phrases is loaded.
     pub(crate) encoder: When,
-    /// When the graph for navigation is built.
     pub(crate) navigation: When,
     /// When depth is drawn: as it is used, or with every picture.
     pub(crate) depth: When,
@@ -90,9 +86,7 @@ pub struct ScenePlan {
     pub(crate) on_cpu: bool,
     /// When the window is drawn: as something changes, or all the time.
     pub(crate) redraw: When,
-    /// When the renderer holds its working memory.
     pub(crate) buffers: When,
-    /// The decisions, for the user.
     pub(crate) lines: Vec<PlanLine>,
 }
 

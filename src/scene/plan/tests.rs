@@ -17,14 +17,7 @@ fn colored(band_one: f32, band_two: f32) -> GaussianCloud {
 
 /// `n` round Gaussians along a line, of this log-scale.
 fn blobs(n: usize, log_scale: f32) -> GaussianCloud {
-    GaussianCloud {
-        positions: (0..n).map(|i| [0.2 * i as f32 - 0.1 * n as f32, 0.0, 0.0]).collect(),
-        log_scales: vec![[log_scale; 3]; n],
-        quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
-        opacity_logits: vec![3.0; n],
-        sh: vec![[0.0; 3]; n],
-        ..GaussianCloud::default()
-    }
+    GaussianCloud::isotropic((0..n).map(|i| [0.2 * i as f32 - 0.1 * n as f32, 0.0, 0.0]).collect(), log_scale, 3.0)
 }
 
 fn camera(side_px: u32) -> Camera {
@@ -142,14 +135,7 @@ fn a_single_photo_is_trained_on() {
     let p = plan(|facts| facts.with_photos(&[camera(1_000)]));
     assert_eq!(p.holdout_every, 0);
     let dataset = |n: usize| {
-        let photo = |i: usize| crate::scene::Photo {
-            name: i.to_string(),
-            path: "a".into(),
-            camera: camera(64),
-            distortion: None,
-            test_split: false,
-            background: None,
-        };
+        let photo = |i: usize| crate::scene::Photo::new(i.to_string(), "a", camera(64));
         crate::scene::Dataset { photos: (0..n).map(photo).collect(), ..crate::scene::Dataset::default() }
     };
     assert_eq!(dataset(1).split(8), (vec![0], vec![]));

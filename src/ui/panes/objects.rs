@@ -27,14 +27,14 @@ pub(crate) struct ObjectsPane {
 struct Renaming {
     id: IdentityId,
     name: String,
-    /// Whether the field has the keyboard already.
-    begun: bool,
+    /// Frames that the field was drawn, until it has the keyboard.
+    frames: u8,
 }
 
 impl ObjectsPane {
     /// Makes a text field of a name.
     pub(crate) fn rename(&mut self, id: IdentityId, all: &Identities) {
-        self.renaming = Some(Renaming { id, name: all.name(id), begun: false });
+        self.renaming = Some(Renaming { id, name: all.name(id), frames: 0 });
     }
 
     pub(crate) fn show(
@@ -90,7 +90,8 @@ impl Tree<'_> {
             return self.leaf(ui, id, actions);
         }
         let mut state = CollapsingState::load_with_default_open(ui.ctx(), Id::unique("branch").with(id), false);
-        let is_within = |r: &Renaming| !r.begun && self.identities.ancestors(r.id).skip(1).any(|whole| whole == id);
+        let is_within =
+            |r: &Renaming| r.frames == 0 && self.identities.ancestors(r.id).skip(1).any(|whole| whole == id);
         if self.renaming.as_ref().is_some_and(is_within) {
             state.set_open(true);
         }
@@ -115,10 +116,12 @@ impl Tree<'_> {
                 return self.name_field(ui, actions);
             }
             let name = ui.add(Button::new(self.identities.name(id)).frame_when_inactive(false));
+            let name = name.on_hover_text("Highlight it in the view; double-click to rename it");
+            if name.clicked() {
+                actions.extend([Action::Select(Some(id)), Action::Ask(self.identities.full_name(id))]);
+            }
             if name.double_clicked() {
                 self.start_renaming(id);
-            } else if name.on_hover_text("Highlight it in the view; double-click to rename it").clicked() {
-                actions.push(Action::Ask(self.identities.full_name(id)));
             }
             self.menu(ui, id, actions);
             let size = self.sizes.get(id as usize).unwrap_or(&0).to_string();
@@ -127,22 +130,22 @@ impl Tree<'_> {
     }
 
     fn start_renaming(&mut self, id: IdentityId) {
-        *self.renaming = Some(Renaming { id, name: self.identities.name(id), begun: false });
+        *self.renaming = Some(Renaming { id, name: self.identities.name(id), frames: 0 });
     }
 
     /// The name as a field with all of it selected. Enter and leaving it take the new name over, Escape does not.
     fn name_field(&mut self, ui: &mut Ui, actions: &mut Vec<Action>) {
-        let Some(Renaming { id, name, begun }) = self.renaming.as_mut() else { return };
+        let Some(Renaming { id, name, frames }) = self.renaming.as_mut() else { return };
         let field = Id::unique("name").with(*id);
-        let first = !std::mem::replace(begun, true);
-        if first {
-            select_all(ui.ctx(), field, name);
-        }
         let edit = ui.add(TextEdit::singleline(name).id(field).char_limit(80).desired_width(170.0));
         let edit = edit.accessible_name("New name");
-        if first {
+        if *frames < 2 {
+            // The keyboard comes with the next frame, and puts the cursor behind the name.
             edit.request_focus();
             edit.scroll_to_me(None);
+            select_all(ui.ctx(), field, name);
+            ui.ctx().request_repaint();
+            *frames += 1;
         } else if !edit.has_focus() {
             let is_new = name.trim() != self.identities.name(*id) && !ui.input(|i| i.key_pressed(Key::Escape));
             actions.extend(is_new.then(|| Action::Change(Edit::Rename(*id, name.clone()))));

@@ -194,7 +194,7 @@ mod tests {
         let mut all = Identities::default();
         let doll = all.add(Level::Object, NOBODY, vec![]);
         let identity = (0..100).map(|i| if i % 10 < 8 { doll } else { NOBODY }).collect();
-        let map = ViewMap { width_px: 10, height_px: 10, identity, share: vec![1.0; 100], alpha: vec![1.0; 100] };
+        let map = ViewMap::certain(10, identity);
         let rgb: Vec<[u8; 3]> = (0..100).map(|i| if i % 10 >= 4 { [200, 0, 0] } else { [0, 0, 200] }).collect();
         let mut brush = Brush::new(doll);
         brush.on_view(&camera);

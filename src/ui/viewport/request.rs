@@ -2,10 +2,22 @@
 
 use std::sync::Arc;
 
+use egui::{Rect, Ui};
+
+use super::Viewport;
+use super::photo::PhotoView;
 use crate::render::RenderSettings;
+use crate::scene::plan::When;
 use crate::scene::{Camera, GaussianCloud, PhotoPixels, SemanticMap};
+use crate::ui::layout::Layout;
+use crate::ui::state::AppState;
 use crate::worker::view::{QualityBudget, SkipPasses, ViewRequest};
 use crate::worker::{Versioned, ViewMode};
+
+/// The eye counts as moving until it has rested this long.
+const REST_SECS: f64 = 0.15;
+/// Longest side of a frame in px: beyond this the eye gains nothing and waiting costs.
+const MAX_SIDE_PX: u32 = 1600;
 
 /// What the view is to show now.
 pub(super) struct Wanted {
@@ -102,6 +114,69 @@ impl Requests {
         let request =
             ViewRequest { cloud, camera, mode, settings, budget, photo, semantics, follow, codes, skip, timed, ticket };
         Some((request, moved))
+    }
+}
+
+impl Viewport {
+    /// Asks for a new frame if anything changed.
+    pub(super) fn request(&mut self, ui: &Ui, shown: Rect, state: &AppState, layout: &Layout, now: f64) {
+        let Some(cloud) = self.cloud.clone() else { return };
+        let plan = &state.plan;
+        let (cloud, semantics) = match &state.semantics {
+            Some(semantics) => {
+                let (cloud, semantics) = self.visibility.apply(&cloud, semantics);
+                (
+                    cloud,
+                    Some(semantics).filter(|_| {
+                        plan.maps.now(self.queries.wanted() || self.picking.wanted() || self.brush.is_some())
+                    }),
+                )
+            }
+            None => (cloud, None),
+        };
+        let rests = now - self.moved_at - REST_SECS;
+        if rests < 0.0 {
+            ui.ctx().request_repaint_after_secs((-rests + 0.01) as f32);
+        }
+        let busy = state.job.as_ref().is_some_and(|j| !j.paused);
+        let budget = match (rests < 0.0, busy) {
+            (true, _) => QualityBudget::Moving,
+            (false, true) => QualityBudget::Shared,
+            (false, false) => QualityBudget::Full,
+        };
+        let size = shown.size() * ui.pixels_per_point();
+        let (w, h) = ((size.x.round() as u32).max(1), (size.y.round() as u32).max(1));
+        let camera = match &self.photo {
+            Some(p) => p.camera().resized(w, h),
+            None => self.eye.camera(w, h),
+        };
+        let always = plan.redraw == When::Always;
+        if always {
+            ui.ctx().request_repaint();
+        }
+        // A newer request would keep what belongs to the last one from ever being drawn.
+        let drawn = self.display.picture().is_some_and(|p| p.ticket == self.requests.ticket())
+            && (semantics.is_none() || self.queries.maps().is_some());
+        let wanted = Wanted {
+            cloud,
+            camera: camera.limited_to(MAX_SIDE_PX),
+            mode: layout.mode,
+            settings: self.overrides.over(state.render_settings(), self.on_gpu()),
+            budget,
+            photo: self.photo.as_ref().and_then(PhotoView::pixels),
+            codes: semantics.is_some() && self.queries.wants_codes(),
+            follow: budget == QualityBudget::Moving && (self.queries.tints() || self.picking.selected().is_some()),
+            semantics,
+            skip: SkipPasses::of(plan),
+            timed: layout.times,
+        };
+        if let Some((request, moved)) = self.requests.next(wanted, always && drawn) {
+            self.lane.request(request);
+            if moved != Moved::Nothing {
+                self.queries.forget_maps(moved == Moved::Eye);
+                self.display.forget_maps();
+            }
+        }
     }
 }
 

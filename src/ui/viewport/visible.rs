@@ -121,14 +121,7 @@ mod tests {
         let map = SemanticMap::from_identities(all, vec![doll, eye, cat, NOBODY], vec![1.0; 4], vec![]);
         let map = Versioned::new(Arc::new(map));
         let n = 4;
-        let cloud = GaussianCloud {
-            positions: (0..n).map(|i| [i as f32, 0.0, 0.0]).collect(),
-            log_scales: vec![[0.0; 3]; n],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; n],
-            opacity_logits: vec![0.0; n],
-            sh: vec![[0.0; 3]; n],
-            ..GaussianCloud::default()
-        };
+        let cloud = GaussianCloud::isotropic((0..n).map(|i| [i as f32, 0.0, 0.0]).collect(), 0.0, 0.0);
         let cloud = Versioned::new(Arc::new(cloud));
         let mut v = Visibility::default();
         let xs = |v: &mut Visibility| {

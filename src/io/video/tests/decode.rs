@@ -11,14 +11,11 @@ use openh264::formats::YUVSource;
 
 use super::super::Format;
 
-/// A video as a decoder sees it.
 pub(crate) struct Decoded {
-    /// Width and height in px.
     pub(crate) size_px: (u32, u32),
     pub(crate) frames: Vec<Vec<u8>>,
     /// Playing time, where the format has times.
     pub(crate) secs: Option<f64>,
-    /// Bytes on disk.
     pub(crate) bytes: u64,
 }
 
@@ -141,7 +138,6 @@ fn parameters(avcc: &[u8]) -> (Vec<u8>, String) {
     (stream, vui)
 }
 
-/// The bits of a parameter set.
 struct Bits<'a>(&'a [u8], usize);
 
 impl Bits<'_> {

@@ -40,7 +40,6 @@ fn camera(width_px: u32, height_px: u32) -> Camera {
     Camera::look_at(DVec3::new(0.0, 0.0, -4.0), DVec3::ZERO, DVec3::NEG_Y, 0.8, width_px, height_px).expect("valid")
 }
 
-/// A label of some pixels.
 fn label(name: &str, level: Level, size: [usize; 2], inside: impl Fn(usize) -> bool + Sync) -> Category {
     let mask = Mask::from_fn(size[0], size[1], inside);
     Category { name: name.into(), level, boxes: mask.bounds().into_iter().collect(), mask }
@@ -98,10 +97,7 @@ fn masks_are_intersection_over_union_by_level() {
 fn langsplat_smooths_scales_and_cuts() {
     // Columns of four objects, 60 px each; rows are all the same, so only columns count.
     let (w, h) = (240, 8);
-    let mut all = Identities::default();
-    (0..4).for_each(|_| {
-        all.add(Level::Object, NOBODY, vec![]);
-    });
+    let all = Identities::objects(4);
     let map = SemanticMap { identities: all, ..SemanticMap::default() };
     let view = exact(w, (0..w * h).map(|i| (i % w / 60) as IdentityId + 1).collect());
     // Relevancies 1, 0.65, 0.76, 0. `v` is half the relevancy, half its mean over columns x-15..x+14;
@@ -162,12 +158,8 @@ fn fastlgs_ex_pools_over_categories_and_views() {
 fn a_selection_is_drawn_alone_and_cut_at_seven_tenths() {
     // A doll, and a cat that stands in front of it.
     let cloud = GaussianCloud {
-        positions: vec![[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]],
         log_scales: vec![[-0.6; 3], [-0.2; 3]],
-        quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 2],
-        opacity_logits: vec![4.0; 2],
-        sh: vec![[0.0; 3]; 2],
-        ..GaussianCloud::default()
+        ..GaussianCloud::isotropic(vec![[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]], 0.0, 4.0)
     };
     let map = scene(vec![DOLL, CAT]);
     let camera = camera(120, 90);

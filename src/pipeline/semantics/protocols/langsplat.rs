@@ -16,7 +16,6 @@ const MAJORITY: usize = 3;
 /// What is kept after normalization.
 const CUT: f32 = 0.4;
 
-/// Compares all categories of a view.
 pub(crate) fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>) -> Vec<Unit> {
     let (w, h) = (view.exact.width_px, view.exact.height_px);
     let identities = &scene.map.identities;
@@ -161,7 +160,7 @@ mod tests {
             })
             .collect();
         let map = SemanticMap { identities: all, ..SemanticMap::default() };
-        let exact = ViewMap { width_px: w, height_px: h, identity, share: vec![1.0; w * h], alpha: vec![1.0; w * h] };
+        let exact = ViewMap::certain(w, identity);
         let truth = exact.mask(&map.identities, eye);
         let camera = Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, w as u32, h as u32).expect("valid");
         let blended = CodeMap::default();

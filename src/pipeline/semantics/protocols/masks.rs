@@ -3,7 +3,6 @@
 use super::{AskedScene, Category, LabeledView, Unit, means};
 use crate::scene::Level;
 
-/// Asks for all categories of a view.
 pub(crate) fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>) -> Vec<Unit> {
     let unit = |c: &Category| {
         let mask = (scene.ask)(&c.name).map(|a| a.mask(view.exact, &scene.map.identities, 1));

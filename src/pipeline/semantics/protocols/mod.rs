@@ -21,22 +21,17 @@ use super::segmenter::FoundMask;
 use super::view_map::ViewMap;
 use crate::scene::{Camera, Level, Mask, PixelBox, SemanticMap};
 
-/// A scene that is asked.
 pub(crate) struct AskedScene<'a> {
-    /// What it consists of.
     pub(crate) map: &'a SemanticMap,
     /// Answers a phrase; `None` for one with nothing in it.
     pub(crate) ask: &'a mut dyn FnMut(&str) -> Option<QueryAnswer>,
 }
 
-/// A labeled view of it.
 pub(crate) struct LabeledView<'a> {
     pub(crate) name: &'a str,
     pub(crate) camera: &'a Camera,
-    /// What its pixels belong to.
     pub(crate) exact: &'a ViewMap,
     pub(crate) blended: &'a CodeMap,
-    /// Labels, of the view's size.
     pub(crate) categories: Vec<Category>,
 }
 
@@ -47,9 +42,7 @@ pub(crate) struct Category {
     pub(crate) name: String,
     /// A part, if it is a piece of something that has a name.
     pub(crate) level: Level,
-    /// Its pixels.
     pub(crate) mask: Mask,
-    /// Box of each region.
     pub(crate) boxes: Vec<PixelBox>,
 }
 
@@ -60,7 +53,6 @@ impl Category {
     }
 }
 
-/// One compared category of a view.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub(crate) struct Unit {
     pub(crate) view: String,

@@ -12,7 +12,6 @@ use crate::scene::{Identities, LanguageFeatures, Level, Mask, SemanticMap};
 /// IoU from which a query counts as answered.
 pub(crate) const HIT_IOU: f64 = 0.5;
 
-/// What is switched on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub(crate) struct Components {
     /// Parts are extracted, not objects alone.
@@ -52,10 +51,8 @@ impl Components {
     }
 }
 
-/// One row of the table.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub(crate) struct Row {
-    /// What was switched on.
     pub(crate) components: Components,
     /// Share of part queries with an IoU of [`HIT_IOU`] or more.
     pub(crate) recall: f64,
@@ -68,9 +65,6 @@ pub(crate) struct Row {
 
 /// Asks for every part of the `views` by its phrase and compares, for one row of the table. `encode`
 /// gives the embedding of a phrase.
-///
-/// # Errors
-/// What `encode` fails with.
 pub(crate) fn row<E>(
     components: Components,
     map: &SemanticMap,

@@ -9,10 +9,6 @@ use crate::scene::{GaussianCloud, Mask};
 /// Accumulated alpha that belongs to the silhouette.
 const CUT: f32 = 0.7;
 
-/// Compares all categories of a view.
-///
-/// # Errors
-/// If the view cannot be drawn.
 pub(crate) fn compare(
     scene: &mut AskedScene<'_>,
     view: &LabeledView<'_>,

@@ -8,9 +8,7 @@ const SCALES: [(f32, f32); 3] = [(0.8, 0.3), (1.6, 0.35), (3.2, 0.35)];
 
 /// A picture's planes, row-major, and its width in px.
 pub(crate) struct ImagePlanes<'a> {
-    /// Width in px.
     pub(crate) width: usize,
-    /// Values of each channel.
     pub(crate) channels: &'a [Vec<f32>],
 }
 

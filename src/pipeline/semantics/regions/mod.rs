@@ -15,8 +15,9 @@ pub(crate) mod shape;
 pub(crate) mod tree;
 
 use self::segment::{Picture, RegionOptions, segment};
+use super::error::FindError;
 use super::filters::{self, FilterOptions};
-use super::segmenter::{FoundMask, SegmentError, Segmenter};
+use super::segmenter::{FoundMask, Segmenter};
 use crate::io;
 use crate::pipeline::observer::Observer;
 use crate::render::RenderSettings;
@@ -27,9 +28,7 @@ use crate::scene::{GaussianCloud, Level, Mask, Photo};
 pub struct Regions<'a> {
     /// Gaussians that were trained on the photos, and how they are drawn, for the scene's shape.
     pub(crate) trained: Option<(&'a GaussianCloud, &'a RenderSettings)>,
-    /// How regions are found.
     pub(crate) options: RegionOptions,
-    /// Which of them are kept.
     pub(crate) filters: FilterOptions,
 }
 
@@ -42,12 +41,7 @@ impl Segmenter for Regions<'_> {
         true
     }
 
-    fn segment(
-        &mut self,
-        photo: &Photo,
-        max_side_px: u32,
-        _: &mut dyn Observer,
-    ) -> Result<Vec<FoundMask>, SegmentError> {
+    fn segment(&mut self, photo: &Photo, max_side_px: u32, _: &mut dyn Observer) -> Result<Vec<FoundMask>, FindError> {
         let pixels = io::photo::load(photo, max_side_px)?;
         let camera = photo.camera.limited_to(max_side_px);
         let ends = self.trained.and_then(|(cloud, settings)| shape::ends_of(cloud, settings, &camera));

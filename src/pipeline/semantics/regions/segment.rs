@@ -58,7 +58,6 @@ const END: f64 = 3.0;
 /// An object and the regions inside it, as found and not yet filtered.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Candidate {
-    /// Its pixels.
     pub(crate) mask: Mask,
     /// Regions of its own tile.
     pub(crate) pieces: Vec<Mask>,
@@ -86,7 +85,6 @@ pub(crate) fn segment(picture: &Picture<'_>, options: &RegionOptions) -> Vec<Can
     kept.into_par_iter().map(candidate).collect()
 }
 
-/// The picture as basins.
 struct Mosaic {
     size: (usize, usize),
     pieces: Vec<Piece>,

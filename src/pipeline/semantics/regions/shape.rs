@@ -115,14 +115,7 @@ mod tests {
 
     #[test]
     fn a_drawn_scene_ends_where_its_surfaces_do() {
-        let cloud = GaussianCloud {
-            positions: vec![[0.0; 3]],
-            log_scales: vec![[-1.0; 3]],
-            quaternions: vec![[1.0, 0.0, 0.0, 0.0]],
-            opacity_logits: vec![6.0],
-            sh: vec![[0.0; 3]],
-            ..GaussianCloud::default()
-        };
+        let cloud = GaussianCloud::isotropic(vec![[0.0; 3]], -1.0, 6.0);
         let camera =
             Camera::look_at(glam::DVec3::new(0.0, 0.0, -4.0), glam::DVec3::ZERO, glam::DVec3::NEG_Y, 0.8, 90, 60)
                 .expect("valid");

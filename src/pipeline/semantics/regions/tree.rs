@@ -4,7 +4,6 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
-/// What is known of a piece.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Piece {
     /// Pixels.
@@ -13,7 +12,6 @@ pub(crate) struct Piece {
     pub(crate) sums: Vec<f64>,
 }
 
-/// What lies between two neighbors.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Border {
     /// Pairs of pixels.
@@ -33,7 +31,6 @@ impl Border {
     }
 }
 
-/// How unlike two neighbors are.
 pub(crate) type Unlike = dyn Fn(&Piece, &Piece, &Border) -> f64 + Sync;
 
 /// A node: a leaf, or two nodes made one.
@@ -47,7 +44,6 @@ pub(crate) struct Node {
     pub(crate) birth: f64,
     /// Unlikeness at which it was merged; that of the last merging for roots.
     pub(crate) death: f64,
-    /// Its pixels.
     pub(crate) area: f64,
 }
 
@@ -157,7 +153,6 @@ impl Tree {
         (0..self.nodes.len() as u32).filter(|&i| whole(&self.nodes[i as usize])).collect()
     }
 
-    /// The leaves below a node.
     pub(crate) fn leaves_of(&self, node: u32) -> Vec<u32> {
         let mut open = vec![node];
         let mut found = Vec::new();

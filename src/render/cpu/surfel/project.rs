@@ -28,7 +28,6 @@ pub(crate) struct SurfelGeometry<R> {
     pub(crate) across: [[R; 2]; 2],
     /// Determinant of `across`, not negative.
     pub(crate) determinant: R,
-    /// Projected center, px.
     pub(crate) center: [R; 2],
     /// Unit normal towards the camera, world axes.
     pub(crate) normal: [R; 3],

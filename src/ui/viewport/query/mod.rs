@@ -125,11 +125,10 @@ impl Queries {
 
     /// The same with the colors of their queries.
     pub(super) fn found_colors(&self) -> Vec<(IdentityId, Color32)> {
-        let color = |k: usize| {
-            Color32::from_rgb(COLORS[k % COLORS.len()][0], COLORS[k % COLORS.len()][1], COLORS[k % COLORS.len()][2])
-        };
-        let of = |(k, asked): (usize, &Asked)| asked.shown(&self.settings).into_iter().map(move |id| (id, color(k)));
-        self.all().enumerate().flat_map(of).collect()
+        let colors = COLORS.map(|[r, g, b]| Color32::from_rgb(r, g, b));
+        let colored =
+            |(k, q): (usize, &Asked)| q.shown(&self.settings).into_iter().map(move |id| (id, colors[k % COLORS.len()]));
+        self.all().enumerate().flat_map(colored).collect()
     }
 
     /// What the present view's pixels belong to, once that is drawn.

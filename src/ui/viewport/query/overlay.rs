@@ -156,7 +156,7 @@ mod tests {
         let lamp = all.add(Level::Object, NOBODY, vec!["lamp".into()]);
         all.add(Level::Part, lamp, vec!["shade".into()]);
         let identity = [[0, 0, 2, 2, 2, 2, 2, 1]; 3].concat();
-        (all, ViewMap { width_px: 8, height_px: 3, identity, share: vec![1.0; 24], alpha: vec![1.0; 24] })
+        (all, ViewMap::certain(8, identity))
     }
 
     fn paint(settings: OverlaySettings) -> ColorImage {

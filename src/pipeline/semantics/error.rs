@@ -1,0 +1,24 @@
+//! Why objects and parts could not be found.
+
+use crate::io::IoError;
+use crate::models::ModelError;
+use crate::pipeline::observer::Interrupted;
+use crate::render::RenderError;
+
+/// Why objects could not be found, looked at or given codes.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
+pub enum FindError {
+    #[error("the '{0}' masks say nothing about any photo; give masks of at least one")]
+    NoSeed(String),
+    #[error(transparent)]
+    Io(#[from] IoError),
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    #[error("photo {0}: {1}")]
+    Render(String, RenderError),
+    #[error("training codes: {0}")]
+    Lift(#[from] RenderError),
+    #[error("cancelled")]
+    Interrupted(#[from] Interrupted),
+}
