@@ -5,13 +5,17 @@ PROFILE ?= release
 # What `make run` passes on, for example `make run ARGS="train photos --out scene"`.
 ARGS ?=
 
-.PHONY: run test setup
+.PHONY: run test setup demo-asset
 
 run:
 	@PROFILE='$(PROFILE)' tools/run.sh $(ARGS)
 
 test:
 	@tools/test.sh
+
+# The trained demo that ships with the program (docs/guide.md).
+demo-asset:
+	@PROFILE='$(PROFILE)' tools/run.sh demo --make assets/demo/demo.zip --out out/demo-asset
 
 # System packages and the Rust tools only; `run` and `test` do this by themselves.
 setup:

@@ -123,7 +123,7 @@ fn write_splat(folder: &Path) -> PathBuf {
 fn the_empty_window_offers_what_to_do() {
     let mut w = Window::new(None);
     w.harness.run_steps(2);
-    for label in ["Try the demo", "Open folder…", "Open file…"] {
+    for label in ["Open the demo", "Train it yourself", "Open folder…", "Open file…"] {
         assert!(w.shows(label), "{label}");
     }
     assert!(w.is_drawn());
@@ -218,7 +218,7 @@ fn the_demo_is_made_opened_and_trained_by_itself() {
     let mut w = Window::keeping(data, None);
     w.harness.run_steps(2);
     w.harness.state_mut().layout.config.max_side_px = 100;
-    w.click("Try the demo");
+    w.click("Train it yourself");
     w.until("the demo's photos", |a| a.state.scene.is_some());
     w.until("training without being asked", |a| a.state.is_training());
     w.until("the plot", |a| a.state.history.steps.len() >= 3);
@@ -228,6 +228,32 @@ fn the_demo_is_made_opened_and_trained_by_itself() {
     w.click("Cancel");
     w.until("the end", |a| a.state.job.is_none());
     assert!(w.app().state.error.is_none() && w.app().state.recent.is_empty());
+}
+
+#[test]
+fn the_shipped_demo_opens_answered_and_recent_scenes_have_pictures() {
+    let data = tempfile::tempdir().expect("folder");
+    let place = || data.path().join("data");
+    let mut w = Window::keeping(place(), None);
+    w.harness.run_steps(2);
+    w.click("Open the demo");
+    w.until("the answer", |a| !a.viewport.queries.found().is_empty());
+    let app = w.app();
+    let map = app.state.semantics.as_ref().expect("objects");
+    let found: Vec<String> = app.viewport.queries.found().iter().map(|id| map.identities.full_name(*id)).collect();
+    assert!(found.iter().all(|name| name.contains("button") && name.ends_with("of the red controller")), "{found:?}");
+    assert!(app.state.scene.as_ref().is_some_and(|s| s.dataset.is_some()) && app.state.recent.is_empty());
+
+    let splat = write_splat(data.path());
+    w.ask(Action::Open(splat.clone()));
+    w.until("the splat", |a| a.state.recent.contains(&splat));
+    let kept = || std::fs::read_dir(place().join("pictures")).map_or(0, |all| all.count());
+    w.until("its picture", |_| kept() == 1);
+    let mut later = Window::keeping(place(), None);
+    assert!(!later.shows("dots.ply"));
+    later.harness.state_mut().state.recent = vec![splat];
+    later.harness.run_steps(2);
+    assert!(later.shows("dots.ply") && later.is_drawn());
 }
 
 fn last_step(app: &App) -> u64 {

@@ -4,8 +4,9 @@ use std::error::Error;
 use std::process::ExitCode;
 
 use super::output;
-use crate::jobs::JobError;
+use crate::io::OpenError;
 use crate::jobs::error::chain;
+use crate::jobs::{JobError, poses};
 use crate::measure::BeginError;
 use crate::pipeline::observer::Interrupted;
 
@@ -33,6 +34,10 @@ impl CliError {
             JobError::EmptyQuery => return Self::Usage(error.to_string()),
             JobError::NotTrained(path) => format!(", with 'fmlgs train {} --out SCENE'", path.display()),
             JobError::PhotosGone(_) => "; give them with --photos".into(),
+            JobError::Open(OpenError::NoPoses(photos)) => {
+                let commands: String = poses::commands(photos).iter().map(|line| format!("\n  {line}")).collect();
+                format!(". COLMAP finds them, and the window runs it where it is installed; by hand:{commands}")
+            }
             JobError::Output(_) => return Self::Usage(error.to_string()),
             JobError::Report(BeginError::Other(..)) => " (--out); --fresh forgets it".into(),
             JobError::NothingHeldOut(_) => "; --holdout-every 0 compares with all photos".into(),

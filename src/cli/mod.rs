@@ -55,7 +55,7 @@ const EXAMPLES: &str = "\
 Examples:
   fmlgs                                 open the window
   fmlgs photos/                         open the window with a folder of posed photos
-  fmlgs demo                            open the window with the demo scene and train it
+  fmlgs demo                            open the window with the trained demo
   fmlgs info photos/                    say what a folder or file is
   fmlgs train photos/ --out scene/      train; the same command again resumes where it stopped
   fmlgs eval scene/ --pictures cmp/     PSNR and SSIM on held-out photos, pictures side by side
@@ -173,7 +173,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Path(args) => path::run(args),
         Command::Agent(args) => agent::run(args),
         Command::Synth(args) => synth::run(args, quiet),
-        Command::Demo(args) if args.headless => demo::run(args, quiet),
+        Command::Demo(args) if args.headless || args.make.is_some() => demo::run(args, quiet),
         Command::Demo(_) => window(vec![Start::Demo], overrides, open_window),
         Command::Export(args) => export::run(args),
         Command::Bench(args) => bench::run(args, quiet),

@@ -10,7 +10,7 @@ use super::{CliError, number, output};
 use crate::jobs::open::{self, Contents};
 use crate::jobs::{plan, train};
 use crate::pipeline::observer::{Observer, Severity};
-use crate::pipeline::train::TrainConfig;
+use crate::pipeline::train::{TrainConfig, preset};
 use crate::render::BackendChoice;
 use crate::scene::Dataset;
 
@@ -24,6 +24,7 @@ use crate::scene::Dataset;
     fmlgs train photos/ --out scene/\n  \
     fmlgs train photos/ --out scene/ --steps 30000 --max-side 1600\n  \
     fmlgs train photos/ --out quick/ --steps 500 --max-side 256 --no-densify\n  \
+    fmlgs train other/ --preset scene/training.toml\n  \
     fmlgs train scene/                       go on with a scene that was cancelled, same settings")]
 pub(crate) struct TrainArgs {
     /// Dataset folder or transforms.json; or a trained scene, to go on with it
@@ -34,6 +35,10 @@ pub(crate) struct TrainArgs {
     out: Option<PathBuf>,
     #[command(flatten)]
     settings: TrainOverrides,
+    /// Settings to start from, a TOML file as every trained scene has one ("training.toml"); others given here
+    /// go before
+    #[arg(long, value_name = "TOML")]
+    preset: Option<PathBuf>,
     #[command(flatten)]
     plan: PlanArgs,
     /// Print one JSON document at the end
@@ -146,6 +151,7 @@ impl TrainArgs {
                 )));
             }
         };
+        let base = self.preset.as_deref().map(preset::read).transpose()?.unwrap_or(base);
         let config = self.settings.over(base);
         let plan = plan::of_photos(&dataset, &config, &self.plan.overrides());
         let backend = if plan.on_cpu { BackendChoice::Cpu } else { config.backend };

@@ -4,6 +4,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::unposed::Unposed;
 use crate::scene::{CameraError, CloudError};
 
 /// A file that could not be read or written.
@@ -83,6 +84,9 @@ pub enum OpenError {
     NotFound { path: PathBuf },
     #[error("{path} is nothing that can be opened. Looked for: {looked_for}. Found: {found}.")]
     Unrecognized { path: PathBuf, looked_for: String, found: String },
+    /// Photos alone.
+    #[error("{}: {} photos, no camera poses", .0.images.display(), .0.photos.len())]
+    NoPoses(Box<Unposed>),
     #[error(transparent)]
     Io(#[from] IoError),
 }

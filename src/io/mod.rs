@@ -5,13 +5,14 @@
 //! error names the file and the place in it.
 
 pub(crate) mod atomic;
+pub(crate) mod bundle;
 pub mod camera_file;
 pub mod camera_path;
 pub mod colmap;
 mod commit;
 mod compressed_ply;
 pub(crate) mod data_folder;
-mod error;
+pub(crate) mod error;
 pub(crate) mod files;
 pub(crate) mod folder_lock;
 pub mod gltf_mesh;
@@ -38,6 +39,7 @@ pub mod splat_ply;
 mod temporary;
 pub mod trained;
 pub mod transforms;
+pub(crate) mod unposed;
 pub(crate) mod video;
 
 pub use error::{IoError, OpenError};

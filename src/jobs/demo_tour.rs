@@ -123,11 +123,11 @@ fn document(out: &Path, outcome: &TrainOutcome, [psnr, ssim]: [f64; 2], queries:
 
 /// Renders the photos unless they are there; returns the seconds it took.
 fn make_photos(folder: &Path, observer: &mut dyn Observer) -> Result<Option<f64>, JobError> {
-    if demo::demo_is_written(folder) {
+    if demo::demo_is_written(folder, &demo::demo_options()) {
         observer.note(Severity::Info, format!("Using the photos in {}", folder.display()));
         return Ok(None);
     }
-    let report = demo::write_demo(folder, observer)?;
+    let report = demo::write_demo(folder, &demo::demo_options(), observer)?;
     observer.note(Severity::Info, report.summary());
     Ok(Some(report.secs))
 }

@@ -52,6 +52,24 @@ pub enum JobError {
     NoGaussians,
     #[error("{0}")]
     Protocol(String),
+    /// Another program failed.
+    #[error("{doing}: {} failed ({why}). Its last words:\n{said}", .program.display())]
+    Program {
+        /// The program.
+        program: PathBuf,
+        /// What it was to do.
+        doing: &'static str,
+        /// How it ended.
+        why: String,
+        /// What it said last.
+        said: String,
+    },
+    /// COLMAP is needed and not installed.
+    #[error("neither COLMAP nor GLOMAP is installed here: 'colmap' is not found on the PATH")]
+    NoTools,
+    /// Photos that do not hang together.
+    #[error("{}: no camera poses were found; the photos overlap too little or show too little texture", .0.display())]
+    NoPosesFound(PathBuf),
     /// The memory that is free is not enough.
     #[error(transparent)]
     Room(#[from] NoRoom),

@@ -25,6 +25,11 @@ impl Folders {
         self.data.join(format!("demo-{}", env!("CARGO_PKG_VERSION")))
     }
 
+    /// Folder of the trained demo that ships with the program and has this digest.
+    pub(crate) fn shipped_demo(&self, digest: &str) -> PathBuf {
+        self.data.join(format!("demo-{}-trained-{digest}", env!("CARGO_PKG_VERSION")))
+    }
+
     /// Folder of the newest scene trained from the dataset at `root`, whether it exists or not.
     pub(crate) fn trained(&self, root: &Path) -> PathBuf {
         self.runs(root).take_while(|run| run.exists()).last().unwrap_or_else(|| self.fresh(root))
@@ -38,6 +43,16 @@ impl Folders {
     /// Folder for a report of the splat at `path`, which has no folder of its own.
     pub(crate) fn report(&self, path: &Path) -> PathBuf {
         unique(&self.data.join("reports"), path)
+    }
+
+    /// Folder for the camera poses of the photos at `root`.
+    pub(crate) fn poses(&self, root: &Path) -> PathBuf {
+        unique(&self.data.join("poses"), root)
+    }
+
+    /// The small picture of the scene at `path`.
+    pub(crate) fn picture(&self, path: &Path) -> PathBuf {
+        unique(&self.data.join("pictures"), path).with_added_extension("png")
     }
 
     /// Folders of the trainings of the dataset at `root`, first to last without end.

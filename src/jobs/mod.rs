@@ -4,6 +4,7 @@
 //! and return a typed result or a [`JobError`]. Whoever calls them says the result in its own way.
 
 pub(crate) mod bench;
+pub(crate) mod demo;
 pub(crate) mod demo_questions;
 pub(crate) mod demo_tour;
 pub mod edit;
@@ -18,7 +19,9 @@ pub(crate) mod models;
 pub mod open;
 pub mod phrases;
 pub(crate) mod plan;
+pub(crate) mod poses;
 pub(crate) mod query;
+pub(crate) mod recent;
 pub(crate) mod render;
 pub(crate) mod report;
 pub(crate) mod scale;

@@ -7,11 +7,11 @@ use glam::DVec3;
 
 use super::{Folders, JobError, plan};
 use crate::io::labels::Labels;
+use crate::io::scene_files::CHECKPOINT_FILE;
 use crate::io::trained::{self, History, SceneCamera};
 use crate::io::{self, Opened, TrainedScene};
 use crate::math::sh::SH_C0;
 use crate::pipeline::observer::{Observer, Severity};
-use crate::pipeline::synth::demo;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::plan::used_degree;
@@ -172,6 +172,8 @@ pub struct OpenedScene {
     pub(crate) facts: SceneFacts,
     /// Id of the save that its files are of, if it has one.
     pub(crate) state: Option<String>,
+    /// Settings of a training in `out` that can go on.
+    pub(crate) resumable: Option<TrainConfig>,
     pub(crate) reports: Vec<PathBuf>,
     pub(crate) report_out: PathBuf,
 }
@@ -187,6 +189,7 @@ impl OpenedScene {
             Some(dataset) if scene.cameras.is_empty() => HomeView::new(&dataset.cameras(), Some(&scene.cloud)),
             _ => scene.home(),
         };
+        let has_checkpoint = scene.folder.as_ref().is_some_and(|f| f.join(CHECKPOINT_FILE).is_file());
         let semantics = scene.folder.is_some().then(|| known_objects(&scene, observer)).flatten();
         Self {
             path: scene.path,
@@ -202,6 +205,7 @@ impl OpenedScene {
             render: scene.settings,
             sh_stored: scene.sh_stored,
             state: scene.state,
+            resumable: has_checkpoint.then_some(scene.config),
             ..Self::default()
         }
     }
@@ -236,15 +240,6 @@ pub(crate) fn open(
     let facts = plan::facts(machine, scene.dataset.as_deref(), cloud, &TrainConfig::default());
     scene.facts = facts.with_semantics(scene.semantics.as_deref());
     Ok(scene)
-}
-
-/// Opens the demo scene, whose photos are made unless that was done before.
-pub(crate) fn demo(folders: &Folders, machine: &Machine, observer: &mut dyn Observer) -> Result<OpenedScene, JobError> {
-    let out = folders.demo();
-    if !demo::demo_is_written(&out) {
-        demo::write_demo(&out, observer)?;
-    }
-    open(&out, folders, machine, observer)
 }
 
 /// The objects and parts stored with a trained scene; broken ones are told and left out.

@@ -7,7 +7,7 @@ use super::{JobError, Scene, open};
 use crate::io::{semantic_map, splat_ply, trained};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::train::checkpoint::CheckpointError;
-use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainError, TrainOutcome};
+use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainError, TrainOutcome, preset};
 use crate::scene::{Dataset, SemanticMap};
 
 #[derive(Clone, Debug)]
@@ -49,7 +49,15 @@ pub(crate) fn run(
             {
                 earlier = Some(out);
             }
-            result => return finished(result?, out, observer),
+            result => {
+                let outcome = result?;
+                if trained::is_scene(&out)
+                    && let Err(e) = preset::keep(&out, config)
+                {
+                    observer.note(Severity::Warning, format!("The settings are not kept as a file: {e}"));
+                }
+                return finished(outcome, out, observer);
+            }
         }
     }
     Err(TrainError::Config("there is no folder to train into".into()).into())

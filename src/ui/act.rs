@@ -20,7 +20,6 @@ use crate::measure::is_report;
 use crate::navigate::FRAMES;
 use crate::navigate::target::{Side, ViewPreference};
 use crate::pipeline::semantics::edit::Edit;
-use crate::pipeline::train::TrainConfig;
 use crate::scene::IdentityId;
 use crate::scene::plan::When;
 use crate::ui::actions::{Action, Pane};
@@ -30,9 +29,9 @@ impl App {
     /// Does what a user asked for.
     pub(super) fn act(&mut self, action: Action, ctx: &egui::Context) {
         match action {
-            Action::TryDemo => self.replace_scene(Action::TryDemo),
             Action::Open(path) if is_report(&path) => self.read_report(path, false),
-            Action::Open(path) => self.replace_scene(Action::Open(path)),
+            Action::Open(path) if path.extension().is_some_and(|e| e == "toml") => self.read_preset(&path),
+            Action::OpenDemo | Action::TrainDemo | Action::Open(_) | Action::FindPoses(_) => self.replace_scene(action),
             Action::StartTraining => self.start_training(),
             Action::PauseTraining => {
                 if let Some(job) = self.state.job.as_ref().filter(|j| j.kind == JobKind::Train) {
@@ -191,6 +190,8 @@ impl App {
     fn open(&mut self, action: Action) {
         let command = match action {
             Action::Open(path) => Command::Open { path },
+            Action::TrainDemo => Command::DemoPhotos,
+            Action::FindPoses(photos) => Command::FindPoses(photos),
             _ => Command::Demo,
         };
         self.submit(command);
@@ -217,8 +218,10 @@ impl App {
             self.state.toast(Tone::Warning, text);
             return;
         }
-        let config = TrainConfig { max_side_px: self.state.plan.train_side_px, ..self.layout.config.clone() };
+        let config = self.state.next_training(&self.layout.config);
         self.state.antialias = config.antialias;
+        let reached = self.state.continues_at(&config).unwrap_or(0);
+        self.state.resumable = Some((config.clone(), reached));
         self.submit(Command::Train { dataset, config, out });
     }
 

@@ -9,10 +9,22 @@ use super::camera;
 use super::context::SceneContext;
 use super::state::Tone;
 use crate::jobs::video::VideoRequest;
+use crate::pipeline::train::preset;
 use crate::render::BackendChoice;
 use crate::worker::{Command, Failure};
 
 impl App {
+    /// Takes over settings for the next training.
+    pub(super) fn read_preset(&mut self, path: &Path) {
+        match preset::read(path) {
+            Ok(config) => {
+                self.layout.config = config;
+                self.state.toast(Tone::Good, format!("The next training has the settings of {}", path.display()));
+            }
+            Err(e) => self.state.fail("Reading training settings", Failure::of(&e, "")),
+        }
+    }
+
     pub(super) fn choose(&mut self, action: Action) {
         let writes = matches!(action, Action::ExportPly | Action::ExportTarget(_) | Action::Screenshot);
         if writes && self.viewport.picture().is_none() {

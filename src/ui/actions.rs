@@ -7,6 +7,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use strum::{IntoStaticStr, VariantArray};
 
+use crate::io::unposed::Unposed;
 use crate::measure::{Knobs, StageName};
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::edit::Edit;
@@ -133,12 +134,15 @@ macro_rules! actions {
 }
 
 actions! {
-    TryDemo: "Try the demo",
-        "Render a tabletop scene into posed photos, open them and train at once. Needs no download.";
+    OpenDemo: "Open the demo", "A trained tabletop with its objects and parts, ready to be asked. Needs no download.";
+    TrainDemo: "Train the demo yourself",
+        "Render the tabletop into posed photos, open them and train at once. Needs no download.";
     OpenFolder: "Open folder\u{2026}",
         "COLMAP, transforms.json (nerfstudio, instant-ngp, Blender), LLFF, or a trained scene.", "Ctrl+O";
     OpenFile: "Open file\u{2026}", "A splat .ply, a transforms.json, or the scene.json of a trained scene.";
     Open(path: PathBuf): format!("Open {}", path.display()), "Open this path.";
+    FindPoses(photos: Box<Unposed>): format!("Find the camera poses of {}", photos.folder.display()),
+        "Run COLMAP on the photos, in a folder of its own, and open the result.";
     ExportPly: "Export Gaussians as .ply\u{2026}", "Write the Gaussians in the format that 3DGS viewers read.", "Ctrl+E";
     Screenshot: "Save the view as .png\u{2026}", "Write the image in the viewport, without the drawn cameras.", "Ctrl+S";
     StartTraining: "Start training",
@@ -293,7 +297,7 @@ impl Action {
 impl From<Start> for Action {
     fn from(start: Start) -> Self {
         match start {
-            Start::Demo => Self::TryDemo,
+            Start::Demo => Self::OpenDemo,
             Start::Scene(path) => Self::Open(path),
             Start::Report(path) => Self::OpenReport(path),
             Start::SecondReport(path) => Self::CompareReport(path),

@@ -14,8 +14,8 @@ use super::file_dialogs::FileDialogs;
 use super::layout::Layout;
 use super::palette::{Palette, shortcut_sheet};
 use super::panes::{
-    bars, dataset::PhotoThumbnails, empty, log, models::Models, object_thumbnails::ObjectThumbnails,
-    objects::ObjectsPane, phrases::PhrasesPane, plan, problems, report::ReportPane, training,
+    bars, dataset::PhotoThumbnails, empty::FirstPage, log, models::Models, object_thumbnails::ObjectThumbnails,
+    objects::ObjectsPane, phrases::PhrasesPane, plan, problems, report::ReportPane, training, unposed,
 };
 use super::state::AppState;
 use super::toasts::Toasts;
@@ -41,6 +41,7 @@ pub struct App {
     pub(super) question: Option<Question>,
     pub(super) palette: Palette,
     pub(super) sheet: bool,
+    first_page: FirstPage,
     photo_thumbnails: PhotoThumbnails,
     object_thumbnails: ObjectThumbnails,
     /// The list of phrases.
@@ -94,6 +95,7 @@ impl App {
             question: None,
             palette: Palette::default(),
             sheet: false,
+            first_page: FirstPage::default(),
             photo_thumbnails: PhotoThumbnails::default(),
             object_thumbnails: ObjectThumbnails::default(),
             phrases: PhrasesPane::default(),
@@ -155,6 +157,7 @@ impl App {
         self.next_edit();
         self.send_chat();
         self.play(ctx);
+        self.first_page.update(ctx, &mut self.state, &self.viewport, &self.worker);
         self.photo_thumbnails.update(ctx, &mut self.state);
         self.object_thumbnails.update(ctx, &mut self.state, self.viewport.cloud().map(|c| &**c), &self.worker);
     }
@@ -174,7 +177,10 @@ impl App {
 
     fn keys_and_drops(&mut self, ctx: &egui::Context) {
         keys::watch_typing(ctx);
-        let has_dialog = self.state.error.is_some() || self.question.is_some() || self.dialogs.is_own_open();
+        let has_dialog = self.state.error.is_some()
+            || self.state.unposed.is_some()
+            || self.question.is_some()
+            || self.dialogs.is_own_open();
         if !self.palette.is_open() && !has_dialog && !self.sheet {
             self.actions.extend(keys::pressed(ctx));
         }
@@ -227,7 +233,7 @@ impl App {
         }
         let Some(scene) = state.scene.clone() else {
             let canvas = Frame::new().fill(theme::CANVAS);
-            CentralPanel::no_frame().frame(canvas).show(ui, |ui| empty::show(ui, state, actions));
+            CentralPanel::no_frame().frame(canvas).show(ui, |ui| self.first_page.show(ui, state, actions));
             return;
         };
         if scene.dataset.is_some() && layout.shows(Pane::Dataset) {
@@ -313,6 +319,11 @@ impl App {
             && yes
         {
             self.give_up_and(question.action);
+        }
+        if let Some(photos) = &self.state.unposed
+            && !unposed::show(ctx, photos, &mut self.actions)
+        {
+            self.state.unposed = None;
         }
         if self.state.error.as_ref().is_some_and(|e| dialogs::show_error(ctx, e)) {
             self.state.error = None;

@@ -23,6 +23,23 @@ pub(crate) enum PlotAxis {
     Steps,
 }
 
+/// How the plots of training are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct PlotSettings {
+    pub(crate) axis: PlotAxis,
+    /// Share of the points that a running mean goes over, in percent.
+    pub(crate) smoothing: f32,
+    /// Whether the loss has a logarithmic axis.
+    pub(crate) log: bool,
+}
+
+impl Default for PlotSettings {
+    fn default() -> Self {
+        Self { axis: PlotAxis::default(), smoothing: 2.0, log: false }
+    }
+}
+
 /// Choices of a user about the window, and the settings of the next training.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -37,8 +54,8 @@ pub struct Layout {
     pub(crate) split: f32,
     /// What the viewport shows.
     pub mode: ViewMode,
-    /// What the plots run over.
-    pub(crate) plot_axis: PlotAxis,
+    /// How the plots of training are drawn.
+    pub(crate) plots: PlotSettings,
     /// Whether the times of a frame's stages are shown.
     pub times: bool,
     /// Settings of the next training.
@@ -63,7 +80,7 @@ impl Default for Layout {
             compare: false,
             split: 0.5,
             mode: ViewMode::Rgb,
-            plot_axis: PlotAxis::default(),
+            plots: PlotSettings::default(),
             times: false,
             config: TrainConfig { steps: 3_000, eval_every: 250, ..TrainConfig::default() },
             plan: Overrides::default(),

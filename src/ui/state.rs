@@ -10,13 +10,16 @@ use super::actions::Action;
 use super::history::History;
 use super::labels::{PhraseTable, ScreenNames};
 pub(crate) use super::train_history::TrainHistory;
+use crate::io::unposed::Unposed;
 use crate::jobs::OpenedScene;
+use crate::jobs::demo::QUESTION;
 use crate::jobs::go_to::{Approached, Explored};
 use crate::jobs::models::ModelList;
 use crate::jobs::thumbnails::ThumbnailSet;
 use crate::math::format;
 use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Progress, Severity};
+use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::{Limits, Overrides, PhotoPixels, SceneFacts, ScenePlan, SemanticMap, text};
 use crate::worker::{Event, Failure, JobId, JobKind, Outcome, Versioned, WorkerThread};
@@ -80,6 +83,10 @@ pub struct AppState {
     pub job: Option<RunningJob>,
     /// Training of the present scene.
     pub history: TrainHistory,
+    /// The training before, while another is shown.
+    pub(crate) previous: TrainHistory,
+    /// Settings of the training that can go on, and the step that it has come to.
+    pub(crate) resumable: Option<(TrainConfig, u64)>,
     /// Job whose Gaussians are those of the present scene.
     pub(crate) training_job: Option<JobId>,
     /// The log, oldest first.
@@ -90,8 +97,12 @@ pub struct AppState {
     pub(crate) toasts: Vec<Toast>,
     /// The error on screen.
     pub error: Option<ErrorBox>,
+    /// Photos that were opened and have no camera poses, until a user has decided what to do.
+    pub(crate) unposed: Option<Box<Unposed>>,
     /// Files and folders opened lately, newest first.
     pub recent: Vec<PathBuf>,
+    /// Small pictures of them, until the window takes them.
+    pub(crate) recent_pictures: Vec<(PathBuf, PhotoPixels)>,
     /// Photos loaded lately, by index and size limit; the window takes them out.
     pub(crate) photos: BTreeMap<(usize, u32), Arc<PhotoPixels>>,
     /// Photos that could not be loaded, by job, for the window to mark; the window takes them out.
@@ -133,6 +144,10 @@ impl AppState {
             Event::Paused(job, paused) => self.with_job(job, |j| j.paused = paused),
             Event::Step(job, metrics) => {
                 if self.training_job == Some(job) {
+                    // One that starts over is another, to be compared with.
+                    if self.history.steps.first().is_some_and(|first| metrics.step <= first.step) {
+                        self.previous = std::mem::take(&mut self.history);
+                    }
                     self.history.push(metrics);
                 }
             }
@@ -147,6 +162,8 @@ impl AppState {
             Event::Finished(job, outcome) => return self.finished(job, outcome),
             Event::Cancelled(job) => {
                 if let Some(ended) = self.end(job) {
+                    let reached = ended.progress.as_ref().filter(|_| ended.kind == JobKind::Train).map(|p| p.done);
+                    self.resumable.iter_mut().zip(reached).for_each(|((_, step), reached)| *step = reached);
                     self.toast(Tone::Info, format!("{}: canceled", ended.title));
                     // What was measured before is worth seeing.
                     let scene = self.scene.as_ref().filter(|_| ended.kind == JobKind::Measure);
@@ -189,6 +206,17 @@ impl AppState {
         let scene = self.scene.as_ref().map(|s| s.render.clone()).unwrap_or_default();
         let sh_degree = if self.is_training() { scene.sh_degree } else { self.plan.sh_degree };
         RenderSettings { sh_degree, antialias: self.antialias, ..scene }
+    }
+
+    /// The settings that a training started now has.
+    pub(crate) fn next_training(&self, config: &TrainConfig) -> TrainConfig {
+        TrainConfig { max_side_px: self.plan.train_side_px, ..config.clone() }
+    }
+
+    /// The step at which a training with these settings goes on, if it does.
+    pub(crate) fn continues_at(&self, config: &TrainConfig) -> Option<u64> {
+        let (before, step) = self.resumable.as_ref()?;
+        (before.is_same_run(config) && (1..config.steps).contains(step)).then_some(*step)
     }
 
     fn set_facts(&mut self, facts: SceneFacts) {
@@ -235,9 +263,13 @@ impl AppState {
         let mut next = Vec::new();
         match outcome {
             Outcome::Opened(scene) => {
-                let is_demo = ended.is_some_and(|j| j.kind == JobKind::Demo);
-                self.opened(*scene, is_demo);
-                next.extend(is_demo.then_some(Action::StartTraining));
+                let kind = ended.map(|j| j.kind);
+                self.opened(*scene, matches!(kind, Some(JobKind::Demo | JobKind::DemoPhotos)));
+                next.extend(match kind {
+                    Some(JobKind::Demo) => Some(Action::Ask(QUESTION.into())),
+                    Some(JobKind::DemoPhotos) => Some(Action::StartTraining),
+                    _ => None,
+                });
             }
             Outcome::Trained { evaluations, out, semantics, facts } => {
                 let carried = semantics.is_some();
@@ -294,6 +326,9 @@ impl AppState {
             Outcome::Thumbnails(map, drawn) => self.thumbnails = Some((map, drawn)),
             Outcome::Phrases(rows, to) => self.phrases.finished(rows, to),
             Outcome::Written(path) => self.toast(Tone::Good, format!("Wrote {}", path.display())),
+            Outcome::Unposed(photos) => self.unposed = Some(photos),
+            Outcome::Kept => {}
+            Outcome::RecentPictures(pictures) => self.recent_pictures = pictures,
             Outcome::Photo { index, max_side_px, pixels } => {
                 self.photos.insert((index, max_side_px), pixels);
             }
@@ -315,6 +350,9 @@ impl AppState {
         self.history =
             TrainHistory { steps: scene.history.steps.clone(), evaluations: scene.history.evaluations.clone() };
         self.training_job = None;
+        self.previous = TrainHistory::default();
+        let reached = self.history.steps.last().map(|s| s.step);
+        self.resumable = scene.resumable.clone().zip(reached);
         (self.explored, self.visited) = (None, None);
         self.photos.clear();
         if !is_demo {

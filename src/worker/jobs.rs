@@ -7,13 +7,13 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use super::failure::{Failure, Stop};
 use super::protocol::{Command, Outcome};
 use super::thread::Jobs;
-use crate::io::{self, trained};
+use crate::io::{self, OpenError, trained};
 use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::models::Source;
 use crate::jobs::train::Trained;
 use crate::jobs::{
-    Folders, JobError, OpenedScene, Scene, edit, export, find_objects, go_to, models, open, phrases, plan, report,
-    scale, thumbnails, train, video,
+    Folders, JobError, OpenedScene, Scene, demo, edit, export, find_objects, go_to, models, open, phrases, plan, poses, recent,
+    report, scale, thumbnails, train, video,
 };
 use crate::measure::{End, FILE, Report};
 use crate::pipeline::observer::{Observer, Severity};
@@ -81,8 +81,17 @@ impl PipelineJobs {
 impl Jobs for PipelineJobs {
     fn run(&self, command: Command, observer: &mut dyn Observer) -> Result<Outcome, Stop> {
         Ok(match command {
-            Command::Open { path } => self.opened(open::open(&path, &self.folders, self.machine(), observer)?),
-            Command::Demo => self.opened(open::demo(&self.folders, self.machine(), observer)?),
+            Command::Open { path } => match open::open(&path, &self.folders, self.machine(), observer) {
+                Err(JobError::Open(OpenError::NoPoses(photos))) => Outcome::Unposed(photos),
+                opened => self.opened(opened?),
+            },
+            Command::FindPoses(photos) => {
+                let tools = poses::PoseTools::installed().ok_or(JobError::NoTools)?;
+                let found = poses::find(&photos, &tools, &self.folders, observer)?;
+                self.opened(open::open(&found, &self.folders, self.machine(), observer)?)
+            }
+            Command::Demo => self.opened(demo::open(&self.folders, self.machine(), observer)?),
+            Command::DemoPhotos => self.opened(demo::open_photos(&self.folders, self.machine(), observer)?),
             Command::Train { dataset, config, out } => return self.train(&dataset, &config, out, observer),
             Command::Evaluate { dataset, cloud, config, out } => {
                 Outcome::Evaluated(measured(dataset, cloud, config, &out, observer)?)
@@ -121,6 +130,14 @@ impl Jobs for PipelineJobs {
                 export::picture(&path, &pixels)?;
                 Outcome::Written(path)
             }
+            Command::KeepPicture { of, pixels } => {
+                // Nobody has asked for it, so nobody is stopped by a full disk.
+                if let Err(e) = recent::keep(&self.folders, &of, &pixels) {
+                    observer.note(Severity::Warning, e.to_string());
+                }
+                Outcome::Kept
+            }
+            Command::RecentPictures(of) => Outcome::RecentPictures(recent::load(&self.folders, of)),
             Command::InstallModel { id, brought } => {
                 let source = brought.as_deref().map_or(Source::Fetch(None), Source::Folder);
                 models::install(&id, source, observer)?;

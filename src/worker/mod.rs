@@ -6,6 +6,7 @@
 pub(crate) mod control;
 pub(crate) mod failure;
 pub mod jobs;
+mod kind;
 mod low_priority_pool;
 pub(crate) mod observer;
 pub(crate) mod protocol;

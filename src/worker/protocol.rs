@@ -6,6 +6,8 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::failure::Failure;
+pub use super::kind::{JobKind, WorkerThread};
+use crate::io::unposed::Unposed;
 use crate::jobs::edit::EditRequest;
 use crate::jobs::go_to::{ApproachRequest, Approached, Explored};
 use crate::jobs::models::ModelList;
@@ -27,7 +29,7 @@ pub struct JobId(pub(crate) u64);
 /// What the window does first.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Start {
-    /// Makes the demo scene, opens it and trains it.
+    /// Opens the trained demo.
     Demo,
     /// Opens this scene.
     Scene(PathBuf),
@@ -35,75 +37,6 @@ pub enum Start {
     Report(PathBuf),
     /// Compares it with this one.
     SecondReport(PathBuf),
-}
-
-/// What sort of job it is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum JobKind {
-    /// Reads a file or folder.
-    Open,
-    /// Makes the demo scene and reads it.
-    Demo,
-    /// Trains Gaussians.
-    Train,
-    /// Measures held-out quality.
-    Evaluate,
-    /// Finds objects and parts.
-    Objects,
-    /// Changes objects and parts.
-    Edit,
-    /// Writes a file.
-    Export,
-    /// Loads a photo's pixels.
-    Photo,
-    /// Writes a picture.
-    Picture,
-    /// Draws objects and parts alone.
-    Thumbnails,
-    /// Lists models.
-    Models,
-    /// Looks at where one can go.
-    Explore,
-    /// Puts a model in place.
-    Model,
-    /// Finds the way to an identity.
-    Approach,
-    /// Draws a video.
-    Video,
-    /// Measures drawing, knob by knob.
-    Measure,
-    /// Reads a report.
-    Report,
-    /// Asks a list of phrases.
-    Phrases,
-    /// Stores the scene's scale.
-    Scale,
-}
-
-impl JobKind {
-    /// Whether its outcome is what is on screen then: what it warns of is wrong with that.
-    pub(crate) fn makes_scene(self) -> bool {
-        matches!(self, Self::Open | Self::Demo | Self::Train | Self::Objects)
-    }
-
-    /// Which thread runs it.
-    pub(crate) fn lane(self) -> WorkerThread {
-        match self {
-            Self::Open | Self::Demo | Self::Train | Self::Evaluate | Self::Objects => WorkerThread::Long,
-            Self::Model | Self::Video | Self::Measure | Self::Phrases => WorkerThread::Long,
-            Self::Edit | Self::Export | Self::Photo | Self::Picture | Self::Thumbnails => WorkerThread::Short,
-            Self::Models | Self::Explore | Self::Approach | Self::Scale | Self::Report => WorkerThread::Short,
-        }
-    }
-}
-
-/// Which thread a job runs on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WorkerThread {
-    /// One after another, minutes each.
-    Long,
-    /// Answered while a long job runs.
-    Short,
 }
 
 /// What a job is to do.
@@ -114,8 +47,12 @@ pub enum Command {
         /// File or folder.
         path: PathBuf,
     },
-    /// Render the demo scene into posed photos, unless that was done before, and read them.
+    /// Read the trained demo that ships with the program.
     Demo,
+    /// Render the demo scene into posed photos, unless that was done before, and read them.
+    DemoPhotos,
+    /// Find the camera poses of photos with programs that are installed, and read the result.
+    FindPoses(Box<Unposed>),
     /// Fit Gaussians to photos.
     Train {
         /// The photos.
@@ -174,6 +111,15 @@ pub enum Command {
         /// The file.
         path: PathBuf,
     },
+    /// Keep a small picture of a scene for the first page.
+    KeepPicture {
+        /// Where the scene lies.
+        of: PathBuf,
+        /// The picture.
+        pixels: Arc<PhotoPixels>,
+    },
+    /// Read the pictures that were kept of these scenes.
+    RecentPictures(Vec<PathBuf>),
     /// Fetch a model of the catalog, or take over files that somebody brings.
     InstallModel {
         /// Its name.
@@ -233,13 +179,15 @@ impl Command {
         match self {
             Self::Open { .. } => JobKind::Open,
             Self::Demo => JobKind::Demo,
+            Self::DemoPhotos => JobKind::DemoPhotos,
+            Self::FindPoses(_) => JobKind::Poses,
             Self::Train { .. } => JobKind::Train,
             Self::Evaluate { .. } => JobKind::Evaluate,
             Self::FindObjects(_) => JobKind::Objects,
             Self::EditObjects { .. } => JobKind::Edit,
             Self::Export { .. } => JobKind::Export,
             Self::Photo { .. } => JobKind::Photo,
-            Self::Picture { .. } => JobKind::Picture,
+            Self::Picture { .. } | Self::KeepPicture { .. } | Self::RecentPictures(_) => JobKind::Picture,
             Self::Thumbnails { .. } => JobKind::Thumbnails,
             Self::ListModels => JobKind::Models,
             Self::Explore { .. } => JobKind::Explore,
@@ -259,7 +207,9 @@ impl Command {
             |p: &PathBuf| p.file_name().map_or_else(|| p.display().to_string(), |n| n.to_string_lossy().into_owned());
         match self {
             Self::Open { path } => format!("Opening {}", name(path)),
-            Self::Demo => "Rendering the demo scene".into(),
+            Self::Demo => "Opening the demo".into(),
+            Self::DemoPhotos => "Rendering the demo scene".into(),
+            Self::FindPoses(photos) => format!("Finding camera poses of {}", name(&photos.folder)),
             Self::Train { dataset, .. } => format!("Training {}", dataset.name),
             Self::Evaluate { dataset, .. } => format!("Evaluating {}", dataset.name),
             Self::FindObjects(request) => format!("Finding objects in {}", request.dataset.name),
@@ -267,6 +217,8 @@ impl Command {
             Self::SetScale { .. } => "Storing the scale".into(),
             Self::Export { path, .. } | Self::Picture { path, .. } => format!("Writing {}", name(path)),
             Self::Photo { photo, .. } => format!("Loading {}", photo.name),
+            Self::KeepPicture { of, .. } => format!("Keeping a picture of {}", name(of)),
+            Self::RecentPictures(_) => "Reading pictures of recent scenes".into(),
             Self::Thumbnails { .. } => "Rendering thumbnails".into(),
             Self::ListModels => "Listing models".into(),
             Self::Explore { .. } => "Exploring where one can go".into(),
@@ -287,6 +239,8 @@ impl Command {
 pub enum Outcome {
     /// A scene was read.
     Opened(Box<OpenedScene>),
+    /// There are photos, and nobody knows from where they were taken.
+    Unposed(Box<Unposed>),
     /// Training is done; the Gaussians lie in the slot.
     Trained {
         /// Evaluations of the whole run, oldest first.
@@ -312,6 +266,10 @@ pub enum Outcome {
     Written(PathBuf),
     /// Phrases were asked; and where their masks are, if they were written.
     Phrases(Vec<PhraseRow>, Option<PathBuf>),
+    /// A picture was kept.
+    Kept,
+    /// Pictures that were kept, with the scenes that they are of.
+    RecentPictures(Vec<(PathBuf, PhotoPixels)>),
     /// A report was read or measured.
     Report {
         /// Where it lies.

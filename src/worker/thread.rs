@@ -69,7 +69,7 @@ impl Worker {
             let work = move || {
                 for queued in queue {
                     // A scene that is opened is waited for: it yields to nobody.
-                    let yields = queued.command.kind() != JobKind::Open;
+                    let yields = !matches!(queued.command.kind(), JobKind::Open | JobKind::Demo);
                     let run = || run_one(&*jobs, queued, &events, &clouds, &controls, &repaint);
                     match &pool {
                         Some(pool) if yields => pool.install(run),

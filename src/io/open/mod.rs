@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use super::trained::{self, TrainedScene};
-use super::{IoError, OpenError, colmap, files, khr_gltf, llff, sog, splat_ply, transforms};
+use super::{IoError, OpenError, colmap, files, khr_gltf, llff, sog, splat_ply, transforms, unposed};
 use crate::scene::{Dataset, GaussianCloud};
 
 /// What a path turned out to be.
@@ -81,6 +81,9 @@ pub fn open(path: &Path) -> Result<Opened> {
 fn open_folder(path: &Path) -> Result<Opened> {
     if let Some(layout) = FOLDERS.iter().find(|l| (l.is)(path)) {
         return Ok((layout.open)(path)?);
+    }
+    if let Some(photos) = unposed::find(path) {
+        return Err(OpenError::NoPoses(Box::new(photos)));
     }
     Err(OpenError::Unrecognized {
         path: path.into(),

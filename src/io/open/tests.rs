@@ -31,6 +31,21 @@ fn what_is_not_recognized_says_what_was_looked_for_and_found() {
 }
 
 #[test]
+fn photos_without_poses_are_counted_and_one_picture_is_none() {
+    let (_guard, path) = folder();
+    fs::create_dir(path.join("images")).expect("create");
+    fs::write(path.join("images/b.JPG"), "b").expect("write");
+    assert!(matches!(open(&path), Err(OpenError::Unrecognized { .. })), "a picture is no scene");
+    for name in ["a.png", ".hidden.jpg", "notes.txt"] {
+        fs::write(path.join("images").join(name), "x").expect("write");
+    }
+    let e = open(&path).expect_err("no poses");
+    assert!(e.to_string().contains("2 photos, no camera poses"), "{e}");
+    let OpenError::NoPoses(found) = e else { panic!("{e}") };
+    assert_eq!((found.images, found.photos), (path.join("images"), vec!["a.png".to_owned(), "b.JPG".to_owned()]));
+}
+
+#[test]
 fn splats_and_scenes_are_told_apart() {
     let (_guard, path) = folder();
     let cloud = GaussianCloud::isotropic(vec![[1.0; 3]], 0.0, 0.0);

@@ -32,20 +32,24 @@ pub(crate) fn demo_options() -> SynthOptions {
 }
 
 /// Whether `out` already holds the photos that [`write_demo`] would write.
-pub(crate) fn demo_is_written(out: &Path) -> bool {
-    let expected = serde_json::json!({ "version": 1, "scene": fingerprint(), "options": demo_options() });
+pub(crate) fn demo_is_written(out: &Path, options: &SynthOptions) -> bool {
+    let expected = serde_json::json!({ "version": 1, "scene": fingerprint(), "options": options });
     let settings = files::read(&out.join(SETTINGS), files::MAX_TEXT_BYTES).ok();
     let found: Option<serde_json::Value> = settings.and_then(|bytes| serde_json::from_slice(&bytes).ok());
     found == Some(expected) && out.join(TRANSFORMS).is_file()
 }
 
-/// Renders the demo's photos into the folder `out`.
-pub(crate) fn write_demo(out: &Path, observer: &mut dyn Observer) -> Result<SynthReport, SynthError> {
+/// Renders photos of the demo scene into the folder `out`.
+pub(crate) fn write_demo(
+    out: &Path,
+    options: &SynthOptions,
+    observer: &mut dyn Observer,
+) -> Result<SynthReport, SynthError> {
     let scene = gltf_mesh::read_slice(demo_glb(), "demo.glb")?;
-    render_scene(&scene, "demo", Some(fingerprint()), &demo_options(), out, observer)
+    render_scene(&scene, "demo", Some(fingerprint()), options, out, observer)
 }
 
 /// FNV-1a of the scene's bytes.
-fn fingerprint() -> u64 {
+pub(crate) fn fingerprint() -> u64 {
     demo_glb().iter().fold(0xcbf2_9ce4_8422_2325, |h, &b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3))
 }

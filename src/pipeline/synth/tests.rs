@@ -315,7 +315,7 @@ fn the_demo_shows_every_thing_and_part() {
         let enough = if identity.level == Level::Object { 40 } else { 4 };
         assert!(identity.views >= enough, "{} is seen in {} of 64 photos", identity.path, identity.views);
     }
-    assert!(!demo::demo_is_written(out.path()), "other settings than the demo's");
+    assert!(!demo::demo_is_written(out.path(), &demo::demo_options()), "other settings than the demo's");
 }
 
 #[test]

@@ -120,6 +120,12 @@ impl TrainConfig {
         }
     }
 
+    /// Whether a training with these settings goes on where one with the others stopped: how often to look and save
+    /// does not change the trajectory.
+    pub(crate) fn is_same_run(&self, other: &Self) -> bool {
+        *other == Self { eval_every: other.eval_every, checkpoint_secs: other.checkpoint_secs, ..self.clone() }
+    }
+
     /// Whether only the CPU can do what is asked.
     pub(crate) fn needs_cpu(&self) -> bool {
         self.surfels || self.geometry_weights().0 > 0.0

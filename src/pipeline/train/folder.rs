@@ -62,10 +62,7 @@ pub(super) fn resumable(
     let path = folder.join(checkpoint::FILE);
     let Some(saved) = checkpoint::load(&path)? else { return Ok(None) };
     let h = &saved.header;
-    // How often to look and save does not change the trajectory.
-    let theirs =
-        TrainConfig { eval_every: config.eval_every, checkpoint_secs: config.checkpoint_secs, ..h.config.clone() };
-    if theirs != *config {
+    if !h.config.is_same_run(config) {
         return Err(CheckpointError::OtherRun { path, what: "settings" });
     }
     if h.photos != photo_names(dataset, train) {

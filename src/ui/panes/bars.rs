@@ -21,7 +21,9 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut 
         let has_photos = state.scene.as_ref().is_some_and(|s| s.dataset.is_some());
         ui.menu_button("File", |ui| {
             ui.set_min_width(260.0);
-            for action in [Action::TryDemo, Action::OpenFolder, Action::OpenFile, Action::ChooseReport] {
+            for action in
+                [Action::OpenDemo, Action::TrainDemo, Action::OpenFolder, Action::OpenFile, Action::ChooseReport]
+            {
                 item(ui, true, None, action, actions);
             }
             ui.menu_button("Open recent", |ui| {

@@ -1,61 +1,200 @@
-//! What the window shows before anything is open.
+//! What the window shows before anything is open: the demo, recent scenes, a place to drop others.
 
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use egui::{Button, ProgressBar, RichText, Ui, vec2};
+use egui::{
+    Align2, Button, Color32, ColorImage, FontId, Image, ProgressBar, Rect, RichText, ScrollArea, Sense, Shape, Stroke,
+    TextureHandle, TextureOptions, Ui, Vec2, vec2,
+};
 
 use super::super::state::{AppState, RunningJob};
+use super::super::viewport::Viewport;
 use super::super::{keys, theme};
+use crate::jobs::demo;
 use crate::math::format;
 use crate::scene::text;
 use crate::ui::actions::Action;
-use crate::worker::JobKind;
+use crate::worker::{Command, JobKind, Worker};
 
-/// Draws the first page.
-pub(crate) fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
-    if let Some(job) = &state.job {
-        return busy(ui, job, actions);
-    }
-    let recent = state.recent.len().min(6);
-    let height = 330.0 + if recent > 0 { 40.0 + 30.0 * recent as f32 } else { 0.0 };
-    ui.vertical_centered(|ui| {
-        ui.add_space(((ui.available_height() - height) * 0.45).max(20.0));
-        ui.set_max_width(460.0);
-        ui.label(RichText::new("FMLGS").size(34.0).strong().color(theme::TEXT));
-        ui.label(RichText::new("From posed photos to live 3D Gaussians").size(16.0).color(theme::WEAK));
-        ui.add_space(26.0);
-        let wide = vec2(300.0, 38.0);
-        let button = |ui: &mut Ui, button: Button<'_>, action: Action, actions: &mut Vec<Action>| {
-            let key = keys::label(ui.ctx(), &action);
-            if ui.add(button.min_size(wide)).on_hover_text(format!("{}  {key}", action.tooltip())).clicked() {
-                actions.push(action);
-            }
+/// Widest that the page becomes, in points.
+const WIDTH: f32 = 760.0;
+/// Recent scenes on the page, and in a row.
+const RECENT: usize = 6;
+const COLUMNS: usize = 3;
+
+/// The first page and its pictures.
+#[derive(Default)]
+pub(crate) struct FirstPage {
+    /// Whether its pictures were asked for.
+    asked: bool,
+    demo: Option<TextureHandle>,
+    recent: BTreeMap<PathBuf, TextureHandle>,
+    /// Number of the scene whose picture was kept last.
+    kept_for: u64,
+}
+
+impl FirstPage {
+    /// Asks for the pictures once, takes them over, and keeps one of the scene on screen.
+    pub(crate) fn update(&mut self, ctx: &egui::Context, state: &mut AppState, viewport: &Viewport, worker: &Worker) {
+        let texture = |name: &str, size: [u32; 2], rgb: &[u8]| {
+            let image = ColorImage::from_rgb(size.map(|s| s as usize), rgb);
+            ctx.load_texture(name, image, TextureOptions::LINEAR)
         };
-        button(ui, theme::primary_button("Try the demo"), Action::TryDemo, actions);
-        button(ui, Button::new("Open folder…"), Action::OpenFolder, actions);
-        button(ui, Button::new("Open file…"), Action::OpenFile, actions);
-        ui.add_space(14.0);
-        ui.label(RichText::new("or drop a folder or a file onto the window").color(theme::WEAK));
-        ui.label(
-            RichText::new("COLMAP  ·  transforms.json  ·  Blender  ·  LLFF  ·  splat .ply  ·  trained scene")
-                .small()
-                .color(theme::WEAK),
-        );
-        if recent > 0 {
-            ui.add_space(22.0);
-            ui.label(RichText::new("Recent").small().strong().color(theme::WEAK));
-            for path in state.recent.iter().take(recent) {
-                let name = text::path(path.file_name().map_or(path.as_path(), Path::new));
-                let parent = path.parent().map(|p| text::elided(&p.to_string_lossy(), 36)).unwrap_or_default();
-                let row = Button::new(RichText::new(name).strong())
-                    .right_text(RichText::new(parent).small().color(theme::WEAK))
-                    .frame_when_inactive(false)
-                    .min_size(vec2(420.0, 26.0));
-                if ui.add(row).on_hover_text(text::path(path)).clicked() {
-                    actions.push(Action::Open(path.clone()));
-                }
+        if !self.asked && state.scene.is_none() {
+            self.asked = true;
+            let picture = demo::picture().ok().and_then(|jpeg| image::load_from_memory(&jpeg).ok());
+            self.demo = picture.map(|p| p.to_rgb8()).map(|p| texture("demo", p.dimensions().into(), p.as_raw()));
+            if !state.recent.is_empty() {
+                // Without them the page is as useful.
+                let _ = worker.submit(Command::RecentPictures(state.recent.clone()));
             }
         }
+        for (path, p) in std::mem::take(&mut state.recent_pictures) {
+            let shown = texture(&path.to_string_lossy(), [p.width_px, p.height_px], p.rgb.as_flattened());
+            self.recent.insert(path, shown);
+        }
+        let Some(scene) = state.scene.as_ref().filter(|_| self.kept_for != state.scene_number) else { return };
+        if viewport.picture().is_some_and(|p| p.full)
+            && let Some(pixels) = viewport.pixels()
+        {
+            self.kept_for = state.scene_number;
+            if state.recent.contains(&scene.path) {
+                let _ = worker.submit(Command::KeepPicture { of: scene.path.clone(), pixels: Arc::new(pixels) });
+            }
+        }
+    }
+
+    /// Draws the page.
+    pub(crate) fn show(&self, ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
+        if let Some(job) = &state.job {
+            return busy(ui, job, actions);
+        }
+        let room = ui.available_size();
+        let width = (room.x - 48.0).clamp(260.0, WIDTH);
+        ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+            let rows = state.recent.len().min(RECENT).div_ceil(COLUMNS) as f32;
+            let height = 90.0 + 0.4125 * width + 96.0 + if rows > 0.0 { 34.0 + rows * 0.25 * width } else { 0.0 };
+            ui.add_space(((room.y - height) * 0.45).max(18.0));
+            ui.horizontal(|ui| {
+                ui.add_space(((room.x - width) * 0.5).max(0.0));
+                ui.vertical(|ui| {
+                    ui.set_width(width);
+                    ui.label(RichText::new("FMLGS").size(34.0).strong().color(theme::TEXT));
+                    let what = "From posed photos to 3D Gaussians that know their objects and parts";
+                    ui.label(RichText::new(what).size(15.0).color(theme::WEAK));
+                    ui.add_space(16.0);
+                    self.start(ui, width, actions);
+                    self.recent(ui, width, state, actions);
+                    ui.add_space(16.0);
+                    drop_area(ui, width);
+                });
+            });
+        });
+    }
+
+    fn start(&self, ui: &mut Ui, width: f32, actions: &mut Vec<Action>) {
+        ui.horizontal_top(|ui| {
+            ui.spacing_mut().item_spacing = vec2(20.0, 8.0);
+            if let Some(texture) = &self.demo {
+                let size = vec2(0.55, 0.4125) * width;
+                let picture = Image::new(texture).fit_to_exact_size(size).corner_radius(8).sense(Sense::click());
+                let tip = Action::OpenDemo.tooltip();
+                let shown = ui.add(picture.alt_text("Picture of the demo")).on_hover_text(tip);
+                if shown.on_hover_cursor(egui::CursorIcon::PointingHand).clicked() {
+                    actions.push(Action::OpenDemo);
+                }
+            }
+            ui.vertical(|ui| {
+                let wide = vec2(ui.available_width(), 36.0);
+                let mut button = |ui: &mut Ui, button: Button<'_>, action: Action| {
+                    let tip = format!("{}  {}", action.tooltip(), keys::label(ui.ctx(), &action));
+                    if ui.add_sized(wide, button).on_hover_text(tip).clicked() {
+                        actions.push(action);
+                    }
+                };
+                button(ui, theme::primary_button("Open the demo"), Action::OpenDemo);
+                button(ui, Button::new("Train it yourself"), Action::TrainDemo);
+                ui.label(
+                    RichText::new(format!(
+                        "Trained, with its objects found and \u{201c}{}\u{201d} asked.",
+                        demo::QUESTION
+                    ))
+                    .small()
+                    .color(theme::WEAK),
+                );
+                ui.add_space(10.0);
+                button(ui, Button::new("Open folder…"), Action::OpenFolder);
+                button(ui, Button::new("Open file…"), Action::OpenFile);
+            });
+        });
+    }
+
+    fn recent(&self, ui: &mut Ui, width: f32, state: &AppState, actions: &mut Vec<Action>) {
+        if state.recent.is_empty() {
+            return;
+        }
+        ui.add_space(18.0);
+        ui.label(RichText::new("Recent").small().strong().color(theme::WEAK));
+        let gap = 10.0;
+        let size = vec2((width - gap * (COLUMNS - 1) as f32) / COLUMNS as f32, 0.23 * width);
+        for row in state.recent.iter().take(RECENT).collect::<Vec<_>>().chunks(COLUMNS) {
+            ui.horizontal(|ui| {
+                ui.spacing_mut().item_spacing = vec2(gap, gap);
+                for path in row {
+                    if self.card(ui, path, size) {
+                        actions.push(Action::Open((*path).clone()));
+                    }
+                }
+            });
+            ui.add_space(gap - 4.0);
+        }
+    }
+
+    /// A recent scene: its picture, its name, where it lies. Whether it was clicked.
+    fn card(&self, ui: &mut Ui, path: &Path, size: Vec2) -> bool {
+        let name = text::path(path.file_name().map_or(path, Path::new));
+        let (rect, response) = ui.allocate_exact_size(size, Sense::click());
+        let response = response.on_hover_text(text::path(path)).on_hover_cursor(egui::CursorIcon::PointingHand);
+        let label = name.clone();
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &label));
+        let painter = ui.painter().with_clip_rect(rect);
+        painter.rect_filled(rect, 8.0, theme::SURFACE);
+        if let Some(texture) = self.recent.get(path) {
+            Image::new(texture).uv(filling(texture.size_vec2(), size)).corner_radius(8).paint_at(ui, rect);
+        }
+        let bar = rect.with_min_y(rect.max.y - 40.0);
+        painter.rect_filled(bar, 0.0, Color32::from_black_alpha(170));
+        let at = bar.left_top() + vec2(10.0, 5.0);
+        let letters = (size.x / 7.5) as usize;
+        painter.text(at, Align2::LEFT_TOP, text::elided(&name, letters), FontId::proportional(14.0), Color32::WHITE);
+        let parent = path.parent().map(|p| text::elided(&p.to_string_lossy(), letters + 4)).unwrap_or_default();
+        let small = FontId::proportional(10.5);
+        painter.text(at + vec2(0.0, 17.0), Align2::LEFT_TOP, parent, small, Color32::from_gray(200));
+        if response.hovered() || response.has_focus() {
+            ui.painter().rect_stroke(rect, 8.0, Stroke::new(1.5, theme::ACCENT), egui::StrokeKind::Inside);
+        }
+        response.clicked()
+    }
+}
+
+/// The middle of a picture of this size that fills a place of the other.
+fn filling(picture: Vec2, place: Vec2) -> Rect {
+    let scale = (place.x / picture.x.max(1.0)).max(place.y / picture.y.max(1.0));
+    Rect::from_center_size(egui::pos2(0.5, 0.5), place / (picture.max(Vec2::splat(1.0)) * scale))
+}
+
+fn drop_area(ui: &mut Ui, width: f32) {
+    let (rect, _) = ui.allocate_exact_size(vec2(width, 62.0), Sense::hover());
+    let corners = [rect.left_top(), rect.right_top(), rect.right_bottom(), rect.left_bottom(), rect.left_top()];
+    ui.painter().extend(Shape::dashed_line(&corners, Stroke::new(1.0, theme::WEAK), 6.0, 5.0));
+    let mut child = ui.new_child(egui::UiBuilder::new().max_rect(rect.shrink(8.0)));
+    child.vertical_centered(|ui| {
+        ui.label(RichText::new("Drop a folder or a file anywhere in the window").color(theme::TEXT));
+        let formats =
+            "COLMAP  ·  transforms.json  ·  Blender  ·  LLFF  ·  photos  ·  splat .ply, .sog  ·  trained scene";
+        ui.label(RichText::new(formats).small().color(theme::WEAK));
     });
 }
 
@@ -78,7 +217,7 @@ fn busy(ui: &mut Ui, job: &RunningJob, actions: &mut Vec<Action>) {
                 ui.spinner();
             }
         }
-        if job.kind == JobKind::Demo {
+        if job.kind == JobKind::DemoPhotos {
             ui.add_space(6.0);
             ui.label(RichText::new("The photos are rendered once; training then starts by itself.").color(theme::WEAK));
         }
@@ -87,4 +226,18 @@ fn busy(ui: &mut Ui, job: &RunningJob, actions: &mut Vec<Action>) {
             actions.push(Action::Cancel);
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_fills_its_place_undistorted() {
+        let uv = filling(vec2(400.0, 300.0), vec2(200.0, 100.0));
+        assert!((uv.width() - 1.0).abs() < 1e-6 && (uv.height() - 2.0 / 3.0).abs() < 1e-6, "{uv:?}");
+        let uv = filling(vec2(100.0, 300.0), vec2(200.0, 100.0));
+        assert!((uv.width() - 1.0).abs() < 1e-6 && (uv.height() - 1.0 / 6.0).abs() < 1e-6, "{uv:?}");
+        assert_eq!(uv.center(), egui::pos2(0.5, 0.5));
+    }
 }

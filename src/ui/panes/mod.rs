@@ -13,3 +13,4 @@ pub(crate) mod plots;
 pub(crate) mod problems;
 pub(crate) mod report;
 pub(crate) mod training;
+pub(crate) mod unposed;

@@ -1,9 +1,9 @@
 //! Plots of training: loss and PSNR against seconds or steps.
 
-use egui::{Ui, Vec2b};
-use egui_plot::{HoverPosition, Legend, Line, MarkerShape, Plot, PlotPoints, Points};
+use egui::{Slider, Ui, Vec2b};
+use egui_plot::{HoverPosition, Legend, Line, LineStyle, MarkerShape, Plot, PlotPoints, Points};
 
-use super::super::layout::PlotAxis;
+use super::super::layout::{PlotAxis, PlotSettings};
 use super::super::state::TrainHistory;
 use super::super::theme;
 use crate::pipeline::observer::{Evaluation, StepMetrics};
@@ -11,9 +11,15 @@ use crate::pipeline::observer::{Evaluation, StepMetrics};
 /// PSNR over seconds of another training, with its name.
 pub(crate) type PsnrCurve = (String, Vec<[f64; 2]>);
 
-/// Draws both plots with a common horizontal axis. The `curves` are of other trainings, and drawn over
-/// seconds only: how many steps they had does not matter to them.
-pub(crate) fn show(ui: &mut Ui, history: &TrainHistory, curves: &[PsnrCurve], axis: &mut PlotAxis) {
+/// Draws both plots with a common horizontal axis: this training and the one before. The `curves` are of others, and
+/// drawn over seconds only: how many steps they had does not matter to them.
+pub(crate) fn show(
+    ui: &mut Ui,
+    [history, previous]: [&TrainHistory; 2],
+    curves: &[PsnrCurve],
+    settings: &mut PlotSettings,
+) {
+    let axis = &mut settings.axis;
     ui.horizontal(|ui| {
         theme::section(ui, "Quality");
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
@@ -22,11 +28,27 @@ pub(crate) fn show(ui: &mut Ui, history: &TrainHistory, curves: &[PsnrCurve], ax
             ui.weak("against");
         });
     });
+    ui.horizontal(|ui| {
+        let id = ui.label("Smoothing").id;
+        ui.add(Slider::new(&mut settings.smoothing, 0.0..=20.0).suffix(" %").fixed_decimals(0)).labelled_by(id);
+        ui.checkbox(&mut settings.log, "Log loss");
+    });
+    let PlotSettings { smoothing, log, .. } = *settings;
+    let smooth = |points: &[[f64; 2]]| smooth(points, smoothing);
+    let axis = &settings.axis;
     let over_secs = *axis == PlotAxis::Seconds;
     let x_step = |m: &StepMetrics| if *axis == PlotAxis::Seconds { m.secs } else { m.step as f64 };
     let x_eval = |e: &Evaluation| if *axis == PlotAxis::Seconds { e.secs } else { e.step as f64 };
-    let psnr: Vec<[f64; 2]> = history.steps.iter().map(|m| [x_step(m), m.train_psnr]).filter(finite).collect();
-    let held: Vec<[f64; 2]> = history.evaluations.iter().map(|e| [x_eval(e), e.psnr]).filter(finite).collect();
+    let psnr = |h: &TrainHistory| h.steps.iter().map(|m| [x_step(m), m.train_psnr]).filter(finite).collect::<Vec<_>>();
+    let held = |h: &TrainHistory| h.evaluations.iter().map(|e| [x_eval(e), e.psnr]).filter(finite).collect::<Vec<_>>();
+    let loss = |h: &TrainHistory| {
+        let shown = |loss: f64| if log { loss.log10() } else { loss };
+        h.steps.iter().map(|m| [x_step(m), shown(m.loss)]).filter(finite).collect::<Vec<_>>()
+    };
+    let before = !previous.steps.is_empty();
+    let dashed = |name: &str, points: &[[f64; 2]]| {
+        Line::new(name, smooth(points)).color(theme::WEAK).width(1.2).style(LineStyle::dashed_loose())
+    };
     plot("psnr", "PSNR (dB)", *axis)
         .legend(Legend::default().position(egui_plot::Corner::RightBottom).background_alpha(0.5))
         .show(ui, |p| {
@@ -34,7 +56,18 @@ pub(crate) fn show(ui: &mut Ui, history: &TrainHistory, curves: &[PsnrCurve], ax
             for ((name, curve), color) in curves.iter().zip(colors).filter(|_| over_secs) {
                 p.line(Line::new(name.clone(), PlotPoints::from(curve.clone())).color(color).width(1.2));
             }
-            p.line(Line::new("training photos", smooth(&psnr)).color(theme::WEAK).width(1.2));
+            if before {
+                p.line(dashed("training before", &psnr(previous)));
+                let held = PlotPoints::from(held(previous));
+                p.line(
+                    Line::new("held-out before", held)
+                        .color(theme::WARNING)
+                        .width(1.4)
+                        .style(LineStyle::dashed_loose()),
+                );
+            }
+            let held = held(history);
+            p.line(Line::new("training photos", smooth(&psnr(history))).color(theme::WEAK).width(1.2));
             p.line(Line::new("held-out photos", PlotPoints::from(held.clone())).color(theme::ACCENT).width(2.0));
             p.points(
                 Points::new("held-out photos", PlotPoints::from(held))
@@ -44,9 +77,16 @@ pub(crate) fn show(ui: &mut Ui, history: &TrainHistory, curves: &[PsnrCurve], ax
             );
         });
     theme::section(ui, "Loss (L1 + 0.2 D-SSIM)");
-    let loss: Vec<[f64; 2]> = history.steps.iter().map(|m| [x_step(m), m.loss]).filter(finite).collect();
-    plot("loss", "Loss", *axis).include_y(0.0).show(ui, |p| {
-        p.line(Line::new("loss", smooth(&loss)).color(theme::ACCENT).width(1.5));
+    let loss_plot = plot("loss", if log { "log10 loss" } else { "Loss" }, *axis);
+    let loss_plot = match log {
+        true => loss_plot.y_axis_formatter(|mark, _| format!("{:.2e}", 10_f64.powf(mark.value))),
+        false => loss_plot.include_y(0.0),
+    };
+    loss_plot.show(ui, |p| {
+        if before {
+            p.line(dashed("before", &loss(previous)));
+        }
+        p.line(Line::new("loss", smooth(&loss(history))).color(theme::ACCENT).width(1.5));
     });
 }
 
@@ -75,14 +115,28 @@ fn finite(p: &[f64; 2]) -> bool {
     p.iter().all(|v| v.is_finite())
 }
 
-/// A running mean over about a fiftieth of the points: single photos differ more than training
-/// changes from one step to the next.
-fn smooth(points: &[[f64; 2]]) -> PlotPoints<'static> {
-    let half = points.len() / 100;
+/// A running mean over `percent` of the points: single photos differ more than training changes from one step to the
+/// next.
+fn smooth(points: &[[f64; 2]], percent: f32) -> PlotPoints<'static> {
+    let half = (points.len() as f32 * percent / 200.0) as usize;
     (0..points.len())
         .map(|i| {
             let near = &points[i.saturating_sub(half)..(i + half + 1).min(points.len())];
             [points[i][0], near.iter().map(|p| p[1]).sum::<f64>() / near.len() as f64]
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn smoothing_is_a_running_mean_and_none_changes_nothing() {
+        let points: Vec<[f64; 2]> = (0..100).map(|i| [f64::from(i), f64::from(i % 2)]).collect();
+        let values = |percent: f32| smooth(&points, percent).points().iter().map(|p| p.y).collect::<Vec<_>>();
+        assert_eq!(values(0.0), points.iter().map(|p| p[1]).collect::<Vec<_>>());
+        assert!(values(20.0)[20..80].iter().all(|v| (v - 0.5).abs() < 0.05), "the zigzag is gone");
+        assert_eq!(smooth(&[], 5.0).points().len(), 0);
+    }
 }

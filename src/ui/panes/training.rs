@@ -7,7 +7,7 @@ use super::super::state::{AppState, RunningJob};
 use super::super::{keys, theme};
 use super::plots::{self, PsnrCurve};
 use crate::math::format;
-use crate::pipeline::train::TrainConfig;
+use crate::pipeline::train::{TrainConfig, preset};
 use crate::ui::actions::Action;
 use crate::worker::JobKind;
 
@@ -32,24 +32,29 @@ pub(crate) fn show(
         None => {
             let largest = dataset.photos.iter().map(|p| p.camera.width_px.max(p.camera.height_px)).max().unwrap_or(1);
             settings(ui, &mut layout.config, largest);
-            start(ui, state, actions);
+            start(ui, state, &layout.config, actions);
         }
     }
     if !state.history.steps.is_empty() || !state.history.evaluations.is_empty() {
         facts(ui, state, job);
-        plots::show(ui, &state.history, curves, &mut layout.plot_axis);
+        plots::show(ui, [&state.history, &state.previous], curves, &mut layout.plots);
     } else if job.is_none() {
         ui.add_space(4.0);
         ui.weak("Loss and PSNR appear here once training runs.");
     }
 }
 
-fn start(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
+fn start(ui: &mut Ui, state: &AppState, config: &TrainConfig, actions: &mut Vec<Action>) {
     ui.add_space(2.0);
     let busy = state.job.is_some();
     ui.horizontal(|ui| {
         let tip = format!("{}  {}", Action::StartTraining.tooltip(), keys::label(ui.ctx(), &Action::StartTraining));
-        let button = theme::primary_button("Start training").min_size(egui::vec2(150.0, 30.0));
+        let steps = format::count(config.steps);
+        let text = match state.continues_at(&state.next_training(config)) {
+            Some(step) => format!("Continue ({} of {steps})", format::count(step)),
+            None => "Start training".to_owned(),
+        };
+        let button = theme::primary_button(&text).min_size(egui::vec2(150.0, 30.0));
         let response =
             ui.add_enabled(!busy, button).on_hover_text(tip).on_disabled_hover_text("Another job is running.");
         if response.clicked() {
@@ -118,6 +123,15 @@ fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {
         ui.horizontal(|ui| {
             let id = ui.label("Seed").id;
             ui.add(DragValue::new(&mut config.seed)).labelled_by(id);
+        });
+        ui.horizontal(|ui| {
+            let tip = "A trained scene keeps them as training.toml; drop such a file onto the window to use them.";
+            if ui.button("Copy settings as TOML").on_hover_text(tip).clicked() {
+                ui.ctx().copy_text(preset::text(config));
+            }
+            if ui.button("Defaults").on_hover_text("Set every training setting back.").clicked() {
+                *config = Layout::default().config;
+            }
         });
     });
 }

@@ -95,9 +95,11 @@ fn opening_replaces_the_scene_and_is_remembered() {
 }
 
 #[test]
-fn the_demo_is_trained_at_once_and_not_listed_as_recent() {
-    let mut s = fold([started(JobKind::Demo)]);
+fn the_demo_is_asked_or_trained_at_once_and_not_listed_as_recent() {
+    let mut s = fold([started(JobKind::DemoPhotos)]);
     assert_eq!(s.apply(opened("demo", &[])), [Action::StartTraining]);
+    s.apply(started(JobKind::Demo));
+    assert_eq!(s.apply(opened("demo", &[])), [Action::Ask("a button of the red controller".into())]);
     assert!(s.recent.is_empty());
     s.apply(started(JobKind::Open));
     assert!(s.apply(opened("other", &[])).is_empty(), "nothing else is");
@@ -205,4 +207,33 @@ fn foreign_text_is_cleaned_on_its_way_to_the_window() {
     for text in one_line.into_iter().chain(more) {
         assert!(!text.contains(['\u{1b}', '\u{202e}', '\u{9b}']) && text.contains("31mb"), "{text:?}");
     }
+}
+
+#[test]
+fn a_stopped_training_goes_on_with_its_own_settings_alone() {
+    let config = TrainConfig { steps: 3_000, ..TrainConfig::default() };
+    let progress = Progress { stage: "Training".into(), done: 253, total: 3_000, elapsed_secs: 1.0, rate: 1.0 };
+    let mut s = fold([started(JobKind::Train), step(250), Event::Progress(JOB, progress)]);
+    s.resumable = Some((config.clone(), 0));
+    assert_eq!(s.continues_at(&config), None, "nothing is stopped yet");
+    s.apply(Event::Cancelled(JOB));
+    assert_eq!(s.continues_at(&config), Some(253));
+    let seldom = TrainConfig { eval_every: 9, checkpoint_secs: 1.0, ..config.clone() };
+    assert_eq!(s.continues_at(&seldom), Some(253), "looking at it changes nothing");
+    assert_eq!(s.continues_at(&TrainConfig { seed: 1, ..config.clone() }), None, "that is another training");
+    assert_eq!(s.continues_at(&TrainConfig { steps: 253, ..config }), None, "it is done");
+}
+
+#[test]
+fn the_training_before_stays_to_be_compared_with() {
+    let mut s = fold([started(JobKind::Train), step(10), step(20), Event::Cancelled(JOB), started(JobKind::Train)]);
+    s.apply(step(30));
+    assert!(s.previous.steps.is_empty(), "it went on");
+    s.apply(Event::Cancelled(JOB));
+    s.apply(started(JobKind::Train));
+    s.apply(step(10));
+    assert_eq!((s.history.steps.len(), s.previous.steps.len()), (1, 3));
+    s.apply(started(JobKind::Open));
+    s.apply(opened("other", &[]));
+    assert!(s.previous.steps.is_empty(), "of another scene nothing stays");
 }

@@ -1,0 +1,110 @@
+//! The demo that ships is what its recipe says, the recipe always makes the same, and what is asked is found.
+
+use super::*;
+use crate::pipeline::observer::Silent;
+use crate::pipeline::semantics::query_engine::QueryEngine;
+use crate::pipeline::semantics::view_map::ViewMap;
+use crate::scene::{LevelFilter, SemanticMap};
+
+/// The recipe's way with a fraction of its photos, pixels and steps.
+fn small(seed: u64) -> DemoRecipe {
+    let full = DemoRecipe::shipped();
+    let photos =
+        SynthOptions { views: 8, held_out: 2, width_px: 80, height_px: 60, samples: 1, points: 1_500, ..full.photos };
+    let training = TrainConfig { steps: 40, max_side_px: 80, seed, ..full.training };
+    DemoRecipe { photos, training, max_seeds: 2, home: 3, ..full }
+}
+
+/// What the recipe makes in `work`, of the photos that are there already and nothing else.
+fn made(recipe: &DemoRecipe, work: &Path) -> Vec<u8> {
+    let _ = std::fs::remove_dir_all(work.join("scene"));
+    make(recipe, work, &mut Silent).expect("made").0
+}
+
+fn opened() -> (tempfile::TempDir, PathBuf, Scene) {
+    let data = tempfile::tempdir().expect("folder");
+    let folder = unpacked(&Folders { data: data.path().into() }).expect("unpacked");
+    let scene = open::scene(&folder.join("scene")).expect("opened");
+    (data, folder, scene)
+}
+
+#[test]
+fn the_recipe_always_makes_the_same() {
+    let work = tempfile::tempdir().expect("folder");
+    let one = made(&small(0), work.path());
+    assert!(one == made(&small(0), work.path()), "byte for byte");
+    assert!(one != made(&small(1), work.path()), "and another seed another");
+}
+
+#[test]
+fn what_ships_was_made_by_the_recipe_and_is_whole() {
+    let record: DemoRecord =
+        serde_json::from_slice(&bundle::read(BUNDLE, RECORD, Path::new(NAME)).expect("read")).expect("parsed");
+    let remedy = "make it anew: fmlgs demo --make assets/demo/demo.zip";
+    assert_eq!((&record.recipe, record.scene), (&DemoRecipe::shipped(), demo::fingerprint()), "{remedy}");
+    let sum = include_str!("../../../assets/demo/demo.sha256");
+    assert_eq!(sum.split_whitespace().next(), Some(digest(BUNDLE).as_str()), "{remedy}");
+    assert!(BUNDLE.len() < 6_000_000, "{} bytes", BUNDLE.len());
+    assert!(record.psnr > 27.0 && record.object_miou > 0.85 && record.part_miou > 0.7, "{record:?}");
+    let picture = image::load_from_memory(&picture().expect("a picture")).expect("decoded");
+    assert_eq!([picture.width(), picture.height()], PICTURE_PX);
+}
+
+#[test]
+fn what_ships_is_as_good_as_its_record_says() {
+    let (_data, folder, scene) = opened();
+    let record: DemoRecord = files::read_json(&folder.join(RECORD)).expect("read");
+    assert_eq!(scene.cloud.len(), record.gaussians);
+    let mut map = scene.semantics().expect("objects");
+    let mut job = PhotoComparison::new(scene, &folder.join("photos"), EvaluateOptions::default()).expect("photos");
+    assert_eq!(job.views.len(), 8);
+    // Two of the eight views are a sample; the photos are JPEG here.
+    job.views.truncate(2);
+    let quality = evaluate::photometric(&job, &mut Silent).expect("measured");
+    assert!(quality.psnr > record.psnr - 3.0, "{} {}", quality.psnr, record.psnr);
+    let asked = |map: &SemanticMap| demo_questions::ask(map, &folder.join("photos"), &job, None).expect("asked");
+    let found = asked(&map);
+    assert!(found.object_miou > 0.75 && found.part_miou > 0.5, "{found:?}");
+    let verdicts: Vec<&str> = found.asked.iter().map(|a| a.verdict).collect();
+    assert_eq!(verdicts[5..], ["not found"; 2], "neither giraffe nor elephant");
+    assert!(verdicts[..5].iter().all(|v| *v != "not found"), "{verdicts:?}");
+    // The control: everything belongs to something else.
+    let count = map.identities.len() as u32;
+    map.identity_of.iter_mut().for_each(|id| *id = (*id + count / 2) % count + 1);
+    let wrong = asked(&map);
+    assert!(wrong.object_miou < 0.3 && wrong.part_miou < 0.3, "{wrong:?}");
+}
+
+#[test]
+fn the_first_question_is_answered_by_buttons_that_are_seen() {
+    let (_data, folder, scene) = opened();
+    let map = scene.semantics().expect("objects");
+    let photos = open::dataset(&folder.join("photos")).expect("photos");
+    let camera = photos.photos[DemoRecipe::shipped().home].camera.limited_to(400);
+    let mut renderer = Renderer::new();
+    let view =
+        ViewMap::render(&mut renderer, &scene.cloud, &map.identity_of, &map.identities, &camera, &scene.settings);
+    let view = view.expect("drawn");
+    let mut engine = QueryEngine::new(map.language.as_ref()).expect("an engine");
+    let answered = engine.ask(&map, QUESTION, LevelFilter::Auto).expect("asked").expect("words");
+    let names: Vec<String> = answered.chosen(1).iter().map(|id| map.identities.full_name(*id)).collect();
+    assert!(!names.is_empty(), "{QUESTION}");
+    assert!(names.iter().all(|n| n.contains("button") && n.ends_with("of the red controller")), "{names:?}");
+    let seen = answered.mask(&view, &map.identities, 1).area();
+    assert!(seen >= 20, "{seen} px are seen from where it opens");
+}
+
+#[test]
+fn it_is_unpacked_once_and_a_users_copy_is_kept() {
+    let data = tempfile::tempdir().expect("folder");
+    let folders = Folders { data: data.path().into() };
+    let folder = unpacked(&folders).expect("unpacked");
+    let own = folder.join("scene/own.txt");
+    std::fs::write(&own, "mine").expect("written");
+    assert_eq!(unpacked(&folders).expect("again"), folder);
+    assert_eq!(std::fs::read(&own).expect("kept"), b"mine");
+    std::fs::remove_file(folder.join("scene/scene.json")).expect("removed");
+    let e = unpacked(&folders).expect_err("it is no scene any more").to_string();
+    assert!(e.contains(&folder.display().to_string()), "{e}");
+    assert!(own.exists(), "nothing is written over");
+}

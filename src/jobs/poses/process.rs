@@ -1,0 +1,147 @@
+//! A program that works for minutes: its lines become progress, and it ends when it is not wanted any more.
+
+use std::collections::VecDeque;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use crossbeam_channel::{RecvTimeoutError, Sender, bounded};
+
+use super::PoseStage;
+use crate::jobs::JobError;
+use crate::pipeline::observer::{Observer, Ticker};
+
+/// Lines that are kept to be quoted.
+const LAST_LINES: usize = 8;
+/// Longest line that is kept, in bytes.
+const LINE_BYTES: u64 = 2_000;
+/// How often it is asked whether to go on while the program says nothing.
+const PATIENCE: Duration = Duration::from_millis(100);
+
+/// A running program, ended when this is dropped.
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // Both fail where it has ended, which is as well.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// All that a program says, nothing if it cannot be started.
+pub(super) fn output(program: &Path, args: &[&str]) -> String {
+    let said = quiet(program).args(args).stdin(Stdio::null()).output();
+    said.map_or_else(|_| String::new(), |o| String::from_utf8_lossy(&[o.stdout, o.stderr].concat()).into_owned())
+}
+
+/// Runs a stage to its end.
+///
+/// # Errors
+/// If it cannot be started or fails, or the observer asks to stop.
+pub(super) fn run(stage: &PoseStage, photos: usize, observer: &mut dyn Observer) -> Result<(), JobError> {
+    let failed = |why: String, said: &VecDeque<String>| JobError::Program {
+        program: stage.program.clone(),
+        doing: stage.title,
+        why,
+        said: said.iter().cloned().collect::<Vec<_>>().join("\n"),
+    };
+    let mut said = VecDeque::new();
+    let mut command = quiet(&stage.program);
+    command.args(&stage.args).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut running = Running(command.spawn().map_err(|e| failed(e.to_string(), &said))?);
+    // Few lines wait: a program that says more than is read waits, too.
+    let (sender, lines) = bounded(64);
+    let listen = |from: Option<Box<dyn Read + Send>>| {
+        let (sender, name) = (sender.clone(), "a program's words");
+        from.map(|from| std::thread::Builder::new().name(name.into()).spawn(move || pass_on(from, &sender)))
+    };
+    let pipes = [
+        listen(running.0.stdout.take().map(|p| Box::new(p) as Box<dyn Read + Send>)),
+        listen(running.0.stderr.take().map(|p| Box::new(p) as Box<dyn Read + Send>)),
+    ];
+    for thread in pipes.into_iter().flatten() {
+        thread.map_err(|e| failed(e.to_string(), &said))?;
+    }
+    drop(sender);
+    let mut ticker = Ticker::new(stage.title, photos);
+    let mut registered = 0;
+    ticker.report(0, observer);
+    loop {
+        ticker.proceed(observer)?;
+        match lines.recv_timeout(PATIENCE) {
+            Ok(line) => {
+                if let Some(done) = progress(&line, photos, &mut registered) {
+                    ticker.report(done, observer);
+                }
+                said.push_back(line);
+                said.drain(..said.len().saturating_sub(LAST_LINES));
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => break,
+        }
+    }
+    let status = running.0.wait().map_err(|e| failed(e.to_string(), &said))?;
+    if status.success() { Ok(()) } else { Err(failed(status.to_string(), &said)) }
+}
+
+/// A command whose windows stay away and whose process does not outlive this one.
+fn quiet(program: &Path) -> Command {
+    let mut command = Command::new(program);
+    // Without a display COLMAP's options of Qt end it otherwise.
+    command.env("QT_QPA_PLATFORM", "offscreen");
+    #[cfg(target_os = "linux")]
+    {
+        use std::os::unix::process::CommandExt;
+        // SAFETY: prctl is async-signal-safe, takes numbers alone and changes the new process only.
+        #[allow(unsafe_code)]
+        unsafe {
+            command.pre_exec(|| match libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) {
+                0 => Ok(()),
+                _ => Err(std::io::Error::last_os_error()),
+            });
+        }
+    }
+    command
+}
+
+/// Sends a program's lines, also those that it writes over one another.
+fn pass_on(from: impl Read, to: &Sender<String>) {
+    let mut reader = BufReader::new(from);
+    loop {
+        let mut line = Vec::new();
+        match reader.by_ref().take(LINE_BYTES).read_until(b'\n', &mut line) {
+            Ok(0) | Err(_) => return,
+            Ok(_) => {}
+        }
+        for part in String::from_utf8_lossy(&line).split(['\r', '\n']).filter(|p| !p.trim().is_empty()) {
+            if to.send(part.trim_end().to_owned()).is_err() {
+                return;
+            }
+        }
+    }
+}
+
+/// How many of `photos` are done by what a line of COLMAP or GLOMAP says: "Processed file [3/96]", "Matching block
+/// [1/2, 2/2]", "Registering image #7 (12)".
+pub(super) fn progress(line: &str, photos: usize, registered: &mut u64) -> Option<u64> {
+    if line.contains("Registering image #") || line.contains("Registering initial") {
+        *registered += 1 + u64::from(line.contains("initial"));
+        return Some((*registered).min(photos as u64));
+    }
+    let words = ["Processed file [", "Matching block [", "Processing block [", "Matching image ["];
+    let inside = words.iter().find_map(|w| line.split_once(w))?.1.split_once(']')?.0;
+    let of = |pair: &str| {
+        let (done, all) = pair.split_once('/')?;
+        Some((done.trim().parse::<f64>().ok()?, all.trim().parse::<f64>().ok().filter(|n| *n > 0.0)?))
+    };
+    let pairs: Vec<(f64, f64)> = inside.split(',').map(of).collect::<Option<_>>()?;
+    let share = match pairs.as_slice() {
+        [(done, all)] => done / all,
+        // Rows of blocks, each with its columns.
+        [(row, rows), (column, columns)] => (row - 1.0 + column / columns) / rows,
+        _ => return None,
+    };
+    Some((share.clamp(0.0, 1.0) * photos as f64).round() as u64)
+}

@@ -1,0 +1,159 @@
+//! Poses found by a program that behaves like COLMAP, and by none.
+
+#![cfg(unix)]
+
+use std::os::unix::fs::PermissionsExt;
+
+use super::process::progress;
+use super::*;
+use crate::io::OpenError;
+use crate::pipeline::observer::{Progress, Signal, Silent};
+
+/// Behaves like COLMAP: writes down what it is asked, says what COLMAP says, copies a reconstruction.
+const SCRIPT: &str = r##"#!/bin/sh
+echo "$@" >> "HERE/asked"
+case "$1" in
+help) echo "COLMAP 3.8 (without CUDA)" ;;
+feature_extractor)
+  [ "$2" = "-h" ] && { echo "  --SiftExtraction.use_gpu arg (=1)"; exit 0; }
+  echo "Processed file [1/3]" >&2; echo "Processed file [3/3]" ;;
+exhaustive_matcher) echo "Matching block [1/1, 1/1] in 0.1s"; MATCHING ;;
+mapper)
+  echo "=> Registered"; echo "Registering image #2 (3)"
+  mkdir -p "$7/0" "$7/1"; echo few > "$7/0/images.bin"; cp "HERE"/model/* "$7/1" ;;
+esac
+"##;
+
+struct Fake {
+    guard: tempfile::TempDir,
+    photos: Unposed,
+}
+
+impl Fake {
+    /// Three photos, a reconstruction of them, and a program that finds it and does `matching` on its way.
+    fn new(matching: &str) -> Self {
+        let guard = tempfile::tempdir().expect("folder");
+        let here = guard.path();
+        let (images, model) = (here.join("my photos"), here.join("model"));
+        let mut all = fs::create_dir(&images).and_then(|()| fs::create_dir(&model));
+        let mut poses = 3_u64.to_le_bytes().to_vec();
+        for i in 0..3_u32 {
+            let picture = image::RgbImage::from_pixel(8, 6, image::Rgb([40 * i as u8, 90, 200]));
+            picture.save(images.join(format!("{i}.png"))).expect("saved");
+            poses.extend((i + 1).to_le_bytes());
+            poses.extend([1.0, 0.0, 0.0, 0.0, f64::from(i), 0.0, 2.0].iter().flat_map(|v: &f64| v.to_le_bytes()));
+            poses.extend(1_u32.to_le_bytes());
+            poses.extend(format!("{i}.png\0").as_bytes());
+            poses.extend(0_u64.to_le_bytes());
+        }
+        let mut camera = 1_u64.to_le_bytes().to_vec();
+        camera.extend([1_u32.to_le_bytes(), 2_u32.to_le_bytes()].concat());
+        camera.extend([8_u64, 6].iter().flat_map(|v| v.to_le_bytes()));
+        camera.extend([7.0, 4.0, 3.0, 0.0].iter().flat_map(|v: &f64| v.to_le_bytes()));
+        for (name, bytes) in [("images.bin", poses), ("cameras.bin", camera), ("points3D.bin", vec![0; 8])] {
+            all = all.and_then(|()| fs::write(model.join(name), bytes));
+        }
+        let script = SCRIPT.replace("HERE", &here.display().to_string()).replace("MATCHING", matching);
+        let program = here.join("colmap");
+        all = all.and_then(|()| fs::write(&program, script));
+        all = all.and_then(|()| fs::set_permissions(&program, fs::Permissions::from_mode(0o755)));
+        all.expect("prepared");
+        let Err(OpenError::NoPoses(photos)) = crate::io::open(&images) else { panic!("they have no poses") };
+        Self { guard, photos: *photos }
+    }
+
+    fn find(&self, observer: &mut dyn Observer) -> Result<PathBuf, JobError> {
+        let here = self.guard.path();
+        let tools = PoseTools::on(here.as_os_str()).expect("it is on the path");
+        find(&self.photos, &tools, &Folders { data: here.join("data") }, observer)
+    }
+
+    fn asked(&self) -> String {
+        fs::read_to_string(self.guard.path().join("asked")).expect("it was asked")
+    }
+}
+
+#[derive(Default)]
+struct Watch {
+    seen: Vec<Progress>,
+    cancel: bool,
+}
+
+impl Observer for Watch {
+    fn progress(&mut self, progress: Progress) {
+        self.seen.push(progress);
+    }
+    fn signal(&self) -> Signal {
+        let matching = self.seen.last().is_some_and(|p| p.stage == "Matching photos");
+        if self.cancel && matching { Signal::Cancel } else { Signal::Continue }
+    }
+}
+
+#[test]
+fn photos_get_their_poses_in_a_folder_of_their_own() {
+    let fake = Fake::new("true");
+    let mut watch = Watch::default();
+    let found = fake.find(&mut watch).expect("found");
+    let dataset = crate::io::colmap::read(&found).expect("it opens");
+    assert_eq!(dataset.photos.len(), 3, "the larger of two reconstructions");
+    assert!(fs::read_dir(&fake.photos.images).expect("read").count() == 3, "nothing is written beside the photos");
+    let (asked, seen) = (fake.asked(), watch.seen);
+    for part in ["feature_extractor --database_path", "--SiftExtraction.use_gpu 0", "--ImageReader.single_camera 1"] {
+        assert!(asked.contains(part), "'{part}' is missing in {asked}");
+    }
+    for stage in ["Finding features", "Matching photos"] {
+        assert!(seen.iter().any(|p| p.stage == stage && p.done == 3 && p.total == 3), "{stage}: {seen:?}");
+    }
+    assert!(seen.iter().any(|p| p.stage == "Finding camera poses" && p.done == 1));
+}
+
+#[test]
+fn a_program_that_fails_is_quoted() {
+    let fake = Fake::new("echo 'out of memory' >&2; exit 3");
+    let text = fake.find(&mut Silent).expect_err("it fails").to_string();
+    for part in ["Matching photos", "colmap", "exit status: 3", "out of memory"] {
+        assert!(text.contains(part), "'{part}' is missing in {text}");
+    }
+    assert!(!fake.asked().contains("\nmapper"), "nothing runs after that");
+}
+
+#[test]
+fn what_is_canceled_ends_its_program() {
+    let fake = Fake::new("echo $$ > \"HERE/pid\"; exec sleep 600".replace("HERE", "$(dirname \"$0\")").as_str());
+    let mut watch = Watch { cancel: true, ..Watch::default() };
+    let error = fake.find(&mut watch).expect_err("canceled");
+    assert!(error.is_cancelled(), "{error}");
+    if let Ok(pid) = fs::read_to_string(fake.guard.path().join("pid")) {
+        assert!(!Path::new("/proc").join(pid.trim()).exists(), "{pid}");
+    }
+}
+
+#[test]
+fn lines_are_read_as_progress() {
+    let mut registered = 0;
+    let mut of = |line: &str| progress(line, 100, &mut registered);
+    assert_eq!(of("I0101 features.cc:1] Processed file [25/100]"), Some(25));
+    assert_eq!(of("Matching block [1/2, 1/2] in 3s"), Some(25));
+    assert_eq!(of("Processing block [2/2, 2/2]"), Some(100));
+    assert_eq!(of("Registering image #17 (3)"), Some(1));
+    assert_eq!(of("Registering image #18 (num_reg_frames=4)"), Some(2));
+    for other in ["Bundle adjustment report", "Processed file [x/y]", "Processed file [1/0]", "Matching block [1"] {
+        assert_eq!(of(other), None, "{other}");
+    }
+}
+
+#[test]
+fn the_commands_can_be_copied_into_a_shell() {
+    let photos = Unposed { folder: "/a b/it's".into(), images: "/a b/it's".into(), photos: vec![] };
+    let lines = commands(&photos);
+    assert_eq!(lines[1], r"cp -r '/a b/it'\''s' '/a b/it'\''s-posed/images'");
+    assert_eq!(lines.last().map(String::as_str), Some(r"fmlgs train '/a b/it'\''s-posed'"));
+    let tidy = Unposed { folder: "/data/fox".into(), images: "/data/fox/images".into(), photos: vec![] };
+    let lines = commands(&tidy);
+    assert_eq!(lines.len(), 5, "nothing is copied: {lines:?}");
+    assert_eq!(
+        lines[3],
+        "colmap mapper --database_path /data/fox/database.db --image_path /data/fox/images --output_path /data/fox/sparse"
+    );
+    assert_eq!(PoseTools::on(OsStr::new("/no/such/place")), None, "without the program it is not offered");
+}

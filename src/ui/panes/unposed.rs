@@ -1,0 +1,59 @@
+//! What to do about photos without camera poses: run COLMAP where it is installed, else its commands to copy.
+
+use egui::{Button, Id, Modal, RichText, ScrollArea, vec2};
+
+use super::super::theme;
+use crate::io::unposed::Unposed;
+use crate::jobs::poses::{self, PoseTools};
+use crate::scene::text;
+use crate::ui::actions::Action;
+
+/// Draws the dialog. Returns whether it stays.
+pub(crate) fn show(ctx: &egui::Context, photos: &Unposed, actions: &mut Vec<Action>) -> bool {
+    let response = Modal::new(Id::unique("unposed")).frame(theme::dialog()).show(ctx, |ui| {
+        ui.set_width(620.0_f32.min(ui.ctx().content_rect().width() - 80.0));
+        ui.heading(format!("{} photos, no camera poses", photos.photos.len()));
+        ui.weak(text::path(&photos.images));
+        ui.add_space(6.0);
+        ui.label("Training needs to know from where each photo was taken. COLMAP finds that from the photos alone.");
+        ui.add_space(10.0);
+        let mut stays = true;
+        let tools = PoseTools::installed();
+        if let Some(tools) = &tools {
+            let find = theme::primary_button(&format!("Find the poses with {}", tools.name()));
+            if ui.add(find.min_size(vec2(240.0, 32.0))).clicked() {
+                actions.push(Action::FindPoses(Box::new(photos.clone())));
+                stays = false;
+            }
+            ui.weak(
+                "Minutes for a hundred photos; can be canceled and goes on where it was. The photos stay as they are.",
+            );
+        }
+        let commands = poses::commands(photos);
+        let list = |ui: &mut egui::Ui| {
+            ScrollArea::vertical().max_height(260.0).show(ui, |ui| {
+                for line in &commands {
+                    ui.horizontal(|ui| {
+                        if ui.add(Button::new("Copy").small()).on_hover_text(line).clicked() {
+                            ui.ctx().copy_text(line.clone());
+                        }
+                        ui.add(egui::Label::new(RichText::new(line).monospace().small()).truncate());
+                    });
+                }
+            });
+            if ui.button("Copy all").clicked() {
+                ui.ctx().copy_text(commands.join("\n"));
+            }
+        };
+        ui.add_space(6.0);
+        if tools.is_some() {
+            ui.collapsing("By hand", list);
+        } else {
+            ui.label("It is not installed here (no 'colmap' on the PATH). Install it from colmap.github.io, then run:");
+            list(ui);
+        }
+        ui.add_space(10.0);
+        stays & !ui.button("Close").clicked()
+    });
+    response.inner && !response.should_close()
+}

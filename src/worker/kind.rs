@@ -1,0 +1,74 @@
+//! Sorts of jobs, and which thread runs each.
+
+/// What sort of job it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum JobKind {
+    /// Reads a file or folder.
+    Open,
+    /// Reads the trained demo.
+    Demo,
+    /// Makes the demo's photos and reads them.
+    DemoPhotos,
+    /// Finds camera poses.
+    Poses,
+    /// Trains Gaussians.
+    Train,
+    /// Measures held-out quality.
+    Evaluate,
+    /// Finds objects and parts.
+    Objects,
+    /// Changes objects and parts.
+    Edit,
+    /// Writes a file.
+    Export,
+    /// Loads a photo's pixels.
+    Photo,
+    /// Writes a picture.
+    Picture,
+    /// Draws objects and parts alone.
+    Thumbnails,
+    /// Lists models.
+    Models,
+    /// Looks at where one can go.
+    Explore,
+    /// Puts a model in place.
+    Model,
+    /// Finds the way to an identity.
+    Approach,
+    /// Draws a video.
+    Video,
+    /// Measures drawing, knob by knob.
+    Measure,
+    /// Reads a report.
+    Report,
+    /// Stores the scene's scale.
+    Scale,
+    /// Asks a list of phrases.
+    Phrases,
+}
+
+impl JobKind {
+    /// Whether its outcome is what is on screen then: what it warns of is wrong with that.
+    pub(crate) fn makes_scene(self) -> bool {
+        matches!(self, Self::Open | Self::Demo | Self::DemoPhotos | Self::Poses | Self::Train | Self::Objects)
+    }
+
+    /// Which thread runs it.
+    pub(crate) fn lane(self) -> WorkerThread {
+        match self {
+            Self::Open | Self::Demo | Self::Train | Self::Evaluate | Self::Objects => WorkerThread::Long,
+            Self::DemoPhotos | Self::Poses | Self::Model | Self::Video | Self::Measure | Self::Phrases => WorkerThread::Long,
+            Self::Edit | Self::Export | Self::Photo | Self::Picture | Self::Thumbnails => WorkerThread::Short,
+            Self::Models | Self::Explore | Self::Approach | Self::Scale | Self::Report => WorkerThread::Short,
+        }
+    }
+}
+
+/// Which thread a job runs on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WorkerThread {
+    /// One after another, minutes each.
+    Long,
+    /// Answered while a long job runs.
+    Short,
+}
