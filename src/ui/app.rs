@@ -257,7 +257,8 @@ impl App {
                         let mut show_objects = |ui: &mut Ui, actions: &mut Vec<Action>| {
                             header(Pane::Objects).default_open(true).show(ui, |ui| {
                                 let (thumbnails, visibility) = (&self.object_thumbnails, &viewport.visibility);
-                                self.objects.show(ui, state, thumbnails, visibility, actions);
+                                let selected = viewport.picking.selected();
+                                self.objects.show(ui, state, thumbnails, visibility, selected, actions);
                             });
                             ui.add_space(10.0);
                         };

@@ -156,11 +156,13 @@ fn without_a_dialog_of_the_system_files_are_chosen_in_the_window() {
     // It is there already: it was opened.
     let before = std::fs::read(&splat).expect("there");
     w.click("Save");
+    w.harness.run_steps(3);
     assert!(w.shows("is there already. Replace it?"));
     w.click("Choose another name");
     assert!(w.app().chooses_file(), "it goes on");
     assert_eq!(std::fs::read(&splat).expect("there"), before);
     w.click("Save");
+    w.harness.run_steps(3);
     w.click("Replace");
     w.until("it is written", |a| a.state.log.iter().any(|l| l.text.starts_with("Wrote ")));
     assert!(!w.app().chooses_file());

@@ -1,7 +1,7 @@
 //! The objects and parts of the scene, as a tree; a click asks for one.
 
 use egui::collapsing_header::CollapsingState;
-use egui::{Button, Checkbox, CollapsingHeader, Color32, Id, Key, RichText, ScrollArea, TextEdit, Ui, vec2};
+use egui::{Align, Button, Checkbox, CollapsingHeader, Color32, Id, Key, RichText, ScrollArea, TextEdit, Ui, vec2};
 
 use super::super::labels::{self, ScreenNames};
 use super::super::state::AppState;
@@ -23,6 +23,8 @@ const THUMBNAIL_PX: f32 = 30.0;
 #[derive(Default)]
 pub(crate) struct ObjectsPane {
     renaming: Option<Renaming>,
+    /// What was selected when it was drawn last.
+    selected: Option<IdentityId>,
 }
 
 /// A name that is being typed in its row.
@@ -45,6 +47,7 @@ impl ObjectsPane {
         state: &AppState,
         object_thumbnails: &ObjectThumbnails,
         visibility: &Visibility,
+        selected: Option<IdentityId>,
         actions: &mut Vec<Action>,
     ) {
         let Some(map) = &state.semantics else {
@@ -68,9 +71,12 @@ impl ObjectsPane {
             }
             bars::history_buttons(ui, &state.changes, actions);
         });
+        // The list follows what is selected in the view.
+        let scroll_to = selected.filter(|_| self.selected != selected);
+        self.selected = selected;
         let renaming = &mut self.renaming;
         let (labels, sizes) = (&state.labels, &state.sizes);
-        let mut tree = Tree { identities, labels, sizes, object_thumbnails, visibility, renaming };
+        let mut tree = Tree { identities, labels, sizes, object_thumbnails, visibility, renaming, selected, scroll_to };
         let roots = identities.iter().filter(|(_, i)| i.parent == NOBODY).map(|(id, _)| id);
         tree.branches(ui, Id::unique("objects"), roots.collect(), actions);
     }
@@ -84,6 +90,9 @@ struct Tree<'a> {
     object_thumbnails: &'a ObjectThumbnails,
     visibility: &'a Visibility,
     renaming: &'a mut Option<Renaming>,
+    selected: Option<IdentityId>,
+    /// What is to be brought into view.
+    scroll_to: Option<IdentityId>,
 }
 
 impl Tree<'_> {
@@ -103,9 +112,9 @@ impl Tree<'_> {
             return self.leaf(ui, id, actions);
         }
         let mut state = CollapsingState::load_with_default_open(ui.ctx(), Id::unique("branch").with(id), false);
-        let is_within =
-            |r: &Renaming| r.frames == 0 && self.identities.ancestors(r.id).skip(1).any(|whole| whole == id);
-        if self.renaming.as_ref().is_some_and(is_within) {
+        let is_within = |piece: IdentityId| self.identities.ancestors(piece).skip(1).any(|whole| whole == id);
+        let renamed = self.renaming.as_ref().filter(|r| r.frames == 0).map(|r| r.id);
+        if renamed.into_iter().chain(self.scroll_to).any(is_within) {
             state.set_open(true);
         }
         let header = state.show_header(ui, |ui| self.leaf(ui, id, actions));
@@ -128,11 +137,18 @@ impl Tree<'_> {
             if self.renaming.as_ref().is_some_and(|r| r.id == id) {
                 return self.name_field(ui, actions);
             }
-            let name = ui.add(Button::new(self.labels.name(self.identities, id)).frame_when_inactive(false));
+            let is_selected = self.selected == Some(id);
+            let name = Button::new(self.labels.name(self.identities, id)).selected(is_selected);
+            let name = ui.add(name.frame_when_inactive(is_selected));
+            if self.scroll_to == Some(id) {
+                name.scroll_to_me(Some(Align::Center));
+            }
+            let name = name.on_hover_text("Select it and highlight it in the view; double-click to rename it");
+            if name.clicked() {
+                actions.extend([Action::Select(Some(id)), Action::Ask(self.identities.full_name(id))]);
+            }
             if name.double_clicked() {
                 self.start_renaming(id);
-            } else if name.on_hover_text("Highlight it in the view; double-click to rename it").clicked() {
-                actions.push(Action::Ask(self.identities.full_name(id)));
             }
             self.menu(ui, id, actions);
             let size = self.sizes.get(id as usize).unwrap_or(&0).to_string();

@@ -24,6 +24,7 @@ pub(super) fn show(ui: &mut Ui, all: &Identities, id: Option<IdentityId>, action
     ui.separator();
     row(ui, Action::GoToTarget(id, Side::Best), "Go there");
     row(ui, Action::Ask(all.full_name(id)), "Mark as a query");
+    row(ui, Action::Rename, "Rename\u{2026}");
     row(ui, Action::Isolate(Some(id)), "Isolate");
     row(ui, Action::Hide(id), "Hide");
     row(ui, Action::Rename, "Rename");
