@@ -6,7 +6,7 @@ use super::relation::{Extent, Viewpoint};
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::answer::{QueryAnswer, by_name};
 use crate::pipeline::semantics::localize::Answer;
-use crate::pipeline::semantics::reading::Reading;
+use crate::pipeline::semantics::reading::QueryReading;
 use crate::pipeline::semantics::timing::StagesMs;
 use crate::scene::{Bounds, Identities, IdentityId, Level, LevelFilter};
 
@@ -120,7 +120,7 @@ pub trait World {
 
 /// Answers a query by names alone: a [`World::locate`] for scenes without an encoder.
 pub fn locate_by_names(identities: &Identities, query: &str, kind: LevelFilter) -> QueryAnswer {
-    match Reading::new(identities, query, kind) {
+    match QueryReading::new(identities, query, kind) {
         Some(reading) => by_name(identities, &reading.phrase, kind),
         None => QueryAnswer {
             answer: Answer::NotFound(Vec::new()),

@@ -16,7 +16,7 @@ use crate::pipeline::observer::{Observer, Ticker};
 use crate::pipeline::semantics::answer::{Certainty, QueryAnswer};
 use crate::pipeline::semantics::matching::MatchMode;
 use crate::pipeline::semantics::query_engine::QueryEngine;
-use crate::pipeline::semantics::reading::Reading;
+use crate::pipeline::semantics::reading::QueryReading;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, LevelFilter, Mask, SemanticMap};
 
@@ -104,7 +104,7 @@ pub(crate) fn run(request: &PhrasesRequest, observer: &mut dyn Observer) -> Resu
     let mut engine = QueryEngine::new(map.language.as_ref())?;
     let mut asked = Vec::new();
     for phrase in phrases {
-        let reading = Reading::new(&map.identities, phrase, *level).ok_or(JobError::EmptyQuery)?;
+        let reading = QueryReading::new(&map.identities, phrase, *level).ok_or(JobError::EmptyQuery)?;
         let answered = engine.answer(map, &reading.phrase, *level)?;
         let unknown = engine.unknown_words(&map.identities, &reading.phrase);
         let ignored = answered.ignored_words(&map.identities, &reading.phrase, &unknown);

@@ -11,7 +11,7 @@ use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::matching::{self, MatchMode};
 pub(crate) use crate::pipeline::semantics::query_engine::{QueryEngine, answer_encoded};
-use crate::pipeline::semantics::reading::Reading;
+use crate::pipeline::semantics::reading::QueryReading;
 use crate::pipeline::semantics::timing::ms_since;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{Features, RenderSettings, Renderer};
@@ -80,7 +80,7 @@ pub(crate) struct QueryResult {
     /// What is meant, and how long that took.
     pub(crate) answered: QueryAnswer,
     /// How the question was read.
-    pub(crate) reading: Reading,
+    pub(crate) reading: QueryReading,
     pub(crate) mask: Mask,
     pub(crate) unknown_words: Vec<String>,
     /// Words that the answer does not rest on.
@@ -96,7 +96,7 @@ pub(crate) fn run(scene: &Scene, map: &SemanticMap, request: &QueryRequest<'_>) 
     let maps = ViewMaps::draw(&mut Renderer::new(), drawn, map, request.camera, blend, map.has_parts())?;
     let mut engine = QueryEngine::new(map.language.as_ref())?;
     let start = Instant::now();
-    let reading = Reading::new(&map.identities, request.text, request.level).ok_or(JobError::EmptyQuery)?;
+    let reading = QueryReading::new(&map.identities, request.text, request.level).ok_or(JobError::EmptyQuery)?;
     let mut answered = engine.answer(map, &reading.phrase, request.level)?;
     let matching_since = Instant::now();
     let mut mask = Mask::empty(maps.identities.width_px, maps.identities.height_px);

@@ -7,7 +7,7 @@ use super::answer::{Language, QueryAnswer, answer, by_embedding, phrases_of};
 use super::by_embedding::{EmbeddingOptions, TextEmbeddings};
 use super::names;
 use super::parse::ParsedQuery;
-use super::reading::Reading;
+use super::reading::QueryReading;
 use super::timing::{StagesMs, ms_since};
 use crate::models::{self, Encoder, ModelError};
 use crate::scene::{Identities, LanguageFeatures, LevelFilter, SemanticMap};
@@ -33,7 +33,7 @@ impl QueryEngine {
         text: &str,
         level: LevelFilter,
     ) -> Result<Option<QueryAnswer>, ModelError> {
-        let reading = Reading::new(&map.identities, text, level);
+        let reading = QueryReading::new(&map.identities, text, level);
         reading.map(|reading| self.answer(map, &reading.phrase, level)).transpose()
     }
 

@@ -13,7 +13,7 @@ pub(crate) type Pairs = Vec<(String, String)>;
 
 /// A query as it is answered.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Reading {
+pub(crate) struct QueryReading {
     pub(crate) phrase: ParsedQuery,
     /// Words that were taken for slips, each with the word that it was taken for.
     pub(crate) mended: Pairs,
@@ -29,7 +29,7 @@ const LONG: usize = 8;
 /// Words of a compound at most.
 const MOST_WORDS: usize = 10;
 
-impl Reading {
+impl QueryReading {
     /// Reads a query about these identities; `None` if there is nothing in it.
     pub(crate) fn new(identities: &Identities, query: &str, level: LevelFilter) -> Option<Self> {
         let (text, mended, near) = mend_all(identities, query);
@@ -224,8 +224,8 @@ mod tests {
         }
     }
 
-    fn read(all: &Identities, text: &str) -> Reading {
-        Reading::new(all, text, LevelFilter::Auto).expect("words")
+    fn read(all: &Identities, text: &str) -> QueryReading {
+        QueryReading::new(all, text, LevelFilter::Auto).expect("words")
     }
 
     #[test]
@@ -247,7 +247,7 @@ mod tests {
         // Without the reading most are wrong, and an object that is asked for is no piece.
         let plain = |row: &&Vec<&str>| told(&all, &ParsedQuery::parse(row[0]).expect("words")) == row[1];
         assert!(lists[0].iter().filter(plain).count() * 4 < lists[0].len());
-        let object = Reading::new(&all, "kettle spout", LevelFilter::Object).expect("words");
+        let object = QueryReading::new(&all, "kettle spout", LevelFilter::Object).expect("words");
         assert_eq!((object.phrase.target.as_str(), object.phrase.whole), ("kettle spout", None));
     }
 
@@ -281,9 +281,9 @@ mod tests {
     #[test]
     fn strange_texts_are_read_in_no_time() {
         let (all, _) = data();
-        assert!(Reading::new(&all, " \t", LevelFilter::Auto).is_none());
+        assert!(QueryReading::new(&all, " \t", LevelFilter::Auto).is_none());
         for text in ["lamp ".repeat(5_000), "x".repeat(5_000), "的".repeat(900), "a\u{0}b \u{202e}lmap".into()] {
-            assert!(Reading::new(&all, &text, LevelFilter::Auto).is_some());
+            assert!(QueryReading::new(&all, &text, LevelFilter::Auto).is_some());
         }
     }
 }

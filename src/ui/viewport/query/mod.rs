@@ -26,7 +26,7 @@ use crate::navigate::Pose;
 use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::matching::MatchMode;
 use crate::pipeline::semantics::names;
-use crate::pipeline::semantics::reading::Reading;
+use crate::pipeline::semantics::reading::QueryReading;
 use crate::pipeline::semantics::timing::{StagesMs, ms_since};
 use crate::scene::{IdentityId, Mask, ScenePlan, SemanticMap};
 use crate::ui::color_by::ColorBy;
@@ -50,7 +50,7 @@ pub struct Asked {
     /// A hit that was chosen among the others; else the best are shown.
     chosen: Option<IdentityId>,
     /// How it was read.
-    reading: Reading,
+    reading: QueryReading,
     /// Words that neither names nor the encoder know.
     unknown: Vec<String>,
     /// Words that the answer does not rest on.
@@ -261,7 +261,7 @@ impl Queries {
 
     fn asked(&self, text: &str, semantics: &SemanticMap) -> Option<Asked> {
         let text = text.trim();
-        let reading = Reading::new(&semantics.identities, text, self.settings.kind)?;
+        let reading = QueryReading::new(&semantics.identities, text, self.settings.kind)?;
         let phrase = &reading.phrase;
         let encoded = self.embeddings.of(phrase);
         let mut answered = answer_encoded(semantics, phrase, self.settings.kind, self.embeddings.phrases(phrase));
