@@ -26,6 +26,7 @@ pub(crate) mod render;
 pub(crate) mod report;
 pub(crate) mod scale;
 pub(crate) mod segment;
+pub(crate) mod sparse_cloud;
 pub(crate) mod synth;
 pub(crate) mod thumbnails;
 pub(crate) mod train;

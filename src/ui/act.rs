@@ -8,7 +8,7 @@ use super::chat::Snapshot;
 use super::color_by::ColorBy;
 use super::context::SceneContext;
 use super::dialogs::Question;
-use super::edits::EditStep;
+use super::history::EditStep;
 use super::state::Tone;
 use super::viewport::brush::Brush;
 use super::viewport::overrides::RenderOverrides;

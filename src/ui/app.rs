@@ -9,8 +9,8 @@ use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 use super::camera::CameraPane;
 use super::chat::Chat;
 use super::dialogs::{self, Question};
-use super::edits::{EditStep, Editing};
 use super::file_dialogs::FileDialogs;
+use super::history::{EditStep, Editing};
 use super::layout::Layout;
 use super::palette::{Palette, shortcut_sheet};
 use super::panes::{

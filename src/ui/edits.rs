@@ -4,32 +4,11 @@ use std::sync::Arc;
 
 use super::app::App;
 use super::context::SceneContext;
-use super::history::{Snapshot, ViewState, edit_text};
+use super::history::{EditSnapshot, EditStep, Editing, ViewState, edit_text};
 use super::state::Tone;
 use crate::jobs::edit::EditRequest;
 use crate::pipeline::semantics::edit::Edit;
-use crate::scene::IdentityId;
 use crate::worker::{Command, JobId};
-
-/// A step that waits for those before it.
-pub(super) enum EditStep {
-    Request(EditRequest),
-    Undo,
-    Redo,
-    /// The agent took a rename back, after which the identity is called this again.
-    UndoRename(IdentityId, String),
-    /// The agent took back what it hid or showed, after which these are left out again.
-    UndoHidden(Vec<IdentityId>),
-}
-
-/// A change of objects and parts that is under way.
-pub(super) struct Editing {
-    job: JobId,
-    /// What it does, in words; `None` if it is the way back or forth to an earlier state.
-    what: Option<String>,
-    /// Whether the way leads forth.
-    redo: bool,
-}
 
 impl App {
     /// Does a step after those that were asked for before.
@@ -65,7 +44,7 @@ impl App {
     }
 
     /// Whether undoing leads to a state like this.
-    fn was(&self, like: impl Fn(&Snapshot) -> bool) -> bool {
+    fn was(&self, like: impl Fn(&EditSnapshot) -> bool) -> bool {
         self.state.changes.before().is_some_and(like)
     }
 
@@ -138,7 +117,7 @@ impl App {
         }
     }
 
-    fn snapshot(&self) -> Snapshot {
+    fn snapshot(&self) -> EditSnapshot {
         let (layout, viewport) = (&self.layout, &self.viewport);
         let view = ViewState {
             hidden: viewport.visibility.hidden().clone(),
@@ -148,7 +127,7 @@ impl App {
             kept: viewport.queries.kept_texts(),
         };
         let map = self.state.semantics.as_deref().cloned();
-        Snapshot { scene: self.state.scene_number, map, view }
+        EditSnapshot { scene: self.state.scene_number, map, view }
     }
 
     /// Takes into the history what was done since, unless objects and parts are about to change. The path only

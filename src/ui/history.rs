@@ -11,7 +11,7 @@ use crate::jobs::edit::EditRequest;
 use crate::pipeline::semantics::edit::Edit;
 use crate::scene::undo::UndoHistory;
 use crate::scene::{CameraPath, Identities, IdentityId, NOBODY, SemanticMap};
-use crate::worker::ViewMode;
+use crate::worker::{JobId, ViewMode};
 
 /// What can be changed back beside objects and parts.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,7 +27,7 @@ pub(crate) struct ViewState {
 
 /// All that can be changed back.
 #[derive(Clone, Debug)]
-pub(crate) struct Snapshot {
+pub(crate) struct EditSnapshot {
     /// Counts scenes: what was done to another is forgotten.
     pub(crate) scene: u64,
     pub(crate) map: Option<Arc<SemanticMap>>,
@@ -38,17 +38,17 @@ pub(crate) struct Snapshot {
 #[derive(Clone, Debug)]
 struct Change {
     what: String,
-    other: Snapshot,
+    other: EditSnapshot,
 }
 
 /// What was done, and how it is now.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct History {
+pub(crate) struct ChangeHistory {
     changes: UndoHistory<Change>,
-    now: Option<Snapshot>,
+    now: Option<EditSnapshot>,
 }
 
-impl Snapshot {
+impl EditSnapshot {
     /// Whether an identity has this name.
     pub(crate) fn is_called(&self, id: IdentityId, name: &str) -> bool {
         let identity = self.map.as_ref().and_then(|map| map.identities.get(id));
@@ -56,9 +56,9 @@ impl Snapshot {
     }
 }
 
-impl History {
+impl ChangeHistory {
     /// How it was when it was looked at last.
-    pub(crate) fn now(&self) -> Option<&Snapshot> {
+    pub(crate) fn now(&self) -> Option<&EditSnapshot> {
         self.now.as_ref()
     }
 
@@ -69,7 +69,7 @@ impl History {
 
     /// Takes in how it is now. A change of objects and parts is called what `edit` says; without it they are others
     /// than before, and what was done is forgotten. What has changed, in words.
-    pub(crate) fn settle(&mut self, now: &Snapshot, edit: Option<&str>) -> Option<String> {
+    pub(crate) fn settle(&mut self, now: &EditSnapshot, edit: Option<&str>) -> Option<String> {
         let before = self.now.as_ref().filter(|before| before.scene == now.scene);
         let is_edited = before.is_some_and(|before| !is_same(&before.map, &now.map));
         let Some(before) = before.filter(|_| !is_edited || edit.is_some()) else {
@@ -100,12 +100,12 @@ impl History {
     }
 
     /// The state that undoing would lead to.
-    pub(crate) fn before(&self) -> Option<&Snapshot> {
+    pub(crate) fn before(&self) -> Option<&EditSnapshot> {
         self.changes.last().map(|c| &c.other)
     }
 
     /// Goes back by one change, or forth: what it was, and the state to be in then.
-    pub(crate) fn go(&mut self, redo: bool) -> Option<(String, Snapshot)> {
+    pub(crate) fn go(&mut self, redo: bool) -> Option<(String, EditSnapshot)> {
         let what = if redo { self.next() } else { self.last() }?.to_owned();
         let mut change = Change { what: what.clone(), other: self.now.clone()? };
         if redo {
@@ -194,6 +194,26 @@ fn shown_text(before: &BTreeSet<IdentityId>, now: &BTreeSet<IdentityId>, all: &I
     }
 }
 
+/// A step that waits for those before it.
+pub(super) enum EditStep {
+    Request(EditRequest),
+    Undo,
+    Redo,
+    /// The agent took a rename back, after which the identity is called this again.
+    UndoRename(IdentityId, String),
+    /// The agent took back what it hid or showed, after which these are left out again.
+    UndoHidden(Vec<IdentityId>),
+}
+
+/// A change of objects and parts that is under way.
+pub(super) struct Editing {
+    pub(super) job: JobId,
+    /// What it does, in words; `None` if it is the way back or forth to an earlier state.
+    pub(super) what: Option<String>,
+    /// Whether the way leads forth.
+    pub(super) redo: bool,
+}
+
 #[cfg(test)]
 mod tests {
     use glam::{DMat3, DVec3};
@@ -209,11 +229,11 @@ mod tests {
         Arc::new(SemanticMap { identities, ..SemanticMap::default() })
     }
 
-    fn start() -> (History, Snapshot) {
+    fn start() -> (ChangeHistory, EditSnapshot) {
         let path = CameraPath { keys: Vec::new(), closed: false, fps: 30.0, seconds: 5.0 };
         let view = ViewState { hidden: BTreeSet::new(), mode: ViewMode::Rgb, cameras: true, path, kept: Vec::new() };
-        let now = Snapshot { scene: 1, map: Some(lamp()), view };
-        let mut history = History::default();
+        let now = EditSnapshot { scene: 1, map: Some(lamp()), view };
+        let mut history = ChangeHistory::default();
         assert_eq!(history.settle(&now, None), None);
         (history, now)
     }
@@ -221,7 +241,7 @@ mod tests {
     #[test]
     fn changes_of_every_kind_come_back_in_order() {
         let (mut history, mut now) = start();
-        let done = |history: &mut History, now: &Snapshot, edit| history.settle(now, edit).expect("a change");
+        let done = |history: &mut ChangeHistory, now: &EditSnapshot, edit| history.settle(now, edit).expect("a change");
         now.view.hidden = [0, 3].into();
         assert_eq!(done(&mut history, &now, None), "showed only lamp");
         now.map = Some(lamp());
@@ -246,7 +266,7 @@ mod tests {
 
     #[test]
     fn another_scene_and_objects_found_anew_have_no_past() {
-        for change in [|now: &mut Snapshot| now.scene = 2, |now: &mut Snapshot| now.map = Some(lamp())] {
+        for change in [|now: &mut EditSnapshot| now.scene = 2, |now: &mut EditSnapshot| now.map = Some(lamp())] {
             let (mut history, mut now) = start();
             now.view.cameras = false;
             assert_eq!(history.settle(&now, None).as_deref(), Some("hid the cameras"));

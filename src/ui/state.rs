@@ -7,7 +7,7 @@ use std::sync::Arc;
 pub use self::messages::{ErrorBox, LogLine};
 pub(crate) use self::messages::{Toast, Tone};
 use super::actions::Action;
-use super::history::History;
+use super::history::ChangeHistory;
 use super::labels::{PhraseTable, ScreenNames};
 pub(crate) use super::train_history::TrainHistory;
 use crate::io::unposed::Unposed;
@@ -76,7 +76,7 @@ pub struct AppState {
     /// Models that were put in place so far.
     pub(crate) models_installed: u64,
     /// What can be undone and redone, whoever did it.
-    pub(crate) changes: History,
+    pub(crate) changes: ChangeHistory,
     /// The newest short job that is over; they end in order.
     pub(crate) short_jobs_done: JobId,
     /// The long job that runs.

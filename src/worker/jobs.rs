@@ -12,8 +12,8 @@ use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::models::Source;
 use crate::jobs::train::Trained;
 use crate::jobs::{
-    Folders, JobError, OpenedScene, Scene, demo, edit, export, find_objects, go_to, models, open, phrases, plan, poses, recent,
-    report, scale, thumbnails, train, video,
+    Folders, JobError, OpenedScene, Scene, demo, edit, export, find_objects, go_to, models, open, phrases, plan, poses,
+    recent, report, scale, thumbnails, train, video,
 };
 use crate::measure::{End, FILE, Report};
 use crate::pipeline::observer::{Observer, Severity};

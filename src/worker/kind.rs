@@ -57,7 +57,9 @@ impl JobKind {
     pub(crate) fn lane(self) -> WorkerThread {
         match self {
             Self::Open | Self::Demo | Self::Train | Self::Evaluate | Self::Objects => WorkerThread::Long,
-            Self::DemoPhotos | Self::Poses | Self::Model | Self::Video | Self::Measure | Self::Phrases => WorkerThread::Long,
+            Self::DemoPhotos | Self::Poses | Self::Model | Self::Video | Self::Measure | Self::Phrases => {
+                WorkerThread::Long
+            }
             Self::Edit | Self::Export | Self::Photo | Self::Picture | Self::Thumbnails => WorkerThread::Short,
             Self::Models | Self::Explore | Self::Approach | Self::Scale | Self::Report => WorkerThread::Short,
         }

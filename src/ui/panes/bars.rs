@@ -3,7 +3,7 @@
 use egui::{Align, Button, RichText, Ui};
 use strum::VariantArray;
 
-use super::super::history::History;
+use super::super::history::ChangeHistory;
 use super::super::layout::Layout;
 use super::super::state::AppState;
 use super::super::{keys, theme};
@@ -104,7 +104,7 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut 
 }
 
 /// Undo and Redo, which say what of.
-pub(crate) fn history_buttons(ui: &mut Ui, changes: &History, actions: &mut Vec<Action>) {
+pub(crate) fn history_buttons(ui: &mut Ui, changes: &ChangeHistory, actions: &mut Vec<Action>) {
     for (action, what) in [(Action::Undo, changes.last()), (Action::Redo, changes.next())] {
         let button = ui.add_enabled(what.is_some(), Button::new(action.text()));
         let tip = format!("{}  {}", what.unwrap_or_default(), keys::label(ui.ctx(), &action));
