@@ -1,6 +1,8 @@
 //! The whole window, headless: what the user sees and does, with the software adapter.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+#[path = "ui_window/demo.rs"]
+mod demo;
 #[path = "ui_window/edits.rs"]
 mod edits;
 #[path = "ui_window/hands.rs"]
@@ -228,32 +230,6 @@ fn the_demo_is_made_opened_and_trained_by_itself() {
     w.click("Cancel");
     w.until("the end", |a| a.state.job.is_none());
     assert!(w.app().state.error.is_none() && w.app().state.recent.is_empty());
-}
-
-#[test]
-fn the_shipped_demo_opens_answered_and_recent_scenes_have_pictures() {
-    let data = tempfile::tempdir().expect("folder");
-    let place = || data.path().join("data");
-    let mut w = Window::keeping(place(), None);
-    w.harness.run_steps(2);
-    w.click("Open the demo");
-    w.until("the answer", |a| !a.viewport.queries.found().is_empty());
-    let app = w.app();
-    let map = app.state.semantics.as_ref().expect("objects");
-    let found: Vec<String> = app.viewport.queries.found().iter().map(|id| map.identities.full_name(*id)).collect();
-    assert!(found.iter().all(|name| name.contains("button") && name.ends_with("of the red controller")), "{found:?}");
-    assert!(app.state.scene.as_ref().is_some_and(|s| s.dataset.is_some()) && app.state.recent.is_empty());
-
-    let splat = write_splat(data.path());
-    w.ask(Action::Open(splat.clone()));
-    w.until("the splat", |a| a.state.recent.contains(&splat));
-    let kept = || std::fs::read_dir(place().join("pictures")).map_or(0, |all| all.count());
-    w.until("its picture", |_| kept() == 1);
-    let mut later = Window::keeping(place(), None);
-    assert!(!later.shows("dots.ply"));
-    later.harness.state_mut().state.recent = vec![splat];
-    later.harness.run_steps(2);
-    assert!(later.shows("dots.ply") && later.is_drawn());
 }
 
 fn last_step(app: &App) -> u64 {
