@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 use super::progress::Console;
 use super::train::TrainOverrides;
 use super::{CliError, output};
-use crate::io;
-use crate::jobs::{Folders, demo as shipped, demo_tour};
+use crate::jobs::{Folders, demo as shipped, demo_tour, export};
 use crate::pipeline::observer::{Observer, Severity};
 
 /// Show the program on the demo scene: make photos, train, look around
@@ -82,9 +81,9 @@ fn make(file: &Path, work: &Path, mut console: Console) -> Result<(), CliError> 
     let made = shipped::make(&shipped::DemoRecipe::shipped(), work, &mut console);
     let (bytes, record) = made.map_err(|e| CliError::of_work(e, "the same command resumes there"))?;
     drop(console);
-    io::atomic::write(file, |w| w.write_all(&bytes))?;
+    export::bytes(file, &bytes)?;
     let sum = format!("{}  demo.zip\n", shipped::digest(&bytes));
-    io::atomic::write(&file.with_extension("sha256"), |w| w.write_all(sum.as_bytes()))?;
+    export::text(&file.with_extension("sha256"), &sum)?;
     output::print(&format!(
         "{}: {:.1} MB, {} Gaussians, held-out PSNR {:.2} dB, SSIM {:.3}; asked by name, objects {:.3} and parts {:.3} mean IoU",
         file.display(),

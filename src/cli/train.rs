@@ -8,9 +8,10 @@ use super::plan::PlanArgs;
 use super::progress::Console;
 use super::{CliError, number, output};
 use crate::jobs::open::{self, Contents};
+use crate::jobs::presets;
 use crate::jobs::{plan, train};
 use crate::pipeline::observer::{Observer, Severity};
-use crate::pipeline::train::{TrainConfig, preset};
+use crate::pipeline::train::TrainConfig;
 use crate::render::BackendChoice;
 use crate::scene::Dataset;
 
@@ -151,7 +152,7 @@ impl TrainArgs {
                 )));
             }
         };
-        let base = self.preset.as_deref().map(preset::read).transpose()?.unwrap_or(base);
+        let base = self.preset.as_deref().map(presets::read).transpose()?.unwrap_or(base);
         let config = self.settings.over(base);
         let plan = plan::of_photos(&dataset, &config, &self.plan.overrides());
         let backend = if plan.on_cpu { BackendChoice::Cpu } else { config.backend };

@@ -19,8 +19,12 @@ pub(crate) fn ply(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
 }
 
 pub(crate) fn text(path: &Path, text: &str) -> Result<(), IoError> {
+    bytes(path, text.as_bytes())
+}
+
+pub(crate) fn bytes(path: &Path, bytes: &[u8]) -> Result<(), IoError> {
     make_parent(path)?;
-    atomic::write(path, |w| w.write_all(text.as_bytes()))
+    atomic::write(path, |w| w.write_all(bytes))
 }
 
 /// Writes a value as indented JSON.

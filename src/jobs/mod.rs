@@ -20,6 +20,7 @@ pub mod open;
 pub mod phrases;
 pub(crate) mod plan;
 pub(crate) mod poses;
+pub(crate) mod presets;
 pub(crate) mod query;
 pub(crate) mod recent;
 pub(crate) mod render;

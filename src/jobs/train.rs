@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::presets;
 use super::{JobError, Scene, open};
 use crate::io::{semantic_map, splat_ply, trained};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::train::checkpoint::CheckpointError;
-use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainError, TrainOutcome, preset};
+use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainError, TrainOutcome};
 use crate::scene::{Dataset, SemanticMap};
 
 #[derive(Clone, Debug)]
@@ -52,7 +53,7 @@ pub(crate) fn run(
             result => {
                 let outcome = result?;
                 if trained::is_scene(&out)
-                    && let Err(e) = preset::keep(&out, config)
+                    && let Err(e) = presets::keep(&out, config)
                 {
                     observer.note(Severity::Warning, format!("The settings are not kept as a file: {e}"));
                 }

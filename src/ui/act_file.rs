@@ -8,15 +8,15 @@ use super::app::App;
 use super::camera;
 use super::context::SceneContext;
 use super::state::Tone;
+use crate::jobs::presets;
 use crate::jobs::video::VideoRequest;
-use crate::pipeline::train::preset;
 use crate::render::BackendChoice;
 use crate::worker::{Command, Failure};
 
 impl App {
     /// Takes over settings for the next training.
     pub(super) fn read_preset(&mut self, path: &Path) {
-        match preset::read(path) {
+        match presets::read(path) {
             Ok(config) => {
                 self.layout.config = config;
                 self.state.toast(Tone::Good, format!("The next training has the settings of {}", path.display()));

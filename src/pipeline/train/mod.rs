@@ -16,7 +16,6 @@ pub(crate) mod init;
 mod optimizer;
 mod outcome;
 mod photos;
-pub(crate) mod preset;
 mod run;
 pub(crate) mod schedule;
 pub mod trainer;

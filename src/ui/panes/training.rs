@@ -6,8 +6,9 @@ use super::super::layout::Layout;
 use super::super::state::{AppState, RunningJob};
 use super::super::{keys, theme};
 use super::plots::{self, PsnrCurve};
+use crate::jobs::presets;
 use crate::math::format;
-use crate::pipeline::train::{TrainConfig, preset};
+use crate::pipeline::train::TrainConfig;
 use crate::ui::actions::Action;
 use crate::worker::JobKind;
 
@@ -127,7 +128,7 @@ fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {
         ui.horizontal(|ui| {
             let tip = "A trained scene keeps them as training.toml; drop such a file onto the window to use them.";
             if ui.button("Copy settings as TOML").on_hover_text(tip).clicked() {
-                ui.ctx().copy_text(preset::text(config));
+                ui.ctx().copy_text(presets::text(config));
             }
             if ui.button("Defaults").on_hover_text("Set every training setting back.").clicked() {
                 *config = Layout::default().config;

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::TrainConfig;
 use crate::io::{IoError, atomic, files};
+use crate::pipeline::train::TrainConfig;
 
 /// What the settings that a scene was trained with are called in its folder.
 const FILE: &str = "training.toml";
