@@ -244,6 +244,7 @@ fn training_moves_the_plot_pauses_resumes_and_is_cancelled() {
     assert!(w.shows("7 train") && w.shows("1 held-out"), "the photos pane");
     assert!(w.shows("Feature maps"), "the scene plan");
     w.harness.state_mut().layout.config.steps = 50_000;
+    w.harness.render().expect("drawn").save("/tmp/look/start.png").expect("saved");
     w.click("Start training");
     w.until("the plot", |a| a.state.history.steps.len() >= 5);
     assert!(w.shows("Pause") && w.shows("Held-out PSNR"));

@@ -134,15 +134,15 @@ macro_rules! actions {
 }
 
 actions! {
-    OpenDemo: "Open the demo", "A trained tabletop with its objects and parts, ready to be asked. Needs no download.";
-    TrainDemo: "Train the demo yourself",
-        "Render the tabletop into posed photos, open them and train at once. Needs no download.";
     OpenFolder: "Open folder\u{2026}",
         "COLMAP, transforms.json (nerfstudio, instant-ngp, Blender), LLFF, or a trained scene.", "Ctrl+O";
     OpenFile: "Open file\u{2026}", "A splat .ply, a transforms.json, or the scene.json of a trained scene.";
     Open(path: PathBuf): format!("Open {}", path.display()), "Open this path.";
     FindPoses(photos: Box<Unposed>): format!("Find the camera poses of {}", photos.folder.display()),
         "Run COLMAP on the photos, in a folder of its own, and open the result.";
+    OpenDemo: "Open the demo", "A trained tabletop with its objects and parts, ready to be asked. Needs no download.";
+    TrainDemo: "Train the demo yourself",
+        "Render the tabletop into posed photos, open them and train at once. Needs no download.";
     ExportPly: "Export Gaussians as .ply\u{2026}", "Write the Gaussians in the format that 3DGS viewers read.", "Ctrl+E";
     Screenshot: "Save the view as .png\u{2026}", "Write the image in the viewport, without the drawn cameras.", "Ctrl+S";
     StartTraining: "Start training",
@@ -183,10 +183,10 @@ actions! {
     SaveChat: "Save conversation\u{2026}", "As Markdown, or .json, with every step and its result.";
     Select(id: Option<IdentityId>): id.map_or_else(|| "Deselect".into(), |id| format!("Select #{id}")),
         "Outline it in the view; keys and menus are about it.";
-    IsolateSelected: "Isolate the selected object or part",
+    IsolateSelected: "Isolate the selection",
         "Draw nothing else, or everything again.", "I";
-    HideSelected: "Hide the selected object or part", "Leave it out of the view.", "H";
-    GoToSelected: "Go to the selected object or part", "Fly to where it is seen best.", "G";
+    HideSelected: "Hide the selection", "Leave it out of the view.", "H";
+    GoToSelected: "Go to the selection", "Fly to where it is seen best.", "G";
     Isolate(only: Option<IdentityId>): only.map_or_else(|| "Show all objects".into(), |id| format!("Show only #{id}")),
         "Draw everything again that was hidden.";
     Hide(id: IdentityId): format!("Hide or show #{id}"), "Leave it out of the view, or draw it again.";

@@ -40,7 +40,7 @@ pub(crate) struct QueryArgs {
     /// Views for --phrases: 'all' photos, or some by index or name, with commas between [default: --camera]
     #[arg(long, requires = "phrases", conflicts_with = "camera")]
     views: Option<String>,
-    /// True masks for --phrases, as it exports them: FOLDER/<view>/<phrase>.png, white on black
+    /// True masks for --phrases, as it exports them: FOLDER/VIEW/PHRASE.png, white on black
     #[arg(long, value_name = "FOLDER", requires = "phrases")]
     truth: Option<PathBuf>,
     /// Write the masks of --phrases as .png, COCO .json and a .csv table into this folder
