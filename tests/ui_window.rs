@@ -244,7 +244,6 @@ fn training_moves_the_plot_pauses_resumes_and_is_cancelled() {
     assert!(w.shows("7 train") && w.shows("1 held-out"), "the photos pane");
     assert!(w.shows("Feature maps"), "the scene plan");
     w.harness.state_mut().layout.config.steps = 50_000;
-    w.harness.render().expect("drawn").save("/tmp/look/start.png").expect("saved");
     w.click("Start training");
     w.until("the plot", |a| a.state.history.steps.len() >= 5);
     assert!(w.shows("Pause") && w.shows("Held-out PSNR"));
@@ -270,7 +269,7 @@ fn training_moves_the_plot_pauses_resumes_and_is_cancelled() {
     assert!(reached < 50_000);
     assert!(w.app().viewport.cloud().is_some_and(|c| !c.is_empty()), "what was trained stays");
 
-    w.click("Start training");
+    w.harness.get_by_label_contains("Continue (").click();
     w.until("going on from the checkpoint", |a| last_step(a) > reached);
     assert!(w.app().state.history.steps.iter().any(|s| s.step < reached), "the curve resumes where it was");
     w.ask(Action::Cancel);

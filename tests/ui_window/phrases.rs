@@ -18,7 +18,6 @@ pub fn are_listed_exported_and_compared(w: &mut Window, folder: &Path) {
     w.ask(Action::Ask("table".into()));
     w.ask(Action::TrueMask(Some(table_mask)));
     w.harness.run_steps(4);
-    w.harness.render().expect("drawn").save("/tmp/look/iou.png").expect("saved");
     assert!(w.shows("IoU 0.9") || w.shows("IoU 1.0"), "drawn twice, it is the same but for its edge");
     // The control: a part of the scene is not the table.
     w.ask(Action::Ask("red controller".into()));

@@ -44,7 +44,7 @@ impl Queries {
             theme::overlay().show(ui, |ui| {
                 ui.set_width(width);
                 let height = (rect.bottom() - at.y - 2.5 * MARGIN).max(60.0);
-                ScrollArea::vertical().max_height(height).show(ui, |ui| {
+                ScrollArea::vertical().max_height(height).min_scrolled_height(height).show(ui, |ui| {
                     self.show_bar(ui, semantics, actions);
                     self.show_answer(ui, state, semantics, cloud, actions);
                     self.show_kept(ui);
