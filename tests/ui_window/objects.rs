@@ -49,7 +49,7 @@ fn objects_are_found_asked_for_renamed_hidden_and_undone() {
     // The table is seen from everywhere.
     let table = map.identities.iter().find(|(_, i)| i.names == ["table"]).map(|(id, _)| id).expect("a table");
     let drawn = |a: &App| a.viewport.queries.maps().map(|m| m.identities.mask(&map.identities, table).area());
-    assert!(drawn(w.app()).is_some_and(|n| n > 0), "it is in view");
+    w.until("it is in view", |a| drawn(a).is_some_and(|n| n > 0));
     w.ask(Action::Hide(table));
     w.until("it is gone from the view", |a| drawn(a) == Some(0));
     w.ask(Action::Isolate(None));
