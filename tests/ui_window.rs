@@ -15,6 +15,8 @@ mod phrases;
 mod problems;
 #[path = "ui_window/report.rs"]
 mod report;
+#[path = "ui_window/split.rs"]
+mod split;
 mod ui_common;
 
 use std::path::{Path, PathBuf};

@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use super::app::App;
 use super::chat::Snapshot;
-use super::color_by::ColorBy;
 use super::context::SceneContext;
 use super::dialogs::Question;
 use super::history::EditStep;
@@ -23,7 +22,7 @@ use crate::pipeline::semantics::edit::Edit;
 use crate::scene::IdentityId;
 use crate::scene::plan::When;
 use crate::ui::actions::{Action, Pane};
-use crate::worker::{Command, JobId, JobKind, ViewMode};
+use crate::worker::{Command, JobId, JobKind};
 
 impl App {
     /// Does what a user asked for.
@@ -63,28 +62,20 @@ impl App {
                     self.submit(Command::SetScale { out, meters_per_unit });
                 }
             }
-            Action::Show(mode) => {
-                self.layout.mode = mode;
-                // The picture is the picture.
-                if mode == ViewMode::Rgb {
-                    self.viewport.queries.tint(ColorBy::Masks);
-                }
-            }
-            Action::Tint(by) => self.viewport.queries.tint(by),
+            Action::Show(_)
+            | Action::Tint(_)
+            | Action::ToggleTimes
+            | Action::ToggleCompare
+            | Action::ToggleSplit
+            | Action::OtherView
+            | Action::ToggleDim
+            | Action::ToggleCameras => self.look(action, ctx),
             Action::OpenReport(path) => self.read_report(path, false),
             Action::CompareReport(path) => self.read_report(path, true),
             Action::EndComparison => self.state.second_report = None,
             Action::BenchmarkRendering => self.measure_drawing(),
             Action::ApplySetting(stage, knobs) => self.apply_setting(stage, &knobs),
             Action::ResetRenderSettings => self.viewport.overrides = RenderOverrides::default(),
-            Action::ToggleTimes => self.layout.times = !self.layout.times,
-            Action::ToggleCompare => {
-                self.layout.compare = !self.layout.compare;
-                if self.layout.compare && self.viewport.photo_index().is_none() {
-                    self.view(&Action::NextPhoto, ctx);
-                }
-            }
-            Action::ToggleCameras => self.layout.cameras = !self.layout.cameras,
             Action::TogglePane(pane) => self.layout.toggle(pane),
             Action::ShowPane(pane) => self.bring_up(pane),
             Action::Rename => self.start_renaming(),
@@ -120,6 +111,7 @@ impl App {
             | Action::AddModel(_)
             | Action::ExportPhrases
             | Action::ChooseTrueMask
+            | Action::SaveTrueMask
             | Action::ChooseReport
             | Action::ChooseSecondReport
             | Action::OpenPath
@@ -130,6 +122,7 @@ impl App {
             Action::FrameScene
             | Action::Select(_)
             | Action::Paint(_)
+            | Action::PaintTrueMask
             | Action::Isolate(_)
             | Action::Hide(_)
             | Action::ResetView
@@ -144,7 +137,7 @@ impl App {
         }
     }
 
-    fn view(&mut self, action: &Action, ctx: &egui::Context) {
+    pub(super) fn view(&mut self, action: &Action, ctx: &egui::Context) {
         let now = ctx.input(|i| i.time);
         self.viewport.act(action, &self.state, &self.worker, now);
     }

@@ -31,6 +31,9 @@ impl App {
             self.state.toast(Tone::Warning, "There is nothing to save yet: open a scene first.");
             return;
         }
+        if action == Action::SaveTrueMask && self.viewport.queries.truth().is_none() {
+            return self.state.toast(Tone::Info, "This view has no true mask: load or paint one.");
+        }
         let scene = self.state.scene.as_ref().map_or_else(|| "scene".to_owned(), |s| s.name.clone());
         let name = match (&action, &self.state.semantics) {
             (Action::ExportTarget(id), Some(map)) => map.identities.full_name(*id).replace(['/', '\\', ' '], "-"),
@@ -82,6 +85,7 @@ impl App {
             },
             Action::ExportVideo => self.export_video(path),
             Action::SaveChat => self.save_chat(&path),
+            Action::SaveTrueMask => self.save_true_mask(&path),
             Action::Screenshot => {
                 if let Some(pixels) = self.viewport.pixels() {
                     self.submit(Command::Picture { pixels: Arc::new(pixels), path });

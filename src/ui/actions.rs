@@ -170,6 +170,9 @@ actions! {
     TrueMask(path: Option<PathBuf>): path.as_ref().map_or_else(|| "End the comparison with a true mask".into(),
             |p| format!("Compare with the true mask {}", p.display())),
         "Hits, misses and false alarms of the newest answer, and its IoU.";
+    PaintTrueMask: "Paint a true mask",
+        "Mark by hand what the answer should be in this view: hits, misses, false alarms and IoU are shown.";
+    SaveTrueMask: "Save the true mask as .png\u{2026}", "White where the object is, as it can be loaded again.";
     GoToTarget(id: IdentityId, side: Side): format!("Go to #{id}, {}", side.text()),
         "Fly to where it is seen best, around everything in between.";
     PlayPath: "Play or pause the camera path", "Fly along the path, or pause where you are.", "Space";
@@ -225,6 +228,9 @@ actions! {
     Tint(by: ColorBy): format!("Color by {}", by.text().to_lowercase()),
         "Color what is in view by what it is; once more for the picture.";
     ToggleCompare: "Compare with the photo", "Show the photo beside the rendering with a slider between them.", "C";
+    ToggleSplit: "Split view", "Two views of the scene by one camera, each with its own query and colors.", "8";
+    OtherView: "Work in the other view", "Keys, queries and colors are about it from then on.", "0";
+    ToggleDim: "Dim the rest", "Darken everything but what was found and what is selected.", "9";
     ToggleCameras: "Show or hide cameras", "Draw the camera of every photo into the view.", "V";
     TogglePane(pane: Pane): format!("Show or hide the {} pane", pane.text().to_lowercase()),
         "Show this part of the window, or make room for others.";
@@ -271,6 +277,7 @@ impl Action {
             Self::Show(ViewMode::Difference) => {
                 "Absolute difference from the photo, amplified four times. Needs a photo's view."
             }
+            Self::Show(ViewMode::Photo) => "The photo through whose camera the view looks. Needs a photo's view.",
             other => other.row().0,
         }
     }

@@ -200,7 +200,9 @@ impl App {
         let Self { state, layout, actions, viewport, .. } = self;
         let unfold = self.unfold.take();
         let header = |pane: Pane| egui::CollapsingHeader::new(pane.text()).open((unfold == Some(pane)).then_some(true));
-        Panel::top("menus").frame(bar).show(ui, |ui| bars::top(ui, state, layout, actions));
+        Panel::top("menus")
+            .frame(bar)
+            .show(ui, |ui| bars::top(ui, state, layout, viewport.queries.is_second(), actions));
         Panel::bottom("status").frame(bar).show(ui, |ui| bars::status(ui, state, layout, viewport.picture(), actions));
         problems::show(ui, state);
         if layout.shows(Pane::Log) {

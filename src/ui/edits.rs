@@ -106,11 +106,12 @@ impl App {
     }
 
     fn show_state(&mut self, view: ViewState) {
-        let ViewState { hidden, mode, cameras, path, kept } = view;
+        let ViewState { hidden, modes, split, dim, cameras, path, kept } = view;
         if self.viewport.visibility.hidden() != &hidden {
             self.viewport.visibility.set_hidden(hidden);
         }
-        (self.layout.mode, self.layout.cameras) = (mode, cameras);
+        ([self.layout.mode, self.layout.second_mode], self.layout.cameras) = (modes, cameras);
+        (self.layout.split_view, self.layout.dim) = (split, dim);
         self.camera.set_path(path);
         if let Some(map) = self.state.semantics.clone() {
             self.viewport.queries.keep_only(&kept, &map);
@@ -121,7 +122,9 @@ impl App {
         let (layout, viewport) = (&self.layout, &self.viewport);
         let view = ViewState {
             hidden: viewport.visibility.hidden().clone(),
-            mode: layout.mode,
+            modes: [layout.mode, layout.second_mode],
+            split: layout.split_view,
+            dim: layout.dim,
             cameras: layout.cameras,
             path: self.camera.path.clone(),
             kept: viewport.queries.kept_texts(),

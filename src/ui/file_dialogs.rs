@@ -213,6 +213,7 @@ fn dialog(action: &Action, name: &str) -> Option<(String, Kind)> {
         Action::SavePath => ("Save the camera path", save("-path.json")),
         Action::SaveChat => ("Save the conversation", save("-conversation.md")),
         Action::ExportVideo => ("Export video", save(".mp4")),
+        Action::SaveTrueMask => ("Save the true mask", save("-true-mask.png")),
         Action::Screenshot => ("Save the view", save(".png")),
         _ => return None,
     };

@@ -6,6 +6,7 @@
 
 mod act;
 mod act_file;
+mod act_look;
 mod act_phrases;
 mod act_report;
 pub mod actions;

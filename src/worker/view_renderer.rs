@@ -7,7 +7,7 @@ use std::time::Instant;
 use super::failure::Failure;
 use super::thread::panic_failure;
 use super::view_modes::{self, ViewMode};
-use super::view_request::{QualityBudget, ViewPicture, ViewRequest, ViewResult};
+use super::view_request::{QualityBudget, SecondPicture, ViewPicture, ViewRequest, ViewResult};
 use crate::render::{self, BackendChoice, Frame, RenderSettings, Renderer};
 use crate::scene::Camera;
 
@@ -67,7 +67,12 @@ impl ViewRenderer {
         self.learn(secs, f64::from(camera.width_px * camera.height_px));
         let stages = self.renderer.stage_times();
         let start = Instant::now();
-        let drawn = view_modes::paint(&frame, request.mode, request.photo.as_deref());
+        let paint = |mode| view_modes::paint(&frame, mode, request.photo.as_deref());
+        let drawn = paint(request.mode);
+        let second = request.second.map(|mode| {
+            let view_modes::Drawn { rgb, depth_range, .. } = paint(mode);
+            SecondPicture { rgb, depth_range }
+        });
         let paint_secs = start.elapsed().as_secs_f64();
         let median_depth = (!frame.median_depth.is_empty()).then_some(frame.median_depth);
         Ok(Arc::new(ViewPicture {
@@ -78,6 +83,7 @@ impl ViewRenderer {
             median_depth,
             depth_range: drawn.depth_range,
             psnr: drawn.psnr,
+            second,
             secs,
             stages,
             paint_secs,
@@ -87,7 +93,8 @@ impl ViewRenderer {
     }
 
     fn try_render(&mut self, request: &ViewRequest, camera: &Camera) -> Result<Frame<f32>, Failure> {
-        let depth = request.budget == QualityBudget::Full || request.mode == ViewMode::Depth || !request.skip.depth;
+        let shows_depth = [Some(request.mode), request.second].contains(&Some(ViewMode::Depth));
+        let depth = request.budget == QualityBudget::Full || shows_depth || !request.skip.depth;
         let settings = RenderSettings { depth, ..request.settings.clone() };
         match catch_unwind(AssertUnwindSafe(|| self.renderer.draw(&request.cloud, camera, &settings))) {
             Ok(result) => result.map_err(|e| Failure::of(&e, "Reset the view (Home), or open the scene again.")),

@@ -17,6 +17,8 @@ pub struct ViewRequest {
     pub camera: Camera,
     /// What of it.
     pub mode: ViewMode,
+    /// What of it beside that, in a second view.
+    pub second: Option<ViewMode>,
     /// How: degree of the colors, background, filter. Depth is drawn where it is needed.
     pub settings: RenderSettings,
     /// How long it may take.
@@ -82,6 +84,14 @@ impl QualityBudget {
     }
 }
 
+/// A drawn view as a second view shows it.
+#[derive(Clone, Debug)]
+pub struct SecondPicture {
+    /// Row-major sRGB.
+    pub rgb: Vec<[u8; 3]>,
+    pub(crate) depth_range: Option<(f32, f32)>,
+}
+
 /// A drawn view.
 #[derive(Clone, Debug)]
 pub struct ViewPicture {
@@ -99,6 +109,8 @@ pub struct ViewPicture {
     pub(crate) depth_range: Option<(f32, f32)>,
     /// PSNR in dB against the photo, if the request had one.
     pub psnr: Option<f64>,
+    /// The same frame as the second view shows it, with its depths, if that was wanted.
+    pub second: Option<SecondPicture>,
     /// Seconds that rendering took.
     pub(crate) secs: f64,
     /// The same by stage, where that is known.

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::brush::Brush;
+use super::brush::{Brush, Purpose};
 use super::eye::Eye;
 use super::photo::PhotoView;
 use super::ruler::Ruler;
@@ -23,7 +23,10 @@ impl Viewport {
                 let selected = self.selected_bounds(state.semantics.as_ref());
                 self.eye.frame(selected.as_ref().unwrap_or(&scene.home.bounds));
             }
-            Action::Paint(of) => self.brush = of.filter(|_| state.semantics.is_some()).map(Brush::new),
+            Action::Paint(of) => {
+                self.brush = of.filter(|_| state.semantics.is_some()).map(|of| Brush::new(Purpose::Piece(of)));
+            }
+            Action::PaintTrueMask => self.brush = all.map(|_| Brush::new(Purpose::TrueMask)),
             Action::Select(id) => return self.picking.select(*id),
             Action::Isolate(only) => return all.map_or((), |all| self.visibility.isolate(all, *only)),
             Action::Hide(id) => return all.map_or((), |all| self.visibility.toggle(all, *id)),

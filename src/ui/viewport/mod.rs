@@ -18,6 +18,7 @@ pub(crate) mod query;
 mod request;
 mod route;
 mod ruler;
+mod split;
 pub(crate) mod visible;
 
 use std::sync::Arc;
@@ -35,6 +36,7 @@ use self::picking::Picking;
 use self::query::Queries;
 use self::request::Requests;
 use self::ruler::Ruler;
+use self::split::Views;
 use self::visible::Visibility;
 use super::camera::CameraPane;
 use super::layout::Layout;
@@ -121,11 +123,13 @@ impl Viewport {
         self.photo.as_ref().map(PhotoView::index)
     }
 
-    /// The frame as pixels, for saving.
+    /// The frame as pixels, for saving: that of the view that is worked in.
     pub(crate) fn pixels(&self) -> Option<PhotoPixels> {
         let p = self.picture()?;
         let (width_px, height_px) = (p.camera.width_px, p.camera.height_px);
-        Some(PhotoPixels { width_px, height_px, rgb: p.rgb.clone(), coverage: None })
+        let second = p.second.as_ref().filter(|_| self.queries.is_second());
+        let rgb = second.map_or(&p.rgb, |second| &second.rgb).clone();
+        Some(PhotoPixels { width_px, height_px, rgb, coverage: None })
     }
 
     /// Takes over a new scene, new Gaussians and loaded photos.
@@ -221,48 +225,80 @@ impl Viewport {
         actions: &mut Vec<Action>,
     ) {
         let Some(scene) = state.scene.clone() else { return };
-        let rect = ui.available_rect_before_wrap();
-        let response = ui.allocate_rect(rect, Sense::click_and_drag());
+        let whole = ui.available_rect_before_wrap();
+        let response = ui.allocate_rect(whole, Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Viewport"));
+        let views = Views::of(whole, layout.split_view);
+        self.work_where_pressed(ui, &views);
         self.display.time_frames(layout.times);
         self.take_frame(ui.ctx());
         let now = ui.input(|i| i.time);
-        self.use_brush(&response, rect, state);
-        if self.handle_input(ui, &response, rect, &scene) {
+        let under = views.under_pointer(ui);
+        self.use_brush(&response, under, state);
+        if self.handle_input(ui, &response, under, &scene) {
             self.leave_photo();
             self.moved_at = now;
         }
-        let shown = self.photo.as_mut().map_or(rect, |p| p.fit(rect));
+        let shown = self.photo.as_mut().map_or(views.first, |p| p.fit(views.first));
+        // All views have the same size: what is at a place of one is at the same place of the others.
+        let shown_in = |view: Rect| shown.translate(view.min - views.first.min);
         self.request(ui, shown, state, layout, now);
-        self.display.paint(ui, rect, shown);
         if let Some(semantics) = &state.semantics {
             self.queries.keep_up(ui.ctx(), semantics, &state.plan);
             self.queries.stand(self.pose());
-            self.queries.paint(ui, shown, semantics);
         }
-        if let Some(photo) = self.photo.as_mut().filter(|_| layout.compare) {
-            photo.show_split(ui, shown, &mut layout.split);
+        let (mut on_camera, mut works_in) = (false, self.queries.is_second());
+        for (second, rect) in views.each() {
+            self.queries.work_in(second);
+            self.display.paint(ui, (rect, shown_in(rect)), second);
+            if let Some(semantics) = &state.semantics {
+                let lit = layout.dim.then(|| self.picking.selected().into_iter().collect());
+                self.queries.paint(ui, shown_in(rect), semantics, lit);
+            }
+            if let Some(photo) = self.photo.as_mut().filter(|_| layout.compare && !second) {
+                photo.show_split(ui, shown, &mut layout.split);
+            }
+            on_camera |= layout.cameras
+                && self.photo.is_none()
+                && self.show_frusta(ui, rect, &scene, &response, layout, actions);
         }
-        let on_camera =
-            layout.cameras && self.photo.is_none() && self.show_frusta(ui, rect, &scene, &response, layout, actions);
-        let meters = scene.meters_per_unit();
-        self.show_ruler(ui, &response, shown, meters, actions);
-        if let Some(semantics) = state.semantics.as_ref().filter(|_| self.brush.is_none() && !self.is_measuring()) {
-            self.show_picking(ui, &response, shown, (semantics, &state.labels), on_camera, actions);
-            if let Some(cloud) = self.cloud.clone() {
+        let picks = self.brush.is_none() && !self.is_measuring();
+        if let Some(semantics) = state.semantics.as_ref().filter(|_| picks) {
+            let maps = self.queries.maps().map(|m| &***m).filter(|_| !on_camera);
+            self.picking.update(&response, shown_in(under), (semantics, &state.labels), maps, actions);
+        }
+        for (second, rect) in views.each() {
+            self.queries.work_in(second);
+            let shown = shown_in(rect);
+            self.show_ruler(ui, &response, shown, scene.meters_per_unit());
+            if let (Some(semantics), Some(cloud)) = (&state.semantics, self.cloud.clone())
+                && picks
+            {
+                if let Some(maps) = self.queries.shown_maps().cloned() {
+                    self.picking.paint(ui, shown, (semantics, &state.labels), &maps);
+                }
                 self.show_marks(ui, shown, &cloud, (semantics, &state.labels), actions);
             }
+            if let Some(pane) = route {
+                self.show_route(ui, rect, pane, state.explored.as_deref());
+            }
+            self.show_overlay(ui, rect, &scene, state, layout, actions);
+            if let (Some(brush), Some(_)) = (&mut self.brush, &state.semantics) {
+                brush.paint(ui, shown, !self.queries.compares());
+            }
+            if let (Some(semantics), Some(cloud)) = (&state.semantics, &self.cloud)
+                && self.queries.show(ui, shown, state, semantics, cloud, actions)
+            {
+                works_in = second;
+            }
+            if views.is_split() && works_in == second {
+                split::mark_worked_in(ui, rect);
+            }
         }
-        if let Some(pane) = route {
-            self.show_route(ui, rect, pane, state.explored.as_deref());
-        }
-        self.show_overlay(ui, rect, &scene, state, layout, actions);
+        self.queries.work_in(works_in);
+        self.show_ruler_card(ui, whole, scene.meters_per_unit(), actions);
         if let (Some(brush), Some(semantics)) = (&mut self.brush, &state.semantics) {
-            brush.paint(ui, shown);
-            brush.show(ui, shown, &semantics.identities, actions);
-        }
-        if let (Some(semantics), Some(cloud)) = (&state.semantics, &self.cloud) {
-            self.queries.show(ui, shown, state, semantics, cloud, actions);
+            brush.show(ui, whole, &semantics.identities, actions);
         }
     }
 

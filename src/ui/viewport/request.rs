@@ -24,6 +24,8 @@ pub(super) struct Wanted {
     pub(super) cloud: Versioned<GaussianCloud>,
     pub(super) camera: Camera,
     pub(super) mode: ViewMode,
+    /// What a second view shows, if it is something else.
+    pub(super) second: Option<ViewMode>,
     pub(super) settings: RenderSettings,
     pub(super) budget: QualityBudget,
     pub(super) photo: Option<Arc<PhotoPixels>>,
@@ -43,6 +45,7 @@ struct Key {
     cloud: u64,
     semantics: Option<u64>,
     mode: ViewMode,
+    second: Option<ViewMode>,
     settings: RenderSettings,
     budget: QualityBudget,
     with_photo: bool,
@@ -83,12 +86,14 @@ impl Requests {
     /// The request for what is wanted, if it is not what was asked for last or wanted `again`; and what
     /// of its pixels is new.
     pub(super) fn next(&mut self, wanted: Wanted, again: bool) -> Option<(ViewRequest, Moved)> {
-        let Wanted { cloud, camera, mode, settings, budget, photo, semantics, codes, follow, skip, timed } = wanted;
+        let Wanted { cloud, camera, mode, second, settings, budget, photo, semantics, codes, follow, skip, timed } =
+            wanted;
         let key = Key {
             camera: camera.clone(),
             cloud: cloud.generation(),
             semantics: semantics.as_ref().map(Versioned::generation),
             mode,
+            second,
             settings: settings.clone(),
             budget,
             with_photo: photo.is_some(),
@@ -111,13 +116,31 @@ impl Requests {
         self.ticket += 1;
         let (cloud, semantics) = (Arc::clone(&cloud), semantics.as_deref().cloned());
         let ticket = self.ticket;
-        let request =
-            ViewRequest { cloud, camera, mode, settings, budget, photo, semantics, follow, codes, skip, timed, ticket };
+        let request = ViewRequest {
+            cloud,
+            camera,
+            mode,
+            second,
+            settings,
+            budget,
+            photo,
+            semantics,
+            follow,
+            codes,
+            skip,
+            timed,
+            ticket,
+        };
         Some((request, moved))
     }
 }
 
 impl Viewport {
+    /// Whether the eye moves.
+    pub(super) fn moves(&self, now: f64) -> bool {
+        now - self.moved_at < REST_SECS
+    }
+
     /// Asks for a new frame if anything changed.
     pub(super) fn request(&mut self, ui: &Ui, shown: Rect, state: &AppState, layout: &Layout, now: f64) {
         let Some(cloud) = self.cloud.clone() else { return };
@@ -161,6 +184,7 @@ impl Viewport {
             cloud,
             camera: camera.limited_to(MAX_SIDE_PX),
             mode: layout.mode,
+            second: layout.split_view.then_some(layout.second_mode).filter(|mode| *mode != layout.mode),
             settings: self.overrides.over(state.render_settings(), self.on_gpu()),
             budget,
             photo: self.photo.as_ref().and_then(PhotoView::pixels),
@@ -194,6 +218,7 @@ mod tests {
                 cloud: cloud.clone(),
                 camera: Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 8, 8).expect("valid"),
                 mode: ViewMode::Rgb,
+                second: None,
                 settings: RenderSettings::default(),
                 budget: QualityBudget::Full,
                 photo: None,
@@ -218,11 +243,12 @@ mod tests {
         assert_eq!(next(&|w| w.budget = QualityBudget::Moving, false), Some((3, Moved::Nothing)));
         assert_eq!(next(&|w| w.settings.sh_degree = 1, false), Some((4, Moved::Nothing)));
         assert_eq!(next(&|w| w.photo = Some(Arc::clone(&photo)), false), Some((5, Moved::Nothing)));
-        assert_eq!(next(&|w| w.camera.center.x += 1.0, false), Some((6, Moved::Eye)));
-        assert_eq!(next(&|_| {}, false), Some((7, Moved::Eye)), "and back");
+        assert_eq!(next(&|w| w.second = Some(ViewMode::Depth), false), Some((6, Moved::Nothing)));
+        assert_eq!(next(&|w| w.camera.center.x += 1.0, false), Some((7, Moved::Eye)));
+        assert_eq!(next(&|_| {}, false), Some((8, Moved::Eye)), "and back");
         // The same Gaussians, published anew.
         let newer = Versioned::new(Arc::clone(&cloud));
-        assert_eq!(next(&|w| w.cloud = newer.clone(), false), Some((8, Moved::Scene)));
+        assert_eq!(next(&|w| w.cloud = newer.clone(), false), Some((9, Moved::Scene)));
         assert_eq!(next(&|w| w.cloud = newer.clone(), false), None);
         requests.forget();
         assert!(requests.next(wanted(&|w| w.cloud = newer.clone()), false).is_some(), "another scene");
