@@ -219,8 +219,8 @@ impl Viewport {
     pub(super) fn use_brush(&mut self, response: &egui::Response, rect: Rect, state: &AppState) {
         let (Some(brush), Some(picture)) = (&mut self.brush, self.display.picture()) else { return };
         let shown = self.photo.as_mut().map_or(rect, |p| p.fit(rect));
-        // Only a full frame has the pixels that the maps have.
-        if !picture.full {
+        // Only a full frame has the pixels that the maps have, and one that is late is not what the eye sees.
+        if !picture.full || picture.ticket != self.requests.ticket() {
             return;
         }
         let is_true = brush.purpose == Purpose::TrueMask;

@@ -287,7 +287,7 @@ impl Viewport {
                 brush.paint(ui, shown, !self.queries.compares());
             }
             if let (Some(semantics), Some(cloud)) = (&state.semantics, &self.cloud)
-                && self.queries.show(ui, shown, state, semantics, cloud, actions)
+                && self.queries.show(ui, rect, state, semantics, cloud, actions)
             {
                 works_in = second;
             }

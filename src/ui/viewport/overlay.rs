@@ -94,15 +94,18 @@ impl Viewport {
             }
         };
         if menus {
-            ComboBox::from_id_salt("mode").selected_text(shown.text()).width(76.0).show_ui(ui, buttons);
+            let mode = ComboBox::from_id_salt("mode").selected_text(shown.text()).width(76.0).show_ui(ui, buttons);
+            mode.response.on_hover_text("What the view shows").accessible_name("Mode");
             let colored_by = self.queries.settings().color_by;
-            ComboBox::from_id_salt("color by").selected_text(colored_by.text()).width(86.0).show_ui(ui, |ui| {
+            let tints = ComboBox::from_id_salt("color by").selected_text(colored_by.text()).width(86.0);
+            let tints = tints.show_ui(ui, |ui| {
                 for &by in ColorBy::VARIANTS {
                     if ui.selectable_label(colored_by == by, by.text()).clicked() && colored_by != by {
                         self.queries.tint(by);
                     }
                 }
             });
+            tints.response.on_hover_text("What colors it beside that").accessible_name("Color by");
         } else {
             buttons(ui);
         }
@@ -176,7 +179,11 @@ impl Viewport {
         if !trained {
             parts.push("sparse points, not trained yet".into());
         }
-        parts.extend(self.display.rate(now).filter(|_| self.moves(now)).map(|fps| format!("{fps:.0} fps")));
+        parts.extend(self.display.rate(now).filter(|_| self.moves(now)).map(rate_text));
         Some(parts.join("  ·  "))
     }
+}
+
+fn rate_text(fps: f64) -> String {
+    if fps < 10.0 { format!("{fps:.1} fps") } else { format!("{fps:.0} fps") }
 }
