@@ -69,6 +69,7 @@ impl App {
             | Action::ToggleSplit
             | Action::OtherView
             | Action::ToggleDim
+            | Action::OpenBeside(_)
             | Action::ToggleCameras => self.look(action, ctx),
             Action::OpenReport(path) => self.read_report(path, false),
             Action::CompareReport(path) => self.read_report(path, true),
@@ -112,6 +113,7 @@ impl App {
             | Action::ExportPhrases
             | Action::ChooseTrueMask
             | Action::SaveTrueMask
+            | Action::ChooseBeside
             | Action::ChooseReport
             | Action::ChooseSecondReport
             | Action::OpenPath
@@ -382,6 +384,10 @@ impl App {
 
     fn type_question(&mut self) {
         if self.state.semantics.is_some() {
+            // Another scene in the second view is not asked.
+            if self.state.beside.is_some() {
+                self.viewport.queries.work_in(false);
+            }
             self.viewport.queries.start_typing();
         } else {
             self.state.toast(Tone::Warning, "There is nothing to query yet: find the objects first (Objects pane).");

@@ -85,6 +85,7 @@ impl App {
             },
             Action::ExportVideo => self.export_video(path),
             Action::SaveChat => self.save_chat(&path),
+            Action::ChooseBeside => self.ask(Action::OpenBeside(Some(path))),
             Action::SaveTrueMask => self.save_true_mask(&path),
             Action::Screenshot => {
                 if let Some(pixels) = self.viewport.pixels() {

@@ -4,7 +4,7 @@ use super::actions::Action;
 use super::app::App;
 use super::color_by::ColorBy;
 use super::state::Tone;
-use crate::worker::ViewMode;
+use crate::worker::{Command, ViewMode};
 
 impl App {
     /// Changes what the view, or the one of two that is worked in, shows.
@@ -33,6 +33,11 @@ impl App {
                 self.viewport.queries.work_in(!self.viewport.queries.is_second());
             }
             Action::OtherView => self.state.toast(Tone::Info, "There is one view: split it first (8)."),
+            Action::OpenBeside(None) => self.state.beside = None,
+            Action::OpenBeside(Some(path)) => {
+                self.layout.split_view = true;
+                self.submit(Command::OpenBeside { path });
+            }
             Action::ToggleDim => self.layout.dim = !self.layout.dim,
             Action::ToggleCameras => self.layout.cameras = !self.layout.cameras,
             _ => {}

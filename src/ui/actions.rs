@@ -230,6 +230,10 @@ actions! {
     ToggleCompare: "Compare with the photo", "Show the photo beside the rendering with a slider between them.", "C";
     ToggleSplit: "Split view", "Two views of the scene by one camera, each with its own query and colors.", "8";
     OtherView: "Work in the other view", "Keys, queries and colors are about it from then on.", "0";
+    ChooseBeside: "Compare with another scene\u{2026}",
+        "Show its Gaussians in the second view by the same camera: two trainings of the same photos.";
+    OpenBeside(path: Option<PathBuf>): path.as_ref().map_or_else(|| "End the comparison with another scene".into(),
+            |p| format!("Compare with the scene {}", p.display())), "Show its Gaussians in the second view.";
     ToggleDim: "Dim the rest", "Darken everything but what was found and what is selected.", "9";
     ToggleCameras: "Show or hide cameras", "Draw the camera of every photo into the view.", "V";
     TogglePane(pane: Pane): format!("Show or hide the {} pane", pane.text().to_lowercase()),

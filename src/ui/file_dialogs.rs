@@ -209,6 +209,7 @@ fn dialog(action: &Action, name: &str) -> Option<(String, Kind)> {
         Action::ChooseMasks => ("Choose the folder with the masks", Kind::Folder),
         Action::ExportPly | Action::ExportTarget(_) => ("Export Gaussians", save(".ply")),
         Action::OpenPath => ("Open a camera path", Kind::File("Camera paths", &["json"])),
+        Action::ChooseBeside => ("Open the folder of another scene", Kind::Folder),
         Action::ChooseReport | Action::ChooseSecondReport => ("Open a report", Kind::File("Reports", &["json"])),
         Action::SavePath => ("Save the camera path", save("-path.json")),
         Action::SaveChat => ("Save the conversation", save("-conversation.md")),

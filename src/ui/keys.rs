@@ -5,7 +5,7 @@ use egui::{Event, Id, Key, KeyboardShortcut, Modifiers};
 use crate::ui::actions::{Action, Shortcut};
 
 /// Mouse gestures and held keys in the viewport, which are no actions: for the shortcut sheet.
-pub(crate) const GESTURES: [(&str, &str); 10] = [
+pub(crate) const GESTURES: [(&str, &str); 12] = [
     ("W A S D", "Fly forward, left, back, right"),
     ("Q  E", "Fly down, up"),
     ("Shift  Alt", "Fly faster, slower (held)"),
@@ -15,6 +15,8 @@ pub(crate) const GESTURES: [(&str, &str); 10] = [
     ("Double click", "Set the pivot to what is under the cursor"),
     ("Click", "Select the object; again or Alt: the part"),
     ("Right click", "The menu of what is there"),
+    ("Shift drag", "Erase, while painting"),
+    ("Click in a view", "Work there, in a split view"),
     ("Click on a camera", "Look through it"),
 ];
 

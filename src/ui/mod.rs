@@ -11,6 +11,7 @@ mod act_phrases;
 mod act_report;
 pub mod actions;
 pub mod app;
+pub(crate) mod beside;
 pub(crate) mod camera;
 pub(crate) mod chat;
 pub(crate) mod chat_model;

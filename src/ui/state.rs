@@ -7,6 +7,7 @@ use std::sync::Arc;
 pub use self::messages::{ErrorBox, LogLine};
 pub(crate) use self::messages::{Toast, Tone};
 use super::actions::Action;
+use super::beside::Beside;
 use super::history::ChangeHistory;
 use super::labels::{PhraseTable, ScreenNames};
 pub(crate) use super::train_history::TrainHistory;
@@ -53,6 +54,8 @@ pub struct ShownReport {
 pub struct AppState {
     /// The scene on screen.
     pub scene: Option<Arc<OpenedScene>>,
+    /// What is seen of another one, in the second view.
+    pub beside: Option<Beside>,
     /// Counts the scenes shown so far; changes when `scene` does.
     pub(crate) scene_number: u64,
     /// What is left out for the scene, and why.
@@ -271,6 +274,12 @@ impl AppState {
                     _ => None,
                 });
             }
+            Outcome::Beside(scene) => {
+                self.beside = Beside::of(*scene);
+                if self.beside.is_none() {
+                    self.toast(Tone::Warning, "There is nothing to compare with: it has no Gaussians.");
+                }
+            }
             Outcome::Trained { evaluations, out, semantics, facts } => {
                 let carried = semantics.is_some();
                 if self.training_job == Some(job) {
@@ -359,6 +368,7 @@ impl AppState {
             self.remember(scene.path.clone());
         }
         self.scene_number += 1;
+        self.beside = None;
         self.set_facts(scene.facts.clone());
         self.antialias = scene.render.antialias;
         self.set_semantics(scene.semantics.clone());

@@ -85,6 +85,9 @@ impl Jobs for PipelineJobs {
                 Err(JobError::Open(OpenError::NoPoses(photos))) => Outcome::Unposed(photos),
                 opened => self.opened(opened?),
             },
+            Command::OpenBeside { path } => {
+                Outcome::Beside(Box::new(open::open(&path, &self.folders, self.machine(), observer)?))
+            }
             Command::FindPoses(photos) => {
                 let tools = poses::PoseTools::installed().ok_or(JobError::NoTools)?;
                 let found = poses::find(&photos, &tools, &self.folders, observer)?;

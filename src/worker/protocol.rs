@@ -47,6 +47,11 @@ pub enum Command {
         /// File or folder.
         path: PathBuf,
     },
+    /// Read a scene whose Gaussians are to be seen beside those on screen.
+    OpenBeside {
+        /// File or folder.
+        path: PathBuf,
+    },
     /// Read the trained demo that ships with the program.
     Demo,
     /// Render the demo scene into posed photos, unless that was done before, and read them.
@@ -178,6 +183,7 @@ impl Command {
     pub(crate) fn kind(&self) -> JobKind {
         match self {
             Self::Open { .. } => JobKind::Open,
+            Self::OpenBeside { .. } => JobKind::Beside,
             Self::Demo => JobKind::Demo,
             Self::DemoPhotos => JobKind::DemoPhotos,
             Self::FindPoses(_) => JobKind::Poses,
@@ -207,6 +213,7 @@ impl Command {
             |p: &PathBuf| p.file_name().map_or_else(|| p.display().to_string(), |n| n.to_string_lossy().into_owned());
         match self {
             Self::Open { path } => format!("Opening {}", name(path)),
+            Self::OpenBeside { path } => format!("Opening {} beside", name(path)),
             Self::Demo => "Opening the demo".into(),
             Self::DemoPhotos => "Rendering the demo scene".into(),
             Self::FindPoses(photos) => format!("Finding camera poses of {}", name(&photos.folder)),
@@ -239,6 +246,8 @@ impl Command {
 pub enum Outcome {
     /// A scene was read.
     Opened(Box<OpenedScene>),
+    /// One to be seen beside it was.
+    Beside(Box<OpenedScene>),
     /// There are photos, and nobody knows from where they were taken.
     Unposed(Box<Unposed>),
     /// Training is done; the Gaussians lie in the slot.

@@ -219,6 +219,7 @@ mod tests {
                     .expect("valid"),
                 mode: ViewMode::Rgb,
                 second: None,
+                beside: None,
                 settings: RenderSettings::default(),
                 budget: QualityBudget::Full,
                 photo: None,

@@ -19,6 +19,8 @@ pub struct ViewRequest {
     pub mode: ViewMode,
     /// What of it beside that, in a second view.
     pub second: Option<ViewMode>,
+    /// Whose Gaussians the second view shows, if they are others, and how they are drawn.
+    pub beside: Option<(Arc<GaussianCloud>, RenderSettings)>,
     /// How: degree of the colors, background, filter. Depth is drawn where it is needed.
     pub settings: RenderSettings,
     /// How long it may take.
@@ -90,6 +92,8 @@ pub struct SecondPicture {
     /// Row-major sRGB.
     pub rgb: Vec<[u8; 3]>,
     pub(crate) depth_range: Option<(f32, f32)>,
+    /// As in the first view.
+    pub psnr: Option<f64>,
 }
 
 /// A drawn view.

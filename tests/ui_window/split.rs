@@ -7,8 +7,8 @@ use fmlgs::ui::actions::Action;
 use fmlgs::ui::app::App;
 use fmlgs::worker::ViewMode;
 
-use super::Window;
 use super::edits::window;
+use super::{Window, write_splat};
 
 /// Colors of the first and the second phrase that is asked.
 const COLORS: [[u8; 3]; 2] = [[255, 179, 0], [0, 200, 215]];
@@ -211,4 +211,46 @@ fn the_rate_is_shown_while_the_eye_moves() {
     w.until("rest", |a| a.viewport.picture().is_some_and(|p| p.full));
     w.harness.run_steps(20);
     assert!(!w.shows(" fps"), "at rest again");
+}
+
+#[test]
+fn another_scene_is_seen_beside_by_the_same_camera() {
+    let folder = tempfile::tempdir().expect("folder");
+    let splat = write_splat(folder.path());
+    let mut other = fmlgs::io::splat_ply::read(&splat).expect("read");
+    other.sh.iter_mut().for_each(|c| c.swap(0, 2));
+    let path = folder.path().join("other.ply");
+    fmlgs::io::splat_ply::write(&path, &other).expect("write");
+    let mut w = Window::new(Some(Action::Open(splat.clone())));
+    w.until("a picture", |a| a.viewport.picture().is_some_and(|p| p.full));
+    w.ask(Action::OpenBeside(Some(path)));
+    w.until("both", |a| a.viewport.picture().is_some_and(|p| p.full && p.second.is_some()));
+    w.harness.run_steps(3);
+    let name = w.app().state.beside.as_ref().expect("open").name.clone();
+    assert!(w.app().layout.split_view && name.starts_with("other") && w.shows(&name));
+    let swapped = |a: &App| {
+        let p = a.viewport.picture().expect("drawn");
+        let second = &p.second.as_ref().expect("two views").rgb;
+        second.iter().zip(&p.rgb).all(|(b, a)| [b[2], b[1], b[0]] == *a)
+    };
+    assert!(swapped(w.app()), "red and blue are exchanged, all else is the same");
+    let before = w.app().viewport.picture().expect("drawn").camera.center;
+    w.harness.hover_at(view(&w).center());
+    w.harness.key_down(Key::A);
+    w.harness.run_steps(3);
+    w.harness.key_up(Key::A);
+    w.until("both from elsewhere", |a| a.viewport.picture().is_some_and(|p| p.full && p.camera.center != before));
+    assert!(swapped(w.app()));
+    // The control: beside itself it looks the same, so nothing is exchanged.
+    let ticket = w.app().viewport.picture().expect("drawn").ticket;
+    w.ask(Action::OpenBeside(Some(splat)));
+    w.until("itself", |a| a.viewport.picture().is_some_and(|p| p.full && p.ticket != ticket));
+    let p = w.app().viewport.picture().expect("drawn");
+    assert!(p.second.as_ref().is_some_and(|s| s.rgb == p.rgb) && !swapped(w.app()));
+    w.ask(Action::OpenBeside(Some(folder.path().join("nothing.ply"))));
+    w.until("an error", |a| a.state.error.is_some());
+    assert!(w.app().state.beside.is_some() && w.app().state.scene.is_some(), "nothing is lost");
+    w.harness.state_mut().state.error = None;
+    w.ask(Action::OpenBeside(None));
+    w.until("one scene", |a| a.viewport.picture().is_some_and(|p| p.full && p.second.is_none()));
 }

@@ -61,6 +61,8 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bo
             item(ui, has_photos, Some(layout.compare), Action::ToggleCompare, actions);
             item(ui, has_scene, Some(layout.split_view), Action::ToggleSplit, actions);
             item(ui, layout.split_view, None, Action::OtherView, actions);
+            let beside = state.beside.as_ref().map_or(Action::ChooseBeside, |_| Action::OpenBeside(None));
+            item(ui, has_scene, None, beside, actions);
             item(ui, state.semantics.is_some(), Some(layout.dim), Action::ToggleDim, actions);
             item(ui, has_scene, Some(layout.times), Action::ToggleTimes, actions);
             ui.separator();

@@ -251,7 +251,9 @@ impl Viewport {
         for (second, rect) in views.each() {
             self.queries.work_in(second);
             self.display.paint(ui, (rect, shown_in(rect)), second);
-            if let Some(semantics) = &state.semantics {
+            // Answers are of the scene, not of another one beside it.
+            let is_other = second && state.beside.is_some();
+            if let Some(semantics) = state.semantics.as_ref().filter(|_| !is_other) {
                 let lit = layout.dim.then(|| self.picking.selected().into_iter().collect());
                 self.queries.paint(ui, shown_in(rect), semantics, lit);
             }
@@ -264,15 +266,18 @@ impl Viewport {
         }
         let picks = self.brush.is_none() && !self.is_measuring();
         if let Some(semantics) = state.semantics.as_ref().filter(|_| picks) {
-            let maps = self.queries.maps().map(|m| &***m).filter(|_| !on_camera);
+            let is_other = state.beside.is_some() && under != views.first;
+            let maps = self.queries.maps().map(|m| &***m).filter(|_| !on_camera && !is_other);
             self.picking.update(&response, shown_in(under), (semantics, &state.labels), maps, actions);
         }
         for (second, rect) in views.each() {
             self.queries.work_in(second);
             let shown = shown_in(rect);
             self.show_ruler(ui, &response, shown, scene.meters_per_unit());
+            let is_other = second && state.beside.is_some();
             if let (Some(semantics), Some(cloud)) = (&state.semantics, self.cloud.clone())
                 && picks
+                && !is_other
             {
                 if let Some(maps) = self.queries.shown_maps().cloned() {
                     self.picking.paint(ui, shown, (semantics, &state.labels), &maps);
@@ -287,6 +292,7 @@ impl Viewport {
                 brush.paint(ui, shown, !self.queries.compares());
             }
             if let (Some(semantics), Some(cloud)) = (&state.semantics, &self.cloud)
+                && !is_other
                 && self.queries.show(ui, rect, state, semantics, cloud, actions)
             {
                 works_in = second;

@@ -18,6 +18,9 @@ use crate::worker::view::ViewPicture;
 /// Views that are less wide than this have menus in place of buttons, points.
 const NARROW: f32 = 480.0;
 
+/// In views that are lower than this are few cards, points.
+const LOW: f32 = 330.0;
+
 /// A card over a view.
 fn card(ui: &Ui, rect: Rect, name: &'static str, (align, down): (Align2, f32), add: impl FnOnce(&mut Ui)) {
     let at = align.pos_in_rect(&rect.shrink(12.0)) + egui::vec2(0.0, down);
@@ -40,13 +43,19 @@ impl Viewport {
         let has_photos = scene.dataset.as_ref().is_some_and(|d| !d.photos.is_empty());
         let (modes, legend) = if second { ("second modes", "second legend") } else { ("modes", "legend") };
         let menus = layout.split_view || rect.width() < NARROW;
-        card(ui, rect, modes, (Align2::LEFT_TOP, 0.0), |ui| self.modes(ui, layout, menus, has_photos, actions));
+        let is_other = second && state.beside.is_some();
+        card(ui, rect, modes, (Align2::LEFT_TOP, 0.0), |ui| {
+            self.modes(ui, layout, (menus, is_other), has_photos, actions);
+        });
         let beside = |p: &ViewPicture| p.second.as_ref().filter(|_| second).map(|other| other.depth_range);
         let depth = self.picture().and_then(|p| beside(p).unwrap_or(p.depth_range));
-        if legend::is_needed(self.queries.settings(), depth) && rect.height() > 330.0 {
+        if legend::is_needed(self.queries.settings(), depth) && rect.height() > LOW && !is_other {
             card(ui, rect, legend, (Align2::RIGHT_BOTTOM, 0.0), |ui| legend::show(ui, self.queries.settings(), depth));
         }
         if second {
+            if let Some(beside) = &state.beside {
+                card(ui, rect, "beside", (Align2::RIGHT_TOP, 0.0), |ui| self.beside_bar(ui, &beside.name, actions));
+            }
             return;
         }
         if has_photos {
@@ -55,7 +64,10 @@ impl Viewport {
             let (align, down) = if beside { (Align2::RIGHT_TOP, 0.0) } else { (Align2::LEFT_TOP, 46.0) };
             card(ui, rect, "photo", (align, down), |ui| self.photo_bar(ui, scene, layout, actions));
         }
-        if let Some(facts) = self.facts(layout, state, ui.input(|i| i.time)) {
+        let now = ui.input(|i| i.time);
+        let rate = self.display.rate(now).filter(|_| self.moves(now)).map(rate_text);
+        let facts = if rect.height() > LOW { self.facts(layout, state, rate) } else { rate };
+        if let Some(facts) = facts {
             card(ui, rect, "facts", (Align2::LEFT_BOTTOM, 0.0), |ui| {
                 ui.label(RichText::new(&facts).small().color(theme::WEAK));
                 if let Some(words) = self.overrides.words() {
@@ -68,7 +80,7 @@ impl Viewport {
             });
         }
         // A small view is for the frame.
-        if let Some(times) = self.display.times().filter(|_| rect.height() > 330.0) {
+        if let Some(times) = self.display.times().filter(|_| rect.height() > LOW) {
             card(ui, rect, "times", (Align2::LEFT_BOTTOM, -46.0), |ui| times.show(ui));
         }
         if self.display.errors().next().is_some() {
@@ -80,8 +92,27 @@ impl Viewport {
         }
     }
 
+    /// Which scene is seen in the second view, and how well.
+    fn beside_bar(&self, ui: &mut Ui, name: &str, actions: &mut Vec<Action>) {
+        ui.label(RichText::new(text::elided(name, 40)).strong()).on_hover_text(name);
+        if let Some(psnr) = self.picture().and_then(|p| p.second.as_ref()?.psnr) {
+            ui.colored_label(theme::ACCENT, format!("preview {}", format::decibel(psnr)));
+        }
+        let close = ui.button("\u{d7}").on_hover_text(Action::OpenBeside(None).text());
+        if close.accessible_name(Action::OpenBeside(None).text()).clicked() {
+            actions.push(Action::OpenBeside(None));
+        }
+    }
+
     /// The choice of what the view shows: menus where it is narrow or there is another one.
-    fn modes(&mut self, ui: &mut Ui, layout: &mut Layout, menus: bool, has_photos: bool, actions: &mut Vec<Action>) {
+    fn modes(
+        &mut self,
+        ui: &mut Ui,
+        layout: &mut Layout,
+        (menus, is_other): (bool, bool),
+        has_photos: bool,
+        actions: &mut Vec<Action>,
+    ) {
         ui.spacing_mut().item_spacing.x = 2.0;
         let shown = *layout.mode_of(self.queries.is_second());
         let mut buttons = |ui: &mut Ui| {
@@ -96,6 +127,9 @@ impl Viewport {
         if menus {
             let mode = ComboBox::from_id_salt("mode").selected_text(shown.text()).width(76.0).show_ui(ui, buttons);
             mode.response.on_hover_text("What the view shows").accessible_name("Mode");
+            if is_other {
+                return;
+            }
             let colored_by = self.queries.settings().color_by;
             let tints = ComboBox::from_id_salt("color by").selected_text(colored_by.text()).width(86.0);
             let tints = tints.show_ui(ui, |ui| {
@@ -157,7 +191,7 @@ impl Viewport {
     }
 
     /// One line about the frame.
-    fn facts(&self, layout: &Layout, state: &AppState, now: f64) -> Option<String> {
+    fn facts(&self, layout: &Layout, state: &AppState, rate: Option<String>) -> Option<String> {
         let p = self.picture()?;
         let mut parts = vec![
             format!("{} \u{d7} {} px", p.camera.width_px, p.camera.height_px),
@@ -179,7 +213,7 @@ impl Viewport {
         if !trained {
             parts.push("sparse points, not trained yet".into());
         }
-        parts.extend(self.display.rate(now).filter(|_| self.moves(now)).map(rate_text));
+        parts.extend(rate);
         Some(parts.join("  ·  "))
     }
 }

@@ -26,6 +26,8 @@ pub(super) struct Wanted {
     pub(super) mode: ViewMode,
     /// What a second view shows, if it is something else.
     pub(super) second: Option<ViewMode>,
+    /// Whose Gaussians, if they are others.
+    pub(super) beside: Option<(Versioned<GaussianCloud>, RenderSettings)>,
     pub(super) settings: RenderSettings,
     pub(super) budget: QualityBudget,
     pub(super) photo: Option<Arc<PhotoPixels>>,
@@ -46,6 +48,7 @@ struct Key {
     semantics: Option<u64>,
     mode: ViewMode,
     second: Option<ViewMode>,
+    beside: Option<u64>,
     settings: RenderSettings,
     budget: QualityBudget,
     with_photo: bool,
@@ -86,14 +89,28 @@ impl Requests {
     /// The request for what is wanted, if it is not what was asked for last or wanted `again`; and what
     /// of its pixels is new.
     pub(super) fn next(&mut self, wanted: Wanted, again: bool) -> Option<(ViewRequest, Moved)> {
-        let Wanted { cloud, camera, mode, second, settings, budget, photo, semantics, codes, follow, skip, timed } =
-            wanted;
+        let Wanted {
+            cloud,
+            camera,
+            mode,
+            second,
+            beside,
+            settings,
+            budget,
+            photo,
+            semantics,
+            codes,
+            follow,
+            skip,
+            timed,
+        } = wanted;
         let key = Key {
             camera: camera.clone(),
             cloud: cloud.generation(),
             semantics: semantics.as_ref().map(Versioned::generation),
             mode,
             second,
+            beside: beside.as_ref().map(|b| b.0.generation()),
             settings: settings.clone(),
             budget,
             with_photo: photo.is_some(),
@@ -121,6 +138,7 @@ impl Requests {
             camera,
             mode,
             second,
+            beside: beside.map(|(cloud, settings)| (Arc::clone(&cloud), settings)),
             settings,
             budget,
             photo,
@@ -180,11 +198,16 @@ impl Viewport {
         // A newer request would keep what belongs to the last one from ever being drawn.
         let drawn = self.display.picture().is_some_and(|p| p.ticket == self.requests.ticket())
             && (semantics.is_none() || self.queries.maps().is_some());
+        let beside = state.beside.as_ref().map(|b| (b.cloud.clone(), b.settings.clone()));
         let wanted = Wanted {
             cloud,
             camera: camera.limited_to(MAX_SIDE_PX),
             mode: layout.mode,
-            second: layout.split_view.then_some(layout.second_mode).filter(|mode| *mode != layout.mode),
+            second: layout
+                .split_view
+                .then_some(layout.second_mode)
+                .filter(|mode| *mode != layout.mode || state.beside.is_some()),
+            beside: beside.filter(|_| layout.split_view),
             settings: self.overrides.over(state.render_settings(), self.on_gpu()),
             budget,
             photo: self.photo.as_ref().and_then(PhotoView::pixels),
@@ -219,6 +242,7 @@ mod tests {
                 camera: Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 8, 8).expect("valid"),
                 mode: ViewMode::Rgb,
                 second: None,
+                beside: None,
                 settings: RenderSettings::default(),
                 budget: QualityBudget::Full,
                 photo: None,
@@ -244,11 +268,14 @@ mod tests {
         assert_eq!(next(&|w| w.settings.sh_degree = 1, false), Some((4, Moved::Nothing)));
         assert_eq!(next(&|w| w.photo = Some(Arc::clone(&photo)), false), Some((5, Moved::Nothing)));
         assert_eq!(next(&|w| w.second = Some(ViewMode::Depth), false), Some((6, Moved::Nothing)));
-        assert_eq!(next(&|w| w.camera.center.x += 1.0, false), Some((7, Moved::Eye)));
-        assert_eq!(next(&|_| {}, false), Some((8, Moved::Eye)), "and back");
+        let other = Versioned::new(Arc::clone(&cloud));
+        let beside = |w: &mut Wanted| w.beside = Some((other.clone(), RenderSettings::default()));
+        assert_eq!(next(&beside, false), Some((7, Moved::Nothing)));
+        assert_eq!(next(&|w| w.camera.center.x += 1.0, false), Some((8, Moved::Eye)));
+        assert_eq!(next(&|_| {}, false), Some((9, Moved::Eye)), "and back");
         // The same Gaussians, published anew.
         let newer = Versioned::new(Arc::clone(&cloud));
-        assert_eq!(next(&|w| w.cloud = newer.clone(), false), Some((9, Moved::Scene)));
+        assert_eq!(next(&|w| w.cloud = newer.clone(), false), Some((10, Moved::Scene)));
         assert_eq!(next(&|w| w.cloud = newer.clone(), false), None);
         requests.forget();
         assert!(requests.next(wanted(&|w| w.cloud = newer.clone()), false).is_some(), "another scene");
