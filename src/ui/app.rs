@@ -314,7 +314,7 @@ impl Contents for App {
         self.layout.shows(pane)
             && match pane {
                 Pane::Report | Pane::Log => true,
-                Pane::Dataset => has_photos,
+                Pane::Dataset | Pane::Training => has_photos,
                 Pane::Objects => has_photos || has_objects,
                 Pane::Phrases => has_objects,
                 _ => scene.is_some(),

@@ -88,12 +88,16 @@ pub(crate) fn begin_frame(ctx: &egui::Context) {
     COLORS.set(colors_of(ctx.theme()));
 }
 
-/// Draws in the dark theme whatever the window's is: colors of a picture are judged on dark ground.
+/// Draws in the dark theme whatever the window's is, cards and menus over it too: colors of a picture are judged on
+/// dark ground.
 pub(crate) fn dark<T>(ui: &mut Ui, add: impl FnOnce(&mut Ui) -> T) -> T {
-    let before = COLORS.replace(&DARK);
-    ui.set_style(ui.ctx().style_of(Theme::Dark));
+    let ctx = ui.ctx().clone();
+    let (colors, preference) = (COLORS.replace(&DARK), ctx.options(|o| o.theme_preference));
+    ctx.set_theme(Theme::Dark);
+    ui.set_style(ctx.style_of(Theme::Dark));
     let shown = add(ui);
-    COLORS.set(before);
+    ctx.set_theme(preference);
+    COLORS.set(colors);
     shown
 }
 

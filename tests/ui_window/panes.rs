@@ -5,25 +5,31 @@ use fmlgs::ui::actions::{Action, Pane};
 
 use super::{Window, write_splat};
 
+fn lists_models(w: &Window) -> bool {
+    w.shows("Looking for models") || w.shows("Inference engine")
+}
+
 #[test]
 fn panes_are_hidden_shown_detached_and_put_back() {
     let folder = tempfile::tempdir().expect("folder");
     let mut w = Window::new(Some(Action::Open(write_splat(folder.path()))));
     w.until("a picture", |a| a.viewport.picture().is_some_and(|p| p.full));
+    w.click("Scene plan");
+    assert!(w.shows("Feature maps") && !lists_models(&w), "one tab is in front");
     w.click("Models");
-    assert!(w.shows("Encoder") && !w.shows("Feature maps"), "one tab is in front");
+    assert!(lists_models(&w) && !w.shows("Feature maps"));
     w.click("Menu of Models");
     w.click("Hide");
-    assert!(!w.app().layout.shows(Pane::Models) && !w.shows("Encoder"));
+    assert!(!w.app().layout.shows(Pane::Models) && !lists_models(&w));
     w.ask(Action::ShowPane(Pane::Models));
-    assert!(w.shows("Encoder"), "back, and in front");
+    assert!(lists_models(&w), "back, and in front");
 
     w.click("Menu of Models");
     w.click("Open in its own window");
     w.harness.run_steps(3);
-    assert!(w.shows("Encoder") && w.shows("Start training"), "beside the tab that was behind it");
+    assert!(lists_models(&w) && w.shows("Feature maps"), "beside the tab that was behind it");
     w.ask(Action::ResetPanes);
-    assert!(!w.shows("Encoder"), "as at first");
+    assert!(lists_models(&w) != w.shows("Feature maps"), "one tab is in front again");
     assert!(w.app().state.error.is_none());
 }
 
@@ -34,10 +40,10 @@ fn the_view_fills_the_window_and_gives_it_back() {
     w.until("a picture", |a| a.viewport.picture().is_some_and(|p| p.full));
     let before = w.app().viewport.picture().expect("drawn").camera.width_px;
     w.press(egui::Key::F11);
-    assert!(!w.shows("Start training") && !w.shows("File"));
+    assert!(!w.shows("Models") && !w.shows("File"));
     w.until("a wider picture", |a| a.viewport.picture().is_some_and(|p| p.camera.width_px > before + 200));
     w.press(egui::Key::Escape);
-    assert!(w.shows("Start training") && w.shows("File"));
+    assert!(w.shows("Models") && w.shows("File"));
     w.until("the picture of before", |a| a.viewport.picture().is_some_and(|p| p.camera.width_px == before));
 }
 

@@ -21,6 +21,9 @@ use crate::ui::actions::Action;
 /// Side of a thumbnail, points.
 const THUMBNAIL_PX: f32 = 30.0;
 
+/// Width of the column of counts, points: "1,234,567".
+const COUNT_PT: f32 = 58.0;
+
 /// The list, and the name in it that is being typed.
 #[derive(Default)]
 pub(crate) struct ObjectsPane {
@@ -146,7 +149,12 @@ impl Tree<'_> {
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let size = format::count(self.sizes.get(id as usize).copied().unwrap_or(0) as u64);
             let size = RichText::new(size).small().monospace().color(theme::weak());
-            ui.label(size).on_hover_text("Gaussians");
+            // One column, however many digits.
+            let column = vec2(COUNT_PT, ui.available_height());
+            ui.allocate_ui_with_layout(column, Layout::right_to_left(Align::Center), |ui| {
+                ui.set_min_width(COUNT_PT);
+                ui.label(size).on_hover_text("Gaussians");
+            });
             ui.scope(|ui| {
                 // Always there for the keyboard, in sight where the mouse is.
                 ui.set_opacity(if is_hovered || self.selected == Some(id) { 1.0 } else { 0.25 });
