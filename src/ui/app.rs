@@ -9,7 +9,7 @@ use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 use super::camera::CameraPane;
 use super::chat::Chat;
 use super::dialogs::{self, Question};
-use super::dock::{Contents, Place};
+use super::dock::{DockContents, Place};
 use super::file_dialogs::FileDialogs;
 use super::history::{EditStep, Editing};
 use super::layout::Layout;
@@ -218,7 +218,7 @@ impl App {
         problems::show(ui, &mut self.state);
         CentralPanel::no_frame().frame(Frame::new().fill(theme::canvas())).show(ui, |ui| {
             if self.fills_window() {
-                return Contents::show(self, ui, Place::View);
+                return DockContents::show(self, ui, Place::View);
             }
             let mut dock = std::mem::take(&mut self.layout.dock);
             dock.show(ui, self);
@@ -305,7 +305,7 @@ impl App {
     }
 }
 
-impl Contents for App {
+impl DockContents for App {
     fn has(&self, place: Place) -> bool {
         let Place::Pane(pane) = place else { return true };
         let scene = self.state.scene.as_ref();

@@ -33,7 +33,7 @@ pub struct Dock {
 }
 
 /// What the dock shows in its places.
-pub(crate) trait Contents {
+pub(crate) trait DockContents {
     /// Whether there is anything to show.
     fn has(&self, place: Place) -> bool;
     fn show(&mut self, ui: &mut Ui, place: Place);
@@ -122,7 +122,7 @@ impl Dock {
     }
 
     /// Draws everything that the contents have.
-    pub(crate) fn show(&mut self, ui: &mut Ui, contents: &mut dyn Contents) {
+    pub(crate) fn show(&mut self, ui: &mut Ui, contents: &mut dyn DockContents) {
         self.show_windows(ui.ctx(), contents);
         let size = ui.available_size();
         let tree = if size.x < NARROW_PT { &mut self.narrow } else { &mut self.wide };
@@ -143,7 +143,7 @@ impl Dock {
         }
     }
 
-    fn show_windows(&mut self, ctx: &egui::Context, contents: &mut dyn Contents) {
+    fn show_windows(&mut self, ctx: &egui::Context, contents: &mut dyn DockContents) {
         for pane in self.detached.clone() {
             if !contents.has(Place::Pane(pane)) {
                 continue;
@@ -188,7 +188,7 @@ fn give_room(tree: &mut Tree<Place>, size: Vec2) {
 
 /// The dock while it is drawn.
 struct Shown<'a> {
-    contents: &'a mut dyn Contents,
+    contents: &'a mut dyn DockContents,
     /// The tile of the view.
     view: Option<TileId>,
     detach: Option<Pane>,
@@ -270,7 +270,7 @@ mod tests {
     #[derive(Default)]
     struct Rects(Vec<(Place, egui::Rect)>);
 
-    impl Contents for Rects {
+    impl DockContents for Rects {
         fn has(&self, place: Place) -> bool {
             !matches!(place, Place::Pane(Pane::Camera | Pane::Phrases | Pane::Report | Pane::Log))
         }
