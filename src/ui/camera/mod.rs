@@ -318,5 +318,5 @@ pub(crate) fn write(file: &Path, path: &CameraPath, aspect: f64) -> Result<(), S
 }
 
 fn caption(text: &str) -> RichText {
-    RichText::new(text).small().color(theme::WEAK)
+    RichText::new(text).small().color(theme::weak())
 }

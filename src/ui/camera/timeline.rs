@@ -18,7 +18,7 @@ pub(crate) fn show(ui: &mut Ui, pane: &mut CameraPane) -> Option<Pose> {
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, "Timeline"));
     let line = rect.shrink2(vec2(8.0, 0.0));
     let painter = ui.painter_at(rect);
-    painter.rect_filled(rect.shrink2(vec2(0.0, 5.0)), 6.0, theme::CANVAS);
+    painter.rect_filled(rect.shrink2(vec2(0.0, 5.0)), 6.0, theme::canvas());
     let seconds = pane.player.clip().map_or(0.0, Clip::seconds).max(1e-3);
     let x = |time: f64| line.left() + (time / seconds).clamp(0.0, 1.0) as f32 * line.width();
     let time = |x: f32| f64::from(((x - line.left()) / line.width().max(1.0)).clamp(0.0, 1.0)) * seconds;
@@ -62,17 +62,17 @@ pub(crate) fn show(ui: &mut Ui, pane: &mut CameraPane) -> Option<Pose> {
         let (a, b) = (x(*arrives), x(*leaves));
         if b - a > 1.0 {
             let wait = Rect::from_min_max(pos2(a, rect.center().y - 2.0), pos2(b, rect.center().y + 2.0));
-            painter.rect_filled(wait, 2.0, theme::WARNING);
+            painter.rect_filled(wait, 2.0, theme::warning());
         }
         let chosen = pane.selected == Some(i);
-        let (size, color) = if chosen { (7.0, theme::ACCENT) } else { (5.0, theme::TEXT) };
+        let (size, color) = if chosen { (7.0, theme::accent()) } else { (5.0, theme::text()) };
         let c = pos2(a, rect.center().y);
         let corners = [vec2(0.0, -size), vec2(size, 0.0), vec2(0.0, size), vec2(-size, 0.0)].map(|v| c + v);
-        painter.add(egui::Shape::convex_polygon(corners.to_vec(), color, Stroke::new(1.0, theme::PANEL)));
+        painter.add(egui::Shape::convex_polygon(corners.to_vec(), color, Stroke::new(1.0, theme::panel())));
     }
     if pane.player.clip().is_some() {
         let at = x(pane.player.time);
-        painter.line_segment([pos2(at, rect.top()), pos2(at, rect.bottom())], Stroke::new(2.0, theme::ACCENT));
+        painter.line_segment([pos2(at, rect.top()), pos2(at, rect.bottom())], Stroke::new(2.0, theme::accent()));
     }
     if let Some(at) = response.hover_pos() {
         let over = near(at);
@@ -92,7 +92,7 @@ fn ticks(painter: &egui::Painter, line: Rect, seconds: f64, x: impl Fn(f64) -> f
     let step = [0.1, 0.5, 1.0, 5.0, 10.0, 60.0, 300.0].into_iter().find(|s| seconds / s <= 24.0).unwrap_or(900.0);
     for i in 0..=(seconds / step) as usize {
         let at = x(i as f64 * step);
-        let stroke = Stroke::new(1.0, theme::WEAK.gamma_multiply(0.5));
+        let stroke = Stroke::new(1.0, theme::weak().gamma_multiply(0.5));
         painter.line_segment([pos2(at, line.bottom() - 9.0), pos2(at, line.bottom() - 6.0)], stroke);
     }
 }

@@ -69,9 +69,9 @@ impl Viewport {
         let facts = if rect.height() > LOW { self.facts(layout, state, rate) } else { rate };
         if let Some(facts) = facts {
             card(ui, rect, "facts", (Align2::LEFT_BOTTOM, 0.0), |ui| {
-                ui.label(RichText::new(&facts).small().color(theme::WEAK));
+                ui.label(RichText::new(&facts).small().color(theme::weak()));
                 if let Some(words) = self.overrides.words() {
-                    ui.label(RichText::new(format!("rendered with {words}")).small().color(theme::WARNING));
+                    ui.label(RichText::new(format!("rendered with {words}")).small().color(theme::warning()));
                     let reset = ui.small_button("Reset").on_hover_text(Action::ResetRenderSettings.tooltip());
                     if reset.accessible_name(Action::ResetRenderSettings.text()).clicked() {
                         actions.push(Action::ResetRenderSettings);
@@ -86,7 +86,7 @@ impl Viewport {
         if self.display.errors().next().is_some() {
             card(ui, rect, "view error", (Align2::CENTER_CENTER, 0.0), |ui| {
                 for error in self.display.errors() {
-                    ui.colored_label(theme::ERROR, error);
+                    ui.colored_label(theme::error(), error);
                 }
             });
         }
@@ -96,7 +96,7 @@ impl Viewport {
     fn beside_bar(&self, ui: &mut Ui, name: &str, actions: &mut Vec<Action>) {
         ui.label(RichText::new(text::elided(name, 40)).strong()).on_hover_text(name);
         if let Some(psnr) = self.picture().and_then(|p| p.second.as_ref()?.psnr) {
-            ui.colored_label(theme::ACCENT, format!("preview {}", format::decibel(psnr)));
+            ui.colored_label(theme::accent(), format!("preview {}", format::decibel(psnr)));
         }
         let close = ui.button("\u{d7}").on_hover_text(Action::OpenBeside(None).text());
         if close.accessible_name(Action::OpenBeside(None).text()).clicked() {
@@ -167,13 +167,13 @@ impl Viewport {
                 ui.label(RichText::new(text::elided(&p.name(), 28)).strong()).on_hover_text(&*p.name());
                 ui.weak(format!("{} of {total}", p.index() + 1));
                 if let Some(psnr) = self.picture().and_then(|p| p.psnr) {
-                    ui.label(RichText::new(format!("preview {}", format::decibel(psnr))).color(theme::ACCENT)).on_hover_text(
+                    ui.label(RichText::new(format!("preview {}", format::decibel(psnr))).color(theme::accent())).on_hover_text(
                         "PSNR of what is on screen against the photo, at the size on screen. The evaluation's number \
                          is at the photo's size in training.",
                     );
                 }
                 if p.failed() {
-                    ui.colored_label(theme::WARNING, "photo not loaded");
+                    ui.colored_label(theme::warning(), "photo not loaded");
                 }
             }
             None => {

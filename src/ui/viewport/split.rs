@@ -69,7 +69,7 @@ impl Viewport {
 
 /// Frames the view that is worked in.
 pub(super) fn mark_worked_in(ui: &Ui, rect: Rect) {
-    ui.painter().rect_stroke(rect, 0.0, Stroke::new(1.5, theme::ACCENT), StrokeKind::Inside);
+    ui.painter().rect_stroke(rect, 0.0, Stroke::new(1.5, theme::accent()), StrokeKind::Inside);
 }
 
 #[cfg(test)]
