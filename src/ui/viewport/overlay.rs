@@ -181,7 +181,8 @@ impl Viewport {
             }
         }
         step(ui, "›", Action::NextPhoto, actions);
-        if self.photo.is_some() {
+        // Half a view is too narrow for the slider's button, and shows the photo otherwise.
+        if self.photo.is_some() && (!layout.split_view || layout.compare) {
             ui.separator();
             let tip = format!("{}  {}", Action::ToggleCompare.tooltip(), keys::label(ui.ctx(), &Action::ToggleCompare));
             if ui.selectable_label(layout.compare, "Compare").on_hover_text(tip).clicked() {
