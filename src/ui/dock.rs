@@ -59,7 +59,7 @@ fn middle(tiles: &mut Tiles<Place>) -> TileId {
     let below = tabs(tiles, &[Pane::Camera, Pane::Phrases, Pane::Log]);
     let middle = tiles.insert_vertical_tile(vec![view, report, below]);
     share(tiles, middle, report, 400.0);
-    share(tiles, middle, below, 270.0);
+    share(tiles, middle, below, 320.0);
     middle
 }
 

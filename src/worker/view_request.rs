@@ -116,7 +116,7 @@ pub struct ViewPicture {
     /// The same frame as the second view shows it, with its depths, if that was wanted.
     pub second: Option<SecondPicture>,
     /// Seconds that rendering took.
-    pub(crate) secs: f64,
+    pub secs: f64,
     /// The same by stage, where that is known.
     pub(crate) stages: StageTimes,
     /// Seconds from colors to bytes: depth scales, differences.
