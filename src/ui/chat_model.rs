@@ -63,11 +63,12 @@ pub(crate) struct ModelChooser {
 impl ModelChooser {
     pub(crate) fn show(&mut self, ui: &mut Ui, settings: &mut ChatSettings) {
         let text = if settings.use_model { "Chat model" } else { "Built-in" };
-        ComboBox::from_id_salt("planner").selected_text(text).width(90.0).show_ui(ui, |ui| {
+        let planner = ComboBox::from_id_salt("planner").selected_text(text).width(90.0).show_ui(ui, |ui| {
             ui.selectable_value(&mut settings.use_model, false, "Built-in")
                 .on_hover_text("The built-in commands; no network.");
             ui.selectable_value(&mut settings.use_model, true, "Chat model").on_hover_text(SENT);
         });
+        planner.response.accessible_name("Planner");
         if settings.use_model {
             let open = ui.menu_button("Address\u{2026}", |ui| self.settings(ui, &mut settings.model));
             if open.inner.is_none() {
@@ -105,7 +106,7 @@ impl ModelChooser {
             ("Key from variable", &mut model.key_variable, "name of an environment variable; empty for none"),
         ] {
             ui.label(RichText::new(label).small().color(theme::WEAK));
-            ui.add(TextEdit::singleline(value).hint_text(hint).desired_width(f32::INFINITY));
+            ui.add(TextEdit::singleline(value).hint_text(hint).desired_width(f32::INFINITY)).accessible_name(label);
         }
         let is_waiting = matches!(self.tested, Asked::Waiting(_));
         ui.horizontal_wrapped(|ui| {

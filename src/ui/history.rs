@@ -10,7 +10,7 @@ use std::sync::Arc;
 use crate::jobs::edit::EditRequest;
 use crate::pipeline::semantics::edit::Edit;
 use crate::scene::undo::UndoHistory;
-use crate::scene::{CameraPath, Identities, IdentityId, NOBODY, SemanticMap};
+use crate::scene::{CameraPath, CropBox, Identities, IdentityId, NOBODY, SemanticMap};
 use crate::worker::{JobId, ViewMode};
 
 /// What can be changed back beside objects and parts.
@@ -18,6 +18,7 @@ use crate::worker::{JobId, ViewMode};
 pub(crate) struct ViewState {
     /// Whose own Gaussians are left out.
     pub(crate) hidden: BTreeSet<IdentityId>,
+    pub(crate) crop: Option<CropBox>,
     pub(crate) mode: ViewMode,
     pub(crate) cameras: bool,
     pub(crate) path: CameraPath,
@@ -146,6 +147,15 @@ fn described(before: &ViewState, now: &ViewState, all: Option<&Identities>) -> S
     if before.hidden != now.hidden {
         return all.map_or_else(String::new, |all| shown_text(&before.hidden, &now.hidden, all));
     }
+    if before.crop != now.crop {
+        return match (before.crop, now.crop) {
+            (None, _) => "cropped the view",
+            (_, None) => "removed the crop box",
+            (Some(before), Some(now)) if before.outside != now.outside => "inverted the crop box",
+            _ => "changed the crop box",
+        }
+        .to_owned();
+    }
     if before.path != now.path {
         let (n, keys) = (now.path.keys.len(), before.path.keys.len());
         let what = match n.abs_diff(keys) {
@@ -231,7 +241,8 @@ mod tests {
 
     fn start() -> (ChangeHistory, EditSnapshot) {
         let path = CameraPath { keys: Vec::new(), closed: false, fps: 30.0, seconds: 5.0 };
-        let view = ViewState { hidden: BTreeSet::new(), mode: ViewMode::Rgb, cameras: true, path, kept: Vec::new() };
+        let (hidden, kept) = (BTreeSet::new(), Vec::new());
+        let view = ViewState { hidden, crop: None, mode: ViewMode::Rgb, cameras: true, path, kept };
         let now = EditSnapshot { scene: 1, map: Some(lamp()), view };
         let mut history = ChangeHistory::default();
         assert_eq!(history.settle(&now, None), None);

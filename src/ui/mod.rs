@@ -8,6 +8,7 @@ mod act;
 mod act_file;
 mod act_phrases;
 mod act_report;
+mod act_view;
 pub mod actions;
 pub mod app;
 pub(crate) mod camera;

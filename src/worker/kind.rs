@@ -45,6 +45,8 @@ pub enum JobKind {
     Scale,
     /// Asks a list of phrases.
     Phrases,
+    /// Looks into a pixel.
+    Inspect,
 }
 
 impl JobKind {
@@ -61,7 +63,9 @@ impl JobKind {
                 WorkerThread::Long
             }
             Self::Edit | Self::Export | Self::Photo | Self::Picture | Self::Thumbnails => WorkerThread::Short,
-            Self::Models | Self::Explore | Self::Approach | Self::Scale | Self::Report => WorkerThread::Short,
+            Self::Models | Self::Explore | Self::Approach | Self::Scale | Self::Report | Self::Inspect => {
+                WorkerThread::Short
+            }
         }
     }
 }

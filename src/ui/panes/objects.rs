@@ -118,7 +118,8 @@ impl Tree<'_> {
             state.set_open(true);
         }
         let header = state.show_header(ui, |ui| self.leaf(ui, id, actions));
-        header.body(|ui| self.branches(ui, Id::unique("pieces").with(id), pieces, actions));
+        let body = header.body(|ui| self.branches(ui, Id::unique("pieces").with(id), pieces, actions));
+        body.0.accessible_name(format!("Parts of {}", self.identities.full_name(id)));
     }
 
     fn leaf(&mut self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {

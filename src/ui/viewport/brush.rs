@@ -131,7 +131,8 @@ impl Brush {
                 ui.label(format!("Paint {what}: drag to paint, click to select what has the same color."));
                 ui.weak("Right-drag and the wheel move the view; moving it clears what was painted.");
                 ui.horizontal(|ui| {
-                    ui.add(TextEdit::singleline(&mut self.name).hint_text("Name").char_limit(80).desired_width(120.0));
+                    let name = TextEdit::singleline(&mut self.name).hint_text("Name").char_limit(80);
+                    ui.add(name.desired_width(120.0)).accessible_name("Name of what is painted");
                     ui.add(Slider::new(&mut self.radius_px, 2.0..=60.0).show_value(false).text("brush"));
                 });
                 ui.horizontal(|ui| {

@@ -2,11 +2,13 @@
 
 mod act;
 pub(crate) mod brush;
+mod crop;
 mod display;
 pub mod eye;
 pub(crate) mod frame_times;
 mod frusta;
 mod input;
+mod inspector;
 mod legend;
 mod marks;
 mod outline;
@@ -28,6 +30,7 @@ use glam::{DVec2, DVec3};
 use self::brush::Brush;
 use self::display::Display;
 use self::eye::Eye;
+use self::inspector::Inspector;
 use self::marks::Marks;
 use self::overrides::RenderOverrides;
 use self::photo::PhotoView;
@@ -72,6 +75,10 @@ pub struct Viewport {
     marks: Marks,
     /// What is being measured.
     ruler: Option<Ruler>,
+    /// Whether the crop box is on screen, to be changed.
+    cropping: bool,
+    /// What is being inspected.
+    inspector: Option<Inspector>,
     /// What is being marked by hand.
     pub(crate) brush: Option<Brush>,
     /// Render settings in place of the scene's own.
@@ -100,6 +107,8 @@ impl Viewport {
             picking: Picking::default(),
             marks: Marks::default(),
             ruler: None,
+            cropping: false,
+            inspector: None,
             brush: None,
             overrides: RenderOverrides::default(),
             zoom_anchor: None,
@@ -140,7 +149,7 @@ impl Viewport {
             self.queries.clear();
             self.visibility = Visibility::default();
             self.picking = Picking::default();
-            self.ruler = None;
+            (self.ruler, self.cropping, self.inspector) = (None, false, None);
             self.brush = None;
             self.overrides = RenderOverrides::default();
             self.eye = Eye::home(&scene.home, None);
@@ -151,6 +160,9 @@ impl Viewport {
             if state.training_job == Some(*job) {
                 self.set_cloud(Some(Arc::clone(cloud)));
             }
+        }
+        if let (Some(found), Some(inspector)) = (state.inspected.take(), &mut self.inspector) {
+            inspector.take(found);
         }
         if let Some(why) = self.display.newly_instead_of_gpu() {
             state.toast(Tone::Warning, why);
@@ -243,11 +255,14 @@ impl Viewport {
         if let Some(photo) = self.photo.as_mut().filter(|_| layout.compare) {
             photo.show_split(ui, shown, &mut layout.split);
         }
-        let on_camera =
-            layout.cameras && self.photo.is_none() && self.show_frusta(ui, rect, &scene, &response, layout, actions);
+        let takes_clicks = self.is_measuring() || self.is_inspecting();
+        let cameras = layout.cameras && self.photo.is_none() && !takes_clicks;
+        let on_camera = cameras && self.show_frusta(ui, rect, &scene, &response, layout, actions);
         let meters = scene.meters_per_unit();
         self.show_ruler(ui, &response, shown, meters, actions);
-        if let Some(semantics) = state.semantics.as_ref().filter(|_| self.brush.is_none() && !self.is_measuring()) {
+        self.show_crop(ui, shown, state, actions);
+        self.show_inspector(ui, &response, shown, state, actions);
+        if let Some(semantics) = state.semantics.as_ref().filter(|_| self.brush.is_none() && !takes_clicks) {
             self.show_picking(ui, &response, shown, (semantics, &state.labels), on_camera, actions);
             if let Some(cloud) = self.cloud.clone() {
                 self.show_marks(ui, shown, &cloud, (semantics, &state.labels), actions);
