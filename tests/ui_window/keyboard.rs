@@ -149,9 +149,7 @@ fn nameless(w: &Window) -> Vec<String> {
 fn named(w: &mut Window, state: &str) {
     w.harness.run_steps(3);
     let without = nameless(w);
-    if !without.is_empty() {
-        eprintln!("XX {state}: {without:#?}");
-    }
+    assert!(without.is_empty(), "{state}: {without:#?}");
 }
 
 #[test]

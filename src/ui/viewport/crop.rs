@@ -34,8 +34,9 @@ impl Viewport {
             }
         }
         let selected = self.selected_bounds(state.semantics.as_ref());
-        let at = Align2::CENTER_BOTTOM.pos_in_rect(&shown.shrink(12.0));
-        let area = Area::new(Id::unique("crop")).order(Order::Middle).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
+        // Above the facts about the frame.
+        let at = Align2::LEFT_BOTTOM.pos_in_rect(&shown.shrink(12.0)) - vec2(0.0, 40.0);
+        let area = Area::new(Id::unique("crop")).order(Order::Middle).pivot(Align2::LEFT_BOTTOM).fixed_pos(at);
         area.constrain_to(shown).show(ui.ctx(), |ui| {
             theme::overlay().show(ui, |ui| {
                 if let Some(crop) = &mut crop {

@@ -11,7 +11,7 @@ use super::super::{keys, theme};
 use super::frusta::clipped;
 use super::visible::VisibleCloud;
 use super::{AppState, Viewport};
-use crate::jobs::inspect::{GaussianRecord, InspectRequest, InspectedPixel};
+use crate::jobs::inspect::{GaussianRecord, InspectRequest, InspectedPixel, PixelRecord};
 use crate::math::format;
 use crate::scene::Camera;
 use crate::ui::actions::Action;
@@ -25,6 +25,8 @@ const CORNERS: usize = 48;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Inspector {
     pixel: Option<Arc<InspectedPixel>>,
+    /// Whether another is being looked into.
+    waits: bool,
     place: usize,
     record: Option<GaussianRecord>,
 }
@@ -33,7 +35,7 @@ impl Inspector {
     /// Shows a pixel from its largest Gaussian on.
     pub(crate) fn take(&mut self, pixel: Arc<InspectedPixel>) {
         self.record = pixel.record(0);
-        (self.pixel, self.place) = (Some(pixel), 0);
+        (self.pixel, self.place, self.waits) = (Some(pixel), 0, false);
     }
 
     fn go(&mut self, place: usize) {
@@ -55,6 +57,7 @@ impl Viewport {
         let VisibleCloud { cloud, semantics, numbers } = self.visibility.apply(&cloud, state.semantics.as_ref());
         let size = DVec2::new(f64::from(camera.width_px), f64::from(camera.height_px));
         let pixel = (at * size).clamp(DVec2::ZERO, size - 1.0);
+        self.inspector.iter_mut().for_each(|inspector| inspector.waits = true);
         Some(InspectRequest {
             cloud: Arc::clone(&cloud),
             map: semantics.as_deref().cloned(),
@@ -86,12 +89,16 @@ impl Viewport {
         // Above the facts about the frame.
         let at = Align2::LEFT_BOTTOM.pos_in_rect(&shown.shrink(12.0)) - vec2(0.0, 40.0);
         let area = Area::new(Id::unique("inspector")).order(Order::Middle).pivot(Align2::LEFT_BOTTOM).fixed_pos(at);
-        area.constrain_to(shown).show(ui.ctx(), |ui| {
+        let drawn = area.constrain_to(shown).show(ui.ctx(), |ui| {
             theme::overlay().show(ui, |ui| {
-                ui.set_width(330.0);
+                ui.set_width((shown.width() - 44.0).clamp(120.0, 330.0));
                 card(ui, inspector, (shown.height() - 190.0).clamp(90.0, 420.0), state, actions);
             });
         });
+        // It has grown: the next frame puts it where it fits.
+        if drawn.response.rect.bottom() > at.y + 1.0 {
+            ui.ctx().request_repaint();
+        }
     }
 }
 
@@ -115,17 +122,17 @@ fn card(ui: &mut Ui, inspector: &mut Inspector, height: f32, state: &AppState, a
             inspector.go(place);
         }
     });
-    match (&inspector.record, &inspector.pixel) {
+    match (&inspector.record, inspector.waits) {
         (Some(record), _) => {
             ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, |ui| {
                 properties(ui, record, state);
             });
         }
-        (None, Some(_)) => {
-            ui.weak("No Gaussian is drawn there. Click one in the view.");
+        (None, true) => {
+            ui.weak("Looking into the pixel\u{2026}");
         }
-        (None, None) => {
-            ui.weak("Click a place in the view.");
+        (None, false) => {
+            ui.weak("No Gaussian is drawn there. Click a place in the view.");
         }
     }
     ui.horizontal(|ui| {
@@ -146,31 +153,33 @@ fn properties(ui: &mut Ui, record: &GaussianRecord, state: &AppState) {
     let list = |values: &[f64]| values.iter().map(|v| format::short(*v)).collect::<Vec<_>>().join(", ");
     let wide = |values: &[f32]| values.iter().map(|v| f64::from(*v)).collect::<Vec<_>>();
     let of = |what: f32| format!("{:.1} %", 100.0 * what);
-    let mut rows: Vec<(String, String)> = vec![
-        ("Number".into(), format!("#{}", record.number)),
-        ("Pixel".into(), format!("({}, {})", record.pixel.x, record.pixel.y)),
-        ("Weight".into(), format!("{:.4}, {} of the pixel", record.pixel.weight, of(record.pixel.share))),
-        ("Center".into(), format!("{} units", list(&record.center))),
-        ("Scales".into(), record.scales.map(|s| format::length(s, meters)).join(", ")),
-        ("Rotation".into(), record.rotation_wxyz.map_or_else(|| format::NONE.into(), |q| list(&wide(&q)))),
-        ("Opacity".into(), format!("{:.4}", record.opacity)),
-    ];
+    let mut more: Vec<(String, String)> = Vec::new();
     for identity in &record.identities {
         let name = state.semantics.as_ref().map(|map| state.labels.name(&map.identities, identity.number));
-        let share = of(identity.pixel_share);
-        rows.push((
-            format!("{:?}", identity.level),
-            format!("{}, weight {:.2}, {share} of the pixel", name.unwrap_or_default(), identity.weight),
-        ));
+        let (name, share) = (name.unwrap_or_default(), of(identity.pixel_share));
+        let text = format!("{name}, weight {:.2}, {share} of the pixel", identity.weight);
+        more.push((format!("{:?}", identity.level), text));
     }
     if record.identities.is_empty() && record.codes.is_some() {
-        rows.push(("Belongs to".into(), "nothing".into()));
+        more.push(("Belongs to".into(), "nothing".into()));
     }
     for (name, code) in ["Object code", "Part code"].iter().zip(record.codes.iter().flatten()) {
-        rows.push(((*name).into(), list(&wide(code))));
+        more.push(((*name).into(), list(&wide(code))));
     }
-    rows.extend(record.extras.iter().map(|(name, value)| (name.clone(), format::number(f64::from(*value)))));
+    more.extend(record.extras.iter().map(|(name, value)| (name.clone(), format::number(f64::from(*value)))));
+    let row = |ui: &mut Ui, name: &str, value: String| {
+        ui.label(RichText::new(name).color(theme::WEAK));
+        ui.add(egui::Label::new(value).wrap());
+        ui.end_row();
+    };
     Grid::new("gaussian").num_columns(2).spacing([10.0, 3.0]).show(ui, |ui| {
+        let PixelRecord { x, y, weight, share, .. } = record.pixel;
+        row(ui, "Number", format!("#{}", record.number));
+        row(ui, "Weight", format!("{weight:.4}, {} of pixel ({x}, {y})", of(share)));
+        row(ui, "Center", format!("{} units", list(&record.center)));
+        row(ui, "Scales", record.scales.map(|s| format::length(s, meters)).join(", "));
+        row(ui, "Rotation", record.rotation_wxyz.map_or_else(|| format::NONE.into(), |q| list(&wide(&q))));
+        row(ui, "Opacity", format!("{:.4}", record.opacity));
         for (name, color) in [("Color from here", record.color), ("Base color", record.base_color)] {
             ui.label(RichText::new(name).color(theme::WEAK));
             ui.horizontal(|ui| {
@@ -181,11 +190,7 @@ fn properties(ui: &mut Ui, record: &GaussianRecord, state: &AppState) {
             });
             ui.end_row();
         }
-        for (name, value) in rows {
-            ui.label(RichText::new(name).color(theme::WEAK));
-            ui.add(egui::Label::new(value).wrap());
-            ui.end_row();
-        }
+        more.into_iter().for_each(|(name, value)| row(ui, &name, value));
     });
     ui.collapsing("Spherical harmonics", |ui| {
         Grid::new("harmonics").num_columns(4).striped(true).spacing([12.0, 2.0]).show(ui, |ui| {
