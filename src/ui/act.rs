@@ -85,7 +85,13 @@ impl App {
             }
             Action::ToggleCameras => self.layout.cameras = !self.layout.cameras,
             Action::TogglePane(pane) => self.layout.toggle(pane),
-            Action::ShowPane(pane) => self.bring_up(pane),
+            Action::ShowPane(pane) => self.layout.show(pane),
+            Action::FillWindow
+            | Action::ResetPanes
+            | Action::UseTheme(_)
+            | Action::LargerText
+            | Action::SmallerText
+            | Action::NormalText => self.arrange(&action, ctx),
             Action::Rename => self.start_renaming(),
             Action::Palette => self.palette.toggle(),
             Action::Shortcuts => self.sheet = !self.sheet,
@@ -107,7 +113,7 @@ impl App {
                 self.layout.show(Pane::Camera);
             }
             Action::StartChat => {
-                self.bring_up(Pane::Chat);
+                self.layout.show(Pane::Chat);
                 self.chat.start_typing();
             }
             Action::OpenFolder
@@ -350,12 +356,6 @@ impl App {
             Effect::RenameUndone(id, name) => self.edit(EditStep::UndoRename(id, name)),
             Effect::Explored(explored) => self.state.explored = Some(explored),
         }
-    }
-
-    /// Shows a pane, unfolded.
-    pub(super) fn bring_up(&mut self, pane: Pane) {
-        self.layout.show(pane);
-        self.unfold = Some(pane);
     }
 
     fn type_question(&mut self) {

@@ -25,6 +25,7 @@ impl App {
         match self.viewport.tool() {
             Some(tool) => self.view(&tool, ctx),
             None if self.viewport.picking.selected().is_some() => self.view(&Action::Select(None), ctx),
+            None if self.full_view => self.arrange(&Action::FillWindow, ctx),
             None => self.act(Action::Cancel, ctx),
         }
     }
@@ -93,7 +94,7 @@ impl App {
     pub(super) fn start_renaming(&mut self) {
         match (self.chosen_identity(), self.state.semantics.clone()) {
             (Some(id), Some(map)) => {
-                self.bring_up(Pane::Objects);
+                self.layout.show(Pane::Objects);
                 self.objects.rename(id, &map.identities);
             }
             _ => self

@@ -3,6 +3,7 @@
 
 use std::path::PathBuf;
 
+use egui::ThemePreference;
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 use strum::{IntoStaticStr, VariantArray};
@@ -239,6 +240,16 @@ actions! {
     ToggleCameras: "Show or hide cameras", "Draw the camera of every photo into the view.", "V";
     TogglePane(pane: Pane): format!("Show or hide the {} pane", pane.text().to_lowercase()),
         "Show this part of the window, or make room for others.";
+    FillWindow: "Fill the window with the view", "Nothing but the view, on the whole screen; once more for all the rest.", "F11";
+    ResetPanes: "Reset the panes", "Put every pane back to where it stood at first.";
+    UseTheme(theme: ThemePreference): match theme {
+            ThemePreference::Dark => "Dark theme",
+            ThemePreference::Light => "Light theme",
+            ThemePreference::System => "The system's theme",
+        }, "The picture is on dark ground in each.";
+    LargerText: "Larger text", "Enlarge everything in the window.";
+    SmallerText: "Smaller text", "Make everything in the window smaller.";
+    NormalText: "Text of normal size", "Everything in the window as large as it was at first.";
     ShowPane(pane: Pane): format!("Show the {} pane", pane.text().to_lowercase()), "Bring this part of the window up.";
     ChooseReport: "Open a report\u{2026}", "A report.json of fmlgs report: error against run time of every setting.";
     ChooseSecondReport: "Compare with another report\u{2026}", "Plotted with hollow markers, its numbers side by side.";
@@ -257,6 +268,10 @@ actions! {
     Quit: "Quit", "Close the window. A running training keeps its last checkpoint.", "Ctrl+Q";
 }
 
+/// In the order of the menu.
+pub(crate) const THEMES: [ThemePreference; 3] =
+    [ThemePreference::Dark, ThemePreference::Light, ThemePreference::System];
+
 impl Action {
     /// Every action that needs no further input, in the order of the palette.
     pub(crate) fn all() -> Vec<Self> {
@@ -266,6 +281,7 @@ impl Action {
         all.extend([Self::Isolate(None), Self::Paint(Some(NOBODY)), Self::SetCrop(None)]);
         all.extend(ViewMode::VARIANTS.iter().map(|mode| Self::Show(*mode)));
         all.extend(Pane::VARIANTS.iter().map(|pane| Self::ShowPane(*pane)));
+        all.extend(THEMES.map(Self::UseTheme));
         all.extend(ColorBy::VARIANTS.iter().map(|by| Self::Tint(*by)));
         all.extend(Pane::VARIANTS.iter().map(|pane| Self::TogglePane(*pane)));
         all.extend(Axis::VARIANTS.iter().map(|axis| Self::TurnUp(*axis)));

@@ -68,7 +68,7 @@ impl ModelChooser {
                 .on_hover_text("The built-in commands; no network.");
             ui.selectable_value(&mut settings.use_model, true, "Chat model").on_hover_text(SENT);
         });
-        planner.response.accessible_name("Planner");
+        planner.response.accessible_name("What reads sentences");
         if settings.use_model {
             let open = ui.menu_button("Address\u{2026}", |ui| self.settings(ui, &mut settings.model));
             if open.inner.is_none() {
@@ -88,7 +88,7 @@ impl ModelChooser {
             Some(none) if none.is_empty() => drop(ui.weak("No chat model's server answers on this machine.")),
             Some(found) => {
                 for server in found {
-                    ui.label(RichText::new(format!("{}, on this machine", server.kind)).small().color(theme::WEAK));
+                    ui.label(RichText::new(format!("{}, on this machine", server.kind)).small().color(theme::weak()));
                     for name in server.models.iter().take(8) {
                         let is_chosen = model.base_url == server.base_url && model.model == *name;
                         if ui.selectable_label(is_chosen, crate::scene::text::line(name)).clicked() {
@@ -105,7 +105,7 @@ impl ModelChooser {
             ("Model", &mut model.model, "its name there"),
             ("Key from variable", &mut model.key_variable, "name of an environment variable; empty for none"),
         ] {
-            ui.label(RichText::new(label).small().color(theme::WEAK));
+            ui.label(RichText::new(label).small().color(theme::weak()));
             ui.add(TextEdit::singleline(value).hint_text(hint).desired_width(f32::INFINITY)).accessible_name(label);
         }
         let is_waiting = matches!(self.tested, Asked::Waiting(_));
@@ -119,12 +119,12 @@ impl ModelChooser {
             match self.tested.answer() {
                 Some(Ok(text)) => drop(ui.label(crate::scene::text::line(text))),
                 Some(Err(text)) => {
-                    drop(ui.label(RichText::new(crate::scene::text::line(text)).color(theme::WARNING)));
+                    drop(ui.label(RichText::new(crate::scene::text::line(text)).color(theme::warning())));
                 }
                 None if is_waiting => drop(ui.spinner()),
                 None => {}
             }
         });
-        ui.label(RichText::new(SENT).small().color(theme::WEAK));
+        ui.label(RichText::new(SENT).small().color(theme::weak()));
     }
 }

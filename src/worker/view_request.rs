@@ -100,7 +100,7 @@ pub struct ViewPicture {
     /// PSNR in dB against the photo, if the request had one.
     pub psnr: Option<f64>,
     /// Seconds that rendering took.
-    pub(crate) secs: f64,
+    pub secs: f64,
     /// The same by stage, where that is known.
     pub(crate) stages: StageTimes,
     /// Seconds from colors to bytes: depth scales, differences.

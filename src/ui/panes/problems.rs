@@ -14,7 +14,7 @@ pub(crate) fn show(ui: &mut Ui, state: &mut AppState) {
         return;
     }
     let bar =
-        Frame::new().fill(theme::PANEL.lerp_to_gamma(theme::WARNING, 0.16)).inner_margin(Margin::symmetric(10, 6));
+        Frame::new().fill(theme::panel().lerp_to_gamma(theme::warning(), 0.16)).inner_margin(Margin::symmetric(10, 6));
     let mut dismissed = None;
     Panel::top("problems").frame(bar).show(ui, |ui| {
         for (i, (_, text)) in state.problems.iter().enumerate().take(MOST) {
@@ -31,7 +31,7 @@ pub(crate) fn show(ui: &mut Ui, state: &mut AppState) {
         }
         let more = state.problems.len().saturating_sub(MOST);
         if more > 0 {
-            ui.label(RichText::new(format!("{more} more in the log")).small().color(theme::WEAK));
+            ui.label(RichText::new(format!("{more} more in the log")).small().color(theme::weak()));
         }
     });
     if let Some(i) = dismissed {

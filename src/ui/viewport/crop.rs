@@ -117,7 +117,7 @@ fn draw_edges(ui: &Ui, shown: Rect, eye: &Camera, bounds: &Bounds) {
     for axis in 0..3 {
         for i in (0..8).filter(|i| i >> axis & 1 == 0) {
             let Some((a, b)) = clipped(eye, corner(bounds, i), corner(bounds, i | 1 << axis)) else { continue };
-            for stroke in [Stroke::new(3.0, Color32::from_black_alpha(110)), Stroke::new(1.3, theme::WARNING)] {
+            for stroke in [Stroke::new(3.0, Color32::from_black_alpha(110)), Stroke::new(1.3, theme::warning())] {
                 painter.line_segment([place(a), place(b)], stroke);
             }
         }
@@ -137,7 +137,7 @@ fn drag_face(ui: &Ui, shown: Rect, eye: &Camera, crop: &mut CropBox, axis: usize
         crop.put_face(axis, high, middle[axis] + travel(handle.drag_delta(), along));
     }
     let held = handle.hovered() || handle.dragged();
-    let fill = if held { theme::ACCENT } else { theme::WARNING };
+    let fill = if held { theme::accent() } else { theme::warning() };
     ui.painter_at(shown).circle(at, HANDLE, fill, Stroke::new(1.5, Color32::from_black_alpha(200)));
     if held {
         handle.on_hover_and_drag_cursor(CursorIcon::Grab).on_hover_text("Drag the face of the crop box");

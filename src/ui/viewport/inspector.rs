@@ -168,7 +168,7 @@ fn properties(ui: &mut Ui, record: &GaussianRecord, state: &AppState) {
     }
     more.extend(record.extras.iter().map(|(name, value)| (name.clone(), format::number(f64::from(*value)))));
     let row = |ui: &mut Ui, name: &str, value: String| {
-        ui.label(RichText::new(name).color(theme::WEAK));
+        ui.label(RichText::new(name).color(theme::weak()));
         ui.add(egui::Label::new(value).wrap());
         ui.end_row();
     };
@@ -181,7 +181,7 @@ fn properties(ui: &mut Ui, record: &GaussianRecord, state: &AppState) {
         row(ui, "Rotation", record.rotation_wxyz.map_or_else(|| format::NONE.into(), |q| list(&wide(&q))));
         row(ui, "Opacity", format!("{:.4}", record.opacity));
         for (name, color) in [("Color from here", record.color), ("Base color", record.base_color)] {
-            ui.label(RichText::new(name).color(theme::WEAK));
+            ui.label(RichText::new(name).color(theme::weak()));
             ui.horizontal(|ui| {
                 let (rect, _) = ui.allocate_exact_size(vec2(22.0, 14.0), Sense::hover());
                 let [r, g, b] = color.map(|c| (255.0 * c.clamp(0.0, 1.0)).round() as u8);
@@ -195,7 +195,7 @@ fn properties(ui: &mut Ui, record: &GaussianRecord, state: &AppState) {
     ui.collapsing("Spherical harmonics", |ui| {
         Grid::new("harmonics").num_columns(4).striped(true).spacing([12.0, 2.0]).show(ui, |ui| {
             for title in ["Band, order", "Red", "Green", "Blue"] {
-                ui.label(RichText::new(title).small().color(theme::WEAK));
+                ui.label(RichText::new(title).small().color(theme::weak()));
             }
             ui.end_row();
             for (i, rgb) in record.sh.iter().enumerate() {
@@ -213,7 +213,7 @@ fn properties(ui: &mut Ui, record: &GaussianRecord, state: &AppState) {
 /// A cross on the pixel, while the view is that of the picture, and the Gaussian's three ellipses.
 fn outline(ui: &Ui, shown: Rect, eye: &Camera, pixel: &InspectedPixel, record: &GaussianRecord) {
     let painter = ui.painter_at(shown);
-    let strokes = [Stroke::new(3.0, Color32::from_black_alpha(140)), Stroke::new(1.2, theme::ACCENT)];
+    let strokes = [Stroke::new(3.0, Color32::from_black_alpha(140)), Stroke::new(1.2, theme::accent())];
     let rotation = record.rotation_wxyz.map_or(DQuat::IDENTITY, |[w, x, y, z]| {
         DQuat::from_xyzw(f64::from(x), f64::from(y), f64::from(z), f64::from(w))
     });

@@ -129,7 +129,7 @@ fn histogram(ui: &mut Ui, settings: &mut OverlaySettings, heat: &[f32]) {
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, "Relevancy threshold"));
     let response = response.on_hover_text("Drag: outline all pixels of at least this relevancy. Double-click: none");
     let painter = ui.painter_at(rect);
-    painter.rect_filled(rect, 3.0, theme::CANVAS);
+    painter.rect_filled(rect, 3.0, theme::canvas());
     // Logarithmic: most pixels have nothing to do with a query.
     let height = |n: u32| (1.0 + n as f32).ln() / (1.0 + heat.len() as f32).ln() * rect.height();
     let width = rect.width() / BINS as f32;
