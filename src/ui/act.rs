@@ -17,7 +17,7 @@ use crate::jobs::find_objects::FindRequest;
 use crate::jobs::go_to::{ApproachRequest, Approached};
 use crate::measure::is_report;
 use crate::navigate::FRAMES;
-use crate::navigate::target::{Side, ViewPreference};
+use crate::navigate::target::ViewPreference;
 use crate::pipeline::semantics::edit::Edit;
 use crate::scene::IdentityId;
 use crate::scene::plan::When;
@@ -42,10 +42,8 @@ impl App {
                     self.worker.cancel(job.id);
                 }
             }
-            Action::Dismiss if self.viewport.is_measuring() => self.view(&Action::Measure, ctx),
-            Action::Dismiss if self.viewport.picking.selected().is_some() => self.view(&Action::Select(None), ctx),
-            Action::Dismiss if self.full_view => self.arrange(&Action::FillWindow, ctx),
-            Action::Dismiss => self.act(Action::Cancel, ctx),
+            Action::Dismiss => self.dismiss(ctx),
+            Action::InspectAt(at) => self.inspect(at),
             Action::Evaluate => self.evaluate(),
             Action::FindObjects => self.find_objects(None),
             Action::FetchModel(id) => self.install_model(id, None),
@@ -114,6 +112,7 @@ impl App {
             | Action::OpenFile
             | Action::ExportPly
             | Action::ExportTarget(_)
+            | Action::ExportCrop
             | Action::Screenshot
             | Action::ChooseMasks
             | Action::AddModel(_)
@@ -128,7 +127,11 @@ impl App {
             | Action::ExportVideo
             | Action::SaveChat => self.choose(action),
             Action::IsolateSelected | Action::HideSelected | Action::GoToSelected => self.act_on_selected(&action, ctx),
+            Action::SelectNext | Action::SelectPrevious | Action::SelectInner => self.select_another(&action, ctx),
             Action::FrameScene
+            | Action::Crop
+            | Action::SetCrop(_)
+            | Action::Inspect
             | Action::Select(_)
             | Action::Paint(_)
             | Action::PaintTrueMask
@@ -144,24 +147,6 @@ impl App {
                 self.view(&action, ctx);
             }
         }
-    }
-
-    pub(super) fn view(&mut self, action: &Action, ctx: &egui::Context) {
-        let now = ctx.input(|i| i.time);
-        self.viewport.act(action, &self.state, &self.worker, now);
-    }
-
-    /// Does what a key means for what is selected.
-    fn act_on_selected(&mut self, action: &Action, ctx: &egui::Context) {
-        let Some(id) = self.viewport.picking.selected() else {
-            return self.state.toast(Tone::Info, "Nothing is selected: click an object in the view.");
-        };
-        let action = match action {
-            Action::HideSelected => Action::Hide(id),
-            Action::GoToSelected => Action::GoToTarget(id, Side::Best),
-            _ => Action::Isolate(Some(id).filter(|_| !self.viewport.visibility.is_isolated())),
-        };
-        self.act(action, ctx);
     }
 
     /// Opens something else; asks first if that ends a running job.
@@ -365,21 +350,6 @@ impl App {
             Effect::Renamed(id, name) => self.edit(EditStep::Request(EditRequest::Apply(Edit::Rename(id, name)))),
             Effect::RenameUndone(id, name) => self.edit(EditStep::UndoRename(id, name)),
             Effect::Explored(explored) => self.state.explored = Some(explored),
-        }
-    }
-
-    /// Makes a text field of the name that was chosen last.
-    fn start_renaming(&mut self) {
-        let found = || self.viewport.queries.found().first().copied();
-        let chosen = self.viewport.picking.selected().or_else(found);
-        match (chosen, self.state.semantics.clone()) {
-            (Some(id), Some(map)) => {
-                self.layout.show(Pane::Objects);
-                self.objects.rename(id, &map.identities);
-            }
-            _ => self
-                .state
-                .toast(Tone::Info, "Choose what to rename first: click it in the view or its name in the list."),
         }
     }
 

@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use egui::ThemePreference;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 use strum::{IntoStaticStr, VariantArray};
 
@@ -12,7 +12,7 @@ use crate::io::unposed::Unposed;
 use crate::measure::{Knobs, StageName};
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::edit::Edit;
-use crate::scene::{IdentityId, NOBODY};
+use crate::scene::{CropBox, IdentityId, NOBODY};
 use crate::ui::color_by::ColorBy;
 use crate::worker::{Start, ViewMode};
 
@@ -187,6 +187,9 @@ actions! {
     SaveChat: "Save conversation\u{2026}", "As Markdown, or .json, with every step and its result.";
     Select(id: Option<IdentityId>): id.map_or_else(|| "Deselect".into(), |id| format!("Select #{id}")),
         "Outline it in the view; keys and menus are about it.";
+    SelectNext: "Select the next object", "In the order of the list; with a part selected, the part next to it.", "N";
+    SelectPrevious: "Select the previous object", "In the order of the list; with a part selected, the part before it.", "P";
+    SelectInner: "Select a part of the selection", "The first part of what is selected; N and P go through the others.", "O";
     IsolateSelected: "Isolate the selection",
         "Draw nothing else, or everything again.", "I";
     HideSelected: "Hide the selection", "Leave it out of the view.", "H";
@@ -196,6 +199,8 @@ actions! {
     Hide(id: IdentityId): format!("Hide or show #{id}"), "Leave it out of the view, or draw it again.";
     ExportTarget(id: IdentityId): format!("Export #{id} as .ply\u{2026}"),
         "Write its Gaussians in the format that 3DGS viewers read.";
+    ExportCrop: "Export what the crop box keeps\u{2026}",
+        "Write the Gaussians whose centers it keeps, hidden ones too, in the format that 3DGS viewers read.";
     Change(edit: Edit): match edit {
             Edit::Rename(_, name) => format!("Rename to {name}"),
             Edit::Merge(from, into) => format!("Merge #{from} into #{into}"),
@@ -217,6 +222,12 @@ actions! {
     SetUp(up: DVec3): format!("Make ({:.2}, {:.2}, {:.2}) the up direction", up.x, up.y, up.z),
         "The plane that was picked becomes the floor.";
     Measure: "Measure a distance", "Click two points on surfaces; set the scale from a length that you know.", "M";
+    Crop: "Crop box", "Show only the Gaussians in a box: drag its faces or type its corners.", "B";
+    SetCrop(crop: Option<CropBox>): if crop.is_some() { "Crop the view" } else { "Remove the crop box" },
+        "Show only what a box keeps, or everything again.";
+    Inspect: "Inspect Gaussians", "Click a pixel to see every property of the Gaussians that it consists of.", "X";
+    InspectAt(at: DVec2): format!("Inspect the Gaussians at ({:.2}, {:.2})", at.x, at.y),
+        "Every property of the Gaussians of a pixel.";
     SetScale(meters: f64): format!("Set the scale to {meters} m per unit"),
         "Lengths are shown in meters from now on; kept with the scene.";
     PreviousPhoto: "Previous photo", "Look through the camera of the previous photo.", "[";
@@ -277,7 +288,7 @@ impl Action {
         let mut all = Self::plain();
         // Without a brush there is nothing to add.
         all.retain(|a| *a != Self::AddPainted);
-        all.extend([Self::Isolate(None), Self::Paint(Some(NOBODY))]);
+        all.extend([Self::Isolate(None), Self::Paint(Some(NOBODY)), Self::SetCrop(None)]);
         all.extend(ViewMode::VARIANTS.iter().map(|mode| Self::Show(*mode)));
         all.extend(Pane::VARIANTS.iter().map(|pane| Self::ShowPane(*pane)));
         all.extend(THEMES.map(Self::UseTheme));

@@ -15,6 +15,7 @@ use crate::io::unposed::Unposed;
 use crate::jobs::OpenedScene;
 use crate::jobs::demo::QUESTION;
 use crate::jobs::go_to::{Approached, Explored};
+use crate::jobs::inspect::InspectedPixel;
 use crate::jobs::models::ModelList;
 use crate::jobs::thumbnails::ThumbnailSet;
 use crate::math::format;
@@ -74,6 +75,8 @@ pub struct AppState {
     pub explored: Option<Arc<Explored>>,
     /// The way that was looked for last, until the window takes it.
     pub(crate) visited: Option<Approached>,
+    /// The pixel that was looked into last, until the window takes it.
+    pub(crate) inspected: Option<Arc<InspectedPixel>>,
     /// Models and the engine that runs them, once they were listed.
     pub(crate) models: Option<Arc<ModelList>>,
     /// Models that were put in place so far.
@@ -324,6 +327,7 @@ impl AppState {
                 self.explored = Some(explored);
                 self.visited = Some(visited);
             }
+            Outcome::Inspected(pixel) => self.inspected = Some(pixel),
             Outcome::Explored(explored) => self.explored = Some(explored),
             Outcome::Report { path, report, second } => {
                 let shown = Some(ShownReport { path, report });

@@ -36,7 +36,7 @@ impl PhrasesPane {
                     .desired_rows(4)
                     .desired_width(f32::INFINITY);
                 ScrollArea::vertical().id_salt("phrases").max_height(ui.available_height() - 34.0).show(ui, |ui| {
-                    ui.add(edit);
+                    ui.add(edit).accessible_name("Phrases");
                 });
                 ui.horizontal(|ui| {
                     let mask = if comparing { Action::TrueMask(None) } else { Action::ChooseTrueMask };

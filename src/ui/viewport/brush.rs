@@ -172,7 +172,8 @@ impl Brush {
                     return;
                 }
                 ui.horizontal(|ui| {
-                    ui.add(TextEdit::singleline(&mut self.name).hint_text("Name").char_limit(80).desired_width(120.0));
+                    let name = TextEdit::singleline(&mut self.name).hint_text("Name").char_limit(80);
+                    ui.add(name.desired_width(120.0)).accessible_name("Name of what is painted");
                     ui.add(Slider::new(&mut self.radius_px, 2.0..=60.0).show_value(false).text("brush"));
                 });
                 ui.horizontal(|ui| {

@@ -197,7 +197,10 @@ impl Viewport {
         let mut parts = vec![
             format!("{} \u{d7} {} px", p.camera.width_px, p.camera.height_px),
             format::millis(p.secs),
-            format!("{} Gaussians", format::count(self.cloud.as_ref().map_or(0, |c| c.len()) as u64)),
+            match (self.visibility.count(), self.cloud.as_ref().map_or(0, |c| c.len()) as u64) {
+                (Some(drawn), all) => format!("{} of {} Gaussians", format::count(drawn as u64), format::count(all)),
+                (None, all) => format!("{} Gaussians", format::count(all)),
+            },
         ];
         if let Some((near, far)) = p.depth_range {
             parts.push(format!("depth {near:.2} to {far:.2}, blue to red"));
