@@ -25,7 +25,7 @@ use crate::scene::{Bounds, Dataset, ScenePlan, SemanticMap};
 pub(crate) struct InfoArgs {
     /// Dataset folder, transforms.json, splat file or trained scene
     path: PathBuf,
-    /// Training pictures are limited to this many px along the longer side; the plan depends on it
+    /// Training images are limited to this many px along the longer side; the plan depends on it
     #[arg(long, default_value_t = TrainConfig::default().max_side_px, value_parser = clap::value_parser!(u32).range(1..=16384))]
     max_side: u32,
     #[command(flatten)]

@@ -31,7 +31,7 @@ pub enum VideoError {
     #[error(transparent)]
     Animation(#[from] VideoFileError),
     /// The observer asked to stop; nothing is left of the video.
-    #[error("cancelled")]
+    #[error("canceled")]
     Interrupted(#[from] Interrupted),
 }
 

@@ -13,8 +13,8 @@ pub(crate) const GESTURES: [(&str, &str); 10] = [
     ("Right drag", "Pan"),
     ("Wheel", "Zoom toward the cursor"),
     ("Double click", "Set the pivot to what is under the cursor"),
-    ("Click", "Select the object; again or Alt: the part"),
-    ("Right click", "The menu of what is there"),
+    ("Click", "Select the object; again, or with Alt, the part"),
+    ("Right click", "Context menu"),
     ("Click on a camera", "Look through it"),
 ];
 

@@ -67,7 +67,7 @@ pub(crate) struct QueryArgs {
     /// Write the mask of the answer: white on black
     #[arg(long)]
     mask: Option<PathBuf>,
-    /// Write the relevancy of every pixel over the picture
+    /// Write the relevancy of every pixel over the image
     #[arg(long)]
     heat: Option<PathBuf>,
     /// Print one JSON document
@@ -143,7 +143,7 @@ fn tell(args: &QueryArgs, text: &str, map: &SemanticMap, result: &QueryResult) -
                 [] => String::new(),
                 words => format!("; words that are not known: {}", words.join(", ")),
             };
-            Err(CliError::failed(format!("nothing here fits '{text}'{near}{known}")))
+            Err(CliError::failed(format!("no match for '{text}'{near}{known}")))
         }
         _ if args.json => Ok(()),
         _ => {

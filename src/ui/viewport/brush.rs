@@ -129,7 +129,7 @@ impl Brush {
                     of => format!("a new part of the {}", identities.full_name(of)),
                 };
                 ui.label(format!("Paint {what}: drag to paint, click to select what has the same color."));
-                ui.weak("Right-drag and the wheel move the view; moving it clears what was painted.");
+                ui.weak("Right-drag and wheel move the view, which clears the paint.");
                 ui.horizontal(|ui| {
                     ui.add(TextEdit::singleline(&mut self.name).hint_text("Name").char_limit(80).desired_width(120.0));
                     ui.add(Slider::new(&mut self.radius_px, 2.0..=60.0).show_value(false).text("brush"));
