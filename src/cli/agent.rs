@@ -24,7 +24,7 @@ const EXAMPLES: &str = "Examples:\n  \
 /// Chat with a scene: it shows, goes there, describes, hides, measures
 ///
 /// Each TEXT is one request of the same conversation; without any, requests are read from standard input, one
-/// a line. The planner 'commands' is built in; 'llm' asks a chat model behind an OpenAI-compatible
+/// per line. The planner 'commands' is built in; 'llm' asks a chat model behind an OpenAI-compatible
 /// address. Exit code 1 if the last request was refused.
 #[derive(Debug, clap::Args)]
 #[command(after_help = format!("{EXAMPLES}\n\n{SENT}"))]

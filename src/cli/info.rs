@@ -155,9 +155,9 @@ fn of_trained(s: &Scene, folder: &Path) -> (Facts, Option<SemanticMap>) {
     };
     let of_others = matches!(map, Ok(None)) && folder.join(MAP_FILE).exists();
     let warning = match &map {
-        Err(e) => Some(format!("its objects cannot be read ('fmlgs preprocess' finds them anew): {e}")),
+        Err(e) => Some(format!("its objects cannot be read ('fmlgs preprocess' finds them again): {e}")),
         Ok(None) if of_others => Some(format!(
-            "{} is of other Gaussians than {}, so no objects are known; 'fmlgs preprocess' finds them anew",
+            "{} is of other Gaussians than {}, so no objects are known; 'fmlgs preprocess' finds them again",
             MAP_FILE, CLOUD_FILE
         )),
         Ok(_) => None,

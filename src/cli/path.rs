@@ -132,7 +132,7 @@ pub(crate) fn run(args: PathArgs) -> Result<(), CliError> {
     let body = kinds.into_iter().filter_map(|(name, s)| Some(row(name, s?)));
     let table = rows(&["way", "largest step", "largest turn", "least clearance", "poses too near"], body);
     output::print(&format!(
-        "to {what}: {:.2} units in {:.1} s, {} poses\n{}\nscene looked at in {build_ms:.0} ms, way found in {route_ms:.0} ms",
+        "to {what}: {:.2} units in {:.1} s, {} poses\n{}\ngraph built in {build_ms:.0} ms, route found in {route_ms:.0} ms",
         flight.length,
         flight.seconds,
         flight.poses.len(),

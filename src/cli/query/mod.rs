@@ -34,7 +34,7 @@ pub(crate) struct QueryArgs {
     /// What to look for
     #[arg(required_unless_present = "phrases", conflicts_with = "phrases")]
     text: Option<String>,
-    /// Ask every phrase of a text file, one a line, instead of one
+    /// Ask every phrase of a text file, one per line, instead of one
     #[arg(long, value_name = "FILE", conflicts_with_all = ["mask", "heat"])]
     phrases: Option<PathBuf>,
     /// Views for --phrases: 'all' photos, or some by index or name, with commas between [default: --camera]

@@ -99,7 +99,7 @@ pub(super) fn objects_for(
         let (map, share) = carry::carry(&map, &old, cloud);
         let text = format!(
             "The scene's objects and parts were transferred to {:.1} % of the Gaussians, by place; 'fmlgs preprocess' finds \
-             them anew",
+             them again",
             100.0 * share
         );
         observer.note(Severity::Info, text);

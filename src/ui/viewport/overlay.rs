@@ -107,8 +107,7 @@ impl Viewport {
                 if let Some(psnr) = self.picture().and_then(|p| p.psnr) {
                     ui.label(RichText::new(format!("preview {}", format::decibel(psnr))).color(theme::ACCENT))
                         .on_hover_text(
-                            "PSNR of the view at screen resolution. \
-                         Evaluation uses the training resolution.",
+                            "PSNR of the view at screen resolution. Evaluation uses the training resolution.",
                         );
                 }
                 if p.failed() {

@@ -138,7 +138,7 @@ fn wrong_settings_are_named() {
 }
 
 #[test]
-fn cancelling_leaves_no_data_set() {
+fn canceling_leaves_no_data_set() {
     struct Stop;
     impl Observer for Stop {
         fn signal(&self) -> Signal {
