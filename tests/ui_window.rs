@@ -9,6 +9,8 @@ mod edits;
 mod hands;
 #[path = "ui_window/objects.rs"]
 mod objects;
+#[path = "ui_window/panes.rs"]
+mod panes;
 #[path = "ui_window/phrases.rs"]
 mod phrases;
 #[path = "ui_window/problems.rs"]
@@ -242,7 +244,9 @@ fn training_moves_the_plot_pauses_resumes_and_is_cancelled() {
     let mut w = Window::new(Some(Action::Open(photos())));
     w.until("the photos", |a| a.state.scene.is_some());
     assert!(w.shows("7 train") && w.shows("1 held-out"), "the photos pane");
+    w.click("Scene plan");
     assert!(w.shows("Feature maps"), "the scene plan");
+    w.click("Training");
     w.harness.state_mut().layout.config.steps = 50_000;
     w.click("Start training");
     w.until("the plot", |a| a.state.history.steps.len() >= 5);

@@ -45,6 +45,7 @@ impl App {
             }
             Action::Dismiss if self.viewport.is_measuring() => self.view(&Action::Measure, ctx),
             Action::Dismiss if self.viewport.picking.selected().is_some() => self.view(&Action::Select(None), ctx),
+            Action::Dismiss if self.full_view => self.arrange(&Action::FillWindow, ctx),
             Action::Dismiss => self.act(Action::Cancel, ctx),
             Action::Evaluate => self.evaluate(),
             Action::FindObjects => self.find_objects(None),
@@ -86,7 +87,13 @@ impl App {
             }
             Action::ToggleCameras => self.layout.cameras = !self.layout.cameras,
             Action::TogglePane(pane) => self.layout.toggle(pane),
-            Action::ShowPane(pane) => self.bring_up(pane),
+            Action::ShowPane(pane) => self.layout.show(pane),
+            Action::FillWindow
+            | Action::ResetPanes
+            | Action::UseTheme(_)
+            | Action::LargerText
+            | Action::SmallerText
+            | Action::NormalText => self.arrange(&action, ctx),
             Action::Rename => self.start_renaming(),
             Action::Palette => self.palette.toggle(),
             Action::Shortcuts => self.sheet = !self.sheet,
@@ -108,7 +115,7 @@ impl App {
                 self.layout.show(Pane::Camera);
             }
             Action::StartChat => {
-                self.bring_up(Pane::Chat);
+                self.layout.show(Pane::Chat);
                 self.chat.start_typing();
             }
             Action::OpenFolder
@@ -364,19 +371,13 @@ impl App {
         }
     }
 
-    /// Shows a pane, unfolded.
-    fn bring_up(&mut self, pane: Pane) {
-        self.layout.show(pane);
-        self.unfold = Some(pane);
-    }
-
     /// Makes a text field of the name that was chosen last.
     fn start_renaming(&mut self) {
         let found = || self.viewport.queries.found().first().copied();
         let chosen = self.viewport.picking.selected().or_else(found);
         match (chosen, self.state.semantics.clone()) {
             (Some(id), Some(map)) => {
-                self.bring_up(Pane::Objects);
+                self.layout.show(Pane::Objects);
                 self.objects.rename(id, &map.identities);
             }
             _ => self.state.toast(Tone::Info, "Select what to rename first, in the view or in the list."),

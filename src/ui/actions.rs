@@ -3,6 +3,7 @@
 
 use std::path::PathBuf;
 
+use egui::ThemePreference;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use strum::{IntoStaticStr, VariantArray};
@@ -228,6 +229,16 @@ actions! {
     ToggleCameras: "Show or hide cameras", "Show the camera of every photo in the view.", "V";
     TogglePane(pane: Pane): format!("Show or hide the {} pane", pane.text().to_lowercase()),
         "Show or hide this pane.";
+    FillWindow: "Fill the window with the view", "Show only the view, full screen; again to show everything.", "F11";
+    ResetPanes: "Reset the panes", "Put every pane back in its initial place.";
+    UseTheme(theme: ThemePreference): match theme {
+            ThemePreference::Dark => "Dark theme",
+            ThemePreference::Light => "Light theme",
+            ThemePreference::System => "System theme",
+        }, "The view keeps its dark background.";
+    LargerText: "Larger text", "Enlarge everything in the window.";
+    SmallerText: "Smaller text", "Reduce everything in the window.";
+    NormalText: "Normal text size", "Reset the size of everything in the window.";
     ShowPane(pane: Pane): format!("Show the {} pane", pane.text().to_lowercase()), "Open this pane.";
     ChooseReport: "Open a report\u{2026}", "A report.json of fmlgs report: error vs. run time of every setting.";
     ChooseSecondReport: "Compare with another report\u{2026}", "Shown with hollow markers, and side by side in the tables.";
@@ -246,6 +257,10 @@ actions! {
     Quit: "Quit", "Close the window. A running training keeps its last checkpoint.", "Ctrl+Q";
 }
 
+/// In the order of the menu.
+pub(crate) const THEMES: [ThemePreference; 3] =
+    [ThemePreference::Dark, ThemePreference::Light, ThemePreference::System];
+
 impl Action {
     /// Every action that needs no further input, in the order of the palette.
     pub(crate) fn all() -> Vec<Self> {
@@ -255,6 +270,7 @@ impl Action {
         all.extend([Self::Isolate(None), Self::Paint(Some(NOBODY))]);
         all.extend(ViewMode::VARIANTS.iter().map(|mode| Self::Show(*mode)));
         all.extend(Pane::VARIANTS.iter().map(|pane| Self::ShowPane(*pane)));
+        all.extend(THEMES.map(Self::UseTheme));
         all.extend(ColorBy::VARIANTS.iter().map(|by| Self::Tint(*by)));
         all.extend(Pane::VARIANTS.iter().map(|pane| Self::TogglePane(*pane)));
         all.extend(Axis::VARIANTS.iter().map(|axis| Self::TurnUp(*axis)));

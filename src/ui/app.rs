@@ -9,6 +9,7 @@ use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 use super::camera::CameraPane;
 use super::chat::Chat;
 use super::dialogs::{self, Question};
+use super::dock::{DockContents, Place};
 use super::file_dialogs::FileDialogs;
 use super::history::{EditStep, Editing};
 use super::layout::Layout;
@@ -65,8 +66,10 @@ pub struct App {
     /// Edits of objects and parts that wait for the one that is under way.
     pub(super) edits: VecDeque<EditStep>,
     pub(super) editing: Option<Editing>,
-    /// A pane that is to be unfolded.
-    pub(super) unfold: Option<Pane>,
+    /// Whether the view takes the whole window.
+    pub(super) full_view: bool,
+    /// Whether objects were known in the last frame.
+    had_objects: bool,
 }
 
 impl App {
@@ -83,6 +86,8 @@ impl App {
         let (repaint, unhurried) = (super::repainter(&cc.egui_ctx, 8), super::repainter(&cc.egui_ctx, 120));
         resource_log::record(ResourceKind::Window, "window", "the program was started", 0);
         let layout = Layout::load(cc.storage);
+        cc.egui_ctx.set_theme(layout.theme);
+        cc.egui_ctx.set_zoom_factor(layout.zoom);
         let mut state = AppState::new(layout.recent.clone());
         state.say(super::state::Tone::Info, format!("FMLGS {}", env!("CARGO_PKG_VERSION")));
         Ok(Self {
@@ -110,7 +115,8 @@ impl App {
             traced: 0,
             edits: VecDeque::new(),
             editing: None,
-            unfold: None,
+            full_view: false,
+            had_objects: false,
             actions: first.into_iter().collect(),
         })
     }
@@ -145,6 +151,12 @@ impl App {
         for load in resource_log::since(self.traced) {
             self.traced += 1;
             self.state.say(super::state::Tone::Info, load.line());
+        }
+        // Once there are objects, they are what a user works with.
+        let has_objects = self.state.semantics.is_some();
+        let news = if has_objects { Pane::Objects } else { Pane::Training };
+        if std::mem::replace(&mut self.had_objects, has_objects) != has_objects && self.layout.shows(news) {
+            self.layout.dock.activate(news);
         }
         self.explore();
         self.viewport.update(&mut self.state, &self.worker);
@@ -195,114 +207,72 @@ impl App {
     }
 
     fn panes(&mut self, ui: &mut Ui) {
-        let bar = Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(10, 6));
-        let pane = Frame::new().fill(theme::PANEL).inner_margin(Margin::same(12));
-        let Self { state, layout, actions, viewport, .. } = self;
-        let unfold = self.unfold.take();
-        let header = |pane: Pane| egui::CollapsingHeader::new(pane.text()).open((unfold == Some(pane)).then_some(true));
-        Panel::top("menus").frame(bar).show(ui, |ui| bars::top(ui, state, layout, actions));
-        Panel::bottom("status").frame(bar).show(ui, |ui| bars::status(ui, state, layout, viewport.picture(), actions));
-        problems::show(ui, state);
-        if layout.shows(Pane::Log) {
-            Panel::bottom("log")
-                .frame(pane)
-                .resizable(true)
-                .default_size(150.0)
-                .min_size(80.0)
-                .show(ui, |ui| log::show(ui, state));
+        let bar = Frame::new().fill(theme::panel()).inner_margin(Margin::symmetric(10, 6));
+        if !self.fills_window() {
+            let Self { state, layout, actions, viewport, .. } = self;
+            Panel::top("menus").frame(bar).show(ui, |ui| bars::top(ui, state, layout, actions));
+            Panel::bottom("status")
+                .frame(bar)
+                .show(ui, |ui| bars::status(ui, state, layout, viewport.picture(), actions));
         }
-        if layout.shows(Pane::Camera) && state.scene.is_some() {
-            let eye = viewport.pose();
-            let shown = Panel::bottom("camera").frame(pane).resizable(true).default_size(260.0).min_size(240.0);
-            let wanted = shown.show(ui, |ui| self.camera.show(ui, state, &eye, actions)).inner;
-            if let Some(pose) = wanted {
-                viewport.stand(&pose, state, ui.input(|i| i.time));
+        problems::show(ui, &mut self.state);
+        CentralPanel::no_frame().frame(Frame::new().fill(theme::canvas())).show(ui, |ui| {
+            if self.fills_window() {
+                return DockContents::show(self, ui, Place::View);
             }
-        }
-        if layout.shows(Pane::Phrases) && state.semantics.is_some() {
-            let comparing = viewport.queries.truth().is_some();
-            let shown = Panel::bottom("phrases").frame(pane).resizable(true).default_size(220.0).min_size(150.0);
-            shown.show(ui, |ui| self.phrases.show(ui, state, comparing, actions));
-        }
-        if layout.shows(Pane::Report) {
-            // The view stays larger than what is said about it.
-            let most = (0.55 * ui.available_height()).max(200.0);
-            let shown =
-                Panel::bottom("report").frame(pane).resizable(true).default_size(400.0).size_range(200.0..=most);
-            shown.show(ui, |ui| self.report.show(ui, state, layout, viewport, actions));
-        }
-        let Some(scene) = state.scene.clone() else {
-            let canvas = Frame::new().fill(theme::CANVAS);
-            CentralPanel::no_frame().frame(canvas).show(ui, |ui| self.first_page.show(ui, state, actions));
-            return;
-        };
-        if scene.dataset.is_some() && layout.shows(Pane::Dataset) {
-            Panel::left("photos").frame(pane).resizable(true).default_size(270.0).size_range(180.0..=600.0).show(
-                ui,
-                |ui| {
-                    self.photo_thumbnails.show(ui, state, layout, viewport.photo_index(), &self.worker, actions);
-                },
-            );
-        }
-        if [Pane::Chat, Pane::Query, Pane::Training, Pane::Objects, Pane::Plan, Pane::Models]
-            .iter()
-            .any(|p| layout.shows(*p))
-        {
-            Panel::right("work").frame(pane).resizable(true).default_size(350.0).size_range(290.0..=640.0).show(
-                ui,
-                |ui| {
-                    ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-                        if layout.shows(Pane::Query) {
-                            header(Pane::Query)
-                                .default_open(true)
-                                .show(ui, |ui| viewport.show_query(ui, state, actions));
-                            ui.add_space(8.0);
-                        }
-                        let can_have = scene.dataset.is_some() || state.semantics.is_some();
-                        let objects = layout.shows(Pane::Objects) && can_have;
-                        let mut show_objects = |ui: &mut Ui, actions: &mut Vec<Action>| {
-                            header(Pane::Objects).default_open(true).show(ui, |ui| {
-                                let (thumbnails, visibility) = (&self.object_thumbnails, &viewport.visibility);
-                                let selected = viewport.picking.selected();
-                                self.objects.show(ui, state, thumbnails, visibility, selected, actions);
-                            });
-                            ui.add_space(10.0);
-                        };
-                        if layout.shows(Pane::Chat) {
-                            let map = state.semantics.clone();
-                            header(Pane::Chat).default_open(map.is_some()).show(ui, |ui| {
-                                let identities = map.as_deref().map(|map| &map.identities);
-                                self.chat.show(ui, &mut layout.chat, &self.object_thumbnails, identities, actions);
-                            });
-                            ui.add_space(8.0);
-                        }
-                        // Once there are any, they are what a user works with.
-                        if objects && state.semantics.is_some() {
-                            show_objects(ui, actions);
-                        }
-                        if layout.shows(Pane::Training) {
-                            ui.heading(Pane::Training.text());
-                            training::show(ui, state, layout, &self.report.curves(state), actions);
-                            ui.add_space(10.0);
-                        }
-                        if objects && state.semantics.is_none() {
-                            show_objects(ui, actions);
-                        }
-                        if layout.shows(Pane::Plan) {
-                            header(Pane::Plan)
-                                .default_open(state.history.steps.is_empty())
-                                .show(ui, |ui| plan::show(ui, &state.plan, &mut layout.plan));
-                        }
-                        if layout.shows(Pane::Models) {
-                            header(Pane::Models)
-                                .show(ui, |ui| self.models.show(ui, state, &mut layout.finding, &self.worker, actions));
-                        }
-                    });
-                },
-            );
+            let mut dock = std::mem::take(&mut self.layout.dock);
+            dock.show(ui, self);
+            self.layout.dock = dock;
+        });
+    }
+
+    /// Whether the view has the whole window.
+    fn fills_window(&self) -> bool {
+        self.full_view && self.state.scene.is_some()
+    }
+
+    fn show_view(&mut self, ui: &mut Ui) {
+        let Self { state, layout, actions, viewport, .. } = self;
+        if state.scene.is_none() {
+            return self.first_page.show(ui, state, actions);
         }
         let route = layout.shows(Pane::Camera).then_some(&self.camera);
-        CentralPanel::no_frame().show(ui, |ui| viewport.show(ui, state, layout, route, actions));
+        theme::dark(ui, |ui| viewport.show(ui, state, layout, route, actions));
+    }
+
+    fn show_pane(&mut self, ui: &mut Ui, pane: Pane) {
+        let Self { state, layout, actions, viewport, .. } = self;
+        match pane {
+            Pane::Dataset => {
+                self.photo_thumbnails.show(ui, state, layout, viewport.photo_index(), &self.worker, actions);
+            }
+            Pane::Chat => {
+                let map = state.semantics.clone();
+                let identities = map.as_deref().map(|map| &map.identities);
+                self.chat.show(ui, &mut layout.chat, &self.object_thumbnails, identities, actions);
+            }
+            Pane::Training => training::show(ui, state, layout, &self.report.curves(state), actions),
+            Pane::Objects => {
+                let (thumbnails, visibility) = (&self.object_thumbnails, &viewport.visibility);
+                let selected = viewport.picking.selected();
+                self.objects.show(ui, state, thumbnails, visibility, selected, actions);
+            }
+            Pane::Query => viewport.show_query(ui, state, actions),
+            Pane::Plan => plan::show(ui, &state.plan, &mut layout.plan),
+            Pane::Models => self.models.show(ui, state, &mut layout.finding, &self.worker, actions),
+            Pane::Phrases => {
+                let comparing = viewport.queries.truth().is_some();
+                self.phrases.show(ui, state, comparing, actions);
+            }
+            Pane::Camera => {
+                let eye = viewport.pose();
+                if let Some(pose) = self.camera.show(ui, state, &eye, actions) {
+                    viewport.stand(&pose, state, ui.input(|i| i.time));
+                }
+            }
+            Pane::Report => self.report.show(ui, state, layout, viewport, actions),
+            Pane::Log => log::show(ui, state),
+        }
     }
 
     fn over_everything(&mut self, ctx: &egui::Context) {
@@ -335,6 +305,39 @@ impl App {
     }
 }
 
+impl DockContents for App {
+    fn has(&self, place: Place) -> bool {
+        let Place::Pane(pane) = place else { return true };
+        let scene = self.state.scene.as_ref();
+        let has_photos = scene.is_some_and(|s| s.dataset.is_some());
+        let has_objects = self.state.semantics.is_some();
+        self.layout.shows(pane)
+            && match pane {
+                Pane::Report | Pane::Log => true,
+                Pane::Dataset | Pane::Training => has_photos,
+                Pane::Objects => has_photos || has_objects,
+                Pane::Phrases => has_objects,
+                _ => scene.is_some(),
+            }
+    }
+
+    fn show(&mut self, ui: &mut Ui, place: Place) {
+        let Place::Pane(pane) = place else { return self.show_view(ui) };
+        Frame::new().fill(theme::panel()).inner_margin(Margin::same(12)).show(ui, |ui| {
+            ui.set_min_size(ui.available_size());
+            if matches!(pane, Pane::Chat | Pane::Training | Pane::Objects | Pane::Query | Pane::Plan | Pane::Models) {
+                ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| self.show_pane(ui, pane));
+            } else {
+                self.show_pane(ui, pane);
+            }
+        });
+    }
+
+    fn hide(&mut self, pane: Pane) {
+        self.actions.push(Action::TogglePane(pane));
+    }
+}
+
 impl eframe::App for App {
     fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
         self.take_events(ctx);
@@ -342,6 +345,8 @@ impl eframe::App for App {
 
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
         let ctx = ui.ctx().clone();
+        theme::begin_frame(&ctx);
+        self.layout.zoom = ctx.zoom_factor();
         self.keys_and_drops(&ctx);
         self.panes(ui);
         self.over_everything(&ctx);
@@ -359,7 +364,7 @@ impl eframe::App for App {
     }
 
     fn clear_color(&self, _visuals: &egui::Visuals) -> [f32; 4] {
-        theme::CANVAS.to_normalized_gamma_f32()
+        theme::canvas().to_normalized_gamma_f32()
     }
 }
 
@@ -367,7 +372,7 @@ fn drop_hint(ctx: &egui::Context) {
     let painter = ctx.layer_painter(egui::LayerId::new(egui::Order::Foreground, egui::Id::unique("drop")));
     let rect = ctx.content_rect();
     painter.rect_filled(rect, 0.0, egui::Color32::from_black_alpha(170));
-    painter.rect_stroke(rect.shrink(24.0), 12.0, egui::Stroke::new(2.0, theme::ACCENT), egui::StrokeKind::Inside);
+    painter.rect_stroke(rect.shrink(24.0), 12.0, egui::Stroke::new(2.0, theme::accent()), egui::StrokeKind::Inside);
     let font = egui::FontId::proportional(24.0);
-    painter.text(rect.center(), egui::Align2::CENTER_CENTER, "Drop to open", font, theme::TEXT);
+    painter.text(rect.center(), egui::Align2::CENTER_CENTER, "Drop to open", font, theme::text());
 }

@@ -168,7 +168,7 @@ impl Chat {
         if self.lines.is_empty() {
             ui.label(
                 RichText::new("Type a command to find, visit, measure or hide things. \u{201c}help\u{201d} lists all.")
-                    .color(theme::WEAK),
+                    .color(theme::weak()),
             );
             ui.horizontal_wrapped(|ui| {
                 for example in ["What is in view?", "help"] {
@@ -225,7 +225,7 @@ impl Chat {
             }
         });
         self.show_continuations(ui, identities.filter(|_| !settings.use_model));
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             self.chooser.show(ui, settings);
             if ui.add_enabled(self.transcript.is_some(), Button::new("Save conversation\u{2026}").small()).clicked() {
                 actions.push(Action::SaveChat);
@@ -251,7 +251,7 @@ impl Chat {
         }
         for (i, text) in self.continuations.1.iter().enumerate() {
             let tab = if i == 0 { "  (Tab)" } else { "" };
-            ui.label(RichText::new(format!("{text}{tab}")).small().color(theme::WEAK));
+            ui.label(RichText::new(format!("{text}{tab}")).small().color(theme::weak()));
         }
     }
 
@@ -278,7 +278,7 @@ fn show_line(ui: &mut Ui, line: &Line, object_thumbnails: &ObjectThumbnails) -> 
             ui.label(RichText::new(text).strong());
         }
         Line::Did(text, done) => {
-            let color = if *done == Some(false) { theme::WARNING } else { theme::WEAK };
+            let color = if *done == Some(false) { theme::warning() } else { theme::weak() };
             ui.label(RichText::new(format!("    {text}")).small().color(color));
         }
         Line::Answer { text, candidates, refused } => {

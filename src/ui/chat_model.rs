@@ -63,11 +63,12 @@ pub(crate) struct ModelChooser {
 impl ModelChooser {
     pub(crate) fn show(&mut self, ui: &mut Ui, settings: &mut ChatSettings) {
         let text = if settings.use_model { "Chat model" } else { "Built-in" };
-        ComboBox::from_id_salt("planner").selected_text(text).width(90.0).show_ui(ui, |ui| {
+        let planner = ComboBox::from_id_salt("planner").selected_text(text).width(90.0).show_ui(ui, |ui| {
             ui.selectable_value(&mut settings.use_model, false, "Built-in")
                 .on_hover_text("The built-in commands; no network.");
             ui.selectable_value(&mut settings.use_model, true, "Chat model").on_hover_text(SENT);
         });
+        planner.response.accessible_name("Planner");
         if settings.use_model {
             let open = ui.menu_button("Address\u{2026}", |ui| self.settings(ui, &mut settings.model));
             if open.inner.is_none() {
@@ -87,7 +88,7 @@ impl ModelChooser {
             Some(none) if none.is_empty() => drop(ui.weak("No chat model server found on this machine.")),
             Some(found) => {
                 for server in found {
-                    ui.label(RichText::new(format!("{}, on this machine", server.kind)).small().color(theme::WEAK));
+                    ui.label(RichText::new(format!("{}, on this machine", server.kind)).small().color(theme::weak()));
                     for name in server.models.iter().take(8) {
                         let is_chosen = model.base_url == server.base_url && model.model == *name;
                         if ui.selectable_label(is_chosen, crate::scene::text::line(name)).clicked() {
@@ -104,7 +105,7 @@ impl ModelChooser {
             ("Model", &mut model.model, "model name on the server"),
             ("API key variable", &mut model.key_variable, "environment variable; empty if none"),
         ] {
-            ui.label(RichText::new(label).small().color(theme::WEAK));
+            ui.label(RichText::new(label).small().color(theme::weak()));
             ui.add(TextEdit::singleline(value).hint_text(hint).desired_width(f32::INFINITY));
         }
         let is_waiting = matches!(self.tested, Asked::Waiting(_));
@@ -118,12 +119,12 @@ impl ModelChooser {
             match self.tested.answer() {
                 Some(Ok(text)) => drop(ui.label(crate::scene::text::line(text))),
                 Some(Err(text)) => {
-                    drop(ui.label(RichText::new(crate::scene::text::line(text)).color(theme::WARNING)));
+                    drop(ui.label(RichText::new(crate::scene::text::line(text)).color(theme::warning())));
                 }
                 None if is_waiting => drop(ui.spinner()),
                 None => {}
             }
         });
-        ui.label(RichText::new(SENT).small().color(theme::WEAK));
+        ui.label(RichText::new(SENT).small().color(theme::weak()));
     }
 }

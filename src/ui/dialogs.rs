@@ -28,7 +28,7 @@ pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox) -> bool {
         egui::ScrollArea::vertical().max_height(220.0).show(ui, |ui| ui.label(&error.failure.message));
         if !error.failure.remedy.is_empty() {
             ui.add_space(6.0);
-            ui.label(RichText::new(&error.failure.remedy).color(theme::TEXT).strong());
+            ui.label(RichText::new(&error.failure.remedy).color(theme::text()).strong());
         }
         ui.add_space(6.0);
         ui.weak("The open scene is unchanged.");

@@ -2,9 +2,11 @@
 
 use std::path::PathBuf;
 
+use egui::ThemePreference;
 use serde::{Deserialize, Serialize};
 
 use super::chat::ChatSettings;
+use super::dock::Dock;
 use crate::jobs::find_objects::FindSettings;
 use crate::pipeline::train::TrainConfig;
 use crate::scene::Overrides;
@@ -46,6 +48,12 @@ impl Default for PlotSettings {
 pub struct Layout {
     /// Panes that are hidden.
     pub hidden: Vec<Pane>,
+    /// Where panes stand.
+    pub(crate) dock: Dock,
+    /// Dark, light, or as the system has it.
+    pub(crate) theme: ThemePreference,
+    /// Size of everything in the window, 1 as designed.
+    pub(crate) zoom: f32,
     /// Whether cameras are drawn into the view.
     pub cameras: bool,
     /// Whether the photo is shown beside the frame.
@@ -76,6 +84,9 @@ impl Default for Layout {
     fn default() -> Self {
         Self {
             hidden: vec![Pane::Log, Pane::Camera, Pane::Report, Pane::Query, Pane::Phrases],
+            dock: Dock::default(),
+            theme: ThemePreference::Dark,
+            zoom: 1.0,
             cameras: true,
             compare: false,
             split: 0.5,
@@ -97,6 +108,8 @@ impl Layout {
     pub(crate) fn load(storage: Option<&dyn eframe::Storage>) -> Self {
         let mut layout: Self = storage.and_then(|s| eframe::get_value(s, KEY)).unwrap_or_default();
         layout.split = if layout.split.is_finite() { layout.split.clamp(0.02, 0.98) } else { 0.5 };
+        layout.zoom = if layout.zoom.is_finite() { layout.zoom.clamp(0.5, 3.0) } else { 1.0 };
+        layout.dock = layout.dock.checked();
         layout
     }
 
@@ -109,9 +122,10 @@ impl Layout {
         !self.hidden.contains(&pane)
     }
 
-    /// Shows a pane.
+    /// Shows a pane, before the others of its group.
     pub(crate) fn show(&mut self, pane: Pane) {
         self.hidden.retain(|p| *p != pane);
+        self.dock.activate(pane);
     }
 
     /// Shows a hidden pane or hides a shown one.

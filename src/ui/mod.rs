@@ -8,6 +8,7 @@ mod act;
 mod act_file;
 mod act_phrases;
 mod act_report;
+mod act_window;
 pub mod actions;
 pub mod app;
 pub(crate) mod camera;
@@ -16,6 +17,7 @@ pub(crate) mod chat_model;
 pub mod color_by;
 mod context;
 pub(crate) mod dialogs;
+mod dock;
 mod edits;
 mod file_dialogs;
 mod fonts;
@@ -50,7 +52,7 @@ pub fn run(first: Vec<Start>, overrides: Vec<PlanOverride>) -> eframe::Result {
         .with_title("FMLGS")
         .with_app_id("fmlgs")
         .with_inner_size([1480.0, 920.0])
-        .with_min_inner_size([860.0, 560.0])
+        .with_min_inner_size([640.0, 480.0])
         .with_drag_and_drop(true);
     // An emulated adapter draws the window several times faster through OpenGL: its Vulkan side
     // runs both branches of every condition in the toolkit's shader.

@@ -150,7 +150,7 @@ fn sheet_grid(ui: &mut egui::Ui, title: &str, rows: &[(String, String)]) {
     theme::section(ui, title);
     egui::Grid::new(title).num_columns(2).spacing([16.0, 5.0]).min_col_width(70.0).show(ui, |ui| {
         for (key, text) in rows {
-            ui.label(RichText::new(key).monospace().color(theme::ACCENT));
+            ui.label(RichText::new(key).monospace().color(theme::accent()));
             ui.label(text);
             ui.end_row();
         }

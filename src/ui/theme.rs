@@ -1,53 +1,143 @@
-//! Colors, sizes and fonts of the window: dark and quiet, with one accent.
+//! Colors, sizes and fonts of the window: quiet, dark or light, with one accent.
 
-use egui::{Color32, CornerRadius, FontId, Margin, RichText, Stroke, Style, TextStyle, Theme, Visuals, vec2};
+use std::cell::Cell;
+
+use egui::{Color32, CornerRadius, FontId, Margin, RichText, Stroke, Style, TextStyle, Theme, Ui, Visuals, vec2};
 
 use super::state::Tone;
 
-/// The one color that asks for attention.
-pub(crate) const ACCENT: Color32 = Color32::from_rgb(0x6c, 0xb2, 0xf0);
-/// Text on the accent.
-pub(crate) const ON_ACCENT: Color32 = Color32::from_rgb(0x0c, 0x14, 0x1c);
-pub(crate) const PANEL: Color32 = Color32::from_rgb(0x18, 0x1a, 0x1f);
-pub(crate) const CANVAS: Color32 = Color32::from_rgb(0x0e, 0x0f, 0x12);
-/// Cards and fields on a pane.
-pub(crate) const SURFACE: Color32 = Color32::from_rgb(0x22, 0x25, 0x2b);
-pub(crate) const LINE: Color32 = Color32::from_rgb(0x2e, 0x32, 0x3a);
-pub(crate) const TEXT: Color32 = Color32::from_rgb(0xd9, 0xdc, 0xe2);
-/// Text of less weight; still 5.5 : 1 on a pane.
-pub(crate) const WEAK: Color32 = Color32::from_rgb(0x93, 0x99, 0xa5);
-pub(crate) const GOOD: Color32 = Color32::from_rgb(0x7f, 0xc7, 0x9a);
-/// Left out or changed; also held-out photos.
-pub(crate) const WARNING: Color32 = Color32::from_rgb(0xe3, 0xb3, 0x5f);
-pub(crate) const ERROR: Color32 = Color32::from_rgb(0xee, 0x82, 0x79);
+/// The colors of a theme.
+#[derive(Clone, Copy)]
+struct Colors {
+    /// The one color that asks for attention, and text on it.
+    accent: Color32,
+    on_accent: Color32,
+    panel: Color32,
+    canvas: Color32,
+    /// Cards and fields on a pane, with the mouse over them, and pressed.
+    surface: Color32,
+    hovered: Color32,
+    pressed: Color32,
+    line: Color32,
+    text: Color32,
+    /// Text of the most weight.
+    strong: Color32,
+    /// Text of less weight; at least 5 : 1 on a pane.
+    weak: Color32,
+    good: Color32,
+    /// Left out or changed; also held-out photos.
+    warning: Color32,
+    error: Color32,
+    /// Cards over the picture.
+    overlay: Color32,
+}
+
+const DARK: Colors = Colors {
+    accent: Color32::from_rgb(0x6c, 0xb2, 0xf0),
+    on_accent: Color32::from_rgb(0x0c, 0x14, 0x1c),
+    panel: Color32::from_rgb(0x18, 0x1a, 0x1f),
+    canvas: Color32::from_rgb(0x0e, 0x0f, 0x12),
+    surface: Color32::from_rgb(0x22, 0x25, 0x2b),
+    hovered: Color32::from_rgb(0x2c, 0x30, 0x38),
+    pressed: Color32::from_rgb(0x36, 0x3b, 0x45),
+    line: Color32::from_rgb(0x2e, 0x32, 0x3a),
+    text: Color32::from_rgb(0xd9, 0xdc, 0xe2),
+    strong: Color32::WHITE,
+    weak: Color32::from_rgb(0x93, 0x99, 0xa5),
+    good: Color32::from_rgb(0x7f, 0xc7, 0x9a),
+    warning: Color32::from_rgb(0xe3, 0xb3, 0x5f),
+    error: Color32::from_rgb(0xee, 0x82, 0x79),
+    overlay: Color32::from_rgba_unmultiplied_const(0x14, 0x16, 0x1a, 225),
+};
+
+const LIGHT: Colors = Colors {
+    accent: Color32::from_rgb(0x1a, 0x66, 0xb8),
+    on_accent: Color32::WHITE,
+    panel: Color32::from_rgb(0xf5, 0xf6, 0xf8),
+    canvas: Color32::WHITE,
+    surface: Color32::from_rgb(0xe6, 0xe9, 0xee),
+    hovered: Color32::from_rgb(0xd9, 0xde, 0xe6),
+    pressed: Color32::from_rgb(0xc9, 0xd1, 0xdd),
+    line: Color32::from_rgb(0xcd, 0xd2, 0xda),
+    text: Color32::from_rgb(0x24, 0x28, 0x30),
+    strong: Color32::BLACK,
+    weak: Color32::from_rgb(0x5a, 0x62, 0x70),
+    good: Color32::from_rgb(0x1e, 0x73, 0x43),
+    warning: Color32::from_rgb(0x8a, 0x59, 0x00),
+    error: Color32::from_rgb(0xb4, 0x2b, 0x22),
+    overlay: Color32::from_rgba_unmultiplied_const(0xfa, 0xfa, 0xfc, 235),
+};
+
+thread_local! {
+    // Windows draw on one thread each, and a picture's overlays keep to the dark theme within a light window.
+    static COLORS: Cell<&'static Colors> = const { Cell::new(&DARK) };
+}
+
+macro_rules! colors {
+    ($($name:ident),*) => {
+        $(pub(crate) fn $name() -> Color32 {
+            COLORS.get().$name
+        })*
+    };
+}
+
+colors!(accent, on_accent, panel, canvas, surface, line, text, weak, good, warning, error);
+
+/// Takes the colors of the window's theme, at the start of a frame.
+pub(crate) fn begin_frame(ctx: &egui::Context) {
+    COLORS.set(colors_of(ctx.theme()));
+}
+
+/// Draws in the dark theme whatever the window's is, cards and menus over it too: colors of a picture are judged on
+/// dark ground.
+pub(crate) fn dark<T>(ui: &mut Ui, add: impl FnOnce(&mut Ui) -> T) -> T {
+    let ctx = ui.ctx().clone();
+    let (colors, preference) = (COLORS.replace(&DARK), ctx.options(|o| o.theme_preference));
+    ctx.set_theme(Theme::Dark);
+    ui.set_style(ctx.style_of(Theme::Dark));
+    let shown = add(ui);
+    ctx.set_theme(preference);
+    COLORS.set(colors);
+    shown
+}
+
+fn colors_of(theme: Theme) -> &'static Colors {
+    match theme {
+        Theme::Dark => &DARK,
+        Theme::Light => &LIGHT,
+    }
+}
 
 /// The color of a message.
 pub(crate) fn tone_color(tone: Tone) -> Color32 {
     match tone {
-        Tone::Info => TEXT,
-        Tone::Good => GOOD,
-        Tone::Warning => WARNING,
-        Tone::Error => ERROR,
+        Tone::Info => text(),
+        Tone::Good => good(),
+        Tone::Warning => warning(),
+        Tone::Error => error(),
     }
 }
 
 /// Puts the theme on the window.
 pub(crate) fn install(ctx: &egui::Context) {
-    ctx.set_theme(Theme::Dark);
     super::fonts::install(ctx);
-    ctx.style_mut_of(Theme::Dark, |style| {
-        style.visuals = visuals();
-        spacing(style);
-        style.animation_time = 0.1;
-        style.text_styles = [
-            (TextStyle::Heading, FontId::proportional(19.0)),
-            (TextStyle::Body, FontId::proportional(13.5)),
-            (TextStyle::Button, FontId::proportional(13.5)),
-            (TextStyle::Small, FontId::proportional(11.5)),
-            (TextStyle::Monospace, FontId::monospace(12.5)),
-        ]
-        .into();
-    });
+    for theme in [Theme::Dark, Theme::Light] {
+        ctx.style_mut_of(theme, |style| style_in(style, theme));
+    }
+}
+
+fn style_in(style: &mut Style, theme: Theme) {
+    style.visuals = visuals(theme);
+    spacing(style);
+    style.animation_time = 0.1;
+    style.text_styles = [
+        (TextStyle::Heading, FontId::proportional(19.0)),
+        (TextStyle::Body, FontId::proportional(13.5)),
+        (TextStyle::Button, FontId::proportional(13.5)),
+        (TextStyle::Small, FontId::proportional(11.5)),
+        (TextStyle::Monospace, FontId::monospace(12.5)),
+    ]
+    .into();
 }
 
 fn spacing(style: &mut Style) {
@@ -61,35 +151,36 @@ fn spacing(style: &mut Style) {
     s.scroll.floating = true;
 }
 
-fn visuals() -> Visuals {
-    let mut v = Visuals::dark();
+fn visuals(theme: Theme) -> Visuals {
+    let c = colors_of(theme);
+    let mut v = theme.default_visuals();
     // A blinking one has the whole window drawn twice a second, for as long as a box has the keyboard.
     v.text_cursor.blink = false;
-    v.panel_fill = PANEL;
-    v.window_fill = PANEL;
-    v.extreme_bg_color = CANVAS;
-    v.text_edit_bg_color = Some(CANVAS);
-    v.faint_bg_color = SURFACE;
-    v.code_bg_color = SURFACE;
-    v.window_stroke = Stroke::new(1.0, LINE);
+    v.panel_fill = c.panel;
+    v.window_fill = c.panel;
+    v.extreme_bg_color = c.canvas;
+    v.text_edit_bg_color = Some(c.canvas);
+    v.faint_bg_color = c.surface;
+    v.code_bg_color = c.surface;
+    v.window_stroke = Stroke::new(1.0, c.line);
     v.window_corner_radius = CornerRadius::same(10);
     v.menu_corner_radius = CornerRadius::same(8);
-    v.weak_text_color = Some(WEAK);
-    v.hyperlink_color = ACCENT;
-    v.warn_fg_color = WARNING;
-    v.error_fg_color = ERROR;
-    v.selection.bg_fill = ACCENT.gamma_multiply(0.28);
-    v.selection.stroke = Stroke::new(1.0, ACCENT);
+    v.weak_text_color = Some(c.weak);
+    v.hyperlink_color = c.accent;
+    v.warn_fg_color = c.warning;
+    v.error_fg_color = c.error;
+    v.selection.bg_fill = c.accent.gamma_multiply(0.28);
+    v.selection.stroke = Stroke::new(1.0, c.accent);
     v.slider_trailing_fill = true;
     v.striped = false;
     let w = &mut v.widgets;
-    w.noninteractive.bg_stroke = Stroke::new(1.0, LINE);
-    w.noninteractive.fg_stroke = Stroke::new(1.0, TEXT);
+    w.noninteractive.bg_stroke = Stroke::new(1.0, c.line);
+    w.noninteractive.fg_stroke = Stroke::new(1.0, c.text);
     let states = [
-        (&mut w.inactive, SURFACE, Color32::TRANSPARENT, TEXT),
-        (&mut w.hovered, Color32::from_rgb(0x2c, 0x30, 0x38), Color32::from_rgb(0x45, 0x4b, 0x57), Color32::WHITE),
-        (&mut w.active, Color32::from_rgb(0x36, 0x3b, 0x45), ACCENT, Color32::WHITE),
-        (&mut w.open, Color32::from_rgb(0x2c, 0x30, 0x38), LINE, Color32::WHITE),
+        (&mut w.inactive, c.surface, Color32::TRANSPARENT, c.text),
+        (&mut w.hovered, c.hovered, c.pressed, c.strong),
+        (&mut w.active, c.pressed, c.accent, c.strong),
+        (&mut w.open, c.hovered, c.line, c.strong),
     ];
     for (state, fill, border, text) in states {
         state.bg_fill = fill;
@@ -105,22 +196,22 @@ fn visuals() -> Visuals {
 
 /// The frame of a dialog.
 pub(crate) fn dialog() -> egui::Frame {
-    egui::Frame::new().fill(PANEL).stroke(Stroke::new(1.0, LINE)).corner_radius(10).inner_margin(18)
+    egui::Frame::new().fill(panel()).stroke(Stroke::new(1.0, line())).corner_radius(10).inner_margin(18)
 }
 
 /// The one button of a group that a user most likely wants.
 pub(crate) fn primary_button(text: &str) -> egui::Button<'static> {
-    egui::Button::new(RichText::new(text.to_owned()).color(ON_ACCENT).strong()).fill(ACCENT).stroke(Stroke::NONE)
+    egui::Button::new(RichText::new(text.to_owned()).color(on_accent()).strong()).fill(accent()).stroke(Stroke::NONE)
 }
 
 /// A small title over a group of things.
-pub(crate) fn section(ui: &mut egui::Ui, title: &str) {
+pub(crate) fn section(ui: &mut Ui, title: &str) {
     ui.add_space(6.0);
-    ui.label(RichText::new(title).small().strong().color(WEAK));
+    ui.label(RichText::new(title).small().strong().color(weak()));
 }
 
 /// A round mark in the color of a message.
-pub(crate) fn mark(ui: &mut egui::Ui, tone: Tone, size: f32) {
+pub(crate) fn mark(ui: &mut Ui, tone: Tone, size: f32) {
     let (rect, _) = ui.allocate_exact_size(egui::Vec2::splat(size), egui::Sense::hover());
     let (color, c, r) = (tone_color(tone), rect.center(), 0.5 * size);
     ui.painter().circle_filled(c, r, color.gamma_multiply(0.22));
@@ -147,8 +238,37 @@ pub(crate) fn mark(ui: &mut egui::Ui, tone: Tone, size: f32) {
 /// A translucent card, for what lies over the viewport.
 pub(crate) fn overlay() -> egui::Frame {
     egui::Frame::new()
-        .fill(Color32::from_rgba_unmultiplied(0x14, 0x16, 0x1a, 225))
-        .stroke(Stroke::new(1.0, LINE))
+        .fill(COLORS.get().overlay)
+        .stroke(Stroke::new(1.0, line()))
         .corner_radius(8)
         .inner_margin(Margin::symmetric(8, 5))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Contrast by WCAG 2.1, 1 to 21.
+    fn contrast(a: Color32, b: Color32) -> f32 {
+        let luminance = |c: Color32| {
+            let [r, g, b, _] = egui::Rgba::from(c).to_array();
+            0.2126 * r + 0.7152 * g + 0.0722 * b
+        };
+        let (a, b) = (luminance(a), luminance(b));
+        (a.max(b) + 0.05) / (a.min(b) + 0.05)
+    }
+
+    #[test]
+    fn text_can_be_read_in_both_themes() {
+        for c in [&DARK, &LIGHT] {
+            for ground in [c.panel, c.canvas] {
+                for text in [c.text, c.strong, c.weak, c.good, c.warning, c.error, c.accent] {
+                    assert!(contrast(text, ground) >= 4.5, "{text:?} on {ground:?}: {}", contrast(text, ground));
+                }
+            }
+            assert!(contrast(c.text, c.surface) >= 7.0 && contrast(c.on_accent, c.accent) >= 4.5);
+        }
+        // The control: what cannot be read is told.
+        assert!(contrast(DARK.line, DARK.panel) < 2.0);
+    }
 }

@@ -7,7 +7,7 @@ mod timeline;
 use std::collections::VecDeque;
 use std::path::Path;
 
-use egui::{Button, ComboBox, DragValue, RichText, Slider, Ui};
+use egui::{Button, ComboBox, DragValue, Grid, RichText, Slider, Ui};
 
 use self::player::{Clip, Player};
 use super::panes::bars;
@@ -28,9 +28,9 @@ pub(crate) struct CameraPane {
     /// The key that was chosen.
     selected: Option<usize>,
     /// The path as it was last made a video of.
-    filmed: Option<(CameraPath, Speed)>,
+    loaded: Option<(CameraPath, Speed)>,
     /// Height of videos, px.
-    film_height: u32,
+    video_height: u32,
     /// Quality of videos, 0 to 100.
     quality: u8,
     /// Whether what was found is marked in videos.
@@ -48,8 +48,8 @@ impl Default for CameraPane {
             speed: Speed::Constant,
             player: Player::default(),
             selected: None,
-            filmed: None,
-            film_height: 720,
+            loaded: None,
+            video_height: 720,
             quality: 80,
             mark: false,
             next: VecDeque::new(),
@@ -129,7 +129,7 @@ impl CameraPane {
 
     /// Makes the path what is played.
     fn put_path_in(&mut self) {
-        self.filmed = Some((self.path.clone(), self.speed));
+        self.loaded = Some((self.path.clone(), self.speed));
         match CameraSpline::new(&self.path, self.speed) {
             Some(spline) if matches!(self.player.clip(), Some(Clip::Path(_))) => {
                 self.player.replace(Some(Clip::Path(Box::new(spline))));
@@ -142,7 +142,7 @@ impl CameraPane {
     /// The video of the path as it is.
     fn keep_up(&mut self) {
         let is_path = matches!(self.player.clip(), Some(Clip::Path(_)) | None);
-        let current = self.filmed.as_ref().is_some_and(|(path, speed)| *path == self.path && *speed == self.speed);
+        let current = self.loaded.as_ref().is_some_and(|(path, speed)| *path == self.path && *speed == self.speed);
         if is_path && !current {
             self.put_path_in();
         }
@@ -150,7 +150,7 @@ impl CameraPane {
 
     /// The cameras of a video of what is played, and how it is written; `None` if there is nothing.
     pub(crate) fn video(&self, out: &Path, aspect: f64) -> Option<(Vec<Camera>, VideoSettings)> {
-        let height = self.film_height;
+        let height = self.video_height;
         let width = (((f64::from(height) * aspect) / 2.0).round().max(1.0) * 2.0) as u32;
         let clip = self.player.clip()?;
         let frames = steps_of(clip.seconds(), self.path.fps, MOST_PICTURES);
@@ -189,7 +189,10 @@ impl CameraPane {
         ui.add_space(2.0);
         wanted = timeline::show(ui, self).or(wanted);
         ui.add_space(2.0);
-        ui.horizontal_wrapped(|ui| self.tools(ui, state, eye, actions));
+        Grid::new("camera tools")
+            .num_columns(2)
+            .spacing([12.0, 5.0])
+            .show(ui, |ui| self.tools(ui, state, eye, actions));
         if self.path.keys.is_empty() {
             ui.add_space(4.0);
             ui.weak(
@@ -203,14 +206,14 @@ impl CameraPane {
     }
 
     fn controls(&mut self, ui: &mut Ui, actions: &mut Vec<Action>) {
-        let has_reel = self.player.clip().is_some();
+        let has_clip = self.player.clip().is_some();
         let tip = |a: &Action| format!("{}  {}", a.tooltip(), super::keys::label(ui.ctx(), a));
         let play = if self.player.playing { "Pause" } else { "Play" };
         let entries = [("\u{2039}", Action::StepBack), (play, Action::PlayPath), ("\u{203a}", Action::StepForward)];
         let entries = entries.map(|(symbol, action)| (symbol, tip(&action), action));
         for (symbol, tip, action) in entries {
             let button = Button::new(symbol).min_size(egui::vec2(28.0, 24.0));
-            if ui.add_enabled(has_reel, button).on_hover_text(tip).clicked() {
+            if ui.add_enabled(has_clip, button).on_hover_text(tip).clicked() {
                 actions.push(action);
             }
         }
@@ -265,6 +268,18 @@ impl CameraPane {
     }
 
     fn tools(&mut self, ui: &mut Ui, state: &AppState, eye: &Pose, actions: &mut Vec<Action>) {
+        ui.label(caption("Path"));
+        ui.horizontal(|ui| self.path_tools(ui, state, eye, actions));
+        ui.end_row();
+        ui.label(caption("Timing"));
+        ui.horizontal(|ui| self.timing(ui));
+        ui.end_row();
+        ui.label(caption("Video"));
+        ui.horizontal(|ui| self.video_tools(ui, state, actions));
+        ui.end_row();
+    }
+
+    fn path_tools(&mut self, ui: &mut Ui, state: &AppState, eye: &Pose, actions: &mut Vec<Action>) {
         let tip = format!("{}  {}", Action::AddKey.tooltip(), super::keys::label(ui.ctx(), &Action::AddKey));
         if ui.button("Add keyframe").on_hover_text(tip).clicked() {
             self.record(eye);
@@ -277,26 +292,31 @@ impl CameraPane {
                 actions.push(action);
             }
         }
-        ui.separator();
-        ui.label("Duration");
-        ui.add(DragValue::new(&mut self.path.seconds).range(0.1..=3600.0).speed(0.05));
+    }
+
+    fn timing(&mut self, ui: &mut Ui) {
+        let duration = ui.label("Duration").id;
+        ui.add(DragValue::new(&mut self.path.seconds).range(0.1..=3600.0).speed(0.05).suffix(" s"))
+            .labelled_by(duration);
         ui.checkbox(&mut self.path.closed, "Closed loop")
             .on_hover_text("Continue from the last keyframe to the first.");
         let mut eased = self.speed == Speed::Eased;
         ui.checkbox(&mut eased, "Ease in/out").on_hover_text("Start and stop smoothly, also at waits.");
         self.speed = if eased { Speed::Eased } else { Speed::Constant };
-        ui.separator();
+    }
+
+    fn video_tools(&mut self, ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
         let idle = state.job.is_none() && self.player.clip().is_some();
         let button = ui.add_enabled(idle, Button::new("Export video\u{2026}"));
         let why = if state.job.is_some() { "Another job is running." } else { "There is nothing to export." };
         if button.on_hover_text(Action::ExportVideo.tooltip()).on_disabled_hover_text(why).clicked() {
             actions.push(Action::ExportVideo);
         }
-        ComboBox::from_id_salt("video height").selected_text(format!("{} px", self.film_height)).width(72.0).show_ui(
+        ComboBox::from_id_salt("video height").selected_text(format!("{} px", self.video_height)).width(72.0).show_ui(
             ui,
             |ui| {
                 for height in [360, 480, 720, 1080, 2160] {
-                    ui.selectable_value(&mut self.film_height, height, format!("{height} px"));
+                    ui.selectable_value(&mut self.video_height, height, format!("{height} px"));
                 }
             },
         );
@@ -318,5 +338,5 @@ pub(crate) fn write(file: &Path, path: &CameraPath, aspect: f64) -> Result<(), S
 }
 
 fn caption(text: &str) -> RichText {
-    RichText::new(text).small().color(theme::WEAK)
+    RichText::new(text).small().color(theme::weak())
 }

@@ -1,6 +1,6 @@
 //! The timeline: where in time one is, and keys that can be dragged to other times.
 
-use egui::{CursorIcon, Rect, Sense, Stroke, Ui, pos2, vec2};
+use egui::{CursorIcon, FontId, Rect, Sense, Stroke, Ui, pos2, vec2};
 
 use super::super::theme;
 use super::CameraPane;
@@ -8,7 +8,7 @@ use super::player::Clip;
 use crate::navigate::Pose;
 
 /// Height of the timeline, points.
-const HEIGHT: f32 = 26.0;
+const HEIGHT: f32 = 40.0;
 /// How near the pointer must come to a key, points.
 const REACH: f32 = 7.0;
 
@@ -18,7 +18,8 @@ pub(crate) fn show(ui: &mut Ui, pane: &mut CameraPane) -> Option<Pose> {
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, "Timeline"));
     let line = rect.shrink2(vec2(8.0, 0.0));
     let painter = ui.painter_at(rect);
-    painter.rect_filled(rect.shrink2(vec2(0.0, 5.0)), 6.0, theme::CANVAS);
+    let track = rect.with_max_y(rect.top() + 24.0);
+    painter.rect_filled(track.shrink2(vec2(0.0, 4.0)), 6.0, theme::canvas());
     let seconds = pane.player.clip().map_or(0.0, Clip::seconds).max(1e-3);
     let x = |time: f64| line.left() + (time / seconds).clamp(0.0, 1.0) as f32 * line.width();
     let time = |x: f32| f64::from(((x - line.left()) / line.width().max(1.0)).clamp(0.0, 1.0)) * seconds;
@@ -61,18 +62,18 @@ pub(crate) fn show(ui: &mut Ui, pane: &mut CameraPane) -> Option<Pose> {
     for (i, [arrives, leaves]) in times.iter().take(pane.path.keys.len()).enumerate() {
         let (a, b) = (x(*arrives), x(*leaves));
         if b - a > 1.0 {
-            let wait = Rect::from_min_max(pos2(a, rect.center().y - 2.0), pos2(b, rect.center().y + 2.0));
-            painter.rect_filled(wait, 2.0, theme::WARNING);
+            let wait = Rect::from_min_max(pos2(a, track.center().y - 2.0), pos2(b, track.center().y + 2.0));
+            painter.rect_filled(wait, 2.0, theme::warning());
         }
         let chosen = pane.selected == Some(i);
-        let (size, color) = if chosen { (7.0, theme::ACCENT) } else { (5.0, theme::TEXT) };
-        let c = pos2(a, rect.center().y);
+        let (size, color) = if chosen { (7.0, theme::accent()) } else { (5.0, theme::text()) };
+        let c = pos2(a, track.center().y);
         let corners = [vec2(0.0, -size), vec2(size, 0.0), vec2(0.0, size), vec2(-size, 0.0)].map(|v| c + v);
-        painter.add(egui::Shape::convex_polygon(corners.to_vec(), color, Stroke::new(1.0, theme::PANEL)));
+        painter.add(egui::Shape::convex_polygon(corners.to_vec(), color, Stroke::new(1.0, theme::panel())));
     }
     if pane.player.clip().is_some() {
         let at = x(pane.player.time);
-        painter.line_segment([pos2(at, rect.top()), pos2(at, rect.bottom())], Stroke::new(2.0, theme::ACCENT));
+        painter.line_segment([pos2(at, track.top()), pos2(at, track.bottom())], Stroke::new(2.0, theme::accent()));
     }
     if let Some(at) = response.hover_pos() {
         let over = near(at);
@@ -88,12 +89,24 @@ pub(crate) fn show(ui: &mut Ui, pane: &mut CameraPane) -> Option<Pose> {
     wanted
 }
 
+/// Ticks below the track, with seconds wherever there is room for a number.
 fn ticks(painter: &egui::Painter, line: Rect, seconds: f64, x: impl Fn(f64) -> f32) {
+    const ROOM: f32 = 44.0;
     let step = [0.1, 0.5, 1.0, 5.0, 10.0, 60.0, 300.0].into_iter().find(|s| seconds / s <= 24.0).unwrap_or(900.0);
+    let every = ((ROOM / (x(step) - x(0.0)).max(1.0)).ceil() as usize).max(1);
     for i in 0..=(seconds / step) as usize {
-        let at = x(i as f64 * step);
-        let stroke = Stroke::new(1.0, theme::WEAK.gamma_multiply(0.5));
-        painter.line_segment([pos2(at, line.bottom() - 9.0), pos2(at, line.bottom() - 6.0)], stroke);
+        let (at, time) = (x(i as f64 * step), i as f64 * step);
+        let has_number = i.is_multiple_of(every);
+        let stroke = Stroke::new(1.0, theme::weak().gamma_multiply(if has_number { 0.9 } else { 0.4 }));
+        painter.line_segment([pos2(at, line.top() + 24.0), pos2(at, line.top() + 28.0)], stroke);
+        if has_number {
+            let text = if step < 1.0 { format!("{time:.1} s") } else { format!("{time:.0} s") };
+            // The first and the last stay within the track.
+            let galley = painter.layout_no_wrap(text, FontId::proportional(10.5), theme::weak());
+            let half = 0.5 * galley.size().x;
+            let left = at.clamp(line.left() - 8.0 + half, line.right() + 8.0 - half) - half;
+            painter.galley(pos2(left, line.top() + 27.0), galley, theme::weak());
+        }
     }
 }
 

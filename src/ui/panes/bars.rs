@@ -10,7 +10,7 @@ use super::super::{keys, theme};
 use crate::math::format;
 use crate::pipeline::observer::Progress;
 use crate::scene::text;
-use crate::ui::actions::{Action, Axis, Pane};
+use crate::ui::actions::{Action, Axis, Pane, THEMES};
 use crate::worker::ViewMode;
 use crate::worker::view::ViewPicture;
 
@@ -73,9 +73,23 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut 
                 item(ui, has_photos, None, action, actions);
             }
             ui.separator();
-            for &pane in Pane::VARIANTS {
-                item(ui, true, Some(layout.shows(pane)), Action::TogglePane(pane), actions);
-            }
+            item(ui, has_scene, None, Action::FillWindow, actions);
+            ui.menu_button("Panes", |ui| {
+                for &pane in Pane::VARIANTS {
+                    item(ui, true, Some(layout.shows(pane)), Action::TogglePane(pane), actions);
+                }
+                ui.separator();
+                item(ui, true, None, Action::ResetPanes, actions);
+            });
+            ui.menu_button("Theme and text size", |ui| {
+                for theme in THEMES {
+                    item(ui, true, Some(layout.theme == theme), Action::UseTheme(theme), actions);
+                }
+                ui.separator();
+                for action in [Action::LargerText, Action::SmallerText, Action::NormalText] {
+                    item(ui, true, None, action, actions);
+                }
+            });
         });
         ui.menu_button("Train", |ui| {
             ui.set_min_width(260.0);
@@ -94,7 +108,7 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut 
             ui.label(RichText::new(&scene.name).strong()).on_hover_text(text::path(&scene.path));
         }
         ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
-            let search = Button::new(RichText::new("Search actions").color(theme::WEAK))
+            let search = Button::new(RichText::new("Search actions").color(theme::weak()))
                 .shortcut_text(keys::label(ui.ctx(), &Action::Palette));
             if ui.add(search).on_hover_text(Action::Palette.tooltip()).clicked() {
                 actions.push(Action::Palette);
@@ -138,7 +152,7 @@ pub(crate) fn status(
     ui.horizontal(|ui| {
         match &state.job {
             Some(job) => {
-                dot(ui, if job.paused { theme::WARNING } else { theme::ACCENT });
+                dot(ui, if job.paused { theme::warning() } else { theme::accent() });
                 let title = if job.paused { format!("{} (paused)", job.title) } else { job.title.clone() };
                 ui.label(RichText::new(title).strong());
                 if let Some(p) = &job.progress {
@@ -152,7 +166,7 @@ pub(crate) fn status(
             }
             None => {
                 ui.label(
-                    RichText::new(if state.scene.is_some() { "Ready" } else { "Nothing open" }).color(theme::WEAK),
+                    RichText::new(if state.scene.is_some() { "Ready" } else { "Nothing open" }).color(theme::weak()),
                 );
             }
         }
@@ -164,8 +178,8 @@ pub(crate) fn status(
             if let Some(p) = picture {
                 let text = RichText::new(format!("Rendered on {}", p.drawn_by)).small();
                 match &p.instead_of_gpu {
-                    Some(why) => ui.label(text.color(theme::WARNING)).on_hover_text(why),
-                    None => ui.label(text.color(theme::WEAK)),
+                    Some(why) => ui.label(text.color(theme::warning())).on_hover_text(why),
+                    None => ui.label(text.color(theme::weak())),
                 };
             }
         });
@@ -180,11 +194,11 @@ fn dot(ui: &mut Ui, color: egui::Color32) {
 
 fn progress(ui: &mut Ui, p: &Progress, paused: bool) {
     let fraction = p.done as f32 / p.total.max(1) as f32;
-    let fill = if paused { theme::WARNING } else { theme::ACCENT };
+    let fill = if paused { theme::warning() } else { theme::accent() };
     ui.add(egui::ProgressBar::new(fraction).desired_width(140.0).desired_height(6.0).fill(fill));
     let mut parts = vec![format!("{} of {}", format::count(p.done), format::count(p.total))];
     if p.rate > 0.0 && !paused {
         parts.push(format!("{} left", p.eta_secs().map_or_else(|| "–".into(), format::duration)));
     }
-    ui.label(RichText::new(format!("{}  {}", p.stage, parts.join("  ·  "))).color(theme::WEAK));
+    ui.label(RichText::new(format!("{}  {}", p.stage, parts.join("  ·  "))).color(theme::weak()));
 }

@@ -135,7 +135,7 @@ impl PhotoThumbnails {
         });
         let picture = Rect::from_min_max(rect.min, pos2(rect.right(), rect.bottom() - CAPTION));
         let painter = ui.painter();
-        painter.rect_filled(picture, 5.0, theme::CANVAS);
+        painter.rect_filled(picture, 5.0, theme::canvas());
         match self.loaded.get(&index) {
             Some(texture) => {
                 let s = texture.size_vec2();
@@ -144,23 +144,23 @@ impl PhotoThumbnails {
                 painter.image(texture.id(), Rect::from_center_size(picture.center(), s * scale), uv, Color32::WHITE);
             }
             None if self.failed.contains(&index) => {
-                text(ui, picture.center(), egui::Align2::CENTER_CENTER, "unreadable", theme::WARNING);
+                text(ui, picture.center(), egui::Align2::CENTER_CENTER, "unreadable", theme::warning());
             }
             None => {}
         }
         let border = match (selected, response.hovered()) {
-            (true, _) => Stroke::new(2.0, theme::ACCENT),
-            (false, true) => Stroke::new(1.0, theme::WEAK),
-            (false, false) => Stroke::new(1.0, theme::LINE),
+            (true, _) => Stroke::new(2.0, theme::accent()),
+            (false, true) => Stroke::new(1.0, theme::weak()),
+            (false, false) => Stroke::new(1.0, theme::line()),
         };
         ui.painter().rect_stroke(picture, 5.0, border, egui::StrokeKind::Inside);
         let y = rect.bottom() - 0.5 * CAPTION;
         let file = caption.name.rsplit('/').next().unwrap_or(caption.name);
-        let color = if caption.held { theme::WARNING } else { theme::WEAK };
+        let color = if caption.held { theme::warning() } else { theme::weak() };
         let room = if caption.psnr.is_some() { 9 } else { 16 };
         text(ui, pos2(rect.left() + 2.0, y), egui::Align2::LEFT_CENTER, &text::elided(file, room), color);
         if let Some(psnr) = caption.psnr {
-            text(ui, pos2(rect.right() - 2.0, y), egui::Align2::RIGHT_CENTER, &format!("{psnr:.1} dB"), theme::TEXT);
+            text(ui, pos2(rect.right() - 2.0, y), egui::Align2::RIGHT_CENTER, &format!("{psnr:.1} dB"), theme::text());
         }
         let use_ = if caption.held { "held out for evaluation" } else { "used for training" };
         response.on_hover_text(format!("{}\n{use_}\nClick to look through its camera", caption.name)).clicked()
@@ -182,17 +182,17 @@ fn facts(ui: &mut Ui, dataset: &Dataset, train: usize, test: usize) {
     ui.label(RichText::new(&dataset.name).heading()).on_hover_text(text::path(&dataset.root));
     let size = dataset.photos.first().map(|p| format!("{} x {} px", p.camera.width_px, p.camera.height_px));
     let parts = [Some(dataset.format.clone()), size];
-    ui.label(RichText::new(parts.into_iter().flatten().collect::<Vec<_>>().join("  ·  ")).color(theme::WEAK));
+    ui.label(RichText::new(parts.into_iter().flatten().collect::<Vec<_>>().join("  ·  ")).color(theme::weak()));
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        ui.label(RichText::new(format!("{train} train")).color(theme::TEXT));
+        ui.label(RichText::new(format!("{train} train")).color(theme::text()));
         ui.weak("·");
-        ui.label(RichText::new(format!("{test} held-out")).color(theme::WARNING));
+        ui.label(RichText::new(format!("{test} held-out")).color(theme::warning()));
         ui.weak(format!("·  {} points", format::count(dataset.points.len() as u64)));
     });
     if !dataset.warnings.is_empty() {
         let text = format!("{} warning{}", dataset.warnings.len(), if dataset.warnings.len() == 1 { "" } else { "s" });
-        ui.label(RichText::new(text).color(theme::WARNING)).on_hover_text(text::lines(&dataset.warnings.join("\n")));
+        ui.label(RichText::new(text).color(theme::warning())).on_hover_text(text::lines(&dataset.warnings.join("\n")));
     }
 }
 

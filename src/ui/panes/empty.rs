@@ -81,9 +81,9 @@ impl FirstPage {
                 ui.add_space(((room.x - width) * 0.5).max(0.0));
                 ui.vertical(|ui| {
                     ui.set_width(width);
-                    ui.label(RichText::new("FMLGS").size(34.0).strong().color(theme::TEXT));
+                    ui.label(RichText::new("FMLGS").size(34.0).strong().color(theme::text()));
                     let what = "3D Gaussians with objects and parts, from posed photos";
-                    ui.label(RichText::new(what).size(15.0).color(theme::WEAK));
+                    ui.label(RichText::new(what).size(15.0).color(theme::weak()));
                     ui.add_space(16.0);
                     self.start(ui, width, actions);
                     self.recent(ui, width, state, actions);
@@ -122,7 +122,7 @@ impl FirstPage {
                         demo::QUESTION
                     ))
                     .small()
-                    .color(theme::WEAK),
+                    .color(theme::weak()),
                 );
                 ui.add_space(10.0);
                 button(ui, Button::new("Open folder…"), Action::OpenFolder);
@@ -136,7 +136,7 @@ impl FirstPage {
             return;
         }
         ui.add_space(18.0);
-        ui.label(RichText::new("Recent").small().strong().color(theme::WEAK));
+        ui.label(RichText::new("Recent").small().strong().color(theme::weak()));
         let gap = 10.0;
         let size = vec2((width - gap * (COLUMNS - 1) as f32) / COLUMNS as f32, 0.23 * width);
         for row in state.recent.iter().take(RECENT).collect::<Vec<_>>().chunks(COLUMNS) {
@@ -160,7 +160,7 @@ impl FirstPage {
         let label = name.clone();
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &label));
         let painter = ui.painter().with_clip_rect(rect);
-        painter.rect_filled(rect, 8.0, theme::SURFACE);
+        painter.rect_filled(rect, 8.0, theme::surface());
         if let Some(texture) = self.recent.get(path) {
             Image::new(texture).uv(filling(texture.size_vec2(), size)).corner_radius(8).paint_at(ui, rect);
         }
@@ -173,7 +173,7 @@ impl FirstPage {
         let small = FontId::proportional(10.5);
         painter.text(at + vec2(0.0, 17.0), Align2::LEFT_TOP, parent, small, Color32::from_gray(200));
         if response.hovered() || response.has_focus() {
-            ui.painter().rect_stroke(rect, 8.0, Stroke::new(1.5, theme::ACCENT), egui::StrokeKind::Inside);
+            ui.painter().rect_stroke(rect, 8.0, Stroke::new(1.5, theme::accent()), egui::StrokeKind::Inside);
         }
         response.clicked()
     }
@@ -188,13 +188,13 @@ fn filling(picture: Vec2, place: Vec2) -> Rect {
 fn drop_area(ui: &mut Ui, width: f32) {
     let (rect, _) = ui.allocate_exact_size(vec2(width, 62.0), Sense::hover());
     let corners = [rect.left_top(), rect.right_top(), rect.right_bottom(), rect.left_bottom(), rect.left_top()];
-    ui.painter().extend(Shape::dashed_line(&corners, Stroke::new(1.0, theme::WEAK), 6.0, 5.0));
+    ui.painter().extend(Shape::dashed_line(&corners, Stroke::new(1.0, theme::weak()), 6.0, 5.0));
     let mut child = ui.new_child(egui::UiBuilder::new().max_rect(rect.shrink(8.0)));
     child.vertical_centered(|ui| {
-        ui.label(RichText::new("Drop a folder or a file anywhere in the window").color(theme::TEXT));
+        ui.label(RichText::new("Drop a folder or a file anywhere in the window").color(theme::text()));
         let formats =
             "COLMAP  ·  transforms.json  ·  Blender  ·  LLFF  ·  photos  ·  splat .ply, .sog  ·  trained scene";
-        ui.label(RichText::new(formats).small().color(theme::WEAK));
+        ui.label(RichText::new(formats).small().color(theme::weak()));
     });
 }
 
@@ -208,10 +208,10 @@ fn busy(ui: &mut Ui, job: &RunningJob, actions: &mut Vec<Action>) {
         match &job.progress {
             Some(p) => {
                 let fraction = p.done as f32 / p.total.max(1) as f32;
-                ui.add(ProgressBar::new(fraction).desired_height(8.0).fill(theme::ACCENT));
+                ui.add(ProgressBar::new(fraction).desired_height(8.0).fill(theme::accent()));
                 let left = p.eta_secs().map_or_else(String::new, |s| format!("  ·  {} left", format::duration(s)));
                 let text = format!("{}  {} of {}{left}", p.stage, format::count(p.done), format::count(p.total));
-                ui.label(RichText::new(text).color(theme::WEAK));
+                ui.label(RichText::new(text).color(theme::weak()));
             }
             None => {
                 ui.spinner();
@@ -220,7 +220,7 @@ fn busy(ui: &mut Ui, job: &RunningJob, actions: &mut Vec<Action>) {
         if job.kind == JobKind::DemoPhotos {
             ui.add_space(6.0);
             ui.label(
-                RichText::new("The photos are rendered once; training then starts automatically.").color(theme::WEAK),
+                RichText::new("The photos are rendered once; training then starts automatically.").color(theme::weak()),
             );
         }
         ui.add_space(14.0);

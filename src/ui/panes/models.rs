@@ -40,9 +40,9 @@ impl Models {
         }
         choose(ui, &known.models, finding);
         let engine = known.engine.as_ref().map_or_else(|| "none".to_owned(), |names| names.join(", "));
-        ui.label(RichText::new(format!("Inference engine: {engine}")).small().color(theme::WEAK));
+        ui.label(RichText::new(format!("Inference engine: {engine}")).small().color(theme::weak()));
         if let Some(note) = &known.note {
-            ui.label(RichText::new(note).small().color(theme::WARNING));
+            ui.label(RichText::new(note).small().color(theme::warning()));
         }
     }
 }
@@ -121,16 +121,16 @@ fn one(ui: &mut Ui, entry: &ModelEntry, model: &ModelState, idle: bool, actions:
     ui.horizontal(|ui| {
         ui.label(RichText::new(&entry.title).strong());
         let (text, color) = match model {
-            ModelState::BuiltIn => ("built in", theme::GOOD),
-            ModelState::Here => ("installed", theme::GOOD),
-            ModelState::Missing(_) => ("not installed", theme::WEAK),
-            ModelState::Broken(_) => ("broken", theme::WARNING),
+            ModelState::BuiltIn => ("built in", theme::good()),
+            ModelState::Here => ("installed", theme::good()),
+            ModelState::Missing(_) => ("not installed", theme::weak()),
+            ModelState::Broken(_) => ("broken", theme::warning()),
         };
         ui.label(RichText::new(text).small().color(color));
     });
-    ui.label(RichText::new(&entry.adds).small().color(theme::WEAK));
+    ui.label(RichText::new(&entry.adds).small().color(theme::weak()));
     if let ModelState::Broken(problem) = model {
-        ui.label(RichText::new(problem).small().color(theme::WARNING));
+        ui.label(RichText::new(problem).small().color(theme::warning()));
     }
     if matches!(model, ModelState::Missing(_) | ModelState::Broken(_)) {
         ui.horizontal(|ui| {
@@ -153,7 +153,7 @@ fn one(ui: &mut Ui, entry: &ModelEntry, model: &ModelState, idle: bool, actions:
                 entry.megabytes(),
                 entry.license
             );
-            ui.label(RichText::new(text).small().color(theme::WEAK));
+            ui.label(RichText::new(text).small().color(theme::weak()));
         }
     }
     ui.add_space(4.0);

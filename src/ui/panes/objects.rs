@@ -1,7 +1,9 @@
 //! The objects and parts of the scene, as a tree; a click asks for one.
 
 use egui::collapsing_header::CollapsingState;
-use egui::{Align, Button, Checkbox, CollapsingHeader, Color32, Id, Key, RichText, ScrollArea, TextEdit, Ui, vec2};
+use egui::{
+    Align, Button, Checkbox, CollapsingHeader, Color32, Id, Key, Layout, Rect, RichText, ScrollArea, TextEdit, Ui, vec2,
+};
 
 use super::super::labels::{self, ScreenNames};
 use super::super::state::AppState;
@@ -10,7 +12,7 @@ use super::super::theme;
 use super::super::viewport::visible::Visibility;
 use super::bars;
 use super::object_thumbnails::ObjectThumbnails;
-use crate::math::format::things;
+use crate::math::format::{self, things};
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::edit::Edit;
 use crate::scene::{Identities, IdentityId, Level, NOBODY};
@@ -18,6 +20,9 @@ use crate::ui::actions::Action;
 
 /// Side of a thumbnail, points.
 const THUMBNAIL_PX: f32 = 30.0;
+
+/// Width of the column of counts, points: "1,234,567".
+const COUNT_PT: f32 = 58.0;
 
 /// The list, and the name in it that is being typed.
 #[derive(Default)]
@@ -109,7 +114,12 @@ impl Tree<'_> {
     fn branch(&mut self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
         let pieces: Vec<IdentityId> = self.identities.children(id).collect();
         if pieces.is_empty() {
-            return self.leaf(ui, id, actions);
+            // In line with those that can be unfolded.
+            ui.horizontal(|ui| {
+                ui.add_space(ui.spacing().indent);
+                self.row(ui, id, actions);
+            });
+            return;
         }
         let mut state = CollapsingState::load_with_default_open(ui.ctx(), Id::unique("branch").with(id), false);
         let is_within = |piece: IdentityId| self.identities.ancestors(piece).skip(1).any(|whole| whole == id);
@@ -117,43 +127,60 @@ impl Tree<'_> {
         if renamed.into_iter().chain(self.scroll_to).any(is_within) {
             state.set_open(true);
         }
-        let header = state.show_header(ui, |ui| self.leaf(ui, id, actions));
+        let header = state.show_header(ui, |ui| self.row(ui, id, actions));
         header.body(|ui| self.branches(ui, Id::unique("pieces").with(id), pieces, actions));
     }
 
-    fn leaf(&mut self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
-        ui.horizontal(|ui| {
-            let drawn = self.visibility.draws(self.identities, id);
-            let mut ticked = drawn != Some(false);
-            let tick = Checkbox::new(&mut ticked, "").indeterminate(drawn.is_none());
-            let tick = ui.add(tick).on_hover_text("Visible");
-            if tick.accessible_name(format!("{} is visible", self.identities.full_name(id))).changed() {
-                actions.push(Action::Hide(id));
-            }
-            self.object_thumbnails.show(ui, id, THUMBNAIL_PX);
-            let code = self.identities.get(id).map_or([0.5; 3], |i| i.code).map(|c| (c * 255.0) as u8);
-            let (rect, _) = ui.allocate_exact_size(vec2(11.0, 11.0), egui::Sense::hover());
-            ui.painter().rect_filled(rect, 3.0, Color32::from_rgb(code[0], code[1], code[2]));
-            if self.renaming.as_ref().is_some_and(|r| r.id == id) {
-                return self.name_field(ui, actions);
-            }
-            let is_selected = self.selected == Some(id);
-            let name = Button::new(self.labels.name(self.identities, id)).selected(is_selected);
-            let name = ui.add(name.frame_when_inactive(is_selected));
-            if self.scroll_to == Some(id) {
-                name.scroll_to_me(Some(Align::Center));
-            }
-            let name = name.on_hover_text("Select it and highlight it in the view; double-click to rename it");
-            if name.clicked() {
-                actions.extend([Action::Select(Some(id)), Action::Ask(self.identities.full_name(id))]);
-            }
-            if name.double_clicked() {
-                self.start_renaming(id);
-            }
-            self.menu(ui, id, actions);
-            let size = self.sizes.get(id as usize).unwrap_or(&0).to_string();
-            ui.label(RichText::new(size).small().color(theme::WEAK)).on_hover_text("Gaussians");
+    /// Tick, thumbnail, color and name from the left; Gaussians and menu from the right.
+    fn row(&mut self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
+        let row = Rect::from_min_size(ui.cursor().min, vec2(ui.available_width(), THUMBNAIL_PX));
+        let is_hovered = ui.rect_contains_pointer(row);
+        let drawn = self.visibility.draws(self.identities, id);
+        let mut ticked = drawn != Some(false);
+        let tick = Checkbox::new(&mut ticked, "").indeterminate(drawn.is_none());
+        let tick = ui.add(tick).on_hover_text("Visible");
+        if tick.accessible_name(format!("{} is visible", self.identities.full_name(id))).changed() {
+            actions.push(Action::Hide(id));
+        }
+        self.object_thumbnails.show(ui, id, THUMBNAIL_PX);
+        let code = self.identities.get(id).map_or([0.5; 3], |i| i.code).map(|c| (c * 255.0) as u8);
+        let (rect, _) = ui.allocate_exact_size(vec2(11.0, 11.0), egui::Sense::hover());
+        ui.painter().rect_filled(rect, 3.0, Color32::from_rgb(code[0], code[1], code[2]));
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let size = format::count(self.sizes.get(id as usize).copied().unwrap_or(0) as u64);
+            let size = RichText::new(size).small().monospace().color(theme::weak());
+            // One column, however many digits.
+            let column = vec2(COUNT_PT, ui.available_height());
+            ui.allocate_ui_with_layout(column, Layout::right_to_left(Align::Center), |ui| {
+                ui.set_min_width(COUNT_PT);
+                ui.label(size).on_hover_text("Gaussians");
+            });
+            ui.scope(|ui| {
+                // Always there for the keyboard, in sight where the mouse is.
+                ui.set_opacity(if is_hovered || self.selected == Some(id) { 1.0 } else { 0.25 });
+                self.menu(ui, id, actions);
+            });
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| self.name(ui, id, actions));
         });
+    }
+
+    fn name(&mut self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
+        if self.renaming.as_ref().is_some_and(|r| r.id == id) {
+            return self.name_field(ui, actions);
+        }
+        let is_selected = self.selected == Some(id);
+        let name = Button::new(self.labels.name(self.identities, id)).selected(is_selected).truncate();
+        let name = ui.add(name.frame_when_inactive(is_selected));
+        if self.scroll_to == Some(id) {
+            name.scroll_to_me(Some(Align::Center));
+        }
+        let name = name.on_hover_text("Select it and highlight it in the view; double-click to rename it");
+        if name.clicked() {
+            actions.extend([Action::Select(Some(id)), Action::Ask(self.identities.full_name(id))]);
+        }
+        if name.double_clicked() {
+            self.start_renaming(id);
+        }
     }
 
     fn start_renaming(&mut self, id: IdentityId) {
@@ -164,7 +191,7 @@ impl Tree<'_> {
     fn name_field(&mut self, ui: &mut Ui, actions: &mut Vec<Action>) {
         let Some(Renaming { id, name, frames }) = self.renaming.as_mut() else { return };
         let field = Id::unique("name").with(*id);
-        let edit = ui.add(TextEdit::singleline(name).id(field).char_limit(80).desired_width(170.0));
+        let edit = ui.add(TextEdit::singleline(name).id(field).char_limit(80).desired_width(f32::INFINITY));
         let edit = edit.accessible_name("New name");
         if *frames < 2 {
             // The keyboard comes with the next frame, and puts the cursor behind the name.
@@ -224,7 +251,7 @@ fn show_how_to_begin(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
         RichText::new(
             "Objects and parts are found from masks of one or a few photos; the Gaussians propagate them to all others.",
         )
-        .color(theme::WEAK),
+        .color(theme::weak()),
     );
     ui.add_space(6.0);
     let idle = state.job.is_none() && state.is_trained();
@@ -233,7 +260,7 @@ fn show_how_to_begin(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     if !has_masks {
         let text = "These photos came without masks. Regions of uniform color are used instead: rough and \
                     unnamed.";
-        ui.label(RichText::new(text).color(theme::WEAK));
+        ui.label(RichText::new(text).color(theme::weak()));
     }
     let action = Action::FindObjects;
     let found = ui.add_enabled(idle, button("Find objects")).on_disabled_hover_text(why);

@@ -69,7 +69,7 @@ fn show_rows(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     ScrollArea::both().id_salt("answers").auto_shrink([false, false]).show(ui, |ui| {
         Grid::new("answers").num_columns(7).striped(true).show(ui, |ui| {
             for head in ["View", "Phrase", "Answer", "", "Score", "Area", "IoU"] {
-                ui.label(RichText::new(head).small().color(theme::WEAK));
+                ui.label(RichText::new(head).small().color(theme::weak()));
             }
             ui.end_row();
             rows.iter().take(SHOWN).for_each(|row| show_row(ui, row, actions));

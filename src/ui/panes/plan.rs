@@ -21,9 +21,10 @@ pub(crate) fn show(ui: &mut Ui, plan: &ScenePlan, overrides: &mut Overrides) {
             if !line.overridden {
                 ui.label(&line.choice);
             }
-            ui.label(RichText::new(&line.reason).small().color(theme::WEAK));
+            ui.label(RichText::new(&line.reason).small().color(theme::weak()));
             if !line.saving.is_empty() {
-                let (word, color) = if line.overridden { ("Costs", theme::WARNING) } else { ("Saves", theme::GOOD) };
+                let (word, color) =
+                    if line.overridden { ("Costs", theme::warning()) } else { ("Saves", theme::good()) };
                 ui.label(RichText::new(format!("{word} {}", line.saving)).small().color(color));
             }
         });

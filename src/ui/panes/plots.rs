@@ -47,12 +47,12 @@ pub(crate) fn show(
     };
     let before = !previous.steps.is_empty();
     let dashed = |name: &str, points: &[[f64; 2]]| {
-        Line::new(name, smooth(points)).color(theme::WEAK).width(1.2).style(LineStyle::dashed_loose())
+        Line::new(name, smooth(points)).color(theme::weak()).width(1.2).style(LineStyle::dashed_loose())
     };
     plot("psnr", "PSNR (dB)", *axis)
         .legend(Legend::default().position(egui_plot::Corner::RightBottom).background_alpha(0.5))
         .show(ui, |p| {
-            let colors = [theme::WARNING, theme::GOOD].into_iter().cycle();
+            let colors = [theme::warning(), theme::good()].into_iter().cycle();
             for ((name, curve), color) in curves.iter().zip(colors).filter(|_| over_secs) {
                 p.line(Line::new(name.clone(), PlotPoints::from(curve.clone())).color(color).width(1.2));
             }
@@ -61,19 +61,19 @@ pub(crate) fn show(
                 let held = PlotPoints::from(held(previous));
                 p.line(
                     Line::new("held-out photos (previous run)", held)
-                        .color(theme::WARNING)
+                        .color(theme::warning())
                         .width(1.4)
                         .style(LineStyle::dashed_loose()),
                 );
             }
             let held = held(history);
-            p.line(Line::new("training photos", smooth(&psnr(history))).color(theme::WEAK).width(1.2));
-            p.line(Line::new("held-out photos", PlotPoints::from(held.clone())).color(theme::ACCENT).width(2.0));
+            p.line(Line::new("training photos", smooth(&psnr(history))).color(theme::weak()).width(1.2));
+            p.line(Line::new("held-out photos", PlotPoints::from(held.clone())).color(theme::accent()).width(2.0));
             p.points(
                 Points::new("held-out photos", PlotPoints::from(held))
                     .shape(MarkerShape::Circle)
                     .radius(3.0)
-                    .color(theme::ACCENT),
+                    .color(theme::accent()),
             );
         });
     theme::section(ui, "Loss (L1 + 0.2 D-SSIM)");
@@ -86,7 +86,7 @@ pub(crate) fn show(
         if before {
             p.line(dashed("before", &loss(previous)));
         }
-        p.line(Line::new("loss", smooth(&loss(history))).color(theme::ACCENT).width(1.5));
+        p.line(Line::new("loss", smooth(&loss(history))).color(theme::accent()).width(1.5));
     });
 }
 
@@ -96,7 +96,7 @@ fn plot(name: &'static str, quantity: &'static str, axis: PlotAxis) -> Plot<'sta
         .height(150.0)
         .show_background(false)
         .show_grid(Vec2b::new(true, true))
-        .grid_color(theme::LINE)
+        .grid_color(theme::line())
         .allow_scroll(false)
         .include_x(0.0)
         .allow_boxed_zoom(false)

@@ -13,7 +13,7 @@ pub(crate) fn show(ui: &mut Ui, state: &mut AppState) {
     if state.problems.is_empty() {
         return;
     }
-    let bar = Frame::new().fill(theme::WARNING.gamma_multiply(0.16)).inner_margin(Margin::symmetric(10, 6));
+    let bar = Frame::new().fill(theme::warning().gamma_multiply(0.16)).inner_margin(Margin::symmetric(10, 6));
     let mut dismissed = None;
     Panel::top("problems").frame(bar).show(ui, |ui| {
         for (i, (_, text)) in state.problems.iter().enumerate().take(MOST) {
@@ -30,7 +30,7 @@ pub(crate) fn show(ui: &mut Ui, state: &mut AppState) {
         }
         let more = state.problems.len().saturating_sub(MOST);
         if more > 0 {
-            ui.label(RichText::new(format!("{more} more in the log")).small().color(theme::WEAK));
+            ui.label(RichText::new(format!("{more} more in the log")).small().color(theme::weak()));
         }
     });
     if let Some(i) = dismissed {

@@ -146,9 +146,9 @@ fn running(ui: &mut Ui, job: &RunningJob, actions: &mut Vec<Action>) {
     );
     ui.label(RichText::new(if job.paused { format!("{text}  (paused)") } else { text }).strong());
     ui.add(egui::ProgressBar::new(done).desired_height(6.0).fill(if job.paused {
-        theme::WARNING
+        theme::warning()
     } else {
-        theme::ACCENT
+        theme::accent()
     }));
     ui.horizontal(|ui| {
         let pause = if job.paused { "Resume" } else { "Pause" };
@@ -191,13 +191,13 @@ fn facts(ui: &mut Ui, state: &AppState, job: Option<&RunningJob>) {
             progress.and_then(crate::pipeline::observer::Progress::eta_secs).map_or_else(dash, format::duration),
         ),
     ];
-    egui::Frame::new().fill(theme::SURFACE).corner_radius(8).inner_margin(10).show(ui, |ui| {
+    egui::Frame::new().fill(theme::surface()).corner_radius(8).inner_margin(10).show(ui, |ui| {
         ui.columns_const(|[a, b]| {
             for (ui, rows) in [(a, &left), (b, &right)] {
                 ui.spacing_mut().item_spacing.y = 3.0;
                 for (name, value) in rows {
                     ui.horizontal(|ui| {
-                        ui.label(RichText::new(*name).small().color(theme::WEAK));
+                        ui.label(RichText::new(*name).small().color(theme::weak()));
                         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                             ui.label(RichText::new(value).strong());
                         });

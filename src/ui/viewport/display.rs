@@ -129,7 +129,7 @@ impl Display {
     pub(super) fn paint(&self, ui: &Ui, rect: Rect, shown: Rect) {
         // Filling what the frame covers anyway would be a fifth of a redraw on an emulated adapter.
         if self.texture.is_none() || shown != rect {
-            ui.painter().rect_filled(rect, 0.0, theme::CANVAS);
+            ui.painter().rect_filled(rect, 0.0, theme::canvas());
         }
         if let Some(texture) = &self.texture {
             let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));

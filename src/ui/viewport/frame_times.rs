@@ -61,7 +61,7 @@ impl FrameTimes {
         let small = |text: &str| RichText::new(text).small();
         let rows = self.rows();
         if rows.is_empty() {
-            ui.label(small("Frame times appear with the next frame: move the view.").color(theme::WEAK));
+            ui.label(small("Frame times appear with the next frame: move the view.").color(theme::weak()));
             return;
         }
         ui.vertical(|ui| {
@@ -69,10 +69,10 @@ impl FrameTimes {
             Grid::new("frame times").num_columns(3).spacing([14.0, 1.0]).min_row_height(13.0).show(ui, |ui| {
                 let head =
                     [format!("ms, {}", self.drawn_by), "last".into(), format!("median of {}", self.frames.len())];
-                head.iter().for_each(|h| drop(ui.label(small(h).color(theme::WEAK))));
+                head.iter().for_each(|h| drop(ui.label(small(h).color(theme::weak()))));
                 ui.end_row();
                 for (name, last, median) in rows {
-                    let color = if name == "total" { theme::ACCENT } else { theme::TEXT };
+                    let color = if name == "total" { theme::accent() } else { theme::text() };
                     ui.label(small(name).color(color));
                     for secs in [last, median] {
                         ui.label(RichText::new(format!("{:>7.2}", secs * 1e3)).monospace().size(11.0).color(color));
@@ -81,7 +81,7 @@ impl FrameTimes {
                 }
             });
             if !self.has_stages {
-                ui.label(small("This device reports only the total.").color(theme::WARNING));
+                ui.label(small("This device reports only the total.").color(theme::warning()));
             }
         });
     }

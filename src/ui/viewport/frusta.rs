@@ -24,7 +24,8 @@ impl Viewport {
         layout: &Layout,
         actions: &mut Vec<Action>,
     ) -> bool {
-        let Some(dataset) = &scene.dataset else { return false };
+        // Around one thing alone they would be clutter.
+        let Some(dataset) = scene.dataset.as_ref().filter(|_| !self.visibility.is_isolated()) else { return false };
         let painter = ui.painter_at(rect);
         let eye = self.overlay_camera(rect);
         let size = 0.09 * scene.home.bounds.radius();
@@ -40,18 +41,21 @@ impl Viewport {
         });
         for (i, photo) in dataset.photos.iter().enumerate() {
             // From inside, a camera is only lines along the border.
-            if photo.camera.center.distance(eye.center) < size {
+            let distance = photo.camera.center.distance(eye.center);
+            if distance < size {
                 continue;
             }
+            let near = (1.5 * scene.home.bounds.radius() / distance).clamp(0.25, 1.0) as f32;
             let pointed = nearest.is_some_and(|n| n.0 == i);
             let color = match (pointed, held_out.contains(&i)) {
-                (true, _) => theme::ACCENT,
-                (false, true) => theme::WARNING.gamma_multiply(0.75),
-                (false, false) => Color32::from_white_alpha(130),
+                (true, _) => theme::accent(),
+                (false, true) => theme::warning().gamma_multiply(0.75 * near),
+                (false, false) => Color32::from_white_alpha(130).gamma_multiply(near),
             };
-            let width = if pointed { 2.0 } else { 1.0 };
+            let width = if pointed { 2.0 } else { 0.8 };
+            let rim = Color32::from_black_alpha(70).gamma_multiply(near);
             // A dark rim keeps the lines visible on bright scenes.
-            for stroke in [Stroke::new(width + 1.5, Color32::from_black_alpha(70)), Stroke::new(width, color)] {
+            for stroke in [Stroke::new(width + 1.5, rim), Stroke::new(width, color)] {
                 draw(&painter, &eye, &photo.camera, size, place, stroke);
             }
         }
@@ -66,11 +70,11 @@ impl Viewport {
 }
 
 fn label(painter: &Painter, at: Pos2, text: &str) {
-    let galley = painter.layout_no_wrap(text.to_owned(), egui::FontId::proportional(12.5), theme::TEXT);
+    let galley = painter.layout_no_wrap(text.to_owned(), egui::FontId::proportional(12.5), theme::text());
     let corner = at + egui::vec2(12.0, -24.0);
     let back = Rect::from_min_size(corner, galley.size()).expand2(egui::vec2(6.0, 3.0));
     painter.rect_filled(back, 5.0, Color32::from_black_alpha(200));
-    painter.galley(corner, galley, theme::TEXT);
+    painter.galley(corner, galley, theme::text());
 }
 
 /// One camera as a pyramid of depth `size`, with a mark on its upper side.

@@ -44,10 +44,10 @@ pub(super) fn show(ui: &mut Ui, settings: &mut OverlaySettings, depth: Option<(f
 /// A color map between what its ends stand for.
 fn bar(ui: &mut Ui, map: Colormap, ends: [String; 2]) {
     let (all, _) = ui.allocate_exact_size(vec2(220.0, 12.0), Sense::hover());
-    let [from, to] = ends.map(|text| ui.painter().layout_no_wrap(text, FontId::proportional(11.5), theme::WEAK));
+    let [from, to] = ends.map(|text| ui.painter().layout_no_wrap(text, FontId::proportional(11.5), theme::weak()));
     let (left, right) = (all.left() + from.size().x + 6.0, all.right() - to.size().x - 6.0);
-    ui.painter().galley(all.left_top() + vec2(0.0, -1.0), from, theme::WEAK);
-    ui.painter().galley(egui::pos2(right + 6.0, all.top() - 1.0), to, theme::WEAK);
+    ui.painter().galley(all.left_top() + vec2(0.0, -1.0), from, theme::weak());
+    ui.painter().galley(egui::pos2(right + 6.0, all.top() - 1.0), to, theme::weak());
     let rect = Rect::from_x_y_ranges(left..=right, all.y_range());
     let mut mesh = Mesh::default();
     for step in 0..STEPS {

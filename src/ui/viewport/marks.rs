@@ -98,7 +98,7 @@ impl Viewport {
     ) {
         let mut targets = self.queries.found_colors();
         targets.extend(
-            self.picking.selected().map(|id| (id, theme::ACCENT)).filter(|t| targets.iter().all(|f| f.0 != t.0)),
+            self.picking.selected().map(|id| (id, theme::accent())).filter(|t| targets.iter().all(|f| f.0 != t.0)),
         );
         targets.retain(|(id, _)| {
             semantics.identities.get(*id).is_some() && self.visibility.draws(&semantics.identities, *id) != Some(false)
@@ -160,11 +160,11 @@ fn arrow(painter: &Painter, shown: Rect, way: Vec2, color: Color32, name: &str) 
     let (back, across) = (tip - way * 20.0, way.rot90() * 10.0);
     let corners = vec![tip, back + across, back - across];
     painter.add(Shape::convex_polygon(corners, color, Stroke::new(2.0, HALO.color)));
-    let galley = painter.layout_no_wrap(name.to_owned(), FontId::proportional(12.5), theme::TEXT);
+    let galley = painter.layout_no_wrap(name.to_owned(), FontId::proportional(12.5), theme::text());
     let beside = back - way * (14.0 + 0.5 * galley.size().x * way.x.abs()) - 0.5 * galley.size();
     let label = Rect::from_min_size(beside, galley.size()).expand2(vec2(6.0, 3.0));
     painter.rect_filled(label, 5.0, Color32::from_black_alpha(190));
-    painter.galley(beside, galley, theme::TEXT);
+    painter.galley(beside, galley, theme::text());
     label.union(Rect::from_center_size(tip - way * 10.0, Vec2::splat(26.0)))
 }
 
@@ -173,14 +173,14 @@ fn ghost(painter: &Painter, outline: &[Pos2], color: Color32, name: &str) -> Rec
     let closed: Vec<Pos2> = outline.iter().chain(outline.first()).copied().collect();
     painter.add(Shape::line(closed.clone(), HALO));
     painter.extend(Shape::dashed_line(&closed, Stroke::new(2.0, color), 7.0, 5.0));
-    let galley = painter.layout_no_wrap(name.to_owned(), FontId::proportional(12.5), theme::TEXT);
+    let galley = painter.layout_no_wrap(name.to_owned(), FontId::proportional(12.5), theme::text());
     let over = Rect::from_points(outline);
     let room = painter.clip_rect().shrink(6.0);
     let at = pos2(over.center().x - 0.5 * galley.size().x, over.top() - galley.size().y - 8.0);
     let at = at.clamp(room.min, (room.max - galley.size()).max(room.min));
     let label = Rect::from_min_size(at, galley.size()).expand2(vec2(6.0, 3.0));
     painter.rect_filled(label, 5.0, Color32::from_black_alpha(190));
-    painter.galley(at, galley, theme::TEXT);
+    painter.galley(at, galley, theme::text());
     label
 }
 

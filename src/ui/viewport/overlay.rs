@@ -42,9 +42,9 @@ impl Viewport {
         }
         if let Some(facts) = self.facts(layout, state) {
             card("facts", Align2::LEFT_BOTTOM, 0.0, &mut |ui| {
-                ui.label(RichText::new(&facts).small().color(theme::WEAK));
+                ui.label(RichText::new(&facts).small().color(theme::weak()));
                 if let Some(words) = self.overrides.words() {
-                    ui.label(RichText::new(format!("rendered with {words}")).small().color(theme::WARNING));
+                    ui.label(RichText::new(format!("rendered with {words}")).small().color(theme::warning()));
                     let reset = ui.small_button("Reset").on_hover_text(Action::ResetRenderSettings.tooltip());
                     if reset.accessible_name(Action::ResetRenderSettings.text()).clicked() {
                         actions.push(Action::ResetRenderSettings);
@@ -63,7 +63,7 @@ impl Viewport {
         if self.display.errors().next().is_some() {
             card("view error", Align2::CENTER_CENTER, 0.0, &mut |ui| {
                 for error in self.display.errors() {
-                    ui.colored_label(theme::ERROR, error);
+                    ui.colored_label(theme::error(), error);
                 }
             });
         }
@@ -105,13 +105,13 @@ impl Viewport {
                 ui.label(RichText::new(text::elided(&p.name(), 28)).strong()).on_hover_text(&*p.name());
                 ui.weak(format!("{} of {total}", p.index() + 1));
                 if let Some(psnr) = self.picture().and_then(|p| p.psnr) {
-                    ui.label(RichText::new(format!("preview {}", format::decibel(psnr))).color(theme::ACCENT))
+                    ui.label(RichText::new(format!("preview {}", format::decibel(psnr))).color(theme::accent()))
                         .on_hover_text(
                             "PSNR of the view at screen resolution. Evaluation uses the training resolution.",
                         );
                 }
                 if p.failed() {
-                    ui.colored_label(theme::WARNING, "photo not loaded");
+                    ui.colored_label(theme::warning(), "photo not loaded");
                 }
             }
             None => {

@@ -97,9 +97,9 @@ impl PhotoView {
             *split = ((pos.x - shown.left()) / shown.width().max(1.0)).clamp(0.02, 0.98);
         }
         let color =
-            if response.hovered() || response.dragged() { theme::ACCENT } else { Color32::from_white_alpha(220) };
+            if response.hovered() || response.dragged() { theme::accent() } else { Color32::from_white_alpha(220) };
         ui.painter().vline(x, shown.y_range(), Stroke::new(1.5, color));
-        ui.painter().circle(pos2(x, shown.center().y), 9.0, theme::PANEL, Stroke::new(1.5, color));
+        ui.painter().circle(pos2(x, shown.center().y), 9.0, theme::panel(), Stroke::new(1.5, color));
         for (side, text, align) in
             [(-1.0, "Rendering", egui::Align2::RIGHT_BOTTOM), (1.0, "Photo", egui::Align2::LEFT_BOTTOM)]
         {

@@ -17,14 +17,14 @@ impl Viewport {
         if let Some(explored) = explored.filter(|_| !pane.player.playing) {
             for (keypoint, part) in explored.navigator.graph.keypoints.iter().zip(&explored.parts) {
                 let Some(at) = place(keypoint.center).filter(|at| rect.contains(*at)) else { continue };
-                let color = if *part == 0 { theme::GOOD } else { theme::ERROR };
+                let color = if *part == 0 { theme::good() } else { theme::error() };
                 let radius = if keypoint.original { 2.5 } else { 1.5 };
                 painter.circle_filled(at, radius + 0.8, Color32::from_black_alpha(90));
                 painter.circle_filled(at, radius, color.gamma_multiply(0.8));
             }
         }
         let way = pane.way();
-        for stroke in [Stroke::new(4.0, Color32::from_black_alpha(110)), Stroke::new(2.0, theme::ACCENT)] {
+        for stroke in [Stroke::new(4.0, Color32::from_black_alpha(110)), Stroke::new(2.0, theme::accent())] {
             for pair in way.windows(2) {
                 if let (Some(a), Some(b)) = (place(pair[0]), place(pair[1]))
                     && (rect.expand(2000.0).contains(a) && rect.expand(2000.0).contains(b))
@@ -35,10 +35,16 @@ impl Viewport {
         }
         for (i, (center, chosen)) in pane.key_places().enumerate() {
             let Some(at) = place(center).filter(|at| rect.contains(*at)) else { continue };
-            let (radius, color) = if chosen { (7.0, theme::ACCENT) } else { (5.0, theme::TEXT) };
+            let (radius, color) = if chosen { (7.0, theme::accent()) } else { (5.0, theme::text()) };
             painter.circle(at, radius, color, Stroke::new(1.5, Color32::from_black_alpha(160)));
             let font = egui::FontId::proportional(11.0);
-            painter.text(at + egui::vec2(9.0, -9.0), egui::Align2::LEFT_BOTTOM, (i + 1).to_string(), font, theme::TEXT);
+            painter.text(
+                at + egui::vec2(9.0, -9.0),
+                egui::Align2::LEFT_BOTTOM,
+                (i + 1).to_string(),
+                font,
+                theme::text(),
+            );
         }
     }
 }

@@ -77,21 +77,21 @@ impl Viewport {
         let places: Vec<Option<Pos2>> = ruler.points.iter().map(|p| place(*p)).collect();
         for (i, pair) in places.windows(2).enumerate() {
             let [Some(a), Some(b)] = pair else { continue };
-            for stroke in [Stroke::new(4.5, Color32::from_black_alpha(150)), Stroke::new(2.0, theme::WARNING)] {
+            for stroke in [Stroke::new(4.5, Color32::from_black_alpha(150)), Stroke::new(2.0, theme::warning())] {
                 painter.line_segment([*a, *b], stroke);
             }
             let length = format::length(ruler.points[i].distance(ruler.points[i + 1]), meters_per_unit);
-            let galley = painter.layout_no_wrap(length, FontId::proportional(14.0), theme::TEXT);
+            let galley = painter.layout_no_wrap(length, FontId::proportional(14.0), theme::text());
             let at = a.lerp(*b, 0.5) + vec2(10.0, -0.5 * galley.size().y);
             painter.rect_filled(
                 Rect::from_min_size(at, galley.size()).expand(5.0),
                 5.0,
                 Color32::from_black_alpha(205),
             );
-            painter.galley(at, galley, theme::TEXT);
+            painter.galley(at, galley, theme::text());
         }
         for at in places.iter().flatten() {
-            painter.circle(*at, 5.0, theme::WARNING, Stroke::new(1.5, Color32::from_black_alpha(200)));
+            painter.circle(*at, 5.0, theme::warning(), Stroke::new(1.5, Color32::from_black_alpha(200)));
         }
         self.ruler = ruler_card(ui, shown, ruler, self.eye.center, meters_per_unit, actions);
     }

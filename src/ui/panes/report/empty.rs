@@ -19,7 +19,7 @@ pub(crate) fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
         ui.strong(&job.title);
         if let Some(p) = &job.progress {
             let share = p.done as f32 / p.total.max(1) as f32;
-            ui.add(egui::ProgressBar::new(share).desired_width(320.0).desired_height(6.0).fill(theme::ACCENT));
+            ui.add(egui::ProgressBar::new(share).desired_width(320.0).desired_height(6.0).fill(theme::accent()));
             ui.weak(format!(
                 "{} of {} measurements. Do not move the view: rendering distorts the times.",
                 p.done, p.total
@@ -57,7 +57,7 @@ pub(crate) fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     ui.weak("All stages (training, finding objects, queries, camera paths, depth) are measured on the command line:");
     ui.horizontal(|ui| {
         let command = command(state);
-        ui.label(RichText::new(&command).monospace().color(theme::ACCENT));
+        ui.label(RichText::new(&command).monospace().color(theme::accent()));
         if ui.small_button("Copy").clicked() {
             ui.ctx().copy_text(command);
         }

@@ -143,9 +143,9 @@ impl ReportPane {
     ) {
         ui.horizontal_wrapped(|ui| {
             ui.label(RichText::new("Error vs. run time").strong());
-            ui.label(RichText::new(name(shown)).color(theme::WEAK)).on_hover_text(text::path(&shown.path));
+            ui.label(RichText::new(name(shown)).color(theme::weak())).on_hover_text(text::path(&shown.path));
             if let Some(second) = second {
-                ui.label(RichText::new(format!("compared with {} (hollow)", name(second))).color(theme::ACCENT))
+                ui.label(RichText::new(format!("compared with {} (hollow)", name(second))).color(theme::accent()))
                     .on_hover_text(text::path(&second.path));
                 button(ui, "End comparison", &Action::EndComparison, true, actions);
             }
@@ -207,7 +207,7 @@ fn section<R>(ui: &mut Ui, title: &str, open: bool, add: impl FnOnce(&mut Ui) ->
 
 /// What must be known before numbers are believed.
 fn warnings(ui: &mut Ui, stage: &Stage, report: &Report, second: Option<&Report>) {
-    let warn = |ui: &mut Ui, text: String| ui.label(RichText::new(text).small().color(theme::WARNING));
+    let warn = |ui: &mut Ui, text: String| ui.label(RichText::new(text).small().color(theme::warning()));
     if !stage.complete() {
         let done = stage.points.iter().filter(|p| p.secs.each.len() >= stage.seeds.len()).count();
         let text = format!(
@@ -234,7 +234,7 @@ fn chosen(ui: &mut Ui, stage: &Stage, selected: Option<&Point>, now: &Now<'_>, a
         ui.weak("Click on a point, or on a row below, to see what it would change. Drag to move, Ctrl+wheel to zoom.");
         return;
     };
-    egui::Frame::new().fill(theme::SURFACE).corner_radius(8).inner_margin(10).show(ui, |ui| {
+    egui::Frame::new().fill(theme::surface()).corner_radius(8).inner_margin(10).show(ui, |ui| {
         ui.set_width(ui.available_width());
         scatter::facts(ui, point, &stage.measures, "");
         ui.add_space(4.0);
@@ -252,10 +252,10 @@ fn chosen(ui: &mut Ui, stage: &Stage, selected: Option<&Point>, now: &Now<'_>, a
                 }
             }
             Offer::Active => {
-                ui.colored_label(theme::GOOD, "Already active.");
+                ui.colored_label(theme::good(), "Already active.");
             }
             Offer::Not(why) => {
-                ui.label(RichText::new(why).color(theme::WEAK));
+                ui.label(RichText::new(why).color(theme::weak()));
             }
         }
     });

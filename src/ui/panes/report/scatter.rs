@@ -36,7 +36,7 @@ impl<'a> Scatter<'a> {
             .height(height)
             .show_background(false)
             .show_grid(Vec2b::TRUE)
-            .grid_color(theme::LINE)
+            .grid_color(theme::line())
             .allow_scroll(false)
             .show_crosshair(false)
             .set_margin_fraction(egui::vec2(0.06, 0.1))
@@ -96,7 +96,7 @@ impl<'a> Scatter<'a> {
         for p in self.second.into_iter().flat_map(|s| &s.points) {
             // Knobs that only the second has are gray.
             let k = methods.iter().position(|m| *m == p.method);
-            let color = k.map_or(theme::WEAK, color);
+            let color = k.map_or(theme::weak(), color);
             let shape = k.map_or(MarkerShape::Circle, shape);
             if let Some(at) = scale::place(p, self.measure) {
                 let hollow = Points::new("second report", vec![at]).shape(shape).filled(false);
@@ -104,7 +104,7 @@ impl<'a> Scatter<'a> {
             }
         }
         if let Some(at) = self.selected.and_then(|p| scale::place(p, self.measure)) {
-            let ring = Points::new("", vec![at]).radius(10.0).filled(false).color(theme::TEXT);
+            let ring = Points::new("", vec![at]).radius(10.0).filled(false).color(theme::text());
             items.push(Item::Points(ring));
         }
         items
@@ -113,7 +113,7 @@ impl<'a> Scatter<'a> {
     fn front(&self) -> Item {
         let points = self.stage.front(self.measure).into_iter();
         let places: Vec<[f64; 2]> = points.filter_map(|i| scale::place(&self.stage.points[i], self.measure)).collect();
-        let style = Stroke::new(8.0, theme::TEXT.gamma_multiply(0.16));
+        let style = Stroke::new(8.0, theme::text().gamma_multiply(0.16));
         Item::Line(Line::new("Pareto front", PlotPoints::from(places)).stroke(style).allow_hover(false))
     }
 

@@ -51,7 +51,7 @@ fn value(p: &Point, measure: &Measure) -> String {
 /// What each knob's rule says of its default.
 pub(crate) fn choices(ui: &mut Ui, stage: &Stage) {
     let choices = stage.choices();
-    ui.label(RichText::new(format!("Rule: {}.", stage.rule.words())).small().color(theme::WEAK));
+    ui.label(RichText::new(format!("Rule: {}.", stage.rule.words())).small().color(theme::weak()));
     if choices.is_empty() {
         ui.weak("This stage has no default to judge.");
         return;
@@ -92,20 +92,20 @@ pub(crate) fn orders(ui: &mut Ui, stage: &Stage) {
 /// Two reports side by side.
 pub(crate) fn comparison(ui: &mut Ui, comparison: &StageComparison<'_>, measure: &Measure) {
     if comparison.pairs.is_empty() {
-        ui.colored_label(theme::WARNING, "The two reports have no setting in common.");
+        ui.colored_label(theme::warning(), "The two reports have no setting in common.");
     }
     Grid::new("comparison").num_columns(4).striped(true).spacing([12.0, 1.0]).min_row_height(20.0).show(ui, |ui| {
         head(ui, &["setting", "times: second / first", "", &format!("{}: second - first", table::title(measure))]);
         for pair in &comparison.pairs {
             ui.label(text::elided(&title(pair.one), MOST_LETTERS)).on_hover_text(title(pair.one));
             let color = match pair.times {
-                _ if !pair.differs() => theme::TEXT,
-                t if t < 1.0 => theme::GOOD,
-                _ => theme::WARNING,
+                _ if !pair.differs() => theme::text(),
+                t if t < 1.0 => theme::good(),
+                _ => theme::warning(),
             };
             ui.colored_label(color, format!("\u{d7} {:.2}", pair.times));
             let times = [pair.one, pair.other].map(|p| format::seconds(p.secs.median));
-            ui.label(RichText::new(format!("{}, {}", times[1], times[0])).small().color(theme::WEAK));
+            ui.label(RichText::new(format!("{}, {}", times[1], times[0])).small().color(theme::weak()));
             ui.label(pair.difference.map_or_else(|| "\u{2013}".into(), signed));
             ui.end_row();
         }
@@ -124,7 +124,7 @@ fn signed(v: f64) -> String {
 pub(crate) fn about(ui: &mut Ui, report: &Report, stage: &Stage) {
     Grid::new("about").num_columns(2).spacing([12.0, 3.0]).show(ui, |ui| {
         let mut row = |name: &str, text: &str| {
-            ui.label(RichText::new(name).small().color(theme::WEAK));
+            ui.label(RichText::new(name).small().color(theme::weak()));
             ui.add(egui::Label::new(RichText::new(text).small()).wrap());
             ui.end_row();
         };
@@ -138,11 +138,11 @@ pub(crate) fn about(ui: &mut Ui, report: &Report, stage: &Stage) {
 }
 
 fn head(ui: &mut Ui, titles: &[&str]) {
-    titles.iter().for_each(|t| drop(ui.label(RichText::new(*t).small().color(theme::WEAK))));
+    titles.iter().for_each(|t| drop(ui.label(RichText::new(*t).small().color(theme::weak()))));
     ui.end_row();
 }
 
 fn verdict(ui: &mut Ui, good: bool, [yes, no]: [&str; 2]) {
-    let (color, text): (Color32, &str) = if good { (theme::GOOD, yes) } else { (theme::WARNING, no) };
+    let (color, text): (Color32, &str) = if good { (theme::good(), yes) } else { (theme::warning(), no) };
     ui.colored_label(color, text);
 }

@@ -188,7 +188,7 @@ fn picked(all: &Identities, innermost: IdentityId, selected: Option<IdentityId>,
 
 /// A name beside the cursor, inside the view.
 fn label(ui: &Ui, shown: Rect, pos: Pos2, name: &str) {
-    let galley = ui.painter().layout_no_wrap(name.to_owned(), FontId::proportional(13.0), theme::TEXT);
+    let galley = ui.painter().layout_no_wrap(name.to_owned(), FontId::proportional(13.0), theme::text());
     let size = galley.size() + vec2(12.0, 6.0);
     let mut back = Rect::from_min_size(pos + vec2(16.0, 14.0), size);
     // At the right and the lower border it is on the other side of the cursor.
@@ -200,7 +200,7 @@ fn label(ui: &Ui, shown: Rect, pos: Pos2, name: &str) {
     }
     let back = back.translate(vec2((shown.left() - back.left()).max(0.0), 0.0));
     ui.painter().rect_filled(back, 5.0, Color32::from_black_alpha(205));
-    ui.painter().galley(back.min + vec2(6.0, 3.0), galley, theme::TEXT);
+    ui.painter().galley(back.min + vec2(6.0, 3.0), galley, theme::text());
 }
 
 #[cfg(test)]

@@ -67,7 +67,7 @@ impl Queries {
     fn show_offered(&mut self, ui: &mut Ui, offered: &[String], semantics: &SemanticMap) {
         let mut taken = None;
         ui.horizontal_wrapped(|ui| {
-            ui.label(RichText::new("Tab:").small().color(theme::WEAK));
+            ui.label(RichText::new("Tab:").small().color(theme::weak()));
             for text in offered {
                 if ui.small_button(text).clicked() {
                     taken = Some(text.clone());

@@ -34,7 +34,7 @@ impl Queries {
         }
         let ignored = newest.ignored.join("\", \"");
         if !ignored.is_empty() {
-            ui.colored_label(theme::WARNING, format!("Ignored: \"{}\".", text::shortened(&ignored, 80)));
+            ui.colored_label(theme::warning(), format!("Ignored: \"{}\".", text::shortened(&ignored, 80)));
         }
         let shown = newest.shown(&self.settings);
         match (&newest.answered.answer, shown.first()) {
@@ -42,7 +42,7 @@ impl Queries {
             (Answer::Ambiguous(_), Some(_)) if newest.chosen.is_none() => {
                 let mut chosen = None;
                 ui.horizontal_wrapped(|ui| {
-                    ui.colored_label(theme::WARNING, format!("Ambiguous: {} equal matches.", shown.len()));
+                    ui.colored_label(theme::warning(), format!("Ambiguous: {} equal matches.", shown.len()));
                     for id in shown.iter().take(NAMED) {
                         if ui.small_button(state.labels.full_name(&semantics.identities, *id)).clicked() {
                             chosen = Some(*id);
@@ -62,7 +62,7 @@ impl Queries {
                         ui.weak(size_text(bounds, state)).on_hover_text("Longest edge of its bounding box");
                     }
                     if pixels == Some(0) {
-                        ui.colored_label(theme::WARNING, "not in this view");
+                        ui.colored_label(theme::warning(), "not in this view");
                     }
                     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                         let go = Action::GoToTarget(target, Side::Best);
@@ -79,7 +79,7 @@ impl Queries {
         }
         if let Some(trouble) = self.embeddings.problem() {
             let text = format!("Names only, no open-vocabulary queries: {}", text::line(trouble));
-            ui.label(RichText::new(text).small().color(theme::WARNING));
+            ui.label(RichText::new(text).small().color(theme::warning()));
         }
     }
 
@@ -93,7 +93,7 @@ impl Queries {
             "" => "No match.".to_owned(),
             unknown => format!("No match for \"{unknown}\"."),
         };
-        ui.colored_label(theme::WARNING, text);
+        ui.colored_label(theme::warning(), text);
         let known = names::completions(&semantics.identities, "", 6).join(", ");
         match newest.reading.near.first() {
             Some((_, other)) => ui.weak(format!("Did you mean \"{other}\"?")),
@@ -106,9 +106,9 @@ impl Queries {
 fn certainty(ui: &mut Ui, newest: &super::Asked) {
     let certainty = newest.answered.certainty(&newest.ignored);
     let color = match certainty {
-        Certainty::Certain => theme::GOOD,
-        Certainty::Likely => theme::TEXT,
-        Certainty::Guess => theme::WARNING,
+        Certainty::Certain => theme::good(),
+        Certainty::Likely => theme::text(),
+        Certainty::Guess => theme::warning(),
     };
     let by = match newest.answered.basis {
         Basis::Names => "by name",

@@ -96,7 +96,7 @@ fn show_target(ui: &mut Ui, target: IdentityId, facts: &Facts, state: &AppState,
     let edges = facts.bounds.map(|b| b.size().to_array().map(|edge| format::length(edge, unit)).join(" \u{00d7} "));
     let size = edges.map(|e| format!("  \u{00b7}  box {e}")).unwrap_or_default();
     let gaussians = format::things(facts.gaussians, "Gaussian");
-    ui.label(RichText::new(format!("{gaussians}{size}")).small().color(theme::WEAK));
+    ui.label(RichText::new(format!("{gaussians}{size}")).small().color(theme::weak()));
     ui.horizontal(|ui| {
         ui.menu_button(RichText::new("Go there\u{2026}").small(), |ui| {
             for &side in Side::VARIANTS {

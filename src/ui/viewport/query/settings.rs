@@ -118,7 +118,7 @@ fn histogram(ui: &mut Ui, settings: &mut OverlaySettings, heat: &[f32]) {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 54.0), Sense::click_and_drag());
     let response = response.on_hover_text("Drag: outline pixels with at least this relevancy. Double-click: off");
     let painter = ui.painter_at(rect);
-    painter.rect_filled(rect, 3.0, theme::CANVAS);
+    painter.rect_filled(rect, 3.0, theme::canvas());
     // Logarithmic: most pixels have nothing to do with a query.
     let height = |n: u32| (1.0 + n as f32).ln() / (1.0 + heat.len() as f32).ln() * rect.height();
     let width = rect.width() / BINS as f32;

@@ -33,7 +33,7 @@ pub(crate) fn show(ui: &mut Ui, basis: &str, stages: &StagesMs) {
     let numbers = ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(6.0, 0.0);
         let small = |text: String, color| RichText::new(text).small().color(color);
-        ui.label(small(format!("{basis} in {}", millis(stages.whole() / 1e3)), theme::TEXT));
+        ui.label(small(format!("{basis} in {}", millis(stages.whole() / 1e3)), theme::text()));
         for (name, (color, ms)) in STAGES.into_iter().zip(COLORS.into_iter().zip(stages.values())) {
             ui.label(small(format!("{name} {}", millis(ms / 1e3)), color));
         }

@@ -1,0 +1,30 @@
+//! What the actions around the window itself do.
+
+use super::app::App;
+use super::dock::Dock;
+use super::layout::Layout;
+use crate::ui::actions::Action;
+
+impl App {
+    /// Does what concerns the window alone: its theme, its panes and how much of it the view has.
+    pub(super) fn arrange(&mut self, action: &Action, ctx: &egui::Context) {
+        match action {
+            Action::FillWindow => {
+                self.full_view = !self.full_view;
+                ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(self.full_view));
+            }
+            Action::ResetPanes => {
+                self.layout.dock = Dock::default();
+                self.layout.hidden = Layout::default().hidden;
+            }
+            Action::UseTheme(theme) => {
+                self.layout.theme = *theme;
+                ctx.set_theme(*theme);
+            }
+            Action::LargerText => egui::gui_zoom::zoom_in(ctx),
+            Action::SmallerText => egui::gui_zoom::zoom_out(ctx),
+            Action::NormalText => ctx.set_zoom_factor(1.0),
+            _ => {}
+        }
+    }
+}

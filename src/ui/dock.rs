@@ -1,0 +1,338 @@
+//! Where the panes stand around the view: tabs that can be dragged anywhere, hidden, or put into windows of their own.
+
+use egui::{Response, Ui, Vec2, ViewportBuilder, ViewportId, WidgetText};
+use egui_tiles::{
+    Behavior, Container, LinearDir, SimplificationOptions, TabState, Tabs, Tile, TileId, Tiles, Tree, UiResponse,
+};
+use serde::{Deserialize, Serialize};
+use strum::VariantArray;
+
+use crate::ui::actions::Pane;
+
+/// Windows of less width have one column beside the view.
+const NARROW_PT: f32 = 1000.0;
+
+/// Least share of a row or column that the view keeps.
+const VIEW_SHARE: f32 = 0.4;
+
+/// What stands at one place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) enum Place {
+    /// The view, or the first page.
+    View,
+    Pane(Pane),
+}
+
+/// The arrangement of the panes, one for wide and one for narrow windows.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Dock {
+    wide: Tree<Place>,
+    narrow: Tree<Place>,
+    /// Panes in windows of their own.
+    detached: Vec<Pane>,
+}
+
+/// What the dock shows in its places.
+pub(crate) trait DockContents {
+    /// Whether there is anything to show.
+    fn has(&self, place: Place) -> bool;
+    fn show(&mut self, ui: &mut Ui, place: Place);
+    fn hide(&mut self, pane: Pane);
+}
+
+impl Default for Dock {
+    fn default() -> Self {
+        Self { wide: wide(), narrow: narrow(), detached: Vec::new() }
+    }
+}
+
+fn tabs(tiles: &mut Tiles<Place>, panes: &[Pane]) -> TileId {
+    let panes = panes.iter().map(|pane| tiles.insert_pane(Place::Pane(*pane))).collect();
+    tiles.insert_tab_tile(panes)
+}
+
+/// The view with what is as wide as it below.
+fn middle(tiles: &mut Tiles<Place>) -> TileId {
+    let view = tiles.insert_pane(Place::View);
+    let view = tiles.insert_tab_tile(vec![view]);
+    let report = tabs(tiles, &[Pane::Report]);
+    let below = tabs(tiles, &[Pane::Camera, Pane::Phrases, Pane::Log]);
+    let middle = tiles.insert_vertical_tile(vec![view, report, below]);
+    share(tiles, middle, report, 400.0);
+    share(tiles, middle, below, 320.0);
+    middle
+}
+
+/// Photos, view, and two groups of tabs at the right.
+fn wide() -> Tree<Place> {
+    let mut tiles = Tiles::default();
+    let photos = tabs(&mut tiles, &[Pane::Dataset]);
+    let middle = middle(&mut tiles);
+    let work = tabs(&mut tiles, &[Pane::Training, Pane::Objects, Pane::Models, Pane::Plan]);
+    let talk = tabs(&mut tiles, &[Pane::Chat, Pane::Query]);
+    let right = tiles.insert_vertical_tile(vec![work, talk]);
+    share(&mut tiles, right, work, 1.9);
+    let root = tiles.insert_horizontal_tile(vec![photos, middle, right]);
+    share(&mut tiles, root, photos, 250.0);
+    share(&mut tiles, root, right, 350.0);
+    Tree::new(egui::Id::unique("dock"), root, tiles)
+}
+
+/// The view, and one group of tabs at the right.
+fn narrow() -> Tree<Place> {
+    let mut tiles = Tiles::default();
+    let middle = middle(&mut tiles);
+    let panes = [Pane::Training, Pane::Objects, Pane::Chat, Pane::Query, Pane::Dataset, Pane::Models, Pane::Plan];
+    let right = tabs(&mut tiles, &panes);
+    let root = tiles.insert_horizontal_tile(vec![middle, right]);
+    share(&mut tiles, root, right, 310.0);
+    Tree::new(egui::Id::unique("narrow dock"), root, tiles)
+}
+
+fn share(tiles: &mut Tiles<Place>, of: TileId, child: TileId, share: f32) {
+    if let Some(Tile::Container(Container::Linear(linear))) = tiles.get_mut(of) {
+        linear.shares.set_share(child, share);
+    }
+}
+
+impl Dock {
+    /// Itself, if each place occurs once: a layout that another version stored may lack some.
+    pub(crate) fn checked(self) -> Self {
+        let is_whole = |tree: &Tree<Place>| {
+            let places = || tree.tiles.tiles().filter_map(|t| if let Tile::Pane(p) = t { Some(*p) } else { None });
+            let all = Pane::VARIANTS.iter().map(|p| Place::Pane(*p)).chain([Place::View]);
+            places().count() == Pane::VARIANTS.len() + 1 && all.into_iter().all(|p| places().any(|q| q == p))
+        };
+        if is_whole(&self.wide) && is_whole(&self.narrow) { self } else { Self::default() }
+    }
+
+    /// Brings a pane before the others of its group.
+    pub(crate) fn activate(&mut self, pane: Pane) {
+        for tree in [&mut self.wide, &mut self.narrow] {
+            tree.make_active(|_, tile| *tile == Tile::Pane(Place::Pane(pane)));
+        }
+    }
+
+    /// Puts a pane into a window of its own, or back.
+    pub(crate) fn detach(&mut self, pane: Pane, apart: bool) {
+        self.detached.retain(|p| *p != pane);
+        if apart {
+            self.detached.push(pane);
+        }
+    }
+
+    /// Draws everything that the contents have.
+    pub(crate) fn show(&mut self, ui: &mut Ui, contents: &mut dyn DockContents) {
+        self.show_windows(ui.ctx(), contents);
+        let size = ui.available_size();
+        let tree = if size.x < NARROW_PT { &mut self.narrow } else { &mut self.wide };
+        let places: Vec<(TileId, Place)> = tree
+            .tiles
+            .iter()
+            .filter_map(|(id, tile)| if let Tile::Pane(place) = tile { Some((*id, *place)) } else { None })
+            .collect();
+        for (id, place) in places {
+            let is_apart = matches!(place, Place::Pane(pane) if self.detached.contains(&pane));
+            tree.set_visible(id, contents.has(place) && !is_apart);
+        }
+        give_room(tree, size);
+        let mut shown = Shown { contents, view: tree.tiles.find_pane(&Place::View), detach: None };
+        tree.ui(&mut shown, ui);
+        if let Some(pane) = shown.detach {
+            self.detach(pane, true);
+        }
+    }
+
+    fn show_windows(&mut self, ctx: &egui::Context, contents: &mut dyn DockContents) {
+        for pane in self.detached.clone() {
+            if !contents.has(Place::Pane(pane)) {
+                continue;
+            }
+            let window = ViewportBuilder::default()
+                .with_title(format!("FMLGS: {}", pane.text()))
+                .with_app_id("fmlgs")
+                .with_inner_size([420.0, 640.0]);
+            let closed = ctx.show_viewport_immediate(ViewportId::from_hash_of(("pane", pane)), window, |ui, _| {
+                contents.show(ui, Place::Pane(pane));
+                ui.input(|i| i.viewport().close_requested())
+            });
+            if closed {
+                self.detach(pane, false);
+            }
+        }
+    }
+}
+
+/// Columns and rows beside the view keep their size in points when the window changes; the view takes the rest.
+fn give_room(tree: &mut Tree<Place>, size: Vec2) {
+    let Some(mut inner) = tree.tiles.find_pane(&Place::View) else { return };
+    while let Some(outer) = tree.tiles.parent_of(inner) {
+        let extent = if tree.is_root(outer) { size } else { tree.tiles.rect(outer).map_or(size, |r| r.size()) };
+        let children = tree.tiles.get_container(outer).map(|c| c.children_vec()).unwrap_or_default();
+        let sides: Vec<TileId> =
+            children.into_iter().filter(|c| *c != inner && tree.tiles.is_visible_in_layout(*c)).collect();
+        if let Some(Tile::Container(Container::Linear(linear))) = tree.tiles.get_mut(outer) {
+            let extent = if linear.dir == LinearDir::Horizontal { extent.x } else { extent.y };
+            let mut others = 0.0;
+            for side in sides {
+                // The share of what was just dropped here is one.
+                let wanted = if linear.shares[side] > 1.0 { linear.shares[side] } else { 0.25 * extent };
+                linear.shares.set_share(side, wanted);
+                others += wanted;
+            }
+            linear.shares.set_share(inner, (extent - others).max(VIEW_SHARE * extent));
+        }
+        inner = outer;
+    }
+}
+
+/// The dock while it is drawn.
+struct Shown<'a> {
+    contents: &'a mut dyn DockContents,
+    /// The tile of the view.
+    view: Option<TileId>,
+    detach: Option<Pane>,
+}
+
+impl Shown<'_> {
+    fn menu(&mut self, ui: &mut Ui, pane: Pane) {
+        if ui.button("Open in its own window").clicked() {
+            self.detach = Some(pane);
+        }
+        if ui.button("Hide").clicked() {
+            self.contents.hide(pane);
+        }
+    }
+}
+
+impl Behavior<Place> for Shown<'_> {
+    fn pane_ui(&mut self, ui: &mut Ui, _: TileId, place: &mut Place) -> UiResponse {
+        self.contents.show(ui, *place);
+        UiResponse::None
+    }
+
+    fn tab_title_for_pane(&mut self, place: &Place) -> WidgetText {
+        match place {
+            Place::View => "View".into(),
+            Place::Pane(pane) => pane.text().into(),
+        }
+    }
+
+    fn is_tab_bar_visible(&self, _: TileId, tabs: &Tabs) -> bool {
+        // Alone, the view needs no title.
+        tabs.children.len() > 1 || tabs.active.is_none_or(|id| self.view != Some(id))
+    }
+
+    fn on_tab_button(&mut self, tiles: &mut Tiles<Place>, id: TileId, button: Response) -> Response {
+        let Some(Place::Pane(pane)) = tiles.get_pane(&id).copied() else { return button };
+        button.context_menu(|ui| self.menu(ui, pane));
+        button.on_hover_text("Drag to move, right-click for more")
+    }
+
+    fn top_bar_right_ui(&mut self, tiles: &Tiles<Place>, ui: &mut Ui, _: TileId, tabs: &Tabs, _: &mut f32) {
+        if let Some(Place::Pane(pane)) = tabs.active.and_then(|id| tiles.get_pane(&id)).copied() {
+            let name = format!("Menu of {}", pane.text());
+            let menu = ui.menu_button("\u{2026}", |ui| self.menu(ui, pane)).response;
+            menu.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &name));
+        }
+    }
+
+    fn tab_bar_height(&self, _: &egui::Style) -> f32 {
+        28.0
+    }
+
+    fn gap_width(&self, _: &egui::Style) -> f32 {
+        3.0
+    }
+
+    fn min_size(&self) -> f32 {
+        120.0
+    }
+
+    fn tab_outline_stroke(&self, _: &egui::Visuals, _: &Tiles<Place>, _: TileId, _: &TabState) -> egui::Stroke {
+        egui::Stroke::NONE
+    }
+
+    fn tab_text_color(&self, visuals: &egui::Visuals, _: &Tiles<Place>, _: TileId, state: &TabState) -> egui::Color32 {
+        if state.active { visuals.strong_text_color() } else { visuals.weak_text_color() }
+    }
+
+    fn simplification_options(&self) -> SimplificationOptions {
+        SimplificationOptions { all_panes_must_have_tabs: true, ..SimplificationOptions::default() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Everything is there to be shown; what was asked to be hidden is counted.
+    #[derive(Default)]
+    struct Rects(Vec<(Place, egui::Rect)>);
+
+    impl DockContents for Rects {
+        fn has(&self, place: Place) -> bool {
+            !matches!(place, Place::Pane(Pane::Camera | Pane::Phrases | Pane::Report | Pane::Log))
+        }
+        fn show(&mut self, ui: &mut Ui, place: Place) {
+            self.0.push((place, ui.max_rect()));
+        }
+        fn hide(&mut self, _: Pane) {}
+    }
+
+    /// The rectangles of what is in sight in a window of this size, once it is at rest.
+    fn shown(dock: &mut Dock, size: [f32; 2]) -> Vec<(Place, egui::Rect)> {
+        let ctx = egui::Context::default();
+        let mut rects = Rects::default();
+        for _ in 0..4 {
+            rects.0.clear();
+            let screen_rect = Some(egui::Rect::from_min_size(egui::Pos2::ZERO, size.into()));
+            let input = egui::RawInput { screen_rect, ..egui::RawInput::default() };
+            ctx.run_ui(input, |ui| dock.show(ui, &mut rects)).textures_delta.clear();
+        }
+        rects.0
+    }
+
+    fn width(shown: &[(Place, egui::Rect)], place: Place) -> Option<f32> {
+        shown.iter().find(|(p, _)| *p == place).map(|(_, r)| r.width())
+    }
+
+    #[test]
+    fn columns_keep_their_width_and_the_view_takes_the_rest() {
+        let mut dock = Dock::default();
+        for size in [[1400.0, 900.0], [2560.0, 1440.0], [1100.0, 700.0], [1400.0, 900.0]] {
+            let shown = shown(&mut dock, size);
+            let of = |pane| width(&shown, Place::Pane(pane)).expect("in sight");
+            assert!((of(Pane::Dataset) - 250.0).abs() < 4.0 && (of(Pane::Training) - 350.0).abs() < 4.0, "{shown:?}");
+            assert!(width(&shown, Place::View).expect("in sight") > size[0] - 620.0);
+        }
+        // Less room than they want: the view keeps its share.
+        let shown = shown(&mut dock, [800.0, 600.0]);
+        assert!(width(&shown, Place::View).expect("in sight") > 400.0, "{shown:?}");
+        assert_eq!(width(&shown, Place::Pane(Pane::Dataset)), None, "behind a tab");
+    }
+
+    #[test]
+    fn a_pane_is_brought_before_the_others_in_every_arrangement() {
+        let mut dock = Dock::default();
+        assert_eq!(width(&shown(&mut dock, [1400.0, 900.0]), Place::Pane(Pane::Plan)), None);
+        dock.activate(Pane::Plan);
+        for size in [[1400.0, 900.0], [800.0, 600.0]] {
+            let shown = shown(&mut dock, size);
+            assert!(
+                width(&shown, Place::Pane(Pane::Plan)).is_some()
+                    && width(&shown, Place::Pane(Pane::Training)).is_none()
+            );
+        }
+    }
+
+    #[test]
+    fn an_arrangement_that_lacks_a_pane_is_not_used() {
+        let mut dock = Dock::default();
+        dock.detach(Pane::Log, true);
+        assert_eq!(dock.clone().checked(), dock);
+        let log = dock.narrow.tiles.find_pane(&Place::Pane(Pane::Log)).expect("there");
+        dock.narrow.tiles.remove(log);
+        assert_eq!(dock.checked(), Dock::default());
+    }
+}
