@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::{CliError, output};
 use crate::jobs::{export, open};
+use crate::math::format;
 use crate::scene::{Bounds, CropBox};
 
 /// Write the Gaussians of a scene as a .ply for other splat viewers
@@ -63,7 +64,7 @@ pub(crate) fn run(args: ExportArgs) -> Result<(), CliError> {
     };
     export::ply(&args.out, &cloud)?;
     let bytes = std::fs::metadata(&args.out).map_or(0, |m| m.len());
-    let size = indicatif::HumanBytes(bytes);
+    let size = format::bytes(bytes);
     output::print(&format!("{}: {} Gaussians, SH degree {}, {size}", args.out.display(), cloud.len(), cloud.sh_degree))
 }
 

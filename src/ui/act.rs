@@ -155,9 +155,7 @@ impl App {
             None => self.open(action),
             Some((_, title)) => {
                 self.question = Some(Question {
-                    text: format!(
-                        "{title} is still running. Cancel it and continue? What it has saved so far is kept."
-                    ),
+                    text: format!("{title} is still running. Cancel it and continue? Saved progress is kept."),
                     yes: "Cancel and continue",
                     no: "Keep running",
                     action,
@@ -220,9 +218,9 @@ impl App {
                 let (cloud, config) = (Arc::clone(&cloud), self.layout.config.clone());
                 self.submit(Command::Evaluate { dataset, cloud, config, out });
             }
-            _ => self
-                .state
-                .toast(Tone::Warning, "Train first: quality is measured on trained Gaussians and held-out photos."),
+            _ => {
+                self.state.toast(Tone::Warning, "Train first: evaluation needs trained Gaussians and held-out photos.")
+            }
         }
     }
 
@@ -230,7 +228,7 @@ impl App {
     pub(super) fn find_objects(&mut self, masks: Option<PathBuf>) {
         let scene = self.state.scene.clone();
         let Some((scene, dataset)) = scene.as_ref().and_then(|s| Some((s, s.dataset.clone()?))) else {
-            self.state.toast(Tone::Warning, "Open a folder of posed photos first: masks belong to photos.");
+            self.state.toast(Tone::Warning, "Open a folder of posed photos first: masks refer to photos.");
             return;
         };
         let masks = masks.or_else(|| scene.masks.clone());
@@ -247,7 +245,7 @@ impl App {
                     with: self.layout.finding.clone(),
                 })));
             }
-            None => self.state.toast(Tone::Warning, "Train first: objects consist of trained Gaussians."),
+            None => self.state.toast(Tone::Warning, "Train first: objects are found among trained Gaussians."),
         }
     }
 
@@ -305,7 +303,7 @@ impl App {
         let Some(SceneContext { scene, cloud, map: Some(map), settings, cameras, up, eye, aspect, explored }) =
             self.context()
         else {
-            self.chat.answer("There is no scene with objects yet: open or train one, and find its objects.");
+            self.chat.answer("Open or train a scene and find its objects first.");
             return;
         };
         let snapshot = Snapshot {
@@ -361,7 +359,7 @@ impl App {
             }
             self.viewport.queries.start_typing();
         } else {
-            self.state.toast(Tone::Warning, "There is nothing to query yet: find the objects first (Objects pane).");
+            self.state.toast(Tone::Warning, "Nothing to query yet: find objects first (Objects pane).");
         }
     }
 }

@@ -19,7 +19,7 @@ impl App {
         match presets::read(path) {
             Ok(config) => {
                 self.layout.config = config;
-                self.state.toast(Tone::Good, format!("The next training has the settings of {}", path.display()));
+                self.state.toast(Tone::Good, format!("The next training uses the settings of {}", path.display()));
             }
             Err(e) => self.state.fail("Reading training settings", Failure::of(&e, "")),
         }
@@ -29,7 +29,7 @@ impl App {
         let writes =
             matches!(action, Action::ExportPly | Action::ExportTarget(_) | Action::ExportCrop | Action::Screenshot);
         if writes && self.viewport.picture().is_none() {
-            self.state.toast(Tone::Warning, "There is nothing to save yet: open a scene first.");
+            self.state.toast(Tone::Warning, "Nothing to save yet: open a scene first.");
             return;
         }
         if action == Action::SaveTrueMask && self.viewport.queries.truth().is_none() {
@@ -94,7 +94,7 @@ impl App {
                 }
             },
             Action::SavePath => match camera::write(&path, &self.camera.path, self.viewport.aspect()) {
-                Ok(()) => self.state.toast(Tone::Good, format!("Wrote {}", path.display())),
+                Ok(()) => self.state.toast(Tone::Good, format!("Saved to {}", path.display())),
                 Err(message) => {
                     self.state.fail("Saving the camera path", Failure { message, remedy: String::new() });
                 }
@@ -116,7 +116,7 @@ impl App {
     fn export_video(&mut self, out: PathBuf) {
         let Some(SceneContext { cloud, map, settings: draw, aspect, .. }) = self.context() else { return };
         let Some((cameras, settings)) = self.camera.video(&out, aspect) else {
-            self.state.toast(Tone::Warning, "There is nothing to export: add keyframes, or go to something first.");
+            self.state.toast(Tone::Warning, "Nothing to export: add keyframes, or fly to an object first.");
             return;
         };
         let found = self.viewport.queries.found();
@@ -129,7 +129,7 @@ impl App {
         let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
         let Some(text) = self.chat.transcript(json).map(str::to_owned) else { return };
         match export::text(path, &text) {
-            Ok(()) => self.state.toast(Tone::Good, format!("Wrote {}", path.display())),
+            Ok(()) => self.state.toast(Tone::Good, format!("Saved to {}", path.display())),
             Err(e) => self.state.fail("Saving the conversation", Failure::of(&e, "")),
         }
     }

@@ -31,7 +31,7 @@ pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox) -> bool {
             ui.label(RichText::new(&error.failure.remedy).color(theme::text()).strong());
         }
         ui.add_space(6.0);
-        ui.weak("What was open is unchanged.");
+        ui.weak("The open scene is unchanged.");
         ui.add_space(12.0);
         ui.horizontal(|ui| {
             let close = ui.add(theme::primary_button("Close")).clicked();

@@ -173,7 +173,7 @@ impl Own {
     /// Draws it. `Some(None)` once it is closed without a path.
     fn show(&mut self, ctx: &Context) -> Option<Option<PathBuf>> {
         if let Some(path) = &self.replaces {
-            let text = format!("{} is there already. Replace it?", path.display());
+            let text = format!("{} already exists. Replace it?", path.display());
             let replace = show_question(ctx, &text, "Replace", "Choose another name")?;
             let path = self.replaces.take();
             if replace {
@@ -213,7 +213,7 @@ fn dialog(action: &Action, name: &str) -> Option<(String, Kind)> {
     let save = |ending: &str| Kind::Save(format!("{name}{ending}"));
     let (title, kind) = match action {
         Action::OpenFolder => ("Open a folder of photos or a trained scene", Kind::Folder),
-        Action::OpenFile => ("Open a scene", Kind::File("Scenes", &["ply", "json", "toml"])),
+        Action::OpenFile => ("Open a scene", Kind::File("Scenes", &["ply", "sog", "gltf", "glb", "json", "toml"])),
         Action::AddModel(id) => return Some((format!("Choose the folder with the files of {id}"), Kind::Folder)),
         Action::ExportPhrases => ("Choose a folder for the masks", Kind::Folder),
         Action::ChooseTrueMask => ("Choose the true mask of this view", Kind::File("Masks", &["png"])),

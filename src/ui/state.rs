@@ -307,7 +307,7 @@ impl AppState {
                 self.history.evaluations.push(e);
             }
             Outcome::Objects(map) => {
-                self.toast(Tone::Good, format!("{} objects and parts found; query one", map.identities.len()));
+                self.toast(Tone::Good, format!("{} objects and parts found", map.identities.len()));
                 self.set_semantics(Some(map));
             }
             Outcome::Edited(map) => self.set_semantics(Some(map)),
@@ -315,13 +315,13 @@ impl AppState {
             Outcome::Scale(meters, stored) => {
                 let scaled = |s: &Arc<OpenedScene>| OpenedScene { metres_per_unit: Some(meters), ..(**s).clone() };
                 self.scene = self.scene.as_ref().map(scaled).map(Arc::new);
-                let kept = if stored { "kept with the scene" } else { "not kept: the scene is not saved yet" };
+                let kept = if stored { "saved with the scene" } else { "not saved: save or train the scene first" };
                 self.toast(Tone::Good, format!("1 unit is {}, {kept}", format::length(1.0, Some(meters))));
             }
             Outcome::Models(models) => self.models = Some(models),
             Outcome::ModelInstalled(id) => {
                 self.models_installed += 1;
-                self.toast(Tone::Good, format!("The model {id} can be used now"));
+                self.toast(Tone::Good, format!("Model {id} is ready"));
             }
             Outcome::Approached(explored, visited) => {
                 self.explored = Some(explored);
@@ -338,7 +338,7 @@ impl AppState {
             }
             Outcome::Thumbnails(map, drawn) => self.thumbnails = Some((map, drawn)),
             Outcome::Phrases(rows, to) => self.phrases.finished(rows, to),
-            Outcome::Written(path) => self.toast(Tone::Good, format!("Wrote {}", path.display())),
+            Outcome::Written(path) => self.toast(Tone::Good, format!("Saved to {}", path.display())),
             Outcome::Unposed(photos) => self.unposed = Some(photos),
             Outcome::Kept => {}
             Outcome::RecentPictures(pictures) => self.recent_pictures = pictures,

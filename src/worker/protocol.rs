@@ -225,14 +225,14 @@ impl Command {
             Self::Evaluate { dataset, .. } => format!("Evaluating {}", dataset.name),
             Self::FindObjects(request) => format!("Finding objects in {}", request.dataset.name),
             Self::EditObjects { .. } => "Editing objects".into(),
-            Self::SetScale { .. } => "Storing the scale".into(),
+            Self::SetScale { .. } => "Saving the scale".into(),
             Self::Export { path, .. } | Self::Picture { path, .. } => format!("Writing {}", name(path)),
             Self::Photo { photo, .. } => format!("Loading {}", photo.name),
-            Self::KeepPicture { of, .. } => format!("Keeping a picture of {}", name(of)),
-            Self::RecentPictures(_) => "Reading pictures of recent scenes".into(),
+            Self::KeepPicture { of, .. } => format!("Saving the thumbnail of {}", name(of)),
+            Self::RecentPictures(_) => "Loading thumbnails of recent scenes".into(),
             Self::Thumbnails { .. } => "Rendering thumbnails".into(),
             Self::ListModels => "Listing models".into(),
-            Self::Explore { .. } => "Exploring where one can go".into(),
+            Self::Explore { .. } => "Building the navigation graph".into(),
             Self::InstallModel { id, .. } => format!("Installing the model {id}"),
             Self::Approach(request) => {
                 format!("Planning the flight to {}", request.map.identities.full_name(request.id))
@@ -240,7 +240,7 @@ impl Command {
             Self::Inspect(_) => "Looking into a pixel".into(),
             Self::Video(request) => format!("Rendering {}", name(&request.out)),
             Self::Measure(_) => "Benchmarking rendering".into(),
-            Self::Phrases(_) => "Asking a list of phrases".into(),
+            Self::Phrases(_) => "Running the phrase list".into(),
             Self::ReadReport { path, .. } => format!("Opening the report {}", name(path)),
         }
     }

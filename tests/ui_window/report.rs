@@ -60,7 +60,7 @@ fn a_report_is_opened_compared_and_its_settings_are_applied() {
     let mut w = Window::new(Some(Action::Open(write_splat(folder.path()))));
     w.until("the splat", |a| a.viewport.picture().is_some_and(|p| p.full));
     w.ask(Action::TogglePane(Pane::Report));
-    assert!(w.shows("Error against run time") && w.shows("fmlgs report") && w.shows("Benchmark rendering"));
+    assert!(w.shows("Error vs. run time") && w.shows("fmlgs report") && w.shows("Benchmark rendering"));
 
     // As if it was dropped: it is no scene, and takes no scene's place.
     w.ask(Action::Open(at("one")));

@@ -79,7 +79,7 @@ fn row(ui: &mut Ui, i: usize, key: &mut PathKey, chosen: bool) -> Option<KeyChan
     key.name = Some(name).filter(|n| !n.is_empty());
     ui.horizontal(|ui| {
         let mut fixed = key.time_secs.is_some();
-        let fix = ui.checkbox(&mut fixed, "").on_hover_text("Fix the time at which it is reached.");
+        let fix = ui.checkbox(&mut fixed, "").on_hover_text("Fix the time of this keyframe.");
         if fix.accessible_name(named("Fixed time")).changed() {
             key.time_secs = fixed.then_some(i as f64);
         }
@@ -104,8 +104,8 @@ fn row(ui: &mut Ui, i: usize, key: &mut PathKey, chosen: bool) -> Option<KeyChan
     let wait = DragValue::new(&mut key.dwell_secs).range(0.0..=600.0).speed(0.02).suffix(" s");
     ui.add(wait).accessible_name(named("Wait"));
     let buttons = [
-        ("Go", "Move the view here.", KeyChange::Go),
-        ("Set", "Replace this keyframe by the current view.", KeyChange::Update),
+        ("Go", "Move the view to this keyframe.", KeyChange::Go),
+        ("Update", "Replace this keyframe with the current view.", KeyChange::Update),
         ("Copy", "Insert a copy after it.", KeyChange::Copy),
         ("Earlier", "Swap it with the previous keyframe.", KeyChange::Up),
         ("Later", "Swap it with the next keyframe.", KeyChange::Down),

@@ -196,8 +196,8 @@ impl CameraPane {
         if self.path.keys.is_empty() {
             ui.add_space(4.0);
             ui.weak(
-                "No keyframes yet. Move the view and add it (K), open a path, or find something and go there: the \
-                 flight can be converted to a path.",
+                "No keyframes yet. Add the current view (K), open a path, or go to an object and convert the \
+                 flight.",
             );
         } else {
             wanted = keys::show(ui, self, eye).or(wanted);
@@ -303,7 +303,7 @@ impl CameraPane {
         ui.checkbox(&mut self.path.closed, "Closed loop")
             .on_hover_text("Continue from the last keyframe to the first.");
         let mut eased = self.speed == Speed::Eased;
-        ui.checkbox(&mut eased, "Ease in/out").on_hover_text("Start and stop smoothly, at waits too.");
+        ui.checkbox(&mut eased, "Ease in/out").on_hover_text("Start and stop smoothly, also at waits.");
         self.speed = if eased { Speed::Eased } else { Speed::Constant };
     }
 

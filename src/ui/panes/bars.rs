@@ -186,7 +186,7 @@ pub(crate) fn status(
                 actions.push(Action::TogglePane(Pane::Log));
             }
             if let Some(p) = picture {
-                let text = RichText::new(format!("Rendered on the {}", p.drawn_by)).small();
+                let text = RichText::new(format!("Rendered on {}", p.drawn_by)).small();
                 match &p.instead_of_gpu {
                     Some(why) => ui.label(text.color(theme::warning())).on_hover_text(why),
                     None => ui.label(text.color(theme::weak())),

@@ -31,7 +31,7 @@ pub(crate) fn show(
     ui.horizontal(|ui| {
         let id = ui.label("Smoothing").id;
         ui.add(Slider::new(&mut settings.smoothing, 0.0..=20.0).suffix(" %").fixed_decimals(0)).labelled_by(id);
-        ui.checkbox(&mut settings.log, "Log loss");
+        ui.checkbox(&mut settings.log, "Log-scale loss");
     });
     let PlotSettings { smoothing, log, .. } = *settings;
     let smooth = |points: &[[f64; 2]]| smooth(points, smoothing);
@@ -57,10 +57,10 @@ pub(crate) fn show(
                 p.line(Line::new(name.clone(), PlotPoints::from(curve.clone())).color(color).width(1.2));
             }
             if before {
-                p.line(dashed("training before", &psnr(previous)));
+                p.line(dashed("training photos (previous run)", &psnr(previous)));
                 let held = PlotPoints::from(held(previous));
                 p.line(
-                    Line::new("held-out before", held)
+                    Line::new("held-out photos (previous run)", held)
                         .color(theme::warning())
                         .width(1.4)
                         .style(LineStyle::dashed_loose()),

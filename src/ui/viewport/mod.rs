@@ -173,7 +173,7 @@ impl Viewport {
         }
         if let Some(why) = self.queries.newly_failed() {
             let remedy = "Install the encoder (Models pane), or find the objects again with another";
-            state.problem(None, &format!("Queries find names only, the text encoder failed: {why}. {remedy}."));
+            state.problem(None, &format!("The text encoder failed, so queries match names only: {why}. {remedy}."));
         }
         if let Some(photo) = &mut self.photo {
             photo.take_loaded(state);

@@ -167,10 +167,10 @@ impl Viewport {
                 ui.label(RichText::new(text::elided(&p.name(), 28)).strong()).on_hover_text(&*p.name());
                 ui.weak(format!("{} of {total}", p.index() + 1));
                 if let Some(psnr) = self.picture().and_then(|p| p.psnr) {
-                    ui.label(RichText::new(format!("preview {}", format::decibel(psnr))).color(theme::accent())).on_hover_text(
-                        "PSNR of what is on screen against the photo, at the size on screen. The evaluation's number \
-                         is at the photo's size in training.",
-                    );
+                    ui.label(RichText::new(format!("preview {}", format::decibel(psnr))).color(theme::accent()))
+                        .on_hover_text(
+                            "PSNR of the view at screen resolution. Evaluation uses the training resolution.",
+                        );
                 }
                 if p.failed() {
                     ui.colored_label(theme::warning(), "photo not loaded");

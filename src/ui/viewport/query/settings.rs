@@ -50,10 +50,10 @@ impl Default for OverlaySettings {
 pub(crate) fn show(ui: &mut Ui, settings: &mut OverlaySettings, heat: Option<&[f32]>) -> bool {
     let kind = settings.kind;
     egui::Grid::new("overlay settings").num_columns(2).spacing(vec2(10.0, 5.0)).show(ui, |ui| {
-        ui.weak("Level");
+        ui.weak("Search in");
         ui.horizontal(|ui| {
             for (kind, text) in
-                [(LevelFilter::Auto, "from the query"), (LevelFilter::Object, "objects"), (LevelFilter::Part, "parts")]
+                [(LevelFilter::Auto, "auto"), (LevelFilter::Object, "objects"), (LevelFilter::Part, "parts")]
             {
                 ui.selectable_value(&mut settings.kind, kind, text);
             }
@@ -127,7 +127,7 @@ fn histogram(ui: &mut Ui, settings: &mut OverlaySettings, heat: &[f32]) {
     });
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 54.0), Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, "Relevancy threshold"));
-    let response = response.on_hover_text("Drag: outline all pixels of at least this relevancy. Double-click: none");
+    let response = response.on_hover_text("Drag: outline pixels with at least this relevancy. Double-click: off");
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect, 3.0, theme::canvas());
     // Logarithmic: most pixels have nothing to do with a query.
