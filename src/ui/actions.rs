@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use egui::ThemePreference;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 use strum::{IntoStaticStr, VariantArray};
 
@@ -12,7 +12,7 @@ use crate::io::unposed::Unposed;
 use crate::measure::{Knobs, StageName};
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::edit::Edit;
-use crate::scene::{IdentityId, NOBODY};
+use crate::scene::{CropBox, IdentityId, NOBODY};
 use crate::ui::color_by::ColorBy;
 use crate::worker::{Start, ViewMode};
 
@@ -171,6 +171,9 @@ actions! {
     TrueMask(path: Option<PathBuf>): path.as_ref().map_or_else(|| "End the comparison with a true mask".into(),
             |p| format!("Compare with the true mask {}", p.display())),
         "Hits, misses, false alarms and IoU of the latest answer.";
+    PaintTrueMask: "Paint a true mask",
+        "Paint what the answer should be in this view. Shows hits, misses, false alarms and IoU.";
+    SaveTrueMask: "Save the true mask as .png\u{2026}", "White where the object is; can be loaded again.";
     GoToTarget(id: IdentityId, side: Side): format!("Go to #{id}, {}", side.text()),
         "Fly to its best view, around obstacles.";
     PlayPath: "Play or pause the camera path", "Fly along the path, or pause where you are.", "Space";
@@ -184,6 +187,9 @@ actions! {
     SaveChat: "Save conversation\u{2026}", "As Markdown, or .json, with every step and its result.";
     Select(id: Option<IdentityId>): id.map_or_else(|| "Deselect".into(), |id| format!("Select #{id}")),
         "Outline it in the view; keys and menus act on it.";
+    SelectNext: "Select the next object", "In the order of the list; with a part selected, the part next to it.", "N";
+    SelectPrevious: "Select the previous object", "In the order of the list; with a part selected, the part before it.", "P";
+    SelectInner: "Select a part of the selection", "The first part of what is selected; N and P go through the others.", "O";
     IsolateSelected: "Isolate the selection",
         "Show only the selection, or everything again.", "I";
     HideSelected: "Hide the selection", "Do not show it in the view.", "H";
@@ -193,6 +199,8 @@ actions! {
     Hide(id: IdentityId): format!("Hide or show #{id}"), "Hide it in the view, or show it again.";
     ExportTarget(id: IdentityId): format!("Export #{id} as .ply\u{2026}"),
         "Write its Gaussians in the format that 3DGS viewers read.";
+    ExportCrop: "Export what the crop box keeps\u{2026}",
+        "Write the Gaussians whose centers it keeps, hidden ones too, in the format that 3DGS viewers read.";
     Change(edit: Edit): match edit {
             Edit::Rename(_, name) => format!("Rename to {name}"),
             Edit::Merge(from, into) => format!("Merge #{from} into #{into}"),
@@ -214,6 +222,12 @@ actions! {
     SetUp(up: DVec3): format!("Make ({:.2}, {:.2}, {:.2}) the up direction", up.x, up.y, up.z),
         "Use the picked plane as the floor.";
     Measure: "Measure a distance", "Click two points on surfaces; set the scale from a known length.", "M";
+    Crop: "Crop box", "Show only the Gaussians in a box: drag its faces or type its corners.", "B";
+    SetCrop(crop: Option<CropBox>): if crop.is_some() { "Crop the view" } else { "Remove the crop box" },
+        "Show only what a box keeps, or everything again.";
+    Inspect: "Inspect Gaussians", "Click a pixel to see every property of its Gaussians.", "X";
+    InspectAt(at: DVec2): format!("Inspect the Gaussians at ({:.2}, {:.2})", at.x, at.y),
+        "Every property of the Gaussians of a pixel.";
     SetScale(meters: f64): format!("Set the scale to {meters} m per unit"),
         "Show lengths in meters; saved with the scene.";
     PreviousPhoto: "Previous photo", "Look through the camera of the previous photo.", "[";
@@ -226,6 +240,13 @@ actions! {
     Tint(by: ColorBy): format!("Color by {}", by.text().to_lowercase()),
         "Color the view this way; again for the RGB image.";
     ToggleCompare: "Compare with the photo", "Show the photo beside the rendering with a slider between them.", "C";
+    ToggleSplit: "Split view", "Two views of the scene by one camera, each with its own query and colors.", "8";
+    OtherView: "Work in the other view", "Keys, queries and colors act on it from now on.", "0";
+    ChooseBeside: "Compare with another scene\u{2026}",
+        "Show its Gaussians in the second view by the same camera: two trainings of the same photos.";
+    OpenBeside(path: Option<PathBuf>): path.as_ref().map_or_else(|| "End the comparison with another scene".into(),
+            |p| format!("Compare with the scene {}", p.display())), "Show its Gaussians in the second view.";
+    ToggleDim: "Dim the rest", "Darken everything except answers and the selection.", "9";
     ToggleCameras: "Show or hide cameras", "Show the camera of every photo in the view.", "V";
     TogglePane(pane: Pane): format!("Show or hide the {} pane", pane.text().to_lowercase()),
         "Show or hide this pane.";
@@ -267,7 +288,7 @@ impl Action {
         let mut all = Self::plain();
         // Without a brush there is nothing to add.
         all.retain(|a| *a != Self::AddPainted);
-        all.extend([Self::Isolate(None), Self::Paint(Some(NOBODY))]);
+        all.extend([Self::Isolate(None), Self::Paint(Some(NOBODY)), Self::SetCrop(None)]);
         all.extend(ViewMode::VARIANTS.iter().map(|mode| Self::Show(*mode)));
         all.extend(Pane::VARIANTS.iter().map(|pane| Self::ShowPane(*pane)));
         all.extend(THEMES.map(Self::UseTheme));
@@ -287,6 +308,7 @@ impl Action {
             Self::Show(ViewMode::Difference) => {
                 "Absolute difference from the photo, amplified four times. Needs a photo's view."
             }
+            Self::Show(ViewMode::Photo) => "The photo through whose camera the view looks. Needs a photo's view.",
             other => other.row().0,
         }
     }

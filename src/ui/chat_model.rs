@@ -106,7 +106,7 @@ impl ModelChooser {
             ("API key variable", &mut model.key_variable, "environment variable; empty if none"),
         ] {
             ui.label(RichText::new(label).small().color(theme::weak()));
-            ui.add(TextEdit::singleline(value).hint_text(hint).desired_width(f32::INFINITY));
+            ui.add(TextEdit::singleline(value).hint_text(hint).desired_width(f32::INFINITY)).accessible_name(label);
         }
         let is_waiting = matches!(self.tested, Asked::Waiting(_));
         ui.horizontal_wrapped(|ui| {

@@ -48,7 +48,7 @@ pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox) -> bool {
 
 /// Asks a question. `Some(true)` to go ahead, `Some(false)` not to, `None` while no one answered.
 pub(crate) fn show_question(ctx: &egui::Context, text: &str, yes: &str, no: &str) -> Option<bool> {
-    let response = Modal::new(Id::unique("question")).frame(theme::dialog()).show(ctx, |ui| {
+    let response = Modal::new(Id::unique("dialog question")).frame(theme::dialog()).show(ctx, |ui| {
         ui.set_width(420.0);
         ui.label(text);
         ui.add_space(12.0);

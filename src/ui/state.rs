@@ -7,6 +7,7 @@ use std::sync::Arc;
 pub use self::messages::{ErrorBox, LogLine};
 pub(crate) use self::messages::{Toast, Tone};
 use super::actions::Action;
+use super::beside::Beside;
 use super::history::ChangeHistory;
 use super::labels::{PhraseTable, ScreenNames};
 pub(crate) use super::train_history::TrainHistory;
@@ -14,6 +15,7 @@ use crate::io::unposed::Unposed;
 use crate::jobs::OpenedScene;
 use crate::jobs::demo::QUESTION;
 use crate::jobs::go_to::{Approached, Explored};
+use crate::jobs::inspect::InspectedPixel;
 use crate::jobs::models::ModelList;
 use crate::jobs::thumbnails::ThumbnailSet;
 use crate::math::format;
@@ -53,6 +55,8 @@ pub struct ShownReport {
 pub struct AppState {
     /// The scene on screen.
     pub scene: Option<Arc<OpenedScene>>,
+    /// What is seen of another one, in the second view.
+    pub beside: Option<Beside>,
     /// Counts the scenes shown so far; changes when `scene` does.
     pub(crate) scene_number: u64,
     /// What is left out for the scene, and why.
@@ -71,6 +75,8 @@ pub struct AppState {
     pub explored: Option<Arc<Explored>>,
     /// The way that was looked for last, until the window takes it.
     pub(crate) visited: Option<Approached>,
+    /// The pixel that was looked into last, until the window takes it.
+    pub(crate) inspected: Option<Arc<InspectedPixel>>,
     /// Models and the engine that runs them, once they were listed.
     pub(crate) models: Option<Arc<ModelList>>,
     /// Models that were put in place so far.
@@ -271,6 +277,12 @@ impl AppState {
                     _ => None,
                 });
             }
+            Outcome::Beside(scene) => {
+                self.beside = Beside::of(*scene);
+                if self.beside.is_none() {
+                    self.toast(Tone::Warning, "There is nothing to compare with: it has no Gaussians.");
+                }
+            }
             Outcome::Trained { evaluations, out, semantics, facts } => {
                 let carried = semantics.is_some();
                 if self.training_job == Some(job) {
@@ -315,6 +327,7 @@ impl AppState {
                 self.explored = Some(explored);
                 self.visited = Some(visited);
             }
+            Outcome::Inspected(pixel) => self.inspected = Some(pixel),
             Outcome::Explored(explored) => self.explored = Some(explored),
             Outcome::Report { path, report, second } => {
                 let shown = Some(ShownReport { path, report });
@@ -359,6 +372,7 @@ impl AppState {
             self.remember(scene.path.clone());
         }
         self.scene_number += 1;
+        self.beside = None;
         self.set_facts(scene.facts.clone());
         self.antialias = scene.render.antialias;
         self.set_semantics(scene.semantics.clone());

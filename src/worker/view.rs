@@ -11,7 +11,7 @@ use super::failure::Failure;
 use super::observer::Repaint;
 use super::thread::panic_failure;
 use super::view_renderer::ViewRenderer;
-pub use super::view_request::{QualityBudget, SkipPasses, ViewPicture, ViewRequest, ViewResult};
+pub use super::view_request::{QualityBudget, SecondPicture, SkipPasses, ViewPicture, ViewRequest, ViewResult};
 use crate::jobs::query::ViewMaps;
 use crate::render::{RenderError, Renderer};
 use crate::scene::Camera;
@@ -218,6 +218,8 @@ mod tests {
                 camera: Camera::look_at(DVec3::new(0.0, 0.0, -3.0), DVec3::ZERO, DVec3::NEG_Y, 0.8, 32, 24)
                     .expect("valid"),
                 mode: ViewMode::Rgb,
+                second: None,
+                beside: None,
                 settings: RenderSettings::default(),
                 budget: QualityBudget::Full,
                 photo: None,

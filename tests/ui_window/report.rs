@@ -5,7 +5,7 @@ use fmlgs::measure::{self, ErrorKind, Knobs, Measure, Point, Report, Rule, Sampl
 use super::*;
 
 /// A report of two stages, whose settings the window has.
-fn write_report(folder: &Path, times: f64, cores: usize) {
+pub(crate) fn write_report(folder: &Path, times: f64, cores: usize) {
     let sample = |v: f64| {
         let mut s = Sample::default();
         [v, 1.1 * v, 0.9 * v].iter().for_each(|v| s.add(*v));

@@ -128,7 +128,8 @@ impl Tree<'_> {
             state.set_open(true);
         }
         let header = state.show_header(ui, |ui| self.row(ui, id, actions));
-        header.body(|ui| self.branches(ui, Id::unique("pieces").with(id), pieces, actions));
+        let body = header.body(|ui| self.branches(ui, Id::unique("pieces").with(id), pieces, actions));
+        body.0.accessible_name(format!("Parts of {}", self.identities.full_name(id)));
     }
 
     /// Tick, thumbnail, color and name from the left; Gaussians and menu from the right.

@@ -36,12 +36,13 @@ impl PhrasesPane {
                     .desired_rows(4)
                     .desired_width(f32::INFINITY);
                 ScrollArea::vertical().id_salt("phrases").max_height(ui.available_height() - 34.0).show(ui, |ui| {
-                    ui.add(edit);
+                    ui.add(edit).accessible_name("Phrases");
                 });
                 ui.horizontal(|ui| {
                     let mask = if comparing { Action::TrueMask(None) } else { Action::ChooseTrueMask };
                     let text = if comparing { "End comparison" } else { "True mask\u{2026}" };
-                    for (action, text) in [(Action::ExportPhrases, "Export masks\u{2026}"), (mask, text)] {
+                    let paint = (Action::PaintTrueMask, "Paint it");
+                    for (action, text) in [(Action::ExportPhrases, "Export\u{2026}"), (mask, text), paint] {
                         if ui.small_button(text).on_hover_text(action.tooltip()).clicked() {
                             actions.push(action);
                         }
@@ -82,7 +83,9 @@ fn show_rows(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
 
 fn show_row(ui: &mut Ui, row: &PhraseRow, actions: &mut Vec<Action>) {
     ui.weak(&row.view);
-    if ui.link(&row.phrase).on_hover_text("Query it in the view").clicked() {
+    let [red, green, blue] = row.color;
+    let phrase = RichText::new(&row.phrase).color(egui::Color32::from_rgb(red, green, blue));
+    if ui.link(phrase).on_hover_text("Query it in the view").clicked() {
         actions.push(Action::Ask(row.phrase.clone()));
     }
     ui.label(if row.answer.is_empty() { row.verdict } else { &row.answer });

@@ -49,7 +49,7 @@ pub(crate) fn show(
     let dashed = |name: &str, points: &[[f64; 2]]| {
         Line::new(name, smooth(points)).color(theme::weak()).width(1.2).style(LineStyle::dashed_loose())
     };
-    plot("psnr", "PSNR (dB)", *axis)
+    let psnr_plot = plot("psnr", "PSNR (dB)", *axis)
         .legend(Legend::default().position(egui_plot::Corner::RightBottom).background_alpha(0.5))
         .show(ui, |p| {
             let colors = [theme::warning(), theme::good()].into_iter().cycle();
@@ -76,18 +76,20 @@ pub(crate) fn show(
                     .color(theme::accent()),
             );
         });
+    psnr_plot.response.accessible_name("Plot of PSNR");
     theme::section(ui, "Loss (L1 + 0.2 D-SSIM)");
     let loss_plot = plot("loss", if log { "log10 loss" } else { "Loss" }, *axis);
     let loss_plot = match log {
         true => loss_plot.y_axis_formatter(|mark, _| format!("{:.2e}", 10_f64.powf(mark.value))),
         false => loss_plot.include_y(0.0),
     };
-    loss_plot.show(ui, |p| {
+    let loss_plot = loss_plot.show(ui, |p| {
         if before {
             p.line(dashed("before", &loss(previous)));
         }
         p.line(Line::new("loss", smooth(&loss(history))).color(theme::accent()).width(1.5));
     });
+    loss_plot.response.accessible_name("Plot of the loss");
 }
 
 fn plot(name: &'static str, quantity: &'static str, axis: PlotAxis) -> Plot<'static> {

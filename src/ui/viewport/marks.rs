@@ -120,7 +120,7 @@ impl Viewport {
                 Mark::Ghost => ghost(&painter, &hull(places), color, &format!("{name} (occluded)")),
                 Mark::Ring => ring(&painter, middle(&places), color),
             };
-            let button = ui.interact(at, ui.scope_id().with(("mark", id)), Sense::click());
+            let button = ui.interact(at, ui.scope_id().with(("mark", id, self.queries.is_second())), Sense::click());
             button.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Fly to {name}")));
             if button.on_hover_text("Click to fly there").on_hover_cursor(egui::CursorIcon::PointingHand).clicked() {
                 actions.push(Action::GoToTarget(id, Side::Best));

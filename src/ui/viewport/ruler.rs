@@ -54,21 +54,15 @@ impl Viewport {
         self.ruler.is_some()
     }
 
-    /// Takes clicks, draws the points and what lies between them, and says what that measures.
-    pub(super) fn show_ruler(
-        &mut self,
-        ui: &Ui,
-        response: &Response,
-        shown: Rect,
-        meters_per_unit: Option<f64>,
-        actions: &mut Vec<Action>,
-    ) {
+    /// Takes clicks in a view, draws the points and what lies between them.
+    pub(super) fn show_ruler(&mut self, ui: &Ui, response: &Response, shown: Rect, meters_per_unit: Option<f64>) {
         let Some(mut ruler) = self.ruler.take() else { return };
         let surface = |pos: Pos2| {
             let at = (pos - shown.min) / shown.size();
             self.display.picked(DVec2::new(f64::from(at.x), f64::from(at.y)), &self.eye)
         };
-        if let Some(point) = response.interact_pointer_pos().filter(|_| response.clicked()).and_then(surface) {
+        let clicked = response.interact_pointer_pos().filter(|pos| response.clicked() && shown.contains(*pos));
+        if let Some(point) = clicked.and_then(surface) {
             ruler.put(point);
         }
         let eye = self.overlay_camera(shown);
@@ -93,7 +87,20 @@ impl Viewport {
         for at in places.iter().flatten() {
             painter.circle(*at, 5.0, theme::warning(), Stroke::new(1.5, Color32::from_black_alpha(200)));
         }
-        self.ruler = ruler_card(ui, shown, ruler, self.eye.center, meters_per_unit, actions);
+        self.ruler = Some(ruler);
+    }
+
+    /// Says what the points measure.
+    pub(super) fn show_ruler_card(
+        &mut self,
+        ui: &Ui,
+        rect: Rect,
+        meters_per_unit: Option<f64>,
+        actions: &mut Vec<Action>,
+    ) {
+        if let Some(ruler) = self.ruler.take() {
+            self.ruler = ruler_card(ui, rect, ruler, self.eye.center, meters_per_unit, actions);
+        }
     }
 }
 

@@ -36,7 +36,7 @@ impl Queries {
         if !ignored.is_empty() {
             ui.colored_label(theme::warning(), format!("Ignored: \"{}\".", text::shortened(&ignored, 80)));
         }
-        let shown = newest.shown(&self.settings);
+        let shown = newest.shown(&self.side.settings);
         match (&newest.answered.answer, shown.first()) {
             (Answer::NotFound(_), None) => self.show_nothing(ui, &newest, semantics),
             (Answer::Ambiguous(_), Some(_)) if newest.chosen.is_none() => {
@@ -74,7 +74,7 @@ impl Queries {
             }
             _ => {}
         }
-        if let Some(comparison) = &self.comparison {
+        if let Some(comparison) = &self.side.comparison {
             comparison.show(ui);
         }
         if let Some(trouble) = self.embeddings.problem() {
@@ -143,16 +143,16 @@ impl Queries {
         semantics: &Versioned<SemanticMap>,
         cloud: &GaussianCloud,
     ) -> Facts {
-        let OverlaySettings { mode, tolerance, .. } = self.settings;
+        let OverlaySettings { mode, tolerance, .. } = self.side.settings;
         let of = (semantics.generation(), target, mode, tolerance.to_bits());
-        if let Some(facts) = self.facts.as_ref().filter(|f| f.of == of) {
+        if let Some(facts) = self.side.facts.as_ref().filter(|f| f.of == of) {
             return facts.clone();
         }
         let inside = matching::gaussians(semantics, target, mode, tolerance);
         let gaussians = inside.iter().filter(|g| **g).count();
         let points = (0..cloud.len()).filter(|&i| inside.get(i) == Some(&true)).map(|i| cloud.world_position(i));
         let facts = Facts { of, gaussians, bounds: Bounds::robust(points) };
-        self.facts = Some(facts.clone());
+        self.side.facts = Some(facts.clone());
         facts
     }
 }

@@ -44,7 +44,7 @@ impl Queries {
         match self.newest().cloned() {
             Some(newest) => {
                 self.show_hits(ui, &newest, state, semantics);
-                if let Some(&target) = newest.shown(&self.settings).first() {
+                if let Some(&target) = newest.shown(&self.side.settings).first() {
                     let facts = self.facts_of(target, semantics, cloud);
                     show_target(ui, target, &facts, state, actions);
                 }
@@ -52,21 +52,21 @@ impl Queries {
                     Basis::Names => "by name",
                     Basis::Embedding => "by embedding",
                 };
-                times::show(ui, basis, &newest.answered.stages.and(self.paint_ms));
+                times::show(ui, basis, &newest.answered.stages.and(self.side.paint_ms));
             }
             None => {
                 ui.weak("No query yet: type into the box in the view ( / ).");
             }
         }
         ui.add_space(6.0);
-        let heat = (!self.heat.is_empty()).then_some(self.heat.as_slice());
-        if settings::show(ui, &mut self.settings, heat) {
+        let heat = (!self.side.heat.is_empty()).then_some(self.side.heat.as_slice());
+        if settings::show(ui, &mut self.side.settings, heat) {
             self.ask_again(semantics);
         }
     }
 
     fn show_hits(&mut self, ui: &mut Ui, newest: &super::Asked, state: &AppState, semantics: &Versioned<SemanticMap>) {
-        let shown = newest.shown(&self.settings);
+        let shown = newest.shown(&self.side.settings);
         let hits = newest.answered.answer.hits().iter().filter(|h| h.score > 0.0).take(LISTED);
         let mut chosen = None;
         egui::Grid::new("hits").num_columns(4).striped(true).show(ui, |ui| {
