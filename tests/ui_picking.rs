@@ -200,11 +200,11 @@ fn things_are_pointed_at_selected_isolated_and_hidden() {
     // The menu of a right click is about what is under the cursor.
     w.click(shade, PointerButton::Secondary, plain);
     assert_eq!(w.selected(), Some(LAMP));
-    assert!(w.shows("Mark as a query") && w.shows("Export as .ply"), "the menu");
-    w.harness.get_by_label("Mark as a query").click();
+    assert!(w.shows("Query this") && w.shows("Export as .ply"), "the menu");
+    w.harness.get_by_label("Query this").click();
     w.harness.run_steps(4);
     assert_eq!(w.app().viewport.queries.found(), [LAMP]);
-    assert!(!w.shows("Mark as a query"), "a choice closes it");
+    assert!(!w.shows("Query this"), "a choice closes it");
 }
 
 #[test]
@@ -250,7 +250,7 @@ fn what_is_not_in_view_is_marked_and_masks_follow_the_eye() {
     w.harness.run_steps(3);
     assert!(w.shows("One color per object"), "the legend");
     w.ask(Action::Tint(ColorBy::Objects));
-    assert!(!w.shows("One color per object"), "once more for the picture");
+    assert!(!w.shows("One color per object"), "again for the RGB image");
 }
 
 /// Prints how long it takes from the cursor, and from a click, to the outline (docs/measured.md).

@@ -98,7 +98,7 @@ pub(crate) fn find_and_ask(
     let find_secs = start.elapsed().as_secs_f64();
     let (kept, _) = SceneFolder::hold(scene, "storing objects")?.replace_map(job.state.as_deref(), &map, &job.cloud)?;
     if let Some(kept) = kept {
-        observer.note(Severity::Info, format!("The objects and parts before are kept in {}", kept.display()));
+        observer.note(Severity::Info, format!("The previous objects and parts are kept in {}", kept.display()));
     }
     observer.note(Severity::Info, format!("{} objects and parts found", map.identities.len()));
     Ok(DemoQueries { find_secs, ..ask(&map, photos, job, Some(pictures))? })

@@ -11,11 +11,17 @@ use serde::Serialize;
 use super::JobError;
 use crate::io::{self, IoError, atomic, scene_files, splat_ply, trained};
 use crate::navigate::{CameraSpline, Pose, Speed};
-use crate::scene::{CameraPath, GaussianCloud, PathKey, PhotoPixels};
+use crate::scene::{CameraPath, CropBox, GaussianCloud, PathKey, PhotoPixels};
 
 pub(crate) fn ply(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
     make_parent(path)?;
     splat_ply::write(path, cloud)
+}
+
+/// The Gaussians that a crop box keeps, if it keeps any.
+pub(crate) fn cropped(cloud: &GaussianCloud, crop: &CropBox) -> Result<GaussianCloud, JobError> {
+    let kept = crop.crop(cloud);
+    if kept.is_empty() { Err(JobError::NoGaussians) } else { Ok(kept) }
 }
 
 pub(crate) fn text(path: &Path, text: &str) -> Result<(), IoError> {

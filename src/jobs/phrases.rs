@@ -87,8 +87,8 @@ pub struct PhraseRow {
 pub(crate) fn listed(text: &str) -> Result<Vec<String>, JobError> {
     let phrases: Vec<String> = text.lines().map(str::trim).filter(|l| !l.is_empty()).map(str::to_owned).collect();
     match phrases.len() {
-        0 => Err(JobError::Phrases("the list has no phrase: write one a line".into())),
-        n if n > MOST => Err(JobError::Phrases(format!("{n} phrases are more than {MOST}: split the list"))),
+        0 => Err(JobError::Phrases("the list is empty: write one phrase per line".into())),
+        n if n > MOST => Err(JobError::Phrases(format!("{n} phrases exceed the limit of {MOST}: split the list"))),
         _ => Ok(phrases),
     }
 }
@@ -121,7 +121,7 @@ pub(crate) fn run(request: &PhrasesRequest, observer: &mut dyn Observer) -> Resu
     colors.keep_all(phrases);
     let (stems, mut coco) = (stems(phrases), Coco::default());
     let (mut rows, mut renderer) = (Vec::new(), Renderer::new());
-    let mut ticker = Ticker::new("Asking phrases", views.len());
+    let mut ticker = Ticker::new("Running the phrase list", views.len());
     for (k, (view, camera)) in views.iter().enumerate() {
         ticker.tick(k, observer)?;
         let blend = request.matching.0 == MatchMode::Blend;

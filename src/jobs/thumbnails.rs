@@ -23,7 +23,7 @@ pub(crate) fn draw(
     home: &HomeView,
 ) -> Result<ThumbnailSet, JobError> {
     let from = home.camera.as_ref().map_or(home.bounds.center() + home.up, |c| c.center);
-    resource_log::record(ResourceKind::Thumbnails, "portraits of objects and parts", "a list of them is shown", 0);
+    resource_log::record(ResourceKind::Thumbnails, "thumbnails of objects and parts", "a list of them is shown", 0);
     let appearances = appearance::of_unnamed(cloud, map);
     Ok(ThumbnailSet { pictures: portraits(cloud, map, settings, from, home.up)?, appearances })
 }

@@ -25,7 +25,7 @@ impl App {
             Err(e) => return self.state.toast(Tone::Warning, e.to_string()),
         };
         let Some(SceneContext { cloud, map: Some(map), settings, scene, .. }) = self.context() else {
-            return self.state.toast(Tone::Warning, "Find objects first: they are what phrases are asked of.");
+            return self.state.toast(Tone::Warning, "Find objects first: queries search among them.");
         };
         let photos = scene.dataset.as_ref().filter(|_| self.phrases.all_photos);
         let views: Vec<(String, Camera)> = match (photos, self.viewport.picture()) {

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use crate::jobs::edit::EditRequest;
 use crate::pipeline::semantics::edit::Edit;
 use crate::scene::undo::UndoHistory;
-use crate::scene::{CameraPath, Identities, IdentityId, NOBODY, SemanticMap};
+use crate::scene::{CameraPath, CropBox, Identities, IdentityId, NOBODY, SemanticMap};
 use crate::worker::{JobId, ViewMode};
 
 /// What can be changed back beside objects and parts.
@@ -18,6 +18,7 @@ use crate::worker::{JobId, ViewMode};
 pub(crate) struct ViewState {
     /// Whose own Gaussians are left out.
     pub(crate) hidden: BTreeSet<IdentityId>,
+    pub(crate) crop: Option<CropBox>,
     /// What the two views show, and whether there are two.
     pub(crate) modes: [ViewMode; 2],
     pub(crate) split: bool,
@@ -149,6 +150,15 @@ fn described(before: &ViewState, now: &ViewState, all: Option<&Identities>) -> S
     if before.hidden != now.hidden {
         return all.map_or_else(String::new, |all| shown_text(&before.hidden, &now.hidden, all));
     }
+    if before.crop != now.crop {
+        return match (before.crop, now.crop) {
+            (None, _) => "cropped the view",
+            (_, None) => "removed the crop box",
+            (Some(before), Some(now)) if before.outside != now.outside => "inverted the crop box",
+            _ => "changed the crop box",
+        }
+        .to_owned();
+    }
     if before.path != now.path {
         let (n, keys) = (now.path.keys.len(), before.path.keys.len());
         let what = match n.abs_diff(keys) {
@@ -242,6 +252,7 @@ mod tests {
         let path = CameraPath { keys: Vec::new(), closed: false, fps: 30.0, seconds: 5.0 };
         let view = ViewState {
             hidden: BTreeSet::new(),
+            crop: None,
             modes: [ViewMode::Rgb; 2],
             split: false,
             dim: false,

@@ -47,6 +47,8 @@ pub enum JobKind {
     Scale,
     /// Asks a list of phrases.
     Phrases,
+    /// Looks into a pixel.
+    Inspect,
 }
 
 impl JobKind {
@@ -65,7 +67,9 @@ impl JobKind {
             Self::Beside | Self::Edit | Self::Export | Self::Photo | Self::Picture | Self::Thumbnails => {
                 WorkerThread::Short
             }
-            Self::Models | Self::Explore | Self::Approach | Self::Scale | Self::Report => WorkerThread::Short,
+            Self::Models | Self::Explore | Self::Approach | Self::Scale | Self::Report | Self::Inspect => {
+                WorkerThread::Short
+            }
         }
     }
 }

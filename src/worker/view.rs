@@ -93,8 +93,8 @@ impl ViewLane {
                         let pixels = maps.identities.identity.len() as u64;
                         resource_log::record(
                             ResourceKind::Maps,
-                            "maps of the view",
-                            "something is asked of it",
+                            "feature maps of the view",
+                            "something is queried",
                             pixels * 12,
                         );
                     }

@@ -107,7 +107,7 @@ fn masks_are_written_in_three_forms_and_compared_with_what_was_written() {
 #[test]
 fn lists_and_masks_that_make_no_sense_are_refused() {
     assert_eq!(listed(" lamp \n\n #3\r\n").expect("two"), ["lamp", "#3"]);
-    assert!(listed("\n \n").is_err_and(|e| e.to_string().contains("one a line")));
+    assert!(listed("\n \n").is_err_and(|e| e.to_string().contains("one phrase per line")));
     assert!(listed(&"lamp\n".repeat(MOST + 1)).is_err_and(|e| e.to_string().contains("split")));
     assert!(matches!(run(&request(&["?"]), &mut Silent), Err(JobError::EmptyQuery)));
     let place = Path::new("a/b.png");

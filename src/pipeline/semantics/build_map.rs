@@ -178,8 +178,8 @@ fn unknown(views: &[ViewReport], photos: &[Photo], share: f64) -> Option<String>
     let many: Vec<&ViewReport> = views.iter().filter(|v| v.unknown > share).collect();
     let worst = many.iter().max_by(|a, b| a.unknown.total_cmp(&b.unknown))?;
     Some(format!(
-        "{} of {} photos show more than {:.0}% that no mask has reached (most: {}, {:.0}%); what is there goes to what \
-         it hangs together with",
+        "{} of {} photos have over {:.0} % unlabeled pixels (worst: {}, {:.0} %); Gaussians there inherit from \
+         connected ones",
         many.len(),
         photos.len(),
         100.0 * share,

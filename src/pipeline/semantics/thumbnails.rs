@@ -38,13 +38,13 @@ pub(crate) fn portraits(
 fn camera(cloud: &GaussianCloud, from: DVec3, up: DVec3) -> Option<Camera> {
     let bounds = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i)))?;
     let center = bounds.center();
-    let towards = (from - center).try_normalize().unwrap_or(up);
+    let toward = (from - center).try_normalize().unwrap_or(up);
     // Seen along the upward axis, any other is up.
-    let up = if towards.dot(up).abs() > 0.99 { up.any_orthonormal_vector() } else { up };
+    let up = if toward.dot(up).abs() > 0.99 { up.any_orthonormal_vector() } else { up };
     let radius = (0.5 * bounds.size().length()).max(1e-9);
     let distance = radius / (0.5 * FOV_RAD).sin();
     let side = SIDE_PX as u32;
-    Camera::look_at(center + towards * distance, center, up, FOV_RAD, side, side)
+    Camera::look_at(center + toward * distance, center, up, FOV_RAD, side, side)
 }
 
 #[cfg(test)]

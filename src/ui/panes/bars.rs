@@ -39,6 +39,7 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bo
             });
             ui.separator();
             item(ui, has_scene, None, Action::ExportPly, actions);
+            item(ui, has_scene, None, Action::ExportCrop, actions);
             item(ui, has_scene, None, Action::Screenshot, actions);
             ui.separator();
             item(ui, true, None, Action::Quit, actions);
@@ -65,6 +66,10 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bo
             item(ui, has_scene, None, beside, actions);
             item(ui, state.semantics.is_some(), Some(layout.dim), Action::ToggleDim, actions);
             item(ui, has_scene, Some(layout.times), Action::ToggleTimes, actions);
+            ui.separator();
+            for action in [Action::Measure, Action::Crop, Action::Inspect] {
+                item(ui, has_scene, None, action, actions);
+            }
             ui.separator();
             for action in [Action::FrameScene, Action::ResetView] {
                 item(ui, has_scene, None, action, actions);
@@ -181,7 +186,7 @@ pub(crate) fn status(
                 actions.push(Action::TogglePane(Pane::Log));
             }
             if let Some(p) = picture {
-                let text = RichText::new(format!("Rendered on the {}", p.drawn_by)).small();
+                let text = RichText::new(format!("Rendered on {}", p.drawn_by)).small();
                 match &p.instead_of_gpu {
                     Some(why) => ui.label(text.color(theme::warning())).on_hover_text(why),
                     None => ui.label(text.color(theme::weak())),

@@ -161,7 +161,7 @@ impl Brush {
                     Purpose::TrueMask => "the true mask of this view".to_owned(),
                 };
                 ui.label(format!("Paint {what}: drag to paint, click to select what has the same color."));
-                ui.weak("With Shift it erases. Right-drag and the wheel move the view; what was painted belongs to this one.");
+                ui.weak("Shift erases. Right-drag and wheel move the view; the paint belongs to this one.");
                 ui.horizontal(|ui| {
                     if self.purpose == Purpose::TrueMask {
                         ui.add(Slider::new(&mut self.radius_px, 2.0..=60.0).show_value(false).text("brush"));
@@ -172,7 +172,8 @@ impl Brush {
                     return;
                 }
                 ui.horizontal(|ui| {
-                    ui.add(TextEdit::singleline(&mut self.name).hint_text("Name").char_limit(80).desired_width(120.0));
+                    let name = TextEdit::singleline(&mut self.name).hint_text("Name").char_limit(80);
+                    ui.add(name.desired_width(120.0)).accessible_name("Name of what is painted");
                     ui.add(Slider::new(&mut self.radius_px, 2.0..=60.0).show_value(false).text("brush"));
                 });
                 ui.horizontal(|ui| {

@@ -99,7 +99,7 @@ fn draw(painter: &Painter, eye: &Camera, camera: &Camera, size: f64, place: impl
 }
 
 /// The part of a segment in front of the eye, projected; `None` if all of it is behind.
-fn clipped(eye: &Camera, a: DVec3, b: DVec3) -> Option<(DVec2, DVec2)> {
+pub(super) fn clipped(eye: &Camera, a: DVec3, b: DVec3) -> Option<(DVec2, DVec2)> {
     const NEAR: f64 = 1e-3;
     let (za, zb) = (eye.camera_from_world(a).z, eye.camera_from_world(b).z);
     let near = NEAR * za.abs().max(zb.abs());

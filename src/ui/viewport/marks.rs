@@ -117,7 +117,7 @@ impl Viewport {
             let at = match mark(inside as f32 / points.len() as f32, size) {
                 Mark::None => continue,
                 Mark::Arrow => arrow(&painter, shown, way(&eye, &points), color, &name),
-                Mark::Ghost => ghost(&painter, &hull(places), color, &format!("{name}, hidden from here")),
+                Mark::Ghost => ghost(&painter, &hull(places), color, &format!("{name} (occluded)")),
                 Mark::Ring => ring(&painter, middle(&places), color),
             };
             let button = ui.interact(at, ui.scope_id().with(("mark", id, self.queries.is_second())), Sense::click());

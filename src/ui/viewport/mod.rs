@@ -2,11 +2,13 @@
 
 mod act;
 pub(crate) mod brush;
+mod crop;
 mod display;
 pub mod eye;
 pub(crate) mod frame_times;
 mod frusta;
 mod input;
+mod inspector;
 mod legend;
 mod marks;
 mod outline;
@@ -29,6 +31,7 @@ use glam::{DVec2, DVec3};
 use self::brush::Brush;
 use self::display::Display;
 use self::eye::Eye;
+use self::inspector::Inspector;
 use self::marks::Marks;
 use self::overrides::RenderOverrides;
 use self::photo::PhotoView;
@@ -74,6 +77,10 @@ pub struct Viewport {
     marks: Marks,
     /// What is being measured.
     ruler: Option<Ruler>,
+    /// Whether the crop box is on screen, to be changed.
+    cropping: bool,
+    /// What is being inspected.
+    inspector: Option<Inspector>,
     /// What is being marked by hand.
     pub(crate) brush: Option<Brush>,
     /// Render settings in place of the scene's own.
@@ -102,6 +109,8 @@ impl Viewport {
             picking: Picking::default(),
             marks: Marks::default(),
             ruler: None,
+            cropping: false,
+            inspector: None,
             brush: None,
             overrides: RenderOverrides::default(),
             zoom_anchor: None,
@@ -144,7 +153,7 @@ impl Viewport {
             self.queries.clear();
             self.visibility = Visibility::default();
             self.picking = Picking::default();
-            self.ruler = None;
+            (self.ruler, self.cropping, self.inspector) = (None, false, None);
             self.brush = None;
             self.overrides = RenderOverrides::default();
             self.eye = Eye::home(&scene.home, None);
@@ -156,12 +165,15 @@ impl Viewport {
                 self.set_cloud(Some(Arc::clone(cloud)));
             }
         }
+        if let (Some(found), Some(inspector)) = (state.inspected.take(), &mut self.inspector) {
+            inspector.take(found);
+        }
         if let Some(why) = self.display.newly_instead_of_gpu() {
             state.toast(Tone::Warning, why);
         }
         if let Some(why) = self.queries.newly_failed() {
             let remedy = "Install the encoder (Models pane), or find the objects again with another";
-            state.problem(None, &format!("Queries find names only, the text encoder failed: {why}. {remedy}."));
+            state.problem(None, &format!("The text encoder failed, so queries match names only: {why}. {remedy}."));
         }
         if let Some(photo) = &mut self.photo {
             photo.take_loaded(state);
@@ -247,6 +259,7 @@ impl Viewport {
             self.queries.keep_up(ui.ctx(), semantics, &state.plan);
             self.queries.stand(self.pose());
         }
+        let takes_clicks = self.is_measuring() || self.is_inspecting();
         let (mut on_camera, mut works_in) = (false, self.queries.is_second());
         for (second, rect) in views.each() {
             self.queries.work_in(second);
@@ -262,14 +275,17 @@ impl Viewport {
             }
             on_camera |= layout.cameras
                 && self.photo.is_none()
+                && !takes_clicks
                 && self.show_frusta(ui, rect, &scene, &response, layout, actions);
         }
-        let picks = self.brush.is_none() && !self.is_measuring();
+        let picks = self.brush.is_none() && !takes_clicks;
         if let Some(semantics) = state.semantics.as_ref().filter(|_| picks) {
             let is_other = state.beside.is_some() && under != views.first;
             let maps = self.queries.maps().map(|m| &***m).filter(|_| !on_camera && !is_other);
             self.picking.update(&response, shown_in(under), (semantics, &state.labels), maps, actions);
         }
+        self.show_crop(ui, shown, state, actions);
+        self.show_inspector(ui, &response, shown, state, actions);
         for (second, rect) in views.each() {
             self.queries.work_in(second);
             let shown = shown_in(rect);

@@ -167,10 +167,10 @@ impl Viewport {
                 ui.label(RichText::new(text::elided(&p.name(), 28)).strong()).on_hover_text(&*p.name());
                 ui.weak(format!("{} of {total}", p.index() + 1));
                 if let Some(psnr) = self.picture().and_then(|p| p.psnr) {
-                    ui.label(RichText::new(format!("preview {}", format::decibel(psnr))).color(theme::accent())).on_hover_text(
-                        "PSNR of what is on screen against the photo, at the size on screen. The evaluation's number \
-                         is at the photo's size in training.",
-                    );
+                    ui.label(RichText::new(format!("preview {}", format::decibel(psnr))).color(theme::accent()))
+                        .on_hover_text(
+                            "PSNR of the view at screen resolution. Evaluation uses the training resolution.",
+                        );
                 }
                 if p.failed() {
                     ui.colored_label(theme::warning(), "photo not loaded");
@@ -197,7 +197,10 @@ impl Viewport {
         let mut parts = vec![
             format!("{} \u{d7} {} px", p.camera.width_px, p.camera.height_px),
             format::millis(p.secs),
-            format!("{} Gaussians", format::count(self.cloud.as_ref().map_or(0, |c| c.len()) as u64)),
+            match (self.visibility.count(), self.cloud.as_ref().map_or(0, |c| c.len()) as u64) {
+                (Some(drawn), all) => format!("{} of {} Gaussians", format::count(drawn as u64), format::count(all)),
+                (None, all) => format!("{} Gaussians", format::count(all)),
+            },
         ];
         if let Some((near, far)) = p.depth_range {
             parts.push(format!("depth {near:.2} to {far:.2}, blue to red"));

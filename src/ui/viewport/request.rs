@@ -6,6 +6,7 @@ use egui::{Rect, Ui};
 
 use super::Viewport;
 use super::photo::PhotoView;
+use super::visible::VisibleCloud;
 use crate::render::RenderSettings;
 use crate::scene::plan::When;
 use crate::scene::{Camera, GaussianCloud, PhotoPixels, SemanticMap};
@@ -163,18 +164,9 @@ impl Viewport {
     pub(super) fn request(&mut self, ui: &Ui, shown: Rect, state: &AppState, layout: &Layout, now: f64) {
         let Some(cloud) = self.cloud.clone() else { return };
         let plan = &state.plan;
-        let (cloud, semantics) = match &state.semantics {
-            Some(semantics) => {
-                let (cloud, semantics) = self.visibility.apply(&cloud, semantics);
-                (
-                    cloud,
-                    Some(semantics).filter(|_| {
-                        plan.maps.now(self.queries.wanted() || self.picking.wanted() || self.brush.is_some())
-                    }),
-                )
-            }
-            None => (cloud, None),
-        };
+        let VisibleCloud { cloud, semantics, .. } = self.visibility.apply(&cloud, state.semantics.as_ref());
+        let with_maps = plan.maps.now(self.queries.wanted() || self.picking.wanted() || self.brush.is_some());
+        let semantics = semantics.filter(|_| with_maps);
         let rests = now - self.moved_at - REST_SECS;
         if rests < 0.0 {
             ui.ctx().request_repaint_after_secs((-rests + 0.01) as f32);

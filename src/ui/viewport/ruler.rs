@@ -120,13 +120,13 @@ fn ruler_card(
         theme::overlay().show(ui, |ui| {
             ui.horizontal(|ui| {
                 let next = match ruler.points.len() {
-                    0 => "Click a surface: the first end".to_owned(),
-                    1 => "Click the second end".to_owned(),
+                    0 => "Click the first point on a surface".to_owned(),
+                    1 => "Click the second point".to_owned(),
                     _ => ruler.distance().map_or_else(
-                        || "The points are the same: click anew".to_owned(),
+                        || "The points coincide: click again".to_owned(),
                         |d| match meters_per_unit {
                             Some(_) => format!("{}, {}", format::length(d, meters_per_unit), format::length(d, None)),
-                            None => format!("{}; the scale is not known", format::length(d, None)),
+                            None => format!("{} (scale unknown)", format::length(d, None)),
                         },
                     ),
                 };
@@ -138,24 +138,24 @@ fn ruler_card(
             });
             if ruler.distance().is_some() {
                 ui.horizontal(|ui| {
-                    ui.label("It is really");
+                    ui.label("True length");
                     ui.add(TextEdit::singleline(&mut ruler.known).hint_text("0.30").desired_width(60.0)).widget_info(
                         || egui::WidgetInfo::labeled(egui::Role::TextInput, true, "True length in meters"),
                     );
-                    ui.label("m long:");
+                    ui.label("m");
                     let scale = ruler.scale();
-                    let set = ui.add_enabled(scale.is_some(), egui::Button::new("Set the scale"));
+                    let set = ui.add_enabled(scale.is_some(), egui::Button::new("Set scale"));
                     if let Some(scale) = scale.filter(|_| set.clicked()) {
                         actions.push(Action::SetScale(scale));
                     }
                 });
             }
             match ruler.normal(eye) {
-                Some(normal) if ui.button("Make these three points the floor").clicked() => {
+                Some(normal) if ui.button("Use these three points as the floor").clicked() => {
                     actions.push(Action::SetUp(normal));
                 }
                 None if ruler.points.len() == 2 => {
-                    ui.weak("A third click on the floor, and these three can be made the floor.");
+                    ui.weak("Click a third point to define the floor.");
                 }
                 _ => {}
             }
@@ -182,7 +182,7 @@ mod tests {
             assert_eq!(ruler.scale(), scale, "{typed}");
         }
         ruler.put(DVec3::new(3.0, 1.0, 0.0));
-        assert_eq!(ruler.normal(DVec3::new(0.0, 0.0, -5.0)), Some(DVec3::NEG_Z), "towards the eye");
+        assert_eq!(ruler.normal(DVec3::new(0.0, 0.0, -5.0)), Some(DVec3::NEG_Z), "toward the eye");
         assert_eq!(ruler.normal(DVec3::new(0.0, 0.0, 5.0)), Some(DVec3::Z));
         ruler.put(DVec3::ZERO);
         assert_eq!((ruler.points.len(), ruler.distance()), (1, None), "the fourth begins anew");

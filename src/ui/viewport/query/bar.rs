@@ -29,7 +29,7 @@ impl Queries {
             let width = ui.available_width() - 72.0;
             let edit = TextEdit::singleline(&mut self.side.typed)
                 .id(id)
-                .hint_text("Query an object, or \"the button of the red controller\"   ( / )")
+                .hint_text("Find an object or part, e.g. \u{201c}the button of the red controller\u{201d}  ( / )")
                 .char_limit(2_000)
                 // Tab completes, as long as there is something to complete to.
                 .lock_focus(!offered.is_empty())
@@ -57,7 +57,7 @@ impl Queries {
                 response.request_focus();
             }
             let details = ui.button("Details");
-            if details.on_hover_text("All of the answer, and how answers are found and drawn").clicked() {
+            if details.on_hover_text("Full answer, search and overlay settings").clicked() {
                 actions.push(Action::TogglePane(Pane::Query));
             }
         });

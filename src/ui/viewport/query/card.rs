@@ -42,7 +42,7 @@ impl Queries {
             (Answer::Ambiguous(_), Some(_)) if newest.chosen.is_none() => {
                 let mut chosen = None;
                 ui.horizontal_wrapped(|ui| {
-                    ui.colored_label(theme::warning(), format!("Ambiguous: {} fit equally.", shown.len()));
+                    ui.colored_label(theme::warning(), format!("Ambiguous: {} equal matches.", shown.len()));
                     for id in shown.iter().take(NAMED) {
                         if ui.small_button(state.labels.full_name(&semantics.identities, *id)).clicked() {
                             chosen = Some(*id);
@@ -59,7 +59,7 @@ impl Queries {
                     ui.add(egui::Label::new(RichText::new(name).strong()).truncate());
                     certainty(ui, &newest);
                     if let Some(bounds) = facts.bounds {
-                        ui.weak(size_text(bounds, state)).on_hover_text("Longest edge of its box");
+                        ui.weak(size_text(bounds, state)).on_hover_text("Longest edge of its bounding box");
                     }
                     if pixels == Some(0) {
                         ui.colored_label(theme::warning(), "not in this view");
@@ -115,7 +115,7 @@ fn certainty(ui: &mut Ui, newest: &super::Asked) {
         Basis::Embedding => "by embedding",
     };
     let numbers = newest.answered.answer.hits().first().map_or_else(String::new, |hit| {
-        format!("Score {:.2} of 1, {:.2} over the next, found {by}", hit.score, hit.margin.max(0.0))
+        format!("Score {:.2}, margin {:.2}, found {by}", hit.score, hit.margin.max(0.0))
     });
     ui.colored_label(color, <&str>::from(certainty)).on_hover_text(numbers);
 }
