@@ -158,7 +158,7 @@ fn video(args: &RenderArgs, path: &Path, quiet: bool) -> Result<(), CliError> {
     if let Some(program) = &args.ffmpeg {
         settings.encoder = VideoEncoder::Ffmpeg { program: program.clone(), args: Vec::new() };
     }
-    let cameras: Vec<Camera> = spline.pictures(fps, MOST_PICTURES).iter().map(|p| p.camera(width, height)).collect();
+    let cameras: Vec<Camera> = spline.poses(fps, MOST_PICTURES).iter().map(|p| p.camera(width, height)).collect();
     let marked = match &args.mark {
         Some(query) => {
             let map = scene.semantics()?;

@@ -75,7 +75,7 @@ pub(crate) fn camera_path(file: &Path, path: &CameraPath, aspect: f64) -> Result
         return io::camera_path::write(file, path);
     }
     let spline = CameraSpline::new(path, Speed::Constant);
-    let poses = spline.map_or_else(Vec::new, |spline| spline.pictures(path.fps, CameraPath::MAX_KEYS as f64));
+    let poses = spline.map_or_else(Vec::new, |spline| spline.poses(path.fps, CameraPath::MAX_KEYS as f64));
     let frames: Vec<PathKey> = poses.iter().map(Pose::key).collect();
     io::camera_path::nerfstudio::write(file, path, &frames, (1280, (1280.0 / aspect.max(0.01)) as u32))
 }

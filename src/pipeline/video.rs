@@ -29,7 +29,7 @@ pub enum VideoError {
     #[error(transparent)]
     Identities(#[from] RenderError),
     #[error(transparent)]
-    Animation(#[from] VideoFileError),
+    File(#[from] VideoFileError),
     /// The observer asked to stop; nothing is left of the video.
     #[error("canceled")]
     Interrupted(#[from] Interrupted),

@@ -293,7 +293,7 @@ pub enum Outcome {
         /// Whether it is to be compared with the one that is shown.
         second: bool,
     },
-    /// Portraits of objects and parts by number less one, as `semantics::portraits` draws them.
+    /// Thumbnails of objects and parts by number less one.
     Thumbnails(Arc<SemanticMap>, ThumbnailSet),
     /// The models were listed.
     Models(Arc<ModelList>),

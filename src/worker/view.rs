@@ -53,13 +53,13 @@ impl ViewLane {
         let (box_, out, mapped) = (Arc::clone(&mailbox), Arc::clone(&pictures), Arc::clone(&maps));
         let (mut mapper, mut mapped_before) = (Renderer::new(), false);
         let work = move || {
-            let mut painter: Option<ViewRenderer> = None;
+            let mut renderer: Option<ViewRenderer> = None;
             let mut patience = None;
             loop {
                 let request = match next(&box_, patience.take()) {
                     Waited::Request(request) => request,
                     Waited::InVain => {
-                        painter.iter_mut().for_each(|p| p.renderer.rest());
+                        renderer.iter_mut().for_each(|p| p.renderer.rest());
                         mapper = Renderer::new();
                         continue;
                     }
@@ -67,11 +67,11 @@ impl ViewLane {
                 };
                 patience = request.skip.buffers.then_some(REST);
                 // Looking for a GPU takes a moment; here no one waits for it.
-                let painter = match painter.take().filter(|p| p.without_gpu == request.skip.gpu) {
-                    Some(known) => painter.insert(known),
-                    None => painter.insert(ViewRenderer::without_gpu(request.skip.gpu)),
+                let renderer = match renderer.take().filter(|p| p.without_gpu == request.skip.gpu) {
+                    Some(known) => renderer.insert(known),
+                    None => renderer.insert(ViewRenderer::without_gpu(request.skip.gpu)),
                 };
-                let drawn = painter.draw(&request);
+                let drawn = renderer.draw(&request);
                 let (exact, start) = (request.budget == QualityBudget::Full, Instant::now());
                 let camera = match &drawn {
                     // While the eye moves both come together, or masks would trail behind.
