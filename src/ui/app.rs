@@ -193,7 +193,12 @@ impl App {
             || self.state.unposed.is_some()
             || self.question.is_some()
             || self.dialogs.is_own_open();
-        if !self.palette.is_open() && !has_dialog && !self.sheet {
+        // Keys are the open menu's; Escape closes it, and nothing else.
+        let has_menu = egui::Popup::is_any_open(ctx);
+        if has_menu && ctx.input_mut(|i| i.consume_key(egui::Modifiers::NONE, egui::Key::Escape)) {
+            egui::Popup::close_all(ctx);
+        }
+        if !self.palette.is_open() && !has_dialog && !self.sheet && !has_menu {
             self.actions.extend(keys::pressed(ctx));
         }
         let dropped: Vec<PathBuf> =
@@ -297,7 +302,7 @@ impl App {
         {
             self.state.unposed = None;
         }
-        if self.state.error.as_ref().is_some_and(|e| dialogs::show_error(ctx, e)) {
+        if self.state.error.as_ref().is_some_and(|e| dialogs::show_error(ctx, e, self.state.scene.is_some())) {
             self.state.error = None;
         }
         if let Some((action, path)) = self.dialogs.show(ctx) {
@@ -327,7 +332,7 @@ impl DockContents for App {
         let Place::Pane(pane) = place else { return self.show_view(ui) };
         Frame::new().fill(theme::panel()).inner_margin(Margin::same(12)).show(ui, |ui| {
             ui.set_min_size(ui.available_size());
-            if matches!(pane, Pane::Chat | Pane::Training | Pane::Objects | Pane::Query | Pane::Plan | Pane::Models) {
+            if matches!(pane, Pane::Training | Pane::Objects | Pane::Query | Pane::Plan | Pane::Models) {
                 ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| self.show_pane(ui, pane));
             } else {
                 self.show_pane(ui, pane);

@@ -31,6 +31,8 @@ const MAX_LINES: usize = 400;
 const CONTINUATIONS: usize = 4;
 /// Side of a candidate's thumbnail, points.
 const THUMBNAIL_PX: f32 = 34.0;
+/// Room for the box, its continuations and the buttons below the talk, points.
+const BELOW_PT: f32 = 130.0;
 
 /// What the agent is to work on, as the window has it now.
 pub(crate) struct Snapshot {
@@ -178,7 +180,8 @@ impl Chat {
                 }
             });
         } else {
-            ScrollArea::vertical().id_salt("talk").max_height(280.0).stick_to_bottom(true).show(ui, |ui| {
+            let height = (ui.available_height() - BELOW_PT).max(60.0);
+            ScrollArea::vertical().id_salt("talk").max_height(height).stick_to_bottom(true).show(ui, |ui| {
                 for line in &self.lines {
                     say = show_line(ui, line, object_thumbnails).or(say.take());
                 }

@@ -17,7 +17,7 @@ pub(crate) struct Question {
 }
 
 /// Shows an error until it is read. Returns whether it was.
-pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox) -> bool {
+pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox, has_scene: bool) -> bool {
     let response = Modal::new(Id::unique("error")).frame(theme::dialog()).show(ctx, |ui| {
         ui.set_width(480.0);
         ui.horizontal(|ui| {
@@ -31,7 +31,9 @@ pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox) -> bool {
             ui.label(RichText::new(&error.failure.remedy).color(theme::text()).strong());
         }
         ui.add_space(6.0);
-        ui.weak("The open scene is unchanged.");
+        if has_scene {
+            ui.weak("The open scene is unchanged.");
+        }
         ui.add_space(12.0);
         ui.horizontal(|ui| {
             let close = ui.add(theme::primary_button("Close")).clicked();

@@ -54,52 +54,56 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bo
         });
         ui.menu_button("View", |ui| {
             ui.set_min_width(280.0);
-            for &mode in ViewMode::VARIANTS {
-                item(ui, has_scene, Some(*layout.mode_of(second) == mode), Action::Show(mode), actions);
-            }
+            ui.menu_button("    Show", |ui| {
+                for &mode in ViewMode::VARIANTS {
+                    item(ui, has_scene, Some(*layout.mode_of(second) == mode), Action::Show(mode), actions);
+                }
+            });
             ui.separator();
             item(ui, has_photos, Some(layout.cameras), Action::ToggleCameras, actions);
             item(ui, has_photos, Some(layout.compare), Action::ToggleCompare, actions);
             item(ui, has_scene, Some(layout.split_view), Action::ToggleSplit, actions);
-            item(ui, layout.split_view, None, Action::OtherView, actions);
+            item(ui, layout.split_view, Some(false), Action::OtherView, actions);
             let beside = state.beside.as_ref().map_or(Action::ChooseBeside, |_| Action::OpenBeside(None));
-            item(ui, has_scene, None, beside, actions);
+            item(ui, has_scene, Some(false), beside, actions);
             item(ui, state.semantics.is_some(), Some(layout.dim), Action::ToggleDim, actions);
             item(ui, has_scene, Some(layout.times), Action::ToggleTimes, actions);
             ui.separator();
-            for action in [Action::Measure, Action::Crop, Action::Inspect] {
-                item(ui, has_scene, None, action, actions);
-            }
-            ui.separator();
             for action in [Action::FrameScene, Action::ResetView] {
-                item(ui, has_scene, None, action, actions);
+                item(ui, has_scene, Some(false), action, actions);
             }
-            ui.menu_button("Up direction", |ui| {
+            ui.menu_button("    Up direction", |ui| {
                 for &axis in Axis::VARIANTS {
-                    item(ui, has_scene, None, Action::TurnUp(axis), actions);
+                    item(ui, has_scene, Some(false), Action::TurnUp(axis), actions);
                 }
             });
             for action in [Action::PreviousPhoto, Action::NextPhoto] {
-                item(ui, has_photos, None, action, actions);
+                item(ui, has_photos, Some(false), action, actions);
             }
             ui.separator();
-            item(ui, has_scene, None, Action::FillWindow, actions);
-            ui.menu_button("Panes", |ui| {
+            item(ui, has_scene, Some(false), Action::FillWindow, actions);
+            ui.menu_button("    Panes", |ui| {
                 for &pane in Pane::VARIANTS {
                     item(ui, true, Some(layout.shows(pane)), Action::TogglePane(pane), actions);
                 }
                 ui.separator();
-                item(ui, true, None, Action::ResetPanes, actions);
+                item(ui, true, Some(false), Action::ResetPanes, actions);
             });
-            ui.menu_button("Theme and text size", |ui| {
+            ui.menu_button("    Theme and text size", |ui| {
                 for theme in THEMES {
                     item(ui, true, Some(layout.theme == theme), Action::UseTheme(theme), actions);
                 }
                 ui.separator();
                 for action in [Action::LargerText, Action::SmallerText, Action::NormalText] {
-                    item(ui, true, None, action, actions);
+                    item(ui, true, Some(false), action, actions);
                 }
             });
+        });
+        ui.menu_button("Tools", |ui| {
+            ui.set_min_width(220.0);
+            for action in [Action::Measure, Action::Crop, Action::Inspect] {
+                item(ui, has_scene, None, action, actions);
+            }
         });
         ui.menu_button("Train", |ui| {
             ui.set_min_width(260.0);
@@ -141,7 +145,7 @@ pub(crate) fn history_buttons(ui: &mut Ui, changes: &ChangeHistory, actions: &mu
 /// A menu entry; `on` marks a switch.
 fn item(ui: &mut Ui, enabled: bool, on: Option<bool>, action: Action, actions: &mut Vec<Action>) {
     let text = match on {
-        Some(true) => format!("•  {}", action.text()),
+        Some(true) => format!("\u{2714} {}", action.text()),
         Some(false) => format!("    {}", action.text()),
         None => action.text(),
     };

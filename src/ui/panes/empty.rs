@@ -118,7 +118,7 @@ impl FirstPage {
                 button(ui, Button::new("Train it yourself"), Action::TrainDemo);
                 ui.label(
                     RichText::new(format!(
-                        "Trained, objects found, query \u{201c}{}\u{201d} answered.",
+                        "Ready-made: trained, its objects found, \u{201c}{}\u{201d} asked. Training it takes some ten minutes.",
                         demo::QUESTION
                     ))
                     .small()

@@ -21,8 +21,8 @@ use crate::ui::actions::Action;
 /// Side of a thumbnail, points.
 const THUMBNAIL_PX: f32 = 30.0;
 
-/// Width of the column of counts, points: "1,234,567".
-const COUNT_PT: f32 = 58.0;
+/// Width of the column of counts, points: "123,456".
+const COUNT_PT: f32 = 48.0;
 
 /// The list, and the name in it that is being typed.
 #[derive(Default)]
@@ -134,6 +134,7 @@ impl Tree<'_> {
 
     /// Tick, thumbnail, color and name from the left; Gaussians and menu from the right.
     fn row(&mut self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
+        ui.spacing_mut().item_spacing.x = 5.0;
         let row = Rect::from_min_size(ui.cursor().min, vec2(ui.available_width(), THUMBNAIL_PX));
         let is_hovered = ui.rect_contains_pointer(row);
         let drawn = self.visibility.draws(self.identities, id);
@@ -158,6 +159,7 @@ impl Tree<'_> {
             });
             ui.scope(|ui| {
                 // Always there for the keyboard, in sight where the mouse is.
+                ui.spacing_mut().button_padding.x = 4.0;
                 ui.set_opacity(if is_hovered || self.selected == Some(id) { 1.0 } else { 0.25 });
                 self.menu(ui, id, actions);
             });

@@ -28,7 +28,7 @@ pub(crate) fn show(
             ui.weak("against");
         });
     });
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         let id = ui.label("Smoothing").id;
         ui.add(Slider::new(&mut settings.smoothing, 0.0..=20.0).suffix(" %").fixed_decimals(0)).labelled_by(id);
         ui.checkbox(&mut settings.log, "Log-scale loss");

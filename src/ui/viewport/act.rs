@@ -9,7 +9,7 @@ use super::photo::PhotoView;
 use super::ruler::Ruler;
 use super::{AppState, OpenedScene, Viewport};
 use crate::navigate::Pose;
-use crate::scene::CropBox;
+use crate::scene::{Bounds, CropBox};
 use crate::ui::actions::Action;
 use crate::worker::Worker;
 
@@ -72,7 +72,10 @@ impl Viewport {
             _ => {
                 self.cropping = true;
                 let crop = self.visibility.crop();
-                let all = CropBox { bounds: scene.home.bounds, outside: false };
+                // At first around what is worth seeing, with room: the box of the scene leaves out one in twenty.
+                let (center, half) = (scene.home.bounds.center(), 0.8 * scene.home.bounds.size());
+                let bounds = Bounds { min: center - half, max: center + half };
+                let all = CropBox { bounds, outside: false };
                 self.visibility.set_crop(Some(crop.unwrap_or(all)));
             }
         }

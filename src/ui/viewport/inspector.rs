@@ -92,7 +92,7 @@ impl Viewport {
         let drawn = area.constrain_to(shown).show(ui.ctx(), |ui| {
             theme::overlay().show(ui, |ui| {
                 ui.set_width((shown.width() - 44.0).clamp(120.0, 330.0));
-                card(ui, inspector, (shown.height() - 190.0).clamp(90.0, 420.0), state, actions);
+                card(ui, inspector, (shown.height() - 300.0).clamp(90.0, 420.0), state, actions);
             });
         });
         // It has grown: the next frame puts it where it fits.

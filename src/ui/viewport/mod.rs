@@ -309,7 +309,7 @@ impl Viewport {
             }
             if let (Some(semantics), Some(cloud)) = (&state.semantics, &self.cloud)
                 && !is_other
-                && self.queries.show(ui, rect, state, semantics, cloud, actions)
+                && self.queries.show(ui, rect, state, (semantics, cloud, &self.visibility), actions)
             {
                 works_in = second;
             }

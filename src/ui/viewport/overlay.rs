@@ -69,10 +69,19 @@ impl Viewport {
         let facts = if rect.height() > LOW { self.facts(layout, state, rate) } else { rate };
         // That it is drawn otherwise than the scene says must be seen in the smallest view.
         let words = self.overrides.words();
-        if facts.is_some() || words.is_some() {
+        let is_cropped = self.visibility.crop().is_some();
+        if facts.is_some() || words.is_some() || is_cropped {
             card(ui, rect, "facts", (Align2::LEFT_BOTTOM, 0.0), |ui| {
                 if let Some(facts) = &facts {
                     ui.label(RichText::new(facts).small().color(theme::weak()));
+                }
+                if is_cropped {
+                    ui.label(RichText::new("cropped").small().color(theme::warning()));
+                    let all = Action::SetCrop(None);
+                    let show = ui.small_button("Show all").on_hover_text("Remove the crop box.");
+                    if show.accessible_name(all.text()).clicked() {
+                        actions.push(all);
+                    }
                 }
                 if let Some(words) = words {
                     ui.label(RichText::new(format!("rendered with {words}")).small().color(theme::warning()));

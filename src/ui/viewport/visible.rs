@@ -94,6 +94,19 @@ impl Visibility {
         self.set_hidden(self.hidden.iter().filter_map(now).collect::<Vec<_>>());
     }
 
+    /// Why nothing of an identity is drawn, for the user; `None` if something is.
+    pub(crate) fn why_not_drawn(&self, all: &Identities, id: IdentityId) -> Option<&'static str> {
+        if self.draws(all, id) == Some(false) {
+            return Some("hidden");
+        }
+        self.crop?;
+        let (_, visible) = self.left.as_ref()?;
+        let inside = all.descendants(id);
+        let is_of = |of: &IdentityId| inside.get(*of as usize) == Some(&true);
+        let is_left = visible.semantics.as_ref()?.identity_of.iter().any(is_of);
+        (!is_left).then_some("outside the crop box")
+    }
+
     /// How many Gaussians are drawn, if not all.
     pub(crate) fn count(&self) -> Option<usize> {
         self.left.as_ref().map(|(_, visible)| visible.cloud.len())

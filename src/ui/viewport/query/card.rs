@@ -2,6 +2,7 @@
 
 use egui::{Align, Layout, RichText, Ui};
 
+use super::super::visible::Visibility;
 use super::{OverlaySettings, Queries};
 use crate::math::format;
 use crate::navigate::target::Side;
@@ -11,7 +12,7 @@ use crate::pipeline::semantics::matching::{self, MatchMode};
 use crate::pipeline::semantics::names;
 use crate::pipeline::semantics::reading::mended_text;
 use crate::scene::{Bounds, GaussianCloud, IdentityId, SemanticMap, text};
-use crate::ui::actions::Action;
+use crate::ui::actions::{Action, Pane};
 use crate::ui::state::AppState;
 use crate::ui::theme;
 use crate::worker::Versioned;
@@ -24,8 +25,7 @@ impl Queries {
         &mut self,
         ui: &mut Ui,
         state: &AppState,
-        semantics: &Versioned<SemanticMap>,
-        cloud: &GaussianCloud,
+        (semantics, cloud, visibility): (&Versioned<SemanticMap>, &GaussianCloud, &Visibility),
         actions: &mut Vec<Action>,
     ) {
         let Some(newest) = self.newest().cloned() else { return };
@@ -41,14 +41,17 @@ impl Queries {
             (Answer::NotFound(_), None) => self.show_nothing(ui, &newest, semantics),
             (Answer::Ambiguous(_), Some(_)) if newest.chosen.is_none() => {
                 let mut chosen = None;
-                ui.horizontal_wrapped(|ui| {
-                    ui.colored_label(theme::warning(), format!("Ambiguous: {} equal matches.", shown.len()));
-                    for id in shown.iter().take(NAMED) {
-                        if ui.small_button(state.labels.full_name(&semantics.identities, *id)).clicked() {
-                            chosen = Some(*id);
-                        }
+                ui.colored_label(theme::warning(), format!("Ambiguous: {} equal matches.", shown.len()));
+                for id in shown.iter().take(NAMED) {
+                    if ui.small_button(state.labels.full_name(&semantics.identities, *id)).clicked() {
+                        chosen = Some(*id);
                     }
-                });
+                }
+                if let Some(more) = shown.len().checked_sub(NAMED).filter(|more| *more > 0)
+                    && ui.link(format!("{more} more\u{2026}")).clicked()
+                {
+                    actions.push(Action::ShowPane(Pane::Query));
+                }
                 self.choose(chosen);
             }
             (_, Some(&target)) => {
@@ -61,9 +64,6 @@ impl Queries {
                     if let Some(bounds) = facts.bounds {
                         ui.weak(size_text(bounds, state)).on_hover_text("Longest edge of its bounding box");
                     }
-                    if pixels == Some(0) {
-                        ui.colored_label(theme::warning(), "not in this view");
-                    }
                     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                         let go = Action::GoToTarget(target, Side::Best);
                         if ui.small_button("Go there").on_hover_text(go.tooltip()).clicked() {
@@ -71,6 +71,17 @@ impl Queries {
                         }
                     });
                 });
+                let hidden = visibility.why_not_drawn(&semantics.identities, target);
+                if let Some(why) = hidden.or((pixels == Some(0)).then_some("not in this view")) {
+                    ui.horizontal(|ui| {
+                        ui.colored_label(theme::warning(), format!("It is {why}."));
+                        if visibility.draws(&semantics.identities, target) == Some(false)
+                            && ui.small_button("Show it").clicked()
+                        {
+                            actions.push(Action::Hide(target));
+                        }
+                    });
+                }
             }
             _ => {}
         }

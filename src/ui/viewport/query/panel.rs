@@ -3,6 +3,7 @@
 use egui::{Align2, Area, Context, Id, LayerId, Order, Rect, ScrollArea, Ui};
 
 use super::super::super::theme;
+use super::super::visible::Visibility;
 use super::Queries;
 use crate::scene::{GaussianCloud, SemanticMap};
 use crate::ui::actions::Action;
@@ -26,8 +27,7 @@ impl Queries {
         ui: &Ui,
         rect: Rect,
         state: &AppState,
-        semantics: &Versioned<SemanticMap>,
-        cloud: &GaussianCloud,
+        (semantics, cloud, visibility): (&Versioned<SemanticMap>, &GaussianCloud, &Visibility),
         actions: &mut Vec<Action>,
     ) -> bool {
         // In the corner: what is looked for is mostly in the middle.
@@ -53,7 +53,7 @@ impl Queries {
                 let scrolled = ScrollArea::vertical().max_height(height).min_scrolled_height(height);
                 let shown = scrolled.show(ui, |ui| {
                     let focused = self.show_bar(ui, semantics, actions);
-                    self.show_answer(ui, state, semantics, cloud, actions);
+                    self.show_answer(ui, state, (semantics, cloud, visibility), actions);
                     self.show_kept(ui);
                     focused
                 });
